@@ -1,0 +1,69 @@
+//! The `hapterra` command line: one file a subcommand, each with its `Args`
+//! and a `run`.
+
+pub mod failure;
+pub mod info;
+pub mod synth;
+
+use std::process::ExitCode;
+
+use clap::{ArgAction, Parser, Subcommand};
+use tracing_subscriber::EnvFilter;
+
+pub use failure::Failure;
+
+/// Touch terrain of any size through a Phantom.
+#[derive(Debug, Parser)]
+#[command(name = "hapterra", version, propagate_version = true)]
+pub struct Cli {
+    /// Say more: -v for progress, -vv for details, -vvv for everything
+    #[arg(short, long, action = ArgAction::Count, global = true)]
+    pub verbose: u8,
+
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Show what a terrain file holds and how it would be streamed
+    Info(info::Args),
+    /// Make a terrain file by formula
+    Synth(synth::Args),
+}
+
+/// Parses the command line, runs it and reports: 0 on success, 1 on failure,
+/// 2 on wrong usage.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    log_to_stderr(cli.verbose);
+    let outcome = match cli.command {
+        Command::Info(args) => info::run(&args),
+        Command::Synth(args) => synth::run(&args),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            failure.report();
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Diagnostics go to standard error; `RUST_LOG` overrides the `-v` count.
+fn log_to_stderr(verbose: u8) {
+    let level = match verbose {
+        0 => "warn",
+        1 => "info",
+        2 => "debug",
+        _ => "trace",
+    };
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .without_time()
+        .init();
+}

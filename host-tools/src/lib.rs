@@ -1,0 +1,12 @@
+//! The host side of hapterra: from a terrain file to tiles on the link, and
+//! the `hapterra` command.
+//!
+//! Read top to bottom, the modules follow the data:
+//!
+//! - [`raster`]: files of every supported format become one [`raster::Raster`];
+//! - [`synth`]: terrains made by formula, for trying and testing;
+//! - [`cli`]: the `hapterra` command, one file a subcommand.
+
+#![forbid(unsafe_code)]
+
+pub mod cli;

@@ -1,0 +1,50 @@
+//! What the tests that cross crates share: where the shared data is, and the
+//! real `hapterra` binary.
+
+#![forbid(unsafe_code)]
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+/// The repository's root folder.
+pub fn repository() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("the tests package is inside the repository")
+}
+
+/// A file or folder of the shared data beside the repository (`../shared`), or
+/// `None` with a visible line when it is absent: the caller then returns.
+pub fn shared(path: &str) -> Option<PathBuf> {
+    let full = repository().parent()?.join("shared").join(path);
+    if full.exists() {
+        return Some(full);
+    }
+    eprintln!("skipped: no shared data at {}", full.display());
+    None
+}
+
+/// Path of the real `hapterra` binary, built first when need be.
+///
+/// # Panics
+/// When the binary does not build.
+pub fn hapterra_binary() -> &'static Path {
+    static BINARY: OnceLock<PathBuf> = OnceLock::new();
+    BINARY.get_or_init(|| {
+        let build = escargot::CargoBuild::new()
+            // From the root, so that features are those of the whole workspace
+            // and nothing is built twice.
+            .manifest_path(repository().join("Cargo.toml"))
+            .bin("hapterra");
+        let build = if cfg!(debug_assertions) {
+            build
+        } else {
+            build.release()
+        };
+        build
+            .run()
+            .expect("the hapterra binary builds")
+            .path()
+            .to_path_buf()
+    })
+}
