@@ -1,0 +1,2 @@
+//! Board.
+fn main() {}

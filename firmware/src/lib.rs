@@ -1,0 +1,3 @@
+//! The haptic application, generic over its board.
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
