@@ -5,8 +5,10 @@
 //!
 //! - [`raster`]: files of every supported format become one [`raster::Raster`];
 //! - [`synth`]: terrains made by formula, for trying and testing;
+//! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
 //! - [`cli`]: the `hapterra` command, one file a subcommand.
 
 #![forbid(unsafe_code)]
 
 pub mod cli;
+pub mod phantom;

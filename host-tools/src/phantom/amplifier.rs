@@ -1,0 +1,106 @@
+//! From a current command to joint torque: the amplifier's limit, the current
+//! loop's lag, the motor and the cable ratio.
+
+use libm::exp;
+
+use super::AxisDrive;
+
+/// One joint's amplifier and motor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Amplifier {
+    axis: AxisDrive,
+    command_a: f64,
+    current_a: f64,
+}
+
+impl Amplifier {
+    /// An amplifier without current.
+    #[must_use]
+    pub fn new(axis: AxisDrive) -> Self {
+        Self {
+            axis,
+            command_a: 0.0,
+            current_a: 0.0,
+        }
+    }
+
+    /// Sets the command in amperes; it is cut at the peak current. What is not
+    /// a number is no command: zero.
+    pub fn command(&mut self, amperes: f64) {
+        let peak = self.axis.motor.peak_a;
+        self.command_a = if amperes.is_nan() {
+            0.0
+        } else {
+            amperes.clamp(-peak, peak)
+        };
+    }
+
+    /// Lets the current follow the command for `h_s` seconds.
+    pub fn advance(&mut self, h_s: f64) {
+        let keep = exp(-h_s / self.axis.motor.current_lag_s);
+        self.current_a = self.command_a + (self.current_a - self.command_a) * keep;
+    }
+
+    /// The current that flows, A.
+    #[must_use]
+    pub fn current_a(&self) -> f64 {
+        self.current_a
+    }
+
+    /// Torque on the joint, N·m.
+    #[must_use]
+    pub fn torque_nm(&self) -> f64 {
+        self.current_a * self.axis.motor.kt_nm_per_a * self.axis.ratio * self.axis.sign
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::phantom::{PhantomModel, kinematics};
+    use glam::{DMat3, DVec3};
+
+    fn settled(axis: AxisDrive, amperes: f64) -> Amplifier {
+        let mut amplifier = Amplifier::new(axis);
+        amplifier.command(amperes);
+        amplifier.advance(1.0);
+        amplifier
+    }
+
+    #[test]
+    fn continuous_current_gives_the_published_tip_forces() {
+        let model = PhantomModel::premium_1_5();
+        let jacobian = DMat3::from_cols_array_2d(&kinematics::jacobian(&model, [0.0; 3]));
+        for (amperes, expected_n) in [(1.24, [1.84, 1.55, 1.92]), (5.5, [8.2, 6.9, 8.5])] {
+            for joint in 0..3 {
+                let mut torque = DVec3::ZERO;
+                torque[joint] = settled(model.drive[joint], amperes).torque_nm();
+                // τ = Jᵀ·F, and the array's rows are glam's columns: J as read is Jᵀ.
+                let force = (jacobian.inverse() * torque).length();
+                assert!(
+                    (force - expected_n[joint]).abs() < 0.05,
+                    "{joint}: {force} N"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn cuts_at_the_peak_and_reads_nonsense_as_zero() {
+        let axis = PhantomModel::premium_1_5().drive[0];
+        assert_eq!(settled(axis, 99.0).current_a(), 5.5);
+        assert_eq!(settled(axis, f64::NEG_INFINITY).current_a(), -5.5);
+        assert_eq!(settled(axis, f64::NAN).current_a(), 0.0);
+    }
+
+    #[test]
+    fn follows_a_step_with_the_current_loops_lag() {
+        let axis = PhantomModel::premium_1_5().drive[0];
+        let mut amplifier = Amplifier::new(axis);
+        amplifier.command(1.0);
+        for _ in 0..100 {
+            amplifier.advance(axis.motor.current_lag_s / 100.0);
+        }
+        assert!((amplifier.current_a() - (1.0 - (-1.0f64).exp())).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,47 @@
+//! The virtual Phantom and the hand that holds it.
+//!
+//! What a real arm would do between two ticks of the haptic loop, in f64 and
+//! independent of the code under test: motor currents go in, encoder counts
+//! come out. Read it in the direction the data flows:
+//!
+//! ```text
+//! currents ─ amplifier ─ motor torque ─┐
+//!                                      ├─ dynamics + friction ─ joints ─ encoder ─ counts
+//! script ─ target ─ hand ─ tip force ──┘            (plant)
+//! ```
+//!
+//! Nothing here reads a clock or draws a random number, and the trigonometry
+//! is `libm`'s, so the same inputs give the same bits on every machine.
+//!
+//! # Frames
+//! - *Device frame*, metres: origin where the joint axes meet, z up, x away
+//!   from the base towards the user, right-handed: for the user, who faces the
+//!   device, y points to the right.
+//! - *Terrain frame*, millimetres as the hand feels them: x east, y north,
+//!   z up. [`Placement`] lays one onto the other.
+
+mod amplifier;
+mod dynamics;
+mod encoder;
+mod friction;
+mod hand;
+pub mod kinematics;
+mod model;
+mod motor;
+mod placement;
+mod plant;
+mod rig;
+mod script;
+mod touch;
+
+pub use amplifier::Amplifier;
+pub use dynamics::Dynamics;
+pub use encoder::Encoder;
+pub use hand::{Hand, HandModel};
+pub use model::{AxisDrive, JointLimits, Lumped, Motor, PhantomModel, STANDARD_GRAVITY};
+pub use motor::MotorTemperature;
+pub use placement::Placement;
+pub use plant::{MAX_SUBSTEP_S, Plant};
+pub use rig::{OutOfReach, Rig};
+pub use script::{Script, Target};
+pub use touch::{Surface, Touch, tour};

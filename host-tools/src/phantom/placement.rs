@@ -1,0 +1,107 @@
+//! Where the terrain lies in front of the arm.
+//!
+//! The user faces the device, so east is the device's +y, north is −x and up
+//! is +z.
+
+use super::{PhantomModel, kinematics};
+
+/// Lays the terrain frame (mm) onto the device frame (m).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// The terrain point at the tip of the arm in its home pose `q = 0`, mm
+    /// east, north, up.
+    pub home_mm: [f64; 3],
+}
+
+impl Placement {
+    /// Terrain millimetres to device metres.
+    #[must_use]
+    pub fn to_device_m(&self, model: &PhantomModel, terrain_mm: [f64; 3]) -> [f64; 3] {
+        let [east, north, up] = std::array::from_fn(|i| (terrain_mm[i] - self.home_mm[i]) * 1e-3);
+        let [x, y, z] = kinematics::tip(model, [0.0; 3]);
+        [x - north, y + east, z + up]
+    }
+
+    /// Device metres to terrain millimetres.
+    #[must_use]
+    pub fn to_terrain_mm(&self, model: &PhantomModel, device_m: [f64; 3]) -> [f64; 3] {
+        let home_m = kinematics::tip(model, [0.0; 3]);
+        let [x, y, z] = std::array::from_fn(|i| (device_m[i] - home_m[i]) * 1e3);
+        let [east, north, up] = self.home_mm;
+        [east + y, north - x, up + z]
+    }
+
+    /// Turns a direction (force, velocity) from the device's frame into the
+    /// terrain's, unit unchanged.
+    #[must_use]
+    pub fn turn_to_terrain(device: [f64; 3]) -> [f64; 3] {
+        let [x, y, z] = device;
+        [y, -x, z]
+    }
+
+    /// Turns a direction from the terrain's frame into the device's, unit
+    /// unchanged.
+    #[must_use]
+    pub fn turn_to_device(terrain: [f64; 3]) -> [f64; 3] {
+        let [east, north, up] = terrain;
+        [-north, east, up]
+    }
+
+    /// Whether the arm gets to a terrain point within its stops.
+    #[must_use]
+    pub fn reaches(&self, model: &PhantomModel, terrain_mm: [f64; 3]) -> bool {
+        kinematics::inverse(model, self.to_device_m(model, terrain_mm))
+            .is_some_and(|q| kinematics::within_stops(model, q))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn home_is_home_and_there_and_back_is_the_same() {
+        let model = PhantomModel::premium_1_5();
+        let place = Placement {
+            home_mm: [600.0, 400.0, 35.0],
+        };
+        let tip = kinematics::tip(&model, [0.0; 3]);
+        assert_eq!(place.to_terrain_mm(&model, tip), place.home_mm);
+        let there = place.to_device_m(&model, [612.0, 380.0, 40.0]);
+        for (got, expected) in there
+            .iter()
+            .zip([tip[0] + 0.02, tip[1] + 0.012, tip[2] + 0.005])
+        {
+            assert!((got - expected).abs() < 1e-12);
+        }
+        let back = place.to_terrain_mm(&model, there);
+        for (got, expected) in back.iter().zip([612.0, 380.0, 40.0]) {
+            assert!((got - expected).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn directions_turn_like_displacements() {
+        assert_eq!(
+            Placement::turn_to_terrain([1.0, 2.0, 3.0]),
+            [2.0, -1.0, 3.0]
+        );
+        let back = Placement::turn_to_device(Placement::turn_to_terrain([1.0, 2.0, 3.0]));
+        assert_eq!(back, [1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn reaches_a_hand_span_and_not_a_metre() {
+        let model = PhantomModel::premium_1_5();
+        let place = Placement { home_mm: [0.0; 3] };
+        for corner in [
+            [-90., -50., -40.],
+            [90., -50., 40.],
+            [-90., 50., 40.],
+            [90., 50., -40.],
+        ] {
+            assert!(place.reaches(&model, corner), "{corner:?}");
+        }
+        assert!(!place.reaches(&model, [1000.0, 0.0, 0.0]));
+    }
+}

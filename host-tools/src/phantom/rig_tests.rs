@@ -1,0 +1,115 @@
+//! A closed loop: encoders to a plain spring wall to currents, 1 kHz.
+
+use super::*;
+use crate::phantom::{Encoder, Touch};
+use glam::{DMat3, DVec3};
+
+const WALL_N_PER_MM: f64 = 0.5;
+const TICK_S: f64 = 1e-3;
+
+/// A controller of three lines for a flat surface at height zero: what a
+/// device would do, from counts alone.
+fn wall_currents(model: &PhantomModel, placement: &Placement, counts: [i32; 3]) -> [f64; 3] {
+    let q = std::array::from_fn(|i| Encoder::new(&model.drive[i]).angle_rad(counts[i]));
+    let [_, _, height_mm] = placement.to_terrain_mm(model, kinematics::tip(model, q));
+    let force = DVec3::new(0.0, 0.0, WALL_N_PER_MM * (-height_mm).max(0.0));
+    let jacobian_transposed = DMat3::from_cols_array_2d(&kinematics::jacobian(model, q));
+    let torque = jacobian_transposed * force;
+    std::array::from_fn(|i| {
+        let axis = &model.drive[i];
+        torque[i] / (axis.ratio * axis.motor.kt_nm_per_a * axis.sign)
+    })
+}
+
+/// Runs the loop until a time, telling `watch` the height and force each tick.
+fn run(rig: &mut Rig, until_s: f64, mut watch: impl FnMut(f64, [f64; 3])) {
+    while rig.t_s() < until_s {
+        let currents = wall_currents(rig.plant().model(), &rig.placement(), rig.counts());
+        rig.step(currents, TICK_S);
+        watch(rig.tip_mm()[2], rig.motor_force_n());
+    }
+}
+
+fn press_and_lift(model: PhantomModel) -> (Rig, f64) {
+    let hand = HandModel::default();
+    let touch = Touch::start(&|_, _| Some(0.0), &hand, WALL_N_PER_MM, [5.0, -3.0], 10.0);
+    let pressed = touch.press(2.0, 1.5);
+    let until_s = pressed.script().duration_s();
+    let script = pressed.lift(10.0).finish();
+    let placement = Placement { home_mm: [0.0; 3] };
+    let rig = Rig::new(model, hand, placement, script).expect("in reach");
+    (rig, until_s)
+}
+
+#[test]
+fn pressed_with_two_newtons_it_rests_at_four_millimetres() {
+    let (mut rig, until) = press_and_lift(PhantomModel::premium_1_5().weightless());
+    let mut last = Vec::new();
+    run(&mut rig, until, |height, force| last.push((height, force)));
+    let settled = &last[last.len() - 300..];
+    // Friction carries at most 0.01 N·m on an arm of 0.21 m against the wall's
+    // and the hand's springs together; the encoder is half a count off.
+    let friction_n = 0.01 / rig.plant().model().l1_m;
+    let hand_n_per_mm = 1e-3 / HandModel::default().give_m_per_n();
+    let bound_mm = friction_n / (WALL_N_PER_MM + hand_n_per_mm) + 0.015;
+    for (height, force) in settled {
+        assert!((height + 4.0).abs() < bound_mm, "{height} ± {bound_mm} mm");
+        assert!(
+            (force[2] - 2.0).abs() < WALL_N_PER_MM * bound_mm,
+            "{force:?} N"
+        );
+    }
+    eprintln!("rests at {:.3} mm, {:.3} N", settled[0].0, settled[0].1[2]);
+    let (low, high) = settled
+        .iter()
+        .fold((f64::MAX, f64::MIN), |(low, high), (z, _)| {
+            (low.min(*z), high.max(*z))
+        });
+    assert!(high - low < 0.03, "rings by {} mm", high - low);
+}
+
+#[test]
+fn lifted_there_is_no_force() {
+    let (mut rig, _) = press_and_lift(PhantomModel::premium_1_5().weightless());
+    let end = rig.script().duration_s() + 0.5;
+    run(&mut rig, end, |_, _| {});
+    assert!(rig.finished());
+    assert!((rig.tip_mm()[2] - 10.0).abs() < 0.5, "{:?}", rig.tip_mm());
+    run(&mut rig, end + 0.2, |_, force| {
+        assert!(DVec3::from(force).length() < 1e-9, "{force:?}");
+    });
+}
+
+/// Tapping at speed: the loop stays inside what the wall can do.
+#[test]
+fn tapped_it_stays_stable() {
+    let hand = HandModel::default();
+    let script = Touch::start(&|_, _| Some(0.0), &hand, WALL_N_PER_MM, [0.0; 2], 10.0)
+        .tap(5, 3.0)
+        .lift(10.0)
+        .finish();
+    let placement = Placement { home_mm: [0.0; 3] };
+    let until = script.duration_s();
+    let mut rig = Rig::new(PhantomModel::premium_1_5(), hand, placement, script).expect("reach");
+    let mut highest_n = 0.0f64;
+    run(&mut rig, until, |height, force| {
+        highest_n = highest_n.max(force[2]);
+        assert!(height > -12.0 && height < 20.0);
+    });
+    assert!((2.0..6.0).contains(&highest_n), "{highest_n} N");
+}
+
+#[test]
+fn names_the_point_it_cannot_reach() {
+    let script = Script::start([0.0; 3]).go([0.0, 400.0, 0.0], 50.0);
+    let placement = Placement { home_mm: [0.0; 3] };
+    let error = Rig::new(
+        PhantomModel::premium_1_5(),
+        HandModel::default(),
+        placement,
+        script,
+    )
+    .expect_err("far");
+    assert_eq!(error.at_mm, [0.0, 400.0, 0.0]);
+    assert!(error.to_string().contains("(0.0, 400.0, 0.0) mm"));
+}

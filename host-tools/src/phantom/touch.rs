@@ -1,0 +1,219 @@
+//! Plans that follow a terrain: approach, press, slide, tap, lift.
+//!
+//! The hand is a spring, so to press with N newtons it aims below the surface
+//! by what the wall, the grip and the arm give way together. It "knows" the
+//! surface, as a person does who has felt it before.
+
+use super::{HandModel, Script};
+
+/// Height of the surface in mm at (east, north) in mm; `None` in a hole.
+pub type Surface<'a> = &'a dyn Fn(f64, f64) -> Option<f64>;
+
+/// Distance between the points of a slide, mm.
+const SLIDE_STEP_MM: f64 = 0.5;
+/// A slide aims at the mean surface of this many points to either side: a hand
+/// does not copy every cliff.
+const SLIDE_SMOOTHING: usize = 4;
+/// Over a hole the hand stays this much above the rim, mm.
+const OVER_HOLE_MM: f64 = 3.0;
+/// Speed of approach and tapping, mm/s.
+const APPROACH_MM_S: f64 = 60.0;
+
+/// Builds a [`Script`] that touches a surface.
+pub struct Touch<'a> {
+    surface: Surface<'a>,
+    give_mm_per_n: f64,
+    script: Script,
+}
+
+impl<'a> Touch<'a> {
+    /// A hand that starts `above_mm` over the surface at a place (over height
+    /// zero where there is a hole), facing walls of the given stiffness.
+    #[must_use]
+    pub fn start(
+        surface: Surface<'a>,
+        hand: &HandModel,
+        wall_n_per_mm: f64,
+        place_mm: [f64; 2],
+        above_mm: f64,
+    ) -> Self {
+        let [x, y] = place_mm;
+        let ground = surface(x, y).unwrap_or(0.0);
+        Self {
+            surface,
+            give_mm_per_n: 1.0 / wall_n_per_mm + 1e3 * hand.give_m_per_n(),
+            script: Script::start([x, y, ground + above_mm]),
+        }
+    }
+
+    /// Presses straight down with a force and holds it for a while.
+    #[must_use]
+    pub fn press(mut self, newtons: f64, seconds: f64) -> Self {
+        let target = self.below(newtons);
+        self.script = self.script.go(target, APPROACH_MM_S).wait(seconds);
+        self
+    }
+
+    /// Slides along a line on the map (mm) while pressing with a force.
+    #[must_use]
+    pub fn slide(mut self, line_mm: &[[f64; 2]], newtons: f64, speed_mm_s: f64) -> Self {
+        let [x, y, _] = self.script.end_mm();
+        let mut line = vec![[x, y]];
+        line.extend_from_slice(line_mm);
+        let points = self.follow(&resample(&line), newtons);
+        self.script = self.script.along(&points, speed_mm_s);
+        self
+    }
+
+    /// Lifts and presses again, several times, with a force at the bottom.
+    #[must_use]
+    pub fn tap(mut self, times: u32, newtons: f64) -> Self {
+        for _ in 0..times {
+            self = self.lift(4.0).press(newtons, 0.1);
+        }
+        self
+    }
+
+    /// Lifts straight up to `above_mm` over the surface.
+    #[must_use]
+    pub fn lift(mut self, above_mm: f64) -> Self {
+        let [x, y, z] = self.script.end_mm();
+        let ground = (self.surface)(x, y).unwrap_or(z);
+        self.script = self.script.go([x, y, ground + above_mm], APPROACH_MM_S);
+        self
+    }
+
+    /// The plan so far.
+    #[must_use]
+    pub fn script(&self) -> &Script {
+        &self.script
+    }
+
+    /// The plan.
+    #[must_use]
+    pub fn finish(self) -> Script {
+        self.script
+    }
+
+    fn below(&self, newtons: f64) -> [f64; 3] {
+        let [x, y, z] = self.script.end_mm();
+        match (self.surface)(x, y) {
+            Some(ground) => [x, y, ground - newtons * self.give_mm_per_n],
+            None => [x, y, z],
+        }
+    }
+
+    /// Aims for each point of a line: the smoothed surface less the press, or
+    /// over a hole the last rim plus some room.
+    fn follow(&self, line: &[[f64; 2]], newtons: f64) -> Vec<[f64; 3]> {
+        let ground: Vec<_> = line.iter().map(|[x, y]| (self.surface)(*x, *y)).collect();
+        let mut rim = ground.iter().flatten().next().copied();
+        let mut points = Vec::with_capacity(line.len());
+        for (i, [x, y]) in line.iter().enumerate() {
+            let near = &ground[i.saturating_sub(SLIDE_SMOOTHING)..];
+            let near = &near[..near.len().min(2 * SLIDE_SMOOTHING + 1)];
+            let known: Vec<f64> = near.iter().flatten().copied().collect();
+            let z = if known.len() == near.len() {
+                let mean = known.iter().sum::<f64>() / known.len() as f64;
+                mean - newtons * self.give_mm_per_n
+            } else {
+                let highest = known.iter().copied().reduce(f64::max);
+                rim = highest.or(rim);
+                rim.unwrap_or(0.0) + OVER_HOLE_MM
+            };
+            points.push([*x, *y, z]);
+        }
+        points
+    }
+}
+
+/// Points at most [`SLIDE_STEP_MM`] apart along a line.
+fn resample(line: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut points = vec![line[0]];
+    for pair in line.windows(2) {
+        let [[x0, y0], [x1, y1]] = [pair[0], pair[1]];
+        let pieces = ((x1 - x0).hypot(y1 - y0) / SLIDE_STEP_MM).ceil().max(1.0);
+        for piece in 1..=pieces as u32 {
+            let u = f64::from(piece) / pieces;
+            points.push([x0 + u * (x1 - x0), y0 + u * (y1 - y0)]);
+        }
+    }
+    points
+}
+
+/// The demonstration: come down on the surface, press, slide a winding line
+/// across a rectangle, tap three times, lift.
+///
+/// `centre_mm` and `half_mm` (east, north) give the rectangle, which should lie
+/// on the data and within the arm's reach; `push_n` the force of the slide.
+#[must_use]
+pub fn tour(
+    surface: Surface<'_>,
+    hand: &HandModel,
+    wall_n_per_mm: f64,
+    centre_mm: [f64; 2],
+    half_mm: [f64; 2],
+    push_n: f64,
+) -> Script {
+    let line = winding(centre_mm, half_mm);
+    Touch::start(surface, hand, wall_n_per_mm, line[0], 12.0)
+        .press(2.0 * push_n, 0.6)
+        .slide(&line, push_n, 45.0)
+        .tap(3, 1.5 * push_n)
+        .lift(12.0)
+        .finish()
+}
+
+/// One and a half waves from west to east.
+fn winding(centre_mm: [f64; 2], half_mm: [f64; 2]) -> Vec<[f64; 2]> {
+    (0..=240)
+        .map(|i| {
+            let u = f64::from(i) / 240.0;
+            let turn = libm::sin(3.0 * std::f64::consts::PI * u);
+            let x = centre_mm[0] + half_mm[0] * (2.0 * u - 1.0);
+            [x, centre_mm[1] + half_mm[1] * turn]
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HAND: fn() -> HandModel = HandModel::default;
+
+    #[test]
+    fn a_press_aims_below_by_what_the_springs_give() {
+        let plan = Touch::start(&|_, _| Some(10.0), &HAND(), 0.5, [1.0, 2.0], 8.0)
+            .press(2.0, 1.0)
+            .finish();
+        assert_eq!(plan.target(0.0).position_mm, [1.0, 2.0, 18.0]);
+        let give = 1.0 / 0.5 + 1.0 / 0.3 + 1.0 / 2.0;
+        let [x, y, z] = plan.end_mm();
+        assert_eq!((x, y), (1.0, 2.0));
+        assert!((z - (10.0 - 2.0 * give)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_slide_follows_the_slope_and_clears_a_hole() {
+        let surface = |x: f64, _: f64| (!(20.0..30.0).contains(&x)).then_some(0.5 * x);
+        let plan = Touch::start(&surface, &HAND(), 0.5, [0.0, 0.0], 5.0)
+            .press(1.0, 0.1)
+            .slide(&[[50.0, 0.0]], 1.0, 40.0)
+            .finish();
+        for [x, _, z] in plan.corners_mm() {
+            if (20.0..30.0).contains(&x) {
+                assert!(z > 10.0, "x {x}: {z} is below the rim");
+            } else if (5.0..17.0).contains(&x) {
+                assert!((z - (0.5 * x - 5.833)).abs() < 0.01, "x {x}: {z}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_tour_over_nothing_is_still_a_plan() {
+        let plan = tour(&|_, _| None, &HAND(), 0.5, [50.0, 50.0], [30.0, 20.0], 1.0);
+        assert!(plan.duration_s() > 1.0);
+        assert!(plan.corners_mm().flatten().all(f64::is_finite));
+    }
+}
