@@ -1,0 +1,39 @@
+//! A critical section that cannot delay the haptic interrupt.
+//!
+//! The usual single-core one masks everything through PRIMASK. This one raises
+//! BASEPRI to [`CEILING`], the priority just below the haptic interrupt's: all
+//! other interrupts wait, that one does not. In return the haptic interrupt
+//! must never enter a critical section nor share anything guarded by one; it
+//! talks to the rest through single-producer queues only.
+
+use core::sync::atomic::{Ordering, compiler_fence};
+
+use cortex_m::register::{basepri, basepri_max};
+
+/// Priority of the haptic interrupt, above everything but faults.
+pub(crate) const HAPTIC: u8 = 0x00;
+/// Highest priority that critical sections hold back: level 1 of the sixteen
+/// that an STM32 has (and of the 256 of the emulated core).
+pub(crate) const CEILING: u8 = 0x10;
+
+struct Ceiling;
+critical_section::set_impl!(Ceiling);
+
+// SAFETY: between `acquire` and the matching `release` no interrupt of priority
+// `CEILING` or below runs, on the one core there is. BASEPRI is only ever
+// raised by `acquire` and set back to what it was by `release`, so sections
+// nest. The fences keep the compiler from moving memory accesses out.
+unsafe impl critical_section::Impl for Ceiling {
+    unsafe fn acquire() -> critical_section::RawRestoreState {
+        let before = basepri::read();
+        basepri_max::write(CEILING);
+        compiler_fence(Ordering::SeqCst);
+        before
+    }
+
+    unsafe fn release(before: critical_section::RawRestoreState) {
+        compiler_fence(Ordering::SeqCst);
+        // SAFETY: `before` is what `acquire` found; see above.
+        unsafe { basepri::write(before) };
+    }
+}

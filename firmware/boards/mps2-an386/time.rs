@@ -1,0 +1,80 @@
+//! The emulated board's time, and when it stands still.
+//!
+//! QEMU runs with `-icount shift=3,sleep=off`: an instruction takes 8 ns of
+//! emulated time (125 million a second, what a 170 MHz Cortex-M4F does at 1.36
+//! cycles an instruction), and sleeping costs no real time. All that the board
+//! knows of time are its two timers, so stopping both stops its time. That is
+//! how lock-step works: while somebody outside has to answer first, there is a
+//! reason to [`hold`], and the time the answer takes does not exist.
+
+use core::sync::atomic::{AtomicU8, Ordering};
+
+use hapterra_firmware::board::TickClock;
+
+use crate::chip::{TIMER_HZ, Timer, clock_timer, tick_timer};
+
+/// Counts between two ticks at 1 kHz.
+const PERIOD: u32 = TIMER_HZ / 1000;
+
+/// Why time stands still, as bits.
+#[derive(Clone, Copy)]
+pub(crate) enum Reason {
+    /// The application said so: it has nothing to do, or waits for tiles.
+    Link = 1 << 0,
+    /// The virtual Phantom has not answered the last tick.
+    Plant = 1 << 1,
+}
+
+static REASONS: AtomicU8 = AtomicU8::new(Reason::Link as u8);
+
+/// Sets both timers up, standing still until [`release`].
+pub(crate) fn start() -> Clock {
+    clock_timer().reload.set(u32::MAX);
+    clock_timer().value.set(u32::MAX);
+    tick_timer().reload.set(PERIOD - 1);
+    tick_timer().value.set(PERIOD - 1);
+    Clock
+}
+
+/// Stops the board's time until this reason is gone.
+pub(crate) fn hold(reason: Reason) {
+    REASONS.fetch_or(reason as u8, Ordering::AcqRel);
+    tick_timer().control.set(Timer::INTERRUPT);
+    clock_timer().control.set(0);
+}
+
+/// Takes the reason back; time goes on when none is left.
+pub(crate) fn release(reason: Reason) {
+    let before = REASONS.fetch_and(!(reason as u8), Ordering::AcqRel);
+    // Only if this reason, and no other, stopped the timers. While they are
+    // stopped the haptic interrupt cannot come and add one; had they been
+    // running, it could, and starting them here would undo that.
+    if before == reason as u8 {
+        clock_timer().control.set(Timer::RUN);
+        tick_timer().control.set(Timer::RUN | Timer::INTERRUPT);
+    }
+}
+
+/// The two timers as the application sees them.
+pub(crate) struct Clock;
+
+impl TickClock for Clock {
+    const HZ: u32 = TIMER_HZ;
+    const PERIOD: u32 = PERIOD;
+
+    fn now(&self) -> u32 {
+        u32::MAX - clock_timer().value.get()
+    }
+
+    fn since_due(&self) -> u32 {
+        (PERIOD - 1).saturating_sub(tick_timer().value.get())
+    }
+
+    fn begin_tick(&mut self) {
+        tick_timer().pending.set(1);
+    }
+
+    fn next_is_due(&self) -> bool {
+        tick_timer().pending.get() != 0
+    }
+}

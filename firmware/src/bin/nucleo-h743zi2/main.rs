@@ -1,2 +1,0 @@
-//! Board.
-fn main() {}

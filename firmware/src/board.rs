@@ -1,0 +1,62 @@
+//! The hardware seam: what a board gives to the application.
+//!
+//! The link is any pair of [`embedded_io_async::Read`] and
+//! [`embedded_io_async::Write`]. Encoders, amplifiers, tick timer and watchdog
+//! have no trait in embedded-hal and get one here; where a board's amplifiers
+//! are pins and duty cycles, [`crate::amplifier`] builds them on embedded-hal's.
+
+use hapterra_core::tick::Sense;
+
+/// The encoders and safety inputs.
+pub trait Encoders {
+    /// Reads everything the tick needs, as of now. Bounded and never waits.
+    fn sense(&mut self) -> Sense;
+}
+
+/// Amplifiers that are off: there is no way to write a current to them.
+pub trait Amplifiers: Sized {
+    /// The same amplifiers, on.
+    type Enabled: EnabledAmplifiers<Disabled = Self>;
+
+    /// Commands zero current, then switches the power stages on.
+    fn enable(self) -> Self::Enabled;
+}
+
+/// Amplifiers that are on.
+pub trait EnabledAmplifiers: Sized {
+    /// The same amplifiers, off.
+    type Disabled: Amplifiers<Enabled = Self>;
+
+    /// Commands the motor currents of axes 1 to 3, in amperes. The board's own
+    /// range limits them; not-a-number commands zero.
+    fn write(&mut self, currents_a: [f32; 3]);
+
+    /// Switches the power stages off, then commands zero current.
+    fn disable(self) -> Self::Disabled;
+}
+
+/// The timer of the haptic tick and the clock that measures it.
+pub trait TickClock {
+    /// Counts of [`Self::now`] and [`Self::since_due`] in a second.
+    const HZ: u32;
+    /// Counts between two ticks.
+    const PERIOD: u32;
+
+    /// A free-running counter that wraps around.
+    fn now(&self) -> u32;
+
+    /// Counts since the current tick's timer event, at most [`Self::PERIOD`].
+    fn since_due(&self) -> u32;
+
+    /// Acknowledges the timer event that this tick answers.
+    fn begin_tick(&mut self);
+
+    /// Whether the next tick's event has come already: this one ran over.
+    fn next_is_due(&self) -> bool;
+}
+
+/// A timer that resets the board unless it is fed.
+pub trait Watchdog {
+    /// Starts the watchdog's time anew.
+    fn feed(&mut self);
+}
