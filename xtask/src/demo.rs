@@ -1,0 +1,149 @@
+//! `cargo xtask demo [FILE]`: the main job, from set-up to picture.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context, Result};
+
+use crate::board::EMULATED;
+use crate::image;
+use crate::run::{cargo, root, run, say, shown, target_dir, timed};
+use crate::setup::{qemu, toolchain};
+
+/// What the user asked for.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(crate) struct Request {
+    /// Terrain file; none for one that the demo makes itself.
+    pub(crate) file: Option<OsString>,
+    /// Passed on to `hapterra demo` as they are.
+    pub(crate) extra: Vec<OsString>,
+}
+
+/// The emulated board, ready to start.
+struct Emulation {
+    image: PathBuf,
+    qemu: PathBuf,
+}
+
+/// Builds what is needed and runs `hapterra demo`; gives its exit code.
+pub(crate) fn demo(request: &Request) -> Result<i32> {
+    let emulation = match request.has("--device") {
+        true => None,
+        false => emulation_or_say_why(),
+    };
+    timed("building the hapterra command", || {
+        run(cargo().args([
+            "build",
+            "--release",
+            "--package",
+            "hapterra",
+            "--bin",
+            "hapterra",
+        ]))
+    })?;
+    let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
+    let mut command = Command::new(target_dir().join("release").join(program));
+    command.args(request.words(emulation.as_ref()));
+    say(format!("running: {}", shown(&command)));
+    let status = command
+        .status()
+        .with_context(|| format!("cannot start `{}`", shown(&command)))?;
+    // None: ended by a signal.
+    Ok(status.code().unwrap_or(1))
+}
+
+fn emulation_or_say_why() -> Option<Emulation> {
+    let ready = || -> Result<Emulation> {
+        let toolchain = toolchain::ready()?;
+        let qemu = qemu::ready()?;
+        let image = timed("building the emulated board's image", || {
+            image::build(toolchain, EMULATED)
+        })?;
+        Ok(Emulation { image, qemu })
+    };
+    ready()
+        .inspect_err(|why| {
+            say(format!("the emulated board cannot be had: {why:#}"));
+            say("so the same application runs compiled for this machine (--device native)");
+        })
+        .ok()
+}
+
+impl Request {
+    /// Whether the words for `hapterra demo` hold `option`.
+    fn has(&self, option: &str) -> bool {
+        let mut words = self.extra.iter().map(|word| word.to_string_lossy());
+        words.any(|word| word == option || word.starts_with(&format!("{option}=")))
+    }
+
+    /// The arguments of the `hapterra` command.
+    fn words(&self, emulation: Option<&Emulation>) -> Vec<OsString> {
+        let mut words: Vec<OsString> = vec!["demo".into()];
+        words.extend(self.file.clone());
+        match emulation {
+            Some(Emulation { image, qemu }) => {
+                let pairs = ["--image".into(), image.into(), "--qemu".into(), qemu.into()];
+                words.extend(pairs);
+            }
+            None if !self.has("--device") => {
+                words.extend(["--device", "native"].map(OsString::from));
+            }
+            None => {}
+        }
+        if !self.has("--out") {
+            words.extend(["--out".into(), root().join("demo").into()]);
+        }
+        words.extend(self.extra.iter().cloned());
+        words
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(file: Option<&str>, extra: &[&str], emulated: bool) -> String {
+        let request = Request {
+            file: file.map(OsString::from),
+            extra: extra.iter().map(OsString::from).collect(),
+        };
+        let emulation = Emulation {
+            image: "ELF".into(),
+            qemu: "QEMU".into(),
+        };
+        let words = request.words(emulated.then_some(&emulation));
+        let words: Vec<_> = words.iter().map(|w| w.to_string_lossy()).collect();
+        words.join(" ")
+    }
+
+    #[test]
+    fn the_emulated_board_is_used_where_it_can_be_had() {
+        let line = line(Some("a b.tif"), &["--out=x", "--seconds", "3"], true);
+        assert_eq!(
+            line,
+            "demo a b.tif --image ELF --qemu QEMU --out=x --seconds 3"
+        );
+    }
+
+    #[test]
+    fn without_emulation_the_device_is_native() {
+        let line = line(None, &["--out", "x"], false);
+        assert_eq!(line, "demo --device native --out x");
+    }
+
+    #[test]
+    fn a_device_of_the_users_is_not_overruled() {
+        let line = line(None, &["--device", "usb", "--out", "x"], false);
+        assert_eq!(line, "demo --device usb --out x");
+    }
+
+    #[test]
+    fn results_go_to_the_workspaces_demo_folder() {
+        let line = line(None, &[], true);
+        assert!(
+            line.ends_with(&format!("--out {}", root().join("demo").display())),
+            "{line}"
+        );
+    }
+}

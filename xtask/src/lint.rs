@@ -1,0 +1,45 @@
+//! `cargo xtask lint`: formatting, clippy and documentation, warnings as errors.
+
+use anyhow::{Context, Result};
+
+use crate::board::BOARDS;
+use crate::image::package_words;
+use crate::run::{cargo, run, timed};
+use crate::setup::toolchain;
+
+/// Runs them all; the first that complains ends it.
+pub(crate) fn lint() -> Result<()> {
+    timed("formatting", || {
+        run(cargo().args(["fmt", "--all", "--check"])).context("type: cargo fmt")
+    })?;
+    timed("clippy for the host", || {
+        let words = [
+            "clippy",
+            "--workspace",
+            "--all-targets",
+            "--",
+            "-D",
+            "warnings",
+        ];
+        run(cargo().args(words))
+    })?;
+    let toolchain = toolchain::ready()?;
+    toolchain.with_clippy()?;
+    for board in &BOARDS {
+        timed(&format!("clippy for {}", board.name), || {
+            let mut command = toolchain.cargo("clippy");
+            command
+                .arg("--release")
+                .args(package_words(board))
+                .args(["--", "-D", "warnings"]);
+            run(&mut command)
+        })?;
+    }
+    timed("documentation", || {
+        let mut command = cargo();
+        command
+            .args(["doc", "--workspace", "--no-deps"])
+            .env("RUSTDOCFLAGS", "-D warnings");
+        run(&mut command)
+    })
+}

@@ -1,0 +1,160 @@
+//! The project's own commands, as `cargo xtask COMMAND`.
+//!
+//! Each finds what it needs, installs it where it may, says what it is doing,
+//! and where it cannot go on says exactly what to type.
+
+mod board;
+mod demo;
+mod deny;
+mod flash;
+mod image;
+mod lint;
+mod panics;
+mod run;
+mod setup;
+mod size;
+mod test;
+
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+use lexopt::prelude::*;
+
+const HELP: &str = "\
+cargo xtask COMMAND
+
+  demo [FILE] [-- ARGS]  touch a terrain file on the emulated board; without FILE,
+                         a terrain made on the spot; ARGS go to `hapterra demo`
+  test [--quick]         all tests, with images, budgets and dependencies;
+                         --quick: the emulated board only, no dependencies
+  lint                   formatting, clippy and documentation, warnings as errors
+  setup                  only find or install what the commands need
+  size                   build the images and hold them to their flash and RAM budgets
+  panics                 build the images and prove that no tick can panic
+  deny                   licences, bans, sources and advisories of dependencies
+  flash BOARD            run an image on a real board with probe-rs
+
+  HAPTERRA_TOOLCHAIN=rustup|distribution  builds the images only with this one
+  HAPTERRA_QEMU=PATH                      the qemu-system-arm to use
+";
+
+fn main() -> ExitCode {
+    match command() {
+        Ok(code) => code,
+        Err(why) => {
+            eprintln!("xtask: error: {why:?}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn command() -> Result<ExitCode> {
+    let mut words = lexopt::Parser::from_env();
+    let Some(word) = words.next()? else {
+        bail!("say what to do:\n\n{HELP}");
+    };
+    let name = match word {
+        Long("help") | Short('h') => "help".into(),
+        Value(name) => name.string()?,
+        other => return Err(other.unexpected().into()),
+    };
+    match name.as_str() {
+        "demo" => {
+            return demo_words(&mut words)
+                .and_then(|r| demo::demo(&r))
+                .map(exit_code);
+        }
+        "test" => test::test(quick(&mut words)?)?,
+        "flash" => flash::flash(board::by_name(&words.value()?.string()?)?)?,
+        plain => {
+            if let Some(extra) = words.next()? {
+                return Err(extra.unexpected().into());
+            }
+            match plain {
+                "lint" => lint::lint()?,
+                "setup" => setup()?,
+                "size" => test::check_sizes(&test::images(&board::BOARDS)?)?,
+                "panics" => test::check_panics(&test::images(&board::BOARDS)?)?,
+                "deny" => deny::check()?,
+                "help" => print!("{HELP}"),
+                _ => bail!("there is no command {plain}:\n\n{HELP}"),
+            }
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn setup() -> Result<()> {
+    let toolchain = setup::toolchain::ready()?;
+    let qemu = setup::qemu::ready()?;
+    run::say(format!(
+        "ready: {toolchain:?} toolchain for the boards, {}",
+        qemu.display()
+    ));
+    Ok(())
+}
+
+fn quick(words: &mut lexopt::Parser) -> Result<bool> {
+    let mut quick = false;
+    while let Some(word) = words.next()? {
+        match word {
+            Long("quick") => quick = true,
+            other => return Err(other.unexpected().into()),
+        }
+    }
+    Ok(quick)
+}
+
+/// `[FILE] [-- ARGS]`: what follows `--` is not looked at here.
+fn demo_words(words: &mut lexopt::Parser) -> Result<demo::Request> {
+    let mut request = demo::Request::default();
+    loop {
+        let rest = words.raw_args()?;
+        match rest.peek() {
+            None => return Ok(request),
+            Some(word) if word == "--" => {
+                request.extra = rest.skip(1).collect();
+                return Ok(request);
+            }
+            Some(_) => {}
+        }
+        match words.next()? {
+            Some(Value(file)) if request.file.is_none() => request.file = Some(file),
+            Some(other) => {
+                let what = other.unexpected();
+                bail!("{what}; options of the run come after `--`");
+            }
+            None => return Ok(request),
+        }
+    }
+}
+
+/// The exit code of a program, as far as this one can hand it on.
+fn exit_code(code: i32) -> ExitCode {
+    u8::try_from(code).map_or(ExitCode::FAILURE, ExitCode::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn demo(words: &[&str]) -> Result<demo::Request> {
+        demo_words(&mut lexopt::Parser::from_args(words))
+    }
+
+    #[test]
+    fn what_follows_two_dashes_goes_to_the_run() {
+        let request = demo(&["a.tif", "--", "--seconds", "3", "--"]).unwrap();
+        assert_eq!(request.file, Some("a.tif".into()));
+        assert_eq!(request.extra, ["--seconds", "3", "--"]);
+        assert_eq!(demo(&["--", "b"]).unwrap().file, None);
+        assert_eq!(demo(&[]).unwrap(), demo::Request::default());
+    }
+
+    #[test]
+    fn a_misplaced_option_is_explained() {
+        let message = demo(&["a.tif", "--seconds", "3"]).unwrap_err().to_string();
+        assert!(message.contains("after `--`"), "{message}");
+        assert!(demo(&["a.tif", "b.tif"]).is_err());
+    }
+}

@@ -1,0 +1,118 @@
+//! Running other programs, and saying so.
+
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+
+/// One line on what is being done, on stderr so that results stay alone on stdout.
+pub(crate) fn say(line: impl AsRef<str>) {
+    eprintln!("xtask: {}", line.as_ref());
+}
+
+/// Root of the workspace.
+pub(crate) fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("xtask/ lies in the workspace")
+}
+
+/// Where cargo puts what it builds for the host.
+pub(crate) fn target_dir() -> PathBuf {
+    match std::env::var_os("CARGO_TARGET_DIR") {
+        Some(dir) => std::path::absolute(&dir).unwrap_or_else(|_| dir.into()),
+        None => root().join("target"),
+    }
+}
+
+/// The cargo that runs this program, in the workspace root, building for the host.
+pub(crate) fn cargo() -> Command {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut command = Command::new(cargo);
+    command
+        .current_dir(root())
+        .env("CARGO_TARGET_DIR", target_dir())
+        .env_remove("CARGO_BUILD_TARGET");
+    command
+}
+
+/// Runs `command` to its end; an unhappy end is an error naming the command.
+pub(crate) fn run(command: &mut Command) -> Result<()> {
+    let line = shown(command);
+    let status = command
+        .status()
+        .with_context(|| format!("cannot start `{line}`"))?;
+    if !status.success() {
+        bail!("`{line}` failed ({status})");
+    }
+    Ok(())
+}
+
+/// Runs `command` and gives its standard output; none if it cannot be started or fails.
+pub(crate) fn output(command: &mut Command) -> Option<String> {
+    let output = command
+        .stdin(Stdio::null())
+        .stderr(Stdio::null())
+        .output()
+        .ok()?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    output.status.success().then_some(text)
+}
+
+/// Where `program` is on the PATH.
+pub(crate) fn on_path(program: &str) -> Option<PathBuf> {
+    let name = format!("{program}{}", std::env::consts::EXE_SUFFIX);
+    let path = std::env::var_os("PATH")?;
+    std::env::split_paths(&path)
+        .map(|dir| dir.join(&name))
+        .find(|file| file.is_file())
+}
+
+/// Does `step`, and says what it is and how long it took.
+pub(crate) fn timed<T>(name: &str, step: impl FnOnce() -> Result<T>) -> Result<T> {
+    say(name);
+    let start = Instant::now();
+    let done = step().with_context(|| format!("{name}: failed"))?;
+    say(format!(
+        "{name}: done in {:.1} s",
+        start.elapsed().as_secs_f64()
+    ));
+    Ok(done)
+}
+
+/// A command line as one would type it.
+pub(crate) fn shown(command: &Command) -> String {
+    let name = Path::new(command.get_program()).file_stem();
+    let words = name.into_iter().chain(command.get_args());
+    let words: Vec<_> = words.map(OsStr::to_string_lossy).collect();
+    words.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_command_is_named() {
+        let mut command = cargo();
+        command.arg("no-such-command").stderr(Stdio::null());
+        let message = run(&mut command).unwrap_err().to_string();
+        assert!(message.contains("cargo no-such-command"), "{message}");
+    }
+
+    #[test]
+    fn a_missing_program_is_named() {
+        let message = run(&mut Command::new("/no/such/program"))
+            .unwrap_err()
+            .to_string();
+        assert!(message.contains("cannot start `program`"), "{message}");
+        assert_eq!(output(&mut Command::new("/no/such/program")), None);
+    }
+
+    #[test]
+    fn the_root_is_the_workspace() {
+        assert!(root().join("xtask/Cargo.toml").is_file());
+    }
+}

@@ -1,0 +1,79 @@
+//! QEMU with the emulated board.
+
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+
+use super::packages::{self, Packages};
+use crate::run::{on_path, output, say};
+
+const PACKAGES: Packages = Packages {
+    apt: Some("qemu-system-arm"),
+    dnf: Some("qemu-system-arm"),
+    pacman: Some("qemu-system-arm"),
+    brew: Some("qemu"),
+};
+
+const PROGRAM: &str = "qemu-system-arm";
+const MACHINE: &str = "mps2-an386";
+
+/// The path of a QEMU that knows the board: `HAPTERRA_QEMU` if set, else the
+/// one on the PATH, else a freshly installed one.
+pub(crate) fn ready() -> Result<PathBuf> {
+    if let Some(given) = std::env::var_os("HAPTERRA_QEMU") {
+        return checked(given.into()).context("HAPTERRA_QEMU names it");
+    }
+    if let Some(found) = find() {
+        return checked(found);
+    }
+    say(format!("{PROGRAM} is not here"));
+    packages::install(&PACKAGES).context(
+        "QEMU cannot be installed from here: get it from https://www.qemu.org/download/, \
+         then put qemu-system-arm on the PATH or its path in HAPTERRA_QEMU",
+    )?;
+    let found = find().with_context(|| format!("installed, but {PROGRAM} is not on the PATH"))?;
+    checked(found)
+}
+
+fn find() -> Option<PathBuf> {
+    // Windows' installer leaves the PATH alone.
+    let installed = PathBuf::from(r"C:\Program Files\qemu\qemu-system-arm.exe");
+    on_path(PROGRAM).or_else(|| installed.is_file().then_some(installed))
+}
+
+fn checked(qemu: PathBuf) -> Result<PathBuf> {
+    let machines = output(Command::new(&qemu).args(["-M", "help"]))
+        .with_context(|| format!("{} does not run", qemu.display()))?;
+    if !knows_the_board(&machines) {
+        bail!(
+            "{} does not know the machine {MACHINE}: a newer QEMU does",
+            qemu.display()
+        );
+    }
+    Ok(qemu)
+}
+
+fn knows_the_board(machines: &str) -> bool {
+    machines
+        .lines()
+        .any(|line| line.split(' ').next() == Some(MACHINE))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_board_is_found_in_the_list_of_machines() {
+        let list = "Supported machines are:\nmps2-an385  ARM MPS2\nmps2-an386           ARM MPS2 with AN386\n";
+        assert!(knows_the_board(list));
+        assert!(!knows_the_board("mps2-an385   like mps2-an386\n"));
+    }
+
+    #[test]
+    fn a_program_that_is_not_there_is_named() {
+        let message = checked("/no/such/qemu".into()).unwrap_err().to_string();
+        assert!(message.contains("/no/such/qemu"), "{message}");
+    }
+}

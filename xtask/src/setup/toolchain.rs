@@ -1,0 +1,217 @@
+//! A toolchain that builds for the boards.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+
+use super::packages::{self, Packages};
+use crate::run::{cargo, on_path, output, run, say, target_dir};
+
+/// The boards' target: Cortex-M4F and M7 with single-precision FPU.
+pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// Debian's newest Rust, kept for its browsers: it has no library for the
+/// boards, but the sources to build one.
+const DISTRIBUTION: Packages = Packages {
+    apt: Some("rustc-web cargo-web rust-web-src lld"),
+    dnf: None,
+    pacman: None,
+    brew: None,
+};
+const DISTRIBUTION_CLIPPY: Packages = Packages {
+    apt: Some("rust-web-clippy"),
+    ..DISTRIBUTION
+};
+
+const BY_HAND: &str = "\
+type: rustup target add thumbv7em-none-eabihf
+      (rustup itself is on https://rustup.rs)";
+
+/// Where the boards' core library comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Toolchain {
+    /// The toolchain that runs this program has it.
+    Own,
+    /// The distribution's Rust builds it from source.
+    Distribution,
+}
+
+impl Toolchain {
+    /// `cargo SUBCOMMAND` for the boards' target.
+    pub(crate) fn cargo(self, subcommand: &str) -> Command {
+        let mut command = match self {
+            Self::Own => cargo(),
+            Self::Distribution => distribution_cargo(),
+        };
+        command.arg(subcommand).args(["--target", TARGET]);
+        if self == Self::Distribution {
+            command.arg("-Zbuild-std=core");
+        }
+        // Flags meant for the host have no place in an image.
+        for variable in [
+            "RUSTFLAGS",
+            "CARGO_ENCODED_RUSTFLAGS",
+            "CARGO_BUILD_RUSTFLAGS",
+        ] {
+            command.env_remove(variable);
+        }
+        command.env("CARGO_TARGET_DIR", self.target_dir());
+        command
+    }
+
+    /// Where it builds. Two compilers in one directory would undo each other's work.
+    pub(crate) fn target_dir(self) -> PathBuf {
+        match self {
+            Self::Own => target_dir(),
+            Self::Distribution => target_dir().join("distribution"),
+        }
+    }
+
+    /// Sees to it that `cargo clippy` is there.
+    pub(crate) fn with_clippy(self) -> Result<()> {
+        match self {
+            Self::Distribution if !Path::new("/usr/bin/clippy-driver").is_file() => {
+                packages::install(&DISTRIBUTION_CLIPPY)
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Finds a toolchain for the boards, or installs one: rustup's target first,
+/// the distribution's packages otherwise. `HAPTERRA_TOOLCHAIN=rustup` or
+/// `=distribution` allows only the one.
+pub(crate) fn ready() -> Result<Toolchain> {
+    match std::env::var("HAPTERRA_TOOLCHAIN").as_deref() {
+        Err(_) | Ok("" | "auto") => own().or_else(|why| {
+            say(format!("rustup cannot: {why:#}"));
+            distribution().context(BY_HAND)
+        }),
+        Ok("rustup") => own().context(BY_HAND),
+        Ok("distribution") => distribution(),
+        Ok(other) => bail!("HAPTERRA_TOOLCHAIN is {other}: say rustup, distribution or auto"),
+    }
+}
+
+fn own() -> Result<Toolchain> {
+    if own_has_target() {
+        return Ok(Toolchain::Own);
+    }
+    say(format!("the target {TARGET} is not installed"));
+    let rustup = on_path("rustup").context("there is no rustup on the PATH")?;
+    let mut add = Command::new(rustup);
+    add.args(["target", "add", TARGET]);
+    say("installing: rustup target add thumbv7em-none-eabihf");
+    run(&mut add)?;
+    if !own_has_target() {
+        bail!("rustup added the target, but not to the toolchain in use");
+    }
+    Ok(Toolchain::Own)
+}
+
+fn own_has_target() -> bool {
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let mut ask = Command::new(rustc);
+    ask.args(["--print", "target-libdir", "--target", TARGET]);
+    output(&mut ask).is_some_and(|dir| holds_core(Path::new(dir.trim())))
+}
+
+fn holds_core(dir: &Path) -> bool {
+    let Ok(entries) = dir.read_dir() else {
+        return false;
+    };
+    let mut names = entries.flatten().map(|e| e.file_name());
+    names.any(|name| name.to_string_lossy().starts_with("libcore-"))
+}
+
+const RUSTC: &str = "/usr/bin/rustc";
+
+fn distribution_cargo() -> Command {
+    let mut command = cargo_at("/usr/bin/cargo");
+    command
+        .env("RUSTC", RUSTC)
+        .env("RUSTC_BOOTSTRAP", "1")
+        .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld")
+        // Of the toolchain that runs this program; it would mix libraries.
+        .env_remove("LD_LIBRARY_PATH")
+        .env_remove("RUSTUP_TOOLCHAIN");
+    command
+}
+
+fn cargo_at(path: &str) -> Command {
+    let mut command = Command::new(path);
+    command.current_dir(crate::run::root());
+    // rustup's cargo-clippy and friends must not be found before /usr/bin's.
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let first = std::iter::once(PathBuf::from("/usr/bin"));
+    if let Ok(joined) = std::env::join_paths(first.chain(std::env::split_paths(&path))) {
+        command.env("PATH", joined);
+    }
+    command
+}
+
+fn distribution() -> Result<Toolchain> {
+    if let Err(missing) = distribution_is_whole() {
+        say(format!("the distribution's Rust: {missing}"));
+        packages::install(&DISTRIBUTION)?;
+        distribution_is_whole()?;
+    }
+    say("building for the boards with the distribution's Rust and its own core library");
+    Ok(Toolchain::Distribution)
+}
+
+fn distribution_is_whole() -> Result<()> {
+    let version = output(Command::new(RUSTC).arg("--version"));
+    let version = version.with_context(|| format!("no {RUSTC}"))?;
+    if minor(&version) < minor(concat!("rustc ", env!("CARGO_PKG_RUST_VERSION"))) {
+        bail!("{} is too old", version.trim());
+    }
+    let root = output(Command::new(RUSTC).args(["--print", "sysroot"])).unwrap_or_default();
+    let sources = Path::new(root.trim()).join("lib/rustlib/src/rust/library/core");
+    if !sources.is_dir() {
+        bail!("no library sources at {}", sources.display());
+    }
+    if !Path::new("/usr/bin/cargo").is_file() {
+        bail!("no /usr/bin/cargo");
+    }
+    on_path("ld.lld").context("no ld.lld on the PATH")?;
+    Ok(())
+}
+
+/// The 96 in `rustc 1.96.0 (…)`.
+fn minor(version: &str) -> Option<u32> {
+    version.split(' ').nth(1)?.split('.').nth(1)?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions_compare_as_numbers() {
+        assert_eq!(minor("rustc 1.96.0 (ac68faa20 2026-05-25)"), Some(96));
+        assert!(minor("rustc 1.100.0") > minor("rustc 1.95"));
+        assert!(minor("nonsense") < minor("rustc 1.63.0"));
+    }
+
+    #[test]
+    fn a_directory_without_core_is_no_target() {
+        assert!(!holds_core(Path::new(env!("CARGO_MANIFEST_DIR"))));
+        assert!(!holds_core(Path::new("/no/such/directory")));
+    }
+
+    #[test]
+    fn only_the_distribution_builds_core_and_in_its_own_place() {
+        let args = |t: Toolchain| crate::run::shown(&t.cargo("build"));
+        assert_eq!(
+            args(Toolchain::Own),
+            format!("cargo build --target {TARGET}")
+        );
+        assert!(args(Toolchain::Distribution).ends_with("-Zbuild-std=core"));
+        assert_ne!(
+            Toolchain::Own.target_dir(),
+            Toolchain::Distribution.target_dir()
+        );
+    }
+}
