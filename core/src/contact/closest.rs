@@ -1,0 +1,184 @@
+//! The closest point of one patch to the hand (paper §4.3.2, eq. 8-11).
+//!
+//! The paper minimises the squared distance D(u, v) by Newton's method in two
+//! variables. That Hessian is indefinite on twisted patches, and the iteration
+//! leaves, cycles or rests on a saddle. Here one variable is eliminated
+//! exactly. With v fixed, the patch is a straight line (a ruling) of slope
+//! m = b + a·v, and its nearest point is known in closed form:
+//!
+//! ```text
+//! g = d + b·p + (c + a·p)·v      height of the ruling's line over the hand's u
+//! z = g / (1 + m²)               height of its nearest point
+//! u = p − m·z                    clamped to [0, 1]
+//! ```
+//!
+//! What remains, F(v) = min over u of D(u, v), is continuously differentiable
+//! because D is a parabola in u: a minimum of F is a minimum of D over the
+//! square, edges and corners included, and no saddle of D is one. F′ is found
+//! by Newton steps kept inside a shrinking bracket; every accepted point is no
+//! farther from the hand than the one before, so the search runs downhill from
+//! where it starts and cannot jump into a worse basin.
+//!
+//! The forms matter: written with `g` over `1 + m²` nothing cancels on steep
+//! patches (docs/contact.md has the error analysis).
+
+use super::patch::Patch;
+
+/// Evaluations of F at most in one search. Reached only on patches steeper
+/// than about 10⁶; the best point so far is then returned.
+pub const MAX_EVALUATIONS: u32 = 32;
+
+/// Distances that differ by less than this, relatively, count as equal: the
+/// rounding of F.
+const TIE: f32 = 1.0 + 1e-6;
+
+/// A point of a patch, as the search sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nearest {
+    /// Eastward coordinate in the patch, `[0, 1]`.
+    pub u: f32,
+    /// Northward coordinate in the patch, `[0, 1]`.
+    pub v: f32,
+    /// Height above the hand, cells.
+    pub z: f32,
+    /// Squared distance from the hand, cells².
+    pub distance_squared: f32,
+    /// Evaluations of F spent.
+    pub evaluations: u32,
+}
+
+/// One evaluation of F.
+#[derive(Clone, Copy)]
+struct Ruling {
+    u: f32,
+    v: f32,
+    z: f32,
+    f: f32,
+    /// F′(v)/2
+    slope: f32,
+    /// F″(v)/2
+    curvature: f32,
+    /// Rounding error that `slope` may have.
+    noise: f32,
+}
+
+/// The nearest point of the ruling at `v`, for a hand at `(p, q)` in patch
+/// coordinates.
+#[inline]
+fn ruling(patch: &Patch, (p, q): (f32, f32), v: f32) -> Ruling {
+    let m = patch.slope_u(v);
+    let steepness = 1.0 + m * m;
+    let g = (patch.d + patch.b * p) + (patch.c + patch.a * p) * v;
+    let free_z = g / steepness;
+    let free_u = p - m * free_z;
+    let (u, z, curvature);
+    if (0.0..=1.0).contains(&free_u) {
+        (u, z) = (free_u, free_z);
+        let (zv, za) = (patch.slope_v(u), patch.a * z);
+        curvature = 1.0 + (zv * zv - za * (za + 2.0 * m * zv)) / steepness;
+    } else {
+        u = if free_u > 0.5 { 1.0 } else { 0.0 };
+        z = patch.height(u, v);
+        let zv = patch.slope_v(u);
+        curvature = 1.0 + zv * zv;
+    }
+    let (dv, lift) = (v - q, z * patch.slope_v(u));
+    Ruling {
+        u,
+        v,
+        z,
+        f: (u - p) * (u - p) + dv * dv + z * z,
+        slope: dv + lift,
+        curvature,
+        noise: f32::EPSILON * (dv.abs() + lift.abs()),
+    }
+}
+
+/// Searches downhill from the ruling at `start` (in `[0, 1]`) for a point of
+/// the patch from which no direction inside the patch leads closer to the hand.
+///
+/// `hand` is the haptic interface point in patch coordinates (u, v); it may lie
+/// outside the unit square. Finite input gives a finite answer.
+#[must_use]
+pub fn nearest_downhill(patch: &Patch, hand: (f32, f32), start: f32) -> Nearest {
+    let mut best = ruling(patch, hand, start);
+    let mut search = Bracket::downhill_of(&best);
+    let mut evaluations = 1;
+    while evaluations < MAX_EVALUATIONS {
+        let Some(v) = search.next(&best) else { break };
+        let trial = ruling(patch, hand, v);
+        evaluations += 1;
+        search.narrow(&mut best, trial);
+    }
+    Nearest {
+        u: best.u,
+        v: best.v,
+        z: best.z,
+        distance_squared: best.f,
+        evaluations,
+    }
+}
+
+/// The side of `best` on which a minimum lies, and how far that side reaches.
+struct Bracket {
+    wall: f32,
+    /// Whether the wall is an end of the patch not yet evaluated.
+    wall_is_end: bool,
+    /// Newton steps in a row that did not halve the slope.
+    lazy: u32,
+}
+
+impl Bracket {
+    fn downhill_of(from: &Ruling) -> Self {
+        Self {
+            wall: if from.slope < 0.0 { 1.0 } else { 0.0 },
+            wall_is_end: true,
+            lazy: 0,
+        }
+    }
+
+    /// Where to evaluate next; `None` when `best` is as good as it gets.
+    fn next(&self, best: &Ruling) -> Option<f32> {
+        let room = self.wall - best.v;
+        if room == 0.0 {
+            return None; // at an end of the patch, and downhill is outside
+        }
+        if best.curvature > 0.0 {
+            let step = -best.slope / best.curvature;
+            if best.slope.abs() <= best.noise || best.v + step == best.v {
+                return None;
+            }
+            let inside = step.abs() < room.abs();
+            if inside && self.lazy < 2 {
+                return Some(best.v + step);
+            }
+            if !inside && self.wall_is_end {
+                return Some(self.wall);
+            }
+        }
+        let middle = best.v + 0.5 * room;
+        (middle != best.v && middle != self.wall).then_some(middle)
+    }
+
+    /// Takes the trial as the best point if it is no farther from the hand,
+    /// else as the new wall.
+    fn narrow(&mut self, best: &mut Ruling, trial: Ruling) {
+        let nearer = trial.f <= best.f * TIE; // false for NaN, too
+        if !nearer {
+            self.wall = trial.v;
+            self.wall_is_end = false;
+            return;
+        }
+        let halved = trial.slope.abs() <= 0.5 * best.slope.abs();
+        self.lazy = if halved { 0 } else { self.lazy + 1 };
+        if self.lazy > 2 {
+            self.lazy = 0; // the middle has been tried
+        }
+        let turned = (trial.slope < 0.0) != (best.slope < 0.0);
+        if turned {
+            self.wall = best.v;
+            self.wall_is_end = false;
+        }
+        *best = trial;
+    }
+}

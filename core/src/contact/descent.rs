@@ -1,0 +1,158 @@
+//! The proxy's way over the surface: downhill in the distance to the hand,
+//! from patch to patch (paper §4.3.2, made exact at edges and vertices).
+
+use super::closest::{Nearest, nearest_downhill};
+use super::patch::Patch;
+use super::spot::{Hand, Spot};
+use super::work::Work;
+use crate::terrain::{Ground, TileKey, Window};
+
+/// Distances that differ by less than this, relatively, count as equal.
+const TIE: f32 = 1.0 + 1e-6;
+/// A neighbour must offer a way at least this long, in cells, to be entered.
+const LEAST_WAY: f32 = 2e-7;
+
+/// How a descent ended.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Descent {
+    /// No direction on the surface leads closer to the hand, which is below.
+    Rests(Spot, Patch),
+    /// From here the straight way to the hand leads off the surface.
+    Leaves(Spot),
+    /// The next patch is in a tile (column, row) that is not here.
+    HeldUp(Spot, Patch, [i32; 2]),
+    /// The tick's work is spent; the squared distance reached.
+    Unfinished(Spot, Patch, f32),
+    /// There is no surface under the proxy any more; the tile wanted, if it
+    /// is missing.
+    Lost(Option<[i32; 2]>),
+}
+
+/// A patch's neighbours over the border that a point lies on, in a fixed order.
+fn neighbours([east, north]: [i32; 2]) -> impl Iterator<Item = [i32; 2]> {
+    let edges = [[east, 0], [0, north], [east, north]];
+    let wanted = [east != 0, north != 0, east != 0 && north != 0];
+    edges
+        .into_iter()
+        .zip(wanted)
+        .filter_map(|(shift, wanted)| wanted.then_some(shift))
+}
+
+pub(super) fn tile_of(cell: [i32; 2]) -> [i32; 2] {
+    let key = TileKey::holding(0, cell);
+    [key.col, key.row]
+}
+
+/// Moves the proxy from `spot` until it rests, leaves, or may not go on.
+///
+/// Each step of the loop depends on nothing but the spot and the hand, so a
+/// descent that is interrupted and taken up again ends on the same bits.
+pub(super) fn descend<const D: usize>(
+    window: &Window<'_, D>,
+    hand: &Hand,
+    mut spot: Spot,
+    may_leave: bool,
+    work: &mut Work,
+) -> Descent {
+    loop {
+        let patch = match hand.ground(window, spot.cell) {
+            Ground::Patch(corners) => Patch::new(corners),
+            Ground::Hole => return Descent::Lost(None),
+            Ground::Missing => return Descent::Lost(Some(tile_of(spot.cell))),
+        };
+        if may_leave && leaves(window, hand, &spot, &patch) {
+            return Descent::Leaves(spot);
+        }
+        if !work.take() {
+            let f = hand.stretch(&spot, &patch).length_squared();
+            return Descent::Unfinished(spot, patch, f);
+        }
+        let here = nearest_downhill(&patch, hand.in_patch(spot.cell), spot.v);
+        work.charge(here.evaluations);
+        (spot.u, spot.v) = (here.u, here.v);
+        match best_neighbour(window, hand, &spot, &here, work) {
+            Way::Into(entry) => spot = entry,
+            Way::Unknown(tile) => return Descent::HeldUp(spot, patch, tile),
+            Way::None if may_leave && here.z < 0.0 => return Descent::Leaves(spot),
+            Way::None => return Descent::Rests(spot, patch),
+        }
+    }
+}
+
+/// Whether the straight way from `spot` to the hand starts above the surface:
+/// above the one-sided slope of the patch it leads into.
+fn leaves<const D: usize>(window: &Window<'_, D>, hand: &Hand, spot: &Spot, patch: &Patch) -> bool {
+    let (p, q) = hand.in_patch(spot.cell);
+    let (east, north) = (p - spot.u, q - spot.v);
+    let [on_u, on_v] = spot.border();
+    let shift = [
+        if on_u as f32 * east > 0.0 { on_u } else { 0 },
+        if on_v as f32 * north > 0.0 { on_v } else { 0 },
+    ];
+    if shift == [0, 0] {
+        return points_off(patch, spot, (east, north));
+    }
+    let entered = spot.across(shift);
+    match hand.ground(window, entered.cell) {
+        Ground::Patch(corners) => points_off(&Patch::new(corners), &entered, (east, north)),
+        // At the border of the data the proxy is held; see `presence`.
+        Ground::Hole | Ground::Missing => false,
+    }
+}
+
+/// Whether the hand lies above the tangent plane of the patch at `spot`.
+fn points_off(patch: &Patch, spot: &Spot, (east, north): (f32, f32)) -> bool {
+    let rise = patch.slope_u(spot.v) * east + patch.slope_v(spot.u) * north;
+    patch.height(spot.u, spot.v) + rise < 0.0
+}
+
+enum Way {
+    /// Downhill goes on from this point of a neighbouring patch.
+    Into(Spot),
+    /// It may go on in a tile that is not here.
+    Unknown([i32; 2]),
+    /// The point is a local minimum of the distance.
+    None,
+}
+
+fn best_neighbour<const D: usize>(
+    window: &Window<'_, D>,
+    hand: &Hand,
+    spot: &Spot,
+    here: &Nearest,
+    work: &mut Work,
+) -> Way {
+    let border = spot.border();
+    if border == [0, 0] {
+        return Way::None;
+    }
+    let (mut way, mut least) = (Way::None, here.distance_squared * TIE);
+    for shift in neighbours(border) {
+        let entry = spot.across(shift);
+        match hand.ground(window, entry.cell) {
+            Ground::Hole => {}
+            Ground::Missing => {
+                if matches!(way, Way::None) && faces(hand, spot, shift) {
+                    way = Way::Unknown(tile_of(entry.cell));
+                }
+            }
+            Ground::Patch(corners) => {
+                let there =
+                    nearest_downhill(&Patch::new(corners), hand.in_patch(entry.cell), entry.v);
+                work.charge(there.evaluations + 3);
+                let moved = (there.u - entry.u).abs().max((there.v - entry.v).abs());
+                if moved > LEAST_WAY && there.distance_squared <= least {
+                    least = there.distance_squared;
+                    way = Way::Into(entry);
+                }
+            }
+        }
+    }
+    way
+}
+
+/// Whether the hand lies on the far side of the border that `shift` crosses.
+fn faces(hand: &Hand, spot: &Spot, [east, north]: [i32; 2]) -> bool {
+    let (p, q) = hand.in_patch(spot.cell);
+    (p - spot.u) * east as f32 >= 0.0 && (q - spot.v) * north as f32 >= 0.0
+}

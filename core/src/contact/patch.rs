@@ -1,0 +1,118 @@
+//! One bilinear patch, seen from the hand (paper §4.1, eq. 1-7).
+
+use glam::Vec3;
+
+/// z(u, v) = `d + b·u + c·v + a·u·v` in cells above the hand, u and v in [0, 1].
+///
+/// The heights count from the haptic interface point's own height, so that no
+/// bit is spent on how high the terrain lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patch {
+    /// Twist, eq. 2's A: how much the slope along u changes with v.
+    pub a: f32,
+    /// Slope along u at v = 0 (B).
+    pub b: f32,
+    /// Slope along v at u = 0 (C).
+    pub c: f32,
+    /// Height of the south-west corner (D).
+    pub d: f32,
+}
+
+impl Patch {
+    /// From the corner heights: south-west, south-east, north-west, north-east.
+    #[must_use]
+    #[inline]
+    pub fn new([sw, se, nw, ne]: [f32; 4]) -> Self {
+        Self {
+            a: (ne - nw) - (se - sw),
+            b: se - sw,
+            c: nw - sw,
+            d: sw,
+        }
+    }
+
+    /// Height above the hand.
+    #[must_use]
+    #[inline]
+    pub fn height(&self, u: f32, v: f32) -> f32 {
+        (self.d + self.b * u) + (self.c + self.a * u) * v
+    }
+
+    /// ∂z/∂u, the slope eastward.
+    #[must_use]
+    #[inline]
+    pub fn slope_u(&self, v: f32) -> f32 {
+        self.b + self.a * v
+    }
+
+    /// ∂z/∂v, the slope northward.
+    #[must_use]
+    #[inline]
+    pub fn slope_v(&self, u: f32) -> f32 {
+        self.c + self.a * u
+    }
+
+    /// The upward normal, not normalised: its z is 1.
+    #[must_use]
+    pub fn normal(&self, u: f32, v: f32) -> Vec3 {
+        Vec3::new(-self.slope_u(v), -self.slope_v(u), 1.0)
+    }
+
+    /// The polar form (blossom) of the height: symmetric, affine in each
+    /// point, and equal to [`Self::height`] where both agree. It is the middle
+    /// Bernstein coefficient of the height along the straight line between
+    /// the two points.
+    #[must_use]
+    #[inline]
+    pub fn blossom(&self, (u0, v0): (f32, f32), (u1, v1): (f32, f32)) -> f32 {
+        let linear = self.b * (u0 + u1) + self.c * (v0 + v1);
+        self.d + 0.5 * (linear + self.a * (u0 * v1 + u1 * v0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn takes_its_corners() {
+        let p = Patch::new([1.0, 3.0, 7.0, 2.0]);
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
+        assert_eq!(corners.map(|(u, v)| p.height(u, v)), [1.0, 3.0, 7.0, 2.0]);
+    }
+
+    #[test]
+    fn edges_are_straight_and_the_middle_is_the_mean() {
+        let p = Patch::new([1.0, 3.0, 7.0, 2.0]);
+        assert_eq!(p.height(0.5, 0.0), 2.0);
+        assert_eq!(p.height(1.0, 0.25), 2.75);
+        assert_eq!(p.height(0.5, 0.5), 3.25);
+    }
+
+    #[test]
+    fn slopes_and_normal_are_the_derivatives() {
+        let p = Patch::new([0.5, -0.25, 1.5, 4.0]);
+        let (u, v, h) = (0.375, 0.625, 1.0 / 64.0);
+        let along_u = (p.height(u + h, v) - p.height(u - h, v)) / (2.0 * h);
+        let along_v = (p.height(u, v + h) - p.height(u, v - h)) / (2.0 * h);
+        assert!((along_u - p.slope_u(v)).abs() < 1e-5);
+        assert!((along_v - p.slope_v(u)).abs() < 1e-5);
+        assert_eq!(p.normal(u, v), Vec3::new(-p.slope_u(v), -p.slope_v(u), 1.0));
+    }
+
+    #[test]
+    fn the_blossom_is_the_middle_bernstein_coefficient() {
+        let p = Patch::new([0.5, -0.25, 1.5, 4.0]);
+        let (from, to) = ((0.125, 0.875), (0.75, 0.25));
+        let (f0, f1, f2) = (
+            p.height(from.0, from.1),
+            p.blossom(from, to),
+            p.height(to.0, to.1),
+        );
+        for s in [0.0_f32, 0.2, 0.5, 0.9, 1.0] {
+            let at = (from.0 + s * (to.0 - from.0), from.1 + s * (to.1 - from.1));
+            let bernstein = f0 * (1.0 - s) * (1.0 - s) + 2.0 * f1 * s * (1.0 - s) + f2 * s * s;
+            assert!((bernstein - p.height(at.0, at.1)).abs() < 1e-5);
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! How much of the surface is there under the hand: the fade at its borders.
+//!
+//! In contact the proxy is held at the edge of a hole, at the border of the
+//! data, and before a tile that is not here. The force then fades with the
+//! distance of the *hand* from the nearest patch, to nothing at [`REACH`], and
+//! there the contact is let go. The hand slides off an edge as it would off a
+//! table, without a kick and without being hooked back from underneath.
+
+use super::spot::Hand;
+use crate::grid::GridPoint;
+use crate::terrain::{Ground, Window};
+
+/// Distance from the nearest patch, in cells, at which nothing is left.
+pub const REACH: f32 = 0.5;
+/// Most that the presence may change in a tick, either way.
+pub const RATE: f32 = 1.0 / 32.0;
+
+/// What the presence should be for a hand at `hip`: 1 over a patch, less
+/// beside one, 0 farther than [`REACH`] from any. Continuous in the hand.
+pub(super) fn target<const D: usize>(window: &Window<'_, D>, hip: &GridPoint) -> f32 {
+    let hand = Hand::new(*hip);
+    let is_patch = |cell| matches!(hand.ground(window, cell), Ground::Patch(_));
+    let [x, y] = hip.column();
+    if is_patch([x, y]) {
+        return 1.0;
+    }
+    let (p, q) = (hip.frac().x, hip.frac().y);
+    let mut nearest = REACH * REACH;
+    for north in -1..=1 {
+        for east in -1..=1 {
+            if is_patch([x + east, y + north]) {
+                let (du, dv) = (gap(p, east), gap(q, north));
+                nearest = nearest.min(du * du + dv * dv);
+            }
+        }
+    }
+    1.0 - libm::sqrtf(nearest) / REACH
+}
+
+/// Distance along one axis from a place in a cell to a neighbouring cell.
+fn gap(place: f32, toward: i32) -> f32 {
+    match toward {
+        1 => 1.0 - place,
+        -1 => place,
+        _ => 0.0,
+    }
+}
+
+/// `presence` moved toward `target` at the bounded rate.
+pub(super) fn approach(presence: f32, target: f32) -> f32 {
+    presence + (target - presence).clamp(-RATE, RATE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::terrain::testing::Field;
+    use glam::Vec3;
+
+    fn hole_at_10_10() -> Field<2> {
+        Field::held([40, 40], |x, y| {
+            if (10..=11).contains(&x) && (10..=11).contains(&y) {
+                f32::NAN
+            } else {
+                0.0
+            }
+        })
+    }
+
+    fn at(x: f32, y: f32) -> GridPoint {
+        GridPoint::new([0; 3], Vec3::new(x, y, -1.0))
+    }
+
+    #[test]
+    fn full_over_a_patch_and_none_far_from_one() {
+        let field = hole_at_10_10();
+        assert_eq!(target(&field.window, &at(8.99, 10.5)), 1.0);
+        assert_eq!(target(&field.window, &at(10.5, 10.5)), 0.0);
+        assert_eq!(target(&field.window, &at(-3.0, 5.0)), 0.0);
+    }
+
+    #[test]
+    fn continuous_across_every_border() {
+        let field = hole_at_10_10();
+        let mut last = target(&field.window, &at(7.0, 9.2));
+        for i in 1..=6000 {
+            let now = target(&field.window, &at(7.0 + i as f32 * 1e-3, 9.2));
+            assert!((now - last).abs() < 3e-3, "at {i}");
+            last = now;
+        }
+        assert!((target(&field.window, &at(40.25, 5.0)) - 0.5).abs() < 1e-6);
+    }
+}

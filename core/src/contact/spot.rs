@@ -1,0 +1,91 @@
+//! A point on the surface: a patch and the place in it.
+
+use glam::Vec3;
+
+use super::patch::Patch;
+use crate::grid::GridPoint;
+use crate::terrain::{Altitude, Ground, Window};
+
+/// A point on the surface, its height left to the patch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spot {
+    /// The patch's column and row.
+    pub cell: [i32; 2],
+    /// Eastward coordinate in the patch, `[0, 1]`.
+    pub u: f32,
+    /// Northward coordinate in the patch, `[0, 1]`.
+    pub v: f32,
+}
+
+impl Spot {
+    /// The same point as patch `cell + shift` sees it, for a point on an edge
+    /// or a corner that both share.
+    #[must_use]
+    pub fn across(&self, [east, north]: [i32; 2]) -> Self {
+        Self {
+            cell: [self.cell[0] + east, self.cell[1] + north],
+            u: mirror(self.u, east),
+            v: mirror(self.v, north),
+        }
+    }
+
+    /// Toward which neighbours the point lies on the patch's border: −1, 0 or
+    /// 1 eastward and northward. `[0, 0]` inside.
+    #[must_use]
+    pub fn border(&self) -> [i32; 2] {
+        [side(self.u), side(self.v)]
+    }
+}
+
+fn side(x: f32) -> i32 {
+    i32::from(x == 1.0) - i32::from(x == 0.0)
+}
+
+fn mirror(x: f32, shift: i32) -> f32 {
+    if shift == 0 { x } else { 1.0 - x }
+}
+
+/// The hand as the patches see it.
+#[derive(Clone, Copy)]
+pub(super) struct Hand {
+    point: GridPoint,
+}
+
+impl Hand {
+    pub(super) const fn new(point: GridPoint) -> Self {
+        Self { point }
+    }
+
+    pub(super) fn altitude(&self) -> Altitude {
+        Altitude::new(self.point.cell()[2], self.point.frac().z)
+    }
+
+    /// The hand in a patch's coordinates.
+    #[inline]
+    pub(super) fn in_patch(&self, [x, y]: [i32; 2]) -> (f32, f32) {
+        let local = self.point.seen_from([x, y, 0]);
+        (local.x, local.y)
+    }
+
+    /// What lies in `cell`, with heights counted from the hand.
+    #[inline]
+    pub(super) fn ground<const D: usize>(&self, window: &Window<'_, D>, cell: [i32; 2]) -> Ground {
+        window.ground(cell, self.altitude())
+    }
+
+    /// The point of the surface at `spot`, `z` cells above the hand.
+    pub(super) fn point_at(&self, spot: &Spot, z: f32) -> GridPoint {
+        let up = self.point.cell()[2];
+        let [x, y] = spot.cell;
+        GridPoint::new(
+            [x, y, up],
+            Vec3::new(spot.u, spot.v, self.point.frac().z + z),
+        )
+    }
+
+    /// From the hand to the surface at `spot`, cells.
+    pub(super) fn stretch(&self, spot: &Spot, patch: &Patch) -> Vec3 {
+        let (p, q) = self.in_patch(spot.cell);
+        Vec3::new(spot.u - p, spot.v - q, patch.height(spot.u, spot.v))
+    }
+}

@@ -1,0 +1,100 @@
+//! From proxy and haptic interface point to newtons.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+/// The spring between the haptic interface point and the proxy (paper §4.3.4),
+/// and the limit of what it may ask for. Immutable while a tick runs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ForceLaw {
+    /// Newtons for a millimetre between proxy and hand, as the hand feels it.
+    pub stiffness_n_per_mm: f32,
+    /// Largest force in newtons; the direction is kept.
+    pub max_force_n: f32,
+}
+
+impl ForceLaw {
+    /// 0.5 N/mm and 8.5 N: what a Phantom Premium 1.5 can hold.
+    pub const PREMIUM: Self = Self {
+        stiffness_n_per_mm: 0.5,
+        max_force_n: 8.5,
+    };
+
+    /// Whether both numbers are finite and not negative.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        let ok = |x: f32| x.is_finite() && x >= 0.0;
+        ok(self.stiffness_n_per_mm) && ok(self.max_force_n)
+    }
+
+    /// Force in newtons for a proxy `stretch_mm` away from the hand.
+    ///
+    /// Along `stretch_mm`, proportional to its length, clamped as a vector.
+    /// Always finite: a stretch that is not gives no force.
+    #[must_use]
+    pub fn force_n(&self, stretch_mm: Vec3) -> Vec3 {
+        clamp_length(stretch_mm * self.stiffness_n_per_mm, self.max_force_n)
+    }
+}
+
+/// `v`, shortened to `limit` where it is longer; zero if it is not finite.
+///
+/// The result is never longer than `limit`, and at most 4 ulp shorter than it
+/// where it was clamped.
+#[must_use]
+pub fn clamp_length(v: Vec3, limit: f32) -> Vec3 {
+    let largest = v.abs().max_element();
+    if !v.is_finite() || largest == 0.0 {
+        return Vec3::ZERO;
+    }
+    // Nothing to square unless the limit is near: the usual case.
+    let squared = v.length_squared();
+    if squared <= limit * limit {
+        return v;
+    }
+    // Scaled first, so that squaring cannot overflow.
+    let unit = v / largest;
+    // Three roundings below; taking two ulp off keeps the result inside.
+    let limit = limit * (1.0 - 2.0 * f32::EPSILON);
+    unit * (limit / libm::sqrtf(unit.length_squared()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn proportional_below_the_limit() {
+        let f = ForceLaw::PREMIUM.force_n(Vec3::new(0.0, 0.0, 4.0));
+        assert_eq!(f, Vec3::new(0.0, 0.0, 2.0));
+    }
+
+    #[test]
+    fn clamped_as_a_vector() {
+        for stretch in [
+            Vec3::new(300.0, -400.0, 0.0),
+            Vec3::splat(3e38),
+            Vec3::new(18.0, 0.0, 0.1),
+        ] {
+            let f = ForceLaw::PREMIUM.force_n(stretch);
+            assert!(
+                f.length() <= 8.5 && f.length() > 8.499_99,
+                "{stretch} -> {f}"
+            );
+            assert!(f.x.signum() == stretch.x.signum());
+        }
+        let f = ForceLaw::PREMIUM.force_n(Vec3::new(300.0, -400.0, 0.0));
+        assert!((f - Vec3::new(5.1, -6.8, 0.0)).length() < 1e-6);
+    }
+
+    #[test]
+    fn not_a_number_gives_no_force() {
+        for bad in [f32::NAN, f32::INFINITY] {
+            assert_eq!(
+                ForceLaw::PREMIUM.force_n(Vec3::new(0.0, bad, 1.0)),
+                Vec3::ZERO
+            );
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Positions over the terrain: an integer cell plus a fraction of it.
+//!
+//! One cell is 1 in x (east), y (north) *and* z (up). The origin is the
+//! south-west sample at height zero. Differences of positions are formed cell
+//! by cell first, so shifting a whole scene by any number of whole cells
+//! changes no bit of what is computed from it.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+/// Largest cell index, in either direction, that a [`GridPoint`] may have.
+///
+/// A quarter of the `i32` range, so that the difference and the sum of any two
+/// indices are still exact. [`GridPoint::new`] clamps to it.
+pub const MAX_CELL: i32 = 1 << 29;
+
+/// A position in cells: `cell + frac`, with every fraction in `[0, 1)`.
+///
+/// Axes: x east, y north, z up. Resolution is 2⁻²⁴ cell at worst, anywhere.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct GridPoint {
+    cell: [i32; 3],
+    frac: [f32; 3],
+}
+
+impl GridPoint {
+    /// The point `offset` cells away from the lower corner of `cell`.
+    ///
+    /// `offset` may lie outside `[0, 1)`; whole cells are carried over. A
+    /// component that is not a number counts as zero, and cells are clamped to
+    /// ±[`MAX_CELL`], so that any input gives a valid point.
+    #[must_use]
+    pub fn new(cell: [i32; 3], offset: Vec3) -> Self {
+        let (x, fx) = carry(cell[0], offset.x);
+        let (y, fy) = carry(cell[1], offset.y);
+        let (z, fz) = carry(cell[2], offset.z);
+        Self {
+            cell: [x, y, z],
+            frac: [fx, fy, fz],
+        }
+    }
+
+    /// The point again, made valid whatever bits it came from (the wire).
+    #[must_use]
+    pub fn normalised(self) -> Self {
+        Self::new(self.cell, self.frac())
+    }
+
+    /// The cell that holds the point: east, north and up.
+    #[must_use]
+    pub const fn cell(&self) -> [i32; 3] {
+        self.cell
+    }
+
+    /// The cell's column and row.
+    #[must_use]
+    pub const fn column(&self) -> [i32; 2] {
+        [self.cell[0], self.cell[1]]
+    }
+
+    /// Where in its cell the point lies, each component in `[0, 1)`.
+    #[must_use]
+    pub const fn frac(&self) -> Vec3 {
+        Vec3::from_array(self.frac)
+    }
+
+    /// The displacement in cells from this point to `other`.
+    ///
+    /// Within 2⁻²⁴ cell, or half an ulp of the result where that is more.
+    #[must_use]
+    pub fn to(&self, other: &Self) -> Vec3 {
+        let part = other.frac() - self.frac();
+        Vec3::new(
+            other.cell[0].wrapping_sub(self.cell[0]) as f32 + part.x,
+            other.cell[1].wrapping_sub(self.cell[1]) as f32 + part.y,
+            other.cell[2].wrapping_sub(self.cell[2]) as f32 + part.z,
+        )
+    }
+
+    /// The point in cells relative to the lower corner of `cell`.
+    #[must_use]
+    pub fn seen_from(&self, cell: [i32; 3]) -> Vec3 {
+        Vec3::new(
+            self.cell[0].wrapping_sub(cell[0]) as f32 + self.frac[0],
+            self.cell[1].wrapping_sub(cell[1]) as f32 + self.frac[1],
+            self.cell[2].wrapping_sub(cell[2]) as f32 + self.frac[2],
+        )
+    }
+
+    /// The point half-way to `other`, exact to 2⁻²⁴ cell at any distance.
+    #[must_use]
+    pub fn midpoint(&self, other: &Self) -> Self {
+        let (x, fx) = half(self.cell[0], other.cell[0], self.frac[0] + other.frac[0]);
+        let (y, fy) = half(self.cell[1], other.cell[1], self.frac[1] + other.frac[1]);
+        let (z, fz) = half(self.cell[2], other.cell[2], self.frac[2] + other.frac[2]);
+        Self::new([x, y, z], Vec3::new(fx, fy, fz))
+    }
+
+    /// Whether this point is lower than `other`.
+    #[must_use]
+    pub fn is_below(&self, other: &Self) -> bool {
+        (self.cell[2], self.frac[2]) < (other.cell[2], other.frac[2])
+    }
+}
+
+/// `cell + offset` with the whole cells of `offset` carried over.
+///
+/// Truncation stands in for `floor`, which the Cortex-M4F has no instruction
+/// for; the two corrections make it one.
+fn carry(cell: i32, offset: f32) -> (i32, f32) {
+    let whole = offset as i32;
+    let mut cell = cell.saturating_add(whole);
+    let mut frac = offset - whole as f32;
+    if frac < 0.0 {
+        frac += 1.0;
+        cell = cell.saturating_sub(1);
+    }
+    // -1e-9 + 1 rounds to 1; infinities and NaN are in no range at all.
+    if !(0.0..1.0).contains(&frac) {
+        cell = cell.saturating_add(i32::from(frac == 1.0));
+        frac = 0.0;
+    }
+    (cell.clamp(-MAX_CELL, MAX_CELL), frac)
+}
+
+fn half(a: i32, b: i32, frac_sum: f32) -> (i32, f32) {
+    let sum = a + b; // both within ±MAX_CELL
+    (sum >> 1, 0.5 * ((sum & 1) as f32 + frac_sum))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn carries_whole_cells_both_ways() {
+        let p = GridPoint::new([5, 5, 5], Vec3::new(2.25, -0.25, -3.0));
+        assert_eq!(p.cell(), [7, 4, 2]);
+        assert_eq!(p.frac(), Vec3::new(0.25, 0.75, 0.0));
+    }
+
+    #[test]
+    fn fraction_never_reaches_one() {
+        let p = GridPoint::new([0; 3], Vec3::new(-1e-9, -f32::MIN_POSITIVE, 0.999_999_97));
+        assert_eq!(p.cell(), [0, 0, 0]);
+        assert!(p.frac().max_element() < 1.0);
+    }
+
+    #[test]
+    fn any_bits_give_a_valid_point() {
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30] {
+            let p = GridPoint::new([i32::MAX, i32::MIN, 0], Vec3::splat(bad));
+            assert!(p.cell().iter().all(|c| c.abs() <= MAX_CELL));
+            assert!(p.frac().is_finite() && p.frac().min_element() >= 0.0);
+        }
+    }
+
+    #[test]
+    fn midpoint_is_exact_far_out() {
+        let a = GridPoint::new([-MAX_CELL, MAX_CELL, 3], Vec3::new(0.5, 0.0, 0.25));
+        let b = GridPoint::new([-MAX_CELL + 5, MAX_CELL - 1, 4], Vec3::new(0.0, 0.0, 0.25));
+        let m = a.midpoint(&b);
+        assert_eq!(a.to(&m), Vec3::new(2.25, -0.5, 0.5));
+        assert_eq!(m.to(&b), Vec3::new(2.25, -0.5, 0.5));
+    }
+}

@@ -1,0 +1,276 @@
+//! A tile: 32 × 32 patches of terrain, and the maxima that let a sweep skip it.
+
+use serde::{Deserialize, Serialize};
+
+use super::ceiling::Altitude;
+use crate::grid::MAX_CELL;
+
+/// Cells along a tile's side, as a power of two.
+pub const TILE_SHIFT: u32 = 5;
+/// Cells along a tile's side.
+pub const TILE_CELLS: usize = 1 << TILE_SHIFT;
+/// Samples along a tile's side; the last row and column are shared with the
+/// next tile, so that a patch never needs two tiles.
+pub const POSTS: usize = TILE_CELLS + 1;
+
+/// Side of the smallest block whose maximum is kept, as a power of two.
+///
+/// 8 cells: 21 maxima in all, 0.08 byte a sample.
+pub(super) const BLOCK_SHIFT: u32 = 3;
+const BLOCKS: usize = TILE_CELLS >> BLOCK_SHIFT;
+const QUARTERS: usize = BLOCKS / 2;
+
+/// Which tile: its level, and its column and row counted from the south-west.
+///
+/// Level `L` is the field with every 2ᴸ-th sample; a tile has 32 × 32 cells of
+/// its own level at every level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct TileKey {
+    /// Decimation level, 0 the finest.
+    pub level: u8,
+    /// Column, counted eastward.
+    pub col: i32,
+    /// Row, counted northward.
+    pub row: i32,
+}
+
+impl TileKey {
+    /// The tile of `level` that holds the patch `cell`.
+    #[must_use]
+    pub const fn holding(level: u8, cell: [i32; 2]) -> Self {
+        Self {
+            level,
+            col: cell[0] >> TILE_SHIFT,
+            row: cell[1] >> TILE_SHIFT,
+        }
+    }
+}
+
+/// Why the bytes of a tile were refused. The buffer is left vacant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum BadTile {
+    /// Not 33 × 33 little-endian `f32`.
+    Length,
+    /// The base lies outside ±[`MAX_CELL`].
+    Base,
+}
+
+/// One buffer of the window: 33 × 33 heights and their block maxima.
+#[derive(Clone, Debug)]
+pub struct Tile {
+    key: Option<TileKey>,
+    base: i32,
+    /// Heights above `base` in cells, `[row][column]` from the south-west;
+    /// NaN where there is no surface.
+    posts: [[f32; POSTS]; POSTS],
+    blocks: [[f32; BLOCKS]; BLOCKS],
+    quarters: [[f32; QUARTERS]; QUARTERS],
+    highest: f32,
+}
+
+impl Tile {
+    /// A buffer that holds no tile.
+    pub const VACANT: Self = Self {
+        key: None,
+        base: 0,
+        posts: [[0.0; POSTS]; POSTS],
+        blocks: [[0.0; BLOCKS]; BLOCKS],
+        quarters: [[0.0; QUARTERS]; QUARTERS],
+        highest: 0.0,
+    };
+
+    /// Which tile this is; `None` for a vacant buffer.
+    #[must_use]
+    pub const fn key(&self) -> Option<TileKey> {
+        self.key
+    }
+
+    /// Forgets the tile; the buffer can be filled again.
+    pub const fn vacate(&mut self) {
+        self.key = None;
+    }
+
+    /// Fills the buffer from heights in cells above `base`, given by column
+    /// and row in `0..33`. NaN is a hole; so is anything beyond ±[`MAX_CELL`].
+    ///
+    /// # Errors
+    /// [`BadTile::Base`] when `base` is out of range.
+    pub fn fill(
+        &mut self,
+        key: TileKey,
+        base: i32,
+        mut height: impl FnMut(usize, usize) -> f32,
+    ) -> Result<(), BadTile> {
+        self.vacate();
+        if base.unsigned_abs() > MAX_CELL.unsigned_abs() {
+            return Err(BadTile::Base);
+        }
+        for (row, posts) in self.posts.iter_mut().enumerate() {
+            for (col, post) in posts.iter_mut().enumerate() {
+                let h = height(col, row);
+                *post = if h.abs() <= MAX_CELL as f32 {
+                    h
+                } else {
+                    f32::NAN
+                };
+            }
+        }
+        self.base = base;
+        self.measure();
+        self.key = Some(key);
+        Ok(())
+    }
+
+    /// Fills the buffer from little-endian `f32` heights, rows from the south.
+    ///
+    /// # Errors
+    /// [`BadTile::Length`] unless there are exactly 33 × 33 of them.
+    pub fn load(&mut self, key: TileKey, base: i32, bytes: &[u8]) -> Result<(), BadTile> {
+        self.vacate();
+        let (posts, rest) = bytes.as_chunks::<4>();
+        if posts.len() != POSTS * POSTS || !rest.is_empty() {
+            return Err(BadTile::Length);
+        }
+        self.fill(key, base, |col, row| {
+            posts
+                .get(row * POSTS + col)
+                .map_or(f32::NAN, |le| f32::from_le_bytes(*le))
+        })
+    }
+
+    /// The integer height, in cells, that [`Self::corners`] counts from.
+    #[must_use]
+    pub const fn base(&self) -> i32 {
+        self.base
+    }
+
+    /// Heights above the base at the corners of the patch in column `u` and
+    /// row `v` (both taken modulo 32): south-west, south-east, north-west,
+    /// north-east.
+    #[must_use]
+    #[inline]
+    pub fn corners(&self, u: i32, v: i32) -> [f32; 4] {
+        let u = u as usize % TILE_CELLS;
+        let v = v as usize % TILE_CELLS;
+        let (south, north) = (&self.posts[v], &self.posts[v + 1]);
+        [south[u], south[u + 1], north[u], north[u + 1]]
+    }
+
+    /// Lowest whole height, in cells, that no sample of the tile exceeds.
+    #[must_use]
+    pub(super) fn top(&self) -> i32 {
+        if self.highest == f32::NEG_INFINITY {
+            return i32::MIN; // all hole
+        }
+        // One more where truncation rounded down or the height is whole: the
+        // comparison with it may then be `>=`.
+        self.base
+            .saturating_add(self.highest as i32)
+            .saturating_add(1)
+    }
+
+    /// Whether `low` is above every sample of the 8- or 16-cell block that
+    /// holds cell `(u, v)`.
+    #[inline]
+    pub(super) fn block_is_below(&self, shift: u32, u: i32, v: i32, low: Altitude) -> bool {
+        let u = u as usize % TILE_CELLS;
+        let v = v as usize % TILE_CELLS;
+        let top = if shift == BLOCK_SHIFT {
+            self.blocks[v >> BLOCK_SHIFT][u >> BLOCK_SHIFT]
+        } else {
+            self.quarters[v >> (BLOCK_SHIFT + 1)][u >> (BLOCK_SHIFT + 1)]
+        };
+        low.above(self.base) > top
+    }
+
+    fn measure(&mut self) {
+        for (row, blocks) in self.blocks.iter_mut().enumerate() {
+            for (col, block) in blocks.iter_mut().enumerate() {
+                *block = highest_of(&self.posts, col << BLOCK_SHIFT, row << BLOCK_SHIFT);
+            }
+        }
+        for (row, quarters) in self.quarters.iter_mut().enumerate() {
+            for (col, quarter) in quarters.iter_mut().enumerate() {
+                let (south, north) = (&self.blocks[2 * row], &self.blocks[2 * row + 1]);
+                *quarter = south[2 * col]
+                    .max(south[2 * col + 1])
+                    .max(north[2 * col])
+                    .max(north[2 * col + 1]);
+            }
+        }
+        self.highest = self
+            .quarters
+            .as_flattened()
+            .iter()
+            .fold(f32::NEG_INFINITY, |high, q| high.max(*q));
+    }
+}
+
+/// Highest sample of the patches of one block; NaN samples do not count.
+fn highest_of(posts: &[[f32; POSTS]; POSTS], col: usize, row: usize) -> f32 {
+    let side = 1 << BLOCK_SHIFT;
+    let rows = posts.iter().skip(row).take(side + 1);
+    rows.flat_map(|posts| posts.iter().skip(col).take(side + 1))
+        .fold(f32::NEG_INFINITY, |high, post| high.max(*post))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::boxed::Box;
+
+    const KEY: TileKey = TileKey {
+        level: 0,
+        col: 3,
+        row: -2,
+    };
+
+    fn filled(height: impl FnMut(usize, usize) -> f32) -> Box<Tile> {
+        let mut tile = Box::new(Tile::VACANT);
+        tile.fill(KEY, 100, height).unwrap();
+        tile
+    }
+
+    #[test]
+    fn corners_are_the_four_samples_around_a_patch() {
+        let tile = filled(|col, row| (col * 100 + row) as f32);
+        assert_eq!(tile.corners(31, 0), [3100.0, 3200.0, 3101.0, 3201.0]);
+        assert_eq!(tile.corners(-1, 32), tile.corners(31, 0));
+    }
+
+    #[test]
+    fn maxima_bound_every_block_and_ignore_holes() {
+        let tile = filled(|col, row| match (col, row) {
+            (8, 8) => 5.5, // belongs to four blocks
+            (20, 20) => f32::NAN,
+            _ => 1.0,
+        });
+        for (u, v) in [(0, 0), (8, 0), (0, 8), (8, 8)] {
+            assert!(!tile.block_is_below(3, u, v, Altitude::new(105, 0.5)));
+            assert!(tile.block_is_below(3, u, v, Altitude::new(105, 0.75)));
+        }
+        assert!(tile.block_is_below(3, 16, 16, Altitude::new(101, 0.25)));
+        assert!(!tile.block_is_below(4, 0, 0, Altitude::new(105, 0.0)));
+        assert_eq!(tile.top(), 106);
+    }
+
+    #[test]
+    fn a_tile_is_all_or_nothing() {
+        let mut tile = filled(|_, _| 0.0);
+        assert_eq!(tile.load(KEY, 0, &[0; 7]), Err(BadTile::Length));
+        assert_eq!(tile.key(), None);
+        let bytes = [0u8; 4 * POSTS * POSTS];
+        assert_eq!(tile.load(KEY, i32::MAX, &bytes), Err(BadTile::Base));
+        assert_eq!(tile.load(KEY, 0, &bytes), Ok(()));
+        assert_eq!(tile.key(), Some(KEY));
+    }
+
+    #[test]
+    fn heights_that_cannot_be_addressed_are_holes() {
+        let tile = filled(|col, _| if col == 0 { f32::INFINITY } else { 1e30 });
+        assert!(tile.corners(0, 0).iter().all(|h| h.is_nan()));
+        assert_eq!(tile.top(), i32::MIN);
+    }
+}

@@ -1,0 +1,174 @@
+//! Framing: postcard + CRC-32 + COBS, ended by a zero byte.
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
+use serde::{Deserialize, Serialize};
+
+/// Longest frame in bytes, its zero included: a tile and what is around it.
+pub const MAX_FRAME: usize = 4608;
+
+/// The 256-entry table costs 1 KiB of flash and is worth it: a tile is 4.4 kB.
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// Why a frame was not understood. It is dropped; the link goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum BadFrame {
+    /// Longer than the reader's buffer.
+    TooLong,
+    /// Not COBS.
+    Encoding,
+    /// The check sum or the content is wrong.
+    Content,
+}
+
+/// Writes `message` as one frame into `buffer`; returns the bytes to send.
+/// `None` when it does not fit.
+pub fn encode<'b, T: Serialize + ?Sized>(message: &T, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
+    let cobs = Cobs::try_new(Slice::new(buffer)).ok()?;
+    let flavour = CrcModifier::new(cobs, CRC.digest());
+    postcard::serialize_with_flavor(message, flavour)
+        .ok()
+        .map(|frame| &*frame)
+}
+
+/// Reads a message from a frame's decoded bytes, check sum included.
+///
+/// # Errors
+/// [`BadFrame::Content`] when the check sum does not fit, or the bytes are no
+/// `T` or more than one.
+pub fn decode<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Result<T, BadFrame> {
+    match postcard::take_from_bytes_crc32(bytes, CRC.digest()) {
+        Ok((message, [])) => Ok(message),
+        _ => Err(BadFrame::Content),
+    }
+}
+
+/// Collects bytes into frames. `N` is the longest frame it takes.
+pub struct FrameReader<const N: usize> {
+    buffer: [u8; N],
+    length: usize,
+    overflowed: bool,
+}
+
+impl<const N: usize> Default for FrameReader<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const N: usize> FrameReader<N> {
+    /// An empty reader.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            buffer: [0; N],
+            length: 0,
+            overflowed: false,
+        }
+    }
+
+    /// Takes bytes up to and including the end of one frame.
+    ///
+    /// Returns how many bytes were taken and, at a frame's end, its decoded
+    /// bytes (to be read with [`decode`]) or why there are none. Empty frames
+    /// are passed over: a sender may put a zero in front to start clean.
+    pub fn push(&mut self, bytes: &[u8]) -> (usize, Option<Result<&[u8], BadFrame>>) {
+        let end = bytes.iter().position(|b| *b == 0);
+        let body = bytes.get(..end.unwrap_or(bytes.len())).unwrap_or(&[]);
+        let room = self.buffer.get_mut(self.length..self.length + body.len());
+        match room {
+            Some(room) => {
+                room.copy_from_slice(body);
+                self.length += body.len();
+            }
+            None => self.overflowed = true,
+        }
+        let Some(end) = end else {
+            return (bytes.len(), None);
+        };
+        let (length, overflowed) = (self.length, self.overflowed);
+        (self.length, self.overflowed) = (0, false);
+        if overflowed {
+            return (end + 1, Some(Err(BadFrame::TooLong)));
+        }
+        if length == 0 {
+            return (end + 1, None);
+        }
+        let frame = self.buffer.get_mut(..length).unwrap_or(&mut []);
+        let decoded = match cobs::decode_in_place(frame) {
+            Ok(n) => frame.get(..n).ok_or(BadFrame::Encoding),
+            Err(_) => Err(BadFrame::Encoding),
+        };
+        (end + 1, Some(decoded))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    fn frames(reader: &mut FrameReader<64>, mut bytes: &[u8]) -> Vec<Result<u32, BadFrame>> {
+        let mut found = Vec::new();
+        while !bytes.is_empty() {
+            let (taken, frame) = reader.push(bytes);
+            if let Some(frame) = frame {
+                found.push(frame.and_then(decode));
+            }
+            bytes = &bytes[taken..];
+        }
+        found
+    }
+
+    fn frame(n: u32) -> Vec<u8> {
+        encode(&n, &mut [0; 64]).unwrap().to_vec()
+    }
+
+    #[test]
+    fn what_goes_in_comes_out_byte_by_byte_or_at_once() {
+        let bytes = [frame(7), frame(0), frame(u32::MAX)].concat();
+        let mut reader = FrameReader::new();
+        assert_eq!(frames(&mut reader, &bytes), [Ok(7), Ok(0), Ok(u32::MAX)]);
+        let one_by_one: Vec<_> = bytes
+            .iter()
+            .flat_map(|b| frames(&mut reader, &[*b]))
+            .collect();
+        assert_eq!(one_by_one, [Ok(7), Ok(0), Ok(u32::MAX)]);
+    }
+
+    #[test]
+    fn joins_in_the_middle() {
+        let bytes = [frame(123_456), frame(5)].concat();
+        for cut in 1..frame(123_456).len() - 1 {
+            let found = frames(&mut FrameReader::new(), &bytes[cut..]);
+            assert_eq!(found.last(), Some(&Ok(5)));
+            assert!(found.iter().filter(|f| f.is_ok()).count() == 1, "cut {cut}");
+        }
+    }
+
+    #[test]
+    fn no_flipped_bit_gets_through() {
+        let good = frame(123_456);
+        for bit in 0..good.len() * 8 {
+            let mut bad = good.clone();
+            bad[bit / 8] ^= 1 << (bit % 8);
+            bad.extend(frame(5));
+            let found = frames(&mut FrameReader::new(), &bad);
+            let understood: Vec<_> = found.into_iter().flatten().collect();
+            // A flip of the zero itself may swallow the next frame too.
+            assert!(
+                understood.iter().all(|n| *n == 5),
+                "bit {bit}: {understood:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_storm_without_end_is_dropped_and_the_next_frame_found() {
+        let mut reader = FrameReader::new();
+        assert_eq!(frames(&mut reader, &[0xA5; 1000]), []);
+        let found = frames(&mut reader, &[&[0], &*frame(9)].concat());
+        assert_eq!(found, [Err(BadFrame::TooLong), Ok(9)]);
+    }
+}

@@ -1,0 +1,17 @@
+//! What travels between the device and the host: one link, one table of
+//! messages, one framing.
+//!
+//! Every message is serialised with postcard, followed by its CRC-32 (ISO-HDLC,
+//! little-endian), COBS-encoded, and ended by a zero byte. A reader that joins
+//! in the middle, or meets garbage, finds the next frame at the next zero.
+//!
+//! The session: the host says [`message::ToDevice::Hello`]; the device answers
+//! with its own [`message::ToHost::Hello`], or with
+//! [`message::ToHost::Refused`] when the protocol versions differ. The host
+//! then sends a [`message::Scene`]; from there on the device asks for the
+//! tiles it needs and reports what it feels. Either end may restart at any
+//! time by beginning again with Hello.
+
+pub mod frame;
+pub mod message;
+pub mod plant;
