@@ -42,7 +42,9 @@ fn main() -> ExitCode {
     match command() {
         Ok(code) => code,
         Err(why) => {
-            eprintln!("xtask: error: {why:?}");
+            // Not anyhow's own listing, which may append a back-trace of xtask.
+            let causes: Vec<_> = why.chain().map(ToString::to_string).collect();
+            eprintln!("xtask: error: {}", causes.join("\n       caused by: "));
             ExitCode::FAILURE
         }
     }

@@ -5,24 +5,11 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use super::packages::{self, Packages};
+use super::distribution;
 use crate::run::{cargo, on_path, output, run, say, target_dir};
 
 /// The boards' target: Cortex-M4F and M7 with single-precision FPU.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
-
-/// Debian's newest Rust, kept for its browsers: it has no library for the
-/// boards, but the sources to build one.
-const DISTRIBUTION: Packages = Packages {
-    apt: Some("rustc-web cargo-web rust-web-src lld"),
-    dnf: None,
-    pacman: None,
-    brew: None,
-};
-const DISTRIBUTION_CLIPPY: Packages = Packages {
-    apt: Some("rust-web-clippy"),
-    ..DISTRIBUTION
-};
 
 const BY_HAND: &str = "\
 type: rustup target add thumbv7em-none-eabihf
@@ -42,7 +29,7 @@ impl Toolchain {
     pub(crate) fn cargo(self, subcommand: &str) -> Command {
         let mut command = match self {
             Self::Own => cargo(),
-            Self::Distribution => distribution_cargo(),
+            Self::Distribution => distribution::cargo(),
         };
         command.arg(subcommand).args(["--target", TARGET]);
         if self == Self::Distribution {
@@ -71,10 +58,9 @@ impl Toolchain {
     /// Sees to it that `cargo clippy` is there.
     pub(crate) fn with_clippy(self) -> Result<()> {
         match self {
-            Self::Distribution if !Path::new("/usr/bin/clippy-driver").is_file() => {
-                packages::install(&DISTRIBUTION_CLIPPY)
-            }
-            _ => Ok(()),
+            // A part of every usual toolchain; cargo itself says so if it is not.
+            Self::Own => Ok(()),
+            Self::Distribution => distribution::with_clippy(),
         }
     }
 }
@@ -86,10 +72,10 @@ pub(crate) fn ready() -> Result<Toolchain> {
     match std::env::var("HAPTERRA_TOOLCHAIN").as_deref() {
         Err(_) | Ok("" | "auto") => own().or_else(|why| {
             say(format!("rustup cannot: {why:#}"));
-            distribution().context(BY_HAND)
+            from_distribution().context(BY_HAND)
         }),
         Ok("rustup") => own().context(BY_HAND),
-        Ok("distribution") => distribution(),
+        Ok("distribution") => from_distribution(),
         Ok(other) => bail!("HAPTERRA_TOOLCHAIN is {other}: say rustup, distribution or auto"),
     }
 }
@@ -110,6 +96,12 @@ fn own() -> Result<Toolchain> {
     Ok(Toolchain::Own)
 }
 
+fn from_distribution() -> Result<Toolchain> {
+    distribution::ready()?;
+    say("building for the boards with the distribution's Rust and its own core library");
+    Ok(Toolchain::Distribution)
+}
+
 fn own_has_target() -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let mut ask = Command::new(rustc);
@@ -125,75 +117,9 @@ fn holds_core(dir: &Path) -> bool {
     names.any(|name| name.to_string_lossy().starts_with("libcore-"))
 }
 
-const RUSTC: &str = "/usr/bin/rustc";
-
-fn distribution_cargo() -> Command {
-    let mut command = cargo_at("/usr/bin/cargo");
-    command
-        .env("RUSTC", RUSTC)
-        .env("RUSTC_BOOTSTRAP", "1")
-        .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld")
-        // Of the toolchain that runs this program; it would mix libraries.
-        .env_remove("LD_LIBRARY_PATH")
-        .env_remove("RUSTUP_TOOLCHAIN");
-    command
-}
-
-fn cargo_at(path: &str) -> Command {
-    let mut command = Command::new(path);
-    command.current_dir(crate::run::root());
-    // rustup's cargo-clippy and friends must not be found before /usr/bin's.
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let first = std::iter::once(PathBuf::from("/usr/bin"));
-    if let Ok(joined) = std::env::join_paths(first.chain(std::env::split_paths(&path))) {
-        command.env("PATH", joined);
-    }
-    command
-}
-
-fn distribution() -> Result<Toolchain> {
-    if let Err(missing) = distribution_is_whole() {
-        say(format!("the distribution's Rust: {missing}"));
-        packages::install(&DISTRIBUTION)?;
-        distribution_is_whole()?;
-    }
-    say("building for the boards with the distribution's Rust and its own core library");
-    Ok(Toolchain::Distribution)
-}
-
-fn distribution_is_whole() -> Result<()> {
-    let version = output(Command::new(RUSTC).arg("--version"));
-    let version = version.with_context(|| format!("no {RUSTC}"))?;
-    if minor(&version) < minor(concat!("rustc ", env!("CARGO_PKG_RUST_VERSION"))) {
-        bail!("{} is too old", version.trim());
-    }
-    let root = output(Command::new(RUSTC).args(["--print", "sysroot"])).unwrap_or_default();
-    let sources = Path::new(root.trim()).join("lib/rustlib/src/rust/library/core");
-    if !sources.is_dir() {
-        bail!("no library sources at {}", sources.display());
-    }
-    if !Path::new("/usr/bin/cargo").is_file() {
-        bail!("no /usr/bin/cargo");
-    }
-    on_path("ld.lld").context("no ld.lld on the PATH")?;
-    Ok(())
-}
-
-/// The 96 in `rustc 1.96.0 (…)`.
-fn minor(version: &str) -> Option<u32> {
-    version.split(' ').nth(1)?.split('.').nth(1)?.parse().ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn versions_compare_as_numbers() {
-        assert_eq!(minor("rustc 1.96.0 (ac68faa20 2026-05-25)"), Some(96));
-        assert!(minor("rustc 1.100.0") > minor("rustc 1.95"));
-        assert!(minor("nonsense") < minor("rustc 1.63.0"));
-    }
 
     #[test]
     fn a_directory_without_core_is_no_target() {

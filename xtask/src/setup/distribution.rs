@@ -1,0 +1,108 @@
+//! The distribution's Rust, for where rustup cannot add the boards' target.
+//!
+//! Debian keeps a recent Rust for its browsers. It has no library for the
+//! boards, but the sources to build one, which `-Zbuild-std` does.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+
+use super::packages::{self, Packages};
+use crate::run::{on_path, output, root, say};
+
+const PACKAGES: Packages = Packages {
+    apt: Some("rustc-web cargo-web rust-web-src lld"),
+    dnf: None,
+    pacman: None,
+    brew: None,
+};
+const CLIPPY_PACKAGES: Packages = Packages {
+    apt: Some("rust-web-clippy"),
+    ..PACKAGES
+};
+
+/// The workspace's `rust-version`, as a compiler would tell it.
+const NEEDED: &str = concat!("rustc ", env!("CARGO_PKG_RUST_VERSION"));
+
+const RUSTC: &str = "/usr/bin/rustc";
+const CARGO: &str = "/usr/bin/cargo";
+const CLIPPY: &str = "/usr/bin/clippy-driver";
+
+/// Its cargo, set up to build its own core library.
+pub(crate) fn cargo() -> Command {
+    let mut command = Command::new(CARGO);
+    command
+        .current_dir(root())
+        .env("RUSTC", RUSTC)
+        .env("RUSTC_BOOTSTRAP", "1")
+        .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld")
+        .env_remove("CARGO_BUILD_TARGET")
+        // Of the toolchain that runs this program; they would mix the two.
+        .env_remove("LD_LIBRARY_PATH")
+        .env_remove("RUSTUP_TOOLCHAIN");
+    // rustup's cargo-clippy must not be found before this one's.
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let first = std::iter::once(PathBuf::from("/usr/bin"));
+    if let Ok(path) = std::env::join_paths(first.chain(std::env::split_paths(&path))) {
+        command.env("PATH", path);
+    }
+    command
+}
+
+/// Sees to it that it is there, whole and recent enough.
+pub(crate) fn ready() -> Result<()> {
+    if let Err(missing) = is_whole() {
+        say(format!("the distribution's Rust: {missing}"));
+        packages::install(&PACKAGES)?;
+    }
+    is_whole()
+}
+
+/// Sees to it that its clippy is there.
+pub(crate) fn with_clippy() -> Result<()> {
+    if Path::new(CLIPPY).is_file() {
+        return Ok(());
+    }
+    packages::install(&CLIPPY_PACKAGES)
+}
+
+fn is_whole() -> Result<()> {
+    let version = output(Command::new(RUSTC).arg("--version"));
+    let version = version.with_context(|| format!("no {RUSTC}"))?;
+    if minor(&version) < minor(NEEDED) {
+        bail!("{} is too old", version.trim());
+    }
+    let sysroot = output(Command::new(RUSTC).args(["--print", "sysroot"])).unwrap_or_default();
+    let sources = Path::new(sysroot.trim()).join("lib/rustlib/src/rust/library/core");
+    if !sources.is_dir() {
+        bail!("no library sources at {}", sources.display());
+    }
+    if !Path::new(CARGO).is_file() {
+        bail!("no {CARGO}");
+    }
+    on_path("ld.lld").context("no ld.lld on the PATH")?;
+    Ok(())
+}
+
+/// The 96 in `rustc 1.96.0 (…)`.
+fn minor(version: &str) -> Option<u32> {
+    version.split(' ').nth(1)?.split('.').nth(1)?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions_compare_as_numbers() {
+        assert_eq!(minor("rustc 1.96.0 (ac68faa20 2026-05-25)"), Some(96));
+        assert!(minor("rustc 1.100.0") > minor("rustc 1.95"));
+        assert!(minor("nonsense") < minor("rustc 1.63.0"));
+    }
+
+    #[test]
+    fn the_version_that_is_needed_is_known() {
+        assert!(minor(NEEDED).is_some(), "{NEEDED}");
+    }
+}
