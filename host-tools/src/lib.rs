@@ -6,9 +6,12 @@
 //! - [`raster`]: files of every supported format become one [`raster::Raster`];
 //! - [`synth`]: terrains made by formula, for trying and testing;
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
+//! - [`picture`]: what was felt, as PNG files;
 //! - [`cli`]: the `hapterra` command, one file a subcommand.
 
 #![forbid(unsafe_code)]
 
 pub mod cli;
 pub mod phantom;
+pub mod picture;
+pub mod raster;

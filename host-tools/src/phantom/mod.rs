@@ -33,6 +33,7 @@ mod plant;
 mod rig;
 mod script;
 mod touch;
+mod tour;
 
 pub use amplifier::Amplifier;
 pub use dynamics::Dynamics;
@@ -44,4 +45,5 @@ pub use placement::Placement;
 pub use plant::{MAX_SUBSTEP_S, Plant};
 pub use rig::{OutOfReach, Rig};
 pub use script::{Script, Target};
-pub use touch::{Surface, Touch, tour};
+pub use touch::{Surface, Touch};
+pub use tour::{Tour, TourPlan};

@@ -27,8 +27,9 @@ pub struct Touch<'a> {
 }
 
 impl<'a> Touch<'a> {
-    /// A hand that starts `above_mm` over the surface at a place (over height
-    /// zero where there is a hole), facing walls of the given stiffness.
+    /// A hand that starts `above_mm` over the surface at a place, facing walls
+    /// of the given stiffness. In a hole the nearest ground within 200 mm
+    /// counts, and height zero where there is none.
     #[must_use]
     pub fn start(
         surface: Surface<'a>,
@@ -38,7 +39,7 @@ impl<'a> Touch<'a> {
         above_mm: f64,
     ) -> Self {
         let [x, y] = place_mm;
-        let ground = surface(x, y).unwrap_or(0.0);
+        let ground = nearest_ground(surface, x, y).unwrap_or(0.0);
         Self {
             surface,
             give_mm_per_n: 1.0 / wall_n_per_mm + 1e3 * hand.give_m_per_n(),
@@ -57,12 +58,26 @@ impl<'a> Touch<'a> {
     /// Slides along a line on the map (mm) while pressing with a force.
     #[must_use]
     pub fn slide(mut self, line_mm: &[[f64; 2]], newtons: f64, speed_mm_s: f64) -> Self {
+        let points = self.follow(&self.course(line_mm), newtons);
+        self.script = self.script.along(&points, speed_mm_s);
+        self
+    }
+
+    /// How long the way of such a slide is, ups and downs included, mm.
+    #[must_use]
+    pub fn slide_length_mm(&self, line_mm: &[[f64; 2]], newtons: f64) -> f64 {
+        let points = self.follow(&self.course(line_mm), newtons);
+        let pairs = points.windows(2);
+        let step = |a: [f64; 3], b: [f64; 3]| glam::DVec3::from(a).distance(b.into());
+        pairs.map(|pair| step(pair[0], pair[1])).sum()
+    }
+
+    /// Closely spaced points from where the hand is along a line.
+    fn course(&self, line_mm: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let [x, y, _] = self.script.end_mm();
         let mut line = vec![[x, y]];
         line.extend_from_slice(line_mm);
-        let points = self.follow(&resample(&line), newtons);
-        self.script = self.script.along(&points, speed_mm_s);
-        self
+        resample(&line)
     }
 
     /// Lifts and presses again, several times, with a force at the bottom.
@@ -78,7 +93,7 @@ impl<'a> Touch<'a> {
     #[must_use]
     pub fn lift(mut self, above_mm: f64) -> Self {
         let [x, y, z] = self.script.end_mm();
-        let ground = (self.surface)(x, y).unwrap_or(z);
+        let ground = nearest_ground(self.surface, x, y).unwrap_or(z);
         self.script = self.script.go([x, y, ground + above_mm], APPROACH_MM_S);
         self
     }
@@ -127,6 +142,17 @@ impl<'a> Touch<'a> {
     }
 }
 
+/// Ground at a place or on the first of growing rings around it that has any.
+fn nearest_ground(surface: Surface<'_>, x: f64, y: f64) -> Option<f64> {
+    let on_ring = |radius: u32| {
+        (0..24).find_map(|turn| {
+            let (sin, cos) = libm::sincos(f64::from(turn) * std::f64::consts::TAU / 24.0);
+            surface(x + f64::from(radius) * cos, y + f64::from(radius) * sin)
+        })
+    };
+    surface(x, y).or_else(|| (1..=200).find_map(on_ring))
+}
+
 /// Points at most [`SLIDE_STEP_MM`] apart along a line.
 fn resample(line: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut points = vec![line[0]];
@@ -139,41 +165,6 @@ fn resample(line: &[[f64; 2]]) -> Vec<[f64; 2]> {
         }
     }
     points
-}
-
-/// The demonstration: come down on the surface, press, slide a winding line
-/// across a rectangle, tap three times, lift.
-///
-/// `centre_mm` and `half_mm` (east, north) give the rectangle, which should lie
-/// on the data and within the arm's reach; `push_n` the force of the slide.
-#[must_use]
-pub fn tour(
-    surface: Surface<'_>,
-    hand: &HandModel,
-    wall_n_per_mm: f64,
-    centre_mm: [f64; 2],
-    half_mm: [f64; 2],
-    push_n: f64,
-) -> Script {
-    let line = winding(centre_mm, half_mm);
-    Touch::start(surface, hand, wall_n_per_mm, line[0], 12.0)
-        .press(2.0 * push_n, 0.6)
-        .slide(&line, push_n, 45.0)
-        .tap(3, 1.5 * push_n)
-        .lift(12.0)
-        .finish()
-}
-
-/// One and a half waves from west to east.
-fn winding(centre_mm: [f64; 2], half_mm: [f64; 2]) -> Vec<[f64; 2]> {
-    (0..=240)
-        .map(|i| {
-            let u = f64::from(i) / 240.0;
-            let turn = libm::sin(3.0 * std::f64::consts::PI * u);
-            let x = centre_mm[0] + half_mm[0] * (2.0 * u - 1.0);
-            [x, centre_mm[1] + half_mm[1] * turn]
-        })
-        .collect()
 }
 
 #[cfg(test)]
@@ -195,6 +186,13 @@ mod tests {
     }
 
     #[test]
+    fn starting_in_a_hole_is_above_the_rim() {
+        let surface = |x: f64, _: f64| (x > 30.0).then_some(45.0);
+        let plan = Touch::start(&surface, &HAND(), 0.5, [0.0, 0.0], 5.0).finish();
+        assert_eq!(plan.end_mm(), [0.0, 0.0, 50.0]);
+    }
+
+    #[test]
     fn a_slide_follows_the_slope_and_clears_a_hole() {
         let surface = |x: f64, _: f64| (!(20.0..30.0).contains(&x)).then_some(0.5 * x);
         let plan = Touch::start(&surface, &HAND(), 0.5, [0.0, 0.0], 5.0)
@@ -208,12 +206,5 @@ mod tests {
                 assert!((z - (0.5 * x - 5.833)).abs() < 0.01, "x {x}: {z}");
             }
         }
-    }
-
-    #[test]
-    fn a_tour_over_nothing_is_still_a_plan() {
-        let plan = tour(&|_, _| None, &HAND(), 0.5, [50.0, 50.0], [30.0, 20.0], 1.0);
-        assert!(plan.duration_s() > 1.0);
-        assert!(plan.corners_mm().flatten().all(f64::is_finite));
     }
 }

@@ -1,0 +1,215 @@
+//! The demonstration that suits a terrain: where to touch it and how.
+
+use super::{HandModel, OutOfReach, PhantomModel, Placement, Rig, Script, Surface, Touch};
+
+/// Half the size of the place that is touched, east and north, mm: most of
+/// what a Premium 1.5 reaches at any height.
+const HALF_MM: [f64; 2] = [70.0, 35.0];
+/// Share of the terrain's half size that is used at most.
+const INSIDE: f64 = 0.84;
+/// Tried one after the other until the arm reaches all of the plan.
+const SHRINK: [f64; 4] = [1.0, 0.6, 0.35, 0.2];
+/// Places tried in each direction.
+const PLACES: u32 = 11;
+/// More relief than this makes a place no more worth touching, mm.
+const ENOUGH_RELIEF_MM: f64 = 25.0;
+/// Slowest and fastest slide, mm/s, and its length aimed at, s.
+const SLIDE_MM_S: (f64, f64) = (45.0, 120.0);
+const SLIDE_S: f64 = 7.0;
+
+/// A plan and where the terrain has to lie for it.
+#[derive(Clone, Debug)]
+pub struct Tour {
+    /// Come down, press, slide along a winding line, tap three times, lift.
+    pub script: Script,
+    /// The middle of the plan at the arm's home.
+    pub placement: Placement,
+}
+
+/// What a tour is planned for.
+#[derive(Clone, Copy)]
+pub struct TourPlan<'a> {
+    /// The terrain, mm.
+    pub surface: Surface<'a>,
+    /// Its extent east and north, mm.
+    pub size_mm: [f64; 2],
+    /// The arm.
+    pub model: PhantomModel,
+    /// The hand.
+    pub hand: HandModel,
+    /// Stiffness of the surface, N/mm.
+    pub wall_n_per_mm: f64,
+    /// Force of the slide, N; presses are twice as strong.
+    pub push_n: f64,
+}
+
+impl TourPlan<'_> {
+    /// Finds the place with the fewest holes and enough relief, the more
+    /// central the better, and plans a tour there.
+    ///
+    /// # Errors
+    /// [`OutOfReach`] if even a small tour has points beyond the arm's reach:
+    /// the terrain is too tall for the hand.
+    pub fn plan(&self) -> Result<Tour, OutOfReach> {
+        let mut error = None;
+        for shrink in SHRINK {
+            let half =
+                [0, 1].map(|i| shrink * f64::min(HALF_MM[i], 0.5 * INSIDE * self.size_mm[i]));
+            let tour = self.at(&winding(self.best_place(half), half));
+            match tour.check(&self.model) {
+                Ok(()) => return Ok(tour),
+                Err(far) => error = error.or(Some(far)),
+            }
+        }
+        Err(error.unwrap_or(OutOfReach {
+            at_mm: [0.0; 3],
+            home_mm: [0.0; 3],
+        }))
+    }
+
+    /// The rig of the tour, hand on the arm at the first point.
+    ///
+    /// # Errors
+    /// As [`TourPlan::plan`].
+    pub fn rig(&self) -> Result<Rig, OutOfReach> {
+        let tour = self.plan()?;
+        Rig::new(self.model, self.hand, tour.placement, tour.script)
+    }
+
+    fn at(&self, line: &[[f64; 2]]) -> Tour {
+        let touch = Touch::start(self.surface, &self.hand, self.wall_n_per_mm, line[0], 12.0)
+            .press(2.0 * self.push_n, 0.6);
+        let length = touch.slide_length_mm(line, self.push_n);
+        let speed = (length / SLIDE_S).clamp(SLIDE_MM_S.0, SLIDE_MM_S.1);
+        let script = touch
+            .slide(line, self.push_n, speed)
+            .tap(3, 1.5 * self.push_n)
+            .lift(12.0)
+            .finish();
+        Tour {
+            placement: Placement {
+                home_mm: middle(&script),
+            },
+            script,
+        }
+    }
+
+    fn best_place(&self, half: [f64; 2]) -> [f64; 2] {
+        let along = |step: u32, axis: usize| {
+            let room = (0.5 * self.size_mm[axis] - half[axis] / INSIDE).max(0.0);
+            0.5 * self.size_mm[axis] + room * (2.0 * f64::from(step) / f64::from(PLACES - 1) - 1.0)
+        };
+        let places = (0..PLACES * PLACES).map(|i| [along(i % PLACES, 0), along(i / PLACES, 1)]);
+        let scored = places.map(|place| (self.worth(place, half), place));
+        scored
+            .reduce(|best, next| if next.0 > best.0 { next } else { best })
+            .map_or([0.5 * self.size_mm[0], 0.5 * self.size_mm[1]], |best| {
+                best.1
+            })
+    }
+
+    /// How good a place is: known ground counts most, then relief up to what
+    /// is enough, then being central.
+    fn worth(&self, place: [f64; 2], half: [f64; 2]) -> f64 {
+        let line = winding(place, half);
+        let mut known = 0u32;
+        let (mut low, mut high) = (f64::MAX, f64::MIN);
+        for height in line.iter().filter_map(|p| (self.surface)(p[0], p[1])) {
+            known += 1;
+            (low, high) = (low.min(height), high.max(height));
+        }
+        let share = f64::from(known) / line.len() as f64;
+        let relief = (high - low).clamp(0.0, ENOUGH_RELIEF_MM) / ENOUGH_RELIEF_MM;
+        let off = |axis: usize| (2.0 * place[axis] / self.size_mm[axis] - 1.0).abs();
+        // It comes down at one end and taps at the other.
+        let ends = [line[0], line[line.len() - 1]];
+        let holes = ends.iter().filter(|p| (self.surface)(p[0], p[1]).is_none());
+        10.0 * share + relief - 0.2 * off(0).max(off(1)) - 4.0 * holes.count() as f64
+    }
+}
+
+impl Tour {
+    fn check(&self, model: &PhantomModel) -> Result<(), OutOfReach> {
+        let mut corners = self.script.corners_mm();
+        match corners.find(|at| !self.placement.reaches(model, *at)) {
+            None => Ok(()),
+            Some(at_mm) => Err(OutOfReach {
+                at_mm,
+                home_mm: self.placement.home_mm,
+            }),
+        }
+    }
+}
+
+/// The middle of the box around a script.
+fn middle(script: &Script) -> [f64; 3] {
+    let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
+    for corner in script.corners_mm() {
+        for axis in 0..3 {
+            low[axis] = low[axis].min(corner[axis]);
+            high[axis] = high[axis].max(corner[axis]);
+        }
+    }
+    std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]))
+}
+
+/// One and a half waves from west to east.
+fn winding(centre_mm: [f64; 2], half_mm: [f64; 2]) -> Vec<[f64; 2]> {
+    (0..=240)
+        .map(|i| {
+            let u = f64::from(i) / 240.0;
+            let turn = libm::sin(3.0 * std::f64::consts::PI * u);
+            let x = centre_mm[0] + half_mm[0] * (2.0 * u - 1.0);
+            [x, centre_mm[1] + half_mm[1] * turn]
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan<'a>(surface: Surface<'a>, size_mm: [f64; 2]) -> TourPlan<'a> {
+        TourPlan {
+            surface,
+            size_mm,
+            model: PhantomModel::premium_1_5(),
+            hand: HandModel::default(),
+            wall_n_per_mm: 0.5,
+            push_n: 1.0,
+        }
+    }
+
+    #[test]
+    fn stays_on_the_data_and_off_the_holes() {
+        // Only the north-east quarter is known.
+        let surface = |x: f64, y: f64| (x > 500.0 && y > 400.0).then_some(3.0);
+        let tour = plan(&surface, [1000.0, 800.0]).plan().expect("in reach");
+        for [x, y, _] in tour.script.corners_mm() {
+            assert!(surface(x, y).is_some(), "{x} {y}");
+            assert!(x < 1000.0 && y < 800.0);
+        }
+    }
+
+    #[test]
+    fn a_tall_terrain_is_toured_small_and_a_wall_of_a_metre_not_at_all() {
+        let steep = |x: f64, _: f64| Some(2.0 * x);
+        let tour = plan(&steep, [300.0, 200.0]).plan().expect("small tour");
+        let east = tour.script.corners_mm().map(|c| c[0]);
+        let (low, high) = east.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+        assert!(high - low < 130.0 && high - low > 20.0, "{low} {high}");
+        let cliff = |x: f64, _: f64| Some(if x > 150.0 { 1000.0 } else { 0.0 } + x * 40.0);
+        assert!(plan(&cliff, [300.0, 200.0]).plan().is_err());
+    }
+
+    #[test]
+    fn tiny_and_empty_terrains_have_a_plan() {
+        let nothing = |_: f64, _: f64| None;
+        for size in [[1.0, 1.0], [500.0, 0.5], [40.0, 80.0]] {
+            for surface in [&(|_: f64, _: f64| Some(0.0)) as Surface<'_>, &nothing] {
+                let tour = plan(surface, size).plan().expect("in reach");
+                assert!(tour.script.corners_mm().flatten().all(f64::is_finite));
+            }
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! Shaded relief: a colour for height, a shade for slope.
+//!
+//! The work depends on the picture's size only: each pixel takes the mean of
+//! at most 3 × 3 samples spread over the ground it covers, whatever the size
+//! of the field, and nothing is copied.
+
+use plotters::style::RGBColor;
+
+use super::style::{self, PAPER};
+use super::window::Window;
+
+/// A terrain as a picture sees it.
+#[derive(Clone, Copy)]
+pub struct Field<'a> {
+    /// Height in mm at (east, north) in mm; `None` in a hole and off the data.
+    pub height_mm: &'a dyn Fn(f64, f64) -> Option<f64>,
+    /// Extent east and north from the south-west sample, mm.
+    pub size_mm: [f64; 2],
+    /// One cell, mm.
+    pub cell_mm: f64,
+}
+
+/// Samples a pixel in each direction, at most.
+const MAX_SAMPLES: u32 = 3;
+/// Slopes are exaggerated until this share of them is below 45°.
+const GENTLE_SHARE: f64 = 0.85;
+/// But not more than this.
+const MAX_EXAGGERATION: f64 = 30.0;
+/// Directions towards the lights (east, north, up) and their strengths: the
+/// main one in the north-west, as maps have it.
+const LIGHTS: [([f64; 3], f64); 3] = [
+    ([-0.5, 0.5, 0.707], 0.65),
+    ([-0.77, -0.2, 0.6], 0.2),
+    ([0.3, 0.74, 0.6], 0.15),
+];
+/// Colours from low to high.
+const TINTS: [RGBColor; 6] = [
+    RGBColor(104, 142, 124),
+    RGBColor(146, 170, 132),
+    RGBColor(196, 200, 152),
+    RGBColor(226, 210, 170),
+    RGBColor(206, 180, 150),
+    RGBColor(245, 241, 236),
+];
+/// Holes: stripes of these two.
+const HOLE: [RGBColor; 2] = [RGBColor(232, 234, 240), RGBColor(178, 184, 198)];
+
+/// A finished relief.
+pub(super) struct Relief {
+    pub(super) columns: i32,
+    pub(super) rows: i32,
+    /// RGB, row by row from the north.
+    pub(super) rgb: Vec<u8>,
+    /// Heights of the first and last tint, mm.
+    pub(super) range_mm: (f64, f64),
+    pub(super) holes: bool,
+}
+
+/// The tint of a height, `t` from 0 (low) to 1 (high).
+pub(super) fn tint(t: f64) -> RGBColor {
+    let at = t.clamp(0.0, 1.0) * (TINTS.len() - 1) as f64;
+    let below = (at as usize).min(TINTS.len() - 2);
+    style::mix(TINTS[below], TINTS[below + 1], at - below as f64)
+}
+
+/// The colour of a hole's pixel.
+pub(super) fn hole(x: i32, y: i32) -> RGBColor {
+    HOLE[usize::from((x + y).rem_euclid(8) < 2)]
+}
+
+/// Shades a window of a field into an image.
+pub(super) fn shade(field: &Field<'_>, window: &Window, columns: i32, rows: i32) -> Relief {
+    let grid = Grid::sample(field, window, columns, rows);
+    let range_mm = grid.range();
+    let exaggeration = grid.exaggeration();
+    let mut rgb = Vec::with_capacity((columns * rows * 3) as usize);
+    let mut holes = false;
+    for y in 0..rows {
+        for x in 0..columns {
+            let RGBColor(r, g, b) = match grid.at(x, y) {
+                Some(height) => {
+                    let t = (height - range_mm.0) / (range_mm.1 - range_mm.0).max(1e-9);
+                    lit(tint(t), grid.slope(x, y).map(|s| s * exaggeration))
+                }
+                None if grid.outside(field, window, x, y) => PAPER,
+                None => {
+                    holes = true;
+                    hole(x, y)
+                }
+            };
+            rgb.extend([r, g, b]);
+        }
+    }
+    Relief {
+        columns,
+        rows,
+        rgb,
+        range_mm,
+        holes,
+    }
+}
+
+/// A tint under the lights; a level surface keeps it.
+fn lit(tint: RGBColor, slope: [f64; 2]) -> RGBColor {
+    let [east, north] = slope;
+    let length = (east * east + north * north + 1.0).sqrt();
+    let mut light = 0.0;
+    let mut level = 0.0;
+    for ([x, y, z], strength) in LIGHTS {
+        light += strength * ((z - x * east - y * north) / length).max(0.0);
+        level += strength * z;
+    }
+    let shade = light / level;
+    if shade < 1.0 {
+        style::mix(RGBColor(34, 40, 62), tint, 0.12 + 0.88 * shade)
+    } else {
+        style::mix(
+            tint,
+            RGBColor(255, 252, 244),
+            ((shade - 1.0) * 1.6).min(0.85),
+        )
+    }
+}
+
+/// Mean heights of the pixels, row 0 in the north.
+struct Grid {
+    columns: i32,
+    rows: i32,
+    pixel_mm: f64,
+    heights: Vec<Option<f64>>,
+}
+
+impl Grid {
+    fn sample(field: &Field<'_>, window: &Window, columns: i32, rows: i32) -> Self {
+        let step = [
+            window.width / f64::from(columns),
+            window.height / f64::from(rows),
+        ];
+        let wanted = (step[0] / field.cell_mm).ceil().max(1.0);
+        let samples = (wanted as u32).min(MAX_SAMPLES);
+        let north = window.south + window.height;
+        let mut heights = Vec::with_capacity((columns * rows) as usize);
+        for y in 0..rows {
+            for x in 0..columns {
+                let corner = [
+                    window.west + f64::from(x) * step[0],
+                    north - f64::from(y + 1) * step[1],
+                ];
+                heights.push(mean(field, corner, step, samples));
+            }
+        }
+        Self {
+            columns,
+            rows,
+            pixel_mm: step[0],
+            heights,
+        }
+    }
+
+    fn at(&self, x: i32, y: i32) -> Option<f64> {
+        let inside = (0..self.columns).contains(&x) && (0..self.rows).contains(&y);
+        inside.then(|| self.heights[(y * self.columns + x) as usize])?
+    }
+
+    /// Rise towards the east and the north, from the neighbours there are.
+    fn slope(&self, x: i32, y: i32) -> [f64; 2] {
+        let here = self.at(x, y);
+        let rise = |low: Option<f64>, high: Option<f64>| match (low, here, high) {
+            (Some(low), _, Some(high)) => (high - low) / (2.0 * self.pixel_mm),
+            (Some(low), Some(here), None) => (here - low) / self.pixel_mm,
+            (None, Some(here), Some(high)) => (high - here) / self.pixel_mm,
+            _ => 0.0,
+        };
+        [
+            rise(self.at(x - 1, y), self.at(x + 1, y)),
+            rise(self.at(x, y + 1), self.at(x, y - 1)),
+        ]
+    }
+
+    /// Heights that nearly all pixels lie between: one spike does not make the
+    /// rest one colour.
+    fn range(&self) -> (f64, f64) {
+        let mut known: Vec<f64> = self.heights.iter().flatten().copied().collect();
+        if known.is_empty() {
+            return (0.0, 1.0);
+        }
+        known.sort_by(f64::total_cmp);
+        let share = |s: f64| known[((known.len() - 1) as f64 * s) as usize];
+        (share(0.002), share(0.998))
+    }
+
+    fn exaggeration(&self) -> f64 {
+        let slope = |x, y| self.at(x, y).map(|_| self.slope(x, y));
+        let mut steepness: Vec<f64> = (0..self.rows)
+            .step_by(3)
+            .flat_map(|y| {
+                (0..self.columns)
+                    .step_by(3)
+                    .filter_map(move |x| slope(x, y))
+            })
+            .map(|[east, north]| east.hypot(north))
+            .filter(|s| *s > 0.0)
+            .collect();
+        if steepness.is_empty() {
+            return 1.0;
+        }
+        steepness.sort_by(f64::total_cmp);
+        let gentle = steepness[((steepness.len() - 1) as f64 * GENTLE_SHARE) as usize];
+        (1.0 / gentle).clamp(0.2, MAX_EXAGGERATION)
+    }
+
+    /// Whether a pixel's middle lies off the data, rather than in a hole.
+    fn outside(&self, field: &Field<'_>, window: &Window, x: i32, y: i32) -> bool {
+        let east = window.west + (f64::from(x) + 0.5) * self.pixel_mm;
+        let north = window.south + window.height - (f64::from(y) + 0.5) * self.pixel_mm;
+        !(0.0..=field.size_mm[0]).contains(&east) || !(0.0..=field.size_mm[1]).contains(&north)
+    }
+}
+
+/// Mean of the known among `samples`² heights in a pixel; a pixel that is half
+/// hole is a hole.
+fn mean(field: &Field<'_>, corner: [f64; 2], step: [f64; 2], samples: u32) -> Option<f64> {
+    let (mut sum, mut known) = (0.0, 0);
+    let at =
+        |i: u32, axis: usize| corner[axis] + (f64::from(i) + 0.5) / f64::from(samples) * step[axis];
+    for j in 0..samples {
+        for i in 0..samples {
+            let height = (field.height_mm)(at(i, 0), at(j, 1)).filter(|h| h.is_finite());
+            sum += height.unwrap_or(0.0);
+            known += u32::from(height.is_some());
+        }
+    }
+    (2 * known > samples * samples).then(|| sum / f64::from(known))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    fn brightness(relief: &Relief, x: i32, y: i32) -> u32 {
+        let at = ((y * relief.columns + x) * 3) as usize;
+        relief.rgb[at..at + 3].iter().map(|v| u32::from(*v)).sum()
+    }
+
+    #[test]
+    fn light_comes_from_the_north_west_and_a_hole_is_striped() {
+        // A cone with a hole at its top.
+        let height = |x: f64, y: f64| {
+            let r = (x - 50.0).hypot(y - 50.0);
+            (r > 12.0).then_some(100.0 - r)
+        };
+        let field = Field {
+            height_mm: &height,
+            size_mm: [100.0, 100.0],
+            cell_mm: 1.0,
+        };
+        let relief = shade(&field, &Window::whole(field.size_mm), 100, 100);
+        assert!(brightness(&relief, 30, 30) > brightness(&relief, 70, 70) + 100);
+        assert!(relief.holes);
+        let RGBColor(r, ..) = hole(50, 50);
+        assert_eq!(relief.rgb[(50 * 100 + 50) * 3], r);
+    }
+
+    #[test]
+    fn work_is_bounded_by_the_picture_not_the_field() {
+        let asked = Cell::new(0u64);
+        let height = |x: f64, y: f64| {
+            asked.set(asked.get() + 1);
+            Some(x.sin() + y.cos())
+        };
+        let field = Field {
+            height_mm: &height,
+            size_mm: [1e6, 1e6],
+            cell_mm: 1.0,
+        };
+        shade(&field, &Window::whole(field.size_mm), 200, 100);
+        assert!(asked.get() <= 200 * 100 * 9);
+    }
+
+    #[test]
+    fn nothing_but_holes_and_wild_heights_still_shade() {
+        for height in [None, Some(f64::INFINITY), Some(0.0), Some(1e30)] {
+            let field = Field {
+                height_mm: &|_, _| height,
+                size_mm: [10.0, 10.0],
+                cell_mm: 1.0,
+            };
+            let relief = shade(&field, &Window::whole(field.size_mm), 20, 20);
+            assert_eq!(relief.rgb.len(), 1200);
+        }
+    }
+}

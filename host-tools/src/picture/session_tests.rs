@@ -1,0 +1,86 @@
+//! Whole pictures, drawn and read back.
+
+use super::*;
+use crate::picture::style::{HIP, PROXY};
+
+fn hills(x: f64, y: f64) -> Option<f64> {
+    let far = (x - 70.0).hypot(y - 40.0) > 9.0;
+    far.then(|| 12.0 * libm::sin(x / 17.0) * libm::cos(y / 13.0))
+}
+
+fn walk() -> Vec<Sample> {
+    (0..4000)
+        .map(|i| {
+            let t_s = 1e-3 * f64::from(i);
+            let (x, y) = (20.0 + 15.0 * t_s, 50.0 + 25.0 * libm::sin(2.0 * t_s));
+            let ground = hills(x, y).unwrap_or(0.0);
+            let depth = 3.0 * libm::sin(3.0 * t_s);
+            let contact = depth > 0.0;
+            let up = if contact { 0.5 * depth } else { 0.0 };
+            Sample {
+                t_s,
+                hip_mm: [x, y, ground - depth],
+                proxy_mm: [x, y, ground - if contact { 0.0 } else { depth }],
+                force_n: [0.1 * up, 0.0, up],
+                contact,
+            }
+        })
+        .collect()
+}
+
+fn session<'a>(samples: &'a [Sample], size_mm: [f64; 2]) -> Session<'a> {
+    Session {
+        title: "Hills",
+        subtitle: "by formula · 1 cell = 1 mm",
+        field: Field {
+            height_mm: &hills,
+            size_mm,
+            cell_mm: 1.0,
+        },
+        samples,
+        facts: &[],
+    }
+}
+
+fn count(canvas: &Canvas, color: plotters::style::RGBColor) -> usize {
+    let rgb = canvas.to_rgb();
+    let same = |p: &&[u8; 3]| **p == [color.0, color.1, color.2];
+    rgb.as_chunks::<3>().0.iter().filter(same).count()
+}
+
+#[test]
+fn a_session_shows_hand_and_proxy_on_map_and_profile() {
+    let samples = walk();
+    let canvas = draw_session(&session(&samples, [100.0, 90.0])).expect("drawn");
+    assert!(count(&canvas, HIP) > 1500, "{}", count(&canvas, HIP));
+    assert!(count(&canvas, PROXY) > 1500, "{}", count(&canvas, PROXY));
+    let empty = draw_session(&session(&[], [100.0, 90.0])).expect("drawn");
+    assert!(count(&empty, HIP) < 300);
+}
+
+#[test]
+fn the_file_reads_back_with_the_size_it_was_drawn() {
+    let samples = walk();
+    let drawn = draw_session(&session(&samples, [5000.0, 3000.0])).expect("drawn");
+    let path = std::env::temp_dir().join(format!("hapterra-{}.png", std::process::id()));
+    drawn.save(&path).expect("written");
+    let file = std::io::BufReader::new(std::fs::File::open(&path).expect("there"));
+    let reader = png::Decoder::new(file).read_info().expect("a PNG");
+    let info = reader.info();
+    assert_eq!((info.width, info.height), drawn.size());
+    std::fs::remove_file(&path).expect("removed");
+}
+
+#[test]
+fn odd_sessions_are_drawn_too() {
+    let one = [walk()[0]];
+    let still = vec![walk()[0]; 50];
+    let mut wild = walk();
+    wild[7].hip_mm = [f64::NAN; 3];
+    wild[9].force_n = [f64::INFINITY, 0.0, 0.0];
+    for samples in [&one[..], &still, &wild] {
+        for size in [[100.0, 90.0], [1e5, 2.0], [3.0, 2000.0]] {
+            draw_session(&session(samples, size)).expect("drawn");
+        }
+    }
+}
