@@ -1,18 +1,230 @@
-//! `hapterra info`: what a terrain file holds.
+//! `hapterra info`: what a terrain file holds and how it would be streamed.
 
-use std::path::PathBuf;
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use hapterra_core::terrain::{POSTS, TILE_CELLS};
 
 use super::Failure;
+use super::input::Input;
+use crate::raster::{CellSize, CellUnit, Certainty, Raster};
 
 /// Arguments of `hapterra info`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Terrain file
-    pub file: PathBuf,
+    /// The terrain.
+    #[command(flatten)]
+    pub input: Input,
+
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Shows what the file holds.
+///
+/// # Errors
+/// When the file cannot be opened as a height field.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    println!("{}", args.file.display());
+    let raster = args.input.open()?;
+    let report = Report::new(&args.input, &raster);
+    if args.json {
+        println!(
+            "{}",
+            serde_json::to_string_pretty(&report).map_err(Failure::new)?
+        );
+    } else {
+        print!("{}", report.text());
+    }
     Ok(())
+}
+
+/// What is shown; the fields' names are those of the JSON.
+#[derive(Serialize)]
+struct Report {
+    file: String,
+    format: String,
+    /// Samples from west to east.
+    columns: u32,
+    /// Samples from south to north.
+    rows: u32,
+    cell: Option<Cell>,
+    /// Metres per vertical unit, where the file says so.
+    metres_per_vertical_unit: Option<f64>,
+    /// In the file's vertical unit.
+    lowest: f64,
+    highest: f64,
+    no_data: u64,
+    /// Bytes the samples take on the host.
+    bytes: usize,
+    levels: Vec<Level>,
+    remarks: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Cell {
+    east: f64,
+    north: f64,
+    unit: &'static str,
+    /// Whether the file states the unit; metres or degrees are assumed if not.
+    unit_stated: bool,
+    /// Ground length of both sides in metres.
+    east_m: f64,
+    north_m: f64,
+    /// Side of the square cell the hand feels.
+    felt_m: f64,
+}
+
+/// One level of detail: the field with every 2^level-th sample.
+#[derive(Serialize)]
+struct Level {
+    level: u8,
+    tile_columns: u32,
+    tile_rows: u32,
+    tiles: u64,
+    /// Bytes of all its tiles as single floats.
+    bytes: u64,
+}
+
+impl Report {
+    fn new(input: &Input, raster: &Raster) -> Self {
+        let summary = raster.summary();
+        Self {
+            file: input.file.display().to_string(),
+            format: raster.format().to_owned(),
+            columns: raster.columns(),
+            rows: raster.rows(),
+            cell: raster.cell().map(Cell::new),
+            metres_per_vertical_unit: raster.stated_metres_per_vertical_unit(),
+            lowest: summary.lowest,
+            highest: summary.highest,
+            no_data: summary.holes,
+            bytes: raster.samples().bytes(),
+            levels: levels(raster.columns(), raster.rows()),
+            remarks: raster.remarks().to_vec(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let samples = u64::from(self.columns) * u64::from(self.rows);
+        let mut text = String::new();
+        let mut line = |name: &str, value: String| {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "{name:<9} {value}");
+        };
+        line("file", self.file.clone());
+        line("format", self.format.clone());
+        line("size", format!("{} × {} samples", self.columns, self.rows));
+        line(
+            "cell",
+            self.cell.as_ref().map_or("unknown".into(), Cell::text),
+        );
+        line("heights", self.heights());
+        line("no data", {
+            let share = 100.0 * self.no_data as f64 / samples as f64;
+            format!("{} samples ({share:.2} %)", self.no_data)
+        });
+        line("memory", format!("{} bytes", self.bytes));
+        for level in &self.levels {
+            line(&format!("level {}", level.level), level.text());
+        }
+        for remark in &self.remarks {
+            line("remark", remark.clone());
+        }
+        text
+    }
+
+    fn heights(&self) -> String {
+        let unit = match self.metres_per_vertical_unit {
+            Some(1.0) => "m".to_owned(),
+            Some(metres) => format!("units of {metres} m"),
+            None => "(unit not stated: metres assumed)".to_owned(),
+        };
+        format!("{} to {} {unit}", self.lowest, self.highest)
+    }
+}
+
+impl Cell {
+    fn new(cell: CellSize) -> Self {
+        let (east_m, north_m) = cell.metres();
+        Self {
+            east: cell.east,
+            north: cell.north,
+            unit: match cell.unit {
+                CellUnit::Degree => "degree",
+                CellUnit::Length { metres: 1.0 } => "metre",
+                CellUnit::Length { .. } => "unit of length",
+            },
+            unit_stated: cell.certainty == Certainty::Stated,
+            east_m,
+            north_m,
+            felt_m: cell.square_metres(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let assumed = if self.unit_stated {
+            ""
+        } else {
+            " (unit assumed)"
+        };
+        let stored = format!("{} × {} {}{assumed}", self.east, self.north, self.unit);
+        let square = (self.east_m - self.north_m).abs() <= 1e-6 * self.north_m;
+        match (square, self.unit) {
+            (true, "metre") => stored,
+            (true, _) => format!("{stored}, {:.3} m on the ground", self.felt_m),
+            (false, _) => format!(
+                "{stored}, {:.3} × {:.3} m on the ground, felt as {:.3} m squares",
+                self.east_m, self.north_m, self.felt_m
+            ),
+        }
+    }
+}
+
+impl Level {
+    fn text(&self) -> String {
+        format!(
+            "{} × {} tiles = {} of {TILE_CELLS} × {TILE_CELLS} cells, {} bytes",
+            self.tile_columns, self.tile_rows, self.tiles, self.bytes
+        )
+    }
+}
+
+/// Levels of detail until one tile holds the field.
+fn levels(columns: u32, rows: u32) -> Vec<Level> {
+    let tile_bytes = (POSTS * POSTS * size_of::<f32>()) as u64;
+    let mut levels = Vec::new();
+    for level in 0..=31 {
+        let tiles = |samples: u32| ((samples - 1) >> level).max(1).div_ceil(TILE_CELLS as u32);
+        let (tile_columns, tile_rows) = (tiles(columns), tiles(rows));
+        let tiles = u64::from(tile_columns) * u64::from(tile_rows);
+        levels.push(Level {
+            level,
+            tile_columns,
+            tile_rows,
+            tiles,
+            bytes: tiles * tile_bytes,
+        });
+        if tiles == 1 {
+            break;
+        }
+    }
+    levels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_end_with_one_tile() {
+        let counts: Vec<(u32, u32)> = levels(129, 65)
+            .iter()
+            .map(|level| (level.tile_columns, level.tile_rows))
+            .collect();
+        assert_eq!(counts, [(4, 2), (2, 1), (1, 1)]);
+        assert_eq!(levels(2, 2).len(), 1);
+        assert_eq!(levels(34, 2)[0].tile_columns, 2);
+    }
 }

@@ -3,6 +3,7 @@
 
 pub mod failure;
 pub mod info;
+pub mod input;
 pub mod synth;
 
 use std::process::ExitCode;

@@ -1,0 +1,115 @@
+//! Why a file is not a terrain: what is wrong, and where.
+
+use std::path::{Path, PathBuf};
+
+/// A file that could not be opened as a height field: what is wrong with which file.
+#[derive(Debug, thiserror::Error)]
+#[error("{fault} ({})", path.display())]
+pub struct Error {
+    path: PathBuf,
+    fault: Fault,
+}
+
+impl Error {
+    pub(super) fn new(path: &Path, fault: Fault) -> Self {
+        Self {
+            path: path.to_path_buf(),
+            fault,
+        }
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What is wrong with it.
+    pub fn fault(&self) -> &Fault {
+        &self.fault
+    }
+}
+
+/// What is wrong with a file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Fault {
+    /// The operating system does not let us read it.
+    #[error("cannot read the file: {0}")]
+    Unreadable(std::io::Error),
+    /// Neither content nor extension say what it is.
+    #[error("unknown file format")]
+    UnknownFormat,
+    /// Raw samples carry no header, and none was stated.
+    #[error("raw samples, but nothing says how many: no size was stated")]
+    RawSizeMissing,
+    /// The format is known, this variant of it is not.
+    #[error("{format}: {feature} is not supported")]
+    Unsupported {
+        /// Name of the format.
+        format: &'static str,
+        /// What of it is missing.
+        feature: String,
+    },
+    /// Readable, but its samples are not heights.
+    #[error("not a height field: {0}")]
+    NotAHeightField(String),
+    /// A picture whose channels could each be the height; none was chosen.
+    #[error("not a height field: {0}")]
+    AmbiguousChannels(String),
+    /// No patch fits.
+    #[error("too small: {columns} × {rows} samples; a surface needs at least two samples each way")]
+    TooSmall {
+        /// Samples from west to east.
+        columns: u64,
+        /// Samples from south to north.
+        rows: u64,
+    },
+    /// There is no surface anywhere.
+    #[error("no surface: all {samples} samples are no-data")]
+    AllNoData {
+        /// Number of samples.
+        samples: u64,
+    },
+    /// A sample is infinite, or so large that it cannot be a height.
+    #[error("the sample at column {column}, row {row} of the file is {value}: not a height")]
+    NotANumber {
+        /// Column in the file, 0 first.
+        column: u64,
+        /// Row in the file, 0 first.
+        row: u64,
+        /// The sample.
+        value: f64,
+    },
+    /// The header promises more than the file can hold or a machine should.
+    #[error("absurd size in the header: {0}")]
+    AbsurdSize(String),
+    /// The file ends too early.
+    #[error("truncated file: {0}")]
+    Truncated(String),
+    /// The file contradicts itself or its format.
+    #[error("damaged file: {0}")]
+    Damaged(String),
+    /// A decoder of somebody else's panicked.
+    #[error("the {0} decoder failed on this file; it is most likely damaged")]
+    DecoderFailed(&'static str),
+}
+
+impl Fault {
+    /// Damage described in place.
+    pub(super) fn damaged(what: impl Into<String>) -> Self {
+        Self::Damaged(what.into())
+    }
+
+    /// An input error while decoding: an early end is a truncated file.
+    pub(super) fn from_io(error: std::io::Error, during: &str) -> Self {
+        match error.kind() {
+            std::io::ErrorKind::UnexpectedEof => {
+                Self::Truncated(format!("it ends while reading {during}"))
+            }
+            std::io::ErrorKind::InvalidData | std::io::ErrorKind::InvalidInput => {
+                Self::Damaged(format!("{during}: {error}"))
+            }
+            _ => Self::Unreadable(error),
+        }
+    }
+}

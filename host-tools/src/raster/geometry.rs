@@ -1,0 +1,135 @@
+//! What a cell measures on the ground, and a vertical unit in metres.
+
+/// The unit of a cell's sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CellUnit {
+    /// A length, in metres each.
+    Length {
+        /// Metres per unit.
+        metres: f64,
+    },
+    /// Degrees of longitude and latitude.
+    Degree,
+}
+
+/// Where a cell's size comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Certainty {
+    /// The file states size and unit.
+    Stated,
+    /// The file states the size; the unit is taken to be the usual one.
+    UnitAssumed,
+}
+
+/// The size of a cell: the distance between neighbouring samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CellSize {
+    /// Along a row, west to east, in `unit`s; positive.
+    pub east: f64,
+    /// Along a column, south to north, in `unit`s; positive.
+    pub north: f64,
+    /// Unit of both.
+    pub unit: CellUnit,
+    /// Latitude of the middle of the field in degrees, where known.
+    pub latitude: Option<f64>,
+    /// Whether the unit is stated or assumed.
+    pub certainty: Certainty,
+}
+
+impl CellSize {
+    /// The cell's sides (east, north) in metres.
+    ///
+    /// Degrees are converted at the middle latitude φ of the field with the
+    /// usual series for the WGS 84 ellipsoid, good to about a metre per degree:
+    ///
+    /// - one degree of latitude: 111132.92 − 559.82 cos 2φ + 1.175 cos 4φ metres,
+    /// - one degree of longitude: 111412.84 cos φ − 93.5 cos 3φ + 0.118 cos 5φ metres.
+    ///
+    /// Where the latitude is not known, a degree of longitude counts as long as
+    /// one of latitude at 45°.
+    pub fn metres(&self) -> (f64, f64) {
+        match self.unit {
+            CellUnit::Length { metres } => (self.east * metres, self.north * metres),
+            CellUnit::Degree => {
+                let phi = self.latitude.unwrap_or(45.0).to_radians();
+                let north = 111_132.92 - 559.82 * (2.0 * phi).cos() + 1.175 * (4.0 * phi).cos();
+                let east =
+                    111_412.84 * phi.cos() - 93.5 * (3.0 * phi).cos() + 0.118 * (5.0 * phi).cos();
+                let east = self.latitude.map_or(north, |_| east);
+                (self.east * east, self.north * north)
+            }
+        }
+    }
+
+    /// The side in metres of the square cell that stands for this one.
+    ///
+    /// The hand feels square cells. One that is not square on the ground (10 m
+    /// by 30 m, or an arc second away from the equator) is felt as the square of
+    /// the same area, so that its mean slope is kept.
+    pub fn square_metres(&self) -> f64 {
+        let (east, north) = self.metres();
+        (east * north).sqrt()
+    }
+
+    /// A size in a unit that the file leaves open: degrees when numbers this
+    /// small, at such a place, can hardly be a length, else metres.
+    ///
+    /// `corner` is the south-west corner in the same unit, `extent` the size of
+    /// the whole field.
+    pub(super) fn guessed(
+        (east, north): (f64, f64),
+        corner: Option<(f64, f64)>,
+        extent: (f64, f64),
+    ) -> Self {
+        let on_earth = corner.is_some_and(|(x, y)| {
+            // An origin of zero is a local frame, not a point in the Atlantic.
+            (x, y) != (0.0, 0.0)
+                && (-360.0..=360.0).contains(&x)
+                && (-360.0..=360.5).contains(&(x + extent.0))
+                && (-90.5..=90.5).contains(&y)
+                && (-90.5..=90.5).contains(&(y + extent.1))
+        });
+        let degrees = on_earth && east < 0.5 && north < 0.5;
+        let latitude = corner.map(|(_, y)| y + extent.1 / 2.0).filter(|_| degrees);
+        Self {
+            east,
+            north,
+            unit: if degrees {
+                CellUnit::Degree
+            } else {
+                CellUnit::Length { metres: 1.0 }
+            },
+            latitude,
+            certainty: Certainty::UnitAssumed,
+        }
+    }
+
+    /// Whether both sides are usable numbers.
+    pub(super) fn is_valid(&self) -> bool {
+        let (east, north) = self.metres();
+        let usable = |side: f64| side.is_finite() && side > 1e-12 && side < 1e12;
+        usable(east) && usable(north)
+    }
+}
+
+/// Metres in a unit of length by the name files give it, as `ft` or `metre`.
+pub(super) fn metres_in(unit: &str) -> Option<f64> {
+    let name: String = unit
+        .to_lowercase()
+        .chars()
+        .filter(|c| c.is_ascii_alphanumeric())
+        .collect();
+    Some(match name.as_str() {
+        "m" | "metre" | "metres" | "meter" | "meters" => 1.0,
+        "cm" | "centimetre" | "centimetres" | "centimeter" | "centimeters" => 0.01,
+        "mm" | "millimetre" | "millimetres" | "millimeter" | "millimeters" => 0.001,
+        "dm" | "decimetre" | "decimeter" | "decimetres" | "decimeters" => 0.1,
+        "km" | "kilometre" | "kilometres" | "kilometer" | "kilometers" => 1000.0,
+        "ft" | "foot" | "feet" | "internationalfoot" | "footinternational" => 0.3048,
+        "usft" | "ftus" | "ussurveyfoot" | "footus" | "surveyfoot" | "ussurveyfeet" => {
+            1200.0 / 3937.0
+        }
+        "fathom" | "fathoms" => 1.8288,
+        _ => return None,
+    })
+}

@@ -1,0 +1,73 @@
+//! What the user may say about a file that the file does not say itself.
+
+/// How to open a file. The default believes the file.
+#[derive(Clone, Debug, Default)]
+pub struct OpenOptions {
+    /// The file is raw samples of this layout, whatever its content looks like.
+    pub raw: Option<RawLayout>,
+    /// Which channel of a PNG holds the height. Without it: the grey of a grey
+    /// picture, the alpha of one with colours and an alpha that varies.
+    pub png_channel: Option<PngChannel>,
+    /// Stored sample value that means no data; replaces what the file says.
+    pub no_data: Option<f64>,
+}
+
+/// Layout of a raw file: rows from north to south, samples from west to east,
+/// nothing before, between or after.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RawLayout {
+    /// Samples from west to east.
+    pub columns: u32,
+    /// Samples from north to south.
+    pub rows: u32,
+    /// Type of a sample.
+    pub sample: RawSample,
+    /// Byte order of a sample.
+    pub endian: Endian,
+}
+
+/// Type of a raw sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum RawSample {
+    /// 8-bit unsigned
+    U8,
+    /// 8-bit signed
+    I8,
+    /// 16-bit unsigned
+    U16,
+    /// 16-bit signed
+    I16,
+    /// 32-bit unsigned
+    U32,
+    /// 32-bit signed
+    I32,
+    /// 32-bit IEEE float
+    F32,
+    /// 64-bit IEEE float
+    F64,
+}
+
+/// Byte order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Endian {
+    /// Least significant byte first
+    #[default]
+    Little,
+    /// Most significant byte first
+    Big,
+}
+
+/// A channel of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum PngChannel {
+    /// The grey of a grey picture
+    Grey,
+    /// Red
+    Red,
+    /// Green
+    Green,
+    /// Blue
+    Blue,
+    /// Alpha, where the paper's data holds the height
+    Alpha,
+}
