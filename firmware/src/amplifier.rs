@@ -1,0 +1,182 @@
+//! Amplifiers made of three current outputs and an enable pin, on
+//! embedded-hal's traits, so that a board only names its pins.
+
+use embedded_hal::digital::OutputPin;
+use embedded_hal::pwm::SetDutyCycle;
+
+use crate::board::{Amplifiers, EnabledAmplifiers};
+
+/// One channel that commands a current as a fraction of full scale.
+pub trait CurrentOutput {
+    /// Commands `fraction` of the amplifier's full-scale current, in -1..=1.
+    fn set(&mut self, fraction: f32);
+}
+
+/// An amplifier that reads its command from a duty cycle, 10 % for the largest
+/// negative current and 90 % for the largest positive one (Maxon ESCON).
+/// Anything outside 10-90 % is a broken wire to it.
+pub struct DutyCycle<P>(pub P);
+
+impl<P: SetDutyCycle> CurrentOutput for DutyCycle<P> {
+    fn set(&mut self, fraction: f32) {
+        let max = f32::from(self.0.max_duty_cycle());
+        // To the nearest step: cut off, full scale would fall below 10 %.
+        let duty = max * (0.5 + 0.4 * fraction) + 0.5;
+        // A duty cycle that the timer refuses leaves the last one; the ones
+        // computed here are below `max_duty_cycle`, which is all it may refuse.
+        let _ = self.0.set_duty_cycle(duty as u16);
+    }
+}
+
+/// A converter code for `fraction` of full scale, -1..=1, where the middle of
+/// `0..=max` is no current. Rounded to the nearest code, at most half off.
+#[must_use]
+pub fn offset_code(fraction: f32, max: u16) -> u16 {
+    let middle = f32::from(max) / 2.0;
+    // The cast saturates; the half makes truncation into rounding.
+    (middle + middle * fraction + 0.5) as u16
+}
+
+/// Three outputs and the pin that switches the power stages, off.
+pub struct Off<O, E> {
+    outputs: [O; 3],
+    enable: E,
+    full_scale_a: f32,
+}
+
+/// Three outputs and the pin that switches the power stages, on.
+pub struct On<O, E>(Off<O, E>);
+
+impl<O: CurrentOutput, E: OutputPin> Off<O, E> {
+    /// Takes the outputs for axes 1 to 3, the enable pin (high: on), and the
+    /// current in amperes that full scale stands for. Switches off first.
+    pub fn new(outputs: [O; 3], enable: E, full_scale_a: f32) -> Self {
+        let mut off = Self {
+            outputs,
+            enable,
+            full_scale_a,
+        };
+        off.switch_off();
+        off
+    }
+
+    fn command(&mut self, currents_a: [f32; 3]) {
+        for (output, current_a) in self.outputs.iter_mut().zip(currents_a) {
+            let fraction = (current_a / self.full_scale_a).clamp(-1.0, 1.0);
+            output.set(if fraction.is_nan() { 0.0 } else { fraction });
+        }
+    }
+
+    fn switch_off(&mut self) {
+        // A pin of this chip cannot fail to be written.
+        let _ = self.enable.set_low();
+        self.command([0.0; 3]);
+    }
+}
+
+impl<O: CurrentOutput, E: OutputPin> Amplifiers for Off<O, E> {
+    type Enabled = On<O, E>;
+
+    fn enable(mut self) -> On<O, E> {
+        self.command([0.0; 3]);
+        let _ = self.enable.set_high();
+        On(self)
+    }
+}
+
+impl<O: CurrentOutput, E: OutputPin> EnabledAmplifiers for On<O, E> {
+    type Disabled = Off<O, E>;
+
+    fn write(&mut self, currents_a: [f32; 3]) {
+        self.0.command(currents_a);
+    }
+
+    fn disable(mut self) -> Off<O, E> {
+        self.0.switch_off();
+        self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::cell::RefCell;
+    use core::convert::Infallible;
+    use embedded_hal::digital;
+    use embedded_hal::pwm;
+    use std::rc::Rc;
+    use std::string::String;
+    use std::vec::Vec;
+
+    /// What was written, in order: "1" and "0" for the pin, numbers for duties.
+    type Log = Rc<RefCell<Vec<String>>>;
+
+    struct Fake(Log);
+
+    impl digital::ErrorType for Fake {
+        type Error = Infallible;
+    }
+
+    impl OutputPin for Fake {
+        fn set_low(&mut self) -> Result<(), Infallible> {
+            self.0.borrow_mut().push("off".into());
+            Ok(())
+        }
+
+        fn set_high(&mut self) -> Result<(), Infallible> {
+            self.0.borrow_mut().push("on".into());
+            Ok(())
+        }
+    }
+
+    impl pwm::ErrorType for Fake {
+        type Error = Infallible;
+    }
+
+    impl SetDutyCycle for Fake {
+        fn max_duty_cycle(&self) -> u16 {
+            1000
+        }
+
+        fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
+            self.0.borrow_mut().push(duty.to_string());
+            Ok(())
+        }
+    }
+
+    fn amplifiers() -> (Off<DutyCycle<Fake>, Fake>, Log) {
+        let log = Log::default();
+        let output = || DutyCycle(Fake(log.clone()));
+        let off = Off::new([output(), output(), output()], Fake(log.clone()), 5.0);
+        assert_eq!(log.take(), ["off", "500", "500", "500"]);
+        (off, log)
+    }
+
+    #[test]
+    fn zero_is_commanded_before_switching_on_and_off_comes_first_after() {
+        let (off, log) = amplifiers();
+        let mut on = off.enable();
+        assert_eq!(log.take(), ["500", "500", "500", "on"]);
+        on.write([1.0, -2.5, 0.0]);
+        assert_eq!(log.take(), ["580", "300", "500"]);
+        let _off = on.disable();
+        assert_eq!(log.take(), ["off", "500", "500", "500"]);
+    }
+
+    #[test]
+    fn the_command_stays_within_10_and_90_percent_whatever_is_asked() {
+        let (off, log) = amplifiers();
+        let mut on = off.enable();
+        log.take();
+        on.write([1e30, f32::NEG_INFINITY, f32::NAN]);
+        assert_eq!(log.take(), ["900", "100", "500"]);
+    }
+
+    #[test]
+    fn converter_codes_span_the_range_and_are_nearest() {
+        assert_eq!(offset_code(-1.0, 4095), 0);
+        assert_eq!(offset_code(0.0, 4095), 2048);
+        assert_eq!(offset_code(1.0, 4095), 4095);
+        assert_eq!(offset_code(0.25, 4095), 2559);
+    }
+}

@@ -1,0 +1,168 @@
+//! The memory of the application, and the queues between its two halves.
+//!
+//! The loop runs in an interrupt and the link in a task below it. They share
+//! single-producer queues and two counters, and nothing else: no lock that one
+//! could wait for, no tile that both could touch.
+
+use core::sync::atomic::AtomicU32;
+
+use hapterra_core::phantom::Calibration;
+use hapterra_core::terrain::{IN_FLIGHT, Tile};
+use hapterra_core::tick::{Command, Haptics};
+use hapterra_core::wire::message::Sample;
+use heapless::spsc::Queue;
+
+use crate::board::{Amplifiers, Encoders, TickClock};
+use crate::haptic_loop::{HapticLoop, LoopEnds};
+use crate::link::{Identity, Link, LinkEnds};
+
+/// Tile buffers besides the window's: one for each tile on its way.
+pub const SPARES: usize = IN_FLIGHT;
+/// Slots of the command queue, one of which stays empty.
+const COMMANDS: usize = 16;
+/// Slots of the record queue: the link may sleep through this many ticks.
+const RECORDS: usize = 64;
+
+/// All tile buffers of a device with a window of `D × D` tiles.
+pub struct Tiles<const D: usize> {
+    window: [[Tile; D]; D],
+    spare: [Tile; SPARES],
+}
+
+impl<const D: usize> Tiles<D> {
+    /// Vacant buffers.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            window: [const { [const { Tile::VACANT }; D] }; D],
+            spare: [const { Tile::VACANT }; SPARES],
+        }
+    }
+}
+
+impl<const D: usize> Default for Tiles<D> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// One tick as the loop reports it to the link.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Record {
+    /// What was felt.
+    pub sample: Sample,
+    /// The number of the point that this answers.
+    pub answers: Option<u32>,
+}
+
+/// Signs of life, read by [`crate::supervisor`] and the link.
+#[derive(Debug, Default)]
+pub struct Vitals {
+    /// Ticks since the start, wrapping.
+    pub ticks: AtomicU32,
+    /// Turns of the link since the start, wrapping.
+    pub turns: AtomicU32,
+    /// Samples that found the queue full.
+    pub dropped: AtomicU32,
+}
+
+/// The queues between the loop and the link.
+pub struct Channels<'t> {
+    commands: Queue<Command<'t>, COMMANDS>,
+    /// Room for every buffer that can be on its way back.
+    spent: Queue<&'t mut Tile, { SPARES + 1 }>,
+    records: Queue<Record, RECORDS>,
+    vitals: Vitals,
+}
+
+impl Channels<'_> {
+    /// Empty queues.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            commands: Queue::new(),
+            spent: Queue::new(),
+            records: Queue::new(),
+            vitals: Vitals {
+                ticks: AtomicU32::new(0),
+                turns: AtomicU32::new(0),
+                dropped: AtomicU32::new(0),
+            },
+        }
+    }
+}
+
+impl Default for Channels<'_> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What a board brings to the application.
+pub struct Hardware<E, A, C> {
+    /// The encoders.
+    pub encoders: E,
+    /// The amplifiers, off.
+    pub amplifiers: A,
+    /// The tick's timer and the clock.
+    pub clock: C,
+    /// The Phantom's calibration record.
+    pub calibration: Calibration,
+}
+
+/// The application's two halves, and the signs of life of both.
+pub struct Application<'t, E, A: Amplifiers, C, const D: usize> {
+    /// For the timer interrupt.
+    pub haptic_loop: HapticLoop<'t, E, A, C, D>,
+    /// For the link task.
+    pub link: Link<'t, D>,
+    /// For the supervisor.
+    pub vitals: &'t Vitals,
+}
+
+/// Builds the application in the given memory. `board` is the name by which the
+/// host knows the board.
+pub fn assemble<'t, E, A, C, const D: usize>(
+    tiles: &'t mut Tiles<D>,
+    channels: &'t mut Channels<'t>,
+    hardware: Hardware<E, A, C>,
+    board: &str,
+) -> Application<'t, E, A, C, D>
+where
+    E: Encoders,
+    A: Amplifiers,
+    C: TickClock,
+{
+    let (to_loop, commands) = channels.commands.split();
+    let (spent, spent_here) = channels.spent.split();
+    let (records, records_here) = channels.records.split();
+    let vitals = &channels.vitals;
+    let window = tiles.window.each_mut().map(|row| row.each_mut());
+    let haptic_loop = HapticLoop::new(
+        Haptics::new(window, hardware.calibration),
+        LoopEnds {
+            commands,
+            spent,
+            records,
+            vitals,
+        },
+        hardware.encoders,
+        hardware.amplifiers,
+        hardware.clock,
+    );
+    let link = Link::new(
+        Identity::new::<C>(board),
+        tiles.spare.each_mut(),
+        LinkEnds {
+            commands: to_loop,
+            spent: spent_here,
+            records: records_here,
+            vitals,
+        },
+    );
+    Application {
+        haptic_loop,
+        link,
+        vitals,
+    }
+}

@@ -1,0 +1,37 @@
+//! Endless counts from the 16-bit counters of encoder timers.
+
+/// Follows a counter that wraps around at 2^16.
+///
+/// Exact while the counter moves less than 32,768 counts between two readings:
+/// at one reading a millisecond that is 8 motor turns, hundreds of times a
+/// Phantom's top speed.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Unwrapped {
+    last: u16,
+    total: i32,
+}
+
+impl Unwrapped {
+    /// Takes the counter's present reading and returns the total count.
+    pub fn follow(&mut self, reading: u16) -> i32 {
+        let moved = reading.wrapping_sub(self.last).cast_signed();
+        self.last = reading;
+        self.total = self.total.wrapping_add(i32::from(moved));
+        self.total
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_on_through_the_wrap_in_both_directions() {
+        let mut count = Unwrapped::default();
+        let mut truth = 0;
+        for step in [5, -10, 30_000, 30_000, 30_000, -32_768, -32_000, 32_767] {
+            truth += step;
+            assert_eq!(count.follow(truth as u16), truth);
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! What the timer interrupt calls a thousand times a second.
+//!
+//! It does only I/O and book-keeping around [`Haptics::tick`]: take what the
+//! link brought, read the encoders, tick, write the amplifiers, leave a record,
+//! measure what that cost. Everything it does is bounded and nothing waits.
+
+use core::sync::atomic::Ordering;
+
+use hapterra_core::guard::{Drive, Fault};
+use hapterra_core::terrain::Tile;
+use hapterra_core::tick::{Command, Haptics, Outcome};
+use hapterra_core::wire::message::Source;
+use heapless::spsc::{Consumer, Producer};
+
+use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, TickClock};
+use crate::channels::{Record, Vitals};
+use crate::timing::Timing;
+
+/// Commands taken in one tick, at most; the rest wait for the next.
+pub const COMMANDS_PER_TICK: usize = 4;
+
+/// Where the hand's position comes from at the moment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Feed {
+    /// There is no scene: nothing to feel, nothing to record.
+    Nothing,
+    /// The encoders.
+    Arm,
+    /// Points over the link; whether one is being felt.
+    Points { pending: bool },
+}
+
+/// The amplifiers in either of their states.
+enum Power<A: Amplifiers> {
+    Off(A),
+    On(A::Enabled),
+}
+
+/// The queues to and from the link, as the loop holds them.
+pub(crate) struct LoopEnds<'t> {
+    pub(crate) commands: Consumer<'t, Command<'t>>,
+    pub(crate) spent: Producer<'t, &'t mut Tile>,
+    pub(crate) records: Producer<'t, Record>,
+    pub(crate) vitals: &'t Vitals,
+}
+
+/// The haptic loop over a board's encoders `E`, amplifiers `A` and clock `C`,
+/// with a window of `D × D` tiles.
+pub struct HapticLoop<'t, E, A: Amplifiers, C, const D: usize> {
+    haptics: Haptics<'t, D>,
+    ends: LoopEnds<'t>,
+    encoders: E,
+    /// `None` only while the amplifiers change state.
+    power: Option<Power<A>>,
+    clock: C,
+    timing: Timing,
+    feed: Feed,
+    /// An answer that found the queue full; nothing else happens before it is out.
+    unsent: Option<Record>,
+}
+
+impl<'t, E, A, C, const D: usize> HapticLoop<'t, E, A, C, D>
+where
+    E: Encoders,
+    A: Amplifiers,
+    C: TickClock,
+{
+    pub(crate) fn new(
+        haptics: Haptics<'t, D>,
+        ends: LoopEnds<'t>,
+        encoders: E,
+        amplifiers: A,
+        clock: C,
+    ) -> Self {
+        Self {
+            haptics,
+            ends,
+            encoders,
+            power: Some(Power::Off(amplifiers)),
+            clock,
+            timing: Timing::new::<C>(),
+            feed: Feed::Nothing,
+            unsent: None,
+        }
+    }
+
+    /// One tick. Returns what the amplifiers were left with.
+    pub fn tick(&mut self) -> Drive {
+        let began = self.timing.begin(&mut self.clock);
+        self.ends.vitals.ticks.fetch_add(1, Ordering::Relaxed);
+        if let Some(record) = self.unsent.take() {
+            self.answer(record);
+            return Drive::default();
+        }
+        self.take_commands();
+        let drive = self.feel();
+        if self.timing.end(&self.clock, began) {
+            self.give_to_haptics(Command::Trip(Fault::TickOverrun));
+        }
+        drive
+    }
+
+    /// The board's encoders, for whoever feeds them from outside.
+    pub fn encoders_mut(&mut self) -> &mut E {
+        &mut self.encoders
+    }
+
+    fn take_commands(&mut self) {
+        for _ in 0..COMMANDS_PER_TICK {
+            let Some(command) = self.ends.commands.dequeue() else {
+                return;
+            };
+            match &command {
+                Command::Scene(scene) if scene.source == Source::Encoders => self.feed = Feed::Arm,
+                Command::Scene(_) => self.feed = Feed::Points { pending: false },
+                Command::Point(_) => self.feed = Feed::Points { pending: true },
+                _ => {}
+            }
+            self.give_to_haptics(command);
+        }
+    }
+
+    fn give_to_haptics(&mut self, command: Command<'t>) {
+        if let Some(tile) = self.haptics.accept(command) {
+            // The queue has room for every buffer there is.
+            let _ = self.ends.spent.enqueue(tile);
+        }
+    }
+
+    fn feel(&mut self) -> Drive {
+        match self.feed {
+            Feed::Arm => self.feel_arm(),
+            Feed::Points { pending: true } => self.feel_point(),
+            Feed::Points { pending: false } | Feed::Nothing => self.drive(Drive::default()),
+        }
+    }
+
+    fn feel_arm(&mut self) -> Drive {
+        let sense = self.encoders.sense();
+        if let Some(fault) = sense.fault {
+            self.give_to_haptics(Command::Trip(fault));
+        }
+        let outcome = self.haptics.tick(sense.counts);
+        let drive = self.drive(outcome.drive);
+        let record = self.record(outcome);
+        if self.ends.records.enqueue(record).is_err() {
+            self.ends.vitals.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+        drive
+    }
+
+    fn feel_point(&mut self) -> Drive {
+        let drive = self.drive(Drive::default());
+        let outcome = self.haptics.tick([0; 3]);
+        let record = self.record(outcome);
+        if outcome.answers.is_some() {
+            self.feed = Feed::Points { pending: false };
+            self.answer(record);
+        } else {
+            // Only tells the link what holds the point up: the next will, too.
+            let _ = self.ends.records.enqueue(record);
+        }
+        drive
+    }
+
+    /// Sends an answer on, or keeps it for the next tick: answers are not lost.
+    fn answer(&mut self, record: Record) {
+        self.unsent = self.ends.records.enqueue(record).err();
+    }
+
+    fn record(&self, mut outcome: Outcome) -> Record {
+        self.timing.fill(&mut outcome.sample);
+        Record {
+            sample: outcome.sample,
+            answers: outcome.answers,
+        }
+    }
+
+    /// Brings the amplifiers to what the tick asks for.
+    fn drive(&mut self, drive: Drive) -> Drive {
+        self.power = self.power.take().map(|power| match (power, drive.enabled) {
+            (Power::Off(off), false) => Power::Off(off),
+            (Power::On(on), false) => Power::Off(on.disable()),
+            (Power::Off(off), true) => Power::On(written(off.enable(), drive)),
+            (Power::On(on), true) => Power::On(written(on, drive)),
+        });
+        drive
+    }
+}
+
+fn written<A: EnabledAmplifiers>(mut amplifiers: A, drive: Drive) -> A {
+    amplifiers.write(drive.currents_a.to_array());
+    amplifiers
+}

@@ -1,0 +1,128 @@
+//! What waits to be sent: answers and requests first, telemetry after.
+
+use hapterra_core::wire::frame::encode;
+use hapterra_core::wire::message::{Telemetry, ToHost};
+
+/// Bytes kept for answers and requests.
+const URGENT: usize = 1024;
+/// The longest of those, which is `Felt` with every number at its longest.
+const LONGEST_URGENT: usize = 192;
+/// The longest telemetry frame: eight samples, every number at its longest.
+const LONGEST_TELEMETRY: usize = 1280;
+
+/// Bytes of whole frames on their way out.
+struct Pending<const N: usize> {
+    bytes: [u8; N],
+    sent: usize,
+    end: usize,
+}
+
+impl<const N: usize> Pending<N> {
+    const fn new() -> Self {
+        Self {
+            bytes: [0; N],
+            sent: 0,
+            end: 0,
+        }
+    }
+
+    const fn is_empty(&self) -> bool {
+        self.sent == self.end
+    }
+
+    const fn room(&self) -> usize {
+        N - (self.end - self.sent)
+    }
+
+    /// Appends a frame; false if it does not fit.
+    fn push(&mut self, message: &ToHost) -> bool {
+        self.bytes.copy_within(self.sent..self.end, 0);
+        (self.sent, self.end) = (0, self.end - self.sent);
+        let free = self.bytes.get_mut(self.end..).unwrap_or(&mut []);
+        let Some(frame) = encode(message, free) else {
+            return false;
+        };
+        self.end += frame.len();
+        true
+    }
+
+    fn take(&mut self, into: &mut [u8]) -> usize {
+        let waiting = self.bytes.get(self.sent..self.end).unwrap_or(&[]);
+        let n = waiting.len().min(into.len());
+        for (to, from) in into.iter_mut().zip(waiting) {
+            *to = *from;
+        }
+        self.sent += n;
+        n
+    }
+}
+
+/// Frames waiting for the writer, in two classes that never mix bytes.
+pub(crate) struct Outbox {
+    urgent: Pending<URGENT>,
+    telemetry: Pending<LONGEST_TELEMETRY>,
+    /// A zero goes first, so that whatever was cut off before is ended.
+    fence: bool,
+}
+
+impl Outbox {
+    pub(crate) const fn new() -> Self {
+        Self {
+            urgent: Pending::new(),
+            telemetry: Pending::new(),
+            fence: false,
+        }
+    }
+
+    /// Drops everything, as for a new session.
+    pub(crate) fn clear(&mut self) {
+        *self = Self::new();
+        self.fence = true;
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.urgent.is_empty() && self.telemetry.is_empty() && !self.fence
+    }
+
+    /// Whether any one answer or request surely fits.
+    pub(crate) fn has_room(&self) -> bool {
+        self.urgent.room() >= LONGEST_URGENT
+    }
+
+    /// Whether the writer has caught up with telemetry.
+    pub(crate) fn wants_telemetry(&self) -> bool {
+        self.telemetry.is_empty()
+    }
+
+    /// Queues an answer or a request; false if there was no room.
+    pub(crate) fn push(&mut self, message: &ToHost) -> bool {
+        self.urgent.push(message)
+    }
+
+    /// Queues the one telemetry message there is room for.
+    pub(crate) fn push_telemetry(&mut self, telemetry: Telemetry) -> bool {
+        self.telemetry.is_empty() && self.telemetry.push(&ToHost::Telemetry(telemetry))
+    }
+
+    /// Moves bytes to be sent next into `into`; returns how many.
+    pub(crate) fn take(&mut self, into: &mut [u8]) -> usize {
+        if self.fence {
+            let Some(first) = into.first_mut() else {
+                return 0;
+            };
+            *first = 0;
+            self.fence = false;
+            return 1;
+        }
+        // A frame that was begun is finished first; telemetry only ever holds
+        // one, and `urgent` is always sent to its end.
+        if self.telemetry.sent > 0 && !self.telemetry.is_empty() {
+            return self.telemetry.take(into);
+        }
+        if self.urgent.is_empty() {
+            self.telemetry.take(into)
+        } else {
+            self.urgent.take(into)
+        }
+    }
+}

@@ -1,0 +1,354 @@
+//! What the messages of one host mean, and what is sent to it.
+
+use core::sync::atomic::Ordering;
+
+use hapterra_core::terrain::{Focus, IN_FLIGHT, Puller, Tile};
+use hapterra_core::tick::Command;
+use hapterra_core::wire::frame::BadFrame;
+use hapterra_core::wire::message::{
+    BATCH, DeviceHello, Heights, HostHello, PROTOCOL, Point, Scene, Source, Telemetry, TileMessage,
+    ToDevice, ToHost,
+};
+use heapless::{Deque, Vec};
+
+use super::LinkEnds;
+use super::focus::follow;
+use super::outbox::Outbox;
+use crate::channels::{Record, SPARES};
+
+/// Samples kept for the writer; beyond them, new ones are dropped.
+const BACKLOG: usize = 24;
+/// Points a host may send ahead; beyond them, they are dropped.
+pub const POINTS_AHEAD: usize = 16;
+
+/// Where the conversation stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// No host has said hello, or one of another protocol did.
+    Closed,
+    /// A session.
+    Open,
+    /// The host said goodbye.
+    Ended,
+}
+
+/// Where a point of a replay stands.
+#[derive(Clone, Copy, Debug, Default)]
+struct Replay {
+    /// The number of the point that the loop is feeling.
+    under_way: Option<u32>,
+    /// The last answer, for a host that missed it.
+    last: Option<Record>,
+}
+
+/// The state of the link above the framing.
+pub(crate) struct Session<'t, const D: usize> {
+    stage: Stage,
+    hello: DeviceHello,
+    scene: Option<Scene>,
+    puller: Puller<D>,
+    focus: Option<Focus>,
+    previous: Record,
+    spare: Vec<&'t mut Tile, SPARES>,
+    ends: LinkEnds<'t>,
+    points: Deque<Point, POINTS_AHEAD>,
+    replay: Replay,
+    outbox: Outbox,
+    backlog: Deque<Record, BACKLOG>,
+    /// Telemetry samples packed in this session.
+    packed: u32,
+    /// Samples dropped here; those dropped by the loop are in the vitals.
+    dropped: u32,
+    bad_frames: u32,
+}
+
+impl<'t, const D: usize> Session<'t, D> {
+    pub(crate) fn new(
+        mut hello: DeviceHello,
+        spare: [&'t mut Tile; SPARES],
+        ends: LinkEnds<'t>,
+    ) -> Self {
+        hello.window = u8::try_from(D).unwrap_or(u8::MAX);
+        Self {
+            stage: Stage::Closed,
+            hello,
+            scene: None,
+            puller: Puller::new(),
+            focus: None,
+            previous: Record::default(),
+            spare: spare.into_iter().collect(),
+            ends,
+            points: Deque::new(),
+            replay: Replay::default(),
+            outbox: Outbox::new(),
+            backlog: Deque::new(),
+            packed: 0,
+            dropped: 0,
+            bad_frames: 0,
+        }
+    }
+
+    /// Whether a message can be acted on: it may need one command and one answer.
+    pub(crate) fn has_room(&self) -> bool {
+        self.ends.commands.ready() && self.outbox.has_room()
+    }
+
+    pub(crate) fn on_message(&mut self, message: ToDevice<'_>) {
+        match (message, self.stage) {
+            (ToDevice::Hello(hello), _) => self.open(hello),
+            (_, Stage::Closed | Stage::Ended) => {}
+            (ToDevice::Scene(scene), _) => self.take_scene(scene),
+            (ToDevice::Tile(tile), _) => self.take_tile(&tile),
+            (ToDevice::Point(point), _) => self.take_point(point),
+            (ToDevice::ClearFault, _) => self.command(Command::ClearFault),
+            (ToDevice::Bye, _) => self.stage = Stage::Ended,
+        }
+    }
+
+    pub(crate) fn on_bad_frame(&mut self, _bad: BadFrame) {
+        self.bad_frames = self.bad_frames.saturating_add(1);
+        // It may have been a tile. Where time stands still until that tile is
+        // there, the time-out would never come.
+        if self.scene.is_some_and(|scene| scene.hold_clock) {
+            self.puller.forget_asked();
+        }
+    }
+
+    pub(crate) const fn bad_frames(&self) -> u32 {
+        self.bad_frames
+    }
+
+    fn open(&mut self, hello: HostHello) {
+        self.interrupted();
+        self.packed = 0;
+        let answer = if hello.protocol == PROTOCOL {
+            self.stage = Stage::Open;
+            let epoch = self.scene.map(|scene| scene.epoch);
+            ToHost::Hello(DeviceHello {
+                epoch,
+                ..self.hello.clone()
+            })
+        } else {
+            self.stage = Stage::Closed;
+            ToHost::Refused { protocol: PROTOCOL }
+        };
+        self.say(&answer);
+    }
+
+    /// Forgets what was said and asked, keeps the scene and what is held.
+    pub(crate) fn interrupted(&mut self) {
+        self.outbox.clear();
+        self.backlog.clear();
+        self.points.clear();
+        self.puller.forget_asked();
+    }
+
+    fn take_scene(&mut self, scene: Scene) {
+        let accepted = scene.is_valid();
+        // The very scene in force goes on: its host came back.
+        if accepted && self.scene != Some(scene) {
+            self.puller.reset(scene.level, scene.size);
+            self.focus = None;
+            self.points.clear();
+            self.replay = Replay::default();
+            self.scene = Some(scene);
+            self.command(Command::Scene(scene));
+        }
+        let epoch = scene.epoch;
+        self.say(&ToHost::SceneTaken { epoch, accepted });
+    }
+
+    fn take_tile(&mut self, message: &TileMessage<'_>) {
+        let ours = self.scene.is_some_and(|s| s.epoch == message.epoch);
+        if !ours || !self.puller.awaits(message.key) {
+            return;
+        }
+        self.reclaim();
+        let Some(tile) = self.spare.pop() else {
+            return;
+        };
+        let key = message.key;
+        let filled = match message.heights {
+            Heights::Hole => tile.fill(key, 0, |_, _| f32::NAN),
+            Heights::Flat { base, height } => tile.fill(key, base, |_, _| height),
+            Heights::Samples { base, bytes } => tile.load(key, base, bytes),
+        };
+        if filled.is_err() {
+            tile.vacate();
+            self.give_back(tile);
+            return self.on_bad_frame(BadFrame::Content);
+        }
+        self.puller.received(key);
+        self.command(Command::Tile(tile));
+    }
+
+    /// A point is felt once; one that was answered is answered again.
+    fn take_point(&mut self, point: Point) {
+        if self.feels_arm() || self.scene.is_none() {
+            return;
+        }
+        let is = |seq: u32| seq == point.seq;
+        if let Some(last) = self.replay.last.filter(|r| r.answers.is_some_and(is)) {
+            return self.say_felt(last);
+        }
+        if self.replay.under_way.is_some_and(is) || self.points.iter().any(|p| is(p.seq)) {
+            return;
+        }
+        // A host that does not wait for answers loses points.
+        let _ = self.points.push_back(point);
+    }
+
+    pub(crate) fn turn(&mut self) {
+        self.ends.vitals.turns.fetch_add(1, Ordering::Relaxed);
+        self.reclaim();
+        self.collect();
+        self.feed_points();
+        self.ask();
+        self.pack();
+    }
+
+    /// Takes back the tile buffers that the loop is done with.
+    fn reclaim(&mut self) {
+        while let Some(tile) = self.ends.spent.dequeue() {
+            // It bears its own name if the window would not have it, and the
+            // name of what it pushed out otherwise: either is not held.
+            if let Some(key) = tile.key() {
+                self.puller.lost(key);
+            }
+            self.give_back(tile);
+        }
+    }
+
+    fn give_back(&mut self, tile: &'t mut Tile) {
+        // There are no more buffers than places.
+        let _ = self.spare.push(tile);
+    }
+
+    /// Reads what the loop recorded since the last turn.
+    fn collect(&mut self) {
+        while self.outbox.has_room() {
+            let Some(record) = self.ends.records.dequeue() else {
+                return;
+            };
+            self.focus = Some(follow(&self.previous, &record));
+            self.previous = record;
+            if record.answers.is_some() {
+                self.replay.under_way = None;
+                self.replay.last = Some(record);
+                self.say_felt(record);
+            } else if self.feels_arm() {
+                self.keep(record);
+            }
+        }
+    }
+
+    fn keep(&mut self, record: Record) {
+        if self.stage == Stage::Open && self.backlog.push_back(record).is_err() {
+            self.dropped = self.dropped.wrapping_add(1);
+        }
+    }
+
+    /// One point at a time: the loop would forget a second.
+    fn feed_points(&mut self) {
+        if self.replay.under_way.is_some() || !self.ends.commands.ready() {
+            return;
+        }
+        if let Some(point) = self.points.pop_front() {
+            self.replay.under_way = Some(point.seq);
+            self.command(Command::Point(point));
+        }
+    }
+
+    /// Asks for tiles, each with a buffer waiting for it.
+    fn ask(&mut self) {
+        let (Stage::Open, Some(scene)) = (self.stage, self.scene) else {
+            return;
+        };
+        let focus = self.focus.unwrap_or_else(|| Focus {
+            proxy: scene.home.column(),
+            hip: scene.home.column(),
+            ..Focus::default()
+        });
+        let now = self.ends.vitals.ticks.load(Ordering::Relaxed);
+        while self.outbox.has_room() && self.has_buffer_for_another() {
+            let Some(key) = self.puller.next_request(now, &focus) else {
+                return;
+            };
+            let epoch = scene.epoch;
+            self.say(&ToHost::Need { epoch, key });
+        }
+    }
+
+    /// With all under way that may be, the puller only asks again.
+    fn has_buffer_for_another(&self) -> bool {
+        let in_flight = self.puller.in_flight();
+        self.spare.len() > in_flight || in_flight == IN_FLIGHT
+    }
+
+    /// Packs the next telemetry message, once the last one has left.
+    fn pack(&mut self) {
+        let enough = self.backlog.len() >= BATCH || self.stage == Stage::Ended;
+        if !enough || self.backlog.is_empty() || !self.outbox.wants_telemetry() {
+            return;
+        }
+        let mut samples = Vec::new();
+        while !samples.is_full() {
+            let Some(record) = self.backlog.pop_front() else {
+                break;
+            };
+            let _ = samples.push(record.sample);
+        }
+        let first = self.packed;
+        self.packed = self.packed.wrapping_add(samples.len() as u32);
+        let lost_by_loop = self.ends.vitals.dropped.load(Ordering::Relaxed);
+        self.outbox.push_telemetry(Telemetry {
+            first,
+            dropped: self.dropped.wrapping_add(lost_by_loop),
+            samples,
+        });
+    }
+
+    pub(crate) fn transmit(&mut self, into: &mut [u8]) -> usize {
+        let mut n = 0;
+        while let Some(rest) = into.get_mut(n..).filter(|rest| !rest.is_empty()) {
+            match self.outbox.take(rest) {
+                0 => break,
+                more => n += more,
+            }
+        }
+        n
+    }
+
+    pub(crate) fn may_stand_still(&self) -> bool {
+        let Some(scene) = self.scene else {
+            return true;
+        };
+        let idle = scene.source == Source::Points && self.replay.under_way.is_none();
+        idle || (scene.hold_clock && self.puller.in_flight() > 0)
+    }
+
+    pub(crate) fn feels_arm(&self) -> bool {
+        self.scene.is_some_and(|s| s.source == Source::Encoders)
+    }
+
+    pub(crate) fn has_ended(&self) -> bool {
+        self.stage == Stage::Ended && self.backlog.is_empty() && self.outbox.is_empty()
+    }
+
+    fn command(&mut self, command: Command<'t>) {
+        // `has_room` was asked before anything that leads here.
+        let _ = self.ends.commands.enqueue(command);
+    }
+
+    fn say_felt(&mut self, record: Record) {
+        if let Some(seq) = record.answers.filter(|_| self.stage == Stage::Open) {
+            let sample = record.sample;
+            self.say(&ToHost::Felt { seq, sample });
+        }
+    }
+
+    fn say(&mut self, message: &ToHost) {
+        // `has_room` was asked before anything that leads here.
+        self.outbox.push(message);
+    }
+}

@@ -1,0 +1,80 @@
+//! The link as a task over a board's reader and writer.
+
+use core::cell::RefCell;
+
+use embassy_futures::join::join;
+use embassy_futures::select::select;
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_sync::signal::Signal;
+use embedded_io_async::{Read, Write};
+
+use super::Link;
+
+/// Bytes moved at once in either direction.
+const CHUNK: usize = 64;
+
+/// What the board has to do with the link.
+pub trait LinkHost {
+    /// Waits for the next tick to have ended.
+    fn tick_done(&self) -> impl Future<Output = ()>;
+
+    /// Called after every turn, with the link as it then stands.
+    fn after_turn<const D: usize>(&self, link: &Link<'_, D>);
+}
+
+/// Serves the link for ever.
+///
+/// Reading and writing go on side by side, so that a host that does not read
+/// cannot keep the device from reading. A reader that gives no bytes says that
+/// the transport was interrupted; a writer that fails likewise.
+pub async fn run<const D: usize>(
+    link: &mut Link<'_, D>,
+    mut rx: impl Read,
+    mut tx: impl Write,
+    board: &impl LinkHost,
+) {
+    let link = RefCell::new(link);
+    let work = Signal::<NoopRawMutex, ()>::new();
+    let room = Signal::<NoopRawMutex, ()>::new();
+    let reading = async {
+        let mut chunk = [0; CHUNK];
+        loop {
+            let n = rx.read(&mut chunk).await.unwrap_or(0);
+            let mut rest = chunk.get(..n).unwrap_or(&[]);
+            if rest.is_empty() {
+                link.borrow_mut().interrupted();
+            }
+            while !rest.is_empty() {
+                let taken = link.borrow_mut().receive(rest);
+                rest = rest.get(taken..).unwrap_or(&[]);
+                work.signal(());
+                if !rest.is_empty() {
+                    room.wait().await;
+                }
+            }
+        }
+    };
+    let writing = async {
+        let mut chunk = [0; CHUNK];
+        loop {
+            select(board.tick_done(), work.wait()).await;
+            loop {
+                link.borrow_mut().turn();
+                board.after_turn(&**link.borrow());
+                room.signal(());
+                let n = link.borrow_mut().transmit(&mut chunk);
+                if n == 0 {
+                    break;
+                }
+                let bytes = chunk.get(..n).unwrap_or(&[]);
+                if tx.write_all(bytes).await.is_err() {
+                    link.borrow_mut().interrupted();
+                }
+            }
+            let _ = tx.flush().await;
+            // The last byte of a session may have been what ended it.
+            board.after_turn(&**link.borrow());
+        }
+    };
+    join(reading, writing).await;
+}

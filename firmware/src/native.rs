@@ -1,0 +1,145 @@
+//! The application as a value, for a host program: no interrupts, no tasks.
+//!
+//! The caller moves bytes and calls [`Device::tick`]. In lock-step it does so
+//! only while [`Device::may_stand_still`] is false, as the emulated board's
+//! clock does; in real time it calls it a thousand times a second regardless.
+
+use hapterra_core::guard::Drive;
+use hapterra_core::phantom::Calibration;
+
+use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, Sense, TickClock};
+use crate::channels::{Application, Channels, Hardware, Tiles, assemble};
+use crate::haptic_loop::HapticLoop;
+use crate::link::Link;
+
+/// Encoders that read what they were last given.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GivenCounts(pub Sense);
+
+impl Encoders for GivenCounts {
+    fn sense(&mut self) -> Sense {
+        self.0
+    }
+}
+
+/// Amplifiers whose currents the caller of the tick takes from its result.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ReportedOff;
+
+/// As [`ReportedOff`], on.
+#[derive(Clone, Copy, Debug)]
+pub struct ReportedOn;
+
+impl Amplifiers for ReportedOff {
+    type Enabled = ReportedOn;
+
+    fn enable(self) -> ReportedOn {
+        ReportedOn
+    }
+}
+
+impl EnabledAmplifiers for ReportedOn {
+    type Disabled = ReportedOff;
+
+    fn write(&mut self, _currents_a: [f32; 3]) {}
+
+    fn disable(self) -> ReportedOff {
+        ReportedOff
+    }
+}
+
+/// A clock for lock-step: no tick takes any time.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StoppedClock;
+
+impl TickClock for StoppedClock {
+    const HZ: u32 = 1_000_000;
+    const PERIOD: u32 = 1_000;
+
+    fn now(&self) -> u32 {
+        0
+    }
+
+    fn since_due(&self) -> u32 {
+        0
+    }
+
+    fn begin_tick(&mut self) {}
+
+    fn next_is_due(&self) -> bool {
+        false
+    }
+}
+
+/// A device in the host's memory, with a window of `D × D` tiles and a clock
+/// `C`.
+pub struct Device<C, const D: usize> {
+    haptic_loop: HapticLoop<'static, GivenCounts, ReportedOff, C, D>,
+    link: Link<'static, D>,
+}
+
+impl<C: TickClock, const D: usize> Device<C, D> {
+    /// Builds the device in memory that lives as long as the program, such as
+    /// a leaked box: tile buffers travel between its halves by reference.
+    pub fn new(
+        tiles: &'static mut Tiles<D>,
+        channels: &'static mut Channels<'static>,
+        clock: C,
+        calibration: Calibration,
+    ) -> Self {
+        let hardware = Hardware {
+            encoders: GivenCounts::default(),
+            amplifiers: ReportedOff,
+            clock,
+            calibration,
+        };
+        let Application {
+            haptic_loop, link, ..
+        } = assemble(tiles, channels, hardware, "native");
+        Self { haptic_loop, link }
+    }
+
+    /// Takes bytes from the host; see [`Link::receive`].
+    pub fn receive(&mut self, bytes: &[u8]) -> usize {
+        let taken = self.link.receive(bytes);
+        self.link.turn();
+        taken
+    }
+
+    /// Moves bytes for the host into `into`; see [`Link::transmit`].
+    pub fn transmit(&mut self, into: &mut [u8]) -> usize {
+        self.link.transmit(into)
+    }
+
+    /// One tick at these encoder counts; returns what the amplifiers got.
+    pub fn tick(&mut self, counts: [i32; 3]) -> Drive {
+        self.haptic_loop.encoders_mut().0.counts = counts;
+        let drive = self.haptic_loop.tick();
+        self.link.turn();
+        drive
+    }
+
+    /// Whether nothing can happen before the host has spoken; see
+    /// [`Link::may_stand_still`].
+    #[must_use]
+    pub fn may_stand_still(&self) -> bool {
+        self.link.may_stand_still()
+    }
+
+    /// Whether the scene in force is felt through the encoders.
+    #[must_use]
+    pub fn feels_arm(&self) -> bool {
+        self.link.feels_arm()
+    }
+
+    /// Whether the host has said goodbye and everything is sent.
+    #[must_use]
+    pub fn has_ended(&self) -> bool {
+        self.link.has_ended()
+    }
+
+    /// The transport was interrupted; see [`Link::interrupted`].
+    pub fn interrupted(&mut self) {
+        self.link.interrupted();
+    }
+}

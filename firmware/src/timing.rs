@@ -1,0 +1,128 @@
+//! What a tick costs, and whether it came in time, by the board's own timers.
+
+use hapterra_core::wire::message::Sample;
+
+use crate::board::TickClock;
+
+/// A tick that begins later than this part of the period is late: nothing is
+/// above the haptic interrupt, so only masked interrupts could hold it up.
+const LATE_PART: u32 = 100;
+
+/// A tick's beginning, by the free-running clock.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Began(u32);
+
+/// Cost and lateness so far. Costs in counts of the board's clock.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Timing {
+    latest_begin: u32,
+    cost: u32,
+    worst_cost: u32,
+    late: u32,
+}
+
+impl Timing {
+    pub(crate) const fn new<C: TickClock>() -> Self {
+        Self {
+            latest_begin: C::PERIOD / LATE_PART,
+            cost: 0,
+            worst_cost: 0,
+            late: 0,
+        }
+    }
+
+    /// Acknowledges the timer and looks at how long ago it was due.
+    pub(crate) fn begin<C: TickClock>(&mut self, clock: &mut C) -> Began {
+        let began = Began(clock.now());
+        if clock.since_due() > self.latest_begin {
+            self.late = self.late.saturating_add(1);
+        }
+        clock.begin_tick();
+        began
+    }
+
+    /// Takes the cost. True if the next tick is already due: an overrun.
+    pub(crate) fn end<C: TickClock>(&mut self, clock: &C, began: Began) -> bool {
+        self.cost = clock.now().wrapping_sub(began.0);
+        self.worst_cost = self.worst_cost.max(self.cost);
+        let overrun = clock.next_is_due();
+        if overrun {
+            self.late = self.late.saturating_add(1);
+        }
+        overrun
+    }
+
+    /// Writes the figures into a sample. Its own tick has not ended, so the
+    /// cost is the one before it's.
+    pub(crate) const fn fill(&self, sample: &mut Sample) {
+        sample.cost = self.cost;
+        sample.worst_cost = self.worst_cost;
+        sample.late = self.late;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Fake {
+        now: u32,
+        since_due: u32,
+        next_is_due: bool,
+    }
+
+    impl TickClock for Fake {
+        const HZ: u32 = 1_000_000;
+        const PERIOD: u32 = 1000;
+
+        fn now(&self) -> u32 {
+            self.now
+        }
+
+        fn since_due(&self) -> u32 {
+            self.since_due
+        }
+
+        fn begin_tick(&mut self) {
+            self.next_is_due = false;
+        }
+
+        fn next_is_due(&self) -> bool {
+            self.next_is_due
+        }
+    }
+
+    #[test]
+    fn cost_is_counted_through_the_wrap_and_the_worst_is_kept() {
+        let mut timing = Timing::new::<Fake>();
+        let mut clock = Fake {
+            now: u32::MAX - 4,
+            since_due: 10,
+            next_is_due: true,
+        };
+        let began = timing.begin(&mut clock);
+        clock.now = 20;
+        assert!(
+            !timing.end(&clock, began),
+            "this tick's own event was taken"
+        );
+        let began = timing.begin(&mut clock);
+        clock.now = 21;
+        assert!(!timing.end(&clock, began));
+        assert_eq!((timing.cost, timing.worst_cost, timing.late), (1, 25, 0));
+    }
+
+    #[test]
+    fn late_at_the_beginning_and_late_at_the_end_both_count() {
+        let mut timing = Timing::new::<Fake>();
+        let mut clock = Fake {
+            now: 0,
+            since_due: 11,
+            next_is_due: false,
+        };
+        let began = timing.begin(&mut clock);
+        clock.next_is_due = true;
+        assert!(timing.end(&clock, began));
+        assert_eq!(timing.late, 2);
+    }
+}
