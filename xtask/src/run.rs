@@ -50,6 +50,21 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
+/// Like [`run`] for a talkative program: what it says is seen only if it fails.
+pub(crate) fn run_quietly(command: &mut Command) -> Result<()> {
+    let line = shown(command);
+    let done = command
+        .stdin(Stdio::null())
+        .output()
+        .with_context(|| format!("cannot start `{line}`"))?;
+    if !done.status.success() {
+        let said = [done.stdout, done.stderr].concat();
+        let said = String::from_utf8_lossy(&said);
+        bail!("`{line}` failed ({})\n{}", done.status, said.trim());
+    }
+    Ok(())
+}
+
 /// Runs `command` and gives its standard output; none if it cannot be started or fails.
 pub(crate) fn output(command: &mut Command) -> Option<String> {
     let output = command
@@ -109,6 +124,14 @@ mod tests {
             .to_string();
         assert!(message.contains("cannot start `program`"), "{message}");
         assert_eq!(output(&mut Command::new("/no/such/program")), None);
+    }
+
+    #[test]
+    fn what_a_quiet_program_said_is_told_when_it_fails() {
+        let message = run_quietly(cargo().arg("no-such-command"))
+            .unwrap_err()
+            .to_string();
+        assert!(message.contains("error: no such command"), "{message}");
     }
 
     #[test]

@@ -67,7 +67,8 @@ pub(crate) fn with_clippy() -> Result<()> {
     packages::install(&CLIPPY_PACKAGES)
 }
 
-fn is_whole() -> Result<()> {
+/// Fails with what is missing.
+pub(crate) fn is_whole() -> Result<()> {
     let version = output(Command::new(RUSTC).arg("--version"));
     let version = version.with_context(|| format!("no {RUSTC}"))?;
     if minor(&version) < minor(NEEDED) {

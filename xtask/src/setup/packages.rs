@@ -4,7 +4,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use crate::run::{on_path, output, run, say, shown};
+use crate::run::{on_path, output, run_quietly, say, shown};
 
 /// What one thing is called by each package manager; `None` where it has no package.
 #[derive(Debug, Clone, Copy)]
@@ -93,7 +93,7 @@ impl Manager {
                 .args(names.split(' '));
             command.env("DEBIAN_FRONTEND", "noninteractive");
             say(format!("installing: {}", shown(&command)));
-            run(&mut command)
+            run_quietly(&mut command)
         };
         let first = attempt();
         if first.is_ok() || self.program != "apt-get" {
@@ -101,7 +101,7 @@ impl Manager {
         }
         say("refreshing apt's package lists, then once more");
         // A failing list of some third party must not stop the one needed here.
-        let _ = run(prefixed(&prefix, self.program).arg("update"));
+        let _ = run_quietly(prefixed(&prefix, self.program).arg("update"));
         attempt()
     }
 

@@ -6,7 +6,7 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 
 use super::distribution;
-use crate::run::{cargo, on_path, output, run, say, target_dir};
+use crate::run::{cargo, on_path, output, run_quietly, say, target_dir};
 
 /// The boards' target: Cortex-M4F and M7 with single-precision FPU.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
@@ -70,14 +70,22 @@ impl Toolchain {
 /// `=distribution` allows only the one.
 pub(crate) fn ready() -> Result<Toolchain> {
     match std::env::var("HAPTERRA_TOOLCHAIN").as_deref() {
-        Err(_) | Ok("" | "auto") => own().or_else(|why| {
-            say(format!("rustup cannot: {why:#}"));
-            from_distribution().context(BY_HAND)
-        }),
+        Err(_) | Ok("" | "auto") => either(),
         Ok("rustup") => own().context(BY_HAND),
         Ok("distribution") => from_distribution(),
         Ok(other) => bail!("HAPTERRA_TOOLCHAIN is {other}: say rustup, distribution or auto"),
     }
+}
+
+fn either() -> Result<Toolchain> {
+    // What is here already comes before anything that needs the network.
+    if !own_has_target() && distribution::is_whole().is_ok() {
+        return from_distribution();
+    }
+    own().or_else(|why| {
+        say(format!("rustup cannot: {why:#}"));
+        from_distribution().context(BY_HAND)
+    })
 }
 
 fn own() -> Result<Toolchain> {
@@ -86,10 +94,8 @@ fn own() -> Result<Toolchain> {
     }
     say(format!("the target {TARGET} is not installed"));
     let rustup = on_path("rustup").context("there is no rustup on the PATH")?;
-    let mut add = Command::new(rustup);
-    add.args(["target", "add", TARGET]);
-    say("installing: rustup target add thumbv7em-none-eabihf");
-    run(&mut add)?;
+    say(format!("installing: rustup target add {TARGET}"));
+    run_quietly(Command::new(rustup).args(["target", "add", TARGET]))?;
     if !own_has_target() {
         bail!("rustup added the target, but not to the toolchain in use");
     }
