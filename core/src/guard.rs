@@ -18,6 +18,10 @@ pub enum Fault {
     EncoderJump = 3,
     /// The encoder or amplifier hardware did not answer.
     Hardware = 4,
+    /// The emergency stop is pressed, or its wire is broken.
+    EmergencyStop = 5,
+    /// The dead-man switch is not held.
+    DeadManReleased = 6,
 }
 
 impl Fault {
