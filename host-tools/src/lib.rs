@@ -5,6 +5,7 @@
 //!
 //! - [`raster`]: files of every supported format become one [`raster::Raster`];
 //! - [`synth`]: terrains made by formula, for trying and testing;
+//! - [`terrain`]: a raster at a scale, cut into tiles;
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
 //! - [`picture`]: what was felt, as PNG files;
 //! - [`cli`]: the `hapterra` command, one file a subcommand.
@@ -15,3 +16,4 @@ pub mod cli;
 pub mod phantom;
 pub mod picture;
 pub mod raster;
+pub mod terrain;

@@ -1,0 +1,13 @@
+//! A raster as the device sees it: scaled to the hand, counted in cells, cut
+//! into tiles.
+//!
+//! [`Scale`] turns the file's units into what the hand feels; [`Terrain`]
+//! is a raster at that scale and one level of detail, with its tiles made one
+//! by one when they are asked for: nothing of the raster is copied or kept.
+
+mod identity;
+mod scale;
+mod tiler;
+
+pub use scale::{BadScale, Scale};
+pub use tiler::{Terrain, TerrainError, TileBuffer};

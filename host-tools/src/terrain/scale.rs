@@ -1,0 +1,154 @@
+//! From the file's units to millimetres in the hand and to cells.
+
+use hapterra_core::Vec3;
+use hapterra_core::grid::{GridPoint, MAX_CELL};
+
+use crate::raster::Raster;
+
+/// How large the terrain is in the hand.
+///
+/// Frame: x east, y north, z up, origin at the south-west sample at height
+/// zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    cell_mm: f64,
+    height_mm_per_unit: f64,
+}
+
+/// A number that no terrain can be scaled with.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum BadScale {
+    /// A cell that is not longer than nothing.
+    #[error("a cell of {0} mm in the hand: it must be longer than zero, and finite")]
+    Cell(f64),
+    /// A height that is not a number.
+    #[error("{0} mm in the hand for a vertical unit: it must be finite")]
+    Height(f64),
+}
+
+impl Scale {
+    /// `cell_mm` hand millimetres a cell, `height_mm_per_unit` hand millimetres
+    /// a vertical unit of the file. A negative height turns the relief upside
+    /// down.
+    ///
+    /// # Errors
+    /// [`BadScale`] for a cell that is not positive, or numbers that are not
+    /// finite or that single precision cannot hold.
+    pub fn new(cell_mm: f64, height_mm_per_unit: f64) -> Result<Self, BadScale> {
+        let as_single = cell_mm as f32;
+        if !(as_single.is_normal() && as_single > 0.0) {
+            return Err(BadScale::Cell(cell_mm));
+        }
+        if !height_mm_per_unit.is_finite() {
+            return Err(BadScale::Height(height_mm_per_unit));
+        }
+        Ok(Self {
+            cell_mm,
+            height_mm_per_unit,
+        })
+    }
+
+    /// `cell_mm` hand millimetres a cell, heights at the file's true
+    /// proportions, or 1 mm a unit where it does not know its cell size.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn true_to(raster: &Raster, cell_mm: f64) -> Result<Self, BadScale> {
+        let cells = raster.cells_per_vertical_unit();
+        Self::new(cell_mm, cells.map_or(1.0, |cells| cells * cell_mm))
+    }
+
+    /// Hand millimetres a cell.
+    #[must_use]
+    pub const fn cell_mm(&self) -> f64 {
+        self.cell_mm
+    }
+
+    /// Hand millimetres a vertical unit of the file.
+    #[must_use]
+    pub const fn height_mm_per_unit(&self) -> f64 {
+        self.height_mm_per_unit
+    }
+
+    /// The same terrain, equally large in the hand, with every `2^level`-th
+    /// sample only: its cells are that much larger.
+    #[must_use]
+    pub fn at_level(&self, level: u8) -> Self {
+        Self {
+            cell_mm: self.cell_mm * f64::from(level).exp2(),
+            ..*self
+        }
+    }
+
+    /// A height of the file in cells.
+    #[must_use]
+    pub fn height_cells(&self, height: f64) -> f64 {
+        height * self.height_mm_per_unit / self.cell_mm
+    }
+
+    /// A place in hand millimetres on the grid; `None` when it is not a number
+    /// or farther than [`MAX_CELL`] cells from the origin.
+    ///
+    /// Worked out in `f64`; the fraction is rounded once, to `f32`.
+    #[must_use]
+    pub fn to_grid(&self, mm: [f64; 3]) -> Option<GridPoint> {
+        let cells = mm.map(|mm| mm / self.cell_mm);
+        let max = f64::from(MAX_CELL);
+        if !cells.iter().all(|c| c.abs() <= max) {
+            return None;
+        }
+        let whole = cells.map(f64::floor);
+        let frac: [f32; 3] = std::array::from_fn(|i| (cells[i] - whole[i]) as f32);
+        // A fraction that was rounded up to one is carried over.
+        Some(GridPoint::new(
+            whole.map(|w| w as i32),
+            Vec3::from_array(frac),
+        ))
+    }
+
+    /// A place on the grid in hand millimetres.
+    #[must_use]
+    pub fn to_mm(&self, point: &GridPoint) -> [f64; 3] {
+        let frac = point.frac().to_array();
+        std::array::from_fn(|i| (f64::from(point.cell()[i]) + f64::from(frac[i])) * self.cell_mm)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn to_the_grid_and_back() {
+        let scale = Scale::new(0.25, 1.0).expect("valid");
+        for mm in [[0.1, -0.1, 1e6], [-1e-12, 0.25, -0.25], [1e8, -1e8, 0.0]] {
+            let point = scale.to_grid(mm).expect("addressable");
+            assert!(point.frac().max_element() < 1.0);
+            for (back, mm) in scale.to_mm(&point).into_iter().zip(mm) {
+                assert!((back - mm).abs() <= 0.25 * 2f64.powi(-24), "{back} {mm}");
+            }
+        }
+        // Just below a whole cell rounds up into the next.
+        let below = scale.to_grid([-1e-12, 0.0, 0.0]).expect("addressable");
+        assert_eq!((below.cell()[0], below.frac().x), (0, 0.0));
+    }
+
+    #[test]
+    fn what_cannot_be_addressed_is_no_point() {
+        let scale = Scale::new(1.0, 1.0).expect("valid");
+        for bad in [f64::NAN, f64::INFINITY, 5.4e8, -5.4e8] {
+            assert_eq!(scale.to_grid([0.0, bad, 0.0]), None);
+        }
+        assert!(scale.to_grid([f64::from(MAX_CELL), 0.0, 0.0]).is_some());
+    }
+
+    #[test]
+    fn nonsense_is_refused_and_a_level_keeps_the_size() {
+        for cell in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-60, 1e60] {
+            assert!(Scale::new(cell, 1.0).is_err(), "{cell}");
+        }
+        assert!(Scale::new(1.0, f64::NAN).is_err());
+        let scale = Scale::new(2.0, 3.0).expect("valid").at_level(3);
+        assert_eq!((scale.cell_mm(), scale.height_cells(16.0)), (16.0, 3.0));
+    }
+}

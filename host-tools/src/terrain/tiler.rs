@@ -1,0 +1,302 @@
+//! Tiles made on demand from the one raster.
+
+use std::cell::OnceCell;
+
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::{GridPoint, MAX_CELL};
+use hapterra_core::terrain::{POSTS, TILE_CELLS, TileKey};
+use hapterra_core::wire::message::{Heights, Scene, Source};
+
+use super::{BadScale, Scale, identity};
+use crate::raster::Raster;
+
+/// Bytes of a tile's samples.
+const TILE_BYTES: usize = 4 * POSTS * POSTS;
+
+/// A raster at a scale and a level of detail.
+pub struct Terrain<'r> {
+    raster: &'r Raster,
+    /// Of the level's cells.
+    scale: Scale,
+    level: u8,
+    /// Patches of the level, east and north.
+    size: [i32; 2],
+    top: i32,
+    fingerprint: OnceCell<u64>,
+}
+
+/// Why a raster cannot be felt at a scale.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum TerrainError {
+    /// The scale itself.
+    #[error(transparent)]
+    Scale(#[from] BadScale),
+    /// Higher or lower than positions can be.
+    #[error(
+        "heights reach {cells:.4e} cells at {} mm a unit and {} mm a cell; at most ±{MAX_CELL} can be felt",
+        scale.height_mm_per_unit(), scale.cell_mm()
+    )]
+    TooTall {
+        /// The largest height, in cells.
+        cells: f64,
+        /// The scale that made it so.
+        scale: Scale,
+    },
+    /// More cells than positions can count.
+    #[error("{0} samples in a row or column; at most {MAX_CELL} can be felt")]
+    TooLarge(u32),
+    /// Decimated away.
+    #[error("level {level} leaves nothing of {columns} × {rows} samples")]
+    NoSuchLevel {
+        /// The level asked for.
+        level: u8,
+        /// Samples of the raster, west to east.
+        columns: u32,
+        /// Samples of the raster, south to north.
+        rows: u32,
+    },
+}
+
+/// Room for one tile's samples, used again for each.
+pub struct TileBuffer {
+    heights: Box<[f64; POSTS * POSTS]>,
+    bytes: Box<[u8; TILE_BYTES]>,
+}
+
+impl Default for TileBuffer {
+    fn default() -> Self {
+        Self {
+            heights: Box::new([f64::NAN; POSTS * POSTS]),
+            bytes: Box::new([0; TILE_BYTES]),
+        }
+    }
+}
+
+impl<'r> Terrain<'r> {
+    /// The raster at `scale`, with every `2^level`-th sample.
+    ///
+    /// # Errors
+    /// [`TerrainError`] when its heights or its size leave what a position can
+    /// say, or the level leaves no patch.
+    pub fn new(raster: &'r Raster, scale: Scale, level: u8) -> Result<Self, TerrainError> {
+        let (columns, rows) = (raster.columns(), raster.rows());
+        let larger = columns.max(rows);
+        if i64::from(larger) > i64::from(MAX_CELL) {
+            return Err(TerrainError::TooLarge(larger));
+        }
+        let patches = |samples: u32| (samples - 1).checked_shr(level.into()).unwrap_or(0) as i32;
+        let size = [patches(columns), patches(rows)];
+        if size.contains(&0) {
+            return Err(TerrainError::NoSuchLevel {
+                level,
+                columns,
+                rows,
+            });
+        }
+        let scale = scale.at_level(level);
+        Ok(Self {
+            raster,
+            scale,
+            level,
+            size,
+            top: top(raster, &scale)?,
+            fingerprint: OnceCell::new(),
+        })
+    }
+
+    /// The raster.
+    #[must_use]
+    pub const fn raster(&self) -> &'r Raster {
+        self.raster
+    }
+
+    /// The scale of this level: its cells are `2^level` times the file's.
+    #[must_use]
+    pub const fn scale(&self) -> &Scale {
+        &self.scale
+    }
+
+    /// Size in patches of this level, east and north.
+    #[must_use]
+    pub const fn size(&self) -> [i32; 2] {
+        self.size
+    }
+
+    /// A whole height in cells that no sample exceeds.
+    #[must_use]
+    pub const fn top(&self) -> i32 {
+        self.top
+    }
+
+    /// Extent east and north from the south-west sample, hand millimetres.
+    #[must_use]
+    pub fn size_mm(&self) -> [f64; 2] {
+        self.size.map(|s| f64::from(s) * self.scale.cell_mm())
+    }
+
+    /// The scene in which the device feels this terrain. Its epoch is a hash
+    /// of the heights and of everything else in it.
+    #[must_use]
+    pub fn scene(&self, law: ForceLaw, rule: Rule, source: Source, home: GridPoint) -> Scene {
+        let mut scene = Scene {
+            epoch: 0,
+            level: self.level,
+            size: self.size,
+            top: self.top,
+            cell_mm: self.scale.cell_mm() as f32,
+            home,
+            law,
+            rule,
+            source,
+            hold_clock: true,
+        };
+        let fingerprint = *self
+            .fingerprint
+            .get_or_init(|| identity::fingerprint(self.raster));
+        scene.epoch = identity::epoch(fingerprint, &self.scale, &scene);
+        scene
+    }
+
+    /// Height of the bilinear surface in hand millimetres at a place in hand
+    /// millimetres, in `f64`; `None` in a hole and off the data.
+    #[must_use]
+    pub fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
+        let (column, u) = place(east_mm / self.scale.cell_mm(), self.size[0])?;
+        let (row, v) = place(north_mm / self.scale.cell_mm(), self.size[1])?;
+        let at = |dx: u32, dy: u32| {
+            let (x, y) = ((column + dx) << self.level, (row + dy) << self.level);
+            self.raster.height(x, y) * self.scale.height_mm_per_unit()
+        };
+        let (south, north) = ([at(0, 0), at(1, 0)], [at(0, 1), at(1, 1)]);
+        let mix = |[a, b]: [f64; 2], t: f64| a * (1.0 - t) + b * t;
+        // Every corner counts: a patch with a hole at one is a hole.
+        let holes = south.iter().chain(&north).any(|h| h.is_nan());
+        (!holes).then(|| mix([mix(south, u), mix(north, u)], v))
+    }
+
+    /// Whether there is such a tile.
+    #[must_use]
+    pub fn has(&self, key: TileKey) -> bool {
+        let last = self.size.map(|s| (s - 1) / TILE_CELLS as i32);
+        key.level == self.level
+            && (0..=last[0]).contains(&key.col)
+            && (0..=last[1]).contains(&key.row)
+    }
+
+    /// The heights of a tile, as they go on the link; `None` if there is no
+    /// such tile. The samples go to `buffer`.
+    #[must_use]
+    pub fn tile<'b>(&self, key: TileKey, buffer: &'b mut TileBuffer) -> Option<Heights<'b>> {
+        if !self.has(key) {
+            return None;
+        }
+        self.read(key, &mut buffer.heights);
+        let Some((low, high)) = range(buffer.heights.as_slice()) else {
+            return Some(Heights::Hole);
+        };
+        let base = base(low, high);
+        let relative = |height: f64| (height - f64::from(base)) as f32;
+        if low == high && self.is_whole(key, &buffer.heights) {
+            return Some(Heights::Flat {
+                base,
+                height: relative(low),
+            });
+        }
+        for (to, height) in buffer.bytes.chunks_exact_mut(4).zip(buffer.heights.iter()) {
+            to.copy_from_slice(&relative(*height).to_le_bytes());
+        }
+        Some(Heights::Samples {
+            base,
+            bytes: buffer.bytes.as_slice(),
+        })
+    }
+
+    /// Copies the tile's samples, in cells; NaN in holes and off the data.
+    fn read(&self, key: TileKey, heights: &mut [f64; POSTS * POSTS]) {
+        let first = |index: i32| index as u32 * TILE_CELLS as u32;
+        let (west, south) = (first(key.col), first(key.row));
+        for (row, line) in (south..).zip(heights.chunks_exact_mut(POSTS)) {
+            if self.level == 0 {
+                self.raster.copy_row(row, west, line);
+            } else {
+                for (column, height) in (west..).zip(line.iter_mut()) {
+                    *height = self.decimated(column, row);
+                }
+            }
+            for height in line {
+                *height = self.scale.height_cells(*height);
+            }
+        }
+    }
+
+    fn decimated(&self, column: u32, row: u32) -> f64 {
+        if column > self.size[0] as u32 || row > self.size[1] as u32 {
+            return f64::NAN;
+        }
+        self.raster.height(column << self.level, row << self.level)
+    }
+
+    /// Whether every sample of the tile that lies in the field has a height.
+    fn is_whole(&self, key: TileKey, heights: &[f64; POSTS * POSTS]) -> bool {
+        let inside = |index: i32, size: i32| {
+            let first = index * TILE_CELLS as i32;
+            (size + 1 - first).min(POSTS as i32) as usize
+        };
+        let (columns, rows) = (inside(key.col, self.size[0]), inside(key.row, self.size[1]));
+        let lines = heights.chunks_exact(POSTS).take(rows);
+        !lines.flat_map(|line| &line[..columns]).any(|h| h.is_nan())
+    }
+}
+
+/// The patch and the place in it of a coordinate in cells.
+fn place(cells: f64, patches: i32) -> Option<(u32, f64)> {
+    if !(0.0..=f64::from(patches)).contains(&cells) {
+        return None;
+    }
+    // The last sample belongs to the last patch.
+    let patch = cells.floor().min(f64::from(patches - 1));
+    Some((patch as u32, cells - patch))
+}
+
+/// Lowest and highest height; `None` if there is none.
+fn range(heights: &[f64]) -> Option<(f64, f64)> {
+    let known = heights.iter().copied().filter(|h| !h.is_nan());
+    known.fold(None, |range, h| {
+        let (low, high) = range.unwrap_or((h, h));
+        Some((low.min(h), high.max(h)))
+    })
+}
+
+/// The whole height a tile counts from: the lowest sample's, or the middle
+/// where single heights would leave what the device can address.
+fn base(low: f64, high: f64) -> i32 {
+    let from_low = high - low.floor() <= f64::from(MAX_CELL);
+    let base = if from_low { low } else { 0.5 * (low + high) };
+    base.floor() as i32 // both within ±MAX_CELL
+}
+
+fn top(raster: &Raster, scale: &Scale) -> Result<i32, TerrainError> {
+    let summary = raster.summary();
+    let ends = [summary.lowest, summary.highest].map(|h| scale.height_cells(h));
+    let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+    let cells = if -low > high { low } else { high };
+    if !(cells.abs() <= f64::from(MAX_CELL)) {
+        return Err(TerrainError::TooTall {
+            cells,
+            scale: *scale,
+        });
+    }
+    // Rounded to `f32` above the base, a sample reaches the next whole number
+    // at most; from 2^23 on, up to 2^30, by as much as its last place.
+    let rounding = if high - low < f64::from(1 << 23) {
+        0
+    } else {
+        64
+    };
+    Ok((high.ceil() as i32 + rounding).min(MAX_CELL + 1))
+}
+
+#[cfg(test)]
+#[path = "tiler_tests.rs"]
+mod tests;

@@ -1,0 +1,144 @@
+//! Tiles against the raster they are cut from.
+
+use super::*;
+
+fn key(level: u8, col: i32, row: i32) -> TileKey {
+    TileKey { level, col, row }
+}
+
+fn unit() -> Scale {
+    Scale::new(1.0, 1.0).expect("valid")
+}
+
+/// The samples of a tile as the device would hold them, in cells.
+fn samples(terrain: &Terrain<'_>, key: TileKey) -> Vec<f64> {
+    let mut buffer = TileBuffer::default();
+    match terrain.tile(key, &mut buffer).expect("a tile") {
+        Heights::Hole => vec![f64::NAN; POSTS * POSTS],
+        Heights::Flat { base, height } => {
+            vec![f64::from(base) + f64::from(height); POSTS * POSTS]
+        }
+        Heights::Samples { base, bytes } => bytes
+            .as_chunks::<4>()
+            .0
+            .iter()
+            .map(|le| f64::from(base) + f64::from(f32::from_le_bytes(*le)))
+            .collect(),
+    }
+}
+
+#[test]
+fn tiles_hold_the_rasters_samples_at_every_level() {
+    let raster = Raster::from_fn(100, 70, |x, y| (x * 1000 + y) as f32 / 8.0).expect("raster");
+    let scale = Scale::new(0.5, 0.25).expect("valid");
+    for level in 0..3 {
+        let terrain = Terrain::new(&raster, scale, level).expect("terrain");
+        let per_unit = 0.25 / (0.5 * f64::from(1 << level));
+        for (col, row) in [(0, 0), (1, 0), (0, 1)] {
+            if !terrain.has(key(level, col, row)) {
+                continue;
+            }
+            let tile = samples(&terrain, key(level, col, row));
+            for (i, got) in tile.into_iter().enumerate() {
+                let x = (col as u32 * 32 + (i % POSTS) as u32) << level;
+                let y = (row as u32 * 32 + (i / POSTS) as u32) << level;
+                let inside = x <= (terrain.size()[0] as u32) << level
+                    && y <= (terrain.size()[1] as u32) << level;
+                if inside {
+                    let expected = raster.height(x, y) * per_unit;
+                    assert!((got - expected).abs() < 1e-3, "{x} {y}: {got} {expected}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_constant_tile_is_one_number_even_at_the_border() {
+    let raster = Raster::from_fn(40, 40, |_, _| 7.25).expect("raster");
+    let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
+    let mut buffer = TileBuffer::default();
+    for (col, row) in [(0, 0), (1, 1)] {
+        assert_eq!(
+            terrain.tile(key(0, col, row), &mut buffer),
+            Some(Heights::Flat {
+                base: 7,
+                height: 0.25
+            })
+        );
+    }
+    for (col, row) in [(2, 0), (0, 2), (-1, 0)] {
+        assert_eq!(terrain.tile(key(0, col, row), &mut buffer), None);
+    }
+    assert_eq!(terrain.tile(key(1, 0, 0), &mut buffer), None);
+}
+
+#[test]
+fn holes_stay_holes_and_an_empty_tile_says_so() {
+    let raster = Raster::from_fn(70, 33, |x, y| {
+        if x >= 32 || (x, y) == (3, 4) {
+            f32::NAN
+        } else {
+            5.0
+        }
+    })
+    .expect("raster");
+    let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
+    let tile = samples(&terrain, key(0, 0, 0));
+    assert!(tile[4 * POSTS + 3].is_nan() && tile[32].is_nan());
+    assert_eq!(tile[4 * POSTS + 4], 5.0);
+    let mut buffer = TileBuffer::default();
+    assert_eq!(terrain.tile(key(0, 2, 0), &mut buffer), Some(Heights::Hole));
+    assert_eq!(terrain.height_mm(3.5, 4.5), None);
+    assert_eq!(terrain.height_mm(10.5, 4.5), Some(5.0));
+    assert_eq!(terrain.height_mm(10.5, 32.1), None);
+}
+
+#[test]
+fn the_top_is_above_every_sample_however_far_up() {
+    for (offset, step) in [(0.0f32, 0.37f32), (-1e6, 0.1), (1e6, 0.06), (0.0, 1e6)] {
+        let raster = Raster::from_fn(33, 33, |x, y| offset + step * (x * y % 97) as f32);
+        let raster = raster.expect("raster");
+        let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
+        for h in samples(&terrain, key(0, 0, 0)) {
+            assert!(h <= f64::from(terrain.top()), "{h} {}", terrain.top());
+        }
+    }
+}
+
+#[test]
+fn too_tall_is_an_error_and_the_limit_is_not() {
+    let raster = Raster::from_fn(4, 4, |x, _| if x == 0 { -1.0 } else { 1.0 }).expect("raster");
+    let limit = f64::from(MAX_CELL);
+    let scale = |height| Scale::new(1.0, height).expect("valid");
+    let terrain = Terrain::new(&raster, scale(limit), 0).expect("at the limit");
+    let tile = samples(&terrain, key(0, 0, 0));
+    assert_eq!((tile[0], tile[1]), (-limit, limit));
+    let error = Terrain::new(&raster, scale(limit * 1.001), 0).err();
+    assert!(matches!(error, Some(TerrainError::TooTall { .. })));
+}
+
+#[test]
+fn a_scenes_epoch_follows_heights_scale_and_law() {
+    let scene = |bump: f32, cell_mm: f64, stiffness_n_per_mm: f32| {
+        let raster = Raster::from_fn(9, 9, |x, y| if (x, y) == (4, 4) { bump } else { 0.0 });
+        let raster = raster.expect("raster");
+        let scale = Scale::new(cell_mm, 1.0).expect("valid");
+        let law = ForceLaw {
+            stiffness_n_per_mm,
+            max_force_n: 8.5,
+        };
+        let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+        let home = GridPoint::default();
+        terrain.scene(law, Rule::Swept, Source::Points, home).epoch
+    };
+    let same = scene(1.0, 1.0, 0.5);
+    assert_eq!(same, scene(1.0, 1.0, 0.5));
+    for other in [
+        scene(1.001, 1.0, 0.5),
+        scene(1.0, 1.000_000_000_1, 0.5),
+        scene(1.0, 1.0, 0.4),
+    ] {
+        assert_ne!(same, other);
+    }
+}
