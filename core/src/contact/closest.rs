@@ -19,18 +19,33 @@
 //! farther from the hand than the one before, so the search runs downhill from
 //! where it starts and cannot jump into a worse basin.
 //!
+//! The steeper of the two directions is the one eliminated: its closed form
+//! gives z without cancellation, where evaluating a steep height at a rounded
+//! v would not.
+//!
 //! The forms matter: written with `g` over `1 + m²` nothing cancels on steep
 //! patches (docs/contact.md has the error analysis).
 
 use super::patch::Patch;
 
-/// Evaluations of F at most in one search. Reached only on patches steeper
-/// than about 10⁶; the best point so far is then returned.
+/// Evaluations of F at most in one pass. Reached only on patches steeper than
+/// about 10⁶; the best point so far is then returned.
 pub const MAX_EVALUATIONS: u32 = 32;
+/// Passes at most: one, and one more each time the other variable turns out to
+/// be the better one to eliminate.
+pub const MAX_PASSES: u32 = 3;
 
 /// Distances that differ by less than this, relatively, count as equal: the
 /// rounding of F.
 const TIE: f32 = 1.0 + 1e-6;
+/// A step shorter than this, in cells, that leaves F about the same is judged
+/// by the slope.
+const SHORT: f32 = 1.0 / 64.0;
+/// Places in a patch closer than this, in cells, count as the same: what is as
+/// near to an edge lies on it.
+const RESOLUTION: f32 = 6e-8;
+/// Squared distance, in cells², below which F is nothing but rounding.
+const LEAST_F: f32 = 1e-10;
 
 /// A point of a patch, as the search sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,6 +87,7 @@ fn ruling(patch: &Patch, (p, q): (f32, f32), v: f32) -> Ruling {
     let free_z = g / steepness;
     let free_u = p - m * free_z;
     let (u, z, curvature);
+    let mut rounding = 0.0;
     if (0.0..=1.0).contains(&free_u) {
         (u, z) = (free_u, free_z);
         let (zv, za) = (patch.slope_v(u), patch.a * z);
@@ -81,6 +97,8 @@ fn ruling(patch: &Patch, (p, q): (f32, f32), v: f32) -> Ruling {
         z = patch.height(u, v);
         let zv = patch.slope_v(u);
         curvature = 1.0 + zv * zv;
+        // What cancels in the height of a steep edge shows in the slope.
+        rounding = zv.abs() * (patch.d.abs() + patch.b.abs() * u + zv.abs() * v);
     }
     let (dv, lift) = (v - q, z * patch.slope_v(u));
     Ruling {
@@ -90,17 +108,80 @@ fn ruling(patch: &Patch, (p, q): (f32, f32), v: f32) -> Ruling {
         f: (u - p) * (u - p) + dv * dv + z * z,
         slope: dv + lift,
         curvature,
-        noise: f32::EPSILON * (dv.abs() + lift.abs()),
+        noise: f32::EPSILON * (dv.abs() + lift.abs() + rounding),
     }
 }
 
-/// Searches downhill from the ruling at `start` (in `[0, 1]`) for a point of
-/// the patch from which no direction inside the patch leads closer to the hand.
+/// Searches downhill from `start` (in `[0, 1]²`) for a point of the patch from
+/// which no direction inside the patch leads closer to the hand.
 ///
 /// `hand` is the haptic interface point in patch coordinates (u, v); it may lie
 /// outside the unit square. Finite input gives a finite answer.
 #[must_use]
-pub fn nearest_downhill(patch: &Patch, hand: (f32, f32), start: f32) -> Nearest {
+pub fn nearest_downhill(patch: &Patch, hand: (f32, f32), start: (f32, f32)) -> Nearest {
+    let mut best = Nearest {
+        u: start.0,
+        v: start.1,
+        z: 0.0,
+        distance_squared: f32::INFINITY,
+        evaluations: 0,
+    };
+    let mut turned = patch.slope_v(start.0).abs() > patch.slope_u(start.1).abs();
+    for _ in 0..MAX_PASSES {
+        let found = if turned {
+            along_v(&patch.transposed(), (hand.1, hand.0), best.u).transposed()
+        } else {
+            along_v(patch, hand, best.v)
+        };
+        best = Nearest {
+            evaluations: best.evaluations + found.evaluations,
+            ..found
+        };
+        if !best.wants_turning(patch, turned) {
+            break;
+        }
+        turned = !turned;
+    }
+    (best.u, best.v) = (snapped(best.u), snapped(best.v));
+    best
+}
+
+fn snapped(x: f32) -> f32 {
+    if x < RESOLUTION {
+        0.0
+    } else if x > 1.0 - RESOLUTION {
+        1.0
+    } else {
+        x
+    }
+}
+
+impl Nearest {
+    fn transposed(self) -> Self {
+        Self {
+            u: self.v,
+            v: self.u,
+            ..self
+        }
+    }
+
+    /// Whether the eliminated variable ended at a limit while the searched one
+    /// did not, or is no longer the steeper one: the other search is then
+    /// better conditioned.
+    fn wants_turning(&self, patch: &Patch, turned: bool) -> bool {
+        let inside = |x: f32| x > RESOLUTION && x < 1.0 - RESOLUTION;
+        let (m, n) = (patch.slope_u(self.v).abs(), patch.slope_v(self.u).abs());
+        let (eliminated, searched, along, across) = if turned {
+            (self.v, self.u, n, m)
+        } else {
+            (self.u, self.v, m, n)
+        };
+        inside(searched) && (!inside(eliminated) || across > 4.0 * along + 4.0)
+    }
+}
+
+/// The search with u eliminated, along v from `start`.
+fn along_v(patch: &Patch, hand: (f32, f32), start: f32) -> Nearest {
     let mut best = ruling(patch, hand, start);
     let mut search = Bracket::downhill_of(&best);
     let mut evaluations = 1;
@@ -140,8 +221,8 @@ impl Bracket {
     /// Where to evaluate next; `None` when `best` is as good as it gets.
     fn next(&self, best: &Ruling) -> Option<f32> {
         let room = self.wall - best.v;
-        if room == 0.0 {
-            return None; // at an end of the patch, and downhill is outside
+        if room.abs() < RESOLUTION {
+            return None; // at a wall, most often an end of the patch
         }
         if best.curvature > 0.0 {
             let step = -best.slope / best.curvature;
@@ -163,13 +244,17 @@ impl Bracket {
     /// Takes the trial as the best point if it is no farther from the hand,
     /// else as the new wall.
     fn narrow(&mut self, best: &mut Ruling, trial: Ruling) {
-        let nearer = trial.f <= best.f * TIE; // false for NaN, too
+        let halved = trial.slope.abs() <= 0.5 * best.slope.abs();
+        // Close to the minimum F is flat and its rounding decides; the slope
+        // still tells.
+        let close = (trial.v - best.v).abs() < SHORT && trial.f <= best.f * 1.01 + LEAST_F;
+        let nearer = trial.f <= best.f * TIE || (halved && close);
         if !nearer {
             self.wall = trial.v;
             self.wall_is_end = false;
+            self.lazy = 2; // not that Newton step again
             return;
         }
-        let halved = trial.slope.abs() <= 0.5 * best.slope.abs();
         self.lazy = if halved { 0 } else { self.lazy + 1 };
         if self.lazy > 2 {
             self.lazy = 0; // the middle has been tried
@@ -182,3 +267,7 @@ impl Bracket {
         *best = trial;
     }
 }
+
+#[cfg(test)]
+#[path = "closest_tests.rs"]
+mod tests;

@@ -67,7 +67,7 @@ pub(super) fn descend<const D: usize>(
             let f = hand.stretch(&spot, &patch).length_squared();
             return Descent::Unfinished(spot, patch, f);
         }
-        let here = nearest_downhill(&patch, hand.in_patch(spot.cell), spot.v);
+        let here = nearest_downhill(&patch, hand.in_patch(spot.cell), (spot.u, spot.v));
         work.charge(here.evaluations);
         (spot.u, spot.v) = (here.u, here.v);
         match best_neighbour(window, hand, &spot, &here, work) {
@@ -137,8 +137,11 @@ fn best_neighbour<const D: usize>(
                 }
             }
             Ground::Patch(corners) => {
-                let there =
-                    nearest_downhill(&Patch::new(corners), hand.in_patch(entry.cell), entry.v);
+                let there = nearest_downhill(
+                    &Patch::new(corners),
+                    hand.in_patch(entry.cell),
+                    (entry.u, entry.v),
+                );
                 work.charge(there.evaluations + 3);
                 let moved = (there.u - entry.u).abs().max((there.v - entry.v).abs());
                 if moved > LEAST_WAY && there.distance_squared <= least {

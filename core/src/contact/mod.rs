@@ -12,9 +12,13 @@ pub mod patch;
 pub mod presence;
 
 mod descent;
+#[cfg(test)]
+mod dice;
 mod paper;
 mod spot;
 mod sweep;
+#[cfg(test)]
+mod tests;
 mod work;
 
 use glam::Vec3;

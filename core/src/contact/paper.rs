@@ -168,7 +168,7 @@ fn bounded_closest_point<const D: usize>(
         Ground::Hole => return Ok(None),
         Ground::Missing => return Err(tile_of(spot.cell)),
     };
-    let found = nearest_downhill(&patch, hand.in_patch(spot.cell), spot.v);
+    let found = nearest_downhill(&patch, hand.in_patch(spot.cell), (spot.u, spot.v));
     work.charge(found.evaluations);
     (spot.u, spot.v) = (found.u, found.v);
     Ok(Some((patch, found.distance_squared)))

@@ -31,6 +31,17 @@ impl Patch {
         }
     }
 
+    /// The patch with u and v exchanged.
+    #[must_use]
+    #[inline]
+    pub const fn transposed(&self) -> Self {
+        Self {
+            b: self.c,
+            c: self.b,
+            ..*self
+        }
+    }
+
     /// Height above the hand.
     #[must_use]
     #[inline]

@@ -134,6 +134,9 @@ impl Path {
                     continue;
                 }
             };
+            if on_surface && step.is_tiny() {
+                continue; // a corner of a cell touched on leaving an edge
+            }
             let start = patch.height(step.from.0, step.from.1) - step.z_from;
             if over_hole && start >= 0.0 {
                 return Some(Sweep::Under);
@@ -159,6 +162,9 @@ impl Path {
 
 /// A crossing within this part of the first cell's way is the start again.
 const NO_PROGRESS: f32 = 1e-6;
+/// Length, in cells, of a step that is passed over where the way leaves the
+/// surface.
+const TINY: f32 = 1e-5;
 
 fn lower(a: &GridPoint, b: &GridPoint) -> Altitude {
     let low = if a.is_below(b) { a } else { b };
@@ -181,6 +187,15 @@ struct Step {
 }
 
 impl Step {
+    /// Too short for the heights at its ends to differ by more than rounding.
+    fn is_tiny(&self) -> bool {
+        (self.to.0 - self.from.0)
+            .abs()
+            .max((self.to.1 - self.from.1).abs())
+            < TINY
+            && (self.z_to - self.z_from).abs() < TINY
+    }
+
     fn spot(&self, s: f32) -> Spot {
         let between = |a: f32, b: f32| (a + s * (b - a)).clamp(0.0, 1.0);
         Spot {

@@ -9,6 +9,7 @@ use super::{TILE_CELLS, Tile, TileKey, Window};
 pub(crate) struct Field<const D: usize> {
     pub(crate) window: Window<'static, D>,
     size: [i32; 2],
+    base: i32,
     height: Box<dyn Fn(i32, i32) -> f32>,
     spare: Vec<&'static mut Tile>,
 }
@@ -23,6 +24,7 @@ impl<const D: usize> Field<D> {
         Self {
             window,
             size,
+            base: 0,
             height: Box::new(height),
             spare: Vec::new(),
         }
@@ -38,6 +40,25 @@ impl<const D: usize> Field<D> {
         );
         for row in 0..=tiles[1] {
             for col in 0..=tiles[0] {
+                field.take(TileKey { level: 0, col, row });
+            }
+        }
+        field
+    }
+
+    /// A square field of `size` patches, all held, moved by `shift` cells (whole
+    /// tiles) east, north and up; nothing lies west and south of it.
+    pub(crate) fn shifted(size: i32, shift: i32, height: fn(i32, i32) -> f32) -> Self {
+        let mut field = Self::new([size + shift; 2], move |x, y| {
+            if x < shift || y < shift {
+                return f32::NAN;
+            }
+            height(x - shift, y - shift)
+        });
+        field.base = shift;
+        let first = shift / TILE_CELLS as i32;
+        for row in first..first + D as i32 {
+            for col in first..first + D as i32 {
                 field.take(TileKey { level: 0, col, row });
             }
         }
@@ -70,7 +91,7 @@ impl<const D: usize> Field<D> {
             .unwrap_or_else(|| Box::leak(Box::new(Tile::VACANT)));
         let (west, south) = (key.col * TILE_CELLS as i32, key.row * TILE_CELLS as i32);
         let size = self.size;
-        tile.fill(key, 0, |col, row| {
+        tile.fill(key, self.base, |col, row| {
             let (x, y) = (west + col as i32, south + row as i32);
             if x > size[0] || y > size[1] {
                 return f32::NAN;

@@ -1,0 +1,144 @@
+//! The search in one patch against bisection in f64.
+
+use super::*;
+use crate::contact::dice::Dice;
+
+/// F′(v)/2 and the point of the ruling at `v`, in f64, for coefficients as f32
+/// holds them.
+fn ruling64(patch: &Patch, hand: (f64, f64), v: f64) -> (f64, f64) {
+    let [a, b, c, d] = [patch.a, patch.b, patch.c, patch.d].map(f64::from);
+    let m = b + a * v;
+    let free_z = (d + b * hand.0 + (c + a * hand.0) * v) / (1.0 + m * m);
+    let free_u = hand.0 - m * free_z;
+    let u = free_u.clamp(0.0, 1.0);
+    let z = if u == free_u {
+        free_z
+    } else {
+        d + b * u + (c + a * u) * v
+    };
+    (u, (v - hand.1) + z * (c + a * u))
+}
+
+/// The local minimum of F that lies downhill of `from`, in f64.
+fn minimum64(patch: &Patch, hand: (f64, f64), from: f64) -> (f64, f64) {
+    let slope = |v: f64| ruling64(patch, hand, v).1;
+    let way = if slope(from) < 0.0 { 1.0 } else { -1.0 };
+    let (mut low, mut step) = (from, 1e-10);
+    let mut high = loop {
+        let next = (low + way * step).clamp(0.0, 1.0);
+        if slope(next) * way >= 0.0 || next == 0.0 || next == 1.0 {
+            break next;
+        }
+        (low, step) = (next, 2.0 * step);
+    };
+    if slope(high) * way > 0.0 {
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            if slope(middle) * way < 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+    }
+    (ruling64(patch, hand, high).0, high)
+}
+
+/// How strongly F curves at its minimum: the error of a flat minimum is the
+/// rounding of F′ over this.
+fn conditioning(patch: &Patch, hand: (f64, f64), v: f64) -> f64 {
+    let h = 1e-5;
+    if v < h || v > 1.0 - h {
+        return 1.0;
+    }
+    let slope = |v: f64| ruling64(patch, hand, v).1;
+    ((slope(v + h) - slope(v - h)) / (2.0 * h)).abs().min(1.0)
+}
+
+struct Errors {
+    /// Queries off by more than 2e-6 cell, conditioning counted.
+    off: u32,
+    worst: f64,
+    mean_evaluations: f64,
+    most_evaluations: u32,
+}
+
+/// Random patches of a slope, hands at a depth below them, random starts.
+fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
+    const QUERIES: u32 = 4000;
+    let mut dice = Dice(0x5EED);
+    let (mut off, mut worst, mut total, mut most) = (0, 0.0_f64, 0_u64, 0);
+    for _ in 0..QUERIES {
+        let flat = [0, 1, 2].map(|_| slope * dice.between(-1.0, 1.0));
+        let last = flat[1] + flat[2] - flat[0] + twist * dice.between(-1.0, 1.0);
+        let corners = [flat[0], flat[1], flat[2], last].map(|h| h as f32);
+        let above = Patch::new(corners);
+        let (u, v) = (dice.unit() as f32, dice.unit() as f32);
+        let down = above.normal(u, v).normalize() * depth as f32;
+        let hand = (u - down.x, v - down.y);
+        let hand_z = above.height(u, v) - down.z;
+        let patch = Patch::new(corners.map(|h| h - hand_z));
+        let start = (dice.unit() as f32, dice.unit() as f32);
+        let found = nearest_downhill(&patch, hand, start);
+        total += u64::from(found.evaluations);
+        most = most.max(found.evaluations);
+        let hand = (f64::from(hand.0), f64::from(hand.1));
+        let truth = minimum64(&patch, hand, f64::from(found.v));
+        let error = (f64::from(found.u) - truth.0).hypot(f64::from(found.v) - truth.1);
+        worst = worst.max(error);
+        off += u32::from(error * conditioning(&patch, hand, truth.1) > 2e-6);
+    }
+    Errors {
+        off,
+        worst,
+        mean_evaluations: total as f64 / f64::from(QUERIES),
+        most_evaluations: most,
+    }
+}
+
+#[test]
+fn within_two_millionths_of_a_cell_on_any_slope() {
+    for slope in [0.0, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4, 1e6] {
+        for depth in [1e-4, 0.01, 0.1, 1.0] {
+            for twist in [0.0, 1e-9, slope, 3.0 * slope] {
+                let errors = survey(slope, depth, twist);
+                let at = std::format!("slope {slope} depth {depth} twist {twist}");
+                // The few are hands at the centre of curvature of a steep
+                // patch, where f32 cannot tell which way is down.
+                let few = if slope > 1.0 { 20 } else { 0 };
+                assert!(errors.off <= few, "{} of 4000 off: {at}", errors.off);
+                assert!(errors.worst < 1e-3, "{:e}: {at}", errors.worst);
+                assert!(
+                    errors.mean_evaluations < 9.0,
+                    "{}: {at}",
+                    errors.mean_evaluations
+                );
+                assert!(
+                    errors.most_evaluations <= MAX_PASSES * MAX_EVALUATIONS,
+                    "{at}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_saddle_is_no_answer() {
+    // Hand in the middle under a strongly twisted patch: (½, ½) is stationary.
+    let patch = Patch::new([4.0, -2.0, -2.0, 4.0].map(|h| h + 1.0));
+    let found = nearest_downhill(&patch, (0.5, 0.5), (0.5, 0.5));
+    assert!(
+        (found.u - 0.5).abs() > 0.1 || (found.v - 0.5).abs() > 0.1,
+        "{found:?}"
+    );
+    let at_saddle = patch.height(0.5, 0.5).powi(2);
+    assert!(found.distance_squared < at_saddle);
+}
+
+#[test]
+fn warm_started_it_takes_two_evaluations() {
+    let patch = Patch::new([0.3, 0.1, 0.45, 0.35]);
+    let first = nearest_downhill(&patch, (0.5, 0.5), (0.5, 0.5));
+    let next = nearest_downhill(&patch, (0.51, 0.5), (first.u, first.v));
+    assert!(next.evaluations <= 3, "{next:?}");
+}

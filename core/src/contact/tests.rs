@@ -1,0 +1,363 @@
+//! What every tick must keep, on terrain from flat to absurd.
+
+use std::vec::Vec;
+
+use super::dice::Dice;
+use super::*;
+use crate::terrain::testing::Field;
+
+fn hash(x: i32, y: i32) -> f64 {
+    let mut h = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
+    h ^= h >> 15;
+    h = h.wrapping_mul(0x2C1B_3C6D);
+    h ^= h >> 12;
+    h = h.wrapping_mul(0x297A_2D39);
+    h ^= h >> 15;
+    f64::from(h) / f64::from(u32::MAX)
+}
+
+const SIZE: i32 = 60;
+
+/// A terrain and its surface in f64.
+struct Ground64 {
+    height: fn(i32, i32) -> f32,
+}
+
+impl Ground64 {
+    fn at(&self, x: f64, y: f64) -> Option<f64> {
+        if !(0.0..f64::from(SIZE)).contains(&x) || !(0.0..f64::from(SIZE)).contains(&y) {
+            return None;
+        }
+        let (i, j) = (x.floor() as i32, y.floor() as i32);
+        let (u, v) = (x - x.floor(), y - y.floor());
+        let h = |di: i32, dj: i32| f64::from((self.height)(i + di, j + dj));
+        let south = h(0, 0) * (1.0 - u) + h(1, 0) * u;
+        let north = h(0, 1) * (1.0 - u) + h(1, 1) * u;
+        let z = south * (1.0 - v) + north * v;
+        (!z.is_nan()).then_some(z)
+    }
+}
+
+impl Ground64 {
+    /// The surface at a point that may lie on the edge of a hole.
+    fn beside(&self, [x, y, _]: [f64; 3]) -> f64 {
+        let e = 1e-9;
+        [(0.0, 0.0), (e, 0.0), (0.0, e), (e, e)]
+            .iter()
+            .find_map(|(dx, dy)| self.at(x - dx, y - dy))
+            .expect("a proxy is on a patch")
+    }
+}
+
+fn point(p: [f64; 3]) -> GridPoint {
+    let cell = p.map(|c| c.floor() as i32);
+    let frac = [0, 1, 2].map(|i| (p[i] - p[i].floor()) as f32);
+    GridPoint::new(cell, Vec3::from_array(frac))
+}
+
+fn position(p: &GridPoint) -> [f64; 3] {
+    let (cell, frac) = (p.cell(), p.frac());
+    [0, 1, 2].map(|i| f64::from(cell[i]) + f64::from(frac[i]))
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Runs a trajectory to the end of every tick and checks each answer.
+fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]]) -> [u32; 3] {
+    let field = Field::<2>::held([SIZE, SIZE], height);
+    let truth = Ground64 { height };
+    let mut contact = Contact::new();
+    let mut seen = [0; 3];
+    for (tick, p) in path.iter().enumerate() {
+        let hip = point(*p);
+        let mut felt = contact.step(&field.window, hip, Rule::Swept, Pace::LockStep);
+        let mut turns = 0;
+        while !felt.settled {
+            felt = contact.step(&field.window, hip, Rule::Swept, Pace::LockStep);
+            turns += 1;
+            assert!(turns < 5000, "{name} {tick}: never settles {felt:?}");
+        }
+        let (x, proxy) = (position(&hip), position(&felt.proxy));
+        seen[felt.state as usize] += 1;
+        let at = std::format!("{name} tick {tick} hip {x:?} {felt:?}");
+        assert!(felt.stretch.is_finite(), "{at}");
+        match felt.state {
+            State::Waiting | State::Free => assert_eq!(felt.stretch, Vec3::ZERO, "{at}"),
+            State::Touching => {
+                let z = truth.beside(proxy);
+                let bound = 2e-6 + slope * 3e-7 + z.abs() * 5e-7;
+                assert!((proxy[2] - z).abs() < bound, "off the surface: {at} {z}");
+                assert_is_nearest(&truth, slope, proxy, x, &at);
+            }
+        }
+        if let (State::Free, Some(z)) = (felt.state, truth.at(x[0], x[1])) {
+            let bound = 2e-6 + slope * 3e-7 + z.abs() * 5e-7;
+            assert!(x[2] > z - bound, "free below the surface: {at} {z}");
+        }
+    }
+    seen
+}
+
+/// No point of the surface right around the proxy is nearer to the hand.
+fn assert_is_nearest(truth: &Ground64, slope: f64, proxy: [f64; 3], hip: [f64; 3], at: &str) {
+    const RING: f64 = 1e-5;
+    let d = distance(proxy, hip);
+    // Beside an edge, but not on it, the ring would look over a ridge.
+    let beside_edge = |c: f64| c != c.round() && (c - c.round()).abs() < 10.0 * RING;
+    if slope > 1e3 || beside_edge(proxy[0]) || beside_edge(proxy[1]) {
+        return;
+    }
+    // A proxy within e of the minimum leaves a gradient of e·(1 + slope²)/d.
+    let bound = RING * (1e-3 + 2e-6 * (1.0 + slope * slope) / d);
+    let d = distance([proxy[0], proxy[1], truth.beside(proxy)], hip);
+    for i in 0..16 {
+        let angle = f64::from(i) * core::f64::consts::TAU / 16.0;
+        let (x, y) = (proxy[0] + RING * angle.cos(), proxy[1] + RING * angle.sin());
+        if let Some(z) = truth.at(x, y) {
+            let other = distance([x, y, z], hip);
+            assert!(
+                other > d - bound,
+                "nearer by {} of {bound}: {at}",
+                d - other
+            );
+        }
+    }
+}
+
+/// A hand that wanders, at `step` cells a tick, around height `mid` ± `span`.
+fn wander(seed: u64, ticks: usize, step: f64, mid: f64, span: f64) -> Vec<[f64; 3]> {
+    let mut dice = Dice(seed);
+    let mut p = [30.0, 30.0, mid + span];
+    let mut v = [0.0; 3];
+    let high = [58.0, 58.0, mid + span];
+    let low = [2.0, 2.0, mid - span];
+    (0..ticks)
+        .map(|_| {
+            for k in 0..3 {
+                v[k] = 0.9 * v[k] + 0.3 * step * dice.between(-1.0, 1.0);
+                p[k] += v[k];
+                if p[k] < low[k] || p[k] > high[k] {
+                    p[k] = p[k].clamp(low[k], high[k]);
+                    v[k] = -v[k];
+                }
+            }
+            p
+        })
+        .collect()
+}
+
+/// Jumps anywhere.
+fn teleport(seed: u64, ticks: usize, mid: f64, span: f64) -> Vec<[f64; 3]> {
+    let mut dice = Dice(seed);
+    let mut path = std::vec![[30.0, 30.0, mid + 3.0 * span]];
+    path.extend((0..ticks).map(|_| {
+        [
+            dice.between(1.0, 59.0),
+            dice.between(1.0, 59.0),
+            dice.between(mid - span, mid + span),
+        ]
+    }));
+    path
+}
+
+/// Where the segment first goes below the surface, by looking at many points:
+/// none, or the point before and the point after.
+fn dense_crossing(truth: &Ground64, from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
+    let at = |i: i32| [0, 1, 2].map(|k| from[k] + f64::from(i) / 2000.0 * (to[k] - from[k]));
+    let below = |p: [f64; 3]| truth.at(p[0], p[1]).is_some_and(|z| p[2] < z);
+    let first = (0..=2000).find(|i| below(at(*i)))?;
+    Some([at((first - 1).max(0)), at(first)])
+}
+
+/// Random segments that start above everything.
+fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, high: f64) {
+    let field = Field::<2>::held([SIZE, SIZE], height);
+    let truth = Ground64 { height };
+    let mut dice = Dice(7);
+    let mut seen = [0, 0];
+    for _ in 0..4000 {
+        let from = [dice.between(0.5, 59.5), dice.between(0.5, 59.5), high];
+        let reach = if dice.unit() < 0.5 { 2.0 } else { 60.0 };
+        let to = [
+            (from[0] + dice.between(-reach, reach)).clamp(0.5, 59.5),
+            (from[1] + dice.between(-reach, reach)).clamp(0.5, 59.5),
+            dice.between(low, high),
+        ];
+        let (a, b) = (point(from), point(to));
+        let mut path = sweep::Path::through_air(a, b);
+        let swept = loop {
+            match path.advance(&field.window, &mut Work::new()) {
+                Sweep::Unfinished => {}
+                ended => break ended,
+            }
+        };
+        let at = std::format!("{name} {from:?} to {to:?}: {swept:?}");
+        match (swept, dense_crossing(&truth, position(&a), position(&b))) {
+            (Sweep::Hit { spot, .. }, Some([before, after])) => {
+                seen[0] += 1;
+                let x = f64::from(spot.cell[0]) + f64::from(spot.u);
+                let y = f64::from(spot.cell[1]) + f64::from(spot.v);
+                // On the way, and not after the dense search has seen it.
+                let way = ((to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2)).sqrt();
+                let gone = ((x - from[0]).powi(2) + (y - from[1]).powi(2)).sqrt();
+                let seen_at = ((after[0] - from[0]).powi(2) + (after[1] - from[1]).powi(2)).sqrt();
+                assert!(gone < seen_at + 4e-6, "late by {} {at}", gone - seen_at);
+                let z = truth.at(x, y).unwrap_or(f64::NAN);
+                let line = from[2] + (to[2] - from[2]) * gone / way;
+                let steep = slope + ((to[2] - from[2]) / way).abs();
+                assert!(
+                    (z - line).abs() < 4e-6 * (1.0 + steep),
+                    "{} {before:?} {at}",
+                    z - line
+                );
+            }
+            (Sweep::Hit { spot, .. }, None) => {
+                // Grazes between two points of the dense search, or touches.
+                let x = f64::from(spot.cell[0]) + f64::from(spot.u);
+                let y = f64::from(spot.cell[1]) + f64::from(spot.v);
+                assert!(truth.at(x, y).is_some(), "{at}");
+            }
+            (Sweep::Clear, None) => seen[1] += 1,
+            (Sweep::Clear, Some([_, after])) => {
+                let z = truth.at(after[0], after[1]).unwrap_or(f64::NAN);
+                assert!(
+                    z - after[2] < 4e-6 * (1.0 + slope),
+                    "missed {after:?} {z} {at}"
+                );
+            }
+            (other, dense) => panic!("{other:?} {dense:?} {at}"),
+        }
+    }
+    assert!(seen[0] > 500 && seen[1] > 100, "both occur: {seen:?}");
+}
+
+#[test]
+fn the_first_crossing_is_found_exactly() {
+    sweeps_agree("flat", flat, 0.0, 1.0, 3.0);
+    sweeps_agree("hills", hills, 1.5, -3.0, 3.2);
+    sweeps_agree("rough", rough, 2.0, 0.0, 2.2);
+    sweeps_agree("noise", noise_100, 200.0, -100.0, 101.0);
+    sweeps_agree("board", checkerboard, 1.0, -0.5, 1.5);
+}
+
+/// Figure 8 of the paper, with walls for its peaks: a single raised sample is
+/// a pole that a proxy may slide around, a wall may not be passed.
+fn two_walls(x: i32, _: i32) -> f32 {
+    if x == 20 || x == 24 { 30.0 } else { 0.0 }
+}
+
+#[test]
+fn proxy_does_not_tunnel_through_a_wall() {
+    let field = Field::<2>::held([SIZE, SIZE], two_walls);
+    let (above, beyond) = (point([10.0, 30.2, 5.0]), point([40.0, 30.7, 5.0]));
+    let mut swept = Contact::new();
+    swept.step(&field.window, above, Rule::Swept, Pace::LockStep);
+    let felt = swept.step(&field.window, beyond, Rule::Swept, Pace::LockStep);
+    assert_eq!(felt.state, State::Touching);
+    assert!(position(&felt.proxy)[0] < 20.0, "{felt:?}");
+    assert!(felt.stretch.x < -19.0);
+}
+
+#[test]
+fn shifting_the_scene_changes_no_bit() {
+    for shift in [1000, 100_000, 100_000_000] {
+        let shift = shift / 32 * 32; // whole tiles, so that one function serves
+        let near = Field::<2>::held([SIZE, SIZE], rough);
+        let far = Field::<2>::shifted(SIZE, shift, rough);
+        let (mut a, mut b) = (Contact::new(), Contact::new());
+        for p in wander(3, 1500, 0.2, 1.0, 1.5) {
+            let hip = point(p);
+            let moved = GridPoint::new(hip.cell().map(|c| c + shift), hip.frac());
+            let here = a.step(&near.window, hip, Rule::Swept, Pace::LockStep);
+            let there = b.step(&far.window, moved, Rule::Swept, Pace::LockStep);
+            assert_eq!(
+                here.stretch.to_array().map(f32::to_bits),
+                there.stretch.to_array().map(f32::to_bits)
+            );
+            assert_eq!(here.proxy.frac(), there.proxy.frac());
+            assert_eq!(here.state, there.state);
+        }
+    }
+}
+
+fn flat(_: i32, _: i32) -> f32 {
+    2.0
+}
+fn hills(x: i32, y: i32) -> f32 {
+    (3.0 * (f64::from(x) * 0.4).sin() * (f64::from(y) * 0.3).cos()) as f32
+}
+fn rough(x: i32, y: i32) -> f32 {
+    (hash(x, y) * 2.0) as f32
+}
+fn noise_100(x: i32, y: i32) -> f32 {
+    (hash(x, y) * 200.0 - 100.0) as f32
+}
+fn checkerboard(x: i32, y: i32) -> f32 {
+    ((x + y) & 1) as f32
+}
+fn spikes(x: i32, y: i32) -> f32 {
+    if hash(x, y) > 0.97 { 1e4 } else { 0.0 }
+}
+fn holes(x: i32, y: i32) -> f32 {
+    if hash(x, y) > 0.95 {
+        f32::NAN
+    } else {
+        rough(x, y)
+    }
+}
+fn denormal(x: i32, y: i32) -> f32 {
+    f32::from_bits((hash(x, y) * 1000.0) as u32)
+}
+
+#[test]
+fn holds_on_flat_and_smooth_terrain() {
+    for seed in 1..=20 {
+        let seen = check("flat", flat, 0.0, &wander(seed, 2000, 0.05, 2.0, 0.6));
+        assert!(seen[1] > 50 && seen[2] > 50, "{seen:?}");
+        check("hills", hills, 1.5, &wander(seed, 2000, 0.1, 0.0, 3.5));
+        check("hills", hills, 1.5, &wander(seed, 500, 3.0, 0.0, 3.5));
+        check("denormal", denormal, 0.0, &wander(seed, 500, 0.1, 0.0, 0.5));
+    }
+}
+
+#[test]
+fn holds_on_rough_terrain() {
+    for seed in 1..=20 {
+        check("rough", rough, 2.0, &wander(seed, 2000, 0.05, 1.0, 1.2));
+        check("rough", rough, 2.0, &wander(seed, 1000, 2.0, 1.0, 2.0));
+        check(
+            "board",
+            checkerboard,
+            1.0,
+            &wander(seed, 1000, 0.2, 0.5, 1.0),
+        );
+        check(
+            "noise",
+            noise_100,
+            200.0,
+            &wander(seed, 1000, 0.5, 0.0, 120.0),
+        );
+    }
+}
+
+#[test]
+fn holds_on_spikes_and_holes() {
+    for seed in 1..=20 {
+        check("spikes", spikes, 1e4, &wander(seed, 1000, 0.5, 0.0, 1.5));
+        check("holes", holes, 2.0, &wander(seed, 2000, 0.2, 1.0, 1.5));
+    }
+}
+
+#[test]
+fn holds_when_the_hand_jumps() {
+    for seed in 1..=20 {
+        check("flat", flat, 0.0, &teleport(seed, 300, 2.0, 2.0));
+        check("hills", hills, 1.5, &teleport(seed, 300, 0.0, 5.0));
+        check("rough", rough, 2.0, &teleport(seed, 300, 1.0, 2.0));
+        check("holes", holes, 2.0, &teleport(seed, 300, 1.0, 2.0));
+        check("noise", noise_100, 200.0, &teleport(seed, 300, 0.0, 100.0));
+        check("spikes", spikes, 1e4, &teleport(seed, 300, 0.0, 3.0));
+    }
+}
