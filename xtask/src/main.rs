@@ -29,8 +29,8 @@ cargo xtask COMMAND
                          --quick: the emulated board only, no dependencies
   lint                   formatting, clippy and documentation, warnings as errors
   setup                  only find or install what the commands need
-  size                   build the images and hold them to their flash and RAM budgets
-  panics                 build the images and prove that no tick can panic
+  size [BOARD]           build the images and hold them to their flash and RAM budgets
+  panics [BOARD]         build the images and prove that no tick can panic
   deny                   licences, bans, sources and advisories of dependencies
   flash BOARD            run an image on a real board with probe-rs
 
@@ -67,6 +67,8 @@ fn command() -> Result<ExitCode> {
                 .map(exit_code);
         }
         "test" => test::test(quick(&mut words)?)?,
+        "size" => test::check_sizes(&test::images(boards(&mut words)?)?)?,
+        "panics" => test::check_panics(&test::images(boards(&mut words)?)?)?,
         "flash" => flash::flash(board::by_name(&words.value()?.string()?)?)?,
         plain => {
             if let Some(extra) = words.next()? {
@@ -75,8 +77,6 @@ fn command() -> Result<ExitCode> {
             match plain {
                 "lint" => lint::lint()?,
                 "setup" => setup()?,
-                "size" => test::check_sizes(&test::images(&board::BOARDS)?)?,
-                "panics" => test::check_panics(&test::images(&board::BOARDS)?)?,
                 "deny" => deny::check()?,
                 "help" => print!("{HELP}"),
                 _ => bail!("there is no command {plain}:\n\n{HELP}"),
@@ -94,6 +94,15 @@ fn setup() -> Result<()> {
         qemu.display()
     ));
     Ok(())
+}
+
+/// `[BOARD]`: one board, or all.
+fn boards(words: &mut lexopt::Parser) -> Result<&'static [board::Board]> {
+    match words.next()? {
+        None => Ok(&board::BOARDS),
+        Some(Value(name)) => Ok(std::slice::from_ref(board::by_name(&name.string()?)?)),
+        Some(other) => Err(other.unexpected().into()),
+    }
 }
 
 fn quick(words: &mut lexopt::Parser) -> Result<bool> {

@@ -31,12 +31,12 @@ pub(crate) fn from<'a>(root: usize, callees: impl Fn(usize) -> &'a [usize]) -> R
 
 impl Reached {
     /// All nodes, nearest first.
-    pub(crate) fn all(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn all(&self) -> impl Iterator<Item = usize> + Clone + '_ {
         self.order.iter().copied()
     }
 
     /// The node from which `node` was first reached; none for the root.
-    pub(crate) fn parent(&self, node: usize) -> Option<usize> {
+    fn parent(&self, node: usize) -> Option<usize> {
         self.parents[node].filter(|&parent| parent != node)
     }
 
@@ -45,11 +45,6 @@ impl Reached {
         let mut chain: Vec<_> = std::iter::successors(Some(node), |&n| self.parent(n)).collect();
         chain.reverse();
         chain
-    }
-
-    /// Whether `node` or one on the way to it is `wanted`.
-    pub(crate) fn below(&self, node: usize, wanted: impl Fn(usize) -> bool) -> bool {
-        self.chain(node).into_iter().any(wanted)
     }
 }
 
@@ -64,6 +59,5 @@ mod tests {
         assert_eq!(reached.all().collect::<Vec<_>>(), [0, 1, 2, 3]);
         assert_eq!(reached.chain(3), [0, 2, 3]);
         assert_eq!(reached.parent(0), None);
-        assert!(reached.below(3, |n| n == 2) && !reached.below(3, |n| n == 1));
     }
 }
