@@ -73,22 +73,34 @@ where
     Ok(chart)
 }
 
-/// A number as a person writes it on an axis: no more decimals than it has,
-/// powers of ten past a million and below a ten-thousandth.
+/// A number as a person writes it on an axis: at most six digits, powers of
+/// ten from a million on and below a ten-thousandth.
 #[must_use]
 pub fn number(value: &f64) -> String {
     let size = value.abs();
     // Ticks are sums of steps: what is left at zero is rounding.
-    if size > 1e-13 && !(1e-4..1e6).contains(&size) {
-        return format!("{value:e}");
+    if size < 1e-13 {
+        return "0".to_owned();
     }
-    let text = format!("{value:.4}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    // A true minus sign, and no "-0".
-    match text.strip_prefix('-') {
-        Some("0") => "0".to_owned(),
-        Some(digits) => format!("−{digits}"),
-        None => text.to_owned(),
+    // A true minus sign.
+    let sign = if *value < 0.0 { "−" } else { "" };
+    let scientific = format!("{size:.5e}");
+    let (mantissa, power) = scientific.split_once('e').unwrap_or((&scientific, "0"));
+    let power: i32 = power.parse().unwrap_or(0);
+    if (-4..6).contains(&power) {
+        let decimals = usize::try_from(5 - power).unwrap_or(0);
+        return format!("{sign}{}", bare(&format!("{size:.decimals$}")));
+    }
+    let power = power.to_string().replace('-', "−");
+    format!("{sign}{}e{power}", bare(mantissa))
+}
+
+/// Digits without the zeros that say nothing.
+fn bare(digits: &str) -> &str {
+    if digits.contains('.') {
+        digits.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        digits
     }
 }
 
@@ -121,12 +133,39 @@ mod tests {
             (1.4e-16, "0"),
             (0.30000000000000004, "0.3"),
             (12500.0, "12500"),
+            (0.0005, "0.0005"),
             (2e6, "2e6"),
-            (1e-6, "1e-6"),
+            (1e-6, "1e−6"),
+            (-9.999999999999999e-5, "−0.0001"),
+            (1e-23, "0"),
+            (1e12, "1e12"),
         ];
         for (value, text) in cases {
             assert_eq!(number(&value), text);
         }
+    }
+
+    /// What a picture of run time against error needs.
+    #[test]
+    fn logarithmic_axes_take_points_and_lines() {
+        use plotters::prelude::*;
+        let mut canvas = super::super::Canvas::new(800, 600);
+        let sheet = canvas.pen().into_drawing_area();
+        let titles = Titles {
+            x: "time (ns)",
+            y: "error (cells)",
+        };
+        let ranges = ((1.0..1e4).log_scale(), (1e-8..1.0).log_scale());
+        let mut chart = chart(&sheet, ranges.0, ranges.1, titles).expect("room");
+        let line = vec![(10.0, 1e-6), (1e3, 1e-2)];
+        let style = style::stroke(&style::SERIES[2], 2.0);
+        super::super::line::draw(&mut chart, &[line], style).expect("drawn");
+        let dot = Circle::new((10.0, 1e-6), px(6), style::SERIES[1].filled());
+        chart.draw_series([dot]).expect("drawn");
+        drop((chart, sheet));
+        let rgb = canvas.to_rgb();
+        let RGBColor(r, g, b) = style::SERIES[1];
+        assert!(rgb.as_chunks::<3>().0.contains(&[r, g, b]));
     }
 
     #[test]

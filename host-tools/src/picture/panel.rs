@@ -112,7 +112,12 @@ fn scale(area: &Area<'_>, top: i32, relief: &Relief) -> Result<i32, PictureError
     }
     let y = bar_bottom + px(16);
     let (low, high) = relief.range_mm;
-    let text = |height: f64| axes::number(&(height * 10.0).round().mul_add(0.1, 0.0));
+    // As many decimals as tell the middle from the ends.
+    let decimals = (1.0 - (high - low).max(1e-9).log10())
+        .ceil()
+        .clamp(0.0, 9.0);
+    let unit = 10f64.powf(-decimals);
+    let text = |height: f64| axes::number(&((height / unit).round() * unit));
     label(area, 0, y, &text(low), HPos::Left)?;
     label(area, width / 2, y, &text(0.5 * (low + high)), HPos::Center)?;
     label(area, width, y, &text(high), HPos::Right)?;

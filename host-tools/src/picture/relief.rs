@@ -42,8 +42,9 @@ const TINTS: [RGBColor; 6] = [
     RGBColor(206, 180, 150),
     RGBColor(245, 241, 236),
 ];
-/// Holes: stripes of these two.
-const HOLE: [RGBColor; 2] = [RGBColor(232, 234, 240), RGBColor(178, 184, 198)];
+/// Ground of a hole, and the stripes on it.
+pub(super) const HOLE: RGBColor = RGBColor(232, 234, 240);
+const STRIPE: RGBColor = RGBColor(178, 184, 198);
 
 /// A finished relief.
 pub(super) struct Relief {
@@ -65,7 +66,11 @@ pub(super) fn tint(t: f64) -> RGBColor {
 
 /// The colour of a hole's pixel.
 pub(super) fn hole(x: i32, y: i32) -> RGBColor {
-    HOLE[usize::from((x + y).rem_euclid(8) < 2)]
+    if (x + y).rem_euclid(8) < 2 {
+        STRIPE
+    } else {
+        HOLE
+    }
 }
 
 /// Shades a window of a field into an image.
@@ -260,6 +265,21 @@ mod tests {
         assert!(relief.holes);
         let RGBColor(r, ..) = hole(50, 50);
         assert_eq!(relief.rgb[(50 * 100 + 50) * 3], r);
+    }
+
+    #[test]
+    fn a_pixel_that_is_mostly_hole_is_a_hole() {
+        let field = |known: &'static dyn Fn(f64) -> bool| {
+            let height = move |x: f64, _: f64| known(x).then_some(2.0);
+            let field = Field {
+                height_mm: &height,
+                size_mm: [3.0, 3.0],
+                cell_mm: 1.0,
+            };
+            mean(&field, [0.0, 0.0], [3.0, 3.0], 3)
+        };
+        assert_eq!(field(&|x| x < 1.0), None);
+        assert_eq!(field(&|x| x < 2.0), Some(2.0));
     }
 
     #[test]

@@ -42,20 +42,31 @@ fn session<'a>(samples: &'a [Sample], size_mm: [f64; 2]) -> Session<'a> {
     }
 }
 
-fn count(canvas: &Canvas, color: plotters::style::RGBColor) -> usize {
+/// Pixels of a colour in rows from the first to before the second.
+fn count(canvas: &Canvas, color: plotters::style::RGBColor, rows: [i32; 2]) -> usize {
     let rgb = canvas.to_rgb();
+    let row = WIDTH_PX as usize * 3;
+    let part = &rgb[rows[0] as usize * row..rows[1] as usize * row];
     let same = |p: &&[u8; 3]| **p == [color.0, color.1, color.2];
-    rgb.as_chunks::<3>().0.iter().filter(same).count()
+    part.as_chunks::<3>().0.iter().filter(same).count()
 }
 
 #[test]
 fn a_session_shows_hand_and_proxy_on_map_and_profile() {
     let samples = walk();
     let canvas = draw_session(&session(&samples, [100.0, 90.0])).expect("drawn");
-    assert!(count(&canvas, HIP) > 1500, "{}", count(&canvas, HIP));
-    assert!(count(&canvas, PROXY) > 1500, "{}", count(&canvas, PROXY));
+    let bottom = canvas.size().1.cast_signed();
+    let forces = bottom - MARGIN_PX - FORCES_PX;
+    let heights = forces - GAP_PX - HEIGHTS_PX;
+    let map = [HEADER_PX, heights];
+    let profile = [heights, forces];
+    for (color, part) in [(HIP, map), (PROXY, map), (HIP, profile), (PROXY, profile)] {
+        let seen = count(&canvas, color, part);
+        assert!(seen > 900, "{color:?} in rows {part:?}: {seen}");
+    }
+    assert!(count(&canvas, style::INK, [forces, bottom]) > 900);
     let empty = draw_session(&session(&[], [100.0, 90.0])).expect("drawn");
-    assert!(count(&empty, HIP) < 300);
+    assert_eq!(count(&empty, HIP, profile), 0);
 }
 
 #[test]

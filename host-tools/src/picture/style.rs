@@ -209,6 +209,13 @@ mod tests {
     #[test]
     fn both_faces_are_readable() {
         assert!(REGULAR.is_some() && BOLD.is_some());
+        // None of what the pictures write comes out as an empty box.
+        for letter in "aZ09.,:−×·µ°()%±".chars() {
+            for font in [&REGULAR, &BOLD] {
+                let known = font.as_ref().map(|f| f.glyph_id(letter).0 != 0);
+                assert_eq!(known, Some(true), "{letter}");
+            }
+        }
         let wide = text_size("mm", &bold(20, &INK)).0;
         assert!(wide > text_size("mm", &text(20, &INK)).0);
     }

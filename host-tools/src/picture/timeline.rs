@@ -1,14 +1,14 @@
 //! Height and force against time.
 
 use plotters::element::{Rectangle, Text};
-use plotters::style::{Color, RGBColor};
+use plotters::style::{Color, RGBColor, ShapeStyle};
 use plotters_backend::text_anchor::{HPos, Pos, VPos};
 use std::ops::Range;
 
 use super::axes::{self, Area, Chart, Titles};
 use super::canvas::{PictureError, SCALE};
 use super::line;
-use super::relief::Field;
+use super::relief::{self, Field};
 use super::session::Sample;
 use super::style::{
     self, GROUND, HIP, INK, PROXY, SERIES, SURFACE, TOUCHING, TOUCHING_INK, px, stroke,
@@ -33,6 +33,8 @@ pub(super) fn heights(
     let mut chart = axes::chart(area, time.clone(), range.clone(), titles)?;
     let columns = area.dim_in_pixel().0 / SCALE as u32;
     touching(&mut chart, samples, time, &range)?;
+    let holes = samples.iter().map(|s| (s.t_s, surface(s).is_none()));
+    bands(&mut chart, holes, time, &range, relief::HOLE.filled())?;
     let ground = line::curve(samples.iter().map(|s| (s.t_s, surface(s))), time, columns);
     fill_below(&mut chart, &ground, range.start)?;
     let touched = |s: &Sample| s.contact.then_some(s.proxy_mm[2]);
@@ -55,6 +57,8 @@ pub(super) fn forces(
         .iter()
         .flat_map(|s| s.force_n.into_iter().chain([size(s.force_n), 0.0, 0.5]));
     let range = axes::spread(all, 0.06);
+    // Room for the key.
+    let range = range.start..range.end + 0.12 * (range.end - range.start);
     let titles = Titles {
         x: "time (s)",
         y: "force (N)",
@@ -96,14 +100,29 @@ fn touching(
     time: &Range<f64>,
     range: &Range<f64>,
 ) -> Result<(), PictureError> {
-    let gap = (time.end - time.start) * 2e-3;
-    let runs = line::runs(samples.iter().map(|s| (s.t_s, s.contact)), gap);
-    chart.draw_series(runs.into_iter().map(|(from, to)| {
-        Rectangle::new(
-            [(from, range.start), (to, range.end)],
-            TOUCHING.mix(TOUCHING_INK).filled(),
-        )
-    }))?;
+    let when = samples.iter().map(|s| (s.t_s, s.contact));
+    bands(
+        chart,
+        when,
+        time,
+        range,
+        TOUCHING.mix(TOUCHING_INK).filled(),
+    )
+}
+
+/// A band from top to bottom for each run of times.
+fn bands(
+    chart: &mut Chart<'_>,
+    when: impl Iterator<Item = (f64, bool)>,
+    time: &Range<f64>,
+    range: &Range<f64>,
+    style: ShapeStyle,
+) -> Result<(), PictureError> {
+    let runs = line::runs(when, (time.end - time.start) * 2e-3);
+    chart.draw_series(
+        runs.into_iter()
+            .map(|(from, to)| Rectangle::new([(from, range.start), (to, range.end)], style)),
+    )?;
     Ok(())
 }
 
