@@ -6,6 +6,7 @@
 //! - [`raster`]: files of every supported format become one [`raster::Raster`];
 //! - [`synth`]: terrains made by formula, for trying and testing;
 //! - [`terrain`]: a raster at a scale, cut into tiles;
+//! - [`link`]: the terrain served to a device, tile by tile;
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
 //! - [`picture`]: what was felt, as PNG files;
 //! - [`cli`]: the `hapterra` command, one file a subcommand.
@@ -13,7 +14,9 @@
 #![forbid(unsafe_code)]
 
 pub mod cli;
+pub mod link;
 pub mod phantom;
 pub mod picture;
 pub mod raster;
+pub mod synth;
 pub mod terrain;

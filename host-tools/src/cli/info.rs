@@ -191,12 +191,16 @@ impl Level {
     }
 }
 
-/// Levels of detail until one tile holds the field.
+/// Levels of detail until one tile holds the field, or no whole cell is left of it
+/// one way.
 fn levels(columns: u32, rows: u32) -> Vec<Level> {
     let tile_bytes = (POSTS * POSTS * size_of::<f32>()) as u64;
     let mut levels = Vec::new();
     for level in 0..=31 {
-        let tiles = |samples: u32| ((samples - 1) >> level).max(1).div_ceil(TILE_CELLS as u32);
+        if (columns.min(rows) - 1) >> level == 0 {
+            break;
+        }
+        let tiles = |samples: u32| ((samples - 1) >> level).div_ceil(TILE_CELLS as u32);
         let (tile_columns, tile_rows) = (tiles(columns), tiles(rows));
         let tiles = u64::from(tile_columns) * u64::from(tile_rows);
         levels.push(Level {
@@ -226,5 +230,6 @@ mod tests {
         assert_eq!(counts, [(4, 2), (2, 1), (1, 1)]);
         assert_eq!(levels(2, 2).len(), 1);
         assert_eq!(levels(34, 2)[0].tile_columns, 2);
+        assert_eq!(levels(5000, 2).len(), 1);
     }
 }

@@ -2,18 +2,92 @@
 
 use std::path::PathBuf;
 
+use clap::ValueHint;
+use indicatif::{ProgressBar, ProgressStyle};
+
 use super::Failure;
+use super::input::parse_size;
+use crate::synth::{Grid, Kind, Synth, WriteError, write};
 
 /// Arguments of `hapterra synth`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// File to write
-    #[arg(short, long)]
+    /// What the terrain looks like
+    #[arg(value_enum)]
+    pub kind: Kind,
+
+    /// File to write: .tif (GeoTIFF), .asc (Esri ASCII) or .png (16-bit, whole metres)
+    #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub output: PathBuf,
+
+    /// Samples: WIDTHxHEIGHT, or one number for a square
+    #[arg(long, value_name = "WxH", default_value = "1024", value_parser = parse_size)]
+    pub size: (u32, u32),
+
+    /// Another seed makes another terrain; the same seed makes the same one anywhere
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+
+    /// Side of a cell in metres
+    #[arg(long, value_name = "METRES", default_value_t = 10.0, value_parser = parse_length)]
+    pub cell_m: f64,
+
+    /// Height of the terrain in metres [default: what suits the kind, some tens of cells]
+    #[arg(long, value_name = "METRES", value_parser = parse_length)]
+    pub amplitude: Option<f64>,
 }
 
 /// Writes the terrain.
+///
+/// # Errors
+/// When it is too small for a surface, or the file cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    println!("{}", args.output.display());
+    let (columns, rows) = args.size;
+    if columns < 2 || rows < 2 {
+        let error = format!("too small: {columns} × {rows} samples");
+        return Err(Failure::new(error).hint("a surface needs at least --size 2x2"));
+    }
+    let usual = args.kind.usual_amplitude_cells() * args.cell_m;
+    let synth = Synth::new(args.kind, args.seed, args.amplitude.unwrap_or(usual));
+    let grid = Grid {
+        columns,
+        rows,
+        cell_m: args.cell_m,
+    };
+    let progress = rows_bar(rows);
+    let written = write(&args.output, &synth, &grid, &mut || progress.inc(1));
+    progress.finish_and_clear();
+    written.map_err(|error| {
+        let hint = hint(&error);
+        Failure::new(error).hint(hint)
+    })?;
+    println!(
+        "wrote {}: {columns} × {rows} samples",
+        args.output.display()
+    );
     Ok(())
+}
+
+fn rows_bar(rows: u32) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} rows, {eta} left");
+    ProgressBar::new(u64::from(rows))
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+fn parse_length(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(length) if length > 0.0 && length <= 1e9 => Ok(length),
+        _ => Err("metres, above 0 and at most 1e9".into()),
+    }
+}
+
+fn hint(error: &WriteError) -> &'static str {
+    match error {
+        WriteError::Io { .. } => {
+            "check that the folder exists and has room, and that you may write there"
+        }
+        WriteError::UnknownExtension { .. } => "name the output .tif for a GeoTIFF",
+        WriteError::TooHighForPng { .. } => "lower --amplitude, or write a .tif",
+        WriteError::Encoder { .. } => "make it smaller with --size",
+    }
 }

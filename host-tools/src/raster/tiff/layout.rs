@@ -58,7 +58,7 @@ impl Layout {
             ));
         }
         let compression: u16 = unsigned(decoder, Tag::Compression)?.unwrap_or(1);
-        let compression = CompressionMethod::from_u16_exhaustive(compression);
+        let compression = supported_compression(compression)?;
         let tiled = decoder.get_chunk_type() == ChunkType::Tile;
         let counts = if tiled {
             Tag::TileByteCounts
@@ -149,6 +149,22 @@ fn unsupported(feature: &str) -> Fault {
         format: "TIFF",
         feature: feature.into(),
     }
+}
+
+/// The compressions that are compiled in, of those that GIS programs write.
+fn supported_compression(code: u16) -> Result<CompressionMethod, Fault> {
+    let name = match code {
+        1 | 5 | 8 | 32773 | 32946 | 50000 => {
+            return Ok(CompressionMethod::from_u16_exhaustive(code));
+        }
+        6 | 7 => "JPEG",
+        34887 => "LERC",
+        34925 => "LZMA",
+        50001 => "WebP",
+        50002 | 52546 => "JPEG XL",
+        _ => return Err(unsupported(&format!("compression {code}"))),
+    };
+    Err(unsupported(&format!("{name} compression")))
 }
 
 fn unsigned<T: TryFrom<u64>, R: Read + Seek>(

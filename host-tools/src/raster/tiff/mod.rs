@@ -74,11 +74,12 @@ fn fault(error: TiffError) -> Fault {
         TiffError::IoError(error) => Fault::from_io(error, "the image"),
         TiffError::UnsupportedError(error) => Fault::Unsupported {
             format: "TIFF",
-            feature: error.to_string(),
+            feature: format!("this variant ({error})"),
         },
-        TiffError::LimitsExceeded | TiffError::IntSizeError => {
-            Fault::AbsurdSize("more than a decoder should make room for".into())
+        TiffError::LimitsExceeded => {
+            Fault::AbsurdSize("TIFF: a list of more entries than any image needs".into())
         }
+        TiffError::IntSizeError => Fault::damaged("TIFF: a number in its header is out of range"),
         TiffError::FormatError(TiffFormatError::InvalidDimensions(columns, rows)) => {
             Fault::damaged(format!("TIFF: an image of {columns} × {rows}"))
         }
