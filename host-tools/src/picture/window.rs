@@ -12,7 +12,7 @@ pub(super) struct Window {
 /// Most finished pixels of a map.
 pub(super) const MAP_PX: (f64, f64) = (1096.0, 800.0);
 /// A path that crosses this share of the terrain is shown on all of it.
-const WHOLE_SHARE: f64 = 0.35;
+const WHOLE_SHARE: f64 = 0.55;
 /// So is any path on a terrain of at most this many cells in each direction.
 const SMALL_CELLS: f64 = 160.0;
 /// Air around a path, as a share of its extent.
