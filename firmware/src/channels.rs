@@ -14,7 +14,7 @@ use heapless::spsc::Queue;
 
 use crate::board::{Amplifiers, Encoders, TickClock};
 use crate::haptic_loop::{HapticLoop, LoopEnds};
-use crate::link::{Identity, Link, LinkEnds};
+use crate::link::{Buffers, Identity, Link, LinkEnds};
 
 /// Tile buffers besides the window's: one for each tile on its way.
 pub const SPARES: usize = IN_FLIGHT;
@@ -66,13 +66,15 @@ pub struct Vitals {
     pub dropped: AtomicU32,
 }
 
-/// The queues between the loop and the link.
+/// The queues between the loop and the link, and the link's large buffers:
+/// all that is better placed once than moved.
 pub struct Channels<'t> {
     commands: Queue<Command<'t>, COMMANDS>,
     /// Room for every buffer that can be on its way back.
     spent: Queue<&'t mut Tile, { SPARES + 1 }>,
     records: Queue<Record, RECORDS>,
     vitals: Vitals,
+    buffers: Buffers,
 }
 
 impl Channels<'_> {
@@ -88,6 +90,7 @@ impl Channels<'_> {
                 turns: AtomicU32::new(0),
                 dropped: AtomicU32::new(0),
             },
+            buffers: Buffers::new(),
         }
     }
 }
@@ -159,6 +162,7 @@ where
             records: records_here,
             vitals,
         },
+        &mut channels.buffers,
     );
     Application {
         haptic_loop,

@@ -11,6 +11,7 @@ use core::sync::atomic::{Ordering, compiler_fence};
 use cortex_m::register::{basepri, basepri_max};
 
 /// Priority of the haptic interrupt, above everything but faults.
+#[allow(dead_code)] // Only where priorities are set by number.
 pub(crate) const HAPTIC: u8 = 0x00;
 /// Highest priority that critical sections hold back: level 1 of the sixteen
 /// that an STM32 has (and of the 256 of the emulated core).

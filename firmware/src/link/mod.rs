@@ -30,8 +30,9 @@ use heapless::spsc::{Consumer, Producer};
 
 use crate::board::TickClock;
 use crate::channels::{Record, SPARES, Vitals};
+use outbox::Outbox;
 pub use session::POINTS_AHEAD;
-use session::Session;
+use session::{Backlog, Session};
 
 /// How the device introduces itself.
 #[derive(Clone, Debug)]
@@ -67,9 +68,26 @@ pub(crate) struct LinkEnds<'t> {
     pub(crate) vitals: &'t Vitals,
 }
 
+/// The link's large buffers.
+pub(crate) struct Buffers {
+    reader: FrameReader<MAX_FRAME>,
+    outbox: Outbox,
+    backlog: Backlog,
+}
+
+impl Buffers {
+    pub(crate) const fn new() -> Self {
+        Self {
+            reader: FrameReader::new(),
+            outbox: Outbox::new(),
+            backlog: Backlog::new(),
+        }
+    }
+}
+
 /// The device's end of the link, for a window of `D × D` tiles.
 pub struct Link<'t, const D: usize> {
-    reader: FrameReader<MAX_FRAME>,
+    reader: &'t mut FrameReader<MAX_FRAME>,
     session: Session<'t, D>,
 }
 
@@ -78,10 +96,16 @@ impl<'t, const D: usize> Link<'t, D> {
         identity: Identity,
         spare: [&'t mut Tile; SPARES],
         ends: LinkEnds<'t>,
+        buffers: &'t mut Buffers,
     ) -> Self {
+        let Buffers {
+            reader,
+            outbox,
+            backlog,
+        } = buffers;
         Self {
-            reader: FrameReader::new(),
-            session: Session::new(identity.0, spare, ends),
+            reader,
+            session: Session::new(identity.0, spare, ends, outbox, backlog),
         }
     }
 
@@ -120,7 +144,7 @@ impl<'t, const D: usize> Link<'t, D> {
 
     /// The transport was interrupted: what was under way is lost.
     pub fn interrupted(&mut self) {
-        self.reader = FrameReader::new();
+        *self.reader = FrameReader::new();
         self.session.interrupted();
     }
 

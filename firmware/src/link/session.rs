@@ -18,6 +18,8 @@ use crate::channels::{Record, SPARES};
 
 /// Samples kept for the writer; beyond them, new ones are dropped.
 const BACKLOG: usize = 24;
+/// Samples on their way to the writer.
+pub(crate) type Backlog = Deque<Record, BACKLOG>;
 /// Points a host may send ahead; beyond them, they are dropped.
 pub const POINTS_AHEAD: usize = 16;
 
@@ -53,8 +55,8 @@ pub(crate) struct Session<'t, const D: usize> {
     ends: LinkEnds<'t>,
     points: Deque<Point, POINTS_AHEAD>,
     replay: Replay,
-    outbox: Outbox,
-    backlog: Deque<Record, BACKLOG>,
+    outbox: &'t mut Outbox,
+    backlog: &'t mut Backlog,
     /// Telemetry samples packed in this session.
     packed: u32,
     /// Samples dropped here; those dropped by the loop are in the vitals.
@@ -67,6 +69,8 @@ impl<'t, const D: usize> Session<'t, D> {
         mut hello: DeviceHello,
         spare: [&'t mut Tile; SPARES],
         ends: LinkEnds<'t>,
+        outbox: &'t mut Outbox,
+        backlog: &'t mut Backlog,
     ) -> Self {
         hello.window = u8::try_from(D).unwrap_or(u8::MAX);
         Self {
@@ -80,8 +84,8 @@ impl<'t, const D: usize> Session<'t, D> {
             ends,
             points: Deque::new(),
             replay: Replay::default(),
-            outbox: Outbox::new(),
-            backlog: Deque::new(),
+            outbox,
+            backlog,
             packed: 0,
             dropped: 0,
             bad_frames: 0,

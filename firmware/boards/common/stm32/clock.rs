@@ -1,0 +1,71 @@
+//! The tick's timer, and the core's cycle counter as the clock.
+
+use cortex_m::Peripherals;
+use cortex_m::peripheral::DWT;
+use embassy_stm32::timer::low_level::Timer;
+use embassy_stm32::{Peri, pac};
+use hapterra_firmware::board::TickClock;
+
+use super::TickTimer;
+
+/// Counts of the prescaled timer in a tick: with the prescaler, exactly a
+/// thousandth of a second. (A frequency asked of embassy would be rounded.)
+pub(crate) struct Period {
+    /// The prescaler register.
+    pub(crate) prescaler: u16,
+    /// The auto-reload register.
+    pub(crate) reload: u16,
+}
+
+/// `HZ` core cycles a second, `PER_COUNT` of them in a count of the timer.
+pub(crate) struct Clock<const HZ: u32, const PER_COUNT: u32> {
+    timer: Timer<'static, TickTimer>,
+}
+
+impl<const HZ: u32, const PER_COUNT: u32> Clock<HZ, PER_COUNT> {
+    /// Sets the timer up, to be started by [`start`], and starts the cycle
+    /// counter.
+    pub(crate) fn new(
+        timer: Peri<'static, TickTimer>,
+        period: &Period,
+        core: &mut Peripherals,
+    ) -> Self {
+        core.DCB.enable_trace();
+        DWT::unlock();
+        core.DWT.enable_cycle_counter();
+        let timer = Timer::new(timer);
+        let registers = timer.regs_core();
+        registers.psc().write_value(period.prescaler);
+        registers.arr().write(|w| w.set_arr(period.reload));
+        timer.generate_update_event();
+        timer.clear_update_interrupt();
+        timer.enable_update_interrupt(true);
+        Self { timer }
+    }
+}
+
+/// Starts the timer, which its owner, the loop, has been moved away with.
+pub(crate) fn start() {
+    pac::TIM7.cr1().modify(|w| w.set_cen(true));
+}
+
+impl<const HZ: u32, const PER_COUNT: u32> TickClock for Clock<HZ, PER_COUNT> {
+    const HZ: u32 = HZ;
+    const PERIOD: u32 = HZ / 1000;
+
+    fn now(&self) -> u32 {
+        DWT::cycle_count()
+    }
+
+    fn since_due(&self) -> u32 {
+        u32::from(self.timer.regs_core().cnt().read().cnt()) * PER_COUNT
+    }
+
+    fn begin_tick(&mut self) {
+        self.timer.clear_update_interrupt();
+    }
+
+    fn next_is_due(&self) -> bool {
+        self.timer.regs_core().sr().read().uif()
+    }
+}

@@ -1,0 +1,33 @@
+//! Interrupt priorities.
+
+use cortex_m::Peripherals;
+use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::pac::Interrupt;
+
+/// Every interrupt that is not the haptic one. embassy leaves interrupts at
+/// priority 0, where critical sections by BASEPRI would not hold them back.
+pub(crate) const OTHERS: Priority = Priority::P6;
+
+/// Puts every interrupt below the ceiling of critical sections. To be called
+/// before any is let through; the haptic one is lifted above afterwards.
+pub(crate) fn lower_all(core: &mut Peripherals) {
+    // All there can be; those that a chip does not have ignore it.
+    for priority in core.NVIC.ipr.iter().take(240) {
+        // SAFETY: no interrupt is enabled yet, so no critical section and no
+        // handler relies on the priorities as they were.
+        unsafe { priority.write(OTHERS as u8) };
+    }
+}
+
+/// Lets the haptic interrupt through, above the ceiling of critical sections,
+/// and `done`, which it raises, below. Then starts the timer.
+pub(crate) fn start_tick(haptic: Interrupt, done: Interrupt) {
+    haptic.set_priority(Priority::P0);
+    haptic.pend();
+    for interrupt in [done, haptic] {
+        // SAFETY: their handlers are ready, and the haptic one, which critical
+        // sections do not hold back, enters none after its first, raised call.
+        unsafe { interrupt.enable() };
+    }
+    super::clock::start();
+}
