@@ -6,7 +6,7 @@ use hapterra_core::wire::message::{Telemetry, ToHost};
 /// Bytes kept for answers and requests.
 const URGENT: usize = 1024;
 /// The longest of those, which is `Felt` with every number at its longest.
-const LONGEST_URGENT: usize = 192;
+pub(super) const LONGEST_URGENT: usize = 192;
 /// The longest telemetry frame: eight samples, every number at its longest.
 const LONGEST_TELEMETRY: usize = 1280;
 

@@ -1,1 +1,5 @@
+//! The link against a scripted host in memory: every fault byte by byte.
 
+mod faults;
+mod rig;
+mod session;

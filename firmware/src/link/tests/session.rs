@@ -1,0 +1,165 @@
+//! What a session does when nothing goes wrong.
+
+use std::vec::Vec;
+
+use hapterra_core::contact::State;
+use hapterra_core::guard::Fault;
+use hapterra_core::wire::message::{PROTOCOL, Sample, Scene, Source, Telemetry, ToDevice, ToHost};
+
+use super::rig::{D, Rig, frame, hello, point, scene};
+use crate::link::outbox::{LONGEST_URGENT, Outbox};
+
+#[test]
+fn introduces_itself() {
+    let mut rig = Rig::new();
+    rig.send(&hello(PROTOCOL));
+    rig.run(1);
+    let [ToHost::Hello(device)] = &rig.heard[..] else {
+        panic!("{:?}", rig.heard);
+    };
+    assert_eq!((device.board.as_str(), device.epoch), ("native", None));
+    assert_eq!((usize::from(device.window), device.tick_hz), (D, 1000));
+}
+
+#[test]
+fn a_replay_feels_every_point_once_and_in_order() {
+    let mut rig = Rig::in_scene(scene(Source::Points));
+    let felt = rig.descend(40);
+    let numbers: Vec<u32> = felt.iter().map(|(seq, _)| *seq).collect();
+    assert_eq!(numbers, Vec::from_iter(0..40));
+    // The plane is at 1.5: point 30 is 0.5 below it.
+    let (_, sample) = felt[30];
+    assert_eq!(sample.state, State::Touching);
+    assert!((sample.force_n.z - 0.25).abs() < 1e-5, "{sample:?}");
+}
+
+#[test]
+fn points_sent_ahead_are_felt_as_points_sent_singly() {
+    let singly = Rig::in_scene(scene(Source::Points)).descend(12);
+    let mut ahead = Rig::in_scene(scene(Source::Points));
+    for seq in 0..12 {
+        ahead.send(&point(seq, seq as f32 * 0.9, 4.0 - seq as f32 * 0.1));
+    }
+    ahead.run(100);
+    let forces = |felt: Vec<(u32, Sample)>| -> Vec<_> {
+        felt.iter().map(|(_, s)| (s.proxy, s.force_n)).collect()
+    };
+    assert_eq!(forces(ahead.felt()), forces(singly));
+}
+
+#[test]
+fn an_invalid_scene_is_refused_and_the_one_before_stays() {
+    let mut rig = Rig::in_scene(scene(Source::Points));
+    let bad = Scene {
+        epoch: 8,
+        cell_mm: f32::NAN,
+        ..scene(Source::Points)
+    };
+    rig.send(&frame(&ToDevice::Scene(bad)));
+    rig.run(1);
+    let answer = ToHost::SceneTaken {
+        epoch: 8,
+        accepted: false,
+    };
+    assert_eq!(rig.heard.last(), Some(&answer));
+    assert_eq!(rig.descend(3).len(), 3);
+}
+
+#[test]
+fn the_arm_is_felt_and_reported_without_a_gap() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    rig.run(400);
+    let telemetry = rig.telemetry();
+    let ticks: Vec<u32> = telemetry
+        .iter()
+        .flat_map(|t| t.samples.iter().map(|s| s.tick))
+        .collect();
+    assert!(ticks.len() > 380, "{}", ticks.len());
+    assert_eq!(ticks, Vec::from_iter(1..=ticks.len() as u32));
+    assert!(telemetry.iter().all(|t| t.dropped == 0));
+}
+
+#[test]
+fn time_may_stand_still_while_a_tile_is_owed_only_if_the_scene_says_so() {
+    for hold_clock in [false, true] {
+        let mut rig = Rig::new();
+        rig.answers_tiles = false;
+        assert!(rig.device.may_stand_still(), "without a scene");
+        rig.send(&hello(PROTOCOL));
+        rig.send(&frame(&ToDevice::Scene(Scene {
+            hold_clock,
+            ..scene(Source::Encoders)
+        })));
+        rig.run(10);
+        assert!(!rig.needs().is_empty());
+        assert_eq!(rig.device.may_stand_still(), hold_clock);
+        let key = rig.needs()[0];
+        for key in rig.needs() {
+            rig.send(&super::rig::tile(7, key));
+        }
+        rig.answers_tiles = true;
+        rig.run(10);
+        assert!(!rig.device.may_stand_still(), "{key:?} was sent");
+    }
+}
+
+#[test]
+fn a_fault_is_latched_reported_and_cleared_on_request() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    rig.run(20);
+    rig.counts = [5000, 0, 0];
+    rig.run(20);
+    let last = |rig: &Rig| rig.telemetry().last().unwrap().samples[7].fault;
+    assert_eq!(last(&rig), Some(Fault::EncoderJump));
+    assert!(!rig.device.tick(rig.counts).enabled);
+    rig.send(&frame(&ToDevice::ClearFault));
+    rig.run(30);
+    assert_eq!(last(&rig), None);
+    assert!(rig.device.tick(rig.counts).enabled);
+}
+
+#[test]
+fn goodbye_comes_after_everything_was_said() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    rig.run(21);
+    rig.send(&frame(&ToDevice::Bye));
+    rig.writer = 100;
+    rig.run(1);
+    assert!(!rig.device.has_ended());
+    rig.writer = usize::MAX;
+    rig.run(3);
+    assert!(rig.device.has_ended());
+    let samples: usize = rig.telemetry().iter().map(|t| t.samples.len()).sum();
+    assert!(samples >= 20, "the last, short batch came too: {samples}");
+}
+
+#[test]
+fn the_longest_messages_fit_their_places() {
+    let sample = Sample {
+        tick: u32::MAX,
+        held_up_by: Some([i32::MIN; 2]),
+        fault: Some(Fault::Hardware),
+        work: u32::MAX,
+        cost: u32::MAX,
+        worst_cost: u32::MAX,
+        late: u32::MAX,
+        hip: far(),
+        proxy: far(),
+        ..Sample::default()
+    };
+    let mut outbox = Outbox::new();
+    let seq = u32::MAX;
+    assert!(outbox.push(&ToHost::Felt { seq, sample }));
+    let length = outbox.take(&mut [0; 4096]);
+    assert!(length <= LONGEST_URGENT, "{length}");
+    let telemetry = Telemetry {
+        first: u32::MAX,
+        dropped: u32::MAX,
+        samples: [sample; 8].into_iter().collect(),
+    };
+    assert!(outbox.push_telemetry(telemetry));
+}
+
+fn far() -> hapterra_core::grid::GridPoint {
+    hapterra_core::grid::GridPoint::new([i32::MIN; 3], hapterra_core::Vec3::ZERO)
+}
