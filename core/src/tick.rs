@@ -186,3 +186,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "tick_tests.rs"]
+mod tests;

@@ -9,7 +9,8 @@ use crate::terrain::{Ground, TileKey, Window};
 
 /// Distances that differ by less than this, relatively, count as equal.
 const TIE: f32 = 1.0 + 1e-6;
-/// A neighbour must offer a way at least this long, in cells, to be entered.
+/// A neighbour must offer a way at least this long, in cells, away from the
+/// border to be entered.
 const LEAST_WAY: f32 = 2e-7;
 
 /// How a descent ended.
@@ -19,8 +20,14 @@ pub(super) enum Descent {
     Rests(Spot, Patch),
     /// From here the straight way to the hand leads off the surface.
     Leaves(Spot),
-    /// The next patch is in a tile (column, row) that is not here.
-    HeldUp(Spot, Patch, [i32; 2]),
+    /// The next patch is in a tile (column, row) that is not here. To be taken
+    /// up again from `entry`, so that the wait leaves no trace.
+    HeldUp {
+        at: Spot,
+        patch: Patch,
+        entry: Spot,
+        tile: [i32; 2],
+    },
     /// The tick's work is spent; the squared distance reached.
     Unfinished(Spot, Patch, f32),
     /// There is no surface under the proxy any more; the tile wanted, if it
@@ -67,12 +74,20 @@ pub(super) fn descend<const D: usize>(
             let f = hand.stretch(&spot, &patch).length_squared();
             return Descent::Unfinished(spot, patch, f);
         }
+        let entry = spot;
         let here = nearest_downhill(&patch, hand.in_patch(spot.cell), (spot.u, spot.v));
         work.charge(here.evaluations);
         (spot.u, spot.v) = (here.u, here.v);
         match best_neighbour(window, hand, &spot, &here, work) {
-            Way::Into(entry) => spot = entry,
-            Way::Unknown(tile) => return Descent::HeldUp(spot, patch, tile),
+            Way::Into(next) => spot = next,
+            Way::Unknown(tile) => {
+                return Descent::HeldUp {
+                    at: spot,
+                    patch,
+                    entry,
+                    tile,
+                };
+            }
             Way::None if may_leave && here.z < 0.0 => return Descent::Leaves(spot),
             Way::None => return Descent::Rests(spot, patch),
         }
@@ -109,7 +124,7 @@ fn points_off(patch: &Patch, spot: &Spot, (east, north): (f32, f32)) -> bool {
 enum Way {
     /// Downhill goes on from this point of a neighbouring patch.
     Into(Spot),
-    /// It may go on in a tile that is not here.
+    /// It may go on in a tile (column, row) that is not here.
     Unknown([i32; 2]),
     /// The point is a local minimum of the distance.
     None,
@@ -131,11 +146,8 @@ fn best_neighbour<const D: usize>(
         let entry = spot.across(shift);
         match hand.ground(window, entry.cell) {
             Ground::Hole => {}
-            Ground::Missing => {
-                if matches!(way, Way::None) && faces(hand, spot, shift) {
-                    way = Way::Unknown(tile_of(entry.cell));
-                }
-            }
+            // It might be the better way: the proxy waits to know.
+            Ground::Missing => return Way::Unknown(tile_of(entry.cell)),
             Ground::Patch(corners) => {
                 let there = nearest_downhill(
                     &Patch::new(corners),
@@ -143,7 +155,10 @@ fn best_neighbour<const D: usize>(
                     (entry.u, entry.v),
                 );
                 work.charge(there.evaluations + 3);
-                let moved = (there.u - entry.u).abs().max((there.v - entry.v).abs());
+                // Along a shared edge this patch has done its best already.
+                let off_u = (there.u - entry.u).abs() * shift[0].abs() as f32;
+                let off_v = (there.v - entry.v).abs() * shift[1].abs() as f32;
+                let moved = off_u.max(off_v);
                 if moved > LEAST_WAY && there.distance_squared <= least {
                     least = there.distance_squared;
                     way = Way::Into(entry);
@@ -152,10 +167,4 @@ fn best_neighbour<const D: usize>(
         }
     }
     way
-}
-
-/// Whether the hand lies on the far side of the border that `shift` crosses.
-fn faces(hand: &Hand, spot: &Spot, [east, north]: [i32; 2]) -> bool {
-    let (p, q) = hand.in_patch(spot.cell);
-    (p - spot.u) * east as f32 >= 0.0 && (q - spot.v) * north as f32 >= 0.0
 }

@@ -315,8 +315,11 @@ impl Contact {
             return None;
         };
         let hand = Hand::new(hip);
-        let (spot, patch, settled, held_up_by) = match descend(window, &hand, spot, may_leave, work)
-        {
+        let mut resume = None;
+        let mut held_up_by = None;
+        let mut settled = true;
+        let (spot, patch) = match descend(window, &hand, spot, may_leave, work) {
+            Descent::Rests(spot, patch) => (spot, patch),
             Descent::Leaves(spot) => {
                 let from = self.point_on(window, &hand, &spot);
                 self.phase = Phase::Sweeping(Path::off_surface(from, hip));
@@ -330,16 +333,26 @@ impl Contact {
                     ..felt
                 });
             }
-            Descent::Rests(spot, patch) => (spot, patch, true, None),
-            Descent::HeldUp(spot, patch, tile) => (spot, patch, false, Some(tile)),
+            Descent::HeldUp {
+                at,
+                patch,
+                entry,
+                tile,
+            } => {
+                (resume, held_up_by, settled) = (Some(entry), Some(tile), false);
+                (at, patch)
+            }
             Descent::Unfinished(spot, patch, f) => {
                 // No nearer than after the tick before: rounding, not a way.
-                let stuck = f >= self.reached * (1.0 - 1e-6);
+                settled = f >= self.reached * (1.0 - 1e-6);
                 self.reached = f;
-                (spot, patch, stuck, None)
+                (spot, patch)
             }
         };
-        self.phase = Phase::Touching { spot, may_leave };
+        self.phase = Phase::Touching {
+            spot: resume.unwrap_or(spot),
+            may_leave,
+        };
         Some(self.touches(window, hip, (spot, patch), settled, held_up_by, pace))
     }
 
@@ -353,17 +366,17 @@ impl Contact {
         held_up_by: Option<[i32; 2]>,
         pace: Pace,
     ) -> Felt {
+        let (mut settled, mut held_up_by) = (settled, held_up_by);
         if settled || pace == Pace::RealTime {
-            let over_own_patch = spot.cell == hip.column();
-            let target = if over_own_patch {
-                1.0
+            let target = self.presence_target(window, hip, &spot);
+            if let (Pace::LockStep, Some(tile)) = (pace, target.missing) {
+                (settled, held_up_by) = (false, Some(tile));
             } else {
-                presence::target(window, &hip)
-            };
-            self.presence = presence::approach(self.presence, target);
-            if self.presence == 0.0 && target == 0.0 {
-                self.let_go();
-                return self.waits(window, hip);
+                self.presence = presence::approach(self.presence, target.presence);
+                if self.presence == 0.0 && target.presence == 0.0 {
+                    self.let_go();
+                    return self.waits(window, hip);
+                }
             }
         }
         let hand = Hand::new(hip);
@@ -376,6 +389,22 @@ impl Contact {
             held_up_by,
             work: 0,
         }
+    }
+
+    /// Nearly always the hand is over the patch that the proxy is on.
+    fn presence_target<const D: usize>(
+        &self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        spot: &Spot,
+    ) -> presence::Target {
+        if spot.cell == hip.column() {
+            return presence::Target {
+                presence: 1.0,
+                missing: None,
+            };
+        }
+        presence::target(window, &hip)
     }
 
     fn let_go(&mut self) {

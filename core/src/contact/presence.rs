@@ -6,6 +6,7 @@
 //! there the contact is let go. The hand slides off an edge as it would off a
 //! table, without a kick and without being hooked back from underneath.
 
+use super::descent::tile_of;
 use super::spot::Hand;
 use crate::grid::GridPoint;
 use crate::terrain::{Ground, Window};
@@ -15,14 +16,34 @@ pub const REACH: f32 = 0.5;
 /// Most that the presence may change in a tick, either way.
 pub const RATE: f32 = 1.0 / 32.0;
 
-/// What the presence should be for a hand at `hip`: 1 over a patch, less
-/// beside one, 0 farther than [`REACH`] from any. Continuous in the hand.
-pub(super) fn target<const D: usize>(window: &Window<'_, D>, hip: &GridPoint) -> f32 {
+/// What the presence should be, and what is not known about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Target {
+    /// 1 over a patch, less beside one, 0 farther than [`REACH`] from any.
+    /// Continuous in the hand. What is missing counts as not there.
+    pub(super) presence: f32,
+    /// A tile (column, row) that might make it more.
+    pub(super) missing: Option<[i32; 2]>,
+}
+
+/// The target for a hand at `hip`.
+pub(super) fn target<const D: usize>(window: &Window<'_, D>, hip: &GridPoint) -> Target {
     let hand = Hand::new(*hip);
-    let is_patch = |cell| matches!(hand.ground(window, cell), Ground::Patch(_));
+    let mut missing = None;
+    let mut is_patch = |cell| match hand.ground(window, cell) {
+        Ground::Patch(_) => true,
+        Ground::Hole => false,
+        Ground::Missing => {
+            missing = Some(tile_of(cell));
+            false
+        }
+    };
     let [x, y] = hip.column();
     if is_patch([x, y]) {
-        return 1.0;
+        return Target {
+            presence: 1.0,
+            missing: None,
+        };
     }
     let (p, q) = (hip.frac().x, hip.frac().y);
     let mut nearest = REACH * REACH;
@@ -34,7 +55,10 @@ pub(super) fn target<const D: usize>(window: &Window<'_, D>, hip: &GridPoint) ->
             }
         }
     }
-    1.0 - libm::sqrtf(nearest) / REACH
+    Target {
+        presence: 1.0 - libm::sqrtf(nearest) / REACH,
+        missing,
+    }
 }
 
 /// Distance along one axis from a place in a cell to a neighbouring cell.
@@ -74,20 +98,27 @@ mod tests {
     #[test]
     fn full_over_a_patch_and_none_far_from_one() {
         let field = hole_at_10_10();
-        assert_eq!(target(&field.window, &at(8.99, 10.5)), 1.0);
-        assert_eq!(target(&field.window, &at(10.5, 10.5)), 0.0);
-        assert_eq!(target(&field.window, &at(-3.0, 5.0)), 0.0);
+        assert_eq!(target(&field.window, &at(8.99, 10.5)).presence, 1.0);
+        assert_eq!(target(&field.window, &at(10.5, 10.5)).presence, 0.0);
+        assert_eq!(target(&field.window, &at(-3.0, 5.0)).presence, 0.0);
+    }
+
+    #[test]
+    fn a_missing_tile_is_named() {
+        let field = Field::<2>::new([100, 100], |_, _| 0.0);
+        let there = target(&field.window, &at(40.5, 5.5));
+        assert_eq!((there.presence, there.missing), (0.0, Some([1, 0])));
     }
 
     #[test]
     fn continuous_across_every_border() {
         let field = hole_at_10_10();
-        let mut last = target(&field.window, &at(7.0, 9.2));
+        let mut last = target(&field.window, &at(7.0, 9.2)).presence;
         for i in 1..=6000 {
-            let now = target(&field.window, &at(7.0 + i as f32 * 1e-3, 9.2));
+            let now = target(&field.window, &at(7.0 + i as f32 * 1e-3, 9.2)).presence;
             assert!((now - last).abs() < 3e-3, "at {i}");
             last = now;
         }
-        assert!((target(&field.window, &at(40.25, 5.0)) - 0.5).abs() < 1e-6);
+        assert!((target(&field.window, &at(40.25, 5.0)).presence - 0.5).abs() < 1e-6);
     }
 }
