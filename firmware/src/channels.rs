@@ -38,6 +38,12 @@ impl<const D: usize> Tiles<D> {
             spare: [const { Tile::VACANT }; SPARES],
         }
     }
+
+    /// The window's buffers and the spare ones.
+    pub(crate) fn split(&mut self) -> ([[&mut Tile; D]; D], [&mut Tile; SPARES]) {
+        let window = self.window.each_mut().map(|row| row.each_mut());
+        (window, self.spare.each_mut())
+    }
 }
 
 impl<const D: usize> Default for Tiles<D> {
@@ -77,7 +83,28 @@ pub struct Channels<'t> {
     buffers: Buffers,
 }
 
-impl Channels<'_> {
+impl<'t> Channels<'t> {
+    /// The loop's ends, the link's ends, the link's buffers.
+    pub(crate) fn split(&'t mut self) -> (LoopEnds<'t>, LinkEnds<'t>, &'t mut Buffers) {
+        let (to_loop, commands) = self.commands.split();
+        let (spent, spent_here) = self.spent.split();
+        let (records, records_here) = self.records.split();
+        let vitals = &self.vitals;
+        let loop_ends = LoopEnds {
+            commands,
+            spent,
+            records,
+            vitals,
+        };
+        let link_ends = LinkEnds {
+            commands: to_loop,
+            spent: spent_here,
+            records: records_here,
+            vitals,
+        };
+        (loop_ends, link_ends, &mut self.buffers)
+    }
+
     /// Empty queues.
     #[must_use]
     pub const fn new() -> Self {
@@ -136,34 +163,17 @@ where
     A: Amplifiers,
     C: TickClock,
 {
-    let (to_loop, commands) = channels.commands.split();
-    let (spent, spent_here) = channels.spent.split();
-    let (records, records_here) = channels.records.split();
-    let vitals = &channels.vitals;
-    let window = tiles.window.each_mut().map(|row| row.each_mut());
+    let (loop_ends, link_ends, buffers) = channels.split();
+    let vitals = loop_ends.vitals;
+    let (window, spare) = tiles.split();
     let haptic_loop = HapticLoop::new(
         Haptics::new(window, hardware.calibration),
-        LoopEnds {
-            commands,
-            spent,
-            records,
-            vitals,
-        },
+        loop_ends,
         hardware.encoders,
         hardware.amplifiers,
         hardware.clock,
     );
-    let link = Link::new(
-        Identity::new::<C>(board),
-        tiles.spare.each_mut(),
-        LinkEnds {
-            commands: to_loop,
-            spent: spent_here,
-            records: records_here,
-            vitals,
-        },
-        &mut channels.buffers,
-    );
+    let link = Link::new(Identity::new::<C>(board), spare, link_ends, buffers);
     Application {
         haptic_loop,
         link,

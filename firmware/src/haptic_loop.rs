@@ -192,3 +192,6 @@ fn written<A: EnabledAmplifiers>(mut amplifiers: A, drive: Drive) -> A {
     amplifiers.write(drive.currents_a.to_array());
     amplifiers
 }
+
+#[cfg(test)]
+mod tests;

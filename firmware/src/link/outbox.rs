@@ -126,3 +126,81 @@ impl Outbox {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hapterra_core::wire::frame::{FrameReader, decode};
+    use std::vec::Vec;
+
+    fn refused(protocol: u16) -> ToHost {
+        ToHost::Refused { protocol }
+    }
+
+    /// Takes `n` bytes, or fewer if there are no more.
+    fn take(outbox: &mut Outbox, n: usize) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        while bytes.len() < n {
+            let mut byte = [0];
+            if outbox.take(&mut byte) == 0 {
+                break;
+            }
+            bytes.extend(byte);
+        }
+        bytes
+    }
+
+    fn understood(mut bytes: &[u8]) -> Vec<ToHost> {
+        let mut reader = FrameReader::<2048>::new();
+        let mut messages = Vec::new();
+        while !bytes.is_empty() {
+            let (taken, frame) = reader.push(bytes);
+            messages.extend(frame.and_then(|frame| frame.and_then(decode).ok()));
+            bytes = &bytes[taken..];
+        }
+        messages
+    }
+
+    #[test]
+    fn a_request_goes_before_telemetry_but_never_into_it() {
+        let telemetry = || ToHost::Telemetry(Telemetry::default());
+        let mut outbox = Outbox::new();
+        outbox.push_telemetry(Telemetry::default());
+        outbox.push(&refused(1));
+        let all = take(&mut outbox, 4096);
+        assert_eq!(understood(&all), [refused(1), telemetry()]);
+
+        outbox.push_telemetry(Telemetry::default());
+        let mut all = take(&mut outbox, 2);
+        outbox.push(&refused(1));
+        all.extend(take(&mut outbox, 4096));
+        assert_eq!(understood(&all), [telemetry(), refused(1)]);
+    }
+
+    #[test]
+    fn what_was_cut_off_does_not_take_the_next_frame_with_it() {
+        let mut outbox = Outbox::new();
+        outbox.push(&refused(1));
+        let mut all = take(&mut outbox, 3);
+        outbox.clear();
+        outbox.push(&refused(2));
+        all.extend(take(&mut outbox, 4096));
+        assert_eq!(understood(&all), [refused(2)]);
+    }
+
+    #[test]
+    fn full_is_full_until_something_was_taken() {
+        let mut outbox = Outbox::new();
+        let mut pushed = 0;
+        while outbox.has_room() {
+            assert!(outbox.push(&refused(pushed)));
+            pushed += 1;
+        }
+        assert!(pushed > 20);
+        let first = take(&mut outbox, LONGEST_URGENT);
+        assert!(outbox.has_room());
+        let rest = take(&mut outbox, 4096);
+        let all: Vec<_> = (0..pushed).map(refused).collect();
+        assert_eq!(understood(&[first, rest].concat()), all);
+    }
+}

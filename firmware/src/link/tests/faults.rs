@@ -4,7 +4,9 @@ use std::vec;
 use std::vec::Vec;
 
 use hapterra_core::terrain::RETRY_TICKS;
-use hapterra_core::wire::message::{BATCH, PROTOCOL, Sample, Scene, Source, ToDevice, ToHost};
+use hapterra_core::wire::message::{
+    BATCH, Heights, PROTOCOL, Sample, Scene, Source, TileMessage, ToDevice, ToHost,
+};
 
 use super::rig::{Rig, frame, hello, point, scene, tile};
 
@@ -92,7 +94,40 @@ fn a_point_whose_answer_was_lost_is_answered_again_without_being_felt_again() {
     let first = rig.descend(3)[2];
     rig.send(&point(2, 1.8, 3.8));
     rig.run(2);
-    assert_eq!(rig.felt().last(), Some(&first));
+    assert_eq!(rig.felt()[3..], [first]);
+}
+
+#[test]
+fn a_point_repeated_while_it_is_felt_is_felt_once() {
+    let mut rig = Rig::asking(scene(Source::Points));
+    for _ in 0..3 {
+        rig.send(&point(0, 0.0, 2.0));
+        rig.run(5);
+    }
+    assert_eq!(rig.felt(), [], "its tile is not there yet");
+    rig.send(&tile(7, rig.needs()[0]));
+    rig.answers_tiles = true;
+    rig.run(1000);
+    assert_eq!(rig.felt().len(), 1);
+}
+
+#[test]
+fn a_tile_that_was_received_is_not_replaced_by_a_late_double() {
+    let mut rig = Rig::in_scene(scene(Source::Points));
+    rig.run(5);
+    for key in rig.needs() {
+        let heights = Heights::Flat {
+            base: 2,
+            height: 0.9,
+        };
+        let epoch = 7;
+        rig.send(&frame(&ToDevice::Tile(TileMessage {
+            epoch,
+            key,
+            heights,
+        })));
+    }
+    assert_eq!(forces(&rig.descend(40)), undisturbed());
 }
 
 #[test]

@@ -1,0 +1,105 @@
+//! The link's tile buffers, against a loop that is played by the test.
+
+use std::boxed::Box;
+use std::vec::Vec;
+
+use hapterra_core::terrain::{Tile, TileKey};
+use hapterra_core::tick::Command;
+use hapterra_core::wire::frame::{FrameReader, decode};
+use hapterra_core::wire::message::{PROTOCOL, Source, ToDevice, ToHost};
+
+use super::rig::{D, frame, hello, scene, tile};
+use crate::channels::{Channels, Record, SPARES, Tiles};
+use crate::haptic_loop::LoopEnds;
+use crate::link::{Identity, Link};
+use crate::native::StoppedClock;
+
+/// A link in a session, and the loop's ends of its queues.
+fn link() -> (Link<'static, D>, LoopEnds<'static>) {
+    let tiles = Box::leak(Box::new(Tiles::<D>::new()));
+    let (loop_ends, link_ends, buffers) = Box::leak(Box::new(Channels::new())).split();
+    let identity = Identity::new::<StoppedClock>("test");
+    let mut link = Link::new(identity, tiles.split().1, link_ends, buffers);
+    let scene = scene(Source::Encoders);
+    for message in [hello(PROTOCOL), frame(&ToDevice::Scene(scene))] {
+        assert_eq!(link.receive(&message), message.len());
+    }
+    (link, loop_ends)
+}
+
+/// Turns the link and reads which tiles it asks for.
+fn asked(link: &mut Link<'static, D>) -> Vec<TileKey> {
+    link.turn();
+    let mut reader = FrameReader::<2048>::new();
+    let mut bytes = [0; 4096];
+    let n = link.transmit(&mut bytes);
+    let mut rest = &bytes[..n];
+    let mut keys = Vec::new();
+    while !rest.is_empty() {
+        let (taken, frame) = reader.push(rest);
+        if let Some(Ok(ToHost::Need { key, .. })) = frame.map(|f| f.and_then(decode)) {
+            keys.push(key);
+        }
+        rest = &rest[taken..];
+    }
+    keys
+}
+
+fn answer(link: &mut Link<'static, D>, key: TileKey) {
+    let bytes = tile(7, key);
+    assert_eq!(link.receive(&bytes), bytes.len());
+}
+
+fn tiles_handed_over(loop_ends: &mut LoopEnds<'static>) -> Vec<&'static mut Tile> {
+    let mut tiles = Vec::new();
+    while let Some(command) = loop_ends.commands.dequeue() {
+        if let Command::Tile(tile) = command {
+            tiles.push(tile);
+        }
+    }
+    tiles
+}
+
+/// What the loop says when the hand is `column` tiles east of the first.
+fn at(column: i32) -> Record {
+    let mut record = Record::default();
+    let cell = [column * 32 + 16, 100, 5];
+    record.sample.hip = hapterra_core::grid::GridPoint::new(cell, hapterra_core::Vec3::ZERO);
+    record.sample.proxy = record.sample.hip;
+    record
+}
+
+#[test]
+fn no_more_tiles_are_asked_for_than_there_are_buffers() {
+    let (mut link, mut loop_ends) = link();
+    let mut total = 0;
+    // The loop sleeps: no buffer comes back, wherever the hand goes.
+    for column in 0..12 {
+        assert!(loop_ends.records.enqueue(at(column)).is_ok());
+        for key in asked(&mut link) {
+            total += 1;
+            answer(&mut link, key);
+        }
+    }
+    assert_eq!(total, SPARES);
+    let tiles = tiles_handed_over(&mut loop_ends);
+    assert_eq!(tiles.len(), SPARES, "every answer found its buffer");
+    // It wakes: they come back, and asking goes on.
+    for tile in tiles {
+        tile.vacate();
+        assert!(loop_ends.spent.enqueue(tile).is_ok());
+    }
+    assert!(!asked(&mut link).is_empty());
+}
+
+#[test]
+fn a_tile_that_the_window_would_not_have_is_asked_for_again() {
+    let (mut link, mut loop_ends) = link();
+    let first = asked(&mut link);
+    answer(&mut link, first[0]);
+    assert!(!asked(&mut link).contains(&first[0]), "it is thought held");
+    for tile in tiles_handed_over(&mut loop_ends) {
+        assert!(loop_ends.spent.enqueue(tile).is_ok());
+    }
+    assert!(asked(&mut link).contains(&first[0]));
+}
