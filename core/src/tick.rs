@@ -8,10 +8,14 @@ use glam::Vec3;
 
 use crate::contact::{Contact, Felt, Pace};
 use crate::grid::GridPoint;
+use crate::guard::thermal::Rating;
 use crate::guard::{Drive, Fault, Guard};
 use crate::phantom::{Calibration, Pose, to_device_frame, to_terrain_frame};
 use crate::terrain::{Tile, TileKey, Window};
 use crate::wire::message::{Point, Sample, Scene, Source};
+
+/// Length of a tick, seconds.
+pub const TICK_S: f32 = 1e-3;
 
 /// What is handed to the loop between ticks.
 pub enum Command<'t> {
@@ -133,8 +137,11 @@ impl<'t, const D: usize> Haptics<'t, D> {
         let force_n = self.guard.limit_force(wanted);
         let torques = pose.torques_nm(to_device_frame(force_n));
         let currents = torques / (self.calibration.ratio * self.calibration.torque_constant);
-        let max = self.calibration.max_current_a;
-        let drive = self.guard.limit_currents(currents, max);
+        let rating = Rating {
+            peak_a: self.calibration.peak_current_a,
+            continuous_a: self.calibration.continuous_current_a,
+        };
+        let drive = self.guard.limit_currents(currents, rating, TICK_S);
         let mut outcome = self.outcome(hip, felt, force_n);
         outcome.drive = drive;
         outcome

@@ -22,13 +22,15 @@ pub struct Calibration {
     pub l2_mm: f32,
     /// Motor torque constant, Nm/A.
     pub torque_constant: f32,
-    /// Largest current an amplifier may be given, A.
-    pub max_current_a: f32,
+    /// Largest current a cool motor may be given, A.
+    pub peak_current_a: f32,
+    /// Current a motor can bear for ever, A.
+    pub continuous_current_a: f32,
 }
 
 impl Calibration {
     /// Phantom Premium 1.5: CAD link lengths and ratios from
-    /// `mahilab/Phantom`, Maxon RE25 motors at their continuous current.
+    /// `mahilab/Phantom`, Maxon RE25 motors.
     pub const PREMIUM_1_5: Self = Self {
         counts_per_turn: 4096.0,
         ratio: Vec3::new(13.3, 11.2, 11.2),
@@ -36,7 +38,8 @@ impl Calibration {
         l1_mm: 209.55,
         l2_mm: 169.545,
         torque_constant: 0.0234,
-        max_current_a: 1.24,
+        peak_current_a: 5.5,
+        continuous_current_a: 1.24,
     };
 
     /// Radians of each joint for a count of its encoder.

@@ -1,9 +1,12 @@
 //! What may reach the amplifiers: every failure ends in zero.
 
+pub mod thermal;
+
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::force::clamp_length;
+use thermal::{Motors, Rating};
 
 /// A latched fault. The numbers are stable; only an explicit reset clears one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -22,6 +25,8 @@ pub enum Fault {
     EmergencyStop = 5,
     /// The dead-man switch is not held.
     DeadManReleased = 6,
+    /// A motor winding is too hot, in spite of derating.
+    MotorTooHot = 7,
 }
 
 impl Fault {
@@ -55,6 +60,7 @@ pub struct Guard {
     fault: Option<Fault>,
     force_n: Vec3,
     counts: Option<[i32; 3]>,
+    motors: Motors,
 }
 
 impl Guard {
@@ -69,9 +75,19 @@ impl Guard {
         self.fault = self.fault.or(Some(fault));
     }
 
-    /// Clears the fault; force comes back at the slew limit.
+    /// Clears the fault; force comes back at the slew limit. How warm the
+    /// motors are is not forgotten.
     pub fn clear(&mut self) {
-        *self = Self::default();
+        *self = Self {
+            motors: self.motors,
+            ..Self::default()
+        };
+    }
+
+    /// How warm the motors are.
+    #[must_use]
+    pub const fn motors(&self) -> &Motors {
+        &self.motors
     }
 
     /// Looks at the encoders before they are used.
@@ -102,22 +118,29 @@ impl Guard {
         self.force_n
     }
 
-    /// The currents that may reach the amplifiers: all scaled down together
-    /// so that none exceeds `max_a`, off after a fault.
+    /// The currents that may reach the amplifiers for the next `dt_s` seconds:
+    /// all scaled down together so that none exceeds what its motor may have
+    /// now; off after a fault.
     #[must_use]
-    pub fn limit_currents(&mut self, wanted_a: Vec3, max_a: f32) -> Drive {
+    pub fn limit_currents(&mut self, wanted_a: Vec3, rating: Rating, dt_s: f32) -> Drive {
         if !wanted_a.is_finite() {
             self.trip(Fault::NotANumber);
         }
+        if self.motors.is_too_hot() {
+            self.trip(Fault::MotorTooHot);
+        }
         if self.fault.is_some() {
+            self.motors.heat(Vec3::ZERO, dt_s);
             return Drive::default();
         }
-        let largest = wanted_a.abs().max_element();
-        let currents_a = if largest > max_a {
-            (wanted_a * (max_a / largest)).clamp(Vec3::splat(-max_a), Vec3::splat(max_a))
+        let allowed_a = self.motors.allowed_a(rating);
+        let excess = (wanted_a.abs() / allowed_a).max_element();
+        let currents_a = if excess > 1.0 {
+            (wanted_a / excess).clamp(-allowed_a, allowed_a)
         } else {
             wanted_a
         };
+        self.motors.heat(currents_a, dt_s);
         Drive {
             currents_a,
             enabled: true,
@@ -129,12 +152,20 @@ impl Guard {
 mod tests {
     use super::*;
 
+    const RATING: Rating = Rating {
+        peak_a: 1.0,
+        continuous_a: 0.5,
+    };
+
     #[test]
     fn not_a_number_is_latched_and_gives_nothing() {
         let mut guard = Guard::default();
         assert_eq!(guard.limit_force(Vec3::new(0.0, f32::NAN, 0.0)), Vec3::ZERO);
         assert_eq!(guard.limit_force(Vec3::Z), Vec3::ZERO);
-        assert_eq!(guard.limit_currents(Vec3::X, 1.0), Drive::default());
+        assert_eq!(
+            guard.limit_currents(Vec3::X, RATING, 1e-3),
+            Drive::default()
+        );
         assert_eq!(guard.fault().map(Fault::number), Some(1));
         guard.clear();
         assert_eq!(guard.limit_force(Vec3::Z), Vec3::Z);
@@ -151,7 +182,7 @@ mod tests {
     #[test]
     fn currents_keep_their_direction() {
         let mut guard = Guard::default();
-        let drive = guard.limit_currents(Vec3::new(3.0, -1.5, 0.3), 1.0);
+        let drive = guard.limit_currents(Vec3::new(3.0, -1.5, 0.3), RATING, 1e-3);
         assert!((drive.currents_a - Vec3::new(1.0, -0.5, 0.1)).length() < 1e-6);
         assert!(drive.currents_a.abs().max_element() <= 1.0);
     }
