@@ -3,6 +3,8 @@
 
 #![forbid(unsafe_code)]
 
+pub mod field;
+
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 

@@ -1,0 +1,199 @@
+//! The statements of *Height Field Haptics*, one by one.
+
+use hapterra_core::Vec3;
+use hapterra_core::contact::closest::nearest_downhill;
+use hapterra_core::contact::patch::Patch;
+use hapterra_core::contact::{Rule, State};
+use hapterra_core::force::ForceLaw;
+use hapterra_tests::field::{Felted, position};
+
+fn rolling(x: i32, y: i32) -> f32 {
+    ((f64::from(x) * 0.37).sin() + (f64::from(y) * 0.23).cos()) as f32
+}
+
+/// P00, P10, P01, P11 of a twisted patch.
+const CORNERS: [f32; 4] = [0.25, 0.75, 1.5, 0.5];
+
+#[test]
+fn eq_1_to_5_the_patch_is_uva_plus_ub_plus_vc_plus_d() {
+    let [p00, p10, p01, p11] = CORNERS;
+    let patch = Patch::new(CORNERS);
+    assert_eq!(patch.a, p11 - p10 - p01 + p00);
+    assert_eq!(patch.b, p10 - p00);
+    assert_eq!(patch.c, p01 - p00);
+    assert_eq!(patch.d, p00);
+    let (u, v) = (0.3, 0.8);
+    let bilinear = u * v * patch.a + u * patch.b + v * patch.c + patch.d;
+    assert!((patch.height(u, v) - bilinear).abs() < 1e-6);
+}
+
+#[test]
+fn eq_6_and_7_on_the_unit_grid_x_and_y_are_u_and_v_plus_the_cell() {
+    let mut hand = Felted::new(64, Rule::Paper, |_, _| 1.0);
+    hand.feel([37.25, 12.75, 2.0]);
+    let felt = hand.feel([37.25, 12.75, 0.9]);
+    assert_eq!(position(&felt.proxy), [37.25, 12.75, 1.0]);
+}
+
+#[test]
+fn eq_8_to_11_at_the_local_closest_point_the_partial_derivatives_vanish() {
+    let patch = Patch::new(CORNERS.map(|h| h - 0.4));
+    let (p, q) = (0.55, 0.45);
+    let found = nearest_downhill(&patch, (p, q), (0.5, 0.5));
+    let (u, v) = (f64::from(found.u), f64::from(found.v));
+    assert!(u > 0.0 && u < 1.0 && v > 0.0 && v < 1.0, "{found:?}");
+    let [a, b, c, d] = [patch.a, patch.b, patch.c, patch.d].map(f64::from);
+    let sigma = [
+        u - f64::from(p),
+        v - f64::from(q),
+        a * u * v + b * u + c * v + d,
+    ];
+    let along_u = sigma[0] + sigma[2] * (b + a * v);
+    let along_v = sigma[1] + sigma[2] * (c + a * u);
+    assert!(
+        along_u.abs() < 1e-6 && along_v.abs() < 1e-6,
+        "{along_u} {along_v}"
+    );
+}
+
+#[test]
+fn section_4_3_2_outside_the_square_the_bounded_closest_point_is_on_an_edge_or_vertex() {
+    let patch = Patch::new(CORNERS.map(|h| h - 0.4));
+    for hand in [
+        (-0.5, 0.4),
+        (1.7, 0.4),
+        (0.4, -0.6),
+        (0.6, 1.9),
+        (-1.0, -1.0),
+        (2.0, 2.0),
+    ] {
+        let found = nearest_downhill(&patch, hand, (0.5, 0.5));
+        let distance = |u: f32, v: f32| {
+            let z = f64::from(patch.height(u, v));
+            f64::from(u - hand.0).powi(2) + f64::from(v - hand.1).powi(2) + z * z
+        };
+        let edges = (0..=1000).flat_map(|i| {
+            let t = i as f32 / 1000.0;
+            [(t, 0.0), (t, 1.0), (0.0, t), (1.0, t)]
+        });
+        let nearest = edges
+            .map(|(u, v)| distance(u, v))
+            .fold(f64::INFINITY, f64::min);
+        let on_border = [found.u, found.v].iter().any(|x| *x == 0.0 || *x == 1.0);
+        assert!(on_border, "{hand:?} {found:?}");
+        assert!(
+            distance(found.u, found.v) < nearest + 1e-6,
+            "{hand:?} {found:?}"
+        );
+    }
+}
+
+#[test]
+fn step_1_no_patch_higher_than_the_segment_means_free_space_and_the_proxy_is_the_hand() {
+    for rule in [Rule::Paper, Rule::Swept] {
+        let mut hand = Felted::new(64, rule, rolling);
+        for i in 0..100 {
+            let hip = [5.0 + 0.5 * f64::from(i), 20.0, 2.25];
+            let felt = hand.feel(hip);
+            assert_eq!(felt.state, State::Free);
+            assert_eq!(position(&felt.proxy), hip);
+            assert_eq!(felt.stretch, Vec3::ZERO);
+        }
+    }
+}
+
+#[test]
+fn step_2_the_search_goes_on_over_edges_and_vertices() {
+    for rule in [Rule::Paper, Rule::Swept] {
+        let mut hand = Felted::new(64, rule, |x, _| 0.1 * x as f32);
+        hand.feel([10.5, 10.5, 3.0]);
+        hand.feel([10.5, 10.5, 1.0]);
+        // Diagonally over many patches in one tick.
+        let felt = hand.feel([17.2, 14.8, 1.2]);
+        let proxy = position(&felt.proxy);
+        // The foot of the perpendicular on the plane z = x/10.
+        let foot = (17.2 + 0.1 * 1.2) / 1.01;
+        assert!((proxy[0] - foot).abs() < 1e-5, "{proxy:?}");
+        assert!((proxy[1] - 14.8).abs() < 1e-5, "{proxy:?}");
+    }
+}
+
+#[test]
+fn step_2_concave_places_rest_on_an_edge_or_a_vertex() {
+    for rule in [Rule::Paper, Rule::Swept] {
+        let mut valley = Felted::new(64, rule, |x, _| (x - 20).abs() as f32);
+        valley.feel([20.3, 10.5, 2.0]);
+        let felt = valley.feel([20.1, 10.5, -0.5]);
+        assert_eq!(position(&felt.proxy)[0], 20.0, "the edge");
+        let mut pit = Felted::new(64, rule, |x, y| (x - 20).abs().max((y - 20).abs()) as f32);
+        pit.feel([20.2, 20.1, 2.0]);
+        let felt = pit.feel([20.05, 19.95, -0.5]);
+        assert_eq!(position(&felt.proxy)[..2], [20.0, 20.0], "the vertex");
+    }
+}
+
+#[test]
+fn step_3_the_sign_of_the_way_out_along_the_normal_decides() {
+    let mut hand = Felted::new(64, Rule::Paper, rolling);
+    let mut both = [0, 0];
+    for i in 0..600 {
+        let t = f64::from(i) * 0.01;
+        let (x, y) = (20.0 + 3.0 * t.sin(), 30.0 + t);
+        let z = surface(x, y) + 0.2 * (7.0 * t).cos();
+        let felt = hand.feel([x, y, z]);
+        let touching = felt.state == State::Touching;
+        both[usize::from(touching)] += 1;
+        assert_eq!(touching, z < surface(x, y), "tick {i}");
+    }
+    assert!(both[0] > 100 && both[1] > 100, "{both:?}");
+}
+
+/// The bilinear surface of `rolling`, in f64.
+fn surface(x: f64, y: f64) -> f64 {
+    let (i, j) = (x.floor() as i32, y.floor() as i32);
+    let (u, v) = (x - x.floor(), y - y.floor());
+    let h = |di, dj| f64::from(rolling(i + di, j + dj));
+    (h(0, 0) * (1.0 - u) + h(1, 0) * u) * (1.0 - v) + (h(0, 1) * (1.0 - u) + h(1, 1) * u) * v
+}
+
+#[test]
+fn step_4_the_force_is_along_the_way_out_and_proportional_to_its_length() {
+    let law = ForceLaw::PREMIUM;
+    for rule in [Rule::Paper, Rule::Swept] {
+        let mut hand = Felted::new(64, rule, rolling);
+        hand.feel([30.5, 30.5, 3.0]);
+        for depth in [0.01, 0.1, 0.5] {
+            let hip = [30.5, 30.5, surface(30.5, 30.5) - depth];
+            let felt = hand.feel(hip);
+            let proxy = position(&felt.proxy);
+            let force = law.force_n(felt.stretch);
+            for axis in 0..3 {
+                let expected = 0.5 * (proxy[axis] - hip[axis]);
+                assert!((f64::from(force[axis]) - expected).abs() < 1e-6);
+            }
+        }
+    }
+}
+
+/// Two thin walls, as the paper's two thin peaks seen from the side.
+fn walls(x: i32, _: i32) -> f32 {
+    if x == 20 || x == 26 { 40.0 } else { 0.0 }
+}
+
+#[test]
+fn figure_8_a_fast_sweep_does_not_pass_through_what_is_thin() {
+    let mut hand = Felted::new(64, Rule::Swept, walls);
+    hand.feel([10.0, 30.3, 3.0]);
+    let felt = hand.feel([50.0, 30.7, 3.0]);
+    assert_eq!(felt.state, State::Touching);
+    let proxy = position(&felt.proxy);
+    assert!(
+        proxy[0] > 19.0 && proxy[0] < 20.0,
+        "stopped by the first wall: {proxy:?}"
+    );
+    // And stays there until the hand comes back.
+    let felt = hand.feel([40.0, 31.0, 3.0]);
+    assert!(position(&felt.proxy)[0] < 20.0);
+    let felt = hand.feel([15.0, 31.0, 3.0]);
+    assert_eq!(felt.state, State::Free);
+}
