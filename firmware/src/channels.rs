@@ -21,7 +21,7 @@ pub const SPARES: usize = IN_FLIGHT;
 /// Slots of the command queue, one of which stays empty.
 const COMMANDS: usize = 16;
 /// Slots of the record queue: the link may sleep through this many ticks.
-const RECORDS: usize = 64;
+const RECORDS: usize = 32;
 
 /// All tile buffers of a device with a window of `D × D` tiles.
 pub struct Tiles<const D: usize> {

@@ -4,6 +4,7 @@
 //! link brought, read the encoders, tick, write the amplifiers, leave a record,
 //! measure what that cost. Everything it does is bounded and nothing waits.
 
+use core::mem;
 use core::sync::atomic::Ordering;
 
 use hapterra_core::guard::{Drive, Fault};
@@ -178,12 +179,15 @@ where
 
     /// Brings the amplifiers to what the tick asks for.
     fn drive(&mut self, drive: Drive) -> Drive {
-        self.power = self.power.take().map(|power| match (power, drive.enabled) {
+        let power = self.power.take().map(|power| match (power, drive.enabled) {
             (Power::Off(off), false) => Power::Off(off),
             (Power::On(on), false) => Power::Off(on.disable()),
             (Power::Off(off), true) => Power::On(written(off.enable(), drive)),
             (Power::On(on), true) => Power::On(written(on, drive)),
         });
+        // An assignment would drop what is there, which is nothing; but with it
+        // the drivers' destructors, which can panic, would be part of the tick.
+        mem::forget(mem::replace(&mut self.power, power));
         drive
     }
 }

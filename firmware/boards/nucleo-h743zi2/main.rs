@@ -22,6 +22,7 @@ mod critical;
 mod stm32;
 
 use core::cell::Cell;
+use core::mem;
 
 use cortex_m::peripheral::NVIC;
 use critical_section::Mutex;
@@ -91,7 +92,10 @@ fn TIM7() {
     static mut TICK: Option<Tick> = None;
     let Some(tick) = TICK else {
         // Raised once by `main`, before there is a tick to be late for.
-        *TICK = critical_section::with(|cs| HANDOVER.borrow(cs).take());
+        let ready = critical_section::with(|cs| HANDOVER.borrow(cs).take());
+        // Not an assignment, which would bring in the drivers' destructors:
+        // they can panic, and nothing in this interrupt may.
+        mem::forget(mem::replace(TICK, ready));
         return;
     };
     tick.tick();
