@@ -8,6 +8,7 @@
 //! - [`terrain`]: a raster at a scale, cut into tiles;
 //! - [`link`]: the terrain served to a device, tile by tile;
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
+//! - [`replay`]: a trajectory felt in lock-step, and recordings;
 //! - [`picture`]: what was felt, as PNG files;
 //! - [`cli`]: the `hapterra` command, one file a subcommand.
 
@@ -18,5 +19,6 @@ pub mod link;
 pub mod phantom;
 pub mod picture;
 pub mod raster;
+pub mod replay;
 pub mod synth;
 pub mod terrain;

@@ -1,9 +1,13 @@
 //! The `hapterra` command line: one file a subcommand, each with its `Args`
 //! and a `run`.
 
+pub mod emulation;
 pub mod failure;
+pub mod feel;
 pub mod info;
 pub mod input;
+mod interrupt;
+pub mod replay;
 pub mod synth;
 
 use std::process::ExitCode;
@@ -33,6 +37,8 @@ pub enum Command {
     Info(info::Args),
     /// Make a terrain file by formula
     Synth(synth::Args),
+    /// Feel a trajectory tick by tick and write what was felt
+    Replay(replay::Args),
 }
 
 /// Parses the command line, runs it and reports: 0 on success, 1 on failure,
@@ -43,6 +49,7 @@ pub fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Info(args) => info::run(&args),
         Command::Synth(args) => synth::run(&args),
+        Command::Replay(args) => replay::run(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,0 +1,189 @@
+//! The host's side of the conversation, without I/O.
+
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
+use hapterra_core::wire::message::{
+    DeviceHello, HostHello, PROTOCOL, Sample, Scene, TileMessage, ToDevice, ToHost,
+};
+
+use super::{LinkError, Tally};
+use crate::terrain::{Terrain, TileBuffer};
+
+/// What came from the device.
+#[derive(Debug)]
+pub enum Event<'e> {
+    /// The scene is in force. `resumed` tells whether the device held it
+    /// already and goes on where it was.
+    Opened {
+        /// How the device introduced itself.
+        device: &'e DeviceHello,
+        /// Whether it goes on with the scene it held.
+        resumed: bool,
+    },
+    /// What was felt in one tick of a scene fed by the encoders.
+    Sample(&'e Sample),
+    /// What was felt at a point of a replay.
+    Felt {
+        /// The point's number.
+        seq: u32,
+        /// What was felt.
+        sample: &'e Sample,
+    },
+}
+
+/// Serves one terrain to one device. Bytes from the device go into
+/// [`Client::receive`]; bytes for it come out of there and of
+/// [`Client::greet`].
+pub struct Client<'t> {
+    terrain: &'t Terrain<'t>,
+    scene: Scene,
+    reader: Box<FrameReader<MAX_FRAME>>,
+    frame: Box<[u8; MAX_FRAME]>,
+    tile: TileBuffer,
+    /// The device of the present session.
+    device: Option<DeviceHello>,
+    tally: Tally,
+}
+
+impl<'t> Client<'t> {
+    /// A client that has not said anything yet.
+    #[must_use]
+    pub fn new(terrain: &'t Terrain<'t>, scene: Scene) -> Self {
+        Self {
+            terrain,
+            scene,
+            reader: Box::default(),
+            frame: Box::new([0; MAX_FRAME]),
+            tile: TileBuffer::default(),
+            device: None,
+            tally: Tally::default(),
+        }
+    }
+
+    /// The scene that is served.
+    #[must_use]
+    pub const fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// What went over the link so far.
+    #[must_use]
+    pub const fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// Begins a session, the first or another: appends the hello to `out`.
+    pub fn greet(&mut self, out: &mut Vec<u8>) {
+        // A zero first ends whatever may have been under way.
+        out.push(0);
+        let protocol = PROTOCOL;
+        self.say(&ToDevice::Hello(HostHello { protocol }), out);
+    }
+
+    /// Appends a message to `out`.
+    pub fn say(&mut self, message: &ToDevice<'_>, out: &mut Vec<u8>) {
+        out.extend_from_slice(framed(message, &mut self.frame));
+    }
+
+    /// Takes bytes from the device, appends the answers to `out` and reports
+    /// what happened. Frames that make no sense are counted and passed over.
+    ///
+    /// # Errors
+    /// [`LinkError::Version`] and [`LinkError::SceneRefused`].
+    pub fn receive(
+        &mut self,
+        mut bytes: &[u8],
+        out: &mut Vec<u8>,
+        on: &mut dyn FnMut(Event<'_>),
+    ) -> Result<(), LinkError> {
+        while !bytes.is_empty() {
+            let (taken, frame) = self.reader.push(bytes);
+            bytes = bytes.get(taken..).unwrap_or(&[]);
+            match frame.map(|frame| frame.and_then(decode::<ToHost>)) {
+                Some(Ok(message)) => self.on_message(message, out, on)?,
+                Some(Err(bad)) => {
+                    self.tally.bad_frames += 1;
+                    tracing::debug!(?bad, "a frame was not understood");
+                }
+                None => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn on_message(
+        &mut self,
+        message: ToHost,
+        out: &mut Vec<u8>,
+        on: &mut dyn FnMut(Event<'_>),
+    ) -> Result<(), LinkError> {
+        match message {
+            ToHost::Hello(device) if device.protocol != PROTOCOL => {
+                return Err(version(device.protocol));
+            }
+            ToHost::Refused { protocol } => return Err(version(protocol)),
+            ToHost::Hello(device) => {
+                self.device = Some(device);
+                self.say(&ToDevice::Scene(self.scene), out);
+            }
+            ToHost::SceneTaken { epoch, accepted } if epoch == self.scene.epoch => {
+                self.on_scene_taken(accepted, on)?;
+            }
+            ToHost::Need { epoch, key } if epoch == self.scene.epoch => self.on_need(key, out),
+            ToHost::Telemetry(telemetry) => {
+                if self.tally.received(&telemetry) {
+                    telemetry.samples.iter().for_each(|s| on(Event::Sample(s)));
+                }
+            }
+            ToHost::Felt { seq, sample } => on(Event::Felt {
+                seq,
+                sample: &sample,
+            }),
+            ToHost::SceneTaken { .. } | ToHost::Need { .. } => {} // of an earlier session
+        }
+        Ok(())
+    }
+
+    fn on_scene_taken(
+        &mut self,
+        accepted: bool,
+        on: &mut dyn FnMut(Event<'_>),
+    ) -> Result<(), LinkError> {
+        if !accepted {
+            return Err(LinkError::SceneRefused);
+        }
+        if let Some(device) = &self.device {
+            self.tally.opened();
+            let resumed = device.epoch == Some(self.scene.epoch);
+            on(Event::Opened { device, resumed });
+        }
+        Ok(())
+    }
+
+    fn on_need(&mut self, key: hapterra_core::terrain::TileKey, out: &mut Vec<u8>) {
+        let Some(heights) = self.terrain.tile(key, &mut self.tile) else {
+            tracing::warn!(?key, "the device asked for a tile that there is not");
+            return;
+        };
+        let message = ToDevice::Tile(TileMessage {
+            epoch: self.scene.epoch,
+            key,
+            heights,
+        });
+        let bytes = framed(&message, &mut self.frame);
+        self.tally.sent_tile(key, bytes.len());
+        tracing::trace!(?key, bytes = bytes.len(), "tile sent");
+        out.extend_from_slice(bytes);
+    }
+}
+
+fn framed<'b>(message: &ToDevice<'_>, frame: &'b mut [u8; MAX_FRAME]) -> &'b [u8] {
+    // The longest message is a tile, and a frame holds one by definition.
+    encode(message, frame).unwrap_or(&[])
+}
+
+fn version(theirs: u16) -> LinkError {
+    LinkError::Version {
+        ours: PROTOCOL,
+        theirs,
+    }
+}

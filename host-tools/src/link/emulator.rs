@@ -1,0 +1,195 @@
+//! The emulated board: QEMU as a child of this program.
+
+use std::io::{self, Read};
+use std::net::{Ipv4Addr, TcpListener};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use super::Tcp;
+
+/// Environment variable that names the image when no option does.
+pub const IMAGE_VARIABLE: &str = "HAPTERRA_MPS2_ELF";
+/// QEMU's name when no option says otherwise.
+pub const QEMU: &str = "qemu-system-arm";
+/// How long QEMU may take to connect its lines.
+const START: Duration = Duration::from_secs(60);
+/// How long the board may take to end after a goodbye.
+const END: Duration = Duration::from_secs(10);
+
+/// Instructions that the emulated board executes for each count of its clock:
+/// `-icount shift=3` makes an instruction 8 ns, a count of its 25 MHz clock is
+/// 40 ns.
+pub const INSTRUCTIONS_PER_COUNT: f64 = 5.0;
+
+/// Why the board cannot be emulated.
+#[derive(Debug, thiserror::Error)]
+pub enum EmulatorError {
+    /// Nobody said where the image is.
+    #[error("no image of the emulated board was named")]
+    NoImage,
+    /// The image cannot be read.
+    #[error("cannot read the emulated board's image {}", path.display())]
+    Image {
+        /// The image.
+        path: PathBuf,
+        /// Why.
+        #[source]
+        source: io::Error,
+    },
+    /// QEMU does not start.
+    #[error("cannot start {}", path.display())]
+    Qemu {
+        /// The program.
+        path: PathBuf,
+        /// Why.
+        #[source]
+        source: io::Error,
+    },
+    /// QEMU ended, or does not connect.
+    #[error("{} did not bring the board up: {said}", path.display())]
+    NotUp {
+        /// The program.
+        path: PathBuf,
+        /// What it wrote, or how it ended.
+        said: String,
+    },
+    /// A socket for the lines cannot be had.
+    #[error("cannot listen on the loopback address")]
+    Listen(#[source] io::Error),
+}
+
+/// A running emulated board; it ends with this value.
+#[derive(Debug)]
+pub struct Emulator {
+    child: Child,
+    path: PathBuf,
+}
+
+/// The two lines of an emulated board.
+#[derive(Debug)]
+pub struct Lines {
+    /// The link.
+    pub link: Tcp,
+    /// Encoders and amplifiers.
+    pub plant: Tcp,
+}
+
+impl Emulator {
+    /// Starts the board from an image and connects its two lines.
+    ///
+    /// # Errors
+    /// [`EmulatorError`] says which part is missing or what QEMU said.
+    pub fn start(qemu: &Path, image: &Path) -> Result<(Self, Lines), EmulatorError> {
+        std::fs::File::open(image).map_err(|source| EmulatorError::Image {
+            path: image.to_owned(),
+            source,
+        })?;
+        let lines = [listen()?, listen()?];
+        let child = command(qemu, image, &lines)
+            .spawn()
+            .map_err(|source| EmulatorError::Qemu {
+                path: qemu.to_owned(),
+                source,
+            })?;
+        let mut emulator = Self {
+            child,
+            path: qemu.to_owned(),
+        };
+        let deadline = Instant::now() + START;
+        let [link, plant] = lines.map(|line| emulator.accept(&line, deadline));
+        let lines = Lines {
+            link: link?,
+            plant: plant?,
+        };
+        Ok((emulator, lines))
+    }
+
+    /// Waits for the board to end by itself, as it does after a goodbye; ends
+    /// it otherwise.
+    ///
+    /// # Errors
+    /// When the process cannot be waited for.
+    pub fn finish(mut self) -> io::Result<ExitStatus> {
+        let deadline = Instant::now() + END;
+        while Instant::now() < deadline {
+            if let Some(status) = self.child.try_wait()? {
+                return Ok(status);
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        self.child.kill()?;
+        self.child.wait()
+    }
+
+    fn accept(&mut self, line: &TcpListener, deadline: Instant) -> Result<Tcp, EmulatorError> {
+        loop {
+            match line.accept() {
+                Ok((stream, _)) => return Tcp::over(stream).map_err(EmulatorError::Listen),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                Err(error) => return Err(EmulatorError::Listen(error)),
+            }
+            let ended = self.child.try_wait().ok().flatten();
+            if let Some(status) = ended {
+                return Err(self.not_up(format!("{status}")));
+            }
+            if Instant::now() > deadline {
+                // What it wrote can only be read to the end once it has ended.
+                let _ = self.child.kill();
+                return Err(self.not_up(format!("no connection in {START:?}")));
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    fn not_up(&mut self, how: String) -> EmulatorError {
+        let mut said = String::new();
+        if let Some(mut stderr) = self.child.stderr.take() {
+            // What cannot be read is not shown.
+            let _ = stderr.read_to_string(&mut said);
+        }
+        let said = match said.trim() {
+            "" => how,
+            words => words.to_owned(),
+        };
+        EmulatorError::NotUp {
+            path: self.path.clone(),
+            said,
+        }
+    }
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        // It has ended already, or it ends now.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn listen() -> Result<TcpListener, EmulatorError> {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(EmulatorError::Listen)?;
+    listener
+        .set_nonblocking(true)
+        .map_err(EmulatorError::Listen)?;
+    Ok(listener)
+}
+
+fn command(qemu: &Path, image: &Path, lines: &[TcpListener; 2]) -> Command {
+    let mut command = Command::new(qemu);
+    command.args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"]);
+    command.args(["-icount", "shift=3,sleep=off"]);
+    command.args(["-semihosting-config", "enable=on,target=native"]);
+    for (index, line) in lines.iter().enumerate() {
+        let port = line.local_addr().map_or(0, |address| address.port());
+        let socket = format!("socket,id=u{index},host=127.0.0.1,port={port},nodelay=on");
+        command.args(["-chardev", &socket, "-serial", &format!("chardev:u{index}")]);
+    }
+    command.arg("-kernel").arg(image);
+    // Its standard output carries the board's log in a binary format.
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped());
+    command
+}

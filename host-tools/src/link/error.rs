@@ -1,0 +1,50 @@
+//! What can go wrong between host and device.
+
+use std::io;
+use std::time::Duration;
+
+/// Why there is no link, or no longer.
+#[derive(Debug, thiserror::Error)]
+pub enum LinkError {
+    /// Nothing there to talk to.
+    #[error("no device: looked for {looked_for}: {why}")]
+    Absent {
+        /// What was looked for and where.
+        looked_for: String,
+        /// What was found instead.
+        why: String,
+    },
+    /// The transport broke.
+    #[error("the device is gone")]
+    Gone(#[source] io::Error),
+    /// The transport stands, but nobody answers.
+    #[error("the device has not answered for {0:.1?}")]
+    Silent(Duration),
+    /// The two ends speak different protocols.
+    #[error(
+        "version mismatch: the device speaks link protocol {theirs}, this command speaks {ours}"
+    )]
+    Version {
+        /// The host's protocol.
+        ours: u16,
+        /// The device's protocol.
+        theirs: u16,
+    },
+    /// The device would not take the scene.
+    #[error("the device refused the scene: it finds a number in it that it cannot work with")]
+    SceneRefused,
+    /// In the middle of something that cannot be taken up again.
+    #[error("the device was restarted and has forgotten what it was doing")]
+    Restarted,
+    /// A point of a replay is never answered.
+    #[error("the device does not come to an end with point {0} of the trajectory")]
+    Stuck(u32),
+}
+
+impl LinkError {
+    /// Whether trying again later can help.
+    #[must_use]
+    pub const fn is_passing(&self) -> bool {
+        matches!(self, Self::Absent { .. } | Self::Gone(_) | Self::Silent(_))
+    }
+}

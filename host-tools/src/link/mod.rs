@@ -1,0 +1,33 @@
+//! The host's end of the link: tiles out, what was felt in.
+//!
+//! ```text
+//! Terrain ── Client ── Session ── Transport ═══ device
+//! ```
+//!
+//! [`Client`] is the conversation without I/O; [`Session`] runs it over a
+//! [`Transport`]: TCP (the emulated board), USB, or a device in this program's
+//! memory ([`Native`]). The device asks and the host answers, so a session
+//! holds nothing that a new one would need: either end may vanish and come
+//! back.
+
+mod client;
+mod emulator;
+mod error;
+mod native;
+mod plant;
+mod session;
+mod tally;
+mod target;
+mod transport;
+mod usb;
+
+pub use client::{Client, Event};
+pub use emulator::{Emulator, EmulatorError, IMAGE_VARIABLE, INSTRUCTIONS_PER_COUNT, Lines, QEMU};
+pub use error::LinkError;
+pub use native::{HostClock, Native};
+pub use plant::{PlantLine, serve_plant};
+pub use session::{Patience, Session};
+pub use tally::Tally;
+pub use target::Target;
+pub use transport::{Tcp, Transport};
+pub use usb::Usb;

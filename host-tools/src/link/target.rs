@@ -1,0 +1,72 @@
+//! Which device: as the user names it.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// A device by the name that the command line gives it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// A board on USB.
+    Usb,
+    /// `tcp:HOST:PORT`: an emulated board, or one behind a network.
+    Tcp(String),
+    /// The application in this program's memory.
+    Native,
+}
+
+impl FromStr for Target {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.strip_prefix("tcp:")) {
+            ("usb", _) => Ok(Self::Usb),
+            ("native", _) => Ok(Self::Native),
+            (_, Some(address)) => tcp_address(address).map(Self::Tcp),
+            _ => Err("a device is usb, tcp:HOST:PORT or native".into()),
+        }
+    }
+}
+
+/// Checks `HOST:PORT`.
+pub(crate) fn tcp_address(text: &str) -> Result<String, String> {
+    let port = text
+        .rsplit_once(':')
+        .map(|(host, port)| (host, port.parse::<u16>()));
+    match port {
+        Some((host, Ok(_))) if !host.is_empty() => Ok(text.to_owned()),
+        _ => Err("an address is HOST:PORT, as localhost:4000".into()),
+    }
+}
+
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Usb => f.write_str("usb"),
+            Self::Tcp(address) => write!(f, "tcp:{address}"),
+            Self::Native => f.write_str("native"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_devices() {
+        assert_eq!("usb".parse(), Ok(Target::Usb));
+        assert_eq!("native".parse(), Ok(Target::Native));
+        let tcp = "tcp:localhost:4000".parse::<Target>();
+        assert_eq!(tcp.map(|t| t.to_string()), Ok("tcp:localhost:4000".into()));
+        for bad in [
+            "",
+            "tcp:",
+            "tcp:localhost",
+            "tcp::1",
+            "tcp:a:99999",
+            "serial",
+        ] {
+            assert!(bad.parse::<Target>().is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! Files that appear only when they are complete.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+/// An output file cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {}", path.display())]
+pub struct OutputError {
+    /// The file.
+    pub path: PathBuf,
+    /// Why.
+    #[source]
+    pub source: io::Error,
+}
+
+/// A file being written. Dropped before [`Output::finish`], it leaves nothing
+/// behind.
+pub struct Output {
+    path: PathBuf,
+    writer: BufWriter<Sink>,
+}
+
+enum Sink {
+    /// Beside the file that it will replace.
+    Beside(NamedTempFile),
+    /// A pipe or device: there is nothing to replace.
+    Straight(File),
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Beside(file) => file.write(bytes),
+            Self::Straight(file) => file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Beside(file) => file.flush(),
+            Self::Straight(file) => file.flush(),
+        }
+    }
+}
+
+impl Output {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// When its folder cannot be written to.
+    pub fn create(path: &Path) -> Result<Self, OutputError> {
+        let failed = |source| OutputError {
+            path: path.to_owned(),
+            source,
+        };
+        let sink = match std::fs::metadata(path) {
+            Ok(there) if there.is_dir() => {
+                return Err(failed(io::Error::other("it is a folder")));
+            }
+            Ok(there) if !there.is_file() => {
+                let file = File::options().write(true).open(path);
+                Sink::Straight(file.map_err(failed)?)
+            }
+            _ => Sink::Beside(temporary(path).map_err(failed)?),
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            writer: BufWriter::with_capacity(1 << 16, sink),
+        })
+    }
+
+    /// The file's path.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Puts the complete file in its place.
+    ///
+    /// # Errors
+    /// When it cannot be written to the end.
+    pub fn finish(self) -> Result<(), OutputError> {
+        let path = self.path;
+        let finished = self.writer.into_inner().map_err(|error| error.into_error());
+        let placed = finished.and_then(|sink| match sink {
+            Sink::Beside(file) => Ok(drop(file.persist(&path).map_err(|error| error.error)?)),
+            Sink::Straight(mut file) => file.flush(),
+        });
+        placed.map_err(|source| OutputError { path, source })
+    }
+}
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.writer.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+fn temporary(path: &Path) -> io::Result<NamedTempFile> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".hapterra-").suffix(".partial");
+    // Readable by whom the user's mask says, as any other file.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn appears_whole_or_not_at_all() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("out.csv");
+        let mut output = Output::create(&path).expect("created");
+        output.write_all(b"half").expect("written");
+        drop(output);
+        let entries = || std::fs::read_dir(folder.path()).expect("listed").count();
+        assert_eq!(entries(), 0);
+        let mut output = Output::create(&path).expect("created");
+        output.write_all(b"all").expect("written");
+        assert!(!path.exists());
+        output.finish().expect("finished");
+        assert_eq!(std::fs::read(&path).expect("there"), b"all");
+        assert_eq!(entries(), 1);
+    }
+
+    #[test]
+    fn an_impossible_place_is_an_error_at_once() {
+        let folder = tempfile::tempdir().expect("a folder");
+        assert!(Output::create(&folder.path().join("no/such/out.csv")).is_err());
+        let error = Output::create(folder.path()).err().expect("a folder");
+        assert!(error.to_string().contains("cannot write"));
+    }
+}
