@@ -11,7 +11,7 @@ pub(crate) struct Reached {
 }
 
 /// Everything reachable from `root`, nearest first.
-pub(crate) fn from<'a>(root: usize, callees: impl Fn(usize) -> &'a [usize]) -> Reached {
+pub(crate) fn from(root: usize, callees: impl Fn(usize) -> Vec<usize>) -> Reached {
     let mut parents = vec![];
     let mut order = vec![];
     let mut next = VecDeque::from([(root, root)]);
@@ -24,7 +24,7 @@ pub(crate) fn from<'a>(root: usize, callees: impl Fn(usize) -> &'a [usize]) -> R
         }
         parents[node] = Some(parent);
         order.push(node);
-        next.extend(callees(node).iter().map(|&callee| (callee, node)));
+        next.extend(callees(node).into_iter().map(|callee| (callee, node)));
     }
     Reached { order, parents }
 }
@@ -55,7 +55,7 @@ mod tests {
     #[test]
     fn a_loop_ends_and_the_shortest_way_is_kept() {
         let graph: [&[usize]; 5] = [&[1, 2], &[2, 0], &[3], &[0], &[0]];
-        let reached = from(0, |n| graph[n]);
+        let reached = from(0, |n| graph[n].to_vec());
         assert_eq!(reached.all().collect::<Vec<_>>(), [0, 1, 2, 3]);
         assert_eq!(reached.chain(3), [0, 2, 3]);
         assert_eq!(reached.parent(0), None);
