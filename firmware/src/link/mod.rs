@@ -16,6 +16,7 @@
 //!   tile that is held, so a host that comes back goes on where it was.
 
 mod focus;
+mod log;
 mod outbox;
 mod session;
 pub mod task;

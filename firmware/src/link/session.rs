@@ -13,6 +13,7 @@ use heapless::{Deque, Vec};
 
 use super::LinkEnds;
 use super::focus::follow;
+use super::log;
 use super::outbox::Outbox;
 use crate::channels::{Record, SPARES};
 
@@ -109,7 +110,8 @@ impl<'t, const D: usize> Session<'t, D> {
         }
     }
 
-    pub(crate) fn on_bad_frame(&mut self, _bad: BadFrame) {
+    pub(crate) fn on_bad_frame(&mut self, bad: BadFrame) {
+        log::bad_frame(bad);
         self.bad_frames = self.bad_frames.saturating_add(1);
         // It may have been a tile. Where time stands still until that tile is
         // there, the time-out would never come.
@@ -127,6 +129,7 @@ impl<'t, const D: usize> Session<'t, D> {
         self.packed = 0;
         let answer = if hello.protocol == PROTOCOL {
             self.stage = Stage::Open;
+            log::opened(self.bad_frames);
             let epoch = self.scene.map(|scene| scene.epoch);
             ToHost::Hello(DeviceHello {
                 epoch,
@@ -134,6 +137,7 @@ impl<'t, const D: usize> Session<'t, D> {
             })
         } else {
             self.stage = Stage::Closed;
+            log::refused(hello.protocol);
             ToHost::Refused { protocol: PROTOCOL }
         };
         self.say(&answer);
@@ -159,6 +163,7 @@ impl<'t, const D: usize> Session<'t, D> {
             self.command(Command::Scene(scene));
         }
         let epoch = scene.epoch;
+        log::scene(epoch, accepted);
         self.say(&ToHost::SceneTaken { epoch, accepted });
     }
 
@@ -315,10 +320,16 @@ impl<'t, const D: usize> Session<'t, D> {
     pub(crate) fn transmit(&mut self, into: &mut [u8]) -> usize {
         let mut n = 0;
         while let Some(rest) = into.get_mut(n..).filter(|rest| !rest.is_empty()) {
-            match self.outbox.take(rest) {
-                0 => break,
-                more => n += more,
-            }
+            n += match self.outbox.take(rest) {
+                0 => {
+                    self.pack();
+                    if self.outbox.is_empty() {
+                        break;
+                    }
+                    0
+                }
+                taken => taken,
+            };
         }
         n
     }

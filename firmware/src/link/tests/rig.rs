@@ -143,6 +143,16 @@ impl Rig {
         }
     }
 
+    /// Ends the session and reads on while there is something to read. No more
+    /// ticks: the program may be about to end.
+    pub(super) fn say_goodbye(&mut self) {
+        self.send(&frame(&ToDevice::Bye));
+        self.deliver();
+        assert!(!self.device.has_ended());
+        self.writer = usize::MAX;
+        self.listen();
+    }
+
     fn deliver(&mut self) {
         let bytes = self.on_the_way.make_contiguous();
         let taken = self.device.receive(bytes);
