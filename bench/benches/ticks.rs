@@ -1,0 +1,64 @@
+//! `cargo bench`: a tick in each state, ours and the plain paper.
+
+use divan::{Bencher, counter::ItemsCount};
+use hapterra_bench::baseline::{Paper, Start};
+use hapterra_bench::grid::Grid;
+use hapterra_bench::haptics::Haptics;
+use hapterra_bench::path::{self, Flight, Path};
+use hapterra_bench::product::{self, Product, SIDE};
+use hapterra_core::contact::Rule;
+
+const TICKS: usize = 4000;
+const PATHS: [&str; 6] = [
+    "slide 0.01",
+    "slide 0.5",
+    "tapping",
+    "unmoved",
+    "fly low",
+    "fly high",
+];
+
+fn main() {
+    divan::main();
+}
+
+fn terrain() -> Grid {
+    Grid::fractal("1250 × 1250", [1250, 1250], 2, 1.0)
+}
+
+fn path(grid: &Grid, name: &'static str) -> Path {
+    match name {
+        "slide 0.01" => path::slide(grid, name, 0.01, TICKS),
+        "slide 0.5" => path::slide(grid, name, 0.5, TICKS),
+        "tapping" => path::tapping(grid, TICKS),
+        "unmoved" => path::resting(grid, TICKS),
+        "fly low" => path::flight(grid, name, Flight::Low, TICKS),
+        _ => path::flight(grid, name, Flight::High, TICKS),
+    }
+}
+
+/// The time shown is for the whole path; the items are ticks.
+fn run(bencher: Bencher<'_, '_>, path: &Path, variant: &mut dyn Haptics) {
+    bencher
+        .counter(ItemsCount::new(path.hands.len()))
+        .bench_local(|| variant.time(&path.hands));
+}
+
+#[divan::bench(args = PATHS)]
+fn swept(bencher: Bencher<'_, '_>, name: &'static str) {
+    let grid = terrain();
+    let mut buffers = product::buffers::<SIDE>();
+    let window = product::window::<SIDE>(&grid, &mut buffers);
+    run(
+        bencher,
+        &path(&grid, name),
+        &mut Product::new(&window, Rule::Swept),
+    );
+}
+
+#[divan::bench(args = PATHS)]
+fn plain(bencher: Bencher<'_, '_>, name: &'static str) {
+    let grid = terrain();
+    let mut paper = Paper::<f32>::new(&grid, Start::LastPoint, 10);
+    run(bencher, &path(&grid, name), &mut paper);
+}

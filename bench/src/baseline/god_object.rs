@@ -1,0 +1,193 @@
+//! The god-object on triangles (Zilles & Salisbury 1995): it moves straight
+//! toward the hand; each facet in its way becomes a constraint plane, and its
+//! goal the point nearest to the hand that satisfies all of them.
+//!
+//! In f64, so that it cannot fall through a facet by rounding.
+
+use super::line::Line;
+use super::triangle::{Facet, Plane};
+use crate::grid::Grid;
+use crate::haptics::{Answer, Hand, Haptics};
+
+/// Facets that may hold it at once.
+const PLANES: usize = 3;
+/// A facet counts as passed when the end of the way is this far below it.
+const BELOW: f64 = 1e-12;
+
+/// The algorithm's state.
+pub struct GodObject<'g> {
+    grid: &'g Grid,
+    hand: Option<[f64; 3]>,
+    god: [f64; 3],
+    answer: Answer,
+}
+
+impl<'g> GodObject<'g> {
+    /// On a terrain.
+    #[must_use]
+    pub const fn new(grid: &'g Grid) -> Self {
+        Self {
+            grid,
+            hand: None,
+            god: [0.0; 3],
+            answer: Answer::FREE,
+        }
+    }
+
+    /// The first facet, not among `known`, that a segment passes downward.
+    #[inline]
+    fn first_hit(
+        &self,
+        from: &[f64; 3],
+        to: &[f64; 3],
+        known: &[Facet],
+    ) -> Option<([f64; 3], Facet, Plane)> {
+        let way = [0, 1, 2].map(|i| to[i] - from[i]);
+        let at = |t: f64| [0, 1, 2].map(|i| from[i] + t * way[i]);
+        // On the diagonal x + y is one more than at the cell's corner.
+        let (sum, rise) = (from[0] + from[1], way[0] + way[1]);
+        let mut entered = 0.0;
+        let line = Line::new([from[0], from[1]], [to[0], to[1]]);
+        for cell in line.filter(|cell| self.grid.has(*cell)) {
+            let [x, y] = cell.map(f64::from);
+            let leaves = |i: usize, low: f64| {
+                let border = if way[i] > 0.0 { low + 1.0 } else { low };
+                if way[i] == 0.0 {
+                    1.0
+                } else {
+                    ((border - from[i]) / way[i]).min(1.0)
+                }
+            };
+            let left = leaves(0, x).min(leaves(1, y)).max(entered);
+            let diagonal = (x + y + 1.0 - sum) / rise;
+            let split = diagonal > entered && diagonal < left;
+            let starts_upper = if split {
+                rise < 0.0
+            } else {
+                sum + rise * 0.5 * (entered + left) > x + y + 1.0
+            };
+            let pieces = [
+                (entered, if split { diagonal } else { left }, starts_upper),
+                (diagonal, left, !starts_upper),
+            ];
+            for (begin, end, upper) in pieces.into_iter().take(1 + usize::from(split)) {
+                let facet = Facet { cell, upper };
+                if known.contains(&facet) {
+                    continue;
+                }
+                let plane = facet.plane(self.grid);
+                let (before, after) = (plane.above(&at(begin)), plane.above(&at(end)));
+                if after > BELOW && after > before {
+                    let t = if before >= 0.0 {
+                        begin
+                    } else {
+                        begin + (end - begin) * before / (before - after)
+                    };
+                    return Some((at(t), facet, plane));
+                }
+            }
+            entered = left;
+        }
+        None
+    }
+}
+
+impl Haptics for GodObject<'_> {
+    fn forget(&mut self) {
+        self.hand = None;
+        self.answer = Answer::FREE;
+    }
+
+    #[inline]
+    fn tick(&mut self, hand: &Hand) -> Answer {
+        let hand = hand.wide;
+        match self.hand.replace(hand) {
+            None => {
+                self.god = hand;
+                return self.answer;
+            }
+            Some(last) if last == hand && !self.answer.touching => return self.answer,
+            Some(_) => {}
+        }
+        let mut facets = [Facet {
+            cell: [-1, -1],
+            upper: false,
+        }; PLANES];
+        let mut planes = [Plane::default(); PLANES];
+        let (mut held, mut goal) = (0, hand);
+        while let Some((hit, facet, plane)) = self.first_hit(&self.god, &goal, &facets[..held]) {
+            self.god = hit;
+            if held == PLANES {
+                goal = hit;
+                break;
+            }
+            (facets[held], planes[held]) = (facet, plane);
+            held += 1;
+            goal = nearest_on(&planes[..held], &hand);
+        }
+        self.god = goal;
+        self.answer = if held == 0 {
+            Answer::FREE
+        } else {
+            Answer::touching([0, 1, 2].map(|i| (goal[i] - hand[i]) as f32))
+        };
+        self.answer
+    }
+}
+
+/// The point nearest to the hand on all planes; a plane that would pull the
+/// god-object toward itself from outside is let go.
+#[inline]
+fn nearest_on(planes: &[Plane], hand: &[f64; 3]) -> [f64; 3] {
+    match planes {
+        [one] => along(hand, one, push(one, hand)),
+        [first, second] => {
+            let (n, m) = (first.normal(), second.normal());
+            let (nn, mm, nm) = (dot(&n, &n), dot(&m, &m), dot(&n, &m));
+            let det = nn * mm - nm * nm;
+            let (g, h) = (first.above(hand), second.above(hand));
+            let (s, t) = ((g * mm - h * nm) / det, (h * nn - g * nm) / det);
+            if det <= 1e-14 * nn * mm || s < 0.0 {
+                along(hand, second, push(second, hand))
+            } else if t < 0.0 {
+                along(hand, first, push(first, hand))
+            } else {
+                let part = along(hand, first, s);
+                along(&part, second, t)
+            }
+        }
+        [first, second, third] => meeting_point(first, second, third)
+            .unwrap_or_else(|| nearest_on(&[*second, *third], hand)),
+        _ => *hand,
+    }
+}
+
+/// How many normals away from the plane the hand is.
+#[inline]
+fn push(plane: &Plane, hand: &[f64; 3]) -> f64 {
+    let normal = plane.normal();
+    plane.above(hand) / dot(&normal, &normal)
+}
+
+#[inline]
+fn along(from: &[f64; 3], plane: &Plane, normals: f64) -> [f64; 3] {
+    let normal = plane.normal();
+    [0, 1, 2].map(|i| from[i] + normals * normal[i])
+}
+
+#[inline]
+fn meeting_point(a: &Plane, b: &Plane, c: &Plane) -> Option<[f64; 3]> {
+    let (be, bn, bl) = (b.east - a.east, b.north - a.north, b.level - a.level);
+    let (ce, cn, cl) = (c.east - a.east, c.north - a.north, c.level - a.level);
+    let det = be * cn - bn * ce;
+    if det.abs() < 1e-14 {
+        return None;
+    }
+    let (x, y) = ((bn * cl - bl * cn) / det, (bl * ce - be * cl) / det);
+    Some([x, y, a.level + a.east * x + a.north * y])
+}
+
+#[inline]
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

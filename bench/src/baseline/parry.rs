@@ -1,0 +1,128 @@
+//! parry3d's height field: a ray from the last hand to this one while free,
+//! the nearest point while in contact.
+
+use parry3d::math::Vector;
+use parry3d::query::{PointQuery, Ray, RayCast};
+use parry3d::shape::HeightField;
+use parry3d::utils::Array2;
+
+use super::triangle::Facet;
+use crate::grid::Grid;
+use crate::haptics::{Answer, Hand, Haptics};
+
+/// Which call finds the nearest point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Project {
+    /// `project_local_point`
+    Anywhere,
+    /// `project_local_point_with_max_dist`, no farther than the last answer
+    /// and the hand's motion since allow.
+    Within,
+}
+
+/// parry's shape and what a tick remembers.
+pub struct Parry<'g> {
+    grid: &'g Grid,
+    field: HeightField,
+    project: Project,
+    hand: Option<Hand>,
+    /// Distance from the hand to the surface, while in contact.
+    depth: Option<f32>,
+    answer: Answer,
+}
+
+impl<'g> Parry<'g> {
+    /// parry's own copy of a terrain.
+    #[must_use]
+    pub fn new(grid: &'g Grid, project: Project) -> Self {
+        let (columns, rows) = (grid.columns + 1, grid.rows + 1);
+        let mut heights = Array2::zeros(rows, columns);
+        for row in 0..rows {
+            for column in 0..columns {
+                heights[(row, column)] = grid.post(column, row);
+            }
+        }
+        let scale = Vector::new(grid.columns as f32, 1.0, grid.rows as f32);
+        Self {
+            grid,
+            field: HeightField::new(heights, scale),
+            project,
+            hand: None,
+            depth: None,
+            answer: Answer::FREE,
+        }
+    }
+
+    /// parry's frame: y up, the origin in the middle of the field.
+    #[inline]
+    fn local(&self, [x, y, z]: [f32; 3]) -> Vector {
+        Vector::new(
+            x - 0.5 * self.grid.columns as f32,
+            z,
+            y - 0.5 * self.grid.rows as f32,
+        )
+    }
+
+    /// Whether the way from the last hand to this one is free.
+    #[inline]
+    fn is_free(&self, from: Vector, to: Vector) -> bool {
+        let ray = Ray::new(from, to - from);
+        self.field.cast_local_ray(&ray, 1.0, false).is_none()
+    }
+
+    /// Whether the hand is below the triangles: parry has no call for that.
+    #[inline]
+    fn is_below(&self, hand: &Hand) -> bool {
+        let facet = Facet::under(hand.wide[0], hand.wide[1]);
+        self.grid.has(facet.cell) && facet.plane(self.grid).above(&hand.wide) > 0.0
+    }
+
+    #[inline]
+    fn nearest(&self, hand: Vector, motion: f32) -> Option<Vector> {
+        let projection = match (self.project, self.depth) {
+            (Project::Within, Some(depth)) => {
+                let reach = depth + motion + 1e-3;
+                self.field
+                    .project_local_point_with_max_dist(hand, false, reach)
+            }
+            _ => Some(self.field.project_local_point(hand, false)),
+        };
+        projection.map(|projection| projection.point)
+    }
+}
+
+impl Haptics for Parry<'_> {
+    fn forget(&mut self) {
+        self.hand = None;
+        self.depth = None;
+        self.answer = Answer::FREE;
+    }
+
+    #[inline]
+    fn tick(&mut self, hand: &Hand) -> Answer {
+        let Some(last) = self.hand.replace(*hand) else {
+            return self.answer;
+        };
+        if last.grid == hand.grid {
+            return self.answer;
+        }
+        let (from, to) = (self.local(last.single), self.local(hand.single));
+        let touches = match self.depth {
+            Some(_) => self.is_below(hand),
+            None => !self.is_free(from, to) && self.is_below(hand),
+        };
+        let nearest = touches.then(|| self.nearest(to, (to - from).length()));
+        self.answer = match nearest.flatten() {
+            Some(point) => {
+                let stretch = point - to;
+                self.depth = Some(stretch.length());
+                Answer::touching([stretch.x, stretch.z, stretch.y])
+            }
+            None => {
+                self.depth = None;
+                Answer::FREE
+            }
+        };
+        self.answer
+    }
+}

@@ -1,0 +1,155 @@
+//! The proxy graph (Walker & Salisbury 2003): in contact the proxy lives on
+//! the edges and vertices of the triangulated field only, and moves from one
+//! to the next while that brings it nearer to the hand.
+
+use super::triangle::Facet;
+use crate::grid::Grid;
+use crate::haptics::{Answer, Hand, Haptics};
+
+/// Moves in one tick, at most.
+const MOVES: u32 = 4096;
+
+/// A node: an edge and a place on it; its ends are the vertices.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    /// Sample at the start of the edge.
+    post: [i32; 2],
+    /// Where the edge leads: east, north or north-west, or the way back.
+    to: [i32; 2],
+    /// Place on it, `[0, 1]`.
+    t: f64,
+    stretch: [f64; 3],
+    squared: f64,
+}
+
+/// The six edges at a vertex, counter-clockwise.
+const SPOKES: [[i32; 2]; 6] = [[1, 0], [0, 1], [-1, 1], [-1, 0], [0, -1], [1, -1]];
+
+/// The algorithm's state.
+pub struct ProxyGraph<'g> {
+    grid: &'g Grid,
+    hand: Option<[f64; 3]>,
+    node: Option<Node>,
+    answer: Answer,
+}
+
+impl<'g> ProxyGraph<'g> {
+    /// On a terrain.
+    #[must_use]
+    pub const fn new(grid: &'g Grid) -> Self {
+        Self {
+            grid,
+            hand: None,
+            node: None,
+            answer: Answer::FREE,
+        }
+    }
+
+    #[inline]
+    fn post(&self, [x, y]: [i32; 2]) -> Option<f64> {
+        let inside =
+            (x as u32 as usize) <= self.grid.columns && (y as u32 as usize) <= self.grid.rows;
+        inside.then(|| f64::from(self.grid.post(x as usize, y as usize)))
+    }
+
+    /// The nearest point of one edge.
+    #[inline]
+    fn on_edge(&self, post: [i32; 2], to: [i32; 2], hand: &[f64; 3]) -> Option<Node> {
+        let end = [post[0] + to[0], post[1] + to[1]];
+        let (low, high) = (self.post(post)?, self.post(end)?);
+        let (dx, dy, dz) = (f64::from(to[0]), f64::from(to[1]), high - low);
+        let from = [
+            f64::from(post[0]) - hand[0],
+            f64::from(post[1]) - hand[1],
+            low - hand[2],
+        ];
+        let along = -(from[0] * dx + from[1] * dy + from[2] * dz);
+        let t = (along / (dx * dx + dy * dy + dz * dz)).clamp(0.0, 1.0);
+        let stretch = [from[0] + t * dx, from[1] + t * dy, from[2] + t * dz];
+        Some(Node {
+            post,
+            to,
+            t,
+            stretch,
+            squared: stretch.iter().map(|x| x * x).sum(),
+        })
+    }
+
+    /// The edges within one move: all at a vertex, or the other two of each
+    /// triangle that shares the edge.
+    #[inline]
+    fn nearer(&self, node: &Node, hand: &[f64; 3]) -> Option<Node> {
+        let mut best = *node;
+        let mut look = |post: [i32; 2], to: [i32; 2]| {
+            if let Some(there) = self.on_edge(post, to, hand)
+                && there.squared < best.squared * (1.0 - 1e-12)
+            {
+                best = there;
+            }
+        };
+        let end = [node.post[0] + node.to[0], node.post[1] + node.to[1]];
+        if node.t == 0.0 || node.t == 1.0 {
+            let vertex = if node.t == 0.0 { node.post } else { end };
+            for spoke in SPOKES {
+                look(vertex, spoke);
+            }
+        } else {
+            let turn = SPOKES.iter().position(|s| *s == node.to).unwrap_or(0);
+            for side in [1, 5] {
+                let third = SPOKES[(turn + side) % 6];
+                look(node.post, third);
+                look(end, [third[0] - node.to[0], third[1] - node.to[1]]);
+            }
+        }
+        (best.squared < node.squared).then_some(best)
+    }
+
+    #[inline]
+    fn descend(&self, mut node: Node, hand: &[f64; 3]) -> Node {
+        for _ in 0..MOVES {
+            match self.nearer(&node, hand) {
+                Some(next) => node = next,
+                None => break,
+            }
+        }
+        node
+    }
+
+    /// How far the triangles lie above the hand.
+    #[inline]
+    fn depth(&self, hand: &[f64; 3]) -> Option<f64> {
+        let facet = Facet::under(hand[0], hand[1]);
+        let held = self.grid.has(facet.cell);
+        held.then(|| facet.plane(self.grid).above(hand))
+    }
+}
+
+impl Haptics for ProxyGraph<'_> {
+    fn forget(&mut self) {
+        self.hand = None;
+        self.node = None;
+        self.answer = Answer::FREE;
+    }
+
+    #[inline]
+    fn tick(&mut self, hand: &Hand) -> Answer {
+        let hand = hand.wide;
+        if self.hand.replace(hand) == Some(hand) {
+            return self.answer;
+        }
+        if self.depth(&hand).is_none_or(|depth| depth <= 0.0) {
+            self.node = None;
+            self.answer = Answer::FREE;
+            return self.answer;
+        }
+        let start = match &self.node {
+            Some(node) => self.on_edge(node.post, node.to, &hand),
+            None => self.on_edge([hand[0] as i32, hand[1] as i32], SPOKES[0], &hand),
+        };
+        self.node = start.map(|start| self.descend(start, &hand));
+        self.answer = self.node.map_or(Answer::FREE, |node| {
+            Answer::touching(node.stretch.map(|x| x as f32))
+        });
+        self.answer
+    }
+}

@@ -1,0 +1,61 @@
+//! The two-triangle split of a cell: the diagonal runs from its south-east to
+//! its north-west corner, as in parry's height field.
+
+use crate::grid::Grid;
+
+/// One half of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Facet {
+    pub(super) cell: [i32; 2],
+    /// The north-eastern half.
+    pub(super) upper: bool,
+}
+
+impl Facet {
+    /// The half under a place.
+    #[inline]
+    pub(super) fn under(x: f64, y: f64) -> Self {
+        let cell = [x as i32, y as i32];
+        let upper = (x - f64::from(cell[0])) + (y - f64::from(cell[1])) > 1.0;
+        Self { cell, upper }
+    }
+
+    /// Its plane: height at the cell's south-west corner, slopes east and north.
+    #[inline]
+    pub(super) fn plane(self, grid: &Grid) -> Plane {
+        let [sw, se, nw, ne] = grid.corners(self.cell).map(f64::from);
+        let (east, north, base) = if self.upper {
+            (ne - nw, ne - se, se + nw - ne)
+        } else {
+            (se - sw, nw - sw, sw)
+        };
+        let [x, y] = self.cell.map(f64::from);
+        Plane {
+            east,
+            north,
+            level: base - east * x - north * y,
+        }
+    }
+}
+
+/// z = level + east·x + north·y
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Plane {
+    pub(super) east: f64,
+    pub(super) north: f64,
+    pub(super) level: f64,
+}
+
+impl Plane {
+    /// How far the plane lies above a point, along z.
+    #[inline]
+    pub(super) fn above(&self, [x, y, z]: &[f64; 3]) -> f64 {
+        self.level + self.east * x + self.north * y - z
+    }
+
+    /// Upward, z = 1.
+    #[inline]
+    pub(super) fn normal(&self) -> [f64; 3] {
+        [-self.east, -self.north, 1.0]
+    }
+}

@@ -1,0 +1,260 @@
+//! All variants on one terrain along all paths, interleaved in one run.
+
+use hapterra_core::contact::Rule;
+
+use crate::baseline::{GodObject, Paper, Parry, Project, ProxyGraph, Start};
+use crate::grid::Grid;
+use crate::haptics::{Answer, Haptics};
+use crate::path::{self, Path};
+use crate::product::{self, Copy, Product, SIDE};
+use crate::stats::{interleave, part, quantiles};
+use crate::truth::{self, Verdict};
+
+/// How much is measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Ticks along a path.
+    pub ticks: usize,
+    /// Times every variant runs every path.
+    pub rounds: usize,
+    /// Answers judged against the truth, at most, on each path.
+    pub judged: usize,
+}
+
+impl Effort {
+    /// For figures to be quoted.
+    pub const FULL: Self = Self {
+        ticks: 20_000,
+        rounds: 15,
+        judged: 4000,
+    };
+    /// For a look.
+    pub const QUICK: Self = Self {
+        ticks: 4000,
+        rounds: 5,
+        judged: 800,
+    };
+}
+
+/// Whose a variant is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// The product's.
+    Ours,
+    /// The paper's algorithm as published.
+    Paper,
+    /// Anything on triangles.
+    Triangles,
+    /// No contact at all: a bound.
+    Bound,
+}
+
+/// What a variant is called, and how much it keeps.
+#[derive(Clone, Copy, Debug)]
+pub struct Label {
+    /// In tables and pictures.
+    pub name: &'static str,
+    /// Whose it is.
+    pub family: Family,
+    /// Bytes a sample beyond the `f32` height itself.
+    pub extra_bytes: f64,
+}
+
+/// The variant that the others are compared with: the paper, plainly.
+pub const PLAIN: &str = "paper f32";
+
+/// One variant along one path.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// The terrain's name.
+    pub terrain: String,
+    /// The path's name.
+    pub path: &'static str,
+    /// Which variant.
+    pub label: Label,
+    /// Nanoseconds a tick: lower quartile, median, upper quartile.
+    pub ns: [f64; 3],
+    /// Median over the rounds of its time over that of [`PLAIN`].
+    pub ratio: f64,
+    /// Of the answers judged; `None` where nothing was felt.
+    pub error: Option<Error>,
+    /// Largest change of the stretch from one tick to the next, cells.
+    pub jump: f64,
+    /// Part of the ticks below the surface that felt nothing.
+    pub missed: f64,
+    /// Part of the ticks in which work was left over.
+    pub unsettled: f64,
+}
+
+/// Errors against the truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Error {
+    /// Distance from the exact closest point, cells.
+    pub mean: f64,
+    /// 99 % are below, cells.
+    pub p99: f64,
+    /// Largest, cells.
+    pub max: f64,
+    /// Mean angle between the forces, degrees.
+    pub angle_mean: f64,
+    /// 99 % are below, degrees.
+    pub angle_p99: f64,
+}
+
+impl Error {
+    /// Sums up; `None` of nothing.
+    #[must_use]
+    pub fn of(verdicts: &[Verdict]) -> Option<Self> {
+        if verdicts.is_empty() {
+            return None;
+        }
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let errors: Vec<f64> = verdicts.iter().map(|verdict| verdict.error).collect();
+        let angles: Vec<f64> = verdicts.iter().map(|verdict| verdict.angle).collect();
+        let (mean, angle_mean) = (mean(&errors), mean(&angles));
+        let [p99, max] = quantiles(errors, [0.99, 1.0]);
+        let [angle_p99] = quantiles(angles, [0.99]);
+        Some(Self {
+            mean,
+            p99,
+            max,
+            angle_mean,
+            angle_p99,
+        })
+    }
+}
+
+type Entry<'a> = (Label, Box<dyn Haptics + 'a>);
+
+/// Measures every variant on one terrain. `progress` is told each path.
+pub fn compare(grid: &Grid, effort: Effort, mut progress: impl FnMut(&str)) -> Vec<Row> {
+    let mut buffers = product::buffers::<SIDE>();
+    let window = product::window::<SIDE>(grid, &mut buffers);
+    let mut entries = opponents(grid);
+    let mut ours = |name, rule| {
+        let label = Label {
+            name,
+            family: Family::Ours,
+            // 21 maxima a tile and 8 bytes of pyramid, over 32 × 32 samples.
+            extra_bytes: (21.0 * 4.0 + 8.0) / 1024.0,
+        };
+        let product: Box<dyn Haptics + '_> = Box::new(Product::new(&window, rule));
+        entries.insert(0, (label, product));
+    };
+    ours("hapterra paper rule", Rule::Paper);
+    ours("hapterra swept", Rule::Swept);
+    let mut rows = Vec::new();
+    for path in path::all(grid, effort.ticks) {
+        progress(path.name);
+        rows.extend(along(grid, &path, &mut entries, effort));
+    }
+    rows
+}
+
+fn opponents(grid: &Grid) -> Vec<Entry<'_>> {
+    let label = |name, family, extra_bytes| Label {
+        name,
+        family,
+        extra_bytes,
+    };
+    let paper = |name| label(name, Family::Paper, 0.0);
+    let triangles = |name, extra| label(name, Family::Triangles, extra);
+    let last = Start::LastPoint;
+    vec![
+        (paper(PLAIN), Box::new(Paper::<f32>::new(grid, last, 10))),
+        (
+            paper("paper f64"),
+            Box::new(Paper::<f64>::new(grid, last, 20)),
+        ),
+        (
+            paper("paper f32, centre, 10"),
+            Box::new(Paper::<f32>::new(grid, Start::Centre, 10)),
+        ),
+        (
+            paper("paper f32, centre, 3"),
+            Box::new(Paper::<f32>::new(grid, Start::Centre, 3)),
+        ),
+        (
+            paper("paper f32, last point, 1"),
+            Box::new(Paper::<f32>::new(grid, last, 1)),
+        ),
+        (triangles("god-object", 0.0), Box::new(GodObject::new(grid))),
+        (
+            triangles("proxy graph", 0.0),
+            Box::new(ProxyGraph::new(grid)),
+        ),
+        // Its own copy of the heights and a byte of status a cell.
+        (
+            triangles("parry within", 5.0),
+            Box::new(Parry::new(grid, Project::Within)),
+        ),
+        (
+            triangles("parry", 5.0),
+            Box::new(Parry::new(grid, Project::Anywhere)),
+        ),
+        (
+            label("copy of the last answer", Family::Bound, 0.0),
+            Box::new(Copy::default()),
+        ),
+    ]
+}
+
+fn along(grid: &Grid, path: &Path, entries: &mut [Entry<'_>], effort: Effort) -> Vec<Row> {
+    let is_bound = |label: &Label| label.family == Family::Bound && path.name != "unmoved";
+    let times = interleave(entries.len(), effort.rounds, |index| {
+        let elapsed = entries[index].1.time(&path.hands);
+        elapsed.as_secs_f64() * 1e9 / path.hands.len() as f64
+    });
+    let plain = entries.iter().position(|(label, _)| label.name == PLAIN);
+    let plain = times[plain.unwrap_or(0)].clone();
+    let rows = entries
+        .iter_mut()
+        .zip(&times)
+        .map(|((label, variant), times)| {
+            let answers = variant.answers(&path.hands);
+            let ratios = times.iter().zip(&plain).map(|(own, plain)| own / plain);
+            Row {
+                terrain: grid.name.clone(),
+                path: path.name,
+                label: *label,
+                ns: quantiles(times.clone(), [0.25, 0.5, 0.75]),
+                ratio: quantiles(ratios.collect(), [0.5])[0],
+                error: error(grid, path, &answers, effort.judged),
+                jump: largest_jump(&answers),
+                missed: missed(grid, path, &answers),
+                unsettled: part(answers.iter().map(|answer| !answer.settled)),
+            }
+        });
+    rows.filter(|row| !is_bound(&row.label)).collect()
+}
+
+fn error(grid: &Grid, path: &Path, answers: &[Answer], judged: usize) -> Option<Error> {
+    let every = answers.len().div_ceil(judged.max(1));
+    let verdicts = path
+        .hands
+        .iter()
+        .zip(answers)
+        .step_by(every)
+        .filter(|(_, answer)| answer.touching)
+        .filter_map(|(hand, answer)| truth::judge(grid, hand, answer));
+    Error::of(&verdicts.collect::<Vec<_>>())
+}
+
+fn largest_jump(answers: &[Answer]) -> f64 {
+    let squared = |pair: &[Answer]| {
+        (0..3)
+            .map(|i| f64::from(pair[1].stretch[i]) - f64::from(pair[0].stretch[i]))
+            .map(|d| d * d)
+            .sum::<f64>()
+    };
+    answers.windows(2).map(squared).fold(0.0, f64::max).sqrt()
+}
+
+/// The first hand is above the surface, so one below it should be felt.
+fn missed(grid: &Grid, path: &Path, answers: &[Answer]) -> f64 {
+    let below = path.hands.iter().zip(answers).filter(|(hand, _)| {
+        let [x, y, z] = hand.wide;
+        grid.height(x, y) - z > 1e-3
+    });
+    part(below.map(|(_, answer)| !answer.touching))
+}

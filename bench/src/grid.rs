@@ -1,0 +1,134 @@
+//! The terrain that every variant gets: plain heights in cells.
+
+use std::path::Path;
+
+use hapterra::raster::Raster;
+use hapterra::synth::{Kind, Synth};
+
+/// Most samples along a side; a larger field is cut to its middle.
+pub const LARGEST_SIDE: u32 = 4097;
+
+/// Heights in cells, row by row from the south, with no hole.
+#[derive(Clone, Debug)]
+pub struct Grid {
+    /// What to call it in tables.
+    pub name: String,
+    /// Patches eastward.
+    pub columns: usize,
+    /// Patches northward.
+    pub rows: usize,
+    /// `(columns + 1) × (rows + 1)` samples.
+    pub posts: Vec<f32>,
+    /// What was done to it for the comparison, one sentence each.
+    pub remarks: Vec<String>,
+}
+
+impl Grid {
+    /// A field of `columns × rows` patches.
+    pub fn from_fn(
+        name: &str,
+        [columns, rows]: [usize; 2],
+        mut height: impl FnMut(usize, usize) -> f32,
+    ) -> Self {
+        let mut posts = Vec::with_capacity((columns + 1) * (rows + 1));
+        for row in 0..=rows {
+            posts.extend((0..=columns).map(|column| height(column, row)));
+        }
+        Self {
+            name: name.to_owned(),
+            columns,
+            rows,
+            posts,
+            remarks: Vec::new(),
+        }
+    }
+
+    /// Mountains made by formula, their heights times `steepness`.
+    pub fn fractal(name: &str, size: [usize; 2], seed: u64, steepness: f64) -> Self {
+        let amplitude = steepness * Kind::Fractal.usual_amplitude_cells();
+        let synth = Synth::new(Kind::Fractal, seed, amplitude);
+        Self::from_fn(name, size, |x, y| synth.height(x as u32, y as u32))
+    }
+
+    /// A terrain file's field at true proportions where it knows them, else
+    /// one cell a vertical unit, times `steepness`.
+    pub fn from_raster(path: &Path, raster: &Raster, steepness: f64) -> Self {
+        let scale = raster.cells_per_vertical_unit().unwrap_or(1.0) * steepness;
+        let [width, height] = [raster.columns(), raster.rows()].map(|n| n.min(LARGEST_SIDE));
+        let first = [(raster.columns() - width) / 2, (raster.rows() - height) / 2];
+        let summary = raster.summary();
+        let mut row_of = (u32::MAX, vec![0.0; width as usize]);
+        let mut filled = 0_u64;
+        let name = path.file_stem().unwrap_or(path.as_os_str());
+        let size = [width as usize - 1, height as usize - 1];
+        let mut grid = Self::from_fn(&name.to_string_lossy(), size, |x, y| {
+            if row_of.0 != y as u32 {
+                row_of.0 = y as u32;
+                raster.copy_row(first[1] + y as u32, first[0], &mut row_of.1);
+            }
+            let height = row_of.1[x];
+            filled += u64::from(height.is_nan());
+            // Near zero, so that the plain versions keep what bits they have.
+            let height = if height.is_nan() {
+                summary.lowest
+            } else {
+                height
+            };
+            ((height - summary.lowest) * scale) as f32
+        });
+        if filled > 0 {
+            grid.remarks.push(format!(
+                "{filled} samples without data lie at the lowest height: not every opponent knows holes"
+            ));
+        }
+        if width < raster.columns() || height < raster.rows() {
+            let cut = format!("cut to {width} × {height} samples in its middle");
+            grid.remarks.push(cut);
+        }
+        grid
+    }
+
+    /// The height of a sample.
+    #[must_use]
+    pub fn post(&self, column: usize, row: usize) -> f32 {
+        self.posts[row * (self.columns + 1) + column]
+    }
+
+    /// Whether there is such a patch.
+    #[inline]
+    #[must_use]
+    pub fn has(&self, [x, y]: [i32; 2]) -> bool {
+        (x as u32 as usize) < self.columns && (y as u32 as usize) < self.rows
+    }
+
+    /// The corner heights of a patch that exists: south-west, south-east,
+    /// north-west, north-east.
+    #[inline]
+    #[must_use]
+    pub fn corners(&self, [x, y]: [i32; 2]) -> [f32; 4] {
+        let stride = self.columns + 1;
+        let south = y as usize * stride + x as usize;
+        let (south, north) = (
+            &self.posts[south..][..2],
+            &self.posts[south + stride..][..2],
+        );
+        [south[0], south[1], north[0], north[1]]
+    }
+
+    /// The bilinear surface at a place inside the field.
+    #[must_use]
+    pub fn height(&self, x: f64, y: f64) -> f64 {
+        let column = (x as usize).min(self.columns - 1);
+        let row = (y as usize).min(self.rows - 1);
+        let (u, v) = (x - column as f64, y - row as f64);
+        let [sw, se, nw, ne] = self.corners([column as i32, row as i32]).map(f64::from);
+        let (south, north) = (sw + u * (se - sw), nw + u * (ne - nw));
+        south + v * (north - south)
+    }
+
+    /// The highest sample.
+    #[must_use]
+    pub fn top(&self) -> f32 {
+        self.posts.iter().fold(f32::NEG_INFINITY, |a, b| a.max(*b))
+    }
+}

@@ -1,0 +1,26 @@
+//! Run time against error: hapterra's contact and honest opponents on the same
+//! terrain, under the same hand, in the same run.
+//!
+//! - [`grid`] and [`path`]: the terrains and the ways of the hand;
+//! - [`haptics`]: what every variant is asked and answers;
+//! - [`product`]: our own rules;
+//! - [`baseline`]: the opponents, none of which is in the product;
+//! - [`truth`]: the exact closest point in f64, which judges every answer;
+//! - [`compare`]: all variants on one terrain, interleaved;
+//! - [`solver`]: one patch, and the square root, alone;
+//! - [`state`]: what a tick can be doing, for counting instructions;
+//! - [`report`]: the table, the CSV file, the picture.
+
+#![forbid(unsafe_code)]
+
+pub mod baseline;
+pub mod compare;
+pub mod grid;
+pub mod haptics;
+pub mod path;
+pub mod product;
+pub mod report;
+pub mod solver;
+pub mod state;
+mod stats;
+pub mod truth;

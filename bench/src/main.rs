@@ -1,0 +1,136 @@
+//! `hapterra bench`: run time against error, beside honest opponents.
+
+#![forbid(unsafe_code)]
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, ValueHint};
+use hapterra::cli::Failure;
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra_bench::compare::{Effort, Row, compare};
+use hapterra_bench::grid::Grid;
+use hapterra_bench::{report, solver};
+use indicatif::ProgressBar;
+
+/// Measure the contact beside other ways to render a height field: time for a
+/// tick, error against the exact closest point, largest jump of the force
+#[derive(Debug, Parser)]
+#[command(name = "hapterra-bench", bin_name = "hapterra bench", version)]
+struct Args {
+    /// Terrain files to measure on
+    #[arg(value_hint = ValueHint::FilePath)]
+    files: Vec<PathBuf>,
+
+    /// Measure on the files only, not on the made terrains of the paper's sizes and 4096 × 4096
+    #[arg(long, requires = "files")]
+    files_only: bool,
+
+    /// Heights of the files times this; 10 is the paper's scale for 10 m posts
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    steepness: f64,
+
+    /// Fewer ticks and rounds: a look, not figures to quote
+    #[arg(long)]
+    quick: bool,
+
+    /// Write all figures to this CSV file
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    csv: Option<PathBuf>,
+
+    /// Draw run time against error to this PNG file
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    png: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    match run(&Args::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            failure.report();
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> Result<(), Failure> {
+    if cfg!(debug_assertions) {
+        eprintln!("note: built without full optimisation; for figures: cargo build --release");
+    }
+    let effort = if args.quick {
+        Effort::QUICK
+    } else {
+        Effort::FULL
+    };
+    let files = read(args)?;
+    let mut rows = Vec::new();
+    for grid in files {
+        measure(&grid, effort, &mut rows);
+    }
+    if !args.files_only {
+        for make in made() {
+            measure(&make(), effort, &mut rows);
+        }
+    }
+    show(&solver::patches(effort), &mut rows);
+    show(&solver::roots(effort), &mut rows);
+    print!("{}", report::summary(&rows));
+    write(args, &rows)
+}
+
+/// Opens every file before anything is measured.
+fn read(args: &Args) -> Result<Vec<Grid>, Failure> {
+    let open = |file: &PathBuf| {
+        let raster = Raster::open(file, &OpenOptions::default()).map_err(|error| {
+            Failure::new(error).hint(format!("see: hapterra info {}", file.display()))
+        })?;
+        Ok(Grid::from_raster(file, &raster, args.steepness))
+    };
+    args.files.iter().map(open).collect()
+}
+
+/// The paper's three sizes, one of them ten times as steep (the paper's own
+/// scale: 10 m posts, 1 m units), and one larger.
+fn made() -> [fn() -> Grid; 5] {
+    [
+        || Grid::fractal("525 × 525", [525, 525], 1, 1.0),
+        || Grid::fractal("1250 × 1250", [1250, 1250], 2, 1.0),
+        || Grid::fractal("1231 × 1231", [1231, 1231], 3, 1.0),
+        || Grid::fractal("1250 × 1250, steep × 10", [1250, 1250], 2, 10.0),
+        || Grid::fractal("4096 × 4096", [4096, 4096], 4, 1.0),
+    ]
+}
+
+fn measure(grid: &Grid, effort: Effort, rows: &mut Vec<Row>) {
+    for remark in &grid.remarks {
+        println!("{}: {remark}", grid.name);
+    }
+    let waiting = ProgressBar::new_spinner();
+    waiting.enable_steady_tick(std::time::Duration::from_millis(500));
+    let measured = compare(grid, effort, |path| {
+        waiting.set_message(format!("{}: {path}", grid.name));
+    });
+    waiting.finish_and_clear();
+    show(&measured, rows);
+}
+
+fn show(measured: &[Row], rows: &mut Vec<Row>) {
+    print!("{}", report::table(measured));
+    rows.extend_from_slice(measured);
+}
+
+fn write(args: &Args, rows: &[Row]) -> Result<(), Failure> {
+    let hint = "check that the folder exists and that you may write there";
+    if let Some(file) = &args.csv {
+        report::write_csv(file, rows).map_err(|error| {
+            let text = format!("cannot write {}: {error}", file.display());
+            Failure::new(text).hint(hint)
+        })?;
+        println!("wrote {}", file.display());
+    }
+    if let Some(file) = &args.png {
+        report::draw(rows, file).map_err(|error| Failure::new(error).hint(hint))?;
+        println!("wrote {}", file.display());
+    }
+    Ok(())
+}

@@ -1,0 +1,239 @@
+//! The ways of the hand: seeded, and placed by the surface they are over.
+
+use crate::grid::Grid;
+use crate::haptics::Hand;
+
+/// A hand's way over one terrain.
+#[derive(Clone, Debug)]
+pub struct Path {
+    /// What it is called in tables.
+    pub name: &'static str,
+    /// One haptic interface point a tick; the first is above the surface.
+    pub hands: Vec<Hand>,
+}
+
+/// Cells kept free at the border of the field.
+const MARGIN: f64 = 4.0;
+
+/// All ways of the comparison over a terrain, `ticks` long; the long sweeps
+/// only where the terrain is large enough.
+#[must_use]
+pub fn all(grid: &Grid, ticks: usize) -> Vec<Path> {
+    let mut paths = vec![
+        slide(grid, "slide 0.01", 0.01, ticks),
+        slide(grid, "slide 0.5", 0.5, ticks),
+        tapping(grid, ticks),
+        random(grid, ticks),
+        resting(grid, ticks),
+        flight(grid, "fly low 0.5", Flight::Low, ticks),
+        flight(grid, "fly high 0.5", Flight::High, ticks),
+    ];
+    for (name, length) in [
+        ("sweep 50", 50.0),
+        ("sweep 500", 500.0),
+        ("sweep 5000", 5000.0),
+    ] {
+        paths.extend(sweeps(grid, name, length, ticks));
+    }
+    paths
+}
+
+/// Slides `depth` 0.1 cell below the surface, `step` cells a tick.
+#[must_use]
+pub fn slide(grid: &Grid, name: &'static str, step: f64, ticks: usize) -> Path {
+    let mut walk = Walk::new(grid, 11);
+    let mut hands = approach(grid, walk.at, -0.1);
+    hands.extend((0..ticks).map(|_| over(grid, walk.on(grid, step), -0.1)));
+    Path { name, hands }
+}
+
+/// Taps half a cell deep every hundred ticks, wandering slowly.
+#[must_use]
+pub fn tapping(grid: &Grid, ticks: usize) -> Path {
+    let mut walk = Walk::new(grid, 12);
+    let mut hands = vec![over(grid, walk.at, 0.5)];
+    hands.extend((0..ticks).map(|tick| {
+        let phase = tick as f64 * (std::f64::consts::TAU / 100.0);
+        over(grid, walk.on(grid, 0.02), 0.5 * phase.cos())
+    }));
+    let name = "tapping";
+    Path { name, hands }
+}
+
+/// Jumps up to 0.3 cell every way, mostly near the surface.
+#[must_use]
+pub fn random(grid: &Grid, ticks: usize) -> Path {
+    let mut walk = Walk::new(grid, 13);
+    let mut height = 0.5;
+    let mut hands = vec![over(grid, walk.at, height)];
+    hands.extend((0..ticks).map(|_| {
+        walk.heading = walk.dice.between(0.0, std::f64::consts::TAU);
+        let step = walk.dice.between(0.0, 0.3);
+        height += walk.dice.between(-0.3, 0.3);
+        // Back from 1 cell above or below.
+        height -= 2.0 * (height - height.clamp(-1.0, 1.0));
+        over(grid, walk.on(grid, step), height)
+    }));
+    let name = "random";
+    Path { name, hands }
+}
+
+/// Rests 0.1 cell below the surface and does not move by one bit.
+#[must_use]
+pub fn resting(grid: &Grid, ticks: usize) -> Path {
+    let walk = Walk::new(grid, 14);
+    let mut hands = approach(grid, walk.at, -0.1);
+    let last = hands[hands.len() - 1];
+    hands.extend(std::iter::repeat_n(last, ticks));
+    let name = "unmoved";
+    Path { name, hands }
+}
+
+/// How high a hand flies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flight {
+    /// One cell above the surface under it.
+    Low,
+    /// Above the whole terrain.
+    High,
+}
+
+/// Flies free, 0.5 cell a tick.
+#[must_use]
+pub fn flight(grid: &Grid, name: &'static str, flight: Flight, ticks: usize) -> Path {
+    let mut walk = Walk::new(grid, 15);
+    let high = f64::from(grid.top()) + 2.0;
+    let mut hands = Vec::with_capacity(ticks);
+    while hands.len() < ticks {
+        let at = walk.on(grid, 0.5);
+        hands.push(match flight {
+            Flight::Low => over(grid, at, 1.0),
+            Flight::High => Hand::at([at[0], at[1], high]),
+        });
+    }
+    Path { name, hands }
+}
+
+/// Sweeps of `length` cells in one tick each, there and back, half a cell
+/// above the highest point on their way: they hit nothing. `None` when the
+/// terrain is too small.
+#[must_use]
+pub fn sweeps(grid: &Grid, name: &'static str, length: f64, ticks: usize) -> Option<Path> {
+    const THERE_AND_BACK: usize = 4;
+    let (width, height) = (grid.columns as f64, grid.rows as f64);
+    if width.hypot(height) < length + 8.0 * MARGIN {
+        return None;
+    }
+    let ways = (2e5 / length) as usize;
+    let ways = ways.min(ticks / (2 * THERE_AND_BACK)).max(4);
+    let mut dice = Dice(16);
+    let sky = f64::from(grid.top()) + 2.0;
+    let mut hands = Vec::new();
+    for _ in 0..ways {
+        let (from, to) = loop {
+            let from = [
+                dice.between(MARGIN, width - MARGIN),
+                dice.between(MARGIN, height - MARGIN),
+            ];
+            let angle = dice.between(0.0, std::f64::consts::TAU);
+            let to = [
+                from[0] + length * angle.cos(),
+                from[1] + length * angle.sin(),
+            ];
+            if inside(grid, to) {
+                break (from, to);
+            }
+        };
+        let low = highest_between(grid, from, to) + 0.5;
+        hands.push(Hand::at([from[0], from[1], sky]));
+        for _ in 0..THERE_AND_BACK {
+            hands.push(Hand::at([from[0], from[1], low]));
+            hands.push(Hand::at([to[0], to[1], low]));
+        }
+        hands.push(Hand::at([to[0], to[1], sky]));
+    }
+    Some(Path { name, hands })
+}
+
+/// The highest sample beside a straight way: an upper bound of the surface.
+fn highest_between(grid: &Grid, from: [f64; 2], to: [f64; 2]) -> f64 {
+    let steps = (4.0 * (to[0] - from[0]).hypot(to[1] - from[1])).ceil();
+    let mut highest = f32::NEG_INFINITY;
+    for step in 0..=steps as usize {
+        let t = step as f64 / steps;
+        let at = [0, 1].map(|i| (from[i] + t * (to[i] - from[i])) as i32);
+        for (dx, dy) in [(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)] {
+            let cell = [at[0] + dx, at[1] + dy];
+            if grid.has(cell) {
+                highest = grid.corners(cell).iter().fold(highest, |a, b| a.max(*b));
+            }
+        }
+    }
+    f64::from(highest)
+}
+
+/// From half a cell above down to `height`.
+fn approach(grid: &Grid, at: [f64; 2], height: f64) -> Vec<Hand> {
+    (0..=10)
+        .map(|i| over(grid, at, 0.5 + f64::from(i) / 10.0 * (height - 0.5)))
+        .collect()
+}
+
+fn over(grid: &Grid, [x, y]: [f64; 2], height: f64) -> Hand {
+    Hand::at([x, y, grid.height(x, y) + height])
+}
+
+fn inside(grid: &Grid, [x, y]: [f64; 2]) -> bool {
+    let within = |at: f64, side: usize| (MARGIN..=side as f64 - MARGIN).contains(&at);
+    within(x, grid.columns) && within(y, grid.rows)
+}
+
+/// A walk that turns slowly and stays inside the field.
+struct Walk {
+    dice: Dice,
+    at: [f64; 2],
+    heading: f64,
+}
+
+impl Walk {
+    fn new(grid: &Grid, seed: u64) -> Self {
+        let mut dice = Dice(seed);
+        let part = |dice: &mut Dice, side: usize| side as f64 * dice.between(0.3, 0.7);
+        Self {
+            at: [part(&mut dice, grid.columns), part(&mut dice, grid.rows)],
+            heading: dice.between(0.0, std::f64::consts::TAU),
+            dice,
+        }
+    }
+
+    fn on(&mut self, grid: &Grid, step: f64) -> [f64; 2] {
+        self.heading += self.dice.between(-0.05, 0.05);
+        let next = [
+            self.at[0] + step * self.heading.cos(),
+            self.at[1] + step * self.heading.sin(),
+        ];
+        if inside(grid, next) {
+            self.at = next;
+        } else {
+            self.heading += std::f64::consts::FRAC_PI_2;
+        }
+        self.at
+    }
+}
+
+/// A small seeded generator, the same everywhere (xorshift64*).
+pub struct Dice(
+    /// Its state; any number but zero.
+    pub u64,
+);
+
+impl Dice {
+    /// In `[low, high)`.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        let bits = self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11;
+        low + (high - low) * (bits as f64 / (1_u64 << 53) as f64)
+    }
+}

@@ -1,0 +1,60 @@
+//! The CSV file: one row for each terrain, path and variant.
+
+use std::path::Path;
+
+use crate::compare::Row;
+
+/// The columns.
+pub const HEADER: [&str; 17] = [
+    "terrain",
+    "path",
+    "variant",
+    "family",
+    "ns_q1",
+    "ns_median",
+    "ns_q3",
+    "times_plain",
+    "error_mean_cells",
+    "error_p99_cells",
+    "error_max_cells",
+    "force_off_mean_deg",
+    "force_off_p99_deg",
+    "largest_jump_cells",
+    "missed_part",
+    "unsettled_part",
+    "extra_bytes_per_sample",
+];
+
+/// Writes all rows; errors are empty where nothing was felt.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_csv(path: &Path, rows: &[Row]) -> Result<(), csv::Error> {
+    let mut writer = csv::Writer::from_path(path)?;
+    writer.write_record(HEADER)?;
+    for row in rows {
+        let mut record = vec![
+            row.terrain.clone(),
+            row.path.to_owned(),
+            row.label.name.to_owned(),
+            format!("{:?}", row.label.family).to_lowercase(),
+        ];
+        record.extend(row.ns.iter().map(f64::to_string));
+        record.push(row.ratio.to_string());
+        record.extend(match &row.error {
+            None => std::array::repeat(String::new()),
+            Some(error) => [
+                error.mean,
+                error.p99,
+                error.max,
+                error.angle_mean,
+                error.angle_p99,
+            ]
+            .map(|x| x.to_string()),
+        });
+        let rest = [row.jump, row.missed, row.unsettled, row.label.extra_bytes];
+        record.extend(rest.map(|x| x.to_string()));
+        writer.write_record(&record)?;
+    }
+    Ok(writer.flush()?)
+}

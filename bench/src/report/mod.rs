@@ -1,0 +1,11 @@
+//! What was measured, as a table, a CSV file and a picture.
+
+mod file;
+mod picture;
+mod summary;
+mod table;
+
+pub use file::{HEADER, write_csv};
+pub use picture::draw;
+pub use summary::summary;
+pub use table::table;

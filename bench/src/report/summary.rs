@@ -1,0 +1,81 @@
+//! What the figures come to: ours over the opponents, and the paper's own.
+
+use std::fmt::Write as _;
+
+use crate::compare::{PLAIN, Row};
+
+/// The product's default.
+const OURS: &str = "hapterra swept";
+/// The paper's Table 1: average haptic updates a second, and for the closest
+/// point or the collision alone, on a 2.4 GHz Pentium 4.
+const TABLE_1: [(&str, f64); 2] = [("average update", 968e3), ("closest point alone", 200e3)];
+
+/// How many times faster than the opponents, terrain by terrain.
+#[must_use]
+pub fn summary(rows: &[Row]) -> String {
+    let mut text = String::from("\nhow many times faster than the opponent is hapterra swept?\n");
+    let questions = [
+        ("slide 0.01", PLAIN, "target 2.5"),
+        ("slide 0.01", "parry within", "target 5"),
+        ("slide 0.5", PLAIN, ""),
+        ("fly low 0.5", PLAIN, "target 2"),
+        ("fly high 0.5", PLAIN, "target 2"),
+        ("unmoved", "copy of the last answer", "target 1"),
+        ("sweep 50", "parry within", "target 10"),
+        ("sweep 500", "parry within", ""),
+        ("sweep 5000", "parry within", ""),
+    ];
+    for (path, opponent, target) in questions {
+        let faster: Vec<String> = terrains(rows)
+            .filter_map(|terrain| {
+                let ns = |name| median(rows, terrain, path, name);
+                Some(format!("{:.2}", ns(opponent)? / ns(OURS)?))
+            })
+            .collect();
+        if !faster.is_empty() {
+            // Writing to a String cannot fail.
+            let _ = writeln!(
+                text,
+                "  {path:<13} than {opponent:<24} {:<40} {target}",
+                faster.join("  ")
+            );
+        }
+    }
+    let worst = rows
+        .iter()
+        .filter(|row| row.label.name == OURS)
+        .filter_map(|row| row.error)
+        .fold(0.0, |worst: f64, error| worst.max(error.max));
+    let _ = writeln!(text, "  largest error of hapterra swept: {worst:.1e} cells");
+    for (what, rate) in TABLE_1 {
+        let slide: Vec<String> = terrains(rows)
+            .filter_map(|terrain| median(rows, terrain, "slide 0.01", OURS))
+            .map(|ns| format!("{:.0}", 1e9 / ns / rate))
+            .collect();
+        if !slide.is_empty() {
+            let _ = writeln!(
+                text,
+                "  over the paper's {what} ({:.0} kHz, on a machine of 2003, so mostly the machine): {} ×",
+                rate / 1e3,
+                slide.join("  ")
+            );
+        }
+    }
+    text
+}
+
+/// Terrains in the order measured.
+fn terrains(rows: &[Row]) -> impl Iterator<Item = &str> {
+    let mut seen: Vec<&str> = Vec::new();
+    for row in rows {
+        if !seen.contains(&row.terrain.as_str()) {
+            seen.push(&row.terrain);
+        }
+    }
+    seen.into_iter()
+}
+
+fn median(rows: &[Row], terrain: &str, path: &str, name: &str) -> Option<f64> {
+    let is = |row: &&Row| row.terrain == terrain && row.path == path && row.label.name == name;
+    rows.iter().find(is).map(|row| row.ns[1])
+}

@@ -1,0 +1,85 @@
+//! What a tick can be doing: one way of the hand for each state, in which the
+//! ticks of that state are marked.
+
+use crate::grid::Grid;
+use crate::haptics::Hand;
+use crate::path::{self, Flight, Path};
+
+/// Ticks of a state that are counted.
+pub const TICKS: usize = 2000;
+
+/// A state's name and its way of the hand.
+pub type Make = fn(&Grid) -> Vec<Step>;
+
+/// One tick: the hand, and whether the tick is one of the state's own.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// Where the hand is.
+    pub hand: Hand,
+    /// Whether it counts.
+    pub counts: bool,
+}
+
+/// All states, as the table lists them.
+pub const STATES: [(&str, Make); 8] = [
+    ("unmoved", |grid| last(path::resting(grid, TICKS))),
+    ("free high", |grid| {
+        last(path::flight(grid, "", Flight::High, TICKS + 1))
+    }),
+    ("free low", |grid| {
+        last(path::flight(grid, "", Flight::Low, TICKS + 1))
+    }),
+    ("first contact", first_contact),
+    ("sliding", |grid| last(path::slide(grid, "", 0.01, TICKS))),
+    ("sliding fast", |grid| {
+        last(path::slide(grid, "", 0.5, TICKS))
+    }),
+    ("resting", resting),
+    ("sweep 50, miss", |grid| {
+        last(path::sweeps(grid, "", 50.0, TICKS).expect("50 cells fit"))
+    }),
+];
+
+/// The terrain of the counts.
+#[must_use]
+pub fn terrain() -> Grid {
+    Grid::fractal("256 × 256", [256, 256], 6, 1.0)
+}
+
+/// The last [`TICKS`] of a path count.
+fn last(path: Path) -> Vec<Step> {
+    let uncounted = path.hands.len().saturating_sub(TICKS).max(1);
+    let step = |(tick, hand): (usize, &Hand)| Step {
+        hand: *hand,
+        counts: tick >= uncounted,
+    };
+    path.hands.iter().enumerate().map(step).collect()
+}
+
+/// Up and down through the surface; going down counts.
+fn first_contact(grid: &Grid) -> Vec<Step> {
+    let above = path::slide(grid, "", 0.03, TICKS).hands;
+    let step = |hand: &Hand| {
+        let [x, y, _] = hand.wide;
+        let at = |height| Hand::at([x, y, grid.height(x, y) + height]);
+        let (free, touching) = (at(0.2), at(-0.1));
+        [(free, false), (touching, true)].map(|(hand, counts)| Step { hand, counts })
+    };
+    above[above.len() - TICKS..].iter().flat_map(step).collect()
+}
+
+/// Pressed on one spot, the hand trembles by one encoder count of 0.03 mm, with
+/// cells of 1 mm.
+fn resting(grid: &Grid) -> Vec<Step> {
+    const COUNT: f64 = 0.03;
+    let mut steps = last(path::resting(grid, TICKS));
+    let mut dice = path::Dice(31);
+    for step in steps.iter_mut().filter(|step| step.counts) {
+        let tremble = step.hand.wide.map(|x| {
+            let counts = dice.between(-1.5, 1.5).round();
+            x + counts * COUNT
+        });
+        step.hand = Hand::at(tremble);
+    }
+    steps
+}

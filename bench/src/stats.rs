@@ -1,0 +1,57 @@
+//! Medians and shares, and the turns that variants take.
+
+/// Lets `count` variants take turns, beginning with another one each round.
+/// Answers what each measured, round by round.
+pub(crate) fn interleave(
+    count: usize,
+    rounds: usize,
+    mut measure: impl FnMut(usize) -> f64,
+) -> Vec<Vec<f64>> {
+    let mut measured = vec![Vec::with_capacity(rounds); count];
+    for round in 0..rounds {
+        for turn in 0..count {
+            let index = (turn + round) % count;
+            let value = measure(index);
+            measured[index].push(value);
+        }
+    }
+    measured
+}
+
+/// Which part of the answers is yes.
+pub(crate) fn part(of: impl Iterator<Item = bool>) -> f64 {
+    let (mut yes, mut all) = (0_u32, 0_u32);
+    for is in of {
+        yes += u32::from(is);
+        all += 1;
+    }
+    f64::from(yes) / f64::from(all.max(1))
+}
+
+/// Nearest-rank quantiles of at least one value.
+pub(crate) fn quantiles<const N: usize>(mut values: Vec<f64>, at: [f64; N]) -> [f64; N] {
+    values.sort_by(f64::total_cmp);
+    at.map(|q| values[(q * (values.len() - 1) as f64).round() as usize])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_values_that_occurred() {
+        let values = vec![5.0, 1.0, 3.0, 2.0, 4.0];
+        assert_eq!(quantiles(values, [0.0, 0.5, 1.0]), [1.0, 3.0, 5.0]);
+    }
+
+    #[test]
+    fn every_variant_is_first_in_turn() {
+        let mut order = Vec::new();
+        let measured = interleave(3, 3, |index| {
+            order.push(index);
+            index as f64
+        });
+        assert_eq!(order, [0, 1, 2, 1, 2, 0, 2, 0, 1]);
+        assert_eq!(measured, [vec![0.0; 3], vec![1.0; 3], vec![2.0; 3]]);
+    }
+}

@@ -1,0 +1,46 @@
+//! Runs one state of the tick, so that its instructions can be counted:
+//! `valgrind --tool=callgrind --toggle-collect='*counted_tick*' hapterra-tick sliding`
+//! divided by the ticks printed.
+
+#![forbid(unsafe_code)]
+
+use std::hint::black_box;
+use std::process::ExitCode;
+
+use hapterra_bench::haptics::{Answer, Hand, Haptics};
+use hapterra_bench::product::{self, Product};
+use hapterra_bench::state::{STATES, terrain};
+use hapterra_core::contact::Rule;
+
+/// Tiles along the window's side, as on a device.
+const SIDE: usize = 8;
+
+fn main() -> ExitCode {
+    let wanted = std::env::args().nth(1).unwrap_or_default();
+    let Some((_, make)) = STATES.iter().find(|(name, _)| *name == wanted) else {
+        let names = STATES.map(|(name, _)| format!("{name:?}")).join(", ");
+        eprintln!("error: no state is called {wanted:?}\nhint: name one of {names}");
+        return ExitCode::FAILURE;
+    };
+    let grid = terrain();
+    let mut buffers = product::buffers::<SIDE>();
+    let window = product::window::<SIDE>(&grid, &mut buffers);
+    let mut product = Product::new(&window, Rule::Swept);
+    let mut ticks = 0;
+    for step in make(&grid) {
+        if step.counts {
+            black_box(counted_tick(&mut product, &step.hand));
+            ticks += 1;
+        } else {
+            black_box(product.tick(&step.hand));
+        }
+    }
+    println!("{ticks}");
+    ExitCode::SUCCESS
+}
+
+/// The name by which the counter knows when to count.
+#[inline(never)]
+fn counted_tick(product: &mut Product<'_, '_, SIDE>, hand: &Hand) -> Answer {
+    product.tick(hand)
+}
