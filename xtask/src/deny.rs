@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use crate::run::{cargo, output, run, say};
 
 /// Installed where it is missing; about a minute and a half on two cores.
-const INSTALL: [&str; 4] = ["install", "cargo-deny@0.20", "--locked", "--quiet"];
+const INSTALL: [&str; 4] = ["install", "cargo-deny@^0.20", "--locked", "--quiet"];
 
 /// Holds the dependencies to deny.toml. Advisories are held too where their
 /// database can be reached.
