@@ -43,7 +43,7 @@ const TIE: f32 = 1.0 + 1e-6;
 const SHORT: f32 = 1.0 / 64.0;
 /// Places in a patch closer than this, in cells, count as the same: what is as
 /// near to an edge lies on it.
-const RESOLUTION: f32 = 6e-8;
+const RESOLUTION: f32 = 1.2e-7;
 /// Squared distance, in cells², below which F is nothing but rounding.
 const LEAST_F: f32 = 1e-10;
 
@@ -149,7 +149,7 @@ pub fn nearest_downhill(patch: &Patch, hand: (f32, f32), start: (f32, f32)) -> N
 fn snapped(x: f32) -> f32 {
     if x < RESOLUTION {
         0.0
-    } else if x > 1.0 - RESOLUTION {
+    } else if 1.0 - x < RESOLUTION {
         1.0
     } else {
         x
@@ -169,7 +169,7 @@ impl Nearest {
     /// did not, or is no longer the steeper one: the other search is then
     /// better conditioned.
     fn wants_turning(&self, patch: &Patch, turned: bool) -> bool {
-        let inside = |x: f32| x > RESOLUTION && x < 1.0 - RESOLUTION;
+        let inside = |x: f32| x >= RESOLUTION && 1.0 - x >= RESOLUTION;
         let (m, n) = (patch.slope_u(self.v).abs(), patch.slope_v(self.u).abs());
         let (eliminated, searched, along, across) = if turned {
             (self.v, self.u, n, m)

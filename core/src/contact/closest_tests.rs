@@ -85,6 +85,11 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
         let hand = (f64::from(hand.0), f64::from(hand.1));
         let truth = minimum64(&patch, hand, f64::from(found.v));
         let error = (f64::from(found.u) - truth.0).hypot(f64::from(found.v) - truth.1);
+        for x in [found.u, found.v] {
+            // Neither on the edge nor off it, no neighbour would be asked.
+            let on_edge = x == 0.0 || x == 1.0;
+            assert!(on_edge || (x > 1.1e-7 && 1.0 - x > 1.2e-7), "{found:?}");
+        }
         worst = worst.max(error);
         off += u32::from(error * conditioning(&patch, hand, truth.1) > 2e-6);
     }
