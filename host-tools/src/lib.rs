@@ -9,6 +9,7 @@
 //! - [`link`]: the terrain served to a device, tile by tile;
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
 //! - [`replay`]: a trajectory felt in lock-step, and recordings;
+//! - [`live`]: a hand in a session, and what it felt in numbers;
 //! - [`picture`]: what was felt, as PNG files;
 //! - [`cli`]: the `hapterra` command, one file a subcommand.
 
@@ -16,6 +17,7 @@
 
 pub mod cli;
 pub mod link;
+pub mod live;
 pub mod phantom;
 pub mod picture;
 pub mod raster;

@@ -17,6 +17,14 @@ pub struct Input {
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
 
+    /// What it does not say itself.
+    #[command(flatten)]
+    pub reading: Reading,
+}
+
+/// What the user says about a terrain file that it does not say itself.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Reading {
     /// The file is raw samples, north row first: WIDTHxHEIGHT
     #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Input")]
     pub raw_size: Option<(u32, u32)>,
@@ -63,7 +71,7 @@ impl Input {
     pub fn open(&self) -> Result<Raster, Failure> {
         let waiting = ProgressBar::new_spinner().with_message(format!("reading {}", self.name()));
         waiting.enable_steady_tick(Duration::from_millis(200));
-        let opened = Raster::open(&self.file, &self.options());
+        let opened = Raster::open(&self.file, &self.reading.options());
         waiting.finish_and_clear();
         let raster = opened.map_err(|error| {
             let hint = hint(&error);
@@ -81,7 +89,9 @@ impl Input {
             .to_string_lossy()
             .into_owned()
     }
+}
 
+impl Reading {
     fn options(&self) -> OpenOptions {
         OpenOptions {
             raw: self.raw_size.map(|(columns, rows)| RawLayout {

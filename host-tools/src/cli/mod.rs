@@ -1,6 +1,7 @@
 //! The `hapterra` command line: one file a subcommand, each with its `Args`
 //! and a `run`.
 
+pub mod demo;
 pub mod emulation;
 pub mod failure;
 pub mod feel;
@@ -8,6 +9,7 @@ pub mod info;
 pub mod input;
 mod interrupt;
 pub mod replay;
+mod report;
 pub mod synth;
 
 use std::process::ExitCode;
@@ -37,6 +39,8 @@ pub enum Command {
     Info(info::Args),
     /// Make a terrain file by formula
     Synth(synth::Args),
+    /// Show it all: a terrain, a board, a hand that tours it, and a picture
+    Demo(demo::Args),
     /// Feel a trajectory tick by tick and write what was felt
     Replay(replay::Args),
 }
@@ -49,6 +53,7 @@ pub fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Info(args) => info::run(&args),
         Command::Synth(args) => synth::run(&args),
+        Command::Demo(args) => demo::run(&args),
         Command::Replay(args) => replay::run(&args),
     };
     match outcome {

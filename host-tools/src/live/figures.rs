@@ -1,0 +1,85 @@
+//! What was felt, in numbers.
+
+use hapterra_core::contact::State;
+use hapterra_core::guard::Fault;
+use hapterra_core::wire::message::Sample;
+
+use crate::replay::Record;
+use crate::terrain::Terrain;
+
+/// Mean and largest of a series.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mean {
+    sum: f64,
+    count: u64,
+    max: f64,
+}
+
+impl Mean {
+    /// Takes a value, not negative.
+    pub fn take(&mut self, value: f64) {
+        self.sum += value;
+        self.count += 1;
+        self.max = self.max.max(value);
+    }
+
+    /// The mean; zero of nothing.
+    #[must_use]
+    pub fn mean(&self) -> f64 {
+        self.sum / self.count.max(1) as f64
+    }
+
+    /// The largest; zero of nothing.
+    #[must_use]
+    pub const fn max(&self) -> f64 {
+        self.max
+    }
+
+    /// How many there were.
+    #[must_use]
+    pub const fn count(&self) -> u64 {
+        self.count
+    }
+}
+
+/// Figures of a session.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Figures {
+    /// Samples taken.
+    pub samples: u64,
+    /// Ticks that began or ended too late, by the device's count.
+    pub late: u32,
+    /// Force in contact, N.
+    pub force_n: Mean,
+    /// Distance from hand to proxy in contact, mm.
+    pub penetration_mm: Mean,
+    /// Distance of the proxy's height from the bilinear surface in `f64`, mm.
+    pub height_error_mm: Mean,
+    /// Cost of a tick, in counts of the device's clock.
+    pub cost: Mean,
+    /// The latest fault.
+    pub fault: Option<Fault>,
+}
+
+impl Figures {
+    /// Takes a sample and the record made of it.
+    pub fn take(&mut self, sample: &Sample, record: &Record, terrain: &Terrain<'_>) {
+        self.samples += 1;
+        self.late = self.late.max(sample.late);
+        self.fault = sample.fault;
+        if sample.tick > 1 {
+            self.cost.take(f64::from(sample.cost)); // the tick's before this
+        }
+        if sample.state != State::Touching {
+            return;
+        }
+        let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        self.force_n.take(length(record.force_n));
+        let [x, y, z] = record.proxy_mm;
+        let depth = std::array::from_fn(|i| record.proxy_mm[i] - record.hip_mm[i]);
+        self.penetration_mm.take(length(depth));
+        if let Some(height) = terrain.height_mm(x, y) {
+            self.height_error_mm.take((z - height).abs());
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Time over several lives of a device.
+
+use hapterra_core::wire::message::Sample;
+
+/// Seconds from the samples' ticks, which begin anew when a device does.
+#[derive(Clone, Copy, Debug)]
+pub struct Timeline {
+    tick_hz: f64,
+    before: u64,
+    latest: u32,
+}
+
+impl Timeline {
+    /// For a device with `tick_hz` ticks a second.
+    #[must_use]
+    pub fn new(tick_hz: u32) -> Self {
+        Self {
+            tick_hz: f64::from(tick_hz.max(1)),
+            before: 0,
+            latest: 0,
+        }
+    }
+
+    /// Ticks since the beginning, over all restarts.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.before + u64::from(self.latest)
+    }
+
+    /// The time of a sample, s.
+    pub fn at(&mut self, sample: &Sample) -> f64 {
+        if sample.tick < self.latest {
+            self.before += u64::from(self.latest);
+        }
+        self.latest = sample.tick;
+        self.ticks() as f64 / self.tick_hz
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn goes_on_through_a_restart() {
+        let mut time = Timeline::new(1000);
+        let tick = |tick| Sample {
+            tick,
+            ..Sample::default()
+        };
+        let at: Vec<f64> = [1, 500, 1, 2].map(|t| time.at(&tick(t))).to_vec();
+        assert_eq!(at, [0.001, 0.5, 0.501, 0.502]);
+        assert_eq!(time.ticks(), 502);
+    }
+}
