@@ -78,11 +78,11 @@ impl Growing {
 
     fn widen_for(&mut self, value: f64) {
         let whole = value.fract() == 0.0;
-        if whole {
+        if whole && value.abs() < 1e30 {
             self.largest = self.largest.max(value.abs());
         }
-        let fits_i16 = whole && value as i16 as f64 == value;
-        let fits_i32 = whole && value as i32 as f64 == value;
+        let fits_i16 = whole && f64::from(value as i16) == value;
+        let fits_i32 = whole && f64::from(value as i32) == value;
         let fits_f32 = !whole || value.abs() <= EXACT_IN_F32 || value.abs() >= 1e30;
         let samples = std::mem::replace(&mut self.samples, Samples::I16(Vec::new()));
         self.samples = match samples {

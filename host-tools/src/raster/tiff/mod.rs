@@ -3,6 +3,7 @@
 
 mod budget;
 mod chunks;
+mod directory;
 mod field;
 mod georef;
 mod layout;
@@ -17,14 +18,12 @@ use super::{Decoded, Fault};
 use layout::Layout;
 use metadata::Metadata;
 
-/// Images to look through for the first full one.
-const IMAGES_LOOKED_AT: usize = 64;
-
 /// Reads the heights: of several bands the first, of several images the first
 /// that is neither an overview nor a mask.
 pub(super) fn decode(input: &Input) -> Result<Decoded, Fault> {
+    let directories = directory::sound(&mut input.reader()?, input.len())?;
     let mut decoder = Decoder::new(input.reader()?).map_err(fault)?;
-    skip_to_full_image(&mut decoder)?;
+    skip_to_full_image(&mut decoder, directories)?;
     let layout = Layout::read(&mut decoder)?;
     budget::check(&layout, input.len())?;
     let (samples, mask) = chunks::read(&mut decoder, &layout)?;
@@ -53,14 +52,15 @@ const MASK: u32 = 4;
 
 fn skip_to_full_image<R: std::io::Read + std::io::Seek>(
     decoder: &mut Decoder<R>,
+    directories: usize,
 ) -> Result<(), Fault> {
-    for _ in 0..IMAGES_LOOKED_AT {
+    for left in (0..directories).rev() {
         let kind = decoder
             .find_tag_unsigned::<u32>(Tag::SubfileType)
             .ok()
             .flatten()
             .unwrap_or(0);
-        if kind & (REDUCED | MASK) == 0 || !decoder.more_images() {
+        if kind & (REDUCED | MASK) == 0 || left == 0 || !decoder.more_images() {
             return Ok(());
         }
         decoder.next_image().map_err(fault)?;

@@ -1,0 +1,239 @@
+//! Whatever a file holds, opening it ends in an error or a terrain: never a panic,
+//! never a hang, never more memory than the file justifies.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use hapterra::raster::{Fault, OpenOptions, Raster};
+use hapterra_tests::{hapterra_binary, shared};
+
+/// Address space a child may use. The program itself takes some 100 MB of it.
+const MEMORY_KIB: u64 = 1 << 20;
+
+/// Far longer than any machine needs for these small files: only a hang reaches it.
+const HANG: Duration = Duration::from_secs(120);
+
+fn files_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).expect("a folder");
+    let mut files: Vec<PathBuf> = entries
+        .map(|entry| entry.expect("an entry").path())
+        .filter(|path| path.is_file())
+        .collect();
+    files.sort();
+    files
+}
+
+/// Runs `hapterra info FILE` in limited memory; `None` is a hang.
+fn info(path: &Path) -> Option<Output> {
+    let mut command = if cfg!(unix) {
+        let mut shell = Command::new("sh");
+        shell
+            .arg("-c")
+            .arg(format!("ulimit -v {MEMORY_KIB}; exec \"$0\" info \"$1\""))
+            .arg(hapterra_binary());
+        shell
+    } else {
+        let mut binary = Command::new(hapterra_binary());
+        binary.arg("info");
+        binary
+    };
+    let mut child = command
+        .arg(path)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary starts");
+    let started = Instant::now();
+    while child.try_wait().expect("a child to wait for").is_none() {
+        if started.elapsed() > HANG {
+            child.kill().expect("the child can be ended");
+            return None;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    Some(child.wait_with_output().expect("its output"))
+}
+
+/// An exit of 0 with a report, or of 1 with what is wrong and what to do.
+fn assert_ends_well(path: &Path) -> bool {
+    let output = info(path).unwrap_or_else(|| panic!("{} hangs", path.display()));
+    let told = String::from_utf8_lossy(&output.stderr);
+    let context = format!("{}: {:?}\n{told}", path.display(), output.status);
+    assert!(!told.contains("panicked"), "{context}");
+    match output.status.code() {
+        Some(0) => assert!(!output.stdout.is_empty(), "{context}"),
+        Some(1) => {
+            assert!(told.starts_with("error: "), "{context}");
+            assert!(told.contains("hint: "), "{context}");
+            let name = path.file_name().expect("a name").to_string_lossy();
+            assert!(told.contains(name.as_ref()), "which file? {context}");
+        }
+        _ => panic!("{context}"),
+    }
+    output.status.success()
+}
+
+#[test]
+fn every_malformed_file_ends_in_an_error_or_a_terrain() {
+    let Some(folder) = shared("terrain_bad") else {
+        return;
+    };
+    let mut opened = Vec::new();
+    for path in files_in(&folder) {
+        let name = path
+            .file_name()
+            .expect("a name")
+            .to_string_lossy()
+            .into_owned();
+        if assert_ends_well(&path) {
+            opened.push(name);
+        }
+    }
+    // Flipped bytes may leave a terrain; cut, wrong and hostile files must not.
+    for name in opened {
+        let may_open = name.starts_with("flip") || name.starts_with("made_ok");
+        assert!(may_open, "{name} opened as if nothing were wrong with it");
+    }
+}
+
+#[test]
+fn what_is_no_terrain_file_at_all_is_said_to_be_that() {
+    let folder = std::env::temp_dir().join(format!("hapterra-bad-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder for tries");
+    let tries: [(&str, &[u8], &str); 9] = [
+        ("empty.tif", b"", "empty"),
+        ("notes.txt", b"ncols of cabbage", "unknown file format"),
+        (
+            "photo.jpg",
+            b"\xff\xd8\xff\xe0 no terrain",
+            "unknown file format",
+        ),
+        ("named.tif", b"hello, world", "its name says TIFF"),
+        ("samples.raw", &[0; 32], "no size was stated"),
+        ("odd.hgt", &[0; 31], "no square"),
+        ("cut.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0", "truncated"),
+        (
+            "nothing.zip",
+            b"PK\x05\x06\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0",
+            "no terrain",
+        ),
+        ("cut.hgt.gz", b"\x1f\x8b\x08\0\0\0\0\0\0\x03", "truncated"),
+    ];
+    for (name, bytes, expected) in tries {
+        let path = folder.join(name);
+        std::fs::write(&path, bytes).expect("a file to try");
+        assert!(!assert_ends_well(&path), "{name} opened");
+        let error = Raster::open(&path, &OpenOptions::default()).expect_err(name);
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+    let missing = Raster::open(folder.join("missing.tif"), &OpenOptions::default());
+    assert!(matches!(
+        missing.expect_err("missing").fault(),
+        Fault::Unreadable(_)
+    ));
+    let itself = Raster::open(&folder, &OpenOptions::default());
+    assert!(matches!(
+        itself.expect_err("a folder").fault(),
+        Fault::Unreadable(_)
+    ));
+    std::fs::remove_dir_all(&folder).expect("the tries are removed");
+}
+
+/// The whole program's errors name the fault, the file and the next step.
+#[test]
+fn an_error_says_what_where_and_what_next() {
+    let output = Command::new(hapterra_binary())
+        .args(["info", "no-such-terrain.tif"])
+        .output()
+        .expect("the binary runs");
+    assert_eq!(output.status.code(), Some(1));
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(told.starts_with("error: cannot read the file: "), "{told}");
+    assert!(told.contains("(no-such-terrain.tif)\nhint: "), "{told}");
+
+    let usage = Command::new(hapterra_binary())
+        .arg("info")
+        .output()
+        .expect("the binary runs");
+    assert_eq!(usage.status.code(), Some(2));
+}
+
+/// A seeded generator (xorshift), so that every run damages files alike.
+struct Dice(u64);
+
+impl Dice {
+    fn roll(&mut self, below: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 % below.max(1) as u64) as usize
+    }
+}
+
+/// Damages a file in one of three ways; the header, where it matters most, is hit
+/// half of the time.
+fn damage(bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
+    let mut damaged = bytes.to_vec();
+    match dice.roll(4) {
+        0 => damaged.truncate(dice.roll(bytes.len())),
+        kind => {
+            let reach = [bytes.len(), 512.min(bytes.len())][dice.roll(2)];
+            for _ in 0..=dice.roll(8) {
+                let place = dice.roll(reach);
+                let bit = 1 << dice.roll(8);
+                damaged[place] = if kind == 1 {
+                    damaged[place] ^ bit
+                } else {
+                    dice.roll(256) as u8
+                };
+            }
+        }
+    }
+    damaged
+}
+
+/// Thousands of damaged copies of every kind of file, in this process: each ends in
+/// an error or a terrain, and what it ends in is not "the decoder failed" more than
+/// now and then.
+#[test]
+fn damaged_copies_of_good_files_never_panic() {
+    let Some(folder) = shared("dem") else {
+        return;
+    };
+    const LARGEST: u64 = 300_000;
+    const COPIES: usize = 60;
+    let tries = std::env::temp_dir().join(format!("hapterra-fuzz-{}", std::process::id()));
+    std::fs::create_dir_all(&tries).expect("a folder for tries");
+    let mut dice = Dice(0x5eed_7e44_a1d0_0001);
+    let (mut copies, mut opened, mut panicked) = (0, 0, 0);
+    for sub in ["variants", "tiff_ok", "real"] {
+        for path in files_in(&folder.join(sub)) {
+            let small = path.metadata().expect("its length").len() <= LARGEST;
+            let raw = path.extension().is_some_and(|e| e == "raw" || e == "csv");
+            if !small || raw {
+                continue;
+            }
+            let bytes = std::fs::read(&path).expect("readable");
+            let copy = tries.join(path.file_name().expect("a name"));
+            for _ in 0..COPIES {
+                std::fs::write(&copy, damage(&bytes, &mut dice)).expect("a copy to try");
+                copies += 1;
+                match Raster::open(&copy, &OpenOptions::default()) {
+                    Ok(_) => opened += 1,
+                    Err(error) => {
+                        panicked += usize::from(matches!(error.fault(), Fault::DecoderFailed(_)));
+                    }
+                }
+            }
+        }
+    }
+    std::fs::remove_dir_all(&tries).expect("the tries are removed");
+    println!("{copies} damaged copies: {opened} opened, {panicked} decoders failed");
+    assert!(copies > 1000, "only {copies} copies were tried");
+    assert!(
+        panicked * 50 < copies,
+        "{panicked} of {copies} decoders failed"
+    );
+}
