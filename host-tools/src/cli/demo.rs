@@ -12,7 +12,7 @@ use super::input::{Input, Reading};
 use super::report::{self, Report};
 use super::{Failure, interrupt};
 use crate::link::{
-    Event, HostClock, LinkError, Native, Patience, Session, Transport, serve_plant,
+    Emulator, Event, HostClock, LinkError, Native, Patience, Session, Transport, serve_plant,
 };
 use crate::live::{Figures, Stage, StageError, suggest};
 use crate::phantom::Rig;
@@ -76,33 +76,24 @@ pub enum Where {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (raster, name) = terrain_of(args)?;
     let law = args.feel.law()?;
-    let (scale, exaggeration) = scale_of(args, &raster)?;
-    let mut scale = scale;
-    let mut exaggeration = exaggeration;
-    let mut halvings = 0;
-    loop {
+    let mut scale = scale_of(args, &raster)?;
+    for _ in 0..HALVINGS {
         let terrain = args.feel.terrain(&raster, scale)?;
         match Stage::set(&terrain, law, args.feel.rule()) {
-            Ok(stage) => {
-                let how = report::how(&terrain, exaggeration);
-                return show(args, &stage, &name, &how);
-            }
+            Ok(stage) => return show(args, &stage, &name),
             // Heights that nobody asked for may as well be lower.
-            Err(StageError::OutOfReach(_))
-                if args.feel.height_mm_per_unit.is_none() && halvings < HALVINGS =>
-            {
-                halvings += 1;
-                exaggeration *= 0.5;
-                scale = Scale::new(scale.cell_mm(), 0.5 * scale.height_mm_per_unit())
-                    .map_err(Failure::new)?;
+            Err(StageError::OutOfReach(_)) if args.feel.height_mm_per_unit.is_none() => {
+                let lower = 0.5 * scale.height_mm_per_unit();
+                scale = Scale::new(scale.cell_mm(), lower).map_err(Failure::new)?;
             }
-            Err(error) => {
-                return Err(
-                    Failure::new(error).hint("choose a smaller --height-mm-per-unit or --cell-mm")
-                );
-            }
+            Err(error) => return Err(too_tall(error)),
         }
     }
+    Err(too_tall("the terrain is too tall for the arm"))
+}
+
+fn too_tall(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Failure {
+    Failure::new(error).hint("choose a smaller --height-mm-per-unit or --cell-mm")
 }
 
 fn terrain_of(args: &Args) -> Result<(Raster, String), Failure> {
@@ -118,22 +109,23 @@ fn terrain_of(args: &Args) -> Result<(Raster, String), Failure> {
     Ok((raster.map_err(Failure::new)?, "fractal".into()))
 }
 
-/// The scale and, where the demo chose it, how much it exaggerates.
-fn scale_of(args: &Args, raster: &Raster) -> Result<(Scale, f64), Failure> {
+/// The scale as stated, or one that suits the hand.
+fn scale_of(args: &Args, raster: &Raster) -> Result<Scale, Failure> {
     if args.feel.height_mm_per_unit.is_some() {
-        return Ok((args.feel.scale(raster)?, 1.0));
+        return args.feel.scale(raster);
     }
-    let suggestion = suggest(raster, args.feel.cell_mm)
-        .map_err(|error| Failure::new(error).hint("choose another --cell-mm"))?;
-    Ok((suggestion.scale, suggestion.exaggeration))
+    suggest(raster, args.feel.cell_mm)
+        .map(|suggestion| suggestion.scale)
+        .map_err(|error| Failure::new(error).hint("choose another --cell-mm"))
 }
 
 /// Runs the tour and shows what was felt.
-fn show(args: &Args, stage: &Stage<'_>, name: &str, how: &str) -> Result<(), Failure> {
+fn show(args: &Args, stage: &Stage<'_>, name: &str) -> Result<(), Failure> {
     std::fs::create_dir_all(&args.out).map_err(|error| {
         Failure::new(format!("cannot make {}: {error}", args.out.display()))
             .hint("name another folder with --out")
     })?;
+    let how = report::how(stage.terrain());
     println!("terrain        {name}: {how}");
     let rig = stage.rig().map_err(Failure::new)?;
     let stop = args.seconds.unwrap_or(f64::MAX).min(stage.duration_s());
@@ -152,7 +144,7 @@ fn show(args: &Args, stage: &Stage<'_>, name: &str, how: &str) -> Result<(), Fai
     report::draw(
         &picture,
         stage.terrain(),
-        (name, how),
+        (name, &how),
         &felt.records,
         &felt.report,
     )?;
@@ -195,9 +187,8 @@ fn emulated(args: &Args, stage: &Stage<'_>, mut rig: Rig, stop_s: f64) -> Result
         });
         let felt = feel(stage, Box::new(link), Patience::EMULATED, stop_s);
         done.store(true, std::sync::atomic::Ordering::Relaxed);
-        if felt.is_err() {
-            drop(emulator);
-            return felt.map_err(explain_link);
+        if let Err(error) = felt {
+            return Err(explain_emulated(error, emulator));
         }
         let status = emulator.finish().map_err(Failure::new)?;
         if !status.success() {
@@ -209,6 +200,15 @@ fn emulated(args: &Args, stage: &Stage<'_>, mut rig: Rig, stop_s: f64) -> Result
         felt.map_err(explain_link)
     })?;
     Ok(felt)
+}
+
+/// A link that broke because the board ended is the board's failure.
+fn explain_emulated(error: LinkError, emulator: Emulator) -> Failure {
+    match emulator.failure() {
+        Some(said) => Failure::new(format!("the emulated board failed: {said}"))
+            .hint("please report it with the file"),
+        None => explain_link(error),
+    }
 }
 
 /// Serves the terrain until the tour has come to its end.

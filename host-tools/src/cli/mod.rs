@@ -10,6 +10,7 @@ pub mod input;
 mod interrupt;
 pub mod replay;
 mod report;
+pub mod run;
 pub mod synth;
 
 use std::process::ExitCode;
@@ -39,6 +40,8 @@ pub enum Command {
     Info(info::Args),
     /// Make a terrain file by formula
     Synth(synth::Args),
+    /// Serve a terrain to a device and watch what is felt
+    Run(run::Args),
     /// Show it all: a terrain, a board, a hand that tours it, and a picture
     Demo(demo::Args),
     /// Feel a trajectory tick by tick and write what was felt
@@ -53,6 +56,7 @@ pub fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Info(args) => info::run(&args),
         Command::Synth(args) => synth::run(&args),
+        Command::Run(args) => run::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Replay(args) => replay::run(&args),
     };

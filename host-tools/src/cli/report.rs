@@ -127,30 +127,20 @@ impl Report {
 }
 
 /// How a terrain lies in the hand, in words.
-pub(super) fn how(terrain: &Terrain<'_>, exaggeration: f64) -> String {
-    let raster = terrain.raster();
-    let proportions = match (raster.cells_per_vertical_unit(), exaggeration) {
-        (Some(true_cells), _) => {
-            let scale = terrain.scale();
-            let factor = scale.height_cells(1.0) / true_cells;
-            match factor {
-                f if (f - 1.0).abs() < 1e-9 => "heights true to scale".to_owned(),
-                f => format!("heights × {:.3}", f)
-                    .trim_end_matches('0')
-                    .trim_end_matches('.')
-                    .to_owned(),
-            }
-        }
-        (None, _) => format!(
-            "{} mm a vertical unit",
-            terrain.scale().height_mm_per_unit()
-        ),
+pub(super) fn how(terrain: &Terrain<'_>) -> String {
+    let (raster, scale) = (terrain.raster(), terrain.scale());
+    let proportions = match raster.cells_per_vertical_unit() {
+        Some(true_cells) => match scale.height_cells(1.0) / true_cells {
+            times if (times - 1.0).abs() < 1e-9 => "heights true to scale".to_owned(),
+            times => format!("heights × {}", (times * 1e6).round() / 1e6),
+        },
+        None => format!("{} mm a vertical unit", scale.height_mm_per_unit()),
     };
     format!(
         "{} × {} samples, {} mm a cell, {proportions}",
         raster.columns(),
         raster.rows(),
-        terrain.scale().cell_mm()
+        scale.cell_mm()
     )
 }
 

@@ -122,6 +122,20 @@ impl Emulator {
         self.child.wait()
     }
 
+    /// What the board or QEMU said if it has ended by itself; ends it otherwise.
+    #[must_use]
+    pub fn failure(mut self) -> Option<String> {
+        // The link breaks a moment before the process has ended.
+        std::thread::sleep(Duration::from_millis(200));
+        let status = self.child.try_wait().ok().flatten()?;
+        let mut said = String::new();
+        if let Some(mut stderr) = self.child.stderr.take() {
+            // What cannot be read is not shown.
+            let _ = stderr.read_to_string(&mut said);
+        }
+        Some(format!("{status}; {}", said.trim()))
+    }
+
     fn accept(&mut self, line: &TcpListener, deadline: Instant) -> Result<Tcp, EmulatorError> {
         loop {
             match line.accept() {

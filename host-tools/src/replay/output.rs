@@ -87,7 +87,7 @@ impl Output {
         let path = self.path;
         let finished = self.writer.into_inner().map_err(|error| error.into_error());
         let placed = finished.and_then(|sink| match sink {
-            Sink::Beside(file) => Ok(drop(file.persist(&path).map_err(|error| error.error)?)),
+            Sink::Beside(file) => file.persist(&path).map(drop).map_err(|error| error.error),
             Sink::Straight(mut file) => file.flush(),
         });
         placed.map_err(|source| OutputError { path, source })

@@ -197,7 +197,7 @@ impl<R: Read + Seek> Trajectory<R> {
         let stream = self.reader.get_mut();
         let mut line = position.line();
         if stream.seek(SeekFrom::Start(position.byte())).is_ok() {
-            let bytes = stream.bytes().map_while(Result::ok);
+            let bytes = io::BufReader::new(stream).bytes().map_while(Result::ok);
             let ends = bytes.take_while(|b| matches!(b, b'\r' | b'\n'));
             line += ends.filter(|b| *b == b'\n').count() as u64;
         }

@@ -281,7 +281,7 @@ fn top(raster: &Raster, scale: &Scale) -> Result<i32, TerrainError> {
     let ends = [summary.lowest, summary.highest].map(|h| scale.height_cells(h));
     let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
     let cells = if -low > high { low } else { high };
-    if !(cells.abs() <= f64::from(MAX_CELL)) {
+    if cells.is_nan() || cells.abs() > f64::from(MAX_CELL) {
         return Err(TerrainError::TooTall {
             cells,
             scale: *scale,
