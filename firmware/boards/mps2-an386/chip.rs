@@ -94,6 +94,8 @@ unsafe impl InterruptNumber for Interrupt {
     }
 }
 
+// SAFETY: they are handlers that `#[interrupt]` and cortex-m-rt define under
+// these names, with this signature, for the vector table to name.
 unsafe extern "C" {
     safe fn LinkReceived();
     safe fn LinkSent();

@@ -12,7 +12,8 @@
 //!   telemetry is dropped and counted, nothing else.
 //! - A tile buffer is asked of the host only if there is one to put it in.
 //! - Frames that are damaged, unasked for, or of another scene change nothing.
-//! - A hello at any time begins a session anew and keeps the scene and every
+//! - A hello at any time (after a zero, which ends what an earlier host may
+//!   have left unfinished) begins a session anew and keeps the scene and every
 //!   tile that is held, so a host that comes back goes on where it was.
 
 mod focus;

@@ -153,6 +153,18 @@ fn joined_in_the_middle_of_a_frame() {
 }
 
 #[test]
+fn a_zero_before_hello_ends_what_the_last_host_left_unfinished() {
+    let mut rig = Rig::in_scene(scene(Source::Points));
+    rig.run(3);
+    rig.heard.clear();
+    rig.send(&point(0, 0.0, 2.0)[..4]);
+    rig.send(&[0]);
+    rig.send(&hello(PROTOCOL));
+    rig.run(1);
+    assert!(matches!(rig.heard[..], [ToHost::Hello(_)]));
+}
+
+#[test]
 fn a_storm_of_garbage_passes() {
     let mut rig = Rig::in_scene(scene(Source::Points));
     let mut noise = 1u32;
