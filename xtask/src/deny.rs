@@ -1,45 +1,64 @@
 //! Licences, bans, sources and advisories of the dependencies, by cargo-deny.
 
-use std::process::Stdio;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result};
 
-use crate::run::{cargo, output, run, say};
-
-/// Installed where it is missing; about a minute and a half on two cores.
-const INSTALL: [&str; 4] = ["install", "cargo-deny@^0.20", "--locked", "--quiet"];
+use crate::run::{cargo, on_path, root, run, say, target_dir};
 
 /// Holds the dependencies to deny.toml. Advisories are held too where their
 /// database can be reached.
 pub(crate) fn check() -> Result<()> {
-    if output(cargo().args(["deny", "--version"])).is_none() {
-        say("cargo-deny is not here; installing it with `cargo install` (once, a minute or two)");
-        run(cargo().args(INSTALL)).context("type: cargo install cargo-deny --locked")?;
-    }
-    run(cargo().args([
-        "deny",
-        "--log-level",
-        "error",
-        "check",
-        "bans",
-        "licenses",
-        "sources",
-    ]))?;
-    let mut fetch = cargo();
-    fetch
-        .args(["deny", "fetch", "db"])
-        .stderr(Stdio::null())
-        .stdout(Stdio::null());
-    if run(&mut fetch).is_err() {
+    let program = ready()?;
+    let deny = |words: &[&str]| {
+        let mut command = Command::new(&program);
+        command
+            .current_dir(root())
+            .args(["--log-level", "error"])
+            .args(words);
+        command
+    };
+    run(&mut deny(&["check", "bans", "licenses", "sources"]))?;
+    let mut fetch = deny(&["fetch", "db"]);
+    if run(fetch.stderr(Stdio::null()).stdout(Stdio::null())).is_err() {
         say("advisories skipped: their database cannot be reached from here");
         return Ok(());
     }
-    run(cargo().args([
-        "deny",
-        "--log-level",
-        "error",
-        "check",
-        "--disable-fetch",
-        "advisories",
-    ]))
+    run(&mut deny(&["check", "--disable-fetch", "advisories"]))
+}
+
+/// The user's cargo-deny, else one of this workspace's own.
+fn ready() -> Result<PathBuf> {
+    if let Some(found) = on_path("cargo-deny") {
+        return Ok(found);
+    }
+    let tools = target_dir().join("tools");
+    let program = format!("cargo-deny{}", std::env::consts::EXE_SUFFIX);
+    let own = tools.join("bin").join(program);
+    if own.is_file() {
+        return Ok(own);
+    }
+    say("cargo-deny is not here; building one under target/ (once, about a minute)");
+    let mut install = cargo();
+    install
+        .args([
+            "install",
+            "cargo-deny@^0.20",
+            "--locked",
+            "--quiet",
+            "--root",
+        ])
+        .arg(&tools);
+    // It runs for a second: compiling it fast counts for more than its speed.
+    for (setting, value) in [
+        ("OPT_LEVEL", "0"),
+        ("LTO", "off"),
+        ("CODEGEN_UNITS", "16"),
+        ("DEBUG", "0"),
+    ] {
+        install.env(format!("CARGO_PROFILE_RELEASE_{setting}"), value);
+    }
+    run(&mut install).context("type: cargo install cargo-deny --locked")?;
+    Ok(own)
 }
