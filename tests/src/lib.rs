@@ -3,7 +3,11 @@
 
 #![forbid(unsafe_code)]
 
+pub mod chance;
+pub mod emulation;
 pub mod field;
+pub mod oracle;
+pub mod walk;
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -33,7 +37,12 @@ pub fn shared(path: &str) -> Option<PathBuf> {
 pub fn hapterra_binary() -> &'static Path {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     BINARY.get_or_init(|| {
+        // This program is TARGET/PROFILE/deps/NAME: the binary goes beside it,
+        // where it was most likely built already.
+        let this = std::env::current_exe().expect("this program has a path");
+        let target = this.ancestors().nth(3).expect("it is in a target folder");
         let build = escargot::CargoBuild::new()
+            .target_dir(target)
             // From the root, so that features are those of the whole workspace
             // and nothing is built twice.
             .manifest_path(repository().join("Cargo.toml"))
