@@ -13,7 +13,7 @@ use super::{Decoded, Fault, OpenOptions, npy};
 pub(super) const DEFLATE_RATIO: u64 = 1040;
 
 /// No packed terrain is unpacked past this: unpacking is in memory.
-const LARGEST_UNPACKED: u64 = 4 << 30;
+const LARGEST_UNPACKED: u64 = 1 << 30;
 
 /// Extensions of what an archive may hold.
 const TERRAIN_EXTENSIONS: [&str; 10] = [
