@@ -3,6 +3,8 @@
 use std::vec::Vec;
 
 use super::dice::Dice;
+use super::sweep::Sweep;
+use super::work::Work;
 use super::*;
 use crate::terrain::testing::Field;
 

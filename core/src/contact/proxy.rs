@@ -1,0 +1,236 @@
+//! What the proxy remembers from tick to tick, and what both rules share.
+
+use super::descent::tile_of;
+use super::paper::{self, Verdict};
+use super::patch::Patch;
+use super::spot::{Hand, Spot};
+use super::sweep::Path;
+use super::work::Work;
+use super::{Felt, Pace, Rule, State, presence};
+use crate::grid::GridPoint;
+use crate::terrain::{Ground, Window};
+
+// The path is most of a contact's state, and there is no heap to put it on.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Debug)]
+pub(super) enum Phase {
+    Waiting,
+    Free,
+    Sweeping(Path),
+    Touching { spot: Spot, may_leave: bool },
+}
+
+/// The proxy and what it remembers from tick to tick.
+#[derive(Clone, Debug)]
+pub struct Contact {
+    pub(super) phase: Phase,
+    pub(super) hip: GridPoint,
+    revision: u32,
+    pub(super) presence: f32,
+    /// The proxy had to wait for terrain, so a force may not come at once.
+    pub(super) late: bool,
+    /// Squared distance at which the last unfinished descent of this same
+    /// hand stopped.
+    pub(super) reached: f32,
+    /// The same hand over the same tiles will give the same answer.
+    steady: bool,
+    pub(super) last: Felt,
+}
+
+impl Default for Contact {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Contact {
+    /// A contact that waits to see the hand above the surface.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            phase: Phase::Waiting,
+            hip: GridPoint::default(),
+            revision: 0,
+            presence: 1.0,
+            late: false,
+            reached: f32::INFINITY,
+            steady: false,
+            last: Felt::default(),
+        }
+    }
+
+    /// The patch the proxy is on, while touching.
+    #[must_use]
+    pub const fn patch(&self) -> Option<[i32; 2]> {
+        match self.phase {
+            Phase::Touching { spot, .. } => Some(spot.cell),
+            _ => None,
+        }
+    }
+
+    /// Moves the proxy for a hand at `hip`. Bounded work, finite output.
+    pub fn step<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        rule: Rule,
+        pace: Pace,
+    ) -> Felt {
+        let moved = hip != self.hip;
+        if !moved && self.steady && self.revision == window.revision() {
+            self.last.work = 0;
+            return self.last;
+        }
+        self.revision = window.revision();
+        let mut work = Work::new();
+        let felt = match rule {
+            Rule::Swept => self.swept(window, hip, moved, pace, &mut work),
+            Rule::Paper => self.paper(window, hip, pace, &mut work),
+        };
+        if felt.settled || pace == Pace::RealTime || rule == Rule::Swept {
+            self.hip = hip;
+        }
+        self.steady = felt.settled && self.presence == 1.0;
+        self.last = Felt {
+            work: work.spent(),
+            ..felt
+        };
+        self.last
+    }
+
+    /// Waiting ends when the hand is above the patch it is over, or above
+    /// everything.
+    pub(super) fn sees_above<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+    ) -> bool {
+        let hand = Hand::new(hip);
+        let above = match hand.ground(window, hip.column()) {
+            Ground::Patch(corners) => Patch::new(corners).height(hip.frac().x, hip.frac().y) < 0.0,
+            Ground::Hole => hand.altitude().cell() >= window.top(),
+            Ground::Missing => false,
+        };
+        if above {
+            self.phase = Phase::Free;
+            self.hip = hip;
+        }
+        above
+    }
+
+    pub(super) fn waits<const D: usize>(&self, window: &Window<'_, D>, hip: GridPoint) -> Felt {
+        let ground = Hand::new(hip).ground(window, hip.column());
+        let missing = matches!(ground, Ground::Missing);
+        Felt {
+            state: State::Waiting,
+            proxy: hip,
+            settled: !missing,
+            held_up_by: missing.then(|| tile_of(hip.column())),
+            ..Felt::default()
+        }
+    }
+
+    pub(super) fn flies(&mut self, hip: GridPoint) -> Felt {
+        self.phase = Phase::Free;
+        self.late = false;
+        Felt {
+            state: State::Free,
+            proxy: hip,
+            settled: true,
+            ..Felt::default()
+        }
+    }
+
+    /// The answer in contact, faded where the surface ends.
+    pub(super) fn touches<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        (spot, patch): (Spot, Patch),
+        settled: bool,
+        held_up_by: Option<[i32; 2]>,
+        pace: Pace,
+    ) -> Felt {
+        let (mut settled, mut held_up_by) = (settled, held_up_by);
+        if settled || pace == Pace::RealTime {
+            let target = self.presence_target(window, hip, &spot);
+            if let (Pace::LockStep, Some(tile)) = (pace, target.missing) {
+                (settled, held_up_by) = (false, Some(tile));
+            } else {
+                self.presence = presence::approach(self.presence, target.presence);
+                if self.presence == 0.0 && target.presence == 0.0 {
+                    self.let_go();
+                    return self.waits(window, hip);
+                }
+            }
+        }
+        let hand = Hand::new(hip);
+        let stretch = hand.stretch(&spot, &patch);
+        Felt {
+            state: State::Touching,
+            proxy: hand.point_at(&spot, stretch.z),
+            stretch: stretch * self.presence,
+            settled,
+            held_up_by,
+            work: 0,
+        }
+    }
+
+    /// Nearly always the hand is over the patch that the proxy is on.
+    fn presence_target<const D: usize>(
+        &self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        spot: &Spot,
+    ) -> presence::Target {
+        if spot.cell == hip.column() {
+            return presence::Target {
+                presence: 1.0,
+                missing: None,
+            };
+        }
+        presence::target(window, &hip)
+    }
+
+    pub(super) fn let_go(&mut self) {
+        self.phase = Phase::Waiting;
+        self.presence = 1.0;
+    }
+
+    fn paper<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        pace: Pace,
+        work: &mut Work,
+    ) -> Felt {
+        let last = match self.phase {
+            Phase::Touching { spot, .. } => Some(spot),
+            _ => None,
+        };
+        if matches!(self.phase, Phase::Waiting) && !self.sees_above(window, hip) {
+            return self.waits(window, hip);
+        }
+        match paper::update(window, last, &self.hip, &hip, work) {
+            Verdict::Free => self.flies(hip),
+            Verdict::Contact(spot, patch) => {
+                if last.is_none() {
+                    self.presence = if self.late { 0.0 } else { 1.0 };
+                }
+                self.phase = Phase::Touching {
+                    spot,
+                    may_leave: true,
+                };
+                self.touches(window, hip, (spot, patch), true, None, pace)
+            }
+            Verdict::HeldUp(tile) => {
+                self.late |= pace == Pace::RealTime;
+                Felt {
+                    settled: false,
+                    held_up_by: Some(tile),
+                    ..self.last
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! The swept rule: continuous in the air, downhill on the surface.
+
+use super::descent::{Descent, descend};
+use super::patch::Patch;
+use super::proxy::{Contact, Phase};
+use super::spot::{Hand, Spot};
+use super::sweep::{Path, Sweep};
+use super::work::Work;
+use super::{Felt, Pace, State};
+use crate::grid::GridPoint;
+use crate::terrain::{Altitude, Box2, Ground, Window};
+
+impl Contact {
+    /// One tick by the swept rule.
+    pub(super) fn swept<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        moved: bool,
+        pace: Pace,
+        work: &mut Work,
+    ) -> Felt {
+        if moved {
+            self.reached = f32::INFINITY;
+            self.redirect(hip);
+        }
+        if matches!(self.phase, Phase::Waiting) && !self.sees_above(window, hip) {
+            return self.waits(window, hip);
+        }
+        // Each turn either ends the tick or spends work, or goes from the air
+        // to the surface at a point strictly nearer to the hand.
+        loop {
+            let ended = match &mut self.phase {
+                Phase::Waiting | Phase::Free => self.fly(window, hip),
+                Phase::Sweeping(_) => self.sweep(window, hip, pace, work),
+                Phase::Touching { .. } => self.touch(window, hip, pace, work),
+            };
+            if let Some(felt) = ended {
+                return felt;
+            }
+        }
+    }
+
+    /// The hand has moved: a way under way now leads to its new place.
+    fn redirect(&mut self, hip: GridPoint) {
+        match &mut self.phase {
+            Phase::Sweeping(path) => *path = Path::through_air(path.at(), hip),
+            Phase::Touching { may_leave, .. } => *may_leave = true,
+            Phase::Waiting | Phase::Free => {}
+        }
+    }
+
+    /// In free space the proxy is the hand; one look tells whether it still is.
+    fn fly<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Option<Felt> {
+        let from = self.hip;
+        let low = if from.is_below(&hip) { &from } else { &hip };
+        let span = Box2::around(from.column(), hip.column());
+        if window.is_clear(span, Altitude::new(low.cell()[2], low.frac().z)) {
+            return Some(self.flies(hip));
+        }
+        self.phase = Phase::Sweeping(Path::through_air(from, hip));
+        None
+    }
+
+    fn sweep<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        pace: Pace,
+        work: &mut Work,
+    ) -> Option<Felt> {
+        let Phase::Sweeping(path) = &mut self.phase else {
+            return None;
+        };
+        let held_up_by = match path.advance(window, work) {
+            Sweep::Clear => return Some(self.flies(hip)),
+            Sweep::Under => {
+                self.let_go();
+                return Some(self.waits(window, hip));
+            }
+            Sweep::Hit { spot, progress } => {
+                self.presence = if self.late { 0.0 } else { 1.0 };
+                self.phase = Phase::Touching {
+                    spot,
+                    may_leave: progress,
+                };
+                return None;
+            }
+            Sweep::HeldUp(tile) => Some(tile),
+            Sweep::Unfinished => None,
+        };
+        self.late |= pace == Pace::RealTime;
+        Some(Felt {
+            state: State::Free,
+            proxy: path.at(),
+            held_up_by,
+            ..Felt::default()
+        })
+    }
+
+    fn touch<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        pace: Pace,
+        work: &mut Work,
+    ) -> Option<Felt> {
+        let Phase::Touching { spot, may_leave } = self.phase else {
+            return None;
+        };
+        let hand = Hand::new(hip);
+        let mut resume = None;
+        let mut held_up_by = None;
+        let mut settled = true;
+        let (spot, patch) = match descend(window, &hand, spot, may_leave, work) {
+            Descent::Rests(spot, patch) => (spot, patch),
+            Descent::Leaves(spot) => {
+                let from = self.point_on(window, &hand, &spot);
+                self.phase = Phase::Sweeping(Path::off_surface(from, hip));
+                return None;
+            }
+            Descent::Lost(tile) => {
+                self.let_go();
+                let felt = self.waits(window, hip);
+                return Some(Felt {
+                    held_up_by: felt.held_up_by.or(tile),
+                    ..felt
+                });
+            }
+            Descent::HeldUp {
+                at,
+                patch,
+                entry,
+                tile,
+            } => {
+                (resume, held_up_by, settled) = (Some(entry), Some(tile), false);
+                (at, patch)
+            }
+            Descent::Unfinished(spot, patch, f) => {
+                // No nearer than after the tick before: rounding, not a way.
+                settled = f >= self.reached * (1.0 - 1e-6);
+                self.reached = f;
+                (spot, patch)
+            }
+        };
+        self.phase = Phase::Touching {
+            spot: resume.unwrap_or(spot),
+            may_leave,
+        };
+        Some(self.touches(window, hip, (spot, patch), settled, held_up_by, pace))
+    }
+
+    fn point_on<const D: usize>(
+        &self,
+        window: &Window<'_, D>,
+        hand: &Hand,
+        spot: &Spot,
+    ) -> GridPoint {
+        match hand.ground(window, spot.cell) {
+            Ground::Patch(corners) => {
+                hand.point_at(spot, Patch::new(corners).height(spot.u, spot.v))
+            }
+            // `descend` has just stood on it.
+            Ground::Hole | Ground::Missing => self.last.proxy,
+        }
+    }
+}
