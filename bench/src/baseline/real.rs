@@ -67,6 +67,8 @@ macro_rules! real {
             fn whole(self) -> i32 {
                 self as i32
             }
+            // Exact for f64 only: the cast is what both can do.
+            #[allow(clippy::cast_lossless)]
             #[inline]
             fn from_whole(whole: i32) -> Self {
                 whole as Self
