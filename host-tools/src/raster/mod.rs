@@ -17,6 +17,7 @@
 
 mod archive;
 mod asc;
+mod decoded;
 mod error;
 mod geometry;
 mod guard;
@@ -34,12 +35,14 @@ mod usgs_dem;
 
 use std::path::Path;
 
+pub use decoded::Summary;
 pub use error::{Error, Fault};
 pub use geometry::{CellSize, CellUnit, Certainty};
 pub use options::{Endian, OpenOptions, PngChannel, RawLayout, RawSample};
 pub use samples::Samples;
 
-use samples::{HoleMask, Widen, with_samples};
+use decoded::Decoded;
+use samples::{Widen, with_samples};
 
 /// No height is larger than this (in the file's vertical unit), whatever the
 /// planet: such a sample is a no-data value that the file forgot to declare.
@@ -53,70 +56,6 @@ pub const LARGEST_HEIGHT: f64 = 1e30;
 pub struct Raster {
     source: Decoded,
     summary: Summary,
-}
-
-/// What a decoder hands over: samples in file order and all that the file says
-/// about them.
-#[derive(Clone, Debug)]
-struct Decoded {
-    /// Name of the format and variant, as `GeoTIFF, int16, deflate`.
-    format: String,
-    /// Samples a row.
-    columns: u32,
-    /// Rows.
-    rows: u32,
-    /// `columns × rows` samples, the file's first row first.
-    samples: Samples,
-    /// Whether the file's first row is the southernmost.
-    south_up: bool,
-    /// Whether the file's first column is the easternmost.
-    east_first: bool,
-    /// Stored value that means no data.
-    no_data: Option<f64>,
-    /// Holes that no value marks.
-    mask: Option<HoleMask>,
-    /// Height = stored × scale + offset.
-    scale: f64,
-    /// See `scale`.
-    offset: f64,
-    /// Size of a cell, where the file knows it.
-    cell: Option<CellSize>,
-    /// Metres per vertical unit, where the file says so.
-    metres_per_vertical_unit: Option<f64>,
-    /// What the user should know.
-    remarks: Vec<String>,
-}
-
-impl Decoded {
-    /// Plain heights, north row first, with nothing else known.
-    fn new(format: impl Into<String>, columns: u32, rows: u32, samples: Samples) -> Self {
-        Self {
-            format: format.into(),
-            columns,
-            rows,
-            samples,
-            south_up: false,
-            east_first: false,
-            no_data: None,
-            mask: None,
-            scale: 1.0,
-            offset: 0.0,
-            cell: None,
-            metres_per_vertical_unit: None,
-            remarks: Vec::new(),
-        }
-    }
-}
-
-/// Range of the heights and number of holes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Summary {
-    /// Lowest height in the file's vertical unit.
-    pub lowest: f64,
-    /// Highest height in the file's vertical unit.
-    pub highest: f64,
-    /// Samples without a height.
-    pub holes: u64,
 }
 
 impl Raster {
@@ -160,29 +99,8 @@ impl Raster {
         Self::checked(decoded, None)
     }
 
-    /// Checks what every format must satisfy, and summarises the heights.
     fn checked(mut source: Decoded, no_data: Option<f64>) -> Result<Self, Fault> {
-        let (columns, rows) = (u64::from(source.columns), u64::from(source.rows));
-        if columns < 2 || rows < 2 {
-            return Err(Fault::TooSmall { columns, rows });
-        }
-        if columns.checked_mul(rows) != u64::try_from(source.samples.len()).ok() {
-            return Err(Fault::damaged(format!(
-                "{} samples where {columns} × {rows} were promised",
-                source.samples.len()
-            )));
-        }
-        if !(source.scale.is_finite() && source.offset.is_finite()) || source.scale == 0.0 {
-            return Err(Fault::damaged(format!(
-                "heights are stored with scale {} and offset {}",
-                source.scale, source.offset
-            )));
-        }
-        source.no_data = no_data
-            .or(source.no_data)
-            .and_then(|value| source.samples.comparable_no_data(value));
-        source.cell = source.cell.filter(CellSize::is_valid);
-        let summary = summarise(&source)?;
+        let summary = source.check(no_data)?;
         Ok(Self { source, summary })
     }
 
@@ -288,54 +206,4 @@ impl Raster {
     pub fn remarks(&self) -> &[String] {
         &self.source.remarks
     }
-}
-
-impl Decoded {
-    /// Height of a stored value; NaN in a hole.
-    fn height_of(&self, stored: f64, index: usize) -> f64 {
-        let hole = self.no_data == Some(stored)
-            || self.mask.as_ref().is_some_and(|mask| mask.is_hole(index));
-        if hole {
-            f64::NAN
-        } else {
-            stored * self.scale + self.offset
-        }
-    }
-}
-
-/// One pass over all samples: range, holes, and the first that is no height.
-fn summarise(source: &Decoded) -> Result<Summary, Fault> {
-    let mut summary = Summary {
-        lowest: f64::INFINITY,
-        highest: f64::NEG_INFINITY,
-        holes: 0,
-    };
-    let mut absurd = None;
-    with_samples!(&source.samples, values => {
-        for (index, value) in values.iter().enumerate() {
-            let height = source.height_of(value.widen(), index);
-            if height.is_nan() {
-                summary.holes += 1;
-            } else if height.abs() > LARGEST_HEIGHT {
-                absurd = absurd.or(Some((index, value.widen())));
-            } else {
-                summary.lowest = summary.lowest.min(height);
-                summary.highest = summary.highest.max(height);
-            }
-        }
-    });
-    if let Some((index, value)) = absurd {
-        let columns = source.columns as usize;
-        return Err(Fault::NotANumber {
-            column: (index % columns) as u64,
-            row: (index / columns) as u64,
-            value,
-        });
-    }
-    if summary.lowest > summary.highest {
-        return Err(Fault::AllNoData {
-            samples: summary.holes,
-        });
-    }
-    Ok(summary)
 }

@@ -4,6 +4,9 @@ mod header;
 mod tokens;
 mod values;
 
+#[cfg(test)]
+mod tests;
+
 use super::input::Input;
 use super::{CellSize, Decoded, Fault};
 use header::Header;

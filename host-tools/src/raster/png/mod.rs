@@ -231,3 +231,6 @@ fn fault(error: DecodingError) -> Fault {
         DecodingError::Parameter(error) => Fault::Damaged(format!("PNG: {error}")),
     }
 }
+
+#[cfg(test)]
+mod tests;

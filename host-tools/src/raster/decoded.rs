@@ -1,0 +1,149 @@
+//! What a decoder hands over, and what every format's result must satisfy.
+
+use super::samples::{HoleMask, Widen, with_samples};
+use super::{CellSize, Fault, LARGEST_HEIGHT, Samples};
+
+/// What a decoder hands over: samples in file order and all that the file says
+/// about them.
+#[derive(Clone, Debug)]
+pub(super) struct Decoded {
+    /// Name of the format and variant, as `GeoTIFF, int16, deflate`.
+    pub(super) format: String,
+    /// Samples a row.
+    pub(super) columns: u32,
+    /// Rows.
+    pub(super) rows: u32,
+    /// `columns × rows` samples, the file's first row first.
+    pub(super) samples: Samples,
+    /// Whether the file's first row is the southernmost.
+    pub(super) south_up: bool,
+    /// Whether the file's first column is the easternmost.
+    pub(super) east_first: bool,
+    /// Stored value that means no data.
+    pub(super) no_data: Option<f64>,
+    /// Holes that no value marks.
+    pub(super) mask: Option<HoleMask>,
+    /// Height = stored × scale + offset.
+    pub(super) scale: f64,
+    /// See `scale`.
+    pub(super) offset: f64,
+    /// Size of a cell, where the file knows it.
+    pub(super) cell: Option<CellSize>,
+    /// Metres per vertical unit, where the file says so.
+    pub(super) metres_per_vertical_unit: Option<f64>,
+    /// What the user should know.
+    pub(super) remarks: Vec<String>,
+}
+
+impl Decoded {
+    /// Plain heights, north row first, with nothing else known.
+    pub(super) fn new(
+        format: impl Into<String>,
+        columns: u32,
+        rows: u32,
+        samples: Samples,
+    ) -> Self {
+        Self {
+            format: format.into(),
+            columns,
+            rows,
+            samples,
+            south_up: false,
+            east_first: false,
+            no_data: None,
+            mask: None,
+            scale: 1.0,
+            offset: 0.0,
+            cell: None,
+            metres_per_vertical_unit: None,
+            remarks: Vec::new(),
+        }
+    }
+}
+
+/// Range of the heights and number of holes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Summary {
+    /// Lowest height in the file's vertical unit.
+    pub lowest: f64,
+    /// Highest height in the file's vertical unit.
+    pub highest: f64,
+    /// Samples without a height.
+    pub holes: u64,
+}
+
+impl Decoded {
+    /// Checks what every format must satisfy, and summarises the heights. `no_data`
+    /// replaces what the file says.
+    pub(super) fn check(&mut self, no_data: Option<f64>) -> Result<Summary, Fault> {
+        let (columns, rows) = (u64::from(self.columns), u64::from(self.rows));
+        if columns < 2 || rows < 2 {
+            return Err(Fault::TooSmall { columns, rows });
+        }
+        if columns.checked_mul(rows) != u64::try_from(self.samples.len()).ok() {
+            return Err(Fault::damaged(format!(
+                "{} samples where {columns} × {rows} were promised",
+                self.samples.len()
+            )));
+        }
+        if !(self.scale.is_finite() && self.offset.is_finite()) || self.scale == 0.0 {
+            return Err(Fault::damaged(format!(
+                "heights are stored with scale {} and offset {}",
+                self.scale, self.offset
+            )));
+        }
+        self.no_data = no_data
+            .or(self.no_data)
+            .and_then(|value| self.samples.comparable_no_data(value));
+        self.cell = self.cell.filter(CellSize::is_valid);
+        summarise(self)
+    }
+
+    /// Height of a stored value; NaN in a hole.
+    pub(super) fn height_of(&self, stored: f64, index: usize) -> f64 {
+        let hole = self.no_data == Some(stored)
+            || self.mask.as_ref().is_some_and(|mask| mask.is_hole(index));
+        if hole {
+            f64::NAN
+        } else {
+            stored * self.scale + self.offset
+        }
+    }
+}
+
+/// One pass over all samples: range, holes, and the first that is no height.
+fn summarise(source: &Decoded) -> Result<Summary, Fault> {
+    let mut summary = Summary {
+        lowest: f64::INFINITY,
+        highest: f64::NEG_INFINITY,
+        holes: 0,
+    };
+    let mut absurd = None;
+    with_samples!(&source.samples, values => {
+        for (index, value) in values.iter().enumerate() {
+            let height = source.height_of(value.widen(), index);
+            if height.is_nan() {
+                summary.holes += 1;
+            } else if height.abs() > LARGEST_HEIGHT {
+                absurd = absurd.or(Some((index, value.widen())));
+            } else {
+                summary.lowest = summary.lowest.min(height);
+                summary.highest = summary.highest.max(height);
+            }
+        }
+    });
+    if let Some((index, value)) = absurd {
+        let columns = source.columns as usize;
+        return Err(Fault::NotANumber {
+            column: (index % columns) as u64,
+            row: (index / columns) as u64,
+            value,
+        });
+    }
+    if summary.lowest > summary.highest {
+        return Err(Fault::AllNoData {
+            samples: summary.holes,
+        });
+    }
+    Ok(summary)
+}
