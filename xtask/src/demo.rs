@@ -28,9 +28,10 @@ struct Emulation {
 
 /// Builds what is needed and runs `hapterra demo`; gives its exit code.
 pub(crate) fn demo(request: &Request) -> Result<i32> {
-    let emulation = match request.has("--device") {
-        true => None,
-        false => emulation_or_say_why(),
+    let emulation = match request.device().as_deref() {
+        None => emulation_or_say_why(),
+        Some("emulated") => Some(emulation()?),
+        Some(_) => None,
     };
     timed("building the hapterra command", || {
         run(cargo().args([
@@ -53,16 +54,17 @@ pub(crate) fn demo(request: &Request) -> Result<i32> {
     Ok(status.code().unwrap_or(1))
 }
 
+fn emulation() -> Result<Emulation> {
+    let toolchain = toolchain::ready()?;
+    let qemu = qemu::ready()?;
+    let image = timed("building the emulated board's image", || {
+        image::build(toolchain, EMULATED)
+    })?;
+    Ok(Emulation { image, qemu })
+}
+
 fn emulation_or_say_why() -> Option<Emulation> {
-    let ready = || -> Result<Emulation> {
-        let toolchain = toolchain::ready()?;
-        let qemu = qemu::ready()?;
-        let image = timed("building the emulated board's image", || {
-            image::build(toolchain, EMULATED)
-        })?;
-        Ok(Emulation { image, qemu })
-    };
-    ready()
+    emulation()
         .inspect_err(|why| {
             say(format!("the emulated board cannot be had: {why:#}"));
             say("so the same application runs compiled for this machine (--device native)");
@@ -71,10 +73,26 @@ fn emulation_or_say_why() -> Option<Emulation> {
 }
 
 impl Request {
-    /// Whether the words for `hapterra demo` hold `option`.
-    fn has(&self, option: &str) -> bool {
-        let mut words = self.extra.iter().map(|word| word.to_string_lossy());
-        words.any(|word| word == option || word.starts_with(&format!("{option}=")))
+    /// The value of `option` among the words for `hapterra demo`.
+    fn value(&self, option: &str) -> Option<String> {
+        let words: Vec<_> = self
+            .extra
+            .iter()
+            .map(|word| word.to_string_lossy())
+            .collect();
+        words.iter().enumerate().find_map(|(i, word)| {
+            let rest = word.strip_prefix(option)?;
+            match rest.strip_prefix('=') {
+                Some(value) => Some(value.to_string()),
+                None if rest.is_empty() => words.get(i + 1).map(ToString::to_string),
+                None => None,
+            }
+        })
+    }
+
+    /// Where the user wants the loop to run, if that was said.
+    fn device(&self) -> Option<String> {
+        self.value("--device")
     }
 
     /// The arguments of the `hapterra` command.
@@ -86,12 +104,12 @@ impl Request {
                 let pairs = ["--image".into(), image.into(), "--qemu".into(), qemu.into()];
                 words.extend(pairs);
             }
-            None if !self.has("--device") => {
+            None if self.device().is_none() => {
                 words.extend(["--device", "native"].map(OsString::from));
             }
             None => {}
         }
-        if !self.has("--out") {
+        if self.value("--out").is_none() {
             words.extend(["--out".into(), root().join("demo").into()]);
         }
         words.extend(self.extra.iter().cloned());
@@ -136,6 +154,18 @@ mod tests {
     fn a_device_of_the_users_is_not_overruled() {
         let line = line(None, &["--device", "usb", "--out", "x"], false);
         assert_eq!(line, "demo --device usb --out x");
+    }
+
+    #[test]
+    fn options_are_read_in_both_spellings() {
+        let words = ["--device=emulated", "--outer", "x", "--out", "y"];
+        let request = Request {
+            file: None,
+            extra: words.map(OsString::from).into(),
+        };
+        assert_eq!(request.device().as_deref(), Some("emulated"));
+        assert_eq!(request.value("--out").as_deref(), Some("y"));
+        assert_eq!(request.value("--seconds"), None);
     }
 
     #[test]
