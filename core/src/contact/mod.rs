@@ -21,6 +21,7 @@ mod sweep;
 mod swept;
 #[cfg(test)]
 mod tests;
+mod track;
 mod work;
 
 use glam::Vec3;

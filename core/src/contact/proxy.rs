@@ -17,7 +17,12 @@ pub(super) enum Phase {
     Waiting,
     Free,
     Sweeping(Path),
-    Touching { spot: Spot, may_leave: bool },
+    Touching {
+        spot: Spot,
+        may_leave: bool,
+        /// The last hand's tick was done, and the proxy came to rest here.
+        rested: bool,
+    },
 }
 
 /// The proxy and what it remembers from tick to tick.
@@ -220,6 +225,7 @@ impl Contact {
                 self.phase = Phase::Touching {
                     spot,
                     may_leave: true,
+                    rested: false,
                 };
                 self.touches(window, hip, (spot, patch), true, None, pace)
             }

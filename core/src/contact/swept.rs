@@ -5,6 +5,7 @@ use super::patch::Patch;
 use super::proxy::{Contact, Phase};
 use super::spot::{Hand, Spot};
 use super::sweep::{Path, Sweep};
+use super::track::follow;
 use super::work::Work;
 use super::{Felt, Pace, State};
 use crate::grid::GridPoint;
@@ -83,6 +84,7 @@ impl Contact {
                 self.phase = Phase::Touching {
                     spot,
                     may_leave: progress,
+                    rested: false,
                 };
                 return None;
             }
@@ -105,10 +107,31 @@ impl Contact {
         pace: Pace,
         work: &mut Work,
     ) -> Option<Felt> {
-        let Phase::Touching { spot, may_leave } = self.phase else {
+        let Phase::Touching {
+            spot,
+            may_leave,
+            rested,
+        } = self.phase
+        else {
             return None;
         };
         let hand = Hand::new(hip);
+        // A repeated tick starts where the first one did, or it would not end
+        // on the same bits.
+        if rested && let Some((next, patch)) = follow(window, &hand, spot, may_leave, work) {
+            self.phase = Phase::Touching {
+                spot: next,
+                may_leave,
+                rested,
+            };
+            let felt = self.touches(window, hip, (next, patch), true, None, pace);
+            if !felt.settled
+                && let Phase::Touching { spot: kept, .. } = &mut self.phase
+            {
+                *kept = spot;
+            }
+            return Some(felt);
+        }
         let mut resume = None;
         let mut held_up_by = None;
         let mut settled = true;
@@ -146,8 +169,13 @@ impl Contact {
         self.phase = Phase::Touching {
             spot: resume.unwrap_or(spot),
             may_leave,
+            rested: settled,
         };
-        Some(self.touches(window, hip, (spot, patch), settled, held_up_by, pace))
+        let felt = self.touches(window, hip, (spot, patch), settled, held_up_by, pace);
+        if let Phase::Touching { rested, .. } = &mut self.phase {
+            *rested = felt.settled;
+        }
+        Some(felt)
     }
 
     fn point_on<const D: usize>(
