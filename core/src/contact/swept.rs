@@ -32,7 +32,7 @@ impl Contact {
         // to the surface at a point strictly nearer to the hand.
         loop {
             let ended = match &mut self.phase {
-                Phase::Waiting | Phase::Free => self.fly(window, hip),
+                Phase::Waiting | Phase::Free => self.fly(window, hip, pace, work),
                 Phase::Sweeping(_) => self.sweep(window, hip, pace, work),
                 Phase::Touching { .. } => self.touch(window, hip, pace, work),
             };
@@ -52,17 +52,31 @@ impl Contact {
     }
 
     /// In free space the proxy is the hand; one look tells whether it still is.
-    fn fly<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Option<Felt> {
+    ///
+    /// Most ways end within the tick; those are not worth storing.
+    fn fly<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        pace: Pace,
+        work: &mut Work,
+    ) -> Option<Felt> {
         let from = self.hip;
         let low = if from.is_below(&hip) { &from } else { &hip };
         let span = Box2::around(from.column(), hip.column());
         if window.is_clear(span, Altitude::new(low.cell()[2], low.frac().z)) {
             return Some(self.flies(hip));
         }
-        self.phase = Phase::Sweeping(Path::through_air(from, hip));
-        None
+        let mut path = Path::through_air(from, hip);
+        let ended = path.advance(window, work);
+        let at = path.at();
+        if matches!(ended, Sweep::HeldUp(_) | Sweep::Unfinished) {
+            self.phase = Phase::Sweeping(path);
+        }
+        self.arrives(window, hip, ended, at, pace)
     }
 
+    /// Goes on with a way from an earlier tick, or off the surface.
     fn sweep<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -73,7 +87,21 @@ impl Contact {
         let Phase::Sweeping(path) = &mut self.phase else {
             return None;
         };
-        let held_up_by = match path.advance(window, work) {
+        let ended = path.advance(window, work);
+        let at = path.at();
+        self.arrives(window, hip, ended, at, pace)
+    }
+
+    /// What a way that ended like this, at `at`, comes to; `None` on the surface.
+    fn arrives<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        ended: Sweep,
+        at: GridPoint,
+        pace: Pace,
+    ) -> Option<Felt> {
+        let held_up_by = match ended {
             Sweep::Clear => return Some(self.flies(hip)),
             Sweep::Under => {
                 self.let_go();
@@ -94,7 +122,7 @@ impl Contact {
         self.late |= pace == Pace::RealTime;
         Some(Felt {
             state: State::Free,
-            proxy: path.at(),
+            proxy: at,
             held_up_by,
             ..Felt::default()
         })
