@@ -39,6 +39,24 @@ pub(super) fn sound(reader: &mut (impl Read + Seek), file_bytes: u64) -> Result<
     Ok(MOST)
 }
 
+/// Where in the file the value of a short tag of one of the sound directories is.
+///
+/// # Errors
+/// When the file cannot be read.
+pub(super) fn value_place(
+    reader: &mut (impl Read + Seek),
+    file_bytes: u64,
+    directory: usize,
+    wanted: u64,
+) -> Result<Option<u64>, Fault> {
+    let mut file = Directories::open(reader, file_bytes)?;
+    let mut offset = file.first_offset()?;
+    for _ in 0..directory {
+        offset = file.check(offset)?;
+    }
+    file.place_of(offset, wanted)
+}
+
 struct Directories<'r, R> {
     reader: &'r mut R,
     file_bytes: u64,
@@ -106,6 +124,27 @@ impl<'r, R: Read + Seek> Directories<'r, R> {
             self.check_values(tag, kind, values, place)?;
         }
         self.number(width).map_err(header_fault)
+    }
+
+    /// Where a directory holds the value of a tag that needs no more room than the
+    /// entry has.
+    fn place_of(&mut self, offset: u64, wanted: u64) -> Result<Option<u64>, Fault> {
+        self.reader
+            .seek(SeekFrom::Start(offset))
+            .map_err(header_fault)?;
+        let (count_width, width) = if self.big { (8, 8) } else { (2, 4) };
+        let entries = self.number(count_width).map_err(header_fault)?;
+        for _ in 0..entries.min(MOST_ENTRIES) {
+            let tag = self.number(2).map_err(header_fault)?;
+            self.number(2).map_err(header_fault)?;
+            self.number(width).map_err(header_fault)?;
+            let place = self.reader.stream_position().map_err(header_fault)?;
+            self.number(width).map_err(header_fault)?;
+            if tag == wanted {
+                return Ok(Some(place));
+            }
+        }
+        Ok(None)
     }
 
     /// The values of an entry that is read must lie inside the file.

@@ -7,6 +7,7 @@ mod directory;
 mod field;
 mod georef;
 mod layout;
+mod mask;
 mod metadata;
 
 use tiff::decoder::Decoder;
@@ -29,6 +30,7 @@ pub(super) fn decode(input: &Input) -> Result<Decoded, Fault> {
     let (samples, mask) = chunks::read(&mut decoder, &layout)?;
     let mut decoded = Decoded::new(layout.described(), layout.columns, layout.rows, samples);
     decoded.mask = mask;
+    mask::apply(input, directories, &mut decoded)?;
     if layout.bands > 1 {
         decoded.remarks.push(format!(
             "it has {} bands: the first is taken for the height",
@@ -56,7 +58,7 @@ fn skip_to_full_image<R: std::io::Read + std::io::Seek>(
 ) -> Result<(), Fault> {
     for left in (0..directories).rev() {
         let kind = decoder
-            .find_tag_unsigned::<u32>(Tag::SubfileType)
+            .find_tag_unsigned::<u32>(Tag::NewSubfileType)
             .ok()
             .flatten()
             .unwrap_or(0);
@@ -86,3 +88,6 @@ fn fault(error: TiffError) -> Fault {
         error => Fault::Damaged(format!("TIFF: {error}")),
     }
 }
+
+#[cfg(test)]
+mod tests;
