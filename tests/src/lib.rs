@@ -5,6 +5,7 @@
 
 pub mod chance;
 pub mod emulation;
+pub mod faulty;
 pub mod field;
 pub mod oracle;
 pub mod walk;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::ValueHint;
 
 use super::Failure;
-use crate::link::{Emulator, EmulatorError, IMAGE_VARIABLE, Lines, LinkError, QEMU};
+use crate::link::{Emulator, EmulatorError, IMAGE_VARIABLE, Lines, LinkError, QEMU, QEMU_VARIABLE};
 
 /// How to start the emulated board.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -16,7 +16,7 @@ pub struct Emulation {
     #[arg(long, value_name = "ELF", value_hint = ValueHint::FilePath)]
     pub image: Option<PathBuf>,
 
-    /// QEMU [default: qemu-system-arm on the path]
+    /// QEMU [default: $HAPTERRA_QEMU, else qemu-system-arm on the path]
     #[arg(long, value_name = "PATH", value_hint = ValueHint::ExecutablePath)]
     pub qemu: Option<PathBuf>,
 }
@@ -25,8 +25,7 @@ impl Emulation {
     /// The image, if one was named.
     #[must_use]
     pub fn image(&self) -> Option<PathBuf> {
-        let named = std::env::var_os(IMAGE_VARIABLE).filter(|name| !name.is_empty());
-        self.image.clone().or_else(|| named.map(PathBuf::from))
+        self.image.clone().or_else(|| variable(IMAGE_VARIABLE))
     }
 
     /// Starts the board.
@@ -38,9 +37,15 @@ impl Emulation {
             .image()
             .ok_or(EmulatorError::NoImage)
             .map_err(explain_emulator)?;
-        let qemu = self.qemu.clone().unwrap_or_else(|| QEMU.into());
+        let named = self.qemu.clone().or_else(|| variable(QEMU_VARIABLE));
+        let qemu = named.unwrap_or_else(|| QEMU.into());
         Emulator::start(&qemu, &image).map_err(explain_emulator)
     }
+}
+
+fn variable(name: &str) -> Option<PathBuf> {
+    let value = std::env::var_os(name).filter(|value| !value.is_empty());
+    value.map(PathBuf::from)
 }
 
 /// Adds what to do next.

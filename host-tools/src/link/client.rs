@@ -30,6 +30,18 @@ pub enum Event<'e> {
     },
 }
 
+/// Where the conversation stands. What does not belong to the stage is a
+/// duplicate of something earlier and changes nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// Nothing said yet, or the scene is in force.
+    Settled,
+    /// Hello was said.
+    Greeted,
+    /// The device said hello, too, and was sent the scene.
+    Placed,
+}
+
 /// Serves one terrain to one device. Bytes from the device go into
 /// [`Client::receive`]; bytes for it come out of there and of
 /// [`Client::greet`].
@@ -41,6 +53,7 @@ pub struct Client<'t> {
     tile: TileBuffer,
     /// The device of the present session.
     device: Option<DeviceHello>,
+    stage: Stage,
     tally: Tally,
 }
 
@@ -55,6 +68,7 @@ impl<'t> Client<'t> {
             frame: Box::new([0; MAX_FRAME]),
             tile: TileBuffer::default(),
             device: None,
+            stage: Stage::Settled,
             tally: Tally::default(),
         }
     }
@@ -75,6 +89,7 @@ impl<'t> Client<'t> {
     pub fn greet(&mut self, out: &mut Vec<u8>) {
         // A zero first ends whatever may have been under way.
         out.push(0);
+        self.stage = Stage::Greeted;
         let protocol = PROTOCOL;
         self.say(&ToDevice::Hello(HostHello { protocol }), out);
     }
@@ -121,11 +136,15 @@ impl<'t> Client<'t> {
                 return Err(version(device.protocol));
             }
             ToHost::Refused { protocol } => return Err(version(protocol)),
-            ToHost::Hello(device) => {
+            ToHost::Hello(device) if self.stage == Stage::Greeted => {
                 self.device = Some(device);
+                self.stage = Stage::Placed;
                 self.say(&ToDevice::Scene(self.scene), out);
             }
-            ToHost::SceneTaken { epoch, accepted } if epoch == self.scene.epoch => {
+            ToHost::SceneTaken { epoch, accepted }
+                if epoch == self.scene.epoch && self.stage == Stage::Placed =>
+            {
+                self.stage = Stage::Settled;
                 self.on_scene_taken(accepted, on)?;
             }
             ToHost::Need { epoch, key } if epoch == self.scene.epoch => self.on_need(key, out),
@@ -138,7 +157,8 @@ impl<'t> Client<'t> {
                 seq,
                 sample: &sample,
             }),
-            ToHost::SceneTaken { .. } | ToHost::Need { .. } => {} // of an earlier session
+            // Of an earlier session, or said twice.
+            ToHost::Hello(_) | ToHost::SceneTaken { .. } | ToHost::Need { .. } => {}
         }
         Ok(())
     }

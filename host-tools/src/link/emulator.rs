@@ -10,6 +10,8 @@ use super::Tcp;
 
 /// Environment variable that names the image when no option does.
 pub const IMAGE_VARIABLE: &str = "HAPTERRA_MPS2_ELF";
+/// Environment variable that names QEMU when no option does.
+pub const QEMU_VARIABLE: &str = "HAPTERRA_QEMU";
 /// QEMU's name when no option says otherwise.
 pub const QEMU: &str = "qemu-system-arm";
 /// How long QEMU may take to connect its lines.

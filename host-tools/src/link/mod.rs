@@ -22,7 +22,9 @@ mod transport;
 mod usb;
 
 pub use client::{Client, Event};
-pub use emulator::{Emulator, EmulatorError, IMAGE_VARIABLE, INSTRUCTIONS_PER_COUNT, Lines, QEMU};
+pub use emulator::{
+    Emulator, EmulatorError, IMAGE_VARIABLE, INSTRUCTIONS_PER_COUNT, Lines, QEMU, QEMU_VARIABLE,
+};
 pub use error::LinkError;
 pub use native::{HostClock, Native};
 pub use plant::{PlantLine, serve_plant};

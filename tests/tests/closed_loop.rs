@@ -1,0 +1,125 @@
+//! The virtual Phantom around the device's own application: what comes out in
+//! millimetres and newtons.
+
+use std::time::Duration;
+
+use hapterra::link::{Event, Native, Patience, Session};
+use hapterra::live::{Figures, Stage};
+use hapterra::phantom::{HandModel, PhantomModel, Placement, Rig, Script, Touch};
+use hapterra::raster::Raster;
+use hapterra::replay::Record;
+use hapterra::synth::{Kind, Synth};
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::contact::{Rule, State};
+use hapterra_core::force::ForceLaw;
+use hapterra_core::wire::message::{Sample, Scene, Source};
+use hapterra_firmware::native::StoppedClock;
+
+/// Runs a device until a tick; every sample it reported.
+fn run(terrain: &Terrain<'_>, scene: Scene, rig: Rig, ticks: u32) -> Vec<Sample> {
+    let device = Native::new(StoppedClock, Some(Box::new(rig)));
+    let (mut session, _) =
+        Session::open(terrain, scene, Box::new(device), Patience::REAL_TIME).expect("opened");
+    let mut samples = Vec::new();
+    while samples.last().is_none_or(|last: &Sample| last.tick < ticks) {
+        let mut take = |event: Event<'_>| {
+            if let Event::Sample(sample) = event {
+                samples.push(*sample);
+            }
+        };
+        session.poll(Duration::ZERO, &mut take).expect("goes on");
+    }
+    assert_eq!(session.tally().lost + session.tally().dropped, 0);
+    assert!(samples.iter().all(|sample| sample.fault.is_none()));
+    samples
+}
+
+/// A plane 20 mm up, felt with a stiffness, and a hand that presses with 2 N
+/// in its middle and lifts. Returns the samples and when the lift begins.
+fn press(stiffness_n_per_mm: f32) -> (Vec<Sample>, usize, Scale) {
+    let raster = Raster::from_fn(101, 101, |_, _| 20.0).expect("raster");
+    let scale = Scale::new(2.0, 1.0).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    let hand = HandModel::default();
+    let wall = f64::from(stiffness_n_per_mm);
+    let pressed =
+        Touch::start(&|_, _| Some(20.0), &hand, wall, [100.0, 100.0], 10.0).press(2.0, 1.5);
+    let lift_s = pressed.script().duration_s();
+    let script: Script = pressed.lift(10.0).finish().wait(0.5);
+    let ticks = (script.duration_s() * 1e3) as u32;
+    let home_mm = [100.0, 100.0, 24.0];
+    // No gravity compensation yet: an arm that weighs nothing.
+    let model = PhantomModel::premium_1_5().weightless();
+    let rig = Rig::new(model, hand, Placement { home_mm }, script).expect("in reach");
+    let law = ForceLaw {
+        stiffness_n_per_mm,
+        max_force_n: 8.5,
+    };
+    let home = scale.to_grid(home_mm).expect("addressable");
+    let scene = terrain.scene(law, Rule::Swept, Source::Encoders, home);
+    let samples = run(&terrain, scene, rig, ticks);
+    (samples, (lift_s * 1e3) as usize, scale)
+}
+
+#[test]
+fn pressed_on_a_plane_with_two_newtons_it_rests_at_the_depth_the_stiffness_says() {
+    for stiffness in [0.5f32, 0.25, 1.0] {
+        let (samples, lift, scale) = press(stiffness);
+        let expected_mm = 2.0 / f64::from(stiffness);
+        // Friction carries 0.01 N·m on an arm of 0.21 m against the wall's and
+        // the hand's springs together; two encoders are half a count off.
+        let hand_n_per_mm = 1e-3 / HandModel::default().give_m_per_n();
+        let bound_mm = 0.01 / 0.2095 / (f64::from(stiffness) + hand_n_per_mm) + 0.03;
+        for sample in &samples[lift - 300..lift - 5] {
+            assert_eq!(sample.state, State::Touching);
+            let depth = 20.0 - scale.to_mm(&sample.hip)[2];
+            assert!(
+                (depth - expected_mm).abs() < bound_mm,
+                "{stiffness} N/mm: {depth} mm deep, {expected_mm} ± {bound_mm} expected"
+            );
+            let spring = f64::from(stiffness) * depth;
+            assert!((f64::from(sample.force_n.z) - spring).abs() < 1e-3);
+        }
+    }
+}
+
+#[test]
+fn lifted_there_is_no_force() {
+    let (samples, _, _) = press(0.5);
+    let end = &samples[samples.len() - 300..];
+    assert!(end.iter().all(|s| s.state == State::Free));
+    assert!(end.iter().all(|s| s.force_n.length() == 0.0));
+}
+
+/// Mean error of the proxy's height against the bilinear surface in `f64`, mm.
+const HEIGHT_ERROR_MM: f64 = 1e-5;
+
+#[test]
+fn slid_across_terrain_the_proxy_stays_on_the_surface_and_the_force_in_bounds() {
+    for kind in [Kind::Fractal, Kind::Crater] {
+        let raster = Synth::new(kind, 2, 30.0).raster(400, 400).expect("raster");
+        let scale = Scale::new(1.0, 1.0).expect("scale");
+        let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+        let stage = Stage::set(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("stage");
+        let ticks = (stage.duration_s() * 1e3) as u32;
+        let rig = stage.rig().expect("rig");
+        let samples = run(&terrain, stage.scene(), rig, ticks);
+        let mut figures = Figures::default();
+        for sample in &samples {
+            let record = Record::of_tick(sample, 1000, &scale);
+            figures.take(sample, &record, &terrain);
+        }
+        let mean = figures.height_error_mm.mean();
+        eprintln!(
+            "{kind:?}: {} ticks in contact, mean height error {mean:.2e} mm, mean force {:.2} N",
+            figures.force_n.count(),
+            figures.force_n.mean()
+        );
+        assert!(figures.height_error_mm.count() > 4000, "hardly a touch");
+        assert!(mean < HEIGHT_ERROR_MM, "{kind:?}: {mean} mm");
+        assert!((0.3..3.0).contains(&figures.force_n.mean()));
+        assert!(figures.force_n.max() <= 8.5);
+        let last = samples.last().expect("samples");
+        assert_eq!((last.state, last.force_n.length()), (State::Free, 0.0));
+    }
+}

@@ -1,0 +1,243 @@
+//! Links that lose, damage and repeat, hosts that die, versions that differ:
+//! the host's client against the device's own application, in memory.
+
+use std::cell::RefCell;
+use std::io;
+use std::rc::Rc;
+use std::time::Duration;
+
+use hapterra::link::{Event, LinkError, Native, Patience, Session, Transport};
+use hapterra::live::Stage;
+use hapterra::raster::Raster;
+use hapterra::replay::{Replayer, on_native};
+use hapterra::synth::{Kind, Synth};
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::contact::{Rule, State};
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
+use hapterra_core::wire::message::{HostHello, PROTOCOL, Sample, ToDevice, ToHost};
+use hapterra_firmware::native::StoppedClock;
+use hapterra_tests::faulty::{Fault, Faulty, Shared};
+use hapterra_tests::walk::wander;
+
+/// A device in memory is quiet only when it waits for the host.
+const AT_ONCE: Patience = Patience {
+    greet_again: Duration::ZERO,
+    give_up: Duration::from_secs(60),
+};
+
+fn fractal() -> Raster {
+    Synth::new(Kind::Fractal, 5, 30.0)
+        .raster(300, 300)
+        .expect("raster")
+}
+
+fn unit() -> Scale {
+    Scale::new(1.0, 1.0).expect("scale")
+}
+
+fn felt(sample: &Sample) -> (GridPoint, GridPoint, [u32; 3], State) {
+    let bits = sample.force_n.to_array().map(f32::to_bits);
+    (sample.hip, sample.proxy, bits, sample.state)
+}
+
+#[test]
+fn a_bad_link_changes_nothing_that_is_felt() {
+    let raster = fractal();
+    let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
+    let law = ForceLaw::PREMIUM;
+    let path = wander(&terrain, 9, 1200, 1.0);
+    let walk = |replayer: &mut Replayer<'_>| -> Vec<_> {
+        let hips = path
+            .iter()
+            .map(|mm| unit().to_grid(*mm).expect("addressable"));
+        hips.map(|hip| felt(&replayer.feel(hip).expect("felt")))
+            .collect()
+    };
+    let mut clean = on_native(&terrain, law, Rule::Swept).expect("opened");
+    let expected = walk(&mut clean);
+    for fault in [Fault::Flip, Fault::Drop, Fault::Twice] {
+        let link = Faulty::new(Native::for_replay(), fault, 20, 1);
+        let harmed = Rc::clone(&link.harmed);
+        let mut replayer =
+            Replayer::open(&terrain, law, Rule::Swept, Box::new(link), AT_ONCE).expect("opened");
+        let got = walk(&mut replayer);
+        assert!(expected == got, "{fault:?} changed what is felt");
+        let tally = replayer.tally();
+        eprintln!("{fault:?}: {} transfers harmed, {tally:?}", harmed.borrow());
+        assert!(*harmed.borrow() > 50, "no harm, no test");
+        if fault != Fault::Twice {
+            assert!(tally.bad_frames > 0 && tally.sessions > 1);
+        }
+    }
+}
+
+#[test]
+fn telemetry_that_is_lost_is_counted() {
+    let raster = fractal();
+    let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
+    let stage = Stage::set(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("stage");
+    let rig = stage.rig().expect("rig");
+    let device = Native::new(StoppedClock, Some(Box::new(rig)));
+    let link = Faulty::new(device, Fault::Drop, 10, 3);
+    let (mut session, _) =
+        Session::open(&terrain, stage.scene(), Box::new(link), AT_ONCE).expect("opened");
+    let (mut first, mut last) = (None, 0);
+    while last < 4000 {
+        session
+            .poll(Duration::ZERO, &mut |event| {
+                if let Event::Sample(sample) = event {
+                    assert!(sample.tick > last, "a sample came twice or too late");
+                    first = first.or(Some(sample.tick));
+                    last = sample.tick;
+                }
+            })
+            .expect("goes on");
+    }
+    let tally = session.tally();
+    let ticks = u64::from(last - first.expect("samples came") + 1);
+    eprintln!("{ticks} ticks, {tally:?}");
+    assert!(tally.lost + tally.dropped > 100, "no harm, no test");
+    if tally.sessions == 1 {
+        assert_eq!(tally.samples + tally.lost + tally.dropped, ticks);
+    }
+}
+
+#[test]
+fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
+    let raster = fractal();
+    let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
+    let stage = Stage::set(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("stage");
+    let rig = stage.rig().expect("rig");
+    let device = Rc::new(RefCell::new(Native::new(StoppedClock, Some(Box::new(rig)))));
+    let watch = |session: &mut Session<'_>, until: u32| {
+        let mut last = Sample::default();
+        while last.tick < until {
+            session
+                .poll(Duration::ZERO, &mut |event| {
+                    if let Event::Sample(sample) = event {
+                        last = *sample;
+                    }
+                })
+                .expect("goes on");
+        }
+        last
+    };
+    let link = || Box::new(Shared(Rc::clone(&device)));
+    let (mut session, hello) =
+        Session::open(&terrain, stage.scene(), link(), AT_ONCE).expect("opened");
+    assert_eq!(hello.epoch, None);
+    let before = watch(&mut session, 1500);
+    assert_eq!(before.state, State::Touching);
+    let fetched = session.tally().tiles;
+    drop(session);
+    // It dies in the middle of a frame, and is away for half a second.
+    device.borrow_mut().send(&[7; 30]).expect("sent");
+    device.borrow_mut().pass(500);
+    let (mut session, hello) =
+        Session::open(&terrain, stage.scene(), link(), AT_ONCE).expect("opened again");
+    assert_eq!(hello.epoch, Some(stage.scene().epoch), "the scene was kept");
+    let after = watch(&mut session, before.tick + 700);
+    assert_eq!(after.state, State::Touching);
+    assert!(after.tick >= before.tick + 500, "its time went on");
+    assert_eq!(after.fault, None);
+    let again = session.tally().tiles;
+    assert!(again < fetched, "{again} tiles again after {fetched}");
+}
+
+#[test]
+fn a_device_that_restarts_ends_a_replay_with_a_word() {
+    let raster = fractal();
+    let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
+    /// Swaps the device for a new one in the middle.
+    struct Restarting(Native, u32);
+    impl Transport for Restarting {
+        fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+            self.1 += 1;
+            if self.1 == 30 {
+                self.0 = Native::for_replay();
+            }
+            self.0.send(bytes)
+        }
+        fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
+            self.0.receive(into, wait)
+        }
+    }
+    let link = Box::new(Restarting(Native::for_replay(), 0));
+    let mut replayer =
+        Replayer::open(&terrain, ForceLaw::PREMIUM, Rule::Swept, link, AT_ONCE).expect("opened");
+    let path = wander(&terrain, 9, 100, 1.0);
+    let mut hips = path
+        .iter()
+        .map(|mm| unit().to_grid(*mm).expect("addressable"));
+    let error = hips.find_map(|hip| replayer.feel(hip).err());
+    assert!(matches!(error, Some(LinkError::Restarted)), "{error:?}");
+}
+
+/// The first message that a device answers to bytes.
+fn answer(device: &mut Native, bytes: &[u8]) -> Option<ToHost> {
+    device.send(bytes).expect("in memory");
+    let mut chunk = [0; 512];
+    let n = device
+        .receive(&mut chunk, Duration::ZERO)
+        .expect("in memory");
+    let mut reader = FrameReader::<MAX_FRAME>::new();
+    let mut rest = &chunk[..n];
+    while !rest.is_empty() {
+        let (taken, frame) = reader.push(rest);
+        rest = &rest[taken..];
+        if let Some(Ok(message)) = frame.map(|frame| frame.and_then(decode)) {
+            return Some(message);
+        }
+    }
+    None
+}
+
+#[test]
+fn the_device_refuses_a_host_of_another_version() {
+    let mut device = Native::for_replay();
+    let mut frame = [0; 64];
+    for protocol in [PROTOCOL + 1, PROTOCOL - 1, u16::MAX] {
+        let hello = ToDevice::Hello(HostHello { protocol });
+        let bytes = encode(&hello, &mut frame).expect("fits");
+        let refused = ToHost::Refused { protocol: PROTOCOL };
+        assert_eq!(answer(&mut device, bytes), Some(refused), "{protocol}");
+    }
+}
+
+#[test]
+fn the_host_says_which_versions_do_not_fit() {
+    /// Answers everything with a refusal.
+    struct Newer;
+    impl Transport for Newer {
+        fn send(&mut self, _: &[u8]) -> io::Result<()> {
+            Ok(())
+        }
+        fn receive(&mut self, into: &mut [u8], _: Duration) -> io::Result<usize> {
+            let protocol = PROTOCOL + 1;
+            let frame = encode(&ToHost::Refused { protocol }, into);
+            Ok(frame.expect("fits").len())
+        }
+    }
+    let raster = fractal();
+    let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
+    let replayer = Replayer::open(
+        &terrain,
+        ForceLaw::PREMIUM,
+        Rule::Swept,
+        Box::new(Newer),
+        AT_ONCE,
+    );
+    let error = replayer.err().expect("refused").to_string();
+    let (ours, theirs) = (PROTOCOL, PROTOCOL + 1);
+    assert!(error.contains("version mismatch"), "{error}");
+    assert!(
+        error.contains(&format!("speaks link protocol {theirs}")),
+        "{error}"
+    );
+    assert!(
+        error.contains(&format!("this command speaks {ours}")),
+        "{error}"
+    );
+}

@@ -1,0 +1,88 @@
+//! A terrain far larger than the device: it holds its window, the host holds
+//! the raster once.
+
+use hapterra::raster::Raster;
+use hapterra::replay::on_native;
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::contact::{Rule, State};
+use hapterra_core::force::ForceLaw;
+
+const SIDE: u32 = 4096;
+
+/// Mebibytes this program has had resident at most; `None` where the system
+/// does not tell.
+fn peak_mib() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib / 1024.0)
+}
+
+#[test]
+fn a_field_of_4096_by_4096_streams_through_a_window() {
+    let raster = Raster::from_fn(SIDE, SIDE, |x, y| {
+        8.0 * (x as f32 * 0.021).sin() + 6.0 * (y as f32 * 0.033).cos()
+    })
+    .expect("raster");
+    let before = peak_mib();
+    let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
+    let mut replayer = on_native(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("opened");
+    let window = u64::from(replayer.device().window).pow(2);
+    let mut touched = 0u32;
+    let steps = 40_000;
+    for i in 0..steps {
+        let t = f64::from(i) / f64::from(steps);
+        // From corner to corner, and twice across on the way.
+        let x = 20.0 + 4050.0 * t;
+        let y = 2048.0 + 2000.0 * (t * 9.0).sin();
+        let ground = terrain.height_mm(x, y).expect("known");
+        let above = if i == 0 { 30.0 } else { -0.5 };
+        let hip = terrain.scale().to_grid([x, y, ground + above]);
+        let sample = replayer.feel(hip.expect("addressable")).expect("felt");
+        touched += u32::from(sample.state == State::Touching);
+        assert!(sample.force_n.is_finite());
+    }
+    assert_eq!(touched, steps as u32 - 1, "lost contact on the way");
+    let tally = replayer.tally();
+    let all = u64::from(SIDE / 32).pow(2);
+    eprintln!(
+        "{} tiles sent of {all}, {} again; window {window}",
+        tally.tiles, tally.again
+    );
+    // It went through far more than it can hold, and fetched far less than all.
+    assert!(tally.tiles > 2 * window && tally.tiles < all / 4);
+    assert!(tally.again < tally.tiles / 4);
+    if let (Some(before), Some(after)) = (before, peak_mib()) {
+        let field = f64::from(SIDE) * f64::from(SIDE) * 4.0 / 1024.0 / 1024.0;
+        eprintln!("{before:.0} MiB with the raster of {field} MiB, {after:.0} MiB at most");
+        assert!(after - before < 0.25 * field, "the raster was copied");
+    } else {
+        eprintln!("skipped: no /proc to read the peak of memory from");
+    }
+}
+
+#[test]
+fn coarser_levels_feel_the_same_terrain_with_fewer_tiles() {
+    let raster = Raster::from_fn(1025, 1025, |x, y| (x + 2 * y) as f32 / 16.0).expect("raster");
+    let tiles = [0u8, 3].map(|level| {
+        let scale = Scale::new(0.25, 0.25).expect("scale");
+        let terrain = Terrain::new(&raster, scale, level).expect("terrain");
+        let mut replayer = on_native(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("opened");
+        for i in 0..2000 {
+            let [x, y] = [10.0 + 0.1 * f64::from(i), 128.0];
+            let ground = terrain.height_mm(x, y).expect("known");
+            let above = if i == 0 { 30.0 } else { -1.0 };
+            let hip = terrain.scale().to_grid([x, y, ground + above]);
+            let sample = replayer.feel(hip.expect("addressable")).expect("felt");
+            if i > 0 {
+                // A plane is the same at every level: so is its force.
+                let normal = 1.0 / (1.0 + (1.0 / 16.0f64).powi(2) + 0.125f64.powi(2)).sqrt();
+                let expected = 0.5 * normal;
+                let force = f64::from(sample.force_n.length());
+                assert!((force - expected).abs() < 1e-4, "level {level}: {force}");
+            }
+        }
+        replayer.tally().tiles
+    });
+    assert!(tiles[1] * 4 < tiles[0], "{tiles:?}");
+}
