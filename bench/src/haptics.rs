@@ -1,10 +1,12 @@
 //! What every variant is asked, and what it answers.
 
 use std::hint::black_box;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use hapterra_core::Vec3;
 use hapterra_core::grid::GridPoint;
+
+use crate::clock::Stopwatch;
 
 /// One haptic interface point, ready for every variant's arithmetic.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,11 +77,11 @@ pub trait Haptics {
     /// Time for a whole path, from nothing.
     fn time(&mut self, path: &[Hand]) -> Duration {
         self.forget();
-        let begin = Instant::now();
+        let watch = Stopwatch::start();
         for hand in path {
             black_box(self.tick(black_box(hand)));
         }
-        begin.elapsed()
+        watch.elapsed()
     }
 
     /// What is felt along a path, from nothing.

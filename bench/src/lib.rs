@@ -14,6 +14,7 @@
 #![forbid(unsafe_code)]
 
 pub mod baseline;
+mod clock;
 pub mod compare;
 pub mod grid;
 pub mod haptics;

@@ -2,12 +2,12 @@
 //! and the ray's quadratic by every square root.
 
 use std::hint::black_box;
-use std::time::Instant;
 
 use hapterra_core::contact::closest::nearest_downhill;
 use hapterra_core::contact::patch::Patch;
 
 use crate::baseline::newton;
+use crate::clock::Stopwatch;
 use crate::compare::{Effort, Error, Family, Label, Row};
 use crate::grid::Grid;
 use crate::path::Dice;
@@ -137,11 +137,11 @@ fn patch_rows(slope: f64, effort: Effort) -> Vec<Row> {
     let cases: Vec<Case> = (0..CASES).map(|_| Case::random(&mut dice, slope)).collect();
     let solvers = solvers();
     let times = interleave(solvers.len(), effort.rounds, |index| {
-        let begin = Instant::now();
+        let watch = Stopwatch::start();
         for case in &cases {
             black_box(solvers[index].2(black_box(case)));
         }
-        begin.elapsed().as_secs_f64() * 1e9 / CASES as f64
+        watch.elapsed().as_secs_f64() * 1e9 / CASES as f64
     });
     let rows = solvers
         .iter()
@@ -241,11 +241,11 @@ pub fn roots(effort: Effort) -> Vec<Row> {
         ),
     ];
     let times = interleave(roots.len(), effort.rounds, |index| {
-        let begin = Instant::now();
+        let watch = Stopwatch::start();
         for gap in &gaps {
             black_box(roots[index].2(black_box(*gap)));
         }
-        begin.elapsed().as_secs_f64() * 1e9 / CASES as f64
+        watch.elapsed().as_secs_f64() * 1e9 / CASES as f64
     });
     let rows = roots
         .iter()

@@ -1,6 +1,7 @@
 //! The `hapterra` command line: one file a subcommand, each with its `Args`
 //! and a `run`.
 
+pub mod bench;
 pub mod demo;
 pub mod emulation;
 pub mod failure;
@@ -46,6 +47,8 @@ pub enum Command {
     Demo(demo::Args),
     /// Feel a trajectory tick by tick and write what was felt
     Replay(replay::Args),
+    /// Measure run time against error, beside other ways to render a height field
+    Bench(bench::Args),
 }
 
 /// Parses the command line, runs it and reports: 0 on success, 1 on failure,
@@ -59,6 +62,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Bench(args) => bench::run(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
