@@ -108,7 +108,12 @@ impl GridPoint {
 ///
 /// Truncation stands in for `floor`, which the Cortex-M4F has no instruction
 /// for; the two corrections make it one.
+#[inline]
 fn carry(cell: i32, offset: f32) -> (i32, f32) {
+    // Nearly always: a place in its own patch.
+    if (0.0..1.0).contains(&offset) {
+        return (cell.clamp(-MAX_CELL, MAX_CELL), offset);
+    }
     let whole = offset as i32;
     let mut cell = cell.saturating_add(whole);
     let mut frac = offset - whole as f32;
