@@ -32,13 +32,32 @@ pub struct Verdict {
 pub fn judge(grid: &Grid, hand: &Hand, answer: &Answer) -> Option<Verdict> {
     let stretch = answer.stretch.map(f64::from);
     let proxy = [0, 1, 2].map(|i| hand.wide[i] + stretch[i]);
-    let exact = closest(grid, &hand.wide, [proxy[0], proxy[1]])?;
-    let off = [0, 1, 2].map(|i| proxy[i] - exact[i]);
-    let force = [0, 1, 2].map(|i| exact[i] - hand.wide[i]);
-    Some(Verdict {
-        error: length(&off),
-        angle: angle(&stretch, &force),
-    })
+    let verdict = |from: [f64; 2]| {
+        let exact = closest(grid, &hand.wide, from)?;
+        let off = [0, 1, 2].map(|i| proxy[i] - exact[i]);
+        let force = [0, 1, 2].map(|i| exact[i] - hand.wide[i]);
+        Some(Verdict {
+            error: length(&off),
+            angle: angle(&stretch, &force),
+        })
+    };
+    let (xs, ys) = (sides(proxy[0]), sides(proxy[1]));
+    let places = xs.iter().flat_map(|x| ys.iter().map(|y| [*x, *y]));
+    places
+        .filter_map(verdict)
+        .min_by(|a, b| a.error.total_cmp(&b.error))
+}
+
+/// Where to begin for a proxy at `x`: there, and on both sides of a border of
+/// patches that single precision cannot tell it from. On a sharp ridge the two
+/// sides lead to different valleys, and rounding is not to choose.
+fn sides(x: f64) -> [f64; 3] {
+    const ROUNDING: f64 = 1e-6;
+    let border = x.round();
+    if (x - border).abs() > ROUNDING {
+        return [x; 3];
+    }
+    [x, border, border - 1e-12]
 }
 
 /// The closest point to `hand` that a descent over the surface from the place
