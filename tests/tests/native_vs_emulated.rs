@@ -1,0 +1,125 @@
+//! The same trajectory in this program and on the emulated Cortex-M4F: the same
+//! bits. There is no bound to state: both compile the same single-precision
+//! arithmetic, which IEEE 754 defines to the last bit.
+
+use std::process::Command;
+
+use hapterra::link::{Emulator, Patience};
+use hapterra::raster::Raster;
+use hapterra::replay::{Replayer, on_native};
+use hapterra::synth::{Kind, Synth};
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::contact::{Rule, State};
+use hapterra_core::force::ForceLaw;
+use hapterra_core::wire::message::Sample;
+use hapterra_tests::emulation::emulated_board;
+use hapterra_tests::hapterra_binary;
+use hapterra_tests::walk::wander;
+
+/// What has to be the same: all but the work and the time it took, which
+/// depend on when a tile came.
+type Felt = ([i32; 3], [u32; 3], [i32; 3], [u32; 3], [u32; 3], State);
+
+fn felt(sample: &Sample) -> Felt {
+    let bits = |v: hapterra_core::Vec3| v.to_array().map(f32::to_bits);
+    (
+        sample.hip.cell(),
+        bits(sample.hip.frac()),
+        sample.proxy.cell(),
+        bits(sample.proxy.frac()),
+        bits(sample.force_n),
+        sample.state,
+    )
+}
+
+fn walk(replayer: &mut Replayer<'_>, path: &[[f64; 3]]) -> Vec<Felt> {
+    let scale = *replayer.terrain().scale();
+    let mut feel = |mm: &[f64; 3]| {
+        let hip = scale.to_grid(*mm).expect("addressable");
+        felt(&replayer.feel(hip).expect("felt"))
+    };
+    path.iter().map(&mut feel).collect()
+}
+
+fn holed() -> Raster {
+    Raster::from_fn(130, 90, |x, y| {
+        let hole = (x / 11 + y / 9) % 5 == 0;
+        let height = (x as f32 * 0.31).sin() * 4.0 + (y as f32 * 0.17).cos() * 6.0;
+        if hole { f32::NAN } else { height }
+    })
+    .expect("raster")
+}
+
+#[test]
+fn a_replay_gives_the_same_bits_on_the_emulated_board() {
+    let Some((qemu, image)) = emulated_board() else {
+        return;
+    };
+    let made = |kind| Synth::new(kind, 3, 25.0).raster(150, 140).expect("raster");
+    for (name, raster, rule) in [
+        ("fractal", made(Kind::Fractal), Rule::Swept),
+        ("steps", made(Kind::Steps), Rule::Swept),
+        ("holes", holed(), Rule::Swept),
+        ("fractal", made(Kind::Fractal), Rule::Paper),
+    ] {
+        let scale = Scale::new(0.8, 0.9).expect("scale");
+        let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+        let law = ForceLaw::PREMIUM;
+        let path = wander(&terrain, 17, 300, -2.0);
+        let mut native = on_native(&terrain, law, rule).expect("opened");
+        let expected = walk(&mut native, &path);
+        let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
+        let _plant = lines.plant;
+        let link = Box::new(lines.link);
+        let mut board =
+            Replayer::open(&terrain, law, rule, link, Patience::EMULATED).expect("opened");
+        assert_eq!(board.device().board.as_str(), "mps2-an386");
+        let got = walk(&mut board, &path);
+        for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
+            assert_eq!(expected, got, "{name}, {rule:?}: row {i} at {:?}", path[i]);
+        }
+        let touched = got.iter().filter(|felt| felt.5 == State::Touching).count();
+        assert!(touched > 50, "{name}: the walk hardly touches");
+        board.say_goodbye().expect("said");
+        let status = emulator.finish().expect("ended");
+        assert!(status.success(), "the board ended with {status}");
+    }
+}
+
+/// The closed loop, too: encoders, currents and the arm in between.
+#[test]
+fn the_demonstration_is_the_same_and_never_late_on_the_emulated_board() {
+    let Some((qemu, image)) = emulated_board() else {
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let demo = |out: &str, more: &[&std::ffi::OsStr]| {
+        let out = folder.path().join(out);
+        let run = Command::new(hapterra_binary())
+            .args(["demo", "--seconds", "2.5", "--out"])
+            .arg(&out)
+            .args(more)
+            .output()
+            .expect("started");
+        let said = String::from_utf8_lossy(&run.stdout).into_owned();
+        let complained = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.success(), "{said}{complained}");
+        assert!(out.join("fractal.png").exists());
+        (std::fs::read(out.join("fractal.csv")).expect("there"), said)
+    };
+    let (native, _) = demo("native", &["--device".as_ref(), "native".as_ref()]);
+    let (emulated, said) = demo(
+        "emulated",
+        &[
+            "--image".as_ref(),
+            image.as_ref(),
+            "--qemu".as_ref(),
+            qemu.as_ref(),
+        ],
+    );
+    assert!(said.contains(", 0 late"), "{said}");
+    assert!(said.contains("0 lost on the link, 0 dropped"), "{said}");
+    let lines = |csv: &[u8]| csv.iter().filter(|b| **b == b'\n').count();
+    assert!(lines(&native) > 2400, "{} lines", lines(&native));
+    assert!(native == emulated, "the recordings differ");
+}

@@ -1,0 +1,287 @@
+//! What a replay feels, against a dense search in `f64` that shares no code
+//! with the loop.
+
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::replay::{Replayer, on_native};
+use hapterra::synth::{Kind, Synth};
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::contact::{Rule, State};
+use hapterra_core::force::ForceLaw;
+use hapterra_core::wire::message::Sample;
+use hapterra_tests::oracle::Oracle;
+use hapterra_tests::shared;
+use hapterra_tests::walk::wander;
+
+/// Distance of the proxy from the surface, cells: a few roundings of a height
+/// that is stored relative to its tile.
+const ON_SURFACE: f64 = 2e-5;
+/// By how much some other point near the proxy may be closer to the hand,
+/// cells.
+const CLOSEST: f64 = 1e-6;
+/// How far that other point is looked for, cells, and not past the border of
+/// the patch that the proxy is in: on rough ground there is often another local
+/// closest point beyond a hump at the border. A proxy that is wrong by a
+/// hundredth of its distance is found out.
+const NEARBY: f64 = 2e-4;
+/// A proxy this close to a border is on it, cells.
+const ON_BORDER: f64 = 1e-6;
+/// Error of the force, N, at stiffnesses near the usual.
+const FORCE_N: f64 = 1e-4;
+
+fn mm(sample: &Sample, scale: &Scale) -> ([f64; 3], [f64; 3]) {
+    (scale.to_mm(&sample.hip), scale.to_mm(&sample.proxy))
+}
+
+fn length(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Heights of a terrain in cells, from the raster itself.
+fn heights<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
+    move |x, y| {
+        let height = terrain.raster().height(x as u32, y as u32);
+        height * terrain.scale().height_mm_per_unit() / terrain.scale().cell_mm()
+    }
+}
+
+fn feel(replayer: &mut Replayer<'_>, hip_mm: [f64; 3]) -> Sample {
+    let hip = replayer.terrain().scale().to_grid(hip_mm);
+    replayer.feel(hip.expect("addressable")).expect("felt")
+}
+
+/// Distance from the nearest border of a patch that a place is not on.
+fn to_border(place: [f64; 2]) -> f64 {
+    let gaps = place.map(|x| (x - x.round()).abs());
+    let gaps = gaps.into_iter().filter(|gap| *gap > ON_BORDER);
+    gaps.fold(f64::INFINITY, f64::min)
+}
+
+/// Wanders over a terrain and judges every answer. Returns how many rows were
+/// in contact.
+fn judge(raster: &Raster, scale: Scale, rule: Rule, seed: u64, rows: usize) -> usize {
+    let terrain = Terrain::new(raster, scale, 0).expect("terrain");
+    let height = heights(&terrain);
+    let oracle = Oracle::new(terrain.size().map(i64::from), &height);
+    let law = ForceLaw::PREMIUM;
+    let mut replayer = on_native(&terrain, law, rule).expect("opened");
+    let mut touched = 0;
+    let mut near_holes = 0;
+    for hip_mm in wander(&terrain, seed, rows, 0.5) {
+        let sample = feel(&mut replayer, hip_mm);
+        let (hip, proxy) = mm(&sample, &scale);
+        let force = sample.force_n.to_array().map(f64::from);
+        if sample.state != State::Touching {
+            assert_eq!(force, [0.0; 3], "a force without contact at {hip_mm:?}");
+            continue;
+        }
+        touched += 1;
+        let (hip_c, proxy_c) = (
+            hip.map(|x| x / scale.cell_mm()),
+            proxy.map(|x| x / scale.cell_mm()),
+        );
+        let surface = oracle.surface(proxy_c[0], proxy_c[1]);
+        let surface = surface.unwrap_or_else(|| panic!("a proxy over nothing at {proxy_c:?}"));
+        let size = surface.abs().max(1.0) * 4.0 * f64::from(f32::EPSILON);
+        assert!(
+            (proxy_c[2] - surface).abs() < ON_SURFACE + size,
+            "the proxy {proxy_c:?} is off the surface at {surface}"
+        );
+        let place = [proxy_c[0], proxy_c[1]];
+        let closer = oracle.closer_nearby(hip_c, place, NEARBY.min(to_border(place)));
+        assert!(
+            closer < CLOSEST,
+            "{closer} closer than {proxy_c:?} to {hip_c:?}"
+        );
+        let stretch_mm: [f64; 3] = std::array::from_fn(|i| proxy[i] - hip[i]);
+        let k = f64::from(law.stiffness_n_per_mm);
+        let full = (k * length(stretch_mm)).min(f64::from(law.max_force_n));
+        // The force follows the stretch; near a hole it may be faded.
+        assert!(length(force) <= full + FORCE_N, "{force:?} {stretch_mm:?}");
+        if oracle.is_known_around(hip_c[0], hip_c[1], 40.0) {
+            let share = full / length(stretch_mm).max(1e-12);
+            for axis in 0..3 {
+                assert!((force[axis] - share * stretch_mm[axis]).abs() < FORCE_N);
+            }
+        } else {
+            near_holes += 1;
+        }
+    }
+    eprintln!("{touched} of {rows} rows in contact, {near_holes} of them near a hole or border");
+    touched
+}
+
+fn synthetic(kind: Kind) -> Raster {
+    Synth::new(kind, 7, 30.0).raster(160, 130).expect("raster")
+}
+
+#[test]
+fn on_made_terrains_the_proxy_is_the_local_closest_point_and_the_force_its_spring() {
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    for (kind, rule) in [
+        (Kind::Fractal, Rule::Swept),
+        (Kind::Fractal, Rule::Paper),
+        (Kind::Ridge, Rule::Swept),
+        (Kind::Plane, Rule::Swept),
+        (Kind::Steps, Rule::Swept),
+        (Kind::Crater, Rule::Swept),
+        (Kind::Spikes, Rule::Swept),
+    ] {
+        eprint!("{kind:?} {rule:?}: ");
+        let touched = judge(&synthetic(kind), scale, rule, 11, 3000);
+        assert!(touched > 300, "{kind:?}: the walk hardly touches");
+    }
+}
+
+#[test]
+fn on_real_terrains_too_whatever_their_holes() {
+    for (file, cell_mm) in [
+        ("dem/real/bigtujunga.tif", 1.0),
+        ("dem/real/mt_everest_90m.tif", 0.3),
+        ("dem/real/red_butte_slc_utm12_f32.tif", 2.0),
+        ("dem/real/hugo_site.asc", 1.0),
+        ("dem/real/dom1_32_356_5699_1_nw_2020.tif", 1.0),
+    ] {
+        let Some(path) = shared(file) else { return };
+        let raster = Raster::open(path, &OpenOptions::default()).expect("opens");
+        let scale = Scale::true_to(&raster, cell_mm).expect("scale");
+        eprint!("{file}: ");
+        let touched = judge(&raster, scale, Rule::Swept, 5, 2000);
+        assert!(touched > 100, "{file}: the walk hardly touches");
+    }
+}
+
+/// Straight down and up again at places all over: contact on one side of the
+/// surface, none on the other.
+#[test]
+fn contact_begins_and_ends_at_the_surface() {
+    let raster = synthetic(Kind::Fractal);
+    let scale = Scale::new(0.7, 0.9).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    for rule in [Rule::Swept, Rule::Paper] {
+        let mut replayer = on_native(&terrain, ForceLaw::PREMIUM, rule).expect("opened");
+        for (i, gap) in [1e-3, 1e-4, 0.1].into_iter().cycle().take(60).enumerate() {
+            let [x, y] = [10.0 + 1.31 * i as f64, 70.0 - 0.83 * i as f64];
+            let ground = terrain.height_mm(x, y).expect("known");
+            let top = f64::from(terrain.top()) * scale.cell_mm() + 1.0;
+            feel(&mut replayer, [x, y, top]);
+            let above = feel(&mut replayer, [x, y, ground + gap]);
+            assert_eq!(above.state, State::Free, "{rule:?} {i}");
+            let below = feel(&mut replayer, [x, y, ground - gap]);
+            assert_eq!(below.state, State::Touching, "{rule:?} {i}");
+            assert!(below.force_n.z > 0.0);
+            let again = feel(&mut replayer, [x, y, ground + 2.0 * gap]);
+            assert_eq!(again.state, State::Free, "{rule:?} {i}");
+            feel(&mut replayer, [x, y, top]);
+        }
+    }
+}
+
+#[test]
+fn no_force_until_the_hand_has_been_above() {
+    let raster = synthetic(Kind::Plane);
+    let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
+    let mut replayer = on_native(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("opened");
+    let ground = terrain.height_mm(60.0, 50.0).expect("known");
+    for depth in [5.0, 1.0, 0.1] {
+        let sample = feel(&mut replayer, [60.0, 50.0, ground - depth]);
+        assert_eq!(
+            (sample.state, sample.force_n.length()),
+            (State::Waiting, 0.0)
+        );
+    }
+    feel(&mut replayer, [60.0, 50.0, ground + 0.1]);
+    let sample = feel(&mut replayer, [60.0, 50.0, ground - 1.0]);
+    assert_eq!(sample.state, State::Touching);
+}
+
+/// A terrain with a hole of 20 × 20 samples in its middle.
+fn holed() -> Raster {
+    Raster::from_fn(100, 100, |x, y| {
+        let hole = (40..60).contains(&x) && (40..60).contains(&y);
+        if hole { f32::NAN } else { 5.0 }
+    })
+    .expect("raster")
+}
+
+#[test]
+fn over_a_hole_and_off_the_data_there_is_nothing_to_feel() {
+    let raster = holed();
+    let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
+    for rule in [Rule::Swept, Rule::Paper] {
+        for place in [[50.0, 50.0], [-3.0, 50.0], [50.0, 120.0], [1e6, -1e6]] {
+            let mut replayer = on_native(&terrain, ForceLaw::PREMIUM, rule).expect("opened");
+            for step in 0..40 {
+                let z = 20.0 - f64::from(step);
+                let sample = feel(&mut replayer, [place[0], place[1], z]);
+                assert_ne!(sample.state, State::Touching, "{rule:?} {place:?} {z}");
+                assert_eq!(sample.force_n.length(), 0.0);
+            }
+        }
+    }
+}
+
+/// Sliding off the edge of a hole lets go gently; coming back in from the side
+/// below the surface does not catch.
+#[test]
+fn the_edge_of_a_hole_lets_go_without_a_kick_and_does_not_hook() {
+    let raster = holed();
+    let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
+    let mut replayer = on_native(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("opened");
+    feel(&mut replayer, [30.0, 50.5, 7.0]);
+    let mut last = feel(&mut replayer, [30.0, 50.5, 4.0]);
+    let mut largest_step = 0.0f32;
+    let mut x = 30.0;
+    while x < 45.0 {
+        x += 0.005;
+        let sample = feel(&mut replayer, [x, 50.5, 4.0]);
+        largest_step = largest_step.max((sample.force_n - last.force_n).length());
+        last = sample;
+    }
+    assert_eq!((last.state, last.force_n.length()), (State::Waiting, 0.0));
+    assert!(largest_step < 0.03, "a kick of {largest_step} N in a tick");
+    while x > 30.0 {
+        x -= 0.05;
+        let sample = feel(&mut replayer, [x, 50.5, 4.0]);
+        assert_eq!(sample.force_n.length(), 0.0, "hooked at {x}");
+    }
+}
+
+/// The paper's Figure 8: from one side of a peak to the other in one tick.
+#[test]
+fn a_fast_sweep_does_not_pass_through_a_peak() {
+    let raster = Raster::from_fn(64, 64, |x, _| if x == 30 || x == 33 { 10.0 } else { 0.0 });
+    let raster = raster.expect("raster");
+    let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
+    let sweep = || {
+        let mut replayer = on_native(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("opened");
+        feel(&mut replayer, [28.0, 32.3, 5.0]);
+        feel(&mut replayer, [36.0, 32.3, 5.0])
+    };
+    let swept = sweep();
+    assert_eq!(swept.state, State::Touching);
+    let proxy = terrain.scale().to_mm(&swept.proxy);
+    assert!(proxy[0] < 30.0, "stopped on the near side: {proxy:?}");
+    assert!(swept.force_n.x < -3.0, "{:?}", swept.force_n);
+}
+
+#[test]
+fn the_same_trajectory_gives_the_same_bits_again() {
+    let raster = synthetic(Kind::Fractal);
+    let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
+    let path = wander(&terrain, 3, 1500, 1.0);
+    let run = || -> Vec<_> {
+        let mut replayer = on_native(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("opened");
+        path.iter()
+            .map(|hip| feel(&mut replayer, *hip))
+            .map(|s| {
+                (
+                    s.hip,
+                    s.proxy,
+                    s.force_n.to_array().map(f32::to_bits),
+                    s.state,
+                )
+            })
+            .collect()
+    };
+    assert_eq!(run(), run());
+}

@@ -1,0 +1,232 @@
+//! `hapterra replay` from outside: its format, and how it fails.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use hapterra_tests::hapterra_binary;
+
+const HEADER: &str =
+    "t_s,x_mm,y_mm,z_mm,contact,proxy_x_mm,proxy_y_mm,proxy_z_mm,force_x_n,force_y_n,force_z_n";
+/// A plane rising by one unit a column, cells of 10 m.
+const TERRAIN: &str =
+    "ncols 40\nnrows 30\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -9999\n";
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new(trajectory: &str) -> Self {
+        let folder = Self(tempfile::tempdir().expect("a folder"));
+        let row = (0..40).map(|x| (x * 10).to_string()).collect::<Vec<_>>();
+        let rows = vec![row.join(" "); 30].join("\n");
+        folder.write("terrain.asc", &format!("{TERRAIN}{rows}\n"));
+        folder.write("in.csv", trajectory);
+        folder
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path(name), text).expect("written");
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn replay(&self, more: &[&str]) -> Output {
+        Command::new(hapterra_binary())
+            .arg("replay")
+            .args([self.path("terrain.asc"), self.path("in.csv")])
+            .arg("--output")
+            .arg(self.path("out.csv"))
+            .args(more)
+            .output()
+            .expect("started")
+    }
+
+    /// Rows of a replay that succeeds, as text.
+    fn felt(&self, more: &[&str]) -> Vec<Vec<String>> {
+        let run = self.replay(more);
+        assert!(run.status.success(), "{}", said(&run));
+        let text = std::fs::read_to_string(self.path("out.csv")).expect("there");
+        let mut lines = text.lines();
+        let header = lines.next().expect("a header");
+        assert!(header == HEADER || header.starts_with(&format!("{HEADER},")));
+        lines
+            .map(|line| line.split(',').map(str::to_owned).collect())
+            .collect()
+    }
+
+    /// Fails with exit code 1 and leaves nothing behind; returns what it says.
+    fn fails(&self, more: &[&str]) -> String {
+        let run = self.replay(more);
+        assert_eq!(run.status.code(), Some(1), "{}", said(&run));
+        let left: Vec<_> = std::fs::read_dir(self.0.path())
+            .expect("listed")
+            .map(|entry| entry.expect("entry").file_name())
+            .filter(|name| name != "terrain.asc" && name != "in.csv")
+            .collect();
+        assert!(left.is_empty(), "left behind: {left:?}");
+        let said = said(&run);
+        assert!(
+            said.contains("error: ") && said.contains("hint: "),
+            "{said}"
+        );
+        said
+    }
+}
+
+fn said(run: &Output) -> String {
+    String::from_utf8_lossy(&run.stderr).into_owned()
+}
+
+fn number(text: &str) -> f64 {
+    text.parse()
+        .unwrap_or_else(|_| panic!("`{text}` is a number"))
+}
+
+const PRESS: &str = "t_s,x_mm,y_mm,z_mm\n0,10.1,7.3,14\n0.001,10.1,7.3,9.6\n0.002,10.1,7.3,0.1e1\n0.003,10.123456789012345,7.3,13\n";
+
+#[test]
+fn one_row_a_row_with_the_columns_that_were_promised() {
+    let folder = Folder::new(PRESS);
+    let rows = folder.felt(&["--cell-mm", "1"]);
+    assert_eq!(rows.len(), 4);
+    let contacts: Vec<_> = rows.iter().map(|row| row[4].as_str()).collect();
+    assert_eq!(contacts, ["0", "1", "1", "0"]);
+    // What went in comes back as the same number, and out of contact the proxy
+    // is the hand.
+    let went_in: f64 = "10.123456789012345".parse().expect("a number");
+    assert_eq!(number(&rows[3][1]).to_bits(), went_in.to_bits());
+    for row in [&rows[0], &rows[3]] {
+        assert_eq!(row[1..4], row[5..8]);
+        assert!(row[8..11].iter().all(|force| number(force) == 0.0));
+    }
+    // The plane rises by 10 units of 1 m on cells of 10 m: 45° at true
+    // proportions. Pressed down by d at a place, the proxy is d/2 up and d/2
+    // west, the force 0.5 N/mm times that.
+    for row in &rows[1..3] {
+        let [x, z] = [number(&row[1]), number(&row[3])];
+        let half = 0.5 * (x - z);
+        assert!((number(&row[5]) - (x - half)).abs() < 1e-5, "{row:?}");
+        assert!((number(&row[6]) - 7.3).abs() < 1e-5, "{row:?}");
+        assert!((number(&row[7]) - (z + half)).abs() < 1e-5, "{row:?}");
+        assert!((number(&row[8]) + 0.5 * half).abs() < 1e-5, "{row:?}");
+        assert!((number(&row[10]) - 0.5 * half).abs() < 1e-5, "{row:?}");
+    }
+}
+
+#[test]
+fn scale_stiffness_and_limit_are_as_stated() {
+    let press = "t_s,x_mm,y_mm,z_mm\n0,20,10,90\n1,20,10,10\n2,20,10,-60\n";
+    let folder = Folder::new(press);
+    let flat = ["--cell-mm", "2", "--height-mm-per-unit", "0"];
+    let felt = |more: &[&str]| folder.felt(&[&flat, more].concat());
+    // At no height at all there is a table at zero.
+    let rows = felt(&["--stiffness-n-per-mm", "0.125", "--max-force-n", "5"]);
+    assert_eq!(rows[1][4], "0");
+    assert_eq!(number(&rows[2][7]), 0.0);
+    assert!(
+        (number(&rows[2][10]) - 5.0).abs() < 1e-5,
+        "limited: {:?}",
+        rows[2]
+    );
+    let rows = felt(&["--stiffness-n-per-mm", "0.125", "--max-force-n", "50"]);
+    assert!((number(&rows[2][10]) - 7.5).abs() < 1e-5, "{:?}", rows[2]);
+}
+
+#[test]
+fn the_same_again_byte_for_byte_and_its_own_output_can_be_replayed() {
+    let folder = Folder::new(PRESS);
+    let first = folder.felt(&[]);
+    let bytes = std::fs::read(folder.path("out.csv")).expect("there");
+    assert_eq!(folder.felt(&[]), first);
+    assert_eq!(std::fs::read(folder.path("out.csv")).expect("there"), bytes);
+    std::fs::copy(folder.path("out.csv"), folder.path("in.csv")).expect("copied");
+    assert_eq!(folder.felt(&[]), first);
+}
+
+#[test]
+fn an_empty_trajectory_gives_an_empty_recording() {
+    let folder = Folder::new("t_s,x_mm,y_mm,z_mm\r\n");
+    assert!(folder.felt(&[]).is_empty());
+    assert!(folder.felt(&["--contact", "paper"]).is_empty());
+}
+
+#[test]
+fn a_wrong_trajectory_is_named_with_line_and_column() {
+    for (rows, expected) in [
+        ("0,1,2,3\n1,2,3\n", "line 3 has 3 columns"),
+        ("0,1,2,3\n1,2,NaN,4\n", "line 3, column y_mm"),
+        ("0,1,2,3\n1,2,3,high\n", "line 3, column z_mm: `high`"),
+        ("0,1e12,2,3\n", "line 2, column x_mm"),
+    ] {
+        let folder = Folder::new(&format!("t_s,x_mm,y_mm,z_mm\n{rows}"));
+        let said = folder.fails(&[]);
+        assert!(said.contains("in.csv: "), "{said}");
+        assert!(said.contains(expected), "{said}");
+    }
+    let said = Folder::new("time,x,y,z\n0,1,2,3\n").fails(&[]);
+    assert!(said.contains("line 1 is not the header"), "{said}");
+}
+
+#[test]
+fn an_old_result_outlives_a_replay_that_fails() {
+    let folder = Folder::new("t_s,x_mm,y_mm,z_mm\n0,1,2,3\n0,1,2,x\n");
+    folder.write("out.csv", "precious");
+    let run = folder.replay(&[]);
+    assert_eq!(run.status.code(), Some(1));
+    let kept = std::fs::read_to_string(folder.path("out.csv"));
+    assert_eq!(kept.expect("there"), "precious");
+}
+
+#[test]
+fn impossible_options_are_errors_before_anything_runs() {
+    let folder = Folder::new(PRESS);
+    for (more, expected) in [
+        (&["--cell-mm", "0"][..], "a cell of 0 mm"),
+        (&["--cell-mm", "nan"], "a cell of NaN mm"),
+        (&["--height-mm-per-unit", "inf"], "must be finite"),
+        (&["--height-mm-per-unit", "1e9"], "heights reach"),
+        (&["--stiffness-n-per-mm", "-1"], "not negative"),
+        (&["--level", "9"], "level 9 leaves nothing"),
+    ] {
+        let more: Vec<String> = match more {
+            [name, value] => vec![format!("{name}={value}")],
+            _ => unreachable!("a name and a value"),
+        };
+        let more: Vec<&str> = more.iter().map(String::as_str).collect();
+        let said = folder.fails(&more);
+        assert!(said.contains(expected), "{more:?}: {said}");
+    }
+    let missing = folder.path("no-such-image.elf");
+    let image = format!("--image={}", missing.display());
+    let said = folder.fails(&["--on", "emulated", &image]);
+    assert!(said.contains("no-such-image.elf"), "{said}");
+    assert!(said.contains("cargo xtask demo"), "{said}");
+}
+
+#[test]
+fn a_device_that_is_not_there_is_an_error_that_says_what_was_looked_for() {
+    let folder = Folder::new(PRESS);
+    let run = |device: &str| {
+        let run = Command::new(hapterra_binary())
+            .args([Path::new("run"), &folder.path("terrain.asc")])
+            .args(["--device", device])
+            .output()
+            .expect("started");
+        assert_eq!(run.status.code(), Some(1), "{}", said(&run));
+        said(&run)
+    };
+    // Port 9 (discard) is served by nobody these days.
+    let tcp = run("tcp:127.0.0.1:9");
+    assert!(
+        tcp.contains("127.0.0.1:9") && tcp.contains("hint: "),
+        "{tcp}"
+    );
+    let Some(usb) = std::env::var_os("HAPTERRA_NO_BOARD").map(|_| run("usb")) else {
+        eprintln!(
+            "skipped: a board may be plugged in here; HAPTERRA_NO_BOARD=1 says there is none"
+        );
+        return;
+    };
+    assert!(usb.contains("1209:0001") && usb.contains("hint: "), "{usb}");
+}
