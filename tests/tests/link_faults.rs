@@ -57,8 +57,14 @@ fn a_bad_link_changes_nothing_that_is_felt() {
     };
     let mut clean = on_native(&terrain, law, Rule::Swept).expect("opened");
     let expected = walk(&mut clean);
-    for fault in [Fault::Flip, Fault::Drop, Fault::Twice] {
-        let link = Faulty::new(Native::for_replay(), fault, 20, 1);
+    // The last says everything twice, the greeting included.
+    for (fault, one_in) in [
+        (Fault::Flip, 20),
+        (Fault::Drop, 20),
+        (Fault::Twice, 20),
+        (Fault::Twice, 1),
+    ] {
+        let link = Faulty::new(Native::for_replay(), fault, one_in, 1);
         let harmed = Rc::clone(&link.harmed);
         let mut replayer =
             Replayer::open(&terrain, law, Rule::Swept, Box::new(link), AT_ONCE).expect("opened");

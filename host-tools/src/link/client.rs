@@ -207,3 +207,49 @@ fn version(theirs: u16) -> LinkError {
         theirs,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::Raster;
+    use crate::terrain::Scale;
+    use hapterra_core::contact::Rule;
+    use hapterra_core::force::ForceLaw;
+    use hapterra_core::grid::GridPoint;
+    use hapterra_core::wire::message::Source;
+
+    #[test]
+    fn what_is_said_twice_opens_once() {
+        let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
+        let scale = Scale::new(1.0, 1.0).expect("scale");
+        let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+        let home = GridPoint::default();
+        let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Points, home);
+        let mut client = Client::new(&terrain, scene);
+        let hello = ToHost::Hello(DeviceHello {
+            protocol: PROTOCOL,
+            board: "test".try_into().expect("fits"),
+            version: "1".try_into().expect("fits"),
+            window: 4,
+            tick_hz: 1000,
+            clock_hz: 1000,
+            epoch: None,
+        });
+        let taken = ToHost::SceneTaken {
+            epoch: scene.epoch,
+            accepted: true,
+        };
+        let (mut out, mut opened) = (Vec::new(), 0);
+        client.greet(&mut out);
+        for message in [&taken, &hello, &hello, &taken, &taken, &hello] {
+            let mut frame = [0; MAX_FRAME];
+            let bytes = encode(message, &mut frame).expect("fits");
+            let mut count =
+                |event: Event<'_>| opened += u32::from(matches!(event, Event::Opened { .. }));
+            client
+                .receive(bytes, &mut out, &mut count)
+                .expect("understood");
+        }
+        assert_eq!((opened, client.tally().sessions), (1, 1));
+    }
+}
