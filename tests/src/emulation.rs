@@ -8,23 +8,30 @@ use std::process::{Command, Stdio};
 /// `cargo xtask test` builds the image and names both.
 #[must_use]
 pub fn emulated_board() -> Option<(PathBuf, PathBuf)> {
-    let variable = |name: &str| {
-        let value = std::env::var_os(name).filter(|value| !value.is_empty());
-        value.map(PathBuf::from)
-    };
-    let Some(image) = variable("HAPTERRA_MPS2_ELF") else {
+    let Some(image) = named("HAPTERRA_MPS2_ELF") else {
         eprintln!("skipped: no emulated board: HAPTERRA_MPS2_ELF is not set");
         return None;
     };
-    let qemu = variable("HAPTERRA_QEMU").unwrap_or_else(|| "qemu-system-arm".into());
-    if !runs(&qemu) {
-        eprintln!(
-            "skipped: no emulated board: {} does not run",
-            qemu.display()
-        );
-        return None;
+    Some((qemu()?, image))
+}
+
+/// The path in an environment variable.
+pub(crate) fn named(variable: &str) -> Option<PathBuf> {
+    let value = std::env::var_os(variable).filter(|value| !value.is_empty());
+    value.map(PathBuf::from)
+}
+
+/// QEMU, or `None` with a visible line.
+pub(crate) fn qemu() -> Option<PathBuf> {
+    let qemu = named("HAPTERRA_QEMU").unwrap_or_else(|| "qemu-system-arm".into());
+    if runs(&qemu) {
+        return Some(qemu);
     }
-    Some((qemu, image))
+    eprintln!(
+        "skipped: no emulated board: {} does not run",
+        qemu.display()
+    );
+    None
 }
 
 fn runs(qemu: &Path) -> bool {

@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 pub mod chance;
+pub mod counting;
 pub mod emulation;
 pub mod faulty;
 pub mod field;

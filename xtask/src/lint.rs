@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 
 use crate::board::BOARDS;
-use crate::image::package_words;
+use crate::image::{counts_words, package_words};
 use crate::run::{cargo, run, timed};
 use crate::setup::toolchain;
 
@@ -25,12 +25,14 @@ pub(crate) fn lint() -> Result<()> {
     })?;
     let toolchain = toolchain::ready()?;
     toolchain.with_clippy()?;
-    for board in &BOARDS {
-        timed(&format!("clippy for {}", board.name), || {
+    let counts = ("the counting image", counts_words());
+    let boards = BOARDS.iter().map(|b| (b.name, package_words(b)));
+    for (name, words) in boards.chain([counts]) {
+        timed(&format!("clippy for {name}"), || {
             let mut command = toolchain.cargo("clippy");
             command
                 .arg("--release")
-                .args(package_words(board))
+                .args(&words)
                 .args(["--", "-D", "warnings"]);
             run(&mut command)
         })?;

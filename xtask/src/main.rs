@@ -4,6 +4,7 @@
 //! and where it cannot go on says exactly what to type.
 
 mod board;
+mod counts;
 mod demo;
 mod deny;
 mod flash;
@@ -31,6 +32,8 @@ cargo xtask COMMAND
   setup                  only find or install what the commands need
   size [BOARD]           build the images and hold them to their flash and RAM budgets
   panics [BOARD]         build the images and prove that no tick can panic
+  counts [--write]       instructions of a tick on the emulated Cortex-M4F, beside their
+                         targets and the kept table; --write: keep these
   deny                   licences, bans, sources and advisories of dependencies
   flash BOARD            run an image on a real board with probe-rs
 
@@ -66,7 +69,8 @@ fn command() -> Result<ExitCode> {
                 .and_then(|r| demo::demo(&r))
                 .map(exit_code);
         }
-        "test" => test::test(quick(&mut words)?)?,
+        "test" => test::test(flag(&mut words, "quick")?)?,
+        "counts" => counts::counts(flag(&mut words, "write")?)?,
         "size" => test::check_sizes(&test::images(boards(&mut words)?)?)?,
         "panics" => test::check_panics(&test::images(boards(&mut words)?)?)?,
         "flash" => flash::flash(board::by_name(&words.value()?.string()?)?)?,
@@ -105,15 +109,16 @@ fn boards(words: &mut lexopt::Parser) -> Result<&'static [board::Board]> {
     }
 }
 
-fn quick(words: &mut lexopt::Parser) -> Result<bool> {
-    let mut quick = false;
+/// The one option that a command knows, given or not.
+fn flag(words: &mut lexopt::Parser, name: &str) -> Result<bool> {
+    let mut given = false;
     while let Some(word) = words.next()? {
         match word {
-            Long("quick") => quick = true,
+            Long(long) if long == name => given = true,
             other => return Err(other.unexpected().into()),
         }
     }
-    Ok(quick)
+    Ok(given)
 }
 
 /// `[FILE] [-- ARGS]`: what follows `--` is not looked at here.

@@ -7,7 +7,7 @@ use anyhow::Result;
 use crate::board::{BOARDS, Board};
 use crate::run::{cargo, run, timed};
 use crate::setup::{qemu, toolchain};
-use crate::{deny, image, panics, size};
+use crate::{counts, deny, image, panics, size};
 
 /// A board and the ELF of its image.
 pub(crate) type Image = (&'static Board, PathBuf);
@@ -20,6 +20,7 @@ pub(crate) fn test(quick: bool) -> Result<()> {
     let images = images(if quick { &BOARDS[..1] } else { &BOARDS })?;
     check_sizes(&images)?;
     check_panics(&images)?;
+    let counts = counts::image()?;
     if !quick {
         timed(
             "checking licences, bans and sources of dependencies",
@@ -30,7 +31,8 @@ pub(crate) fn test(quick: bool) -> Result<()> {
         let mut command = cargo();
         command
             .args(["test", "--workspace"])
-            .env("HAPTERRA_QEMU", qemu);
+            .env("HAPTERRA_QEMU", qemu)
+            .env(image::COUNTS_VARIABLE, &counts);
         for (board, path) in &images {
             command.env(board.elf_variable, path);
         }

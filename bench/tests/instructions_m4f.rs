@@ -1,0 +1,28 @@
+//! Instructions of single ticks on an emulated Cortex-M4F, beside the table that
+//! is kept and the targets that were set.
+//!
+//! Exact counts of the code that a board runs; no other load disturbs them.
+//! They are instructions, not cycles. `cargo xtask counts` builds the image and
+//! runs this; after a change that is meant, `cargo xtask counts --write`.
+
+mod m4f;
+
+use hapterra_tests::counting::CountingBoard;
+use m4f::table::{Row, Table};
+use m4f::{chain, contact};
+
+#[test]
+fn no_state_of_the_tick_costs_more_than_it_did() {
+    let Some(board) = CountingBoard::found() else {
+        return;
+    };
+    let mut rows = contact::rows(&board);
+    rows.extend(chain::rows(&board));
+    println!("{}", Row::TITLES);
+    rows.iter().for_each(|row| println!("{row}"));
+    if std::env::var_os("HAPTERRA_COUNTS").is_some_and(|what| what == "write") {
+        return Table::write(&rows);
+    }
+    let worse = Table::kept().worse(&rows);
+    assert!(worse.is_empty(), "{}", worse.join("\n"));
+}

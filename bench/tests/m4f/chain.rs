@@ -1,0 +1,155 @@
+//! The whole tick: encoder counts, pose, hand, contact, force, guard, torques,
+//! currents.
+
+use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
+use hapterra_bench::grid::Grid;
+use hapterra_bench::path::Dice;
+use hapterra_bench::state::{TICKS, terrain};
+use hapterra_core::contact::State;
+use hapterra_core::wire::message::{Scene, Source};
+use hapterra_tests::counting::CountingBoard;
+
+use super::contact::scene;
+use super::table::{Row, Target};
+
+/// Ticks on the way down, which do not count.
+const APPROACH: usize = 50;
+
+/// An arm over the middle of the terrain.
+struct Arm<'g> {
+    grid: &'g Grid,
+    model: PhantomModel,
+    placement: Placement,
+}
+
+/// All of them.
+pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
+    let grid = terrain();
+    let arm = Arm::over(&grid);
+    let mut dice = Dice(21);
+    let mut heading = 0.3_f64;
+    let mut at = [0.0, 0.0];
+    let mut slide = |speed: f64| {
+        heading += dice.between(-0.05, 0.05);
+        // Inside a hand's breadth: turned back at the border of it.
+        if f64::hypot(at[0], at[1]) > 40.0 {
+            heading = f64::atan2(-at[1], -at[0]);
+        }
+        at = [at[0] + speed * heading.cos(), at[1] + speed * heading.sin()];
+        at
+    };
+    let free: Vec<_> = (0..TICKS).map(|_| arm.counts(slide(0.05), 1.5)).collect();
+    let sliding: Vec<_> = (0..TICKS).map(|_| arm.counts(slide(0.05), -0.4)).collect();
+    let fast: Vec<_> = (0..TICKS).map(|_| arm.counts(slide(0.5), -0.4)).collect();
+    let rested = arm.counts([3.0, 4.0], -0.4);
+    let mut dice = Dice(22);
+    let mut tremble = || dice.between(-1.5, 1.5).round() as i32;
+    let resting = (0..TICKS).map(|_| rested.map(|count| count + tremble()));
+    let in_contact = Target {
+        median: Some(2500),
+        p99: Some(2500),
+        max: Some(10_000),
+    };
+    let in_the_air = Target {
+        median: None,
+        p99: None,
+        ..in_contact
+    };
+    vec![
+        arm.row(board, "chain, free", in_the_air, &free, State::Free),
+        arm.row(
+            board,
+            "chain, sliding",
+            in_contact,
+            &sliding,
+            State::Touching,
+        ),
+        arm.row(
+            board,
+            "chain, sliding fast",
+            in_contact,
+            &fast,
+            State::Touching,
+        ),
+        arm.row(
+            board,
+            "chain, resting",
+            in_contact,
+            &resting.collect::<Vec<_>>(),
+            State::Touching,
+        ),
+    ]
+}
+
+impl<'g> Arm<'g> {
+    fn over(grid: &'g Grid) -> Self {
+        let (x, y) = (0.5 * grid.columns as f64, 0.5 * grid.rows as f64);
+        Self {
+            grid,
+            model: PhantomModel::premium_1_5(),
+            placement: Placement {
+                home_mm: [x, y, grid.height(x, y).floor()],
+            },
+        }
+    }
+
+    /// What the encoders read with the tip `above` mm over the surface, `off` mm
+    /// from home.
+    fn counts(&self, off: [f64; 2], above: f64) -> [i32; 3] {
+        let home = self.placement.home_mm;
+        let (x, y) = (home[0] + off[0], home[1] + off[1]);
+        self.counts_at([x, y, self.grid.height(x, y) + above])
+    }
+
+    fn counts_at(&self, terrain_mm: [f64; 3]) -> [i32; 3] {
+        let device_m = self.placement.to_device_m(&self.model, terrain_mm);
+        let angles = kinematics::inverse(&self.model, device_m).expect("in reach");
+        let read = |axis: usize| Encoder::new(&self.model.drive[axis]).counts(angles[axis]);
+        [read(0), read(1), read(2)]
+    }
+
+    fn scene(&self) -> Scene {
+        let [x, y, z] = self.placement.home_mm;
+        let home = hapterra_bench::haptics::Hand::at([x, y, z]).grid;
+        Scene {
+            home,
+            source: Source::Encoders,
+            ..scene(self.grid)
+        }
+    }
+
+    /// Runs the counts, a way down to the first of them before, and counts the
+    /// ticks in which the proxy is in `state`: nearly all of them.
+    fn row(
+        &self,
+        board: &CountingBoard,
+        name: &str,
+        target: Target,
+        counts: &[[i32; 3]],
+        state: State,
+    ) -> Row {
+        let pose = |counts: &[i32; 3]| {
+            let angle = |axis: usize| Encoder::new(&self.model.drive[axis]).angle_rad(counts[axis]);
+            let tip = kinematics::tip(&self.model, [angle(0), angle(1), angle(2)]);
+            self.placement.to_terrain_mm(&self.model, tip)
+        };
+        let [x, y, z] = pose(&counts[0]);
+        let down = (0..APPROACH).map(|i| {
+            let above = 2.0 * (1.0 - i as f64 / APPROACH as f64);
+            self.counts_at([x, y, z + above])
+        });
+        let all: Vec<_> = down.chain(counts.iter().copied()).collect();
+        let post = |x: i32, y: i32| self.grid.post(x as usize, y as usize);
+        let ticks = board.chain(&self.scene(), &post, &all);
+        assert_eq!(ticks.len(), all.len());
+        let ticks = ticks.iter().skip(APPROACH);
+        let there = ticks.filter(|tick| tick.state == state as u32 && tick.settled);
+        let there: Vec<u32> = there.map(|tick| tick.instructions).collect();
+        assert!(
+            there.len() > counts.len() * 9 / 10,
+            "{name}: {}",
+            there.len()
+        );
+        Row::new(name, target, there)
+    }
+}

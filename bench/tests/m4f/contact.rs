@@ -1,0 +1,120 @@
+//! The states of the contact alone: the same ways of the hand as in the counts
+//! on the host, and the long sweeps.
+
+use hapterra_bench::grid::Grid;
+use hapterra_bench::haptics::Hand;
+use hapterra_bench::path;
+use hapterra_bench::state::{STATES, Step, TICKS, terrain};
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::terrain::TileKey;
+use hapterra_core::wire::message::{Scene, Source};
+use hapterra_tests::counting::{CountingBoard, Event, tiles};
+
+use super::table::{Row, Target};
+
+/// Targets by state.
+fn target(state: &str) -> Target {
+    let of = |median, p99| Target {
+        median,
+        p99,
+        max: Some(10_000),
+    };
+    match state {
+        "unmoved" => of(Some(80), None),
+        "free high" | "free low" => of(Some(200), None),
+        "sliding" => of(Some(900), Some(1500)),
+        _ => of(None, None),
+    }
+}
+
+/// All of them.
+pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
+    let grid = terrain();
+    let mut rows: Vec<Row> = STATES
+        .iter()
+        .map(|(state, make)| row(board, &grid, state, &make(&grid), tiles(size(&grid))))
+        .collect();
+    // As far as a device's window reaches.
+    let wide = Grid::fractal("512 × 512", [512, 512], 6, 1.0);
+    let sweeps = path::sweeps(&wide, "", 500.0, TICKS).expect("500 cells fit");
+    let sweeps: Vec<Step> = every(&sweeps.hands);
+    rows.push(row(
+        board,
+        &wide,
+        "sweep 500, miss",
+        &sweeps,
+        tiles(size(&wide)),
+    ));
+    // Farther than it reaches the tiles are not there: the way is held up.
+    let long = Grid::fractal("5120 × 64", [5120, 64], 6, 1.0);
+    let near = tiles([512, 64]);
+    rows.push(row(board, &long, "sweep 5000, held up", &far(&long), near));
+    rows
+}
+
+fn row(
+    board: &CountingBoard,
+    grid: &Grid,
+    state: &str,
+    steps: &[Step],
+    tiles: impl Iterator<Item = TileKey>,
+) -> Row {
+    let hands = steps.iter().map(|step| Event::Hand(step.hand.grid));
+    let events: Vec<Event> = tiles.map(Event::Tile).chain(hands).collect();
+    let post = |x: i32, y: i32| grid.post(x as usize, y as usize);
+    let ticks = board.contact(&scene(grid), 0, &post, &events);
+    assert_eq!(ticks.len(), steps.len());
+    let counted = steps.iter().zip(&ticks).filter(|(step, _)| step.counts);
+    let instructions = counted.map(|(_, tick)| tick.instructions).collect();
+    Row::new(state, target(state), instructions)
+}
+
+/// All but the first of them count.
+fn every(hands: &[Hand]) -> Vec<Step> {
+    let step = |(tick, hand): (usize, &Hand)| Step {
+        hand: *hand,
+        counts: tick > 0,
+    };
+    hands.iter().enumerate().map(step).collect()
+}
+
+/// Down at the western end, then 5,000 cells east at once, and back.
+fn far(grid: &Grid) -> Vec<Step> {
+    let sky = f64::from(grid.top()) + 2.0;
+    let mut dice = path::Dice(16);
+    let mut steps = Vec::new();
+    for _ in 0..TICKS / 8 {
+        let at = [dice.between(4.0, 60.0), dice.between(4.0, 60.0)];
+        let low = f64::from(grid.top()) - 0.5;
+        let mut step = |x: f64, z: f64, counts| {
+            let hand = Hand::at([x, at[1], z]);
+            steps.push(Step { hand, counts });
+        };
+        step(at[0], sky, false);
+        step(at[0], low, false);
+        step(at[0] + 5000.0, low, true);
+    }
+    steps
+}
+
+fn size(grid: &Grid) -> [i32; 2] {
+    [grid.columns as i32, grid.rows as i32]
+}
+
+/// A scene of points over the field.
+pub(crate) fn scene(grid: &Grid) -> Scene {
+    Scene {
+        epoch: 1,
+        level: 0,
+        size: size(grid),
+        top: grid.top().floor() as i32 + 1,
+        cell_mm: 1.0,
+        home: GridPoint::default(),
+        law: ForceLaw::PREMIUM,
+        rule: Rule::Swept,
+        source: Source::Points,
+        hold_clock: false,
+    }
+}

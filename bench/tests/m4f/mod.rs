@@ -1,0 +1,5 @@
+//! The parts of the count on the emulated Cortex-M4F.
+
+pub(crate) mod chain;
+pub(crate) mod contact;
+pub(crate) mod table;

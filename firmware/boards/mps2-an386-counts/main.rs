@@ -1,0 +1,143 @@
+//! Counts the instructions of single ticks on the emulated Cortex-M4F.
+//!
+//! Not a product: the same core, compiled in the same way, called in a loop over
+//! a walk that the host wrote, between two looks at a timer.
+//!
+//! ```text
+//! qemu-system-arm -M mps2-an386 -nographic -monitor none \
+//!     -icount shift=10,sleep=off -semihosting-config enable=on,target=native \
+//!     -kernel mps2-an386-counts
+//! ```
+//!
+//! An instruction takes 2¹⁰ ns of emulated time, a count of the 25 MHz timer
+//! 40 ns: 25.6 counts for each instruction, so every count of instructions is
+//! exact.
+//!
+//! In its working folder it finds, through semihosting:
+//! - `walk.frames`: [`ToDevice`] frames as on the link: a scene, then tiles and
+//!   points in the order of events. Fed by points, each is one
+//!   [`Contact::step`] in real time.
+//! - `counts.frames`, for a scene fed by encoders: [`Counts`] frames, each one
+//!   [`Haptics::tick`], count to current.
+//!
+//! and leaves `ticks.bin`: [`RECORD`] little-endian words a tick.
+#![no_std]
+#![no_main]
+
+mod bare;
+mod files;
+
+use core::hint::black_box;
+
+use cortex_m_rt::entry;
+use hapterra_core::contact::{Contact, Felt, Pace, Rule};
+use hapterra_core::grid::GridPoint;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::terrain::{Tile, Window};
+use hapterra_core::tick::{Command, Haptics, Outcome};
+use hapterra_core::wire::message::{Heights, Scene, Source, TileMessage, ToDevice};
+use hapterra_core::wire::plant::Counts;
+use static_cell::ConstStaticCell;
+
+use files::{Frames, Records};
+
+/// Tiles along the side of the window, as in the product's image.
+const WINDOW: usize = 16;
+/// Words of a record: timer counts, state, whether settled, work, three of the
+/// stretch or force, three of the proxy's cell, three of its fraction.
+pub(crate) const RECORD: usize = 13;
+
+static TILES: ConstStaticCell<[[Tile; WINDOW]; WINDOW]> =
+    ConstStaticCell::new([const { [const { Tile::VACANT }; WINDOW] }; WINDOW]);
+static SPARE: ConstStaticCell<Tile> = ConstStaticCell::new(Tile::VACANT);
+
+#[entry]
+fn main() -> ! {
+    let mut frames = Frames::open(c"walk.frames");
+    let Some(ToDevice::Scene(scene)) = frames.next() else {
+        panic!("the walk does not begin with a scene");
+    };
+    let mut records = Records::create(c"ticks.bin");
+    match scene.source {
+        Source::Points => contact(&scene, &mut frames, &mut records),
+        Source::Encoders => chain(&scene, &mut frames, &mut records),
+    }
+    records.flush();
+    semihosting::process::exit(0)
+}
+
+/// The contact alone: each point is one step.
+fn contact(scene: &Scene, frames: &mut Frames, records: &mut Records) {
+    let mut window = Window::new(TILES.take().each_mut().map(|row| row.each_mut()));
+    window.reset(scene.level, scene.size, scene.top);
+    let mut spare = SPARE.take();
+    let mut contact = Contact::new();
+    let timer = bare::timer();
+    while let Some(message) = frames.next() {
+        match message {
+            ToDevice::Tile(tile) => {
+                fill(spare, &tile);
+                spare = window.install(spare);
+            }
+            ToDevice::Point(point) => {
+                let hip = black_box(point.hip);
+                let (cost, felt) = timer.counted(|| step(&mut contact, &window, hip, scene.rule));
+                records.add(
+                    [cost, felt.state as u32, u32::from(felt.settled), felt.work],
+                    felt.stretch,
+                    &felt.proxy,
+                );
+            }
+            _ => panic!("a walk has tiles and points only"),
+        }
+    }
+}
+
+#[inline(never)]
+fn step(contact: &mut Contact, window: &Window<'_, WINDOW>, hip: GridPoint, rule: Rule) -> Felt {
+    contact.step(window, hip, rule, Pace::RealTime)
+}
+
+/// The whole tick, from encoder counts to motor currents.
+fn chain(scene: &Scene, frames: &mut Frames, records: &mut Records) {
+    let tiles = TILES.take().each_mut().map(|row| row.each_mut());
+    let mut haptics = Haptics::new(tiles, Calibration::PREMIUM_1_5);
+    let _ = haptics.accept(Command::Scene(*scene));
+    let mut spare = Some(SPARE.take());
+    while let Some(ToDevice::Tile(tile)) = frames.next() {
+        let buffer = spare.take().expect("every tile gives a buffer back");
+        fill(buffer, &tile);
+        spare = haptics.accept(Command::Tile(buffer));
+    }
+    let mut sensed = Frames::open(c"counts.frames");
+    let timer = bare::timer();
+    while let Some(Counts { counts, .. }) = sensed.next() {
+        let counts = black_box(counts);
+        let (cost, outcome) = timer.counted(|| tick(&mut haptics, counts));
+        let sample = &outcome.sample;
+        records.add(
+            [
+                cost,
+                sample.state as u32,
+                u32::from(outcome.drive.enabled),
+                sample.work,
+            ],
+            sample.force_n,
+            &sample.proxy,
+        );
+    }
+}
+
+#[inline(never)]
+fn tick(haptics: &mut Haptics<'static, WINDOW>, counts: [i32; 3]) -> Outcome {
+    haptics.tick(counts)
+}
+
+fn fill(tile: &mut Tile, message: &TileMessage<'_>) {
+    let filled = match message.heights {
+        Heights::Hole => tile.fill(message.key, 0, |_, _| f32::NAN),
+        Heights::Flat { base, height } => tile.fill(message.key, base, |_, _| height),
+        Heights::Samples { base, bytes } => tile.load(message.key, base, bytes),
+    };
+    filled.expect("the host made it well");
+}

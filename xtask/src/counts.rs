@@ -1,0 +1,34 @@
+//! `cargo xtask counts`: instructions of a tick on the emulated Cortex-M4F.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+
+use crate::image;
+use crate::run::{cargo, run, timed};
+use crate::setup::{qemu, toolchain};
+
+/// Prints the counts beside their targets and compares them with the kept
+/// table, or writes that anew.
+pub(crate) fn counts(write: bool) -> Result<()> {
+    let qemu = qemu::ready()?;
+    let image = image()?;
+    let mut command = cargo();
+    let words = ["--package", "hapterra-bench", "--test", "instructions_m4f"];
+    command
+        .arg("test")
+        .args(words)
+        .args(["--", "--nocapture"])
+        .env("HAPTERRA_QEMU", qemu)
+        .env(image::COUNTS_VARIABLE, image)
+        .env("HAPTERRA_COUNTS", if write { "write" } else { "" });
+    run(&mut command)
+}
+
+/// Builds the counting image.
+pub(crate) fn image() -> Result<PathBuf> {
+    let toolchain = toolchain::ready()?;
+    timed("building the counting image", || {
+        image::build_counts(toolchain)
+    })
+}
