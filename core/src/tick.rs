@@ -130,7 +130,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.guard.watch(counts);
         let pose = Pose::from_counts(&self.calibration, counts);
         let hip = self.place(scene, &pose);
-        let felt = self
+        let felt = *self
             .contact
             .step(&self.window, hip, scene.rule, Pace::RealTime);
         let wanted = scene.law.force_n(felt.stretch * scene.cell_mm);
@@ -153,7 +153,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         let Some(point) = self.point else {
             return self.outcome(GridPoint::default(), Felt::default(), Vec3::ZERO);
         };
-        let felt = self
+        let felt = *self
             .contact
             .step(&self.window, point.hip, scene.rule, Pace::LockStep);
         let force_n = scene.law.force_n(felt.stretch * scene.cell_mm);

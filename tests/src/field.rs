@@ -57,7 +57,7 @@ impl Felted {
     pub fn feel(&mut self, hip: [f64; 3]) -> Felt {
         let hip = point(hip);
         for _ in 0..10_000 {
-            let felt = self
+            let felt = *self
                 .contact
                 .step(&self.window, hip, self.rule, Pace::LockStep);
             if felt.settled {

@@ -62,8 +62,8 @@ pub(super) fn descend<const D: usize>(
     work: &mut Work,
 ) -> Descent {
     loop {
-        let patch = match hand.ground(window, spot.cell) {
-            Ground::Patch(corners) => Patch::new(corners),
+        let patch = match window.ground(spot.cell) {
+            Ground::Patch(corners) => hand.patch(&corners),
             Ground::Hole => return Descent::Lost(None),
             Ground::Missing => return Descent::Lost(Some(tile_of(spot.cell))),
         };
@@ -108,8 +108,8 @@ fn leaves<const D: usize>(window: &Window<'_, D>, hand: &Hand, spot: &Spot, patc
         return points_off(patch, spot, (east, north));
     }
     let entered = spot.across(shift);
-    match hand.ground(window, entered.cell) {
-        Ground::Patch(corners) => points_off(&Patch::new(corners), &entered, (east, north)),
+    match window.ground(entered.cell) {
+        Ground::Patch(corners) => points_off(&hand.patch(&corners), &entered, (east, north)),
         // At the border of the data the proxy is held; see `presence`.
         Ground::Hole | Ground::Missing => false,
     }
@@ -144,13 +144,13 @@ fn best_neighbour<const D: usize>(
     let (mut way, mut least) = (Way::None, here.distance_squared * TIE);
     for shift in neighbours(border) {
         let entry = spot.across(shift);
-        match hand.ground(window, entry.cell) {
+        match window.ground(entry.cell) {
             Ground::Hole => {}
             // It might be the better way: the proxy waits to know.
             Ground::Missing => return Way::Unknown(tile_of(entry.cell)),
             Ground::Patch(corners) => {
                 let there = nearest_downhill(
-                    &Patch::new(corners),
+                    &hand.patch(&corners),
                     hand.in_patch(entry.cell),
                     (entry.u, entry.v),
                 );

@@ -75,8 +75,8 @@ fn first_candidate<const D: usize>(
     let (view, hand) = (Hand::new(*low), Hand::new(*hip));
     for cell in cells_under(previous, hip).take(CANDIDATES as usize) {
         // One unit for eight cells: looking at a patch is that much cheaper.
-        match view.ground(window, cell) {
-            Ground::Patch(corners) if corners.iter().any(|h| *h > 0.0) => {
+        match window.ground(cell) {
+            Ground::Patch(corners) if view.is_below_any(&corners) => {
                 let (p, q) = hand.in_patch(cell);
                 return Ok(Some(Spot {
                     cell,
@@ -163,8 +163,8 @@ fn bounded_closest_point<const D: usize>(
     spot: &mut Spot,
     work: &mut Work,
 ) -> Result<Option<(Patch, f32)>, [i32; 2]> {
-    let patch = match hand.ground(window, spot.cell) {
-        Ground::Patch(corners) => Patch::new(corners),
+    let patch = match window.ground(spot.cell) {
+        Ground::Patch(corners) => hand.patch(&corners),
         Ground::Hole => return Ok(None),
         Ground::Missing => return Err(tile_of(spot.cell)),
     };
@@ -189,8 +189,8 @@ fn is_inside<const D: usize>(
             continue;
         }
         let over = spot.across(shift);
-        if let Ground::Patch(corners) = hand.ground(window, over.cell) {
-            normal += unit(Patch::new(corners).normal(over.u, over.v));
+        if let Ground::Patch(corners) = window.ground(over.cell) {
+            normal += unit(hand.patch(&corners).normal(over.u, over.v));
         }
     }
     hand.stretch(spot, patch).dot(normal) > 0.0

@@ -2,10 +2,12 @@
 
 use glam::Vec3;
 
-/// z(u, v) = `d + b·u + c·v + a·u·v` in cells above the hand, u and v in [0, 1].
+use crate::terrain::Altitude;
+
+/// z(u, v) = `d + b·u + c·v + a·u·v` in cells, u and v in [0, 1].
 ///
-/// The heights count from the haptic interface point's own height, so that no
-/// bit is spent on how high the terrain lies.
+/// Most often the heights count from the haptic interface point's own height,
+/// so that no bit is spent on how high the terrain lies ([`Self::seen_from`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Patch {
     /// Twist, eq. 2's A: how much the slope along u changes with v.
@@ -28,6 +30,17 @@ impl Patch {
             b: se - sw,
             c: nw - sw,
             d: sw,
+        }
+    }
+
+    /// The patch with its heights, which count from `base` whole cells, counted
+    /// from the altitude `from`.
+    #[must_use]
+    #[inline]
+    pub fn seen_from(self, from: Altitude, base: i32) -> Self {
+        Self {
+            d: from.up_to(base, self.d),
+            ..self
         }
     }
 

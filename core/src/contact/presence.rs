@@ -7,7 +7,6 @@
 //! table, without a kick and without being hooked back from underneath.
 
 use super::descent::tile_of;
-use super::spot::Hand;
 use crate::grid::GridPoint;
 use crate::terrain::{Ground, Window};
 
@@ -28,9 +27,8 @@ pub(super) struct Target {
 
 /// The target for a hand at `hip`.
 pub(super) fn target<const D: usize>(window: &Window<'_, D>, hip: &GridPoint) -> Target {
-    let hand = Hand::new(*hip);
     let mut missing = None;
-    let mut is_patch = |cell| match hand.ground(window, cell) {
+    let mut is_patch = |cell| match window.ground(cell) {
         Ground::Patch(_) => true,
         Ground::Hole => false,
         Ground::Missing => {

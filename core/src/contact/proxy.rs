@@ -5,24 +5,31 @@ use super::paper::{self, Verdict};
 use super::patch::Patch;
 use super::spot::{Hand, Spot};
 use super::sweep::Path;
+use super::track::Track;
 use super::work::Work;
 use super::{Felt, Pace, Rule, State, presence};
 use crate::grid::GridPoint;
-use crate::terrain::{Ground, Window};
+use crate::terrain::{Altitude, Box2, Ground, Window};
 
 // The path is most of a contact's state, and there is no heap to put it on.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
 pub(super) enum Phase {
     Waiting,
+    /// The last tick ended free, with the proxy in the hand.
     Free,
     Sweeping(Path),
-    Touching {
-        spot: Spot,
-        may_leave: bool,
-        /// The last hand's tick was done, and the proxy came to rest here.
-        rested: bool,
-    },
+    Touching(Touch),
+}
+
+/// A proxy on the surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Touch {
+    pub(super) spot: Spot,
+    pub(super) may_leave: bool,
+    /// Where the proxy came to rest in the last tick, and all of it was felt,
+    /// on a patch over which it can be followed.
+    pub(super) track: Option<Track>,
 }
 
 /// The proxy and what it remembers from tick to tick.
@@ -30,15 +37,17 @@ pub(super) enum Phase {
 pub struct Contact {
     pub(super) phase: Phase,
     pub(super) hip: GridPoint,
+    /// The window's revision in the last tick.
     revision: u32,
+    /// The window's revision for which the last answer is the answer again,
+    /// while the hand has not moved; zero for none.
+    answered: u32,
     pub(super) presence: f32,
     /// The proxy had to wait for terrain, so a force may not come at once.
     pub(super) late: bool,
     /// Squared distance at which the last unfinished descent of this same
     /// hand stopped.
     pub(super) reached: f32,
-    /// The same hand over the same tiles will give the same answer.
-    steady: bool,
     pub(super) last: Felt,
 }
 
@@ -56,10 +65,10 @@ impl Contact {
             phase: Phase::Waiting,
             hip: GridPoint::default(),
             revision: 0,
+            answered: 0,
             presence: 1.0,
             late: false,
             reached: f32::INFINITY,
-            steady: false,
             last: Felt::default(),
         }
     }
@@ -68,39 +77,89 @@ impl Contact {
     #[must_use]
     pub const fn patch(&self) -> Option<[i32; 2]> {
         match self.phase {
-            Phase::Touching { spot, .. } => Some(spot.cell),
+            Phase::Touching(touch) => Some(touch.spot.cell),
             _ => None,
         }
     }
 
     /// Moves the proxy for a hand at `hip`. Bounded work, finite output.
+    #[inline]
     pub fn step<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
         rule: Rule,
         pace: Pace,
-    ) -> Felt {
-        let moved = hip != self.hip;
-        if !moved && self.steady && self.revision == window.revision() {
+    ) -> &Felt {
+        let revision = window.revision();
+        if self.answered == revision && self.hip == hip {
             self.last.work = 0;
-            return self.last;
+        } else if rule == Rule::Swept && self.revision == revision && self.goes_on(window, &hip) {
+            self.hip = hip;
+            self.answered = revision;
+        } else {
+            self.feel_anew(window, hip, rule, pace);
         }
-        self.revision = window.revision();
+        &self.last
+    }
+
+    /// The two cases that nearly every tick is: free as before, or sliding
+    /// over the same patch. Writes the answer, or changes nothing.
+    #[inline]
+    fn goes_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
+        match &mut self.phase {
+            Phase::Free => {
+                let free = is_free(window, &self.hip, hip);
+                if free {
+                    self.last.proxy = *hip;
+                    self.last.work = 0;
+                }
+                free
+            }
+            Phase::Touching(touch) => {
+                let Some(track) = &mut touch.track else {
+                    return false;
+                };
+                if !track.is_under(window, hip.column()) {
+                    return false;
+                }
+                let Some(stretch) = track.follow(hip, &mut touch.spot) else {
+                    return false;
+                };
+                touch.may_leave = true;
+                self.last.proxy = Hand::new(*hip).point_at(&touch.spot, stretch.z);
+                self.last.stretch = stretch;
+                self.last.work = 1;
+                true
+            }
+            Phase::Waiting | Phase::Sweeping(_) => false,
+        }
+    }
+
+    /// The general case.
+    #[inline(never)]
+    fn feel_anew<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        rule: Rule,
+        pace: Pace,
+    ) {
         let mut work = Work::new();
+        self.revision = window.revision();
         let felt = match rule {
-            Rule::Swept => self.swept(window, hip, moved, pace, &mut work),
+            Rule::Swept => self.swept(window, hip, hip != self.hip, pace, &mut work),
             Rule::Paper => self.paper(window, hip, pace, &mut work),
         };
         if felt.settled || pace == Pace::RealTime || rule == Rule::Swept {
             self.hip = hip;
         }
-        self.steady = felt.settled && self.presence == 1.0;
+        let steady = felt.settled && self.presence == 1.0;
+        self.answered = if steady { self.revision } else { 0 };
         self.last = Felt {
             work: work.spent(),
             ..felt
         };
-        self.last
     }
 
     /// Waiting ends when the hand is above the patch it is over, or above
@@ -111,8 +170,8 @@ impl Contact {
         hip: GridPoint,
     ) -> bool {
         let hand = Hand::new(hip);
-        let above = match hand.ground(window, hip.column()) {
-            Ground::Patch(corners) => Patch::new(corners).height(hip.frac().x, hip.frac().y) < 0.0,
+        let above = match window.ground(hip.column()) {
+            Ground::Patch(corners) => hand.patch(&corners).height(hip.frac().x, hip.frac().y) < 0.0,
             Ground::Hole => hand.altitude().cell() >= window.top(),
             Ground::Missing => false,
         };
@@ -124,8 +183,7 @@ impl Contact {
     }
 
     pub(super) fn waits<const D: usize>(&self, window: &Window<'_, D>, hip: GridPoint) -> Felt {
-        let ground = Hand::new(hip).ground(window, hip.column());
-        let missing = matches!(ground, Ground::Missing);
+        let missing = matches!(window.ground(hip.column()), Ground::Missing);
         Felt {
             state: State::Waiting,
             proxy: hip,
@@ -210,7 +268,7 @@ impl Contact {
         work: &mut Work,
     ) -> Felt {
         let last = match self.phase {
-            Phase::Touching { spot, .. } => Some(spot),
+            Phase::Touching(touch) => Some(touch.spot),
             _ => None,
         };
         if matches!(self.phase, Phase::Waiting) && !self.sees_above(window, hip) {
@@ -222,11 +280,11 @@ impl Contact {
                 if last.is_none() {
                     self.presence = if self.late { 0.0 } else { 1.0 };
                 }
-                self.phase = Phase::Touching {
+                self.phase = Phase::Touching(Touch {
                     spot,
                     may_leave: true,
-                    rested: false,
-                };
+                    track: None,
+                });
                 self.touches(window, hip, (spot, patch), true, None, pace)
             }
             Verdict::HeldUp(tile) => {
@@ -239,4 +297,13 @@ impl Contact {
             }
         }
     }
+}
+
+/// Whether one look tells that the way of a free hand is free.
+#[inline]
+fn is_free<const D: usize>(window: &Window<'_, D>, from: &GridPoint, to: &GridPoint) -> bool {
+    let low = if from.is_below(to) { from } else { to };
+    let low = Altitude::new(low.cell()[2], low.frac().z);
+    low.cell() >= window.top()
+        || window.is_clear_nearby(Box2::around(from.column(), to.column()), low)
 }

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::patch::Patch;
 use crate::grid::GridPoint;
-use crate::terrain::{Altitude, Ground, Window};
+use crate::terrain::{Altitude, Corners};
 
 /// A point on the surface, its height left to the patch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,6 +56,7 @@ impl Hand {
         Self { point }
     }
 
+    #[inline]
     pub(super) fn altitude(&self) -> Altitude {
         Altitude::new(self.point.cell()[2], self.point.frac().z)
     }
@@ -67,13 +68,20 @@ impl Hand {
         (local.x, local.y)
     }
 
-    /// What lies in `cell`, with heights counted from the hand.
+    /// The patch of these corners, with heights counted from the hand.
     #[inline]
-    pub(super) fn ground<const D: usize>(&self, window: &Window<'_, D>, cell: [i32; 2]) -> Ground {
-        window.ground(cell, self.altitude())
+    pub(super) fn patch(&self, corners: &Corners) -> Patch {
+        Patch::new(corners.heights).seen_from(self.altitude(), corners.base)
+    }
+
+    /// Whether any of these corners is above the hand.
+    pub(super) fn is_below_any(&self, corners: &Corners) -> bool {
+        let up = |height: &f32| self.altitude().up_to(corners.base, *height);
+        corners.heights.iter().any(|height| up(height) > 0.0)
     }
 
     /// The point of the surface at `spot`, `z` cells above the hand.
+    #[inline]
     pub(super) fn point_at(&self, spot: &Spot, z: f32) -> GridPoint {
         let up = self.point.cell()[2];
         let [x, y] = spot.cell;

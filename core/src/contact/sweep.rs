@@ -12,7 +12,6 @@ use heapless::Vec;
 
 use super::crossing::{first_crossing, next_crossing};
 use super::descent::tile_of;
-use super::patch::Patch;
 use super::spot::{Hand, Spot};
 use super::work::Work;
 use crate::grid::GridPoint;
@@ -125,8 +124,8 @@ impl Path {
             if !work.take() {
                 return Some(Sweep::Unfinished);
             }
-            let patch = match view.ground(window, step.cell) {
-                Ground::Patch(corners) => Patch::new(corners),
+            let patch = match window.ground(step.cell) {
+                Ground::Patch(corners) => view.patch(&corners),
                 Ground::Missing => return Some(Sweep::HeldUp(tile_of(step.cell))),
                 Ground::Hole => {
                     over_hole = true;

@@ -1,11 +1,10 @@
 //! The swept rule: continuous in the air, downhill on the surface.
 
 use super::descent::{Descent, descend};
-use super::patch::Patch;
-use super::proxy::{Contact, Phase};
+use super::proxy::{Contact, Phase, Touch};
 use super::spot::{Hand, Spot};
 use super::sweep::{Path, Sweep};
-use super::track::follow;
+use super::track::Track;
 use super::work::Work;
 use super::{Felt, Pace, State};
 use crate::grid::GridPoint;
@@ -34,7 +33,7 @@ impl Contact {
             let ended = match &mut self.phase {
                 Phase::Waiting | Phase::Free => self.fly(window, hip, pace, work),
                 Phase::Sweeping(_) => self.sweep(window, hip, pace, work),
-                Phase::Touching { .. } => self.touch(window, hip, pace, work),
+                Phase::Touching(_) => self.touch(window, hip, pace, work),
             };
             if let Some(felt) = ended {
                 return felt;
@@ -46,7 +45,7 @@ impl Contact {
     fn redirect(&mut self, hip: GridPoint) {
         match &mut self.phase {
             Phase::Sweeping(path) => *path = Path::through_air(path.at(), hip),
-            Phase::Touching { may_leave, .. } => *may_leave = true,
+            Phase::Touching(touch) => touch.may_leave = true,
             Phase::Waiting | Phase::Free => {}
         }
     }
@@ -109,11 +108,11 @@ impl Contact {
             }
             Sweep::Hit { spot, progress } => {
                 self.presence = if self.late { 0.0 } else { 1.0 };
-                self.phase = Phase::Touching {
+                self.phase = Phase::Touching(Touch {
                     spot,
                     may_leave: progress,
-                    rested: false,
-                };
+                    track: None,
+                });
                 return None;
             }
             Sweep::HeldUp(tile) => Some(tile),
@@ -135,31 +134,13 @@ impl Contact {
         pace: Pace,
         work: &mut Work,
     ) -> Option<Felt> {
-        let Phase::Touching {
-            spot,
-            may_leave,
-            rested,
-        } = self.phase
+        let Phase::Touching(Touch {
+            spot, may_leave, ..
+        }) = self.phase
         else {
             return None;
         };
         let hand = Hand::new(hip);
-        // A repeated tick starts where the first one did, or it would not end
-        // on the same bits.
-        if rested && let Some((next, patch)) = follow(window, &hand, spot, may_leave, work) {
-            self.phase = Phase::Touching {
-                spot: next,
-                may_leave,
-                rested,
-            };
-            let felt = self.touches(window, hip, (next, patch), true, None, pace);
-            if !felt.settled
-                && let Phase::Touching { spot: kept, .. } = &mut self.phase
-            {
-                *kept = spot;
-            }
-            return Some(felt);
-        }
         let mut resume = None;
         let mut held_up_by = None;
         let mut settled = true;
@@ -194,16 +175,29 @@ impl Contact {
                 (spot, patch)
             }
         };
-        self.phase = Phase::Touching {
+        self.phase = Phase::Touching(Touch {
             spot: resume.unwrap_or(spot),
             may_leave,
-            rested: settled,
-        };
+            track: None,
+        });
         let felt = self.touches(window, hip, (spot, patch), settled, held_up_by, pace);
-        if let Phase::Touching { rested, .. } = &mut self.phase {
-            *rested = felt.settled;
+        if felt.settled && self.presence == 1.0 {
+            self.lay_track(window, hip.column());
         }
         Some(felt)
+    }
+
+    /// Remembers the patch of a proxy at rest for the ticks to come.
+    fn lay_track<const D: usize>(&mut self, window: &Window<'_, D>, over: [i32; 2]) {
+        let Phase::Touching(touch) = &mut self.phase else {
+            return;
+        };
+        // At the very border of a hole the presence is 1, too.
+        let is_over_patch =
+            touch.spot.cell == over || matches!(window.ground(over), Ground::Patch(_));
+        if is_over_patch && let Ground::Patch(corners) = window.ground(touch.spot.cell) {
+            touch.track = Track::new(&corners, over);
+        }
     }
 
     fn point_on<const D: usize>(
@@ -212,9 +206,9 @@ impl Contact {
         hand: &Hand,
         spot: &Spot,
     ) -> GridPoint {
-        match hand.ground(window, spot.cell) {
+        match window.ground(spot.cell) {
             Ground::Patch(corners) => {
-                hand.point_at(spot, Patch::new(corners).height(spot.u, spot.v))
+                hand.point_at(spot, hand.patch(&corners).height(spot.u, spot.v))
             }
             // `descend` has just stood on it.
             Ground::Hole | Ground::Missing => self.last.proxy,

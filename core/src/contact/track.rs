@@ -1,169 +1,178 @@
-//! The proxy's way when the hand has hardly moved: the patch's closest point
-//! by Newton's method in both variables, from the last one.
+//! The proxy's way when the hand has hardly moved: the closest point of the
+//! patch it rests on, by Newton's method in both variables.
 //!
-//! Nearly every tick in contact is of this kind. It is left to the general
-//! search as soon as anything is not plain: a border of the patch in reach, a
-//! steep or strongly twisted patch, a long way, a proxy that may leave. What
-//! is answered here is the minimum that the general search would end at: the
-//! Hessian stays positive definite over a way too short for it to change, so
-//! the distance is convex there and has one minimum.
+//! Nearly every tick in contact is of this kind. What is answered here is the
+//! point that the general search ([`super::descent`]) would come to rest at;
+//! as soon as that is not plain, the general search decides.
+//!
+//! While a·z is small the squared distance is convex between the last proxy
+//! and the new one, so there is one minimum to be found there and it does not
+//! matter where the search starts. A hand close under the surface starts it at
+//! the point above itself: ticks then do not wait for one another's results,
+//! and the first step has a closed form.
+
+use glam::Vec3;
 
 use super::patch::Patch;
 use super::spot::{Hand, Spot};
-use super::work::Work;
-use crate::terrain::{Ground, Window};
+use crate::grid::GridPoint;
+use crate::terrain::{Corners, Ground, Window};
 
-/// Slopes and twist at most, cells a cell: what the rounding of the height
-/// then costs is below 1e-6 cell.
-const GENTLE: f32 = 4.0;
-/// First step at most, cells.
-const SHORT: f32 = 1.0 / 16.0;
-/// Newton's error after a step s that followed a step r is about s³/r²: each
-/// step's relative error is the square of the one's before. Cells.
-const LEFT: f32 = 1e-8;
-/// A first step of a length whose square is below [`LEFT`] by a wide margin is
-/// the last; taken for the step before the first.
-const BEFORE: f32 = 4.6e-3;
-/// Steps at most: quadratic convergence needs no more.
+/// |a| + |b| + |c| at most, cells a cell: what the rounding of the height then
+/// costs is below 1e-6 cell.
+const GENTLE: f32 = 6.0;
+/// A hand starts the search while its depth times the slope is below this.
+const SHALLOW: f32 = 0.25;
+/// Error that may be left, cells.
+const LEFT: f32 = 5e-8;
+/// Newton steps at most, after the start.
 const STEPS: u32 = 4;
+/// Largest |a·z|: the Hessian's eigenvalues are then ½ at least.
+const CONVEX: f32 = 0.5;
 /// Distance from the patch's border below which the general search decides.
 const BORDER: f32 = 1e-6;
 
-/// A closest point inside a patch.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Tracked {
-    /// Eastward coordinate in the patch.
-    u: f32,
-    /// Northward coordinate in the patch.
-    v: f32,
+/// A patch that a proxy rests on and may be followed over.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Track {
+    /// Heights above `base` cells.
+    patch: Patch,
+    base: i32,
+    /// |a| + |b| + |c|: no two points of the patch differ by more in height.
+    steepest: f32,
+    /// Change of the Hessian, at most, for a step of a cell: Newton's error
+    /// after a step s is `bend`·s² at most.
+    bend: f32,
+    /// How far, in steps, a way downhill may swing out.
+    swing: f32,
+    /// A column known to hold a patch, for the hand to be over.
+    over: [i32; 2],
 }
 
-/// The proxy's next place on the patch it is on, when that is plain to tell:
-/// where [`super::descent::descend`] would come to rest.
-#[inline]
-pub(super) fn follow<const D: usize>(
-    window: &Window<'_, D>,
-    hand: &Hand,
-    spot: Spot,
-    may_leave: bool,
-    work: &mut Work,
-) -> Option<(Spot, Patch)> {
-    let Ground::Patch(corners) = hand.ground(window, spot.cell) else {
-        return None;
-    };
-    let patch = Patch::new(corners);
-    let start = (spot.u, spot.v);
-    let Tracked { u, v } = track(&patch, hand.in_patch(spot.cell), start, may_leave)?;
-    work.take().then_some((Spot { u, v, ..spot }, patch))
-}
-
-/// Follows the closest point from (u, v) for a hand at (p, q), both in patch
-/// coordinates; `None` where it takes the general search to tell.
-///
-/// With `may_leave`, a hand that is above the tangent plane of either end is
-/// one of those cases.
-#[inline]
-fn track(
-    patch: &Patch,
-    (p, q): (f32, f32),
-    (mut u, mut v): (f32, f32),
-    may_leave: bool,
-) -> Option<Tracked> {
-    let steepest = patch.a.abs().max(patch.b.abs()).max(patch.c.abs());
-    if !(steepest <= GENTLE && is_inside(u) && is_inside(v)) {
-        return None;
+impl Track {
+    /// The patch of these corners, for a hand over `over`; `None` if it is too
+    /// steep.
+    pub(super) fn new(corners: &Corners, over: [i32; 2]) -> Option<Self> {
+        let patch = Patch::new(corners.heights);
+        let steepest = patch.a.abs() + patch.b.abs() + patch.c.abs();
+        if !(steepest <= GENTLE) {
+            return None;
+        }
+        Some(Self {
+            patch,
+            base: corners.base,
+            steepest,
+            // The rows of the Hessian's derivative are 2a(zv, …) and 2a(zu, zu + zv).
+            bend: 6.0 * patch.a.abs() * steepest,
+            // A sublevel set around a minimum, of a function whose curvature
+            // lies between ½ and L, is √(2L) times as wide as it is narrow.
+            swing: 2.0 * libm::sqrtf(1.5 + 2.0 * steepest * steepest),
+            over,
+        })
     }
-    let mut before = BEFORE;
-    let mut longest = SHORT;
-    for _ in 0..STEPS {
-        let (zu, zv) = (patch.slope_u(v), patch.slope_v(u));
+
+    /// Whether a patch lies under a hand in `column`, so that the force needs
+    /// no fading.
+    #[inline]
+    pub(super) fn is_under<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        column: [i32; 2],
+    ) -> bool {
+        if self.over == column {
+            return true;
+        }
+        let there = matches!(window.ground(column), Ground::Patch(_));
+        if there {
+            self.over = column;
+        }
+        there
+    }
+
+    /// Moves the spot to the closest point for a hand at `hip`, and tells how
+    /// far it is from the hand; `None`, and the spot as it was, where it takes
+    /// the general search to tell.
+    #[inline]
+    pub(super) fn follow(&self, hip: &GridPoint, spot: &mut Spot) -> Option<Vec3> {
+        let hand = Hand::new(*hip);
+        let patch = self.patch.seen_from(hand.altitude(), self.base);
+        let (p, q) = hand.in_patch(spot.cell);
+        let above = patch.height(p, q);
+        // How high the tangent plane in the spot passes over the hand.
+        if !(above >= patch.a * ((p - spot.u) * (q - spot.v))) {
+            return None;
+        }
+        let (u, v) = self.closest(&patch, (p, q), above, (spot.u, spot.v))?;
         let z = patch.height(u, v);
-        let (east, north) = (p - u, q - v);
-        if may_leave && z + (zu * east + zv * north) < 0.0 {
+        let moved = (u - spot.u).abs().max((v - spot.v).abs());
+        let reach = (self.swing * moved).min(1.0);
+        let convex = patch.a.abs() * (z + self.steepest * reach) <= CONVEX;
+        if !(is_inside(u) && is_inside(v) && z >= 0.0 && convex) {
             return None;
         }
-        // Half the gradient and the Hessian of the squared distance (eq. 8-11).
-        let (gu, gv) = (z * zu - east, z * zv - north);
-        let (uu, vv) = (1.0 + zu * zu, 1.0 + zv * zv);
-        let uv = zu * zv + z * patch.a;
-        let det = uu * vv - uv * uv;
-        // Without the twist it would be 1 + zu² + zv².
-        if det < 0.5 * (uu + zv * zv) {
-            return None;
-        }
-        let scale = 1.0 / det;
-        let (du, dv) = ((gv * uv - gu * vv) * scale, (gu * uv - gv * uu) * scale);
-        (u, v) = (u + du, v + dv);
-        let step = du.abs().max(dv.abs());
-        if !(step <= longest && is_inside(u) && is_inside(v)) {
-            return None;
-        }
-        if step * step * step <= LEFT * before * before {
-            return Some(Tracked { u, v });
-        }
-        (before, longest) = (step, step);
+        (spot.u, spot.v) = (u, v);
+        Some(Vec3::new(u - p, v - q, z))
     }
-    None
+
+    /// Newton's method for the closest point, from above the hand at `(p, q)`
+    /// or from `last`.
+    #[inline]
+    fn closest(
+        &self,
+        patch: &Patch,
+        (p, q): (f32, f32),
+        above: f32,
+        last: (f32, f32),
+    ) -> Option<(f32, f32)> {
+        let (mut u, mut v) = last;
+        let mut step = f32::INFINITY;
+        if above * self.steepest <= SHALLOW {
+            let (du, dv) = from_above(patch, (p, q), above);
+            (u, v) = (p + du, q + dv);
+            step = du.abs().max(dv.abs());
+        }
+        for _ in 0..STEPS {
+            if self.bend * (step * step) <= LEFT {
+                return Some((u, v));
+            }
+            let (du, dv) = newton(patch, (p - u, q - v), (u, v));
+            (u, v) = (u + du, v + dv);
+            step = du.abs().max(dv.abs());
+        }
+        None
+    }
 }
 
+/// The first step, from the point above the hand: [`newton`] without the terms
+/// that are zero there.
+#[inline]
+fn from_above(patch: &Patch, (p, q): (f32, f32), z: f32) -> (f32, f32) {
+    let (zu, zv) = (patch.slope_u(q), patch.slope_v(p));
+    let za = patch.a * z;
+    let det = (1.0 + zu * zu) + (zv * zv - za * (za + 2.0 * (zu * zv)));
+    let down = -z / det;
+    ((zu - zv * za) * down, (zv - zu * za) * down)
+}
+
+/// One step of Newton's method (eq. 8-11) from (u, v), for a hand `(east,
+/// north)` of there.
+#[inline]
+fn newton(patch: &Patch, (east, north): (f32, f32), (u, v): (f32, f32)) -> (f32, f32) {
+    let (zu, zv) = (patch.slope_u(v), patch.slope_v(u));
+    let z = (patch.d + patch.b * u) + zv * v;
+    // Half the gradient and the Hessian of the squared distance.
+    let (gu, gv) = (z * zu - east, z * zv - north);
+    let (uu, vv) = (1.0 + zu * zu, 1.0 + zv * zv);
+    let uv = zu * zv + patch.a * z;
+    let scale = 1.0 / (uu * vv - uv * uv);
+    ((gv * uv - gu * vv) * scale, (gu * uv - gv * uu) * scale)
+}
+
+#[inline]
 fn is_inside(x: f32) -> bool {
     x > BORDER && x < 1.0 - BORDER
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::closest::nearest_downhill;
-    use super::super::dice::Dice;
-    use super::*;
-
-    /// Patches up to a slope, hands within a tenth of a cell under the last
-    /// answer's own hand, and what both ways of solving say.
-    fn agree(slope: f64, bound: f32) -> [u32; 2] {
-        let mut dice = Dice(41);
-        let mut seen = [0; 2];
-        for _ in 0..20_000 {
-            let depth = dice.between(0.01, 1.0);
-            let corners = core::array::from_fn(|_| (depth + dice.between(0.0, slope)) as f32);
-            let patch = Patch::new(corners);
-            let place = |dice: &mut Dice| dice.between(0.0, 1.0) as f32;
-            let hand = (place(&mut dice), place(&mut dice));
-            let start = nearest_downhill(&patch, hand, hand);
-            let moved = |x: f32, dice: &mut Dice| x + dice.between(-0.05, 0.05) as f32;
-            let next = (moved(hand.0, &mut dice), moved(hand.1, &mut dice));
-            let tracked = track(&patch, next, (start.u, start.v), false);
-            seen[usize::from(tracked.is_some())] += 1;
-            let Some(tracked) = tracked else { continue };
-            let general = nearest_downhill(&patch, next, (start.u, start.v));
-            let off = (tracked.u - general.u)
-                .abs()
-                .max((tracked.v - general.v).abs());
-            assert!(off <= bound, "{patch:?} {next:?} {tracked:?} {general:?}");
-        }
-        seen
-    }
-
-    #[test]
-    fn ends_where_the_general_search_ends() {
-        let [_, gentle] = agree(0.3, 5e-7);
-        let [left, steep] = agree(2.0, 1.5e-6);
-        assert!(gentle > 8000 && steep > 1000 && left > 1000);
-    }
-
-    #[test]
-    fn leaves_what_is_not_plain_to_the_general_search() {
-        let flat = Patch::new([0.1; 4]);
-        let inside = (0.5, 0.5);
-        assert!(track(&flat, (0.51, 0.5), inside, true).is_some());
-        assert_eq!(track(&flat, (1.01, 0.5), (0.99, 0.5), true), None);
-        assert_eq!(track(&flat, (0.7, 0.5), inside, true), None);
-        let above = Patch::new([-0.1; 4]);
-        assert_eq!(track(&above, (0.51, 0.5), inside, true), None);
-        let steep = Patch::new([0.0, 9.0, 0.0, 9.0]);
-        assert_eq!(track(&steep, (0.51, 0.5), inside, true), None);
-        // Twisted so far above the hand that the middle is a saddle.
-        let saddle = Patch::new([3.0, 5.0, 5.0, 3.0]);
-        assert_eq!(track(&saddle, (0.5, 0.5), inside, true), None);
-        let nothing = Patch::new([f32::NAN; 4]);
-        assert_eq!(track(&nothing, (0.51, 0.5), inside, true), None);
-    }
-}
+#[path = "track_tests.rs"]
+mod tests;

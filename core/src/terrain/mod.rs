@@ -10,4 +10,4 @@ mod window;
 pub use ceiling::{Altitude, Box2};
 pub use pull::{Focus, HORIZON_TICKS, IN_FLIGHT, MARGIN_CELLS, Puller, RETRY_TICKS};
 pub use tile::{BadTile, POSTS, TILE_CELLS, TILE_SHIFT, Tile, TileKey};
-pub use window::{Ground, Window};
+pub use window::{Corners, Ground, Window};

@@ -6,13 +6,21 @@ use super::tile::{BLOCK_SHIFT, TILE_SHIFT, Tile, TileKey};
 /// What lies in a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ground {
-    /// A patch: its corner heights (south-west, south-east, north-west,
-    /// north-east) in cells above the altitude asked from.
-    Patch([f32; 4]),
+    /// A patch.
+    Patch(Corners),
     /// No surface: no data, or outside the field.
     Hole,
     /// The tile is not here yet.
     Missing,
+}
+
+/// The corners of a patch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Corners {
+    /// Whole height, in cells, that the corner heights count from.
+    pub base: i32,
+    /// South-west, south-east, north-west, north-east, cells above the base.
+    pub heights: [f32; 4],
 }
 
 /// `D × D` tiles; tile `(col, row)` always lives in slot `(col mod D, row mod D)`.
@@ -54,7 +62,7 @@ impl<'t, const D: usize> Window<'t, D> {
         self.level = level;
         self.size = size;
         self.top = top;
-        self.revision = self.revision.wrapping_add(1);
+        self.revise();
     }
 
     /// Puts `tile` in its slot and gives back the buffer that was there; gives
@@ -68,7 +76,7 @@ impl<'t, const D: usize> Window<'t, D> {
         let slot = &mut self.slots[wrap::<D>(key.row)][wrap::<D>(key.col)];
         let spent = core::mem::replace(slot, tile);
         self.renew_maxima(key, top);
-        self.revision = self.revision.wrapping_add(1);
+        self.revise();
         spent
     }
 
@@ -90,7 +98,7 @@ impl<'t, const D: usize> Window<'t, D> {
         self.top
     }
 
-    /// Changes whenever what the window holds does.
+    /// Changes whenever what the window holds does. Never zero.
     #[must_use]
     pub const fn revision(&self) -> u32 {
         self.revision
@@ -102,27 +110,25 @@ impl<'t, const D: usize> Window<'t, D> {
         self.slots[wrap::<D>(key.row)][wrap::<D>(key.col)].key()
     }
 
-    /// What lies in `cell`, with heights as seen from the altitude `from`.
+    /// What lies in `cell`.
     #[must_use]
     #[inline]
-    pub fn ground(&self, cell: [i32; 2], from: Altitude) -> Ground {
+    pub fn ground(&self, cell: [i32; 2]) -> Ground {
         if !self.has_cell(cell) {
             return Ground::Hole;
         }
         let Some(tile) = self.held(cell[0] >> TILE_SHIFT, cell[1] >> TILE_SHIFT) else {
             return Ground::Missing;
         };
-        let [sw, se, nw, ne] = tile.corners(cell[0], cell[1]);
+        let heights = tile.corners(cell[0], cell[1]);
+        let [sw, se, nw, ne] = heights;
         if (sw + se + nw + ne).is_nan() {
             return Ground::Hole;
         }
-        let base = tile.base();
-        Ground::Patch([
-            from.up_to(base, sw),
-            from.up_to(base, se),
-            from.up_to(base, nw),
-            from.up_to(base, ne),
-        ])
+        Ground::Patch(Corners {
+            base: tile.base(),
+            heights,
+        })
     }
 
     /// Whether everything in the box is known to lie below `low`.
@@ -133,6 +139,24 @@ impl<'t, const D: usize> Window<'t, D> {
     #[inline]
     pub fn is_clear(&self, span: Box2, low: Altitude) -> bool {
         low.cell() >= self.top || self.box_is_clear(span.clipped(self.size), low)
+    }
+
+    /// Whether all samples around a box of two patches a side at most are
+    /// known to lie below `low`: the nine samples themselves are looked at.
+    ///
+    /// `false` also where the box is larger, or not all in one tile of the
+    /// field.
+    #[must_use]
+    #[inline]
+    pub fn is_clear_nearby(&self, span: Box2, low: Altitude) -> bool {
+        let Box2 { from, to } = span;
+        let tile_of = |cell: [i32; 2]| cell.map(|c| c >> TILE_SHIFT);
+        let small = (to[0] - from[0]) | (to[1] - from[1]) <= 1;
+        if !small || tile_of(from) != tile_of(to) || !self.has_cell(from) {
+            return false;
+        }
+        self.held(from[0] >> TILE_SHIFT, from[1] >> TILE_SHIFT)
+            .is_some_and(|tile| low.up_to(tile.base(), tile.highest_around(from, to)) < 0.0)
     }
 
     fn box_is_clear(&self, span: Box2, low: Altitude) -> bool {
@@ -173,6 +197,10 @@ impl<'t, const D: usize> Window<'t, D> {
         } else {
             i32::MAX
         }
+    }
+
+    fn revise(&mut self) {
+        self.revision = self.revision.wrapping_add(1).max(1);
     }
 
     fn renew_maxima(&mut self, key: TileKey, top: i32) {
@@ -228,28 +256,18 @@ mod tests {
         field.hold_around([100, 70]);
         for cell in [[100, 70], [95, 63], [96, 64], [127, 95], [64, 32]] {
             let [x, y] = cell;
-            assert_eq!(
-                field.window.ground(cell, Altitude::new(0, 0.0)),
-                Ground::Patch([
-                    rough(x, y),
-                    rough(x + 1, y),
-                    rough(x, y + 1),
-                    rough(x + 1, y + 1)
-                ])
-            );
+            let heights = [
+                rough(x, y),
+                rough(x + 1, y),
+                rough(x, y + 1),
+                rough(x + 1, y + 1),
+            ];
+            let corners = Corners { base: 0, heights };
+            assert_eq!(field.window.ground(cell), Ground::Patch(corners));
         }
-        assert_eq!(
-            field.window.ground([-1, 0], Altitude::new(0, 0.0)),
-            Ground::Hole
-        );
-        assert_eq!(
-            field.window.ground([640, 9], Altitude::new(0, 0.0)),
-            Ground::Hole
-        );
-        assert_eq!(
-            field.window.ground([600, 9], Altitude::new(0, 0.0)),
-            Ground::Missing
-        );
+        assert_eq!(field.window.ground([-1, 0]), Ground::Hole);
+        assert_eq!(field.window.ground([640, 9]), Ground::Hole);
+        assert_eq!(field.window.ground([600, 9]), Ground::Missing);
     }
 
     #[test]
