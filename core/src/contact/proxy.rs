@@ -27,15 +27,16 @@ pub(super) enum Phase {
 pub(super) struct Touch {
     pub(super) spot: Spot,
     pub(super) may_leave: bool,
-    /// Where the proxy came to rest in the last tick, and all of it was felt,
-    /// on a patch over which it can be followed.
-    pub(super) track: Option<Track>,
 }
 
 /// The proxy and what it remembers from tick to tick.
 #[derive(Clone, Debug)]
 pub struct Contact {
     pub(super) phase: Phase,
+    /// Only while touching: the patch on which the proxy came to rest in the
+    /// last tick, with nothing left to do and no fading, where it can be
+    /// followed.
+    pub(super) track: Option<Track>,
     pub(super) hip: GridPoint,
     /// The window's revision in the last tick.
     revision: u32,
@@ -43,7 +44,8 @@ pub struct Contact {
     /// while the hand has not moved; zero for none.
     answered: u32,
     pub(super) presence: f32,
-    /// The proxy had to wait for terrain, so a force may not come at once.
+    /// A free proxy had to wait, for terrain or for work: the force of the next
+    /// contact may not come at once.
     pub(super) late: bool,
     /// Squared distance at which the last unfinished descent of this same
     /// hand stopped.
@@ -63,6 +65,7 @@ impl Contact {
     pub fn new() -> Self {
         Self {
             phase: Phase::Waiting,
+            track: None,
             hip: GridPoint::default(),
             revision: 0,
             answered: 0,
@@ -91,49 +94,74 @@ impl Contact {
         rule: Rule,
         pace: Pace,
     ) -> &Felt {
-        let revision = window.revision();
-        if self.answered == revision && self.hip == hip {
+        if self.answered == window.revision() && self.hip == hip {
             self.last.work = 0;
-        } else if rule == Rule::Swept && self.revision == revision && self.goes_on(window, &hip) {
-            self.hip = hip;
-            self.answered = revision;
-        } else {
+        } else if !(rule == Rule::Swept && self.goes_on(window, &hip)) {
             self.feel_anew(window, hip, rule, pace);
         }
         &self.last
     }
 
-    /// The two cases that nearly every tick is: free as before, or sliding
-    /// over the same patch. Writes the answer, or changes nothing.
+    /// The two cases that nearly every tick is: sliding on over the same patch,
+    /// or free as before. Answers, or changes nothing.
     #[inline]
     fn goes_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
-        match &mut self.phase {
-            Phase::Free => {
-                let free = is_free(window, &self.hip, hip);
-                if free {
-                    self.last.proxy = *hip;
-                    self.last.work = 0;
-                }
-                free
-            }
-            Phase::Touching(touch) => {
-                let Some(track) = &mut touch.track else {
-                    return false;
-                };
-                if !track.is_under(window, hip.column()) {
-                    return false;
-                }
-                let Some(stretch) = track.follow(hip, &mut touch.spot) else {
-                    return false;
-                };
-                touch.may_leave = true;
-                self.last.proxy = Hand::new(*hip).point_at(&touch.spot, stretch.z);
-                self.last.stretch = stretch;
-                self.last.work = 1;
-                true
-            }
-            Phase::Waiting | Phase::Sweeping(_) => false,
+        if self.revision != window.revision() {
+            return false;
         }
+        if self.track.is_some() {
+            self.slides_on(window, hip)
+        } else {
+            matches!(self.phase, Phase::Free) && self.flies_on(window, hip)
+        }
+    }
+
+    /// The last answer was "free".
+    #[inline(never)]
+    fn flies_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
+        let low = if self.hip.is_below(hip) {
+            &self.hip
+        } else {
+            hip
+        };
+        let low = Altitude::new(low.cell()[2], low.frac().z);
+        let free = low.cell() >= window.top()
+            || window.is_clear_nearby(Box2::around(self.hip.column(), hip.column()), low);
+        if free {
+            self.last.proxy = *hip;
+            self.last.work = 0;
+            self.answers(hip);
+        }
+        free
+    }
+
+    /// The last answer was "touching", and all of it was felt.
+    #[inline(never)]
+    fn slides_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
+        let (Phase::Touching(touch), Some(track)) = (&mut self.phase, &mut self.track) else {
+            return false;
+        };
+        if !track.is_under(window, hip.column()) {
+            return false;
+        }
+        let Some(stretch) = track.follow(hip, &mut touch.spot) else {
+            return false;
+        };
+        touch.may_leave = true;
+        let [_, _, up] = hip.cell();
+        let [x, y] = touch.spot.cell;
+        let height = hip.frac().z + stretch.z;
+        self.last.proxy = GridPoint::over([x, y, up], [touch.spot.u, touch.spot.v], height);
+        self.last.stretch = stretch;
+        self.last.work = 1;
+        self.answers(hip);
+        true
+    }
+
+    #[inline]
+    fn answers(&mut self, hip: &GridPoint) {
+        self.hip = *hip;
+        self.answered = self.revision;
     }
 
     /// The general case.
@@ -147,6 +175,7 @@ impl Contact {
     ) {
         let mut work = Work::new();
         self.revision = window.revision();
+        self.track = None;
         let felt = match rule {
             Rule::Swept => self.swept(window, hip, hip != self.hip, pace, &mut work),
             Rule::Paper => self.paper(window, hip, pace, &mut work),
@@ -196,6 +225,7 @@ impl Contact {
     pub(super) fn flies(&mut self, hip: GridPoint) -> Felt {
         self.phase = Phase::Free;
         self.late = false;
+        self.presence = 1.0;
         Felt {
             state: State::Free,
             proxy: hip,
@@ -277,18 +307,17 @@ impl Contact {
         match paper::update(window, last, &self.hip, &hip, work) {
             Verdict::Free => self.flies(hip),
             Verdict::Contact(spot, patch) => {
-                if last.is_none() {
-                    self.presence = if self.late { 0.0 } else { 1.0 };
+                if core::mem::take(&mut self.late) {
+                    self.presence = 0.0;
                 }
                 self.phase = Phase::Touching(Touch {
                     spot,
                     may_leave: true,
-                    track: None,
                 });
                 self.touches(window, hip, (spot, patch), true, None, pace)
             }
             Verdict::HeldUp(tile) => {
-                self.late |= pace == Pace::RealTime;
+                self.late |= last.is_none() && pace == Pace::RealTime;
                 Felt {
                     settled: false,
                     held_up_by: Some(tile),
@@ -297,13 +326,4 @@ impl Contact {
             }
         }
     }
-}
-
-/// Whether one look tells that the way of a free hand is free.
-#[inline]
-fn is_free<const D: usize>(window: &Window<'_, D>, from: &GridPoint, to: &GridPoint) -> bool {
-    let low = if from.is_below(to) { from } else { to };
-    let low = Altitude::new(low.cell()[2], low.frac().z);
-    low.cell() >= window.top()
-        || window.is_clear_nearby(Box2::around(from.column(), to.column()), low)
 }

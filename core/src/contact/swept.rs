@@ -107,11 +107,13 @@ impl Contact {
                 return Some(self.waits(window, hip));
             }
             Sweep::Hit { spot, progress } => {
-                self.presence = if self.late { 0.0 } else { 1.0 };
+                // A hop from the surface to the surface keeps what it had.
+                if core::mem::take(&mut self.late) {
+                    self.presence = 0.0;
+                }
                 self.phase = Phase::Touching(Touch {
                     spot,
                     may_leave: progress,
-                    track: None,
                 });
                 return None;
             }
@@ -134,10 +136,7 @@ impl Contact {
         pace: Pace,
         work: &mut Work,
     ) -> Option<Felt> {
-        let Phase::Touching(Touch {
-            spot, may_leave, ..
-        }) = self.phase
-        else {
+        let Phase::Touching(Touch { spot, may_leave }) = self.phase else {
             return None;
         };
         let hand = Hand::new(hip);
@@ -178,7 +177,6 @@ impl Contact {
         self.phase = Phase::Touching(Touch {
             spot: resume.unwrap_or(spot),
             may_leave,
-            track: None,
         });
         let felt = self.touches(window, hip, (spot, patch), settled, held_up_by, pace);
         if felt.settled && self.presence == 1.0 {
@@ -196,7 +194,7 @@ impl Contact {
         let is_over_patch =
             touch.spot.cell == over || matches!(window.ground(over), Ground::Patch(_));
         if is_over_patch && let Ground::Patch(corners) = window.ground(touch.spot.cell) {
-            touch.track = Track::new(&corners, over);
+            self.track = Track::new(&corners, over);
         }
     }
 

@@ -11,6 +11,9 @@
 //! the point above itself: ticks then do not wait for one another's results,
 //! and the first step has a closed form.
 
+// `!(a <= b)` is how what is not a number is left to the general search, too.
+#![allow(clippy::neg_cmp_op_on_partial_ord)]
+
 use glam::Vec3;
 
 use super::patch::Patch;
@@ -104,11 +107,15 @@ impl Track {
         }
         let (u, v) = self.closest(&patch, (p, q), above, (spot.u, spot.v))?;
         let z = patch.height(u, v);
-        let moved = (u - spot.u).abs().max((v - spot.v).abs());
-        let reach = (self.swing * moved).min(1.0);
-        let convex = patch.a.abs() * (z + self.steepest * reach) <= CONVEX;
-        if !(is_inside(u) && is_inside(v) && z >= 0.0 && convex) {
+        if !(z >= 0.0 && is_inside(u) && is_inside(v)) {
             return None;
+        }
+        if !(patch.a.abs() * (z + self.steepest) <= CONVEX) {
+            let moved = (u - spot.u).abs().max((v - spot.v).abs());
+            let reach = self.steepest * (self.swing * moved);
+            if !(patch.a.abs() * (z + reach) <= CONVEX) {
+                return None;
+            }
         }
         (spot.u, spot.v) = (u, v);
         Some(Vec3::new(u - p, v - q, z))
@@ -125,21 +132,27 @@ impl Track {
         last: (f32, f32),
     ) -> Option<(f32, f32)> {
         let (mut u, mut v) = last;
-        let mut step = f32::INFINITY;
         if above * self.steepest <= SHALLOW {
-            let (du, dv) = from_above(patch, (p, q), above);
-            (u, v) = (p + du, q + dv);
-            step = du.abs().max(dv.abs());
-        }
-        for _ in 0..STEPS {
-            if self.bend * (step * step) <= LEFT {
+            let step = from_above(patch, (p, q), above);
+            (u, v) = (p + step.0, q + step.1);
+            if self.is_last(step) {
                 return Some((u, v));
             }
-            let (du, dv) = newton(patch, (p - u, q - v), (u, v));
-            (u, v) = (u + du, v + dv);
-            step = du.abs().max(dv.abs());
+        }
+        for _ in 0..STEPS {
+            let step = newton(patch, (p - u, q - v), (u, v));
+            (u, v) = (u + step.0, v + step.1);
+            if self.is_last(step) {
+                return Some((u, v));
+            }
         }
         None
+    }
+
+    /// Whether the error left after this step is negligible.
+    #[inline]
+    fn is_last(&self, (du, dv): (f32, f32)) -> bool {
+        self.bend * (du * du + dv * dv) <= LEFT
     }
 }
 
