@@ -11,13 +11,17 @@
 //! - [`replay`]: a trajectory felt in lock-step, and recordings;
 //! - [`live`]: a hand in a session, and what it felt in numbers;
 //! - [`picture`]: what was felt, as PNG files;
+//! - [`board`]: boards, probes, and images onto chips;
+//! - [`output`]: files that appear only when they are complete;
 //! - [`cli`]: the `hapterra` command, one file a subcommand.
 
 #![forbid(unsafe_code)]
 
+pub mod board;
 pub mod cli;
 pub mod link;
 pub mod live;
+pub mod output;
 pub mod phantom;
 pub mod picture;
 pub mod raster;

@@ -35,6 +35,7 @@ cargo xtask COMMAND
   counts [--write]       instructions of a tick on the emulated Cortex-M4F, beside their
                          targets and the kept table; --write: keep these
   deny                   licences, bans, sources and advisories of dependencies
+  image BOARD            build an image and print where its ELF is
   flash BOARD            run an image on a real board with probe-rs
 
   HAPTERRA_TOOLCHAIN=rustup|distribution  builds the images only with this one
@@ -73,6 +74,12 @@ fn command() -> Result<ExitCode> {
         "counts" => counts::counts(flag(&mut words, "write")?)?,
         "size" => test::check_sizes(&test::images(boards(&mut words)?)?)?,
         "panics" => test::check_panics(&test::images(boards(&mut words)?)?)?,
+        "image" => {
+            let board = board::by_name(&words.value()?.string()?)?;
+            for (_, path) in test::images(std::slice::from_ref(board))? {
+                println!("{}", path.display());
+            }
+        }
         "flash" => flash::flash(board::by_name(&words.value()?.string()?)?)?,
         plain => {
             if let Some(extra) = words.next()? {

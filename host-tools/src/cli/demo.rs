@@ -15,9 +15,10 @@ use crate::link::{
     Emulator, Event, HostClock, LinkError, Native, Patience, Session, Transport, serve_plant,
 };
 use crate::live::{Figures, Stage, StageError, suggest};
+use crate::output::Output;
 use crate::phantom::Rig;
 use crate::raster::Raster;
-use crate::replay::{Output, Record, Recording, state_name};
+use crate::replay::{Record, Recording, state_name};
 use crate::synth::{Kind, Synth};
 use crate::terrain::Scale;
 

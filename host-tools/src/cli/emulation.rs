@@ -67,7 +67,13 @@ pub(super) fn explain_emulator(error: EmulatorError) -> Failure {
 
 /// Adds what to do next.
 pub(super) fn explain_link(error: LinkError) -> Failure {
-    let hint = match &error {
+    let hint = link_hint(&error);
+    Failure::new(error).hint(hint)
+}
+
+/// What to do next about a link.
+pub(super) fn link_hint(error: &LinkError) -> &'static str {
+    match error {
         LinkError::Absent { looked_for, .. } if looked_for.contains("USB") => {
             "plug the board in, check its cable and that you may open it (on Linux a udev rule); or try --device native"
         }
@@ -82,6 +88,5 @@ pub(super) fn explain_link(error: LinkError) -> Failure {
         LinkError::SceneRefused | LinkError::Stuck(_) => {
             "this should not happen: please report it with the file and the options"
         }
-    };
-    Failure::new(error).hint(hint)
+    }
 }

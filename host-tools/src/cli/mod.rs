@@ -6,9 +6,11 @@ pub mod demo;
 pub mod emulation;
 pub mod failure;
 pub mod feel;
+pub mod flash;
 pub mod info;
 pub mod input;
 mod interrupt;
+pub mod list;
 pub mod replay;
 mod report;
 pub mod run;
@@ -47,6 +49,10 @@ pub enum Command {
     Demo(demo::Args),
     /// Feel a trajectory tick by tick and write what was felt
     Replay(replay::Args),
+    /// Show boards, debug probes and ports that can be seen from here
+    List(list::Args),
+    /// Write an image to a board through its debug probe
+    Flash(flash::Args),
     /// Measure run time against error, beside other ways to render a height field
     Bench(bench::Args),
 }
@@ -62,6 +68,8 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::List(args) => list::run(&args),
+        Command::Flash(args) => flash::run(&args),
         Command::Bench(args) => bench::run(&args),
     };
     match outcome {

@@ -19,8 +19,9 @@ use crate::link::{
     serve_plant,
 };
 use crate::live::{Figures, Stage, Timeline};
+use crate::output::{Output, OutputError};
 use crate::phantom::Rig;
-use crate::replay::{Output, OutputError, Record, Recording, state_name};
+use crate::replay::{Record, Recording, state_name};
 
 /// Between two tries to find a device that is gone.
 const RETRY: Duration = Duration::from_millis(500);

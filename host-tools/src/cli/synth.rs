@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::ValueHint;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::Failure;
 use super::input::parse_size;
+use super::{Failure, interrupt};
 use crate::synth::{Grid, Kind, Synth, WriteError, write};
 
 /// Arguments of `hapterra synth`.
@@ -55,7 +55,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         cell_m: args.cell_m,
     };
     let progress = rows_bar(rows);
-    let written = write(&args.output, &synth, &grid, &mut || progress.inc(1));
+    interrupt::listen();
+    let written = write(&args.output, &synth, &grid, &mut || {
+        progress.inc(1);
+        !interrupt::requested()
+    });
     progress.finish_and_clear();
     written.map_err(|error| {
         let hint = hint(&error);
@@ -83,9 +87,11 @@ fn parse_length(text: &str) -> Result<f64, String> {
 
 fn hint(error: &WriteError) -> &'static str {
     match error {
-        WriteError::Io { .. } => {
+        WriteError::Output(_) => {
             "check that the folder exists and has room, and that you may write there"
         }
+        WriteError::NoRoom { .. } => "make it smaller with --size, or name a file on a larger disk",
+        WriteError::Interrupted => "nothing was written",
         WriteError::UnknownExtension { .. } => "name the output .tif for a GeoTIFF",
         WriteError::TooHighForPng { .. } => "lower --amplitude, or write a .tif",
         WriteError::Encoder { .. } => "make it smaller with --size",

@@ -13,6 +13,7 @@
 mod client;
 mod emulator;
 mod error;
+mod inquiry;
 mod native;
 mod plant;
 mod session;
@@ -26,10 +27,13 @@ pub use emulator::{
     Emulator, EmulatorError, IMAGE_VARIABLE, INSTRUCTIONS_PER_COUNT, Lines, QEMU, QEMU_VARIABLE,
 };
 pub use error::LinkError;
+pub use inquiry::ask_who;
 pub use native::{HostClock, Native};
 pub use plant::{PlantLine, serve_plant};
 pub use session::{Patience, Session};
 pub use tally::Tally;
 pub use target::Target;
+pub(crate) use target::tcp_address;
 pub use transport::{Tcp, Transport};
 pub use usb::Usb;
+pub(crate) use usb::usb_devices;

@@ -31,13 +31,43 @@ impl Usb {
     /// # Errors
     /// [`LinkError::Absent`] says what was looked for and what is there.
     pub fn connect() -> Result<Self, LinkError> {
-        let found = devices();
-        let Some(info) = found.iter().find(|info| is_hapterra(info)) else {
-            return Err(absent(match found.len() {
+        let (found, looked_at) = Self::list();
+        match found.first() {
+            Some(info) => Self::open(info),
+            None => Err(absent(match looked_at {
                 0 => "no USB devices at all are visible here".into(),
                 n => format!("{n} USB devices, none of them a hapterra board"),
-            }));
-        };
+            })),
+        }
+    }
+
+    /// The boards on USB, and how many USB devices there are in all.
+    #[must_use]
+    pub fn list() -> (Vec<nusb::DeviceInfo>, usize) {
+        let devices = usb_devices();
+        let count = devices.len();
+        (devices.into_iter().filter(is_hapterra).collect(), count)
+    }
+
+    /// What is looked for, in words.
+    #[must_use]
+    pub fn looked_for() -> String {
+        format!("a hapterra board on USB ({VENDOR_ID:04x}:{PRODUCT_ID:04x})")
+    }
+
+    /// Where a board is plugged in, and its serial number.
+    #[must_use]
+    pub fn place(info: &nusb::DeviceInfo) -> String {
+        let (bus, address) = (info.bus_id(), info.device_address());
+        let serial = info.serial_number().unwrap_or("no serial number");
+        format!("bus {bus} device {address}, {serial}")
+    }
+
+    /// Opens a board.
+    ///
+    /// # Errors
+    /// [`LinkError::Absent`] says why not.
+    pub fn open(info: &nusb::DeviceInfo) -> Result<Self, LinkError> {
         let cannot = |error: nusb::Error| absent(format!("found it, but cannot open it: {error}"));
         let device = info.open().wait().map_err(cannot)?;
         let number = info
@@ -84,7 +114,7 @@ impl Transport for Usb {
 }
 
 /// All USB devices; none where the system has no USB to list.
-fn devices() -> Vec<nusb::DeviceInfo> {
+pub(crate) fn usb_devices() -> Vec<nusb::DeviceInfo> {
     match nusb::list_devices().wait() {
         Ok(devices) => devices.collect(),
         Err(error) => {
@@ -104,7 +134,7 @@ fn is_hapterra(info: &nusb::DeviceInfo) -> bool {
 
 fn absent(why: String) -> LinkError {
     LinkError::Absent {
-        looked_for: format!("a hapterra board on USB ({VENDOR_ID:04x}:{PRODUCT_ID:04x})"),
+        looked_for: Usb::looked_for(),
         why,
     }
 }

@@ -7,12 +7,10 @@
 //! the result depends on nothing but the terrain, the law and the trajectory.
 
 mod felt;
-mod output;
 mod recording;
 mod trajectory;
 
 pub use felt::Replayer;
-pub use output::{Output, OutputError};
 pub use recording::{Record, Recording};
 pub use trajectory::{Row, Trajectory, TrajectoryError};
 
@@ -22,6 +20,7 @@ use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 
 use crate::link::{LinkError, Native, Patience, Transport};
+use crate::output::{Output, OutputError};
 use crate::terrain::Terrain;
 
 /// Why a replay did not come to its end. Nothing is left at the output's path.

@@ -6,7 +6,8 @@ use std::io::Write;
 use hapterra_core::contact::State;
 use hapterra_core::wire::message::Sample;
 
-use super::{Output, OutputError, Row};
+use super::Row;
+use crate::output::{Output, OutputError};
 use crate::terrain::Scale;
 
 /// The columns of every recording; more may follow.

@@ -3,8 +3,10 @@
 
 mod hash;
 mod kinds;
+mod room;
 mod write;
 
+pub use room::NoRoom;
 pub use write::{Grid, WriteError, write};
 
 use crate::raster::{Fault, Raster};

@@ -1,8 +1,7 @@
 //! Files that GIS programs open, written a few rows at a time, so that a terrain
 //! may be larger than memory.
 
-use std::fs::File;
-use std::io::{BufWriter, Seek, Write};
+use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
 
 use tiff::TiffError;
@@ -10,6 +9,8 @@ use tiff::encoder::{TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard, colort
 use tiff::tags::Tag;
 
 use super::Synth;
+use super::room::{self, NoRoom};
+use crate::output::{Output, OutputError};
 
 /// How much of a terrain is written, and how large it is on the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,13 +27,19 @@ pub struct Grid {
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The file could not be created or filled.
-    #[error("cannot write {}: {cause}", path.display())]
-    Io {
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// It would not fit.
+    #[error("cannot write {}: {lack}", path.display())]
+    NoRoom {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
-        cause: std::io::Error,
+        /// What is needed and what is free.
+        lack: NoRoom,
     },
+    /// The caller did not want to go on.
+    #[error("interrupted")]
+    Interrupted,
     /// The extension names no format that is written.
     #[error("cannot write {}: its extension is none of .tif, .asc, .png", path.display())]
     UnknownExtension {
@@ -57,54 +64,86 @@ pub enum WriteError {
 
 /// Writes a terrain in the format of the path's extension: `.tif` (GeoTIFF, float32,
 /// metres, BigTIFF when it has to be), `.asc` (Esri ASCII) or `.png` (16-bit grey,
-/// whole metres). `row_done` is called once a row.
+/// whole metres). The file appears when it is complete. `go_on` is asked once a row
+/// whether to.
 ///
 /// # Errors
-/// When the extension, the file or the heights do not allow it.
+/// When the extension, the free space, the file or the heights do not allow it.
+/// Nothing is left of what was written.
 pub fn write(
     path: &Path,
     synth: &Synth,
     grid: &Grid,
-    row_done: &mut dyn FnMut(),
+    go_on: &mut dyn FnMut() -> bool,
 ) -> Result<(), WriteError> {
-    let extension = path
-        .extension()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_lowercase();
-    let writer: fn(&mut Sink<'_>) -> Result<(), Stop> = match extension.as_str() {
-        "tif" | "tiff" => write_geotiff,
-        "asc" => write_asc,
-        "png" => write_png,
-        _ => {
-            return Err(WriteError::UnknownExtension {
-                path: path.to_path_buf(),
-            });
-        }
+    let format = Format::of(path).ok_or_else(|| WriteError::UnknownExtension {
+        path: path.to_path_buf(),
+    })?;
+    room::check(path, format, synth, grid).map_err(|lack| WriteError::NoRoom {
+        path: path.to_path_buf(),
+        lack,
+    })?;
+    let mut sink = Sink {
+        out: Output::create(path)?,
+        synth,
+        grid,
+        go_on,
     };
-    let written = File::create(path).map_err(Stop::Io).and_then(|file| {
-        let mut sink = Sink {
-            out: BufWriter::with_capacity(1 << 20, file),
-            synth,
-            grid,
-            row_done,
-        };
-        writer(&mut sink)?;
-        sink.out.flush().map_err(Stop::Io)
-    });
-    written.map_err(|stop| stop.at(path))
+    let written = match format {
+        Format::GeoTiff => write_geotiff(&mut sink),
+        Format::EsriAscii => write_asc(&mut sink),
+        Format::Png => write_png(&mut sink),
+    };
+    written.map_err(|stop| stop.at(path))?;
+    Ok(sink.out.finish()?)
+}
+
+/// What a terrain is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Format {
+    GeoTiff,
+    EsriAscii,
+    Png,
+}
+
+impl Format {
+    /// By the path's extension.
+    fn of(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_string_lossy().to_lowercase();
+        match extension.as_str() {
+            "tif" | "tiff" => Some(Self::GeoTiff),
+            "asc" => Some(Self::EsriAscii),
+            "png" => Some(Self::Png),
+            _ => None,
+        }
+    }
 }
 
 /// Where the rows go, and what makes them.
 struct Sink<'a> {
-    out: BufWriter<File>,
+    out: Output,
     synth: &'a Synth,
     grid: &'a Grid,
-    row_done: &'a mut dyn FnMut(),
+    go_on: &'a mut dyn FnMut() -> bool,
+}
+
+impl Sink<'_> {
+    fn row_done(&mut self) -> Result<(), Stop> {
+        row_done(self.go_on)
+    }
+}
+
+fn row_done(go_on: &mut dyn FnMut() -> bool) -> Result<(), Stop> {
+    if go_on() {
+        Ok(())
+    } else {
+        Err(Stop::Interrupted)
+    }
 }
 
 /// Why writing stopped.
 enum Stop {
+    Interrupted,
     Io(std::io::Error),
     TooHigh(f32),
     Encoder(String),
@@ -114,7 +153,8 @@ impl Stop {
     fn at(self, path: &Path) -> WriteError {
         let path = path.to_path_buf();
         match self {
-            Self::Io(cause) => WriteError::Io { path, cause },
+            Self::Interrupted => WriteError::Interrupted,
+            Self::Io(source) => OutputError { path, source }.into(),
             Self::TooHigh(height) => WriteError::TooHighForPng { height },
             Self::Encoder(cause) => WriteError::Encoder { path, cause },
         }
@@ -146,7 +186,7 @@ impl From<png::EncodingError> for Stop {
 }
 
 /// Appends a row's heights; rows are counted from the south.
-fn append_row(synth: &Synth, columns: u32, row: u32, heights: &mut Vec<f32>) {
+pub(super) fn append_row(synth: &Synth, columns: u32, row: u32, heights: &mut Vec<f32>) {
     heights.extend((0..columns).map(|column| synth.height(column, row)));
 }
 
@@ -181,7 +221,7 @@ fn write_tiff_kind<K: TiffKind>(sink: &mut Sink<'_>) -> Result<(), Stop> {
         strip.clear();
         for row in (south..north).rev() {
             append_row(sink.synth, columns, row, &mut strip);
-            (sink.row_done)();
+            row_done(sink.go_on)?;
         }
         image.write_strip(&strip)?;
         north = south;
@@ -231,14 +271,19 @@ fn write_asc(sink: &mut Sink<'_>) -> Result<(), Stop> {
     for row in (0..rows).rev() {
         heights.clear();
         append_row(sink.synth, columns, row, &mut heights);
-        for (column, height) in heights.iter().enumerate() {
-            let separator = if column == 0 { "" } else { " " };
-            write!(sink.out, "{separator}{height}")?;
-        }
-        writeln!(sink.out)?;
-        (sink.row_done)();
+        write_asc_row(&mut sink.out, &heights)?;
+        sink.row_done()?;
     }
     Ok(())
+}
+
+/// One row as text.
+pub(super) fn write_asc_row(out: &mut dyn Write, heights: &[f32]) -> std::io::Result<()> {
+    for (column, height) in heights.iter().enumerate() {
+        let separator = if column == 0 { "" } else { " " };
+        write!(out, "{separator}{height}")?;
+    }
+    writeln!(out)
 }
 
 fn write_png(sink: &mut Sink<'_>) -> Result<(), Stop> {
@@ -262,7 +307,7 @@ fn write_png(sink: &mut Sink<'_>) -> Result<(), Stop> {
             bytes.extend((whole as u16).to_be_bytes());
         }
         stream.write_all(&bytes)?;
-        (sink.row_done)();
+        row_done(sink.go_on)?;
     }
     stream.finish()?;
     writer.finish()?;

@@ -1,0 +1,172 @@
+//! An image onto a chip, through a debug probe.
+
+use probe_rs::Permissions;
+use probe_rs::flashing::{DownloadOptions, FlashError as WriteError, FlashProgress, ProgressEvent};
+use probe_rs::probe::list::{Accessibility, Lister};
+use probe_rs::probe::{DebugProbeError, DebugProbeInfo, DebugProbeSelector};
+
+use super::Image;
+
+/// An image was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Flashed {
+    /// The probe that was used.
+    pub probe: String,
+    /// Bytes written, and read back to compare.
+    pub bytes: usize,
+}
+
+/// How far it is: bytes done of bytes to do, in the phase at hand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Bytes done.
+    pub done: u64,
+    /// Bytes to do.
+    pub of: u64,
+}
+
+/// Why an image could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum FlashError {
+    /// No probe at all.
+    #[error("no debug probe: looked for ST-LINK, CMSIS-DAP, J-Link and other probes on USB")]
+    NoProbe,
+    /// None with this name.
+    #[error("no debug probe is {wanted}: there is {}", there.join(", "))]
+    NoSuchProbe {
+        /// What was asked for.
+        wanted: String,
+        /// What there is.
+        there: Vec<String>,
+    },
+    /// Several, and none was named.
+    #[error("several debug probes: {}", .0.join(", "))]
+    ManyProbes(Vec<String>),
+    /// The user may not open it.
+    #[error("the debug probe {0} is there, but this user may not open it")]
+    Forbidden(String),
+    /// The name of a probe is not one.
+    #[error("{0} does not name a probe")]
+    Selector(String),
+    /// The probe does not open.
+    #[error("the debug probe {name} does not open")]
+    Probe {
+        /// The probe.
+        name: String,
+        /// Why.
+        #[source]
+        source: DebugProbeError,
+    },
+    /// The chip does not answer.
+    #[error("{chip} does not answer at the debug probe {name}")]
+    Chip {
+        /// The probe.
+        name: String,
+        /// The chip.
+        chip: String,
+        /// Why.
+        #[source]
+        source: Box<probe_rs::Error>,
+    },
+    /// The chip would not take the image.
+    #[error("{chip} did not take the image")]
+    Write {
+        /// The chip.
+        chip: String,
+        /// Why.
+        #[source]
+        source: Box<WriteError>,
+    },
+}
+
+/// Writes an image, compares what is in the chip then, and starts it. The chip is
+/// held in reset first, so that its pins let go of the amplifiers.
+///
+/// # Errors
+/// [`FlashError`].
+pub fn flash(
+    image: &Image,
+    probe: Option<&str>,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Flashed, FlashError> {
+    let lister = Lister::new();
+    let info = choose(&lister, probe)?;
+    let name = name(&info);
+    let opened = info.open().map_err(|source| FlashError::Probe {
+        name: name.clone(),
+        source,
+    })?;
+    let chip = image.target.name.clone();
+    let unanswered = |source: probe_rs::Error| FlashError::Chip {
+        name: name.clone(),
+        chip: chip.clone(),
+        source: Box::new(source),
+    };
+    let mut session = opened
+        .attach_under_reset(image.target.clone(), Permissions::default())
+        .map_err(unanswered)?;
+    let refused = |source: WriteError| FlashError::Write {
+        chip: chip.clone(),
+        source: Box::new(source),
+    };
+    let mut loader = image.target.flash_loader();
+    for part in &image.parts {
+        loader
+            .add_data(part.address, &part.bytes)
+            .map_err(refused)?;
+    }
+    let mut options = DownloadOptions::default();
+    options.verify = true;
+    options.progress = FlashProgress::new(phases(progress));
+    loader.commit(&mut session, options).map_err(refused)?;
+    let started = session.core(0).and_then(|mut core| core.reset());
+    started.map_err(unanswered)?;
+    Ok(Flashed {
+        probe: name,
+        bytes: image.parts.iter().map(|part| part.bytes.len()).sum(),
+    })
+}
+
+fn choose(lister: &Lister, wanted: Option<&str>) -> Result<DebugProbeInfo, FlashError> {
+    let selector = wanted.map(|text| {
+        text.parse::<DebugProbeSelector>()
+            .map_err(|_| FlashError::Selector(text.to_owned()))
+    });
+    let selector = selector.transpose()?;
+    let here = lister.list_all_with_access();
+    let names = || here.iter().map(|item| name(&item.info)).collect::<Vec<_>>();
+    let fits = |info: &DebugProbeInfo| selector.as_ref().is_none_or(|s| s.matches_probe(info));
+    let mut chosen = here.iter().filter(|item| fits(&item.info));
+    match (chosen.next(), chosen.next(), wanted) {
+        _ if here.is_empty() => Err(FlashError::NoProbe),
+        (None, _, wanted) => Err(FlashError::NoSuchProbe {
+            wanted: wanted.unwrap_or_default().to_owned(),
+            there: names(),
+        }),
+        (Some(_), Some(_), _) => Err(FlashError::ManyProbes(names())),
+        (Some(item), None, _) if item.accessibility == Accessibility::PermissionDenied => {
+            Err(FlashError::Forbidden(name(&item.info)))
+        }
+        (Some(item), None, _) => Ok(item.info.clone()),
+    }
+}
+
+fn name(info: &DebugProbeInfo) -> String {
+    let serial = info.serial_number.as_deref();
+    let serial = serial.map_or(String::new(), |serial| format!(":{serial}"));
+    let (vendor, product) = (info.vendor_id, info.product_id);
+    format!("{vendor:04x}:{product:04x}{serial} ({})", info.identifier)
+}
+
+/// Adds up what probe-rs tells of each phase.
+fn phases<'p>(progress: &'p mut dyn FnMut(Progress)) -> impl FnMut(ProgressEvent) + 'p {
+    let mut at = Progress { done: 0, of: 0 };
+    move |event| {
+        match event {
+            ProgressEvent::AddProgressBar { total, .. } => at.of += total.unwrap_or(0),
+            ProgressEvent::Progress { size, .. } => at.done += size,
+            _ => return,
+        }
+        progress(at);
+    }
+}

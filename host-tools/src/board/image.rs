@@ -1,0 +1,282 @@
+//! An image as what has to be where in the chip, held against the memories that
+//! the chip has, before anything is touched.
+
+use std::io;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use object::LittleEndian;
+use object::elf::{EM_ARM, FileHeader32, PT_LOAD};
+use object::read::elf::{FileHeader, ProgramHeader};
+use probe_rs::Target;
+use probe_rs::config::{MemoryRegion, Registry};
+
+use super::Board;
+
+/// An image that fits its chip.
+#[derive(Debug)]
+pub struct Image {
+    pub(super) target: Target,
+    /// What goes into the chip's flash.
+    pub(super) parts: Vec<Part>,
+    /// Where it goes, for people.
+    pub placed: Vec<Placed>,
+}
+
+/// Bytes for an address.
+#[derive(Debug)]
+pub(super) struct Part {
+    pub(super) address: u64,
+    pub(super) bytes: Vec<u8>,
+}
+
+/// What an image takes of one of its chip's memories.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Placed {
+    /// First address and the one past the last of the memory.
+    pub memory: Range<u64>,
+    /// Whether it keeps its content without power.
+    pub is_flash: bool,
+    /// Bytes taken.
+    pub bytes: u64,
+}
+
+/// Why a file is no image for a board.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The board has no chip.
+    #[error("{0} is emulated: there is no chip to write to")]
+    Emulated(&'static str),
+    /// The file cannot be read.
+    #[error("cannot read {}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        #[source]
+        source: io::Error,
+    },
+    /// It is not a program for a Cortex-M.
+    #[error("{} is no image for a board: {why}", path.display())]
+    NoImage {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// Part of it would lie where the chip has no memory of that kind.
+    #[error(
+        "{} is not for {chip}: {bytes} bytes of it belong at {address:#010x}, where that chip has no {memory}",
+        path.display()
+    )]
+    OutOfMemory {
+        /// The file.
+        path: PathBuf,
+        /// The chip.
+        chip: String,
+        /// Where the part begins.
+        address: u64,
+        /// How long it is.
+        bytes: u64,
+        /// Flash or RAM.
+        memory: &'static str,
+    },
+    /// probe-rs does not know the chip.
+    #[error("the chip {0} is not known")]
+    UnknownChip(&'static str, #[source] probe_rs::config::RegistryError),
+}
+
+impl Image {
+    /// Reads an ELF and holds it against the memories of the board's chip, as
+    /// probe-rs' registry knows them.
+    ///
+    /// # Errors
+    /// [`ImageError`]: what does not fit.
+    pub fn read(board: &Board, path: &Path) -> Result<Self, ImageError> {
+        let chip = board.chip.ok_or(ImageError::Emulated(board.name))?;
+        let target = Registry::from_builtin_families()
+            .get_target_by_name(chip)
+            .map_err(|error| ImageError::UnknownChip(chip, error))?;
+        let elf = std::fs::read(path).map_err(|source| ImageError::Unreadable {
+            path: path.to_owned(),
+            source,
+        })?;
+        let segments = segments(&elf).map_err(|why| ImageError::NoImage {
+            path: path.to_owned(),
+            why,
+        })?;
+        place(target, segments).map_err(|stray| ImageError::OutOfMemory {
+            path: path.to_owned(),
+            chip: chip.to_owned(),
+            address: stray.address,
+            bytes: stray.bytes,
+            memory: if stray.in_flash { "flash" } else { "RAM" },
+        })
+    }
+}
+
+/// A loaded segment: where it runs, where it is loaded from, what is in it.
+struct Segment {
+    runs: u64,
+    in_memory: u64,
+    loaded: u64,
+    bytes: Vec<u8>,
+}
+
+fn segments(elf: &[u8]) -> Result<Vec<Segment>, String> {
+    let header = FileHeader32::<LittleEndian>::parse(elf).map_err(|_| "it is no 32-bit ELF")?;
+    if header.e_machine(LittleEndian) != EM_ARM {
+        return Err("it is not for ARM".into());
+    }
+    let headers = header
+        .program_headers(LittleEndian, elf)
+        .map_err(|error| error.to_string())?;
+    let loads = headers
+        .iter()
+        .filter(|segment| segment.p_type(LittleEndian) == PT_LOAD);
+    let segments: Result<Vec<_>, String> = loads
+        .map(|segment| {
+            let bytes = segment
+                .data(LittleEndian, elf)
+                .map_err(|()| "it is cut off")?;
+            Ok(Segment {
+                runs: segment.p_vaddr(LittleEndian).into(),
+                in_memory: segment.p_memsz(LittleEndian).into(),
+                loaded: segment.p_paddr(LittleEndian).into(),
+                bytes: bytes.to_vec(),
+            })
+        })
+        .collect();
+    match segments {
+        Ok(segments) if segments.iter().all(|s| s.bytes.is_empty()) => {
+            Err("there is nothing to load in it".into())
+        }
+        segments => segments,
+    }
+}
+
+/// Part of an image that lies in no memory of the chip.
+struct Stray {
+    address: u64,
+    bytes: u64,
+    in_flash: bool,
+}
+
+fn place(target: Target, segments: Vec<Segment>) -> Result<Image, Stray> {
+    let mut placed: Vec<Placed> = Vec::new();
+    let mut take = |address: u64, bytes: u64, in_flash: bool| {
+        if bytes == 0 {
+            return Ok(());
+        }
+        let stray = Stray {
+            address,
+            bytes,
+            in_flash,
+        };
+        let memory = memory(&target, address, bytes, in_flash).ok_or(stray)?;
+        match placed.iter_mut().find(|place| place.memory == memory) {
+            Some(place) => place.bytes += bytes,
+            None => placed.push(Placed {
+                memory,
+                is_flash: in_flash,
+                bytes,
+            }),
+        }
+        Ok(())
+    };
+    for segment in &segments {
+        take(segment.loaded, segment.bytes.len() as u64, true)?;
+        // What runs where it is loaded is in flash already.
+        if segment.runs != segment.loaded || segment.bytes.is_empty() {
+            take(segment.runs, segment.in_memory, false)?;
+        }
+    }
+    let parts = segments.into_iter().filter(|s| !s.bytes.is_empty());
+    Ok(Image {
+        parts: parts
+            .map(|s| Part {
+                address: s.loaded,
+                bytes: s.bytes,
+            })
+            .collect(),
+        target,
+        placed,
+    })
+}
+
+/// The memory of the chip that holds all of a range, if one does.
+fn memory(target: &Target, address: u64, bytes: u64, in_flash: bool) -> Option<Range<u64>> {
+    let holds = |range: &Range<u64>| range.start <= address && address + bytes <= range.end;
+    target.memory_map.iter().find_map(|region| match region {
+        MemoryRegion::Nvm(flash) if in_flash && holds(&flash.range) => Some(flash.range.clone()),
+        MemoryRegion::Ram(ram) if !in_flash && holds(&ram.range) => Some(ram.range.clone()),
+        _ => None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn g474() -> Target {
+        Registry::from_builtin_families()
+            .get_target_by_name("STM32G474RETx")
+            .expect("known")
+    }
+
+    fn segment(runs: u64, loaded: u64, bytes: usize, in_memory: u64) -> Segment {
+        Segment {
+            runs,
+            in_memory,
+            loaded,
+            bytes: vec![1; bytes],
+        }
+    }
+
+    const FLASH: u64 = 0x0800_0000;
+    const RAM: u64 = 0x2000_0000;
+
+    #[test]
+    fn code_and_data_find_their_memories() {
+        let code = segment(FLASH, FLASH, 1000, 1000);
+        let data = segment(RAM, FLASH + 1000, 40, 240);
+        let image = place(g474(), vec![code, data]).ok().expect("fits");
+        let taken: Vec<_> = image.placed.iter().map(|p| (p.is_flash, p.bytes)).collect();
+        assert_eq!(taken, [(true, 1040), (false, 240)]);
+        assert_eq!(image.parts.len(), 2);
+    }
+
+    #[test]
+    fn an_image_of_another_chip_is_refused() {
+        // The H743's data RAM, and flash past the G474's 512 KiB.
+        for stray in [
+            segment(0x2400_0000, FLASH, 8, 8),
+            segment(FLASH, FLASH + 0x8_0000 - 4, 8, 8),
+            segment(0, 0, 64, 64),
+        ] {
+            assert!(place(g474(), vec![stray]).is_err());
+        }
+    }
+
+    #[test]
+    fn what_is_no_image_is_refused_in_words() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("image");
+        let board = Board::named("nucleo-g474re").expect("known");
+        let read = || Image::read(board, &path).expect_err("no image").to_string();
+        assert!(read().contains("cannot read"), "{}", read());
+        std::fs::write(&path, "not an image").expect("written");
+        assert!(read().contains("no 32-bit ELF"), "{}", read());
+        let emulated = Board::named("mps2-an386").expect("known");
+        let error = Image::read(emulated, &path).expect_err("no chip");
+        assert!(matches!(error, ImageError::Emulated(_)));
+    }
+
+    #[test]
+    fn every_board_with_a_chip_is_known_to_probe_rs() {
+        let registry = Registry::from_builtin_families();
+        for chip in super::super::BOARDS.iter().filter_map(|board| board.chip) {
+            registry.get_target_by_name(chip).expect(chip);
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! `hapterra list`: boards, debug probes and ports that can be seen from here.
+
+use std::time::Duration;
+
+use super::emulation::link_hint;
+use super::{Failure, report};
+use crate::board::{BOARDS, probes};
+use crate::link::{LinkError, Tcp, Usb, ask_who, tcp_address};
+
+/// Arguments of `hapterra list`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Where else to look for an emulated board's link
+    #[arg(long = "tcp", value_name = "HOST:PORT", value_parser = tcp_address)]
+    pub addresses: Vec<String>,
+}
+
+/// Where the link of an emulated board is looked for without being told.
+const USUAL_ADDRESS: &str = "localhost:4000";
+/// How long a board may take to say who it is.
+const PATIENCE: Duration = Duration::from_millis(1500);
+
+/// Lists what there is; where there is nothing, what was looked for and what to
+/// check.
+///
+/// # Errors
+/// None: finding nothing is an answer.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    println!("boards with firmware");
+    for board in &BOARDS {
+        let chip = board
+            .chip
+            .map_or(String::new(), |chip| format!(" ({chip})"));
+        println!("  {:<15} {}{chip}", board.name, board.what);
+    }
+    list_usb();
+    list_probes();
+    list_emulated(args);
+    Ok(())
+}
+
+fn list_usb() {
+    println!("boards on USB");
+    let (found, looked_at) = Usb::list();
+    if found.is_empty() {
+        println!(
+            "  none: looked for {} among {looked_at} USB devices",
+            Usb::looked_for()
+        );
+        println!("  check that the board's own USB connector is plugged in, not only its ST-LINK,");
+        println!("  that the cable carries data, and that the board runs hapterra's firmware");
+    }
+    for info in found {
+        let place = Usb::place(&info);
+        let known = Usb::open(&info)
+            .and_then(|mut link| ask_who(&mut link, PATIENCE))
+            .map(|hello| report::device(&hello));
+        println!("  {place}: {}", known.unwrap_or_else(|error| told(&error)));
+    }
+}
+
+fn list_probes() {
+    println!("debug probes");
+    let (found, looked_at) = probes();
+    if found.is_empty() {
+        println!("  none: looked for ST-LINK, CMSIS-DAP and J-Link among {looked_at} USB devices");
+        println!("  check the cable to the board's ST-LINK connector");
+    }
+    for probe in &found {
+        let name = probe.name.as_deref().unwrap_or("no name");
+        println!("  {} {} ({name})", probe.kind, probe.selector);
+    }
+    #[cfg(not(feature = "probe"))]
+    if !found.is_empty() {
+        println!(
+            "  this hapterra was built without debug probes, so it cannot flash through them:"
+        );
+        println!("  {}", super::flash::WITHOUT);
+    }
+}
+
+fn list_emulated(args: &Args) {
+    println!("emulated boards");
+    let usual = [USUAL_ADDRESS.to_owned()];
+    let addresses = if args.addresses.is_empty() {
+        &usual[..]
+    } else {
+        &args.addresses
+    };
+    for address in addresses {
+        let who = Tcp::connect(address).and_then(|mut link| ask_who(&mut link, PATIENCE));
+        match who {
+            Ok(hello) => println!("  tcp:{address}: {}", report::device(&hello)),
+            Err(LinkError::Absent { why, .. }) => {
+                println!("  none at tcp:{address}: {why}");
+                println!(
+                    "  name another place with --tcp HOST:PORT; `hapterra demo` starts a board of its own"
+                );
+            }
+            Err(error) => println!("  tcp:{address}: {}", told(&error)),
+        }
+    }
+}
+
+fn told(error: &LinkError) -> String {
+    format!("{error}; {}", link_hint(error))
+}

@@ -1,0 +1,170 @@
+//! Whether a file will fit, before the disk is full of its first half.
+
+use std::fmt;
+use std::io;
+use std::path::Path;
+
+use super::Synth;
+use super::write::{Format, Grid, append_row, write_asc_row};
+use crate::output::folder_of;
+
+/// Samples that are made to see how long they are as text.
+const SAMPLED: u32 = 4096;
+/// Deflate makes at most this many bytes of one.
+const DEFLATE_AT_BEST: u64 = 1032;
+
+/// A disk with too little room.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NoRoom {
+    /// Bytes that the file takes, or would take at least.
+    pub needed: u64,
+    /// Bytes free where it would lie.
+    pub free: u64,
+}
+
+impl fmt::Display for NoRoom {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [needed, free] = [self.needed, self.free].map(|bytes| bytes as f64 / 1e9);
+        write!(f, "it takes {needed:.1} GB and {free:.1} GB are free there")
+    }
+}
+
+/// Fails if the folder's file system has less room than the file takes. Where the
+/// system does not tell, or the output is a pipe or device, the writing decides.
+pub(super) fn check(path: &Path, format: Format, synth: &Synth, grid: &Grid) -> Result<(), NoRoom> {
+    let goes_to_a_disk =
+        std::fs::metadata(path).is_ok_and(|there| there.is_file()) || !path.exists();
+    let Some(free) = goes_to_a_disk.then(|| free_at(path)).flatten() else {
+        return Ok(());
+    };
+    let needed = bytes(format, synth, grid);
+    if needed > free {
+        return Err(NoRoom { needed, free });
+    }
+    Ok(())
+}
+
+fn free_at(path: &Path) -> Option<u64> {
+    let free = fs4::available_space(folder_of(path));
+    free.inspect_err(|error| tracing::debug!("free space is not told: {error}"))
+        .ok()
+}
+
+/// Bytes of the file: exact but for the header as a GeoTIFF, by the length of the first
+/// samples as text, and as a PNG what the best compression would leave.
+fn bytes(format: Format, synth: &Synth, grid: &Grid) -> u64 {
+    let samples = u64::from(grid.columns) * u64::from(grid.rows);
+    match format {
+        Format::GeoTiff => samples.saturating_mul(size_of::<f32>() as u64),
+        Format::EsriAscii => {
+            let columns = grid.columns.min(SAMPLED);
+            let mut row = Vec::new();
+            append_row(synth, columns, grid.rows / 2, &mut row);
+            let mut text = Length(0);
+            // Counting cannot fail.
+            let _ = write_asc_row(&mut text, &row);
+            (u128::from(samples) * u128::from(text.0) / u128::from(columns.max(1)))
+                .try_into()
+                .unwrap_or(u64::MAX)
+        }
+        Format::Png => samples.saturating_mul(size_of::<u16>() as u64) / DEFLATE_AT_BEST,
+    }
+}
+
+/// Counts what is written to it.
+struct Length(u64);
+
+impl io::Write for Length {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0 += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::{Kind, write};
+
+    /// What is foretold for a file, and how long it is then.
+    fn foretold_and_true(name: &str, kind: Kind) -> (u64, u64) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join(name);
+        let synth = Synth::new(kind, 3, 500.0);
+        let grid = Grid {
+            columns: 300,
+            rows: 200,
+            cell_m: 10.0,
+        };
+        write(&path, &synth, &grid, &mut || true).expect("written");
+        let format = match name {
+            "a.tif" => Format::GeoTiff,
+            "a.asc" => Format::EsriAscii,
+            _ => Format::Png,
+        };
+        let length = std::fs::metadata(&path).expect("there").len();
+        (bytes(format, &synth, &grid), length)
+    }
+
+    #[test]
+    fn what_is_foretold_comes_true() {
+        for kind in [Kind::Fractal, Kind::Plane, Kind::Steps] {
+            let (foretold, length) = foretold_and_true("a.tif", kind);
+            assert!(
+                length >= foretold && length < foretold + 4000,
+                "{foretold} {length}"
+            );
+            let (foretold, length) = foretold_and_true("a.asc", kind);
+            let ratio = foretold as f64 / length as f64;
+            assert!((0.7..1.4).contains(&ratio), "{foretold} {length}");
+            let (foretold, length) = foretold_and_true("a.png", kind);
+            assert!(foretold <= length, "{foretold} {length}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_fit_is_refused_with_figures_and_nothing_is_left() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let grid = Grid {
+            columns: 4_000_000_000,
+            rows: 4_000_000_000,
+            cell_m: 10.0,
+        };
+        let synth = Synth::new(Kind::Plane, 1, 10.0);
+        for name in ["a.tif", "a.asc", "a.png"] {
+            let path = folder.path().join(name);
+            let error = write(&path, &synth, &grid, &mut || true).expect_err("no such disk");
+            let text = error.to_string();
+            assert!(
+                text.contains(name) && text.contains("GB are free"),
+                "{text}"
+            );
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 0);
+    }
+
+    #[test]
+    fn an_interrupted_file_leaves_nothing_and_spares_what_was_there() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.tif");
+        std::fs::write(&path, "before").expect("written");
+        let grid = Grid {
+            columns: 100,
+            rows: 100,
+            cell_m: 10.0,
+        };
+        let mut rows = 0;
+        let mut go_on = || {
+            rows += 1;
+            rows < 50
+        };
+        let synth = Synth::new(Kind::Plane, 1, 10.0);
+        write(&path, &synth, &grid, &mut go_on).expect_err("interrupted");
+        assert_eq!(std::fs::read(&path).expect("there"), b"before");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 1);
+    }
+}
