@@ -8,7 +8,10 @@ pub mod counting;
 pub mod emulation;
 pub mod faulty;
 pub mod field;
+pub mod invariants;
 pub mod oracle;
+pub mod scene;
+pub mod soak;
 pub mod walk;
 
 use std::path::{Path, PathBuf};

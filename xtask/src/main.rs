@@ -14,6 +14,7 @@ mod panics;
 mod run;
 mod setup;
 mod size;
+mod soak;
 mod test;
 
 use std::process::ExitCode;
@@ -34,6 +35,8 @@ cargo xtask COMMAND
   panics [BOARD]         build the images and prove that no tick can panic
   counts [--write]       instructions of a tick on the emulated Cortex-M4F, beside their
                          targets and the kept table; --write: keep these
+  soak MINUTES [--seed N]  random scenes on all cores, every tick judged in f64
+  soak --seed N --scene K  one of them again
   deny                   licences, bans, sources and advisories of dependencies
   image BOARD            build an image and print where its ELF is
   flash BOARD            run an image on a real board with probe-rs
@@ -71,6 +74,7 @@ fn command() -> Result<ExitCode> {
                 .map(exit_code);
         }
         "test" => test::test(flag(&mut words, "quick")?)?,
+        "soak" => soak::soak(words.raw_args()?.collect())?,
         "counts" => counts::counts(flag(&mut words, "write")?)?,
         "size" => test::check_sizes(&test::images(boards(&mut words)?)?)?,
         "panics" => test::check_panics(&test::images(boards(&mut words)?)?)?,

@@ -1,0 +1,131 @@
+//! `hapterra-soak MINUTES [--seed N] [--scene K]`; see `cargo xtask soak`.
+
+#![forbid(unsafe_code)]
+
+use std::io::{IsTerminal, Write, stderr};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use hapterra_tests::scene::stage::Buffers;
+use hapterra_tests::soak::{Found, Tally, Until, run, soak};
+
+/// Violations of each invariant that are told in full.
+const SHOWN: usize = 3;
+
+struct Wanted {
+    minutes: f64,
+    seed: u64,
+    scene: Option<u64>,
+}
+
+fn main() -> ExitCode {
+    match wanted() {
+        Ok(Wanted {
+            seed,
+            scene: Some(scene),
+            ..
+        }) => one(seed, scene),
+        Ok(wanted) => all(&wanted),
+        Err(why) => {
+            eprintln!("error: {why}\nhint: hapterra-soak MINUTES [--seed N] [--scene K]");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn wanted() -> Result<Wanted, String> {
+    let mut wanted = Wanted {
+        minutes: 1.0,
+        seed: 1,
+        scene: None,
+    };
+    let mut words = std::env::args().skip(1);
+    while let Some(word) = words.next() {
+        let mut number = || {
+            let given = words.next().and_then(|n| n.parse().ok());
+            given.ok_or(format!("{word} wants a whole number"))
+        };
+        match word.as_str() {
+            "--seed" => wanted.seed = number()?,
+            "--scene" => wanted.scene = Some(number()?),
+            minutes => {
+                let minutes = minutes.parse().ok().filter(|m: &f64| *m > 0.0);
+                wanted.minutes = minutes.ok_or(format!("{word} is no number of minutes"))?;
+            }
+        }
+    }
+    Ok(wanted)
+}
+
+/// One scene again, by its number.
+fn one(seed: u64, number: u64) -> ExitCode {
+    match run(seed, number, &mut Buffers::default()) {
+        Found::Held(kind, measured) => {
+            println!("seed {seed}, scene {number}, {kind:?}: holds\n{measured:#?}");
+            ExitCode::SUCCESS
+        }
+        Found::Broke(kind, _, what) => {
+            println!("seed {seed}, scene {number}, {kind:?}: {what}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn all(wanted: &Wanted) -> ExitCode {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let time = Duration::from_secs_f64(wanted.minutes * 60.0);
+    let began = Instant::now();
+    let mut last = None;
+    let tally = soak(wanted.seed, 0, Until::Time(time), threads, |tally| {
+        let second = began.elapsed().as_secs();
+        if last != Some(second) {
+            last = Some(second);
+            live(tally, began.elapsed(), time);
+        }
+    });
+    if stderr().is_terminal() {
+        eprintln!();
+    }
+    println!(
+        "seed {}, {:.1} minutes on {threads} threads\n{tally}",
+        wanted.seed,
+        began.elapsed().as_secs_f64() / 60.0
+    );
+    // A few of each kind.
+    let mut told: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
+    for (number, kind, what) in &tally.broken {
+        let invariant = what.split(' ').next().unwrap_or_default();
+        let times = told.entry(invariant).or_default();
+        *times += 1;
+        if *times > SHOWN {
+            continue;
+        }
+        println!(
+            "\n{kind:?}: {what}\n    again: cargo xtask soak --seed {} --scene {number}",
+            wanted.seed
+        );
+    }
+    if tally.broken.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
+}
+
+/// One line, written over again on a terminal, once a minute elsewhere.
+fn live(tally: &Tally, elapsed: Duration, time: Duration) {
+    let terminal = stderr().is_terminal();
+    if !terminal && !elapsed.as_secs().is_multiple_of(60) {
+        return;
+    }
+    let (start, end) = if terminal { ("\r", "") } else { ("", "\n") };
+    eprint!(
+        "{start}{:4} of {} s: {} scenes, {:.1} million ticks, {} wrong answers{end}",
+        elapsed.as_secs(),
+        time.as_secs(),
+        tally.scenes,
+        tally.ticks() as f64 / 1e6,
+        tally.broken.len()
+    );
+    let _ = stderr().flush();
+}

@@ -1,0 +1,100 @@
+//! The bilinear surface in f64.
+
+use crate::scene::terrain::Terrain;
+
+/// One patch, heights as they are: z = d + b·u + c·v + a·u·v.
+#[derive(Clone, Copy, Debug)]
+pub struct Patch {
+    /// Its column and row.
+    pub cell: [i32; 2],
+    a: f64,
+    b: f64,
+    c: f64,
+    d: f64,
+}
+
+impl Patch {
+    /// The patch in a cell, unless there is none.
+    #[must_use]
+    pub fn at(terrain: &Terrain, cell: [i32; 2]) -> Option<Self> {
+        let [sw, se, nw, ne] = terrain.patch(cell)?;
+        Some(Self {
+            cell,
+            a: (ne - nw) - (se - sw),
+            b: se - sw,
+            c: nw - sw,
+            d: sw,
+        })
+    }
+
+    /// Height at a place of the terrain.
+    #[must_use]
+    pub fn height(&self, x: f64, y: f64) -> f64 {
+        let (u, v) = self.local(x, y);
+        self.d + self.b * u + (self.c + self.a * u) * v
+    }
+
+    /// Slopes eastward and northward.
+    #[must_use]
+    pub fn slopes(&self, x: f64, y: f64) -> [f64; 2] {
+        let (u, v) = self.local(x, y);
+        [self.b + self.a * v, self.c + self.a * u]
+    }
+
+    /// How steep it is at a place.
+    #[must_use]
+    pub fn slope(&self, x: f64, y: f64) -> f64 {
+        let [east, north] = self.slopes(x, y);
+        east.hypot(north)
+    }
+
+    /// Heights of its corners.
+    #[must_use]
+    pub fn corners(&self) -> [f64; 4] {
+        let (b, c) = (self.d + self.b, self.d + self.c);
+        [self.d, b, c, b + self.c + self.a]
+    }
+
+    /// The twist: how much a slope changes over the patch.
+    #[must_use]
+    pub fn twist(&self) -> f64 {
+        self.a
+    }
+
+    /// Middle Bernstein coefficient of the height along a straight line.
+    #[must_use]
+    pub fn blossom(&self, from: [f64; 2], to: [f64; 2]) -> f64 {
+        let (u0, v0) = self.local(from[0], from[1]);
+        let (u1, v1) = self.local(to[0], to[1]);
+        self.d + 0.5 * (self.b * (u0 + u1) + self.c * (v0 + v1) + self.a * (u0 * v1 + u1 * v0))
+    }
+
+    fn local(&self, x: f64, y: f64) -> (f64, f64) {
+        (x - f64::from(self.cell[0]), y - f64::from(self.cell[1]))
+    }
+}
+
+/// The patches that a place belongs to: one inside, two on an edge, four on a
+/// vertex, less where there are holes.
+pub fn patches_at(terrain: &Terrain, x: f64, y: f64) -> impl Iterator<Item = Patch> + '_ {
+    let rows = sides(y);
+    sides(x)
+        .flat_map(move |col| rows.clone().map(move |row| [col, row]))
+        .filter_map(|cell| Patch::at(terrain, cell))
+}
+
+/// The cells along one axis that a coordinate belongs to.
+fn sides(x: f64) -> std::ops::RangeInclusive<i32> {
+    let cell = x.floor() as i32;
+    if x == x.floor() {
+        cell - 1..=cell
+    } else {
+        cell..=cell
+    }
+}
+
+/// Distance of two points.
+#[must_use]
+pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
+}

@@ -1,0 +1,234 @@
+//! Ways of the hand over a terrain, wild and gentle.
+
+use super::terrain::{Terrain, WALL_EVERY};
+use crate::chance::Chance;
+
+/// Positions are whole multiples of this many cells, so that they are exact in
+/// single precision however a scene is mirrored, turned or shifted.
+pub const GRAIN: f64 = 1.0 / (1 << 20) as f64;
+/// An encoder count at the tip, cells of a millimetre.
+const COUNT: f64 = 0.03;
+
+/// What the hand does for a while.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Habit {
+    /// Steps of one length near the surface.
+    Wander,
+    /// Anywhere in one tick.
+    Teleport,
+    /// Trembles by one encoder count.
+    Tremble,
+    /// Presses on a vertex from exactly below it.
+    Vertex,
+    /// Moves exactly along the line of an edge, at its height or near it.
+    Graze,
+    /// Stands exactly on lines of the grid.
+    OnLines,
+    /// Up and down through the surface.
+    Tap,
+    /// Across the whole field in one tick, there and back.
+    Sweep,
+    /// Does not move.
+    Still,
+    /// As far away as positions go.
+    Beyond,
+}
+
+const HABITS: [Habit; 10] = [
+    Habit::Wander,
+    Habit::Teleport,
+    Habit::Tremble,
+    Habit::Vertex,
+    Habit::Graze,
+    Habit::OnLines,
+    Habit::Tap,
+    Habit::Sweep,
+    Habit::Still,
+    Habit::Beyond,
+];
+
+/// `ticks` positions in cells; the first is high above everything.
+#[must_use]
+pub fn walk(terrain: &Terrain, chance: &mut Chance, ticks: usize) -> Vec<[f64; 3]> {
+    let size = terrain.size.map(f64::from);
+    let sky = f64::from(terrain.top()).min(1e7) + 2.0;
+    let at = [chance.between(1.0, size[0]), chance.between(1.0, size[1])];
+    let mut hand = Hand {
+        terrain,
+        size,
+        chance,
+        path: vec![],
+        at,
+    };
+    hand.put(at[0], at[1], sky);
+    while hand.path.len() < ticks {
+        let habit = match hand.chance.below(20) {
+            n if n < HABITS.len() => HABITS[n],
+            _ => Habit::Wander,
+        };
+        hand.go_on(habit);
+        if hand.chance.below(6) == 0 {
+            let [x, y] = hand.at;
+            hand.put(x, y, sky);
+        }
+    }
+    hand.path.truncate(ticks);
+    hand.path
+}
+
+struct Hand<'a> {
+    terrain: &'a Terrain,
+    size: [f64; 2],
+    chance: &'a mut Chance,
+    path: Vec<[f64; 3]>,
+    at: [f64; 2],
+}
+
+impl Hand<'_> {
+    fn put(&mut self, x: f64, y: f64, z: f64) {
+        self.at = [x, y];
+        self.path
+            .push([x, y, z].map(|c| (c / GRAIN).round() * GRAIN));
+    }
+
+    fn above(&mut self, x: f64, y: f64, height: f64) {
+        self.put(x, y, self.terrain.height_about(x, y) + height);
+    }
+
+    /// A length over many orders of magnitude, at most `most`.
+    fn length(&mut self, most: f64) -> f64 {
+        most * 10_f64.powf(self.chance.between(-4.0, 0.0))
+    }
+
+    fn anywhere(&mut self) -> [f64; 2] {
+        // Off the field, too.
+        [0, 1].map(|axis| self.chance.between(-2.0, self.size[axis] + 2.0))
+    }
+
+    fn vertex(&mut self) -> [f64; 2] {
+        self.anywhere().map(f64::round)
+    }
+
+    fn go_on(&mut self, habit: Habit) {
+        let ticks = 1 + self.chance.below(40);
+        match habit {
+            Habit::Wander => self.wander(4 * ticks),
+            Habit::Teleport => self.teleport(ticks),
+            Habit::Tremble => self.tremble(ticks),
+            Habit::Vertex => self.press_vertex(ticks),
+            Habit::Graze => self.graze(ticks),
+            Habit::OnLines => self.on_lines(ticks),
+            Habit::Tap => self.tap(ticks),
+            Habit::Sweep => self.sweep(1 + ticks / 8),
+            Habit::Still => self.still(ticks),
+            Habit::Beyond => self.beyond(),
+        }
+    }
+
+    fn wander(&mut self, ticks: usize) {
+        let stride = self.length(3.0);
+        let mut heading = self.chance.between(0.0, std::f64::consts::TAU);
+        let mut height = self.chance.between(-1.5, 0.8);
+        for _ in 0..ticks {
+            heading += self.chance.between(-0.4, 0.4);
+            height += 0.1 * stride * self.chance.between(-1.0, 1.0);
+            let x = (self.at[0] + stride * heading.cos()).clamp(-1.0, self.size[0] + 1.0);
+            let y = (self.at[1] + stride * heading.sin()).clamp(-1.0, self.size[1] + 1.0);
+            self.above(x, y, height);
+        }
+    }
+
+    fn teleport(&mut self, ticks: usize) {
+        for _ in 0..ticks {
+            let [x, y] = self.anywhere();
+            let height = self.length(10.0) * if self.chance.below(2) == 0 { 1.0 } else { -1.0 };
+            self.above(x, y, height);
+        }
+    }
+
+    fn tremble(&mut self, ticks: usize) {
+        let [x, y] = self.at;
+        let z = self.terrain.height_about(x, y) - self.length(2.0);
+        for _ in 0..ticks {
+            let mut off = || (self.chance.below(3) as f64 - 1.0) * COUNT;
+            let (dx, dy, dz) = (off(), off(), off());
+            self.put(x + dx, y + dy, z + dz);
+        }
+        self.at = [x, y];
+    }
+
+    fn press_vertex(&mut self, ticks: usize) {
+        let [x, y] = self.vertex();
+        self.above(x, y, 0.5);
+        let depth = self.length(2.0);
+        for tick in 0..ticks {
+            // Exactly under it, and beside it by the least there is.
+            let off = if tick % 3 == 2 { GRAIN } else { 0.0 };
+            let z = self.terrain.height_about(x, y) - depth;
+            self.put(x + off, y - off, z);
+        }
+    }
+
+    fn graze(&mut self, ticks: usize) {
+        let [x, y] = self.vertex();
+        let above = [0.0, GRAIN, -GRAIN, 1e-3][self.chance.below(4)];
+        let step = [1.0, 0.5, 0.25, 0.125][self.chance.below(4)];
+        let along = self.chance.below(2);
+        self.above(x, y, 1.0);
+        for tick in 0..ticks {
+            let mut at = [x, y];
+            at[along] += step * tick as f64;
+            self.above(at[0], at[1], above);
+        }
+    }
+
+    fn on_lines(&mut self, ticks: usize) {
+        for _ in 0..ticks {
+            let axis = self.chance.below(2);
+            let stride = self.length(2.0);
+            let mut at = self.at;
+            at[axis] = at[axis].round() + self.chance.below(3) as f64 - 1.0;
+            at[1 - axis] += stride * self.chance.between(-1.0, 1.0);
+            let height = self.chance.between(-0.7, 0.4);
+            self.above(at[0], at[1], height);
+        }
+    }
+
+    fn tap(&mut self, ticks: usize) {
+        let (depth, stride) = (self.length(2.0), self.length(0.5));
+        for tick in 0..ticks {
+            let [x, y] = self.at;
+            let height = depth * (tick as f64 * 0.7).cos();
+            self.above(x + stride, y - 0.3 * stride, height);
+        }
+    }
+
+    fn sweep(&mut self, times: usize) {
+        let height = self.chance.between(-0.5, 1.0);
+        for _ in 0..times {
+            let [x, y] = self.anywhere();
+            self.above(x, y, height);
+            let (x, y) = (self.size[0] - x, self.size[1] - y);
+            let z = self.path[self.path.len() - 1][2];
+            if self.chance.below(2) == 0 {
+                self.put(x, y, z);
+            } else {
+                self.above(x, y, height);
+            }
+        }
+    }
+
+    fn still(&mut self, ticks: usize) {
+        let last = self.path[self.path.len() - 1];
+        self.path.extend(std::iter::repeat_n(last, ticks));
+    }
+
+    fn beyond(&mut self) {
+        let far = [1e4, 1e6, 1e8][self.chance.below(3)];
+        let mut sign = || [far, -far, 3.0][self.chance.below(3)];
+        let (x, y, z) = (sign(), sign(), sign());
+        self.put(x, y, z);
+        let half = 0.5 * f64::from(WALL_EVERY);
+        self.at = [half, half];
+    }
+}

@@ -1,0 +1,145 @@
+//! The product's window over a terrain: held whole, or pulled tile by tile.
+
+use hapterra_core::contact::{Contact, Felt};
+use hapterra_core::grid::GridPoint;
+use hapterra_core::terrain::{Focus, IN_FLIGHT, Puller, TILE_CELLS, Tile, TileKey, Window};
+
+use super::terrain::Terrain;
+
+/// Tiles along the side of the window.
+pub const SIDE: usize = 8;
+const CELLS: i32 = TILE_CELLS as i32;
+
+/// Memory for a stage; may be used again and again.
+pub struct Buffers(Vec<Tile>);
+
+impl Default for Buffers {
+    fn default() -> Self {
+        Self(vec![Tile::VACANT; SIDE * SIDE + IN_FLIGHT])
+    }
+}
+
+/// How the tiles come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Supply {
+    /// All are here from the start.
+    Held,
+    /// Asked for, and here so many ticks later.
+    Pulled {
+        /// Ticks from the request to the tile.
+        latency: u32,
+    },
+}
+
+/// A window over a terrain that lies `shift` cells east, north and up.
+pub struct Stage<'t, 'g> {
+    /// The window.
+    pub window: Window<'t, SIDE>,
+    terrain: &'g Terrain,
+    shift: [i32; 3],
+    supply: Supply,
+    puller: Puller<SIDE>,
+    spare: Vec<&'t mut Tile>,
+    coming: Vec<(u32, TileKey)>,
+}
+
+impl<'t, 'g> Stage<'t, 'g> {
+    /// The terrain in place.
+    ///
+    /// # Panics
+    /// When a terrain that is to be held is larger than the window.
+    pub fn new(
+        buffers: &'t mut Buffers,
+        terrain: &'g Terrain,
+        shift: [i32; 3],
+        supply: Supply,
+    ) -> Self {
+        let mut tiles = buffers.0.iter_mut();
+        let mut next = || tiles.next().expect("there is one for every slot");
+        let slots = std::array::from_fn(|_| std::array::from_fn(|_| next()));
+        let mut window = Window::new(slots);
+        let size = [0, 1].map(|axis| terrain.size[axis] + shift[axis]);
+        window.reset(0, size, terrain.top() + shift[2]);
+        let mut puller = Puller::new();
+        puller.reset(0, size);
+        let mut stage = Self {
+            window,
+            terrain,
+            shift,
+            supply,
+            puller,
+            spare: tiles.collect(),
+            coming: Vec::new(),
+        };
+        if supply == Supply::Held {
+            stage.hold_all();
+        }
+        stage
+    }
+
+    fn hold_all(&mut self) {
+        let tiles = |axis: usize| {
+            let first = self.shift[axis] >> 5;
+            first..=(self.shift[axis] + self.terrain.size[axis] - 1) >> 5
+        };
+        let (cols, rows) = (tiles(0), tiles(1));
+        assert!(cols.clone().count() <= SIDE && rows.clone().count() <= SIDE);
+        for row in rows {
+            for col in cols.clone() {
+                self.install(TileKey { level: 0, col, row });
+            }
+        }
+    }
+
+    fn install(&mut self, key: TileKey) {
+        let tile = self.spare.pop().expect("as many spares as requests");
+        let [dx, dy, dz] = self.shift;
+        let terrain = self.terrain;
+        tile.fill(key, dz, |col, row| {
+            terrain.post(
+                key.col * CELLS + col as i32 - dx,
+                key.row * CELLS + row as i32 - dy,
+            )
+        })
+        .expect("the base is in range");
+        self.spare.push(self.window.install(tile));
+    }
+
+    /// Asks for what the tick showed to be wanted, and takes what has come.
+    pub fn supply(&mut self, now: u32, contact: &Contact, felt: &Felt, hip: &GridPoint) {
+        let Supply::Pulled { latency } = self.supply else {
+            return;
+        };
+        let focus = Focus {
+            held_up_by: felt.held_up_by,
+            proxy: felt.proxy.column(),
+            hip: hip.column(),
+            velocity: [0.0; 2],
+        };
+        while let Some(key) = self.puller.next_request(now, &focus) {
+            self.coming.push((now + latency, key));
+        }
+        let mut arrived = Vec::new();
+        self.coming.retain(|(due, key)| {
+            let here = *due <= now;
+            if here {
+                arrived.push(*key);
+            }
+            !here
+        });
+        for key in arrived {
+            self.take(key, contact);
+        }
+    }
+
+    /// As the loop does: a tile does not push out the one under the proxy.
+    fn take(&mut self, key: TileKey, contact: &Contact) {
+        let under_proxy = contact.patch().map(|cell| TileKey::holding(0, cell));
+        let occupant = self.window.occupant(key);
+        self.puller.received(key);
+        if under_proxy.is_some() && under_proxy != Some(key) && occupant == under_proxy {
+            return self.puller.lost(key);
+        }
+        self.install(key);
+    }
+}

@@ -1,0 +1,211 @@
+//! Terrains from flat to absurd, as plain samples.
+
+use crate::chance::Chance;
+
+/// Heights beyond this, in cells, are holes: no position can say them.
+const TALLEST: f32 = (1 << 29) as f32;
+
+/// What a terrain is like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// One height everywhere.
+    Flat,
+    /// A plane that slopes both ways.
+    Slope,
+    /// Waves a few cells long.
+    Hills,
+    /// Every sample by itself, between 0 and 2.
+    Rough,
+    /// Every sample by itself, over hundreds of cells.
+    Noise,
+    /// 0 and 1 in turns.
+    Checkerboard,
+    /// Flat, one sample in thirty 10⁶ high.
+    Spikes,
+    /// Numbers too small to be normal, of both signs.
+    Denormals,
+    /// Rough, with samples that are not numbers, infinite, or out of range.
+    Holes,
+    /// Straight ridges of tents.
+    Ridges,
+    /// Cliffs between plateaus.
+    Steps,
+    /// A twist from 10⁻⁹ to 10⁶ in each patch.
+    Twisted,
+    /// A few raised rows and columns, far higher than any hand.
+    Walls,
+    /// Gentle ground with a little noise: what a scan looks like.
+    Scan,
+}
+
+/// All kinds.
+pub const KINDS: [Kind; 14] = [
+    Kind::Flat,
+    Kind::Slope,
+    Kind::Hills,
+    Kind::Rough,
+    Kind::Noise,
+    Kind::Checkerboard,
+    Kind::Spikes,
+    Kind::Denormals,
+    Kind::Holes,
+    Kind::Ridges,
+    Kind::Steps,
+    Kind::Twisted,
+    Kind::Walls,
+    Kind::Scan,
+];
+
+/// Height of a wall, cells.
+pub const WALL: f64 = 300.0;
+/// Every so many-th row and column of [`Kind::Walls`] is raised.
+pub const WALL_EVERY: i32 = 23;
+
+/// Samples in rows from the south; what is no height is NaN.
+#[derive(Clone, Debug)]
+pub struct Terrain {
+    /// What it is like.
+    pub kind: Kind,
+    /// Patches east and north.
+    pub size: [i32; 2],
+    posts: Vec<f32>,
+}
+
+impl Terrain {
+    /// One of a kind.
+    #[must_use]
+    pub fn new(kind: Kind, size: [i32; 2], seed: u64) -> Self {
+        let mut chance = Chance::new(seed);
+        let shape = Shape {
+            kind,
+            seed,
+            wave: [chance.between(0.1, 0.9), chance.between(0.1, 0.9)],
+            // Powers of ten, as gentle as nothing and as steep as there is.
+            amplitude: 10_f64.powf(chance.between(-9.0, 6.0)),
+            tilt: [chance.between(-2.0, 2.0), chance.between(-2.0, 2.0)],
+        };
+        Self::from_fn(kind, size, |x, y| shape.height(x, y))
+    }
+
+    /// By a function of the sample.
+    #[must_use]
+    pub fn from_fn(kind: Kind, size: [i32; 2], height: impl Fn(i32, i32) -> f32) -> Self {
+        let row = |y| (0..=size[0]).map(move |x| (x, y));
+        let posts = (0..=size[1]).flat_map(row).map(|(x, y)| {
+            let h = height(x, y);
+            if h.abs() <= TALLEST { h } else { f32::NAN }
+        });
+        Self {
+            kind,
+            size,
+            posts: posts.collect(),
+        }
+    }
+
+    /// A sample; NaN off the field.
+    #[must_use]
+    pub fn post(&self, x: i32, y: i32) -> f32 {
+        if x < 0 || y < 0 || x > self.size[0] || y > self.size[1] {
+            return f32::NAN;
+        }
+        self.posts[(y * (self.size[0] + 1) + x) as usize]
+    }
+
+    /// The corners of a patch (south-west, south-east, north-west, north-east);
+    /// `None` in a hole and off the field.
+    #[must_use]
+    pub fn patch(&self, [x, y]: [i32; 2]) -> Option<[f64; 4]> {
+        if x < 0 || y < 0 || x >= self.size[0] || y >= self.size[1] {
+            return None;
+        }
+        let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
+        let corners = corners.map(|(east, north)| f64::from(self.post(x + east, y + north)));
+        corners.iter().all(|h| !h.is_nan()).then_some(corners)
+    }
+
+    /// A whole height that no sample exceeds.
+    #[must_use]
+    pub fn top(&self) -> i32 {
+        let highest = self.posts.iter().fold(f32::NEG_INFINITY, |a, b| a.max(*b));
+        if highest == f32::NEG_INFINITY {
+            0
+        } else {
+            highest as i32 + 1
+        }
+    }
+
+    /// About how high the surface is around a place, whatever is there.
+    #[must_use]
+    pub fn height_about(&self, x: f64, y: f64) -> f64 {
+        let cell = [x.floor() as i32, y.floor() as i32];
+        let Some([sw, se, nw, ne]) = self.patch(cell) else {
+            return 0.0;
+        };
+        let (u, v) = (x - x.floor(), y - y.floor());
+        let (south, north) = (sw + u * (se - sw), nw + u * (ne - nw));
+        south + v * (north - south)
+    }
+}
+
+struct Shape {
+    kind: Kind,
+    seed: u64,
+    wave: [f64; 2],
+    amplitude: f64,
+    tilt: [f64; 2],
+}
+
+impl Shape {
+    fn height(&self, x: i32, y: i32) -> f32 {
+        let (fx, fy) = (f64::from(x), f64::from(y));
+        let [wx, wy] = self.wave;
+        let [tx, ty] = self.tilt;
+        let dice = self.dice(x, y);
+        let waves = (wx * fx).sin() * (wy * fy).cos();
+        let height = match self.kind {
+            Kind::Flat => 2.0,
+            Kind::Slope => tx * fx + ty * fy,
+            Kind::Hills => 3.0 * waves,
+            Kind::Rough => 2.0 * dice,
+            Kind::Noise => 600.0 * dice - 300.0,
+            Kind::Checkerboard => f64::from((x + y) & 1),
+            Kind::Spikes => f64::from(dice > 0.967) * 1e6,
+            Kind::Denormals => {
+                let tiny = f32::from_bits((dice * 1000.0) as u32);
+                return if self.dice(y, x) > 0.5 { tiny } else { -tiny };
+            }
+            Kind::Holes => return hole_or(dice, 2.0 * self.dice(y, x)),
+            Kind::Ridges => 4.0 * ((0.25 * (tx * fx + ty * fy)).rem_euclid(2.0) - 1.0).abs(),
+            Kind::Steps => 5.0 * (waves * 1.5).round() + f64::from(x / 11 % 3),
+            Kind::Twisted => {
+                let sign = if (x + y) & 1 == 0 { 1.0 } else { -1.0 };
+                sign * self.amplitude * (0.5 + dice)
+            }
+            Kind::Walls => {
+                if x % WALL_EVERY == 0 || y % WALL_EVERY == 0 {
+                    return WALL as f32;
+                }
+                waves
+            }
+            Kind::Scan => 3.0 * waves + tx * 0.1 * fx + 0.05 * dice,
+        };
+        height as f32
+    }
+
+    /// A number in `[0, 1)` that belongs to a sample.
+    fn dice(&self, x: i32, y: i32) -> f64 {
+        let place = u64::from(x.cast_unsigned()) << 32 | u64::from(y.cast_unsigned());
+        Chance::new(self.seed ^ place.wrapping_mul(0x9e37_79b9_7f4a_7c15)).between(0.0, 1.0)
+    }
+}
+
+fn hole_or(dice: f64, height: f64) -> f32 {
+    match (dice * 100.0) as u32 {
+        0 | 1 => f32::NAN,
+        2 => f32::INFINITY,
+        3 => f32::NEG_INFINITY,
+        4 => 1e30,
+        5 => -1e10,
+        _ => height as f32,
+    }
+}

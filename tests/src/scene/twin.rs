@@ -1,0 +1,178 @@
+//! Scenes run twice, the second time so that nothing felt may change.
+
+use hapterra_core::contact::{Pace, Rule};
+
+use super::hand::GRAIN;
+use super::run::{Player, Scene};
+use super::stage::{Buffers, Supply};
+use super::symmetry;
+use super::terrain::Kind;
+use crate::chance::Chance;
+use crate::invariants::judge::Seen;
+use crate::invariants::surface::distance;
+use crate::invariants::{Invariant, Violation};
+
+type Verdict = Result<(), Violation>;
+
+/// The same again: the same bits.
+///
+/// # Errors
+/// Where they differ.
+pub fn repeated(scene: &Scene, seen: &[Seen], buffers: &mut Buffers) -> Verdict {
+    let again = scene.feel(buffers, [0; 3], scene.supply, |_| Ok(()))?;
+    same_bits(Invariant::Repeatable, seen, &again, [0; 3])
+}
+
+/// Up to 10⁸ cells away: the same bits.
+///
+/// Both runs are away from the origin, so that what lies beyond the field is
+/// alike: not here, until it is asked for. In lock-step by any whole cells; in
+/// real time, where the work of a tick may run out, by as many as keep the tiles
+/// and the blocks of tiles the same.
+///
+/// # Errors
+/// Where they differ.
+pub fn shifted(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Verdict {
+    let whole = match scene.pace {
+        Pace::RealTime => 256,
+        Pace::LockStep => 1,
+    };
+    let far = [1_000, 30_000, 1_000_000, 100_000_000];
+    let mut pick = || far[chance.below(far.len())] / whole * whole;
+    let shift = [pick(), pick(), pick() - 50_000_000];
+    let near = scene.feel(
+        buffers,
+        [256, 256, 0],
+        Supply::Pulled { latency: 0 },
+        |_| Ok(()),
+    )?;
+    let away = scene.feel(buffers, shift, Supply::Pulled { latency: 0 }, |_| Ok(()))?;
+    let by = [shift[0] - 256, shift[1] - 256, shift[2]];
+    same_bits(Invariant::Shift, &near, &away, by)
+}
+
+/// With the whole field held: the same bits, where waiting leaves no trace.
+///
+/// # Errors
+/// Where they differ.
+pub fn windowed(scene: &Scene, seen: &[Seen], buffers: &mut Buffers) -> Verdict {
+    let fits = scene.terrain.size.iter().all(|patches| *patches <= 256);
+    if scene.pace != Pace::LockStep || scene.supply == Supply::Held || !fits {
+        return Ok(());
+    }
+    let whole = scene.feel(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+    same_bits(Invariant::Window, seen, &whole, [0; 3])
+}
+
+fn same_bits(invariant: Invariant, seen: &[Seen], other: &[Seen], shift: [i32; 3]) -> Verdict {
+    for (tick, (a, b)) in seen.iter().zip(other).enumerate() {
+        let bits = |seen: &Seen, shift: [i32; 3]| {
+            let (cell, frac) = (seen.felt.proxy.cell(), seen.felt.proxy.frac());
+            (
+                seen.felt.state,
+                seen.felt.stretch.to_array().map(f32::to_bits),
+                [0, 1, 2].map(|i| cell[i] - shift[i]),
+                frac.to_array().map(f32::to_bits),
+            )
+        };
+        if bits(a, [0; 3]) != bits(b, shift) {
+            let detail = format!("{shift:?}: {a:?} but {b:?}");
+            return Err(Violation {
+                invariant,
+                tick,
+                detail,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Mirrored or turned: the same answers to within rounding.
+///
+/// The core counts from the south-west corner of a patch, so rounding differs.
+/// Where two ways are equally good, or so nearly that rounding decides, the
+/// twins may part; from there on they are not compared.
+///
+/// # Errors
+/// Where they differ for no such reason.
+pub fn turned(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Verdict {
+    // On a border of the data a hand belongs to the patch in the north-east,
+    // mirrored or not; and what is left over of a tick may differ.
+    let settles = scene.pace == Pace::LockStep && scene.supply == Supply::Held;
+    if !settles || scene.rule == Rule::Paper || scene.terrain.kind == Kind::Holes {
+        return Ok(());
+    }
+    let inside = |p: &[f64; 3]| {
+        let within = |axis: usize| p[axis].clamp(0.5, f64::from(scene.terrain.size[axis]) - 0.5);
+        [within(0), within(1), p[2]]
+    };
+    let path: Vec<_> = scene.path.iter().map(inside).collect();
+    let scene = &scene.with(scene.terrain.clone(), path);
+    let seen = scene.feel(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+    let symmetries = symmetry::all();
+    let symmetry = symmetries[chance.below(symmetries.len())];
+    let turned = |p| symmetry.point(&scene.terrain, p);
+    let path = scene.path.iter().map(|p| turned(*p)).collect();
+    let twin = scene.with(symmetry.terrain(&scene.terrain), path);
+    let other = twin.feel(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+    for (tick, (a, b)) in seen.iter().zip(&other).enumerate() {
+        if agree(turned(a.proxy), a, b) {
+            continue;
+        }
+        if is_undecided(
+            scene,
+            tick,
+            |there| agree(turned(there.proxy), there, b),
+            buffers,
+        ) {
+            return Ok(());
+        }
+        let detail = format!("{symmetry:?}: {a:?} but {b:?}");
+        return Err(Violation {
+            invariant: Invariant::Symmetry,
+            tick,
+            detail,
+        });
+    }
+    Ok(())
+}
+
+/// Rounding apart, the same answer.
+fn agree(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {
+    let far = distance(a.proxy, a.hip).max(1.0);
+    let near = distance(proxy, b.proxy) <= 1e-4 * far;
+    let (da, db) = (distance(a.proxy, a.hip), distance(b.proxy, b.hip));
+    let tie = (da - db).abs() <= 1e-5 * far;
+    a.felt.state == b.felt.state && a.felt.settled == b.felt.settled && (near || tie)
+}
+
+/// Whether a hair's breadth on the way to this tick makes the difference, too.
+fn is_undecided(
+    scene: &Scene,
+    tick: usize,
+    agrees: impl Fn(&Seen) -> bool,
+    buffers: &mut Buffers,
+) -> bool {
+    const HAIRS: [f64; 3] = [1.0, 16.0, 256.0];
+    for hair in HAIRS {
+        for corner in 0..8 {
+            let mut player = Player::new(scene, buffers, [0; 3], scene.supply);
+            let off = |bit: usize| {
+                if corner >> bit & 1 == 0 {
+                    GRAIN
+                } else {
+                    -GRAIN
+                }
+            };
+            let mut felt = None;
+            for hip in &scene.path[..=tick] {
+                let hip = [0, 1, 2].map(|i| hip[i] + hair * off(i));
+                felt = player.feel(hip).map(|felt| Seen::new(hip, felt, [0; 3]));
+            }
+            if felt.is_some_and(|felt| agrees(&felt)) {
+                return true;
+            }
+        }
+    }
+    false
+}

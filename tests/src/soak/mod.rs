@@ -1,0 +1,104 @@
+//! Random scenes on all cores, until the time is up.
+//!
+//! Scenes are numbered, and a scene follows from its seed and number alone, so
+//! whatever was found can be run again.
+
+mod tally;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+pub use tally::{Found, Tally};
+
+use crate::invariants::judge::Measured;
+use crate::scene::run::Scene;
+use crate::scene::stage::Buffers;
+
+/// When to stop.
+#[derive(Clone, Copy, Debug)]
+pub enum Until {
+    /// When so much time has passed.
+    Time(Duration),
+    /// After so many scenes.
+    Scenes(u64),
+}
+
+/// Runs the scenes of a seed from number `first` on `threads` threads; `live` is
+/// called now and then with what there is so far.
+///
+/// # Panics
+/// When a thread cannot be started.
+pub fn soak(
+    seed: u64,
+    first: u64,
+    until: Until,
+    threads: usize,
+    mut live: impl FnMut(&Tally),
+) -> Tally {
+    let began = Instant::now();
+    let next = AtomicU64::new(first);
+    let tally = Mutex::new(Tally::default());
+    let is_over = |number: u64| match until {
+        Until::Time(time) => began.elapsed() >= time,
+        Until::Scenes(scenes) => number >= first + scenes,
+    };
+    let work = || {
+        let mut buffers = Buffers::default();
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            if is_over(number) {
+                return;
+            }
+            let found = run(seed, number, &mut buffers);
+            tally.lock().expect("no panic inside").add(number, found);
+        }
+    };
+    thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads.max(1)).map(|_| scope.spawn(work)).collect();
+        while !workers.iter().all(thread::ScopedJoinHandle::is_finished) {
+            thread::sleep(Duration::from_millis(50));
+            live(&tally.lock().expect("no panic inside"));
+        }
+    });
+    tally.into_inner().expect("no panic inside")
+}
+
+/// One scene; a panic is a violation, too.
+#[must_use]
+pub fn run(seed: u64, number: u64, buffers: &mut Buffers) -> Found {
+    let scene = Scene::random(seed, number);
+    let ran = catch_unwind(AssertUnwindSafe(|| scene.run(buffers)));
+    let kind = scene.terrain.kind;
+    match ran {
+        Ok(Ok(measured)) => Found::Held(kind, measured),
+        Ok(Err(violation)) => Found::Broke(
+            kind,
+            format!("{:?}", violation.invariant),
+            violation.to_string(),
+        ),
+        Err(panic) => {
+            // A tile may have been left half filled.
+            *buffers = Buffers::default();
+            let said = panic.downcast_ref::<String>().cloned();
+            let said = said.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()));
+            Found::Broke(kind, "Panic".to_owned(), said.unwrap_or_default())
+        }
+    }
+}
+
+/// Adds up what two judges measured.
+fn merge(a: &mut Measured, b: &Measured) {
+    for (a, b) in a.states.iter_mut().zip(b.states) {
+        *a += b;
+    }
+    a.unsettled += b.unsettled;
+    a.work = a.work.max(b.work);
+    a.off_surface = a.off_surface.max(b.off_surface);
+    a.off_minimum = a.off_minimum.max(b.off_minimum);
+    a.judged += b.judged;
+    a.beyond += b.beyond;
+    a.around += b.around;
+}

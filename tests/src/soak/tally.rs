@@ -1,0 +1,96 @@
+//! What a soak has seen so far.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use super::merge;
+use crate::invariants::judge::Measured;
+use crate::scene::terrain::{KINDS, Kind};
+
+/// What came of one scene.
+#[derive(Clone, Debug)]
+pub enum Found {
+    /// Everything held.
+    Held(Kind, Measured),
+    /// Something did not: which invariant, and what was found.
+    Broke(Kind, String, String),
+}
+
+/// All scenes so far.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    /// Scenes run.
+    pub scenes: u64,
+    /// Violations: the scene's number, its terrain, and what was found.
+    pub broken: Vec<(u64, Kind, String)>,
+    by_kind: BTreeMap<usize, Measured>,
+    by_invariant: BTreeMap<String, u64>,
+}
+
+impl Tally {
+    /// One more scene.
+    pub fn add(&mut self, number: u64, found: Found) {
+        self.scenes += 1;
+        match found {
+            Found::Broke(kind, invariant, what) => {
+                let what_broke = format!("{invariant} on {kind:?}");
+                *self.by_invariant.entry(what_broke).or_default() += 1;
+                self.broken.push((number, kind, what));
+            }
+            Found::Held(kind, measured) => {
+                let row = KINDS.iter().position(|k| *k == kind).unwrap_or(0);
+                merge(self.by_kind.entry(row).or_default(), &measured);
+            }
+        }
+    }
+
+    /// Over all terrains.
+    #[must_use]
+    pub fn total(&self) -> Measured {
+        let mut total = Measured::default();
+        for measured in self.by_kind.values() {
+            merge(&mut total, measured);
+        }
+        total
+    }
+
+    /// Ticks judged.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.total().states.iter().sum()
+    }
+}
+
+impl fmt::Display for Tally {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "terrain            ticks    waiting       free   touching  unsettled  work  off surface  off minimum     beyond   around"
+        )?;
+        for (kind, m) in &self.by_kind {
+            row(f, &format!("{:?}", KINDS[*kind]), m)?;
+        }
+        row(f, "all", &self.total())?;
+        writeln!(
+            f,
+            "\n{} scenes, {} ticks, {} wrong answers",
+            self.scenes,
+            self.ticks(),
+            self.broken.len()
+        )?;
+        for (invariant, scenes) in &self.by_invariant {
+            writeln!(f, "    {invariant}: {scenes} scenes")?;
+        }
+        Ok(())
+    }
+}
+
+fn row(f: &mut fmt::Formatter<'_>, name: &str, m: &Measured) -> fmt::Result {
+    let [waiting, free, touching] = m.states;
+    let ticks = waiting + free + touching;
+    writeln!(
+        f,
+        "{name:13} {ticks:10} {waiting:10} {free:10} {touching:10} {:10} {:5}  {:11.2e}  {:11.2e} {:10} {:8}",
+        m.unsettled, m.work, m.off_surface, m.off_minimum, m.beyond, m.around
+    )
+}

@@ -1,0 +1,27 @@
+//! `cargo xtask soak`: random scenes on all cores, judged tick by tick.
+
+use std::ffi::OsString;
+
+use anyhow::{Result, bail};
+
+use crate::run::{cargo, run, shown, target_dir, timed};
+
+/// Builds the soak in its own profile, fast and without the product's slow
+/// linking, and hands `words` on to it.
+pub(crate) fn soak(words: Vec<OsString>) -> Result<()> {
+    if words.is_empty() {
+        bail!("say for how long: cargo xtask soak MINUTES [--seed N], or --seed N --scene K");
+    }
+    timed("building the soak", || {
+        let package = ["--package", "hapterra-tests", "--bin", "hapterra-soak"];
+        run(cargo().args(["build", "--profile", "soak"]).args(package))
+    })?;
+    let name = format!("hapterra-soak{}", std::env::consts::EXE_SUFFIX);
+    let mut command = std::process::Command::new(target_dir().join("soak").join(name));
+    command.args(words);
+    let status = command.status()?;
+    if !status.success() {
+        bail!("`{}` found wrong answers ({status})", shown(&command));
+    }
+    Ok(())
+}
