@@ -94,7 +94,12 @@ fn contact(scene: &Scene, frames: &mut Frames, records: &mut Records) {
 }
 
 #[inline(never)]
-fn step(contact: &mut Contact, window: &Window<'_, WINDOW>, hip: GridPoint, rule: Rule) -> Felt {
+fn step<'c>(
+    contact: &'c mut Contact,
+    window: &Window<'_, WINDOW>,
+    hip: GridPoint,
+    rule: Rule,
+) -> &'c Felt {
     contact.step(window, hip, rule, Pace::RealTime)
 }
 

@@ -163,7 +163,7 @@ impl<'t, 'g> Player<'t, 'g> {
     pub fn feel(&mut self, hip: [f64; 3]) -> Option<Felt> {
         let hip = shifted(hip, self.shift);
         for _ in 0..PATIENCE {
-            let felt = self
+            let felt = *self
                 .contact
                 .step(&self.stage.window, hip, self.rule, self.pace);
             self.stage.supply(self.now, &self.contact, &felt, &hip);
