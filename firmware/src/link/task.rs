@@ -3,7 +3,7 @@
 use core::cell::RefCell;
 
 use embassy_futures::join::join;
-use embassy_futures::select::select;
+use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::signal::Signal;
 use embedded_io_async::{Read, Write};
@@ -25,8 +25,9 @@ pub trait LinkHost {
 /// Serves the link for ever.
 ///
 /// Reading and writing go on side by side, so that a host that does not read
-/// cannot keep the device from reading. A reader that gives no bytes says that
-/// the transport was interrupted; a writer that fails likewise.
+/// cannot keep the device from reading, nor the link from its turns. A reader
+/// that gives no bytes says that the transport was interrupted; a writer that
+/// fails likewise.
 pub async fn run<const D: usize>(
     link: &mut Link<'_, D>,
     mut rx: impl Read,
@@ -67,7 +68,17 @@ pub async fn run<const D: usize>(
                     break;
                 }
                 let bytes = chunk.get(..n).unwrap_or(&[]);
-                if tx.write_all(bytes).await.is_err() {
+                // A host that does not read, or is gone, holds the writer up
+                // for as long as it likes. The link goes on with the loop.
+                let turning = async {
+                    loop {
+                        board.tick_done().await;
+                        link.borrow_mut().turn();
+                        room.signal(());
+                    }
+                };
+                let sent = select(tx.write_all(bytes), turning).await;
+                if let Either::First(Err(_)) = sent {
                     link.borrow_mut().interrupted();
                 }
             }
