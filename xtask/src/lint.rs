@@ -5,13 +5,14 @@ use anyhow::{Context, Result};
 use crate::board::BOARDS;
 use crate::image::{counts_words, package_words};
 use crate::run::{cargo, run, timed};
-use crate::setup::toolchain;
+use crate::setup::{emulator, toolchain};
 
 /// Runs them all; the first that complains ends it.
 pub(crate) fn lint() -> Result<()> {
     timed("formatting", || {
         run(cargo().args(["fmt", "--all", "--check"])).context("type: cargo fmt")
     })?;
+    emulator::ready()?;
     timed("clippy for the host", || {
         let words = [
             "clippy",

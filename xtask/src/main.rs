@@ -104,6 +104,7 @@ fn command() -> Result<ExitCode> {
 fn setup() -> Result<()> {
     let toolchain = setup::toolchain::ready()?;
     let qemu = setup::qemu::ready()?;
+    setup::emulator::ready()?;
     run::say(format!(
         "ready: {toolchain:?} toolchain for the boards, {}",
         qemu.display()

@@ -6,17 +6,23 @@ use anyhow::Result;
 
 use crate::board::{BOARDS, Board};
 use crate::run::{cargo, run, timed};
-use crate::setup::{qemu, toolchain};
+use crate::setup::{emulator, qemu, toolchain};
 use crate::{counts, deny, image, panics, size};
 
 /// A board and the ELF of its image.
 pub(crate) type Image = (&'static Board, PathBuf);
+
+/// `quick` has no images of the real boards, and nothing to build what runs them.
+const WITHOUT_IMAGES: [&str; 2] = ["--exclude", "hapterra-image-tests"];
 
 /// Builds the images, holds them to their budgets, runs every test of the
 /// workspace on the host with QEMU beside it, and checks the dependencies.
 /// `quick` leaves out the boards that are not emulated and the dependencies.
 pub(crate) fn test(quick: bool) -> Result<()> {
     let qemu = qemu::ready()?;
+    if !quick {
+        emulator::ready()?;
+    }
     let images = images(if quick { &BOARDS[..1] } else { &BOARDS })?;
     check_sizes(&images)?;
     check_panics(&images)?;
@@ -31,6 +37,7 @@ pub(crate) fn test(quick: bool) -> Result<()> {
         let mut command = cargo();
         command
             .args(["test", "--workspace"])
+            .args(if quick { &WITHOUT_IMAGES[..] } else { &[] })
             .env("HAPTERRA_QEMU", qemu)
             .env(image::COUNTS_VARIABLE, &counts);
         for (board, path) in &images {

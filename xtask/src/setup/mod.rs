@@ -1,6 +1,7 @@
 //! Finding what the commands need, and installing it where that is allowed.
 
 mod distribution;
+pub(crate) mod emulator;
 mod packages;
 pub(crate) mod qemu;
 pub(crate) mod toolchain;

@@ -1,0 +1,227 @@
+//! What the core finds at the addresses of its peripherals.
+
+use std::collections::HashMap;
+
+use crate::chip::{Chip, UsbKind};
+use crate::nvic::{self, Nvic};
+use crate::timer::Timer;
+use crate::usb::{FullSpeed, Otg, Peripheral};
+use crate::watchdog::Watchdog;
+
+/// Offsets of a GPIO port's registers.
+const MODER: u32 = 0x00;
+const IDR: u32 = 0x10;
+const ODR: u32 = 0x14;
+const BSRR: u32 = 0x18;
+const PORTS: u32 = 11;
+/// DWT's cycle counter.
+const CYCCNT: u32 = 0xE000_1004;
+
+/// A write to something that moves the arm: its commands or the enable pin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effect {
+    /// The command of an axis (0 to 2): a converter code or a compare count.
+    Command(usize, u32),
+    /// The amplifiers' enable pin.
+    Enable(bool),
+}
+
+/// All peripherals of a chip.
+pub struct Bus {
+    chip: &'static Chip,
+    words: HashMap<u32, u32>,
+    inputs: HashMap<(u32, u32), bool>,
+    timers: Vec<Timer>,
+    /// The interrupt controller.
+    pub nvic: Nvic,
+    /// The independent watchdog.
+    pub watchdog: Watchdog,
+    /// The USB peripheral.
+    pub usb: Box<dyn Peripheral>,
+    /// Time since power-up.
+    pub now_ns: u64,
+    /// What reached commands and enable pin, in order, since it was last taken.
+    pub effects: Vec<Effect>,
+}
+
+impl Bus {
+    /// After a power-up, or a reset by the watchdog.
+    #[must_use]
+    pub fn new(chip: &'static Chip, by_watchdog: bool) -> Self {
+        let usb: Box<dyn Peripheral> = match chip.usb {
+            UsbKind::FullSpeedDevice { .. } => Box::new(FullSpeed::default()),
+            UsbKind::Otg { .. } => Box::new(Otg::default()),
+        };
+        let (flags, power_up, watchdog, _) = chip.reset_flags;
+        let cause = if by_watchdog { watchdog } else { power_up };
+        Self {
+            chip,
+            words: HashMap::from([(flags, cause)]),
+            inputs: HashMap::new(),
+            timers: chip
+                .timers
+                .iter()
+                .map(|_| Timer::new(chip.timer_hz))
+                .collect(),
+            nvic: Nvic::default(),
+            watchdog: Watchdog::default(),
+            usb,
+            now_ns: 0,
+            effects: vec![],
+        }
+    }
+
+    /// Lets time pass.
+    pub fn advance(&mut self, by_ns: u64) {
+        self.now_ns += by_ns;
+        for timer in &mut self.timers {
+            timer.advance(self.now_ns);
+        }
+        self.gather();
+    }
+
+    /// Peripherals' lines become pending interrupts.
+    pub fn gather(&mut self) {
+        for (timer, at) in self.timers.iter().zip(self.chip.timers) {
+            if let Some(interrupt) = at.interrupt.filter(|_| timer.is_asserting()) {
+                self.nvic.pend(interrupt);
+            }
+        }
+        if self.usb.is_asserting() {
+            self.nvic.pend(self.chip.usb_interrupt);
+        }
+    }
+
+    /// Sets the counters of axes 1 to 3.
+    pub fn feed_encoders(&mut self, counts: [i32; 3]) {
+        for (name, count) in self.chip.encoders.into_iter().zip(counts) {
+            let found = self.chip.timers.iter().position(|t| t.name == name);
+            if let Some(timer) = found.and_then(|i| self.timers.get_mut(i)) {
+                timer.feed(count as u16);
+            }
+        }
+    }
+
+    /// Sets the level at an input pin.
+    pub fn set_input(&mut self, pin: (u32, u32), high: bool) {
+        self.inputs.insert(pin, high);
+    }
+
+    /// The level of a pin, as a pull-down outside makes it where nothing drives.
+    #[must_use]
+    pub fn output(&self, (port, pin): (u32, u32)) -> bool {
+        let register = |offset| self.plain(self.chip.gpio + 0x400 * port + offset);
+        let drives = register(MODER) >> (2 * pin) & 3 == 1;
+        drives && register(ODR) >> pin & 1 == 1
+    }
+
+    /// What is commanded on axes 1 to 3, as the registers have it.
+    #[must_use]
+    pub fn commands(&mut self) -> [u32; 3] {
+        self.chip.commands.map(|address| self.read(address))
+    }
+
+    /// The timer at an address, and the offset into it.
+    fn timer(&mut self, address: u32) -> Option<(&mut Timer, u32)> {
+        let mut all = self.timers.iter_mut().zip(self.chip.timers);
+        all.find(|(_, at)| (at.base..at.base + 0x60).contains(&address))
+            .map(|(timer, at)| (timer, address - at.base))
+    }
+
+    fn usb_offset(&self, address: u32) -> Option<u32> {
+        let (base, bytes) = match self.chip.usb {
+            UsbKind::FullSpeedDevice { base, .. } => (base, 0x800),
+            UsbKind::Otg { base } => (base, 0xB000),
+        };
+        (base..base + bytes)
+            .contains(&address)
+            .then(|| address - base)
+    }
+
+    fn port(&self, address: u32) -> Option<(u32, u32)> {
+        let offset = address.checked_sub(self.chip.gpio)?;
+        (offset < 0x400 * PORTS).then_some((offset / 0x400, offset % 0x400))
+    }
+
+    fn plain(&self, address: u32) -> u32 {
+        self.words.get(&address).copied().unwrap_or(0)
+    }
+
+    /// A word that the core reads.
+    pub fn read(&mut self, address: u32) -> u32 {
+        if let Some((timer, offset)) = self.timer(address) {
+            return timer.get(offset);
+        }
+        if let Some(offset) = self.usb_offset(address) {
+            return self.usb.read(offset);
+        }
+        if let Some((port, IDR)) = self.port(address) {
+            let level = |pin| self.inputs.get(&(port, pin)).copied().unwrap_or(false);
+            return (0..16).map(|pin| u32::from(level(pin)) << pin).sum();
+        }
+        match address {
+            nvic::BASE..=0xE000_EFFF => self.nvic.read(address - nvic::BASE),
+            CYCCNT => {
+                (u128::from(self.now_ns) * u128::from(self.chip.core_hz) / 1_000_000_000) as u32
+            }
+            _ if address & !0x3FF == self.chip.watchdog => {
+                self.watchdog.read(address - self.chip.watchdog)
+            }
+            _ => self.ready(address, self.plain(address)),
+        }
+    }
+
+    /// What the hardware adds to a register.
+    fn ready(&self, address: u32, mut value: u32) -> u32 {
+        for rule in self.chip.follows.iter().filter(|f| f.address == address) {
+            if value & rule.of != 0 {
+                value |= rule.ready;
+            }
+        }
+        for (_, bits) in self.chip.set.iter().filter(|(at, _)| *at == address) {
+            value |= bits;
+        }
+        for &(_, from, to, width) in self.chip.copies.iter().filter(|c| c.0 == address) {
+            let mask = (1 << width) - 1;
+            value = value & !(mask << to) | (value >> from & mask) << to;
+        }
+        value
+    }
+
+    /// A write of the core's, in the bytes of `mask`.
+    pub fn write(&mut self, address: u32, value: u32, mask: u32) {
+        let enabled = self.output(self.chip.enable);
+        if let Some((timer, offset)) = self.timer(address) {
+            timer.write(offset, value, mask);
+        } else if let Some(offset) = self.usb_offset(address) {
+            self.usb.write(offset, value, mask);
+        } else if let Some((port, BSRR)) = self.port(address) {
+            let odr = self.chip.gpio + 0x400 * port + ODR;
+            let level = self.plain(odr) & !(value >> 16) | value & 0xFFFF;
+            self.words.insert(odr, level);
+        } else if (nvic::BASE..nvic::BASE + 0x1000).contains(&address) {
+            self.nvic.write(address - nvic::BASE, value, mask);
+        } else if address & !0x3FF == self.chip.watchdog {
+            self.watchdog
+                .write(address - self.chip.watchdog, value, self.now_ns);
+        } else {
+            self.write_plain(address, value, mask);
+        }
+        if let Some(axis) = self.chip.commands.iter().position(|c| *c == address) {
+            self.effects.push(Effect::Command(axis, value & mask));
+        }
+        let now_enabled = self.output(self.chip.enable);
+        if now_enabled != enabled {
+            self.effects.push(Effect::Enable(now_enabled));
+        }
+    }
+
+    fn write_plain(&mut self, address: u32, value: u32, mask: u32) {
+        let (flags, _, _, clear) = self.chip.reset_flags;
+        let mut value = self.plain(address) & !mask | value & mask;
+        if address == flags && value & clear != 0 {
+            value = 0;
+        }
+        self.words.insert(address, value);
+    }
+}

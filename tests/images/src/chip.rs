@@ -1,0 +1,220 @@
+//! Where the two chips keep what the images use.
+
+/// A timer at an address, with its kernel clock and, if it is used, interrupt.
+#[derive(Clone, Copy, Debug)]
+pub struct TimerAt {
+    /// Name in the manual.
+    pub name: &'static str,
+    /// Base address.
+    pub base: u32,
+    /// Position in the vector table.
+    pub interrupt: Option<usize>,
+}
+
+/// "When these bits are set, those read as set, too."
+#[derive(Clone, Copy, Debug)]
+pub struct Follows {
+    /// The register that is read.
+    pub address: u32,
+    /// Bits looked at.
+    pub of: u32,
+    /// Bits that follow.
+    pub ready: u32,
+}
+
+/// Which USB peripheral the chip has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UsbKind {
+    /// The device-only one, with packet memory.
+    FullSpeedDevice {
+        /// Registers.
+        base: u32,
+        /// Packet memory.
+        memory: u32,
+    },
+    /// Synopsys' OTG.
+    Otg {
+        /// Registers and FIFOs.
+        base: u32,
+    },
+}
+
+/// A chip.
+#[derive(Clone, Copy, Debug)]
+pub struct Chip {
+    /// Board name, as in the workspace.
+    pub board: &'static str,
+    /// Name in probe-rs's registry.
+    pub chip: &'static str,
+    /// Environment variable with the image's path.
+    pub variable: &'static str,
+    /// Whether the core is a Cortex-M7.
+    pub is_m7: bool,
+    /// Core clock.
+    pub core_hz: u64,
+    /// Clock of the timers.
+    pub timer_hz: u64,
+    /// Memories that code and data may be in: address and bytes.
+    pub memories: &'static [(u32, u32)],
+    /// The timers in use.
+    pub timers: &'static [TimerAt],
+    /// Names of the encoder timers of axes 1 to 3.
+    pub encoders: [&'static str; 3],
+    /// First GPIO port; they are 0x400 apart.
+    pub gpio: u32,
+    /// The watchdog.
+    pub watchdog: u32,
+    /// Register with the reset flags, the flag of a power-up, the watchdog's,
+    /// and the bit that clears them all.
+    pub reset_flags: (u32, u32, u32, u32),
+    /// Ready bits.
+    pub follows: &'static [Follows],
+    /// Registers that read these bits as set, whatever was written.
+    pub set: &'static [(u32, u32)],
+    /// Fields that copy another field: register, from bit, to bit, width.
+    pub copies: &'static [(u32, u32, u32, u32)],
+    /// USB.
+    pub usb: UsbKind,
+    /// USB's interrupt.
+    pub usb_interrupt: usize,
+    /// The haptic tick's interrupt.
+    pub tick_interrupt: usize,
+    /// Pins: port and number.
+    pub enable: (u32, u32),
+    /// Opens when pressed: high then.
+    pub emergency_stop: (u32, u32),
+    /// Closed to ground while held.
+    pub dead_man: (u32, u32),
+    /// Where the commands of axes 1 to 3 are.
+    pub commands: [u32; 3],
+}
+
+const fn timer(name: &'static str, base: u32, interrupt: Option<usize>) -> TimerAt {
+    TimerAt {
+        name,
+        base,
+        interrupt,
+    }
+}
+
+const fn follows(address: u32, of: u32, ready: u32) -> Follows {
+    Follows { address, of, ready }
+}
+
+const B: u32 = 1;
+const C: u32 = 2;
+const F: u32 = 5;
+const KIB: u32 = 1024;
+
+/// STM32G474RE on the NUCLEO-G474RE (RM0440).
+pub static G474: Chip = Chip {
+    board: "nucleo-g474re",
+    chip: "STM32G474RETx",
+    variable: "HAPTERRA_G474_ELF",
+    is_m7: false,
+    core_hz: 170_000_000,
+    timer_hz: 170_000_000,
+    memories: &[
+        (0x0800_0000, 512 * KIB),
+        (0x2000_0000, 128 * KIB),
+        // System memory: the unique identifier and calibration words.
+        (0x1FFF_0000, 64 * KIB),
+    ],
+    timers: &[
+        timer("TIM2", 0x4000_0000, None),
+        timer("TIM3", 0x4000_0400, None),
+        timer("TIM4", 0x4000_0800, None),
+        timer("TIM5", 0x4000_0C00, Some(50)),
+        timer("TIM7", 0x4000_1400, Some(55)),
+    ],
+    encoders: ["TIM2", "TIM3", "TIM4"],
+    gpio: 0x4800_0000,
+    watchdog: 0x4000_3000,
+    reset_flags: (0x4002_1094, 1 << 27, 1 << 29, 1 << 23),
+    follows: &[
+        // RCC_CR: HSI, HSE, PLL.
+        follows(0x4002_1000, 1 << 8, 1 << 10),
+        follows(0x4002_1000, 1 << 16, 1 << 17),
+        follows(0x4002_1000, 1 << 24, 1 << 25),
+        // RCC_CRRCR: HSI48; RCC_CSR: LSI.
+        follows(0x4002_1098, 1 << 0, 1 << 1),
+        follows(0x4002_1094, 1 << 0, 1 << 1),
+    ],
+    set: &[],
+    // RCC_CFGR: SWS follows SW.
+    copies: &[(0x4002_1008, 0, 2, 2)],
+    usb: UsbKind::FullSpeedDevice {
+        base: 0x4000_5C00,
+        memory: 0x4000_6000,
+    },
+    usb_interrupt: 20,
+    tick_interrupt: 55,
+    enable: (B, 0),
+    emergency_stop: (C, 0),
+    dead_man: (C, 1),
+    // DAC1 channels 1 and 2, DAC2 channel 1: DHR12Rx.
+    commands: [0x5000_0808, 0x5000_0814, 0x5000_0C08],
+};
+
+/// STM32H743ZI on the NUCLEO-H743ZI2 (RM0433).
+pub static H743: Chip = Chip {
+    board: "nucleo-h743zi2",
+    chip: "STM32H743ZITx",
+    variable: "HAPTERRA_H743_ELF",
+    is_m7: true,
+    core_hz: 480_000_000,
+    timer_hz: 240_000_000,
+    memories: &[
+        (0x0800_0000, 2048 * KIB),
+        (0x2000_0000, 128 * KIB),
+        (0x2400_0000, 512 * KIB),
+        (0x1FF0_0000, 128 * KIB),
+    ],
+    timers: &[
+        timer("TIM1", 0x4001_0000, None),
+        timer("TIM8", 0x4001_0400, None),
+        timer("TIM3", 0x4000_0400, None),
+        timer("TIM4", 0x4000_0800, None),
+        timer("TIM5", 0x4000_0C00, Some(50)),
+        timer("TIM7", 0x4000_1400, Some(55)),
+    ],
+    encoders: ["TIM8", "TIM3", "TIM4"],
+    gpio: 0x5802_0000,
+    watchdog: 0x5800_4800,
+    reset_flags: (0x5802_44D0, 1 << 23, 1 << 26, 1 << 16),
+    follows: &[
+        // RCC_CR: HSI, CSI, HSI48, HSE, the PLLs.
+        follows(0x5802_4400, 1 << 0, 1 << 2),
+        follows(0x5802_4400, 1 << 7, 1 << 8),
+        follows(0x5802_4400, 1 << 12, 1 << 13),
+        follows(0x5802_4400, 1 << 16, 1 << 17),
+        follows(0x5802_4400, 1 << 24, 1 << 25),
+        follows(0x5802_4400, 1 << 26, 1 << 27),
+        follows(0x5802_4400, 1 << 28, 1 << 29),
+        // RCC_CSR: LSI.
+        follows(0x5802_4474, 1 << 0, 1 << 1),
+    ],
+    set: &[
+        // PWR_CSR1.ACTVOSRDY, PWR_CR3 (USB regulator ready), PWR_D3CR.VOSRDY.
+        (0x5802_4804, 1 << 13),
+        (0x5802_480C, 1 << 26),
+        (0x5802_4818, 1 << 13),
+        // SYSCFG_CCCSR.READY.
+        (0x5800_0420, 1 << 8),
+        // RCC_CR: the clock domains are ready.
+        (0x5802_4400, 0b11 << 14),
+    ],
+    // RCC_CFGR: SWS follows SW.
+    copies: &[(0x5802_4410, 0, 3, 3)],
+    usb: UsbKind::Otg { base: 0x4008_0000 },
+    usb_interrupt: 101,
+    tick_interrupt: 55,
+    enable: (F, 3),
+    emergency_stop: (F, 4),
+    dead_man: (F, 5),
+    // TIM1_CCR1 to 3.
+    commands: [0x4001_0034, 0x4001_0038, 0x4001_003C],
+};
+
+/// Both.
+pub static CHIPS: [&Chip; 2] = [&G474, &H743];

@@ -1,0 +1,175 @@
+//! A board on the bench: powered up, plugged in, an arm in someone's hand.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::Duration;
+
+use hapterra::link::{Event, Patience, Session};
+use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
+use hapterra::terrain::Terrain;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::wire::message::{Sample, Scene};
+
+use crate::chip::{CHIPS, Chip};
+use crate::elf::Image;
+use crate::machine::{Machine, Stop};
+use crate::usb::host::{Shared, UsbLink, enumerate};
+
+/// Counts that an arm may move in a tick without being taken for a fault.
+const COUNTS_PER_TICK: i32 = 60;
+
+/// The machines whose images there are: `cargo xtask test` builds and names
+/// them. A visible line for each that is missing.
+#[must_use]
+pub fn machines() -> Vec<Machine> {
+    let image = |chip: &&'static Chip| {
+        let path = std::env::var_os(chip.variable).filter(|path| !path.is_empty());
+        if path.is_none() {
+            eprintln!(
+                "skipped: no image of {}: {} is not set",
+                chip.board, chip.variable
+            );
+        }
+        path.map(|path| Machine::new(chip, Image::read(path.as_ref())))
+    };
+    CHIPS.iter().filter_map(image).collect()
+}
+
+/// A device with a session, felt through its encoders.
+pub struct Device<'t> {
+    /// The board.
+    pub machine: Shared,
+    session: Session<'t>,
+    /// Where the encoders are.
+    pub counts: [i32; 3],
+    /// The latest sample.
+    pub latest: Option<Sample>,
+}
+
+impl<'t> Device<'t> {
+    /// Powers the board up with the arm in its home pose and the dead-man
+    /// switch held, plugs it in and opens a session in `scene`.
+    ///
+    /// # Panics
+    /// When any of it fails.
+    #[must_use]
+    pub fn open(mut machine: Machine, terrain: &'t Terrain<'t>, scene: Scene) -> Self {
+        let dead_man = machine.chip.dead_man;
+        machine.set_input(dead_man, false);
+        assert_eq!(machine.run_ms(5), Stop::Time);
+        enumerate(&mut machine).expect("enumerated");
+        let machine = Rc::new(RefCell::new(machine));
+        let link = Box::new(UsbLink(Rc::clone(&machine)));
+        // No verdict depends on how fast this machine is.
+        let (session, _) =
+            Session::open(terrain, scene, link, Patience::EMULATED).expect("a session");
+        let mut device = Self {
+            machine,
+            session,
+            counts: [0; 3],
+            latest: None,
+        };
+        device.run_ms(20);
+        device
+    }
+
+    /// Lets time pass, the host answering.
+    ///
+    /// # Panics
+    /// When the link breaks.
+    pub fn run_ms(&mut self, ms: u64) {
+        let end_ns = self.machine.borrow().bus().now_ns + ms * 1_000_000;
+        while self.machine.borrow().bus().now_ns < end_ns {
+            let mut take = |event: Event<'_>| {
+                if let Event::Sample(sample) = event {
+                    self.latest = Some(*sample);
+                }
+            };
+            self.session
+                .poll(Duration::from_millis(1), &mut take)
+                .expect("goes on");
+        }
+    }
+
+    /// Moves the arm to these counts, no faster than a hand does.
+    pub fn move_to(&mut self, counts: [i32; 3]) {
+        while self.counts != counts {
+            for (now, then) in self.counts.iter_mut().zip(counts) {
+                *now += (then - *now).clamp(-COUNTS_PER_TICK, COUNTS_PER_TICK);
+            }
+            self.machine.borrow().bus().feed_encoders(self.counts);
+            self.run_ms(1);
+        }
+    }
+
+    /// What is commanded on axes 1 to 3: converter codes or compare counts.
+    #[must_use]
+    pub fn commands(&self) -> [u32; 3] {
+        self.machine.borrow().bus().commands()
+    }
+}
+
+/// An inclined plane under the arm, and what it is like to press it, in f64
+/// from the counts on, sharing no code with the device.
+#[derive(Clone, Copy, Debug)]
+pub struct Plane {
+    /// The arm.
+    pub model: PhantomModel,
+    /// Where the terrain lies.
+    pub place: Placement,
+    /// Rise east and north, millimetres a millimetre.
+    pub slope: [f64; 2],
+    /// Height above the origin, mm.
+    pub height_mm: f64,
+    /// Spring and limit.
+    pub law: ForceLaw,
+}
+
+impl Plane {
+    /// How far (mm) a terrain point is above the plane, along its normal.
+    #[must_use]
+    pub fn above_mm(&self, [east, north, up]: [f64; 3]) -> f64 {
+        let surface = self.height_mm + self.slope[0] * east + self.slope[1] * north;
+        (up - surface) * self.normal()[2]
+    }
+
+    /// Unit normal: east, north, up.
+    #[must_use]
+    pub fn normal(&self) -> [f64; 3] {
+        let [a, b] = self.slope;
+        let length = (a * a + b * b + 1.0).sqrt();
+        [-a / length, -b / length, 1.0 / length]
+    }
+
+    /// Counts nearest to a tip `depth_mm` under the plane at an east and north.
+    ///
+    /// # Panics
+    /// When the arm does not reach.
+    #[must_use]
+    pub fn counts_at(&self, [east, north]: [f64; 2], depth_mm: f64) -> [i32; 3] {
+        let surface = self.height_mm + self.slope[0] * east + self.slope[1] * north;
+        let up = surface - depth_mm / self.normal()[2];
+        let tip = self.place.to_device_m(&self.model, [east, north, up]);
+        let q = kinematics::inverse(&self.model, tip).expect("in reach");
+        std::array::from_fn(|axis| Encoder::new(&self.model.drive[axis]).counts(q[axis]))
+    }
+
+    /// Motor currents (A) of axes 1 to 3 with the arm at these counts.
+    #[must_use]
+    pub fn currents_a(&self, counts: [i32; 3]) -> [f64; 3] {
+        let q: [f64; 3] = std::array::from_fn(|axis| {
+            Encoder::new(&self.model.drive[axis]).angle_rad(counts[axis])
+        });
+        let tip = kinematics::tip(&self.model, q);
+        let depth_mm = -self.above_mm(self.place.to_terrain_mm(&self.model, tip));
+        let newtons = (f64::from(self.law.stiffness_n_per_mm) * depth_mm)
+            .clamp(0.0, self.law.max_force_n.into());
+        let force = Placement::turn_to_device(self.normal().map(|n| n * newtons));
+        let jacobian = kinematics::jacobian(&self.model, q);
+        std::array::from_fn(|joint| {
+            let torque: f64 = (0..3).map(|axis| jacobian[axis][joint] * force[axis]).sum();
+            let drive = &self.model.drive[joint];
+            drive.sign * torque / (drive.ratio * drive.motor.kt_nm_per_a)
+        })
+    }
+}

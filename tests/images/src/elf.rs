@@ -1,0 +1,154 @@
+//! What a test wants to know of an image.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use object::LittleEndian;
+use object::elf::{FileHeader32, PT_LOAD, STT_FUNC};
+use object::read::elf::{FileHeader, ProgramHeader, Sym};
+
+/// A run of bytes and where it is loaded and runs.
+#[derive(Clone, Debug)]
+pub struct Segment {
+    /// Address it runs at.
+    pub runs: u32,
+    /// Address it is loaded to.
+    pub loaded: u32,
+    /// Bytes in memory.
+    pub size: u32,
+    /// What is in the file; the rest of `size` is not set by it.
+    pub bytes: Vec<u8>,
+}
+
+/// A function of the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Function {
+    /// Its first instruction, without the Thumb bit.
+    pub address: u32,
+    /// Its length in bytes.
+    pub size: u32,
+}
+
+/// An image: segments and symbols.
+pub struct Image {
+    /// What is loaded.
+    pub segments: Vec<Segment>,
+    functions: BTreeMap<String, Function>,
+    symbols: BTreeMap<String, u32>,
+    /// Where code (true) and data in it (false) begin.
+    mapping: BTreeMap<u32, bool>,
+}
+
+impl Image {
+    /// Reads the ELF at `path`.
+    ///
+    /// # Panics
+    /// When it is none, or cannot be read: a test has nothing else to do.
+    #[must_use]
+    pub fn read(path: &Path) -> Self {
+        let bytes = std::fs::read(path).expect("the image can be read");
+        let header = FileHeader32::<LittleEndian>::parse(&*bytes).expect("a 32-bit ELF");
+        let sections = header.sections(LittleEndian, &*bytes).expect("sections");
+        let table = sections
+            .symbols(LittleEndian, &*bytes, object::elf::SHT_SYMTAB)
+            .expect("symbols");
+        let (mut functions, mut symbols) = (BTreeMap::new(), BTreeMap::new());
+        let mut mapping = BTreeMap::new();
+        for symbol in table.iter() {
+            let name = symbol.name(LittleEndian, table.strings()).unwrap_or(b"");
+            let name = String::from_utf8_lossy(name).into_owned();
+            let (address, size) = (symbol.st_value(LittleEndian), symbol.st_size(LittleEndian));
+            if symbol.st_type() == STT_FUNC {
+                let address = address & !1;
+                functions.insert(name.clone(), Function { address, size });
+            }
+            match name.split('.').next() {
+                Some("$t") => drop(mapping.insert(address, true)),
+                Some("$d") => drop(mapping.insert(address, false)),
+                _ => drop(symbols.insert(name, address)),
+            }
+        }
+        let segments = header
+            .program_headers(LittleEndian, &*bytes)
+            .expect("program headers")
+            .iter()
+            .filter(|p| p.p_type(LittleEndian) == PT_LOAD && p.p_memsz(LittleEndian) > 0)
+            .map(|p| Segment {
+                runs: p.p_vaddr(LittleEndian),
+                loaded: p.p_paddr(LittleEndian),
+                size: p.p_memsz(LittleEndian),
+                bytes: p.data(LittleEndian, &*bytes).expect("data").to_vec(),
+            })
+            .collect();
+        Self {
+            segments,
+            functions,
+            symbols,
+            mapping,
+        }
+    }
+
+    /// All functions by their (mangled) names.
+    pub fn functions(&self) -> impl Iterator<Item = (&str, Function)> {
+        self.functions.iter().map(|(name, f)| (name.as_str(), *f))
+    }
+
+    /// Functions whose name has all of `parts` in it.
+    #[must_use]
+    pub fn functions_like(&self, parts: &[&str]) -> Vec<Function> {
+        let fits = |name: &str| parts.iter().all(|part| name.contains(part));
+        let all = self.functions().filter(|(name, _)| fits(name));
+        all.map(|(_, function)| function).collect()
+    }
+
+    /// The name of the function that holds `address`.
+    #[must_use]
+    pub fn at(&self, address: u32) -> &str {
+        self.functions()
+            .find(|(_, f)| (f.address..f.address + f.size.max(2)).contains(&address))
+            .map_or("?", |(name, _)| name)
+    }
+
+    /// The value of a symbol, as a linker script gives them.
+    #[must_use]
+    pub fn symbol(&self, name: &str) -> Option<u32> {
+        self.symbols.get(name).copied()
+    }
+
+    /// Every instruction with its address; a short one in the upper half-word.
+    pub fn instructions(&self) -> impl Iterator<Item = (u32, u32)> {
+        let starts: Vec<_> = self.mapping.iter().map(|(a, code)| (*a, *code)).collect();
+        let ends: Vec<_> = starts.iter().skip(1).map(|(a, _)| *a).collect();
+        let code = starts
+            .into_iter()
+            .zip(ends)
+            .filter(|((_, is_code), _)| *is_code);
+        code.flat_map(|((start, _), end)| decode(start, &self.halves(start, end)))
+    }
+
+    fn halves(&self, start: u32, end: u32) -> Vec<u16> {
+        let bytes = self.segments.iter().find_map(|s| {
+            let from = start.checked_sub(s.runs)? as usize;
+            s.bytes.get(from..from + (end - start) as usize)
+        });
+        let bytes = bytes.unwrap_or(&[]);
+        let halves = bytes.as_chunks::<2>().0.iter();
+        halves.map(|b| u16::from_le_bytes(*b)).collect()
+    }
+}
+
+/// Cuts half-words into instructions.
+fn decode(start: u32, halves: &[u16]) -> Vec<(u32, u32)> {
+    let (mut found, mut at) = (vec![], 0);
+    while let Some(first) = halves.get(at) {
+        let address = start + 2 * at as u32;
+        let is_long = first >> 11 >= 0b11101;
+        let second = if is_long { halves.get(at + 1) } else { None };
+        found.push((
+            address,
+            u32::from(*first) << 16 | second.map_or(0, |s| (*s).into()),
+        ));
+        at += if is_long { 2 } else { 1 };
+    }
+    found
+}

@@ -1,0 +1,28 @@
+//! The boards' own images in an emulated core, from reset, without the boards.
+//!
+//! ```text
+//!   scripted host ── usb ──┐                 ┌── DAC, PWM: caught
+//!                          ▼                 │
+//!   encoder counts ──▶  bus (MMIO)  ◀──▶  unicorn: the unmodified ELF
+//!                          ▲
+//!   time ── timers ── nvic ┘
+//! ```
+//!
+//! [`machine::Machine`] is the core with its exceptions; [`bus::Bus`] what it
+//! finds at its peripherals' addresses. Only what the images use is modelled,
+//! as the chips' reference manuals (RM0440, RM0433) and the architecture's
+//! (ARM DDI 0403E) describe it. A register that nothing models reads back what
+//! was written last.
+//!
+//! What this shows is what the instructions of the image do. What it cannot
+//! show is electrical, or a fault of the silicon or of these models.
+
+pub mod bus;
+pub mod chip;
+pub mod device;
+pub mod elf;
+pub mod machine;
+pub mod nvic;
+pub mod timer;
+pub mod usb;
+pub mod watchdog;

@@ -1,0 +1,135 @@
+//! The interrupt controller and the few system registers the images use.
+
+use std::collections::HashMap;
+
+/// Base of the system control space's page.
+pub const BASE: u32 = 0xE000_E000;
+const ISER: u32 = 0x100;
+const ICER: u32 = 0x180;
+const ISPR: u32 = 0x200;
+const ICPR: u32 = 0x280;
+const IPR: u32 = 0x400;
+/// Most interrupts there can be.
+const INTERRUPTS: usize = 240;
+
+/// Enables, pending bits and priorities of all interrupts.
+pub struct Nvic {
+    enabled: [bool; INTERRUPTS],
+    pending: [bool; INTERRUPTS],
+    priority: [u8; INTERRUPTS],
+    other: HashMap<u32, u32>,
+}
+
+impl Default for Nvic {
+    fn default() -> Self {
+        Self {
+            enabled: [false; INTERRUPTS],
+            pending: [false; INTERRUPTS],
+            priority: [0; INTERRUPTS],
+            other: HashMap::new(),
+        }
+    }
+}
+
+impl Nvic {
+    /// The word at an offset into the page.
+    #[must_use]
+    pub fn read(&self, offset: u32) -> u32 {
+        let bits = |from: u32, of: &[bool; INTERRUPTS]| {
+            let first = ((offset - from) / 4 * 32) as usize;
+            let bit = |i: usize| u32::from(of.get(first + i).copied().unwrap_or(false)) << i;
+            (0..32).map(bit).sum()
+        };
+        match offset {
+            ISER..0x120 => bits(ISER, &self.enabled),
+            ICER..0x1A0 => bits(ICER, &self.enabled),
+            ISPR..0x220 => bits(ISPR, &self.pending),
+            ICPR..0x2A0 => bits(ICPR, &self.pending),
+            IPR..0x4F0 => {
+                let first = (offset - IPR) as usize;
+                let four = self.priority.get(first..first + 4).unwrap_or(&[0; 4]);
+                u32::from_le_bytes(four.try_into().unwrap_or_default())
+            }
+            _ => self.other.get(&offset).copied().unwrap_or(0),
+        }
+    }
+
+    /// Writes `value` under `mask` (all bytes that the access has).
+    pub fn write(&mut self, offset: u32, value: u32, mask: u32) {
+        let each = |from: u32| {
+            let first = (offset - from) / 4 * 32;
+            let is_set = move |i: &u32| value & mask & (1 << i) != 0;
+            (0..32).filter(is_set).map(move |i| (first + i) as usize)
+        };
+        match offset {
+            ISER..0x120 => set(&mut self.enabled, each(ISER), true),
+            ICER..0x1A0 => set(&mut self.enabled, each(ICER), false),
+            ISPR..0x220 => set(&mut self.pending, each(ISPR), true),
+            ICPR..0x2A0 => set(&mut self.pending, each(ICPR), false),
+            IPR..0x4F0 => {
+                let first = (offset - IPR) as usize;
+                for (i, byte) in value.to_le_bytes().into_iter().enumerate() {
+                    if mask >> (8 * i) & 0xFF != 0 {
+                        // Four bits are implemented: the rest reads zero.
+                        self.priority[first + i] = byte & 0xF0;
+                    }
+                }
+            }
+            _ => {
+                let word = self.other.entry(offset).or_default();
+                *word = *word & !mask | value & mask;
+            }
+        }
+    }
+
+    /// Raises an interrupt.
+    pub fn pend(&mut self, interrupt: usize) {
+        self.pending[interrupt] = true;
+    }
+
+    /// The interrupt that would be taken at execution priority `current`, and
+    /// its own.
+    #[must_use]
+    pub fn deliverable(&self, current: i16) -> Option<(usize, u8)> {
+        let ready = (0..INTERRUPTS).filter(|i| self.enabled[*i] && self.pending[*i]);
+        let first = ready.min_by_key(|i| (self.priority[*i], *i))?;
+        let priority = self.priority[first];
+        (i16::from(priority) < current).then_some((first, priority))
+    }
+
+    /// Any that is enabled and pending: what wakes a sleeping core.
+    #[must_use]
+    pub fn has_pending(&self) -> bool {
+        (0..INTERRUPTS).any(|i| self.enabled[i] && self.pending[i])
+    }
+
+    /// Whether an interrupt is let through.
+    #[must_use]
+    pub fn is_enabled(&self, interrupt: usize) -> bool {
+        self.enabled[interrupt]
+    }
+
+    /// Whether an interrupt is let through and has not been taken.
+    #[must_use]
+    pub fn waits(&self, interrupt: usize) -> bool {
+        self.enabled[interrupt] && self.pending[interrupt]
+    }
+
+    /// It is taken: no longer pending.
+    pub fn take(&mut self, interrupt: usize) {
+        self.pending[interrupt] = false;
+    }
+
+    /// Every enabled interrupt and its priority.
+    #[must_use]
+    pub fn enabled(&self) -> Vec<(usize, u8)> {
+        let on = (0..INTERRUPTS).filter(|i| self.enabled[*i]);
+        on.map(|i| (i, self.priority[i])).collect()
+    }
+}
+
+fn set(bits: &mut [bool; INTERRUPTS], which: impl Iterator<Item = usize>, to: bool) {
+    for bit in which.filter(|i| *i < INTERRUPTS) {
+        bits[bit] = to;
+    }
+}

@@ -1,0 +1,157 @@
+//! A timer of the chips: counting up, moved by an encoder, or standing still.
+
+const CR1: u32 = 0x00;
+const SMCR: u32 = 0x08;
+const DIER: u32 = 0x0C;
+const SR: u32 = 0x10;
+const EGR: u32 = 0x14;
+const CNT: u32 = 0x24;
+const PSC: u32 = 0x28;
+/// The auto-reload register: it counts from 0 to this.
+pub const ARR: u32 = 0x2C;
+/// The first of four compare registers.
+pub const CCR1: u32 = 0x34;
+
+/// Bits of CR1.
+const CEN: u32 = 1 << 0;
+const URS: u32 = 1 << 2;
+/// Bit of SR: the counter went round.
+const UIF: u32 = 1 << 0;
+
+/// One timer.
+pub struct Timer {
+    hz: u64,
+    registers: [u32; 24],
+    now_ns: u64,
+    /// What is left of the last count, in billionths of a clock.
+    carry: u64,
+}
+
+impl Timer {
+    /// A stopped timer with a kernel clock of `hz`.
+    #[must_use]
+    pub fn new(hz: u64) -> Self {
+        let mut timer = Self {
+            hz,
+            registers: [0; 24],
+            now_ns: 0,
+            carry: 0,
+        };
+        timer.set(ARR, 0xFFFF);
+        timer
+    }
+
+    /// A register.
+    #[must_use]
+    pub fn get(&self, offset: u32) -> u32 {
+        self.registers.get((offset / 4) as usize).map_or(0, |r| *r)
+    }
+
+    fn set(&mut self, offset: u32, value: u32) {
+        if let Some(register) = self.registers.get_mut((offset / 4) as usize) {
+            *register = value;
+        }
+    }
+
+    /// Sets the count, as an encoder does.
+    pub fn feed(&mut self, count: u16) {
+        self.set(CNT, count.into());
+    }
+
+    /// A write of the core's.
+    pub fn write(&mut self, offset: u32, value: u32, mask: u32) {
+        match offset {
+            // Flags are cleared by writing zero.
+            SR => self.set(SR, self.get(SR) & (value | !mask)),
+            EGR => {
+                if value & 1 != 0 {
+                    self.set(CNT, 0);
+                    self.carry = 0;
+                    let raised = if self.get(CR1) & URS == 0 { UIF } else { 0 };
+                    self.set(SR, self.get(SR) | raised);
+                }
+            }
+            _ => self.set(offset, self.get(offset) & !mask | value & mask),
+        }
+    }
+
+    fn is_counting(&self) -> bool {
+        let follows_encoder = matches!(self.get(SMCR) & 7, 1..=3);
+        self.get(CR1) & CEN != 0 && !follows_encoder
+    }
+
+    /// Lets time pass up to `now_ns`, setting flags on the way.
+    pub fn advance(&mut self, now_ns: u64) {
+        let passed_ns = now_ns - self.now_ns;
+        self.now_ns = now_ns;
+        if !self.is_counting() {
+            return;
+        }
+        let a_count = 1_000_000_000 * (u64::from(self.get(PSC)) + 1);
+        let clocks = passed_ns * self.hz + self.carry;
+        self.carry = clocks % a_count;
+        self.step(clocks / a_count);
+    }
+
+    fn step(&mut self, counts: u64) {
+        let period = u64::from(self.get(ARR)) + 1;
+        let from = u64::from(self.get(CNT));
+        let to = from + counts;
+        let mut flags = u32::from(to >= period) * UIF;
+        for channel in 0..4 {
+            let at = u64::from(self.get(CCR1 + 4 * channel));
+            let next = if at > from { at } else { at + period };
+            if at < period && next <= to {
+                flags |= 2 << channel;
+            }
+        }
+        self.set(SR, self.get(SR) | flags);
+        self.set(CNT, (to % period) as u32);
+    }
+
+    /// Whether its interrupt is asserted.
+    #[must_use]
+    pub fn is_asserting(&self) -> bool {
+        self.get(SR) & self.get(DIER) & 0x1F != 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_prescaled_timer_goes_round_in_exactly_its_period() {
+        let mut timer = Timer::new(170_000_000);
+        for (register, value) in [(PSC, 3), (ARR, 42_499), (DIER, 1), (CR1, CEN)] {
+            timer.write(register, value, u32::MAX);
+        }
+        let mut rounds = 0;
+        for step in 1..=1_000_000 {
+            timer.advance(step * 10_000);
+            if timer.is_asserting() {
+                rounds += 1;
+                assert_eq!(step, rounds * 100, "a thousand a second");
+                timer.write(SR, !UIF, u32::MAX);
+            }
+        }
+        assert_eq!(rounds, 10_000);
+    }
+
+    #[test]
+    fn a_compare_match_is_flagged_once_a_round() {
+        let mut timer = Timer::new(1_000_000);
+        for (register, value) in [(ARR, 99), (CCR1, 40), (DIER, 2), (CR1, CEN)] {
+            timer.write(register, value, u32::MAX);
+        }
+        let mut at = vec![];
+        for us in 1..=300 {
+            timer.advance(us * 1000);
+            if timer.is_asserting() {
+                at.push(us);
+                timer.write(SR, 0, u32::MAX);
+            }
+        }
+        assert_eq!(at, [40, 140, 240]);
+    }
+}

@@ -1,0 +1,55 @@
+//! The chips' two USB peripherals, and a host that talks to them by script.
+//!
+//! Packets are moved whole: no bits, no CRC, no frames, no time on the wire.
+
+mod full_speed;
+pub mod host;
+
+mod otg;
+
+pub use full_speed::FullSpeed;
+pub use otg::Otg;
+
+/// How a device answers a packet to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Handshake {
+    /// Taken.
+    Ack,
+    /// Not now.
+    Nak,
+    /// Never like this.
+    Stall,
+}
+
+/// How a device answers a request for a packet.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// A packet.
+    Data(Vec<u8>),
+    /// Not now.
+    Nak,
+    /// Never like this.
+    Stall,
+}
+
+/// A peripheral, seen from the core and from the wire.
+pub trait Peripheral {
+    /// A word that the core reads.
+    fn read(&mut self, offset: u32) -> u32;
+    /// A word that the core writes, in the bytes of `mask`.
+    fn write(&mut self, offset: u32, value: u32, mask: u32);
+    /// Whether the interrupt is asserted.
+    fn is_asserting(&self) -> bool;
+    /// Whether it shows itself to a host.
+    fn is_attached(&self) -> bool;
+    /// The host resets the bus.
+    fn bus_reset(&mut self);
+    /// The bus has been idle for 3 ms, as after an unplugging.
+    fn suspend(&mut self);
+    /// The host begins a control transfer.
+    fn setup(&mut self, request: [u8; 8]) -> Handshake;
+    /// The host sends a packet.
+    fn out(&mut self, endpoint: usize, packet: &[u8]) -> Handshake;
+    /// The host asks for a packet.
+    fn take_in(&mut self, endpoint: usize) -> Answer;
+}

@@ -1,0 +1,54 @@
+//! The independent watchdog.
+
+const KR: u32 = 0x00;
+const PR: u32 = 0x04;
+const RLR: u32 = 0x08;
+/// The low-speed oscillator that drives it.
+const LSI_HZ: u64 = 32_000;
+
+/// The watchdog and when it was fed.
+#[derive(Default)]
+pub struct Watchdog {
+    running: bool,
+    prescaler: u32,
+    reload: u32,
+    fed_ns: u64,
+    /// How often it was fed.
+    pub feedings: u64,
+}
+
+impl Watchdog {
+    /// A register; all statuses say done.
+    #[must_use]
+    pub fn read(&self, offset: u32) -> u32 {
+        match offset {
+            PR => self.prescaler,
+            RLR => self.reload,
+            _ => 0,
+        }
+    }
+
+    /// A write of the core's.
+    pub fn write(&mut self, offset: u32, value: u32, now_ns: u64) {
+        match (offset, value) {
+            (KR, 0xCCCC) => (self.running, self.fed_ns) = (true, now_ns),
+            (KR, 0xAAAA) => (self.feedings, self.fed_ns) = (self.feedings + 1, now_ns),
+            (PR, _) => self.prescaler = value & 7,
+            (RLR, _) => self.reload = value & 0xFFF,
+            _ => {}
+        }
+    }
+
+    /// Nanoseconds that it may go unfed.
+    #[must_use]
+    pub fn patience_ns(&self) -> u64 {
+        let divider = 4 << self.prescaler;
+        (u64::from(self.reload) + 1) * divider * 1_000_000_000 / LSI_HZ
+    }
+
+    /// Whether it resets the chip.
+    #[must_use]
+    pub fn bites(&self, now_ns: u64) -> bool {
+        self.running && now_ns - self.fed_ns >= self.patience_ns()
+    }
+}

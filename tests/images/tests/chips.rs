@@ -1,0 +1,111 @@
+//! What is loaded and what is reserved lies in the chip's memories, as
+//! probe-rs's registry knows them.
+
+use std::ops::Range;
+
+use hapterra_image_tests::device::machines;
+use hapterra_image_tests::machine::Machine;
+use probe_rs::config::{MemoryRegion, Registry, Target};
+
+fn target(machine: &Machine) -> Target {
+    let registry = Registry::from_builtin_families();
+    let found = registry.get_target_by_name(machine.chip.chip);
+    found.expect("probe-rs knows the chip")
+}
+
+/// Ranges of RAM, neighbours joined.
+fn ram(target: &Target) -> Vec<Range<u64>> {
+    joined(target, |region| match region {
+        MemoryRegion::Ram(ram) => Some(ram.range.clone()),
+        _ => None,
+    })
+}
+
+fn flash(target: &Target) -> Vec<Range<u64>> {
+    joined(target, |region| match region {
+        MemoryRegion::Nvm(nvm) => Some(nvm.range.clone()),
+        _ => None,
+    })
+}
+
+fn joined(target: &Target, pick: fn(&MemoryRegion) -> Option<Range<u64>>) -> Vec<Range<u64>> {
+    let mut all: Vec<_> = target.memory_map.iter().filter_map(pick).collect();
+    all.sort_by_key(|range| range.start);
+    let mut joined: Vec<Range<u64>> = vec![];
+    for range in all {
+        match joined.last_mut() {
+            Some(last) if last.end >= range.start => last.end = last.end.max(range.end),
+            _ => joined.push(range),
+        }
+    }
+    joined
+}
+
+fn holds(memories: &[Range<u64>], start: u32, bytes: usize) -> bool {
+    let (start, end) = (u64::from(start), u64::from(start) + bytes as u64);
+    memories.iter().any(|m| m.start <= start && end <= m.end)
+}
+
+#[test]
+fn every_segment_lies_in_the_chips_memory() {
+    for machine in machines() {
+        let (chip, target) = (machine.chip, target(&machine));
+        let (ram, flash) = (ram(&target), flash(&target));
+        let mut loader = target.flash_loader();
+        for segment in &machine.image.segments {
+            let what = format!(
+                "{}: {:#x} at {:#x}",
+                chip.board, segment.loaded, segment.runs
+            );
+            if !segment.bytes.is_empty() {
+                assert!(holds(&flash, segment.loaded, segment.bytes.len()), "{what}");
+                let added = loader.add_data(segment.loaded.into(), &segment.bytes);
+                added.expect("probe-rs would flash it");
+            }
+            let in_place =
+                segment.runs == segment.loaded && segment.bytes.len() as u32 == segment.size;
+            let runs_in = if in_place { &flash } else { &ram };
+            assert!(
+                holds(runs_in, segment.runs, segment.size as usize),
+                "{what}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_stack_lies_in_ram_and_above_what_is_static() {
+    for machine in machines() {
+        let (chip, target) = (machine.chip, target(&machine));
+        let top = machine.word(chip.memories[0].0);
+        // 8 KiB at least; how much is really used is measured elsewhere.
+        assert!(
+            holds(&ram(&target), top - 8192, 8192),
+            "{}: {top:#x}",
+            chip.board
+        );
+        for segment in &machine.image.segments {
+            let end = segment.runs + segment.size;
+            assert!(
+                end + 8192 <= top || segment.runs >= top,
+                "{}: {:#x} to {end:#x} leaves no stack under {top:#x}",
+                chip.board,
+                segment.runs
+            );
+        }
+    }
+}
+
+#[test]
+fn the_emulated_chip_has_the_memories_of_the_real_one() {
+    for machine in machines() {
+        let target = target(&machine);
+        let real: Vec<_> = [flash(&target), ram(&target)].concat();
+        for (start, bytes) in machine.chip.memories {
+            // System memory is not for programs: the registry may leave it out.
+            let system = (0x1FF0_0000..0x2000_0000).contains(start);
+            let there = system || holds(&real, *start, *bytes as usize);
+            assert!(there, "{}: {start:#x}", machine.chip.board);
+        }
+    }
+}

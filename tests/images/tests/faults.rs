@@ -1,0 +1,291 @@
+//! What goes wrong in the boards' own images: each ends in no current and
+//! amplifiers off, in a number of ticks that is stated here.
+
+use hapterra::phantom::{PhantomModel, Placement};
+use hapterra::raster::Raster;
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::guard::Fault;
+use hapterra_core::wire::message::{Scene, Source};
+use hapterra_image_tests::bus::Effect;
+use hapterra_image_tests::device::{Device, Plane, machines};
+use hapterra_image_tests::elf::Function;
+use hapterra_image_tests::machine::{Machine, Stop};
+
+/// Branches to itself: what a task that hangs does.
+const HANG: [u8; 2] = [0xFE, 0xE7];
+/// No instruction: a hard fault.
+const UNDEFINED: [u8; 2] = [0x00, 0xDE];
+/// The watchdog's time, and what its feeding adds to it, ms.
+const WATCHDOG_MS: u64 = 50;
+const CHECK_MS: u64 = 10;
+
+struct Bench {
+    plane: Plane,
+    raster: Raster,
+    scale: Scale,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let plane = Plane {
+            model: PhantomModel::premium_1_5(),
+            place: Placement {
+                home_mm: [100.0, 100.0, 30.0],
+            },
+            slope: [0.0; 2],
+            height_mm: 20.0,
+            law: ForceLaw::PREMIUM,
+        };
+        Self {
+            plane,
+            raster: Raster::from_fn(201, 201, |_, _| 20.0).expect("raster"),
+            scale: Scale::new(1.0, 1.0).expect("scale"),
+        }
+    }
+
+    fn terrain(&self) -> Terrain<'_> {
+        Terrain::new(&self.raster, self.scale, 0).expect("terrain")
+    }
+
+    fn scene(&self, terrain: &Terrain<'_>) -> Scene {
+        let home = self
+            .scale
+            .to_grid(self.plane.place.home_mm)
+            .expect("addressable");
+        terrain.scene(self.plane.law, Rule::Swept, Source::Encoders, home)
+    }
+
+    /// Presses 3 mm deep and holds still.
+    fn press<'t>(&self, machine: Machine, terrain: &'t Terrain<'t>) -> Device<'t> {
+        let mut device = Device::open(machine, terrain, self.scene(terrain));
+        device.move_to(self.plane.counts_at([100.0, 100.0], -3.0));
+        device.run_ms(40);
+        device.move_to(self.plane.counts_at([100.0, 100.0], 3.0));
+        device.run_ms(40);
+        let machine = device.machine.borrow();
+        assert!(machine.is_enabled(), "{}: pressed", machine.chip.board);
+        drop(machine);
+        let _ = device.machine.borrow_mut().take_effects();
+        device
+    }
+
+    /// Presses on every board and does something to it.
+    fn on_each(&self, mut then: impl FnMut(&mut Device<'_>)) {
+        for machine in machines() {
+            let terrain = self.terrain();
+            then(&mut self.press(machine, &terrain));
+        }
+    }
+}
+
+/// Commands for no current.
+fn idle(machine: &Machine) -> u32 {
+    if machine.chip.is_m7 {
+        // Half of the PWM timer's period, rounded as the driver rounds.
+        (machine.bus().read(0x4001_002C) + 2) / 2
+    } else {
+        2048
+    }
+}
+
+/// Whole ticks that pass until the amplifiers are off, `at_most` so many.
+fn ticks_until_off(machine: &mut Machine, at_most: usize) -> usize {
+    for ticks in 1..=at_most {
+        assert_eq!(machine.run_ticks(1), Stop::Asked);
+        if !machine.is_enabled() {
+            return ticks;
+        }
+    }
+    panic!("{}: still on after {at_most} ticks", machine.chip.board);
+}
+
+/// The amplifiers were switched off before anything else was done to them, and
+/// left with zero commands.
+fn assert_off_came_first(machine: &mut Machine) {
+    let idle = idle(machine);
+    let effects = machine.take_effects();
+    let off = effects.iter().position(|e| *e == Effect::Enable(false));
+    let after = &effects[off.expect("switched off")..];
+    for axis in 0..3 {
+        let of_axis = |e: &&Effect| matches!(e, Effect::Command(a, _) if *a == axis);
+        let last = after.iter().rfind(of_axis);
+        assert_eq!(
+            last,
+            Some(&Effect::Command(axis, idle)),
+            "{}",
+            machine.chip.board
+        );
+    }
+    assert!(!after.contains(&Effect::Enable(true)), "stays off");
+}
+
+#[test]
+fn the_emergency_stop_takes_one_tick() {
+    Bench::new().on_each(|device| {
+        let mut machine = device.machine.borrow_mut();
+        let pin = machine.chip.emergency_stop;
+        machine.set_input(pin, true);
+        assert_eq!(ticks_until_off(&mut machine, 2), 1);
+        machine.set_input(pin, false);
+        machine.run_ticks(20);
+        assert_off_came_first(&mut machine);
+        assert!(!machine.is_enabled(), "latched");
+        drop(machine);
+        device.run_ms(40);
+        let fault = device.latest.and_then(|sample| sample.fault);
+        assert_eq!(fault, Some(Fault::EmergencyStop));
+    });
+}
+
+#[test]
+fn letting_the_dead_man_switch_go_takes_one_tick() {
+    Bench::new().on_each(|device| {
+        let mut machine = device.machine.borrow_mut();
+        let pin = machine.chip.dead_man;
+        machine.set_input(pin, true);
+        assert_eq!(ticks_until_off(&mut machine, 2), 1);
+        machine.run_ticks(20);
+        assert_off_came_first(&mut machine);
+        drop(machine);
+        device.run_ms(40);
+        let fault = device.latest.and_then(|sample| sample.fault);
+        assert_eq!(fault, Some(Fault::DeadManReleased));
+    });
+}
+
+#[test]
+fn an_encoder_that_jumps_takes_one_tick() {
+    for axis in 0..3 {
+        Bench::new().on_each(|device| {
+            let mut counts = device.counts;
+            counts[axis] += 400;
+            let mut machine = device.machine.borrow_mut();
+            machine.bus().feed_encoders(counts);
+            assert_eq!(ticks_until_off(&mut machine, 2), 1);
+            machine.run_ticks(20);
+            assert_off_came_first(&mut machine);
+            drop(machine);
+            device.run_ms(40);
+            let fault = device.latest.and_then(|sample| sample.fault);
+            assert_eq!(fault, Some(Fault::EncoderJump));
+        });
+    }
+}
+
+/// Milliseconds until the watchdog resets a chip in which a function hangs;
+/// none if it never does.
+fn ms_until_reset(machine: &mut Machine, function: Function) -> Option<u64> {
+    machine.patch(function.address, &HANG);
+    let before_ns = machine.bus().now_ns;
+    // Something for the USB stack to do.
+    machine.bus().usb.bus_reset();
+    let stop = machine.run_ms(3 * WATCHDOG_MS);
+    let ms = (machine.bus().now_ns - before_ns) / 1_000_000;
+    (stop == Stop::Watchdog).then_some(ms)
+}
+
+fn assert_in_time(machine: &mut Machine, ms: u64) {
+    let patience = machine.bus().watchdog.patience_ns() / 1_000_000;
+    assert!(
+        (WATCHDOG_MS..WATCHDOG_MS + 2).contains(&patience),
+        "{patience} ms"
+    );
+    assert!(ms <= WATCHDOG_MS + CHECK_MS, "reset after {ms} ms");
+    // The reset lets go of every pin, and the pull-down outside acts.
+    machine.reset(true);
+    assert!(!machine.is_enabled());
+}
+
+#[test]
+fn while_nothing_hangs_the_watchdog_is_fed() {
+    Bench::new().on_each(|device| {
+        let mut machine = device.machine.borrow_mut();
+        machine.bus().usb.bus_reset();
+        assert_eq!(machine.run_ms(500), Stop::Time);
+    });
+}
+
+#[test]
+fn a_task_that_hangs_ends_in_the_watchdogs_reset() {
+    let bench = Bench::new();
+    let tasks = |machine: &Machine| {
+        machine
+            .image
+            .functions_like(&["embassy_executor", "raw", "TaskStorage", "poll"])
+    };
+    for image in machines() {
+        let (board, all) = (image.chip.board, tasks(&image));
+        assert!(all.len() >= 4, "{board}: main, USB, link, supervisor");
+        let mut harmless = 0;
+        for task in &all {
+            let machine = machines().into_iter().find(|m| m.chip.board == board);
+            let terrain = bench.terrain();
+            let device = bench.press(machine.expect("still there"), &terrain);
+            let mut machine = device.machine.borrow_mut();
+            match ms_until_reset(&mut machine, *task) {
+                Some(ms) => assert_in_time(&mut machine, ms),
+                None => harmless += 1,
+            }
+        }
+        assert!(
+            harmless <= 1,
+            "{board}: main has ended and is never polled again"
+        );
+    }
+}
+
+#[test]
+fn a_tick_that_hangs_ends_in_the_watchdogs_reset() {
+    Bench::new().on_each(|device| {
+        let mut machine = device.machine.borrow_mut();
+        let tick = machine.image.functions_like(&["tick", "Haptics"]);
+        let tick = *tick.first().expect("the tick is a function of its own");
+        let ms = ms_until_reset(&mut machine, tick).expect("reset");
+        assert_in_time(&mut machine, ms);
+    });
+}
+
+/// Runs until the amplifiers are off: at once, and nothing is done after it.
+fn assert_off_at_once_and_for_good(machine: &mut Machine) {
+    // The link sends what the host reads.
+    let stop = machine.run_until(50, |m| {
+        let _ = m.bus().usb.take_in(1);
+        !m.is_enabled()
+    });
+    assert_eq!(stop, Stop::Asked, "{}", machine.chip.board);
+    assert_eq!(machine.take_effects().last(), Some(&Effect::Enable(false)));
+    assert_eq!(machine.run_ms(200), Stop::Watchdog);
+    assert_eq!(machine.take_effects(), [], "nothing after it");
+}
+
+/// A function that the link calls for every message it sends.
+fn encoder(machine: &Machine) -> Function {
+    let found = machine.image.functions_like(&["wire", "frame", "encode"]);
+    *found.first().expect("a function of its own")
+}
+
+#[test]
+fn a_hard_fault_switches_the_amplifiers_off_before_anything_else() {
+    Bench::new().on_each(|device| {
+        let mut machine = device.machine.borrow_mut();
+        let at = encoder(&machine);
+        machine.patch(at.address, &UNDEFINED);
+        assert_off_at_once_and_for_good(&mut machine);
+        assert_eq!(machine.hard_faults, 1);
+    });
+}
+
+#[test]
+fn a_panic_switches_the_amplifiers_off_before_anything_else() {
+    Bench::new().on_each(|device| {
+        let mut machine = device.machine.borrow_mut();
+        let at = encoder(&machine);
+        let panic = machine.image.functions_like(&["panic_const_rem_by_zero"]);
+        let panic = *panic.first().expect("a function that panics");
+        machine.call_instead(at, panic);
+        assert_off_at_once_and_for_good(&mut machine);
+        assert_eq!(machine.hard_faults, 0);
+    });
+}

@@ -1,0 +1,87 @@
+//! A plane pressed by a millimetre, from encoder counts to what is at the
+//! amplifiers' inputs, in the boards' own images.
+
+use hapterra::phantom::{PhantomModel, Placement};
+use hapterra::raster::Raster;
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::contact::{Rule, State};
+use hapterra_core::force::ForceLaw;
+use hapterra_core::wire::message::Source;
+use hapterra_image_tests::bus::Effect;
+use hapterra_image_tests::chip::Chip;
+use hapterra_image_tests::device::{Device, Plane, machines};
+use hapterra_image_tests::timer::ARR;
+
+/// Amperes at the ends of the range of either board.
+const FULL_SCALE_A: f64 = 5.5;
+/// Auto-reload register of the H743's PWM timer.
+const TIM1_ARR: u32 = 0x4001_0000 + ARR;
+
+fn plane() -> Plane {
+    Plane {
+        model: PhantomModel::premium_1_5(),
+        place: Placement {
+            home_mm: [100.0, 100.0, 75.0],
+        },
+        slope: [0.25, -0.125],
+        height_mm: 55.0,
+        law: ForceLaw::PREMIUM,
+    }
+}
+
+/// The command that stands for a current, not yet rounded.
+fn command(chip: &Chip, pwm_counts: f64, current_a: f64) -> f64 {
+    let fraction = current_a / FULL_SCALE_A;
+    if chip.is_m7 {
+        pwm_counts * (0.5 + 0.4 * fraction)
+    } else {
+        2047.5 + 2047.5 * fraction
+    }
+}
+
+#[test]
+fn a_plane_pressed_by_a_millimetre_gives_the_currents_of_the_f64_computation() {
+    let plane = plane();
+    let height = |x: u32, y: u32| 55.0 + 0.25 * x as f32 - 0.125 * y as f32;
+    let raster = Raster::from_fn(201, 201, height).expect("raster");
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    let home = scale.to_grid(plane.place.home_mm).expect("addressable");
+    let scene = terrain.scene(plane.law, Rule::Swept, Source::Encoders, home);
+    for machine in machines() {
+        let chip = machine.chip;
+        let mut device = Device::open(machine, &terrain, scene);
+        let pwm_counts = f64::from(device.machine.borrow().bus().read(TIM1_ARR)) + 1.0;
+        let mut worst = 0.0f64;
+        for at in [[100.0, 100.0], [70.0, 90.0], [131.5, 118.25], [88.0, 60.0]] {
+            device.move_to(plane.counts_at(at, -3.0));
+            device.run_ms(40);
+            device.move_to(plane.counts_at(at, 1.0));
+            device.run_ms(40);
+            let sample = device.latest.expect("telemetry");
+            assert_eq!(sample.fault, None, "{}", chip.board);
+            assert_eq!(sample.state, State::Touching, "{}: {sample:?}", chip.board);
+            let truth = plane.currents_a(device.counts);
+            assert!(truth.iter().any(|a| a.abs() > 0.1), "{truth:?}");
+            let expected = truth.map(|a| command(chip, pwm_counts, a));
+            let got = device.commands();
+            for (got, expected) in got.into_iter().zip(expected) {
+                worst = worst.max((f64::from(got) - expected).abs());
+            }
+            assert!(
+                worst <= 1.0,
+                "{} at {at:?}: {got:?}, {expected:?} expected",
+                chip.board
+            );
+            assert!(device.machine.borrow().is_enabled());
+        }
+        println!("{}: at most {worst:.2} codes from f64", chip.board);
+        let mut machine = device.machine.borrow_mut();
+        let effects = machine.take_effects();
+        let enables = effects
+            .iter()
+            .filter(|e| matches!(e, Effect::Enable(_)))
+            .count();
+        assert_eq!(enables, 1, "switched on once and never off");
+    }
+}

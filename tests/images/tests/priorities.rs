@@ -1,0 +1,140 @@
+//! Nothing delays the haptic interrupt: what its priority is, what critical
+//! sections hold back, and what happens when it comes in the middle of one.
+
+use std::fmt::Write;
+
+use hapterra::raster::Raster;
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::wire::message::Source;
+use hapterra_image_tests::device::{Device, machines};
+use hapterra_image_tests::machine::{Machine, Stop};
+
+/// The highest priority that critical sections hold back.
+const CEILING: u8 = 0x10;
+/// The page with the table.
+const PAGE: &str = include_str!("../../../docs/priorities.md");
+
+/// Name of the handler in the vector table.
+fn handler(machine: &Machine, interrupt: usize) -> String {
+    let table = machine.chip.memories[0].0;
+    let address = machine.word(table + 4 * (interrupt as u32 + 16)) & !1;
+    if machine
+        .image
+        .symbol("DefaultHandler")
+        .is_some_and(|d| d & !1 == address)
+    {
+        return "DefaultHandler".into();
+    }
+    machine.image.at(address).to_string()
+}
+
+/// Rows of the page's table for a board: runs of neighbours in one row.
+fn rows(machine: &Machine) -> String {
+    let mut rows: Vec<(Vec<(usize, String)>, u8)> = vec![];
+    for (interrupt, priority) in machine.bus().nvic.enabled() {
+        let entry = (interrupt, handler(machine, interrupt));
+        match rows.last_mut() {
+            Some((run, p))
+                if *p == priority && run.last().is_some_and(|l| l.0 + 1 == interrupt) =>
+            {
+                run.push(entry);
+            }
+            _ => rows.push((vec![entry], priority)),
+        }
+    }
+    rows.sort_by_key(|(run, priority)| (*priority, run[0].0));
+    let mut text = String::new();
+    for (run, priority) in rows {
+        let numbers: Vec<_> = run.iter().map(|(n, _)| n.to_string()).collect();
+        let mut names: Vec<_> = run.iter().map(|(_, name)| format!("`{name}`")).collect();
+        names.dedup();
+        let board = machine.chip.board;
+        let _ = writeln!(
+            text,
+            "| {board} | `0x{priority:02x}` | {} | {} |",
+            numbers.join(", "),
+            names.join(", ")
+        );
+    }
+    text
+}
+
+#[test]
+fn the_haptic_interrupt_is_alone_above_the_ceiling_and_the_page_says_so() {
+    for mut machine in machines() {
+        let chip = machine.chip;
+        assert_eq!(machine.run_ms(5), Stop::Time);
+        for (interrupt, priority) in machine.bus().nvic.enabled() {
+            if interrupt == chip.tick_interrupt {
+                assert_eq!(priority, 0, "{}", chip.board);
+            } else {
+                assert!(priority >= CEILING, "{}: {interrupt}", chip.board);
+            }
+        }
+        let rows = rows(&machine);
+        assert!(
+            PAGE.contains(&rows),
+            "docs/priorities.md has to say:\n{rows}"
+        );
+    }
+}
+
+#[test]
+fn only_programs_that_failed_mask_everything() {
+    for machine in machines() {
+        let image = &machine.image;
+        let mut maskers = vec![];
+        for (address, word) in image.instructions() {
+            let cpsid = word >> 16 == 0xB672 || word >> 16 == 0xB671;
+            // MSR PRIMASK or FAULTMASK, of a register.
+            let msr = word & 0xFFF0_FFFF == 0xF380_8810 || word & 0xFFF0_FFFF == 0xF380_8813;
+            if cpsid || msr {
+                maskers.push(image.at(address));
+            }
+        }
+        assert!(!maskers.is_empty(), "the panic handler does");
+        maskers.dedup();
+        // `main` takes the core's peripherals under a mask, before there is a
+        // tick; it is the first of the tasks and never polled again.
+        let main = maskers.iter().position(|name| name.contains("TaskStorage"));
+        main.map(|i| maskers.remove(i));
+        let known = [
+            "__cpsid",
+            "rust_begin_unwind",
+            "HardFault",
+            "DefaultHandler",
+        ];
+        for name in maskers {
+            let is_known = known.iter().any(|k| name.contains(k));
+            assert!(
+                is_known,
+                "{}: {name} masks all interrupts",
+                machine.chip.board
+            );
+        }
+    }
+}
+
+#[test]
+fn a_tick_raised_in_any_critical_section_or_interrupt_is_not_delayed() {
+    let raster = Raster::from_fn(257, 257, |x, y| ((x * y) % 7) as f32).expect("raster");
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    let home = scale.to_grid([128.0, 128.0, 40.0]).expect("addressable");
+    let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
+    for mut machine in machines() {
+        let board = machine.chip.board;
+        // Fine enough to find the shortest sections, odd enough to find all.
+        machine.slice = 13;
+        machine.provokes_every = Some(11);
+        // Tiles on their way in, telemetry on its way out.
+        let device = Device::open(machine, &terrain, scene);
+        let machine = device.machine.borrow();
+        println!("{board}: raised {} times out of turn", machine.provoked);
+        assert!(machine.provoked > 200, "{board}: {}", machine.provoked);
+        assert_eq!(machine.delayed, 0, "{board}");
+        assert_eq!(machine.masked, 0, "{board}: PRIMASK");
+    }
+}
