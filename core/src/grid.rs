@@ -41,18 +41,6 @@ impl GridPoint {
         }
     }
 
-    /// The point `height` cells above the cell's floor, at a place in `[0, 1)`
-    /// over it: [`Self::new`] where only the height may carry.
-    #[must_use]
-    #[inline]
-    pub(crate) fn over([x, y, z]: [i32; 3], [u, v]: [f32; 2], height: f32) -> Self {
-        let (z, fz) = carry(z, height);
-        Self {
-            cell: [x, y, z],
-            frac: [u, v, fz],
-        }
-    }
-
     /// The point again, made valid whatever bits it came from (the wire).
     #[must_use]
     pub fn normalised(self) -> Self {

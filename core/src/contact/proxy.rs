@@ -1,6 +1,7 @@
 //! What the proxy remembers from tick to tick, and what both rules share.
 
 use super::descent::tile_of;
+use super::glide::glide;
 use super::paper::{self, Verdict};
 use super::patch::Patch;
 use super::spot::{Hand, Spot};
@@ -144,16 +145,23 @@ impl Contact {
         if !track.is_under(window, hip.column()) {
             return false;
         }
-        let Some(stretch) = track.follow(hip, &mut touch.spot) else {
-            return false;
+        let hand = Hand::new(*hip);
+        let mut work = 1;
+        let stretch = match track.follow(&hand, &mut touch.spot) {
+            Some(stretch) => stretch,
+            None => {
+                let Some(rest) = glide(window, &hand, *track, touch.spot) else {
+                    return false;
+                };
+                (*track, touch.spot) = (rest.track, rest.spot);
+                work += 2 * rest.hops;
+                rest.stretch
+            }
         };
         touch.may_leave = true;
-        let [_, _, up] = hip.cell();
-        let [x, y] = touch.spot.cell;
-        let height = hip.frac().z + stretch.z;
-        self.last.proxy = GridPoint::over([x, y, up], [touch.spot.u, touch.spot.v], height);
+        self.last.proxy = hand.point_at(&touch.spot, stretch.z);
         self.last.stretch = stretch;
-        self.last.work = 1;
+        self.last.work = work;
         self.answers(hip);
         true
     }

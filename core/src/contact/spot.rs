@@ -37,6 +37,16 @@ impl Spot {
     }
 }
 
+/// Distance from a patch's border, in cells, within which a place counts as
+/// neither inside nor on it: only the general search goes there.
+const BORDER: f32 = 1e-6;
+
+/// Whether a coordinate is well inside a patch.
+#[inline]
+pub(super) fn is_inside(x: f32) -> bool {
+    x > BORDER && x < 1.0 - BORDER
+}
+
 fn side(x: f32) -> i32 {
     i32::from(x == 1.0) - i32::from(x == 0.0)
 }

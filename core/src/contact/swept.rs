@@ -194,7 +194,7 @@ impl Contact {
         let is_over_patch =
             touch.spot.cell == over || matches!(window.ground(over), Ground::Patch(_));
         if is_over_patch && let Ground::Patch(corners) = window.ground(touch.spot.cell) {
-            self.track = Track::new(&corners, over);
+            self.track = Track::new(&corners, over).map(|track| track.resting(&touch.spot));
         }
     }
 

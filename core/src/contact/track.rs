@@ -17,8 +17,7 @@
 use glam::Vec3;
 
 use super::patch::Patch;
-use super::spot::{Hand, Spot};
-use crate::grid::GridPoint;
+use super::spot::{Hand, Spot, is_inside};
 use crate::terrain::{Corners, Ground, Window};
 
 /// |a| + |b| + |c| at most, cells a cell: what the rounding of the height then
@@ -32,8 +31,6 @@ const LEFT: f32 = 5e-8;
 const STEPS: u32 = 4;
 /// Largest |a·z|: the Hessian's eigenvalues are then ½ at least.
 const CONVEX: f32 = 0.5;
-/// Distance from the patch's border below which the general search decides.
-const BORDER: f32 = 1e-6;
 
 /// A patch that a proxy rests on and may be followed over.
 #[derive(Clone, Copy, Debug)]
@@ -49,12 +46,14 @@ pub(super) struct Track {
     /// How far, in steps, a way downhill may swing out.
     swing: f32,
     /// A column known to hold a patch, for the hand to be over.
-    over: [i32; 2],
+    pub(super) over: [i32; 2],
+    /// Whether the proxy is well inside the patch.
+    inside: bool,
 }
 
 impl Track {
-    /// The patch of these corners, for a hand over `over`; `None` if it is too
-    /// steep.
+    /// The patch of these corners, for a hand over `over` and a proxy on its
+    /// border; `None` if it is too steep.
     pub(super) fn new(corners: &Corners, over: [i32; 2]) -> Option<Self> {
         let patch = Patch::new(corners.heights);
         let steepest = patch.a.abs() + patch.b.abs() + patch.c.abs();
@@ -71,7 +70,30 @@ impl Track {
             // lies between ½ and L, is √(2L) times as wide as it is narrow.
             swing: 2.0 * libm::sqrtf(1.5 + 2.0 * steepest * steepest),
             over,
+            inside: false,
         })
+    }
+
+    /// The same for a proxy at `spot`.
+    #[inline]
+    pub(super) fn resting(self, spot: &Spot) -> Self {
+        Self {
+            inside: is_inside(spot.u) && is_inside(spot.v),
+            ..self
+        }
+    }
+
+    /// The patch with its heights counted from the hand.
+    #[inline]
+    pub(super) fn seen_by(&self, hand: &Hand) -> Patch {
+        self.patch.seen_from(hand.altitude(), self.base)
+    }
+
+    /// Whether the squared distance is convex all over the patch, for a hand
+    /// `z` cells under any one point of it.
+    #[inline]
+    pub(super) fn is_convex(&self, z: f32) -> bool {
+        self.patch.a.abs() * (z + self.steepest) <= CONVEX
     }
 
     /// Whether a patch lies under a hand in `column`, so that the force needs
@@ -96,9 +118,11 @@ impl Track {
     /// far it is from the hand; `None`, and the spot as it was, where it takes
     /// the general search to tell.
     #[inline]
-    pub(super) fn follow(&self, hip: &GridPoint, spot: &mut Spot) -> Option<Vec3> {
-        let hand = Hand::new(*hip);
-        let patch = self.patch.seen_from(hand.altitude(), self.base);
+    pub(super) fn follow(&self, hand: &Hand, spot: &mut Spot) -> Option<Vec3> {
+        if !self.inside {
+            return None;
+        }
+        let patch = self.seen_by(hand);
         let (p, q) = hand.in_patch(spot.cell);
         let above = patch.height(p, q);
         // How high the tangent plane in the spot passes over the hand.
@@ -110,7 +134,7 @@ impl Track {
         if !(z >= 0.0 && is_inside(u) && is_inside(v)) {
             return None;
         }
-        if !(patch.a.abs() * (z + self.steepest) <= CONVEX) {
+        if !self.is_convex(z) {
             let moved = (u - spot.u).abs().max((v - spot.v).abs());
             let reach = self.steepest * (self.swing * moved);
             if !(patch.a.abs() * (z + reach) <= CONVEX) {
@@ -121,10 +145,10 @@ impl Track {
         Some(Vec3::new(u - p, v - q, z))
     }
 
-    /// Newton's method for the closest point, from above the hand at `(p, q)`
-    /// or from `last`.
+    /// Newton's method for the closest point of the patch and what it would be
+    /// beyond its borders, from above the hand at `(p, q)` or from `last`.
     #[inline]
-    fn closest(
+    pub(super) fn closest(
         &self,
         patch: &Patch,
         (p, q): (f32, f32),
@@ -179,11 +203,6 @@ fn newton(patch: &Patch, (east, north): (f32, f32), (u, v): (f32, f32)) -> (f32,
     let uv = zu * zv + patch.a * z;
     let scale = 1.0 / (uu * vv - uv * uv);
     ((gv * uv - gu * vv) * scale, (gu * uv - gv * uu) * scale)
-}
-
-#[inline]
-fn is_inside(x: f32) -> bool {
-    x > BORDER && x < 1.0 - BORDER
 }
 
 #[cfg(test)]

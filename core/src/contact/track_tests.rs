@@ -1,6 +1,7 @@
 use super::super::closest::nearest_downhill;
 use super::super::dice::Dice;
 use super::*;
+use crate::grid::GridPoint;
 
 fn track(heights: [f32; 4]) -> Option<Track> {
     Track::new(&Corners { base: 0, heights }, [0, 0])
@@ -17,7 +18,8 @@ fn spot(u: f32, v: f32) -> Spot {
 /// Where a hand at height zero takes the proxy from a spot.
 fn follow(heights: [f32; 4], (p, q): (f32, f32), from: (f32, f32)) -> Option<(f32, f32)> {
     let mut spot = spot(from.0, from.1);
-    let stretch = track(heights)?.follow(&hand(p, q), &mut spot)?;
+    let track = track(heights)?.resting(&spot);
+    let stretch = track.follow(&Hand::new(hand(p, q)), &mut spot)?;
     let offset = (stretch.x - (spot.u - p)).abs() + (stretch.y - (spot.v - q)).abs();
     assert!(offset < 1e-6, "{stretch} {spot:?}");
     Some((spot.u, spot.v))
@@ -85,10 +87,8 @@ fn leaves_what_is_not_plain_to_the_general_search() {
     assert!(track(saddle).is_some());
     assert_eq!(follow(saddle, (0.5, 0.5), inside), None, "a saddle");
     let mut spot = spot(0.5, 0.5);
-    let gentle = track([0.1; 4]).unwrap();
+    let gentle = track([0.1; 4]).unwrap().resting(&spot);
     let far = GridPoint::new([0, 0, -(1 << 29)], Vec3::new(0.5, 0.5, 0.0));
-    assert!(
-        gentle.follow(&far, &mut spot).is_some(),
-        "flat, however deep"
-    );
+    let followed = gentle.follow(&Hand::new(far), &mut spot);
+    assert!(followed.is_some(), "flat, however deep");
 }
