@@ -95,7 +95,7 @@ impl Contact {
         rule: Rule,
         pace: Pace,
     ) -> &Felt {
-        if self.answered == window.revision() && self.hip == hip {
+        if self.answered == window.revision() && self.hip.is_same(&hip) {
             self.last.work = 0;
         } else if !(rule == Rule::Swept && self.goes_on(window, &hip)) {
             self.feel_anew(window, hip, rule, pace);
@@ -146,22 +146,33 @@ impl Contact {
             return false;
         }
         let hand = Hand::new(*hip);
-        let mut work = 1;
-        let stretch = match track.follow(&hand, &mut touch.spot) {
-            Some(stretch) => stretch,
-            None => {
-                let Some(rest) = glide(window, &hand, *track, touch.spot) else {
-                    return false;
-                };
-                (*track, touch.spot) = (rest.track, rest.spot);
-                work += 2 * rest.hops;
-                rest.stretch
-            }
+        let Some(stretch) = track.follow(&hand, &mut touch.spot) else {
+            return self.glides_on(window, hip);
         };
         touch.may_leave = true;
-        self.last.proxy = hand.point_at(&touch.spot, stretch.z);
+        self.last.proxy = hand.point_inside(&touch.spot, stretch.z);
         self.last.stretch = stretch;
-        self.last.work = work;
+        self.last.work = 1;
+        self.answers(hip);
+        true
+    }
+
+    /// As [`Self::slides_on`], on or over the borders of patches.
+    #[inline(never)]
+    fn glides_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
+        let (Phase::Touching(touch), Some(track)) = (&mut self.phase, &mut self.track) else {
+            return false;
+        };
+        let hand = Hand::new(*hip);
+        let Some(rest) = glide(window, &hand, *track, touch.spot) else {
+            return false;
+        };
+        *track = rest.track;
+        touch.spot = rest.spot;
+        touch.may_leave = true;
+        self.last.proxy = hand.point_at(&rest.spot, rest.stretch.z);
+        self.last.stretch = rest.stretch;
+        self.last.work = 1 + 2 * rest.hops;
         self.answers(hip);
         true
     }

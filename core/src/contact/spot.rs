@@ -101,6 +101,14 @@ impl Hand {
         )
     }
 
+    /// As [`Self::point_at`], for a spot that is on no border.
+    #[inline]
+    pub(super) fn point_inside(&self, spot: &Spot, z: f32) -> GridPoint {
+        let [x, y] = spot.cell;
+        let cell = [x, y, self.point.cell()[2]];
+        GridPoint::over(cell, [spot.u, spot.v], self.point.frac().z + z)
+    }
+
     /// From the hand to the surface at `spot`, cells.
     pub(super) fn stretch(&self, spot: &Spot, patch: &Patch) -> Vec3 {
         let (p, q) = self.in_patch(spot.cell);

@@ -117,7 +117,8 @@ impl Track {
     /// Moves the spot to the closest point for a hand at `hip`, and tells how
     /// far it is from the hand; `None`, and the spot as it was, where it takes
     /// the general search to tell.
-    #[inline]
+    #[inline(always)]
+    // Inlined, all of it: this is the tick.
     pub(super) fn follow(&self, hand: &Hand, spot: &mut Spot) -> Option<Vec3> {
         if !self.inside {
             return None;
@@ -147,7 +148,7 @@ impl Track {
 
     /// Newton's method for the closest point of the patch and what it would be
     /// beyond its borders, from above the hand at `(p, q)` or from `last`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn closest(
         &self,
         patch: &Patch,
@@ -174,7 +175,7 @@ impl Track {
     }
 
     /// Whether the error left after this step is negligible.
-    #[inline]
+    #[inline(always)]
     fn is_last(&self, (du, dv): (f32, f32)) -> bool {
         self.bend * (du * du + dv * dv) <= LEFT
     }
@@ -182,7 +183,7 @@ impl Track {
 
 /// The first step, from the point above the hand: [`newton`] without the terms
 /// that are zero there.
-#[inline]
+#[inline(always)]
 fn from_above(patch: &Patch, (p, q): (f32, f32), z: f32) -> (f32, f32) {
     let (zu, zv) = (patch.slope_u(q), patch.slope_v(p));
     let za = patch.a * z;
@@ -193,7 +194,7 @@ fn from_above(patch: &Patch, (p, q): (f32, f32), z: f32) -> (f32, f32) {
 
 /// One step of Newton's method (eq. 8-11) from (u, v), for a hand `(east,
 /// north)` of there.
-#[inline]
+#[inline(always)]
 fn newton(patch: &Patch, (east, north): (f32, f32), (u, v): (f32, f32)) -> (f32, f32) {
     let (zu, zv) = (patch.slope_u(v), patch.slope_v(u));
     let z = (patch.d + patch.b * u) + zv * v;
