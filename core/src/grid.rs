@@ -45,7 +45,11 @@ impl GridPoint {
     /// over it: [`Self::new`] where only the height may carry.
     #[inline]
     pub(crate) fn over([x, y, z]: [i32; 3], [u, v]: [f32; 2], height: f32) -> Self {
-        let (z, fz) = carry(z, height);
+        let (z, fz) = if (0.0..1.0).contains(&height) {
+            (z, height)
+        } else {
+            carry(z, height)
+        };
         Self {
             cell: [x, y, z],
             frac: [u, v, fz],

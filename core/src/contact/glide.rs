@@ -23,7 +23,6 @@ const LEVEL: f32 = 1e-5;
 
 /// Where a way over gentle ground ends.
 pub(super) struct Rest {
-    pub(super) spot: Spot,
     pub(super) track: Track,
     /// From the hand to the proxy, cells.
     pub(super) stretch: Vec3,
@@ -31,38 +30,35 @@ pub(super) struct Rest {
     pub(super) hops: u32,
 }
 
-/// Moves a proxy that rested at `spot`, on the patch of `track`, to where it
-/// rests now; `None` where it takes the general search to tell.
+/// Moves a proxy to where it rests now; `None` where it takes the general search
+/// to tell.
 #[inline(never)]
 pub(super) fn glide<const D: usize>(
     window: &Window<'_, D>,
     hand: &Hand,
-    mut track: Track,
-    mut spot: Spot,
+    from: &Track,
 ) -> Option<Rest> {
+    let mut track = *from;
     let mut patch = track.seen_by(hand);
-    if leaves(window, hand, &spot, &patch) {
+    if leaves(window, hand, &track.spot, &patch) {
         return None;
     }
     for hops in 0..HOPS {
-        let (p, q) = hand.in_patch(spot.cell);
-        let (u, v) = track.closest(&patch, (p, q), patch.height(p, q), (spot.u, spot.v))?;
-        let rests = |spot: Spot, track: Track| {
-            let z = patch.height(spot.u, spot.v);
-            let stretch = Vec3::new(spot.u - p, spot.v - q, z);
-            let certain = z >= 0.0 && track.is_convex(z);
-            certain.then_some(Rest {
-                spot,
-                track: track.resting(&spot),
-                stretch,
-                hops,
-            })
+        let cell = track.spot.cell;
+        let (p, q) = hand.in_patch(cell);
+        let to = track.closest(&patch, (p, q))?;
+        let (u, v) = (p + to.x, q + to.y);
+        let rests = |spot: Spot, stretch: Vec3| Rest {
+            track: track.at(spot),
+            stretch,
+            hops,
         };
         if is_inside(u) && is_inside(v) {
-            return rests(Spot { u, v, ..spot }, track);
+            let certain = track.is_convex(to.z) || track.is_convex_between(to.z, (u, v));
+            return (to.z >= 0.0 && certain).then(|| rests(Spot { cell, u, v }, to));
         }
         let edge = Edge::toward(u, v)?;
-        let at = edge.closest(&patch, (p, q), spot.cell)?;
+        let at = edge.closest(&patch, (p, q), cell)?;
         let z = patch.height(at.u, at.v);
         if !(z >= 0.0 && track.is_convex(z) && edge.slope(&patch, &at, (p, q)) < -LEVEL) {
             return None;
@@ -71,17 +67,17 @@ pub(super) fn glide<const D: usize>(
         let Ground::Patch(corners) = window.ground(entry.cell) else {
             return None;
         };
-        let beyond = Track::new(&corners, track.over)?;
+        let beyond = Track::new(&corners, track.over, entry)?;
         let (next, hand_there) = (beyond.seen_by(hand), hand.in_patch(entry.cell));
         let slope = edge.slope(&next, &entry, hand_there);
         if slope > LEVEL {
-            return rests(at, track);
+            return Some(rests(at, Vec3::new(at.u - p, at.v - q, z)));
         }
         let goes_on = slope < -LEVEL;
         if !goes_on || leaves(window, hand, &entry, &next) {
             return None;
         }
-        (spot, track, patch) = (entry, beyond, next);
+        (track, patch) = (beyond, next);
     }
     None
 }
