@@ -10,6 +10,7 @@
 //! holds nothing that a new one would need: either end may vanish and come
 //! back.
 
+mod bulk;
 mod client;
 mod emulator;
 mod error;
@@ -22,13 +23,14 @@ mod target;
 mod transport;
 mod usb;
 
-pub use client::{Arming, Client, Event};
+pub use bulk::{Bulk, BulkEndpoints, Pipes, is_hapterra};
+pub use client::{Client, Event};
 pub use emulator::{
     Emulator, EmulatorError, IMAGE_VARIABLE, INSTRUCTIONS_PER_COUNT, Lines, QEMU, QEMU_VARIABLE,
 };
 pub use error::LinkError;
 pub use inquiry::ask_who;
-pub use native::{HostClock, Meddler, Native};
+pub use native::{HostClock, Native};
 pub use plant::{PlantLine, serve_plant};
 pub use session::{Patience, Session};
 pub use tally::Tally;

@@ -3,26 +3,26 @@
 use std::io::{self, Read, Write};
 use std::time::Duration;
 
-use hapterra_firmware::usb::{INTERFACE_CLASS, PACKET, PRODUCT, PRODUCT_ID, VENDOR_ID};
+use hapterra_firmware::usb::{PRODUCT_ID, VENDOR_ID};
 use nusb::MaybeFuture;
-use nusb::descriptors::TransferType;
 use nusb::io::{EndpointRead, EndpointWrite};
-use nusb::transfer::{Bulk, Direction, In, Out};
+use nusb::transfer::{self, In, Out};
 
-use super::transport::is_time_out;
+use super::bulk::{Bulk, BulkEndpoints, Pipes, TRANSFER, is_hapterra};
 use super::{LinkError, Transport};
 
-/// Bytes in a transfer, a multiple of the packet size.
-const TRANSFER: usize = 64 * PACKET;
 /// Transfers under way from the device, so that none of its packets waits.
 const TRANSFERS: usize = 4;
 /// How long the board may leave a transfer unread before it counts as gone.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// The bulk endpoints of a hapterra board.
-pub struct Usb {
-    reader: EndpointRead<Bulk>,
-    writer: EndpointWrite<Bulk>,
+/// A hapterra board.
+pub struct Usb(Bulk<SystemPipes>);
+
+/// Its pipes, by the system's USB.
+struct SystemPipes {
+    reader: EndpointRead<transfer::Bulk>,
+    writer: EndpointWrite<transfer::Bulk>,
 }
 
 impl Usb {
@@ -46,7 +46,7 @@ impl Usb {
     pub fn list() -> (Vec<nusb::DeviceInfo>, usize) {
         let devices = usb_devices();
         let count = devices.len();
-        (devices.into_iter().filter(is_hapterra).collect(), count)
+        (devices.into_iter().filter(is_board).collect(), count)
     }
 
     /// What is looked for, in words.
@@ -70,46 +70,46 @@ impl Usb {
     pub fn open(info: &nusb::DeviceInfo) -> Result<Self, LinkError> {
         let cannot = |error: nusb::Error| absent(format!("found it, but cannot open it: {error}"));
         let device = info.open().wait().map_err(cannot)?;
-        let number = info
-            .interfaces()
-            .find(|interface| interface.class() == INTERFACE_CLASS)
-            .map_or(0, nusb::InterfaceInfo::interface_number);
-        let interface = device
-            .detach_and_claim_interface(number)
-            .wait()
-            .map_err(cannot)?;
-        let [input, output] = [Direction::In, Direction::Out].map(|direction| {
-            let descriptor = interface.descriptor()?;
-            let mut endpoints = descriptor.endpoints();
-            let bulk = endpoints.find(|endpoint| {
-                endpoint.transfer_type() == TransferType::Bulk && endpoint.direction() == direction
-            });
-            bulk.map(|endpoint| endpoint.address())
-        });
-        let (Some(input), Some(output)) = (input, output) else {
+        let endpoints = match device.active_configuration() {
+            Ok(configuration) => BulkEndpoints::find(&configuration),
+            Err(error) => return Err(absent(format!("found it, but {error}"))),
+        };
+        let Some(endpoints) = endpoints else {
             return Err(absent("found it, but it has no bulk endpoints".into()));
         };
-        let input = interface.endpoint::<Bulk, In>(input).map_err(cannot)?;
-        let output = interface.endpoint::<Bulk, Out>(output).map_err(cannot)?;
-        Ok(Self {
+        let interface = device
+            .detach_and_claim_interface(endpoints.interface)
+            .wait()
+            .map_err(cannot)?;
+        let input = interface.endpoint::<transfer::Bulk, In>(endpoints.input);
+        let output = interface.endpoint::<transfer::Bulk, Out>(endpoints.output);
+        let (input, output) = (input.map_err(cannot)?, output.map_err(cannot)?);
+        Ok(Self(Bulk(SystemPipes {
             reader: input.reader(TRANSFER).with_num_transfers(TRANSFERS),
             writer: output.writer(TRANSFER).with_write_timeout(WRITE_TIMEOUT),
-        })
+        })))
     }
 }
 
-impl Transport for Usb {
-    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.writer.write_all(bytes)?;
+impl Pipes for SystemPipes {
+    fn send(&mut self, transfer: &[u8]) -> io::Result<()> {
+        self.writer.write_all(transfer)?;
         self.writer.flush()
     }
 
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
         self.reader.set_read_timeout(wait);
-        match self.reader.read(into) {
-            Err(error) if is_time_out(&error) => Ok(0),
-            other => other,
-        }
+        self.reader.read(into)
+    }
+}
+
+impl Transport for Usb {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.0.send(bytes)
+    }
+
+    fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
+        self.0.receive(into, wait)
     }
 }
 
@@ -124,12 +124,8 @@ pub(crate) fn usb_devices() -> Vec<nusb::DeviceInfo> {
     }
 }
 
-fn is_hapterra(info: &nusb::DeviceInfo) -> bool {
-    info.vendor_id() == VENDOR_ID
-        && info.product_id() == PRODUCT_ID
-        && info
-            .product_string()
-            .is_none_or(|name| name.contains(PRODUCT))
+fn is_board(info: &nusb::DeviceInfo) -> bool {
+    is_hapterra(info.vendor_id(), info.product_id(), info.product_string())
 }
 
 fn absent(why: String) -> LinkError {

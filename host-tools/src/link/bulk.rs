@@ -1,0 +1,171 @@
+//! What the link looks for on USB and how it moves bytes there, apart from the
+//! system's USB: a device in memory can stand in its place.
+
+use std::io;
+use std::time::Duration;
+
+use hapterra_firmware::usb::{INTERFACE_CLASS, PACKET, PRODUCT, PRODUCT_ID, VENDOR_ID};
+use nusb::descriptors::{ConfigurationDescriptor, InterfaceDescriptor, TransferType};
+use nusb::transfer::Direction;
+
+use super::Transport;
+use super::transport::is_time_out;
+
+/// Most bytes in a transfer, a multiple of the packet size.
+pub(super) const TRANSFER: usize = 64 * PACKET;
+
+/// Whether a device with these numbers, and this product string where it can
+/// be read, is a hapterra board.
+#[must_use]
+pub fn is_hapterra(vendor: u16, product: u16, name: Option<&str>) -> bool {
+    let named = name.is_none_or(|name| name.contains(PRODUCT));
+    vendor == VENDOR_ID && product == PRODUCT_ID && named
+}
+
+/// Where a board's link is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BulkEndpoints {
+    /// Number of the interface to claim.
+    pub interface: u8,
+    /// Address of the endpoint that is read.
+    pub input: u8,
+    /// Address of the endpoint that is written.
+    pub output: u8,
+}
+
+impl BulkEndpoints {
+    /// The first interface of the link's class that has a bulk endpoint in
+    /// each direction.
+    #[must_use]
+    pub fn find(configuration: &ConfigurationDescriptor<'_>) -> Option<Self> {
+        let mut settings = configuration.interface_alt_settings();
+        settings.find_map(|setting| {
+            let ours = setting.class() == INTERFACE_CLASS;
+            let [input, output] =
+                [Direction::In, Direction::Out].map(|direction| bulk(&setting, direction));
+            ours.then_some(Self {
+                interface: setting.interface_number(),
+                input: input?,
+                output: output?,
+            })
+        })
+    }
+}
+
+fn bulk(setting: &InterfaceDescriptor<'_>, direction: Direction) -> Option<u8> {
+    let mut endpoints = setting.endpoints();
+    let found = endpoints.find(|endpoint| {
+        endpoint.transfer_type() == TransferType::Bulk && endpoint.direction() == direction
+    });
+    found.map(|endpoint| endpoint.address())
+}
+
+/// The two bulk pipes of a device, on whatever USB.
+pub trait Pipes {
+    /// Sends one transfer of at most 4 KiB, cut into whole packets and a
+    /// shorter last one; no empty packet ends it.
+    ///
+    /// # Errors
+    /// When the device is gone or does not take it.
+    fn send(&mut self, transfer: &[u8]) -> io::Result<()>;
+
+    /// Receives what has come, after waiting for at most `wait` for the first
+    /// byte. A time-out may be zero or an error that says so.
+    ///
+    /// # Errors
+    /// When the device is gone.
+    fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize>;
+}
+
+/// A byte stream over two bulk pipes.
+pub struct Bulk<P>(pub P);
+
+impl<P: Pipes> Transport for Bulk<P> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        bytes
+            .chunks(TRANSFER)
+            .try_for_each(|transfer| self.0.send(transfer))
+    }
+
+    fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
+        match self.0.receive(into, wait) {
+            Err(error) if is_time_out(&error) => Ok(0),
+            other => other,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_is_told_by_its_numbers_and_by_its_name_where_it_can_be_read() {
+        assert!(is_hapterra(VENDOR_ID, PRODUCT_ID, Some("hapterra nucleo")));
+        assert!(is_hapterra(VENDOR_ID, PRODUCT_ID, None));
+        assert!(!is_hapterra(VENDOR_ID, PRODUCT_ID, Some("blinky")));
+        assert!(!is_hapterra(VENDOR_ID, 0x0002, Some(PRODUCT)));
+    }
+
+    #[test]
+    fn an_interface_of_another_class_or_with_one_direction_is_passed_over() {
+        let interface = |number, class, endpoints: &[u8]| {
+            let mut bytes = vec![9, 4, number, 0, endpoints.len() as u8, class, 0, 0, 0];
+            for address in endpoints {
+                bytes.extend([7, 5, *address, 2, 64, 0, 0]);
+            }
+            bytes
+        };
+        let found = |interfaces: &[Vec<u8>]| {
+            let body = interfaces.concat();
+            let total = (9 + body.len()) as u16;
+            let [low, high] = total.to_le_bytes();
+            let head = [9, 2, low, high, interfaces.len() as u8, 1, 0, 0x80, 50];
+            let bytes = [head.as_slice(), &body].concat();
+            BulkEndpoints::find(&ConfigurationDescriptor::new(&bytes).expect("well formed"))
+        };
+        let [other, half, ours] = [
+            interface(0, 0x0A, &[0x02, 0x82]),
+            interface(1, 0xFF, &[0x83]),
+            interface(2, 0xFF, &[0x04, 0x85]),
+        ];
+        assert_eq!(found(&[other.clone(), half.clone()]), None);
+        let expected = BulkEndpoints {
+            interface: 2,
+            input: 0x85,
+            output: 0x04,
+        };
+        assert_eq!(found(&[other, half, ours]), Some(expected));
+    }
+
+    /// Pipes that take so much and give what they were given.
+    struct Scripted {
+        sent: Vec<usize>,
+        answer: fn() -> io::Result<usize>,
+    }
+
+    impl Pipes for Scripted {
+        fn send(&mut self, transfer: &[u8]) -> io::Result<()> {
+            self.sent.push(transfer.len());
+            Ok(())
+        }
+
+        fn receive(&mut self, _into: &mut [u8], _wait: Duration) -> io::Result<usize> {
+            (self.answer)()
+        }
+    }
+
+    #[test]
+    fn what_is_long_is_cut_and_a_time_out_is_no_error() {
+        let pipes = Scripted {
+            sent: vec![],
+            answer: || Err(io::ErrorKind::TimedOut.into()),
+        };
+        let mut stream = Bulk(pipes);
+        stream.send(&[0; 2 * TRANSFER + 5]).expect("sent");
+        assert_eq!(stream.0.sent, [TRANSFER, TRANSFER, 5]);
+        assert_eq!(stream.receive(&mut [0; 8], Duration::ZERO).ok(), Some(0));
+        stream.0.answer = || Err(io::ErrorKind::NotConnected.into());
+        assert!(stream.receive(&mut [0; 8], Duration::ZERO).is_err());
+    }
+}
