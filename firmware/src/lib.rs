@@ -16,8 +16,7 @@
 //! ```
 //!
 //! [`board`] is the hardware seam; [`channels`] builds the application from it;
-//! [`vitals`] and [`supervisor`] keep the watchdog; [`store`] keeps the
-//! calibration; [`crash`] is what is left of a program that ended; [`native`] is the same application as a value in a host program, without
+//! [`native`] is the same application as a value in a host program, without
 //! interrupts or tasks. The images are in `boards/`.
 //!
 //! # Priorities
@@ -59,13 +58,10 @@
 pub mod amplifier;
 pub mod board;
 pub mod channels;
-pub mod crash;
 pub mod encoder;
 pub mod haptic_loop;
 pub mod link;
 pub mod native;
-pub mod store;
 pub mod supervisor;
 mod timing;
 pub mod usb;
-pub mod vitals;

@@ -5,21 +5,18 @@
 //! clock does; in real time it calls it a thousand times a second regardless.
 
 use hapterra_core::guard::Drive;
-use hapterra_core::wire::status::BootReport;
+use hapterra_core::phantom::Calibration;
 
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, Sense, TickClock};
 use crate::channels::{Application, Channels, Hardware, Tiles, assemble};
 use crate::haptic_loop::HapticLoop;
 use crate::link::Link;
-use crate::store::Stored;
-use crate::supervisor::{NoWatchdog, Supervisor};
-use crate::vitals::Part;
 
-/// Encoders and switches that read what they were last given.
+/// Encoders that read what they were last given.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Given(pub Sense);
+pub struct GivenCounts(pub Sense);
 
-impl Encoders for Given {
+impl Encoders for GivenCounts {
     fn sense(&mut self) -> Sense {
         self.0
     }
@@ -77,11 +74,8 @@ impl TickClock for StoppedClock {
 /// A device in the host's memory, with a window of `D × D` tiles and a clock
 /// `C`.
 pub struct Device<C, const D: usize> {
-    haptic_loop: HapticLoop<'static, Given, ReportedOff, C, D>,
+    haptic_loop: HapticLoop<'static, GivenCounts, ReportedOff, C, D>,
     link: Link<'static, D>,
-    supervisor: Supervisor<'static, NoWatchdog>,
-    /// What the device remembers without power.
-    memory: Stored,
 }
 
 impl<C: TickClock, const D: usize> Device<C, D> {
@@ -91,48 +85,25 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         tiles: &'static mut Tiles<D>,
         channels: &'static mut Channels<'static>,
         clock: C,
-        calibration: Stored,
-        boot: BootReport,
+        calibration: Calibration,
     ) -> Self {
         let hardware = Hardware {
-            encoders: Given::default(),
+            encoders: GivenCounts::default(),
             amplifiers: ReportedOff,
             clock,
             calibration,
-            boot,
         };
         let Application {
-            haptic_loop,
-            link,
-            vitals,
+            haptic_loop, link, ..
         } = assemble(tiles, channels, hardware, "native");
-        Self {
-            haptic_loop,
-            link,
-            supervisor: Supervisor::new(vitals, NoWatchdog, &[Part::Tick, Part::Link]),
-            memory: calibration,
-        }
-    }
-
-    /// What the device would find in its memory if it were restarted now.
-    #[must_use]
-    pub const fn memory(&self) -> &Stored {
-        &self.memory
+        Self { haptic_loop, link }
     }
 
     /// Takes bytes from the host; see [`Link::receive`].
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
         let taken = self.link.receive(bytes);
-        self.turn();
-        taken
-    }
-
-    fn turn(&mut self) {
-        if let Some(calibration) = self.link.to_store() {
-            self.memory = Stored::Found(calibration);
-            self.link.stored(Ok(()));
-        }
         self.link.turn();
+        taken
     }
 
     /// Moves bytes for the host into `into`; see [`Link::transmit`].
@@ -140,19 +111,12 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         self.link.transmit(into)
     }
 
-    /// One tick with these encoders and switches; returns what the amplifiers
-    /// got.
-    pub fn tick(&mut self, sense: Sense) -> Drive {
-        let drive = self.tick_alone(sense);
-        self.turn();
-        self.supervisor.check();
+    /// One tick at these encoder counts; returns what the amplifiers got.
+    pub fn tick(&mut self, counts: [i32; 3]) -> Drive {
+        self.haptic_loop.encoders_mut().0.counts = counts;
+        let drive = self.haptic_loop.tick();
+        self.link.turn();
         drive
-    }
-
-    /// As [`Device::tick`], with the task of the link hanging.
-    pub fn tick_alone(&mut self, sense: Sense) -> Drive {
-        self.haptic_loop.encoders_mut().0 = sense;
-        self.haptic_loop.tick()
     }
 
     /// Whether nothing can happen before the host has spoken; see
@@ -162,10 +126,10 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         self.link.may_stand_still()
     }
 
-    /// Whether the arm is in use; see [`Link::drives_arm`].
+    /// Whether the scene in force is felt through the encoders.
     #[must_use]
-    pub fn drives_arm(&self) -> bool {
-        self.link.drives_arm()
+    pub fn feels_arm(&self) -> bool {
+        self.link.feels_arm()
     }
 
     /// Whether the host has said goodbye and everything is sent.

@@ -12,6 +12,7 @@ pub mod invariants;
 pub mod oracle;
 pub mod scene;
 pub mod soak;
+pub mod usb;
 pub mod walk;
 
 use std::path::{Path, PathBuf};

@@ -14,7 +14,6 @@ pub mod presence;
 mod descent;
 #[cfg(test)]
 mod dice;
-mod glide;
 mod paper;
 mod proxy;
 mod spot;

@@ -42,20 +42,18 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Config, bind_interrupts, pac, rcc, time::Hertz};
 use embassy_usb::UsbDevice;
 use embassy_usb::driver::Driver as UsbDriver;
-use hapterra_core::wire::status::BootReport;
+use hapterra_core::phantom::Calibration;
 use hapterra_firmware::amplifier::{CurrentOutput, Off, offset_code};
 use hapterra_firmware::channels::{Application, Channels, Hardware, Tiles, assemble};
 use hapterra_firmware::haptic_loop::HapticLoop;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::run;
-use hapterra_firmware::store::Stored;
 use hapterra_firmware::supervisor::Supervisor;
-use hapterra_firmware::vitals::Part;
+use hapterra_firmware::usb::{Descriptors, Known, Packets};
 use static_cell::ConstStaticCell;
 
 use stm32::arm::{Arm, SafetyInputs};
 use stm32::clock::{Clock, Period};
-use stm32::usb::Packets;
 use stm32::{Board, Dog, TICK_DONE};
 
 /// Tiles along the side of the window.
@@ -82,6 +80,7 @@ type TickClock = Clock<CORE_HZ, 4>;
 type Usb = Driver<'static, USB>;
 
 static TILES: ConstStaticCell<Tiles<WINDOW>> = ConstStaticCell::new(Tiles::new());
+static DESCRIPTORS: ConstStaticCell<Descriptors> = ConstStaticCell::new(Descriptors::new());
 static CHANNELS: ConstStaticCell<Channels<'static>> = ConstStaticCell::new(Channels::new());
 
 type Tick = HapticLoop<'static, Encoders, Amplifiers, TickClock, WINDOW>;
@@ -151,7 +150,7 @@ fn configuration() -> Config {
 }
 
 #[embassy_executor::task]
-async fn serve_usb(mut device: UsbDevice<'static, Usb>) -> ! {
+async fn serve_usb(mut device: UsbDevice<'static, Known<Usb>>) -> ! {
     device.run().await
 }
 
@@ -193,8 +192,7 @@ async fn main(spawner: Spawner) {
         encoders: Arm::new(counters, inputs),
         amplifiers: Off::new(outputs, enable, FULL_SCALE_A),
         clock: TickClock::new(p.TIM7, &PERIOD, &mut core),
-        calibration: Stored::Missing,
-        boot: BootReport::default(),
+        calibration: Calibration::PREMIUM_1_5,
     };
     let Application {
         haptic_loop,
@@ -203,7 +201,8 @@ async fn main(spawner: Spawner) {
     } = assemble(TILES.take(), CHANNELS.take(), hardware, "nucleo-g474re");
 
     let driver = Driver::new(p.USB, Irqs, p.PA12, p.PA11);
-    let (device, rx, tx) = stm32::usb::device(driver, embassy_stm32::uid::uid_hex());
+    let (device, rx, tx) =
+        hapterra_firmware::usb::device(driver, embassy_stm32::uid::uid_hex(), DESCRIPTORS.take());
     spawner.spawn(serve_usb(device).expect("started once"));
     spawner.spawn(serve_link(link, rx, tx).expect("started once"));
 
@@ -211,9 +210,6 @@ async fn main(spawner: Spawner) {
     stm32::nvic::start_tick(Interrupt::TIM7_DAC, Interrupt::TIM6_DAC);
     let mut dog = IndependentWatchdog::new(p.IWDG, stm32::WATCHDOG_US);
     dog.unleash();
-    spawner.spawn(
-        supervise(Supervisor::new(vitals, Dog(dog), &[Part::Tick, Part::Link]))
-            .expect("started once"),
-    );
+    spawner.spawn(supervise(Supervisor::new(vitals, Dog(dog))).expect("started once"));
     defmt::info!("nucleo-g474re is up");
 }

@@ -4,16 +4,18 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use hapterra::link::{Event, Patience, Session};
+use hapterra::link::{Bulk, BulkEndpoints, Event, Patience, Session};
 use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
 use hapterra::terrain::Terrain;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::wire::message::{Sample, Scene};
+use hapterra_tests::usb::host::{Found, ScriptedPipes, enumerate};
+
+use nusb::descriptors::ConfigurationDescriptor;
 
 use crate::chip::{CHIPS, Chip};
 use crate::elf::Image;
 use crate::machine::{Machine, Stop};
-use crate::usb::host::{Shared, UsbLink, enumerate};
 
 /// Counts that an arm may move in a tick without being taken for a fault.
 const COUNTS_PER_TICK: i32 = 60;
@@ -38,7 +40,7 @@ pub fn machines() -> Vec<Machine> {
 /// A device with a session, felt through its encoders.
 pub struct Device<'t> {
     /// The board.
-    pub machine: Shared,
+    pub machine: Rc<RefCell<Machine>>,
     session: Session<'t>,
     /// Where the encoders are.
     pub counts: [i32; 3],
@@ -57,9 +59,10 @@ impl<'t> Device<'t> {
         let dead_man = machine.chip.dead_man;
         machine.set_input(dead_man, false);
         assert_eq!(machine.run_ms(5), Stop::Time);
-        enumerate(&mut machine).expect("enumerated");
+        let found = enumerate(&mut machine).expect("enumerated");
         let machine = Rc::new(RefCell::new(machine));
-        let link = Box::new(UsbLink(Rc::clone(&machine)));
+        let pipes = ScriptedPipes::new(Rc::clone(&machine), endpoints(&found));
+        let link = Box::new(Bulk(pipes));
         // No verdict depends on how fast this machine is.
         let (session, _) =
             Session::open(terrain, scene, link, Patience::EMULATED).expect("a session");
@@ -107,6 +110,13 @@ impl<'t> Device<'t> {
     pub fn commands(&self) -> [u32; 3] {
         self.machine.borrow().bus().commands()
     }
+}
+
+/// The link's endpoints, found as the real program finds them.
+fn endpoints(found: &Found) -> BulkEndpoints {
+    let configuration = ConfigurationDescriptor::new(&found.configuration);
+    let configuration = configuration.expect("a configuration descriptor");
+    BulkEndpoints::find(&configuration).expect("the link's endpoints")
 }
 
 /// An inclined plane under the arm, and what it is like to press it, in f64

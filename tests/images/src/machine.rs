@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use hapterra_tests::usb::{Answer, Handshake, MOMENTS_A_MS, Port};
 use unicorn_engine::{Arch, ArmCpuModel, Context, Mode, Prot, RegisterARM, Unicorn};
 
 use crate::bus::{Bus, Effect};
@@ -444,6 +445,37 @@ impl Machine {
         self.hard_faults += 1;
         self.enter(HARD_FAULT, -1);
         None
+    }
+}
+
+/// The chip at the end of a scripted host's cable.
+impl Port for Machine {
+    fn is_attached(&self) -> bool {
+        self.bus().usb.is_attached()
+    }
+
+    fn bus_reset(&mut self) {
+        self.bus().usb.bus_reset();
+    }
+
+    fn setup(&mut self, request: [u8; 8]) -> Handshake {
+        self.bus().usb.setup(request)
+    }
+
+    fn out(&mut self, endpoint: usize, packet: &[u8]) -> Handshake {
+        self.bus().usb.out(endpoint, packet)
+    }
+
+    fn take_in(&mut self, endpoint: usize) -> Answer {
+        self.bus().usb.take_in(endpoint)
+    }
+
+    fn wait(&mut self) -> Result<(), String> {
+        let until_ns = self.bus().now_ns + 1_000_000 / MOMENTS_A_MS;
+        match self.run_until(1, |m| m.bus().now_ns >= until_ns) {
+            Stop::Asked | Stop::Time => Ok(()),
+            stop => Err(format!("{stop:?}")),
+        }
     }
 }
 

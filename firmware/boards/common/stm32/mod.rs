@@ -4,7 +4,6 @@ pub(crate) mod arm;
 pub(crate) mod clock;
 pub(crate) mod failure;
 pub(crate) mod nvic;
-pub(crate) mod usb;
 
 use embassy_stm32::peripherals;
 use embassy_stm32::wdg::{IndependentWatchdog, Instance};

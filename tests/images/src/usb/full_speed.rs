@@ -1,6 +1,8 @@
 //! The device-only full-speed peripheral with packet memory (RM0440, 45).
 
-use super::{Answer, Handshake, Peripheral};
+use hapterra_tests::usb::{Answer, Handshake};
+
+use super::Peripheral;
 
 const CNTR: u32 = 0x40;
 const ISTR: u32 = 0x44;

@@ -1,36 +1,13 @@
-//! The chips' two USB peripherals, and a host that talks to them by script.
-//!
-//! Packets are moved whole: no bits, no CRC, no frames, no time on the wire.
+//! The chips' two USB peripherals, for the scripted host of `hapterra-tests`.
 
 mod full_speed;
-pub mod host;
 
 mod otg;
 
 pub use full_speed::FullSpeed;
 pub use otg::Otg;
 
-/// How a device answers a packet to it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Handshake {
-    /// Taken.
-    Ack,
-    /// Not now.
-    Nak,
-    /// Never like this.
-    Stall,
-}
-
-/// How a device answers a request for a packet.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Answer {
-    /// A packet.
-    Data(Vec<u8>),
-    /// Not now.
-    Nak,
-    /// Never like this.
-    Stall,
-}
+use hapterra_tests::usb::{Answer, Handshake};
 
 /// A peripheral, seen from the core and from the wire.
 pub trait Peripheral {

@@ -7,7 +7,9 @@
 
 use std::collections::{HashMap, VecDeque};
 
-use super::{Answer, Handshake, Peripheral};
+use hapterra_tests::usb::{Answer, Handshake};
+
+use super::Peripheral;
 
 const GAHBCFG: u32 = 0x008;
 const GRSTCTL: u32 = 0x010;

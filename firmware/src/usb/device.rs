@@ -1,0 +1,85 @@
+//! What the device says of itself.
+
+use embassy_usb::driver::Driver;
+use embassy_usb::msos::{
+    CompatibleIdFeatureDescriptor, PropertyData, RegistryPropertyFeatureDescriptor, windows_version,
+};
+use embassy_usb::{Builder, Config, UsbDevice};
+
+use super::known::Known;
+use super::packets::Packets;
+use super::{
+    INTERFACE_CLASS, INTERFACE_GUIDS, MSOS_VENDOR_CODE, PACKET, PRODUCT, PRODUCT_ID, VENDOR_ID,
+};
+
+/// Room for the descriptors, and for the data of control transfers.
+pub struct Descriptors {
+    config: [u8; 64],
+    bos: [u8; 64],
+    msos: [u8; 256],
+    control: [u8; 64],
+}
+
+impl Descriptors {
+    /// Empty room.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            config: [0; 64],
+            bos: [0; 64],
+            msos: [0; 256],
+            control: [0; 64],
+        }
+    }
+}
+
+impl Default for Descriptors {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The device's end of USB: the stack, to be run for ever, and the two ends of
+/// the link.
+pub type Parts<'d, D> = (
+    UsbDevice<'d, Known<D>>,
+    Packets<<D as Driver<'d>>::EndpointOut>,
+    Packets<<D as Driver<'d>>::EndpointIn>,
+);
+
+/// Describes the device on `driver` and takes it apart.
+pub fn device<'d, D: Driver<'d>>(
+    driver: D,
+    serial_number: &'d str,
+    buffers: &'d mut Descriptors,
+) -> Parts<'d, D> {
+    let mut config = Config::new(VENDOR_ID, PRODUCT_ID);
+    config.manufacturer = Some("hapterra");
+    config.product = Some(PRODUCT);
+    config.serial_number = Some(serial_number);
+    let mut builder = Builder::new(
+        Known(driver),
+        config,
+        &mut buffers.config,
+        &mut buffers.bos,
+        &mut buffers.msos,
+        &mut buffers.control,
+    );
+    builder.msos_descriptor(windows_version::WIN8_1, MSOS_VENDOR_CODE);
+    let mut function = builder.function(INTERFACE_CLASS, 0, 0);
+    function.msos_feature(CompatibleIdFeatureDescriptor::new("WINUSB", ""));
+    function.msos_feature(RegistryPropertyFeatureDescriptor::new(
+        "DeviceInterfaceGUIDs",
+        PropertyData::RegMultiSz(&INTERFACE_GUIDS),
+    ));
+    let mut interface = function.interface();
+    let mut setting = interface.alt_setting(INTERFACE_CLASS, 0, 0, None);
+    let from_host = setting.endpoint_bulk_out(None, PACKET as u16);
+    let to_host = setting.endpoint_bulk_in(None, PACKET as u16);
+    drop(function);
+    (
+        builder.build(),
+        Packets::new(from_host),
+        Packets::new(to_host),
+    )
+}

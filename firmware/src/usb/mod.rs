@@ -1,0 +1,36 @@
+//! How the boards present themselves on USB: one vendor-specific interface
+//! with a bulk endpoint in each direction, found by these numbers.
+//!
+//! Windows takes it without a driver (WinUSB, by Microsoft OS 2.0 descriptors);
+//! Linux lets users at it by the rule in `host-tools/udev/`. The stack is
+//! embassy-usb's over any driver: the boards' peripherals, or in tests a host
+//! that follows a script.
+
+#[cfg(feature = "usb")]
+mod device;
+#[cfg(feature = "usb")]
+mod known;
+#[cfg(feature = "usb")]
+mod packets;
+
+#[cfg(feature = "usb")]
+pub use device::{Descriptors, Parts, device};
+#[cfg(feature = "usb")]
+pub use known::Known;
+#[cfg(feature = "usb")]
+pub use packets::Packets;
+
+/// Vendor: pid.codes, shared by open-source projects.
+pub const VENDOR_ID: u16 = 0x1209;
+/// Product: one of pid.codes' numbers for testing, until the project has its own.
+pub const PRODUCT_ID: u16 = 0x0001;
+/// What the product string says; the test numbers alone could be anybody's.
+pub const PRODUCT: &str = "hapterra";
+/// Class code of the link's interface: vendor-specific.
+pub const INTERFACE_CLASS: u8 = 0xFF;
+/// Bytes in a full-speed bulk packet.
+pub const PACKET: usize = 64;
+/// Request code of the Microsoft OS descriptors; any that is not otherwise used.
+pub const MSOS_VENDOR_CODE: u8 = 0x01;
+/// Under which a Windows program finds the interface.
+pub const INTERFACE_GUIDS: [&str; 1] = ["{7B0D3C64-5F6E-4A0B-9C7C-6B1E5A0C2D11}"];

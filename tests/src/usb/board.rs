@@ -1,0 +1,181 @@
+//! The application with embassy's USB stack over the scripted wire: the code
+//! of the real boards from the link's task down to the endpoints.
+
+use std::cell::{Cell, RefCell};
+use std::future::Future;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::task::{Context, Waker};
+
+use embassy_futures::join::join;
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_sync::signal::Signal;
+use embassy_usb_driver::Event;
+use hapterra_core::phantom::Calibration;
+use hapterra_firmware::board::{Sense, Watchdog};
+use hapterra_firmware::channels::{Application, Channels, Hardware, Tiles, assemble};
+use hapterra_firmware::haptic_loop::HapticLoop;
+use hapterra_firmware::link::Link;
+use hapterra_firmware::link::task::{LinkHost, run};
+use hapterra_firmware::native::{GivenCounts, ReportedOff, StoppedClock};
+use hapterra_firmware::supervisor::Supervisor;
+use hapterra_firmware::usb::{Descriptors, device};
+
+use super::driver::{ScriptedDriver, Wire};
+use super::{Answer, Handshake, MOMENTS_A_MS, Port};
+
+/// Tiles along the side of the window.
+const WINDOW: usize = 4;
+/// Polls after which everything that can happen now has happened.
+const POLLS: usize = 8;
+/// The serial number it gives.
+pub const SERIAL: &str = "0123456789ABCDEF";
+
+/// Tells the link that a tick has ended.
+#[derive(Clone)]
+struct TickDone(Rc<Signal<NoopRawMutex, ()>>);
+
+impl LinkHost for TickDone {
+    async fn tick_done(&self) {
+        self.0.wait().await;
+    }
+
+    fn after_turn<const D: usize>(&self, _link: &Link<'_, D>) {}
+}
+
+/// A board without a chip.
+pub struct Board {
+    wire: Rc<RefCell<Wire>>,
+    tasks: Pin<Box<dyn Future<Output = ()>>>,
+    haptic_loop: HapticLoop<'static, GivenCounts, ReportedOff, StoppedClock, WINDOW>,
+    supervisor: Supervisor<'static, Fed>,
+    fed: Fed,
+    done: TickDone,
+    moments: u64,
+}
+
+/// A watchdog that remembers being fed.
+#[derive(Clone, Default)]
+struct Fed(Rc<Cell<bool>>);
+
+impl Watchdog for Fed {
+    fn feed(&mut self) {
+        self.0.set(true);
+    }
+}
+
+impl Board {
+    /// A board that was just powered by the cable. Its memory is leaked, as a
+    /// board's is never freed.
+    #[must_use]
+    pub fn plugged_in() -> Self {
+        let hardware = Hardware {
+            encoders: GivenCounts::default(),
+            amplifiers: ReportedOff,
+            clock: StoppedClock,
+            calibration: Calibration::PREMIUM_1_5,
+        };
+        let tiles = Box::leak(Box::new(Tiles::new()));
+        let channels = Box::leak(Box::new(Channels::new()));
+        let Application {
+            haptic_loop,
+            mut link,
+            vitals,
+        } = assemble(tiles, channels, hardware, "scripted");
+        let wire = Rc::new(RefCell::new(Wire::default()));
+        wire.borrow_mut().report(Event::PowerDetected);
+        let driver = ScriptedDriver(Rc::clone(&wire), [0; 2]);
+        let buffers = Box::leak(Box::new(Descriptors::new()));
+        let (mut stack, rx, tx) = device(driver, SERIAL, buffers);
+        let fed = Fed::default();
+        let done = TickDone(Rc::new(Signal::new()));
+        let host = done.clone();
+        let tasks = Box::pin(async move {
+            let link = async { run(&mut link, rx, tx, &host).await };
+            join(stack.run(), link).await;
+        });
+        Self {
+            wire,
+            tasks,
+            haptic_loop,
+            supervisor: Supervisor::new(vitals, fed.clone()),
+            fed,
+            done,
+            moments: 0,
+        }
+    }
+
+    /// Sets the encoders' counts.
+    pub fn feed_encoders(&mut self, counts: [i32; 3]) {
+        *self.haptic_loop.encoders_mut() = GivenCounts(Sense {
+            counts,
+            ..Sense::default()
+        });
+    }
+
+    /// The cable is pulled. Boards that do not sense the supply's voltage see
+    /// an idle bus and nothing else.
+    pub fn unplug(&mut self) {
+        self.wire.borrow_mut().report(Event::Suspend);
+        self.settle();
+    }
+
+    /// Packets so far that were longer than an endpoint's.
+    #[must_use]
+    pub fn babbles(&self) -> u32 {
+        self.wire.borrow().babbles
+    }
+
+    /// Whether the watchdog is fed now: loop and link have lived since it was
+    /// asked last.
+    pub fn is_alive(&mut self) -> bool {
+        self.fed.0.take();
+        self.supervisor.check();
+        self.fed.0.take()
+    }
+
+    fn settle(&mut self) {
+        let mut context = Context::from_waker(Waker::noop());
+        for _ in 0..POLLS {
+            let ended = self.tasks.as_mut().poll(&mut context).is_ready();
+            assert!(!ended, "tasks never end");
+        }
+    }
+}
+
+impl Port for Board {
+    fn is_attached(&self) -> bool {
+        true
+    }
+
+    fn bus_reset(&mut self) {
+        self.wire.borrow_mut().report(Event::Reset);
+        self.settle();
+    }
+
+    fn setup(&mut self, request: [u8; 8]) -> Handshake {
+        self.wire.borrow_mut().setup(request)
+    }
+
+    fn out(&mut self, endpoint: usize, packet: &[u8]) -> Handshake {
+        let hand = self.wire.borrow_mut().out(endpoint, packet);
+        self.settle();
+        hand
+    }
+
+    fn take_in(&mut self, endpoint: usize) -> Answer {
+        let answer = self.wire.borrow_mut().take_in(endpoint);
+        self.settle();
+        answer
+    }
+
+    fn wait(&mut self) -> Result<(), String> {
+        self.moments += 1;
+        if self.moments.is_multiple_of(MOMENTS_A_MS) {
+            self.haptic_loop.tick();
+            self.done.0.signal(());
+        }
+        self.settle();
+        Ok(())
+    }
+}
