@@ -43,10 +43,13 @@ impl GridPoint {
 
     /// The point `height` cells above the cell's floor, at a place in `[0, 1)`
     /// over it: [`Self::new`] where only the height may carry.
-    #[must_use]
     #[inline]
     pub(crate) fn over([x, y, z]: [i32; 3], [u, v]: [f32; 2], height: f32) -> Self {
-        let (z, fz) = carry(z, height);
+        let (z, fz) = if (0.0..1.0).contains(&height) {
+            (z, height)
+        } else {
+            carry(z, height)
+        };
         Self {
             cell: [x, y, z],
             frac: [u, v, fz],
@@ -111,8 +114,22 @@ impl GridPoint {
 
     /// Whether this point is lower than `other`.
     #[must_use]
+    #[inline]
     pub fn is_below(&self, other: &Self) -> bool {
-        (self.cell[2], self.frac[2]) < (other.cell[2], other.frac[2])
+        let (here, there) = (self.cell[2], other.cell[2]);
+        here < there || (here == there && self.frac[2] < other.frac[2])
+    }
+
+    /// Whether this is `other`, bit for bit.
+    ///
+    /// The answer of every tick of a hand at rest, so it is written in a way
+    /// that does not become a call of `memcmp`.
+    #[must_use]
+    #[inline]
+    pub fn is_same(&self, other: &Self) -> bool {
+        let cell = |i: usize| self.cell[i] ^ other.cell[i];
+        let frac = |i: usize| self.frac[i].to_bits() ^ other.frac[i].to_bits();
+        (cell(0) | cell(1) | cell(2)) as u32 | frac(0) | frac(1) | frac(2) == 0
     }
 }
 

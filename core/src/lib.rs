@@ -12,7 +12,8 @@
 //! 4. [`contact`] moves the proxy over bilinear patches.
 //! 5. [`force`] turns proxy and haptic interface point into newtons.
 //! 6. [`guard`] decides what may reach the amplifiers.
-//! 7. [`tick`] is all of it as one pure function, called at 1 kHz.
+//! 7. [`tick`] is all of it as one pure function, called 1,000 to 10,000 times a
+//!    second ([`guard::TickRate`]).
 //! 8. [`wire`] is what travels between the device and the host.
 #![no_std]
 #![forbid(unsafe_code)]

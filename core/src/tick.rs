@@ -1,30 +1,37 @@
 //! The tick: one pure function from encoder counts to amplifier currents.
 //!
 //! It reads nothing and writes nothing but its own state, never blocks, and
-//! does a bounded amount of work. Scenes, tiles and points are handed to it
-//! between ticks by [`Haptics::accept`].
+//! does a bounded amount of work. Scenes, tiles, points and settings are
+//! handed to it between ticks by [`Haptics::accept`] and
+//! [`Haptics::configure`].
 
 use glam::Vec3;
 
 use crate::contact::{Contact, Felt, Pace};
 use crate::grid::GridPoint;
-use crate::guard::thermal::Rating;
-use crate::guard::{Drive, Fault, Guard};
-use crate::phantom::{Calibration, Pose, to_device_frame, to_terrain_frame};
+use crate::guard::{Drive, Fault, Guard, Limits, Report, SceneKind, Sense, Surroundings, TickRate};
+use crate::phantom::{Calibration, Mechanism, Pose, to_device_frame, to_terrain_frame};
 use crate::terrain::{Tile, TileKey, Window};
 use crate::wire::message::{Point, Sample, Scene, Source};
-
-/// Length of a tick, seconds.
-pub const TICK_S: f32 = 1e-3;
+use crate::wire::status::Health;
 
 /// What is handed to the loop between ticks.
 pub enum Command<'t> {
-    /// A scene, already checked ([`Scene::is_valid`]).
+    /// A scene, already checked ([`Scene::is_valid`]). The arm is disarmed,
+    /// and force that was there goes out gently.
     Scene(Scene),
+    /// No scene any more. The arm is disarmed likewise.
+    DropScene,
     /// A filled tile.
     Tile(&'t mut Tile),
     /// A hand position to be felt, in a scene fed by points.
     Point(Point),
+    /// Arm, once nothing is in the way and the dead-man switch is pressed.
+    Arm,
+    /// Disarm; force goes out gently.
+    Disarm,
+    /// These are the counts in the zero pose of the calibration record.
+    Zero([i32; 3]),
     /// Clear a latched fault.
     ClearFault,
     /// Latch a fault found outside the tick.
@@ -47,21 +54,29 @@ pub struct Haptics<'t, const D: usize> {
     window: Window<'t, D>,
     contact: Contact,
     guard: Guard,
-    calibration: Calibration,
+    mechanism: Option<Mechanism>,
+    /// Counts in the zero pose, once they are known.
+    zero: Option<[i32; 3]>,
     scene: Option<Scene>,
     point: Option<Point>,
     tick: u32,
 }
 
 impl<'t, const D: usize> Haptics<'t, D> {
-    /// A loop without a scene: amplifiers off.
+    /// A loop at this rate without calibration and scene: disarmed, with a
+    /// fault that was found at boot.
     #[must_use]
-    pub fn new(tiles: [[&'t mut Tile; D]; D], calibration: Calibration) -> Self {
+    pub fn new(
+        tiles: [[&'t mut Tile; D]; D],
+        rate: TickRate,
+        found_at_boot: Option<Fault>,
+    ) -> Self {
         Self {
             window: Window::new(tiles),
             contact: Contact::new(),
-            guard: Guard::default(),
-            calibration,
+            guard: Guard::new(rate, found_at_boot),
+            mechanism: None,
+            zero: None,
             scene: None,
             point: None,
             tick: 0,
@@ -74,23 +89,55 @@ impl<'t, const D: usize> Haptics<'t, D> {
     pub fn accept(&mut self, command: Command<'t>) -> Option<&'t mut Tile> {
         match command {
             Command::Scene(scene) => self.take_scene(scene),
+            Command::DropScene => self.drop_scene(),
             Command::Tile(tile) => return Some(self.take_tile(tile)),
             Command::Point(point) => self.point = Some(point),
+            Command::Arm => self.guard.arm(),
+            Command::Disarm => self.guard.disarm(),
+            Command::Zero(counts) => self.take_zero(counts),
             Command::ClearFault => self.guard.clear(),
             Command::Trip(fault) => self.guard.trip(fault),
         }
         None
     }
 
+    /// Swaps the arm's settings between ticks. Whoever hands them over sees to
+    /// it that the arm is disarmed; if it is not, it is switched off.
+    pub fn configure(&mut self, mechanism: Mechanism) {
+        self.guard.stop();
+        self.guard.configure(&mechanism);
+        self.mechanism = Some(mechanism);
+        self.contact = Contact::new();
+    }
+
     fn take_scene(&mut self, scene: Scene) {
         if !scene.is_valid() {
             return;
+        }
+        match scene.source {
+            Source::Encoders => self.guard.disarm(),
+            Source::Points => self.guard.stop(),
         }
         self.window.reset(scene.level, scene.size, scene.top);
         self.contact = Contact::new();
         self.scene = Some(scene);
         self.point = None;
         self.tick = 0;
+    }
+
+    fn drop_scene(&mut self) {
+        self.guard.disarm();
+        self.contact = Contact::new();
+        self.scene = None;
+        self.point = None;
+    }
+
+    /// Everything looks elsewhere from now on, so nothing is driven meanwhile.
+    fn take_zero(&mut self, counts: [i32; 3]) {
+        self.guard.stop();
+        self.guard.restart_counts();
+        self.contact = Contact::new();
+        self.zero = Some(counts);
     }
 
     /// Never lets a tile push out the one under the proxy.
@@ -114,34 +161,83 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.guard.fault()
     }
 
-    /// One tick. `counts` are the three encoders'.
-    pub fn tick(&mut self, counts: [i32; 3]) -> Outcome {
+    /// The calibration in force.
+    #[must_use]
+    pub fn calibration(&self) -> Option<&Calibration> {
+        self.mechanism.as_ref().map(Mechanism::calibration)
+    }
+
+    /// Where the guard stands and what was measured, after a tick.
+    #[must_use]
+    pub fn health(&self, sense: &Sense, drive: &Drive) -> Health {
+        let zero = self.zero.unwrap_or_default();
+        let angles = self
+            .mechanism
+            .as_ref()
+            .map(|m| m.angles(sense.counts, zero));
+        Health {
+            report: self.guard.report(),
+            sense: *sense,
+            zero: self.zero,
+            angles_rad: angles.unwrap_or_default(),
+            currents_a: drive.currents_a,
+            winding_c: self.guard.motors().winding_c(),
+        }
+    }
+
+    /// Where the guard stands, after a tick.
+    #[must_use]
+    pub const fn report(&self) -> Report {
+        self.guard.report()
+    }
+
+    /// One tick with what the encoders and safety inputs say. `watchdog_live`:
+    /// whether the board's watchdog is being fed.
+    pub fn tick(&mut self, sense: &Sense, watchdog_live: bool) -> Outcome {
         self.tick = self.tick.wrapping_add(1);
-        match self.scene {
-            Some(scene) if scene.source == Source::Encoders => self.feel_arm(&scene, counts),
-            Some(scene) => self.feel_point(&scene),
-            None => self.outcome(GridPoint::default(), Felt::default(), Vec3::ZERO),
+        match &self.scene {
+            Some(scene) if scene.source == Source::Points => self.feel_point(),
+            _ => self.feel_arm(sense, watchdog_live),
         }
     }
 
     /// The full path: counts, pose, haptic interface point, proxy, force,
     /// torques, currents.
-    fn feel_arm(&mut self, scene: &Scene, counts: [i32; 3]) -> Outcome {
-        self.guard.watch(counts);
-        let pose = Pose::from_counts(&self.calibration, counts);
-        let hip = self.place(scene, &pose);
-        let felt = *self
-            .contact
-            .step(&self.window, hip, scene.rule, Pace::RealTime);
-        let wanted = scene.law.force_n(felt.stretch * scene.cell_mm);
-        let force_n = self.guard.limit_force(wanted);
-        let torques = pose.torques_nm(to_device_frame(force_n));
-        let currents = torques / (self.calibration.ratio * self.calibration.torque_constant);
-        let rating = Rating {
-            peak_a: self.calibration.peak_current_a,
-            continuous_a: self.calibration.continuous_current_a,
+    fn feel_arm(&mut self, sense: &Sense, watchdog_live: bool) -> Outcome {
+        let zero = self.zero.unwrap_or_default();
+        let mechanism = self.mechanism.as_ref();
+        let pose = mechanism.map(|mechanism| mechanism.pose(sense.counts, zero));
+        let around = Surroundings {
+            arm: mechanism.zip(pose.as_ref()),
+            zeroed: self.zero.is_some(),
+            scene: self
+                .scene
+                .as_ref()
+                .map_or(SceneKind::None, |_| SceneKind::Arm),
+            watchdog_live,
         };
-        let drive = self.guard.limit_currents(currents, rating, TICK_S);
+        let lost_counts = self.guard.watch(sense, &around);
+        let (Some(mechanism), Some(pose)) = (mechanism, pose) else {
+            return self.outcome(GridPoint::default(), Felt::default(), Vec3::ZERO);
+        };
+        let (mut hip, mut felt, mut wanted) = Default::default();
+        if let Some(scene) = &self.scene {
+            hip = place(mechanism, scene, &pose);
+            felt = *self
+                .contact
+                .step(&self.window, hip, scene.rule, Pace::RealTime);
+            wanted = scene.law.force_n(felt.stretch * scene.cell_mm);
+        }
+        let force_n = self.guard.limit_force(wanted);
+        let mut drive = Drive::default();
+        if self.guard.mode().drives() {
+            let weight = mechanism.gravity_nm(&pose) * self.guard.gain();
+            let torques = pose.torques_nm(to_device_frame(force_n)) + weight;
+            drive = self.guard.limit_currents(mechanism.currents_a(torques));
+        }
+        if lost_counts {
+            self.zero = None;
+        }
         let mut outcome = self.outcome(hip, felt, force_n);
         outcome.drive = drive;
         outcome
@@ -149,8 +245,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
 
     /// Replay: the host's point in place of the arm, amplifiers off. The tick
     /// is repeated until nothing holds it up; only then is the point answered.
-    fn feel_point(&mut self, scene: &Scene) -> Outcome {
-        let Some(point) = self.point else {
+    fn feel_point(&mut self) -> Outcome {
+        let (Some(scene), Some(point)) = (&self.scene, self.point) else {
             return self.outcome(GridPoint::default(), Felt::default(), Vec3::ZERO);
         };
         let felt = *self
@@ -165,17 +261,9 @@ impl<'t, const D: usize> Haptics<'t, D> {
         outcome
     }
 
-    /// Where the tip is over the terrain.
-    fn place(&self, scene: &Scene, pose: &Pose) -> GridPoint {
-        let home = Pose::from_angles(&self.calibration, Vec3::ZERO);
-        let moved_mm = to_terrain_frame(pose.tip_mm() - home.tip_mm());
-        GridPoint::new(
-            scene.home.cell(),
-            scene.home.frac() + moved_mm / scene.cell_mm,
-        )
-    }
-
     fn outcome(&self, hip: GridPoint, felt: Felt, force_n: Vec3) -> Outcome {
+        let mut limits = self.guard.limits();
+        limits.set(Limits::TERRAIN_MISSING, felt.held_up_by.is_some());
         Outcome {
             drive: Drive::default(),
             sample: Sample {
@@ -185,6 +273,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
                 force_n,
                 state: felt.state,
                 held_up_by: felt.held_up_by,
+                mode: self.guard.mode(),
+                limits,
                 fault: self.guard.fault(),
                 work: felt.work,
                 ..Sample::default()
@@ -192,6 +282,15 @@ impl<'t, const D: usize> Haptics<'t, D> {
             answers: None,
         }
     }
+}
+
+/// Where the tip is over the terrain.
+fn place(mechanism: &Mechanism, scene: &Scene, pose: &Pose) -> GridPoint {
+    let moved_mm = to_terrain_frame(pose.tip_mm() - mechanism.home_mm());
+    GridPoint::new(
+        scene.home.cell(),
+        scene.home.frac() + moved_mm / scene.cell_mm,
+    )
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use std::vec::Vec;
 use super::*;
 use crate::contact::{Rule, State};
 use crate::force::ForceLaw;
+use crate::guard::{Blockers, Mode};
 use crate::terrain::{Focus, Puller, TILE_CELLS};
 
 const SIZE: i32 = 640;
@@ -33,13 +34,16 @@ struct Device<const D: usize> {
     height: fn(i32, i32) -> f32,
     focus: Focus,
     served: usize,
+    dead_man: bool,
 }
 
 impl<const D: usize> Device<D> {
     fn new(source: Source, height: fn(i32, i32) -> f32) -> Self {
         let tile = || -> &'static mut Tile { Box::leak(Box::new(Tile::VACANT)) };
         let tiles = core::array::from_fn(|_| core::array::from_fn(|_| tile()));
-        let mut haptics = Haptics::new(tiles, Calibration::PREMIUM_1_5);
+        let mut haptics = Haptics::new(tiles, TickRate::DEFAULT, None);
+        let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5);
+        haptics.configure(mechanism.expect("valid"));
         let scene = scene(source);
         assert!(haptics.accept(Command::Scene(scene)).is_none());
         let mut puller = Puller::new();
@@ -51,12 +55,42 @@ impl<const D: usize> Device<D> {
             height,
             focus: Focus::default(),
             served: 0,
+            dead_man: false,
         }
+    }
+
+    /// The same, armed with the arm in its zero pose.
+    fn armed(height: fn(i32, i32) -> f32) -> Self {
+        let mut device = Self::new(Source::Encoders, height);
+        device.arm([0; 3]);
+        device
+    }
+
+    fn say(&mut self, command: Command<'static>) {
+        assert!(self.haptics.accept(command).is_none());
+    }
+
+    /// Zeroes the arm in its home pose and arms it where it is.
+    fn arm(&mut self, counts: [i32; 3]) {
+        self.say(Command::Zero([0; 3]));
+        self.say(Command::Arm);
+        self.dead_man = false;
+        let _ = self.tick(counts);
+        self.dead_man = true;
+        for _ in 0..2_200 {
+            let _ = self.tick(counts);
+        }
+        assert_eq!(self.haptics.report().mode, Mode::Armed);
     }
 
     /// One tick, then every tile that is wanted.
     fn tick(&mut self, counts: [i32; 3]) -> Outcome {
-        let outcome = self.haptics.tick(counts);
+        let sense = Sense {
+            counts,
+            dead_man: self.dead_man,
+            ..Sense::default()
+        };
+        let outcome = self.haptics.tick(&sense, true);
         self.focus = Focus {
             held_up_by: outcome.sample.held_up_by,
             proxy: outcome.sample.proxy.column(),
@@ -115,54 +149,163 @@ fn hills(x: i32, y: i32) -> f32 {
     (8.0 * (x * 0.11).sin() * (y * 0.07).cos() + (x * 1.3).sin()) as f32
 }
 
+/// Rises above the plane and comes back into it. Home is half a millimetre
+/// below; 64 counts of the second axis are 1.8 mm.
+fn dip() -> impl Iterator<Item = [i32; 3]> {
+    let rise = (0..=64).map(|n| [0, n, 0]);
+    rise.chain((0..=64).map(|n| [0, 64 - n, 0]))
+}
+
 #[test]
 fn pressed_on_a_plane_the_motors_push_back() {
-    let mut device = Device::<4>::new(Source::Encoders, plane);
-    // Rise above the plane first: 64 counts of the second axis are 1.8 mm.
-    let rise = (0..=64).map(|n| [0, n, 0]);
-    let fall = (0..=64).map(|n| [0, 64 - n, 0]);
-    let outcomes: Vec<_> = rise.chain(fall).map(|c| device.tick(c)).collect();
+    let mut device = Device::<4>::armed(plane);
+    let outcomes: Vec<_> = dip().map(|c| device.tick(c)).collect();
     assert_eq!(outcomes[64].sample.state, State::Free);
-    assert_eq!(outcomes[64].drive.currents_a, Vec3::ZERO);
+    // τ2 = G2·cos q2; I = τ/(11.2 · 0.0234 Nm/A): the weight alone.
+    let weight_a = -0.0163 / (11.2 * 0.0234);
+    assert!((outcomes[64].drive.currents_a - Vec3::Y * weight_a).length() < 1e-4);
     let last = outcomes.last().unwrap();
     assert_eq!(last.sample.state, State::Touching);
-    // Home is half a cell, so half a millimetre, below the plane.
     assert!((last.sample.force_n - Vec3::new(0.0, 0.0, 0.25)).length() < 1e-4);
-    // τ2 = l1·F = 209.55 mm · 0.25 N; I = τ/(11.2 · 0.0234 Nm/A)
-    assert!(
-        (last.drive.currents_a.y - 0.199_9).abs() < 1e-3,
-        "{:?}",
-        last.drive
-    );
+    // τ2 = l1·F = 209.55 mm · 0.25 N
+    let pushed_a = 0.209_55 * 0.25 / (11.2 * 0.0234);
+    let currents = last.drive.currents_a;
+    assert!((currents - Vec3::Y * (pushed_a + weight_a)).length() < 1e-3);
     assert!(last.drive.enabled);
 }
 
 #[test]
-fn begun_inside_the_terrain_there_is_no_force() {
+fn disarmed_the_same_is_felt_by_nobody() {
     let mut device = Device::<4>::new(Source::Encoders, plane);
-    for _ in 0..50 {
-        let outcome = device.tick([0; 3]);
-        assert_eq!(outcome.sample.state, State::Waiting);
-        assert_eq!(outcome.drive.currents_a, Vec3::ZERO);
+    let last = dip().map(|c| device.tick(c)).last().unwrap();
+    assert_eq!(last.sample.state, State::Touching, "the contact is there");
+    assert_eq!(last.sample.force_n, Vec3::ZERO);
+    assert_eq!(last.drive, Drive::default());
+}
+
+#[test]
+fn the_weight_of_the_arm_is_held_with_the_sign_of_the_calibration() {
+    for (encoder_sign, motor_sign) in [(Vec3::ONE, Vec3::ONE), (-Vec3::ONE, -Vec3::Z + Vec3::Y)] {
+        let record = Calibration {
+            encoder_sign,
+            motor_sign: Vec3::new(1.0, motor_sign.y, motor_sign.z),
+            ..Calibration::PREMIUM_1_5
+        };
+        let mechanism = Mechanism::new(&record).expect("valid");
+        let pose = Pose::from_angles(&record, Vec3::new(0.1, 0.4, 0.3));
+        let currents = mechanism.currents_a(mechanism.gravity_nm(&pose));
+        let per_ampere = 11.2 * 0.0234;
+        let expected = Vec3::new(
+            0.0,
+            record.motor_sign.y * -0.0163 * 0.4f32.cos() / per_ampere,
+            record.motor_sign.z * -0.0738 * 0.3f32.sin() / per_ampere,
+        );
+        assert!((currents - expected).length() < 1e-5);
     }
 }
 
 #[test]
-fn a_fault_is_latched_until_cleared() {
-    let mut device = Device::<4>::new(Source::Encoders, plane);
-    let _ = device.tick([0; 3]);
+fn begun_inside_the_terrain_there_is_no_force() {
+    let mut device = Device::<4>::armed(plane);
+    for _ in 0..50 {
+        let outcome = device.tick([0; 3]);
+        assert_eq!(outcome.sample.state, State::Waiting);
+        assert_eq!(outcome.sample.force_n, Vec3::ZERO);
+    }
+}
+
+#[test]
+fn a_fault_is_latched_until_cleared_and_counts_lost_have_to_be_zeroed() {
+    let mut device = Device::<4>::armed(plane);
+    assert!(device.tick([0; 3]).drive.enabled);
     let outcome = device.tick([5000, 0, 0]);
+    assert_eq!(outcome.drive, Drive::default());
     assert_eq!(outcome.sample.fault, Some(Fault::EncoderJump));
     for _ in 0..3 {
         assert_eq!(device.tick([5000, 0, 0]).drive, Drive::default());
     }
-    assert!(device.haptics.accept(Command::ClearFault).is_none());
-    assert!(device.tick([5000, 0, 0]).drive.enabled);
+    device.say(Command::ClearFault);
+    let outcome = device.tick([0; 3]);
+    assert_eq!((outcome.sample.fault, outcome.drive.enabled), (None, false));
+    let blockers = device.haptics.report().blockers;
+    assert!(blockers.contains(Blockers::NOT_ZEROED), "{blockers:?}");
+    device.arm([0; 3]);
+    assert!(device.tick([0; 3]).drive.enabled);
+}
+
+/// Pressed into the plane, with force, armed.
+fn pressed() -> (Device<4>, Vec3) {
+    let mut device = Device::<4>::armed(plane);
+    let last = dip().map(|c| device.tick(c)).last().unwrap();
+    (device, last.sample.force_n)
+}
+
+#[test]
+fn without_its_scene_or_with_another_force_goes_out_without_a_step() {
+    let other = Scene {
+        epoch: 2,
+        ..scene(Source::Encoders)
+    };
+    for command in [Command::DropScene, Command::Scene(other), Command::Disarm] {
+        let (mut device, mut last) = pressed();
+        assert!(last.z > 0.2);
+        device.say(command);
+        let mut ticks = 0;
+        loop {
+            let outcome = device.tick([0; 3]);
+            let step = (outcome.sample.force_n - last).length();
+            assert!(step < 0.01, "{step} N");
+            last = outcome.sample.force_n;
+            if !outcome.drive.enabled {
+                break;
+            }
+            ticks += 1;
+        }
+        assert!((90..=101).contains(&ticks), "{ticks}");
+        assert_eq!((last, device.haptics.fault()), (Vec3::ZERO, None));
+    }
+}
+
+#[test]
+fn settings_a_new_zero_and_a_replay_switch_off_at_once() {
+    let points = Scene {
+        epoch: 2,
+        ..scene(Source::Points)
+    };
+    for command in [Command::Zero([7, 7, 7]), Command::Scene(points)] {
+        let (mut device, _) = pressed();
+        device.say(command);
+        assert_eq!(device.tick([0; 3]).drive, Drive::default());
+    }
+    let (mut device, _) = pressed();
+    let mechanism = Mechanism::new(&Calibration::PREMIUM_1_0).expect("valid");
+    device.haptics.configure(mechanism);
+    assert_eq!(device.tick([0; 3]).drive, Drive::default());
+    let model = device.haptics.calibration().map(|c| c.model);
+    assert_eq!(model, Some(crate::phantom::Model::Premium10));
+}
+
+#[test]
+fn without_a_calibration_nothing_is_felt_and_nothing_arms() {
+    let mut device = Device::<4>::new(Source::Encoders, plane);
+    device.haptics.mechanism = None;
+    device.say(Command::Zero([0; 3]));
+    device.say(Command::Arm);
+    for tick in 0..3_000 {
+        device.dead_man = tick > 10;
+        let outcome = device.tick([0; 3]);
+        assert_eq!(
+            (outcome.drive, outcome.sample.state),
+            (Drive::default(), State::Waiting)
+        );
+    }
+    let report = device.haptics.report();
+    assert_eq!(report.decision.refused, Blockers::NO_CALIBRATION);
 }
 
 #[test]
 fn a_scene_that_makes_no_sense_is_not_taken() {
-    let mut device = Device::<4>::new(Source::Encoders, plane);
+    let mut device = Device::<4>::armed(plane);
     let good = scene(Source::Encoders);
     let bad = [
         Scene {

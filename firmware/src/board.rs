@@ -5,16 +5,7 @@
 //! have no trait in embedded-hal and get one here; where a board's amplifiers
 //! are pins and duty cycles, [`crate::amplifier`] builds them on embedded-hal's.
 
-use hapterra_core::guard::Fault;
-
-/// What the encoders and the safety inputs say.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sense {
-    /// Counts of axes 1 to 3 since power-up.
-    pub counts: [i32; 3],
-    /// A reason to switch off, which the guard latches.
-    pub fault: Option<Fault>,
-}
+pub use hapterra_core::guard::Sense;
 
 /// The encoders and safety inputs.
 pub trait Encoders {

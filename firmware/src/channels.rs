@@ -1,20 +1,22 @@
 //! The memory of the application, and the queues between its two halves.
 //!
 //! The loop runs in an interrupt and the link in a task below it. They share
-//! single-producer queues and two counters, and nothing else: no lock that one
-//! could wait for, no tile that both could touch.
+//! single-producer queues and a few counters, and nothing else: no lock that
+//! one could wait for, no tile that both could touch.
 
-use core::sync::atomic::AtomicU32;
-
-use hapterra_core::phantom::Calibration;
+use hapterra_core::guard::{Fault, TickRate};
+use hapterra_core::phantom::Mechanism;
 use hapterra_core::terrain::{IN_FLIGHT, Tile};
 use hapterra_core::tick::{Command, Haptics};
 use hapterra_core::wire::message::Sample;
+use hapterra_core::wire::status::{BootReport, Health};
 use heapless::spsc::Queue;
 
 use crate::board::{Amplifiers, Encoders, TickClock};
 use crate::haptic_loop::{HapticLoop, LoopEnds};
 use crate::link::{Buffers, Identity, Link, LinkEnds};
+use crate::store::Stored;
+use crate::vitals::Vitals;
 
 /// Tile buffers besides the window's: one for each tile on its way.
 pub const SPARES: usize = IN_FLIGHT;
@@ -22,6 +24,10 @@ pub const SPARES: usize = IN_FLIGHT;
 const COMMANDS: usize = 16;
 /// Slots of the record queue: the link may sleep through this many ticks.
 const RECORDS: usize = 32;
+/// Slots of the settings queue: one set of settings at a time.
+const SETTINGS: usize = 2;
+/// Slots of the queue by which the loop tells where it stands.
+const HEALTHS: usize = 2;
 
 /// All tile buffers of a device with a window of `D × D` tiles.
 pub struct Tiles<const D: usize> {
@@ -61,17 +67,6 @@ pub struct Record {
     pub answers: Option<u32>,
 }
 
-/// Signs of life, read by [`crate::supervisor`] and the link.
-#[derive(Debug, Default)]
-pub struct Vitals {
-    /// Ticks since the start, wrapping.
-    pub ticks: AtomicU32,
-    /// Turns of the link since the start, wrapping.
-    pub turns: AtomicU32,
-    /// Samples that found the queue full.
-    pub dropped: AtomicU32,
-}
-
 /// The queues between the loop and the link, and the link's large buffers:
 /// all that is better placed once than moved.
 pub struct Channels<'t> {
@@ -79,6 +74,8 @@ pub struct Channels<'t> {
     /// Room for every buffer that can be on its way back.
     spent: Queue<&'t mut Tile, { SPARES + 1 }>,
     records: Queue<Record, RECORDS>,
+    settings: Queue<Mechanism, SETTINGS>,
+    healths: Queue<Health, HEALTHS>,
     vitals: Vitals,
     buffers: Buffers,
 }
@@ -89,17 +86,23 @@ impl<'t> Channels<'t> {
         let (to_loop, commands) = self.commands.split();
         let (spent, spent_here) = self.spent.split();
         let (records, records_here) = self.records.split();
+        let (to_arm, settings) = self.settings.split();
+        let (healths, healths_here) = self.healths.split();
         let vitals = &self.vitals;
         let loop_ends = LoopEnds {
             commands,
             spent,
             records,
+            settings,
+            healths,
             vitals,
         };
         let link_ends = LinkEnds {
             commands: to_loop,
             spent: spent_here,
             records: records_here,
+            settings: to_arm,
+            healths: healths_here,
             vitals,
         };
         (loop_ends, link_ends, &mut self.buffers)
@@ -112,11 +115,9 @@ impl<'t> Channels<'t> {
             commands: Queue::new(),
             spent: Queue::new(),
             records: Queue::new(),
-            vitals: Vitals {
-                ticks: AtomicU32::new(0),
-                turns: AtomicU32::new(0),
-                dropped: AtomicU32::new(0),
-            },
+            settings: Queue::new(),
+            healths: Queue::new(),
+            vitals: Vitals::new(),
             buffers: Buffers::new(),
         }
     }
@@ -136,8 +137,10 @@ pub struct Hardware<E, A, C> {
     pub amplifiers: A,
     /// The tick's timer and the clock.
     pub clock: C,
-    /// The Phantom's calibration record.
-    pub calibration: Calibration,
+    /// The Phantom's calibration record, as the board's memory has it.
+    pub calibration: Stored,
+    /// What the board found when it started.
+    pub boot: BootReport,
 }
 
 /// The application's two halves, and the signs of life of both.
@@ -166,17 +169,42 @@ where
     let (loop_ends, link_ends, buffers) = channels.split();
     let vitals = loop_ends.vitals;
     let (window, spare) = tiles.split();
+    let mechanism = prepared(&hardware.calibration);
+    let damaged = hardware.calibration != Stored::Missing && mechanism.is_none();
+    let found = damaged.then_some(Fault::CalibrationCorrupt);
+    let mut haptics = Haptics::new(window, rate::<C>(), hardware.boot.fault().or(found));
+    if let Some(mechanism) = mechanism {
+        haptics.configure(mechanism);
+    }
     let haptic_loop = HapticLoop::new(
-        Haptics::new(window, hardware.calibration),
+        haptics,
         loop_ends,
         hardware.encoders,
         hardware.amplifiers,
         hardware.clock,
     );
-    let link = Link::new(Identity::new::<C>(board), spare, link_ends, buffers);
+    let identity = Identity::new::<C>(board, hardware.boot, mechanism.as_ref());
+    let link = Link::new(identity, spare, link_ends, buffers);
     Application {
         haptic_loop,
         link,
         vitals,
+    }
+}
+
+/// The tick rate that a board's clock was built for.
+pub(crate) const fn rate<C: TickClock>() -> TickRate {
+    const {
+        match TickRate::new(C::HZ / C::PERIOD) {
+            Some(rate) => rate,
+            None => panic!("the tick rate is 1 to 10 kHz"),
+        }
+    }
+}
+
+fn prepared(stored: &Stored) -> Option<Mechanism> {
+    match stored {
+        Stored::Found(calibration) => Mechanism::new(calibration).ok(),
+        Stored::Missing | Stored::Damaged => None,
     }
 }

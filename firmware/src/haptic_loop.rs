@@ -1,21 +1,29 @@
-//! What the timer interrupt calls a thousand times a second.
+//! What the timer interrupt calls a thousand times a second, or up to ten
+//! thousand.
 //!
 //! It does only I/O and book-keeping around [`Haptics::tick`]: take what the
 //! link brought, read the encoders, tick, write the amplifiers, leave a record,
 //! measure what that cost. Everything it does is bounded and nothing waits.
 
-use core::mem;
-use core::sync::atomic::Ordering;
+mod liveness;
+mod reporter;
 
-use hapterra_core::guard::{Drive, Fault};
+use core::mem;
+
+use hapterra_core::guard::{Drive, Fault, Sense};
+use hapterra_core::phantom::Mechanism;
 use hapterra_core::terrain::Tile;
 use hapterra_core::tick::{Command, Haptics, Outcome};
 use hapterra_core::wire::message::Source;
+use hapterra_core::wire::status::Health;
 use heapless::spsc::{Consumer, Producer};
 
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, TickClock};
-use crate::channels::{Record, Vitals};
+use crate::channels::{Record, rate};
 use crate::timing::Timing;
+use crate::vitals::{Part, Vitals};
+use liveness::Liveness;
+use reporter::Reporter;
 
 /// Commands taken in one tick, at most; the rest wait for the next.
 pub const COMMANDS_PER_TICK: usize = 4;
@@ -23,7 +31,8 @@ pub const COMMANDS_PER_TICK: usize = 4;
 /// Where the hand's position comes from at the moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Feed {
-    /// There is no scene: nothing to feel, nothing to record.
+    /// There is no scene: nothing to feel, nothing to record. The guard still
+    /// looks at the arm.
     Nothing,
     /// The encoders.
     Arm,
@@ -42,6 +51,8 @@ pub(crate) struct LoopEnds<'t> {
     pub(crate) commands: Consumer<'t, Command<'t>>,
     pub(crate) spent: Producer<'t, &'t mut Tile>,
     pub(crate) records: Producer<'t, Record>,
+    pub(crate) settings: Consumer<'t, Mechanism>,
+    pub(crate) healths: Producer<'t, Health>,
     pub(crate) vitals: &'t Vitals,
 }
 
@@ -56,6 +67,8 @@ pub struct HapticLoop<'t, E, A: Amplifiers, C, const D: usize> {
     clock: C,
     timing: Timing,
     feed: Feed,
+    liveness: Liveness,
+    reporter: Reporter,
     /// An answer that found the queue full; nothing else happens before it is out.
     unsent: Option<Record>,
 }
@@ -81,6 +94,8 @@ where
             clock,
             timing: Timing::new::<C>(),
             feed: Feed::Nothing,
+            liveness: Liveness::new(rate::<C>()),
+            reporter: Reporter::new(rate::<C>()),
             unsent: None,
         }
     }
@@ -88,7 +103,8 @@ where
     /// One tick. Returns what the amplifiers were left with.
     pub fn tick(&mut self) -> Drive {
         let began = self.timing.begin(&mut self.clock);
-        self.ends.vitals.ticks.fetch_add(1, Ordering::Relaxed);
+        self.ends.vitals.count_tick();
+        self.ends.vitals.check_in(Part::Tick);
         if let Some(record) = self.unsent.take() {
             self.answer(record);
             return Drive::default();
@@ -107,6 +123,9 @@ where
     }
 
     fn take_commands(&mut self) {
+        if let Some(mechanism) = self.ends.settings.dequeue() {
+            self.haptics.configure(mechanism);
+        }
         for _ in 0..COMMANDS_PER_TICK {
             let Some(command) = self.ends.commands.dequeue() else {
                 return;
@@ -114,6 +133,7 @@ where
             match &command {
                 Command::Scene(scene) if scene.source == Source::Encoders => self.feed = Feed::Arm,
                 Command::Scene(_) => self.feed = Feed::Points { pending: false },
+                Command::DropScene => self.feed = Feed::Nothing,
                 Command::Point(_) => self.feed = Feed::Points { pending: true },
                 _ => {}
             }
@@ -129,30 +149,47 @@ where
     }
 
     fn feel(&mut self) -> Drive {
+        let live = self.liveness.tick(self.ends.vitals.fed());
         match self.feed {
-            Feed::Arm => self.feel_arm(),
-            Feed::Points { pending: true } => self.feel_point(),
-            Feed::Points { pending: false } | Feed::Nothing => self.drive(Drive::default()),
+            Feed::Arm | Feed::Nothing => self.feel_arm(live),
+            Feed::Points { pending } => self.feel_point(pending),
         }
     }
 
-    fn feel_arm(&mut self) -> Drive {
+    fn feel_arm(&mut self, watchdog_live: bool) -> Drive {
         let sense = self.encoders.sense();
-        if let Some(fault) = sense.fault {
-            self.give_to_haptics(Command::Trip(fault));
-        }
-        let outcome = self.haptics.tick(sense.counts);
+        let outcome = self.haptics.tick(&sense, watchdog_live);
         let drive = self.drive(outcome.drive);
-        let record = self.record(outcome);
-        if self.ends.records.enqueue(record).is_err() {
-            self.ends.vitals.dropped.fetch_add(1, Ordering::Relaxed);
+        if self.feed == Feed::Arm && self.reporter.records_this(&outcome.sample) {
+            let record = self.record(outcome);
+            if self.ends.records.enqueue(record).is_err() {
+                self.ends.vitals.count_dropped();
+            }
         }
+        self.report(&sense, &drive);
         drive
     }
 
-    fn feel_point(&mut self) -> Drive {
+    /// Tells where the loop stands, when something has changed and now and
+    /// then. Where there is no room it is told in the next tick.
+    fn report(&mut self, sense: &Sense, drive: &Drive) {
+        let report = self.haptics.report();
+        if self.reporter.reports_this(&report) && self.ends.healths.ready() {
+            let health = self.haptics.health(sense, drive);
+            // There is room.
+            let _ = self.ends.healths.enqueue(health);
+            self.reporter.reported(&report);
+        }
+    }
+
+    fn feel_point(&mut self, pending: bool) -> Drive {
         let drive = self.drive(Drive::default());
-        let outcome = self.haptics.tick([0; 3]);
+        if !pending {
+            return drive;
+        }
+        let sense = Sense::default();
+        let outcome = self.haptics.tick(&sense, false);
+        self.report(&sense, &drive);
         let record = self.record(outcome);
         if outcome.answers.is_some() {
             self.feed = Feed::Points { pending: false };

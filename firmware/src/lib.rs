@@ -16,7 +16,8 @@
 //! ```
 //!
 //! [`board`] is the hardware seam; [`channels`] builds the application from it;
-//! [`native`] is the same application as a value in a host program, without
+//! [`vitals`] and [`supervisor`] keep the watchdog; [`store`] keeps the
+//! calibration; [`crash`] is what is left of a program that ended; [`native`] is the same application as a value in a host program, without
 //! interrupts or tasks. The images are in `boards/`.
 //!
 //! # Priorities
@@ -58,10 +59,13 @@
 pub mod amplifier;
 pub mod board;
 pub mod channels;
+pub mod crash;
 pub mod encoder;
 pub mod haptic_loop;
 pub mod link;
 pub mod native;
+pub mod store;
 pub mod supervisor;
 mod timing;
 pub mod usb;
+pub mod vitals;

@@ -5,18 +5,21 @@
 //! clock does; in real time it calls it a thousand times a second regardless.
 
 use hapterra_core::guard::Drive;
-use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::status::BootReport;
 
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, Sense, TickClock};
 use crate::channels::{Application, Channels, Hardware, Tiles, assemble};
 use crate::haptic_loop::HapticLoop;
 use crate::link::Link;
+use crate::store::Stored;
+use crate::supervisor::{NoWatchdog, Supervisor};
+use crate::vitals::Part;
 
-/// Encoders that read what they were last given.
+/// Encoders and switches that read what they were last given.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct GivenCounts(pub Sense);
+pub struct Given(pub Sense);
 
-impl Encoders for GivenCounts {
+impl Encoders for Given {
     fn sense(&mut self) -> Sense {
         self.0
     }
@@ -74,8 +77,11 @@ impl TickClock for StoppedClock {
 /// A device in the host's memory, with a window of `D × D` tiles and a clock
 /// `C`.
 pub struct Device<C, const D: usize> {
-    haptic_loop: HapticLoop<'static, GivenCounts, ReportedOff, C, D>,
+    haptic_loop: HapticLoop<'static, Given, ReportedOff, C, D>,
     link: Link<'static, D>,
+    supervisor: Supervisor<'static, NoWatchdog>,
+    /// What the device remembers without power.
+    memory: Stored,
 }
 
 impl<C: TickClock, const D: usize> Device<C, D> {
@@ -85,25 +91,48 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         tiles: &'static mut Tiles<D>,
         channels: &'static mut Channels<'static>,
         clock: C,
-        calibration: Calibration,
+        calibration: Stored,
+        boot: BootReport,
     ) -> Self {
         let hardware = Hardware {
-            encoders: GivenCounts::default(),
+            encoders: Given::default(),
             amplifiers: ReportedOff,
             clock,
             calibration,
+            boot,
         };
         let Application {
-            haptic_loop, link, ..
+            haptic_loop,
+            link,
+            vitals,
         } = assemble(tiles, channels, hardware, "native");
-        Self { haptic_loop, link }
+        Self {
+            haptic_loop,
+            link,
+            supervisor: Supervisor::new(vitals, NoWatchdog, &[Part::Tick, Part::Link]),
+            memory: calibration,
+        }
+    }
+
+    /// What the device would find in its memory if it were restarted now.
+    #[must_use]
+    pub const fn memory(&self) -> &Stored {
+        &self.memory
     }
 
     /// Takes bytes from the host; see [`Link::receive`].
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
         let taken = self.link.receive(bytes);
-        self.link.turn();
+        self.turn();
         taken
+    }
+
+    fn turn(&mut self) {
+        if let Some(calibration) = self.link.to_store() {
+            self.memory = Stored::Found(calibration);
+            self.link.stored(Ok(()));
+        }
+        self.link.turn();
     }
 
     /// Moves bytes for the host into `into`; see [`Link::transmit`].
@@ -111,12 +140,19 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         self.link.transmit(into)
     }
 
-    /// One tick at these encoder counts; returns what the amplifiers got.
-    pub fn tick(&mut self, counts: [i32; 3]) -> Drive {
-        self.haptic_loop.encoders_mut().0.counts = counts;
-        let drive = self.haptic_loop.tick();
-        self.link.turn();
+    /// One tick with these encoders and switches; returns what the amplifiers
+    /// got.
+    pub fn tick(&mut self, sense: Sense) -> Drive {
+        let drive = self.tick_alone(sense);
+        self.turn();
+        self.supervisor.check();
         drive
+    }
+
+    /// As [`Device::tick`], with the task of the link hanging.
+    pub fn tick_alone(&mut self, sense: Sense) -> Drive {
+        self.haptic_loop.encoders_mut().0 = sense;
+        self.haptic_loop.tick()
     }
 
     /// Whether nothing can happen before the host has spoken; see
@@ -126,10 +162,10 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         self.link.may_stand_still()
     }
 
-    /// Whether the scene in force is felt through the encoders.
+    /// Whether the arm is in use; see [`Link::drives_arm`].
     #[must_use]
-    pub fn feels_arm(&self) -> bool {
-        self.link.feels_arm()
+    pub fn drives_arm(&self) -> bool {
+        self.link.drives_arm()
     }
 
     /// Whether the host has said goodbye and everything is sent.

@@ -11,10 +11,11 @@ use std::process::{Command, Stdio};
 
 use hapterra_core::Vec3;
 use hapterra_core::grid::GridPoint;
+use hapterra_core::guard::Sense;
 use hapterra_core::terrain::{POSTS, TILE_CELLS, TileKey};
 use hapterra_core::wire::frame::{MAX_FRAME, encode};
 use hapterra_core::wire::message::{Heights, Point, Scene, TileMessage, ToDevice};
-use hapterra_core::wire::plant::Counts;
+use hapterra_core::wire::plant::Sensed;
 use serde::Serialize;
 
 use crate::emulation::{named, qemu};
@@ -93,7 +94,8 @@ impl CountingBoard {
         self.run(folder.path())
     }
 
-    /// Whole ticks, count to current; every tile is held before the first.
+    /// Whole ticks, count to current; every tile is held before the first, and
+    /// the arm is armed.
     ///
     /// # Panics
     /// When the emulated program fails.
@@ -109,8 +111,11 @@ impl CountingBoard {
         write_walk(folder.path(), scene, 0, height, &tiles);
         let mut frames = Frames::create(&folder.path().join("counts.frames"));
         for (tick, counts) in (0..).zip(counts) {
-            let counts = *counts;
-            frames.add(&Counts { tick, counts });
+            let sense = Sense {
+                counts: *counts,
+                ..Sense::default()
+            };
+            frames.add(&Sensed { tick, sense });
         }
         frames.close();
         self.run(folder.path())

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use hapterra::link::{Event, Native, Patience, Session};
+use hapterra::link::{Arming, Event, Native, Patience, Session};
 use hapterra::live::{Figures, Stage};
 use hapterra::phantom::{HandModel, PhantomModel, Placement, Rig, Script, Touch};
 use hapterra::raster::Raster;
@@ -17,9 +17,11 @@ use hapterra_firmware::native::StoppedClock;
 
 /// Runs a device until a tick; every sample it reported.
 fn run(terrain: &Terrain<'_>, scene: Scene, rig: Rig, ticks: u32) -> Vec<Sample> {
-    let device = Native::new(StoppedClock, Some(Box::new(rig)));
+    let device = Native::new(StoppedClock, Some(Box::new(rig.arming())));
+    let device = Box::new(device);
     let (mut session, _) =
-        Session::open(terrain, scene, Box::new(device), Patience::REAL_TIME).expect("opened");
+        Session::open_arming(terrain, scene, Arming::VIRTUAL, device, Patience::REAL_TIME)
+            .expect("opened");
     let mut samples = Vec::new();
     while samples.last().is_none_or(|last: &Sample| last.tick < ticks) {
         let mut take = |event: Event<'_>| {
@@ -46,10 +48,10 @@ fn press(stiffness_n_per_mm: f32) -> (Vec<Sample>, usize, Scale) {
         Touch::start(&|_, _| Some(20.0), &hand, wall, [100.0, 100.0], 10.0).press(2.0, 1.5);
     let lift_s = pressed.script().duration_s();
     let script: Script = pressed.lift(10.0).finish().wait(0.5);
-    let ticks = (script.duration_s() * 1e3) as u32;
+    let ticks = ((Rig::ARMED_S + script.duration_s()) * 1e3) as u32;
     let home_mm = [100.0, 100.0, 24.0];
-    // No gravity compensation yet: an arm that weighs nothing.
-    let model = PhantomModel::premium_1_5().weightless();
+    // With all its weight, which the device holds.
+    let model = PhantomModel::premium_1_5();
     let rig = Rig::new(model, hand, Placement { home_mm }, script).expect("in reach");
     let law = ForceLaw {
         stiffness_n_per_mm,
@@ -58,7 +60,7 @@ fn press(stiffness_n_per_mm: f32) -> (Vec<Sample>, usize, Scale) {
     let home = scale.to_grid(home_mm).expect("addressable");
     let scene = terrain.scene(law, Rule::Swept, Source::Encoders, home);
     let samples = run(&terrain, scene, rig, ticks);
-    (samples, (lift_s * 1e3) as usize, scale)
+    (samples, ((Rig::ARMED_S + lift_s) * 1e3) as usize, scale)
 }
 
 #[test]

@@ -131,7 +131,8 @@ pub(crate) static BOARDS: [Board; 3] = [
         known_indirect: &[],
         known_calls: QUEUES_AND_PWM,
         memories: &[
-            memory("flash", 0x0800_0000, 2048 * KIB, 128 * KIB),
+            // Plenty; the smaller board is the one that has to be small.
+            memory("flash", 0x0800_0000, 2048 * KIB, 192 * KIB),
             memory("AXI RAM", 0x2400_0000, 512 * KIB, 512 * KIB),
             // The stack's own; 32 KiB of it at least.
             memory("DTCM", 0x2000_0000, 128 * KIB, 96 * KIB),

@@ -96,7 +96,12 @@ pub(super) fn descend<const D: usize>(
 
 /// Whether the straight way from `spot` to the hand starts above the surface:
 /// above the one-sided slope of the patch it leads into.
-fn leaves<const D: usize>(window: &Window<'_, D>, hand: &Hand, spot: &Spot, patch: &Patch) -> bool {
+pub(super) fn leaves<const D: usize>(
+    window: &Window<'_, D>,
+    hand: &Hand,
+    spot: &Spot,
+    patch: &Patch,
+) -> bool {
     let (p, q) = hand.in_patch(spot.cell);
     let (east, north) = (p - spot.u, q - spot.v);
     let [on_u, on_v] = spot.border();

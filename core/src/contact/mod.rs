@@ -14,6 +14,7 @@ pub mod presence;
 mod descent;
 #[cfg(test)]
 mod dice;
+mod glide;
 mod paper;
 mod proxy;
 mod spot;

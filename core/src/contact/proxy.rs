@@ -1,6 +1,7 @@
 //! What the proxy remembers from tick to tick, and what both rules share.
 
 use super::descent::tile_of;
+use super::glide::glide;
 use super::paper::{self, Verdict};
 use super::patch::Patch;
 use super::spot::{Hand, Spot};
@@ -15,33 +16,26 @@ use crate::terrain::{Altitude, Box2, Ground, Window};
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
 pub(super) enum Phase {
+    /// The hand has not been above the surface yet.
     Waiting,
     /// The last tick ended free, with the proxy in the hand.
     Free,
+    /// On a way through the air that is not at its end.
     Sweeping(Path),
-    Touching(Touch),
-}
-
-/// A proxy on the surface.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Touch {
-    pub(super) spot: Spot,
-    pub(super) may_leave: bool,
+    /// On the surface.
+    Touching { spot: Spot, may_leave: bool },
+    /// On the surface, where the last tick came to rest, with nothing left to
+    /// do and no fading, on a patch that the proxy can be followed over.
+    Following(Track),
 }
 
 /// The proxy and what it remembers from tick to tick.
 #[derive(Clone, Debug)]
 pub struct Contact {
     pub(super) phase: Phase,
-    /// Only while touching: the patch on which the proxy came to rest in the
-    /// last tick, with nothing left to do and no fading, where it can be
-    /// followed.
-    pub(super) track: Option<Track>,
     pub(super) hip: GridPoint,
-    /// The window's revision in the last tick.
-    revision: u32,
-    /// The window's revision for which the last answer is the answer again,
-    /// while the hand has not moved; zero for none.
+    /// The window's revision that the last answer holds for, when nothing is
+    /// left to do and no force is fading; else zero.
     answered: u32,
     pub(super) presence: f32,
     /// A free proxy had to wait, for terrain or for work: the force of the next
@@ -65,9 +59,7 @@ impl Contact {
     pub fn new() -> Self {
         Self {
             phase: Phase::Waiting,
-            track: None,
             hip: GridPoint::default(),
-            revision: 0,
             answered: 0,
             presence: 1.0,
             late: false,
@@ -78,9 +70,10 @@ impl Contact {
 
     /// The patch the proxy is on, while touching.
     #[must_use]
-    pub const fn patch(&self) -> Option<[i32; 2]> {
-        match self.phase {
-            Phase::Touching(touch) => Some(touch.spot.cell),
+    pub fn patch(&self) -> Option<[i32; 2]> {
+        match &self.phase {
+            Phase::Touching { spot, .. } => Some(spot.cell),
+            Phase::Following(track) => Some(track.spot.cell),
             _ => None,
         }
     }
@@ -94,25 +87,25 @@ impl Contact {
         rule: Rule,
         pace: Pace,
     ) -> &Felt {
-        if self.answered == window.revision() && self.hip == hip {
+        let known = self.answered == window.revision();
+        if known && self.hip.is_same(&hip) {
             self.last.work = 0;
-        } else if !(rule == Rule::Swept && self.goes_on(window, &hip)) {
+        } else if known && rule == Rule::Swept && self.goes_on(window, &hip) {
+            self.hip = hip;
+        } else {
             self.feel_anew(window, hip, rule, pace);
         }
         &self.last
     }
 
-    /// The two cases that nearly every tick is: sliding on over the same patch,
-    /// or free as before. Answers, or changes nothing.
+    /// The two cases that nearly every tick is: free as before, or sliding on
+    /// over the same patch. Answers, or changes nothing.
     #[inline]
     fn goes_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
-        if self.revision != window.revision() {
-            return false;
-        }
-        if self.track.is_some() {
-            self.slides_on(window, hip)
-        } else {
-            matches!(self.phase, Phase::Free) && self.flies_on(window, hip)
+        match self.phase {
+            Phase::Free => self.flies_on(window, hip),
+            Phase::Following(_) => self.slides_on(window, hip),
+            _ => false,
         }
     }
 
@@ -130,38 +123,45 @@ impl Contact {
         if free {
             self.last.proxy = *hip;
             self.last.work = 0;
-            self.answers(hip);
         }
         free
     }
 
-    /// The last answer was "touching", and all of it was felt.
     #[inline(never)]
     fn slides_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
-        let (Phase::Touching(touch), Some(track)) = (&mut self.phase, &mut self.track) else {
+        let Phase::Following(track) = &mut self.phase else {
+            return false;
+        };
+        let hand = Hand::new(*hip);
+        let followed = (track.over == hip.column()).then(|| track.follow(&hand));
+        let Some(stretch) = followed.flatten() else {
+            return self.glides_on(window, hip);
+        };
+        self.last.proxy = hand.point_inside(&track.spot, stretch.z);
+        self.last.stretch = stretch;
+        self.last.work = 1;
+        true
+    }
+
+    /// As [`Self::slides_on`], where there is more to look at: on or over the
+    /// borders of patches, for a deep hand, over twisted patches.
+    #[inline(never)]
+    fn glides_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
+        let Phase::Following(track) = &mut self.phase else {
             return false;
         };
         if !track.is_under(window, hip.column()) {
             return false;
         }
-        let Some(stretch) = track.follow(hip, &mut touch.spot) else {
+        let hand = Hand::new(*hip);
+        let Some(rest) = glide(window, &hand, track) else {
             return false;
         };
-        touch.may_leave = true;
-        let [_, _, up] = hip.cell();
-        let [x, y] = touch.spot.cell;
-        let height = hip.frac().z + stretch.z;
-        self.last.proxy = GridPoint::over([x, y, up], [touch.spot.u, touch.spot.v], height);
-        self.last.stretch = stretch;
-        self.last.work = 1;
-        self.answers(hip);
+        *track = rest.track;
+        self.last.proxy = hand.point_at(&rest.track.spot, rest.stretch.z);
+        self.last.stretch = rest.stretch;
+        self.last.work = 1 + 2 * rest.hops;
         true
-    }
-
-    #[inline]
-    fn answers(&mut self, hip: &GridPoint) {
-        self.hip = *hip;
-        self.answered = self.revision;
     }
 
     /// The general case.
@@ -174,8 +174,12 @@ impl Contact {
         pace: Pace,
     ) {
         let mut work = Work::new();
-        self.revision = window.revision();
-        self.track = None;
+        if let Phase::Following(track) = &self.phase {
+            self.phase = Phase::Touching {
+                spot: track.spot,
+                may_leave: true,
+            };
+        }
         let felt = match rule {
             Rule::Swept => self.swept(window, hip, hip != self.hip, pace, &mut work),
             Rule::Paper => self.paper(window, hip, pace, &mut work),
@@ -184,7 +188,7 @@ impl Contact {
             self.hip = hip;
         }
         let steady = felt.settled && self.presence == 1.0;
-        self.answered = if steady { self.revision } else { 0 };
+        self.answered = if steady { window.revision() } else { 0 };
         self.last = Felt {
             work: work.spent(),
             ..felt
@@ -298,7 +302,7 @@ impl Contact {
         work: &mut Work,
     ) -> Felt {
         let last = match self.phase {
-            Phase::Touching(touch) => Some(touch.spot),
+            Phase::Touching { spot, .. } => Some(spot),
             _ => None,
         };
         if matches!(self.phase, Phase::Waiting) && !self.sees_above(window, hip) {
@@ -310,10 +314,10 @@ impl Contact {
                 if core::mem::take(&mut self.late) {
                     self.presence = 0.0;
                 }
-                self.phase = Phase::Touching(Touch {
+                self.phase = Phase::Touching {
                     spot,
                     may_leave: true,
-                });
+                };
                 self.touches(window, hip, (spot, patch), true, None, pace)
             }
             Verdict::HeldUp(tile) => {

@@ -37,6 +37,16 @@ impl Spot {
     }
 }
 
+/// Distance from a patch's border, in cells, within which a place counts as
+/// neither inside nor on it: only the general search goes there.
+const BORDER: f32 = 1e-6;
+
+/// Whether a coordinate is well inside a patch.
+#[inline]
+pub(super) fn is_inside(x: f32) -> bool {
+    x > BORDER && x < 1.0 - BORDER
+}
+
 fn side(x: f32) -> i32 {
     i32::from(x == 1.0) - i32::from(x == 0.0)
 }
@@ -89,6 +99,14 @@ impl Hand {
             [x, y, up],
             Vec3::new(spot.u, spot.v, self.point.frac().z + z),
         )
+    }
+
+    /// As [`Self::point_at`], for a spot that is on no border.
+    #[inline]
+    pub(super) fn point_inside(&self, spot: &Spot, z: f32) -> GridPoint {
+        let [x, y] = spot.cell;
+        let cell = [x, y, self.point.cell()[2]];
+        GridPoint::over(cell, [spot.u, spot.v], self.point.frac().z + z)
     }
 
     /// From the hand to the surface at `spot`, cells.

@@ -1,7 +1,7 @@
 //! The swept rule: continuous in the air, downhill on the surface.
 
 use super::descent::{Descent, descend};
-use super::proxy::{Contact, Phase, Touch};
+use super::proxy::{Contact, Phase};
 use super::spot::{Hand, Spot};
 use super::sweep::{Path, Sweep};
 use super::track::Track;
@@ -33,7 +33,7 @@ impl Contact {
             let ended = match &mut self.phase {
                 Phase::Waiting | Phase::Free => self.fly(window, hip, pace, work),
                 Phase::Sweeping(_) => self.sweep(window, hip, pace, work),
-                Phase::Touching(_) => self.touch(window, hip, pace, work),
+                Phase::Touching { .. } | Phase::Following(_) => self.touch(window, hip, pace, work),
             };
             if let Some(felt) = ended {
                 return felt;
@@ -45,8 +45,8 @@ impl Contact {
     fn redirect(&mut self, hip: GridPoint) {
         match &mut self.phase {
             Phase::Sweeping(path) => *path = Path::through_air(path.at(), hip),
-            Phase::Touching(touch) => touch.may_leave = true,
-            Phase::Waiting | Phase::Free => {}
+            Phase::Touching { may_leave, .. } => *may_leave = true,
+            Phase::Waiting | Phase::Free | Phase::Following(_) => {}
         }
     }
 
@@ -111,10 +111,10 @@ impl Contact {
                 if core::mem::take(&mut self.late) {
                     self.presence = 0.0;
                 }
-                self.phase = Phase::Touching(Touch {
+                self.phase = Phase::Touching {
                     spot,
                     may_leave: progress,
-                });
+                };
                 return None;
             }
             Sweep::HeldUp(tile) => Some(tile),
@@ -136,7 +136,7 @@ impl Contact {
         pace: Pace,
         work: &mut Work,
     ) -> Option<Felt> {
-        let Phase::Touching(Touch { spot, may_leave }) = self.phase else {
+        let Phase::Touching { spot, may_leave } = self.phase else {
             return None;
         };
         let hand = Hand::new(hip);
@@ -174,10 +174,10 @@ impl Contact {
                 (spot, patch)
             }
         };
-        self.phase = Phase::Touching(Touch {
+        self.phase = Phase::Touching {
             spot: resume.unwrap_or(spot),
             may_leave,
-        });
+        };
         let felt = self.touches(window, hip, (spot, patch), settled, held_up_by, pace);
         if felt.settled && self.presence == 1.0 {
             self.lay_track(window, hip.column());
@@ -187,14 +187,16 @@ impl Contact {
 
     /// Remembers the patch of a proxy at rest for the ticks to come.
     fn lay_track<const D: usize>(&mut self, window: &Window<'_, D>, over: [i32; 2]) {
-        let Phase::Touching(touch) = &mut self.phase else {
+        let Phase::Touching { spot, .. } = self.phase else {
             return;
         };
         // At the very border of a hole the presence is 1, too.
-        let is_over_patch =
-            touch.spot.cell == over || matches!(window.ground(over), Ground::Patch(_));
-        if is_over_patch && let Ground::Patch(corners) = window.ground(touch.spot.cell) {
-            self.track = Track::new(&corners, over);
+        let is_over_patch = spot.cell == over || matches!(window.ground(over), Ground::Patch(_));
+        if is_over_patch
+            && let Ground::Patch(corners) = window.ground(spot.cell)
+            && let Some(track) = Track::new(&corners, over, spot)
+        {
+            self.phase = Phase::Following(track);
         }
     }
 

@@ -17,8 +17,7 @@
 use glam::Vec3;
 
 use super::patch::Patch;
-use super::spot::{Hand, Spot};
-use crate::grid::GridPoint;
+use super::spot::{Hand, Spot, is_inside};
 use crate::terrain::{Corners, Ground, Window};
 
 /// |a| + |b| + |c| at most, cells a cell: what the rounding of the height then
@@ -28,50 +27,80 @@ const GENTLE: f32 = 6.0;
 const SHALLOW: f32 = 0.25;
 /// Error that may be left, cells.
 const LEFT: f32 = 5e-8;
-/// Newton steps at most, after the start.
+/// Newton steps at most where the start was not good enough.
 const STEPS: u32 = 4;
 /// Largest |a·z|: the Hessian's eigenvalues are then ½ at least.
 const CONVEX: f32 = 0.5;
-/// Distance from the patch's border below which the general search decides.
-const BORDER: f32 = 1e-6;
 
-/// A patch that a proxy rests on and may be followed over.
+/// A proxy at rest on a patch, and what is worth knowing about the patch to
+/// follow it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Track {
+    pub(super) spot: Spot,
+    /// Whether the spot is well inside the patch.
+    inside: bool,
+    /// A column known to hold a patch, for the hand to be over.
+    pub(super) over: [i32; 2],
     /// Heights above `base` cells.
     patch: Patch,
     base: i32,
     /// |a| + |b| + |c|: no two points of the patch differ by more in height.
     steepest: f32,
-    /// Change of the Hessian, at most, for a step of a cell: Newton's error
+    /// Depth of the hand, in cells, up to which the search starts from it.
+    shallow: f32,
+    /// Depth of the hand under any one point of the patch, in cells, up to
+    /// which the squared distance is convex all over the patch.
+    convex: f32,
+    /// Change of the Hessian, at most, over a step of a cell: Newton's error
     /// after a step s is `bend`·s² at most.
     bend: f32,
-    /// How far, in steps, a way downhill may swing out.
-    swing: f32,
-    /// A column known to hold a patch, for the hand to be over.
-    over: [i32; 2],
 }
 
 impl Track {
-    /// The patch of these corners, for a hand over `over`; `None` if it is too
-    /// steep.
-    pub(super) fn new(corners: &Corners, over: [i32; 2]) -> Option<Self> {
+    /// A proxy at `spot`, on the patch of these corners, for a hand over
+    /// `over`; `None` if the patch is too steep.
+    pub(super) fn new(corners: &Corners, over: [i32; 2], spot: Spot) -> Option<Self> {
         let patch = Patch::new(corners.heights);
-        let steepest = patch.a.abs() + patch.b.abs() + patch.c.abs();
+        let twist = patch.a.abs();
+        let steepest = twist + patch.b.abs() + patch.c.abs();
         if !(steepest <= GENTLE) {
             return None;
         }
         Some(Self {
+            spot,
+            inside: is_inside(spot.u) && is_inside(spot.v),
+            over,
             patch,
             base: corners.base,
             steepest,
+            shallow: SHALLOW / steepest,
+            convex: CONVEX / twist - steepest,
             // The rows of the Hessian's derivative are 2a(zv, …) and 2a(zu, zu + zv).
-            bend: 6.0 * patch.a.abs() * steepest,
-            // A sublevel set around a minimum, of a function whose curvature
-            // lies between ½ and L, is √(2L) times as wide as it is narrow.
-            swing: 2.0 * libm::sqrtf(1.5 + 2.0 * steepest * steepest),
-            over,
+            bend: 6.0 * twist * steepest,
         })
+    }
+
+    /// The same with the proxy at another spot of the patch.
+    #[inline]
+    pub(super) fn at(self, spot: Spot) -> Self {
+        Self {
+            spot,
+            inside: is_inside(spot.u) && is_inside(spot.v),
+            ..self
+        }
+    }
+
+    /// The patch with its heights counted from the hand.
+    #[inline]
+    pub(super) fn seen_by(&self, hand: &Hand) -> Patch {
+        self.patch.seen_from(hand.altitude(), self.base)
+    }
+
+    /// Whether the squared distance is convex all over the patch, for a hand
+    /// `z` cells under any one point of it.
+    #[inline]
+    pub(super) fn is_convex(&self, z: f32) -> bool {
+        z <= self.convex
     }
 
     /// Whether a patch lies under a hand in `column`, so that the force needs
@@ -92,79 +121,98 @@ impl Track {
         there
     }
 
-    /// Moves the spot to the closest point for a hand at `hip`, and tells how
-    /// far it is from the hand; `None`, and the spot as it was, where it takes
-    /// the general search to tell.
+    /// Moves the spot to the closest point for a shallow hand, and tells how far
+    /// it is from the hand; `None`, and the spot as it was, where more has to be
+    /// looked at.
     #[inline]
-    pub(super) fn follow(&self, hip: &GridPoint, spot: &mut Spot) -> Option<Vec3> {
-        let hand = Hand::new(*hip);
-        let patch = self.patch.seen_from(hand.altitude(), self.base);
-        let (p, q) = hand.in_patch(spot.cell);
+    pub(super) fn follow(&mut self, hand: &Hand) -> Option<Vec3> {
+        let patch = self.seen_by(hand);
+        let (p, q) = hand.in_patch(self.spot.cell);
         let above = patch.height(p, q);
         // How high the tangent plane in the spot passes over the hand.
-        if !(above >= patch.a * ((p - spot.u) * (q - spot.v))) {
+        let stays = above >= patch.a * ((p - self.spot.u) * (q - self.spot.v));
+        if !(self.inside && stays && above <= self.shallow) {
             return None;
         }
-        let (u, v) = self.closest(&patch, (p, q), above, (spot.u, spot.v))?;
-        let z = patch.height(u, v);
-        if !(z >= 0.0 && is_inside(u) && is_inside(v)) {
+        let (to, is_exact) = self.leap(&patch, (p, q), above);
+        let (u, v) = (p + to.x, q + to.y);
+        let plain = is_exact && to.z >= 0.0 && self.is_convex(to.z);
+        if !(plain && is_inside(u) && is_inside(v)) {
             return None;
         }
-        if !(patch.a.abs() * (z + self.steepest) <= CONVEX) {
-            let moved = (u - spot.u).abs().max((v - spot.v).abs());
-            let reach = self.steepest * (self.swing * moved);
-            if !(patch.a.abs() * (z + reach) <= CONVEX) {
-                return None;
-            }
-        }
-        (spot.u, spot.v) = (u, v);
-        Some(Vec3::new(u - p, v - q, z))
+        (self.spot.u, self.spot.v) = (u, v);
+        Some(to)
     }
 
-    /// Newton's method for the closest point, from above the hand at `(p, q)`
-    /// or from `last`.
-    #[inline]
-    fn closest(
+    /// From a hand at `(p, q)`, `above` cells under the patch there, to the
+    /// closest point, and whether it is within the error that may be left: one
+    /// step of Newton's method and one more with the same Hessian.
+    #[inline(always)]
+    fn leap(&self, patch: &Patch, (p, q): (f32, f32), above: f32) -> (Vec3, bool) {
+        let slope = patch.slope_u(q);
+        let (zu, zv) = (slope, patch.slope_v(p));
+        // Where the distance is only height, half its gradient is z·(zu, zv).
+        let (uu, vv) = (1.0 + zu * zu, 1.0 + zv * zv);
+        let uv = zu * zv + patch.a * above;
+        let scale = 1.0 / (uu * vv - uv * uv);
+        let drop = above * scale;
+        let (du, dv) = ((zv * uv - zu * vv) * drop, (zu * uv - zv * uu) * drop);
+        // The gradient that is left there, and what the same Hessian makes of it.
+        let (zu, zv) = (zu + patch.a * dv, zv + patch.a * du);
+        let z = above + (slope * du + zv * dv);
+        let (gu, gv) = (z * zu + du, z * zv + dv);
+        let (eu, ev) = ((gv * uv - gu * vv) * scale, (gu * uv - gv * uu) * scale);
+        // The first step's error, less by what the Hessian has changed over it.
+        let (first, second) = (du * du + dv * dv, eu * eu + ev * ev);
+        let is_exact = (self.bend * self.bend) * (first * second) <= LEFT * LEFT;
+        (
+            Vec3::new(du + eu, dv + ev, z + (zu * eu + zv * ev)),
+            is_exact,
+        )
+    }
+
+    /// From a hand at `(p, q)` to the closest point of the patch and of what it
+    /// would be beyond its borders; `None` if Newton's method does not end.
+    pub(super) fn closest(&self, patch: &Patch, (p, q): (f32, f32)) -> Option<Vec3> {
+        let above = patch.height(p, q);
+        let mut start = (self.spot.u - p, self.spot.v - q);
+        if above <= self.shallow {
+            let (to, is_exact) = self.leap(patch, (p, q), above);
+            if is_exact {
+                return Some(to);
+            }
+            start = (to.x, to.y);
+        }
+        self.by_newton(patch, (p, q), start)
+    }
+
+    /// Whether the squared distance is convex from the last spot to (u, v),
+    /// `z` cells above the hand, and wherever a way downhill might swing out to.
+    pub(super) fn is_convex_between(&self, z: f32, (u, v): (f32, f32)) -> bool {
+        let moved = (u - self.spot.u).abs().max((v - self.spot.v).abs());
+        // A sublevel set around a minimum, of a function whose curvature lies
+        // between ½ and L, is √(2L) times as wide as it is narrow.
+        let swing = 2.0 * libm::sqrtf(1.5 + 2.0 * self.steepest * self.steepest);
+        let reach = (self.steepest * (swing * moved)).min(self.steepest);
+        self.patch.a.abs() * (z + reach) <= CONVEX
+    }
+
+    /// Newton's method from the point `(du, dv)` of the hand.
+    fn by_newton(
         &self,
         patch: &Patch,
         (p, q): (f32, f32),
-        above: f32,
-        last: (f32, f32),
-    ) -> Option<(f32, f32)> {
-        let (mut u, mut v) = last;
-        if above * self.steepest <= SHALLOW {
-            let step = from_above(patch, (p, q), above);
-            (u, v) = (p + step.0, q + step.1);
-            if self.is_last(step) {
-                return Some((u, v));
-            }
-        }
+        (mut du, mut dv): (f32, f32),
+    ) -> Option<Vec3> {
         for _ in 0..STEPS {
-            let step = newton(patch, (p - u, q - v), (u, v));
-            (u, v) = (u + step.0, v + step.1);
-            if self.is_last(step) {
-                return Some((u, v));
+            let (eu, ev) = newton(patch, (-du, -dv), (p + du, q + dv));
+            (du, dv) = (du + eu, dv + ev);
+            if self.bend * (eu * eu + ev * ev) <= LEFT {
+                return Some(Vec3::new(du, dv, patch.height(p + du, q + dv)));
             }
         }
         None
     }
-
-    /// Whether the error left after this step is negligible.
-    #[inline]
-    fn is_last(&self, (du, dv): (f32, f32)) -> bool {
-        self.bend * (du * du + dv * dv) <= LEFT
-    }
-}
-
-/// The first step, from the point above the hand: [`newton`] without the terms
-/// that are zero there.
-#[inline]
-fn from_above(patch: &Patch, (p, q): (f32, f32), z: f32) -> (f32, f32) {
-    let (zu, zv) = (patch.slope_u(q), patch.slope_v(p));
-    let za = patch.a * z;
-    let det = (1.0 + zu * zu) + (zv * zv - za * (za + 2.0 * (zu * zv)));
-    let down = -z / det;
-    ((zu - zv * za) * down, (zv - zu * za) * down)
 }
 
 /// One step of Newton's method (eq. 8-11) from (u, v), for a hand `(east,
@@ -179,11 +227,6 @@ fn newton(patch: &Patch, (east, north): (f32, f32), (u, v): (f32, f32)) -> (f32,
     let uv = zu * zv + patch.a * z;
     let scale = 1.0 / (uu * vv - uv * uv);
     ((gv * uv - gu * vv) * scale, (gu * uv - gv * uu) * scale)
-}
-
-#[inline]
-fn is_inside(x: f32) -> bool {
-    x > BORDER && x < 1.0 - BORDER
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 use super::super::closest::nearest_downhill;
 use super::super::dice::Dice;
 use super::*;
+use crate::grid::GridPoint;
 
-fn track(heights: [f32; 4]) -> Option<Track> {
-    Track::new(&Corners { base: 0, heights }, [0, 0])
+fn track(heights: [f32; 4], spot: Spot) -> Option<Track> {
+    Track::new(&Corners { base: 0, heights }, [0, 0], spot)
 }
 
 fn hand(p: f32, q: f32) -> GridPoint {
@@ -16,11 +17,23 @@ fn spot(u: f32, v: f32) -> Spot {
 
 /// Where a hand at height zero takes the proxy from a spot.
 fn follow(heights: [f32; 4], (p, q): (f32, f32), from: (f32, f32)) -> Option<(f32, f32)> {
-    let mut spot = spot(from.0, from.1);
-    let stretch = track(heights)?.follow(&hand(p, q), &mut spot)?;
-    let offset = (stretch.x - (spot.u - p)).abs() + (stretch.y - (spot.v - q)).abs();
-    assert!(offset < 1e-6, "{stretch} {spot:?}");
-    Some((spot.u, spot.v))
+    let mut track = track(heights, spot(from.0, from.1))?;
+    let hand = Hand::new(hand(p, q));
+    let (stretch, u, v) = match track.follow(&hand) {
+        Some(stretch) => (stretch, track.spot.u, track.spot.v),
+        None => {
+            let to = track.closest(&track.seen_by(&hand), (p, q))?;
+            let (u, v) = (p + to.x, q + to.y);
+            if !(to.z >= 0.0 && is_inside(u) && is_inside(v) && track.is_convex(to.z)) {
+                return None;
+            }
+            (to, u, v)
+        }
+    };
+    let patch = Patch::new(heights);
+    let off = Vec3::new(u - p, v - q, patch.height(u, v)) - stretch;
+    assert!(off.abs().max_element() < 1e-6, "{stretch} {track:?}");
+    Some((u, v))
 }
 
 /// Patches up to a slope, hands within a tenth of a cell under the last
@@ -78,17 +91,14 @@ fn leaves_what_is_not_plain_to_the_general_search() {
     assert!(flat(0.1, (0.51, 0.5)).is_some());
     assert_eq!(flat(0.1, (1.01, 0.5)), None, "over the border");
     assert_eq!(flat(-0.1, (0.51, 0.5)), None, "above the surface");
-    assert!(track([0.0, 9.0, 0.0, 9.0]).is_none(), "steep");
-    assert!(track([f32::NAN; 4]).is_none(), "nothing");
+    let middle = spot(0.5, 0.5);
+    assert!(track([0.0, 9.0, 0.0, 9.0], middle).is_none(), "steep");
+    assert!(track([f32::NAN; 4], middle).is_none(), "nothing");
     // Twisted so far above the hand that the middle is a saddle.
     let saddle = [1.5, 2.5, 2.5, 1.5];
-    assert!(track(saddle).is_some());
+    assert!(track(saddle, middle).is_some());
     assert_eq!(follow(saddle, (0.5, 0.5), inside), None, "a saddle");
-    let mut spot = spot(0.5, 0.5);
-    let gentle = track([0.1; 4]).unwrap();
     let far = GridPoint::new([0, 0, -(1 << 29)], Vec3::new(0.5, 0.5, 0.0));
-    assert!(
-        gentle.follow(&far, &mut spot).is_some(),
-        "flat, however deep"
-    );
+    let followed = track([0.1; 4], middle).unwrap().follow(&Hand::new(far));
+    assert!(followed.is_some(), "flat, however deep");
 }

@@ -1,22 +1,21 @@
 //! How warm the motors are, and what current they may still be given.
 //!
 //! A winding heats in seconds, the housing around it in minutes, so two nodes
-//! a motor (Maxon RE25 118743, data sheet): winding to housing 3.1 K/W and
-//! 12 s, housing to air 14 K/W and 612 s. The winding's resistance is taken
-//! hot, which errs on the warm side.
+//! a motor. The winding's resistance is taken hot, which errs on the warm side.
+//!
+//! Both change little in a tick, so little at 10 kHz that single precision
+//! would lose it. The heat of each tick is added up and the temperatures follow
+//! every 10 ms.
 
 use glam::Vec3;
 
-/// Winding resistance at 100 °C, Ω (2.18 Ω at 25 °C).
-const RESISTANCE_OHM: f32 = 2.82;
-/// Winding to housing, housing to air, K/W.
-const TO_HOUSING: f32 = 3.1;
-const TO_AIR: f32 = 14.0;
-/// Time constants, s.
-const WINDING_S: f32 = 12.0;
-const HOUSING_S: f32 = 612.0;
+use super::rate::TickRate;
+use crate::phantom::{Calibration, Thermal};
+
 /// Air, °C.
 const AIR_C: f32 = 25.0;
+/// Between two steps of the temperatures, ms.
+const STEP_MS: u32 = 10;
 
 /// From this winding temperature on the current is reduced, °C.
 pub const DERATE_C: f32 = 80.0;
@@ -25,48 +24,141 @@ pub const CONTINUOUS_C: f32 = 100.0;
 /// Here the guard trips, °C. Derating alone never comes this far.
 pub const TRIP_C: f32 = 110.0;
 
-/// Peak and continuous current of an axis, A.
+/// Peak and continuous currents of the axes, A.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rating {
-    /// What a cool motor may be given.
-    pub peak_a: f32,
-    /// What it can bear for ever.
-    pub continuous_a: f32,
+struct Rating {
+    peak_a: Vec3,
+    continuous_a: Vec3,
 }
 
-/// Temperatures of the three motors above the air's, K.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// What a step of the temperatures needs, worked out once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Step {
+    /// Ticks in a step.
+    ticks: u32,
+    /// K of the winding above the housing for A² flowing for ever.
+    winding_k_per_a2: f32,
+    housing_k_per_a2: f32,
+    /// Share of the way that a step goes.
+    winding: f32,
+    housing: f32,
+}
+
+/// Temperatures of the three motors above the air's, and what follows.
+#[derive(Clone, Copy, Debug)]
 pub struct Motors {
+    rate: TickRate,
+    rating: Rating,
+    step: Step,
     winding_k: Vec3,
     housing_k: Vec3,
+    /// Σ I² since the last step, A², and of how many ticks.
+    squares: Vec3,
+    ticks: u32,
+    allowed_a: Vec3,
+    too_hot: bool,
 }
 
 impl Motors {
+    /// Motors as cold as the air, that may have no current yet.
+    #[must_use]
+    pub fn new(rate: TickRate) -> Self {
+        let unknown = Calibration::PREMIUM_1_5.thermal;
+        Self {
+            rate,
+            rating: Rating {
+                peak_a: Vec3::ZERO,
+                continuous_a: Vec3::ZERO,
+            },
+            step: Step::new(&unknown, rate),
+            winding_k: Vec3::ZERO,
+            housing_k: Vec3::ZERO,
+            squares: Vec3::ZERO,
+            ticks: 0,
+            allowed_a: Vec3::ZERO,
+            too_hot: false,
+        }
+    }
+
+    /// Takes ratings and time constants. How warm they are is not forgotten.
+    pub fn configure(&mut self, calibration: &Calibration) {
+        self.rating = Rating {
+            peak_a: calibration.peak_current_a,
+            continuous_a: calibration.continuous_current_a,
+        };
+        self.step = Step::new(&calibration.thermal, self.rate);
+        self.judge();
+    }
+
     /// Estimated winding temperatures, °C.
     #[must_use]
     pub fn winding_c(&self) -> Vec3 {
         self.winding_k + self.housing_k + AIR_C
     }
 
-    /// Lets `currents_a` flow for `dt_s` seconds.
-    pub fn heat(&mut self, currents_a: Vec3, dt_s: f32) {
-        let watts = currents_a * currents_a * RESISTANCE_OHM;
-        self.winding_k += (watts * TO_HOUSING - self.winding_k) * (dt_s / WINDING_S);
-        self.housing_k += (watts * TO_AIR - self.housing_k) * (dt_s / HOUSING_S);
+    /// Lets `currents_a` flow for a tick.
+    pub fn heat(&mut self, currents_a: Vec3) {
+        self.squares += currents_a * currents_a;
+        self.ticks += 1;
+        if self.ticks >= self.step.ticks {
+            self.advance();
+        }
+    }
+
+    fn advance(&mut self) {
+        let step = &self.step;
+        let mean = self.squares / self.ticks as f32;
+        self.winding_k += (mean * step.winding_k_per_a2 - self.winding_k) * step.winding;
+        self.housing_k += (mean * step.housing_k_per_a2 - self.housing_k) * step.housing;
+        self.squares = Vec3::ZERO;
+        self.ticks = 0;
+        self.judge();
+    }
+
+    fn judge(&mut self) {
+        let winding_c = self.winding_c();
+        let warm = (winding_c - DERATE_C) / (CONTINUOUS_C - DERATE_C);
+        let less = self.rating.peak_a - self.rating.continuous_a;
+        self.allowed_a = self.rating.peak_a - warm.clamp(Vec3::ZERO, Vec3::ONE) * less;
+        // Written so that what is not a number is too hot.
+        self.too_hot = !winding_c.cmple(Vec3::splat(TRIP_C)).all();
     }
 
     /// The most that each axis may be given now, A.
     #[must_use]
-    pub fn allowed_a(&self, rating: Rating) -> Vec3 {
-        let warm = (self.winding_c() - DERATE_C) / (CONTINUOUS_C - DERATE_C);
-        let less = (rating.peak_a - rating.continuous_a).max(0.0);
-        Vec3::splat(rating.peak_a) - warm.clamp(Vec3::ZERO, Vec3::ONE) * less
+    pub const fn allowed_a(&self) -> Vec3 {
+        self.allowed_a
+    }
+
+    /// What each axis may be given for ever, A.
+    #[must_use]
+    pub const fn continuous_a(&self) -> Vec3 {
+        self.rating.continuous_a
+    }
+
+    /// What each axis may be given while it is cool, A.
+    #[must_use]
+    pub const fn peak_a(&self) -> Vec3 {
+        self.rating.peak_a
     }
 
     /// Whether a winding is too hot to go on.
     #[must_use]
-    pub fn is_too_hot(&self) -> bool {
-        self.winding_c().max_element() > TRIP_C
+    pub const fn is_too_hot(&self) -> bool {
+        self.too_hot
+    }
+}
+
+impl Step {
+    fn new(thermal: &Thermal, rate: TickRate) -> Self {
+        let step_s = STEP_MS as f32 * 1e-3;
+        Self {
+            ticks: rate.ticks(STEP_MS),
+            winding_k_per_a2: thermal.resistance_ohm * thermal.winding_k_per_w,
+            housing_k_per_a2: thermal.resistance_ohm * thermal.housing_k_per_w,
+            winding: step_s / thermal.winding_s,
+            housing: step_s / thermal.housing_s,
+        }
     }
 }
 
@@ -74,40 +166,59 @@ impl Motors {
 mod tests {
     use super::*;
 
-    const RE25: Rating = Rating {
-        peak_a: 5.5,
-        continuous_a: 1.24,
-    };
-
     /// Asks for a current for some time, given what is allowed.
-    fn after(seconds: u32, wanted_a: f32) -> (Motors, Vec3) {
-        let mut motors = Motors::default();
+    fn after(rate: TickRate, seconds: u32, wanted_a: f32) -> (Motors, Vec3) {
+        let mut motors = Motors::new(rate);
+        motors.configure(&Calibration::PREMIUM_1_5);
         let mut given = Vec3::ZERO;
-        for _ in 0..seconds * 100 {
-            given = Vec3::splat(wanted_a).min(motors.allowed_a(RE25));
-            motors.heat(given, 0.01);
+        for _ in 0..seconds * rate.hz() {
+            given = Vec3::splat(wanted_a).min(motors.allowed_a());
+            motors.heat(given);
         }
         (motors, given)
     }
 
+    fn khz(khz: u32) -> TickRate {
+        TickRate::new(khz * 1000).expect("in range")
+    }
+
+    #[test]
+    fn without_a_calibration_there_is_no_current() {
+        assert_eq!(Motors::new(TickRate::DEFAULT).allowed_a(), Vec3::ZERO);
+    }
+
     #[test]
     fn a_cool_motor_may_have_its_peak() {
-        let (motors, given) = after(1, 5.5);
+        let (motors, given) = after(khz(1), 1, 5.5);
         assert_eq!(given.x, 5.5);
         assert!(motors.winding_c().x < DERATE_C);
     }
 
     #[test]
     fn asked_for_the_peak_for_ever_it_derates_and_never_trips() {
-        let (motors, given) = after(3000, 5.5);
+        let (motors, given) = after(khz(1), 3000, 5.5);
         assert!(!motors.is_too_hot(), "{:?}", motors.winding_c());
         assert!(given.x < 1.4 && given.x >= 1.24, "{given}");
     }
 
     #[test]
     fn the_continuous_current_is_borne_for_ever() {
-        let (motors, given) = after(4000, 1.24);
+        let (motors, given) = after(khz(1), 4000, 1.24);
         assert_eq!(given.x, 1.24);
         assert!(motors.winding_c().x < CONTINUOUS_C);
+        // 1.24² A² · 2.82 Ω · 17.1 K/W above the air.
+        assert!(
+            (motors.winding_c().x - 99.0).abs() < 0.5,
+            "{:?}",
+            motors.winding_c()
+        );
+    }
+
+    #[test]
+    fn as_warm_at_ten_kilohertz_as_at_one() {
+        let (slow, _) = after(khz(1), 200, 1.3);
+        let (fast, _) = after(khz(10), 200, 1.3);
+        let difference = (slow.winding_c() - fast.winding_c()).abs().max_element();
+        assert!(difference < 0.01, "{difference} K");
     }
 }

@@ -3,48 +3,133 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// A Phantom's calibration record. Lengths in millimetres, axes 1 to 3.
+/// The model that a record was made for; the preset it began as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Model {
+    /// Phantom Premium 1.0.
+    Premium10,
+    /// Phantom Premium 1.5.
+    #[default]
+    Premium15,
+    /// Phantom Premium 3.0.
+    Premium30,
+    /// Phantom Omni, later Touch.
+    Omni,
+    /// Anything else with this linkage.
+    Other,
+}
+
+/// A Phantom's calibration record. Lengths in millimetres, angles in radians,
+/// vectors hold axes 1 to 3.
 ///
 /// Published values differ by a few per cent and cable ratios by rig, so these
-/// are data, never constants in code.
+/// are data, never constants in code. [`Calibration::validate`] says whether a
+/// record can be worked with; nothing else checks its numbers again.
+///
+/// There is no index on the encoders: where the joints are is known only after
+/// the arm was put into its zero pose since power-up. So the record holds the
+/// *angles* of that pose ([`zero_rad`](Self::zero_rad)), and the counts read in
+/// it are given to the loop each time ([`crate::tick::Command::Zero`]).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
+    /// Which Phantom this is.
+    pub model: Model,
     /// Encoder counts a motor turn, four edges a line.
     pub counts_per_turn: f32,
-    /// Motor turns a joint turn; negative where counts fall as the joint's
-    /// angle grows.
+    /// Motor turns a joint turn, positive.
     pub ratio: Vec3,
-    /// Counts read in the home pose (all joint angles zero).
-    pub home_counts: [i32; 3],
+    /// +1 where counts rise as the joint's angle grows, −1 where they fall.
+    pub encoder_sign: Vec3,
+    /// +1 where a positive current turns the joint towards larger angles, −1
+    /// otherwise.
+    pub motor_sign: Vec3,
+    /// Joint angles of the pose in which the arm is zeroed.
+    pub zero_rad: Vec3,
     /// Length of the upper link, mm.
     pub l1_mm: f32,
     /// Length of the fore link, mm.
     pub l2_mm: f32,
-    /// Motor torque constant, Nm/A.
-    pub torque_constant: f32,
+    /// Joint angles that the stops allow.
+    pub limits: JointLimits,
+    /// Torque that holds joint 2 against the arm's weight where cos q2 is 1, Nm.
+    pub gravity_2_nm: f32,
+    /// Torque that holds joint 3 against the arm's weight where sin q3 is 1, Nm.
+    pub gravity_3_nm: f32,
+    /// Motor torque constants, Nm/A.
+    pub torque_constant: Vec3,
     /// Largest current a cool motor may be given, A.
-    pub peak_current_a: f32,
+    pub peak_current_a: Vec3,
     /// Current a motor can bear for ever, A.
-    pub continuous_current_a: f32,
+    pub continuous_current_a: Vec3,
+    /// How the motors warm.
+    pub thermal: Thermal,
+    /// Largest force the device may make at the tip, N.
+    pub max_force_n: f32,
+    /// Speed of the tip from which force is reduced, mm/s. At twice this speed
+    /// nothing is left, and what stays above that is a fault.
+    pub max_speed_mm_s: f32,
+}
+
+/// Joint angles that the stops allow. The second and third are absolute link
+/// angles, so the parallel linkage also bounds their difference.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointLimits {
+    /// Smallest angle of each joint, rad.
+    pub min_rad: Vec3,
+    /// Largest angle of each joint, rad.
+    pub max_rad: Vec3,
+    /// Largest q2 − q3, rad; below π/2, where the links would be in line.
+    pub q2_minus_q3_max_rad: f32,
+    /// Largest q3 − q2, rad; below π/2.
+    pub q3_minus_q2_max_rad: f32,
+}
+
+/// Two thermal nodes: winding to housing, housing to air. One type of motor on
+/// all three axes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Thermal {
+    /// Winding resistance at 100 °C, Ω; taken hot, which errs on the warm side.
+    pub resistance_ohm: f32,
+    /// Winding to housing, K/W.
+    pub winding_k_per_w: f32,
+    /// Housing to air, K/W.
+    pub housing_k_per_w: f32,
+    /// Time constant of the winding, s.
+    pub winding_s: f32,
+    /// Time constant of the housing, s.
+    pub housing_s: f32,
 }
 
 impl Calibration {
-    /// Phantom Premium 1.5: CAD link lengths and ratios from
-    /// `mahilab/Phantom`, Maxon RE25 motors.
-    pub const PREMIUM_1_5: Self = Self {
-        counts_per_turn: 4096.0,
-        ratio: Vec3::new(13.3, 11.2, 11.2),
-        home_counts: [0; 3],
-        l1_mm: 209.55,
-        l2_mm: 169.545,
-        torque_constant: 0.0234,
-        peak_current_a: 5.5,
-        continuous_current_a: 1.24,
-    };
-
-    /// Radians of each joint for a count of its encoder.
+    /// Encoder counts for a radian of each joint, with their signs.
     #[must_use]
-    pub fn radians_per_count(&self) -> Vec3 {
-        core::f32::consts::TAU / (self.counts_per_turn * self.ratio)
+    pub fn counts_per_radian(&self) -> Vec3 {
+        self.encoder_sign * self.ratio * (self.counts_per_turn / core::f32::consts::TAU)
+    }
+}
+
+impl JointLimits {
+    /// Whether a pose lies inside, give or take `margin_rad`. Not-a-number
+    /// lies outside.
+    #[must_use]
+    pub fn allow(&self, q: Vec3, margin_rad: f32) -> bool {
+        self.each_allows(q, margin_rad) && self.linkage_allows(q, margin_rad)
+    }
+
+    /// Whether each joint by itself lies inside, give or take `margin_rad`.
+    #[must_use]
+    pub fn each_allows(&self, q: Vec3, margin_rad: f32) -> bool {
+        let margin = Vec3::splat(margin_rad);
+        q.cmpge(self.min_rad - margin).all() && q.cmple(self.max_rad + margin).all()
+    }
+
+    /// Whether the linkage allows q2 and q3 together, give or take
+    /// `margin_rad`.
+    #[must_use]
+    pub fn linkage_allows(&self, q: Vec3, margin_rad: f32) -> bool {
+        let spread = q.y - q.z;
+        spread <= self.q2_minus_q3_max_rad + margin_rad
+            && -spread <= self.q3_minus_q2_max_rad + margin_rad
     }
 }

@@ -7,6 +7,14 @@
 //! r = l1·cos q2 + l2·sin q3
 //! x = cos q1·r     y = sin q1·r     z = l1·sin q2 − l2·cos q3
 //! ```
+//!
+//! # Singular poses
+//!
+//! `det J = ±l1·l2·r·cos(q2 − q3)`: at r = 0 the tip is on the base's axis, at
+//! |q2 − q3| = 90° the links are in line. Forces become torques by *Jᵀ*, which
+//! is a product and never an inverse, so nothing grows there; see
+//! [`Pose::torques_nm`] for the bound. Only the way back from a tip to joint
+//! angles ([`super::inverse`]) divides, and says what it does.
 
 use glam::Vec3;
 
@@ -16,6 +24,7 @@ use super::trig::sin_cos;
 /// A pose of the arm: what the Jacobian and the tip are computed from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
+    angles: Vec3,
     sin: Vec3,
     cos: Vec3,
     l1_mm: f32,
@@ -23,15 +32,6 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// From encoder counts.
-    #[must_use]
-    pub fn from_counts(calibration: &Calibration, counts: [i32; 3]) -> Self {
-        let home = calibration.home_counts;
-        let from_home = |axis: usize| counts[axis].wrapping_sub(home[axis]) as f32;
-        let turned = Vec3::new(from_home(0), from_home(1), from_home(2));
-        Self::from_angles(calibration, turned * calibration.radians_per_count())
-    }
-
     /// From joint angles in radians.
     #[must_use]
     pub fn from_angles(calibration: &Calibration, q: Vec3) -> Self {
@@ -39,6 +39,7 @@ impl Pose {
         let (s2, c2) = sin_cos(q.y);
         let (s3, c3) = sin_cos(q.z);
         Self {
+            angles: q,
             sin: Vec3::new(s1, s2, s3),
             cos: Vec3::new(c1, c2, c3),
             l1_mm: calibration.l1_mm,
@@ -46,12 +47,32 @@ impl Pose {
         }
     }
 
-    fn reach_mm(&self) -> f32 {
+    /// Joint angles, rad.
+    #[must_use]
+    pub const fn angles(&self) -> Vec3 {
+        self.angles
+    }
+
+    /// Their sines.
+    #[must_use]
+    pub(super) const fn sin(&self) -> Vec3 {
+        self.sin
+    }
+
+    /// Their cosines.
+    #[must_use]
+    pub(super) const fn cos(&self) -> Vec3 {
+        self.cos
+    }
+
+    /// Distance of the tip from the base's axis, mm; negative behind it.
+    #[must_use]
+    pub fn reach_mm(&self) -> f32 {
         self.l1_mm * self.cos.y + self.l2_mm * self.sin.z
     }
 
-    /// Tip position in the device frame, mm. Within 0.2 µm of f64 over the
-    /// whole workspace (swept in the tests).
+    /// Tip position in the device frame, mm. Within 0.2 µm of f64 for a
+    /// Premium 1.5's links, over the whole workspace (swept in the tests).
     #[must_use]
     pub fn tip_mm(&self) -> Vec3 {
         let r = self.reach_mm();
@@ -63,7 +84,11 @@ impl Pose {
     }
 
     /// Joint torques in Nm that make `force_n` (device frame) at the tip:
-    /// τ = Jᵀ·F. Bounded in every pose, singular ones included.
+    /// τ = Jᵀ·F.
+    ///
+    /// Bounded in every pose, singular ones included: |τ1| ≤ (l1 + l2)·|F|,
+    /// |τ2| ≤ l1·|F|, |τ3| ≤ l2·|F|, because each column of J is a joint's
+    /// lever and no lever is longer (swept in the tests).
     #[must_use]
     pub fn torques_nm(&self, force_n: Vec3) -> Vec3 {
         let (s, c) = (self.sin, self.cos);
@@ -74,6 +99,20 @@ impl Pose {
             self.l1_mm * (c.y * force_n.z - s.y * radial),
             self.l2_mm * (c.z * radial + s.z * force_n.z),
         ) * 1e-3
+    }
+
+    /// Velocity of the tip in the device frame for joint rates in rad/s, mm/s:
+    /// v = J·q̇.
+    #[must_use]
+    pub fn tip_velocity_mm_s(&self, rates: Vec3) -> Vec3 {
+        let (s, c) = (self.sin, self.cos);
+        let around = self.reach_mm() * rates.x;
+        let outward = self.l2_mm * c.z * rates.z - self.l1_mm * s.y * rates.y;
+        Vec3::new(
+            c.x * outward - s.x * around,
+            s.x * outward + c.x * around,
+            self.l1_mm * c.y * rates.y + self.l2_mm * s.z * rates.z,
+        )
     }
 }
 
@@ -91,77 +130,5 @@ pub(crate) fn to_device_frame(terrain: Vec3) -> Vec3 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const PREMIUM: Calibration = Calibration::PREMIUM_1_5;
-
-    /// Every 7th degree or so of the joint limits.
-    fn workspace() -> impl Iterator<Item = [f64; 3]> {
-        let steps = |from: i32, to: i32| (from..=to).step_by(7).map(|d| f64::from(d).to_radians());
-        steps(-90, 90).flat_map(move |q1| {
-            steps(-124, 119).flat_map(move |q2| steps(-29, 214).map(move |q3| [q1, q2, q3]))
-        })
-    }
-
-    fn tip_f64([q1, q2, q3]: [f64; 3]) -> [f64; 3] {
-        let (l1, l2) = (f64::from(PREMIUM.l1_mm), f64::from(PREMIUM.l2_mm));
-        let r = l1 * q2.cos() + l2 * q3.sin();
-        [q1.cos() * r, q1.sin() * r, l1 * q2.sin() - l2 * q3.cos()]
-    }
-
-    #[test]
-    fn the_tip_is_within_its_bound_over_the_workspace() {
-        let mut worst = 0.0_f64;
-        for q in workspace() {
-            // The angle as f32 holds it is the input; its rounding is not ours.
-            let angles = Vec3::new(q[0] as f32, q[1] as f32, q[2] as f32);
-            let truth = tip_f64(angles.to_array().map(f64::from));
-            let tip = Pose::from_angles(&PREMIUM, angles).tip_mm();
-            for axis in 0..3 {
-                worst = worst.max((f64::from(tip[axis]) - truth[axis]).abs());
-            }
-        }
-        assert!(worst < 2e-4, "{worst} mm");
-    }
-
-    #[test]
-    fn torques_are_the_transposed_jacobian() {
-        let force = Vec3::new(1.5, -0.7, 2.2);
-        for q in workspace().step_by(97) {
-            let angles = Vec3::new(q[0] as f32, q[1] as f32, q[2] as f32);
-            let torques = Pose::from_angles(&PREMIUM, angles).torques_nm(force);
-            for joint in 0..3 {
-                let h = 1e-6;
-                let (mut lo, mut hi) = (q, q);
-                lo[joint] -= h;
-                hi[joint] += h;
-                let (lo, hi) = (tip_f64(lo), tip_f64(hi));
-                let power: f64 = (0..3)
-                    .map(|a| (hi[a] - lo[a]) / (2.0 * h) * 1e-3 * f64::from(force[a]))
-                    .sum();
-                assert!((power - f64::from(torques[joint])).abs() < 1e-5);
-            }
-        }
-    }
-
-    #[test]
-    fn one_count_moves_the_tip_by_what_the_data_sheet_says() {
-        let home = Pose::from_counts(&PREMIUM, [0; 3]).tip_mm();
-        let resolution = [24.2, 28.7, 23.2];
-        for (axis, expected_um) in resolution.into_iter().enumerate() {
-            let mut counts = [0; 3];
-            counts[axis] = 1;
-            let moved = Pose::from_counts(&PREMIUM, counts).tip_mm() - home;
-            assert!((moved.length() * 1e3 - expected_um).abs() < 0.2, "{moved}");
-        }
-    }
-
-    #[test]
-    fn frames_turn_into_each_other() {
-        let v = Vec3::new(1.0, 2.0, 3.0);
-        assert_eq!(to_terrain_frame(to_device_frame(v)), v);
-        // Away from the user is north, and that is toward the base.
-        assert_eq!(to_terrain_frame(Vec3::NEG_X), Vec3::Y);
-    }
-}
+#[path = "kinematics_tests.rs"]
+mod tests;

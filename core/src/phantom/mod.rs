@@ -1,14 +1,30 @@
 //! The Phantom: encoder counts to tip position, tip force to motor currents.
 //!
+//! Read `calibration` (what is known of an arm), [`Mechanism`] (what follows
+//! from it, worked out outside the tick), [`Pose`] (tip and torques), and
+//! [`Readings`] (velocity). `presets`, `check` and `record` are about the
+//! calibration itself: where to begin, whether it makes sense, how it is kept.
+//!
 //! Two frames. The *device frame* has its origin where the joint axes meet, x
 //! away from the base toward the user, z up. The *terrain frame* is the user's
 //! view: x east (right), y north (away), z up. They differ by a quarter turn.
 
 mod calibration;
+mod check;
+mod inverse;
 mod kinematics;
+mod mechanism;
+mod presets;
+mod record;
 mod trig;
+mod velocity;
 
-pub use calibration::Calibration;
+pub use calibration::{Calibration, JointLimits, Model, Thermal};
+pub use check::{BadCalibration, Field};
+pub use inverse::Unreachable;
 pub(crate) use kinematics::to_device_frame;
 pub use kinematics::{Pose, to_terrain_frame};
+pub use mechanism::Mechanism;
+pub use record::{BadRecord, RECORD_BYTES, VERSION as RECORD_VERSION};
 pub use trig::sin_cos;
+pub use velocity::{Readings, WINDOW as VELOCITY_WINDOW};

@@ -218,12 +218,9 @@ impl<'t, const D: usize> Window<'t, D> {
     #[inline]
     fn held(&self, col: i32, row: i32) -> Option<&Tile> {
         let tile = &*self.slots[wrap::<D>(row)][wrap::<D>(col)];
-        let key = TileKey {
-            level: self.level,
-            col,
-            row,
-        };
-        (tile.key() == Some(key)).then_some(tile)
+        // `install` takes tiles of the field's level only.
+        let is_here = |key: TileKey| key.col == col && key.row == row;
+        tile.key().is_some_and(is_here).then_some(tile)
     }
 
     #[inline]

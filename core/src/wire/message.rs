@@ -12,11 +12,13 @@ use serde::{Deserialize, Serialize};
 use crate::contact::{Rule, State};
 use crate::force::ForceLaw;
 use crate::grid::{GridPoint, MAX_CELL};
-use crate::guard::Fault;
+use crate::guard::{Fault, Limits, Mode, Report};
+use crate::phantom::Calibration;
 use crate::terrain::TileKey;
+use crate::wire::status::{Answer, Status};
 
 /// Version of this table.
-pub const PROTOCOL: u16 = 1;
+pub const PROTOCOL: u16 = 2;
 /// Samples in a telemetry message, at most.
 pub const BATCH: usize = 8;
 /// Length limit of names in a hello, bytes.
@@ -35,9 +37,36 @@ pub enum ToDevice<'a> {
     Tile(TileMessage<'a>),
     /// A hand position to be felt, in a scene fed by points.
     Point(Point),
+    /// Asks for a [`ToHost::Status`].
+    Status,
+    /// Asks to arm: once nothing is in the way, the dead-man switch has to be
+    /// let go and pressed. Answered when that much is known.
+    Arm,
+    /// Asks to disarm; force goes out gently.
+    Disarm,
+    /// Says what the encoders read in the zero pose of the calibration.
+    Zero {
+        /// Counts of axes 1 to 3.
+        counts: [i32; 3],
+    },
+    /// Puts a calibration in force. Only while disarmed.
+    SetCalibration {
+        /// The record.
+        calibration: Calibration,
+        /// Whether to store it in the device's memory, too; a second answer,
+        /// to [`Request::StoreCalibration`], tells how that went.
+        ///
+        /// [`Request::StoreCalibration`]: super::status::Request::StoreCalibration
+        store: bool,
+    },
+    /// Asks for a [`ToHost::Calibration`].
+    GetCalibration,
     /// Clears a latched fault.
     ClearFault,
-    /// Ends the session. The emulated board ends its program, too.
+    /// Drops the scene: disarms, and force goes out gently.
+    DropScene,
+    /// Ends the session, and drops the scene likewise. The emulated board ends
+    /// its program, too.
     Bye,
 }
 
@@ -76,6 +105,15 @@ pub enum ToHost {
         /// What was felt there.
         sample: Sample,
     },
+    /// Where the guard stands; told at the beginning of a session and whenever
+    /// it changes.
+    Guard(Report),
+    /// Answers [`ToDevice::Status`].
+    Status(Status),
+    /// Answers [`ToDevice::GetCalibration`].
+    Calibration(Option<Calibration>),
+    /// Answers a request.
+    Answer(Answer),
 }
 
 /// The host introduces itself.
@@ -216,12 +254,17 @@ pub struct Sample {
     pub hip: GridPoint,
     /// Proxy.
     pub proxy: GridPoint,
-    /// Force commanded, newtons: east, north, up.
+    /// Force commanded, newtons: east, north, up. Zero unless the amplifiers
+    /// are on; in a replay, what the scene's law makes.
     pub force_n: Vec3,
     /// What the proxy is doing.
     pub state: State,
     /// The tile (column, row) whose absence holds the proxy up.
     pub held_up_by: Option<[i32; 2]>,
+    /// How far arming has come.
+    pub mode: Mode,
+    /// Why the force is less than the scene asked for.
+    pub limits: Limits,
     /// Latched fault.
     pub fault: Option<Fault>,
     /// Units of contact work spent.

@@ -11,7 +11,12 @@
 //! then sends a [`message::Scene`]; from there on the device asks for the
 //! tiles it needs and reports what it feels. Either end may restart at any
 //! time by beginning again with Hello.
+//!
+//! Nothing is driven before the host has asked for it
+//! ([`message::ToDevice::Arm`]) and the dead-man switch was pressed after that;
+//! what is still in the way is told in [`message::ToHost::Guard`].
 
 pub mod frame;
 pub mod message;
 pub mod plant;
+pub mod status;

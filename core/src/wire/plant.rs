@@ -1,17 +1,19 @@
-//! The emulated board's second line: encoders in, amplifiers out.
+//! The emulated board's second line: encoders and switches in, amplifiers out.
 //!
 //! On this line the virtual Phantom takes the place of encoder timers and
 //! amplifiers. Each tick is one exchange, in the same framing as the link.
 
 use serde::{Deserialize, Serialize};
 
-/// Plant to board: what the encoders read at a tick.
+use crate::guard::Sense;
+
+/// Plant to board: what the encoders and switches say at a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Counts {
-    /// The tick these counts are for.
+pub struct Sensed {
+    /// The tick this is for.
     pub tick: u32,
-    /// Encoder counts of the three axes.
-    pub counts: [i32; 3],
+    /// Encoders and switches.
+    pub sense: Sense,
 }
 
 /// Board to plant: what the amplifiers were given in a tick.
@@ -23,4 +25,6 @@ pub struct Currents {
     pub currents_a: [f32; 3],
     /// Whether the amplifiers are enabled.
     pub enabled: bool,
+    /// Length of the board's tick, ns.
+    pub tick_ns: u32,
 }

@@ -17,8 +17,9 @@
 //! - `walk.frames`: [`ToDevice`] frames as on the link: a scene, then tiles and
 //!   points in the order of events. Fed by points, each is one
 //!   [`Contact::step`] in real time.
-//! - `counts.frames`, for a scene fed by encoders: [`Counts`] frames, each one
-//!   [`Haptics::tick`], count to current.
+//! - `counts.frames`, for a scene fed by encoders: [`Sensed`] frames, each one
+//!   [`Haptics::tick`], count to current, once the arm was armed where the
+//!   first of them is.
 //!
 //! and leaves `ticks.bin`: [`RECORD`] little-endian words a tick.
 #![no_std]
@@ -32,11 +33,12 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use hapterra_core::contact::{Contact, Felt, Pace, Rule};
 use hapterra_core::grid::GridPoint;
-use hapterra_core::phantom::Calibration;
+use hapterra_core::guard::{Sense, TickRate};
+use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::terrain::{Tile, Window};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 use hapterra_core::wire::message::{Heights, Scene, Source, TileMessage, ToDevice};
-use hapterra_core::wire::plant::Counts;
+use hapterra_core::wire::plant::Sensed;
 use static_cell::ConstStaticCell;
 
 use files::{Frames, Records};
@@ -106,7 +108,8 @@ fn step<'c>(
 /// The whole tick, from encoder counts to motor currents.
 fn chain(scene: &Scene, frames: &mut Frames, records: &mut Records) {
     let tiles = TILES.take().each_mut().map(|row| row.each_mut());
-    let mut haptics = Haptics::new(tiles, Calibration::PREMIUM_1_5);
+    let mut haptics = Haptics::new(tiles, TickRate::DEFAULT, None);
+    haptics.configure(Mechanism::new(&Calibration::PREMIUM_1_5).expect("valid"));
     let _ = haptics.accept(Command::Scene(*scene));
     let mut spare = Some(SPARE.take());
     while let Some(ToDevice::Tile(tile)) = frames.next() {
@@ -116,9 +119,17 @@ fn chain(scene: &Scene, frames: &mut Frames, records: &mut Records) {
     }
     let mut sensed = Frames::open(c"counts.frames");
     let timer = bare::timer();
-    while let Some(Counts { counts, .. }) = sensed.next() {
-        let counts = black_box(counts);
-        let (cost, outcome) = timer.counted(|| tick(&mut haptics, counts));
+    let mut armed = false;
+    while let Some(Sensed { sense, .. }) = sensed.next() {
+        if !armed {
+            arm(&mut haptics, sense);
+            armed = true;
+        }
+        let sense = black_box(Sense {
+            dead_man: true,
+            ..sense
+        });
+        let (cost, outcome) = timer.counted(|| tick(&mut haptics, &sense));
         let sample = &outcome.sample;
         records.add(
             [
@@ -133,9 +144,22 @@ fn chain(scene: &Scene, frames: &mut Frames, records: &mut Records) {
     }
 }
 
+/// Arms as a user does, force fully in.
+fn arm(haptics: &mut Haptics<'static, WINDOW>, at: Sense) {
+    let _ = haptics.accept(Command::Zero([0; 3]));
+    let _ = haptics.accept(Command::Arm);
+    for ticks in 0..2_200 {
+        let sense = Sense {
+            dead_man: ticks > 0,
+            ..at
+        };
+        let _ = haptics.tick(&sense, true);
+    }
+}
+
 #[inline(never)]
-fn tick(haptics: &mut Haptics<'static, WINDOW>, counts: [i32; 3]) -> Outcome {
-    haptics.tick(counts)
+fn tick(haptics: &mut Haptics<'static, WINDOW>, sense: &Sense) -> Outcome {
+    haptics.tick(sense, true)
 }
 
 fn fill(tile: &mut Tile, message: &TileMessage<'_>) {

@@ -45,6 +45,7 @@ fn amplifiers_off() {
         tick: u32::MAX,
         currents_a: [0.0; 3],
         enabled: false,
+        tick_ns: 0,
     };
     let mut frame = [0; 64];
     let uart = plant_uart();

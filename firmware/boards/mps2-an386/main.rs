@@ -26,7 +26,7 @@ mod plant;
 mod serial;
 mod time;
 
-use core::cell::Cell;
+use core::cell::{Cell, RefCell};
 
 use cortex_m::peripheral::NVIC;
 use cortex_m_rt::{entry, interrupt};
@@ -36,11 +36,15 @@ use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::channels::{Application, Channels, Hardware, Tiles, assemble};
 use hapterra_firmware::haptic_loop::HapticLoop;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::{LinkHost, run};
 use hapterra_firmware::native::ReportedOff;
+use hapterra_firmware::store::Stored;
+use hapterra_firmware::supervisor::{NoWatchdog, Supervisor};
+use hapterra_firmware::vitals::{Part, Vitals};
 use static_cell::ConstStaticCell;
 
 use chip::Interrupt;
@@ -122,9 +126,21 @@ fn Executor() {
 }
 
 /// What this board has to do with the link.
-#[derive(Default)]
 struct Emulated {
     fed_by_arm: Cell<bool>,
+    supervisor: RefCell<Supervisor<'static, NoWatchdog>>,
+}
+
+impl Emulated {
+    /// Nothing but its own host watches this board, so the supervisor needs no
+    /// task of its own.
+    fn new(vitals: &'static Vitals) -> Self {
+        let parts = &[Part::Tick, Part::Link];
+        Self {
+            fed_by_arm: Cell::new(false),
+            supervisor: RefCell::new(Supervisor::new(vitals, NoWatchdog, parts)),
+        }
+    }
 }
 
 impl LinkHost for Emulated {
@@ -137,9 +153,10 @@ impl LinkHost for Emulated {
             defmt::info!("the host said goodbye");
             semihosting::process::exit(0);
         }
-        let feels_arm = link.feels_arm();
-        if self.fed_by_arm.replace(feels_arm) != feels_arm {
-            plant::expect(feels_arm);
+        self.supervisor.borrow_mut().check();
+        let drives_arm = link.drives_arm();
+        if self.fed_by_arm.replace(drives_arm) != drives_arm {
+            plant::expect(drives_arm);
         }
         if link.may_stand_still() {
             time::hold(Reason::Link);
@@ -150,9 +167,9 @@ impl LinkHost for Emulated {
 }
 
 #[embassy_executor::task]
-async fn serve_link(mut link: Link<'static, WINDOW>) {
+async fn serve_link(mut link: Link<'static, WINDOW>, vitals: &'static Vitals) {
     let (rx, tx) = LINK.open();
-    run(&mut link, rx, tx, &Emulated::default()).await;
+    run(&mut link, rx, tx, &Emulated::new(vitals)).await;
 }
 
 #[embassy_executor::task]
@@ -164,10 +181,10 @@ async fn serve_plant(port: PlantPort) {
 /// Starts the other tasks, which cannot be handed over from outside: what they
 /// hold between two awaits stays on this executor.
 #[embassy_executor::task]
-async fn start(link: Link<'static, WINDOW>, port: PlantPort) {
+async fn start(link: Link<'static, WINDOW>, vitals: &'static Vitals, port: PlantPort) {
     // SAFETY: called from a task of the executor that is meant.
     let spawner = unsafe { Spawner::for_current_executor().await };
-    spawner.spawn(serve_link(link).expect("started once"));
+    spawner.spawn(serve_link(link, vitals).expect("started once"));
     spawner.spawn(serve_plant(port).expect("started once"));
 }
 
@@ -178,10 +195,14 @@ fn main() -> ! {
         encoders: arm,
         amplifiers: ReportedOff,
         clock: time::start(),
-        calibration: Calibration::PREMIUM_1_5,
+        // There is no memory; the virtual Phantom is a Premium 1.5.
+        calibration: Stored::Found(Calibration::PREMIUM_1_5),
+        boot: BootReport::default(),
     };
     let Application {
-        haptic_loop, link, ..
+        haptic_loop,
+        link,
+        vitals,
     } = assemble(TILES.take(), CHANNELS.take(), hardware, "mps2-an386");
     let tick = Tick {
         haptic_loop,
@@ -190,7 +211,7 @@ fn main() -> ! {
     critical_section::with(|cs| HANDOVER.borrow(cs).set(Some(tick)));
     let_interrupts_through();
     let spawner = EXECUTOR.start(Interrupt::Executor);
-    spawner.spawn(start(link, port).expect("started once"));
+    spawner.spawn(start(link, vitals, port).expect("started once"));
     defmt::info!("mps2-an386 is up");
     loop {
         cortex_m::asm::wfi();

@@ -1,5 +1,5 @@
-//! The virtual Phantom at the other end of UART1: it sends the encoder counts
-//! of a tick and gets the currents of that tick.
+//! The virtual Phantom at the other end of UART1: it sends what encoders and
+//! switches say in a tick and gets the currents of that tick.
 //!
 //! In a scene felt through the encoders every tick waits for its counts: from
 //! the end of one tick until the counts of the next are there, the board's time
@@ -13,8 +13,8 @@ use embassy_sync::signal::Signal;
 use embedded_io_async::{Read, Write};
 use hapterra_core::guard::Drive;
 use hapterra_core::wire::frame::{FrameReader, decode, encode};
-use hapterra_core::wire::plant::{Counts, Currents};
-use hapterra_firmware::board::{Encoders, Sense};
+use hapterra_core::wire::plant::{Currents, Sensed};
+use hapterra_firmware::board::{Encoders, Sense, TickClock};
 use heapless::spsc::{Consumer, Producer, Queue};
 use static_cell::ConstStaticCell;
 
@@ -24,7 +24,7 @@ use crate::time::{self, Reason};
 /// Longest frame on this line.
 const FRAME: usize = 64;
 
-static COUNTS: ConstStaticCell<Queue<Counts, 4>> = ConstStaticCell::new(Queue::new());
+static COUNTS: ConstStaticCell<Queue<Sensed, 4>> = ConstStaticCell::new(Queue::new());
 static CURRENTS: ConstStaticCell<Queue<Currents, 4>> = ConstStaticCell::new(Queue::new());
 /// Whether counts wait for a tick.
 static COUNTS_WAIT: AtomicBool = AtomicBool::new(false);
@@ -37,7 +37,7 @@ pub(crate) fn open() -> (PlantArm, Answers, PlantPort) {
     let (to_plant, currents) = CURRENTS.take().split();
     let arm = PlantArm {
         counts,
-        latest: [0; 3],
+        latest: Sense::default(),
         sensed: None,
     };
     let port = PlantPort {
@@ -59,8 +59,8 @@ pub(crate) fn expect(counts: bool) {
 
 /// The virtual Phantom's encoders, as the tick reads them.
 pub(crate) struct PlantArm {
-    counts: Consumer<'static, Counts>,
-    latest: [i32; 3],
+    counts: Consumer<'static, Sensed>,
+    latest: Sense,
     /// The number of the tick whose counts were read and not yet answered.
     pub(crate) sensed: Option<u32>,
 }
@@ -73,15 +73,12 @@ impl PlantArm {
 
 impl Encoders for PlantArm {
     fn sense(&mut self) -> Sense {
-        if let Some(Counts { tick, counts }) = self.counts.dequeue() {
-            self.latest = counts;
+        if let Some(Sensed { tick, sense }) = self.counts.dequeue() {
+            self.latest = sense;
             self.sensed = Some(tick);
         }
         COUNTS_WAIT.store(self.counts.ready(), Ordering::Release);
-        Sense {
-            counts: self.latest,
-            fault: None,
-        }
+        self.latest
     }
 }
 
@@ -95,13 +92,14 @@ impl Answers {
             tick,
             currents_a: drive.currents_a.to_array(),
             enabled: drive.enabled,
+            tick_ns: time::Clock::PERIOD * (1_000_000_000 / time::Clock::HZ),
         });
     }
 }
 
 /// The task's side of the line.
 pub(crate) struct PlantPort {
-    counts: Producer<'static, Counts>,
+    counts: Producer<'static, Sensed>,
     currents: Consumer<'static, Currents>,
 }
 

@@ -42,14 +42,16 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Config, bind_interrupts, pac, rcc, time::Hertz};
 use embassy_usb::UsbDevice;
 use embassy_usb::driver::Driver as UsbDriver;
-use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::amplifier::{CurrentOutput, Off, offset_code};
 use hapterra_firmware::channels::{Application, Channels, Hardware, Tiles, assemble};
 use hapterra_firmware::haptic_loop::HapticLoop;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::run;
+use hapterra_firmware::store::Stored;
 use hapterra_firmware::supervisor::Supervisor;
 use hapterra_firmware::usb::{Descriptors, Known, Packets};
+use hapterra_firmware::vitals::Part;
 use static_cell::ConstStaticCell;
 
 use stm32::arm::{Arm, SafetyInputs};
@@ -192,7 +194,8 @@ async fn main(spawner: Spawner) {
         encoders: Arm::new(counters, inputs),
         amplifiers: Off::new(outputs, enable, FULL_SCALE_A),
         clock: TickClock::new(p.TIM7, &PERIOD, &mut core),
-        calibration: Calibration::PREMIUM_1_5,
+        calibration: Stored::Missing,
+        boot: BootReport::default(),
     };
     let Application {
         haptic_loop,
@@ -210,6 +213,9 @@ async fn main(spawner: Spawner) {
     stm32::nvic::start_tick(Interrupt::TIM7_DAC, Interrupt::TIM6_DAC);
     let mut dog = IndependentWatchdog::new(p.IWDG, stm32::WATCHDOG_US);
     dog.unleash();
-    spawner.spawn(supervise(Supervisor::new(vitals, Dog(dog))).expect("started once"));
+    spawner.spawn(
+        supervise(Supervisor::new(vitals, Dog(dog), &[Part::Tick, Part::Link]))
+            .expect("started once"),
+    );
     defmt::info!("nucleo-g474re is up");
 }

@@ -1,6 +1,5 @@
 //! The loop against a link that does not keep up.
 
-use core::sync::atomic::Ordering;
 use std::boxed::Box;
 use std::vec::Vec;
 
@@ -8,25 +7,27 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::phantom::Calibration;
+use hapterra_core::guard::TickRate;
+use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::message::{Point, Scene};
 
 use super::*;
 use crate::channels::{Channels, Tiles};
 use crate::link::LinkEnds;
-use crate::native::{GivenCounts, ReportedOff, StoppedClock};
+use crate::native::{Given, ReportedOff, StoppedClock};
 
-type Loop = HapticLoop<'static, GivenCounts, ReportedOff, StoppedClock, 4>;
+type Loop = HapticLoop<'static, Given, ReportedOff, StoppedClock, 4>;
 
 fn looped(source: Source) -> (Loop, LinkEnds<'static>) {
     let tiles = Box::leak(Box::new(Tiles::<4>::new()));
     let (loop_ends, mut link_ends, _) = Box::leak(Box::new(Channels::new())).split();
-    let haptics = Haptics::new(tiles.split().0, Calibration::PREMIUM_1_5);
+    let mut haptics = Haptics::new(tiles.split().0, TickRate::DEFAULT, None);
+    haptics.configure(Mechanism::new(&Calibration::PREMIUM_1_5).expect("valid"));
     let haptic_loop = HapticLoop::new(
         haptics,
         loop_ends,
-        GivenCounts::default(),
+        Given::default(),
         ReportedOff,
         StoppedClock,
     );
@@ -56,7 +57,7 @@ fn samples_that_find_no_room_are_counted() {
     for _ in 0..200 {
         haptic_loop.tick();
     }
-    let dropped = link_ends.vitals.dropped.load(Ordering::Relaxed);
+    let dropped = link_ends.vitals.dropped();
     assert!(dropped > 100);
     assert_eq!(drain(&mut link_ends).len() as u32 + dropped, 200);
 }

@@ -16,6 +16,7 @@
 //!   have left unfinished) begins a session anew and keeps the scene and every
 //!   tile that is held, so a host that comes back goes on where it was.
 
+mod desk;
 mod focus;
 mod log;
 mod outbox;
@@ -24,26 +25,38 @@ pub mod task;
 #[cfg(test)]
 mod tests;
 
+use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::terrain::Tile;
 use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode};
 use hapterra_core::wire::message::{DeviceHello, PROTOCOL};
+use hapterra_core::wire::status::{BootReport, Health, Refusal};
 use heapless::spsc::{Consumer, Producer};
 
 use crate::board::TickClock;
-use crate::channels::{Record, SPARES, Vitals};
+use crate::channels::{Record, SPARES};
+use crate::vitals::Vitals;
 use outbox::Outbox;
 pub use session::POINTS_AHEAD;
 use session::{Backlog, Session};
 
-/// How the device introduces itself.
+/// What is known of the device when it starts.
 #[derive(Clone, Debug)]
-pub(crate) struct Identity(DeviceHello);
+pub(crate) struct Identity {
+    hello: DeviceHello,
+    boot: BootReport,
+    calibration: Option<Calibration>,
+}
 
 impl Identity {
-    /// Takes the board's name, cut to what the message holds.
-    pub(crate) fn new<C: TickClock>(board: &str) -> Self {
-        Self(DeviceHello {
+    /// Takes the board's name, cut to what the message holds, how it started,
+    /// and the arm that it knows.
+    pub(crate) fn new<C: TickClock>(
+        board: &str,
+        boot: BootReport,
+        mechanism: Option<&Mechanism>,
+    ) -> Self {
+        let hello = DeviceHello {
             protocol: PROTOCOL,
             board: name(board),
             version: name(env!("CARGO_PKG_VERSION")),
@@ -51,7 +64,12 @@ impl Identity {
             tick_hz: C::HZ / C::PERIOD,
             clock_hz: C::HZ,
             epoch: None,
-        })
+        };
+        Self {
+            hello,
+            boot,
+            calibration: mechanism.map(|mechanism| *mechanism.calibration()),
+        }
     }
 }
 
@@ -67,6 +85,8 @@ pub(crate) struct LinkEnds<'t> {
     pub(crate) commands: Producer<'t, Command<'t>>,
     pub(crate) spent: Consumer<'t, &'t mut Tile>,
     pub(crate) records: Consumer<'t, Record>,
+    pub(crate) settings: Producer<'t, Mechanism>,
+    pub(crate) healths: Consumer<'t, Health>,
     pub(crate) vitals: &'t Vitals,
 }
 
@@ -107,7 +127,7 @@ impl<'t, const D: usize> Link<'t, D> {
         } = buffers;
         Self {
             reader,
-            session: Session::new(identity.0, spare, ends, outbox, backlog),
+            session: Session::new(identity, spare, ends, outbox, backlog),
         }
     }
 
@@ -163,10 +183,23 @@ impl<'t, const D: usize> Link<'t, D> {
         self.session.may_stand_still()
     }
 
-    /// Whether the scene in force is felt through the encoders.
+    /// Whether the arm is in use: the scene in force is felt through the
+    /// encoders, or force is still going out.
     #[must_use]
-    pub fn feels_arm(&self) -> bool {
-        self.session.feels_arm()
+    pub fn drives_arm(&self) -> bool {
+        self.session.drives_arm()
+    }
+
+    /// A calibration that the host wants stored in the board's memory, until
+    /// [`Self::stored`] tells how that went. The arm is disarmed.
+    #[must_use]
+    pub fn to_store(&self) -> Option<Calibration> {
+        self.session.to_store()
+    }
+
+    /// How storing it went: [`Refusal::NoMemory`] or [`Refusal::MemoryFailed`].
+    pub fn stored(&mut self, result: Result<(), Refusal>) {
+        self.session.stored(result);
     }
 
     /// Whether the host has said goodbye and everything is sent.

@@ -4,9 +4,9 @@ use hapterra_core::wire::frame::encode;
 use hapterra_core::wire::message::{Telemetry, ToHost};
 
 /// Bytes kept for answers and requests.
-const URGENT: usize = 1024;
-/// The longest of those, which is `Felt` with every number at its longest.
-pub(super) const LONGEST_URGENT: usize = 192;
+const URGENT: usize = 1152;
+/// The longest of those, which is `Status` with every number at its longest.
+pub(super) const LONGEST_URGENT: usize = 448;
 /// The longest telemetry frame: eight samples, every number at its longest.
 const LONGEST_TELEMETRY: usize = 1280;
 

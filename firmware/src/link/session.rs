@@ -1,21 +1,23 @@
 //! What the messages of one host mean, and what is sent to it.
 
-use core::sync::atomic::Ordering;
-
+use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::terrain::{Focus, IN_FLIGHT, Puller, Tile};
 use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::BadFrame;
 use hapterra_core::wire::message::{
-    BATCH, DeviceHello, Heights, HostHello, PROTOCOL, Point, Scene, Source, Telemetry, TileMessage,
-    ToDevice, ToHost,
+    BATCH, Heights, HostHello, PROTOCOL, Point, Scene, Source, Telemetry, TileMessage, ToDevice,
+    ToHost,
 };
+use hapterra_core::wire::status::{Answer, Refusal, Request, Status};
 use heapless::{Deque, Vec};
 
-use super::LinkEnds;
+use super::desk::{Counts, Desk};
 use super::focus::follow;
 use super::log;
 use super::outbox::Outbox;
+use super::{Identity, LinkEnds};
 use crate::channels::{Record, SPARES};
+use crate::vitals::Part;
 
 /// Samples kept for the writer; beyond them, new ones are dropped.
 const BACKLOG: usize = 24;
@@ -47,7 +49,8 @@ struct Replay {
 /// The state of the link above the framing.
 pub(crate) struct Session<'t, const D: usize> {
     stage: Stage,
-    hello: DeviceHello,
+    /// Everything about arming, calibration and status.
+    pub(super) desk: Desk,
     scene: Option<Scene>,
     puller: Puller<D>,
     focus: Option<Focus>,
@@ -67,16 +70,16 @@ pub(crate) struct Session<'t, const D: usize> {
 
 impl<'t, const D: usize> Session<'t, D> {
     pub(crate) fn new(
-        mut hello: DeviceHello,
+        mut identity: Identity,
         spare: [&'t mut Tile; SPARES],
         ends: LinkEnds<'t>,
         outbox: &'t mut Outbox,
         backlog: &'t mut Backlog,
     ) -> Self {
-        hello.window = u8::try_from(D).unwrap_or(u8::MAX);
+        identity.hello.window = u8::try_from(D).unwrap_or(u8::MAX);
         Self {
             stage: Stage::Closed,
-            hello,
+            desk: Desk::new(identity),
             scene: None,
             puller: Puller::new(),
             focus: None,
@@ -105,9 +108,97 @@ impl<'t, const D: usize> Session<'t, D> {
             (ToDevice::Scene(scene), _) => self.take_scene(scene),
             (ToDevice::Tile(tile), _) => self.take_tile(&tile),
             (ToDevice::Point(point), _) => self.take_point(point),
-            (ToDevice::ClearFault, _) => self.command(Command::ClearFault),
-            (ToDevice::Bye, _) => self.stage = Stage::Ended,
+            (ToDevice::Bye, _) => self.end(),
+            (ToDevice::DropScene, _) => {
+                self.drop_scene();
+                self.answer(Request::DropScene, Ok(()));
+            }
+            (ToDevice::Status, _) => {
+                let status = self.status();
+                self.say(&ToHost::Status(status));
+            }
+            (ToDevice::GetCalibration, _) => {
+                self.say(&ToHost::Calibration(self.desk.calibration()));
+            }
+            (ToDevice::Arm, _) => {
+                self.desk.arm();
+                self.command(Command::Arm);
+            }
+            (ToDevice::Disarm, _) => {
+                self.command(Command::Disarm);
+                self.answer(Request::Disarm, Ok(()));
+            }
+            (ToDevice::ClearFault, _) => {
+                self.command(Command::ClearFault);
+                self.answer(Request::ClearFault, Ok(()));
+            }
+            (ToDevice::Zero { counts }, _) => self.take_zero(counts),
+            (ToDevice::SetCalibration { calibration, store }, _) => {
+                self.take_calibration(&calibration, store);
+            }
         }
+    }
+
+    fn take_zero(&mut self, counts: [i32; 3]) {
+        let result = self.desk.may_change_settings();
+        if result.is_ok() {
+            self.command(Command::Zero(counts));
+        }
+        self.answer(Request::Zero, result);
+    }
+
+    fn take_calibration(&mut self, calibration: &Calibration, store: bool) {
+        let result = self.hand_over(calibration, store);
+        self.answer(Request::SetCalibration, result);
+    }
+
+    /// Checks a calibration and hands it to the loop.
+    fn hand_over(&mut self, calibration: &Calibration, store: bool) -> Result<(), Refusal> {
+        self.desk.may_change_settings()?;
+        let mechanism = Mechanism::new(calibration).map_err(Refusal::Calibration)?;
+        if self.desk.is_storing() {
+            return Err(Refusal::Busy);
+        }
+        let handed_over = self.ends.settings.enqueue(mechanism);
+        handed_over.map_err(|_| Refusal::Busy)?;
+        self.desk.set_calibration(calibration, store);
+        Ok(())
+    }
+
+    fn end(&mut self) {
+        self.drop_scene();
+        self.stage = Stage::Ended;
+    }
+
+    /// The loop fades the force out by itself.
+    fn drop_scene(&mut self) {
+        if self.scene.take().is_some() {
+            self.command(Command::DropScene);
+        }
+        self.focus = None;
+        self.points.clear();
+        self.replay = Replay::default();
+        self.puller.forget_asked();
+    }
+
+    fn status(&self) -> Status {
+        let counts = Counts {
+            bad_frames: self.bad_frames,
+            dropped: self.dropped,
+        };
+        let epoch = self.scene.map(|scene| scene.epoch);
+        self.desk
+            .status(self.ends.vitals, &self.previous.sample, epoch, counts)
+    }
+
+    /// A calibration waits to be stored: see [`Self::stored`].
+    pub(crate) fn to_store(&self) -> Option<Calibration> {
+        self.desk.to_store()
+    }
+
+    /// How storing it went.
+    pub(crate) fn stored(&mut self, result: Result<(), Refusal>) {
+        self.desk.stored(result);
     }
 
     pub(crate) fn on_bad_frame(&mut self, bad: BadFrame) {
@@ -130,11 +221,8 @@ impl<'t, const D: usize> Session<'t, D> {
         let answer = if hello.protocol == PROTOCOL {
             self.stage = Stage::Open;
             log::opened(self.bad_frames);
-            let epoch = self.scene.map(|scene| scene.epoch);
-            ToHost::Hello(DeviceHello {
-                epoch,
-                ..self.hello.clone()
-            })
+            self.desk.opened();
+            ToHost::Hello(self.desk.hello(self.scene.map(|scene| scene.epoch)))
         } else {
             self.stage = Stage::Closed;
             log::refused(hello.protocol);
@@ -208,9 +296,10 @@ impl<'t, const D: usize> Session<'t, D> {
     }
 
     pub(crate) fn turn(&mut self) {
-        self.ends.vitals.turns.fetch_add(1, Ordering::Relaxed);
+        self.ends.vitals.check_in(Part::Link);
         self.reclaim();
         self.collect();
+        self.tell();
         self.feed_points();
         self.ask();
         self.pack();
@@ -239,7 +328,7 @@ impl<'t, const D: usize> Session<'t, D> {
             let Some(record) = self.ends.records.dequeue() else {
                 return;
             };
-            self.focus = Some(follow(&self.previous, &record));
+            self.focus = Some(follow(&self.previous, &record, self.desk.ticks_per_ms()));
             self.previous = record;
             if record.answers.is_some() {
                 self.replay.under_way = None;
@@ -248,6 +337,19 @@ impl<'t, const D: usize> Session<'t, D> {
             } else if self.feels_arm() {
                 self.keep(record);
             }
+        }
+    }
+
+    /// Tells where the loop stands, and what became of requests.
+    fn tell(&mut self) {
+        while let Some(health) = self.ends.healths.dequeue() {
+            self.desk.take(health);
+        }
+        while self.stage == Stage::Open && self.outbox.has_room() {
+            let Some(message) = self.desk.next_to_say() else {
+                return;
+            };
+            self.say(&message);
         }
     }
 
@@ -278,7 +380,7 @@ impl<'t, const D: usize> Session<'t, D> {
             hip: scene.home.column(),
             ..Focus::default()
         });
-        let now = self.ends.vitals.ticks.load(Ordering::Relaxed);
+        let now = self.desk.milliseconds(self.ends.vitals.ticks());
         while self.outbox.has_room() && self.has_buffer_for_another() {
             let Some(key) = self.puller.next_request(now, &focus) else {
                 return;
@@ -309,7 +411,7 @@ impl<'t, const D: usize> Session<'t, D> {
         }
         let first = self.packed;
         self.packed = self.packed.wrapping_add(samples.len() as u32);
-        let lost_by_loop = self.ends.vitals.dropped.load(Ordering::Relaxed);
+        let lost_by_loop = self.ends.vitals.dropped();
         self.outbox.push_telemetry(Telemetry {
             first,
             dropped: self.dropped.wrapping_add(lost_by_loop),
@@ -335,19 +437,34 @@ impl<'t, const D: usize> Session<'t, D> {
     }
 
     pub(crate) fn may_stand_still(&self) -> bool {
-        let Some(scene) = self.scene else {
-            return true;
+        let waits = match &self.scene {
+            None => true,
+            Some(scene) if scene.source == Source::Points => self.replay.under_way.is_none(),
+            Some(scene) if scene.hold_clock && self.puller.in_flight() > 0 => return true,
+            Some(_) => false,
         };
-        let idle = scene.source == Source::Points && self.replay.under_way.is_none();
-        idle || (scene.hold_clock && self.puller.in_flight() > 0)
+        // What was said to the loop is to reach it, and force to go out.
+        waits
+            && self.ends.commands.is_empty()
+            && self.ends.settings.is_empty()
+            && self.desk.is_at_rest()
     }
 
     pub(crate) fn feels_arm(&self) -> bool {
         self.scene.is_some_and(|s| s.source == Source::Encoders)
     }
 
+    pub(crate) fn drives_arm(&self) -> bool {
+        self.feels_arm() || self.desk.drives()
+    }
+
     pub(crate) fn has_ended(&self) -> bool {
-        self.stage == Stage::Ended && self.backlog.is_empty() && self.outbox.is_empty()
+        let said = self.backlog.is_empty() && self.outbox.is_empty();
+        self.stage == Stage::Ended && said && !self.desk.drives()
+    }
+
+    fn answer(&mut self, request: Request, result: Result<(), Refusal>) {
+        self.say(&ToHost::Answer(Answer { request, result }));
     }
 
     fn command(&mut self, command: Command<'t>) {

@@ -7,6 +7,8 @@ use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::signal::Signal;
 use embedded_io_async::{Read, Write};
+use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::status::Refusal;
 
 use super::Link;
 
@@ -20,6 +22,12 @@ pub trait LinkHost {
 
     /// Called after every turn, with the link as it then stands.
     fn after_turn<const D: usize>(&self, link: &Link<'_, D>);
+
+    /// Stores a calibration in the board's memory. The watchdog goes on
+    /// watching: what takes long has to wait, not to block.
+    fn store(&self, _calibration: &Calibration) -> impl Future<Output = Result<(), Refusal>> {
+        core::future::ready(Err(Refusal::NoMemory))
+    }
 }
 
 /// Serves the link for ever.
@@ -59,6 +67,11 @@ pub async fn run<const D: usize>(
         let mut chunk = [0; CHUNK];
         loop {
             select(board.tick_done(), work.wait()).await;
+            let to_store = link.borrow().to_store();
+            if let Some(calibration) = to_store {
+                let result = board.store(&calibration).await;
+                link.borrow_mut().stored(result);
+            }
             loop {
                 link.borrow_mut().turn();
                 board.after_turn(&**link.borrow());

@@ -12,7 +12,8 @@ use super::input::{Input, Reading};
 use super::report::{self, Report};
 use super::{Failure, interrupt};
 use crate::link::{
-    Emulator, Event, HostClock, LinkError, Native, Patience, Session, Transport, serve_plant,
+    Arming, Emulator, Event, HostClock, LinkError, Native, Patience, Session, Transport,
+    serve_plant,
 };
 use crate::live::{Figures, Stage, StageError, suggest};
 use crate::output::Output;
@@ -187,11 +188,15 @@ fn emulated(args: &Args, stage: &Stage<'_>, mut rig: Rig, stop_s: f64) -> Result
             }
         });
         let felt = feel(stage, Box::new(link), Patience::EMULATED, stop_s);
-        done.store(true, std::sync::atomic::Ordering::Relaxed);
+        let stop = || done.store(true, std::sync::atomic::Ordering::Relaxed);
         if let Err(error) = felt {
+            stop();
             return Err(explain_emulated(error, emulator));
         }
-        let status = emulator.finish().map_err(Failure::new)?;
+        // The arm is still there while the board lets its force go out.
+        let status = emulator.finish();
+        stop();
+        let status = status.map_err(Failure::new)?;
         if !status.success() {
             return Err(
                 Failure::new(format!("the emulated board ended with {status}"))
@@ -220,7 +225,8 @@ fn feel(
     stop_s: f64,
 ) -> Result<Felt, LinkError> {
     let terrain = stage.terrain();
-    let (mut session, device) = Session::open(terrain, stage.scene(), transport, patience)?;
+    let (mut session, device) =
+        Session::open_arming(terrain, stage.scene(), Arming::VIRTUAL, transport, patience)?;
     println!("device         {}", report::device(&device));
     let stop_tick = (stop_s * f64::from(device.tick_hz)).ceil() as u32;
     let progress = report::progress(u64::from(stop_tick));

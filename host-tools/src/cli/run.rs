@@ -2,7 +2,7 @@
 
 use std::io::IsTerminal;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use clap::ValueHint;
@@ -15,7 +15,7 @@ use super::input::Input;
 use super::report::{self, Report};
 use super::{Failure, interrupt};
 use crate::link::{
-    Event, HostClock, LinkError, Native, Patience, Session, Target, Tcp, Transport, Usb,
+    Arming, Event, HostClock, LinkError, Native, Patience, Session, Target, Tcp, Transport, Usb,
     serve_plant,
 };
 use crate::live::{Figures, Stage, Timeline};
@@ -25,6 +25,8 @@ use crate::replay::{Record, Recording, state_name};
 
 /// Between two tries to find a device that is gone.
 const RETRY: Duration = Duration::from_millis(500);
+/// For how long the virtual arm stays after the session has ended.
+const LINGER: Duration = Duration::from_secs(2);
 /// Between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(2);
 
@@ -82,19 +84,21 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return serve(args, &stage);
     };
     let rig = stage.rig().map_err(Failure::new)?;
-    let done = AtomicBool::new(false);
+    let done = OnceLock::new();
     std::thread::scope(|scope| {
         scope.spawn(|| move_arm(address, rig, &done));
         let served = serve(args, &stage);
-        done.store(true, Ordering::Relaxed);
+        // The arm is still there while the board lets its force go out.
+        let _ = done.set(Instant::now() + LINGER);
         served
     })
 }
 
-/// The virtual Phantom at a board's plant line, which may come and go.
-fn move_arm(address: &str, mut rig: Rig, done: &AtomicBool) {
-    let stop = || done.load(Ordering::Relaxed);
-    while !stop() {
+/// The virtual Phantom at a board's plant line, which may come and go; until
+/// the line ends after the session has, or the time that `done` names.
+fn move_arm(address: &str, mut rig: Rig, done: &OnceLock<Instant>) {
+    let stop = || done.get().is_some_and(|by| Instant::now() >= *by);
+    while done.get().is_none() {
         let ended = Tcp::connect(address)
             .map_err(|error| error.to_string())
             .and_then(|mut line| {
@@ -109,9 +113,16 @@ fn move_arm(address: &str, mut rig: Rig, done: &AtomicBool) {
 
 fn serve(args: &Args, stage: &Stage<'_>) -> Result<(), Failure> {
     let transport = connect(args, stage)?;
-    let opened = Session::open(
+    // A virtual arm was switched on in its zero pose; where a real one was,
+    // its user has to say.
+    let arming = match args.plant.is_some() || args.device == Target::Native {
+        true => Arming::VIRTUAL,
+        false => Arming::default(),
+    };
+    let opened = Session::open_arming(
         stage.terrain(),
         stage.scene(),
+        arming,
         transport,
         Patience::REAL_TIME,
     );

@@ -1,9 +1,12 @@
 //! The host's side of the conversation, without I/O.
 
+use hapterra_core::guard::Report;
+use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::message::{
     DeviceHello, HostHello, PROTOCOL, Sample, Scene, TileMessage, ToDevice, ToHost,
 };
+use hapterra_core::wire::status::{Answer, Status};
 
 use super::{LinkError, Tally};
 use crate::terrain::{Terrain, TileBuffer};
@@ -28,6 +31,28 @@ pub enum Event<'e> {
         /// What was felt.
         sample: &'e Sample,
     },
+    /// Where the device's guard stands; told at the beginning of a session and
+    /// whenever it changes.
+    Guard(&'e Report),
+    /// The answer to a question for the status.
+    Status(&'e Status),
+    /// The calibration in force.
+    Calibration(Option<&'e Calibration>),
+    /// The answer to a request.
+    Answer(&'e Answer),
+}
+
+/// How a session arms the device, in the same breath as it puts the scene in
+/// force.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Arming {
+    /// What the encoders read in the zero pose, where the host knows.
+    pub zero: Option<[i32; 3]>,
+}
+
+impl Arming {
+    /// For a virtual Phantom, which was switched on in its zero pose.
+    pub const VIRTUAL: Self = Self { zero: Some([0; 3]) };
 }
 
 /// Where the conversation stands. What does not belong to the stage is a
@@ -48,6 +73,7 @@ enum Stage {
 pub struct Client<'t> {
     terrain: &'t Terrain<'t>,
     scene: Scene,
+    arming: Option<Arming>,
     reader: Box<FrameReader<MAX_FRAME>>,
     frame: Box<[u8; MAX_FRAME]>,
     tile: TileBuffer,
@@ -64,6 +90,7 @@ impl<'t> Client<'t> {
         Self {
             terrain,
             scene,
+            arming: None,
             reader: Box::default(),
             frame: Box::new([0; MAX_FRAME]),
             tile: TileBuffer::default(),
@@ -71,6 +98,13 @@ impl<'t> Client<'t> {
             stage: Stage::Settled,
             tally: Tally::default(),
         }
+    }
+
+    /// The same client, arming the device at the beginning of each session.
+    #[must_use]
+    pub fn arming(mut self, arming: Arming) -> Self {
+        self.arming = Some(arming);
+        self
     }
 
     /// The scene that is served.
@@ -140,6 +174,7 @@ impl<'t> Client<'t> {
                 self.device = Some(device);
                 self.stage = Stage::Placed;
                 self.say(&ToDevice::Scene(self.scene), out);
+                self.say_arming(out);
             }
             ToHost::SceneTaken { epoch, accepted }
                 if epoch == self.scene.epoch && self.stage == Stage::Placed =>
@@ -157,10 +192,24 @@ impl<'t> Client<'t> {
                 seq,
                 sample: &sample,
             }),
+            ToHost::Guard(report) => on(Event::Guard(&report)),
+            ToHost::Status(status) => on(Event::Status(&status)),
+            ToHost::Calibration(calibration) => on(Event::Calibration(calibration.as_ref())),
+            ToHost::Answer(answer) => on(Event::Answer(&answer)),
             // Of an earlier session, or said twice.
             ToHost::Hello(_) | ToHost::SceneTaken { .. } | ToHost::Need { .. } => {}
         }
         Ok(())
+    }
+
+    fn say_arming(&mut self, out: &mut Vec<u8>) {
+        let Some(arming) = self.arming else {
+            return;
+        };
+        if let Some(counts) = arming.zero {
+            self.say(&ToDevice::Zero { counts }, out);
+        }
+        self.say(&ToDevice::Arm, out);
     }
 
     fn on_scene_taken(

@@ -24,13 +24,13 @@ mod transport;
 mod usb;
 
 pub use bulk::{Bulk, BulkEndpoints, Pipes, is_hapterra};
-pub use client::{Client, Event};
+pub use client::{Arming, Client, Event};
 pub use emulator::{
     Emulator, EmulatorError, IMAGE_VARIABLE, INSTRUCTIONS_PER_COUNT, Lines, QEMU, QEMU_VARIABLE,
 };
 pub use error::LinkError;
 pub use inquiry::ask_who;
-pub use native::{HostClock, Native};
+pub use native::{HostClock, Meddler, Native};
 pub use plant::{PlantLine, serve_plant};
 pub use session::{Patience, Session};
 pub use tally::Tally;

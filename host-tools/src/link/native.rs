@@ -4,18 +4,19 @@ use std::collections::VecDeque;
 use std::io;
 use std::time::{Duration, Instant};
 
+use hapterra_core::guard::{Drive, Sense};
 use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::board::TickClock;
 use hapterra_firmware::channels::{Channels, Tiles};
 use hapterra_firmware::native::{Device, StoppedClock};
+use hapterra_firmware::store::Stored;
 
 use super::Transport;
 use crate::phantom::Rig;
 
 /// Tiles along the side of the window, as on the emulated board.
 const WINDOW: usize = 16;
-/// Seconds between two ticks.
-const TICK_S: f64 = 1e-3;
 /// Ticks run while waiting for the device to say something, at most.
 const TICKS_A_CALL: u32 = 1000;
 
@@ -52,14 +53,23 @@ impl TickClock for HostClock {
 /// A device in memory, in lock-step: its time passes while the host waits for
 /// it to say something, and only as long as it waits for nothing itself.
 ///
-/// Without a rig the arm rests in its home pose.
+/// Without a rig the arm rests in its home pose, and nobody holds the
+/// dead-man switch.
 pub struct Native<C: TickClock = StoppedClock> {
     device: Device<C, WINDOW>,
     rig: Option<Box<Rig>>,
-    counts: [i32; 3],
+    sense: Sense,
+    drive: Drive,
+    meddler: Option<Meddler>,
+    ticks: u64,
     /// What the device said while it was told something.
     pending: VecDeque<u8>,
 }
+
+/// Stands between arm and device: is told the number of the next tick and what
+/// the amplifiers got in the last one, and may change what encoders and
+/// switches say. How tests make things go wrong, and see what comes of it.
+pub type Meddler = Box<dyn FnMut(u64, &mut Sense, &Drive)>;
 
 impl Native<StoppedClock> {
     /// A device to replay trajectories on: no tick takes any time.
@@ -70,19 +80,58 @@ impl Native<StoppedClock> {
 }
 
 impl<C: TickClock> Native<C> {
-    /// A device whose arm is `rig`.
+    /// A device whose arm is `rig`, a Premium 1.5, with that calibration in
+    /// its memory.
     #[must_use]
     pub fn new(clock: C, rig: Option<Box<Rig>>) -> Self {
+        let stored = Stored::Found(Calibration::PREMIUM_1_5);
+        Self::started(clock, rig, stored, BootReport::default())
+    }
+
+    /// A device that finds this in its memory, and this about its start.
+    #[must_use]
+    pub fn started(clock: C, rig: Option<Box<Rig>>, stored: Stored, boot: BootReport) -> Self {
         // The two halves of the application hand tile buffers to each other by
         // reference, for as long as the program runs.
         let tiles = Box::leak(Box::new(Tiles::new()));
         let channels = Box::leak(Box::new(Channels::new()));
-        Self {
-            device: Device::new(tiles, channels, clock, Calibration::PREMIUM_1_5),
-            counts: rig.as_ref().map_or([0; 3], |rig| rig.counts()),
+        let mut native = Self {
+            device: Device::new(tiles, channels, clock, stored, boot),
             rig,
+            sense: Sense::default(),
+            drive: Drive::default(),
+            meddler: None,
+            ticks: 0,
             pending: VecDeque::new(),
-        }
+        };
+        native.feel_arm();
+        native
+    }
+
+    /// The same device with something between it and its arm.
+    #[must_use]
+    pub fn meddled_with(mut self, meddler: Meddler) -> Self {
+        self.meddler = Some(meddler);
+        self.meddle();
+        self
+    }
+
+    /// The arm.
+    #[must_use]
+    pub fn rig(&self) -> Option<&Rig> {
+        self.rig.as_deref()
+    }
+
+    /// What the amplifiers got in the last tick.
+    #[must_use]
+    pub const fn drive(&self) -> Drive {
+        self.drive
+    }
+
+    /// What the device would find in its memory if it were restarted now.
+    #[must_use]
+    pub const fn memory(&self) -> &Stored {
+        self.device.memory()
     }
 
     /// Lets time pass while nobody listens, as a board does whose host is gone.
@@ -93,13 +142,26 @@ impl<C: TickClock> Native<C> {
     }
 
     fn tick(&mut self) {
-        let drive = self.device.tick(self.counts);
-        if !self.device.feels_arm() {
-            return;
+        self.drive = self.device.tick(self.sense);
+        self.ticks += 1;
+        if let Some(rig) = self.rig.as_mut().filter(|_| self.device.drives_arm()) {
+            let currents_a = self.drive.currents_a.to_array().map(f64::from);
+            rig.step(currents_a, f64::from(C::PERIOD) / f64::from(C::HZ));
         }
-        if let Some(rig) = &mut self.rig {
-            let currents_a = drive.currents_a.to_array().map(f64::from);
-            self.counts = rig.step(currents_a, TICK_S);
+        self.feel_arm();
+        self.meddle();
+    }
+
+    /// What encoders and switches say now.
+    fn feel_arm(&mut self) {
+        if let Some(rig) = &self.rig {
+            self.sense = rig.sense();
+        }
+    }
+
+    fn meddle(&mut self) {
+        if let Some(meddler) = &mut self.meddler {
+            meddler(self.ticks, &mut self.sense, &self.drive);
         }
     }
 

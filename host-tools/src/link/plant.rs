@@ -1,19 +1,17 @@
-//! The virtual Phantom at the emulated board's second line: encoder counts in,
-//! motor currents out, one exchange a tick.
+//! The virtual Phantom at the emulated board's second line: encoders and
+//! switches in, motor currents out, one exchange a tick.
 
 use std::io;
 use std::time::Duration;
 
 use hapterra_core::wire::frame::{FrameReader, decode, encode};
-use hapterra_core::wire::plant::{Counts, Currents};
+use hapterra_core::wire::plant::{Currents, Sensed};
 
 use super::Transport;
 use crate::phantom::Rig;
 
 /// Longest frame on this line.
 const FRAME: usize = 64;
-/// Seconds between two ticks.
-const TICK_S: f64 = 1e-3;
 
 /// One end of the plant's line.
 pub struct PlantLine<'a> {
@@ -36,13 +34,13 @@ impl<'a> PlantLine<'a> {
         }
     }
 
-    /// Tells the board what the encoders read at a tick.
+    /// Tells the board what encoders and switches say at a tick.
     ///
     /// # Errors
     /// When the board is gone.
-    pub fn tell(&mut self, counts: &Counts) -> io::Result<()> {
+    pub fn tell(&mut self, sensed: &Sensed) -> io::Result<()> {
         let mut frame = [0; FRAME];
-        let bytes = encode(counts, &mut frame).unwrap_or(&[]); // 64 bytes hold it
+        let bytes = encode(sensed, &mut frame).unwrap_or(&[]); // 64 bytes hold it
         self.transport.send(bytes)
     }
 
@@ -81,9 +79,9 @@ pub fn serve_plant(
 ) -> io::Result<()> {
     let mut line = PlantLine::new(transport);
     let mut tick = 0;
-    let mut counts = rig.counts();
     while !stop() {
-        line.tell(&Counts { tick, counts })?;
+        let sense = rig.sense();
+        line.tell(&Sensed { tick, sense })?;
         let currents = loop {
             if let Some(currents) = line.currents(Duration::from_millis(100))? {
                 break currents;
@@ -96,7 +94,8 @@ pub fn serve_plant(
         if currents.tick != tick && !currents.enabled {
             return Err(io::Error::other("the board has failed"));
         }
-        counts = rig.step(currents.currents_a.map(f64::from), TICK_S);
+        let tick_s = f64::from(currents.tick_ns) / 1e9;
+        rig.step(currents.currents_a.map(f64::from), tick_s);
         tick = tick.wrapping_add(1);
     }
     Ok(())

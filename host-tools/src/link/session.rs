@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use hapterra_core::wire::message::{DeviceHello, Scene, ToDevice};
 
-use super::{Client, Event, LinkError, Tally, Transport};
+use super::{Arming, Client, Event, LinkError, Tally, Transport};
 use crate::terrain::Terrain;
 
 /// How long a device may be quiet.
@@ -53,9 +53,32 @@ impl<'t> Session<'t> {
         transport: Box<dyn Transport + 't>,
         patience: Patience,
     ) -> Result<(Self, DeviceHello), LinkError> {
+        Self::open_with(Client::new(terrain, scene), transport, patience)
+    }
+
+    /// As [`Session::open`], and asks the device to arm.
+    ///
+    /// # Errors
+    /// As [`Session::open`].
+    pub fn open_arming(
+        terrain: &'t Terrain<'t>,
+        scene: Scene,
+        arming: Arming,
+        transport: Box<dyn Transport + 't>,
+        patience: Patience,
+    ) -> Result<(Self, DeviceHello), LinkError> {
+        let client = Client::new(terrain, scene).arming(arming);
+        Self::open_with(client, transport, patience)
+    }
+
+    fn open_with(
+        client: Client<'t>,
+        transport: Box<dyn Transport + 't>,
+        patience: Patience,
+    ) -> Result<(Self, DeviceHello), LinkError> {
         let now = Instant::now();
         let mut session = Self {
-            client: Client::new(terrain, scene),
+            client,
             transport,
             patience,
             heard: now,

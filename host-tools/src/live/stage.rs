@@ -82,23 +82,20 @@ impl<'t> Stage<'t> {
             .scene(self.law, self.rule, Source::Encoders, self.home)
     }
 
-    /// The virtual Phantom with the hand on it, at the beginning of its tour.
+    /// The virtual Phantom with the hand on it, at the beginning of its tour;
+    /// it lets the device arm first.
     ///
     /// # Errors
     /// [`StageError::OutOfReach`].
     pub fn rig(&self) -> Result<Rig, StageError> {
         let script = self.tour.script.clone();
-        Ok(Rig::new(
-            self.model,
-            self.hand,
-            self.tour.placement,
-            script,
-        )?)
+        let rig = Rig::new(self.model, self.hand, self.tour.placement, script)?;
+        Ok(rig.arming())
     }
 
-    /// How long the tour takes with a rest at its end, s.
+    /// How long the tour takes with arming before it and a rest at its end, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
-        self.tour.script.duration_s() + REST_S
+        Rig::ARMED_S + self.tour.script.duration_s() + REST_S
     }
 }

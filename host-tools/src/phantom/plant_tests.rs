@@ -90,12 +90,13 @@ fn a_loaded_arm_under_its_friction_does_not_creep() {
 /// The firmware's own kinematics, f32 and from counts, see the arm where it is.
 #[test]
 fn the_firmware_reads_the_counts_as_the_plant_means_them() {
-    use hapterra_core::phantom::{Calibration, Pose as DevicePose};
+    use hapterra_core::phantom::{Calibration, Mechanism};
+    let device = Mechanism::new(&Calibration::PREMIUM_1_5).expect("valid");
     for joint in 0..60 {
         let turn = f64::from(joint) / 10.0;
         let q = [0.8 * turn.sin(), 0.5 * turn.cos(), 0.4 * (2.0 * turn).sin()];
         let plant = Plant::new(premium(), q);
-        let pose = DevicePose::from_counts(&Calibration::PREMIUM_1_5, plant.counts());
+        let pose = device.pose(plant.counts(), [0; 3]);
         let seen = pose.tip_mm().as_dvec3() * 1e-3;
         let off = seen.distance(DVec3::from(plant.tip_m()));
         // Half a count of each axis: 12, 15 and 12 µm at home, more stretched out.

@@ -1,7 +1,16 @@
 //! The whole outside world of a device in one object: a Phantom, a hand that
 //! follows a script, and where the terrain lies in front of them.
 
+use hapterra_core::guard::Sense;
+
 use super::{HandModel, PhantomModel, Placement, Plant, Script, kinematics};
+
+/// When a hand that waits for the arm to be armed presses the dead-man switch,
+/// s.
+const PRESS_S: f64 = 0.5;
+/// When its script begins: after the device has confirmed and force has come
+/// in, s.
+const ARMED_S: f64 = 3.0;
 
 /// A scripted hand on a virtual Phantom over a placed terrain.
 #[derive(Clone, Debug)]
@@ -9,6 +18,8 @@ pub struct Rig {
     plant: Plant,
     placement: Placement,
     script: Script,
+    /// When the script begins, s.
+    begin_s: f64,
     t_s: f64,
 }
 
@@ -52,14 +63,44 @@ impl Rig {
             plant: Plant::new(model, q).held_by(hand),
             placement,
             script,
+            begin_s: 0.0,
             t_s: 0.0,
         })
+    }
+
+    /// The same hand, first letting the device arm: it rests at the script's
+    /// first point, presses the dead-man switch after half a second, holds it
+    /// from then on, and begins its script [`Self::begin_s`] after the start.
+    #[must_use]
+    pub fn arming(mut self) -> Self {
+        self.begin_s = ARMED_S;
+        self
+    }
+
+    /// When the script begins, s.
+    #[must_use]
+    pub fn begin_s(&self) -> f64 {
+        self.begin_s
+    }
+
+    /// When a script begins whose hand lets the device arm first, s.
+    pub const ARMED_S: f64 = ARMED_S;
+
+    /// What encoders and switches say now.
+    #[must_use]
+    pub fn sense(&self) -> Sense {
+        Sense {
+            counts: self.plant.counts(),
+            dead_man: self.begin_s > 0.0 && self.t_s >= PRESS_S,
+            emergency_stop: false,
+            hardware_failed: false,
+        }
     }
 
     /// Applies current commands (A) for `dt_s` seconds while the hand follows
     /// its script, and reads the encoders at the end.
     pub fn step(&mut self, currents_a: [f64; 3], dt_s: f64) -> [i32; 3] {
-        let target = self.script.target(self.t_s);
+        let target = self.script.target(self.t_s - self.begin_s);
         let at_m = self
             .placement
             .to_device_m(self.plant.model(), target.position_mm);
@@ -84,7 +125,7 @@ impl Rig {
     /// Whether the script has come to its end.
     #[must_use]
     pub fn finished(&self) -> bool {
-        self.t_s >= self.script.duration_s()
+        self.t_s >= self.begin_s + self.script.duration_s()
     }
 
     /// True tip position, mm, terrain frame.

@@ -89,7 +89,12 @@ impl<'t> Replayer<'t> {
                 .poll(Duration::from_millis(100), &mut |event| match event {
                     Event::Felt { seq, sample } if seq == expected => answer = Some(*sample),
                     Event::Opened { resumed, .. } => opened_again = Some(resumed),
-                    Event::Felt { .. } | Event::Sample(_) => {}
+                    Event::Felt { .. }
+                    | Event::Sample(_)
+                    | Event::Guard(_)
+                    | Event::Status(_)
+                    | Event::Calibration(_)
+                    | Event::Answer(_) => {}
                 })?;
             match opened_again {
                 Some(false) => return Err(LinkError::Restarted),

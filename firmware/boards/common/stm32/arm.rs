@@ -3,7 +3,6 @@
 use embassy_stm32::gpio::Input;
 use embassy_stm32::timer::GeneralInstance4Channel;
 use embassy_stm32::timer::qei::Qei;
-use hapterra_core::guard::Fault;
 use hapterra_firmware::board::{Encoders, Sense};
 use hapterra_firmware::encoder::Unwrapped;
 
@@ -27,15 +26,6 @@ pub(crate) struct SafetyInputs {
     pub(crate) emergency_stop: Input<'static>,
     /// Closed while held: high when released, and when the wire is broken.
     pub(crate) dead_man: Input<'static>,
-}
-
-impl SafetyInputs {
-    fn fault(&self) -> Option<Fault> {
-        if self.emergency_stop.is_high() {
-            return Some(Fault::EmergencyStop);
-        }
-        self.dead_man.is_high().then_some(Fault::DeadManReleased)
-    }
 }
 
 /// Axes 1 to 3, each on its own timer.
@@ -65,7 +55,9 @@ impl<A: Counter, B: Counter, C: Counter> Encoders for Arm<A, B, C> {
                 y.follow(b.count()),
                 z.follow(c.count()),
             ],
-            fault: self.inputs.fault(),
+            dead_man: self.inputs.dead_man.is_low(),
+            emergency_stop: self.inputs.emergency_stop.is_high(),
+            hardware_failed: false,
         }
     }
 }

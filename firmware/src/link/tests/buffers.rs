@@ -7,6 +7,7 @@ use hapterra_core::terrain::{Tile, TileKey};
 use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::{FrameReader, decode};
 use hapterra_core::wire::message::{PROTOCOL, Source, ToDevice, ToHost};
+use hapterra_core::wire::status::BootReport;
 
 use super::rig::{D, frame, hello, scene, tile};
 use crate::channels::{Channels, Record, SPARES, Tiles};
@@ -18,7 +19,7 @@ use crate::native::StoppedClock;
 fn link() -> (Link<'static, D>, LoopEnds<'static>) {
     let tiles = Box::leak(Box::new(Tiles::<D>::new()));
     let (loop_ends, link_ends, buffers) = Box::leak(Box::new(Channels::new())).split();
-    let identity = Identity::new::<StoppedClock>("test");
+    let identity = Identity::new::<StoppedClock>("test", BootReport::default(), None);
     let mut link = Link::new(identity, tiles.split().1, link_ends, buffers);
     let scene = scene(Source::Encoders);
     for message in [hello(PROTOCOL), frame(&ToDevice::Scene(scene))] {

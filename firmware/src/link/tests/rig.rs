@@ -8,6 +8,7 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
+use hapterra_core::guard::{Mode, Report, Sense};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
@@ -15,20 +16,26 @@ use hapterra_core::wire::message::{
     Heights, HostHello, PROTOCOL, Point, Sample, Scene, Source, Telemetry, TileMessage, ToDevice,
     ToHost,
 };
+use hapterra_core::wire::status::{Answer, BootReport, Refusal, Request, Status};
 
 use crate::channels::{Channels, Tiles};
 use crate::native::{Device, StoppedClock};
+use crate::store::Stored;
 
 /// Tiles along the window's side in these tests.
 pub(super) const D: usize = 4;
 
+/// What a host of this protocol says first.
+pub(super) const HELLO: HostHello = HostHello { protocol: PROTOCOL };
+
 /// A device without a host. Its memory is leaked, as a board's is never freed.
-pub(super) fn device() -> Device<StoppedClock, D> {
+fn device(stored: Stored, boot: BootReport) -> Device<StoppedClock, D> {
     Device::new(
         Box::leak(Box::new(Tiles::new())),
         Box::leak(Box::new(Channels::new())),
         StoppedClock,
-        Calibration::PREMIUM_1_5,
+        stored,
+        boot,
     )
 }
 
@@ -88,21 +95,27 @@ pub(super) struct Rig {
     pub(super) answers_tiles: bool,
     /// What the answer to a tile becomes on the way.
     pub(super) damage: fn(&mut Vec<u8>),
-    pub(super) counts: [i32; 3],
+    pub(super) sense: Sense,
 }
 
 impl Rig {
     /// A host that has not said anything yet.
     pub(super) fn new() -> Self {
+        let stored = Stored::Found(Calibration::PREMIUM_1_5);
+        Self::started(stored, BootReport::default())
+    }
+
+    /// The same, with a device that started like this.
+    pub(super) fn started(stored: Stored, boot: BootReport) -> Self {
         Self {
-            device: device(),
+            device: device(stored, boot),
             reader: Box::new(FrameReader::new()),
             on_the_way: VecDeque::new(),
             writer: usize::MAX,
             heard: Vec::new(),
             answers_tiles: true,
             damage: |_| {},
-            counts: [0; 3],
+            sense: Sense::default(),
         }
     }
 
@@ -127,6 +140,28 @@ impl Rig {
         rig
     }
 
+    /// A session in a scene felt through the arm, armed.
+    pub(super) fn armed() -> Self {
+        let mut rig = Self::in_scene(scene(Source::Encoders));
+        rig.arm();
+        rig
+    }
+
+    /// Arms as a user does.
+    pub(super) fn arm(&mut self) {
+        self.sense.dead_man = false;
+        self.say(&ToDevice::Zero { counts: [0; 3] });
+        self.say(&ToDevice::Arm);
+        self.run(10);
+        self.sense.dead_man = true;
+        self.run(2_300);
+        assert_eq!(self.report().map(|r| r.mode), Some(Mode::Armed));
+    }
+
+    pub(super) fn say(&mut self, message: &ToDevice<'_>) {
+        self.send(&frame(message));
+    }
+
     pub(super) fn send(&mut self, bytes: &[u8]) {
         self.on_the_way.extend(bytes);
     }
@@ -138,7 +173,7 @@ impl Rig {
             self.listen();
             self.deliver();
             if !self.device.may_stand_still() {
-                self.device.tick(self.counts);
+                self.device.tick(self.sense);
             }
         }
     }
@@ -213,6 +248,35 @@ impl Rig {
             _ => None,
         };
         self.heard.iter().filter_map(telemetry).collect()
+    }
+
+    /// What was last told of the guard.
+    pub(super) fn report(&self) -> Option<Report> {
+        let guard = |m: &ToHost| match m {
+            ToHost::Guard(report) => Some(*report),
+            _ => None,
+        };
+        self.heard.iter().rev().find_map(guard)
+    }
+
+    /// The answers so far to a kind of request.
+    pub(super) fn answers(&self, to: Request) -> Vec<Result<(), Refusal>> {
+        let answer = |m: &ToHost| match m {
+            ToHost::Answer(Answer { request, result }) if *request == to => Some(*result),
+            _ => None,
+        };
+        self.heard.iter().filter_map(answer).collect()
+    }
+
+    /// Asks for the status.
+    pub(super) fn status(&mut self) -> Status {
+        self.say(&ToDevice::Status);
+        self.run(1);
+        let status = |m: &ToHost| match m {
+            ToHost::Status(status) => Some(status.clone()),
+            _ => None,
+        };
+        self.heard.iter().rev().find_map(status).expect("answered")
     }
 
     /// Points from above down into the plane, fed one by one, as felt.

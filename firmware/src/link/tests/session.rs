@@ -3,7 +3,7 @@
 use std::vec::Vec;
 
 use hapterra_core::contact::State;
-use hapterra_core::guard::Fault;
+use hapterra_core::guard::{Fault, Limits};
 use hapterra_core::wire::message::{PROTOCOL, Sample, Scene, Source, Telemetry, ToDevice, ToHost};
 
 use super::rig::{D, Rig, frame, hello, point, scene};
@@ -14,7 +14,7 @@ fn introduces_itself() {
     let mut rig = Rig::new();
     rig.send(&hello(PROTOCOL));
     rig.run(1);
-    let [ToHost::Hello(device)] = &rig.heard[..] else {
+    let [ToHost::Hello(device), ToHost::Guard(_)] = &rig.heard[..] else {
         panic!("{:?}", rig.heard);
     };
     assert_eq!((device.board.as_str(), device.epoch), ("native", None));
@@ -104,21 +104,6 @@ fn time_may_stand_still_while_a_tile_is_owed_only_if_the_scene_says_so() {
 }
 
 #[test]
-fn a_fault_is_latched_reported_and_cleared_on_request() {
-    let mut rig = Rig::in_scene(scene(Source::Encoders));
-    rig.run(20);
-    rig.counts = [5000, 0, 0];
-    rig.run(20);
-    let last = |rig: &Rig| rig.telemetry().last().unwrap().samples[7].fault;
-    assert_eq!(last(&rig), Some(Fault::EncoderJump));
-    assert!(!rig.device.tick(rig.counts).enabled);
-    rig.send(&frame(&ToDevice::ClearFault));
-    rig.run(30);
-    assert_eq!(last(&rig), None);
-    assert!(rig.device.tick(rig.counts).enabled);
-}
-
-#[test]
 fn goodbye_comes_after_everything_was_said() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.run(21);
@@ -137,6 +122,7 @@ fn the_longest_messages_fit_their_places() {
         tick: u32::MAX,
         held_up_by: Some([i32::MIN; 2]),
         fault: Some(Fault::Hardware),
+        limits: Limits::all(),
         work: u32::MAX,
         cost: u32::MAX,
         worst_cost: u32::MAX,

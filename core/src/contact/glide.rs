@@ -1,0 +1,138 @@
+//! The proxy's way over gentle ground: from patch to patch, where the squared
+//! distance is convex in each.
+//!
+//! A convex distance has one minimum in a patch, and a point of an edge from
+//! which downhill leads out of the patch is that minimum. So the way that
+//! [`super::descent`] would search is known: to the edge, across it, and on; or
+//! to rest on the edge where downhill leads back from the other side, too.
+//! Wherever that is not certain the general search decides.
+
+use glam::Vec3;
+
+use super::descent::leaves;
+use super::patch::Patch;
+use super::spot::{Hand, Spot, is_inside};
+use super::track::Track;
+use crate::terrain::{Ground, Window};
+
+/// Patches entered at most in one tick.
+pub(super) const HOPS: u32 = 4;
+/// Slope of half the squared distance, in cells, below which it is not certain
+/// which way is downhill.
+const LEVEL: f32 = 1e-5;
+
+/// Where a way over gentle ground ends.
+pub(super) struct Rest {
+    pub(super) track: Track,
+    /// From the hand to the proxy, cells.
+    pub(super) stretch: Vec3,
+    /// Patches entered.
+    pub(super) hops: u32,
+}
+
+/// Moves a proxy to where it rests now; `None` where it takes the general search
+/// to tell.
+#[inline(never)]
+pub(super) fn glide<const D: usize>(
+    window: &Window<'_, D>,
+    hand: &Hand,
+    from: &Track,
+) -> Option<Rest> {
+    let mut track = *from;
+    let mut patch = track.seen_by(hand);
+    if leaves(window, hand, &track.spot, &patch) {
+        return None;
+    }
+    for hops in 0..HOPS {
+        let cell = track.spot.cell;
+        let (p, q) = hand.in_patch(cell);
+        let to = track.closest(&patch, (p, q))?;
+        let (u, v) = (p + to.x, q + to.y);
+        let rests = |spot: Spot, stretch: Vec3| Rest {
+            track: track.at(spot),
+            stretch,
+            hops,
+        };
+        if is_inside(u) && is_inside(v) {
+            let certain = track.is_convex(to.z) || track.is_convex_between(to.z, (u, v));
+            return (to.z >= 0.0 && certain).then(|| rests(Spot { cell, u, v }, to));
+        }
+        let edge = Edge::toward(u, v)?;
+        let at = edge.closest(&patch, (p, q), cell)?;
+        let z = patch.height(at.u, at.v);
+        if !(z >= 0.0 && track.is_convex(z) && edge.slope(&patch, &at, (p, q)) < -LEVEL) {
+            return None;
+        }
+        let entry = at.across(edge.shift());
+        let Ground::Patch(corners) = window.ground(entry.cell) else {
+            return None;
+        };
+        let beyond = Track::new(&corners, track.over, entry)?;
+        let (next, hand_there) = (beyond.seen_by(hand), hand.in_patch(entry.cell));
+        let slope = edge.slope(&next, &entry, hand_there);
+        if slope > LEVEL {
+            return Some(rests(at, Vec3::new(at.u - p, at.v - q, z)));
+        }
+        let goes_on = slope < -LEVEL;
+        if !goes_on || leaves(window, hand, &entry, &next) {
+            return None;
+        }
+        (track, patch) = (beyond, next);
+    }
+    None
+}
+
+/// One of a patch's four edges.
+#[derive(Clone, Copy)]
+struct Edge {
+    /// Whether it runs north, at `place` of the way east.
+    runs_north: bool,
+    /// 0 or 1.
+    place: f32,
+}
+
+impl Edge {
+    /// The edge that a point beyond it, and beyond no other, lies beyond.
+    fn toward(u: f32, v: f32) -> Option<Self> {
+        let (runs_north, beyond) = match (is_inside(u), is_inside(v)) {
+            (false, true) => (true, u),
+            (true, false) => (false, v),
+            _ => return None,
+        };
+        let place = if beyond > 0.5 { 1.0 } else { 0.0 };
+        Some(Self { runs_north, place })
+    }
+
+    /// The neighbour across it.
+    fn shift(self) -> [i32; 2] {
+        let out = if self.place > 0.5 { 1 } else { -1 };
+        if self.runs_north { [out, 0] } else { [0, out] }
+    }
+
+    /// The point of the edge, a straight line, closest to a hand at `(p, q)`;
+    /// `None` near its ends.
+    fn closest(self, patch: &Patch, (p, q): (f32, f32), cell: [i32; 2]) -> Option<Spot> {
+        let along = |slope: f32, above: f32| slope * above / (1.0 + slope * slope);
+        let (u, v) = if self.runs_north {
+            let u = self.place;
+            (u, q - along(patch.slope_v(u), patch.height(u, q)))
+        } else {
+            let v = self.place;
+            (p - along(patch.slope_u(v), patch.height(p, v)), v)
+        };
+        let inside = is_inside(if self.runs_north { v } else { u });
+        inside.then_some(Spot { cell, u, v })
+    }
+
+    /// Slope of half the squared distance at a point of the edge, in the
+    /// direction out of the patch that the edge was made for.
+    fn slope(self, patch: &Patch, at: &Spot, (p, q): (f32, f32)) -> f32 {
+        let z = patch.height(at.u, at.v);
+        let out = if self.place > 0.5 { 1.0 } else { -1.0 };
+        if self.runs_north {
+            out * ((at.u - p) + z * patch.slope_u(at.v))
+        } else {
+            out * ((at.v - q) + z * patch.slope_v(at.u))
+        }
+    }
+}

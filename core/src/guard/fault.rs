@@ -1,0 +1,147 @@
+//! What went wrong: numbered, stable, latched.
+
+use serde::{Deserialize, Serialize};
+
+/// A latched fault. The numbers are stable; only an explicit reset clears one.
+/// While one is latched the amplifiers are off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Fault {
+    /// A force or current was not a number.
+    NotANumber = 1,
+    /// A tick took longer than its period.
+    TickOverrun = 2,
+    /// An encoder moved farther in a tick than the arm can. Counts were lost,
+    /// so the arm has to be zeroed again.
+    EncoderJump = 3,
+    /// The encoder or amplifier hardware did not answer.
+    Hardware = 4,
+    /// The emergency stop was pressed, or its wire broke.
+    EmergencyStop = 5,
+    /// The dead-man switch was let go while the amplifiers were on.
+    DeadManReleased = 6,
+    /// A motor winding is too hot, in spite of derating.
+    MotorTooHot = 7,
+    /// A joint beyond its stops.
+    JointLimit = 8,
+    /// Joints 2 and 3 in a relation that the linkage does not allow.
+    Linkage = 9,
+    /// A motor pushes and its encoder does not move.
+    NoMotion = 10,
+    /// The tip stayed above twice the speed limit.
+    TooFast = 11,
+    /// A task has stopped: the watchdog is no longer fed.
+    TaskStalled = 12,
+    /// Found at boot: the watchdog had to reset the board.
+    WatchdogReset = 13,
+    /// Found at boot: the program had panicked.
+    Panicked = 14,
+    /// Found at boot: the processor had hit a hard fault, or an interrupt
+    /// without a handler.
+    HardFault = 15,
+    /// Found at boot: the stored calibration record is damaged.
+    CalibrationCorrupt = 16,
+}
+
+impl Fault {
+    /// Every fault, by number.
+    pub const ALL: [Self; 16] = [
+        Self::NotANumber,
+        Self::TickOverrun,
+        Self::EncoderJump,
+        Self::Hardware,
+        Self::EmergencyStop,
+        Self::DeadManReleased,
+        Self::MotorTooHot,
+        Self::JointLimit,
+        Self::Linkage,
+        Self::NoMotion,
+        Self::TooFast,
+        Self::TaskStalled,
+        Self::WatchdogReset,
+        Self::Panicked,
+        Self::HardFault,
+        Self::CalibrationCorrupt,
+    ];
+
+    /// The fault's number.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        self as u8
+    }
+
+    /// What it means, in a sentence for the user.
+    #[must_use]
+    pub const fn meaning(self) -> &'static str {
+        match self {
+            Self::NotANumber => "a force or current was not a number",
+            Self::TickOverrun => "a tick took longer than its period",
+            Self::EncoderJump => "an encoder moved farther in a tick than the arm can",
+            Self::Hardware => "the encoder or amplifier hardware did not answer",
+            Self::EmergencyStop => "the emergency stop was pressed, or its wire broke",
+            Self::DeadManReleased => "the dead-man switch was let go while the motors were on",
+            Self::MotorTooHot => "a motor winding is too hot",
+            Self::JointLimit => "a joint reads beyond its stops",
+            Self::Linkage => "joints 2 and 3 read a pose that the linkage does not allow",
+            Self::NoMotion => "a motor pushed and its encoder did not move",
+            Self::TooFast => "the tip stayed above twice the speed limit",
+            Self::TaskStalled => "a task on the board stopped, so the watchdog was not fed",
+            Self::WatchdogReset => "the watchdog had to reset the board",
+            Self::Panicked => "the board's program panicked before it was reset",
+            Self::HardFault => "the board's processor met a hard fault before it was reset",
+            Self::CalibrationCorrupt => "the calibration record on the board is damaged",
+        }
+    }
+
+    /// What the user can do about it. Clearing it comes after that.
+    #[must_use]
+    pub const fn what_to_do(self) -> &'static str {
+        match self {
+            Self::NotANumber => "please report it with the terrain and the recording",
+            Self::TickOverrun => "choose a lower tick rate; if it is the default, please report it",
+            Self::EncoderJump => {
+                "check the encoder cables and their shields, then zero the arm again"
+            }
+            Self::Hardware => "check supply and cables of encoders and amplifiers",
+            Self::EmergencyStop => "make sure that the arm is safe, then release the stop",
+            Self::DeadManReleased => "nothing is wrong: clear it, arm, and press the switch again",
+            Self::MotorTooHot => "let the motors cool for some minutes; lower the force",
+            Self::JointLimit => "zero the arm again; check ratios and signs of the calibration",
+            Self::Linkage => "zero the arm again; check the encoder of joint 2 or 3",
+            Self::NoMotion => "check the encoder cable of the axis, the cable drive and the fuse",
+            Self::TooFast => "hold the arm firmly; check the motors' signs in the calibration",
+            Self::TaskStalled | Self::WatchdogReset => {
+                "please report it with the output of `hapterra status`"
+            }
+            Self::Panicked | Self::HardFault => {
+                "please report it with the crash shown by `hapterra status`"
+            }
+            Self::CalibrationCorrupt => "calibrate again, or store the record from its file",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_stable() {
+        for (i, fault) in Fault::ALL.into_iter().enumerate() {
+            assert_eq!(usize::from(fault.number()), i + 1, "{fault:?}");
+            assert!(!fault.meaning().is_empty() && !fault.what_to_do().is_empty());
+        }
+        let first: [u8; 7] = [1, 2, 3, 4, 5, 6, 7];
+        let named = [
+            Fault::NotANumber,
+            Fault::TickOverrun,
+            Fault::EncoderJump,
+            Fault::Hardware,
+            Fault::EmergencyStop,
+            Fault::DeadManReleased,
+            Fault::MotorTooHot,
+        ];
+        assert_eq!(named.map(Fault::number), first);
+    }
+}

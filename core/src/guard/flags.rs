@@ -1,0 +1,138 @@
+//! What keeps the arm from being armed, and why output is reduced: two sets of
+//! named bits. Neither is a fault.
+
+use bitflags::bitflags;
+use serde::{Deserialize, Serialize};
+
+bitflags! {
+    /// What keeps the amplifiers off. The bits are stable.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+    pub struct Blockers: u16 {
+        /// There is no calibration record.
+        const NO_CALIBRATION = 1 << 0;
+        /// The arm has not been put into its zero pose since power-up.
+        const NOT_ZEROED = 1 << 1;
+        /// There is nothing to feel.
+        const NO_SCENE = 1 << 2;
+        /// The scene is a replay: it is fed by points, not by the arm.
+        const REPLAY = 1 << 3;
+        /// A fault is latched.
+        const FAULT_LATCHED = 1 << 4;
+        /// The emergency stop is pressed, or its wire is broken.
+        const EMERGENCY_STOP = 1 << 5;
+        /// The encoders or amplifiers report that they cannot work.
+        const HARDWARE = 1 << 6;
+        /// The joints read a pose beyond their limits.
+        const OUTSIDE_LIMITS = 1 << 7;
+        /// The watchdog is not being fed.
+        const WATCHDOG_NOT_LIVE = 1 << 8;
+        /// The host has not asked to arm, or has asked to disarm.
+        const HOST_DISARMED = 1 << 9;
+        /// The dead-man switch was held when arming was asked for: it has to
+        /// be let go first.
+        const DEAD_MAN_STILL_HELD = 1 << 10;
+        /// The dead-man switch is not held.
+        const DEAD_MAN_RELEASED = 1 << 11;
+        /// The force that would be made now is not small yet.
+        const FORCE_TOO_LARGE = 1 << 12;
+    }
+}
+
+bitflags! {
+    /// Why the force is less than the scene asked for. The bits are stable.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+    pub struct Limits: u16 {
+        /// The force was longer than the device may make.
+        const FORCE_CLAMPED = 1 << 0;
+        /// The force wanted to change faster than a hand could make it.
+        const SLEW_LIMITED = 1 << 1;
+        /// A motor current was above its peak.
+        const CURRENT_LIMITED = 1 << 2;
+        /// A warm motor may have less than its peak, and it wanted more.
+        const THERMAL_DERATED = 1 << 3;
+        /// The tip moves faster than the speed limit.
+        const SPEED_LIMITED = 1 << 4;
+        /// Force is still coming in after arming.
+        const RAMPING = 1 << 5;
+        /// Force is going out before disarming.
+        const FADING = 1 << 6;
+        /// Terrain that might be felt here is not on the device yet.
+        const TERRAIN_MISSING = 1 << 7;
+    }
+}
+
+impl Blockers {
+    /// What only the user's hand can change: an arm command waits for it.
+    pub const BY_HAND: Self = Self::HOST_DISARMED
+        .union(Self::DEAD_MAN_STILL_HELD)
+        .union(Self::DEAD_MAN_RELEASED)
+        .union(Self::FORCE_TOO_LARGE);
+
+    /// The set bits one by one with what each means, and what to do.
+    pub fn meanings(self) -> impl Iterator<Item = (&'static str, &'static str)> {
+        self.iter_names().map(|(name, bit)| (name, bit.meaning()))
+    }
+
+    /// What one bit means and what to do; of the lowest where there are more.
+    #[must_use]
+    pub const fn meaning(self) -> &'static str {
+        let lowest = Self::from_bits_retain(self.bits() & self.bits().wrapping_neg());
+        match lowest {
+            Self::NO_CALIBRATION => "there is no calibration record: calibrate the arm",
+            Self::NOT_ZEROED => "where the joints are is not known: put the arm into its zero pose",
+            Self::NO_SCENE => "there is nothing to feel: run a terrain",
+            Self::REPLAY => "a trajectory is being replayed: end it first",
+            Self::FAULT_LATCHED => "a fault is latched: see to its cause, then clear it",
+            Self::EMERGENCY_STOP => "the emergency stop is pressed, or its wire is broken",
+            Self::HARDWARE => "the encoders or amplifiers cannot work: check supply and cables",
+            Self::OUTSIDE_LIMITS => {
+                "the joints read a pose beyond their limits: zero the arm again"
+            }
+            Self::WATCHDOG_NOT_LIVE => "the watchdog is not being fed: a task on the board hangs",
+            Self::HOST_DISARMED => "the host has not asked to arm",
+            Self::DEAD_MAN_STILL_HELD => "the dead-man switch is held: let it go, then press it",
+            Self::DEAD_MAN_RELEASED => "the dead-man switch is not held: press it",
+            Self::FORCE_TOO_LARGE => "the tip is inside the terrain: lift it off",
+            _ => "",
+        }
+    }
+}
+
+impl Limits {
+    /// The set bits one by one with what each means.
+    pub fn meanings(self) -> impl Iterator<Item = (&'static str, &'static str)> {
+        self.iter_names().map(|(name, bit)| (name, bit.meaning()))
+    }
+
+    /// What one bit means; of the lowest where there are more.
+    #[must_use]
+    pub const fn meaning(self) -> &'static str {
+        let lowest = Self::from_bits_retain(self.bits() & self.bits().wrapping_neg());
+        match lowest {
+            Self::FORCE_CLAMPED => "the force is at the device's limit",
+            Self::SLEW_LIMITED => "the force changes as fast as it may",
+            Self::CURRENT_LIMITED => "a motor is at its peak current",
+            Self::THERMAL_DERATED => "a motor is warm and may have less current",
+            Self::SPEED_LIMITED => "the tip is too fast for the full force",
+            Self::RAMPING => "force is coming in after arming",
+            Self::FADING => "force is going out before disarming",
+            Self::TERRAIN_MISSING => "terrain that might be felt here is on its way",
+            _ => "",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_bit_has_a_name_and_a_meaning() {
+        for (name, meaning) in Blockers::all().meanings().chain(Limits::all().meanings()) {
+            assert!(!name.is_empty() && !meaning.is_empty(), "{name}");
+        }
+        assert_eq!(Blockers::all().meanings().count(), 13);
+        assert_eq!(Limits::all().meanings().count(), 8);
+        assert_eq!(Blockers::empty().meaning(), "");
+    }
+}

@@ -1,0 +1,62 @@
+//! How often the loop ticks, and what follows from it.
+
+/// Ticks a second: a build choice, 1 kHz by default. The stiffness that a user
+/// can hold grows with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TickRate(u32);
+
+impl TickRate {
+    /// Slowest and fastest, ticks a second.
+    pub const RANGE_HZ: (u32, u32) = (1_000, 10_000);
+    /// 1 kHz.
+    pub const DEFAULT: Self = Self(1_000);
+
+    /// A rate in [`Self::RANGE_HZ`].
+    #[must_use]
+    pub const fn new(hz: u32) -> Option<Self> {
+        if hz < Self::RANGE_HZ.0 || hz > Self::RANGE_HZ.1 {
+            return None;
+        }
+        Some(Self(hz))
+    }
+
+    /// Ticks a second.
+    #[must_use]
+    pub const fn hz(self) -> u32 {
+        self.0
+    }
+
+    /// Length of a tick, s.
+    #[must_use]
+    pub const fn tick_s(self) -> f32 {
+        1.0 / self.0 as f32
+    }
+
+    /// Ticks in some time, at least one.
+    #[must_use]
+    pub const fn ticks(self, milliseconds: u32) -> u32 {
+        let ticks = self.0 as u64 * milliseconds as u64 / 1000;
+        if ticks == 0 { 1 } else { ticks as u32 }
+    }
+}
+
+impl Default for TickRate {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_rates_that_were_thought_of() {
+        assert_eq!(TickRate::new(999), None);
+        assert_eq!(TickRate::new(10_001), None);
+        let fast = TickRate::new(8_000).expect("in range");
+        assert_eq!((fast.ticks(1), fast.ticks(2_000)), (8, 16_000));
+        assert_eq!(TickRate::DEFAULT.ticks(0), 1);
+        assert_eq!(TickRate::DEFAULT.tick_s(), 1e-3);
+    }
+}

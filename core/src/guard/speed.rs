@@ -1,0 +1,108 @@
+//! How fast the tip is, looked at only as closely as need be.
+
+use glam::Vec3;
+
+use super::rate::TickRate;
+use crate::phantom::{Mechanism, Pose, Readings};
+
+/// The tip may stay above twice the speed limit for this many readings, a
+/// millisecond each.
+const PATIENCE: u32 = 5;
+
+/// Watches the tip's speed, once a millisecond.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Speed {
+    readings: Readings,
+    /// Ticks between two readings, and since the last.
+    every: u32,
+    ticks: u32,
+    /// Readings a second.
+    hz: f32,
+    /// Counts of each axis from one reading to the next within which the tip
+    /// is below the limit in every pose.
+    surely_slow: [u32; 3],
+    limit_mm_s: f32,
+    too_fast: u32,
+    share: f32,
+}
+
+/// What a tick's look at the speed found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Look {
+    /// Between two readings.
+    NotYet,
+    /// A reading was taken; counts moved since the last.
+    Moved([i32; 3]),
+    /// The same, and the tip has been far too fast for too long.
+    TooFast,
+}
+
+impl Speed {
+    pub(super) fn new(rate: TickRate) -> Self {
+        let every = rate.ticks(1);
+        Self {
+            readings: Readings::default(),
+            every,
+            ticks: 0,
+            hz: rate.hz() as f32 / every as f32,
+            surely_slow: [0; 3],
+            limit_mm_s: 0.0,
+            too_fast: 0,
+            share: 1.0,
+        }
+    }
+
+    pub(super) fn configure(&mut self, mechanism: &Mechanism) {
+        let record = mechanism.calibration();
+        self.limit_mm_s = record.max_speed_mm_s;
+        let (l1, l2) = (record.l1_mm, record.l2_mm);
+        // A third of the limit for each joint, with its longest lever; a count
+        // less, for the readings' error.
+        let levers_mm = Vec3::new(l1 + l2, l1, l2) * mechanism.radians_per_count().abs();
+        let counts = self.limit_mm_s / (3.0 * self.hz * levers_mm);
+        self.surely_slow = counts.to_array().map(|c| (c as u32).saturating_sub(1));
+    }
+
+    /// Forgets what was: these counts follow from nothing before.
+    pub(super) fn restart(&mut self, counts: [i32; 3]) {
+        self.readings.restart(counts);
+        self.ticks = 0;
+        self.too_fast = 0;
+        self.share = 1.0;
+    }
+
+    /// Takes a tick's counts.
+    pub(super) fn look(&mut self, counts: [i32; 3], mechanism: &Mechanism, pose: &Pose) -> Look {
+        self.ticks += 1;
+        if self.ticks < self.every {
+            return Look::NotYet;
+        }
+        self.ticks = 0;
+        self.readings.take(counts);
+        let moved = self.readings.moved();
+        let slow = moved.iter().zip(self.surely_slow);
+        if slow
+            .into_iter()
+            .all(|(moved, slow)| moved.unsigned_abs() <= slow)
+        {
+            self.share = 1.0;
+            self.too_fast = 0;
+            return Look::Moved(moved);
+        }
+        let rates = self.readings.velocity() * self.hz * mechanism.radians_per_count();
+        let speed = pose.tip_velocity_mm_s(rates).length();
+        let over = speed / self.limit_mm_s - 1.0;
+        self.share = 1.0 - over.clamp(0.0, 1.0);
+        self.too_fast = if over < 1.0 { 0 } else { self.too_fast + 1 };
+        match self.too_fast > PATIENCE {
+            true => Look::TooFast,
+            false => Look::Moved(moved),
+        }
+    }
+
+    /// The share of the force that may be made at this speed: 1 up to the
+    /// limit, 0 from twice the limit on.
+    pub(super) const fn share(&self) -> f32 {
+        self.share
+    }
+}

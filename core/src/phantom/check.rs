@@ -1,0 +1,332 @@
+//! Whether a calibration record can be worked with, and what to do if not.
+
+use core::fmt;
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use super::calibration::Calibration;
+
+/// A number of the record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Field {
+    /// [`Calibration::counts_per_turn`].
+    CountsPerTurn,
+    /// [`Calibration::ratio`].
+    Ratio,
+    /// [`Calibration::encoder_sign`].
+    EncoderSign,
+    /// [`Calibration::motor_sign`].
+    MotorSign,
+    /// [`Calibration::zero_rad`].
+    Zero,
+    /// [`Calibration::l1_mm`].
+    L1,
+    /// [`Calibration::l2_mm`].
+    L2,
+    /// The joint limits' smallest angles.
+    MinAngle,
+    /// The joint limits' largest angles.
+    MaxAngle,
+    /// The linkage's largest q2 − q3.
+    Q2MinusQ3,
+    /// The linkage's largest q3 − q2.
+    Q3MinusQ2,
+    /// [`Calibration::gravity_2_nm`].
+    Gravity2,
+    /// [`Calibration::gravity_3_nm`].
+    Gravity3,
+    /// [`Calibration::torque_constant`].
+    TorqueConstant,
+    /// [`Calibration::peak_current_a`].
+    PeakCurrent,
+    /// [`Calibration::continuous_current_a`].
+    ContinuousCurrent,
+    /// Winding resistance.
+    Resistance,
+    /// Winding to housing.
+    WindingResistance,
+    /// Housing to air.
+    HousingResistance,
+    /// Time constant of the winding.
+    WindingTime,
+    /// Time constant of the housing.
+    HousingTime,
+    /// [`Calibration::max_force_n`].
+    MaxForce,
+    /// [`Calibration::max_speed_mm_s`].
+    MaxSpeed,
+}
+
+impl Field {
+    /// Smallest and largest value that make sense, and the unit.
+    #[must_use]
+    pub const fn range(self) -> (f32, f32, &'static str) {
+        const PI: f32 = core::f32::consts::PI;
+        match self {
+            Self::CountsPerTurn => (100.0, 1e6, "counts"),
+            Self::Ratio => (1.0, 100.0, "motor turns a joint turn"),
+            Self::EncoderSign | Self::MotorSign => (-1.0, 1.0, "(−1 or +1)"),
+            Self::Zero | Self::MinAngle | Self::MaxAngle => (-1.5 * PI, 1.5 * PI, "rad"),
+            Self::L1 | Self::L2 => (30.0, 1000.0, "mm"),
+            // Short of π/2, where the links are in line and the arm is singular.
+            Self::Q2MinusQ3 | Self::Q3MinusQ2 => (0.1, 1.5, "rad"),
+            Self::Gravity2 | Self::Gravity3 => (-1.0, 1.0, "Nm"),
+            Self::TorqueConstant => (1e-3, 1.0, "Nm/A"),
+            Self::PeakCurrent | Self::ContinuousCurrent => (0.01, 20.0, "A"),
+            Self::Resistance => (0.05, 100.0, "Ω"),
+            Self::WindingResistance | Self::HousingResistance => (0.1, 100.0, "K/W"),
+            Self::WindingTime => (0.5, 1e3, "s"),
+            Self::HousingTime => (10.0, 1e5, "s"),
+            Self::MaxForce => (0.1, 40.0, "N"),
+            Self::MaxSpeed => (50.0, 3000.0, "mm/s"),
+        }
+    }
+
+    /// What it is and where to get it from.
+    #[must_use]
+    pub const fn advice(self) -> &'static str {
+        match self {
+            Self::CountsPerTurn => "take the encoder's lines times four",
+            Self::Ratio => "measure with the ratio check, or count motor turns for a joint turn",
+            Self::EncoderSign => "turn the joint towards larger angles: +1 if the counts rise",
+            Self::MotorSign => "+1 if a positive current pushes the joint towards larger angles",
+            Self::Zero => "give the joint angles of the zero pose, inside the joint limits",
+            Self::L1 => "measure the upper link between its joint axes",
+            Self::L2 => "measure the fore link from its joint axis to the tip",
+            Self::MinAngle | Self::MaxAngle => {
+                "move the joint to its stops and note the angles; the smallest must be below the largest"
+            }
+            Self::Q2MinusQ3 | Self::Q3MinusQ2 => {
+                "move the linkage to its stops; below 90°, where the links would be in line"
+            }
+            Self::Gravity2 | Self::Gravity3 => {
+                "fit gravity again from still poses; the motors must be able to hold it for ever"
+            }
+            Self::TorqueConstant => "take it from the motor's data sheet",
+            Self::PeakCurrent | Self::ContinuousCurrent => {
+                "take it from the motor's data sheet; the continuous current is not above the peak"
+            }
+            Self::Resistance
+            | Self::WindingResistance
+            | Self::HousingResistance
+            | Self::WindingTime
+            | Self::HousingTime => "take it from the thermal part of the motor's data sheet",
+            Self::MaxForce => "take the device's peak force",
+            Self::MaxSpeed => "a hand needs about 1000 mm/s",
+        }
+    }
+}
+
+/// Why a record cannot be worked with.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct BadCalibration {
+    /// The number that is wrong.
+    pub field: Field,
+    /// The axis, 1 to 3, where there is one for each.
+    pub axis: Option<u8>,
+    /// What it is.
+    pub value: f32,
+}
+
+impl fmt::Display for BadCalibration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (min, max, unit) = self.field.range();
+        write!(f, "{:?}", self.field)?;
+        if let Some(axis) = self.axis {
+            write!(f, " of axis {axis}")?;
+        }
+        let advice = self.field.advice();
+        write!(
+            f,
+            " is {}, expected {min} to {max} {unit}: {advice}",
+            self.value
+        )
+    }
+}
+
+impl core::error::Error for BadCalibration {}
+
+impl Calibration {
+    /// Whether every number is one that the loop can work with.
+    ///
+    /// # Errors
+    /// [`BadCalibration`] names the first that is not.
+    pub fn validate(&self) -> Result<(), BadCalibration> {
+        one(Field::CountsPerTurn, self.counts_per_turn)?;
+        each(Field::Ratio, self.ratio)?;
+        signs(Field::EncoderSign, self.encoder_sign)?;
+        signs(Field::MotorSign, self.motor_sign)?;
+        one(Field::L1, self.l1_mm)?;
+        one(Field::L2, self.l2_mm)?;
+        self.validate_angles()?;
+        each(Field::TorqueConstant, self.torque_constant)?;
+        self.validate_currents()?;
+        self.validate_gravity()?;
+        let thermal = &self.thermal;
+        one(Field::Resistance, thermal.resistance_ohm)?;
+        one(Field::WindingResistance, thermal.winding_k_per_w)?;
+        one(Field::HousingResistance, thermal.housing_k_per_w)?;
+        one(Field::WindingTime, thermal.winding_s)?;
+        one(Field::HousingTime, thermal.housing_s)?;
+        one(Field::MaxForce, self.max_force_n)?;
+        one(Field::MaxSpeed, self.max_speed_mm_s)
+    }
+
+    fn validate_angles(&self) -> Result<(), BadCalibration> {
+        let limits = &self.limits;
+        each(Field::MinAngle, limits.min_rad)?;
+        each(Field::MaxAngle, limits.max_rad)?;
+        one(Field::Q2MinusQ3, limits.q2_minus_q3_max_rad)?;
+        one(Field::Q3MinusQ2, limits.q3_minus_q2_max_rad)?;
+        every(Field::MaxAngle, limits.max_rad, |axis, max| {
+            max > limits.min_rad[axis]
+        })?;
+        each(Field::Zero, self.zero_rad)?;
+        // The arm stands against its stops where some rigs are zeroed.
+        let inside = limits.allow(self.zero_rad, 0.05);
+        every(Field::Zero, self.zero_rad, |_, _| inside)
+    }
+
+    fn validate_currents(&self) -> Result<(), BadCalibration> {
+        each(Field::PeakCurrent, self.peak_current_a)?;
+        each(Field::ContinuousCurrent, self.continuous_current_a)?;
+        every(
+            Field::ContinuousCurrent,
+            self.continuous_current_a,
+            |axis, a| a <= self.peak_current_a[axis],
+        )
+    }
+
+    /// Holding the arm must leave motors room to push: half the current that
+    /// they can bear for ever.
+    fn validate_gravity(&self) -> Result<(), BadCalibration> {
+        one(Field::Gravity2, self.gravity_2_nm)?;
+        one(Field::Gravity3, self.gravity_3_nm)?;
+        let bearable = 0.5 * self.continuous_current_a * self.ratio * self.torque_constant;
+        let fits =
+            |field, value: f32, bearable: f32| check(field, None, value, value.abs() <= bearable);
+        fits(Field::Gravity2, self.gravity_2_nm, bearable.y)?;
+        fits(Field::Gravity3, self.gravity_3_nm, bearable.z)
+    }
+}
+
+fn check(field: Field, axis: Option<u8>, value: f32, good: bool) -> Result<(), BadCalibration> {
+    match good {
+        true => Ok(()),
+        false => Err(BadCalibration { field, axis, value }),
+    }
+}
+
+fn in_range(field: Field, value: f32) -> bool {
+    let (min, max, _) = field.range();
+    (min..=max).contains(&value)
+}
+
+fn one(field: Field, value: f32) -> Result<(), BadCalibration> {
+    check(field, None, value, in_range(field, value))
+}
+
+fn every(
+    field: Field,
+    values: Vec3,
+    good: impl Fn(usize, f32) -> bool,
+) -> Result<(), BadCalibration> {
+    for (axis, value) in values.to_array().into_iter().enumerate() {
+        check(field, Some(axis as u8 + 1), value, good(axis, value))?;
+    }
+    Ok(())
+}
+
+fn each(field: Field, values: Vec3) -> Result<(), BadCalibration> {
+    every(field, values, |_, value| in_range(field, value))
+}
+
+fn signs(field: Field, values: Vec3) -> Result<(), BadCalibration> {
+    every(field, values, |_, value| value.abs() == 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::format;
+
+    /// A record with one thing wrong, and what should be said of it.
+    type Case = (fn(&mut Calibration), Field, Option<u8>);
+
+    #[test]
+    fn each_number_that_is_wrong_is_named() {
+        let cases: [Case; 24] = [
+            (|c| c.counts_per_turn = 0.0, Field::CountsPerTurn, None),
+            (|c| c.ratio.y = -11.2, Field::Ratio, Some(2)),
+            (|c| c.encoder_sign.x = 0.5, Field::EncoderSign, Some(1)),
+            (|c| c.motor_sign.z = 0.0, Field::MotorSign, Some(3)),
+            (|c| c.zero_rad.x = 1.7, Field::Zero, Some(1)),
+            (|c| c.zero_rad.z = f32::NAN, Field::Zero, Some(3)),
+            (|c| c.l1_mm = f32::INFINITY, Field::L1, None),
+            (|c| c.l2_mm = 0.17, Field::L2, None),
+            (|c| c.limits.min_rad.x = -90.0, Field::MinAngle, Some(1)),
+            (|c| c.limits.max_rad.z = -1.0, Field::MaxAngle, Some(3)),
+            (
+                |c| c.limits.q2_minus_q3_max_rad = 1.6,
+                Field::Q2MinusQ3,
+                None,
+            ),
+            (
+                |c| c.limits.q3_minus_q2_max_rad = 0.0,
+                Field::Q3MinusQ2,
+                None,
+            ),
+            (|c| c.gravity_2_nm = 2.0, Field::Gravity2, None),
+            // In range, but more than the motor can hold.
+            (|c| c.gravity_3_nm = 0.9, Field::Gravity3, None),
+            (
+                |c| c.torque_constant.x = 0.0,
+                Field::TorqueConstant,
+                Some(1),
+            ),
+            (|c| c.peak_current_a.y = 99.0, Field::PeakCurrent, Some(2)),
+            (
+                |c| c.continuous_current_a.z = 6.0,
+                Field::ContinuousCurrent,
+                Some(3),
+            ),
+            (|c| c.thermal.resistance_ohm = -1.0, Field::Resistance, None),
+            (
+                |c| c.thermal.winding_k_per_w = f32::NAN,
+                Field::WindingResistance,
+                None,
+            ),
+            (
+                |c| c.thermal.housing_k_per_w = 0.0,
+                Field::HousingResistance,
+                None,
+            ),
+            (|c| c.thermal.winding_s = 0.0, Field::WindingTime, None),
+            (|c| c.thermal.housing_s = 1.0, Field::HousingTime, None),
+            (|c| c.max_force_n = 100.0, Field::MaxForce, None),
+            (|c| c.max_speed_mm_s = 0.0, Field::MaxSpeed, None),
+        ];
+        for (spoil, field, axis) in cases {
+            let mut record = Calibration::PREMIUM_1_5;
+            spoil(&mut record);
+            let bad = record.validate().expect_err("spoilt");
+            assert_eq!((bad.field, bad.axis), (field, axis), "{bad}");
+        }
+    }
+
+    #[test]
+    fn what_is_said_names_the_value_the_range_and_what_to_do() {
+        let record = Calibration {
+            l1_mm: 3.0,
+            ..Calibration::PREMIUM_1_5
+        };
+        let said = format!("{}", record.validate().expect_err("too short"));
+        assert_eq!(
+            said,
+            "L1 is 3, expected 30 to 1000 mm: measure the upper link between its joint axes"
+        );
+    }
+}

@@ -1,0 +1,102 @@
+//! From a tip back to joint angles.
+//!
+//! Not used by the tick, which never needs it: it is for planning, calibration
+//! and tests, and costs `libm`'s arc tangents.
+//!
+//! A tip has up to four poses: the arm turned towards it or leaning over
+//! backwards, each with the elbow on either side. The linkage keeps
+//! |q2 − q3| below 90°, which leaves one elbow; the joint limits choose
+//! between the two directions, the arm turned towards the tip first.
+//!
+//! # Near singular poses
+//!
+//! On the base's axis (r = 0) every q1 gives the same tip; the answer is one of
+//! them. With the links nearly in line the joint angles of a tip change as the
+//! square root of its distance; the *tip* of the answer still is the one asked
+//! for, within 1 µm (swept in the tests).
+
+use core::f32::consts::{FRAC_PI_2, TAU};
+
+use glam::Vec3;
+use libm::{atan2f, sqrtf};
+
+use super::calibration::Calibration;
+
+/// Why no pose puts the tip there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Unreachable {
+    /// A coordinate is not a finite number.
+    #[error("the position is not a number")]
+    NotFinite,
+    /// Farther out than both links in line.
+    #[error("farther out than the links reach")]
+    TooFar,
+    /// Nearer than the links can fold.
+    #[error("nearer than the links can fold")]
+    TooNear,
+    /// Only poses beyond the stops.
+    #[error("only poses beyond the joint limits reach it")]
+    BeyondLimits,
+}
+
+/// By this much the cosine of the elbow may miss what there is: rounding.
+const ROUNDING: f32 = 4.0 * f32::EPSILON;
+
+impl Calibration {
+    /// Joint angles inside the limits that put the tip at `tip_mm` (device
+    /// frame).
+    ///
+    /// # Errors
+    /// [`Unreachable`] says why there are none.
+    pub fn joints_at(&self, tip_mm: Vec3) -> Result<Vec3, Unreachable> {
+        if !tip_mm.is_finite() {
+            return Err(Unreachable::NotFinite);
+        }
+        let Vec3 { x, y, z } = tip_mm;
+        let r = libm::hypotf(x, y);
+        let elbow = self.elbow(r, z)?;
+        let (sin, cos) = super::sin_cos(elbow);
+        let inner = atan2f(self.l2_mm * sin, self.l1_mm + self.l2_mm * cos);
+        let pose = |q1: f32, r: f32| {
+            let q2 = atan2f(z, r) + inner;
+            Vec3::new(q1, q2, q2 - elbow + FRAC_PI_2)
+        };
+        let ways = [pose(atan2f(y, x), r), pose(atan2f(-y, -x), -r)];
+        let found = ways.into_iter().find_map(|q| self.turned_inside(q));
+        found.ok_or(Unreachable::BeyondLimits)
+    }
+
+    /// q2 − q3 + 90°, between 0 and 180°, from
+    /// r² + z² = l1² + l2² + 2·l1·l2·cos(elbow).
+    fn elbow(&self, r: f32, z: f32) -> Result<f32, Unreachable> {
+        let (l1, l2) = (self.l1_mm, self.l2_mm);
+        // Differences of squares as products: no digits are lost where the
+        // links are nearly in line, one way or the other.
+        let far = libm::hypotf(r, z);
+        let short_of_full = (l1 + l2 - far) * (l1 + l2 + far) / (2.0 * l1 * l2);
+        let past_folded = (far - (l1 - l2)) * (far + (l1 - l2)) / (2.0 * l1 * l2);
+        if short_of_full < -ROUNDING {
+            return Err(Unreachable::TooFar);
+        }
+        if past_folded < -ROUNDING {
+            return Err(Unreachable::TooNear);
+        }
+        // 1 − cos and 1 + cos: the half angle's tangent.
+        let (less, more) = (short_of_full.max(0.0), past_folded.max(0.0));
+        Ok(2.0 * atan2f(sqrtf(less), sqrtf(more)))
+    }
+
+    /// The same pose with whole turns taken off or added, if that brings it
+    /// inside the limits.
+    fn turned_inside(&self, q: Vec3) -> Option<Vec3> {
+        let turn = Vec3::new(0.0, TAU, TAU);
+        [q, q + turn, q - turn]
+            .into_iter()
+            .find(|q| self.limits.allow(*q, 1e-5))
+    }
+}
+
+#[cfg(test)]
+#[path = "inverse_tests.rs"]
+mod tests;

@@ -1,0 +1,98 @@
+//! A calibration record as the tick uses it: everything that does not change
+//! from tick to tick is worked out once, outside it.
+
+use glam::Vec3;
+
+use super::calibration::Calibration;
+use super::check::BadCalibration;
+use super::kinematics::Pose;
+
+/// A valid record and what follows from it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mechanism {
+    calibration: Calibration,
+    radians_per_count: Vec3,
+    amperes_per_nm: Vec3,
+    home_mm: Vec3,
+}
+
+impl Mechanism {
+    /// Checks a record and prepares it.
+    ///
+    /// # Errors
+    /// [`BadCalibration`] names the number that cannot be worked with.
+    pub fn new(calibration: &Calibration) -> Result<Self, BadCalibration> {
+        calibration.validate()?;
+        let per_ampere = calibration.motor_sign * calibration.ratio * calibration.torque_constant;
+        Ok(Self {
+            calibration: *calibration,
+            radians_per_count: calibration.counts_per_radian().recip(),
+            amperes_per_nm: per_ampere.recip(),
+            home_mm: Pose::from_angles(calibration, Vec3::ZERO).tip_mm(),
+        })
+    }
+
+    /// The record.
+    #[must_use]
+    pub const fn calibration(&self) -> &Calibration {
+        &self.calibration
+    }
+
+    /// Radians of each joint for a count of its encoder, with their signs.
+    #[must_use]
+    pub const fn radians_per_count(&self) -> Vec3 {
+        self.radians_per_count
+    }
+
+    /// The tip where all joint angles are zero, device frame, mm.
+    #[must_use]
+    pub const fn home_mm(&self) -> Vec3 {
+        self.home_mm
+    }
+
+    /// Joint angles at encoder counts, given the counts read in the zero pose.
+    #[must_use]
+    pub fn angles(&self, counts: [i32; 3], zero: [i32; 3]) -> Vec3 {
+        let turned = |axis: usize| counts[axis].wrapping_sub(zero[axis]) as f32;
+        let turned = Vec3::new(turned(0), turned(1), turned(2));
+        self.calibration.zero_rad + turned * self.radians_per_count
+    }
+
+    /// The pose at encoder counts, given the counts read in the zero pose.
+    ///
+    /// Its tip is within 1 µm of the same in f64 over the whole workspace of
+    /// every preset (swept in the tests).
+    #[must_use]
+    pub fn pose(&self, counts: [i32; 3], zero: [i32; 3]) -> Pose {
+        Pose::from_angles(&self.calibration, self.angles(counts, zero))
+    }
+
+    /// The counts nearest to a pose, given the counts read in the zero pose.
+    #[must_use]
+    pub fn counts(&self, q: Vec3, zero: [i32; 3]) -> [i32; 3] {
+        let turned = (q - self.calibration.zero_rad) / self.radians_per_count;
+        let turned = turned.to_array().map(libm::roundf);
+        core::array::from_fn(|axis| zero[axis].wrapping_add(turned[axis] as i32))
+    }
+
+    /// Torques in Nm that hold the arm against its weight.
+    #[must_use]
+    pub fn gravity_nm(&self, pose: &Pose) -> Vec3 {
+        let record = &self.calibration;
+        Vec3::new(
+            0.0,
+            record.gravity_2_nm * pose.cos().y,
+            record.gravity_3_nm * pose.sin().z,
+        )
+    }
+
+    /// Motor currents in amperes for joint torques in Nm.
+    #[must_use]
+    pub fn currents_a(&self, torques_nm: Vec3) -> Vec3 {
+        torques_nm * self.amperes_per_nm
+    }
+}
+
+#[cfg(test)]
+#[path = "mechanism_tests.rs"]
+mod tests;

@@ -1,0 +1,143 @@
+//! Calibration records to begin with.
+//!
+//! Sources: `mahilab/Phantom` (a Premium 1.5 measured and driven, CAD and motor
+//! data), Çavuşoğlu, Feygin & Tendick (Presence, 2002), CHAI3D's device limits.
+//! What has one weak source or none is marked *uncertain*: measure it before
+//! the first force.
+
+use glam::Vec3;
+
+use super::calibration::{Calibration, JointLimits, Model, Thermal};
+
+/// Angles in degrees, which have to be multiplied out in a constant.
+const fn rad(degrees: f32) -> f32 {
+    degrees * (core::f32::consts::PI / 180.0)
+}
+
+/// The stops of a Premium 1.5 (CAD).
+const PREMIUM_STOPS: JointLimits = JointLimits {
+    min_rad: Vec3::new(rad(-90.0), rad(-124.0), rad(-29.0)),
+    max_rad: Vec3::new(rad(90.0), rad(119.0), rad(214.0)),
+    q2_minus_q3_max_rad: rad(65.0),
+    q3_minus_q2_max_rad: rad(55.0),
+};
+
+/// Maxon RE25 118743 (data sheet): 2.18 Ω at 25 °C, hot 2.82 Ω.
+const RE25: Thermal = Thermal {
+    resistance_ohm: 2.82,
+    winding_k_per_w: 3.1,
+    housing_k_per_w: 14.0,
+    winding_s: 12.0,
+    housing_s: 612.0,
+};
+
+impl Model {
+    /// The record to begin with; of a Premium 1.5 for [`Model::Other`].
+    #[must_use]
+    pub const fn preset(self) -> Calibration {
+        match self {
+            Self::Premium10 => Calibration::PREMIUM_1_0,
+            Self::Premium15 => Calibration::PREMIUM_1_5,
+            Self::Premium30 => Calibration::PREMIUM_3_0,
+            Self::Omni => Calibration::OMNI,
+            Self::Other => Calibration {
+                model: Self::Other,
+                ..Calibration::PREMIUM_1_5
+            },
+        }
+    }
+}
+
+impl Calibration {
+    /// Phantom Premium 1.5. Link lengths, stops and motors from CAD and data
+    /// sheet (C2002 has 215 and 170 mm); gravity without stylus from C2002
+    /// (−0.0117 and −0.0873 Nm by CAD). Uncertain: the cable ratios; the signs,
+    /// which depend on the wiring.
+    pub const PREMIUM_1_5: Self = Self {
+        model: Model::Premium15,
+        counts_per_turn: 4096.0,
+        ratio: Vec3::new(13.3, 11.2, 11.2),
+        encoder_sign: Vec3::ONE,
+        motor_sign: Vec3::ONE,
+        zero_rad: Vec3::ZERO,
+        l1_mm: 209.55,
+        l2_mm: 169.545,
+        limits: PREMIUM_STOPS,
+        gravity_2_nm: -0.0163,
+        gravity_3_nm: -0.0738,
+        torque_constant: Vec3::splat(0.0234),
+        peak_current_a: Vec3::splat(5.5),
+        continuous_current_a: Vec3::splat(1.24),
+        thermal: RE25,
+        max_force_n: 8.5,
+        max_speed_mm_s: 1000.0,
+    };
+
+    /// Phantom Premium 1.0: 8.5 N. Uncertain: link lengths (140 mm), and
+    /// everything else, which is a Premium 1.5's. Gravity is left to be fitted.
+    pub const PREMIUM_1_0: Self = Self {
+        model: Model::Premium10,
+        l1_mm: 140.0,
+        l2_mm: 140.0,
+        gravity_2_nm: 0.0,
+        gravity_3_nm: 0.0,
+        ..Self::PREMIUM_1_5
+    };
+
+    /// Phantom Premium 3.0: 22 N, 0.02 mm a count. Uncertain: all of it. The
+    /// links are a Premium 1.5's scaled by the workspaces' widths (838/381
+    /// mm), the ratios follow from 0.02 mm a count, motors and stops are a
+    /// Premium 1.5's. Gravity is left to be fitted.
+    pub const PREMIUM_3_0: Self = Self {
+        model: Model::Premium30,
+        ratio: Vec3::new(35.0, 35.0, 29.0),
+        l1_mm: 461.0,
+        l2_mm: 373.0,
+        gravity_2_nm: 0.0,
+        gravity_3_nm: 0.0,
+        max_force_n: 22.0,
+        ..Self::PREMIUM_1_5
+    };
+
+    /// Phantom Omni (Touch): 133.35 mm links, 3.3 N, 0.055 mm a count.
+    /// Uncertain: the ratios, which follow from that, stops and motors, which
+    /// are guesses on the careful side. Gravity is left to be fitted.
+    pub const OMNI: Self = Self {
+        model: Model::Omni,
+        ratio: Vec3::splat(3.72),
+        l1_mm: 133.35,
+        l2_mm: 133.35,
+        limits: JointLimits {
+            min_rad: Vec3::new(rad(-55.0), rad(-60.0), rad(-29.0)),
+            max_rad: Vec3::new(rad(55.0), rad(105.0), rad(120.0)),
+            ..PREMIUM_STOPS
+        },
+        gravity_2_nm: 0.0,
+        gravity_3_nm: 0.0,
+        torque_constant: Vec3::splat(0.02),
+        peak_current_a: Vec3::splat(2.0),
+        continuous_current_a: Vec3::splat(0.5),
+        max_force_n: 3.3,
+        ..Self::PREMIUM_1_5
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_is_valid_and_names_its_model() {
+        for model in [
+            Model::Premium10,
+            Model::Premium15,
+            Model::Premium30,
+            Model::Omni,
+            Model::Other,
+        ] {
+            let preset = model.preset();
+            assert_eq!(preset.model, model);
+            assert_eq!(preset.validate(), Ok(()), "{model:?}");
+        }
+    }
+}

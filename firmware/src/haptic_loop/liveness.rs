@@ -1,0 +1,55 @@
+//! Whether the watchdog is being fed, seen from the tick.
+//!
+//! The watchdog itself resets a board whose tasks hang. The tick need not wait
+//! for that: it sees that nobody feeds it and switches off first.
+
+use hapterra_core::guard::TickRate;
+
+/// The watchdog has to be fed at least this often, ms: less than the 50 ms
+/// after which a board's watchdog resets it.
+pub(super) const STALL_MS: u32 = 40;
+
+/// Follows the count of feedings.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Liveness {
+    limit: u32,
+    fed: u32,
+    /// Ticks since the count last rose; `None` before it ever has.
+    since: Option<u32>,
+}
+
+impl Liveness {
+    pub(super) fn new(rate: TickRate) -> Self {
+        Self {
+            limit: rate.ticks(STALL_MS),
+            fed: 0,
+            since: None,
+        }
+    }
+
+    /// One tick with the count as it is now: whether the watchdog is live.
+    pub(super) fn tick(&mut self, fed: u32) -> bool {
+        if fed != self.fed {
+            self.fed = fed;
+            self.since = Some(0);
+        } else {
+            self.since = self.since.map(|since| since.saturating_add(1));
+        }
+        self.since.is_some_and(|since| since <= self.limit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn live_from_the_first_feeding_until_forty_milliseconds_without_one() {
+        let mut liveness = Liveness::new(TickRate::DEFAULT);
+        assert!((0..100).all(|_| !liveness.tick(0)), "never fed");
+        assert!(liveness.tick(1));
+        let lived = (0..1000).take_while(|_| liveness.tick(1)).count();
+        assert_eq!(lived, 40);
+        assert!(liveness.tick(2), "fed again");
+    }
+}

@@ -1,0 +1,225 @@
+//! The calibration record in flash, so that a loss of power at any moment
+//! leaves the old record or the new one, never none.
+//!
+//! Two areas of one or more erase blocks each hold a row of places for a
+//! record. A record is written into the next blank place, never over another;
+//! an area is erased only when the one that holds the newest record is the
+//! other. What was cut off in the middle has no valid check sum and is passed
+//! over.
+//!
+//! ```text
+//! place:   number (u32)   its complement (u32)   record (`Calibration::encode`)   0xFF …
+//! ```
+//!
+//! The newest record is the valid one with the highest number. Erasing is slow
+//! (a sector of a large chip: seconds), so [`CalibrationStore::prepare`] does it
+//! at start-up, before there is a watchdog; saving then only writes.
+
+use embedded_storage::nor_flash::NorFlash;
+use hapterra_core::phantom::{BadRecord, Calibration, RECORD_BYTES};
+
+/// Number and complement.
+const HEAD: usize = 8;
+/// Bytes of a place: a multiple of 32, the largest write size among the chips.
+pub const PLACE: usize = HEAD + RECORD_BYTES + 24;
+
+/// What was found in the memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+// Read once, at start-up.
+#[allow(clippy::large_enum_variant)]
+pub enum Stored {
+    /// Nothing was ever stored, or there is no memory.
+    #[default]
+    Missing,
+    /// A record.
+    Found(Calibration),
+    /// Something, but no record that could be read.
+    Damaged,
+}
+
+/// Why a record could not be stored. The one before is still there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum StoreError {
+    /// The flash does not erase.
+    #[error("the flash cannot be erased")]
+    Erase,
+    /// No place would take it.
+    #[error("the flash cannot be written")]
+    Write,
+}
+
+/// One place, as read.
+enum Place {
+    Blank,
+    Holds(u32, Result<Calibration, BadRecord>),
+    /// Not even a number.
+    Spoilt,
+}
+
+/// The newest record and where things go on.
+#[derive(Default)]
+struct Found {
+    newest: Option<(u32, Calibration)>,
+    /// The area it is in.
+    area: usize,
+    spoilt: bool,
+}
+
+/// Keeps calibration records in two areas of a flash.
+pub struct CalibrationStore<F> {
+    flash: F,
+    /// First byte of each area.
+    areas: [u32; 2],
+    /// Bytes of an area.
+    size: u32,
+}
+
+impl<F: NorFlash> CalibrationStore<F> {
+    /// Over two areas of `size` bytes that begin at `areas`: whole erase
+    /// blocks of this flash and nobody else's.
+    pub const fn new(flash: F, areas: [u32; 2], size: u32) -> Self {
+        assert!(PLACE.is_multiple_of(F::WRITE_SIZE) && size as usize >= PLACE);
+        assert!((size as usize).is_multiple_of(F::ERASE_SIZE));
+        Self { flash, areas, size }
+    }
+
+    /// Reads the newest record.
+    pub fn load(&mut self) -> Stored {
+        let found = self.look();
+        match found.newest {
+            Some((_, calibration)) => Stored::Found(calibration),
+            None if found.spoilt => Stored::Damaged,
+            None => Stored::Missing,
+        }
+    }
+
+    /// Erases the area that the newest record is not in, unless it is blank.
+    /// To be called at start-up.
+    ///
+    /// # Errors
+    /// [`StoreError::Erase`].
+    pub fn prepare(&mut self) -> Result<(), StoreError> {
+        let found = self.look();
+        let spare = usize::from(found.newest.is_some()) ^ found.area;
+        if self.next_blank(spare, 0) != Some(0) {
+            self.erase(spare)?;
+        }
+        Ok(())
+    }
+
+    /// Stores a record.
+    ///
+    /// # Errors
+    /// [`StoreError`]; the record before is still there.
+    pub fn save(&mut self, calibration: &Calibration) -> Result<(), StoreError> {
+        let found = self.look();
+        let number = found.newest.map_or(0, |(number, _)| number.wrapping_add(1));
+        let place = filled(number, calibration);
+        if self.write_into(found.area, &place) {
+            return Ok(());
+        }
+        // Full: on in the other one, and only that is erased.
+        let other = 1 - found.area;
+        if self.next_blank(other, 0) != Some(0) {
+            self.erase(other)?;
+        }
+        match self.write_into(other, &place) {
+            true => Ok(()),
+            false => Err(StoreError::Write),
+        }
+    }
+
+    /// Writes into the first blank place of an area that takes it.
+    fn write_into(&mut self, area: usize, bytes: &[u8; PLACE]) -> bool {
+        let mut from = 0;
+        while let Some(place) = self.next_blank(area, from) {
+            let at = self.at(area, place);
+            let mut back = [0; PLACE];
+            let written = self.flash.write(at, bytes).is_ok()
+                && self.flash.read(at, &mut back).is_ok()
+                && back == *bytes;
+            if written {
+                return true;
+            }
+            from = place + 1;
+        }
+        false
+    }
+
+    fn places(&self) -> u32 {
+        self.size / PLACE as u32
+    }
+
+    fn at(&self, area: usize, place: u32) -> u32 {
+        let [first, second] = self.areas;
+        let start = if area == 0 { first } else { second };
+        start + place * PLACE as u32
+    }
+
+    fn next_blank(&mut self, area: usize, from: u32) -> Option<u32> {
+        (from..self.places()).find(|place| matches!(self.read(area, *place), Place::Blank))
+    }
+
+    fn erase(&mut self, area: usize) -> Result<(), StoreError> {
+        let from = self.at(area, 0);
+        let erased = self.flash.erase(from, from + self.size);
+        erased.map_err(|_| StoreError::Erase)
+    }
+
+    fn look(&mut self) -> Found {
+        let mut found = Found::default();
+        for area in 0..2 {
+            for place in 0..self.places() {
+                match self.read(area, place) {
+                    Place::Blank => {}
+                    Place::Holds(number, Ok(calibration)) => {
+                        let newer = |(known, _)| number.wrapping_sub(known) < u32::MAX / 2;
+                        if found.newest.is_none_or(newer) {
+                            found.newest = Some((number, calibration));
+                            found.area = area;
+                        }
+                    }
+                    Place::Holds(_, Err(_)) | Place::Spoilt => found.spoilt = true,
+                }
+            }
+        }
+        found
+    }
+
+    fn read(&mut self, area: usize, place: u32) -> Place {
+        let mut bytes = [0; PLACE];
+        if self.flash.read(self.at(area, place), &mut bytes).is_err() {
+            return Place::Spoilt;
+        }
+        if bytes.iter().all(|byte| *byte == 0xFF) {
+            return Place::Blank;
+        }
+        let (head, record) = bytes.split_at(HEAD);
+        let word = |bytes: &[u8]| bytes.first_chunk().copied().map(u32::from_le_bytes);
+        let (Some(number), Some(check)) = (word(head), head.get(4..).and_then(word)) else {
+            return Place::Spoilt;
+        };
+        if check != !number {
+            return Place::Spoilt;
+        }
+        Place::Holds(number, Calibration::decode(record))
+    }
+}
+
+/// A place's bytes.
+fn filled(number: u32, calibration: &Calibration) -> [u8; PLACE] {
+    let mut place = [0xFF; PLACE];
+    let mut buffer = [0; RECORD_BYTES];
+    let record = calibration.encode(&mut buffer);
+    let head = number
+        .to_le_bytes()
+        .into_iter()
+        .chain((!number).to_le_bytes());
+    for (to, from) in place.iter_mut().zip(head.chain(record.iter().copied())) {
+        *to = from;
+    }
+    place
+}
+
+#[cfg(test)]
+mod tests;

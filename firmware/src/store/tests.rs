@@ -1,0 +1,210 @@
+//! The store on a flash whose power fails.
+
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+};
+use std::vec;
+use std::vec::Vec;
+
+use super::*;
+
+/// A flash in memory: bits only fall when written, a word is written once, and
+/// after so many more words and blocks the power is gone.
+#[derive(Clone)]
+struct Flash<const WRITE: usize, const ERASE: usize> {
+    bytes: Vec<u8>,
+    /// Steps (words written, blocks erased) until the power fails.
+    left: usize,
+    steps: usize,
+}
+
+#[derive(Debug)]
+struct Failed;
+
+impl NorFlashError for Failed {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+impl<const WRITE: usize, const ERASE: usize> Flash<WRITE, ERASE> {
+    fn new(size: usize) -> Self {
+        Self {
+            bytes: vec![0xFF; size],
+            left: usize::MAX,
+            steps: 0,
+        }
+    }
+
+    /// Whether this step is still done, and whether it is the one cut in half.
+    fn step(&mut self) -> Result<bool, Failed> {
+        self.steps += 1;
+        match self.left {
+            0 => Err(Failed),
+            left => {
+                self.left = left - 1;
+                Ok(left == 1)
+            }
+        }
+    }
+}
+
+impl<const WRITE: usize, const ERASE: usize> ErrorType for Flash<WRITE, ERASE> {
+    type Error = Failed;
+}
+
+impl<const WRITE: usize, const ERASE: usize> ReadNorFlash for Flash<WRITE, ERASE> {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Failed> {
+        let from = offset as usize;
+        bytes.copy_from_slice(&self.bytes[from..from + bytes.len()]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.bytes.len()
+    }
+}
+
+impl<const WRITE: usize, const ERASE: usize> NorFlash for Flash<WRITE, ERASE> {
+    const WRITE_SIZE: usize = WRITE;
+    const ERASE_SIZE: usize = ERASE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Failed> {
+        assert!((from | to).is_multiple_of(ERASE as u32));
+        for block in (from as usize..to as usize).step_by(ERASE) {
+            let cut = self.step()?;
+            // Cut off, half of the block is still what it was.
+            let half = if cut { ERASE / 2 } else { ERASE };
+            self.bytes[block..block + half].fill(0xFF);
+            if cut {
+                return Err(Failed);
+            }
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Failed> {
+        assert!(offset.is_multiple_of(WRITE as u32) && bytes.len().is_multiple_of(WRITE));
+        for (i, word) in bytes.chunks(WRITE).enumerate() {
+            let cut = self.step()?;
+            let at = offset as usize + i * WRITE;
+            let place = &mut self.bytes[at..at + WRITE];
+            if place.iter().any(|byte| *byte != 0xFF) {
+                return Err(Failed); // programmed once already: its ECC is set
+            }
+            for (to, from) in place.iter_mut().zip(word) {
+                // Cut off, some bits have not fallen yet.
+                *to &= if cut { from | 0x5A } else { *from };
+            }
+            if cut {
+                return Err(Failed);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn numbered(n: usize) -> Calibration {
+    Calibration {
+        l1_mm: 200.0 + n as f32,
+        ..Calibration::PREMIUM_1_5
+    }
+}
+
+/// A store on a flash of this kind, as after a reset.
+fn store<const W: usize, const E: usize>(
+    flash: Flash<W, E>,
+    size: usize,
+) -> CalibrationStore<Flash<W, E>> {
+    let flash = Flash {
+        left: usize::MAX,
+        ..flash
+    };
+    CalibrationStore::new(flash, [0, size as u32], size as u32)
+}
+
+#[test]
+fn nothing_then_something_then_the_latest() {
+    let mut store = store(Flash::<8, 2048>::new(4096), 2048);
+    assert_eq!(store.load(), Stored::Missing);
+    for n in 0..40 {
+        store.save(&numbered(n)).expect("saved");
+        assert_eq!(store.load(), Stored::Found(numbered(n)), "{n}");
+    }
+}
+
+/// Cuts the power at each step of each of many savings.
+fn cut_everywhere<const W: usize, const E: usize>(size: usize, savings: usize) {
+    let mut flash = Flash::<W, E>::new(2 * size);
+    let mut cuts = 0;
+    for n in 0..savings {
+        let mut whole = store(flash.clone(), size);
+        whole.flash.steps = 0;
+        whole.save(&numbered(n)).expect("saved");
+        for left in 1..=whole.flash.steps {
+            let mut failing = store(flash.clone(), size);
+            failing.flash.left = left;
+            // The last step may be cut only after all bits were right.
+            let _ = failing.save(&numbered(n));
+            let mut after = store(failing.flash, size);
+            let found = after.load();
+            let old = match n {
+                0 => [Stored::Missing, Stored::Damaged].contains(&found),
+                n => found == Stored::Found(numbered(n - 1)),
+            };
+            let new = found == Stored::Found(numbered(n));
+            assert!(old || new, "saving {n} cut at {left}: {found:?}");
+            // And the store works on from there.
+            after.prepare().expect("prepared");
+            after.save(&numbered(n + 100)).expect("saved");
+            assert_eq!(after.load(), Stored::Found(numbered(n + 100)));
+            cuts += 1;
+        }
+        flash = whole.flash;
+    }
+    assert!(cuts > 9 * savings, "{cuts}");
+}
+
+#[test]
+fn power_lost_at_any_step_leaves_the_old_record_or_the_new() {
+    // As on a G474, an H743 (shortened), and in blocks smaller than a place.
+    cut_everywhere::<8, 2048>(2048, 30);
+    cut_everywhere::<32, 8192>(8192, 80);
+    cut_everywhere::<4, 256>(512, 10);
+}
+
+#[test]
+fn prepared_it_saves_without_erasing() {
+    let mut store = store(Flash::<8, 2048>::new(4096), 2048);
+    for n in 0..40 {
+        store.prepare().expect("prepared");
+        store.flash.steps = 0;
+        store.save(&numbered(n)).expect("saved");
+        assert!(store.flash.steps <= PLACE / 8, "{n}: erased");
+    }
+}
+
+#[test]
+fn garbage_is_damaged_not_missing_and_can_be_written_over() {
+    let mut flash = Flash::<8, 2048>::new(4096);
+    flash.bytes.fill(0xA5);
+    let mut store = store(flash, 2048);
+    assert_eq!(store.load(), Stored::Damaged);
+    store.save(&numbered(1)).expect("saved");
+    assert_eq!(store.load(), Stored::Found(numbered(1)));
+}
+
+#[test]
+fn every_flipped_bit_of_the_only_record_is_noticed() {
+    let mut fresh = store(Flash::<8, 2048>::new(4096), 2048);
+    fresh.save(&numbered(1)).expect("saved");
+    let mut buffer = [0; RECORD_BYTES];
+    let length = HEAD + numbered(1).encode(&mut buffer).len();
+    for bit in 0..8 * length {
+        let mut flash = fresh.flash.clone();
+        flash.bytes[bit / 8] ^= 1 << (bit % 8);
+        assert_eq!(store(flash, 2048).load(), Stored::Damaged, "bit {bit}");
+    }
+}
