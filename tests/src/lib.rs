@@ -8,6 +8,7 @@ pub mod counting;
 pub mod emulation;
 pub mod faulty;
 pub mod field;
+pub mod fuzzing;
 pub mod invariants;
 pub mod oracle;
 pub mod scene;

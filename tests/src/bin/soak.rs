@@ -93,16 +93,15 @@ fn all(wanted: &Wanted) -> ExitCode {
     );
     // A few of each kind.
     let mut told: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
-    for (number, kind, what) in &tally.broken {
-        let invariant = what.split(' ').next().unwrap_or_default();
-        let times = told.entry(invariant).or_default();
+    for broken in &tally.broken {
+        let times = told.entry(&broken.invariant).or_default();
         *times += 1;
         if *times > SHOWN {
             continue;
         }
         println!(
-            "\n{kind:?}: {what}\n    again: cargo xtask soak --seed {} --scene {number}",
-            wanted.seed
+            "\n{:?}: {}\n    again: cargo xtask soak --seed {} --scene {}",
+            broken.kind, broken.what, wanted.seed, broken.number
         );
     }
     if tally.broken.is_empty() {

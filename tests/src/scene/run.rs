@@ -27,9 +27,18 @@ pub struct Scene {
     pub pace: Pace,
     /// How the tiles come.
     pub supply: Supply,
-    /// Which of the twins is run beside it.
-    twin: usize,
+    /// Which of the twins are run beside it.
+    twins: Twins,
     seed: u64,
+}
+
+/// Which twins a scene is compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Twins {
+    /// One of them, or none: scenes of a soak are many.
+    One(usize),
+    /// Each.
+    All,
 }
 
 impl Scene {
@@ -67,8 +76,28 @@ impl Scene {
             rule,
             pace,
             supply,
-            twin: if paper { 0 } else { chance.below(6) },
+            twins: Twins::One(if paper { 0 } else { chance.below(6) }),
             seed: chance.bits(),
+        }
+    }
+
+    /// A scene of one's own, compared with every twin.
+    #[must_use]
+    pub const fn given(
+        terrain: Terrain,
+        path: Vec<[f64; 3]>,
+        rule: Rule,
+        pace: Pace,
+        supply: Supply,
+    ) -> Self {
+        Self {
+            terrain,
+            path,
+            rule,
+            pace,
+            supply,
+            twins: Twins::All,
+            seed: 1,
         }
     }
 
@@ -80,12 +109,20 @@ impl Scene {
         let mut judge = Judge::new(&self.terrain, self.rule);
         let seen = self.feel(buffers, [0; 3], self.supply, |seen| judge.look(seen))?;
         let mut chance = Chance::new(self.seed);
-        match self.twin {
-            0 => twin::repeated(self, &seen, buffers)?,
-            1 => twin::shifted(self, buffers, &mut chance)?,
-            2 => twin::windowed(self, &seen, buffers)?,
-            3 | 4 => twin::turned(self, buffers, &mut chance)?,
-            _ => {}
+        let wanted = |twin: usize| {
+            matches!(self.twins, Twins::One(n) if n == twin) || self.twins == Twins::All
+        };
+        if wanted(0) {
+            twin::repeated(self, &seen, buffers)?;
+        }
+        if wanted(1) {
+            twin::shifted(self, buffers, &mut chance)?;
+        }
+        if wanted(2) {
+            twin::windowed(self, &seen, buffers)?;
+        }
+        if wanted(3) || wanted(4) {
+            twin::turned(self, buffers, &mut chance)?;
         }
         Ok(judge.measured)
     }

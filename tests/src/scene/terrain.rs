@@ -134,6 +134,30 @@ impl Terrain {
         }
     }
 
+    /// The largest step between two neighbouring samples; infinite with holes.
+    #[must_use]
+    pub fn steepest(&self) -> f32 {
+        let [columns, rows] = self.size;
+        let steps = (0..=rows).flat_map(|y| (0..=columns).map(move |x| (x, y)));
+        let steps = steps.flat_map(|(x, y)| {
+            let here = self.post(x, y);
+            let east = if x < columns {
+                self.post(x + 1, y)
+            } else {
+                here
+            };
+            let north = if y < rows { self.post(x, y + 1) } else { here };
+            [east - here, north - here]
+        });
+        steps.fold(0.0, |most, step| {
+            if step.is_nan() {
+                f32::INFINITY
+            } else {
+                step.abs().max(most)
+            }
+        })
+    }
+
     /// About how high the surface is around a place, whatever is there.
     #[must_use]
     pub fn height_about(&self, x: f64, y: f64) -> f64 {

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-pub use tally::{Found, Tally};
+pub use tally::{Broken, Found, Tally};
 
 use crate::invariants::judge::Measured;
 use crate::scene::run::Scene;

@@ -16,13 +16,26 @@ pub enum Found {
     Broke(Kind, String, String),
 }
 
+/// A scene in which something did not hold.
+#[derive(Clone, Debug)]
+pub struct Broken {
+    /// Its number.
+    pub number: u64,
+    /// Its terrain.
+    pub kind: Kind,
+    /// Which invariant, by name; `Panic` for a panic.
+    pub invariant: String,
+    /// What was found.
+    pub what: String,
+}
+
 /// All scenes so far.
 #[derive(Clone, Debug, Default)]
 pub struct Tally {
     /// Scenes run.
     pub scenes: u64,
-    /// Violations: the scene's number, its terrain, and what was found.
-    pub broken: Vec<(u64, Kind, String)>,
+    /// Violations.
+    pub broken: Vec<Broken>,
     by_kind: BTreeMap<usize, Measured>,
     by_invariant: BTreeMap<String, u64>,
 }
@@ -33,9 +46,14 @@ impl Tally {
         self.scenes += 1;
         match found {
             Found::Broke(kind, invariant, what) => {
-                let what_broke = format!("{invariant} on {kind:?}");
-                *self.by_invariant.entry(what_broke).or_default() += 1;
-                self.broken.push((number, kind, what));
+                let which = format!("{invariant} on {kind:?}");
+                *self.by_invariant.entry(which).or_default() += 1;
+                self.broken.push(Broken {
+                    number,
+                    kind,
+                    invariant,
+                    what,
+                });
             }
             Found::Held(kind, measured) => {
                 let row = KINDS.iter().position(|k| *k == kind).unwrap_or(0);

@@ -1,0 +1,6 @@
+//! What is done with arbitrary bytes: the bodies of the fuzz targets in `fuzz/`,
+//! which a plain test drives, too (`tests/fuzzed.rs`).
+
+mod bytes;
+pub mod tick;
+pub mod wire;

@@ -1,0 +1,143 @@
+//! Arbitrary scenes, tiles, points and encoder counts into the tick.
+
+use hapterra_core::Vec3;
+use hapterra_core::contact::{Rule, WORK_PER_TICK};
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::{GridPoint, MAX_CELL};
+use hapterra_core::guard::Fault;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::terrain::{Tile, TileKey};
+use hapterra_core::tick::{Command, Haptics, Outcome};
+use hapterra_core::wire::message::{Point, Scene, Source};
+
+use super::bytes::Bytes;
+
+/// Tiles along the side of the window.
+const SIDE: usize = 2;
+
+/// Does what the bytes say, and looks at every tick.
+///
+/// # Panics
+/// When a tick gives what no tick may give.
+pub fn run(data: &[u8]) {
+    let mut bytes = Bytes(data);
+    let mut tiles = vec![Tile::VACANT; SIDE * SIDE + 1];
+    let mut slots = tiles.iter_mut();
+    let mut next = || slots.next().expect("one for each slot, and one");
+    let window = std::array::from_fn(|_| std::array::from_fn(|_| next()));
+    let mut spare = Some(next());
+    let mut haptics = Haptics::<SIDE>::new(window, Calibration::PREMIUM_1_5);
+    let mut law = ForceLaw::PREMIUM;
+    while !bytes.is_empty() {
+        match bytes.byte() % 8 {
+            0 => {
+                let scene = scene(&mut bytes);
+                if scene.is_valid() {
+                    law = scene.law;
+                }
+                let _ = haptics.accept(Command::Scene(scene));
+            }
+            1 | 2 => {
+                let tile = spare.take().expect("every tile gives a buffer back");
+                fill(tile, &mut bytes);
+                spare = haptics.accept(Command::Tile(tile));
+            }
+            3 => {
+                let _ = haptics.accept(Command::ClearFault);
+            }
+            4 => {
+                let _ = haptics.accept(Command::Trip(Fault::Hardware));
+            }
+            5 => {
+                let hip = position(&mut bytes);
+                let _ = haptics.accept(Command::Point(Point { seq: 1, hip }));
+            }
+            _ => {}
+        }
+        let counts = [
+            bytes.int(),
+            i32::from(bytes.byte()),
+            i32::from(bytes.byte()),
+        ];
+        look(&haptics.tick(counts), &law);
+    }
+}
+
+fn scene(bytes: &mut Bytes<'_>) -> Scene {
+    let kind = bytes.byte();
+    let mut scene = Scene {
+        epoch: 1,
+        level: 0,
+        size: [64, 64],
+        top: 1 << 20,
+        cell_mm: 1.0,
+        home: GridPoint::new([30, 30, 2], Vec3::ZERO),
+        law: ForceLaw::PREMIUM,
+        rule: if kind & 1 == 0 {
+            Rule::Swept
+        } else {
+            Rule::Paper
+        },
+        source: if kind & 2 == 0 {
+            Source::Points
+        } else {
+            Source::Encoders
+        },
+        hold_clock: false,
+    };
+    if kind & 4 != 0 {
+        scene.size = [bytes.int(), bytes.int()];
+        scene.top = bytes.int();
+    }
+    if kind & 8 != 0 {
+        scene.cell_mm = bytes.float();
+        scene.home = position(bytes);
+        scene.law = ForceLaw {
+            stiffness_n_per_mm: bytes.float(),
+            max_force_n: bytes.float(),
+        };
+    }
+    scene
+}
+
+fn fill(tile: &mut Tile, bytes: &mut Bytes<'_>) {
+    let key = TileKey {
+        level: bytes.byte() / 128,
+        col: i32::from(bytes.byte() % 4) - 1,
+        row: i32::from(bytes.byte() % 4) - 1,
+    };
+    let base = if bytes.byte() == 255 { bytes.int() } else { 0 };
+    let heights: Vec<f32> = (0..7).map(|_| bytes.height()).collect();
+    // A tile that is refused is left vacant, which the loop refuses in turn.
+    let _ = tile.fill(key, base, |col, row| heights[(3 * col + 5 * row) % 7]);
+}
+
+fn position(bytes: &mut Bytes<'_>) -> GridPoint {
+    if bytes.byte() == 255 {
+        let cell = [bytes.int(), bytes.int(), bytes.int()];
+        return GridPoint::new(cell, Vec3::new(bytes.float(), bytes.float(), bytes.float()));
+    }
+    let cell = [bytes.byte() % 64, bytes.byte() % 64, bytes.byte() % 8];
+    let mut part = || f32::from(bytes.byte()) / 128.0;
+    let offset = Vec3::new(part(), part(), part());
+    GridPoint::new(cell.map(i32::from), offset - Vec3::new(0.0, 0.0, 4.0))
+}
+
+fn look(outcome: &Outcome, law: &ForceLaw) {
+    let (sample, drive) = (&outcome.sample, &outcome.drive);
+    let force = sample.force_n.as_dvec3().length();
+    let limit = f64::from(law.max_force_n) * (1.0 + 1e-6);
+    assert!(sample.force_n.is_finite() && force <= limit, "{outcome:?}");
+    assert!(drive.currents_a.is_finite(), "{outcome:?}");
+    let most = Calibration::PREMIUM_1_5.peak_current_a;
+    assert!(drive.currents_a.abs().max_element() <= most, "{outcome:?}");
+    let off = drive.currents_a == Vec3::ZERO;
+    assert!(drive.enabled || off, "{outcome:?}");
+    assert!(sample.fault.is_none() || !drive.enabled, "{outcome:?}");
+    assert!(sample.work <= WORK_PER_TICK, "{outcome:?}");
+    for point in [&sample.hip, &sample.proxy] {
+        let (cell, frac) = (point.cell(), point.frac().to_array());
+        assert!(cell.iter().all(|c| c.abs() <= MAX_CELL), "{outcome:?}");
+        assert!(frac.iter().all(|f| (0.0..1.0).contains(f)), "{outcome:?}");
+    }
+}

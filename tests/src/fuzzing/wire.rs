@@ -1,0 +1,172 @@
+//! Arbitrary bytes into the frame decoder and the device's end of the link.
+
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
+use hapterra_core::wire::message::{HostHello, PROTOCOL, Scene, Source, ToDevice, ToHost};
+use hapterra_firmware::channels::{Channels, Tiles};
+use hapterra_firmware::native::{Device, StoppedClock};
+
+use super::bytes::Bytes;
+
+/// A device that lives as long as the thread: its memory cannot be had back.
+pub struct Wire {
+    device: Device<StoppedClock, 2>,
+    host: Box<FrameReader<8192>>,
+}
+
+impl Default for Wire {
+    fn default() -> Self {
+        let device = Device::new(
+            Box::leak(Box::new(Tiles::new())),
+            Box::leak(Box::new(Channels::new())),
+            StoppedClock,
+            Calibration::PREMIUM_1_5,
+        );
+        Self {
+            device,
+            host: Box::new(FrameReader::new()),
+        }
+    }
+}
+
+impl Wire {
+    /// Plays the bytes to the decoder and to the device, in a fresh session and
+    /// scene.
+    ///
+    /// # Panics
+    /// When the device says what is no message, or drives a motor in a replay.
+    pub fn run(&mut self, data: &[u8]) {
+        decoded(data);
+        self.begin();
+        let mut bytes = Bytes(data);
+        while !bytes.is_empty() {
+            let kind = bytes.byte();
+            let length = usize::from(bytes.byte()).min(bytes.0.len());
+            let (chunk, rest) = bytes.0.split_at(length);
+            bytes.0 = rest;
+            match kind % 4 {
+                // As it is, on the line.
+                0 => self.hear(chunk),
+                // In a frame whose check sum fits, so that its content is read.
+                1 | 2 => self.hear(&framed(chunk)),
+                _ => self.device.interrupted(),
+            }
+            let counts = [i32::from(kind), 0, 0];
+            let drive = self.device.tick(counts);
+            assert!(drive.currents_a.is_finite(), "{drive:?}");
+            assert!(self.device.feels_arm() || !drive.enabled, "{drive:?}");
+            self.listen();
+        }
+    }
+
+    /// A new session, whatever was heard before.
+    fn begin(&mut self) {
+        self.device.interrupted();
+        self.hear(&[0]);
+        let hello = HostHello { protocol: PROTOCOL };
+        self.hear(&message(&ToDevice::Hello(hello)));
+        self.hear(&message(&ToDevice::Scene(scene())));
+        self.hear(&message(&ToDevice::ClearFault));
+        let _ = self.device.tick([0; 3]);
+        self.listen();
+    }
+
+    /// All of it, with ticks in between where the device takes no more.
+    fn hear(&mut self, mut bytes: &[u8]) {
+        for _ in 0..10_000 {
+            let taken = self.device.receive(bytes);
+            bytes = &bytes[taken..];
+            if bytes.is_empty() {
+                return;
+            }
+            let _ = self.device.tick([0; 3]);
+            self.listen();
+        }
+        panic!("the device does not take {} bytes", bytes.len());
+    }
+
+    /// Everything the device says is a message.
+    fn listen(&mut self) {
+        let mut chunk = [0; 256];
+        for _ in 0..10_000 {
+            let n = self.device.transmit(&mut chunk);
+            if n == 0 {
+                return;
+            }
+            let mut said = &chunk[..n];
+            while !said.is_empty() {
+                let (taken, frame) = self.host.push(said);
+                said = &said[taken..];
+                if let Some(frame) = frame {
+                    let frame = frame.expect("the device sends whole frames");
+                    let _: ToHost = decode(frame).expect("and messages in them");
+                }
+            }
+        }
+        panic!("the device does not stop talking");
+    }
+}
+
+/// The decoder alone, for both directions.
+fn decoded(mut data: &[u8]) {
+    let mut reader = Box::new(FrameReader::<MAX_FRAME>::new());
+    while !data.is_empty() {
+        let (taken, frame) = reader.push(data);
+        assert!(taken > 0);
+        if let Some(Ok(frame)) = frame {
+            let _ = decode::<ToDevice<'_>>(frame);
+            let _ = decode::<ToHost>(frame);
+        }
+        data = &data[taken..];
+    }
+}
+
+/// Bytes as postcard would have written them, check sum and all.
+fn framed(content: &[u8]) -> Vec<u8> {
+    /// Serializes as nothing but its bytes.
+    struct Raw<'b>(&'b [u8]);
+    impl serde::Serialize for Raw<'_> {
+        fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+            use serde::ser::SerializeTuple;
+            let mut tuple = serializer.serialize_tuple(self.0.len())?;
+            for byte in self.0 {
+                tuple.serialize_element(byte)?;
+            }
+            tuple.end()
+        }
+    }
+    encode(&Raw(content), &mut [0; MAX_FRAME])
+        .expect("a chunk is short")
+        .to_vec()
+}
+
+/// A whole message on the line.
+///
+/// # Panics
+/// When it does not fit a frame.
+#[must_use]
+pub fn message(message: &ToDevice<'_>) -> Vec<u8> {
+    encode(message, &mut [0; MAX_FRAME])
+        .expect("fits a frame")
+        .to_vec()
+}
+
+/// A replay over 64 × 64 patches.
+#[must_use]
+pub fn scene() -> Scene {
+    Scene {
+        epoch: 7,
+        level: 0,
+        size: [64, 64],
+        top: 100,
+        cell_mm: 1.0,
+        home: GridPoint::default(),
+        law: ForceLaw::PREMIUM,
+        rule: Rule::Swept,
+        source: Source::Points,
+        hold_clock: false,
+    }
+}

@@ -1,0 +1,121 @@
+//! The bodies of the fuzz targets, driven without a fuzzer: bytes at random, and
+//! inputs that make sense with some of their bytes changed. The same every time.
+
+use hapterra_core::Vec3;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::terrain::TileKey;
+use hapterra_core::wire::message::{Heights, Point, Source, TileMessage, ToDevice};
+use hapterra_tests::chance::Chance;
+use hapterra_tests::fuzzing::{tick, wire};
+
+fn random(chance: &mut Chance, length: usize) -> Vec<u8> {
+    (0..length).map(|_| chance.bits() as u8).collect()
+}
+
+/// Some bytes changed, dropped or said twice.
+fn mutated(chance: &mut Chance, input: &[u8]) -> Vec<u8> {
+    let mut bytes = input.to_vec();
+    for _ in 0..chance.below(6) {
+        let at = chance.below(bytes.len());
+        match chance.below(4) {
+            0 => bytes[at] = chance.bits() as u8,
+            1 => bytes[at] ^= 1 << chance.below(8),
+            2 => {
+                bytes.remove(at);
+            }
+            _ => bytes.insert(at, bytes[at]),
+        }
+    }
+    bytes
+}
+
+/// A scene of points, a tile, and points that go down into it.
+fn sensible_ticks(chance: &mut Chance) -> Vec<u8> {
+    let mut bytes = vec![0, chance.below(4) as u8, 0, 0, 0, 0, 0, 0];
+    bytes.extend([1, 0, 1, 1, 0]);
+    bytes.extend((0..7).map(|_| 120 + chance.below(20) as u8));
+    bytes.extend([0; 6]);
+    for step in 0..chance.below(30) as u8 {
+        bytes.extend([5, 0, 10, 10, 6 - step / 6, step, step, 0]);
+        bytes.extend([step, 0, 0, 0, step, step]);
+    }
+    bytes
+}
+
+#[test]
+fn no_bytes_break_the_tick() {
+    let mut chance = Chance::new(11);
+    for round in 0..20_000 {
+        let length = chance.below(400);
+        let input = match round % 3 {
+            0 => random(&mut chance, length),
+            _ => {
+                let sensible = sensible_ticks(&mut chance);
+                mutated(&mut chance, &sensible)
+            }
+        };
+        tick::run(&input);
+    }
+}
+
+/// Whole messages on the line, cut into the target's chunks.
+fn sensible_talk(chance: &mut Chance) -> Vec<u8> {
+    let samples = [0.5f32.to_le_bytes(); 33 * 33].concat();
+    let mut line = Vec::new();
+    for seq in 0..1 + chance.below(6) as u32 {
+        let key = TileKey {
+            level: 0,
+            col: chance.below(3) as i32,
+            row: 0,
+        };
+        let heights = match chance.below(3) {
+            0 => Heights::Samples {
+                base: 1,
+                bytes: &samples,
+            },
+            1 => Heights::Flat {
+                base: 0,
+                height: 1.5,
+            },
+            _ => Heights::Hole,
+        };
+        let depth = chance.between(-2.0, 3.0) as f32;
+        let hip = GridPoint::new([10, 10, 0], Vec3::new(0.3, 0.4, depth));
+        let said = match chance.below(5) {
+            0 => ToDevice::Tile(TileMessage {
+                epoch: 7,
+                key,
+                heights,
+            }),
+            1 => ToDevice::Scene(hapterra_core::wire::message::Scene {
+                epoch: seq,
+                source: Source::Encoders,
+                ..wire::scene()
+            }),
+            2 => ToDevice::ClearFault,
+            _ => ToDevice::Point(Point { seq, hip }),
+        };
+        line.extend(wire::message(&said));
+    }
+    let chunks = line.chunks(255);
+    chunks
+        .flat_map(|chunk| [&[0, chunk.len() as u8], chunk].concat())
+        .collect()
+}
+
+#[test]
+fn no_bytes_break_the_link() {
+    let mut chance = Chance::new(12);
+    let mut wire = wire::Wire::default();
+    for round in 0..20_000 {
+        let length = chance.below(600);
+        let input = match round % 3 {
+            0 => random(&mut chance, length),
+            _ => {
+                let sensible = sensible_talk(&mut chance);
+                mutated(&mut chance, &sensible)
+            }
+        };
+        wire.run(&input);
+    }
+}

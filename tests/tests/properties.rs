@@ -1,0 +1,126 @@
+//! Properties of the tick on small terrains that proptest makes up and, where one
+//! fails, makes as small and plain as it can.
+//!
+//! What is checked in each tick is in `hapterra_tests::invariants`. Failures are
+//! kept in `properties.proptest-regressions` and run first the next time; what
+//! they taught has a test of its own in `regressions.rs`.
+
+use hapterra_core::contact::{Pace, Rule};
+use hapterra_tests::scene::hand::GRAIN;
+use hapterra_tests::scene::run::Scene;
+use hapterra_tests::scene::stage::{Buffers, Supply};
+use hapterra_tests::scene::terrain::{Kind, Terrain};
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::test_runner::FileFailurePersistence;
+
+const REGRESSIONS: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/tests/properties.proptest-regressions"
+);
+/// Patches along a side.
+const SIDE: usize = 6;
+const POSTS: usize = (SIDE + 1) * (SIDE + 1);
+
+fn terrain(heights: &[f32]) -> Terrain {
+    let side = SIDE as i32;
+    Terrain::from_fn(Kind::Rough, [side, side], |x, y| {
+        heights[(y * (side + 1) + x) as usize]
+    })
+}
+
+/// Ground that a hand knows: slopes up to four.
+fn gentle() -> impl Strategy<Value = Vec<f32>> {
+    let height = prop_oneof![
+        Just(0.0_f32),
+        (-8..8_i32).prop_map(|h| h as f32 / 4.0),
+        -2.0..2.0_f32,
+    ];
+    vec(height, POSTS)
+}
+
+/// Anything a file can hold.
+fn wild() -> impl Strategy<Value = Vec<f32>> {
+    let height = prop_oneof![
+        4 => Just(0.0_f32),
+        4 => -2.0..2.0_f32,
+        1 => Just(1e6_f32),
+        1 => -1e5..1e5_f32,
+        1 => any::<f32>(),
+        1 => Just(f32::NAN),
+        1 => Just(f32::INFINITY),
+        1 => Just(f32::MIN_POSITIVE / 4.0),
+    ];
+    vec(height, POSTS)
+}
+
+/// A coordinate: on the lines of the grid, between them, or off the field.
+fn coordinate() -> impl Strategy<Value = f64> {
+    let side = SIDE as i32;
+    prop_oneof![
+        (0..=side).prop_map(f64::from),
+        (-4..=4 * side + 4).prop_map(|quarters| f64::from(quarters) / 4.0),
+        (0.0..f64::from(side)).prop_map(|c| (c / GRAIN).round() * GRAIN),
+    ]
+}
+
+fn path() -> impl Strategy<Value = Vec<[f64; 3]>> {
+    let height = prop_oneof![
+        (-8..=12_i32).prop_map(|quarters| f64::from(quarters) / 4.0),
+        (-3.0..3.0_f64).prop_map(|z| (z / GRAIN).round() * GRAIN),
+    ];
+    let hand = (coordinate(), coordinate(), height).prop_map(|(x, y, z)| [x, y, z]);
+    // Seen above everything first.
+    vec(hand, 1..30).prop_map(|mut path| {
+        path.insert(0, [3.5, 3.5, 4e6]);
+        path.insert(1, [3.5, 3.5, 4.0]);
+        path
+    })
+}
+
+fn rule() -> impl Strategy<Value = Rule> {
+    prop_oneof![4 => Just(Rule::Swept), 1 => Just(Rule::Paper)]
+}
+
+fn pace() -> impl Strategy<Value = Pace> {
+    prop_oneof![Just(Pace::RealTime), Just(Pace::LockStep)]
+}
+
+fn holds(scene: &Scene) -> Result<(), TestCaseError> {
+    match scene.run(&mut Buffers::default()) {
+        Ok(_) => Ok(()),
+        Err(violation) => Err(TestCaseError::fail(violation.to_string())),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 400,
+        failure_persistence: Some(Box::new(FileFailurePersistence::Direct(REGRESSIONS))),
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    #[ignore = "found, not yet mended: see regressions.rs"]
+    fn everything_holds_on_gentle_ground(
+        heights in gentle(), path in path(), rule in rule(), pace in pace(),
+    ) {
+        holds(&Scene::given(terrain(&heights), path, rule, pace, Supply::Held))?;
+    }
+
+    #[test]
+    #[ignore = "found, not yet mended: see regressions.rs"]
+    fn everything_holds_on_wild_ground(
+        heights in wild(), path in path(), rule in rule(), pace in pace(),
+    ) {
+        holds(&Scene::given(terrain(&heights), path, rule, pace, Supply::Held))?;
+    }
+
+    #[test]
+    fn everything_holds_while_tiles_arrive(
+        heights in gentle(), path in path(), pace in pace(), latency in 0..4_u32,
+    ) {
+        let supply = Supply::Pulled { latency };
+        holds(&Scene::given(terrain(&heights), path, Rule::Swept, pace, supply))?;
+    }
+}
