@@ -1,0 +1,92 @@
+//! What the whole chain from count to current costs on the emulated
+//! Cortex-M4F, by count of instructions.
+
+use std::time::Duration;
+
+use hapterra::link::{
+    Arming, Emulator, Event, INSTRUCTIONS_PER_COUNT, Patience, Session, serve_plant,
+};
+use hapterra::live::{Mean, Stage};
+use hapterra::synth::{Kind, Synth};
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::contact::{Rule, State};
+use hapterra_core::force::ForceLaw;
+use hapterra_core::guard::Mode;
+use hapterra_core::wire::message::Sample;
+use hapterra_tests::emulation::emulated_board;
+
+/// Most that a tick in contact may cost on average: kinematics, contact,
+/// guard, torques, and all the loop does around them.
+const IN_CONTACT: f64 = 2_500.0;
+
+/// The demonstration's samples on the emulated board.
+fn felt() -> Option<Vec<Sample>> {
+    let (qemu, image) = emulated_board()?;
+    let raster = Synth::new(Kind::Fractal, 1, 30.0)
+        .raster(400, 400)
+        .expect("raster");
+    let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
+    let stage = Stage::set(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("stage");
+    let mut rig = stage.rig().expect("rig");
+    let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
+    let mut plant = lines.plant;
+    let ticks = (1e3 * stage.duration_s()) as u32;
+    let samples = std::thread::scope(|scope| {
+        // Until the board goes.
+        scope.spawn(move || serve_plant(&mut plant, &mut rig, &|| false));
+        let link = Box::new(lines.link);
+        let (scene, patience) = (stage.scene(), Patience::EMULATED);
+        let opened = Session::open_arming(&terrain, scene, Arming::VIRTUAL, link, patience);
+        let (mut session, _) = opened.expect("opened");
+        let mut samples: Vec<Sample> = Vec::new();
+        while samples.last().is_none_or(|last| last.tick < ticks) {
+            session
+                .poll(Duration::from_millis(100), &mut |event| {
+                    if let Event::Sample(sample) = event {
+                        samples.push(*sample);
+                    }
+                })
+                .expect("goes on");
+        }
+        session.say_goodbye().expect("said");
+        let status = emulator.finish().expect("ended");
+        assert!(status.success(), "the board ended with {status}");
+        samples
+    });
+    Some(samples)
+}
+
+#[test]
+fn a_tick_in_contact_stays_within_its_budget_and_none_is_late() {
+    let Some(samples) = felt() else {
+        return;
+    };
+    let mut costs: [(&str, Mean); 4] =
+        ["disarmed", "free", "waiting", "touching"].map(|name| (name, Mean::default()));
+    for pair in samples.windows(2) {
+        // A sample tells what the tick before it cost.
+        let (sample, cost) = (&pair[0], f64::from(pair[1].cost));
+        let kind = match (sample.mode, sample.state) {
+            (Mode::Armed, State::Free) => 1,
+            (Mode::Armed, State::Waiting) => 2,
+            (Mode::Armed, State::Touching) => 3,
+            _ => 0,
+        };
+        costs[kind].1.take(cost * INSTRUCTIONS_PER_COUNT);
+    }
+    for (name, cost) in &costs {
+        let (mean, max) = (cost.mean(), cost.max());
+        eprintln!(
+            "{name:<9} {:>6} ticks: mean {mean:.0}, worst {max:.0} instructions",
+            cost.count()
+        );
+    }
+    let touching = costs[3].1;
+    assert!(touching.count() > 4_000, "hardly a touch");
+    assert!(
+        touching.mean() <= IN_CONTACT,
+        "{} instructions",
+        touching.mean()
+    );
+    assert_eq!(samples.last().map(|s| s.late), Some(0));
+}
