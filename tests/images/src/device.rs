@@ -8,7 +8,10 @@ use hapterra::link::{Bulk, BulkEndpoints, Event, Patience, Session};
 use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
 use hapterra::terrain::Terrain;
 use hapterra_core::force::ForceLaw;
-use hapterra_core::wire::message::{Sample, Scene};
+use hapterra_core::guard::{Mode, Report};
+use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::message::{Sample, Scene, ToDevice};
+use hapterra_core::wire::status::Status;
 use hapterra_tests::usb::host::{Found, ScriptedPipes, enumerate};
 
 use nusb::descriptors::ConfigurationDescriptor;
@@ -46,18 +49,20 @@ pub struct Device<'t> {
     pub counts: [i32; 3],
     /// The latest sample.
     pub latest: Option<Sample>,
+    /// Where the guard stands, as last told.
+    pub guard: Option<Report>,
+    /// The latest status.
+    pub status: Option<Status>,
 }
 
 impl<'t> Device<'t> {
-    /// Powers the board up with the arm in its home pose and the dead-man
-    /// switch held, plugs it in and opens a session in `scene`.
+    /// Powers the board up with the arm in its zero pose, plugs it in and opens
+    /// a session in `scene`.
     ///
     /// # Panics
     /// When any of it fails.
     #[must_use]
     pub fn open(mut machine: Machine, terrain: &'t Terrain<'t>, scene: Scene) -> Self {
-        let dead_man = machine.chip.dead_man;
-        machine.set_input(dead_man, false);
         assert_eq!(machine.run_ms(5), Stop::Time);
         let found = enumerate(&mut machine).expect("enumerated");
         let machine = Rc::new(RefCell::new(machine));
@@ -71,9 +76,59 @@ impl<'t> Device<'t> {
             session,
             counts: [0; 3],
             latest: None,
+            guard: None,
+            status: None,
         };
         device.run_ms(20);
         device
+    }
+
+    /// As [`Self::open`], then calibrates, says that this is the zero pose, asks
+    /// to arm and presses the dead-man switch: the amplifiers are on, and force
+    /// is coming in.
+    ///
+    /// # Panics
+    /// When the amplifiers do not come on.
+    #[must_use]
+    pub fn arm(machine: Machine, terrain: &'t Terrain<'t>, scene: Scene) -> Self {
+        let mut device = Self::open(machine, terrain, scene);
+        let calibration = Calibration::PREMIUM_1_5;
+        device.say(&ToDevice::SetCalibration {
+            calibration,
+            store: false,
+        });
+        device.run_ms(10);
+        device.say(&ToDevice::Zero { counts: [0; 3] });
+        device.say(&ToDevice::Arm);
+        device.run_ms(30);
+        let pin = device.machine.borrow().chip.dead_man;
+        device.machine.borrow_mut().set_input(pin, false);
+        let came_on = (0..400).any(|_| {
+            device.run_ms(1);
+            device.machine.borrow().is_enabled()
+        });
+        assert!(came_on, "{:?}", device.guard);
+        device
+    }
+
+    /// Waits until all of the force has come in.
+    ///
+    /// # Panics
+    /// When that does not happen.
+    pub fn wait_for_full_force(&mut self) {
+        let armed = (0..300).any(|_| {
+            self.run_ms(10);
+            self.guard.is_some_and(|report| report.mode == Mode::Armed)
+        });
+        assert!(armed, "{:?}", self.guard);
+    }
+
+    /// Sends a message.
+    ///
+    /// # Panics
+    /// When the link breaks.
+    pub fn say(&mut self, message: &ToDevice<'_>) {
+        self.session.say(message).expect("sent");
     }
 
     /// Lets time pass, the host answering.
@@ -83,10 +138,11 @@ impl<'t> Device<'t> {
     pub fn run_ms(&mut self, ms: u64) {
         let end_ns = self.machine.borrow().bus().now_ns + ms * 1_000_000;
         while self.machine.borrow().bus().now_ns < end_ns {
-            let mut take = |event: Event<'_>| {
-                if let Event::Sample(sample) = event {
-                    self.latest = Some(*sample);
-                }
+            let mut take = |event: Event<'_>| match event {
+                Event::Sample(sample) => self.latest = Some(*sample),
+                Event::Guard(report) => self.guard = Some(*report),
+                Event::Status(status) => self.status = Some(status.clone()),
+                _ => {}
             };
             self.session
                 .poll(Duration::from_millis(1), &mut take)
@@ -176,8 +232,16 @@ impl Plane {
             .clamp(0.0, self.law.max_force_n.into());
         let force = Placement::turn_to_device(self.normal().map(|n| n * newtons));
         let jacobian = kinematics::jacobian(&self.model, q);
+        // What holds the links, by the record: -g2·cos q2 and -g3·sin q3 pull.
+        let record = Calibration::PREMIUM_1_5;
+        let held = [
+            0.0,
+            f64::from(record.gravity_2_nm) * q[1].cos(),
+            f64::from(record.gravity_3_nm) * q[2].sin(),
+        ];
         std::array::from_fn(|joint| {
-            let torque: f64 = (0..3).map(|axis| jacobian[axis][joint] * force[axis]).sum();
+            let pressed: f64 = (0..3).map(|axis| jacobian[axis][joint] * force[axis]).sum();
+            let torque = pressed + held[joint];
             let drive = &self.model.drive[joint];
             drive.sign * torque / (drive.ratio * drive.motor.kt_nm_per_a)
         })

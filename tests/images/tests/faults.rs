@@ -59,7 +59,7 @@ impl Bench {
 
     /// Presses 3 mm deep and holds still.
     fn press<'t>(&self, machine: Machine, terrain: &'t Terrain<'t>) -> Device<'t> {
-        let mut device = Device::open(machine, terrain, self.scene(terrain));
+        let mut device = Device::arm(machine, terrain, self.scene(terrain));
         device.move_to(self.plane.counts_at([100.0, 100.0], -3.0));
         device.run_ms(40);
         device.move_to(self.plane.counts_at([100.0, 100.0], 3.0));

@@ -50,7 +50,8 @@ fn a_plane_pressed_by_a_millimetre_gives_the_currents_of_the_f64_computation() {
     let scene = terrain.scene(plane.law, Rule::Swept, Source::Encoders, home);
     for machine in machines() {
         let chip = machine.chip;
-        let mut device = Device::open(machine, &terrain, scene);
+        let mut device = Device::arm(machine, &terrain, scene);
+        device.wait_for_full_force();
         let pwm_counts = f64::from(device.machine.borrow().bus().read(TIM1_ARR)) + 1.0;
         let mut worst = 0.0f64;
         for at in [[100.0, 100.0], [70.0, 90.0], [131.5, 118.25], [88.0, 60.0]] {

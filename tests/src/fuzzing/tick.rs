@@ -4,8 +4,8 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::{Rule, WORK_PER_TICK};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
-use hapterra_core::guard::Fault;
-use hapterra_core::phantom::Calibration;
+use hapterra_core::guard::{Fault, Sense, TickRate};
+use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::terrain::{Tile, TileKey};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 use hapterra_core::wire::message::{Point, Scene, Source};
@@ -26,7 +26,8 @@ pub fn run(data: &[u8]) {
     let mut next = || slots.next().expect("one for each slot, and one");
     let window = std::array::from_fn(|_| std::array::from_fn(|_| next()));
     let mut spare = Some(next());
-    let mut haptics = Haptics::<SIDE>::new(window, Calibration::PREMIUM_1_5);
+    let mut haptics = Haptics::<SIDE>::new(window, TickRate::DEFAULT, None);
+    haptics.configure(Mechanism::new(&Calibration::PREMIUM_1_5).expect("a preset"));
     let mut law = ForceLaw::PREMIUM;
     while !bytes.is_empty() {
         match bytes.byte() % 8 {
@@ -52,14 +53,25 @@ pub fn run(data: &[u8]) {
                 let hip = position(&mut bytes);
                 let _ = haptics.accept(Command::Point(Point { seq: 1, hip }));
             }
-            _ => {}
+            6 => {
+                let _ = haptics.accept(Command::Arm);
+            }
+            _ => {
+                let _ = haptics.accept(Command::Zero([0; 3]));
+            }
         }
         let counts = [
             bytes.int(),
             i32::from(bytes.byte()),
             i32::from(bytes.byte()),
         ];
-        look(&haptics.tick(counts), &law);
+        let sense = Sense {
+            counts,
+            dead_man: counts[2] % 2 == 0,
+            emergency_stop: counts[1] == 255,
+            hardware_failed: counts[1] == 254,
+        };
+        look(&haptics.tick(&sense, true), &law);
     }
 }
 
@@ -130,7 +142,7 @@ fn look(outcome: &Outcome, law: &ForceLaw) {
     assert!(sample.force_n.is_finite() && force <= limit, "{outcome:?}");
     assert!(drive.currents_a.is_finite(), "{outcome:?}");
     let most = Calibration::PREMIUM_1_5.peak_current_a;
-    assert!(drive.currents_a.abs().max_element() <= most, "{outcome:?}");
+    assert!(drive.currents_a.abs().cmple(most).all(), "{outcome:?}");
     let off = drive.currents_a == Vec3::ZERO;
     assert!(drive.enabled || off, "{outcome:?}");
     assert!(sample.fault.is_none() || !drive.enabled, "{outcome:?}");

@@ -3,11 +3,14 @@
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
+use hapterra_core::guard::Sense;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::message::{HostHello, PROTOCOL, Scene, Source, ToDevice, ToHost};
+use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::channels::{Channels, Tiles};
 use hapterra_firmware::native::{Device, StoppedClock};
+use hapterra_firmware::store::Stored;
 
 use super::bytes::Bytes;
 
@@ -23,7 +26,8 @@ impl Default for Wire {
             Box::leak(Box::new(Tiles::new())),
             Box::leak(Box::new(Channels::new())),
             StoppedClock,
-            Calibration::PREMIUM_1_5,
+            Stored::Found(Calibration::PREMIUM_1_5),
+            BootReport::default(),
         );
         Self {
             device,
@@ -54,10 +58,14 @@ impl Wire {
                 1 | 2 => self.hear(&framed(chunk)),
                 _ => self.device.interrupted(),
             }
-            let counts = [i32::from(kind), 0, 0];
-            let drive = self.device.tick(counts);
+            let sense = Sense {
+                counts: [i32::from(kind), 0, 0],
+                dead_man: kind % 2 == 0,
+                ..Sense::default()
+            };
+            let drive = self.device.tick(sense);
             assert!(drive.currents_a.is_finite(), "{drive:?}");
-            assert!(self.device.feels_arm() || !drive.enabled, "{drive:?}");
+            assert!(self.device.drives_arm() || !drive.enabled, "{drive:?}");
             self.listen();
         }
     }
@@ -70,7 +78,7 @@ impl Wire {
         self.hear(&message(&ToDevice::Hello(hello)));
         self.hear(&message(&ToDevice::Scene(scene())));
         self.hear(&message(&ToDevice::ClearFault));
-        let _ = self.device.tick([0; 3]);
+        let _ = self.device.tick(Sense::default());
         self.listen();
     }
 
@@ -82,7 +90,7 @@ impl Wire {
             if bytes.is_empty() {
                 return;
             }
-            let _ = self.device.tick([0; 3]);
+            let _ = self.device.tick(Sense::default());
             self.listen();
         }
         panic!("the device does not take {} bytes", bytes.len());

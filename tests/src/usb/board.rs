@@ -12,14 +12,17 @@ use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_usb_driver::Event;
 use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::board::{Sense, Watchdog};
 use hapterra_firmware::channels::{Application, Channels, Hardware, Tiles, assemble};
 use hapterra_firmware::haptic_loop::HapticLoop;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::{LinkHost, run};
-use hapterra_firmware::native::{GivenCounts, ReportedOff, StoppedClock};
+use hapterra_firmware::native::{Given, ReportedOff, StoppedClock};
+use hapterra_firmware::store::Stored;
 use hapterra_firmware::supervisor::Supervisor;
 use hapterra_firmware::usb::{Descriptors, device};
+use hapterra_firmware::vitals::Part;
 
 use super::driver::{ScriptedDriver, Wire};
 use super::{Answer, Handshake, MOMENTS_A_MS, Port};
@@ -47,7 +50,7 @@ impl LinkHost for TickDone {
 pub struct Board {
     wire: Rc<RefCell<Wire>>,
     tasks: Pin<Box<dyn Future<Output = ()>>>,
-    haptic_loop: HapticLoop<'static, GivenCounts, ReportedOff, StoppedClock, WINDOW>,
+    haptic_loop: HapticLoop<'static, Given, ReportedOff, StoppedClock, WINDOW>,
     supervisor: Supervisor<'static, Fed>,
     fed: Fed,
     done: TickDone,
@@ -70,10 +73,11 @@ impl Board {
     #[must_use]
     pub fn plugged_in() -> Self {
         let hardware = Hardware {
-            encoders: GivenCounts::default(),
+            encoders: Given::default(),
             amplifiers: ReportedOff,
             clock: StoppedClock,
-            calibration: Calibration::PREMIUM_1_5,
+            calibration: Stored::Found(Calibration::PREMIUM_1_5),
+            boot: BootReport::default(),
         };
         let tiles = Box::leak(Box::new(Tiles::new()));
         let channels = Box::leak(Box::new(Channels::new()));
@@ -98,7 +102,7 @@ impl Board {
             wire,
             tasks,
             haptic_loop,
-            supervisor: Supervisor::new(vitals, fed.clone()),
+            supervisor: Supervisor::new(vitals, fed.clone(), &[Part::Tick, Part::Link]),
             fed,
             done,
             moments: 0,
@@ -107,7 +111,7 @@ impl Board {
 
     /// Sets the encoders' counts.
     pub fn feed_encoders(&mut self, counts: [i32; 3]) {
-        *self.haptic_loop.encoders_mut() = GivenCounts(Sense {
+        *self.haptic_loop.encoders_mut() = Given(Sense {
             counts,
             ..Sense::default()
         });
