@@ -12,12 +12,14 @@
 //! - [`live`]: a hand in a session, and what it felt in numbers;
 //! - [`picture`]: what was felt, as PNG files;
 //! - [`board`]: boards, probes, and images onto chips;
+//! - [`calibrate`]: from ruler and scale to a calibration record;
 //! - [`output`]: files that appear only when they are complete;
 //! - [`cli`]: the `hapterra` command, one file a subcommand.
 
 #![forbid(unsafe_code)]
 
 pub mod board;
+pub mod calibrate;
 pub mod cli;
 pub mod link;
 pub mod live;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::emulation::link_hint;
 use super::{Failure, report};
 use crate::board::{BOARDS, probes};
-use crate::link::{LinkError, Tcp, Usb, ask_who, tcp_address};
+use crate::link::{Dialogue, LinkError, Tcp, Transport, Usb, tcp_address};
 
 /// Arguments of `hapterra list`.
 #[derive(Debug, clap::Args)]
@@ -52,9 +52,7 @@ fn list_usb() {
     }
     for info in found {
         let place = Usb::place(&info);
-        let known = Usb::open(&info)
-            .and_then(|mut link| ask_who(&mut link, PATIENCE))
-            .map(|hello| report::device(&hello));
+        let known = Usb::open(&info).and_then(|link| who(Box::new(link)));
         println!("  {place}: {}", known.unwrap_or_else(|error| told(&error)));
     }
 }
@@ -88,9 +86,8 @@ fn list_emulated(args: &Args) {
         &args.addresses
     };
     for address in addresses {
-        let who = Tcp::connect(address).and_then(|mut link| ask_who(&mut link, PATIENCE));
-        match who {
-            Ok(hello) => println!("  tcp:{address}: {}", report::device(&hello)),
+        match Tcp::connect(address).and_then(|link| who(Box::new(link))) {
+            Ok(who) => println!("  tcp:{address}: {who}"),
             Err(LinkError::Absent { why, .. }) => {
                 println!("  none at tcp:{address}: {why}");
                 println!(
@@ -100,6 +97,12 @@ fn list_emulated(args: &Args) {
             Err(error) => println!("  tcp:{address}: {}", told(&error)),
         }
     }
+}
+
+/// The device behind a link, in words.
+fn who(link: Box<dyn Transport>) -> Result<String, LinkError> {
+    let dialogue = Dialogue::open(link, PATIENCE)?;
+    Ok(report::device(dialogue.device()))
 }
 
 fn told(error: &LinkError) -> String {

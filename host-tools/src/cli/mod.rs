@@ -1,8 +1,11 @@
 //! The `hapterra` command line: one file a subcommand, each with its `Args`
 //! and a `run`.
 
+mod arming;
 pub mod bench;
+pub mod calibrate;
 pub mod demo;
+pub mod device;
 pub mod emulation;
 pub mod failure;
 pub mod feel;
@@ -14,6 +17,7 @@ pub mod list;
 pub mod replay;
 mod report;
 pub mod run;
+pub mod status;
 pub mod synth;
 
 use std::process::ExitCode;
@@ -51,6 +55,10 @@ pub enum Command {
     Replay(replay::Args),
     /// Show boards, debug probes and ports that can be seen from here
     List(list::Args),
+    /// Show how a device is: calibration, what keeps it from arming, faults, figures
+    Status(status::Args),
+    /// Calibrate an arm: zero pose, ratios against a ruler, gravity
+    Calibrate(calibrate::Args),
     /// Write an image to a board through its debug probe
     Flash(flash::Args),
     /// Measure run time against error, beside other ways to render a height field
@@ -69,6 +77,8 @@ pub fn main() -> ExitCode {
         Command::Demo(args) => demo::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::List(args) => list::run(&args),
+        Command::Status(args) => status::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Flash(args) => flash::run(&args),
         Command::Bench(args) => bench::run(&args),
     };

@@ -9,6 +9,7 @@ use clap::ValueHint;
 use hapterra_core::wire::message::{DeviceHello, Sample};
 use indicatif::ProgressBar;
 
+use super::arming::ArmingDesk;
 use super::emulation::explain_link;
 use super::feel::Feel;
 use super::input::Input;
@@ -134,8 +135,19 @@ fn serve(args: &Args, stage: &Stage<'_>) -> Result<(), Failure> {
     );
     println!("device         {}", report::device(&device));
     let mut watch = Watch::new(args, stage, &device)?;
+    let mut desk = ArmingDesk::at_the_terminal();
     while !watch.is_over() {
-        let polled = session.poll(Duration::from_millis(50), &mut |event| watch.take(event));
+        let polled = session.poll(Duration::from_millis(50), &mut |event| {
+            desk.hear(&event);
+            watch.take(event);
+        });
+        for line in desk.lines() {
+            watch.status.suspend(|| eprintln!("{line}"));
+        }
+        let polled = polled.and_then(|()| {
+            let mut messages = desk.messages().into_iter();
+            messages.try_for_each(|message| session.say(&message))
+        });
         watch.show(&session);
         match polled {
             Err(error) if error.is_passing() => wait_for(args, stage, &mut session, error)?,

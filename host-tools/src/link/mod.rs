@@ -12,9 +12,9 @@
 
 mod bulk;
 mod client;
+mod dialogue;
 mod emulator;
 mod error;
-mod inquiry;
 mod native;
 mod plant;
 mod session;
@@ -25,11 +25,11 @@ mod usb;
 
 pub use bulk::{Bulk, BulkEndpoints, Pipes, is_hapterra};
 pub use client::{Arming, Client, Event};
+pub use dialogue::Dialogue;
 pub use emulator::{
     Emulator, EmulatorError, IMAGE_VARIABLE, INSTRUCTIONS_PER_COUNT, Lines, QEMU, QEMU_VARIABLE,
 };
 pub use error::LinkError;
-pub use inquiry::ask_who;
 pub use native::{HostClock, Meddler, Native};
 pub use plant::{PlantLine, serve_plant};
 pub use session::{Patience, Session};

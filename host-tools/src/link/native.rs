@@ -61,6 +61,7 @@ pub struct Native<C: TickClock = StoppedClock> {
     sense: Sense,
     drive: Drive,
     meddler: Option<Meddler>,
+    restless: bool,
     ticks: u64,
     /// What the device said while it was told something.
     pending: VecDeque<u8>,
@@ -101,6 +102,7 @@ impl<C: TickClock> Native<C> {
             sense: Sense::default(),
             drive: Drive::default(),
             meddler: None,
+            restless: false,
             ticks: 0,
             pending: VecDeque::new(),
         };
@@ -113,6 +115,14 @@ impl<C: TickClock> Native<C> {
     pub fn meddled_with(mut self, meddler: Meddler) -> Self {
         self.meddler = Some(meddler);
         self.meddle();
+        self
+    }
+
+    /// The same device, whose time passes whenever somebody listens, as a
+    /// board's does: also while it waits for nothing but the host.
+    #[must_use]
+    pub fn restless(mut self) -> Self {
+        self.restless = true;
         self
     }
 
@@ -194,7 +204,7 @@ impl<C: TickClock> Transport for Native<C> {
         }
         for _ in 0..TICKS_A_CALL {
             let said = self.device.transmit(into);
-            if said > 0 || self.device.may_stand_still() {
+            if said > 0 || (self.device.may_stand_still() && !self.restless) {
                 return Ok(said);
             }
             self.tick();

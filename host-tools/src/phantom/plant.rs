@@ -68,6 +68,19 @@ impl Plant {
         }
     }
 
+    /// Puts the arm to rest in another pose, and the hand with it. The counters
+    /// go on from where they were.
+    pub fn put(&mut self, q_rad: [f64; 3]) {
+        self.q = DVec3::from(q_rad);
+        self.rate = DVec3::ZERO;
+        let tip_m = self.tip_m();
+        if let Some(hand) = &mut self.hand {
+            hand.at = DVec3::from(tip_m);
+            hand.speed = DVec3::ZERO;
+            hand.aim(tip_m, [0.0; 3]);
+        }
+    }
+
     /// Where the hand wants to be, m and m/s in the device frame. Within a
     /// step the target goes on at that speed. Without a hand, nothing.
     pub fn aim(&mut self, target_m: [f64; 3], speed_m_s: [f64; 3]) {

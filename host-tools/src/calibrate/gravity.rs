@@ -1,0 +1,120 @@
+//! The weight on joints 2 and 3, from poses in which something that reads its
+//! force holds the arm still.
+
+use hapterra_core::phantom::Calibration;
+
+use super::{Arm, FitError};
+
+/// An arm held still, the motors off.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Still {
+    /// Joint angles, rad.
+    pub q_rad: [f64; 3],
+    /// The force that holds it at the tip, N, device frame.
+    pub force_n: [f64; 3],
+}
+
+/// What the poses tell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GravityFit {
+    /// As [`Calibration::gravity_2_nm`].
+    pub gravity_2_nm: f64,
+    /// As [`Calibration::gravity_3_nm`].
+    pub gravity_3_nm: f64,
+    /// Root mean square of what is left over, Nm: the joints' friction.
+    pub off_nm: f64,
+}
+
+impl GravityFit {
+    /// Puts the weights into a record.
+    pub fn apply(&self, record: &mut Calibration) {
+        record.gravity_2_nm = self.gravity_2_nm as f32;
+        record.gravity_3_nm = self.gravity_3_nm as f32;
+    }
+}
+
+/// The weights that explain the poses best, in the sense of least squares. The
+/// joints' friction, 0.01 Nm, is how far off each pose may be.
+///
+/// # Errors
+/// [`FitError::NoWeight`]: all poses have joint 2 upright, or joint 3 hanging.
+pub fn fit_gravity(record: &Calibration, poses: &[Still]) -> Result<GravityFit, FitError> {
+    let arm = Arm::of(record);
+    // (how much of the weight is felt, torque) of each pose.
+    let felt = |still: &Still| {
+        let [_, two, three] = arm.torques_nm(still.q_rad, still.force_n);
+        let [_, q2, q3] = still.q_rad;
+        [(libm::cos(q2), two), (libm::sin(q3), three)]
+    };
+    let felt: Vec<_> = poses.iter().map(felt).collect();
+    let weight = |joint: usize| {
+        let (share, torque) = felt.iter().fold((0.0, 0.0), |(share, torque), pose| {
+            let (s, t) = pose[joint];
+            (share + s * s, torque + s * t)
+        });
+        match share > 0.05 {
+            true => Ok(torque / share),
+            false => Err(FitError::NoWeight { joint: joint + 2 }),
+        }
+    };
+    let (gravity_2_nm, gravity_3_nm) = (weight(0)?, weight(1)?);
+    let left = felt.iter().map(|[two, three]| {
+        let (a, b) = (
+            two.1 - gravity_2_nm * two.0,
+            three.1 - gravity_3_nm * three.0,
+        );
+        a * a + b * b
+    });
+    let left: f64 = left.sum();
+    Ok(GravityFit {
+        gravity_2_nm,
+        gravity_3_nm,
+        off_nm: libm::sqrt(left / (2 * felt.len()) as f64),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The force at the tip that makes the torques which hold the weights, in a
+    /// pose with q1 = 0.
+    fn holding(q: [f64; 3], weights: [f64; 2]) -> Still {
+        let record = Calibration::PREMIUM_1_5;
+        let (l1, l2) = (
+            1e-3 * f64::from(record.l1_mm),
+            1e-3 * f64::from(record.l2_mm),
+        );
+        let (two, three) = (weights[0] * libm::cos(q[1]), weights[1] * libm::sin(q[2]));
+        // τ2 = l1·(c2·z − s2·x), τ3 = l2·(c3·x + s3·z)
+        let (a, b) = (-l1 * libm::sin(q[1]), l1 * libm::cos(q[1]));
+        let (c, d) = (l2 * libm::cos(q[2]), l2 * libm::sin(q[2]));
+        let whole = a * d - b * c;
+        Still {
+            q_rad: q,
+            force_n: [
+                (two * d - b * three) / whole,
+                0.0,
+                (a * three - two * c) / whole,
+            ],
+        }
+    }
+
+    #[test]
+    fn weights_come_back() {
+        let poses: Vec<_> = [[0.0, 0.2, 0.3], [0.0, -0.2, 0.6], [0.0, 0.5, 0.1]]
+            .map(|q| holding(q, [0.07, -0.02]))
+            .to_vec();
+        let fit = fit_gravity(&Calibration::PREMIUM_1_5, &poses).expect("a fit");
+        assert!((fit.gravity_2_nm - 0.07).abs() < 1e-6, "{fit:?}");
+        assert!((fit.gravity_3_nm + 0.02).abs() < 1e-6, "{fit:?}");
+        assert!(fit.off_nm < 1e-6);
+    }
+
+    #[test]
+    fn poses_that_say_nothing_are_refused() {
+        let hanging = holding([0.0, 0.1, 0.0], [0.07, 0.0]);
+        let error = fit_gravity(&Calibration::PREMIUM_1_5, &[hanging]).expect_err("q3 is 0");
+        assert_eq!(error, FitError::NoWeight { joint: 3 });
+    }
+}

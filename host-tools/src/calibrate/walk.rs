@@ -1,0 +1,210 @@
+//! The walk through a calibration.
+
+use hapterra_core::phantom::Calibration;
+
+use super::{
+    Arm, Check, Direction, FitError, GravityFit, RatioFit, Still, fit_gravity, fit_ratios,
+};
+
+/// How far the tip is to be moved along the ruler, mm.
+const ABOUT_MM: f64 = 80.0;
+/// Encoders that move by more than this between two looks are not still.
+const STILL_COUNTS: u32 = 3;
+/// Poses in which the weight is measured.
+const POSES: usize = 4;
+
+/// Who moves the arm and reads ruler and scale.
+pub trait Attendant {
+    /// Is told something.
+    fn hear(&mut self, line: &str);
+
+    /// Puts the arm into its zero pose and holds it there.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    fn zero_pose(&mut self) -> Result<(), Stopped>;
+
+    /// Moves the tip from where it is along a ruler, `about_mm` or so, and tells
+    /// how far it went, mm; negative where it went the other way.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    fn move_along(&mut self, direction: Direction, about_mm: f64) -> Result<f64, Stopped>;
+
+    /// Holds the tip still with something that reads its force, in another pose
+    /// each time. Tells the force with which it is held, N, upwards and towards
+    /// the user; none where gravity is not to be measured any further.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    fn hold_still(&mut self, number: usize) -> Result<Option<[f64; 2]>, Stopped>;
+
+    /// Whether the record is right.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    fn agrees(&mut self, review: &Review) -> Result<bool, Stopped>;
+}
+
+/// The attendant does not want to go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("stopped: nothing was changed on the device")]
+pub struct Stopped;
+
+/// Why a walk came to no record.
+#[derive(Debug, thiserror::Error)]
+pub enum WalkError<E: std::error::Error + 'static> {
+    /// The attendant stopped.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+    /// The measurements do not fit together.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// The device does not tell its counts.
+    #[error(transparent)]
+    Counts(E),
+    /// The attendant does not like the record.
+    #[error("the record was not agreed to: nothing was changed on the device")]
+    Refused,
+}
+
+/// What was found, for looking at before it is taken.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Review {
+    /// The record that the walk began with.
+    pub before: Calibration,
+    /// The record that it came to.
+    pub after: Calibration,
+    /// The counts of the zero pose.
+    pub zero: [i32; 3],
+    /// The ratios, if they were measured.
+    pub ratios: Option<RatioFit>,
+    /// The weights, if they were measured.
+    pub gravity: Option<GravityFit>,
+}
+
+/// What is to be measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// The ratios.
+    pub ratios: bool,
+    /// The weights.
+    pub gravity: bool,
+}
+
+/// Walks through a calibration from a record. `counts` reads the encoders.
+///
+/// # Errors
+/// [`WalkError`].
+pub fn walk<E: std::error::Error + 'static>(
+    before: &Calibration,
+    plan: Plan,
+    attendant: &mut dyn Attendant,
+    counts: &mut dyn FnMut() -> Result<[i32; 3], E>,
+) -> Result<Review, WalkError<E>> {
+    let mut walk = Walk {
+        attendant,
+        counts,
+        zero: [0; 3],
+    };
+    walk.zero()?;
+    let mut review = Review {
+        before: *before,
+        after: *before,
+        zero: walk.zero,
+        ratios: None,
+        gravity: None,
+    };
+    if plan.ratios {
+        let fit = fit_ratios(before, &walk.checks()?)?;
+        fit.apply(&mut review.after);
+        review.ratios = Some(fit);
+    }
+    if plan.gravity {
+        let poses = walk.poses(&review.after)?;
+        if !poses.is_empty() {
+            let fit = fit_gravity(&review.after, &poses)?;
+            fit.apply(&mut review.after);
+            review.gravity = Some(fit);
+        }
+    }
+    match walk.attendant.agrees(&review)? {
+        true => Ok(review),
+        false => Err(WalkError::Refused),
+    }
+}
+
+struct Walk<'a, E> {
+    attendant: &'a mut dyn Attendant,
+    counts: &'a mut dyn FnMut() -> Result<[i32; 3], E>,
+    zero: [i32; 3],
+}
+
+impl<E: std::error::Error + 'static> Walk<'_, E> {
+    fn zero(&mut self) -> Result<(), WalkError<E>> {
+        self.attendant.zero_pose()?;
+        self.zero = self.still_counts()?;
+        Ok(())
+    }
+
+    fn checks(&mut self) -> Result<Vec<Check>, WalkError<E>> {
+        let mut checks = Vec::new();
+        for direction in Direction::ALL {
+            if direction != Direction::ALL[0] {
+                self.attendant.zero_pose()?;
+            }
+            let from = self.since_zero()?;
+            let mm = self.attendant.move_along(direction, ABOUT_MM)?;
+            let to = self.since_zero()?;
+            checks.push(Check {
+                from,
+                to,
+                direction,
+                mm,
+            });
+        }
+        Ok(checks)
+    }
+
+    fn poses(&mut self, record: &Calibration) -> Result<Vec<Still>, WalkError<E>> {
+        let arm = Arm::of(record);
+        let rad_per_count = record
+            .counts_per_radian()
+            .to_array()
+            .map(|counts| 1.0 / f64::from(counts));
+        let mut poses = Vec::new();
+        for number in 1..=POSES {
+            let Some([up, towards]) = self.attendant.hold_still(number)? else {
+                break;
+            };
+            poses.push(Still {
+                q_rad: arm.angles(rad_per_count, self.since_zero()?),
+                force_n: [towards, 0.0, up],
+            });
+        }
+        Ok(poses)
+    }
+
+    fn since_zero(&mut self) -> Result<[i32; 3], WalkError<E>> {
+        let counts = self.still_counts()?;
+        Ok(std::array::from_fn(|i| {
+            counts[i].wrapping_sub(self.zero[i])
+        }))
+    }
+
+    /// The counts, once the arm is held still.
+    fn still_counts(&mut self) -> Result<[i32; 3], WalkError<E>> {
+        let mut told = false;
+        loop {
+            let once = (self.counts)().map_err(WalkError::Counts)?;
+            let again = (self.counts)().map_err(WalkError::Counts)?;
+            if (0..3).all(|i| once[i].abs_diff(again[i]) <= STILL_COUNTS) {
+                return Ok(again);
+            }
+            if !told {
+                self.attendant.hear("the arm moves: hold it still");
+            }
+            told = true;
+        }
+    }
+}

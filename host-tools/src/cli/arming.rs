@@ -1,0 +1,199 @@
+//! Arming while a terrain is served: says what keeps the arm from it, and takes
+//! Enter for "go on": clear the fault, zero the arm, ask to arm.
+
+use std::io::{BufRead, IsTerminal};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+
+use hapterra_core::guard::{Blockers, Mode, Report};
+use hapterra_core::wire::message::ToDevice;
+use hapterra_core::wire::status::{Refusal, Request};
+
+use super::status::blockers;
+use crate::link::Event;
+
+/// Leads the user from disarmed to armed.
+pub(super) struct ArmingDesk {
+    enter: Receiver<()>,
+    report: Option<Report>,
+    /// Enter was pressed with the arm in its zero pose: its counts are asked for.
+    zeroing: bool,
+    say: Vec<ToDevice<'static>>,
+    /// Lines for the user, in order.
+    lines: Vec<String>,
+}
+
+impl ArmingDesk {
+    /// Listens to the terminal, if there is one.
+    pub(super) fn at_the_terminal() -> Self {
+        let (pressed, enter) = channel();
+        if std::io::stdin().is_terminal() {
+            std::thread::spawn(move || {
+                for line in std::io::stdin().lock().lines() {
+                    if line.is_err() || pressed.send(()).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        Self::listening(enter)
+    }
+
+    fn listening(enter: Receiver<()>) -> Self {
+        Self {
+            enter,
+            report: None,
+            zeroing: false,
+            say: Vec::new(),
+            lines: Vec::new(),
+        }
+    }
+
+    /// Takes what the device tells.
+    pub(super) fn hear(&mut self, event: &Event<'_>) {
+        match event {
+            Event::Guard(report) => self.stands(report),
+            Event::Answer(answer) => match (answer.request, &answer.result) {
+                (Request::Arm, Err(Refusal::Blocked(why))) => {
+                    self.lines.push("not armed:".into());
+                    self.lines
+                        .extend(blockers(*why).map(|line| format!("  {line}")));
+                    self.ask_for_enter(*why);
+                }
+                (request, Err(refused)) => self.lines.push(format!("{request:?}: {refused}")),
+                (_, Ok(())) => {}
+            },
+            Event::Status(status) if self.zeroing => {
+                self.zeroing = false;
+                let counts = status.health.sense.counts;
+                self.say.extend([ToDevice::Zero { counts }, ToDevice::Arm]);
+                let [a, b, c] = counts;
+                self.lines.push(format!("zeroed at {a} {b} {c} counts"));
+            }
+            _ => {}
+        }
+    }
+
+    /// Says how the guard stands, where that is news.
+    fn stands(&mut self, report: &Report) {
+        let before = self.report.replace(*report);
+        let same = before.is_some_and(|b| {
+            (b.mode, b.fault) == (report.mode, report.fault) && b.blockers == report.blockers
+        });
+        if same {
+            return;
+        }
+        let was = before.and_then(|before| before.fault);
+        if let Some(fault) = report.fault.filter(|_| was != report.fault) {
+            let number = fault.number();
+            self.lines
+                .push(format!("FAULT {number} {fault:?}: {}", fault.meaning()));
+            self.lines.push(format!("  {}", fault.what_to_do()));
+            return self.ask_for_enter(report.blockers);
+        }
+        match report.mode {
+            Mode::Requested => {
+                self.lines.push("ready to arm; waits for your hand:".into());
+                let hand = report.blockers & Blockers::BY_HAND;
+                self.lines
+                    .extend(blockers(hand).map(|line| format!("  {line}")));
+            }
+            Mode::Confirming if report.blockers.contains(Blockers::FORCE_TOO_LARGE) => {
+                let what = Blockers::FORCE_TOO_LARGE.meaning();
+                self.lines.push(format!("held back: {what}"));
+            }
+            Mode::Ramping => self.lines.push("amplifiers on; force comes in".into()),
+            Mode::Armed => self.lines.push("armed".into()),
+            Mode::Disarmed if before.is_some_and(|before| before.mode.drives()) => {
+                self.lines.push("disarmed; amplifiers off".into());
+            }
+            _ => {}
+        }
+    }
+
+    fn ask_for_enter(&mut self, why: Blockers) {
+        self.lines.push(match why.contains(Blockers::NOT_ZEROED) {
+            true => "put the arm into its zero pose, hold it there and press Enter".into(),
+            false => "when that is seen to, press Enter to clear it and arm".into(),
+        });
+    }
+
+    /// What is to be said to the device now.
+    pub(super) fn messages(&mut self) -> Vec<ToDevice<'static>> {
+        if self.enter_pressed() {
+            let report = self.report.unwrap_or_default();
+            if report.fault.is_some() {
+                self.say.push(ToDevice::ClearFault);
+            }
+            self.zeroing = report.blockers.contains(Blockers::NOT_ZEROED);
+            self.say.push(match self.zeroing {
+                true => ToDevice::Status,
+                false => ToDevice::Arm,
+            });
+        }
+        std::mem::take(&mut self.say)
+    }
+
+    fn enter_pressed(&self) -> bool {
+        // Gone: there is no terminal.
+        !matches!(
+            self.enter.try_recv(),
+            Err(TryRecvError::Empty | TryRecvError::Disconnected)
+        )
+    }
+
+    /// What is to be said to the user now.
+    pub(super) fn lines(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.lines)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hapterra_core::guard::Fault;
+    use hapterra_core::wire::status::Answer;
+
+    fn refused(why: Blockers) -> Answer {
+        Answer {
+            request: Request::Arm,
+            result: Err(Refusal::Blocked(why)),
+        }
+    }
+
+    #[test]
+    fn an_arm_that_is_not_zeroed_is_told_and_enter_asks_for_its_counts() {
+        let (press, enter) = channel();
+        let mut desk = ArmingDesk::listening(enter);
+        let report = Report {
+            blockers: Blockers::NOT_ZEROED,
+            ..Report::default()
+        };
+        desk.hear(&Event::Guard(&report));
+        desk.hear(&Event::Answer(&refused(Blockers::NOT_ZEROED)));
+        let told = desk.lines().join("\n");
+        assert!(
+            told.contains("NOT_ZEROED") && told.contains("press Enter"),
+            "{told}"
+        );
+        assert_eq!(desk.messages(), []);
+        press.send(()).expect("listening");
+        assert_eq!(desk.messages(), [ToDevice::Status]);
+    }
+
+    #[test]
+    fn a_fault_is_told_once_and_enter_clears_it_and_arms() {
+        let (press, enter) = channel();
+        let mut desk = ArmingDesk::listening(enter);
+        let report = Report {
+            fault: Some(Fault::DeadManReleased),
+            blockers: Blockers::FAULT_LATCHED,
+            ..Report::default()
+        };
+        desk.hear(&Event::Guard(&report));
+        assert!(desk.lines().join("\n").contains("FAULT 6 DeadManReleased"));
+        desk.hear(&Event::Guard(&report));
+        assert!(desk.lines().is_empty());
+        press.send(()).expect("listening");
+        assert_eq!(desk.messages(), [ToDevice::ClearFault, ToDevice::Arm]);
+    }
+}
