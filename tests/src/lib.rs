@@ -3,6 +3,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod campaign;
 pub mod chance;
 pub mod counting;
 pub mod emulation;

@@ -4,6 +4,7 @@
 //! and where it cannot go on says exactly what to type.
 
 mod board;
+mod campaign;
 mod counts;
 mod demo;
 mod deny;
@@ -37,6 +38,9 @@ cargo xtask COMMAND
                          targets and the kept table; --write: keep these
   soak MINUTES [--seed N]  random scenes on all cores, every tick judged in f64
   soak --seed N --scene K  one of them again
+  campaign [--seconds N] [--seed S] [--segment K]
+                         the closed loop with everything going wrong at random, 10,000 s of
+                         arm time unless told otherwise; writes docs/campaign.md
   deny                   licences, bans, sources and advisories of dependencies
   image BOARD            build an image and print where its ELF is
   flash BOARD            run an image on a real board with probe-rs
@@ -78,6 +82,7 @@ fn command() -> Result<ExitCode> {
         "counts" => counts::counts(flag(&mut words, "write")?)?,
         "size" => test::check_sizes(&test::images(boards(&mut words)?)?)?,
         "panics" => test::check_panics(&test::images(boards(&mut words)?)?)?,
+        "campaign" => campaign::campaign(words.raw_args()?)?,
         "image" => {
             let board = board::by_name(&words.value()?.string()?)?;
             for (_, path) in test::images(std::slice::from_ref(board))? {

@@ -1,0 +1,176 @@
+//! A virtual Phantom in a hand that wanders over the terrain, pressing and
+//! lifting.
+
+use std::f64::consts::TAU;
+
+use hapterra::phantom::{HandModel, PhantomModel, Placement, Plant, kinematics};
+use hapterra::terrain::Terrain;
+
+use crate::chance::Chance;
+
+/// How far the hand wanders from the home pose, east and north, mm.
+const REACH_MM: [f64; 2] = [55.0, 30.0];
+/// How fast the hand moves up and down where it is not yanked, mm/s.
+const UP_AND_DOWN_MM_S: f64 = 100.0;
+/// Above the terrain while the arm is being armed, mm.
+const LIFTED_MM: f64 = 14.0;
+/// No hand is still: physiological tremor, mm, and turns a second of each axis.
+const TREMOR_MM: f64 = 0.4;
+const TREMOR_HZ: [f64; 3] = [8.3, 9.7, 11.2];
+/// Length of a tick, s.
+const TICK_S: f64 = 1e-3;
+
+/// What the hand is up to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mood {
+    /// Held off the terrain.
+    Lifted,
+    /// Wanders in and out of contact.
+    Wanders,
+    /// Presses as hard as it can.
+    Presses,
+    /// Is pulled away by this much, mm.
+    Yanked([f64; 3]),
+}
+
+/// The arm and its hand.
+pub struct Arm<'t> {
+    terrain: &'t Terrain<'t>,
+    plant: Plant,
+    placement: Placement,
+    /// Turns a second and phase of the waves that make the way: two east, two
+    /// north, two up.
+    waves: [(f64, f64); 6],
+    t_s: f64,
+    above_mm: f64,
+    ground_mm: f64,
+    target_mm: [f64; 3],
+}
+
+impl<'t> Arm<'t> {
+    /// An arm whose home pose is over the middle of a terrain.
+    ///
+    /// # Panics
+    /// When the terrain has a hole in its middle or is out of reach.
+    pub fn new(terrain: &'t Terrain<'t>, chance: &mut Chance) -> Self {
+        let [east, north] = terrain.size_mm().map(|side| 0.5 * side);
+        let ground_mm = terrain
+            .height_mm(east, north)
+            .expect("no hole in the middle");
+        let placement = Placement {
+            home_mm: [east, north, ground_mm],
+        };
+        let model = PhantomModel::premium_1_5();
+        let start = [east, north, ground_mm + LIFTED_MM];
+        let q = kinematics::inverse(&model, placement.to_device_m(&model, start));
+        let wave = |chance: &mut Chance| (chance.between(0.05, 0.45), chance.between(0.0, TAU));
+        Self {
+            terrain,
+            plant: Plant::new(model, q.expect("within reach")).held_by(HandModel::default()),
+            placement,
+            waves: std::array::from_fn(|_| wave(chance)),
+            t_s: 0.0,
+            above_mm: LIFTED_MM,
+            ground_mm,
+            target_mm: start,
+        }
+    }
+
+    /// The terrain point at the home pose, mm.
+    #[must_use]
+    pub fn home_mm(&self) -> [f64; 3] {
+        self.placement.home_mm
+    }
+
+    /// What the encoders read.
+    #[must_use]
+    pub fn counts(&self) -> [i32; 3] {
+        self.plant.counts()
+    }
+
+    /// The plant.
+    #[must_use]
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// One tick under these motor currents.
+    pub fn step(&mut self, currents_a: [f64; 3], mood: Mood) {
+        let before = self.target_mm;
+        self.t_s += TICK_S;
+        self.target_mm = self.target(mood);
+        let speed = std::array::from_fn(|i| 1e-3 * (self.target_mm[i] - before[i]) / TICK_S);
+        let at = self.placement.to_device_m(self.plant.model(), before);
+        self.plant.aim(at, Placement::turn_to_device(speed));
+        self.plant.step(currents_a, TICK_S);
+    }
+
+    fn target(&mut self, mood: Mood) -> [f64; 3] {
+        let wave = |i: usize| {
+            let (turns, phase) = self.waves[i];
+            libm::sin(TAU * turns * self.t_s + phase)
+        };
+        let [home_east, home_north, _] = self.placement.home_mm;
+        let east = home_east + REACH_MM[0] * (0.6 * wave(0) + 0.4 * wave(1));
+        let north = home_north + REACH_MM[1] * (0.6 * wave(2) + 0.4 * wave(3));
+        let wanted = match mood {
+            Mood::Lifted => LIFTED_MM,
+            Mood::Presses => -70.0,
+            Mood::Wanders | Mood::Yanked(_) => -5.0 + 7.0 * wave(4) + 5.0 * wave(5),
+        };
+        let most = UP_AND_DOWN_MM_S * TICK_S;
+        self.above_mm += (wanted - self.above_mm).clamp(-most, most);
+        // Over a hole the hand stays where it was.
+        if let Some(ground) = self.terrain.height_mm(east, north) {
+            self.ground_mm += (ground - self.ground_mm).clamp(-2.0 * most, 2.0 * most);
+        }
+        let mut target = [east, north, self.ground_mm + self.above_mm];
+        for (at, turns) in target.iter_mut().zip(TREMOR_HZ) {
+            *at += TREMOR_MM * libm::sin(TAU * turns * self.t_s);
+        }
+        if let Mood::Yanked(by) = mood {
+            target.iter_mut().zip(by).for_each(|(at, by)| *at += by);
+        }
+        target
+    }
+
+    /// The force at the tip that explains the motors' torques, less the arm's
+    /// weight as the calibration has it, N; none near a singular pose, where
+    /// small torques are large forces.
+    #[must_use]
+    pub fn force_n(&self, currents_a: [f64; 3], weight_nm: [f64; 3]) -> Option<f64> {
+        let model = self.plant.model();
+        let q = self.plant.q_rad();
+        let spread = libm::cos(q[1] - q[2]);
+        let reach_m = model.l1_m * libm::cos(q[1]) + model.l2_m * libm::sin(q[2]);
+        if spread.abs() < 0.5 || reach_m.abs() < 0.08 {
+            return None;
+        }
+        let torque: [f64; 3] = std::array::from_fn(|i| {
+            let axis = &model.drive[i];
+            currents_a[i] * axis.ratio * axis.sign * axis.motor.kt_nm_per_a - weight_nm[i]
+        });
+        Some(solved(&kinematics::jacobian(model, q), torque))
+    }
+}
+
+/// Length of F in Jᵀ·F = τ, by Cramer's rule.
+fn solved(jacobian: &[[f64; 3]; 3], torque: [f64; 3]) -> f64 {
+    // Rows of Jᵀ are the columns of J.
+    let row = |i: usize| [jacobian[0][i], jacobian[1][i], jacobian[2][i]];
+    let [a, b, c] = [row(0), row(1), row(2)];
+    let cross = |u: [f64; 3], v: [f64; 3]| {
+        [
+            u[1] * v[2] - u[2] * v[1],
+            u[2] * v[0] - u[0] * v[2],
+            u[0] * v[1] - u[1] * v[0],
+        ]
+    };
+    let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+    let (bc, ca, ab) = (cross(b, c), cross(c, a), cross(a, b));
+    let determinant = dot(a, bc);
+    let force: [f64; 3] = std::array::from_fn(|i| {
+        (torque[0] * bc[i] + torque[1] * ca[i] + torque[2] * ab[i]) / determinant
+    });
+    libm::sqrt(dot(force, force))
+}

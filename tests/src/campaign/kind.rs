@@ -1,0 +1,198 @@
+//! What is made to go wrong, and what is expected of it.
+
+use hapterra_core::guard::Fault;
+
+/// Something that goes wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// One encoder reads some hundred counts more from one tick on.
+    EncoderJump,
+    /// One encoder reads far off for a single tick.
+    EncoderGlitch,
+    /// Encoders read up to two counts off, another error in each tick.
+    EncoderNoise,
+    /// One encoder stands still for a while, then reads right again.
+    EncoderStuck,
+    /// One encoder reads its joint on and on, as if it ran away.
+    EncoderRunaway,
+    /// One encoder creeps beyond its joint's limits.
+    EncoderBeyondLimits,
+    /// The emergency stop is pressed.
+    EmergencyStop,
+    /// The dead-man switch is let go.
+    DeadManReleased,
+    /// The dead-man switch opens for one tick.
+    DeadManBounce,
+    /// The encoder or amplifier hardware says that it cannot work.
+    HardwareFailed,
+    /// Bytes are lost, both ways.
+    LinkLoss,
+    /// Bytes come late, both ways.
+    LinkDelay,
+    /// Bytes come twice, both ways.
+    LinkDuplicates,
+    /// Bits are flipped, both ways.
+    LinkCorruption,
+    /// The link is silent for seconds, then the host comes back.
+    LinkSilence,
+    /// The host is restarted and brings another scene.
+    HostRestarted,
+    /// The host says goodbye.
+    Goodbye,
+    /// Well-formed messages that make no sense now: another calibration,
+    /// another zero pose, points of a replay, tiles that nobody asked for.
+    Misplaced,
+    /// A tick is not done when the next is due.
+    TickOverrun,
+    /// Ticks begin late.
+    LateTicks,
+    /// The link's task hangs.
+    TaskStalled,
+    /// Tiles that are asked for do not come for seconds.
+    TilesMissing,
+    /// Tiles come whose heights are infinite, not numbers or absurd.
+    TilesPoisoned,
+    /// The hand presses as hard as it can until the motors are hot.
+    HotMotors,
+    /// The hand is yanked away.
+    Yank,
+}
+
+/// What may become of it. What is not in here is a violation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Expectation {
+    /// It may be ridden through: the arm stays armed.
+    pub may_ride: bool,
+    /// It may disarm the arm without a fault: force goes out, no more.
+    pub may_disarm: bool,
+    /// Faults that it may latch.
+    pub may_latch: &'static [Fault],
+    /// Ticks after its first one in which the amplifiers may still be on, where
+    /// it has to be latched.
+    pub within: Option<u32>,
+}
+
+/// For how many ticks it lasts, shortest and longest.
+pub type Duration = (u32, u32);
+
+const RIDE: Expectation = Expectation {
+    may_ride: true,
+    may_disarm: false,
+    may_latch: &[],
+    within: None,
+};
+
+const fn latch(may_latch: &'static [Fault], within: u32) -> Expectation {
+    Expectation {
+        may_ride: false,
+        may_disarm: false,
+        may_latch,
+        within: Some(within),
+    }
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 25] = [
+        Self::EncoderJump,
+        Self::EncoderGlitch,
+        Self::EncoderNoise,
+        Self::EncoderStuck,
+        Self::EncoderRunaway,
+        Self::EncoderBeyondLimits,
+        Self::EmergencyStop,
+        Self::DeadManReleased,
+        Self::DeadManBounce,
+        Self::HardwareFailed,
+        Self::LinkLoss,
+        Self::LinkDelay,
+        Self::LinkDuplicates,
+        Self::LinkCorruption,
+        Self::LinkSilence,
+        Self::HostRestarted,
+        Self::Goodbye,
+        Self::Misplaced,
+        Self::TickOverrun,
+        Self::LateTicks,
+        Self::TaskStalled,
+        Self::TilesMissing,
+        Self::TilesPoisoned,
+        Self::HotMotors,
+        Self::Yank,
+    ];
+
+    /// What is expected.
+    #[must_use]
+    pub const fn expectation(self) -> Expectation {
+        match self {
+            Self::EncoderJump | Self::EncoderGlitch => latch(&[Fault::EncoderJump], 0),
+            Self::EmergencyStop => latch(&[Fault::EmergencyStop], 0),
+            Self::DeadManReleased | Self::DeadManBounce => latch(&[Fault::DeadManReleased], 0),
+            Self::HardwareFailed => latch(&[Fault::Hardware], 0),
+            // Found when the tick that ran over has driven already.
+            Self::TickOverrun => latch(&[Fault::TickOverrun], 1),
+            Self::TaskStalled => latch(&[Fault::TaskStalled], STALL_TICKS),
+            Self::EncoderRunaway => {
+                latch(&[Fault::TooFast, Fault::JointLimit, Fault::Linkage], 400)
+            }
+            Self::EncoderBeyondLimits => latch(&[Fault::JointLimit, Fault::Linkage], 3_000),
+            // Where nothing moves or pushes it cannot be seen, and does no harm;
+            // what it missed comes back as a jump.
+            Self::EncoderStuck => Expectation {
+                may_latch: &[Fault::NoMotion, Fault::EncoderJump, Fault::TooFast],
+                ..RIDE
+            },
+            Self::HotMotors => Expectation {
+                may_latch: &[Fault::MotorTooHot],
+                ..RIDE
+            },
+            Self::Yank => Expectation {
+                may_latch: &[Fault::TooFast, Fault::EncoderJump],
+                ..RIDE
+            },
+            Self::HostRestarted | Self::Goodbye => Expectation {
+                may_ride: false,
+                may_disarm: true,
+                ..RIDE
+            },
+            Self::EncoderNoise
+            | Self::LinkLoss
+            | Self::LinkDelay
+            | Self::LinkDuplicates
+            | Self::LinkCorruption
+            | Self::LinkSilence
+            | Self::Misplaced
+            | Self::LateTicks
+            | Self::TilesMissing
+            | Self::TilesPoisoned => RIDE,
+        }
+    }
+
+    /// How long it lasts, ticks.
+    #[must_use]
+    pub const fn duration(self) -> Duration {
+        match self {
+            Self::EncoderGlitch | Self::DeadManBounce | Self::TickOverrun => (1, 1),
+            Self::EncoderJump | Self::Goodbye | Self::HostRestarted => (1, 1),
+            Self::EmergencyStop | Self::DeadManReleased | Self::HardwareFailed => (1, 150),
+            Self::EncoderStuck => (50, 1_500),
+            Self::EncoderRunaway => (400, 400),
+            Self::EncoderBeyondLimits => (3_000, 3_000),
+            Self::LinkSilence => (200, 3_000),
+            Self::TilesMissing | Self::TilesPoisoned => (300, 2_000),
+            Self::HotMotors => (15_000, 25_000),
+            Self::Yank => (40, 120),
+            Self::TaskStalled => (STALL_TICKS + 20, STALL_TICKS + 200),
+            Self::LateTicks => (1, 50),
+            Self::EncoderNoise
+            | Self::LinkLoss
+            | Self::LinkDelay
+            | Self::LinkDuplicates
+            | Self::LinkCorruption
+            | Self::Misplaced => (50, 800),
+        }
+    }
+}
+
+/// Within this many ticks a task that hangs has to be noticed.
+pub const STALL_TICKS: u32 = 41;

@@ -1,0 +1,148 @@
+//! What became of everything that went wrong, as a table.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use hapterra_core::guard::Fault;
+
+use super::kind::Kind;
+use super::watch::Extremes;
+
+/// What became of a mishap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The arm stayed armed.
+    Ridden,
+    /// The arm was disarmed, without a fault.
+    Disarmed,
+    /// A fault was latched.
+    Latched(Fault),
+}
+
+/// What became of one kind.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+struct Row {
+    injected: u32,
+    ridden: u32,
+    disarmed: u32,
+    /// By the fault's number.
+    latched: BTreeMap<u8, (Fault, u32)>,
+    /// Most ticks after the first one in which the amplifiers were on, where
+    /// it was latched or disarmed.
+    worst: Option<u64>,
+}
+
+/// All of a campaign.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tally {
+    rows: Vec<(Kind, Row)>,
+    /// Ticks run.
+    pub ticks: u64,
+    /// Ticks with the amplifiers on.
+    pub armed: u64,
+    /// The largest that was seen.
+    pub extremes: Extremes,
+}
+
+impl Tally {
+    /// Counts a mishap.
+    ///
+    /// # Errors
+    /// When that is not what is expected of its kind.
+    pub fn count(
+        &mut self,
+        kind: Kind,
+        outcome: Outcome,
+        reaction: Option<u64>,
+    ) -> Result<(), String> {
+        let row = self.row(kind);
+        row.injected += 1;
+        let expected = kind.expectation();
+        let fits = match outcome {
+            Outcome::Ridden => {
+                row.ridden += 1;
+                expected.may_ride
+            }
+            Outcome::Disarmed => {
+                row.disarmed += 1;
+                expected.may_disarm
+            }
+            Outcome::Latched(fault) => {
+                row.latched.entry(fault.number()).or_insert((fault, 0)).1 += 1;
+                expected.may_latch.contains(&fault)
+            }
+        };
+        row.worst = row.worst.max(reaction);
+        if !fits {
+            return Err(format!(
+                "{kind:?} ended as {outcome:?}, expected {expected:?}"
+            ));
+        }
+        match (expected.within, reaction) {
+            (Some(most), Some(took)) if took <= u64::from(most) => Ok(()),
+            (Some(most), took) => Err(format!(
+                "{kind:?}: amplifiers on for {took:?} ticks, expected at most {most}"
+            )),
+            (None, _) => Ok(()),
+        }
+    }
+
+    fn row(&mut self, kind: Kind) -> &mut Row {
+        let at = self.rows.iter().position(|(known, _)| *known == kind);
+        let at = at.unwrap_or_else(|| {
+            self.rows.push((kind, Row::default()));
+            self.rows.len() - 1
+        });
+        &mut self.rows[at].1
+    }
+
+    /// Adds a segment's time and extremes.
+    pub fn add(&mut self, ticks: u64, armed: u64, extremes: &Extremes) {
+        self.ticks += ticks;
+        self.armed += armed;
+        self.extremes = self.extremes.or(*extremes);
+    }
+
+    /// Mishaps in all.
+    #[must_use]
+    pub fn injected(&self) -> u32 {
+        self.rows.iter().map(|(_, row)| row.injected).sum()
+    }
+
+    /// How often a kind was injected.
+    #[must_use]
+    pub fn injected_of(&self, kind: Kind) -> u32 {
+        let row = self.rows.iter().find(|(known, _)| *known == kind);
+        row.map_or(0, |(_, row)| row.injected)
+    }
+
+    /// The table, in Markdown.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let mut text = String::from(
+            "| went wrong | injected | ridden through | disarmed | latched | amplifiers on for at most, ticks |\n\
+             | --- | ---: | ---: | ---: | --- | ---: |\n",
+        );
+        for kind in Kind::ALL {
+            let Some((_, row)) = self.rows.iter().find(|(known, _)| *known == kind) else {
+                continue;
+            };
+            let latched: Vec<_> = row
+                .latched
+                .values()
+                .map(|(fault, count)| format!("{count} {fault:?}"))
+                .collect();
+            let worst = row.worst.map_or("always".into(), |ticks| ticks.to_string());
+            // Writing to a String cannot fail.
+            let _ = writeln!(
+                text,
+                "| {kind:?} | {} | {} | {} | {} | {worst} |",
+                row.injected,
+                row.ridden,
+                row.disarmed,
+                latched.join(", "),
+            );
+        }
+        text
+    }
+}

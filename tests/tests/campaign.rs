@@ -1,0 +1,31 @@
+//! A short stretch of the closed-loop campaign, and whether the report that is
+//! kept is whole.
+
+use hapterra_tests::campaign::kind::Kind;
+use hapterra_tests::campaign::{SEED, report, run};
+use hapterra_tests::repository;
+
+#[test]
+fn nothing_that_goes_wrong_gets_past_the_guard() {
+    let tally = run(SEED, 60, &mut |_, _| {}).expect("no violation");
+    assert!(tally.armed >= 60_000);
+    for kind in Kind::ALL {
+        assert!(tally.injected_of(kind) > 0, "{kind:?} was not tried");
+    }
+    // Otherwise the bounds were never put to the test.
+    assert!(tally.extremes.force_n > 4.0, "{:?}", tally.extremes);
+    assert!(tally.extremes.current_a > 2.0, "{:?}", tally.extremes);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_campaign() {
+    let once = || run(SEED + 1, 1, &mut |_, _| {}).expect("no violation");
+    assert_eq!(once(), once());
+}
+
+#[test]
+fn the_report_that_is_kept_has_every_kind() {
+    let path = repository().join("docs/campaign.md");
+    let page = std::fs::read_to_string(path).expect("the report is kept");
+    assert_eq!(report::missing(&page), []);
+}
