@@ -58,6 +58,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     })
 }
 
+/// What an emulated board says that nobody has given anything to do.
+const NO_TICK: &str =
+    "no tick has run yet: the time of an emulated board stands still until it has a scene";
+
 type Line = (&'static str, String);
 
 fn lines(status: &Status) -> Vec<Line> {
@@ -73,6 +77,10 @@ fn lines(status: &Status) -> Vec<Line> {
         ("calibration", calibration(status)),
     ];
     lines.extend(boot(&status.boot));
+    if status.ticks.run == 0 {
+        lines.push(("arm", NO_TICK.into()));
+        return lines;
+    }
     lines.extend(guard(status));
     lines.extend(measured(status));
     lines
@@ -223,7 +231,10 @@ mod tests {
             calibration: CalibrationSource::None,
             model: None,
             health: Health::default(),
-            ticks: TickFigures::default(),
+            ticks: TickFigures {
+                run: 1,
+                ..TickFigures::default()
+            },
             stack: StackFigures::default(),
             bad_frames: 0,
             dropped: 0,
@@ -252,6 +263,17 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part} in\n{text}");
         }
+    }
+
+    #[test]
+    fn before_the_first_tick_nothing_is_said_of_the_arm() {
+        let mut status = status();
+        status.ticks.run = 0;
+        let text = text(&status);
+        assert!(
+            text.contains("no tick has run") && !text.contains("motors"),
+            "{text}"
+        );
     }
 
     #[test]
