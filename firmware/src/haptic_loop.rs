@@ -13,7 +13,7 @@ use core::mem;
 use hapterra_core::guard::{Drive, Fault, Sense};
 use hapterra_core::phantom::Mechanism;
 use hapterra_core::terrain::Tile;
-use hapterra_core::tick::{Command, Haptics, Outcome};
+use hapterra_core::tick::{Command, Haptics};
 use hapterra_core::wire::message::Source;
 use hapterra_core::wire::status::Health;
 use heapless::spsc::{Consumer, Producer};
@@ -158,16 +158,22 @@ where
 
     fn feel_arm(&mut self, watchdog_live: bool) -> Drive {
         let sense = self.encoders.sense();
-        let outcome = self.haptics.tick(&sense, watchdog_live);
-        let drive = self.drive(outcome.drive);
+        let mut outcome = self.haptics.tick(&sense, watchdog_live);
+        self.drive(&outcome.drive);
         if self.feed == Feed::Arm && self.reporter.records_this(&outcome.sample) {
-            let record = self.record(outcome);
-            if self.ends.records.enqueue(record).is_err() {
+            if self.ends.records.ready() {
+                self.timing.fill(&mut outcome.sample);
+                // There is room.
+                let _ = self.ends.records.enqueue(Record {
+                    sample: outcome.sample,
+                    answers: None,
+                });
+            } else {
                 self.ends.vitals.count_dropped();
             }
         }
-        self.report(&sense, &drive);
-        drive
+        self.report(&sense, &outcome.drive);
+        outcome.drive
     }
 
     /// Tells where the loop stands, when something has changed and now and
@@ -183,14 +189,19 @@ where
     }
 
     fn feel_point(&mut self, pending: bool) -> Drive {
-        let drive = self.drive(Drive::default());
+        let drive = Drive::default();
+        self.drive(&drive);
         if !pending {
             return drive;
         }
         let sense = Sense::default();
-        let outcome = self.haptics.tick(&sense, false);
+        let mut outcome = self.haptics.tick(&sense, false);
         self.report(&sense, &drive);
-        let record = self.record(outcome);
+        self.timing.fill(&mut outcome.sample);
+        let record = Record {
+            sample: outcome.sample,
+            answers: outcome.answers,
+        };
         if outcome.answers.is_some() {
             self.feed = Feed::Points { pending: false };
             self.answer(record);
@@ -206,16 +217,8 @@ where
         self.unsent = self.ends.records.enqueue(record).err();
     }
 
-    fn record(&self, mut outcome: Outcome) -> Record {
-        self.timing.fill(&mut outcome.sample);
-        Record {
-            sample: outcome.sample,
-            answers: outcome.answers,
-        }
-    }
-
     /// Brings the amplifiers to what the tick asks for.
-    fn drive(&mut self, drive: Drive) -> Drive {
+    fn drive(&mut self, drive: &Drive) {
         let power = self.power.take().map(|power| match (power, drive.enabled) {
             (Power::Off(off), false) => Power::Off(off),
             (Power::On(on), false) => Power::Off(on.disable()),
@@ -225,11 +228,10 @@ where
         // An assignment would drop what is there, which is nothing; but with it
         // the drivers' destructors, which can panic, would be part of the tick.
         mem::forget(mem::replace(&mut self.power, power));
-        drive
     }
 }
 
-fn written<A: EnabledAmplifiers>(mut amplifiers: A, drive: Drive) -> A {
+fn written<A: EnabledAmplifiers>(mut amplifiers: A, drive: &Drive) -> A {
     amplifiers.write(drive.currents_a.to_array());
     amplifiers
 }

@@ -108,7 +108,9 @@ pub struct Report {
 /// The guard's memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Guard {
-    rate: TickRate,
+    /// Most counts and newtons from one tick to the next.
+    max_counts: u32,
+    max_slew_n: f32,
     arming: Arming,
     fault: Option<Fault>,
     blockers: Blockers,
@@ -130,7 +132,8 @@ impl Guard {
     #[must_use]
     pub fn new(rate: TickRate, found_at_boot: Option<Fault>) -> Self {
         Self {
-            rate,
+            max_counts: MAX_COUNTS_PER_S.div_ceil(rate.hz()),
+            max_slew_n: MAX_SLEW_N_PER_S / rate.hz() as f32,
             arming: Arming::new(rate),
             fault: found_at_boot,
             blockers: Blockers::empty(),
@@ -270,7 +273,7 @@ impl Guard {
 
     /// Whether an encoder moved farther than it can.
     fn follow(&mut self, counts: [i32; 3]) -> bool {
-        let most = MAX_COUNTS_PER_S.div_ceil(self.rate.hz());
+        let most = self.max_counts;
         let jumped = self.counts.is_some_and(|last| {
             let mut axes = last.iter().zip(counts);
             axes.any(|(a, b)| a.abs_diff(b) > most)
@@ -399,7 +402,7 @@ impl Guard {
             aim *= share;
         }
         let change = aim - self.force_n;
-        let step = clamp_length(change, MAX_SLEW_N_PER_S / self.rate.hz() as f32);
+        let step = clamp_length(change, self.max_slew_n);
         if step != change {
             self.limits |= Limits::SLEW_LIMITED;
         }

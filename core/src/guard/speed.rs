@@ -13,6 +13,7 @@ const PATIENCE: u32 = 5;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Speed {
     readings: Readings,
+    latest: [i32; 3],
     /// Ticks between two readings, and since the last.
     every: u32,
     ticks: u32,
@@ -42,6 +43,7 @@ impl Speed {
         let every = rate.ticks(1);
         Self {
             readings: Readings::default(),
+            latest: [0; 3],
             every,
             ticks: 0,
             hz: rate.hz() as f32 / every as f32,
@@ -66,6 +68,7 @@ impl Speed {
     /// Forgets what was: these counts follow from nothing before.
     pub(super) fn restart(&mut self, counts: [i32; 3]) {
         self.readings.restart(counts);
+        self.latest = counts;
         self.ticks = 0;
         self.too_fast = 0;
         self.share = 1.0;
@@ -79,12 +82,12 @@ impl Speed {
         }
         self.ticks = 0;
         self.readings.take(counts);
-        let moved = self.readings.moved();
-        let slow = moved.iter().zip(self.surely_slow);
-        if slow
-            .into_iter()
-            .all(|(moved, slow)| moved.unsigned_abs() <= slow)
-        {
+        let [a, b, c] = self.latest;
+        let [x, y, z] = counts;
+        let moved = [x.wrapping_sub(a), y.wrapping_sub(b), z.wrapping_sub(c)];
+        self.latest = counts;
+        let slow = |axis: usize| moved[axis].unsigned_abs() <= self.surely_slow[axis];
+        if slow(0) && slow(1) && slow(2) {
             self.share = 1.0;
             self.too_fast = 0;
             return Look::Moved(moved);

@@ -28,8 +28,12 @@ impl Stillness {
     /// True if a motor pushes and nothing comes of it.
     pub(super) fn look(&mut self, moved: [i32; 3], currents_a: Vec3, continuous_a: Vec3) -> bool {
         let load = currents_a.abs();
+        if load.cmple(0.5 * continuous_a).all() {
+            *self = Self::default();
+            return false;
+        }
         let strained = load.cmpgt(continuous_a).any();
-        let still = moved == [0; 3];
+        let still = moved.iter().all(|moved| *moved == 0);
         self.all_still = if strained && still {
             self.all_still + 1
         } else {

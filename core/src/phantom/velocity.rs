@@ -58,7 +58,6 @@ impl Readings {
 
     /// Forgets everything but this reading.
     pub fn restart(&mut self, counts: [i32; 3]) {
-        *self = Self::default();
         self.take(counts);
         self.before = 0;
     }
@@ -95,10 +94,14 @@ impl Readings {
         let (mut low, mut high) = (f32::MIN, f32::MAX);
         let (mut sum, mut moment) = (0.0, 0.0);
         let mut window = 0;
-        for (i, reciprocal) in RECIPROCAL.iter().enumerate().take(self.before + 1).skip(1) {
+        for i in 1..=self.before.min(WINDOW) {
+            let reciprocal = RECIPROCAL.get(i).copied().unwrap_or(0.0);
             let fallen = newest.wrapping_sub(self.ago(i, axis)) as f32;
-            let lower = low.max((fallen - NOISE) * reciprocal);
-            let upper = high.min((fallen + NOISE) * reciprocal);
+            // Compared by hand: `max` and `min` are calls on this processor.
+            let lower = (fallen - NOISE) * reciprocal;
+            let lower = if lower > low { lower } else { low };
+            let upper = (fallen + NOISE) * reciprocal;
+            let upper = if upper < high { upper } else { high };
             if lower > upper {
                 break;
             }
@@ -111,7 +114,13 @@ impl Readings {
         // for which the window was chosen.
         let fit = FIT.get(window).copied().unwrap_or(0.0);
         let slope = (2.0 * moment - window as f32 * sum) * fit;
-        slope.max(low).min(high)
+        if slope < low {
+            low
+        } else if slope > high {
+            high
+        } else {
+            slope
+        }
     }
 }
 

@@ -4,7 +4,7 @@
 //! full of samples has no room for tiles. Where the loop stands, ten times a
 //! second, and at once when it changes.
 
-use hapterra_core::guard::{Limits, Report, TickRate};
+use hapterra_core::guard::{Fault, Report, TickRate};
 use hapterra_core::wire::message::Sample;
 
 /// Between two tellings of where the loop stands, ms.
@@ -18,7 +18,7 @@ pub(super) struct Reporter {
     ticks: u32,
     tell_every: u32,
     untold: u32,
-    told: Option<Report>,
+    told: u64,
 }
 
 impl Reporter {
@@ -28,7 +28,8 @@ impl Reporter {
             ticks: 0,
             tell_every: rate.ticks(TELL_MS),
             untold: 0,
-            told: None,
+            // No report has this: modes are few.
+            told: u64::MAX,
         }
     }
 
@@ -45,28 +46,31 @@ impl Reporter {
     /// Whether it is to be told now that the guard stands here.
     pub(super) fn reports_this(&mut self, report: &Report) -> bool {
         self.untold = self.untold.saturating_add(1);
-        self.untold >= self.tell_every || self.told != Some(without_limits(report))
+        self.untold >= self.tell_every || self.told != without_limits(report)
     }
 
     /// It was told.
     pub(super) fn reported(&mut self, report: &Report) {
         self.untold = 0;
-        self.told = Some(without_limits(report));
+        self.told = without_limits(report);
     }
 }
 
-/// Limits come and go with every touch, and each sample has them.
-fn without_limits(report: &Report) -> Report {
-    Report {
-        limits: Limits::empty(),
-        ..*report
-    }
+/// The report in a number. Limits come and go with every touch, and each
+/// sample has them.
+fn without_limits(report: &Report) -> u64 {
+    let fault = report.fault.map_or(0, Fault::number);
+    u64::from(report.blockers.bits())
+        | u64::from(report.decision.refused.bits()) << 16
+        | u64::from(report.decision.count) << 32
+        | u64::from(fault) << 40
+        | (report.mode as u64) << 48
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hapterra_core::guard::Mode;
+    use hapterra_core::guard::{Limits, Mode};
 
     #[test]
     fn samples_come_a_thousand_times_a_second() {
