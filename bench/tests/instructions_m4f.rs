@@ -9,7 +9,7 @@ mod m4f;
 
 use hapterra_tests::counting::CountingBoard;
 use m4f::table::{Row, Table};
-use m4f::{chain, contact};
+use m4f::{chain, contact, wild};
 
 #[test]
 fn no_state_of_the_tick_costs_more_than_it_did() {
@@ -18,6 +18,7 @@ fn no_state_of_the_tick_costs_more_than_it_did() {
     };
     let mut rows = contact::rows(&board);
     rows.extend(chain::rows(&board));
+    rows.extend(wild::rows(&board));
     println!("{}", Row::TITLES);
     rows.iter().for_each(|row| println!("{row}"));
     if std::env::var_os("HAPTERRA_COUNTS").is_some_and(|what| what == "write") {

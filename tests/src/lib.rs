@@ -16,6 +16,7 @@ pub mod scene;
 pub mod soak;
 pub mod usb;
 pub mod walk;
+pub mod wild;
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;

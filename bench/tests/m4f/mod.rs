@@ -3,3 +3,4 @@
 pub(crate) mod chain;
 pub(crate) mod contact;
 pub(crate) mod table;
+pub(crate) mod wild;
