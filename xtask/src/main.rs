@@ -11,6 +11,7 @@ mod deny;
 mod flash;
 mod image;
 mod lint;
+mod miri;
 mod panics;
 mod run;
 mod setup;
@@ -41,6 +42,7 @@ cargo xtask COMMAND
   campaign [--seconds N] [--seed S] [--segment K]
                          the closed loop with everything going wrong at random, 10,000 s of
                          arm time unless told otherwise; writes docs/campaign.md
+  miri                   core's tests under Miri, where it can run
   deny                   licences, bans, sources and advisories of dependencies
   image BOARD            build an image and print where its ELF is
   flash BOARD            run an image on a real board with probe-rs
@@ -96,6 +98,7 @@ fn command() -> Result<ExitCode> {
             }
             match plain {
                 "lint" => lint::lint()?,
+                "miri" => miri::miri()?,
                 "setup" => setup()?,
                 "deny" => deny::check()?,
                 "help" => print!("{HELP}"),
