@@ -134,9 +134,9 @@ impl<'t> Arm<'t> {
         target
     }
 
-    /// The force at the tip that explains the motors' torques, less the arm's
-    /// weight as the calibration has it, N; none near a singular pose, where
-    /// small torques are large forces.
+    /// The least force at the tip that explains the motors' torques with any share
+    /// of the arm's weight held, N: the share is not known while force comes in or
+    /// goes out. None near a singular pose, where small torques are large forces.
     #[must_use]
     pub fn force_n(&self, currents_a: [f64; 3], weight_nm: [f64; 3]) -> Option<f64> {
         let model = self.plant.model();
@@ -146,31 +146,36 @@ impl<'t> Arm<'t> {
         if spread.abs() < 0.5 || reach_m.abs() < 0.08 {
             return None;
         }
-        let torque: [f64; 3] = std::array::from_fn(|i| {
+        let torque = std::array::from_fn(|i| {
             let axis = &model.drive[i];
-            currents_a[i] * axis.ratio * axis.sign * axis.motor.kt_nm_per_a - weight_nm[i]
+            currents_a[i] * axis.ratio * axis.sign * axis.motor.kt_nm_per_a
         });
-        Some(solved(&kinematics::jacobian(model, q), torque))
+        let jacobian = kinematics::jacobian(model, q);
+        let [all, weight] = [torque, weight_nm].map(|torque| force(&jacobian, torque));
+        let share = (dot(all, weight) / dot(weight, weight).max(1e-12)).clamp(0.0, 1.0);
+        let rest = std::array::from_fn(|i| all[i] - share * weight[i]);
+        Some(libm::sqrt(dot(rest, rest)))
     }
 }
 
-/// Length of F in Jᵀ·F = τ, by Cramer's rule.
-fn solved(jacobian: &[[f64; 3]; 3], torque: [f64; 3]) -> f64 {
+/// F in Jᵀ·F = τ, by Cramer's rule.
+fn force(jacobian: &[[f64; 3]; 3], torque: [f64; 3]) -> [f64; 3] {
     // Rows of Jᵀ are the columns of J.
     let row = |i: usize| [jacobian[0][i], jacobian[1][i], jacobian[2][i]];
     let [a, b, c] = [row(0), row(1), row(2)];
-    let cross = |u: [f64; 3], v: [f64; 3]| {
-        [
-            u[1] * v[2] - u[2] * v[1],
-            u[2] * v[0] - u[0] * v[2],
-            u[0] * v[1] - u[1] * v[0],
-        ]
-    };
-    let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
     let (bc, ca, ab) = (cross(b, c), cross(c, a), cross(a, b));
-    let determinant = dot(a, bc);
-    let force: [f64; 3] = std::array::from_fn(|i| {
-        (torque[0] * bc[i] + torque[1] * ca[i] + torque[2] * ab[i]) / determinant
-    });
-    libm::sqrt(dot(force, force))
+    let whole = dot(a, bc);
+    std::array::from_fn(|i| (torque[0] * bc[i] + torque[1] * ca[i] + torque[2] * ab[i]) / whole)
+}
+
+fn cross(u: [f64; 3], v: [f64; 3]) -> [f64; 3] {
+    [
+        u[1] * v[2] - u[2] * v[1],
+        u[2] * v[0] - u[0] * v[2],
+        u[0] * v[1] - u[1] * v[0],
+    ]
+}
+
+fn dot(u: [f64; 3], v: [f64; 3]) -> f64 {
+    u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 }

@@ -144,6 +144,13 @@ impl Mishap {
         self.kind == Kind::TaskStalled
     }
 
+    /// Whether the device is told at `now` that its transport was interrupted, as
+    /// USB tells it; a silent line tells nothing.
+    #[must_use]
+    pub fn unplugs(&self, now: u64) -> bool {
+        self.kind == Kind::LinkSilence && self.sign > 0 && now == self.ticks.start
+    }
+
     /// What it does to the hand.
     #[must_use]
     pub fn mood(&self) -> Mood {

@@ -33,7 +33,7 @@ pub enum Kind {
     LinkDuplicates,
     /// Bits are flipped, both ways.
     LinkCorruption,
-    /// The link is silent for seconds, then the host comes back.
+    /// The link is unplugged or silent for seconds, then the host comes back.
     LinkSilence,
     /// The host is restarted and brings another scene.
     HostRestarted,
@@ -180,7 +180,7 @@ impl Kind {
             Self::EncoderBeyondLimits => (3_000, 3_000),
             Self::LinkSilence => (200, 3_000),
             Self::TilesMissing | Self::TilesPoisoned => (300, 2_000),
-            Self::HotMotors => (15_000, 25_000),
+            Self::HotMotors => (25_000, 60_000),
             Self::Yank => (40, 120),
             Self::TaskStalled => (STALL_TICKS + 20, STALL_TICKS + 200),
             Self::LateTicks => (1, 50),

@@ -289,6 +289,9 @@ impl<'t> Stretch<'t> {
             mishap.meddle(&mut sense, &mut self.lost, self.now, &mut self.chance);
             (unkind, tiles) = (mishap.unkind(), mishap.tiles());
             (hands, stalls) = (mishap.hands(), mishap.stalls());
+            if mishap.unplugs(self.now) {
+                self.device.interrupted();
+            }
             if let Some(message) = mishap.misplaced(&mut self.chance, self.scene.epoch) {
                 self.host.say(&message, self.now, &unkind, &mut self.chance);
             }

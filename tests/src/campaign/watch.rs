@@ -13,10 +13,9 @@ const SLEW_N: f32 = 1.0;
 const HOTTEST_C: f64 = 112.0;
 /// Room for rounding in comparisons of f32.
 const ROUNDING: f32 = 1e-4;
-/// By this much the force worked out from the currents may be above the clamp:
-/// the weight of the arm is held with a gain that is not known here, and the
-/// preset's gravity and the arm's differ in the fourth digit.
-const WEIGHT_N: f64 = 0.75;
+/// By this much the force worked out from the currents may be above the clamp: an
+/// encoder that is wrong makes the device push with levers that are not the arm's.
+const LEVERS_N: f64 = 0.5;
 
 /// The largest that was seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -111,7 +110,7 @@ impl Watch {
             return Ok(());
         };
         self.extremes.motor_force_n = self.extremes.motor_force_n.max(force);
-        let most = f64::from(self.record.max_force_n) + WEIGHT_N;
+        let most = f64::from(self.record.max_force_n) + LEVERS_N;
         match force <= most {
             true => Ok(()),
             false => Err(format!("the motors make {force:.2} N at the tip")),
