@@ -1,0 +1,145 @@
+//! The commands around a device as a newcomer meets them: with nothing plugged
+//! in, and with wrong words.
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use hapterra_tests::hapterra_binary;
+
+fn hapterra(words: &[&str]) -> Output {
+    Command::new(hapterra_binary())
+        .args(words)
+        .stdin(Stdio::null())
+        .output()
+        .expect("it runs")
+}
+
+fn told(output: &Output) -> String {
+    let both = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
+    String::from_utf8_lossy(&both).into_owned()
+}
+
+/// Runs a command that has to fail with `code`, saying each of these.
+fn fails(words: &[&str], code: i32, says: &[&str]) {
+    let output = hapterra(words);
+    let told = told(&output);
+    assert_eq!(output.status.code(), Some(code), "{words:?}: {told}");
+    for part in says {
+        assert!(told.contains(part), "{words:?}: no {part:?} in\n{told}");
+    }
+}
+
+#[test]
+fn list_says_what_it_looked_for() {
+    // Port 1 is nobody's.
+    let output = hapterra(&["list", "--tcp", "127.0.0.1:1"]);
+    let told = told(&output);
+    assert!(output.status.success(), "{told}");
+    for part in [
+        "nucleo-g474re",
+        "STM32H743ZITx",
+        "boards on USB",
+        "debug probes",
+        "none at tcp:127.0.0.1:1",
+    ] {
+        assert!(told.contains(part), "no {part:?} in\n{told}");
+    }
+}
+
+#[test]
+fn status_of_the_device_in_memory_names_what_blocks_it() {
+    let output = hapterra(&["status", "--device", "native"]);
+    let told = told(&output);
+    assert!(output.status.success(), "{told}");
+    for part in [
+        "native",
+        "Disarmed",
+        "NOT_ZEROED",
+        "NO_SCENE",
+        "HOST_DISARMED",
+        "fault          none",
+        "protocol",
+    ] {
+        assert!(told.contains(part), "no {part:?} in\n{told}");
+    }
+}
+
+#[test]
+fn a_record_goes_to_a_file_and_comes_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("arm.hapcal");
+    let file = file.to_str().expect("a plain path");
+    let base = ["calibrate", "--device", "native", "--no-walk"];
+    let write = [&base[..], &["--set", "ratio-2=10.5", "--output", file]].concat();
+    let output = hapterra(&write);
+    assert!(output.status.success(), "{}", told(&output));
+    let again = folder.path().join("again.hapcal");
+    let again = again.to_str().expect("a plain path");
+    let read = [&base[..], &["--from", file, "--output", again]].concat();
+    let output = hapterra(&read);
+    assert!(output.status.success(), "{}", told(&output));
+    let bytes = |path: &str| std::fs::read(path).expect("written");
+    assert_eq!(bytes(file), bytes(again));
+    let mut damaged = bytes(file);
+    damaged[20] ^= 1;
+    std::fs::write(file, damaged).expect("written");
+    let read = [&base[..], &["--from", file]].concat();
+    fails(&read, 1, &["damaged", "hint:"]);
+}
+
+#[test]
+fn wrong_words_are_answered_with_what_to_do() {
+    fails(
+        &["status", "--device", "serial"],
+        2,
+        &["usb, tcp:HOST:PORT, native or emulated"],
+    );
+    fails(
+        &["status", "--device", "tcp:127.0.0.1:1"],
+        1,
+        &["127.0.0.1:1", "hint:"],
+    );
+    fails(
+        &["status", "--device", "emulated", "--image", "/no/such"],
+        1,
+        &["/no/such", "hint:"],
+    );
+    fails(&["flash", "--board", "uno"], 2, &["nucleo-g474re"]);
+    fails(&["flash", "--board", "mps2-an386"], 2, &["emulated"]);
+    fails(
+        &["flash", "--board", "nucleo-g474re", "--image", "/no/such"],
+        1,
+        &["hint:"],
+    );
+    let calibrate =
+        |set: &'static str| ["calibrate", "--device", "native", "--no-walk", "--set", set];
+    fails(&calibrate("l1-mm=3"), 1, &["30 to 1000 mm", "hint:"]);
+    fails(&calibrate("length=3"), 2, &["l1-mm"]);
+    fails(&calibrate("l1-mm=long"), 2, &["no number"]);
+    fails(
+        &["calibrate", "--device", "native", "--from", "/no/such"],
+        1,
+        &["/no/such", "hint:"],
+    );
+}
+
+#[test]
+fn a_terrain_that_no_disk_holds_is_refused_before_it_is_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("huge.tif");
+    let path = file.to_str().expect("a plain path");
+    fails(
+        &[
+            "synth",
+            "plane",
+            "-o",
+            path,
+            "--size",
+            "4000000000x4000000000",
+        ],
+        1,
+        &["GB are free", "hint:"],
+    );
+    assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 0);
+    assert!(!Path::new(path).exists());
+}
