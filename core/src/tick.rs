@@ -194,16 +194,23 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// One tick with what the encoders and safety inputs say. `watchdog_live`:
     /// whether the board's watchdog is being fed.
     pub fn tick(&mut self, sense: &Sense, watchdog_live: bool) -> Outcome {
+        let mut outcome = Outcome::default();
+        self.tick_into(sense, watchdog_live, &mut outcome);
+        outcome
+    }
+
+    /// As [`Haptics::tick`], into a place that stays: nothing is copied.
+    pub fn tick_into(&mut self, sense: &Sense, watchdog_live: bool, outcome: &mut Outcome) {
         self.tick = self.tick.wrapping_add(1);
         match &self.scene {
-            Some(scene) if scene.source == Source::Points => self.feel_point(),
-            _ => self.feel_arm(sense, watchdog_live),
+            Some(scene) if scene.source == Source::Points => self.feel_point(outcome),
+            _ => self.feel_arm(sense, watchdog_live, outcome),
         }
     }
 
     /// The full path: counts, pose, haptic interface point, proxy, force,
     /// torques, currents.
-    fn feel_arm(&mut self, sense: &Sense, watchdog_live: bool) -> Outcome {
+    fn feel_arm(&mut self, sense: &Sense, watchdog_live: bool, outcome: &mut Outcome) {
         let zero = self.zero.unwrap_or_default();
         let mechanism = self.mechanism.as_ref();
         let pose = mechanism.map(|mechanism| mechanism.pose(sense.counts, zero));
@@ -217,8 +224,11 @@ impl<'t, const D: usize> Haptics<'t, D> {
             watchdog_live,
         };
         let lost_counts = self.guard.watch(sense, &around);
+        outcome.drive = Drive::default();
+        outcome.answers = None;
         let (Some(mechanism), Some(pose)) = (mechanism, pose) else {
-            return self.outcome(GridPoint::default(), Felt::default(), Vec3::ZERO);
+            let (hip, felt) = (GridPoint::default(), Felt::default());
+            return self.tell(hip, &felt, Vec3::ZERO, &mut outcome.sample);
         };
         let (mut hip, mut felt, mut wanted) = Default::default();
         if let Some(scene) = &self.scene {
@@ -229,58 +239,52 @@ impl<'t, const D: usize> Haptics<'t, D> {
             wanted = scene.law.force_n(felt.stretch * scene.cell_mm);
         }
         let force_n = self.guard.limit_force(wanted);
-        let mut drive = Drive::default();
         if self.guard.mode().drives() {
             let weight = mechanism.gravity_nm(&pose) * self.guard.gain();
             let torques = pose.torques_nm(to_device_frame(force_n)) + weight;
-            drive = self.guard.limit_currents(mechanism.currents_a(torques));
+            outcome.drive = self.guard.limit_currents(mechanism.currents_a(torques));
         }
         if lost_counts {
             self.zero = None;
         }
-        let mut outcome = self.outcome(hip, felt, force_n);
-        outcome.drive = drive;
-        outcome
+        self.tell(hip, &felt, force_n, &mut outcome.sample);
     }
 
     /// Replay: the host's point in place of the arm, amplifiers off. The tick
     /// is repeated until nothing holds it up; only then is the point answered.
-    fn feel_point(&mut self) -> Outcome {
+    fn feel_point(&mut self, outcome: &mut Outcome) {
+        outcome.drive = Drive::default();
+        outcome.answers = None;
         let (Some(scene), Some(point)) = (&self.scene, self.point) else {
-            return self.outcome(GridPoint::default(), Felt::default(), Vec3::ZERO);
+            let (hip, felt) = (GridPoint::default(), Felt::default());
+            return self.tell(hip, &felt, Vec3::ZERO, &mut outcome.sample);
         };
         let felt = *self
             .contact
             .step(&self.window, point.hip, scene.rule, Pace::LockStep);
         let force_n = scene.law.force_n(felt.stretch * scene.cell_mm);
-        let mut outcome = self.outcome(point.hip, felt, force_n);
+        self.tell(point.hip, &felt, force_n, &mut outcome.sample);
         if felt.settled {
             outcome.answers = Some(point.seq);
             self.point = None;
         }
-        outcome
     }
 
-    fn outcome(&self, hip: GridPoint, felt: Felt, force_n: Vec3) -> Outcome {
+    /// Writes what was felt into the sample, all but what the loop around it
+    /// measures.
+    fn tell(&self, hip: GridPoint, felt: &Felt, force_n: Vec3, sample: &mut Sample) {
         let mut limits = self.guard.limits();
         limits.set(Limits::TERRAIN_MISSING, felt.held_up_by.is_some());
-        Outcome {
-            drive: Drive::default(),
-            sample: Sample {
-                tick: self.tick,
-                hip,
-                proxy: felt.proxy,
-                force_n,
-                state: felt.state,
-                held_up_by: felt.held_up_by,
-                mode: self.guard.mode(),
-                limits,
-                fault: self.guard.fault(),
-                work: felt.work,
-                ..Sample::default()
-            },
-            answers: None,
-        }
+        sample.tick = self.tick;
+        sample.hip = hip;
+        sample.proxy = felt.proxy;
+        sample.force_n = force_n;
+        sample.state = felt.state;
+        sample.held_up_by = felt.held_up_by;
+        sample.mode = self.guard.mode();
+        sample.limits = limits;
+        sample.fault = self.guard.fault();
+        sample.work = felt.work;
     }
 }
 

@@ -13,7 +13,7 @@ use core::mem;
 use hapterra_core::guard::{Drive, Fault, Sense};
 use hapterra_core::phantom::Mechanism;
 use hapterra_core::terrain::Tile;
-use hapterra_core::tick::{Command, Haptics};
+use hapterra_core::tick::{Command, Haptics, Outcome};
 use hapterra_core::wire::message::Source;
 use hapterra_core::wire::status::Health;
 use heapless::spsc::{Consumer, Producer};
@@ -67,6 +67,8 @@ pub struct HapticLoop<'t, E, A: Amplifiers, C, const D: usize> {
     clock: C,
     timing: Timing,
     feed: Feed,
+    /// The last tick's, kept in its place so that it need not be copied.
+    outcome: Outcome,
     liveness: Liveness,
     reporter: Reporter,
     /// An answer that found the queue full; nothing else happens before it is out.
@@ -94,6 +96,7 @@ where
             clock,
             timing: Timing::new::<C>(),
             feed: Feed::Nothing,
+            outcome: Outcome::default(),
             liveness: Liveness::new(rate::<C>()),
             reporter: Reporter::new(rate::<C>()),
             unsent: None,
@@ -158,22 +161,24 @@ where
 
     fn feel_arm(&mut self, watchdog_live: bool) -> Drive {
         let sense = self.encoders.sense();
-        let mut outcome = self.haptics.tick(&sense, watchdog_live);
-        self.drive(&outcome.drive);
-        if self.feed == Feed::Arm && self.reporter.records_this(&outcome.sample) {
+        self.haptics
+            .tick_into(&sense, watchdog_live, &mut self.outcome);
+        let drive = self.outcome.drive;
+        self.drive(&drive);
+        if self.feed == Feed::Arm && self.reporter.records_this(&self.outcome.sample) {
             if self.ends.records.ready() {
-                self.timing.fill(&mut outcome.sample);
+                self.timing.fill(&mut self.outcome.sample);
                 // There is room.
                 let _ = self.ends.records.enqueue(Record {
-                    sample: outcome.sample,
+                    sample: self.outcome.sample,
                     answers: None,
                 });
             } else {
                 self.ends.vitals.count_dropped();
             }
         }
-        self.report(&sense, &outcome.drive);
-        outcome.drive
+        self.report(&sense, &drive);
+        drive
     }
 
     /// Tells where the loop stands, when something has changed and now and
@@ -195,8 +200,9 @@ where
             return drive;
         }
         let sense = Sense::default();
-        let mut outcome = self.haptics.tick(&sense, false);
+        self.haptics.tick_into(&sense, false, &mut self.outcome);
         self.report(&sense, &drive);
+        let mut outcome = self.outcome;
         self.timing.fill(&mut outcome.sample);
         let record = Record {
             sample: outcome.sample,
