@@ -53,6 +53,9 @@ pub(crate) struct Session<'t, const D: usize> {
     pub(super) desk: Desk,
     scene: Option<Scene>,
     puller: Puller<D>,
+    /// The millisecond in which the puller last had nothing to ask for, while
+    /// nothing has changed since. It looks far around: not at every tick.
+    content: Option<u32>,
     focus: Option<Focus>,
     previous: Record,
     spare: Vec<&'t mut Tile, SPARES>,
@@ -82,6 +85,7 @@ impl<'t, const D: usize> Session<'t, D> {
             desk: Desk::new(identity),
             scene: None,
             puller: Puller::new(),
+            content: None,
             focus: None,
             previous: Record::default(),
             spare: spare.into_iter().collect(),
@@ -102,6 +106,7 @@ impl<'t, const D: usize> Session<'t, D> {
     }
 
     pub(crate) fn on_message(&mut self, message: ToDevice<'_>) {
+        self.content = None;
         match (message, self.stage) {
             (ToDevice::Hello(hello), _) => self.open(hello),
             (_, Stage::Closed | Stage::Ended) => {}
@@ -202,6 +207,7 @@ impl<'t, const D: usize> Session<'t, D> {
     }
 
     pub(crate) fn on_bad_frame(&mut self, bad: BadFrame) {
+        self.content = None;
         log::bad_frame(bad);
         self.bad_frames = self.bad_frames.saturating_add(1);
         // It may have been a tile. Where time stands still until that tile is
@@ -233,6 +239,7 @@ impl<'t, const D: usize> Session<'t, D> {
 
     /// Forgets what was said and asked, keeps the scene and what is held.
     pub(crate) fn interrupted(&mut self) {
+        self.content = None;
         self.outbox.clear();
         self.backlog.clear();
         self.points.clear();
@@ -308,6 +315,7 @@ impl<'t, const D: usize> Session<'t, D> {
     /// Takes back the tile buffers that the loop is done with.
     fn reclaim(&mut self) {
         while let Some(tile) = self.ends.spent.dequeue() {
+            self.content = None;
             // It bears its own name if the window would not have it, and the
             // name of what it pushed out otherwise: either is not held.
             if let Some(key) = tile.key() {
@@ -328,6 +336,7 @@ impl<'t, const D: usize> Session<'t, D> {
             let Some(record) = self.ends.records.dequeue() else {
                 return;
             };
+            self.content = None;
             self.focus = Some(follow(&self.previous, &record, self.desk.ticks_per_ms()));
             self.previous = record;
             if record.answers.is_some() {
@@ -381,8 +390,12 @@ impl<'t, const D: usize> Session<'t, D> {
             ..Focus::default()
         });
         let now = self.desk.milliseconds(self.ends.vitals.ticks());
+        if self.content == Some(now) {
+            return;
+        }
         while self.outbox.has_room() && self.has_buffer_for_another() {
             let Some(key) = self.puller.next_request(now, &focus) else {
+                self.content = Some(now);
                 return;
             };
             let epoch = scene.epoch;
