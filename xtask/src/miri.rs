@@ -7,8 +7,8 @@ use anyhow::Result;
 use crate::run::{output, root, run, say, target_dir, timed};
 
 /// Parts of the names of tests that sweep over so much that Miri would take
-/// hours. They show how good an answer is; the code they run runs in others.
-const LONG: [&str; 20] = [
+/// hours, or arm a device for thousands of ticks.
+const LONG: [&str; 22] = [
     "within_two_millionths",
     "warm_started_it",
     "a_saddle_is_no_answer",
@@ -28,6 +28,8 @@ const LONG: [&str; 20] = [
     "velocity::tests",
     "stillness::tests",
     "clear_means_clear",
+    "guard::tests",
+    "tick::tests",
     "a_small_window_feels",
 ];
 

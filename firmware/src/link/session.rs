@@ -20,7 +20,7 @@ use crate::channels::{Record, SPARES};
 use crate::vitals::Part;
 
 /// Samples kept for the writer; beyond them, new ones are dropped.
-const BACKLOG: usize = 24;
+const BACKLOG: usize = 16;
 /// Samples on their way to the writer.
 pub(crate) type Backlog = Deque<Record, BACKLOG>;
 /// Points a host may send ahead; beyond them, they are dropped.
