@@ -275,6 +275,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
     fn tell(&self, hip: GridPoint, felt: &Felt, force_n: Vec3, sample: &mut Sample) {
         let mut limits = self.guard.limits();
         limits.set(Limits::TERRAIN_MISSING, felt.held_up_by.is_some());
+        let fading = self.contact.presence() < 1.0;
+        limits.set(Limits::PRESENCE_FADING, fading);
         sample.tick = self.tick;
         sample.hip = hip;
         sample.proxy = felt.proxy;

@@ -372,3 +372,31 @@ fn a_small_window_feels_what_a_whole_one_feels() {
         "the small window had to fetch again"
     );
 }
+
+#[test]
+fn pushed_over_the_edge_of_the_data_the_force_fades_and_says_why() {
+    let mut device = Device::<4>::armed(edge);
+    // Home is 20 cells from the edge; a count of the first axis is 24 µm.
+    for counts in dip() {
+        let _ = device.tick(counts);
+    }
+    let mut fading = Vec::new();
+    let mut last = Vec3::ZERO;
+    for n in 0..2_000 {
+        let outcome = device.tick([n, 0, 0]);
+        let sample = &outcome.sample;
+        if sample.limits.contains(Limits::PRESENCE_FADING) {
+            fading.push(sample.force_n.length());
+        }
+        assert!((sample.force_n - last).length() < 0.02 || n < 2);
+        last = sample.force_n;
+    }
+    assert!(fading.len() > 10, "{}", fading.len());
+    assert!(fading.first() > fading.last());
+    assert_eq!(last, Vec3::ZERO);
+}
+
+/// A plane with nothing more than 20 cells east of the middle.
+fn edge(x: i32, _: i32) -> f32 {
+    if x > 340 { f32::NAN } else { 5.5 }
+}

@@ -467,6 +467,10 @@ fn without_its_host_it_goes_on_and_fades_at_the_edge_of_what_it_holds() {
     // above it.
     assert_eq!((last.mode, last.fault), (Mode::Armed, None));
     assert_eq!((last.state, last.held_up_by), (State::Waiting, None));
+    // And while the host was away the device knew why there was less force.
+    let reasons = bed.samples.iter().map(|s| s.limits);
+    let why = reasons.fold(Limits::empty(), |all, limits| all | limits);
+    eprintln!("limits: {why:?}");
 }
 
 #[test]

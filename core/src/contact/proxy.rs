@@ -68,6 +68,13 @@ impl Contact {
         }
     }
 
+    /// How much of the surface is there under the hand: less than 1 where its
+    /// force is fading.
+    #[must_use]
+    pub const fn presence(&self) -> f32 {
+        self.presence
+    }
+
     /// The patch the proxy is on, while touching.
     #[must_use]
     pub fn patch(&self) -> Option<[i32; 2]> {

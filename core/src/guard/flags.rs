@@ -58,6 +58,8 @@ bitflags! {
         const FADING = 1 << 6;
         /// Terrain that might be felt here is not on the device yet.
         const TERRAIN_MISSING = 1 << 7;
+        /// The surface fades out at its border, or comes in after a wait.
+        const PRESENCE_FADING = 1 << 8;
     }
 }
 
@@ -117,6 +119,7 @@ impl Limits {
             Self::RAMPING => "force is coming in after arming",
             Self::FADING => "force is going out before disarming",
             Self::TERRAIN_MISSING => "terrain that might be felt here is on its way",
+            Self::PRESENCE_FADING => "the surface fades at its border, or comes in after a wait",
             _ => "",
         }
     }
@@ -132,7 +135,7 @@ mod tests {
             assert!(!name.is_empty() && !meaning.is_empty(), "{name}");
         }
         assert_eq!(Blockers::all().meanings().count(), 13);
-        assert_eq!(Limits::all().meanings().count(), 8);
+        assert_eq!(Limits::all().meanings().count(), 9);
         assert_eq!(Blockers::empty().meaning(), "");
     }
 }
