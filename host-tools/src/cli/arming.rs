@@ -91,9 +91,10 @@ impl ArmingDesk {
             return self.ask_for_enter(report.blockers);
         }
         match report.mode {
-            Mode::Requested => {
+            // What is in the way besides is refused, or gone, in a moment.
+            Mode::Requested if Blockers::BY_HAND.contains(report.blockers) => {
                 self.lines.push("ready to arm; waits for your hand:".into());
-                let hand = report.blockers & Blockers::BY_HAND;
+                let hand = report.blockers;
                 self.lines
                     .extend(blockers(hand).map(|line| format!("  {line}")));
             }
@@ -178,6 +179,24 @@ mod tests {
         assert_eq!(desk.messages(), []);
         press.send(()).expect("listening");
         assert_eq!(desk.messages(), [ToDevice::Status]);
+    }
+
+    #[test]
+    fn that_it_waits_for_the_hand_is_told_once() {
+        let (_press, enter) = channel();
+        let mut desk = ArmingDesk::listening(enter);
+        let waits = |more| Report {
+            mode: Mode::Requested,
+            blockers: Blockers::DEAD_MAN_RELEASED | more,
+            ..Report::default()
+        };
+        desk.hear(&Event::Guard(&waits(Blockers::WATCHDOG_NOT_LIVE)));
+        assert!(desk.lines().is_empty());
+        desk.hear(&Event::Guard(&waits(Blockers::empty())));
+        let told = desk.lines().join("\n");
+        assert!(told.contains("press it"), "{told}");
+        desk.hear(&Event::Guard(&waits(Blockers::empty())));
+        assert!(desk.lines().is_empty());
     }
 
     #[test]

@@ -116,7 +116,8 @@ fn serve(args: &Args, stage: &Stage<'_>) -> Result<(), Failure> {
     let transport = connect(args, stage)?;
     // A virtual arm was switched on in its zero pose; where a real one was,
     // its user has to say.
-    let arming = match args.plant.is_some() || args.device == Target::Native {
+    let scripted = args.plant.is_some() || args.device == Target::Native;
+    let arming = match scripted {
         true => Arming::VIRTUAL,
         false => Arming::default(),
     };
@@ -141,7 +142,9 @@ fn serve(args: &Args, stage: &Stage<'_>) -> Result<(), Failure> {
             desk.hear(&event);
             watch.take(event);
         });
-        for line in desk.lines() {
+        let lines = desk.lines();
+        // A scripted hand needs no telling.
+        for line in lines.iter().filter(|_| !scripted) {
             watch.status.suspend(|| eprintln!("{line}"));
         }
         let polled = polled.and_then(|()| {
