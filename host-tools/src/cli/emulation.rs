@@ -75,7 +75,7 @@ pub(super) fn explain_link(error: LinkError) -> Failure {
 pub(super) fn link_hint(error: &LinkError) -> &'static str {
     match error {
         LinkError::Absent { looked_for, .. } if looked_for.contains("USB") => {
-            "plug the board in, check its cable and that you may open it (on Linux a udev rule); or try --device native"
+            "plug the board in, check its cable and that you may open it (on Linux the udev rule host-tools/udev/70-hapterra.rules); or try --device native"
         }
         LinkError::Absent { .. } => "start the emulated board there, or try --device native",
         LinkError::Gone(_) | LinkError::Silent(_) | LinkError::Restarted => {
