@@ -102,3 +102,14 @@ fn what_cannot_be_reached_says_why() {
     assert_eq!(at(378.0, 0.0, 0.0), Err(Unreachable::BeyondLimits));
     assert_eq!(at(-200.0, 1.0, -150.0), Err(Unreachable::BeyondLimits));
 }
+
+#[test]
+fn whole_turns_are_taken_off_where_the_limits_lie_beyond_half_a_turn() {
+    let mut record = Calibration::PREMIUM_1_5;
+    record.limits.min_rad = Vec3::new(-1.5, -4.0, -4.0);
+    record.limits.max_rad = Vec3::new(1.5, 2.0, 2.0);
+    let q = Vec3::new(0.1, -3.4, -3.2);
+    assert!(record.limits.allow(q, 0.0));
+    let found = record.joints_at(tip(&record, q)).expect("reachable");
+    assert!((found - q).abs().max_element() < 1e-4, "{found}");
+}
