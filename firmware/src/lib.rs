@@ -62,6 +62,7 @@ pub mod channels;
 pub mod crash;
 pub mod encoder;
 pub mod haptic_loop;
+pub mod led;
 pub mod link;
 pub mod native;
 pub mod store;

@@ -60,28 +60,9 @@ const KIB: u64 = 1024;
 /// The emulated board has only its queues to the tasks to be known for.
 const QUEUES: &[Exception] = &[queue(&["HapticTick"]), queue(&["HapticLoop"])];
 
-/// With a DAC for an amplifier.
-const QUEUES_AND_DAC: &[Exception] = &[
-    queue(&["TIM7_DAC"]),
-    queue(&["HapticLoop"]),
-    Exception {
-        caller: &["hapterra_firmware::amplifier::Off<", "::command"],
-        callee: "core::panicking::panic",
-        because: "embassy asserts the DAC channel's number, a constant of the board, on each write",
-    },
-];
+const G474_QUEUES: &[Exception] = &[queue(&["TIM7_DAC"]), queue(&["HapticLoop"])];
 
-/// With a PWM for an amplifier.
-const QUEUES_AND_PWM: &[Exception] = &[
-    queue(&["TIM7"]),
-    queue(&["HapticLoop"]),
-    Exception {
-        caller: &["hapterra_firmware::amplifier::Off<", "::command"],
-        callee: "defmt",
-        because: "embassy asserts that a duty cycle is at most the timer's period, and logs before \
-                  it panics; amplifier.rs commands 90 % of it at most",
-    },
-];
+const H743_QUEUES: &[Exception] = &[queue(&["TIM7"]), queue(&["HapticLoop"])];
 
 const fn queue(caller: &'static [&'static str]) -> Exception {
     Exception {
@@ -116,7 +97,7 @@ pub(crate) static BOARDS: [Board; 3] = [
         elf_variable: "HAPTERRA_G474_ELF",
         tick_interrupt: "TIM7_DAC",
         known_indirect: &[],
-        known_calls: QUEUES_AND_DAC,
+        known_calls: G474_QUEUES,
         memories: &[
             memory("flash", 0x0800_0000, 512 * KIB, 128 * KIB),
             // 16 KiB stay for the stack.
@@ -129,7 +110,7 @@ pub(crate) static BOARDS: [Board; 3] = [
         elf_variable: "HAPTERRA_H743_ELF",
         tick_interrupt: "TIM7",
         known_indirect: &[],
-        known_calls: QUEUES_AND_PWM,
+        known_calls: H743_QUEUES,
         memories: &[
             // Plenty; the smaller board is the one that has to be small.
             memory("flash", 0x0800_0000, 2048 * KIB, 192 * KIB),

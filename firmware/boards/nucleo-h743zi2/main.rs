@@ -11,6 +11,7 @@
 //! | emergency stop, closed to ground | PF4 | |
 //! | dead-man switch, closed to ground while held | PF5 | |
 //! | USB D-, D+ | PA11, PA12 | OTG_FS |
+//! | status LED | PB0 | the board's green LD1 |
 #![no_std]
 #![no_main]
 // Interrupt handlers bear the names of the vectors.
@@ -22,15 +23,19 @@ mod critical;
 mod stm32;
 
 use core::cell::Cell;
+use core::convert::Infallible;
 use core::mem;
 
 use cortex_m::peripheral::NVIC;
 use critical_section::Mutex;
 use defmt_rtt as _;
 use embassy_executor::Spawner;
+use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::pac::Interrupt;
+use embassy_stm32::pac::common::{RW, Reg};
+use embassy_stm32::pac::timer::regs::Ccr1ch;
 use embassy_stm32::peripherals::{IWDG1, TIM1, TIM3, TIM4, TIM8, USB_OTG_FS};
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::qei::{self, Qei};
@@ -40,43 +45,43 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Config, bind_interrupts, pac, rcc, time::Hertz};
 use embassy_usb::UsbDevice;
 use embassy_usb::driver::Driver as UsbDriver;
-use hapterra_core::wire::status::BootReport;
+use embedded_hal::pwm::{self, SetDutyCycle};
 use hapterra_firmware::amplifier::{DutyCycle, Off};
 use hapterra_firmware::channels::{Application, Channels, Hardware, Tiles, assemble};
 use hapterra_firmware::haptic_loop::HapticLoop;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::run;
-use hapterra_firmware::store::Stored;
-use hapterra_firmware::supervisor::Supervisor;
 use hapterra_firmware::usb::{Descriptors, Known, Packets};
-use hapterra_firmware::vitals::Part;
+use hapterra_firmware::vitals::Vitals;
 use static_cell::ConstStaticCell;
 
 use stm32::arm::{Arm, SafetyInputs};
-use stm32::clock::{Clock, Period};
-use stm32::{Board, Dog, TICK_DONE};
+use stm32::clock::Clock;
+use stm32::memory::Memory;
+use stm32::{Board, ResetFlags};
 
 /// Tiles along the side of the window.
 const WINDOW: usize = 8;
 /// Core cycles a second.
 const CORE_HZ: u32 = 480_000_000;
-/// 240 MHz / 4 / 60,000 = 1 kHz.
-const PERIOD: Period = Period {
-    prescaler: 3,
-    reload: 59_999,
-};
 /// Frequency of the duty cycles. An ESCON reads 10 Hz to 5 kHz; the faster, the
 /// less a command is delayed, and the coarser it is read.
 const PWM_HZ: u32 = 5_000;
 /// Current in amperes that duty cycles of 10 % and 90 % stand for.
 const FULL_SCALE_A: f32 = 5.5;
 
+/// First address of flash.
+const FLASH_BASE: usize = 0x0800_0000;
+/// The last two sectors of bank 2, which `memory/nucleo-h743zi2.x` leaves out.
+const CALIBRATIONS: [u32; 2] = [0x1C_0000, 0x1E_0000];
+const CALIBRATIONS_SIZE: u32 = 0x2_0000;
+
 bind_interrupts!(struct Irqs {
     OTG_FS => InterruptHandler<USB_OTG_FS>;
 });
 
 type Encoders = Arm<Qei<'static, TIM8>, Qei<'static, TIM3>, Qei<'static, TIM4>>;
-type Amplifiers = Off<DutyCycle<SimplePwmChannel<'static, TIM1>>, Output<'static>>;
+type Amplifiers = Off<DutyCycle<Compare>, Output<'static>>;
 type TickClock = Clock<CORE_HZ, 8>;
 type Usb = Driver<'static, USB_OTG_FS>;
 
@@ -109,7 +114,55 @@ fn TIM7() {
 /// Raised by the tick; TIM6 itself is not used.
 #[interrupt]
 fn TIM6_DAC() {
-    TICK_DONE.signal(());
+    stm32::tick_done();
+}
+
+/// A compare register as a duty cycle.
+struct Compare {
+    /// Keeps the channel as it was set up.
+    _channel: SimplePwmChannel<'static, TIM1>,
+    /// Its register: embassy's own way asserts the duty cycle at each write, and
+    /// nothing in a tick may panic.
+    register: Reg<Ccr1ch, RW>,
+    max: u16,
+}
+
+// SAFETY: the register belongs to the channel, which can be sent as well.
+unsafe impl Send for Compare {}
+
+impl pwm::ErrorType for Compare {
+    type Error = Infallible;
+}
+
+impl SetDutyCycle for Compare {
+    fn max_duty_cycle(&self) -> u16 {
+        self.max
+    }
+
+    fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
+        self.register.write(|w| w.set_ccr(duty));
+        Ok(())
+    }
+}
+
+/// What the chip says about its last reset; then it forgets.
+fn reset_flags() -> ResetFlags {
+    let flags = pac::RCC.rsr().read();
+    pac::RCC.rsr().modify(|w| w.set_rmvf(true));
+    ResetFlags {
+        watchdog: flags.iwdg1rstf() || flags.wwdg1rstf(),
+        software: flags.sftrstf(),
+        power: flags.porrstf(),
+        pin: flags.pinrstf(),
+    }
+}
+
+/// The data cache forgets these bytes, after memory has got them.
+fn write_back(address: usize, bytes: usize) {
+    // SAFETY: cleaning and invalidating by address keeps what memory is to
+    // hold, and the cache's registers have no state that anybody relies on.
+    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    core.SCB.clean_invalidate_dcache_by_address(address, bytes);
 }
 
 /// For a program that failed: the enable pin low, past any driver.
@@ -151,8 +204,8 @@ fn configuration() -> Config {
 }
 
 #[embassy_executor::task]
-async fn serve_usb(mut device: UsbDevice<'static, Known<Usb>>) -> ! {
-    device.run().await
+async fn serve_usb(device: UsbDevice<'static, Known<Usb>>, vitals: &'static Vitals) {
+    stm32::serve_usb(device, vitals).await;
 }
 
 #[embassy_executor::task]
@@ -160,13 +213,18 @@ async fn serve_link(
     mut link: Link<'static, WINDOW>,
     rx: Packets<<Usb as UsbDriver<'static>>::EndpointOut>,
     tx: Packets<<Usb as UsbDriver<'static>>::EndpointIn>,
+    memory: Memory,
 ) {
-    run(&mut link, rx, tx, &Board).await;
+    run(&mut link, rx, tx, &Board(memory)).await;
 }
 
 #[embassy_executor::task]
-async fn supervise(supervisor: Supervisor<'static, Dog<IWDG1>>) {
-    stm32::supervise(supervisor).await;
+async fn supervise(
+    vitals: &'static Vitals,
+    dog: IndependentWatchdog<'static, IWDG1>,
+    led: Output<'static>,
+) {
+    stm32::supervise(vitals, dog, led).await;
 }
 
 #[embassy_executor::main]
@@ -189,9 +247,13 @@ async fn main(spawner: Spawner) {
         CountingMode::EdgeAlignedUp,
     )
     .split();
-    let outputs = [pwm.ch1, pwm.ch2, pwm.ch3].map(|mut channel| {
+    let outputs = [(0, pwm.ch1), (1, pwm.ch2), (2, pwm.ch3)].map(|(index, mut channel)| {
         channel.enable();
-        DutyCycle(channel)
+        DutyCycle(Compare {
+            max: channel.max_duty_cycle() as u16,
+            _channel: channel,
+            register: pac::TIM1.ccr(index),
+        })
     });
     let pulses = qei::Config::default();
     let counters = (
@@ -203,12 +265,15 @@ async fn main(spawner: Spawner) {
         emergency_stop: Input::new(p.PF4, Pull::Up),
         dead_man: Input::new(p.PF5, Pull::Up),
     };
+    let boot = stm32::boot_report(reset_flags());
+    let flash = Flash::new_blocking(p.FLASH);
+    let (memory, calibration) = Memory::open(flash, CALIBRATIONS, CALIBRATIONS_SIZE);
     let hardware = Hardware {
         encoders: Arm::new(counters, inputs),
         amplifiers: Off::new(outputs, enable, FULL_SCALE_A),
-        clock: TickClock::new(p.TIM7, &PERIOD, &mut core),
-        calibration: Stored::Missing,
-        boot: BootReport::default(),
+        clock: TickClock::new(p.TIM7, &mut core),
+        calibration,
+        boot,
     };
     let Application {
         haptic_loop,
@@ -223,16 +288,14 @@ async fn main(spawner: Spawner) {
     let driver = Driver::new_fs(p.USB_OTG_FS, Irqs, p.PA12, p.PA11, buffer, wiring);
     let (device, rx, tx) =
         hapterra_firmware::usb::device(driver, embassy_stm32::uid::uid_hex(), DESCRIPTORS.take());
-    spawner.spawn(serve_usb(device).expect("started once"));
-    spawner.spawn(serve_link(link, rx, tx).expect("started once"));
+    spawner.spawn(serve_usb(device, vitals).expect("started once"));
+    spawner.spawn(serve_link(link, rx, tx, memory).expect("started once"));
 
     critical_section::with(|cs| HANDOVER.borrow(cs).set(Some(haptic_loop)));
     stm32::nvic::start_tick(Interrupt::TIM7, Interrupt::TIM6_DAC);
     let mut dog = IndependentWatchdog::new(p.IWDG1, stm32::WATCHDOG_US);
     dog.unleash();
-    spawner.spawn(
-        supervise(Supervisor::new(vitals, Dog(dog), &[Part::Tick, Part::Link]))
-            .expect("started once"),
-    );
+    let led = Output::new(p.PB0, Level::Low, Speed::Low);
+    spawner.spawn(supervise(vitals, dog, led).expect("started once"));
     defmt::info!("nucleo-h743zi2 is up");
 }

@@ -88,6 +88,10 @@ impl Desk {
         self.arming = Some(self.health.report.decision.count);
     }
 
+    pub(super) const fn report(&self) -> &Report {
+        &self.health.report
+    }
+
     pub(super) const fn drives(&self) -> bool {
         self.health.report.mode.drives()
     }

@@ -35,6 +35,7 @@ use heapless::spsc::{Consumer, Producer};
 
 use crate::board::TickClock;
 use crate::channels::{Record, SPARES};
+use crate::led::Signal;
 use crate::vitals::Vitals;
 use outbox::Outbox;
 pub use session::POINTS_AHEAD;
@@ -188,6 +189,12 @@ impl<'t, const D: usize> Link<'t, D> {
     #[must_use]
     pub fn drives_arm(&self) -> bool {
         self.session.drives_arm()
+    }
+
+    /// What the board's status LED has to say.
+    #[must_use]
+    pub fn signal(&self) -> Signal {
+        self.session.signal()
     }
 
     /// A calibration that the host wants stored in the board's memory, until

@@ -1,5 +1,6 @@
 //! What the messages of one host mean, and what is sent to it.
 
+use hapterra_core::contact::State;
 use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::terrain::{Focus, IN_FLIGHT, Puller, Tile};
 use hapterra_core::tick::Command;
@@ -17,6 +18,7 @@ use super::log;
 use super::outbox::Outbox;
 use super::{Identity, LinkEnds};
 use crate::channels::{Record, SPARES};
+use crate::led::Signal;
 use crate::vitals::Part;
 
 /// Samples kept for the writer; beyond them, new ones are dropped.
@@ -465,6 +467,11 @@ impl<'t, const D: usize> Session<'t, D> {
 
     pub(crate) fn feels_arm(&self) -> bool {
         self.scene.is_some_and(|s| s.source == Source::Encoders)
+    }
+
+    pub(crate) fn signal(&self) -> Signal {
+        let touching = self.previous.sample.state == State::Touching;
+        Signal::of(self.desk.report(), touching)
     }
 
     pub(crate) fn drives_arm(&self) -> bool {

@@ -140,7 +140,8 @@ pub static G474: Chip = Chip {
         follows(0x4002_1098, 1 << 0, 1 << 1),
         follows(0x4002_1094, 1 << 0, 1 << 1),
     ],
-    set: &[],
+    // FLASH_OPTR.DBANK: two banks, as the chip is sold.
+    set: &[(0x4002_2020, 1 << 22)],
     // RCC_CFGR: SWS follows SW.
     copies: &[(0x4002_1008, 0, 2, 2)],
     usb: UsbKind::FullSpeedDevice {

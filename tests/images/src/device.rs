@@ -18,10 +18,10 @@ use nusb::descriptors::ConfigurationDescriptor;
 
 use crate::chip::{CHIPS, Chip};
 use crate::elf::Image;
-use crate::machine::{Machine, Stop};
+use crate::machine::Machine;
 
-/// Counts that an arm may move in a tick without being taken for a fault.
-const COUNTS_PER_TICK: i32 = 60;
+/// Counts that the arm moves in a tick: a third of a metre a second.
+const COUNTS_PER_TICK: i32 = 12;
 
 /// The machines whose images there are: `cargo xtask test` builds and names
 /// them. A visible line for each that is missing.
@@ -63,7 +63,6 @@ impl<'t> Device<'t> {
     /// When any of it fails.
     #[must_use]
     pub fn open(mut machine: Machine, terrain: &'t Terrain<'t>, scene: Scene) -> Self {
-        assert_eq!(machine.run_ms(5), Stop::Time);
         let found = enumerate(&mut machine).expect("enumerated");
         let machine = Rc::new(RefCell::new(machine));
         let pipes = ScriptedPipes::new(Rc::clone(&machine), endpoints(&found));
@@ -121,6 +120,34 @@ impl<'t> Device<'t> {
             self.guard.is_some_and(|report| report.mode == Mode::Armed)
         });
         assert!(armed, "{:?}", self.guard);
+    }
+
+    /// Pulls the cable and resets the chip, as its watchdog does. Memory keeps
+    /// what it holds.
+    ///
+    /// # Panics
+    /// When somebody else holds the machine.
+    #[must_use]
+    pub fn reset(self) -> Machine {
+        let Self {
+            machine, session, ..
+        } = self;
+        drop(session);
+        let machine = Rc::try_unwrap(machine).ok().expect("nobody else has it");
+        let mut machine = machine.into_inner();
+        machine.reset(true);
+        machine
+    }
+
+    /// Asks for the status.
+    ///
+    /// # Panics
+    /// When there is no answer.
+    pub fn ask_status(&mut self) -> Status {
+        self.status = None;
+        self.say(&ToDevice::Status);
+        self.run_ms(150);
+        self.status.clone().expect("an answer")
     }
 
     /// Sends a message.

@@ -116,6 +116,9 @@ impl Machine {
     }
 
     fn load(&mut self) {
+        let (flash, bytes) = self.chip.memories[0];
+        let erased = vec![0xFF; bytes as usize];
+        self.core.mem_write(flash.into(), &erased).expect("flash");
         for segment in &self.image.segments {
             if !segment.bytes.is_empty() {
                 self.core
@@ -223,6 +226,22 @@ impl Machine {
         code.extend(location.to_le_bytes());
         code.extend((panicking.address | 1).to_le_bytes());
         self.patch(function.address, &code);
+    }
+
+    /// Puts a function's own code back.
+    pub fn heal(&mut self, function: Function) {
+        let holds = |s: &&crate::elf::Segment| {
+            (s.runs..s.runs + s.bytes.len() as u32).contains(&function.address)
+        };
+        let code = self.image.segments.iter().find(holds).map(|segment| {
+            let from = (function.address - segment.runs) as usize;
+            let to = segment
+                .bytes
+                .len()
+                .min(from + function.size.max(24) as usize);
+            segment.bytes[from..to].to_vec()
+        });
+        self.patch(function.address, &code.unwrap_or_default());
     }
 
     fn register(&self, register: RegisterARM) -> u64 {

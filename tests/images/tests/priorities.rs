@@ -65,7 +65,7 @@ fn rows(machine: &Machine) -> String {
 fn the_haptic_interrupt_is_alone_above_the_ceiling_and_the_page_says_so() {
     for mut machine in machines() {
         let chip = machine.chip;
-        assert_eq!(machine.run_ms(5), Stop::Time);
+        assert_eq!(machine.run_ms(200), Stop::Time);
         for (interrupt, priority) in machine.bus().nvic.enabled() {
             if interrupt == chip.tick_interrupt {
                 assert_eq!(priority, 0, "{}", chip.board);
@@ -105,6 +105,9 @@ fn only_programs_that_failed_mask_everything() {
             "rust_begin_unwind",
             "HardFault",
             "DefaultHandler",
+            // embassy's flash driver, for the one register write that begins an
+            // erase: a dozen instructions, and only while disarmed.
+            "blocking_erase",
         ];
         for name in maskers {
             let is_known = known.iter().any(|k| name.contains(k));

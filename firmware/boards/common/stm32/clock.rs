@@ -8,13 +8,20 @@ use hapterra_firmware::board::TickClock;
 
 use super::TickTimer;
 
-/// Counts of the prescaled timer in a tick: with the prescaler, exactly a
-/// thousandth of a second. (A frequency asked of embassy would be rounded.)
-pub(crate) struct Period {
-    /// The prescaler register.
-    pub(crate) prescaler: u16,
-    /// The auto-reload register.
-    pub(crate) reload: u16,
+/// Ticks a second: `HAPTERRA_TICK_HZ` when the image is built, else 1,000.
+const TICK_HZ: u32 = match option_env!("HAPTERRA_TICK_HZ") {
+    Some(text) => number(text),
+    None => 1_000,
+};
+
+/// Divides the timer's clock before it is counted.
+const DIVIDER: u16 = 4;
+
+const fn number(text: &str) -> u32 {
+    match u32::from_str_radix(text, 10) {
+        Ok(number) => number,
+        Err(_) => panic!("HAPTERRA_TICK_HZ is a number, 1000 to 10000"),
+    }
 }
 
 /// `HZ` core cycles a second, `PER_COUNT` of them in a count of the timer.
@@ -23,20 +30,27 @@ pub(crate) struct Clock<const HZ: u32, const PER_COUNT: u32> {
 }
 
 impl<const HZ: u32, const PER_COUNT: u32> Clock<HZ, PER_COUNT> {
+    /// The auto-reload register. Exact, where a frequency asked of embassy
+    /// would be rounded.
+    const RELOAD: u16 = {
+        let counts_a_second = HZ / PER_COUNT;
+        assert!(
+            counts_a_second.is_multiple_of(TICK_HZ),
+            "choose a HAPTERRA_TICK_HZ that divides the timer's clock"
+        );
+        (counts_a_second / TICK_HZ - 1) as u16
+    };
+
     /// Sets the timer up, to be started by [`start`], and starts the cycle
     /// counter.
-    pub(crate) fn new(
-        timer: Peri<'static, TickTimer>,
-        period: &Period,
-        core: &mut Peripherals,
-    ) -> Self {
+    pub(crate) fn new(timer: Peri<'static, TickTimer>, core: &mut Peripherals) -> Self {
         core.DCB.enable_trace();
         DWT::unlock();
         core.DWT.enable_cycle_counter();
         let timer = Timer::new(timer);
         let registers = timer.regs_core();
-        registers.psc().write_value(period.prescaler);
-        registers.arr().write(|w| w.set_arr(period.reload));
+        registers.psc().write_value(DIVIDER - 1);
+        registers.arr().write(|w| w.set_arr(Self::RELOAD));
         timer.generate_update_event();
         timer.clear_update_interrupt();
         timer.enable_update_interrupt(true);
@@ -51,7 +65,7 @@ pub(crate) fn start() {
 
 impl<const HZ: u32, const PER_COUNT: u32> TickClock for Clock<HZ, PER_COUNT> {
     const HZ: u32 = HZ;
-    const PERIOD: u32 = HZ / 1000;
+    const PERIOD: u32 = HZ / TICK_HZ;
 
     fn now(&self) -> u32 {
         DWT::cycle_count()

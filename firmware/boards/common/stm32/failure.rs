@@ -1,29 +1,56 @@
-//! The end of a program that failed: amplifiers off, a report, then the reset
-//! that the starved watchdog brings.
+//! The end of a program that failed: amplifiers off, a record that survives the
+//! reset, a report to whoever listens, then the reset that the starved watchdog
+//! brings.
 
+use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
+use core::ptr;
+use core::sync::atomic::{AtomicU32, Ordering};
 
+use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, exception};
+use hapterra_core::wire::status::Crash;
+use hapterra_firmware::crash::{CRASH_WORDS, CrashRecord};
 
-use crate::amplifiers_off;
+use crate::{amplifiers_off, write_back};
+
+/// Ticks since the start, counted by the interrupt below the haptic one.
+pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
+
+type Words = [u32; CRASH_WORDS];
+
+/// Start-up code leaves this section as it is, so a record outlives a reset.
+#[unsafe(link_section = ".uninit.crash")]
+static mut RECORD: MaybeUninit<Words> = MaybeUninit::uninit();
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     stop();
-    defmt::error!("{}", defmt::Display2Format(info));
+    let (file, line) = info.location().map_or(("", 0), |at| (at.file(), at.line()));
+    keep(&CrashRecord::panic(file, line, ticks()));
+    defmt::error!("panic at {}:{}", file, line);
     rest()
 }
 
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     stop();
-    defmt::error!("hard fault: {}", defmt::Debug2Format(frame));
+    // SAFETY: a read of a status register, which has no side effect.
+    let status = unsafe { (*SCB::PTR).cfsr.read() };
+    keep(&CrashRecord::hard_fault(
+        frame.pc(),
+        frame.lr(),
+        status,
+        ticks(),
+    ));
+    defmt::error!("hard fault at {:#x}, status {:#x}", frame.pc(), status);
     rest()
 }
 
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
     stop();
+    keep(&CrashRecord::unhandled(number, ticks()));
     defmt::error!("interrupt {} has no handler", number);
     rest()
 }
@@ -33,6 +60,32 @@ unsafe fn DefaultHandler(number: i16) -> ! {
 fn stop() {
     cortex_m::interrupt::disable();
     amplifiers_off();
+}
+
+fn ticks() -> u32 {
+    TICKS.load(Ordering::Relaxed)
+}
+
+fn keep(record: &CrashRecord) {
+    write(record.words());
+}
+
+fn write(words: &Words) {
+    let place = &raw mut RECORD;
+    // SAFETY: written here only: by `main` before any interrupt is let through,
+    // and by a program that failed, which does nothing else any more.
+    unsafe { ptr::write_volatile(place.cast::<Words>(), *words) };
+    write_back(place as usize, size_of::<Words>());
+}
+
+/// What the program before left, once. To be called before any interrupt is
+/// let through.
+pub(crate) fn take_record() -> Option<Crash> {
+    // SAFETY: nobody writes it now, and any bits are words. Whether they are a
+    // record is for its check sum to say.
+    let words = unsafe { ptr::read_volatile((&raw const RECORD).cast::<Words>()) };
+    write(&CrashRecord::NONE);
+    CrashRecord::read(&words)
 }
 
 fn rest() -> ! {

@@ -1,0 +1,28 @@
+//! How much of the stack was ever used.
+//!
+//! cortex-m-rt paints it before `main` (feature `paint-stack`); what still
+//! bears the paint was never used.
+
+use core::ptr;
+
+use cortex_m_rt::STACK_PAINT_VALUE;
+
+unsafe extern "C" {
+    static _stack_start: u32;
+    static _stack_end: u32;
+}
+
+/// Size and high-water mark in bytes. Reads the unused part once, at most all
+/// of it.
+pub(crate) fn figures() -> (u32, u32) {
+    let (top, bottom) = (&raw const _stack_start, &raw const _stack_end);
+    let mut unused = bottom;
+    // SAFETY: addresses from the linker's, which are those of the stack, whole
+    // words in RAM. The part that is read is below the stack pointer, so nobody
+    // writes it meanwhile but an interrupt, which only makes it count as used.
+    while unused < top && unsafe { ptr::read_volatile(unused) } == STACK_PAINT_VALUE {
+        unused = unused.wrapping_add(1);
+    }
+    let bytes = |from: *const u32, to: *const u32| (to as u32).saturating_sub(from as u32);
+    (bytes(bottom, top), bytes(unused, top))
+}

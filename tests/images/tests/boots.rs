@@ -1,0 +1,164 @@
+//! What a board knows of itself after it was reset: why, how the program before
+//! ended, and its calibration. And how much of its stack it needs.
+
+use hapterra::raster::Raster;
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::guard::Fault;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::message::{Scene, Source, ToDevice};
+use hapterra_core::wire::status::{CalibrationSource, CrashKind, ResetCause, Status};
+use hapterra_image_tests::device::{Device, machines};
+use hapterra_image_tests::elf::Function;
+use hapterra_image_tests::machine::{Machine, Stop};
+use hapterra_tests::usb::Port;
+
+fn raster() -> Raster {
+    Raster::from_fn(257, 257, |x, y| ((x * y) % 7) as f32).expect("raster")
+}
+
+fn scene(terrain: &Terrain<'_>) -> Scene {
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let home = scale.to_grid([128.0, 128.0, 40.0]).expect("addressable");
+    terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home)
+}
+
+/// Opens a board, lets something be done to it, and asks it after the reset.
+fn after_reset(mut ruin: impl FnMut(&mut Device<'_>)) -> Vec<(Machine, Status)> {
+    let raster = raster();
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    let ask = |machine: Machine| {
+        let mut device = Device::open(machine, &terrain, scene(&terrain));
+        ruin(&mut device);
+        let mut again = Device::open(device.reset(), &terrain, scene(&terrain));
+        let status = again.ask_status();
+        (again.reset(), status)
+    };
+    machines().into_iter().map(ask).collect()
+}
+
+/// A function that the link calls for every message it sends.
+fn encoder(machine: &Machine) -> Function {
+    let found = machine.image.functions_like(&["wire", "frame", "encode"]);
+    *found.first().expect("a function of its own")
+}
+
+/// Runs, the host reading, until the watchdog bites.
+fn starve(machine: &mut Machine) {
+    let stop = machine.run_until(300, |m| {
+        let _ = m.take_in(1);
+        false
+    });
+    assert_eq!(stop, Stop::Watchdog);
+}
+
+#[test]
+fn a_panic_is_told_after_the_reset_with_its_place() {
+    let told = after_reset(|device| {
+        let mut machine = device.machine.borrow_mut();
+        let at = encoder(&machine);
+        let panic = machine.image.functions_like(&["panic_const_rem_by_zero"]);
+        machine.call_instead(at, *panic.first().expect("a function that panics"));
+        starve(&mut machine);
+        machine.heal(at);
+    });
+    for (machine, status) in told {
+        let board = machine.chip.board;
+        assert_eq!(status.boot.cause, ResetCause::Watchdog, "{board}");
+        let crash = status.boot.crash.expect("a crash");
+        assert_eq!(crash.kind, CrashKind::Panic, "{board}");
+        assert_eq!((crash.file.as_str(), crash.line), ("made/by/a/test.rs", 7));
+        assert!(crash.tick > 0, "{board}");
+        assert_eq!(status.health.report.fault, Some(Fault::Panicked), "{board}");
+    }
+}
+
+#[test]
+fn a_hard_fault_is_told_after_the_reset_with_its_address() {
+    let told = after_reset(|device| {
+        let mut machine = device.machine.borrow_mut();
+        let at = encoder(&machine);
+        machine.patch(at.address, &[0x00, 0xDE]);
+        starve(&mut machine);
+        machine.heal(at);
+    });
+    for (machine, status) in told {
+        let board = machine.chip.board;
+        let crash = status.boot.crash.expect("a crash");
+        assert_eq!(crash.kind, CrashKind::HardFault, "{board}");
+        assert_eq!(
+            machine.image.at(crash.pc),
+            machine.image.at(encoder(&machine).address)
+        );
+        assert_eq!(
+            status.health.report.fault,
+            Some(Fault::HardFault),
+            "{board}"
+        );
+    }
+}
+
+#[test]
+fn a_reset_by_the_watchdog_alone_is_told_and_a_crash_only_once() {
+    let told = after_reset(|device| {
+        let mut machine = device.machine.borrow_mut();
+        let at = encoder(&machine);
+        machine.patch(at.address, &[0xFE, 0xE7]);
+        starve(&mut machine);
+        machine.heal(at);
+    });
+    for (machine, status) in told {
+        let board = machine.chip.board;
+        assert_eq!(status.boot.cause, ResetCause::Watchdog, "{board}");
+        assert_eq!(status.boot.crash, None, "{board}");
+        let fault = status.health.report.fault;
+        assert_eq!(fault, Some(Fault::WatchdogReset), "{board}");
+    }
+}
+
+#[test]
+fn a_stored_calibration_is_there_after_the_reset() {
+    let told = after_reset(|device| {
+        let before = device.ask_status();
+        assert_eq!(before.boot.cause, ResetCause::PowerOn);
+        assert_eq!(before.calibration, CalibrationSource::None);
+        let calibration = Calibration::PREMIUM_1_5;
+        device.say(&ToDevice::SetCalibration {
+            calibration,
+            store: true,
+        });
+        device.run_ms(100);
+    });
+    for (machine, status) in told {
+        let board = machine.chip.board;
+        assert_eq!(status.calibration, CalibrationSource::Stored, "{board}");
+        assert_eq!(
+            status.model,
+            Some(Calibration::PREMIUM_1_5.model),
+            "{board}"
+        );
+    }
+}
+
+#[test]
+fn a_third_of_the_stack_is_never_used() {
+    let raster = raster();
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    for machine in machines() {
+        let board = machine.chip.board;
+        let mut device = Device::arm(machine, &terrain, scene(&terrain));
+        device.move_to([300, -200, 250]);
+        device.run_ms(1_200);
+        let stack = device.ask_status().stack;
+        println!(
+            "{board}: {} of {} bytes of stack used",
+            stack.high_water, stack.size
+        );
+        assert!(stack.size >= 12 * 1024, "{board}: {stack:?}");
+        assert!(stack.high_water > 500, "{board}: {stack:?}");
+        assert!(3 * stack.high_water <= 2 * stack.size, "{board}: {stack:?}");
+    }
+}
