@@ -25,7 +25,6 @@ mod critical;
 mod stm32;
 
 use core::cell::Cell;
-use core::mem;
 
 use cortex_m::peripheral::NVIC;
 use critical_section::Mutex;
@@ -53,7 +52,7 @@ use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::run;
 use hapterra_firmware::usb::{Descriptors, Known, Packets};
 use hapterra_firmware::vitals::Vitals;
-use static_cell::ConstStaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 
 use stm32::arm::{Arm, SafetyInputs};
 use stm32::clock::Clock;
@@ -79,7 +78,7 @@ bind_interrupts!(struct Irqs {
 });
 
 type Encoders = Arm<Qei<'static, TIM2>, Qei<'static, TIM3>, Qei<'static, TIM4>>;
-type Amplifiers = Off<DacOutput, Output<'static>>;
+type Amplifiers = Off<[DacOutput; 3], Output<'static>>;
 type TickClock = Clock<CORE_HZ, 4>;
 type Usb = Driver<'static, USB>;
 
@@ -88,19 +87,19 @@ static DESCRIPTORS: ConstStaticCell<Descriptors> = ConstStaticCell::new(Descript
 static CHANNELS: ConstStaticCell<Channels<'static>> = ConstStaticCell::new(Channels::new());
 
 type Tick = HapticLoop<'static, Encoders, Amplifiers, TickClock, WINDOW>;
-/// Carries the loop to its interrupt: filled once, before that is let through.
-static HANDOVER: Mutex<Cell<Option<Tick>>> = Mutex::new(Cell::new(None));
+/// Where the loop lives. Not in the interrupt's own variable: what has a value
+/// from the start is stored in flash, too.
+static LOOP: StaticCell<Tick> = StaticCell::new();
+/// Carries it to its interrupt: filled once, before that is let through.
+static HANDOVER: Mutex<Cell<Option<&'static mut Tick>>> = Mutex::new(Cell::new(None));
 
 /// The haptic tick, above everything else.
 #[interrupt]
 fn TIM7_DAC() {
-    static mut TICK: Option<Tick> = None;
+    static mut TICK: Option<&'static mut Tick> = None;
     let Some(tick) = TICK else {
         // Raised once by `main`, before there is a tick to be late for.
-        let ready = critical_section::with(|cs| HANDOVER.borrow(cs).take());
-        // Not an assignment, which would bring in the drivers' destructors:
-        // they can panic, and nothing in this interrupt may.
-        mem::forget(mem::replace(TICK, ready));
+        *TICK = critical_section::with(|cs| HANDOVER.borrow(cs).take());
         return;
     };
     tick.tick();
@@ -251,7 +250,8 @@ async fn main(spawner: Spawner) {
     spawner.spawn(serve_usb(device, vitals).expect("started once"));
     spawner.spawn(serve_link(link, rx, tx, memory).expect("started once"));
 
-    critical_section::with(|cs| HANDOVER.borrow(cs).set(Some(haptic_loop)));
+    let tick = LOOP.init(haptic_loop);
+    critical_section::with(|cs| HANDOVER.borrow(cs).set(Some(tick)));
     stm32::nvic::start_tick(Interrupt::TIM7_DAC, Interrupt::TIM6_DAC);
     let mut dog = IndependentWatchdog::new(p.IWDG, stm32::WATCHDOG_US);
     dog.unleash();

@@ -1,8 +1,18 @@
 //! Amplifiers made of three current outputs and an enable pin, on
 //! embedded-hal's traits, so that a board only names its pins.
+//!
+//! | output | commands by |
+//! | --- | --- |
+//! | [`offset_code`] | a converter on the chip, behind an offset stage |
+//! | [`DutyCycle`] | a duty cycle of 10 to 90 % |
+//! | [`Ad5754`] | a quad converter on SPI, ±10 V |
+
+mod ad5754;
 
 use embedded_hal::digital::OutputPin;
 use embedded_hal::pwm::SetDutyCycle;
+
+pub use ad5754::{Ad5754, SetupError, bipolar_code};
 
 use crate::board::{Amplifiers, EnabledAmplifiers};
 
@@ -10,6 +20,20 @@ use crate::board::{Amplifiers, EnabledAmplifiers};
 pub trait CurrentOutput {
     /// Commands `fraction` of the amplifier's full-scale current, in -1..=1.
     fn set(&mut self, fraction: f32);
+}
+
+/// The outputs of all three axes.
+pub trait CurrentOutputs {
+    /// Commands these fractions of the full-scale current, each in -1..=1.
+    fn set(&mut self, fractions: [f32; 3]);
+}
+
+impl<O: CurrentOutput> CurrentOutputs for [O; 3] {
+    fn set(&mut self, fractions: [f32; 3]) {
+        for (output, fraction) in self.iter_mut().zip(fractions) {
+            output.set(fraction);
+        }
+    }
 }
 
 /// An amplifier that reads its command from a duty cycle, 10 % for the largest
@@ -39,7 +63,7 @@ pub fn offset_code(fraction: f32, max: u16) -> u16 {
 
 /// Three outputs and the pin that switches the power stages, off.
 pub struct Off<O, E> {
-    outputs: [O; 3],
+    outputs: O,
     enable: E,
     full_scale_a: f32,
 }
@@ -47,10 +71,10 @@ pub struct Off<O, E> {
 /// Three outputs and the pin that switches the power stages, on.
 pub struct On<O, E>(Off<O, E>);
 
-impl<O: CurrentOutput, E: OutputPin> Off<O, E> {
+impl<O: CurrentOutputs, E: OutputPin> Off<O, E> {
     /// Takes the outputs for axes 1 to 3, the enable pin (high: on), and the
     /// current in amperes that full scale stands for. Switches off first.
-    pub fn new(outputs: [O; 3], enable: E, full_scale_a: f32) -> Self {
+    pub fn new(outputs: O, enable: E, full_scale_a: f32) -> Self {
         let mut off = Self {
             outputs,
             enable,
@@ -61,10 +85,10 @@ impl<O: CurrentOutput, E: OutputPin> Off<O, E> {
     }
 
     fn command(&mut self, currents_a: [f32; 3]) {
-        for (output, current_a) in self.outputs.iter_mut().zip(currents_a) {
+        self.outputs.set(currents_a.map(|current_a| {
             let fraction = (current_a / self.full_scale_a).clamp(-1.0, 1.0);
-            output.set(if fraction.is_nan() { 0.0 } else { fraction });
-        }
+            if fraction.is_nan() { 0.0 } else { fraction }
+        }));
     }
 
     fn switch_off(&mut self) {
@@ -74,7 +98,7 @@ impl<O: CurrentOutput, E: OutputPin> Off<O, E> {
     }
 }
 
-impl<O: CurrentOutput, E: OutputPin> Amplifiers for Off<O, E> {
+impl<O: CurrentOutputs, E: OutputPin> Amplifiers for Off<O, E> {
     type Enabled = On<O, E>;
 
     fn enable(mut self) -> On<O, E> {
@@ -84,7 +108,7 @@ impl<O: CurrentOutput, E: OutputPin> Amplifiers for Off<O, E> {
     }
 }
 
-impl<O: CurrentOutput, E: OutputPin> EnabledAmplifiers for On<O, E> {
+impl<O: CurrentOutputs, E: OutputPin> EnabledAmplifiers for On<O, E> {
     type Disabled = Off<O, E>;
 
     fn write(&mut self, currents_a: [f32; 3]) {
@@ -144,7 +168,7 @@ mod tests {
         }
     }
 
-    fn amplifiers() -> (Off<DutyCycle<Fake>, Fake>, Log) {
+    fn amplifiers() -> (Off<[DutyCycle<Fake>; 3], Fake>, Log) {
         let log = Log::default();
         let output = || DutyCycle(Fake(log.clone()));
         let off = Off::new([output(), output(), output()], Fake(log.clone()), 5.0);

@@ -1,0 +1,206 @@
+//! A quad converter on SPI with bipolar outputs, ±10 V: AD5754R and its
+//! 12- and 14-bit relatives (Analog Devices, data sheet rev. G).
+//!
+//! The BIN/2sCOMP pin is tied to ground (two's complement) and LDAC too (each
+//! write takes effect at once). A frame has 24 bits: the register in bits 21-19,
+//! the channel in bits 18-16, then the value. Outputs A, B and C command axes 1
+//! to 3; D stays powered down.
+
+use embedded_hal::digital::OutputPin;
+use embedded_hal::spi::SpiBus;
+
+use super::CurrentOutputs;
+
+/// Registers, where they are in a frame's first byte.
+const DATA: u8 = 0b000 << 3;
+const RANGE: u8 = 0b001 << 3;
+const POWER: u8 = 0b010 << 3;
+/// The channel that stands for all.
+const ALL: u8 = 0b100;
+/// ±10 V.
+const BIPOLAR_10_V: u16 = 0b100;
+/// Channels A, B and C on, and the reference.
+const POWER_UP: u16 = 0b1_0111;
+
+/// Why the converter could not be set up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SetupError {
+    /// The bus does not work.
+    Bus,
+    /// The chip-select pin does not work.
+    Select,
+}
+
+/// The converter behind a bus of its own and its SYNC pin.
+pub struct Ad5754<B, S> {
+    bus: B,
+    sync: S,
+}
+
+impl<B: SpiBus, S: OutputPin> Ad5754<B, S> {
+    /// Sets the converter up: zero on every channel, then ±10 V, then power.
+    /// The bus clocks data in on the falling edge (mode 1), at 30 MHz at most.
+    /// The outputs may take 10 µs to settle after this.
+    ///
+    /// # Errors
+    /// [`SetupError`].
+    pub fn new(bus: B, sync: S) -> Result<Self, SetupError> {
+        let mut converter = Self { bus, sync };
+        converter.write(DATA | ALL, 0)?;
+        converter.write(RANGE | ALL, BIPOLAR_10_V)?;
+        converter.write(POWER, POWER_UP)?;
+        Ok(converter)
+    }
+
+    fn write(&mut self, head: u8, value: u16) -> Result<(), SetupError> {
+        let [high, low] = value.to_be_bytes();
+        self.sync.set_low().map_err(|_| SetupError::Select)?;
+        let sent = self.bus.write(&[head, high, low]);
+        let sent = sent.and_then(|()| self.bus.flush());
+        // Let go whatever happened: a frame that was cut short is ignored.
+        self.sync.set_high().map_err(|_| SetupError::Select)?;
+        sent.map_err(|_| SetupError::Bus)
+    }
+}
+
+impl<B: SpiBus, S: OutputPin> CurrentOutputs for Ad5754<B, S> {
+    fn set(&mut self, fractions: [f32; 3]) {
+        for (channel, fraction) in (0..).zip(fractions) {
+            // The bus of a chip in a tick cannot fail; were it to, the last
+            // command would stay, and the enable pin is what switches off.
+            let _ = self.write(DATA | channel, bipolar_code(fraction));
+        }
+    }
+}
+
+/// The code for `fraction` of ±10 V, -1..=1, in two's complement. Rounded to the
+/// nearest, at most half a code (0.15 mV) off; full scale is one code short of
+/// 10 V, as the converter has it.
+#[must_use]
+pub fn bipolar_code(fraction: f32) -> u16 {
+    // The cast saturates, and turns not-a-number into zero.
+    let scaled = fraction * 32_768.0;
+    let rounded = scaled + if scaled < 0.0 { -0.5 } else { 0.5 };
+    (rounded as i16).cast_unsigned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::amplifier::Off;
+    use crate::board::{Amplifiers, EnabledAmplifiers};
+    use core::cell::RefCell;
+    use core::convert::Infallible;
+    use embedded_hal::{digital, spi};
+    use std::rc::Rc;
+    use std::vec;
+    use std::vec::Vec;
+
+    /// What was on the wires: a frame for each time that SYNC was low.
+    #[derive(Clone, Default)]
+    struct Wires(Rc<RefCell<Vec<Vec<u8>>>>);
+
+    impl spi::ErrorType for Wires {
+        type Error = Infallible;
+    }
+
+    impl SpiBus for Wires {
+        fn read(&mut self, _: &mut [u8]) -> Result<(), Infallible> {
+            unreachable!("nothing is read")
+        }
+
+        fn write(&mut self, bytes: &[u8]) -> Result<(), Infallible> {
+            let mut frames = self.0.borrow_mut();
+            frames.last_mut().expect("SYNC is low").extend(bytes);
+            Ok(())
+        }
+
+        fn transfer(&mut self, _: &mut [u8], _: &[u8]) -> Result<(), Infallible> {
+            unreachable!("nothing is read")
+        }
+
+        fn transfer_in_place(&mut self, _: &mut [u8]) -> Result<(), Infallible> {
+            unreachable!("nothing is read")
+        }
+
+        fn flush(&mut self) -> Result<(), Infallible> {
+            Ok(())
+        }
+    }
+
+    impl digital::ErrorType for Wires {
+        type Error = Infallible;
+    }
+
+    impl OutputPin for Wires {
+        fn set_low(&mut self) -> Result<(), Infallible> {
+            self.0.borrow_mut().push(vec![]);
+            Ok(())
+        }
+
+        fn set_high(&mut self) -> Result<(), Infallible> {
+            Ok(())
+        }
+    }
+
+    /// An enable pin that nobody looks at.
+    struct Enable;
+
+    impl digital::ErrorType for Enable {
+        type Error = Infallible;
+    }
+
+    impl OutputPin for Enable {
+        fn set_low(&mut self) -> Result<(), Infallible> {
+            Ok(())
+        }
+
+        fn set_high(&mut self) -> Result<(), Infallible> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn it_is_zero_before_it_has_a_range_and_has_one_before_power() {
+        let wires = Wires::default();
+        assert!(Ad5754::new(wires.clone(), wires.clone()).is_ok());
+        let frames = wires.0.take();
+        assert_eq!(
+            frames,
+            [[0x04, 0x00, 0x00], [0x0C, 0x00, 0x04], [0x10, 0x00, 0x17]]
+        );
+    }
+
+    #[test]
+    fn currents_become_three_frames_one_a_channel() {
+        let wires = Wires::default();
+        let converter = Ad5754::new(wires.clone(), wires.clone()).expect("set up");
+        let mut on = Off::new(converter, Enable, 5.0).enable();
+        wires.0.take();
+        on.write([2.5, -2.5, f32::NAN]);
+        let frames = wires.0.take();
+        assert_eq!(
+            frames,
+            [[0x00, 0x40, 0x00], [0x01, 0xC0, 0x00], [0x02, 0x00, 0x00]]
+        );
+        let _off = on.disable();
+        assert_eq!(wires.0.take(), [[0, 0, 0], [1, 0, 0], [2, 0, 0]]);
+    }
+
+    #[test]
+    fn codes_are_nearest_and_saturate() {
+        assert_eq!(bipolar_code(0.0), 0);
+        assert_eq!(bipolar_code(1.0), 0x7FFF);
+        assert_eq!(bipolar_code(-1.0), 0x8000);
+        assert_eq!(bipolar_code(2.0), 0x7FFF);
+        assert_eq!(bipolar_code(f32::NAN), 0);
+        for code in -32_768..=32_767_i32 {
+            for off in [-0.4, 0.0, 0.4] {
+                let fraction = (f64::from(code) + off) / 32_768.0;
+                let nearest = (code as i16).cast_unsigned();
+                assert_eq!(bipolar_code(fraction as f32), nearest, "{code} {off}");
+            }
+        }
+    }
+}
