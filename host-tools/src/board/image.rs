@@ -204,14 +204,29 @@ fn place(target: Target, segments: Vec<Segment>) -> Result<Image, Stray> {
     })
 }
 
-/// The memory of the chip that holds all of a range, if one does.
+/// The memory of the chip that holds all of a range, if one does. Neighbours are
+/// one memory: an image may lie across them.
 fn memory(target: &Target, address: u64, bytes: u64, in_flash: bool) -> Option<Range<u64>> {
-    let holds = |range: &Range<u64>| range.start <= address && address + bytes <= range.end;
-    target.memory_map.iter().find_map(|region| match region {
-        MemoryRegion::Nvm(flash) if in_flash && holds(&flash.range) => Some(flash.range.clone()),
-        MemoryRegion::Ram(ram) if !in_flash && holds(&ram.range) => Some(ram.range.clone()),
-        _ => None,
-    })
+    let mut ranges: Vec<Range<u64>> = target
+        .memory_map
+        .iter()
+        .filter_map(|region| match region {
+            MemoryRegion::Nvm(flash) if in_flash => Some(flash.range.clone()),
+            MemoryRegion::Ram(ram) if !in_flash => Some(ram.range.clone()),
+            _ => None,
+        })
+        .collect();
+    ranges.sort_by_key(|range| range.start);
+    let mut joined: Vec<Range<u64>> = Vec::new();
+    for range in ranges {
+        match joined.last_mut() {
+            Some(last) if last.end >= range.start => last.end = last.end.max(range.end),
+            _ => joined.push(range),
+        }
+    }
+    joined
+        .into_iter()
+        .find(|range| range.start <= address && address + bytes <= range.end)
 }
 
 #[cfg(test)]
@@ -244,6 +259,15 @@ mod tests {
         let taken: Vec<_> = image.placed.iter().map(|p| (p.is_flash, p.bytes)).collect();
         assert_eq!(taken, [(true, 1040), (false, 240)]);
         assert_eq!(image.parts.len(), 2);
+    }
+
+    #[test]
+    fn data_may_lie_across_the_chips_blocks_of_ram() {
+        // SRAM1, SRAM2 and CCM of the G474, 128 KiB end to end.
+        let data = segment(RAM + 0x1000, FLASH, 8, 0x1_F000);
+        assert!(place(g474(), vec![data]).is_ok());
+        let too_much = segment(RAM + 0x1000, FLASH, 8, 0x1_F001);
+        assert!(place(g474(), vec![too_much]).is_err());
     }
 
     #[test]
