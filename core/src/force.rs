@@ -40,7 +40,7 @@ impl ForceLaw {
 
 /// `v`, shortened to `limit` where it is longer; zero if it is not finite.
 ///
-/// The result is never longer than `limit`, and at most 4 ulp shorter than it
+/// The result is never longer than `limit`, and at most 8 ulp shorter than it
 /// where it was clamped.
 #[must_use]
 pub fn clamp_length(v: Vec3, limit: f32) -> Vec3 {
@@ -55,8 +55,8 @@ pub fn clamp_length(v: Vec3, limit: f32) -> Vec3 {
     }
     // Scaled first, so that squaring cannot overflow.
     let unit = v / largest;
-    // Three roundings below; taking two ulp off keeps the result inside.
-    let limit = limit * (1.0 - 2.0 * f32::EPSILON);
+    // Four roundings below, and one in the caller's own look at the length.
+    let limit = limit * (1.0 - 4.0 * f32::EPSILON);
     unit * (limit / libm::sqrtf(unit.length_squared()))
 }
 

@@ -7,7 +7,7 @@
 //! m = b + a·v, and its nearest point is known in closed form:
 //!
 //! ```text
-//! g = d + b·p + (c + a·p)·v      height of the ruling's line over the hand's u
+//! g = z(p, 0)·(1 − v) + z(p, 1)·v      height of the ruling's line over the hand's u
 //! z = g / (1 + m²)               height of its nearest point
 //! u = p − m·z                    clamped to [0, 1]
 //! ```
@@ -83,7 +83,10 @@ struct Ruling {
 fn ruling(patch: &Patch, (p, q): (f32, f32), v: f32) -> Ruling {
     let m = patch.slope_u(v);
     let steepness = 1.0 + m * m;
-    let g = (patch.d + patch.b * p) + (patch.c + patch.a * p) * v;
+    let [sw, _, nw, _] = patch.corners;
+    // The lines of the southern and the northern edge, over the hand's u.
+    let (south, north) = (sw + patch.b[0] * p, nw + patch.b[1] * p);
+    let g = south * (1.0 - v) + north * v;
     let free_z = g / steepness;
     let free_u = p - m * free_z;
     let (u, z, curvature);
@@ -97,8 +100,10 @@ fn ruling(patch: &Patch, (p, q): (f32, f32), v: f32) -> Ruling {
         z = patch.height(u, v);
         let zv = patch.slope_v(u);
         curvature = 1.0 + zv * zv;
-        // What cancels in the height of a steep edge shows in the slope.
-        rounding = zv.abs() * (patch.d.abs() + patch.b.abs() * u + zv.abs() * v);
+        // The rounding of a steep edge's height shows in the slope.
+        let [sw, se, nw, ne] = patch.corners;
+        let (start, end) = if u > 0.5 { (se, ne) } else { (sw, nw) };
+        rounding = zv.abs() * (start.abs() * (1.0 - v) + end.abs() * v);
     }
     let (dv, lift) = (v - q, z * patch.slope_v(u));
     Ruling {
@@ -142,14 +147,16 @@ pub fn nearest_downhill(patch: &Patch, hand: (f32, f32), start: (f32, f32)) -> N
         }
         turned = !turned;
     }
-    (best.u, best.v) = (snapped(best.u), snapped(best.v));
-    best
+    best.snapped(patch, hand)
 }
 
-fn snapped(x: f32) -> f32 {
-    if x < RESOLUTION {
+/// A coordinate, put on the border where it is as near to it as can be told for
+/// a hand at coordinate `hand`.
+fn snapped(x: f32, hand: f32) -> f32 {
+    let resolution = RESOLUTION * (1.0 + 2.0 * hand.abs());
+    if x < resolution {
         0.0
-    } else if 1.0 - x < RESOLUTION {
+    } else if 1.0 - x < resolution {
         1.0
     } else {
         x
@@ -157,6 +164,22 @@ fn snapped(x: f32) -> f32 {
 }
 
 impl Nearest {
+    fn snapped(self, patch: &Patch, (p, q): (f32, f32)) -> Self {
+        let (u, v) = (snapped(self.u, p), snapped(self.v, q));
+        if (u, v) == (self.u, self.v) {
+            return self;
+        }
+        let z = patch.height(u, v);
+        let distance_squared = (u - p) * (u - p) + (v - q) * (v - q) + z * z;
+        Self {
+            u,
+            v,
+            z,
+            distance_squared,
+            ..self
+        }
+    }
+
     fn transposed(self) -> Self {
         Self {
             u: self.v,
@@ -192,11 +215,24 @@ fn along_v(patch: &Patch, hand: (f32, f32), start: f32) -> Nearest {
         search.narrow(&mut best, trial);
     }
     Nearest {
-        u: best.u,
+        u: best.u_on_the_surface(patch),
         v: best.v,
         z: best.z,
         distance_squared: best.f,
         evaluations,
+    }
+}
+
+impl Ruling {
+    /// u as its height has it: of a far hand, u = p − m·z keeps no more than p
+    /// does, and on a steep patch that little is a lot of height.
+    fn u_on_the_surface(&self, patch: &Patch) -> f32 {
+        let m = patch.slope_u(self.v);
+        if m.abs() <= 1.0 || self.u == 0.0 || self.u == 1.0 {
+            return self.u;
+        }
+        let off = self.z - patch.height(self.u, self.v);
+        (self.u + off / m).clamp(0.0, 1.0)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::contact::dice::Dice;
 /// F′(v)/2 and the point of the ruling at `v`, in f64, for coefficients as f32
 /// holds them.
 fn ruling64(patch: &Patch, hand: (f64, f64), v: f64) -> (f64, f64) {
-    let [a, b, c, d] = [patch.a, patch.b, patch.c, patch.d].map(f64::from);
+    let [a, b, c, d] = [patch.a, patch.b[0], patch.c[0], patch.corners[0]].map(f64::from);
     let m = b + a * v;
     let free_z = (d + b * hand.0 + (c + a * hand.0) * v) / (1.0 + m * m);
     let free_u = hand.0 - m * free_z;

@@ -16,27 +16,28 @@ const LEAST_WAY: f32 = 2e-7;
 /// How a descent ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Descent {
-    /// No direction on the surface leads closer to the hand, which is below.
-    Rests(Spot, Patch),
+    /// No direction on the surface leads closer to the hand, which is below;
+    /// height of the point above the hand.
+    Rests(Spot, f32),
     /// From here the straight way to the hand leads off the surface.
     Leaves(Spot),
     /// The next patch is in a tile (column, row) that is not here. To be taken
     /// up again from `entry`, so that the wait leaves no trace.
     HeldUp {
         at: Spot,
-        patch: Patch,
+        z: f32,
         entry: Spot,
         tile: [i32; 2],
     },
-    /// The tick's work is spent; the squared distance reached.
-    Unfinished(Spot, Patch, f32),
+    /// The tick's work is spent; height above the hand.
+    Unfinished(Spot, f32),
     /// There is no surface under the proxy any more; the tile wanted, if it
     /// is missing.
     Lost(Option<[i32; 2]>),
 }
 
 /// A patch's neighbours over the border that a point lies on, in a fixed order.
-fn neighbours([east, north]: [i32; 2]) -> impl Iterator<Item = [i32; 2]> {
+pub(super) fn neighbours([east, north]: [i32; 2]) -> impl Iterator<Item = [i32; 2]> {
     let edges = [[east, 0], [0, north], [east, north]];
     let wanted = [east != 0, north != 0, east != 0 && north != 0];
     edges
@@ -71,8 +72,7 @@ pub(super) fn descend<const D: usize>(
             return Descent::Leaves(spot);
         }
         if !work.take() {
-            let f = hand.stretch(&spot, &patch).length_squared();
-            return Descent::Unfinished(spot, patch, f);
+            return Descent::Unfinished(spot, patch.height(spot.u, spot.v));
         }
         let entry = spot;
         let here = nearest_downhill(&patch, hand.in_patch(spot.cell), (spot.u, spot.v));
@@ -83,13 +83,13 @@ pub(super) fn descend<const D: usize>(
             Way::Unknown(tile) => {
                 return Descent::HeldUp {
                     at: spot,
-                    patch,
+                    z: here.z,
                     entry,
                     tile,
                 };
             }
             Way::None if may_leave && here.z < 0.0 => return Descent::Leaves(spot),
-            Way::None => return Descent::Rests(spot, patch),
+            Way::None => return Descent::Rests(spot, here.z),
         }
     }
 }

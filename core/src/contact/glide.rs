@@ -9,7 +9,7 @@
 
 use glam::Vec3;
 
-use super::descent::leaves;
+use super::descent::{leaves, tile_of};
 use super::patch::Patch;
 use super::spot::{Hand, Spot, is_inside};
 use super::track::Track;
@@ -21,6 +21,16 @@ pub(super) const HOPS: u32 = 4;
 /// which way is downhill.
 const LEVEL: f32 = 1e-5;
 
+/// What a way over gentle ground comes to.
+pub(super) enum Glide {
+    /// It ends here.
+    Rests(Rest),
+    /// A tile (column, row) on it is not here.
+    HeldUp([i32; 2]),
+    /// It takes the general search to tell.
+    Unsure,
+}
+
 /// Where a way over gentle ground ends.
 pub(super) struct Rest {
     pub(super) track: Track,
@@ -30,56 +40,84 @@ pub(super) struct Rest {
     pub(super) hops: u32,
 }
 
-/// Moves a proxy to where it rests now; `None` where it takes the general search
-/// to tell.
+/// Where a proxy rests now that rested on a track.
 #[inline(never)]
-pub(super) fn glide<const D: usize>(
+pub(super) fn glide<const D: usize>(window: &Window<'_, D>, hand: &Hand, from: &Track) -> Glide {
+    match try_glide(window, hand, from) {
+        Ok(Some(rest)) => Glide::Rests(rest),
+        Ok(None) => Glide::Unsure,
+        Err(tile) => Glide::HeldUp(tile),
+    }
+}
+
+/// As [`glide`]; `None` where it takes the general search to tell.
+fn try_glide<const D: usize>(
     window: &Window<'_, D>,
     hand: &Hand,
     from: &Track,
-) -> Option<Rest> {
+) -> Result<Option<Rest>, [i32; 2]> {
     let mut track = *from;
     let mut patch = track.seen_by(hand);
     if leaves(window, hand, &track.spot, &patch) {
-        return None;
+        return Ok(None);
     }
     for hops in 0..HOPS {
-        let cell = track.spot.cell;
-        let (p, q) = hand.in_patch(cell);
-        let to = track.closest(&patch, (p, q))?;
-        let (u, v) = (p + to.x, q + to.y);
-        let rests = |spot: Spot, stretch: Vec3| Rest {
-            track: track.at(spot),
+        let rests = |track: Track, stretch: Vec3| Rest {
+            track,
             stretch,
             hops,
         };
-        if is_inside(u) && is_inside(v) {
-            let certain = track.is_convex(to.z) || track.is_convex_between(to.z, (u, v));
-            return (to.z >= 0.0 && certain).then(|| rests(Spot { cell, u, v }, to));
-        }
-        let edge = Edge::toward(u, v)?;
-        let at = edge.closest(&patch, (p, q), cell)?;
-        let z = patch.height(at.u, at.v);
-        if !(z >= 0.0 && track.is_convex(z) && edge.slope(&patch, &at, (p, q)) < -LEVEL) {
-            return None;
-        }
-        let entry = at.across(edge.shift());
-        let Ground::Patch(corners) = window.ground(entry.cell) else {
-            return None;
+        let (at, edge) = match within(&track, &patch, hand) {
+            Some(Within::Inside(to, spot)) => return Ok(Some(rests(track.at(spot), to))),
+            Some(Within::OnEdge(at, edge)) => (at, edge),
+            None => return Ok(None),
         };
-        let beyond = Track::new(&corners, track.over, entry)?;
-        let (next, hand_there) = (beyond.seen_by(hand), hand.in_patch(entry.cell));
-        let slope = edge.slope(&next, &entry, hand_there);
+        let entry = at.across(edge.shift());
+        let corners = match window.ground(entry.cell) {
+            Ground::Patch(corners) => corners,
+            Ground::Hole => return Ok(None),
+            Ground::Missing => return Err(tile_of(entry.cell)),
+        };
+        let Some(beyond) = Track::new(&corners, track.over, entry) else {
+            return Ok(None);
+        };
+        let next = beyond.seen_by(hand);
+        let slope = edge.slope(&next, &entry, hand.in_patch(entry.cell));
         if slope > LEVEL {
-            return Some(rests(at, Vec3::new(at.u - p, at.v - q, z)));
+            let stretch = hand.stretch(&at, patch.height(at.u, at.v));
+            return Ok(Some(rests(track.at(at), stretch)));
         }
-        let goes_on = slope < -LEVEL;
-        if !goes_on || leaves(window, hand, &entry, &next) {
-            return None;
+        if slope >= -LEVEL || leaves(window, hand, &entry, &next) {
+            return Ok(None);
         }
         (track, patch) = (beyond, next);
     }
-    None
+    Ok(None)
+}
+
+/// Where a patch's own minimum of the distance is.
+enum Within {
+    /// Here, this far from the hand.
+    Inside(Vec3, Spot),
+    /// On an edge, beyond which downhill goes on as far as this patch can tell.
+    OnEdge(Spot, Edge),
+}
+
+/// The minimum of a patch, where the distance is sure to be convex.
+fn within(track: &Track, patch: &Patch, hand: &Hand) -> Option<Within> {
+    let cell = track.spot.cell;
+    let (p, q) = hand.in_patch(cell);
+    let to = track.closest(patch, (p, q))?;
+    let (u, v) = (p + to.x, q + to.y);
+    if is_inside(u) && is_inside(v) {
+        let certain = track.is_convex(to.z) || track.is_convex_between(to.z, (u, v));
+        return (to.z >= 0.0 && certain).then_some(Within::Inside(to, Spot { cell, u, v }));
+    }
+    let edge = Edge::toward(u, v)?;
+    let at = edge.closest(patch, (p, q), cell)?;
+    let z = patch.height(at.u, at.v);
+    let certain = z >= 0.0 && track.is_convex(z) && edge.slope(patch, &at, (p, q)) < -LEVEL;
+    certain.then_some(Within::OnEdge(at, edge))
 }
 
 /// One of a patch's four edges.

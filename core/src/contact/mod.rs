@@ -17,6 +17,7 @@ mod dice;
 mod glide;
 mod paper;
 mod proxy;
+mod quick;
 mod spot;
 mod sweep;
 mod swept;
@@ -69,6 +70,8 @@ pub enum State {
     Free,
     /// The proxy is on the surface and the hand below it.
     Touching,
+    /// The surface it was on has come to an end: what was felt last fades away.
+    LettingGo,
 }
 
 /// One tick's answer.

@@ -10,14 +10,14 @@
 use glam::Vec3;
 
 use super::closest::nearest_downhill;
-use super::descent::tile_of;
+use super::descent::{neighbours, tile_of};
 use super::patch::Patch;
 use super::spot::{Hand, Spot};
 use super::work::Work;
 use crate::grid::GridPoint;
 use crate::terrain::{Ground, Window};
 
-/// Cells under a segment that are looked at for a candidate, at most.
+/// Cells under a segment that are looked at for a candidate in a tick, at most.
 const CANDIDATES: u32 = 4096;
 /// Distances that differ by less than this, relatively, count as equal.
 const TIE: f32 = 1.0 - 1e-6;
@@ -25,35 +25,58 @@ const TIE: f32 = 1.0 - 1e-6;
 /// What the rule says of one tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Verdict {
-    /// In contact, proxy at the local closest point.
-    Contact(Spot, Patch),
+    /// In contact, proxy at the local closest point so far, this high above
+    /// the hand, and whether that is the last word.
+    Contact {
+        /// The proxy.
+        spot: Spot,
+        /// Its height above the hand.
+        z: f32,
+        /// Whether the search has ended.
+        settled: bool,
+    },
     /// Free space: the proxy is the haptic interface point.
     Free,
     /// A tile (column, row) is not here.
     HeldUp([i32; 2]),
+    /// There are more cells under the segment than a tick may look at.
+    Unfinished,
 }
 
-/// One update: candidate, local closest point, collision.
+/// What the look for a candidate came to.
+enum Candidate {
+    At(Spot),
+    None,
+    HeldUp([i32; 2]),
+    Unfinished,
+}
+
+/// One update: candidate, local closest point, collision. `passed` counts the
+/// cells under the segment that an unfinished look has already been at.
 pub(super) fn update<const D: usize>(
     window: &Window<'_, D>,
     last_contact: Option<Spot>,
     previous: &GridPoint,
     hip: &GridPoint,
+    passed: &mut u32,
     work: &mut Work,
 ) -> Verdict {
     let hand = Hand::new(*hip);
     let start = match last_contact {
         Some(spot) => spot,
-        None => match first_candidate(window, previous, hip, work) {
-            Ok(Some(spot)) => spot,
-            Ok(None) => return Verdict::Free,
-            Err(tile) => return Verdict::HeldUp(tile),
+        None => match next_candidate(window, previous, hip, passed, work) {
+            Candidate::At(spot) => spot,
+            Candidate::None => return Verdict::Free,
+            Candidate::HeldUp(tile) => return Verdict::HeldUp(tile),
+            Candidate::Unfinished => return Verdict::Unfinished,
         },
     };
     match local_closest_point(window, &hand, start, work) {
-        Ok(Some((spot, patch))) if is_inside(window, &hand, &spot, &patch) => {
-            Verdict::Contact(spot, patch)
-        }
+        Ok(Some(found)) if is_inside(window, &hand, &found) => Verdict::Contact {
+            spot: found.spot,
+            z: found.z,
+            settled: found.settled,
+        },
         Ok(_) => Verdict::Free,
         Err(tile) => Verdict::HeldUp(tile),
     }
@@ -61,35 +84,39 @@ pub(super) fn update<const D: usize>(
 
 /// Step 1: the first patch under the segment whose highest corner is above the
 /// segment's lowest height.
-fn first_candidate<const D: usize>(
+fn next_candidate<const D: usize>(
     window: &Window<'_, D>,
     previous: &GridPoint,
     hip: &GridPoint,
+    passed: &mut u32,
     work: &mut Work,
-) -> Result<Option<Spot>, [i32; 2]> {
+) -> Candidate {
     let low = if previous.is_below(hip) {
         previous
     } else {
         hip
     };
     let (view, hand) = (Hand::new(*low), Hand::new(*hip));
-    for cell in cells_under(previous, hip).take(CANDIDATES as usize) {
-        // One unit for eight cells: looking at a patch is that much cheaper.
+    let mut cells = cells_under(previous, hip).skip(*passed as usize);
+    for _ in 0..CANDIDATES {
+        let Some(cell) = cells.next() else {
+            let _ = work.take();
+            return Candidate::None;
+        };
         match window.ground(cell) {
             Ground::Patch(corners) if view.is_below_any(&corners) => {
                 let (p, q) = hand.in_patch(cell);
-                return Ok(Some(Spot {
+                return Candidate::At(Spot {
                     cell,
                     u: p.clamp(0.0, 1.0),
                     v: q.clamp(0.0, 1.0),
-                }));
+                });
             }
-            Ground::Missing => return Err(tile_of(cell)),
-            Ground::Patch(_) | Ground::Hole => {}
+            Ground::Missing => return Candidate::HeldUp(tile_of(cell)),
+            Ground::Patch(_) | Ground::Hole => *passed += 1,
         }
     }
-    let _ = work.take();
-    Ok(None)
+    Candidate::Unfinished
 }
 
 /// The cells under a segment, by an incremental line algorithm.
@@ -126,43 +153,54 @@ fn cells_under(from: &GridPoint, to: &GridPoint) -> impl Iterator<Item = [i32; 2
     })
 }
 
+/// The closest point of a patch, or of several.
+#[derive(Clone, Copy)]
+struct Found {
+    spot: Spot,
+    patch: Patch,
+    /// Height above the hand.
+    z: f32,
+    distance_squared: f32,
+    settled: bool,
+}
+
 /// Step 2: from patch to patch while the bounded closest point gets nearer.
 fn local_closest_point<const D: usize>(
     window: &Window<'_, D>,
     hand: &Hand,
-    mut spot: Spot,
+    start: Spot,
     work: &mut Work,
-) -> Result<Option<(Spot, Patch)>, [i32; 2]> {
-    let Some((mut patch, mut least)) = bounded_closest_point(window, hand, &mut spot, work)? else {
+) -> Result<Option<Found>, [i32; 2]> {
+    let Some(mut best) = bounded_closest_point(window, hand, start, work)? else {
         return Ok(None);
     };
-    while spot.border() != [0, 0] && work.take() {
+    while best.spot.border() != [0, 0] {
+        if !work.take() {
+            best.settled = false;
+            break;
+        }
         let mut nearer = None;
-        let [east, north] = spot.border();
-        for shift in [[east, 0], [0, north], [east, north]] {
-            if shift == [0, 0] || (shift != [east, north] && east * north == 0) {
-                continue; // an edge has one neighbour, a vertex three
-            }
-            let mut there = spot.across(shift);
-            let found = bounded_closest_point(window, hand, &mut there, work)?;
-            if let Some((over, distance)) = found.filter(|(_, d)| *d < least * TIE) {
-                least = distance;
-                nearer = Some((there, over));
+        let mut least = best.distance_squared;
+        for shift in neighbours(best.spot.border()) {
+            let found = bounded_closest_point(window, hand, best.spot.across(shift), work)?;
+            if let Some(found) = found.filter(|found| found.distance_squared < least * TIE) {
+                least = found.distance_squared;
+                nearer = Some(found);
             }
         }
         let Some(next) = nearer else { break };
-        (spot, patch) = next;
+        best = next;
     }
-    Ok(Some((spot, patch)))
+    Ok(Some(best))
 }
 
-/// Moves the spot to the closest point of its patch; `None` over a hole.
+/// The closest point of the patch that a spot is in; `None` over a hole.
 fn bounded_closest_point<const D: usize>(
     window: &Window<'_, D>,
     hand: &Hand,
-    spot: &mut Spot,
+    spot: Spot,
     work: &mut Work,
-) -> Result<Option<(Patch, f32)>, [i32; 2]> {
+) -> Result<Option<Found>, [i32; 2]> {
     let patch = match window.ground(spot.cell) {
         Ground::Patch(corners) => hand.patch(&corners),
         Ground::Hole => return Ok(None),
@@ -170,30 +208,31 @@ fn bounded_closest_point<const D: usize>(
     };
     let found = nearest_downhill(&patch, hand.in_patch(spot.cell), (spot.u, spot.v));
     work.charge(found.evaluations);
-    (spot.u, spot.v) = (found.u, found.v);
-    Ok(Some((patch, found.distance_squared)))
+    Ok(Some(Found {
+        spot: Spot {
+            u: found.u,
+            v: found.v,
+            ..spot
+        },
+        patch,
+        z: found.z,
+        distance_squared: found.distance_squared,
+        settled: true,
+    }))
 }
 
 /// Step 3: the sign of (LCP − HIP)·n, n averaged over the patches that share
 /// the edge or vertex.
-fn is_inside<const D: usize>(
-    window: &Window<'_, D>,
-    hand: &Hand,
-    spot: &Spot,
-    patch: &Patch,
-) -> bool {
-    let mut normal = unit(patch.normal(spot.u, spot.v));
-    let [east, north] = spot.border();
-    for shift in [[east, 0], [0, north], [east, north]] {
-        if shift == [0, 0] || (shift != [east, north] && east * north == 0) {
-            continue;
-        }
+fn is_inside<const D: usize>(window: &Window<'_, D>, hand: &Hand, found: &Found) -> bool {
+    let spot = &found.spot;
+    let mut normal = unit(found.patch.normal(spot.u, spot.v));
+    for shift in neighbours(spot.border()) {
         let over = spot.across(shift);
         if let Ground::Patch(corners) = window.ground(over.cell) {
             normal += unit(hand.patch(&corners).normal(over.u, over.v));
         }
     }
-    hand.stretch(spot, patch).dot(normal) > 0.0
+    hand.stretch(spot, found.z).dot(normal) > 0.0
 }
 
 fn unit(v: Vec3) -> Vec3 {

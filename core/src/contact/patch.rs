@@ -12,24 +12,26 @@ use crate::terrain::Altitude;
 pub struct Patch {
     /// Twist, eq. 2's A: how much the slope along u changes with v.
     pub a: f32,
-    /// Slope along u at v = 0 (B).
-    pub b: f32,
-    /// Slope along v at u = 0 (C).
-    pub c: f32,
-    /// Height of the south-west corner (D).
-    pub d: f32,
+    /// Slope along u at v = 0 (B) and at v = 1.
+    pub b: [f32; 2],
+    /// Slope along v at u = 0 (C) and at u = 1.
+    pub c: [f32; 2],
+    /// Heights of the corners: south-west (D), south-east, north-west,
+    /// north-east.
+    pub corners: [f32; 4],
 }
 
 impl Patch {
     /// From the corner heights: south-west, south-east, north-west, north-east.
     #[must_use]
     #[inline]
-    pub fn new([sw, se, nw, ne]: [f32; 4]) -> Self {
+    pub fn new(corners: [f32; 4]) -> Self {
+        let [sw, se, nw, ne] = corners;
         Self {
             a: (ne - nw) - (se - sw),
-            b: se - sw,
-            c: nw - sw,
-            d: sw,
+            b: [se - sw, ne - nw],
+            c: [nw - sw, ne - se],
+            corners,
         }
     }
 
@@ -39,7 +41,7 @@ impl Patch {
     #[inline]
     pub fn seen_from(self, from: Altitude, base: i32) -> Self {
         Self {
-            d: from.up_to(base, self.d),
+            corners: self.corners.map(|height| from.up_to(base, height)),
             ..self
         }
     }
@@ -48,32 +50,44 @@ impl Patch {
     #[must_use]
     #[inline]
     pub const fn transposed(&self) -> Self {
+        let [sw, se, nw, ne] = self.corners;
         Self {
+            a: self.a,
             b: self.c,
             c: self.b,
-            ..*self
+            corners: [sw, nw, se, ne],
         }
     }
 
-    /// Height above the hand.
+    /// Height at a place in the patch. Exact on the edges and relatively
+    /// accurate all over: a spike in one corner costs nothing in the others.
     #[must_use]
     #[inline]
     pub fn height(&self, u: f32, v: f32) -> f32 {
-        (self.d + self.b * u) + (self.c + self.a * u) * v
+        let [sw, se, nw, ne] = self.corners;
+        mix(mix(sw, se, u), mix(nw, ne, u), v)
     }
 
-    /// ∂z/∂u, the slope eastward.
+    /// Height as the polynomial gives it, also beyond the borders: cheaper, but
+    /// what a spike cancels is lost.
+    #[must_use]
+    #[inline]
+    pub fn polynomial(&self, u: f32, v: f32) -> f32 {
+        (self.corners[0] + self.b[0] * u) + (self.c[0] + self.a * u) * v
+    }
+
+    /// ∂z/∂u, the slope eastward. Exact on the edges.
     #[must_use]
     #[inline]
     pub fn slope_u(&self, v: f32) -> f32 {
-        self.b + self.a * v
+        mix(self.b[0], self.b[1], v)
     }
 
-    /// ∂z/∂v, the slope northward.
+    /// ∂z/∂v, the slope northward. Exact on the edges.
     #[must_use]
     #[inline]
     pub fn slope_v(&self, u: f32) -> f32 {
-        self.c + self.a * u
+        mix(self.c[0], self.c[1], u)
     }
 
     /// The upward normal, not normalised: its z is 1.
@@ -89,9 +103,14 @@ impl Patch {
     #[must_use]
     #[inline]
     pub fn blossom(&self, (u0, v0): (f32, f32), (u1, v1): (f32, f32)) -> f32 {
-        let linear = self.b * (u0 + u1) + self.c * (v0 + v1);
-        self.d + 0.5 * (linear + self.a * (u0 * v1 + u1 * v0))
+        0.5 * (self.height(u0, v1) + self.height(u1, v0))
     }
+}
+
+/// From `x` at 0 to `y` at 1, both exactly.
+#[inline]
+fn mix(x: f32, y: f32, t: f32) -> f32 {
+    x * (1.0 - t) + y * t
 }
 
 #[cfg(test)]
@@ -138,5 +157,17 @@ mod tests {
             let bernstein = f0 * (1.0 - s) * (1.0 - s) + 2.0 * f1 * s * (1.0 - s) + f2 * s * s;
             assert!((bernstein - p.height(at.0, at.1)).abs() < 1e-5);
         }
+    }
+
+    #[test]
+    fn a_spike_costs_nothing_elsewhere() {
+        let p = Patch::new([0.645_8, 1e6, 0.645_8, -3e7]);
+        assert_eq!(p.height(0.0, 0.3), 0.645_8);
+        assert_eq!(p.slope_v(0.0), 0.0);
+        let q = Patch::new([1e6, 0.645_8, -1e6, 0.25]);
+        assert_eq!(q.height(1.0, 0.0), 0.645_8);
+        assert_eq!(q.height(1.0, 1.0), 0.25);
+        assert_eq!(q.slope_v(1.0), 0.25 - 0.645_8);
+        assert_eq!(q.blossom((1.0, 0.0), (1.0, 1.0)), 0.5 * (0.645_8 + 0.25));
     }
 }

@@ -8,12 +8,24 @@
 
 use super::descent::tile_of;
 use crate::grid::GridPoint;
-use crate::terrain::{Ground, Window};
+use crate::terrain::{Ground, TILE_CELLS, Window};
 
 /// Distance from the nearest patch, in cells, at which nothing is left.
 pub const REACH: f32 = 0.5;
 /// Most that the presence may change in a tick, either way.
 pub const RATE: f32 = 1.0 / 32.0;
+/// Cells, along an axis, from the proxy at which a hand is too far off for what
+/// lies under it to matter: the presence is then full.
+///
+/// A tile's side less one: what is looked at, a neighbour of the hand's patch
+/// included, never shares a slot of the window with the tile under the proxy.
+pub const FAR: u32 = TILE_CELLS as u32 - 1;
+
+/// Whether the patch under the hand is too far from the proxy's to matter.
+#[inline]
+pub(super) fn is_far(proxy: [i32; 2], hand: [i32; 2]) -> bool {
+    proxy[0].abs_diff(hand[0]).max(proxy[1].abs_diff(hand[1])) >= FAR
+}
 
 /// What the presence should be, and what is not known about it.
 #[derive(Clone, Copy, Debug, PartialEq)]

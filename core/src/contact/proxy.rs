@@ -1,16 +1,16 @@
 //! What the proxy remembers from tick to tick, and what both rules share.
 
+use glam::Vec3;
+
 use super::descent::tile_of;
-use super::glide::glide;
 use super::paper::{self, Verdict};
-use super::patch::Patch;
 use super::spot::{Hand, Spot};
 use super::sweep::Path;
 use super::track::Track;
 use super::work::Work;
 use super::{Felt, Pace, Rule, State, presence};
 use crate::grid::GridPoint;
-use crate::terrain::{Altitude, Box2, Ground, Window};
+use crate::terrain::{Ground, Window};
 
 // The path is most of a contact's state, and there is no heap to put it on.
 #[allow(clippy::large_enum_variant)]
@@ -27,6 +27,8 @@ pub(super) enum Phase {
     /// On the surface, where the last tick came to rest, with nothing left to
     /// do and no fading, on a patch that the proxy can be followed over.
     Following(Track),
+    /// What was touched ended: its last force fades away.
+    LettingGo { proxy: GridPoint, stretch: Vec3 },
 }
 
 /// The proxy and what it remembers from tick to tick.
@@ -34,9 +36,10 @@ pub(super) enum Phase {
 pub struct Contact {
     pub(super) phase: Phase,
     pub(super) hip: GridPoint,
-    /// The window's revision that the last answer holds for, when nothing is
-    /// left to do and no force is fading; else zero.
-    answered: u32,
+    /// The last answer is the answer again while the hand has not moved: there
+    /// is nothing left to do, and no force is fading. (A field does not change;
+    /// another one comes with a new contact.)
+    pub(super) answered: bool,
     pub(super) presence: f32,
     /// A free proxy had to wait, for terrain or for work: the force of the next
     /// contact may not come at once.
@@ -44,6 +47,9 @@ pub struct Contact {
     /// Squared distance at which the last unfinished descent of this same
     /// hand stopped.
     pub(super) reached: f32,
+    /// Cells that an unfinished look for a candidate, by the paper's rule and
+    /// for this same hand, has been at.
+    passed: u32,
     pub(super) last: Felt,
 }
 
@@ -60,10 +66,11 @@ impl Contact {
         Self {
             phase: Phase::Waiting,
             hip: GridPoint::default(),
-            answered: 0,
+            answered: false,
             presence: 1.0,
             late: false,
             reached: f32::INFINITY,
+            passed: 0,
             last: Felt::default(),
         }
     }
@@ -94,81 +101,14 @@ impl Contact {
         rule: Rule,
         pace: Pace,
     ) -> &Felt {
-        let known = self.answered == window.revision();
-        if known && self.hip.is_same(&hip) {
+        if self.answered && self.hip.is_same(&hip) {
             self.last.work = 0;
-        } else if known && rule == Rule::Swept && self.goes_on(window, &hip) {
+        } else if rule == Rule::Swept && self.goes_on(window, &hip, pace) {
             self.hip = hip;
         } else {
             self.feel_anew(window, hip, rule, pace);
         }
         &self.last
-    }
-
-    /// The two cases that nearly every tick is: free as before, or sliding on
-    /// over the same patch. Answers, or changes nothing.
-    #[inline]
-    fn goes_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
-        match self.phase {
-            Phase::Free => self.flies_on(window, hip),
-            Phase::Following(_) => self.slides_on(window, hip),
-            _ => false,
-        }
-    }
-
-    /// The last answer was "free".
-    #[inline(never)]
-    fn flies_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
-        let low = if self.hip.is_below(hip) {
-            &self.hip
-        } else {
-            hip
-        };
-        let low = Altitude::new(low.cell()[2], low.frac().z);
-        let free = low.cell() >= window.top()
-            || window.is_clear_nearby(Box2::around(self.hip.column(), hip.column()), low);
-        if free {
-            self.last.proxy = *hip;
-            self.last.work = 0;
-        }
-        free
-    }
-
-    #[inline(never)]
-    fn slides_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
-        let Phase::Following(track) = &mut self.phase else {
-            return false;
-        };
-        let hand = Hand::new(*hip);
-        let followed = (track.over == hip.column()).then(|| track.follow(&hand));
-        let Some(stretch) = followed.flatten() else {
-            return self.glides_on(window, hip);
-        };
-        self.last.proxy = hand.point_inside(&track.spot, stretch.z);
-        self.last.stretch = stretch;
-        self.last.work = 1;
-        true
-    }
-
-    /// As [`Self::slides_on`], where there is more to look at: on or over the
-    /// borders of patches, for a deep hand, over twisted patches.
-    #[inline(never)]
-    fn glides_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
-        let Phase::Following(track) = &mut self.phase else {
-            return false;
-        };
-        if !track.is_under(window, hip.column()) {
-            return false;
-        }
-        let hand = Hand::new(*hip);
-        let Some(rest) = glide(window, &hand, track) else {
-            return false;
-        };
-        *track = rest.track;
-        self.last.proxy = hand.point_at(&rest.track.spot, rest.stretch.z);
-        self.last.stretch = rest.stretch;
-        self.last.work = 1 + 2 * rest.hops;
-        true
     }
 
     /// The general case.
@@ -194,8 +134,7 @@ impl Contact {
         if felt.settled || pace == Pace::RealTime || rule == Rule::Swept {
             self.hip = hip;
         }
-        let steady = felt.settled && self.presence == 1.0;
-        self.answered = if steady { window.revision() } else { 0 };
+        self.answered = felt.settled && self.presence == 1.0;
         self.last = Felt {
             work: work.spent(),
             ..felt
@@ -250,7 +189,7 @@ impl Contact {
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
-        (spot, patch): (Spot, Patch),
+        (spot, z): (Spot, f32),
         settled: bool,
         held_up_by: Option<[i32; 2]>,
         pace: Pace,
@@ -269,11 +208,10 @@ impl Contact {
             }
         }
         let hand = Hand::new(hip);
-        let stretch = hand.stretch(&spot, &patch);
         Felt {
             state: State::Touching,
-            proxy: hand.point_at(&spot, stretch.z),
-            stretch: stretch * self.presence,
+            proxy: hand.point_at(&spot, z),
+            stretch: hand.stretch(&spot, z) * self.presence,
             settled,
             held_up_by,
             work: 0,
@@ -287,7 +225,7 @@ impl Contact {
         hip: GridPoint,
         spot: &Spot,
     ) -> presence::Target {
-        if spot.cell == hip.column() {
+        if spot.cell == hip.column() || presence::is_far(spot.cell, hip.column()) {
             return presence::Target {
                 presence: 1.0,
                 missing: None,
@@ -301,6 +239,39 @@ impl Contact {
         self.presence = 1.0;
     }
 
+    /// The contact is lost: what was felt fades away where it was.
+    pub(super) fn loses<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Felt {
+        if self.last.state == State::Touching {
+            self.presence = 1.0;
+            self.phase = Phase::LettingGo {
+                proxy: self.last.proxy,
+                stretch: self.last.stretch,
+            };
+            return self.fades(window, hip);
+        }
+        self.let_go();
+        self.waits(window, hip)
+    }
+
+    /// A tick of letting go.
+    pub(super) fn fades<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Felt {
+        self.presence = presence::approach(self.presence, 0.0);
+        let Phase::LettingGo { proxy, stretch } = self.phase else {
+            return self.waits(window, hip);
+        };
+        if self.presence == 0.0 {
+            self.let_go();
+            return self.waits(window, hip);
+        }
+        Felt {
+            state: State::LettingGo,
+            proxy,
+            stretch: stretch * self.presence,
+            settled: true,
+            ..Felt::default()
+        }
+    }
+
     fn paper<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -312,12 +283,16 @@ impl Contact {
             Phase::Touching { spot, .. } => Some(spot),
             _ => None,
         };
+        if hip != self.hip {
+            self.passed = 0;
+        }
         if matches!(self.phase, Phase::Waiting) && !self.sees_above(window, hip) {
             return self.waits(window, hip);
         }
-        match paper::update(window, last, &self.hip, &hip, work) {
+        let previous = self.hip;
+        match paper::update(window, last, &previous, &hip, &mut self.passed, work) {
             Verdict::Free => self.flies(hip),
-            Verdict::Contact(spot, patch) => {
+            Verdict::Contact { spot, z, settled } => {
                 if core::mem::take(&mut self.late) {
                     self.presence = 0.0;
                 }
@@ -325,16 +300,20 @@ impl Contact {
                     spot,
                     may_leave: true,
                 };
-                self.touches(window, hip, (spot, patch), true, None, pace)
+                self.touches(window, hip, (spot, z), settled, None, pace)
             }
-            Verdict::HeldUp(tile) => {
-                self.late |= last.is_none() && pace == Pace::RealTime;
-                Felt {
-                    settled: false,
-                    held_up_by: Some(tile),
-                    ..self.last
-                }
-            }
+            Verdict::HeldUp(tile) => self.is_held_up(last.is_none(), Some(tile), pace),
+            Verdict::Unfinished => self.is_held_up(last.is_none(), None, pace),
+        }
+    }
+
+    /// By the paper's rule: the last answer again.
+    fn is_held_up(&mut self, is_free: bool, by: Option<[i32; 2]>, pace: Pace) -> Felt {
+        self.late |= is_free && pace == Pace::RealTime;
+        Felt {
+            settled: false,
+            held_up_by: by,
+            ..self.last
         }
     }
 }

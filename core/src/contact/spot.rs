@@ -109,9 +109,9 @@ impl Hand {
         GridPoint::over(cell, [spot.u, spot.v], self.point.frac().z + z)
     }
 
-    /// From the hand to the surface at `spot`, cells.
-    pub(super) fn stretch(&self, spot: &Spot, patch: &Patch) -> Vec3 {
+    /// From the hand to the spot, `z` cells above it.
+    pub(super) fn stretch(&self, spot: &Spot, z: f32) -> Vec3 {
         let (p, q) = self.in_patch(spot.cell);
-        Vec3::new(spot.u - p, spot.v - q, patch.height(spot.u, spot.v))
+        Vec3::new(spot.u - p, spot.v - q, z)
     }
 }

@@ -19,6 +19,8 @@ use crate::terrain::{Altitude, Box2, Ground, Window};
 
 /// Longest piece, in cells along an axis, that is walked cell by cell.
 const WALK_CELLS: u32 = 8;
+/// Tallest piece, in cells, that is walked.
+const WALK_HEIGHT: u32 = 16;
 /// Halvings that bring the longest possible segment down to a walk, and one.
 const DEPTH: usize = 29;
 
@@ -92,8 +94,9 @@ impl Path {
             }
             let span = Box2::around(self.at.column(), end.column());
             if window.is_clear(span, lower(&self.at, &end)) {
-                self.over_hole = false;
-            } else if is_short(span) || self.ends.is_full() {
+                // Above all that is around, so only the field's border matters.
+                self.over_hole = !window.has_cell(end.column());
+            } else if is_short(span, &self.at, &end) || self.ends.is_full() {
                 if let Some(ended) = self.walk(window, end, work) {
                     return ended;
                 }
@@ -124,6 +127,10 @@ impl Path {
             if !work.take() {
                 return Some(Sweep::Unfinished);
             }
+            if on_surface && step.is_tiny() {
+                // A corner of a cell, or of a hole, touched on leaving an edge.
+                continue;
+            }
             let patch = match window.ground(step.cell) {
                 Ground::Patch(corners) => view.patch(&corners),
                 Ground::Missing => return Some(Sweep::HeldUp(tile_of(step.cell))),
@@ -133,9 +140,6 @@ impl Path {
                     continue;
                 }
             };
-            if on_surface && step.is_tiny() {
-                continue; // a corner of a cell touched on leaving an edge
-            }
             let start = patch.height(step.from.0, step.from.1) - step.z_from;
             if over_hole && start >= 0.0 {
                 return Some(Sweep::Under);
@@ -170,9 +174,12 @@ fn lower(a: &GridPoint, b: &GridPoint) -> Altitude {
     Altitude::new(low.cell()[2], low.frac().z)
 }
 
-fn is_short(span: Box2) -> bool {
+/// Whether a piece is walked: short, and in height, too, which would otherwise
+/// cost bits.
+fn is_short(span: Box2, from: &GridPoint, to: &GridPoint) -> bool {
     let across = |axis: usize| span.to[axis].abs_diff(span.from[axis]);
-    across(0).max(across(1)) <= WALK_CELLS
+    let tall = from.cell()[2].abs_diff(to.cell()[2]);
+    across(0).max(across(1)) <= WALK_CELLS && tall <= WALK_HEIGHT
 }
 
 /// The part of a piece that lies in one cell.

@@ -1,6 +1,7 @@
 //! The swept rule: continuous in the air, downhill on the surface.
 
 use super::descent::{Descent, descend};
+use super::presence::is_far;
 use super::proxy::{Contact, Phase};
 use super::spot::{Hand, Spot};
 use super::sweep::{Path, Sweep};
@@ -24,6 +25,9 @@ impl Contact {
             self.reached = f32::INFINITY;
             self.redirect(hip);
         }
+        if matches!(self.phase, Phase::LettingGo { .. }) {
+            return self.fades(window, hip);
+        }
         if matches!(self.phase, Phase::Waiting) && !self.sees_above(window, hip) {
             return self.waits(window, hip);
         }
@@ -31,7 +35,9 @@ impl Contact {
         // to the surface at a point strictly nearer to the hand.
         loop {
             let ended = match &mut self.phase {
-                Phase::Waiting | Phase::Free => self.fly(window, hip, pace, work),
+                Phase::Waiting | Phase::Free | Phase::LettingGo { .. } => {
+                    self.fly(window, hip, pace, work)
+                }
                 Phase::Sweeping(_) => self.sweep(window, hip, pace, work),
                 Phase::Touching { .. } | Phase::Following(_) => self.touch(window, hip, pace, work),
             };
@@ -46,7 +52,7 @@ impl Contact {
         match &mut self.phase {
             Phase::Sweeping(path) => *path = Path::through_air(path.at(), hip),
             Phase::Touching { may_leave, .. } => *may_leave = true,
-            Phase::Waiting | Phase::Free | Phase::Following(_) => {}
+            _ => {}
         }
     }
 
@@ -102,10 +108,7 @@ impl Contact {
     ) -> Option<Felt> {
         let held_up_by = match ended {
             Sweep::Clear => return Some(self.flies(hip)),
-            Sweep::Under => {
-                self.let_go();
-                return Some(self.waits(window, hip));
-            }
+            Sweep::Under => return Some(self.loses(window, hip)),
             Sweep::Hit { spot, progress } => {
                 // A hop from the surface to the surface keeps what it had.
                 if core::mem::take(&mut self.late) {
@@ -143,42 +146,37 @@ impl Contact {
         let mut resume = None;
         let mut held_up_by = None;
         let mut settled = true;
-        let (spot, patch) = match descend(window, &hand, spot, may_leave, work) {
-            Descent::Rests(spot, patch) => (spot, patch),
+        let (spot, z) = match descend(window, &hand, spot, may_leave, work) {
+            Descent::Rests(spot, z) => (spot, z),
             Descent::Leaves(spot) => {
                 let from = self.point_on(window, &hand, &spot);
                 self.phase = Phase::Sweeping(Path::off_surface(from, hip));
                 return None;
             }
             Descent::Lost(tile) => {
-                self.let_go();
-                let felt = self.waits(window, hip);
+                let felt = self.loses(window, hip);
                 return Some(Felt {
                     held_up_by: felt.held_up_by.or(tile),
                     ..felt
                 });
             }
-            Descent::HeldUp {
-                at,
-                patch,
-                entry,
-                tile,
-            } => {
+            Descent::HeldUp { at, z, entry, tile } => {
                 (resume, held_up_by, settled) = (Some(entry), Some(tile), false);
-                (at, patch)
+                (at, z)
             }
-            Descent::Unfinished(spot, patch, f) => {
+            Descent::Unfinished(spot, z) => {
                 // No nearer than after the tick before: rounding, not a way.
-                settled = f >= self.reached * (1.0 - 1e-6);
+                let f = hand.stretch(&spot, z).length_squared();
+                settled = f >= self.reached;
                 self.reached = f;
-                (spot, patch)
+                (spot, z)
             }
         };
         self.phase = Phase::Touching {
             spot: resume.unwrap_or(spot),
             may_leave,
         };
-        let felt = self.touches(window, hip, (spot, patch), settled, held_up_by, pace);
+        let felt = self.touches(window, hip, (spot, z), settled, held_up_by, pace);
         if felt.settled && self.presence == 1.0 {
             self.lay_track(window, hip.column());
         }
@@ -190,11 +188,15 @@ impl Contact {
         let Phase::Touching { spot, .. } = self.phase else {
             return;
         };
+        let known = if is_far(spot.cell, over) {
+            spot.cell
+        } else {
+            over
+        };
         // At the very border of a hole the presence is 1, too.
-        let is_over_patch = spot.cell == over || matches!(window.ground(over), Ground::Patch(_));
-        if is_over_patch
+        if matches!(window.ground(known), Ground::Patch(_))
             && let Ground::Patch(corners) = window.ground(spot.cell)
-            && let Some(track) = Track::new(&corners, over, spot)
+            && let Some(track) = Track::new(&corners, known, spot)
         {
             self.phase = Phase::Following(track);
         }

@@ -16,7 +16,9 @@
 
 use glam::Vec3;
 
+use super::descent::tile_of;
 use super::patch::Patch;
+use super::presence::is_far;
 use super::spot::{Hand, Spot, is_inside};
 use crate::terrain::{Corners, Ground, Window};
 
@@ -56,13 +58,23 @@ pub(super) struct Track {
     bend: f32,
 }
 
+/// What lies under a hand.
+pub(super) enum Under {
+    /// A patch, or nothing that matters: the force needs no fading.
+    Patch,
+    /// No surface.
+    Hole,
+    /// The tile (column, row) is not here.
+    Missing([i32; 2]),
+}
+
 impl Track {
     /// A proxy at `spot`, on the patch of these corners, for a hand over
     /// `over`; `None` if the patch is too steep.
     pub(super) fn new(corners: &Corners, over: [i32; 2], spot: Spot) -> Option<Self> {
         let patch = Patch::new(corners.heights);
         let twist = patch.a.abs();
-        let steepest = twist + patch.b.abs() + patch.c.abs();
+        let steepest = twist + patch.b[0].abs() + patch.c[0].abs();
         if !(steepest <= GENTLE) {
             return None;
         }
@@ -103,22 +115,23 @@ impl Track {
         z <= self.convex
     }
 
-    /// Whether a patch lies under a hand in `column`, so that the force needs
-    /// no fading.
-    #[inline]
+    /// What lies under a hand in `column`, as far as the force depends on it.
     pub(super) fn is_under<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         column: [i32; 2],
-    ) -> bool {
-        if self.over == column {
-            return true;
+    ) -> Under {
+        if self.over == column || is_far(self.spot.cell, column) {
+            return Under::Patch;
         }
-        let there = matches!(window.ground(column), Ground::Patch(_));
-        if there {
-            self.over = column;
+        match window.ground(column) {
+            Ground::Patch(_) => {
+                self.over = column;
+                Under::Patch
+            }
+            Ground::Hole => Under::Hole,
+            Ground::Missing => Under::Missing(tile_of(column)),
         }
-        there
     }
 
     /// Moves the spot to the closest point for a shallow hand, and tells how far
@@ -128,7 +141,7 @@ impl Track {
     pub(super) fn follow(&mut self, hand: &Hand) -> Option<Vec3> {
         let patch = self.seen_by(hand);
         let (p, q) = hand.in_patch(self.spot.cell);
-        let above = patch.height(p, q);
+        let above = patch.polynomial(p, q);
         // How high the tangent plane in the spot passes over the hand.
         let stays = above >= patch.a * ((p - self.spot.u) * (q - self.spot.v));
         if !(self.inside && stays && above <= self.shallow) {
@@ -149,8 +162,8 @@ impl Track {
     /// step of Newton's method and one more with the same Hessian.
     #[inline(always)]
     fn leap(&self, patch: &Patch, (p, q): (f32, f32), above: f32) -> (Vec3, bool) {
-        let slope = patch.slope_u(q);
-        let (zu, zv) = (slope, patch.slope_v(p));
+        let slope = patch.b[0] + patch.a * q;
+        let (zu, zv) = (slope, patch.c[0] + patch.a * p);
         // Where the distance is only height, half its gradient is z·(zu, zv).
         let (uu, vv) = (1.0 + zu * zu, 1.0 + zv * zv);
         let uv = zu * zv + patch.a * above;
@@ -174,7 +187,7 @@ impl Track {
     /// From a hand at `(p, q)` to the closest point of the patch and of what it
     /// would be beyond its borders; `None` if Newton's method does not end.
     pub(super) fn closest(&self, patch: &Patch, (p, q): (f32, f32)) -> Option<Vec3> {
-        let above = patch.height(p, q);
+        let above = patch.polynomial(p, q);
         let mut start = (self.spot.u - p, self.spot.v - q);
         if above <= self.shallow {
             let (to, is_exact) = self.leap(patch, (p, q), above);
@@ -208,7 +221,7 @@ impl Track {
             let (eu, ev) = newton(patch, (-du, -dv), (p + du, q + dv));
             (du, dv) = (du + eu, dv + ev);
             if self.bend * (eu * eu + ev * ev) <= LEFT {
-                return Some(Vec3::new(du, dv, patch.height(p + du, q + dv)));
+                return Some(Vec3::new(du, dv, patch.polynomial(p + du, q + dv)));
             }
         }
         None
@@ -219,8 +232,8 @@ impl Track {
 /// north)` of there.
 #[inline]
 fn newton(patch: &Patch, (east, north): (f32, f32), (u, v): (f32, f32)) -> (f32, f32) {
-    let (zu, zv) = (patch.slope_u(v), patch.slope_v(u));
-    let z = (patch.d + patch.b * u) + zv * v;
+    let (zu, zv) = (patch.b[0] + patch.a * v, patch.c[0] + patch.a * u);
+    let z = (patch.corners[0] + patch.b[0] * u) + zv * v;
     // Half the gradient and the Hessian of the squared distance.
     let (gu, gv) = (z * zu - east, z * zv - north);
     let (uu, vv) = (1.0 + zu * zu, 1.0 + zv * zv);

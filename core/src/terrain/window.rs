@@ -223,8 +223,9 @@ impl<'t, const D: usize> Window<'t, D> {
         tile.key().is_some_and(is_here).then_some(tile)
     }
 
+    /// Whether the field has a cell there, be it a hole.
     #[inline]
-    fn has_cell(&self, cell: [i32; 2]) -> bool {
+    pub(crate) fn has_cell(&self, cell: [i32; 2]) -> bool {
         // One unsigned comparison an axis catches negative indices too.
         (cell[0] as u32) < self.size[0] as u32 && (cell[1] as u32) < self.size[1] as u32
     }

@@ -102,5 +102,6 @@ pub fn state_name(state: hapterra_core::contact::State) -> &'static str {
         State::Waiting => "waiting",
         State::Free => "free",
         State::Touching => "touching",
+        State::LettingGo => "letting go",
     }
 }

@@ -1,0 +1,109 @@
+//! The two cases that nearly every tick is: free as before, or sliding on over
+//! gentle ground.
+//!
+//! Whether a tick is one of them depends on the terrain and on the hand's way
+//! alone, never on what the window happens to hold: other bits come out than by
+//! the general search, so another window must not choose another way.
+
+use super::Pace;
+use super::glide::{Glide, glide};
+use super::proxy::{Contact, Phase};
+use super::spot::Hand;
+use super::track::Under;
+use crate::grid::GridPoint;
+use crate::terrain::{Altitude, Box2, Window};
+
+impl Contact {
+    /// Answers, or changes nothing.
+    #[inline]
+    pub(super) fn goes_on<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: &GridPoint,
+        pace: Pace,
+    ) -> bool {
+        match self.phase {
+            Phase::Free => self.flies_on(window, hip),
+            Phase::Following(_) => self.slides_on(window, hip, pace),
+            _ => false,
+        }
+    }
+
+    /// The last answer was "free".
+    #[inline(never)]
+    fn flies_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
+        let low = if self.hip.is_below(hip) {
+            &self.hip
+        } else {
+            hip
+        };
+        let low = Altitude::new(low.cell()[2], low.frac().z);
+        let free = low.cell() >= window.top()
+            || window.is_clear_nearby(Box2::around(self.hip.column(), hip.column()), low);
+        if free {
+            self.last.proxy = *hip;
+            self.last.work = 0;
+        }
+        free
+    }
+
+    /// The proxy rests on gentle ground, and all of it is felt.
+    #[inline(never)]
+    fn slides_on<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: &GridPoint,
+        pace: Pace,
+    ) -> bool {
+        let Phase::Following(track) = &mut self.phase else {
+            return false;
+        };
+        let hand = Hand::new(*hip);
+        let followed = (track.over == hip.column()).then(|| track.follow(&hand));
+        let Some(stretch) = followed.flatten() else {
+            return self.glides_on(window, hip, pace);
+        };
+        self.last.proxy = hand.point_inside(&track.spot, stretch.z);
+        self.last.stretch = stretch;
+        self.last.work = 1;
+        true
+    }
+
+    /// As [`Self::slides_on`], where there is more to look at: on or over the
+    /// borders of patches, for a deep hand, over twisted patches.
+    #[inline(never)]
+    fn glides_on<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: &GridPoint,
+        pace: Pace,
+    ) -> bool {
+        let Phase::Following(track) = &mut self.phase else {
+            return false;
+        };
+        let hand = Hand::new(*hip);
+        let glide = match track.is_under(window, hip.column()) {
+            Under::Patch => glide(window, &hand, track),
+            Under::Hole => Glide::Unsure,
+            Under::Missing(tile) => Glide::HeldUp(tile),
+        };
+        match glide {
+            Glide::Rests(rest) => {
+                *track = rest.track;
+                self.last.proxy = hand.point_at(&rest.track.spot, rest.stretch.z);
+                self.last.stretch = rest.stretch;
+                self.last.work = 1 + 2 * rest.hops;
+                self.last.held_up_by = None;
+                self.last.settled = true;
+                self.answered = true;
+            }
+            Glide::HeldUp(tile) if pace == Pace::LockStep => {
+                self.last.held_up_by = Some(tile);
+                self.last.settled = false;
+                self.answered = false;
+            }
+            Glide::HeldUp(_) | Glide::Unsure => return false,
+        }
+        true
+    }
+}
