@@ -19,11 +19,11 @@ fn eq_1_to_5_the_patch_is_uva_plus_ub_plus_vc_plus_d() {
     let [p00, p10, p01, p11] = CORNERS;
     let patch = Patch::new(CORNERS);
     assert_eq!(patch.a, p11 - p10 - p01 + p00);
-    assert_eq!(patch.b, p10 - p00);
-    assert_eq!(patch.c, p01 - p00);
-    assert_eq!(patch.d, p00);
+    assert_eq!(patch.b, [p10 - p00, p11 - p01]);
+    assert_eq!(patch.c, [p01 - p00, p11 - p10]);
+    assert_eq!(patch.corners[0], p00);
     let (u, v) = (0.3, 0.8);
-    let bilinear = u * v * patch.a + u * patch.b + v * patch.c + patch.d;
+    let bilinear = u * v * patch.a + u * patch.b[0] + v * patch.c[0] + patch.corners[0];
     assert!((patch.height(u, v) - bilinear).abs() < 1e-6);
 }
 
@@ -42,7 +42,7 @@ fn eq_8_to_11_at_the_local_closest_point_the_partial_derivatives_vanish() {
     let found = nearest_downhill(&patch, (p, q), (0.5, 0.5));
     let (u, v) = (f64::from(found.u), f64::from(found.v));
     assert!(u > 0.0 && u < 1.0 && v > 0.0 && v < 1.0, "{found:?}");
-    let [a, b, c, d] = [patch.a, patch.b, patch.c, patch.d].map(f64::from);
+    let [a, b, c, d] = [patch.a, patch.b[0], patch.c[0], patch.corners[0]].map(f64::from);
     let sigma = [
         u - f64::from(p),
         v - f64::from(q),

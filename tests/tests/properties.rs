@@ -101,7 +101,6 @@ proptest! {
     })]
 
     #[test]
-    #[ignore = "found, not yet mended: see regressions.rs"]
     fn everything_holds_on_gentle_ground(
         heights in gentle(), path in path(), rule in rule(), pace in pace(),
     ) {
@@ -109,7 +108,6 @@ proptest! {
     }
 
     #[test]
-    #[ignore = "found, not yet mended: see regressions.rs"]
     fn everything_holds_on_wild_ground(
         heights in wild(), path in path(), rule in rule(), pace in pace(),
     ) {

@@ -7,7 +7,7 @@ const SEED: u64 = 2026;
 fn thousand() -> Tally {
     let tally = soak(SEED, 0, Until::Scenes(1000), 2, |_| {});
     println!("{tally}");
-    let [waiting, free, touching] = tally.total().states;
+    let [waiting, free, touching, _] = tally.total().states;
     assert!(waiting > 10_000 && free > 50_000 && touching > 50_000);
     tally
 }

@@ -44,6 +44,8 @@ const SHORT: f32 = 1.0 / 64.0;
 /// Places in a patch closer than this, in cells, count as the same: what is as
 /// near to an edge lies on it.
 const RESOLUTION: f32 = 1.2e-7;
+/// The same for a hand so far off that its coordinates resolve no better.
+const COARSEST: f32 = 0.25;
 /// Squared distance, in cells², below which F is nothing but rounding.
 const LEAST_F: f32 = 1e-10;
 
@@ -150,10 +152,16 @@ pub fn nearest_downhill(patch: &Patch, hand: (f32, f32), start: (f32, f32)) -> N
     best.snapped(patch, hand)
 }
 
+/// Places in a patch closer than this, in cells, cannot be told apart for a hand
+/// at coordinate `hand`.
+pub(super) fn resolution(hand: f32) -> f32 {
+    (RESOLUTION * (1.0 + 2.0 * hand.abs())).min(COARSEST)
+}
+
 /// A coordinate, put on the border where it is as near to it as can be told for
 /// a hand at coordinate `hand`.
 fn snapped(x: f32, hand: f32) -> f32 {
-    let resolution = RESOLUTION * (1.0 + 2.0 * hand.abs());
+    let resolution = resolution(hand);
     if x < resolution {
         0.0
     } else if 1.0 - x < resolution {
@@ -171,6 +179,9 @@ impl Nearest {
         }
         let z = patch.height(u, v);
         let distance_squared = (u - p) * (u - p) + (v - q) * (v - q) + z * z;
+        if distance_squared > self.distance_squared * TIE + LEAST_F {
+            return self; // up a steep wall that stands on the border
+        }
         Self {
             u,
             v,

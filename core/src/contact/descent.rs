@@ -1,10 +1,10 @@
 //! The proxy's way over the surface: downhill in the distance to the hand,
 //! from patch to patch (paper §4.3.2, made exact at edges and vertices).
 
-use super::closest::{Nearest, nearest_downhill};
+use super::closest::{Nearest, nearest_downhill, resolution};
 use super::patch::Patch;
 use super::spot::{Hand, Spot};
-use super::work::Work;
+use super::work::{VISIT, Work};
 use crate::terrain::{Ground, TileKey, Window};
 
 /// Distances that differ by less than this, relatively, count as equal.
@@ -71,7 +71,7 @@ pub(super) fn descend<const D: usize>(
         if may_leave && leaves(window, hand, &spot, &patch) {
             return Descent::Leaves(spot);
         }
-        if !work.take() {
+        if !work.take(VISIT) {
             return Descent::Unfinished(spot, patch.height(spot.u, spot.v));
         }
         let entry = spot;
@@ -142,7 +142,9 @@ fn best_neighbour<const D: usize>(
     here: &Nearest,
     work: &mut Work,
 ) -> Way {
-    let border = spot.border();
+    // Up a wall a proxy may stand beside the edge without being on it.
+    let (p, q) = hand.in_patch(spot.cell);
+    let border = spot.border_within([resolution(p), resolution(q)]);
     if border == [0, 0] {
         return Way::None;
     }
@@ -159,7 +161,7 @@ fn best_neighbour<const D: usize>(
                     hand.in_patch(entry.cell),
                     (entry.u, entry.v),
                 );
-                work.charge(there.evaluations + 3);
+                work.charge(there.evaluations + VISIT);
                 // Along a shared edge this patch has done its best already.
                 let off_u = (there.u - entry.u).abs() * shift[0].abs() as f32;
                 let off_v = (there.v - entry.v).abs() * shift[1].abs() as f32;

@@ -13,12 +13,13 @@ use super::closest::nearest_downhill;
 use super::descent::{neighbours, tile_of};
 use super::patch::Patch;
 use super::spot::{Hand, Spot};
-use super::work::Work;
+use super::work::{VISIT, Work};
 use crate::grid::GridPoint;
 use crate::terrain::{Ground, Window};
 
-/// Cells under a segment that are looked at for a candidate in a tick, at most.
-const CANDIDATES: u32 = 4096;
+/// Cells under a segment that are looked at for a candidate, at most: a hand that
+/// moves farther in a tick passes through whatever comes after.
+const CANDIDATES: usize = 4096;
 /// Distances that differ by less than this, relatively, count as equal.
 const TIE: f32 = 1.0 - 1e-6;
 
@@ -39,8 +40,6 @@ pub(super) enum Verdict {
     Free,
     /// A tile (column, row) is not here.
     HeldUp([i32; 2]),
-    /// There are more cells under the segment than a tick may look at.
-    Unfinished,
 }
 
 /// What the look for a candidate came to.
@@ -48,17 +47,16 @@ enum Candidate {
     At(Spot),
     None,
     HeldUp([i32; 2]),
-    Unfinished,
 }
 
 /// One update: candidate, local closest point, collision. `passed` counts the
-/// cells under the segment that an unfinished look has already been at.
+/// cells under the segment that were no candidates before a tile was missing.
 pub(super) fn update<const D: usize>(
     window: &Window<'_, D>,
     last_contact: Option<Spot>,
     previous: &GridPoint,
     hip: &GridPoint,
-    passed: &mut u32,
+    passed: &mut usize,
     work: &mut Work,
 ) -> Verdict {
     let hand = Hand::new(*hip);
@@ -68,7 +66,6 @@ pub(super) fn update<const D: usize>(
             Candidate::At(spot) => spot,
             Candidate::None => return Verdict::Free,
             Candidate::HeldUp(tile) => return Verdict::HeldUp(tile),
-            Candidate::Unfinished => return Verdict::Unfinished,
         },
     };
     match local_closest_point(window, &hand, start, work) {
@@ -88,7 +85,7 @@ fn next_candidate<const D: usize>(
     window: &Window<'_, D>,
     previous: &GridPoint,
     hip: &GridPoint,
-    passed: &mut u32,
+    passed: &mut usize,
     work: &mut Work,
 ) -> Candidate {
     let low = if previous.is_below(hip) {
@@ -97,12 +94,12 @@ fn next_candidate<const D: usize>(
         hip
     };
     let (view, hand) = (Hand::new(*low), Hand::new(*hip));
-    let mut cells = cells_under(previous, hip).skip(*passed as usize);
-    for _ in 0..CANDIDATES {
-        let Some(cell) = cells.next() else {
-            let _ = work.take();
-            return Candidate::None;
-        };
+    let _ = work.take(1);
+    if view.altitude().cell() >= window.top() {
+        return Candidate::None;
+    }
+    let cells = cells_under(previous, hip).take(CANDIDATES);
+    for cell in cells.skip(*passed) {
         match window.ground(cell) {
             Ground::Patch(corners) if view.is_below_any(&corners) => {
                 let (p, q) = hand.in_patch(cell);
@@ -116,7 +113,7 @@ fn next_candidate<const D: usize>(
             Ground::Patch(_) | Ground::Hole => *passed += 1,
         }
     }
-    Candidate::Unfinished
+    Candidate::None
 }
 
 /// The cells under a segment, by an incremental line algorithm.
@@ -175,7 +172,7 @@ fn local_closest_point<const D: usize>(
         return Ok(None);
     };
     while best.spot.border() != [0, 0] {
-        if !work.take() {
+        if !work.take(1) {
             best.settled = false;
             break;
         }
@@ -207,7 +204,7 @@ fn bounded_closest_point<const D: usize>(
         Ground::Missing => return Err(tile_of(spot.cell)),
     };
     let found = nearest_downhill(&patch, hand.in_patch(spot.cell), (spot.u, spot.v));
-    work.charge(found.evaluations);
+    work.charge(found.evaluations + VISIT);
     Ok(Some(Found {
         spot: Spot {
             u: found.u,

@@ -47,10 +47,14 @@ pub struct Contact {
     /// Squared distance at which the last unfinished descent of this same
     /// hand stopped.
     pub(super) reached: f32,
-    /// Cells that an unfinished look for a candidate, by the paper's rule and
-    /// for this same hand, has been at.
-    passed: u32,
+    /// By the paper's rule: cells on the way to `sought` that were found to be no
+    /// candidates before a tile was missing.
+    passed: usize,
+    sought: GridPoint,
     pub(super) last: Felt,
+    /// What was felt before the general case had to look, which may take it
+    /// several turns in lock-step.
+    before: Felt,
 }
 
 impl Default for Contact {
@@ -71,7 +75,9 @@ impl Contact {
             late: false,
             reached: f32::INFINITY,
             passed: 0,
+            sought: GridPoint::default(),
             last: Felt::default(),
+            before: Felt::default(),
         }
     }
 
@@ -121,6 +127,9 @@ impl Contact {
         pace: Pace,
     ) {
         let mut work = Work::new();
+        if self.last.settled || pace == Pace::RealTime {
+            self.before = self.last;
+        }
         if let Phase::Following(track) = &self.phase {
             self.phase = Phase::Touching {
                 spot: track.spot,
@@ -149,11 +158,11 @@ impl Contact {
         hip: GridPoint,
     ) -> bool {
         let hand = Hand::new(hip);
-        let above = match window.ground(hip.column()) {
+        let above_it = || match window.ground(hip.column()) {
             Ground::Patch(corners) => hand.patch(&corners).height(hip.frac().x, hip.frac().y) < 0.0,
-            Ground::Hole => hand.altitude().cell() >= window.top(),
-            Ground::Missing => false,
+            Ground::Hole | Ground::Missing => false,
         };
+        let above = hand.altitude().cell() >= window.top() || above_it();
         if above {
             self.phase = Phase::Free;
             self.hip = hip;
@@ -241,11 +250,11 @@ impl Contact {
 
     /// The contact is lost: what was felt fades away where it was.
     pub(super) fn loses<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Felt {
-        if self.last.state == State::Touching {
+        if self.before.state == State::Touching {
             self.presence = 1.0;
             self.phase = Phase::LettingGo {
-                proxy: self.last.proxy,
-                stretch: self.last.stretch,
+                proxy: self.before.proxy,
+                stretch: self.before.stretch,
             };
             return self.fades(window, hip);
         }
@@ -283,8 +292,8 @@ impl Contact {
             Phase::Touching { spot, .. } => Some(spot),
             _ => None,
         };
-        if hip != self.hip {
-            self.passed = 0;
+        if hip != self.sought || self.last.settled {
+            (self.passed, self.sought) = (0, hip);
         }
         if matches!(self.phase, Phase::Waiting) && !self.sees_above(window, hip) {
             return self.waits(window, hip);
@@ -302,18 +311,20 @@ impl Contact {
                 };
                 self.touches(window, hip, (spot, z), settled, None, pace)
             }
-            Verdict::HeldUp(tile) => self.is_held_up(last.is_none(), Some(tile), pace),
-            Verdict::Unfinished => self.is_held_up(last.is_none(), None, pace),
-        }
-    }
-
-    /// By the paper's rule: the last answer again.
-    fn is_held_up(&mut self, is_free: bool, by: Option<[i32; 2]>, pace: Pace) -> Felt {
-        self.late |= is_free && pace == Pace::RealTime;
-        Felt {
-            settled: false,
-            held_up_by: by,
-            ..self.last
+            Verdict::HeldUp(tile) if last.is_some() => Felt {
+                settled: false,
+                held_up_by: Some(tile),
+                ..self.last
+            },
+            Verdict::HeldUp(tile) => {
+                self.late |= pace == Pace::RealTime;
+                Felt {
+                    state: State::Free,
+                    proxy: previous,
+                    held_up_by: Some(tile),
+                    ..Felt::default()
+                }
+            }
         }
     }
 }

@@ -18,15 +18,22 @@ pub struct Spot {
 }
 
 impl Spot {
-    /// The same point as patch `cell + shift` sees it, for a point on an edge
-    /// or a corner that both share.
+    /// The same point as patch `cell + shift` sees it, for a point on, or as good
+    /// as on, an edge or a corner that both share.
     #[must_use]
     pub fn across(&self, [east, north]: [i32; 2]) -> Self {
         Self {
             cell: [self.cell[0] + east, self.cell[1] + north],
-            u: mirror(self.u, east),
-            v: mirror(self.v, north),
+            u: beyond(self.u, east),
+            v: beyond(self.v, north),
         }
+    }
+
+    /// As [`Self::border`], for a point that may be as far off as that,
+    /// eastward and northward.
+    pub(super) fn border_within(&self, [u, v]: [f32; 2]) -> [i32; 2] {
+        let near = |x: f32, by: f32| i32::from(x >= 1.0 - by) - i32::from(x <= by);
+        [near(self.u, u), near(self.v, v)]
     }
 
     /// Toward which neighbours the point lies on the patch's border: −1, 0 or
@@ -51,8 +58,12 @@ fn side(x: f32) -> i32 {
     i32::from(x == 1.0) - i32::from(x == 0.0)
 }
 
-fn mirror(x: f32, shift: i32) -> f32 {
-    if shift == 0 { x } else { 1.0 - x }
+fn beyond(x: f32, shift: i32) -> f32 {
+    match shift {
+        0 => x,
+        1.. => 0.0,
+        _ => 1.0,
+    }
 }
 
 /// The hand as the patches see it.

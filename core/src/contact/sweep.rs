@@ -13,7 +13,7 @@ use heapless::Vec;
 use super::crossing::{first_crossing, next_crossing};
 use super::descent::tile_of;
 use super::spot::{Hand, Spot};
-use super::work::Work;
+use super::work::{LOOK, STRIDE, Work};
 use crate::grid::GridPoint;
 use crate::terrain::{Altitude, Box2, Ground, Window};
 
@@ -89,7 +89,7 @@ impl Path {
         work: &mut Work,
     ) -> Sweep {
         while let Some(&end) = self.ends.last() {
-            if !work.take() {
+            if !work.take(LOOK) {
                 return Sweep::Unfinished;
             }
             let span = Box2::around(self.at.column(), end.column());
@@ -124,7 +124,7 @@ impl Path {
         let mut on_surface = self.on_surface;
         let mut steps = Steps::new(&self.at, &end);
         while let Some(step) = steps.next() {
-            if !work.take() {
+            if !work.take(STRIDE) {
                 return Some(Sweep::Unfinished);
             }
             if on_surface && step.is_tiny() {

@@ -1,10 +1,18 @@
 //! How much one tick may do.
 
-/// Units of work a tick may spend: a patch visited, a box asked about, or
-/// three evaluations in a patch are one unit each.
+/// Units of work a tick may spend; a unit is about a hundred instructions of a
+/// Cortex-M4F.
 ///
-/// Past it the work goes on in the next tick from where it stopped.
+/// Past it the work goes on in the next tick from where it stopped. What has
+/// been begun is ended: a look at a patch and its neighbours may go over.
 pub const WORK_PER_TICK: u32 = 64;
+
+/// Units for coming to a patch; the evaluations there are a unit each.
+pub(super) const VISIT: u32 = 2;
+/// Units for asking whether a box is clear.
+pub(super) const LOOK: u32 = 2;
+/// Units for a cell that a sweep walks through.
+pub(super) const STRIDE: u32 = 3;
 
 /// What is left of a tick's work.
 #[derive(Debug)]
@@ -19,17 +27,17 @@ impl Work {
         }
     }
 
-    /// Takes one unit; `false` when none is left.
+    /// Takes so many units; `false` when none was left.
     #[must_use]
-    pub(super) fn take(&mut self) -> bool {
-        let enough = self.left > 0;
-        self.left = self.left.saturating_sub(1);
-        enough
+    pub(super) fn take(&mut self, units: u32) -> bool {
+        let some = self.left > 0;
+        self.charge(units);
+        some
     }
 
-    /// Charges for the evaluations of one search in a patch.
-    pub(super) fn charge(&mut self, evaluations: u32) {
-        self.left = self.left.saturating_sub(evaluations / 3);
+    /// Charges for what is done already.
+    pub(super) fn charge(&mut self, units: u32) {
+        self.left = self.left.saturating_sub(units);
     }
 
     /// Units spent so far.

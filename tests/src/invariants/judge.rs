@@ -83,8 +83,8 @@ impl Seen {
 /// What the judge learned that is no yes or no.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured {
-    /// Ticks waiting, free and touching.
-    pub states: [u64; 3],
+    /// Ticks waiting, free, touching and letting go.
+    pub states: [u64; 4],
     /// Ticks that left work over.
     pub unsettled: u64,
     /// Most units of work in a tick.
@@ -110,6 +110,8 @@ pub struct Judge<'g> {
     rule: Rule,
     tick: usize,
     before: Option<Seen>,
+    /// What was felt, cells, when the proxy began to let go.
+    let_go_from: f64,
     /// What was learned.
     pub measured: Measured,
 }
@@ -125,6 +127,7 @@ impl<'g> Judge<'g> {
             rule,
             tick: 0,
             before: None,
+            let_go_from: 0.0,
             measured: Measured::default(),
         }
     }
@@ -163,6 +166,7 @@ impl<'g> Judge<'g> {
         };
         self.was_seen_above(&before, seen)?;
         self.fades(&before, seen)?;
+        self.lets_go_gently(&before, seen)?;
         self.descends(&before, seen)?;
         if before.is_free() {
             self.first_crossing(&before, seen)?;
@@ -191,7 +195,8 @@ impl<'g> Judge<'g> {
         }
         let none = felt.stretch.to_array() == [0.0; 3];
         let free_at_hand = !seen.is_free() || seen.proxy == seen.hip;
-        if (!seen.is_touching() && !none) || !free_at_hand {
+        let may_press = seen.is_touching() || felt.state == State::LettingGo;
+        if (!may_press && !none) || !free_at_hand {
             return self.fail(Invariant::Consistent, format!("{seen:?}"));
         }
         Ok(())
@@ -231,7 +236,8 @@ impl<'g> Judge<'g> {
             return Ok(()); // off the surface: said before
         };
         self.measured.judged += 1;
-        if distance(seen.proxy, seen.hip) > FAR {
+        // Within the bound of the hand itself there is no force to be wrong about.
+        if !(ERROR..=FAR).contains(&distance(seen.proxy, seen.hip)) {
             return Ok(());
         }
         let allowed = seen.allowed();
@@ -320,6 +326,23 @@ impl<'g> Judge<'g> {
                 before.presence(),
                 seen.presence()
             );
+            return self.fail(Invariant::Fade, detail);
+        }
+        Ok(())
+    }
+
+    /// What was felt last fades to nothing in equal steps.
+    fn lets_go_gently(&mut self, before: &Seen, seen: &Seen) -> Verdict {
+        let felt = |seen: &Seen| seen.felt.stretch.as_dvec3().length();
+        let lets_go = |seen: &Seen| seen.felt.state == State::LettingGo;
+        if lets_go(seen) && !lets_go(before) {
+            self.let_go_from = felt(before);
+        }
+        let step = felt(before) - felt(seen);
+        let most = (f64::from(RATE) + 1e-3) * self.let_go_from;
+        let ends = lets_go(before) || lets_go(seen);
+        if ends && !(-1e-6..=most + 1e-6).contains(&step) {
+            let detail = format!("a step of {step:.3e}, {before:?} then {seen:?}");
             return self.fail(Invariant::Fade, detail);
         }
         Ok(())

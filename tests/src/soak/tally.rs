@@ -104,8 +104,8 @@ impl fmt::Display for Tally {
 }
 
 fn row(f: &mut fmt::Formatter<'_>, name: &str, m: &Measured) -> fmt::Result {
-    let [waiting, free, touching] = m.states;
-    let ticks = waiting + free + touching;
+    let [waiting, free, touching, letting_go] = m.states;
+    let (touching, ticks) = (touching + letting_go, m.states.iter().sum::<u64>());
     writeln!(
         f,
         "{name:13} {ticks:10} {waiting:10} {free:10} {touching:10} {:10} {:5}  {:11.2e}  {:11.2e} {:10} {:8}",
