@@ -49,6 +49,7 @@ cargo xtask COMMAND
 
   HAPTERRA_TOOLCHAIN=rustup|distribution  builds the images only with this one
   HAPTERRA_QEMU=PATH                      the qemu-system-arm to use
+  HAPTERRA_TICK_HZ=1000..10000            haptic ticks a second of the real boards' images
 ";
 
 fn main() -> ExitCode {
