@@ -17,12 +17,13 @@ use super::work::{LOOK, STRIDE, Work};
 use crate::grid::GridPoint;
 use crate::terrain::{Altitude, Box2, Ground, Window};
 
-/// Longest piece, in cells along an axis, that is walked cell by cell.
-const WALK_CELLS: u32 = 8;
+/// Longest piece, in cells along an axis, that is walked cell by cell: nine
+/// cells at most, which a tick's work is enough for.
+const WALK_CELLS: u32 = 4;
 /// Tallest piece, in cells, that is walked.
 const WALK_HEIGHT: u32 = 16;
 /// Halvings that bring the longest possible segment down to a walk, and one.
-const DEPTH: usize = 29;
+const DEPTH: usize = 30;
 
 /// How a sweep ended.
 #[derive(Clone, Copy, Debug)]

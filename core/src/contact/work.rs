@@ -1,18 +1,18 @@
 //! How much one tick may do.
 
-/// Units of work a tick may spend; a unit is about a hundred instructions of a
+/// Units of work a tick may spend; a unit is two to three hundred instructions of a
 /// Cortex-M4F.
 ///
 /// Past it the work goes on in the next tick from where it stopped. What has
 /// been begun is ended: a look at a patch and its neighbours may go over.
-pub const WORK_PER_TICK: u32 = 64;
+pub const WORK_PER_TICK: u32 = 20;
 
 /// Units for coming to a patch; the evaluations there are a unit each.
 pub(super) const VISIT: u32 = 2;
 /// Units for asking whether a box is clear.
 pub(super) const LOOK: u32 = 2;
 /// Units for a cell that a sweep walks through.
-pub(super) const STRIDE: u32 = 3;
+pub(super) const STRIDE: u32 = 2;
 
 /// What is left of a tick's work.
 #[derive(Debug)]
