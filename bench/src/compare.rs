@@ -220,7 +220,7 @@ fn along(grid: &Grid, path: &Path, entries: &mut [Entry<'_>], effort: Effort) ->
                 ns: quantiles(times.clone(), [0.25, 0.5, 0.75]),
                 ratio: quantiles(ratios.collect(), [0.5])[0],
                 error: error(grid, path, &answers, effort.judged),
-                jump: largest_jump(&answers),
+                jump: largest_jump(&answers[path.approach.saturating_sub(1)..]),
                 missed: missed(grid, path, &answers),
                 unsettled: part(answers.iter().map(|answer| !answer.settled)),
             }

@@ -10,6 +10,8 @@ pub struct Path {
     pub name: &'static str,
     /// One haptic interface point a tick; the first is above the surface.
     pub hands: Vec<Hand>,
+    /// How many of them, at the beginning, come down from above the surface.
+    pub approach: usize,
 }
 
 /// Cells kept free at the border of the field.
@@ -43,8 +45,13 @@ pub fn all(grid: &Grid, ticks: usize) -> Vec<Path> {
 pub fn slide(grid: &Grid, name: &'static str, step: f64, ticks: usize) -> Path {
     let mut walk = Walk::new(grid, 11);
     let mut hands = approach(grid, walk.at, -0.1);
+    let approach = hands.len();
     hands.extend((0..ticks).map(|_| over(grid, walk.on(grid, step), -0.1)));
-    Path { name, hands }
+    Path {
+        name,
+        hands,
+        approach,
+    }
 }
 
 /// Taps half a cell deep every hundred ticks, wandering slowly.
@@ -57,7 +64,11 @@ pub fn tapping(grid: &Grid, ticks: usize) -> Path {
         over(grid, walk.on(grid, 0.02), 0.5 * phase.cos())
     }));
     let name = "tapping";
-    Path { name, hands }
+    Path {
+        name,
+        hands,
+        approach: 0,
+    }
 }
 
 /// Jumps up to 0.3 cell every way, mostly near the surface.
@@ -75,7 +86,11 @@ pub fn random(grid: &Grid, ticks: usize) -> Path {
         over(grid, walk.on(grid, step), height)
     }));
     let name = "random";
-    Path { name, hands }
+    Path {
+        name,
+        hands,
+        approach: 0,
+    }
 }
 
 /// Rests 0.1 cell below the surface and does not move by one bit.
@@ -83,10 +98,15 @@ pub fn random(grid: &Grid, ticks: usize) -> Path {
 pub fn resting(grid: &Grid, ticks: usize) -> Path {
     let walk = Walk::new(grid, 14);
     let mut hands = approach(grid, walk.at, -0.1);
-    let last = hands[hands.len() - 1];
+    let approach = hands.len();
+    let last = hands[approach - 1];
     hands.extend(std::iter::repeat_n(last, ticks));
     let name = "unmoved";
-    Path { name, hands }
+    Path {
+        name,
+        hands,
+        approach,
+    }
 }
 
 /// How high a hand flies.
@@ -111,7 +131,11 @@ pub fn flight(grid: &Grid, name: &'static str, flight: Flight, ticks: usize) -> 
             Flight::High => Hand::at([at[0], at[1], high]),
         });
     }
-    Path { name, hands }
+    Path {
+        name,
+        hands,
+        approach: 0,
+    }
 }
 
 /// Sweeps of `length` cells in one tick each, there and back, half a cell
@@ -152,7 +176,11 @@ pub fn sweeps(grid: &Grid, name: &'static str, length: f64, ticks: usize) -> Opt
         }
         hands.push(Hand::at([to[0], to[1], sky]));
     }
-    Some(Path { name, hands })
+    Some(Path {
+        name,
+        hands,
+        approach: 0,
+    })
 }
 
 /// The highest sample beside a straight way: an upper bound of the surface.

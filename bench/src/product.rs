@@ -88,6 +88,28 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
             stretch: felt.stretch.to_array(),
         }
     }
+
+    /// To be judged: the proxy itself, before any fading.
+    fn answers(&mut self, path: &[Hand]) -> Vec<Answer> {
+        self.forget();
+        let mut feel = |hand: &Hand| {
+            let felt = self
+                .contact
+                .step(self.window, hand.grid, self.rule, Pace::RealTime);
+            let touching = felt.state == State::Touching;
+            let stretch = if touching {
+                hand.grid.to(&felt.proxy)
+            } else {
+                felt.stretch
+            };
+            Answer {
+                touching,
+                settled: felt.settled,
+                stretch: stretch.to_array(),
+            }
+        };
+        path.iter().map(|hand| feel(hand)).collect()
+    }
 }
 
 /// The least that a tick can do: see that the hand has not moved, and give the

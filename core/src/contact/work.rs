@@ -1,11 +1,11 @@
 //! How much one tick may do.
 
-/// Units of work a tick may spend; a unit is two to three hundred instructions of a
+/// Units of work a tick may spend; a unit is about two hundred instructions of a
 /// Cortex-M4F.
 ///
 /// Past it the work goes on in the next tick from where it stopped. What has
 /// been begun is ended: a look at a patch and its neighbours may go over.
-pub const WORK_PER_TICK: u32 = 20;
+pub const WORK_PER_TICK: u32 = 64;
 
 /// Units for coming to a patch; the evaluations there are a unit each.
 pub(super) const VISIT: u32 = 2;
