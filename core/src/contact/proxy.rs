@@ -47,6 +47,8 @@ pub struct Contact {
     /// Squared distance at which the last unfinished descent of this same
     /// hand stopped.
     pub(super) reached: f32,
+    /// How often the proxy has left the surface for this same hand.
+    pub(super) leaps: u32,
     /// By the paper's rule: cells on the way to `sought` that were found to be no
     /// candidates before a tile was missing.
     passed: usize,
@@ -74,6 +76,7 @@ impl Contact {
             presence: 1.0,
             late: false,
             reached: f32::INFINITY,
+            leaps: 0,
             passed: 0,
             sought: GridPoint::default(),
             last: Felt::default(),

@@ -11,6 +11,10 @@ use super::{Felt, Pace, State};
 use crate::grid::GridPoint;
 use crate::terrain::{Altitude, Box2, Ground, Window};
 
+/// Times that a proxy may leave the surface for one hand: more is rounding,
+/// from a place to another and back.
+const LEAPS: u32 = 256;
+
 impl Contact {
     /// One tick by the swept rule.
     pub(super) fn swept<const D: usize>(
@@ -22,7 +26,7 @@ impl Contact {
         work: &mut Work,
     ) -> Felt {
         if moved {
-            self.reached = f32::INFINITY;
+            (self.reached, self.leaps) = (f32::INFINITY, 0);
             self.redirect(hip);
         }
         if matches!(self.phase, Phase::LettingGo { .. }) {
@@ -116,7 +120,7 @@ impl Contact {
                 }
                 self.phase = Phase::Touching {
                     spot,
-                    may_leave: progress,
+                    may_leave: progress && self.leaps < LEAPS,
                 };
                 return None;
             }
@@ -149,6 +153,7 @@ impl Contact {
         let (spot, z) = match descend(window, &hand, spot, may_leave, work) {
             Descent::Rests(spot, z) => (spot, z),
             Descent::Leaves(spot) => {
+                self.leaps += 1;
                 let from = self.point_on(window, &hand, &spot);
                 self.phase = Phase::Sweeping(Path::off_surface(from, hip));
                 return None;
