@@ -92,7 +92,7 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
     /// To be judged: the proxy itself, before any fading.
     fn answers(&mut self, path: &[Hand]) -> Vec<Answer> {
         self.forget();
-        let mut feel = |hand: &Hand| {
+        let feel = |hand: &Hand| {
             let felt = self
                 .contact
                 .step(self.window, hand.grid, self.rule, Pace::RealTime);
@@ -108,7 +108,7 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
                 stretch: stretch.to_array(),
             }
         };
-        path.iter().map(|hand| feel(hand)).collect()
+        path.iter().map(feel).collect()
     }
 }
 
