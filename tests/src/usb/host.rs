@@ -21,7 +21,7 @@ pub const PACKET: usize = 64;
 /// Why a transfer failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Failure {
-    /// Not answered in [`PATIENCE_MS`].
+    /// Not answered in `PATIENCE_MS`.
     Silence,
     /// Refused.
     Stalled,
