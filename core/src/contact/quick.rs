@@ -5,13 +5,16 @@
 //! alone, never on what the window happens to hold: other bits come out than by
 //! the general search, so another window must not choose another way.
 
+use glam::Vec3;
+
 use super::Pace;
 use super::glide::{Glide, glide};
 use super::proxy::{Contact, Phase};
 use super::spot::Hand;
+use super::sweep::lower;
 use super::track::Under;
 use crate::grid::GridPoint;
-use crate::terrain::{Altitude, Box2, Window};
+use crate::terrain::{Box2, Window};
 
 impl Contact {
     /// Answers, or changes nothing.
@@ -32,12 +35,7 @@ impl Contact {
     /// The last answer was "free".
     #[inline(never)]
     fn flies_on<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
-        let low = if self.hip.is_below(hip) {
-            &self.hip
-        } else {
-            hip
-        };
-        let low = Altitude::new(low.cell()[2], low.frac().z);
+        let low = lower(&self.hip, hip);
         let free = low.cell() >= window.top()
             || window.is_clear_nearby(Box2::around(self.hip.column(), hip.column()), low);
         if free {
@@ -63,10 +61,20 @@ impl Contact {
         let Some(stretch) = followed.flatten() else {
             return self.glides_on(window, hip, pace);
         };
-        self.last.proxy = hand.point_inside(&track.spot, stretch.z);
-        self.last.stretch = stretch;
-        self.last.work = 1;
+        let proxy = hand.point_inside(&track.spot, stretch.z);
+        self.rests_at(proxy, stretch, 1);
         true
+    }
+
+    /// The answer of a slide: all of it is felt, and nothing held it up.
+    #[inline]
+    fn rests_at(&mut self, proxy: GridPoint, stretch: Vec3, work: u32) {
+        self.last.proxy = proxy;
+        self.last.stretch = stretch;
+        self.last.work = work;
+        self.last.held_up_by = None;
+        self.last.settled = true;
+        self.answered = true;
     }
 
     /// As [`Self::slides_on`], where there is more to look at: on or over the
@@ -90,12 +98,8 @@ impl Contact {
         match glide {
             Glide::Rests(rest) => {
                 *track = rest.track;
-                self.last.proxy = hand.point_at(&rest.track.spot, rest.stretch.z);
-                self.last.stretch = rest.stretch;
-                self.last.work = 1 + 2 * rest.hops;
-                self.last.held_up_by = None;
-                self.last.settled = true;
-                self.answered = true;
+                let proxy = hand.point_at(&rest.track.spot, rest.stretch.z);
+                self.rests_at(proxy, rest.stretch, 1 + 2 * rest.hops);
             }
             Glide::HeldUp(tile) if pace == Pace::LockStep => {
                 self.last.held_up_by = Some(tile);

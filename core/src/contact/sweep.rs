@@ -170,7 +170,9 @@ const NO_PROGRESS: f32 = 1e-6;
 /// surface.
 const TINY: f32 = 1e-5;
 
-fn lower(a: &GridPoint, b: &GridPoint) -> Altitude {
+/// The lower end of a way.
+#[inline]
+pub(super) fn lower(a: &GridPoint, b: &GridPoint) -> Altitude {
     let low = if a.is_below(b) { a } else { b };
     Altitude::new(low.cell()[2], low.frac().z)
 }

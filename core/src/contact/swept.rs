@@ -4,12 +4,12 @@ use super::descent::{Descent, descend};
 use super::presence::is_far;
 use super::proxy::{Contact, Phase};
 use super::spot::{Hand, Spot};
-use super::sweep::{Path, Sweep};
+use super::sweep::{Path, Sweep, lower};
 use super::track::Track;
 use super::work::Work;
 use super::{Felt, Pace, State};
 use crate::grid::GridPoint;
-use crate::terrain::{Altitude, Box2, Ground, Window};
+use crate::terrain::{Box2, Ground, Window};
 
 /// Times that a proxy may leave the surface for one hand: more is rounding,
 /// from a place to another and back.
@@ -71,9 +71,8 @@ impl Contact {
         work: &mut Work,
     ) -> Option<Felt> {
         let from = self.hip;
-        let low = if from.is_below(&hip) { &from } else { &hip };
         let span = Box2::around(from.column(), hip.column());
-        if window.is_clear(span, Altitude::new(low.cell()[2], low.frac().z)) {
+        if window.is_clear(span, lower(&from, &hip)) {
             return Some(self.flies(hip));
         }
         let mut path = Path::through_air(from, hip);
