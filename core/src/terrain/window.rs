@@ -33,7 +33,6 @@ pub struct Window<'t, const D: usize> {
     level: u8,
     size: [i32; 2],
     top: i32,
-    revision: u32,
 }
 
 impl<'t, const D: usize> Window<'t, D> {
@@ -46,7 +45,6 @@ impl<'t, const D: usize> Window<'t, D> {
             level: 0,
             size: [0, 0],
             top: i32::MIN,
-            revision: 0,
         };
         window.reset(0, [0, 0], i32::MIN);
         window
@@ -62,7 +60,6 @@ impl<'t, const D: usize> Window<'t, D> {
         self.level = level;
         self.size = size;
         self.top = top;
-        self.revise();
     }
 
     /// Puts `tile` in its slot and gives back the buffer that was there; gives
@@ -76,7 +73,6 @@ impl<'t, const D: usize> Window<'t, D> {
         let slot = &mut self.slots[wrap::<D>(key.row)][wrap::<D>(key.col)];
         let spent = core::mem::replace(slot, tile);
         self.renew_maxima(key, top);
-        self.revise();
         spent
     }
 
@@ -96,12 +92,6 @@ impl<'t, const D: usize> Window<'t, D> {
     #[must_use]
     pub const fn top(&self) -> i32 {
         self.top
-    }
-
-    /// Changes whenever what the window holds does. Never zero.
-    #[must_use]
-    pub const fn revision(&self) -> u32 {
-        self.revision
     }
 
     /// The tile now in the slot where `key` belongs.
@@ -197,10 +187,6 @@ impl<'t, const D: usize> Window<'t, D> {
         } else {
             i32::MAX
         }
-    }
-
-    fn revise(&mut self) {
-        self.revision = self.revision.wrapping_add(1).max(1);
     }
 
     fn renew_maxima(&mut self, key: TileKey, top: i32) {
