@@ -40,24 +40,25 @@ impl ForceLaw {
 
 /// `v`, shortened to `limit` where it is longer; zero if it is not finite.
 ///
-/// The result is never longer than `limit`, and at most 8 ulp shorter than it
-/// where it was clamped.
+/// The result is never longer than `limit` (of normal size), and at most 8 ulp
+/// shorter than it where it was clamped.
 #[must_use]
 pub fn clamp_length(v: Vec3, limit: f32) -> Vec3 {
     let largest = v.abs().max_element();
     if !v.is_finite() || largest == 0.0 {
         return Vec3::ZERO;
     }
-    // Nothing to square unless the limit is near: the usual case.
     let squared = v.length_squared();
-    if squared <= limit * limit {
+    // The usual case; not where the square is too small or too large to tell.
+    if squared.is_normal() && squared <= limit * limit {
         return v;
     }
     // Scaled first, so that squaring cannot overflow.
     let unit = v / largest;
     // Four roundings below, and one in the caller's own look at the length.
     let limit = limit * (1.0 - 4.0 * f32::EPSILON);
-    unit * (limit / libm::sqrtf(unit.length_squared()))
+    let part = limit / libm::sqrtf(unit.length_squared());
+    if largest <= part { v } else { unit * part }
 }
 
 #[cfg(test)]
@@ -68,6 +69,23 @@ mod tests {
     fn proportional_below_the_limit() {
         let f = ForceLaw::PREMIUM.force_n(Vec3::new(0.0, 0.0, 4.0));
         assert_eq!(f, Vec3::new(0.0, 0.0, 2.0));
+    }
+
+    #[test]
+    fn a_limit_that_cannot_be_squared_is_kept_all_the_same() {
+        let long = Vec3::new(5.1e27, -2e27, 5.1e26);
+        for limit in [1e-30, 1e-22, 1e19, 1e20, 5e27, 1e38] {
+            for scale in [1e-37, 1.0, 1e10] {
+                let v = long * scale;
+                let length = v.as_dvec3().length();
+                let kept = clamp_length(v, limit).as_dvec3().length();
+                let wanted = length.min(f64::from(limit));
+                assert!(
+                    kept <= f64::from(limit) && kept >= wanted * (1.0 - 1e-6),
+                    "{v} by {limit}: {kept}"
+                );
+            }
+        }
     }
 
     #[test]
