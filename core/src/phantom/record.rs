@@ -114,7 +114,9 @@ mod tests {
     #[test]
     fn no_flipped_bit_and_no_missing_byte_gets_through() {
         let good = bytes();
-        for bit in 0..8 * good.len() {
+        // Miri is some hundred times slower: there, a few of each.
+        let (bits, lengths) = if cfg!(miri) { (61, 17) } else { (1, 1) };
+        for bit in (0..8 * good.len()).step_by(bits) {
             let mut bad = good.clone();
             bad[bit / 8] ^= 1 << (bit % 8);
             let error = Calibration::decode(&bad).expect_err("damaged");
@@ -125,7 +127,7 @@ mod tests {
             };
             assert!(expected, "bit {bit}: {error:?}");
         }
-        for length in 0..good.len() {
+        for length in (0..good.len()).step_by(lengths) {
             assert!(Calibration::decode(&good[..length]).is_err(), "{length}");
         }
         assert_eq!(Calibration::decode(&[0xFF; 64]), Err(BadRecord::NotARecord));
