@@ -9,6 +9,7 @@ mod counts;
 mod demo;
 mod deny;
 mod flash;
+mod fuzz;
 mod image;
 mod lint;
 mod miri;
@@ -42,6 +43,8 @@ cargo xtask COMMAND
   campaign [--seconds N] [--seed S] [--segment K]
                          the closed loop with everything going wrong at random, 10,000 s of
                          arm time unless told otherwise; writes docs/campaign.md
+  fuzz TARGET MINUTES    libFuzzer on `tick` or `wire`; installs cargo-fuzz and a nightly
+                         compiler where they are missing
   miri                   core's tests under Miri, where it can run
   deny                   licences, bans, sources and advisories of dependencies
   image BOARD            build an image and print where its ELF is
@@ -91,6 +94,13 @@ fn command() -> Result<ExitCode> {
             for (_, path) in test::images(std::slice::from_ref(board))? {
                 println!("{}", path.display());
             }
+        }
+        "fuzz" => {
+            let target = words.value()?.string()?;
+            let minutes = words
+                .value()
+                .map_err(|_| anyhow::anyhow!("say for how many minutes"))?;
+            fuzz::fuzz(&target, &minutes.string()?)?;
         }
         "flash" => flash::flash(board::by_name(&words.value()?.string()?)?)?,
         plain => {

@@ -138,7 +138,8 @@ fn position(bytes: &mut Bytes<'_>) -> GridPoint {
 fn look(outcome: &Outcome, law: &ForceLaw) {
     let (sample, drive) = (&outcome.sample, &outcome.drive);
     let force = sample.force_n.as_dvec3().length();
-    let limit = f64::from(law.max_force_n) * (1.0 + 1e-6);
+    // A limit smaller than any normal number is kept to no more than that.
+    let limit = f64::from(law.max_force_n.max(f32::MIN_POSITIVE)) * (1.0 + 1e-6);
     assert!(sample.force_n.is_finite() && force <= limit, "{outcome:?}");
     assert!(drive.currents_a.is_finite(), "{outcome:?}");
     let most = Calibration::PREMIUM_1_5.peak_current_a;

@@ -1,0 +1,113 @@
+//! `cargo xtask fuzz TARGET MINUTES`: libFuzzer on the tick or on the wire.
+
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+
+use crate::run::{on_path, output, root, run, say, target_dir, timed};
+
+/// The programs in `fuzz/fuzz_targets`.
+const TARGETS: [&str; 2] = ["tick", "wire"];
+
+/// Bytes of an input at most: some hundred ticks, or messages.
+const LONGEST: u32 = 4096;
+/// Seconds after which an input counts as one that hangs.
+const PATIENCE_S: u32 = 20;
+
+/// Fuzzes `target` for so many minutes, from what earlier runs kept in
+/// `fuzz/corpus`. An input that breaks it ends the run and is kept in
+/// `fuzz/artifacts`.
+pub(crate) fn fuzz(target: &str, minutes: &str) -> Result<()> {
+    if !TARGETS.contains(&target) {
+        bail!(
+            "there is no target {target}; there are: {}",
+            TARGETS.join(", ")
+        );
+    }
+    let seconds = seconds(minutes)?;
+    has_nightly()?;
+    has_cargo_fuzz()?;
+    if on_path("c++").is_none() {
+        bail!("libFuzzer wants a C++ compiler; on Debian: apt-get install g++");
+    }
+    timed(&format!("fuzzing {target} for {minutes} minutes"), || {
+        run(nightly(&["fuzz", "run", "--fuzz-dir", ".", target, "--"])
+            .current_dir(root().join("fuzz"))
+            .arg(format!("-max_total_time={seconds}"))
+            .arg(format!("-max_len={LONGEST}"))
+            .arg(format!("-timeout={PATIENCE_S}"))
+            .arg("-print_final_stats=1")
+            .env("CARGO_TARGET_DIR", target_dir()))
+    })
+}
+
+fn seconds(minutes: &str) -> Result<u64> {
+    let known = minutes.parse().ok().filter(|m: &f64| *m > 0.0);
+    let minutes = known.with_context(|| format!("{minutes} is no number of minutes"))?;
+    Ok((60.0 * minutes).ceil() as u64)
+}
+
+/// The nightly compiler's cargo, whichever runs this program.
+fn nightly(words: &[&str]) -> Command {
+    let mut command = Command::new("cargo");
+    command
+        .arg("+nightly")
+        .args(words)
+        .env_remove("CARGO")
+        .env_remove("RUSTUP_TOOLCHAIN");
+    command
+}
+
+fn has_nightly() -> Result<()> {
+    const WORDS: [&str; 5] = ["toolchain", "install", "nightly", "--profile", "minimal"];
+    let is_here = || output(&mut nightly(&["--version"])).is_some();
+    if is_here() {
+        return Ok(());
+    }
+    say("installing: rustup toolchain install nightly --profile minimal");
+    if output(Command::new("rustup").args(WORDS)).is_none() || !is_here() {
+        bail!(
+            "no nightly compiler, whose sanitizers libFuzzer needs; with rustup, type: rustup {}",
+            WORDS.join(" ")
+        );
+    }
+    Ok(())
+}
+
+fn has_cargo_fuzz() -> Result<()> {
+    if output(&mut nightly(&["fuzz", "--version"])).is_some() {
+        return Ok(());
+    }
+    timed("installing: cargo install cargo-fuzz --locked", || {
+        run(&mut nightly(&["install", "cargo-fuzz", "--locked"]))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_target_is_there_and_no_other() {
+        let mut found: Vec<_> = std::fs::read_dir(root().join("fuzz/fuzz_targets"))
+            .expect("a folder")
+            .map(|entry| entry.expect("readable").path())
+            .map(|path| {
+                path.file_stem()
+                    .expect("a name")
+                    .to_string_lossy()
+                    .into_owned()
+            })
+            .collect();
+        found.sort();
+        assert_eq!(found, TARGETS);
+    }
+
+    #[test]
+    fn words_that_make_no_sense_are_refused() {
+        assert_eq!(seconds("0.5").unwrap(), 30);
+        assert!(seconds("0").is_err() && seconds("soon").is_err());
+        let message = fuzz("tock", "1").unwrap_err().to_string();
+        assert!(message.contains("tick, wire"), "{message}");
+    }
+}
