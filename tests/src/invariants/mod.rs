@@ -1,12 +1,16 @@
 //! What must hold in every tick, on any terrain, for any hand, judged in f64 by
 //! methods that are none of the product's.
 //!
-//! [`judge`] is the list; [`surface`], [`crossing`] and [`descent`] are what it
-//! knows about the terrain. Everything is in cells.
+//! [`judge`] is the list; [`seen`] is what it looks at, [`surface`], [`crossing`]
+//! and [`descent`] are what it knows about the terrain. Everything is in cells.
 
+mod answer;
+mod change;
 pub mod crossing;
 pub mod descent;
 pub mod judge;
+mod place;
+pub mod seen;
 pub mod surface;
 
 /// What a tick may not break.
@@ -14,7 +18,7 @@ pub mod surface;
 pub enum Invariant {
     /// The answer is finite and a valid position.
     Finite,
-    /// The force is within the clamp.
+    /// The force is the spring's, within the clamp.
     Clamp,
     /// The tick's work is within its bound.
     Work,

@@ -8,7 +8,8 @@ use super::terrain::{KINDS, Terrain};
 use super::{hand, twin};
 use crate::chance::Chance;
 use crate::field::point;
-use crate::invariants::judge::{Judge, Measured, Seen};
+use crate::invariants::judge::{Judge, Measured};
+use crate::invariants::seen::Seen;
 use crate::invariants::{Invariant, Violation};
 
 /// Ticks that one hand may be repeated for in lock-step.

@@ -5,10 +5,10 @@ use hapterra_core::contact::{Pace, Rule};
 use super::hand::GRAIN;
 use super::run::{Player, Scene};
 use super::stage::{Buffers, Supply};
-use super::symmetry;
+use super::symmetry::{self, Symmetry};
 use super::terrain::Kind;
 use crate::chance::Chance;
-use crate::invariants::judge::Seen;
+use crate::invariants::seen::Seen;
 use crate::invariants::surface::distance;
 use crate::invariants::{Invariant, Violation};
 
@@ -64,7 +64,11 @@ pub fn windowed(scene: &Scene, seen: &[Seen], buffers: &mut Buffers) -> Verdict 
     same_bits(Invariant::Window, seen, &whole, [0; 3])
 }
 
-fn same_bits(invariant: Invariant, seen: &[Seen], other: &[Seen], shift: [i32; 3]) -> Verdict {
+/// Compares two runs of which the second is `shift` cells away.
+///
+/// # Errors
+/// `invariant`, where a bit of the answers differs.
+pub fn same_bits(invariant: Invariant, seen: &[Seen], other: &[Seen], shift: [i32; 3]) -> Verdict {
     for (tick, (a, b)) in seen.iter().zip(other).enumerate() {
         let bits = |seen: &Seen, shift: [i32; 3]| {
             let (cell, frac) = (seen.felt.proxy.cell(), seen.felt.proxy.frac());
@@ -120,7 +124,22 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Verd
     let path = scene.path.iter().map(|p| turned(*p)).collect();
     let twin = scene.with(symmetry.terrain(&scene.terrain), path);
     let other = twin.feel(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
-    for (tick, (a, b)) in seen.iter().zip(&other).enumerate() {
+    same_way(scene, symmetry, &seen, &other, buffers)
+}
+
+/// Compares what was felt with what the mirrored or turned twin felt.
+///
+/// # Errors
+/// Where they differ and a hair's breadth makes no difference.
+pub fn same_way(
+    scene: &Scene,
+    symmetry: Symmetry,
+    seen: &[Seen],
+    other: &[Seen],
+    buffers: &mut Buffers,
+) -> Verdict {
+    let turned = |p| symmetry.point(&scene.terrain, p);
+    for (tick, (a, b)) in seen.iter().zip(other).enumerate() {
         if agree(turned(a.proxy), a, b) {
             continue;
         }

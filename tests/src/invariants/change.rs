@@ -1,0 +1,139 @@
+//! How a tick goes on from the one before.
+
+use hapterra_core::contact::State;
+use hapterra_core::contact::presence::RATE;
+
+use super::judge::{Judge, Verdict};
+use super::seen::Seen;
+use super::surface::{distance, patches_at};
+use super::{Invariant, crossing};
+use crate::scene::terrain::{Kind, WALL, WALL_EVERY};
+
+/// Distances that differ by less than this part count as equal: the squared
+/// distance is compared to 10⁻⁶ in each patch on the way.
+const TIE: f64 = 4e-6;
+/// A hand that moves no farther than this in a tick, in cells, is in the same
+/// contact as before.
+const NEAR: f64 = 0.1;
+
+impl Judge<'_> {
+    pub(super) fn was_seen_above(&self, before: &Seen, seen: &Seen) -> Verdict {
+        if before.felt.state == State::Waiting && seen.is_touching() {
+            return self.fail(Invariant::SeenAbove, format!("{before:?} then {seen:?}"));
+        }
+        Ok(())
+    }
+
+    pub(super) fn fades(&self, before: &Seen, seen: &Seen) -> Verdict {
+        let moved = distance(before.hip, seen.hip);
+        let hopped = distance(before.proxy, seen.proxy);
+        if !before.is_touching() || moved > NEAR {
+            return Ok(()); // a new contact may come at once
+        }
+        let rate = f64::from(RATE) + 1e-3;
+        let broken = match (before.presence(), seen.presence()) {
+            (Some(was), Some(is)) => hopped < 2.0 * NEAR && (is - was).abs() > rate,
+            // Let go: there was next to nothing left.
+            (Some(was), None) => seen.felt.state == State::Waiting && was > rate,
+            (None, _) => false,
+        };
+        if broken {
+            let detail = format!(
+                "{:?} to {:?}: {before:?} then {seen:?}",
+                before.presence(),
+                seen.presence()
+            );
+            return self.fail(Invariant::Fade, detail);
+        }
+        Ok(())
+    }
+
+    /// What was felt last fades to nothing in equal steps.
+    pub(super) fn lets_go_gently(&mut self, before: &Seen, seen: &Seen) -> Verdict {
+        let felt = |seen: &Seen| seen.felt.stretch.as_dvec3().length();
+        let lets_go = |seen: &Seen| seen.felt.state == State::LettingGo;
+        if lets_go(seen) && !lets_go(before) {
+            self.let_go_from = felt(before);
+        }
+        let step = felt(before) - felt(seen);
+        let most = (f64::from(RATE) + 1e-3) * self.let_go_from;
+        let ends = lets_go(before) || lets_go(seen);
+        // It gets less, and does not turn.
+        let [was, is] = [before, seen].map(|seen| seen.felt.stretch.as_dvec3());
+        let turned = was.cross(is).length() > 1e-6 * was.length() * is.length().max(1e-6);
+        if ends && (turned || !(-1e-6..=most + 1e-6).contains(&step)) {
+            let detail = format!("a step of {step:.3e}, {before:?} then {seen:?}");
+            return self.fail(Invariant::Fade, detail);
+        }
+        Ok(())
+    }
+
+    pub(super) fn descends(&self, before: &Seen, seen: &Seen) -> Verdict {
+        // A proxy that waits for a tile goes on from where it entered its patch.
+        let waited = before.felt.held_up_by.is_some();
+        if !(before.is_touching() && seen.is_touching()) || waited {
+            return Ok(());
+        }
+        let was = distance(before.proxy, seen.hip);
+        let is = distance(seen.proxy, seen.hip);
+        let allowed = |seen: &Seen| seen.allowed_in_space(self.terrain);
+        if is > was * (1.0 + TIE) + allowed(seen) + allowed(before) {
+            let detail = format!("{is} after {was}: {before:?} then {seen:?}");
+            return self.fail(Invariant::Descent, detail);
+        }
+        Ok(())
+    }
+
+    pub(super) fn first_crossing(&mut self, before: &Seen, seen: &Seen) -> Verdict {
+        // Lowered by what rounding may do, the way meets the surface no later.
+        let slope = patches_at(self.terrain, seen.proxy[0], seen.proxy[1])
+            .map(|patch| patch.slope(seen.proxy[0], seen.proxy[1]))
+            .fold(0.0, f64::max);
+        let margin = 2.0 * (seen.allowed() + before.allowed()) * (1.0 + slope);
+        let lowered = |[x, y, z]: [f64; 3]| [x, y, z - margin];
+        let met = crossing::first(self.terrain, lowered(before.hip), lowered(seen.hip));
+        match (met, seen.is_touching()) {
+            (None, true) => {
+                let detail = format!("nothing was crossed: {before:?} then {seen:?}");
+                self.fail(Invariant::Freedom, detail)
+            }
+            (Some(met), true) => {
+                let (from, is) = (
+                    distance(met.at, lowered(seen.hip)),
+                    distance(seen.proxy, seen.hip),
+                );
+                if is > from * (1.0 + TIE) + 2.0 * margin {
+                    let detail = format!("{is} after {from} at {met:?}: {before:?} then {seen:?}");
+                    return self.fail(Invariant::FirstCrossing, detail);
+                }
+                Ok(())
+            }
+            (Some(met), false) => {
+                self.measured.around += u64::from(seen.is_free() && met.depth > 1e-3);
+                Ok(())
+            }
+            (None, false) => Ok(()),
+        }
+    }
+
+    pub(super) fn passes_no_wall(&self, before: &Seen, seen: &Seen) -> Verdict {
+        let inside = |p: [f64; 3]| {
+            (0..2).all(|axis| (0.0..=f64::from(self.terrain.size[axis])).contains(&p[axis]))
+        };
+        let held = |seen: &Seen| seen.felt.state != State::Waiting;
+        // Any place on a wall's top is farther from the hand than the proxy was.
+        let out_of_reach = WALL - seen.hip[2] > distance(before.proxy, seen.hip) + 1.0;
+        if self.terrain.kind != Kind::Walls
+            || !(held(before) && held(seen) && out_of_reach)
+            || !(inside(before.proxy) && inside(seen.proxy) && inside(seen.hip))
+        {
+            return Ok(());
+        }
+        let room =
+            |p: [f64; 3]| [0, 1].map(|axis| (p[axis] / f64::from(WALL_EVERY)).floor() as i32);
+        if room(before.proxy) != room(seen.proxy) {
+            return self.fail(Invariant::Wall, format!("{before:?} then {seen:?}"));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,112 @@
+//! Where a proxy lies.
+
+use super::judge::{Judge, Verdict};
+use super::seen::{ERROR, Seen};
+use super::surface::{Patch, distance, patches_at};
+use super::{Invariant, descent};
+
+/// Hands farther from the surface than this, in cells, are so far that distances
+/// to all that is near the proxy count as equal.
+const FAR: f64 = 1e4;
+
+impl Judge<'_> {
+    pub(super) fn is_on_surface(&mut self, seen: &Seen) -> Verdict {
+        let [x, y, z] = seen.proxy;
+        let off = patches_at(self.terrain, x, y)
+            .map(|patch| (z - patch.height(x, y)).abs() / patch.slope(x, y).hypot(1.0));
+        let off = off.fold(f64::INFINITY, f64::min);
+        if off > seen.allowed() {
+            let detail = format!("by {off:.3e} of {:.3e}: {seen:?}", seen.allowed());
+            return self.fail(Invariant::OnSurface, detail);
+        }
+        if seen.allowed() == ERROR {
+            self.measured.off_surface = self.measured.off_surface.max(off);
+        }
+        Ok(())
+    }
+
+    pub(super) fn is_local_minimum(&mut self, seen: &Seen) -> Verdict {
+        let Some((error, patch, start)) = self.off_minimum(seen.proxy, seen.hip) else {
+            return Ok(()); // off the surface: said before
+        };
+        self.measured.judged += 1;
+        // Within the bound of the hand itself there is no force to be wrong about.
+        if !(ERROR..=FAR).contains(&distance(seen.proxy, seen.hip)) {
+            return Ok(());
+        }
+        let allowed = seen.allowed();
+        if error <= allowed {
+            if allowed == ERROR {
+                self.measured.off_minimum = self.measured.off_minimum.max(error);
+            }
+            return Ok(());
+        }
+        self.measured.beyond += 1;
+        // On steep ground a unit in the last place of a coordinate is much height:
+        // the bound is one in the plane. And how far does the truth move for a
+        // rounding of the hand?
+        let here = descent::from(self.terrain, seen.hip, start, patch).at;
+        let moved = |axis: usize, by: f64| {
+            let mut hip = seen.hip;
+            hip[axis] += by;
+            level(descent::from(self.terrain, hip, start, patch).at, here)
+        };
+        let moves = (0..3).flat_map(|axis| [moved(axis, allowed), moved(axis, -allowed)]);
+        let condition = moves.fold(0.0, f64::max);
+        let error = level(here, seen.proxy);
+        if error > 4.0 * (allowed + condition) {
+            let detail = format!(
+                "{error:.3e} of {allowed:.3e} from {here:?}, truth moves {condition:.1e}: {seen:?}"
+            );
+            return self.fail(Invariant::LocalMinimum, detail);
+        }
+        Ok(())
+    }
+
+    /// Distance from the exact closest point: the least over the patches that
+    /// single precision cannot tell the proxy's place from.
+    fn off_minimum(&self, proxy: [f64; 3], hip: [f64; 3]) -> Option<(f64, Patch, [f64; 2])> {
+        let [xs, ys] = [sides(proxy[0]), sides(proxy[1])];
+        let starts = xs.iter().flat_map(|x| ys.iter().map(|y| [*x, *y]));
+        starts
+            .flat_map(|start| {
+                patches_at(self.terrain, start[0], start[1]).map(move |patch| (start, patch))
+            })
+            .map(|(start, patch)| {
+                let exact = descent::from(self.terrain, hip, start, patch);
+                (distance(exact.at, proxy), patch, start)
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    pub(super) fn is_above(&self, seen: &Seen, before: Option<&Seen>) -> Verdict {
+        let [x, y, z] = seen.hip;
+        // On a line of the grid the hand is over the patch to the north-east.
+        let Some(patch) = Patch::at(self.terrain, [x.floor() as i32, y.floor() as i32]) else {
+            return Ok(());
+        };
+        let below = (patch.height(x, y) - z) / patch.slope(x, y).hypot(1.0);
+        let before = before.map_or(z, |before| before.hip[2]);
+        let fall = z.abs().max((z - before).abs());
+        if below > ERROR.max(4.0 * f64::from(f32::EPSILON) * fall) {
+            return self.fail(Invariant::AboveSurface, format!("by {below:.3e}: {seen:?}"));
+        }
+        Ok(())
+    }
+}
+
+/// Distance in the plane.
+fn level(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// A coordinate, and the border of a patch that single precision cannot tell it
+/// from: on a sharp ridge its two sides lead to different valleys.
+fn sides(x: f64) -> Vec<f64> {
+    const ROUNDING: f64 = 1e-6;
+    let border = x.round();
+    if x == border || (x - border).abs() > ROUNDING {
+        return vec![x];
+    }
+    vec![x, border]
+}

@@ -1,0 +1,79 @@
+//! One tick as the judge sees it, and how exact it has to be.
+
+use hapterra_core::contact::{Felt, State};
+use hapterra_core::force::ForceLaw;
+
+use super::surface::{distance, patches_at};
+use crate::field::position;
+use crate::scene::terrain::Terrain;
+
+/// Error that is always allowed, cells (docs/contact.md).
+pub const ERROR: f64 = 2e-6;
+/// Stretches shorter than this, in cells, tell nothing about a fade.
+const SHORT: f64 = 1e-3;
+/// The law that turns stretches into forces, and the sizes of a cell it does so for.
+pub const LAW: ForceLaw = ForceLaw::PREMIUM;
+/// Millimetres of a cell.
+pub const CELLS_MM: [f32; 3] = [1e-3, 1.0, 1e3];
+
+/// One tick as the judge sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// The hand.
+    pub hip: [f64; 3],
+    /// The answer.
+    pub felt: Felt,
+    /// The proxy, where the terrain was made.
+    pub proxy: [f64; 3],
+    /// The force that the product's law gives for it, N, by [`CELLS_MM`].
+    pub force_n: [[f64; 3]; CELLS_MM.len()],
+}
+
+impl Seen {
+    /// A tick over a terrain that lies `shift` cells away.
+    #[must_use]
+    pub fn new(hip: [f64; 3], felt: Felt, shift: [i32; 3]) -> Self {
+        let at = position(&felt.proxy);
+        Self {
+            hip,
+            felt,
+            proxy: [0, 1, 2].map(|i| at[i] - f64::from(shift[i])),
+            force_n: CELLS_MM.map(|cell_mm| {
+                let force = LAW.force_n(felt.stretch * cell_mm);
+                force.as_dvec3().to_array()
+            }),
+        }
+    }
+
+    pub(super) fn is_free(&self) -> bool {
+        self.felt.state == State::Free && self.felt.settled
+    }
+
+    pub(super) fn is_touching(&self) -> bool {
+        self.felt.state == State::Touching
+    }
+
+    /// What part of the spring is felt; `None` where it is too short to tell.
+    pub(super) fn presence(&self) -> Option<f64> {
+        let whole = distance(self.proxy, self.hip);
+        let felt = self.felt.stretch.as_dvec3().length();
+        (self.is_touching() && whole > SHORT).then(|| felt / whole)
+    }
+
+    /// Error allowed where the height is not in question: the bound, or four
+    /// units in the last place of the largest coordinate of the hand in the
+    /// proxy's patch.
+    pub(super) fn allowed(&self) -> f64 {
+        let reach = (0..3).map(|i| (self.proxy[i] - self.hip[i]).abs());
+        let largest = reach.fold(1.0, f64::max) + 1.0;
+        ERROR.max(4.0 * f64::from(f32::EPSILON) * largest)
+    }
+
+    /// Error allowed in space: the corners of the patch are coordinates, too.
+    pub(super) fn allowed_in_space(&self, terrain: &Terrain) -> f64 {
+        let [x, y, _] = self.proxy;
+        let corners = patches_at(terrain, x, y).flat_map(|patch| patch.corners());
+        let highest = corners.fold(0.0, |most, h| (h - self.hip[2]).abs().max(most));
+        self.allowed().max(4.0 * f64::from(f32::EPSILON) * highest)
+    }
+}

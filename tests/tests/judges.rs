@@ -1,0 +1,384 @@
+//! Each invariant's judge speaks when it should, and no other does: honest
+//! observations are forged in one way, and judged.
+
+use hapterra_core::Vec3;
+use hapterra_core::contact::{Felt, Pace, Rule, State, WORK_PER_TICK};
+use hapterra_core::grid::GridPoint;
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
+use hapterra_tests::field::point;
+use hapterra_tests::invariants::judge::Judge;
+use hapterra_tests::invariants::seen::Seen;
+use hapterra_tests::invariants::{Invariant, Violation};
+use hapterra_tests::scene::run::Scene;
+use hapterra_tests::scene::stage::{Buffers, Supply};
+use hapterra_tests::scene::symmetry;
+use hapterra_tests::scene::terrain::{Kind, Terrain};
+use hapterra_tests::scene::twin;
+
+const SIZE: [i32; 2] = [40, 40];
+
+/// Ground at height 2.
+fn flat() -> Terrain {
+    Terrain::from_fn(Kind::Flat, SIZE, |_, _| 2.0)
+}
+
+/// A ridge along x = 20, its sides falling by 1 a cell.
+fn ridge() -> Terrain {
+    Terrain::from_fn(Kind::Ridges, SIZE, |x, _| 2.0 - (x - 20).abs() as f32)
+}
+
+/// Walls along x = 0, 23 and y = 0, 23; 0 between them.
+fn walls() -> Terrain {
+    Terrain::from_fn(Kind::Walls, SIZE, |x, y| {
+        if x % 23 == 0 || y % 23 == 0 {
+            300.0
+        } else {
+            0.0
+        }
+    })
+}
+
+fn felt(state: State, proxy: [f64; 3], stretch: [f64; 3]) -> Felt {
+    Felt {
+        state,
+        proxy: point(proxy),
+        stretch: Vec3::from_array(stretch.map(|s| s as f32)),
+        settled: true,
+        held_up_by: None,
+        work: 3,
+    }
+}
+
+fn waiting(hip: [f64; 3]) -> Seen {
+    Seen::new(hip, felt(State::Waiting, hip, [0.0; 3]), [0; 3])
+}
+
+fn free(hip: [f64; 3]) -> Seen {
+    Seen::new(hip, felt(State::Free, hip, [0.0; 3]), [0; 3])
+}
+
+/// With that part of the spring felt.
+fn faded(hip: [f64; 3], proxy: [f64; 3], presence: f64) -> Seen {
+    let stretch = [0, 1, 2].map(|i| presence * (proxy[i] - hip[i]));
+    Seen::new(hip, felt(State::Touching, proxy, stretch), [0; 3])
+}
+
+fn touching(hip: [f64; 3], proxy: [f64; 3]) -> Seen {
+    faded(hip, proxy, 1.0)
+}
+
+fn letting_go(hip: [f64; 3], stretch: [f64; 3]) -> Seen {
+    Seen::new(
+        hip,
+        felt(State::LettingGo, [10.5, 10.5, 2.0], stretch),
+        [0; 3],
+    )
+}
+
+/// The same answer with something changed, and the forces that follow from it.
+fn with(seen: Seen, change: impl FnOnce(&mut Felt)) -> Seen {
+    let mut felt = seen.felt;
+    change(&mut felt);
+    Seen::new(seen.hip, felt, [0; 3])
+}
+
+/// A position whose fraction no constructor would make.
+fn forged_position() -> GridPoint {
+    let mut buffer = [0; MAX_FRAME];
+    let frame = encode(&([10_i32, 10, 2], [0.5_f32, 1.5, 0.0]), &mut buffer).expect("fits");
+    let mut reader = FrameReader::<MAX_FRAME>::new();
+    let (_, bytes) = reader.push(frame);
+    decode(bytes.expect("a frame").expect("undamaged")).expect("a position")
+}
+
+/// Everything the judge says about the last of these ticks; nothing about those
+/// before.
+fn told(terrain: &Terrain, ticks: &[Seen]) -> Vec<Violation> {
+    let mut judge = Judge::new(terrain, Rule::Swept);
+    let (last, before) = ticks.split_last().expect("there are ticks");
+    for seen in before {
+        assert_eq!(judge.all(seen), [], "before the forged one");
+    }
+    judge.all(last)
+}
+
+/// The forgery is found by that judge alone, and what was honest by none.
+fn speaks(invariant: Invariant, terrain: &Terrain, before: &[Seen], honest: Seen, forged: Seen) {
+    let all = |last| told(terrain, &[before, &[last]].concat());
+    assert_eq!(all(honest), [], "{invariant:?}, honest");
+    let found: Vec<_> = all(forged).iter().map(|v| v.invariant).collect();
+    assert_eq!(found, [invariant], "{forged:?}");
+}
+
+const ABOVE: [f64; 3] = [10.5, 10.5, 3.0];
+const BELOW: [f64; 3] = [10.5, 10.5, 1.5];
+const ON: [f64; 3] = [10.5, 10.5, 2.0];
+
+/// What one answer says by itself.
+#[test]
+fn an_answer_that_is_no_answer_is_found() {
+    use Invariant::{Clamp, Consistent, Finite, Work};
+    let terrain = flat();
+    let honest = touching(BELOW, ON);
+    let forgeries: [(Invariant, Seen); 12] = [
+        (Finite, with(honest, |f| f.stretch.z = f32::NAN)),
+        (Finite, with(honest, |f| f.stretch.x = f32::INFINITY)),
+        (Finite, with(honest, |f| f.proxy = forged_position())),
+        (Work, with(honest, |f| f.work = WORK_PER_TICK + 1)),
+        // A force without a contact, away from the way to the proxy, too strong.
+        (Consistent, with(honest, |f| f.stretch.x = 0.01)),
+        (Consistent, with(honest, |f| f.stretch.z = -0.5)),
+        (Consistent, with(honest, |f| f.stretch.z = 0.501)),
+        (Consistent, with(waiting(BELOW), |f| f.stretch.z = 0.1)),
+        // The law's forces: too long, of another spring, the other way, no number.
+        (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, z * 1.000_01])),
+        (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, -z])),
+        (Clamp, forces(honest, |_| [0.0, 0.0, 8.500_01])),
+        (Clamp, forces(honest, |_| [0.0, 0.0, f64::NAN])),
+    ];
+    for (invariant, forged) in forgeries {
+        speaks(invariant, &terrain, &[], honest, forged);
+    }
+    let off_hand = with(free(ABOVE), |f| f.proxy = point([10.5, 10.5, 3.001]));
+    speaks(Consistent, &terrain, &[], free(ABOVE), off_hand);
+    let pressing = with(free(ABOVE), |f| f.stretch.z = 1e-3);
+    speaks(Consistent, &terrain, &[], free(ABOVE), pressing);
+}
+
+fn forces(seen: Seen, change: impl Fn([f64; 3]) -> [f64; 3]) -> Seen {
+    Seen {
+        force_n: seen.force_n.map(change),
+        ..seen
+    }
+}
+
+#[test]
+fn a_proxy_off_the_surface_is_found() {
+    let honest = touching(BELOW, ON);
+    for off in [-1e-4, -3e-6, 3e-6, 1e-4] {
+        let forged = touching(BELOW, [10.5, 10.5, 2.0 + off]);
+        speaks(Invariant::OnSurface, &flat(), &[], honest, forged);
+    }
+}
+
+#[test]
+fn a_proxy_beside_the_closest_point_is_found() {
+    // On level ground, on a slope of 1, and beside the edge it would rest on.
+    let level = |off: f64| touching(BELOW, [10.5 + off, 10.5, 2.0]);
+    let slope = |off: f64| touching([17.0, 10.5, -2.0], [16.5 + off, 10.5, -1.5 + off]);
+    for off in [-1e-2, -3e-5, 3e-5, 1e-2] {
+        speaks(
+            Invariant::LocalMinimum,
+            &flat(),
+            &[],
+            level(0.0),
+            level(off),
+        );
+        speaks(
+            Invariant::LocalMinimum,
+            &ridge(),
+            &[],
+            slope(0.0),
+            slope(off),
+        );
+    }
+    let valley = Terrain::from_fn(Kind::Ridges, SIZE, |x, _| (x - 20).abs() as f32);
+    let rest = |off: f64| touching([20.0, 10.5, -1.0], [20.0 + off, 10.5, off]);
+    speaks(Invariant::LocalMinimum, &valley, &[], rest(0.0), rest(1e-4));
+}
+
+/// A hand in the ridge, and the closest points of its two sides.
+const IN_RIDGE: [f64; 3] = [19.875, 10.5, 1.0];
+const NEAR_SIDE: [f64; 3] = [19.4375, 10.5, 1.4375];
+const FAR_SIDE: [f64; 3] = [20.4375, 10.5, 1.5625];
+
+#[test]
+fn a_proxy_that_goes_over_a_ridge_to_be_farther_off_is_found() {
+    let honest = touching(IN_RIDGE, NEAR_SIDE);
+    let forged = touching(IN_RIDGE, FAR_SIDE);
+    let before = touching([19.75, 10.5, 1.0], [19.375, 10.5, 1.375]);
+    speaks(Invariant::Descent, &ridge(), &[before], honest, forged);
+}
+
+#[test]
+fn a_contact_beyond_the_first_crossing_is_found() {
+    let honest = touching(IN_RIDGE, NEAR_SIDE);
+    let forged = touching(IN_RIDGE, FAR_SIDE);
+    let before = free([18.875, 10.5, 1.5]);
+    speaks(
+        Invariant::FirstCrossing,
+        &ridge(),
+        &[before],
+        honest,
+        forged,
+    );
+}
+
+#[test]
+fn a_contact_with_nothing_crossed_is_found() {
+    let before = free(ABOVE);
+    let near = [10.625, 10.5, 2.5];
+    let forged = touching(near, [10.625, 10.5, 2.0]);
+    speaks(Invariant::Freedom, &flat(), &[before], free(near), forged);
+}
+
+#[test]
+fn a_free_hand_below_the_surface_is_found() {
+    for depth in [1.0 / 65536.0, 0.5, 100.0] {
+        let below = [10.5, 10.5, 2.0 - depth];
+        let honest = touching(below, ON);
+        for before in [&[][..], &[free(ABOVE)]] {
+            let forged = free(below);
+            // So far a fall is known to fewer digits.
+            if depth < 10.0 || before.is_empty() {
+                speaks(Invariant::AboveSurface, &flat(), before, honest, forged);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_contact_out_of_nowhere_is_found() {
+    let (before, forged) = (waiting(BELOW), touching(BELOW, ON));
+    speaks(
+        Invariant::SeenAbove,
+        &flat(),
+        &[before],
+        waiting(BELOW),
+        forged,
+    );
+}
+
+#[test]
+fn a_wall_that_is_passed_is_found() {
+    let before = free([20.5, 10.5, 3.0]);
+    let honest = free([21.5, 10.5, 3.0]);
+    let forged = free([25.5, 10.5, 3.0]);
+    speaks(Invariant::Wall, &walls(), &[before], honest, forged);
+    // And by a proxy that stays on the ground.
+    let before = touching([20.5, 10.5, -0.5], [20.5, 10.5, 0.0]);
+    let honest = touching([21.5, 10.5, -0.5], [21.5, 10.5, 0.0]);
+    let forged = touching([25.5, 10.5, -0.5], [25.5, 10.5, 0.0]);
+    speaks(Invariant::Wall, &walls(), &[before], honest, forged);
+}
+
+#[test]
+fn a_force_that_comes_or_goes_at_once_is_found() {
+    let before = touching(BELOW, ON);
+    let fades = |presence| faded(BELOW, ON, presence);
+    let terrain = &flat();
+    let speaks = |before: &[Seen], honest, forged| {
+        speaks(Invariant::Fade, terrain, before, honest, forged);
+    };
+    speaks(&[before], fades(0.97), fades(0.95));
+    speaks(&[fades(0.5)], fades(0.53), fades(0.55));
+    // Let go at once.
+    speaks(&[before], fades(1.0), waiting(BELOW));
+    // Letting go too fast, coming back, and turning.
+    let go = |part: f64| letting_go(BELOW, [0.0, 0.0, 0.5 * part]);
+    speaks(&[before], go(0.97), go(0.9));
+    speaks(&[before, go(0.97)], go(0.95), go(0.99));
+    let turned = letting_go(BELOW, [0.01, 0.0, 0.475]);
+    speaks(&[before, go(0.97)], go(0.95), turned);
+    speaks(&[before, go(0.97), go(0.95)], go(0.92), waiting(BELOW));
+}
+
+/// A scene of a few hands, and what it feels.
+fn played(supply: Supply) -> (Scene, Vec<Seen>, Buffers) {
+    // Down into a side of the ridge, along it, and up again.
+    let path = [3.0, 0.0, 0.25, 3.0].map(|z| [18.5 + 0.5 * z, 10.5, z]);
+    let scene = Scene::given(ridge(), path.to_vec(), Rule::Swept, Pace::LockStep, supply);
+    let mut buffers = Buffers::default();
+    let seen = scene
+        .feel(&mut buffers, [0; 3], supply, |_| Ok(()))
+        .expect("it settles");
+    (scene, seen, buffers)
+}
+
+/// Any one bit of an answer, changed.
+fn other_bits(seen: &[Seen]) -> Vec<Vec<Seen>> {
+    let changes: [fn(&mut Felt); 4] = [
+        |f| f.stretch.z = f32::from_bits(f.stretch.z.to_bits() ^ 1),
+        |f| f.proxy = f.proxy.midpoint(&point([0.0, 0.0, 0.0])),
+        |f| f.state = State::Waiting,
+        |f| f.stretch.x = -0.0,
+    ];
+    changes
+        .map(|change| {
+            let mut forged = seen.to_vec();
+            forged[1] = with(forged[1], change);
+            forged
+        })
+        .to_vec()
+}
+
+fn only(invariant: Invariant, verdict: Result<(), Violation>) {
+    assert_eq!(verdict.expect_err("forged").invariant, invariant);
+}
+
+#[test]
+fn other_bits_are_found() {
+    let (scene, seen, mut buffers) = played(Supply::Held);
+    assert_eq!(twin::repeated(&scene, &seen, &mut buffers), Ok(()));
+    for forged in other_bits(&seen) {
+        let verdict = twin::repeated(&scene, &forged, &mut buffers);
+        only(Invariant::Repeatable, verdict);
+    }
+    let (scene, seen, mut buffers) = played(Supply::Pulled { latency: 2 });
+    assert_eq!(twin::windowed(&scene, &seen, &mut buffers), Ok(()));
+    for forged in other_bits(&seen) {
+        let verdict = twin::windowed(&scene, &forged, &mut buffers);
+        only(Invariant::Window, verdict);
+    }
+}
+
+#[test]
+fn other_bits_far_away_are_found() {
+    let shift = [3200, 6400, -1_000_000];
+    let (scene, seen, mut buffers) = played(Supply::Held);
+    let pulled = Supply::Pulled { latency: 0 };
+    let away = scene.feel(&mut buffers, shift, pulled, |_| Ok(()));
+    let away = away.expect("it settles");
+    let judge = |away: &[Seen], by| twin::same_bits(Invariant::Shift, &seen, away, by);
+    assert_eq!(judge(&away, shift), Ok(()));
+    for forged in other_bits(&away) {
+        only(Invariant::Shift, judge(&forged, shift));
+    }
+    only(Invariant::Shift, judge(&away, [3201, 6400, -1_000_000]));
+}
+
+#[test]
+fn a_scene_that_feels_otherwise_mirrored_is_found() {
+    let (scene, seen, mut buffers) = played(Supply::Held);
+    for symmetry in symmetry::all() {
+        let turned = |p| symmetry.point(&scene.terrain, p);
+        let path = scene.path.iter().map(|p| turned(*p)).collect();
+        let twin = scene.with(symmetry.terrain(&scene.terrain), path);
+        let other = twin
+            .feel(&mut buffers, [0; 3], Supply::Held, |_| Ok(()))
+            .expect("it settles");
+        let mut judge =
+            |other: &[Seen]| twin::same_way(&scene, symmetry, &seen, other, &mut buffers);
+        assert_eq!(judge(&other), Ok(()), "{symmetry:?}");
+        let mut elsewhere = other.clone();
+        elsewhere[1] = touching(other[1].hip, {
+            let [x, y, z] = other[1].proxy;
+            [x, y, z + 1e-3]
+        });
+        only(Invariant::Symmetry, judge(&elsewhere));
+        let mut let_go = other;
+        let_go[2] = free(let_go[2].hip);
+        only(Invariant::Symmetry, judge(&let_go));
+    }
+}
+
+#[test]
+fn a_hand_that_is_never_answered_is_found() {
+    let path = vec![ABOVE, BELOW];
+    let never = Supply::Pulled { latency: 1 << 30 };
+    let scene = Scene::given(flat(), path, Rule::Swept, Pace::LockStep, never);
+    only(
+        Invariant::Settles,
+        scene.run(&mut Buffers::default()).map(|_| ()),
+    );
+}
