@@ -7,8 +7,16 @@
 use std::path::PathBuf;
 use std::{env, fs};
 
-/// The boards, by the name of their feature without `board-`.
-const BOARDS: [&str; 3] = ["mps2-an386", "nucleo-g474re", "nucleo-h743zi2"];
+/// A board: its name, which is that of its feature without `board-`, and its
+/// memory map.
+struct Board(&'static str, &'static str);
+
+const BOARDS: [Board; 4] = [
+    Board("mps2-an386", "mps2-an386"),
+    Board("nucleo-g474re", "nucleo-g474re"),
+    Board("nucleo-h743zi2", "nucleo-h743zi2"),
+    Board("nucleo-h743zi2-spi", "nucleo-h743zi2"),
+];
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
@@ -16,14 +24,15 @@ fn main() {
     if env::var("CARGO_CFG_TARGET_ARCH").as_deref() != Ok("arm") {
         return;
     }
-    let chosen: Vec<&str> = BOARDS.into_iter().filter(|b| is_enabled(b)).collect();
-    let [board] = chosen[..] else {
-        assert!(chosen.is_empty(), "choose one board, not {chosen:?}");
+    let chosen: Vec<_> = BOARDS.iter().filter(|b| is_enabled(b.0)).collect();
+    let [Board(board, memory)] = chosen[..] else {
+        let names: Vec<_> = chosen.iter().map(|b| b.0).collect();
+        assert!(names.is_empty(), "choose one board, not {names:?}");
         return;
     };
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-    fs::copy(format!("memory/{board}.x"), out.join("board.x")).expect("copy the memory map");
-    if board == "mps2-an386" {
+    fs::copy(format!("memory/{memory}.x"), out.join("board.x")).expect("copy the memory map");
+    if *board == "mps2-an386" {
         // cortex-m-rt wants the names of a device crate's interrupts; this
         // board's own vector table names its handlers itself.
         fs::write(out.join("device.x"), "/* none */\n").expect("write device.x");

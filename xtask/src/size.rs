@@ -20,7 +20,7 @@ pub(crate) struct Use {
 pub(crate) fn check<'a>(images: impl Iterator<Item = (&'a Board, &'a Path)>) -> Result<()> {
     let mut over = vec![];
     println!(
-        "{:<16}{:<9}{:>9}{:>9}{:>7}",
+        "{:<20}{:<9}{:>9}{:>9}{:>7}",
         "image", "memory", "bytes", "budget", ""
     );
     for (board, path) in images {
@@ -30,7 +30,7 @@ pub(crate) fn check<'a>(images: impl Iterator<Item = (&'a Board, &'a Path)>) -> 
             let (name, budget) = (memory.name, memory.budget);
             let percent = bytes * 100 / budget;
             println!(
-                "{:<16}{name:<9}{bytes:>9}{budget:>9}{percent:>5} %",
+                "{:<20}{name:<9}{bytes:>9}{budget:>9}{percent:>5} %",
                 board.name
             );
             if bytes > budget {

@@ -2,7 +2,7 @@
 //! 12- and 14-bit relatives (Analog Devices, data sheet rev. G).
 //!
 //! The BIN/2sCOMP pin is tied to ground (two's complement) and LDAC too (each
-//! write takes effect at once). A frame has 24 bits: the register in bits 21-19,
+//! write takes effect at once); CLR is tied high. A frame has 24 bits: the register in bits 21-19,
 //! the channel in bits 18-16, then the value. Outputs A, B and C command axes 1
 //! to 3; D stays powered down.
 
@@ -22,16 +22,6 @@ const BIPOLAR_10_V: u16 = 0b100;
 /// Channels A, B and C on, and the reference.
 const POWER_UP: u16 = 0b1_0111;
 
-/// Why the converter could not be set up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum SetupError {
-    /// The bus does not work.
-    Bus,
-    /// The chip-select pin does not work.
-    Select,
-}
-
 /// The converter behind a bus of its own and its SYNC pin.
 pub struct Ad5754<B, S> {
     bus: B,
@@ -39,37 +29,37 @@ pub struct Ad5754<B, S> {
 }
 
 impl<B: SpiBus, S: OutputPin> Ad5754<B, S> {
-    /// Sets the converter up: zero on every channel, then ±10 V, then power.
     /// The bus clocks data in on the falling edge (mode 1), at 30 MHz at most.
-    /// The outputs may take 10 µs to settle after this.
-    ///
-    /// # Errors
-    /// [`SetupError`].
-    pub fn new(bus: B, sync: S) -> Result<Self, SetupError> {
-        let mut converter = Self { bus, sync };
-        converter.write(DATA | ALL, 0)?;
-        converter.write(RANGE | ALL, BIPOLAR_10_V)?;
-        converter.write(POWER, POWER_UP)?;
-        Ok(converter)
+    pub const fn new(bus: B, sync: S) -> Self {
+        Self { bus, sync }
     }
 
-    fn write(&mut self, head: u8, value: u16) -> Result<(), SetupError> {
+    /// Sends a frame. What a bus or a pin of this chip says of a failure is not
+    /// looked at here: whoever made the bus keeps it for
+    /// [`Sense::hardware_failed`](crate::board::Sense), which switches off.
+    fn write(&mut self, head: u8, value: u16) {
         let [high, low] = value.to_be_bytes();
-        self.sync.set_low().map_err(|_| SetupError::Select)?;
-        let sent = self.bus.write(&[head, high, low]);
-        let sent = sent.and_then(|()| self.bus.flush());
+        let _ = self.sync.set_low();
+        let _ = self.bus.write(&[head, high, low]);
+        let _ = self.bus.flush();
         // Let go whatever happened: a frame that was cut short is ignored.
-        self.sync.set_high().map_err(|_| SetupError::Select)?;
-        sent.map_err(|_| SetupError::Bus)
+        let _ = self.sync.set_high();
     }
 }
 
 impl<B: SpiBus, S: OutputPin> CurrentOutputs for Ad5754<B, S> {
+    /// Zero on every channel, then ±10 V, then power: a converter whose supply
+    /// comes and goes with the power stages' has forgotten all of it. The
+    /// outputs may take 10 µs to settle after this.
+    fn prepare(&mut self) {
+        self.write(DATA | ALL, 0);
+        self.write(RANGE | ALL, BIPOLAR_10_V);
+        self.write(POWER, POWER_UP);
+    }
+
     fn set(&mut self, fractions: [f32; 3]) {
         for (channel, fraction) in (0..).zip(fractions) {
-            // The bus of a chip in a tick cannot fail; were it to, the last
-            // command would stay, and the enable pin is what switches off.
-            let _ = self.write(DATA | channel, bipolar_code(fraction));
+            self.write(DATA | channel, bipolar_code(fraction));
         }
     }
 }
@@ -164,18 +154,19 @@ mod tests {
     #[test]
     fn it_is_zero_before_it_has_a_range_and_has_one_before_power() {
         let wires = Wires::default();
-        assert!(Ad5754::new(wires.clone(), wires.clone()).is_ok());
-        let frames = wires.0.take();
-        assert_eq!(
-            frames,
-            [[0x04, 0x00, 0x00], [0x0C, 0x00, 0x04], [0x10, 0x00, 0x17]]
-        );
+        let off = Off::new(Ad5754::new(wires.clone(), wires.clone()), Enable, 5.0);
+        let set_up = [[0x04, 0x00, 0x00], [0x0C, 0x00, 0x04], [0x10, 0x00, 0x17]];
+        let zero = [[0, 0, 0], [1, 0, 0], [2, 0, 0]];
+        assert_eq!(wires.0.take(), [set_up, zero].concat());
+        // And again, whenever the power stages come on.
+        let _on = off.enable();
+        assert_eq!(wires.0.take(), [set_up, zero].concat());
     }
 
     #[test]
     fn currents_become_three_frames_one_a_channel() {
         let wires = Wires::default();
-        let converter = Ad5754::new(wires.clone(), wires.clone()).expect("set up");
+        let converter = Ad5754::new(wires.clone(), wires.clone());
         let mut on = Off::new(converter, Enable, 5.0).enable();
         wires.0.take();
         on.write([2.5, -2.5, f32::NAN]);

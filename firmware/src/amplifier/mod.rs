@@ -12,7 +12,7 @@ mod ad5754;
 use embedded_hal::digital::OutputPin;
 use embedded_hal::pwm::SetDutyCycle;
 
-pub use ad5754::{Ad5754, SetupError, bipolar_code};
+pub use ad5754::{Ad5754, bipolar_code};
 
 use crate::board::{Amplifiers, EnabledAmplifiers};
 
@@ -24,6 +24,10 @@ pub trait CurrentOutput {
 
 /// The outputs of all three axes.
 pub trait CurrentOutputs {
+    /// Makes them ready, with no current commanded: at start-up, and each time
+    /// before the power stages are switched on.
+    fn prepare(&mut self) {}
+
     /// Commands these fractions of the full-scale current, each in -1..=1.
     fn set(&mut self, fractions: [f32; 3]);
 }
@@ -80,7 +84,9 @@ impl<O: CurrentOutputs, E: OutputPin> Off<O, E> {
             enable,
             full_scale_a,
         };
-        off.switch_off();
+        let _ = off.enable.set_low();
+        off.outputs.prepare();
+        off.command([0.0; 3]);
         off
     }
 
@@ -102,6 +108,7 @@ impl<O: CurrentOutputs, E: OutputPin> Amplifiers for Off<O, E> {
     type Enabled = On<O, E>;
 
     fn enable(mut self) -> On<O, E> {
+        self.outputs.prepare();
         self.command([0.0; 3]);
         let _ = self.enable.set_high();
         On(self)

@@ -28,7 +28,7 @@ pub struct Board {
 }
 
 /// Every board.
-pub const BOARDS: [Board; 3] = [
+pub const BOARDS: [Board; 4] = [
     Board {
         name: "mps2-an386",
         chip: None,
@@ -43,6 +43,11 @@ pub const BOARDS: [Board; 3] = [
         name: "nucleo-h743zi2",
         chip: Some("STM32H743ZITx"),
         what: "Cortex-M7 at 480 MHz, three duty cycles for amplifiers",
+    },
+    Board {
+        name: "nucleo-h743zi2-spi",
+        chip: Some("STM32H743ZITx"),
+        what: "the same with a quad ±10 V converter on SPI (AD5754R)",
     },
 ];
 

@@ -10,7 +10,7 @@ use crate::board::{BOARDS, Board};
 /// Arguments of `hapterra flash`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The board: nucleo-g474re or nucleo-h743zi2
+    /// The board: nucleo-g474re, nucleo-h743zi2 or nucleo-h743zi2-spi
     #[arg(long, value_name = "BOARD", value_parser = parse_board)]
     pub board: &'static Board,
 

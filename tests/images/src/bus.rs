@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 
-use crate::chip::{Chip, UsbKind};
+use crate::chip::{Chip, Commands, UsbKind};
+use crate::converter::Converter;
 use crate::nvic::{self, Nvic};
 use crate::timer::Timer;
 use crate::usb::{FullSpeed, Otg, Peripheral};
@@ -17,11 +18,15 @@ const PORTS: u32 = 11;
 /// DWT's cycle counter.
 const CYCCNT: u32 = 0xE000_1004;
 
+/// How long a sector takes to be erased, ns: twice the watchdog's time. A real
+/// H743 takes seconds, which would be as many minutes here.
+const ERASE_NS: u64 = 100_000_000;
+
 /// A write to something that moves the arm: its commands or the enable pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
     /// The command of an axis (0 to 2): a converter code or a compare count.
-    Command(usize, u32),
+    Command(usize, i32),
     /// The amplifiers' enable pin.
     Enable(bool),
 }
@@ -36,8 +41,14 @@ pub struct Bus {
     pub nvic: Nvic,
     /// The independent watchdog.
     pub watchdog: Watchdog,
+    /// What is on the SPI of a board that has it.
+    pub converter: Converter,
     /// The USB peripheral.
     pub usb: Box<dyn Peripheral>,
+    /// Sectors that are being erased: address and bytes.
+    pub erased: Vec<(u32, u32)>,
+    /// Until when the flash is busy, ns.
+    busy_until_ns: u64,
     /// Time since power-up.
     pub now_ns: u64,
     /// What reached commands and enable pin, in order, since it was last taken.
@@ -65,7 +76,10 @@ impl Bus {
                 .collect(),
             nvic: Nvic::default(),
             watchdog: Watchdog::default(),
+            converter: Converter::default(),
             usb,
+            erased: vec![],
+            busy_until_ns: 0,
             now_ns: 0,
             effects: vec![],
         }
@@ -117,8 +131,23 @@ impl Bus {
 
     /// What is commanded on axes 1 to 3, as the registers have it.
     #[must_use]
-    pub fn commands(&mut self) -> [u32; 3] {
-        self.chip.commands.map(|address| self.read(address))
+    pub fn commands(&mut self) -> [i32; 3] {
+        match self.chip.commands {
+            Commands::Converters(at) | Commands::DutyCycles(at, _) => {
+                at.map(|address| self.read(address) as i32)
+            }
+            Commands::Serial { .. } => self.converter.codes(),
+        }
+    }
+
+    /// The code of a current on this board, not yet rounded.
+    #[must_use]
+    pub fn code(&mut self, current_a: f64) -> f64 {
+        let largest = match self.chip.commands {
+            Commands::DutyCycles(_, largest) => self.read(largest),
+            _ => 0,
+        };
+        self.chip.commands.code(current_a, largest)
     }
 
     /// The timer at an address, and the offset into it.
@@ -167,8 +196,14 @@ impl Bus {
             _ if address & !0x3FF == self.chip.watchdog => {
                 self.watchdog.read(address - self.chip.watchdog)
             }
+            _ if self.is_sent(address) => self.converter.status(self.plain(address)),
             _ => self.ready(address, self.plain(address)),
         }
+    }
+
+    /// Whether this is the register that says that a frame is out.
+    fn is_sent(&self, address: u32) -> bool {
+        matches!(self.chip.commands, Commands::Serial { sent, .. } if sent.0 == address)
     }
 
     /// What the hardware adds to a register.
@@ -177,6 +212,10 @@ impl Bus {
             if value & rule.of != 0 {
                 value |= rule.ready;
             }
+        }
+        let (status, busy) = self.chip.flash.status;
+        if address == status && self.now_ns < self.busy_until_ns {
+            value |= busy;
         }
         for (_, bits) in self.chip.set.iter().filter(|(at, _)| *at == address) {
             value |= bits;
@@ -207,12 +246,30 @@ impl Bus {
         } else {
             self.write_plain(address, value, mask);
         }
-        if let Some(axis) = self.chip.commands.iter().position(|c| *c == address) {
-            self.effects.push(Effect::Command(axis, value & mask));
-        }
+        self.command(address, value, mask);
         let now_enabled = self.output(self.chip.enable);
         if now_enabled != enabled {
             self.effects.push(Effect::Enable(now_enabled));
+        }
+    }
+
+    /// What a write does to the commands.
+    fn command(&mut self, address: u32, value: u32, mask: u32) {
+        match self.chip.commands {
+            Commands::Converters(at) | Commands::DutyCycles(at, _) => {
+                if let Some(axis) = at.iter().position(|c| *c == address) {
+                    let command = Effect::Command(axis, (value & mask) as i32);
+                    self.effects.push(command);
+                }
+            }
+            Commands::Serial { data, sync, .. } => {
+                if address == data {
+                    self.converter.take(value as u8);
+                }
+                if let Some((axis, code)) = self.converter.select(!self.output(sync)) {
+                    self.effects.push(Effect::Command(axis, code));
+                }
+            }
         }
     }
 
@@ -221,6 +278,12 @@ impl Bus {
         let mut value = self.plain(address) & !mask | value & mask;
         if address == flags && value & clear != 0 {
             value = 0;
+        }
+        let (control, start) = self.chip.flash.control;
+        if address == control && value & start != 0 {
+            self.erased.push((self.chip.flash.sector)(value));
+            self.busy_until_ns = self.now_ns + ERASE_NS;
+            value &= !start;
         }
         self.words.insert(address, value);
     }

@@ -39,6 +39,43 @@ pub enum UsbKind {
     },
 }
 
+/// What commands the amplifiers of axes 1 to 3, and the code of a current.
+#[derive(Clone, Copy, Debug)]
+pub enum Commands {
+    /// Converters on the chip: their data registers, 12 bits, the middle is zero.
+    Converters([u32; 3]),
+    /// Compare registers, and the register with the largest count: 50 % is zero,
+    /// 10 % and 90 % are the ends of the range.
+    DutyCycles([u32; 3], u32),
+    /// A quad converter on SPI in two's complement: the transmit register, the
+    /// status register's end-of-transfer bit, and the pin that frames.
+    Serial {
+        /// Register that bytes are written to.
+        data: u32,
+        /// Status register and the bit that says that a frame is out.
+        sent: (u32, u32),
+        /// Low during a frame: port and number.
+        sync: (u32, u32),
+    },
+}
+
+/// How a chip's flash is erased, sector by sector, and where the calibrations
+/// are in it.
+#[derive(Clone, Copy, Debug)]
+pub struct Flash {
+    /// Control register, and the bit that begins an erase.
+    pub control: (u32, u32),
+    /// Status register, and the bits that are set meanwhile.
+    pub status: (u32, u32),
+    /// Address and bytes of the sector that a control word names.
+    pub sector: fn(u32) -> (u32, u32),
+    /// Addresses of the two areas with calibrations, and bytes of an area.
+    pub calibrations: ([u32; 2], u32),
+}
+
+/// Amperes at the ends of every board's range.
+const FULL_SCALE_A: f64 = 5.5;
+
 /// A chip.
 #[derive(Clone, Copy, Debug)]
 pub struct Chip {
@@ -85,8 +122,10 @@ pub struct Chip {
     pub emergency_stop: (u32, u32),
     /// Closed to ground while held.
     pub dead_man: (u32, u32),
+    /// The flash with the calibrations.
+    pub flash: Flash,
     /// Where the commands of axes 1 to 3 are.
-    pub commands: [u32; 3],
+    pub commands: Commands,
 }
 
 const fn timer(name: &'static str, base: u32, interrupt: Option<usize>) -> TimerAt {
@@ -103,6 +142,7 @@ const fn follows(address: u32, of: u32, ready: u32) -> Follows {
 
 const B: u32 = 1;
 const C: u32 = 2;
+const E: u32 = 4;
 const F: u32 = 5;
 const KIB: u32 = 1024;
 
@@ -153,8 +193,18 @@ pub static G474: Chip = Chip {
     enable: (B, 0),
     emergency_stop: (C, 0),
     dead_man: (C, 1),
+    // FLASH_CR: PNB, BKER, STRT; FLASH_SR.BSY. Pages of 2 KiB.
+    flash: Flash {
+        control: (0x4002_2014, 1 << 16),
+        status: (0x4002_2010, 1 << 16),
+        sector: |control| {
+            let page = control >> 3 & 0x7F | control >> 11 << 7 & 0x80;
+            (0x0800_0000 + page * 2 * KIB, 2 * KIB)
+        },
+        calibrations: ([0x0807_F000, 0x0807_F800], 2 * KIB),
+    },
     // DAC1 channels 1 and 2, DAC2 channel 1: DHR12Rx.
-    commands: [0x5000_0808, 0x5000_0814, 0x5000_0C08],
+    commands: Commands::Converters([0x5000_0808, 0x5000_0814, 0x5000_0C08]),
 };
 
 /// STM32H743ZI on the NUCLEO-H743ZI2 (RM0433).
@@ -213,9 +263,45 @@ pub static H743: Chip = Chip {
     enable: (F, 3),
     emergency_stop: (F, 4),
     dead_man: (F, 5),
-    // TIM1_CCR1 to 3.
-    commands: [0x4001_0034, 0x4001_0038, 0x4001_003C],
+    // FLASH_CR2: SNB, START; FLASH_SR2: BSY, QW. Sectors of 128 KiB.
+    flash: Flash {
+        control: (0x5200_210C, 1 << 7),
+        status: (0x5200_2110, 0b101),
+        sector: |control| {
+            let sector = control >> 8 & 7;
+            (0x0810_0000 + sector * 128 * KIB, 128 * KIB)
+        },
+        calibrations: ([0x081C_0000, 0x081E_0000], 128 * KIB),
+    },
+    // TIM1_CCR1 to 3, TIM1_ARR.
+    commands: Commands::DutyCycles([0x4001_0034, 0x4001_0038, 0x4001_003C], 0x4001_002C),
 };
 
-/// Both.
-pub static CHIPS: [&Chip; 2] = [&G474, &H743];
+/// The same with a converter on SPI4.
+pub static H743_SPI: Chip = Chip {
+    board: "nucleo-h743zi2-spi",
+    variable: "HAPTERRA_H743_SPI_ELF",
+    commands: Commands::Serial {
+        data: 0x4001_3420,
+        sent: (0x4001_3414, 1 << 3),
+        sync: (E, 11),
+    },
+    ..H743
+};
+
+/// All of them.
+pub static CHIPS: [&Chip; 3] = [&G474, &H743, &H743_SPI];
+
+impl Commands {
+    /// The code of a current, not yet rounded. `largest`: the largest count of
+    /// duty cycles.
+    #[must_use]
+    pub fn code(&self, current_a: f64, largest: u32) -> f64 {
+        let fraction = current_a / FULL_SCALE_A;
+        match self {
+            Self::Converters(_) => 2047.5 + 2047.5 * fraction,
+            Self::DutyCycles(..) => f64::from(largest + 1) * (0.5 + 0.4 * fraction),
+            Self::Serial { .. } => 32_768.0 * fraction,
+        }
+    }
+}

@@ -11,7 +11,7 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Mode, Report};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::message::{Sample, Scene, ToDevice};
-use hapterra_core::wire::status::Status;
+use hapterra_core::wire::status::{Answer, Status};
 use hapterra_tests::usb::host::{Found, ScriptedPipes, enumerate};
 
 use nusb::descriptors::ConfigurationDescriptor;
@@ -53,6 +53,8 @@ pub struct Device<'t> {
     pub guard: Option<Report>,
     /// The latest status.
     pub status: Option<Status>,
+    /// The latest answer.
+    pub answer: Option<Answer>,
 }
 
 impl<'t> Device<'t> {
@@ -77,6 +79,7 @@ impl<'t> Device<'t> {
             latest: None,
             guard: None,
             status: None,
+            answer: None,
         };
         device.run_ms(20);
         device
@@ -169,6 +172,7 @@ impl<'t> Device<'t> {
                 Event::Sample(sample) => self.latest = Some(*sample),
                 Event::Guard(report) => self.guard = Some(*report),
                 Event::Status(status) => self.status = Some(status.clone()),
+                Event::Answer(answer) => self.answer = Some(*answer),
                 _ => {}
             };
             self.session
@@ -190,7 +194,7 @@ impl<'t> Device<'t> {
 
     /// What is commanded on axes 1 to 3: converter codes or compare counts.
     #[must_use]
-    pub fn commands(&self) -> [u32; 3] {
+    pub fn commands(&self) -> [i32; 3] {
         self.machine.borrow().bus().commands()
     }
 }

@@ -1,7 +1,7 @@
 //! The boards' own images in an emulated core, from reset, without the boards.
 //!
 //! ```text
-//!   scripted host ── usb ──┐                 ┌── DAC, PWM: caught
+//!   scripted host ── usb ──┐                 ┌── DAC, PWM, SPI: caught
 //!                          ▼                 │
 //!   encoder counts ──▶  bus (MMIO)  ◀──▶  unicorn: the unmodified ELF
 //!                          ▲
@@ -19,6 +19,7 @@
 
 pub mod bus;
 pub mod chip;
+pub mod converter;
 pub mod device;
 pub mod elf;
 pub mod machine;

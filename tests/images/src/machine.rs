@@ -303,6 +303,7 @@ impl Machine {
     /// One slice of instructions, or one nap, between looks at interrupts.
     fn step(&mut self) -> Option<Stop> {
         self.bus().gather();
+        self.erase();
         self.provoke();
         self.take_interrupt();
         self.watch_masks();
@@ -320,6 +321,15 @@ impl Machine {
             Err(error) => return self.fault(&format!("{error:?}")),
         }
         None
+    }
+
+    /// What the flash was told to erase is gone at once, and the flash busy for
+    /// a while.
+    fn erase(&mut self) {
+        let sectors = std::mem::take(&mut self.bus().erased);
+        for (address, bytes) in sectors {
+            self.patch(address, &vec![0xFF; bytes as usize]);
+        }
     }
 
     fn is_ticking(&self) -> bool {

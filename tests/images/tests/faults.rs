@@ -9,6 +9,7 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Fault;
 use hapterra_core::wire::message::{Scene, Source};
 use hapterra_image_tests::bus::Effect;
+use hapterra_image_tests::chip::Commands;
 use hapterra_image_tests::device::{Device, Plane, machines};
 use hapterra_image_tests::elf::Function;
 use hapterra_image_tests::machine::{Machine, Stop};
@@ -80,14 +81,9 @@ impl Bench {
     }
 }
 
-/// Commands for no current.
-fn idle(machine: &Machine) -> u32 {
-    if machine.chip.is_m7 {
-        // Half of the PWM timer's period, rounded as the driver rounds.
-        (machine.bus().read(0x4001_002C) + 2) / 2
-    } else {
-        2048
-    }
+/// Command for no current: rounded as the drivers round.
+fn idle(machine: &Machine) -> i32 {
+    (machine.bus().code(0.0) + 0.5) as i32
 }
 
 /// Whole ticks that pass until the amplifiers are off, `at_most` so many.
@@ -172,6 +168,23 @@ fn an_encoder_that_jumps_takes_one_tick() {
             assert_eq!(fault, Some(Fault::EncoderJump));
         });
     }
+}
+
+#[test]
+fn a_converter_that_gets_no_frames_takes_two_ticks() {
+    Bench::new().on_each(|device| {
+        let mut machine = device.machine.borrow_mut();
+        if !matches!(machine.chip.commands, Commands::Serial { .. }) {
+            return;
+        }
+        machine.bus().converter.is_cut = true;
+        // The tick in which it is found out has read its inputs already.
+        assert_eq!(ticks_until_off(&mut machine, 3), 2);
+        drop(machine);
+        device.run_ms(40);
+        let fault = device.latest.and_then(|sample| sample.fault);
+        assert_eq!(fault, Some(Fault::Hardware));
+    });
 }
 
 /// Milliseconds until the watchdog resets a chip in which a function hangs;

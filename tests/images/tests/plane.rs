@@ -8,14 +8,7 @@ use hapterra_core::contact::{Rule, State};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::wire::message::Source;
 use hapterra_image_tests::bus::Effect;
-use hapterra_image_tests::chip::Chip;
 use hapterra_image_tests::device::{Device, Plane, machines};
-use hapterra_image_tests::timer::ARR;
-
-/// Amperes at the ends of the range of either board.
-const FULL_SCALE_A: f64 = 5.5;
-/// Auto-reload register of the H743's PWM timer.
-const TIM1_ARR: u32 = 0x4001_0000 + ARR;
 
 fn plane() -> Plane {
     Plane {
@@ -26,16 +19,6 @@ fn plane() -> Plane {
         slope: [0.25, -0.125],
         height_mm: 55.0,
         law: ForceLaw::PREMIUM,
-    }
-}
-
-/// The command that stands for a current, not yet rounded.
-fn command(chip: &Chip, pwm_counts: f64, current_a: f64) -> f64 {
-    let fraction = current_a / FULL_SCALE_A;
-    if chip.is_m7 {
-        pwm_counts * (0.5 + 0.4 * fraction)
-    } else {
-        2047.5 + 2047.5 * fraction
     }
 }
 
@@ -52,7 +35,6 @@ fn a_plane_pressed_by_a_millimetre_gives_the_currents_of_the_f64_computation() {
         let chip = machine.chip;
         let mut device = Device::arm(machine, &terrain, scene);
         device.wait_for_full_force();
-        let pwm_counts = f64::from(device.machine.borrow().bus().read(TIM1_ARR)) + 1.0;
         let mut worst = 0.0f64;
         for at in [[100.0, 100.0], [70.0, 90.0], [131.5, 118.25], [88.0, 60.0]] {
             device.move_to(plane.counts_at(at, -3.0));
@@ -64,7 +46,7 @@ fn a_plane_pressed_by_a_millimetre_gives_the_currents_of_the_f64_computation() {
             assert_eq!(sample.state, State::Touching, "{}: {sample:?}", chip.board);
             let truth = plane.currents_a(device.counts);
             assert!(truth.iter().any(|a| a.abs() > 0.1), "{truth:?}");
-            let expected = truth.map(|a| command(chip, pwm_counts, a));
+            let expected = truth.map(|a| device.machine.borrow().bus().code(a));
             let got = device.commands();
             for (got, expected) in got.into_iter().zip(expected) {
                 worst = worst.max((f64::from(got) - expected).abs());

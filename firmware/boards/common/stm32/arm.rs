@@ -57,7 +57,7 @@ impl<A: Counter, B: Counter, C: Counter> Encoders for Arm<A, B, C> {
             ],
             dead_man: self.inputs.dead_man.is_low(),
             emergency_stop: self.inputs.emergency_stop.is_high(),
-            hardware_failed: false,
+            hardware_failed: crate::hardware_failed(),
         }
     }
 }
