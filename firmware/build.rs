@@ -4,32 +4,45 @@
 //! any `-L` copy; that file only says `INCLUDE board.x`, and this script puts
 //! the right `board.x` on the search path.
 
+#[path = "build/tick_rate.rs"]
+mod tick_rate;
+
 use std::path::PathBuf;
 use std::{env, fs};
 
-/// A board: its name, which is that of its feature without `board-`, and its
-/// memory map.
-struct Board(&'static str, &'static str);
+/// A board: its name, which is that of its feature without `board-`, its memory
+/// map, and how often its tick timer counts in a second, where its tick rate
+/// can be chosen.
+struct Board(&'static str, &'static str, Option<u32>);
 
 const BOARDS: [Board; 4] = [
-    Board("mps2-an386", "mps2-an386"),
-    Board("nucleo-g474re", "nucleo-g474re"),
-    Board("nucleo-h743zi2", "nucleo-h743zi2"),
-    Board("nucleo-h743zi2-spi", "nucleo-h743zi2"),
+    Board("mps2-an386", "mps2-an386", None),
+    Board("nucleo-g474re", "nucleo-g474re", Some(42_500_000)),
+    Board("nucleo-h743zi2", "nucleo-h743zi2", Some(60_000_000)),
+    Board("nucleo-h743zi2-spi", "nucleo-h743zi2", Some(60_000_000)),
 ];
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=build");
+    println!("cargo::rerun-if-env-changed=HAPTERRA_TICK_HZ");
     println!("cargo::rerun-if-changed=memory");
     if env::var("CARGO_CFG_TARGET_ARCH").as_deref() != Ok("arm") {
         return;
     }
     let chosen: Vec<_> = BOARDS.iter().filter(|b| is_enabled(b.0)).collect();
-    let [Board(board, memory)] = chosen[..] else {
+    let [Board(board, memory, counts_a_second)] = chosen[..] else {
         let names: Vec<_> = chosen.iter().map(|b| b.0).collect();
         assert!(names.is_empty(), "choose one board, not {names:?}");
         return;
     };
+    if let Some(counts_a_second) = counts_a_second {
+        let said = env::var("HAPTERRA_TICK_HZ").ok();
+        match tick_rate::tick_hz(said.as_deref(), board, *counts_a_second) {
+            Ok(hz) => println!("cargo::rustc-env=HAPTERRA_TICK_HZ={hz}"),
+            Err(why) => println!("cargo::error={why}"),
+        }
+    }
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     fs::copy(format!("memory/{memory}.x"), out.join("board.x")).expect("copy the memory map");
     if *board == "mps2-an386" {

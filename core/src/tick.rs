@@ -51,6 +51,7 @@ pub struct Outcome {
 
 /// All state of the loop over a window of `D × D` tiles.
 pub struct Haptics<'t, const D: usize> {
+    rate: TickRate,
     window: Window<'t, D>,
     contact: Contact,
     guard: Guard,
@@ -72,8 +73,9 @@ impl<'t, const D: usize> Haptics<'t, D> {
         found_at_boot: Option<Fault>,
     ) -> Self {
         Self {
+            rate,
             window: Window::new(tiles),
-            contact: Contact::new(),
+            contact: Contact::ticking(rate),
             guard: Guard::new(rate, found_at_boot),
             mechanism: None,
             zero: None,
@@ -107,7 +109,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.guard.stop();
         self.guard.configure(&mechanism);
         self.mechanism = Some(mechanism);
-        self.contact = Contact::new();
+        self.contact = Contact::ticking(self.rate);
     }
 
     fn take_scene(&mut self, scene: Scene) {
@@ -119,7 +121,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             Source::Points => self.guard.stop(),
         }
         self.window.reset(scene.level, scene.size, scene.top);
-        self.contact = Contact::new();
+        self.contact = Contact::ticking(self.rate);
         self.scene = Some(scene);
         self.point = None;
         self.tick = 0;
@@ -127,7 +129,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
 
     fn drop_scene(&mut self) {
         self.guard.disarm();
-        self.contact = Contact::new();
+        self.contact = Contact::ticking(self.rate);
         self.scene = None;
         self.point = None;
     }
@@ -136,7 +138,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     fn take_zero(&mut self, counts: [i32; 3]) {
         self.guard.stop();
         self.guard.restart_counts();
-        self.contact = Contact::new();
+        self.contact = Contact::ticking(self.rate);
         self.zero = Some(counts);
     }
 

@@ -70,3 +70,8 @@ pub mod supervisor;
 mod timing;
 pub mod usb;
 pub mod vitals;
+
+// The build script's, for its tests.
+#[cfg(test)]
+#[path = "../build/tick_rate.rs"]
+mod tick_rate;

@@ -12,8 +12,11 @@ use crate::terrain::{Ground, TILE_CELLS, Window};
 
 /// Distance from the nearest patch, in cells, at which nothing is left.
 pub const REACH: f32 = 0.5;
-/// Most that the presence may change in a tick, either way.
-pub const RATE: f32 = 1.0 / 32.0;
+/// Most that the presence may change in a second, either way: from all to
+/// nothing in 32 ms.
+pub const RATE_PER_S: f32 = 31.25;
+/// Most that it may change in a tick at 1 kHz.
+pub const RATE: f32 = RATE_PER_S / 1_000.0;
 /// Cells, along an axis, from the proxy at which a hand is too far off for what
 /// lies under it to matter: the presence is then full.
 ///
@@ -80,14 +83,16 @@ fn gap(place: f32, toward: i32) -> f32 {
     }
 }
 
-/// `presence` moved toward `target` at the bounded rate.
-pub(super) fn approach(presence: f32, target: f32) -> f32 {
-    presence + (target - presence).clamp(-RATE, RATE)
+/// `presence` moved toward `target`, by at most `most`, which is positive.
+pub(super) fn approach(presence: f32, target: f32, most: f32) -> f32 {
+    presence + (target - presence).max(-most).min(most)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::{Contact, Pace, Rule, State};
+    use crate::guard::TickRate;
     use crate::terrain::testing::Field;
     use glam::Vec3;
 
@@ -130,5 +135,36 @@ mod tests {
             last = now;
         }
         assert!((target(&field.window, &at(40.25, 5.0)).presence - 0.5).abs() < 1e-6);
+    }
+
+    /// Milliseconds that a hand which is moved into the hole goes on feeling
+    /// its edge, and the largest change of the presence in a tick.
+    fn faded_after(khz: u32) -> (f32, f32) {
+        let field = hole_at_10_10();
+        let rate = TickRate::new(1_000 * khz).expect("in range");
+        let mut contact = Contact::ticking(rate);
+        let mut step = |hip: GridPoint| {
+            let felt = *contact.step(&field.window, hip, Rule::Swept, Pace::RealTime);
+            (felt.state, contact.presence())
+        };
+        let above = GridPoint::new([0; 3], Vec3::new(8.5, 10.5, 1.0));
+        assert_eq!(step(above).0, State::Free);
+        assert_eq!(step(at(8.5, 10.5)).0, State::Touching);
+        let (mut last, mut most, mut ticks) = (1.0, 0.0f32, 0);
+        while let (State::Touching, presence) = step(at(10.5, 10.5)) {
+            most = most.max(last - presence);
+            last = presence;
+            ticks += 1;
+        }
+        (ticks as f32 / khz as f32, most)
+    }
+
+    #[test]
+    fn as_long_at_ten_kilohertz_as_at_one() {
+        for khz in [1, 2, 5, 10] {
+            let (ms, most) = faded_after(khz);
+            assert!((30.9..=32.1).contains(&ms), "{khz} kHz: {ms} ms");
+            assert!(most <= 1.001 * RATE / khz as f32, "{khz} kHz: {most}");
+        }
     }
 }

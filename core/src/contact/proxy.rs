@@ -10,6 +10,7 @@ use super::track::Track;
 use super::work::Work;
 use super::{Felt, Pace, Rule, State, presence};
 use crate::grid::GridPoint;
+use crate::guard::TickRate;
 use crate::terrain::{Ground, Window};
 
 // The path is most of a contact's state, and there is no heap to put it on.
@@ -41,6 +42,8 @@ pub struct Contact {
     /// another one comes with a new contact.)
     pub(super) answered: bool,
     pub(super) presence: f32,
+    /// Most that the presence may change in a tick.
+    fade: f32,
     /// A free proxy had to wait, for terrain or for work: the force of the next
     /// contact may not come at once.
     pub(super) late: bool,
@@ -66,14 +69,21 @@ impl Default for Contact {
 }
 
 impl Contact {
-    /// A contact that waits to see the hand above the surface.
+    /// A contact that waits to see the hand above the surface, at 1 kHz.
     #[must_use]
     pub fn new() -> Self {
+        Self::ticking(TickRate::DEFAULT)
+    }
+
+    /// The same at another rate.
+    #[must_use]
+    pub fn ticking(rate: TickRate) -> Self {
         Self {
             phase: Phase::Waiting,
             hip: GridPoint::default(),
             answered: false,
             presence: 1.0,
+            fade: presence::RATE_PER_S * rate.tick_s(),
             late: false,
             reached: f32::INFINITY,
             leaps: 0,
@@ -212,7 +222,7 @@ impl Contact {
             if let (Pace::LockStep, Some(tile)) = (pace, target.missing) {
                 (settled, held_up_by) = (false, Some(tile));
             } else {
-                self.presence = presence::approach(self.presence, target.presence);
+                self.presence = presence::approach(self.presence, target.presence, self.fade);
                 if self.presence == 0.0 && target.presence == 0.0 {
                     self.let_go();
                     return self.waits(window, hip);
@@ -267,7 +277,7 @@ impl Contact {
 
     /// A tick of letting go.
     pub(super) fn fades<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Felt {
-        self.presence = presence::approach(self.presence, 0.0);
+        self.presence = presence::approach(self.presence, 0.0, self.fade);
         let Phase::LettingGo { proxy, stretch } = self.phase else {
             return self.waits(window, hip);
         };

@@ -2,6 +2,9 @@
 
 /// Ticks a second: a build choice, 1 kHz by default. The stiffness that a user
 /// can hold grows with it.
+///
+/// Whole kilohertz, so that a millisecond is a number of ticks: what has to
+/// happen once a millisecond, or for so many of them, does so at every rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TickRate(u32);
 
@@ -11,10 +14,10 @@ impl TickRate {
     /// 1 kHz.
     pub const DEFAULT: Self = Self(1_000);
 
-    /// A rate in [`Self::RANGE_HZ`].
+    /// A rate in [`Self::RANGE_HZ`], in whole kilohertz.
     #[must_use]
     pub const fn new(hz: u32) -> Option<Self> {
-        if hz < Self::RANGE_HZ.0 || hz > Self::RANGE_HZ.1 {
+        if hz < Self::RANGE_HZ.0 || hz > Self::RANGE_HZ.1 || !hz.is_multiple_of(1_000) {
             return None;
         }
         Some(Self(hz))
@@ -54,6 +57,7 @@ mod tests {
     fn only_rates_that_were_thought_of() {
         assert_eq!(TickRate::new(999), None);
         assert_eq!(TickRate::new(10_001), None);
+        assert_eq!(TickRate::new(1_500), None);
         let fast = TickRate::new(8_000).expect("in range");
         assert_eq!((fast.ticks(1), fast.ticks(2_000)), (8, 16_000));
         assert_eq!(TickRate::DEFAULT.ticks(0), 1);

@@ -8,21 +8,15 @@ use hapterra_firmware::board::TickClock;
 
 use super::TickTimer;
 
-/// Ticks a second: `HAPTERRA_TICK_HZ` when the image is built, else 1,000.
-const TICK_HZ: u32 = match option_env!("HAPTERRA_TICK_HZ") {
-    Some(text) => number(text),
-    None => 1_000,
+/// Ticks a second. `build.rs` has seen to it that it is one of the rates that
+/// this board can have.
+const TICK_HZ: u32 = match u32::from_str_radix(env!("HAPTERRA_TICK_HZ"), 10) {
+    Ok(hz) => hz,
+    Err(_) => panic!("build.rs writes a number"),
 };
 
 /// Divides the timer's clock before it is counted.
 const DIVIDER: u16 = 4;
-
-const fn number(text: &str) -> u32 {
-    match u32::from_str_radix(text, 10) {
-        Ok(number) => number,
-        Err(_) => panic!("HAPTERRA_TICK_HZ is a number, 1000 to 10000"),
-    }
-}
 
 /// `HZ` core cycles a second, `PER_COUNT` of them in a count of the timer.
 pub(crate) struct Clock<const HZ: u32, const PER_COUNT: u32> {
@@ -36,7 +30,7 @@ impl<const HZ: u32, const PER_COUNT: u32> Clock<HZ, PER_COUNT> {
         let counts_a_second = HZ / PER_COUNT;
         assert!(
             counts_a_second.is_multiple_of(TICK_HZ),
-            "choose a HAPTERRA_TICK_HZ that divides the timer's clock"
+            "build.rs knows another clock of this timer"
         );
         (counts_a_second / TICK_HZ - 1) as u16
     };
