@@ -1,5 +1,5 @@
 //! What the whole chain from count to current costs on the emulated
-//! Cortex-M4F, by count of instructions.
+//! Cortex-M4F, by count of instructions, and how deep its stack goes.
 
 use std::time::Duration;
 
@@ -12,15 +12,16 @@ use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::{Rule, State};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Mode;
-use hapterra_core::wire::message::Sample;
+use hapterra_core::wire::message::{Sample, ToDevice};
+use hapterra_core::wire::status::Status;
 use hapterra_tests::emulation::emulated_board;
 
 /// Most that a tick in contact may cost on average: kinematics, contact,
 /// guard, torques, and all the loop does around them.
 const IN_CONTACT: f64 = 2_500.0;
 
-/// The demonstration's samples on the emulated board.
-fn felt() -> Option<Vec<Sample>> {
+/// The demonstration's samples on the emulated board, and how it is afterwards.
+fn felt() -> Option<(Vec<Sample>, Status)> {
     let (qemu, image) = emulated_board()?;
     let raster = Synth::new(Kind::Fractal, 1, 30.0)
         .raster(400, 400)
@@ -31,36 +32,50 @@ fn felt() -> Option<Vec<Sample>> {
     let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
     let mut plant = lines.plant;
     let ticks = (1e3 * stage.duration_s()) as u32;
-    let samples = std::thread::scope(|scope| {
+    let felt = std::thread::scope(|scope| {
         // Until the board goes.
         scope.spawn(move || serve_plant(&mut plant, &mut rig, &|| false));
         let link = Box::new(lines.link);
         let (scene, patience) = (stage.scene(), Patience::EMULATED);
         let opened = Session::open_arming(&terrain, scene, Arming::VIRTUAL, link, patience);
         let (mut session, _) = opened.expect("opened");
-        let mut samples: Vec<Sample> = Vec::new();
-        while samples.last().is_none_or(|last| last.tick < ticks) {
+        let (mut samples, mut status): (Vec<Sample>, Option<Status>) = (vec![], None);
+        let mut asked = false;
+        while status.is_none() {
             session
-                .poll(Duration::from_millis(100), &mut |event| {
-                    if let Event::Sample(sample) = event {
-                        samples.push(*sample);
-                    }
+                .poll(Duration::from_millis(100), &mut |event| match event {
+                    Event::Sample(sample) => samples.push(*sample),
+                    Event::Status(told) => status = Some(told.clone()),
+                    _ => {}
                 })
                 .expect("goes on");
+            if !asked && samples.last().is_some_and(|last| last.tick >= ticks) {
+                session.say(&ToDevice::Status).expect("said");
+                asked = true;
+            }
         }
         session.say_goodbye().expect("said");
-        let status = emulator.finish().expect("ended");
-        assert!(status.success(), "the board ended with {status}");
-        samples
+        let ended = emulator.finish().expect("ended");
+        assert!(ended.success(), "the board ended with {ended}");
+        (samples, status.expect("told"))
     });
-    Some(samples)
+    Some(felt)
 }
 
 #[test]
-fn a_tick_in_contact_stays_within_its_budget_and_none_is_late() {
-    let Some(samples) = felt() else {
+fn a_tick_in_contact_stays_within_its_budget_and_the_stack_too() {
+    let Some((samples, status)) = felt() else {
         return;
     };
+    // A window of 16 x 16 tiles is moved over it when the board starts.
+    let stack = status.stack;
+    eprintln!(
+        "stack: {} of {} bytes used at most",
+        stack.high_water, stack.size
+    );
+    assert_eq!(stack.size, 32 * 1024);
+    assert!(stack.high_water > 500, "{stack:?}");
+    assert!(3 * stack.high_water <= 2 * stack.size, "{stack:?}");
     let mut costs: [(&str, Mean); 4] =
         ["disarmed", "free", "waiting", "touching"].map(|name| (name, Mean::default()));
     for pair in samples.windows(2) {

@@ -24,6 +24,8 @@ mod critical;
 mod failure;
 mod plant;
 mod serial;
+#[path = "../common/stack.rs"]
+mod stack;
 mod time;
 
 use core::cell::{Cell, RefCell};
@@ -125,8 +127,13 @@ fn Executor() {
     unsafe { EXECUTOR.on_interrupt() };
 }
 
+/// Turns of the link between two looks at the stack.
+const STACK_TURNS: u32 = 1_000;
+
 /// What this board has to do with the link.
 struct Emulated {
+    vitals: &'static Vitals,
+    turns: Cell<u32>,
     fed_by_arm: Cell<bool>,
     supervisor: RefCell<Supervisor<'static, NoWatchdog>>,
 }
@@ -137,8 +144,19 @@ impl Emulated {
     fn new(vitals: &'static Vitals) -> Self {
         let parts = &[Part::Tick, Part::Link];
         Self {
+            vitals,
+            turns: Cell::new(0),
             fed_by_arm: Cell::new(false),
             supervisor: RefCell::new(Supervisor::new(vitals, NoWatchdog, parts)),
+        }
+    }
+
+    fn measure_stack(&self) {
+        let turns = self.turns.get().wrapping_add(1);
+        self.turns.set(turns);
+        if turns.is_multiple_of(STACK_TURNS) {
+            let (size, high_water) = stack::figures();
+            self.vitals.measure_stack(size, high_water);
         }
     }
 }
@@ -154,6 +172,7 @@ impl LinkHost for Emulated {
             semihosting::process::exit(0);
         }
         self.supervisor.borrow_mut().check();
+        self.measure_stack();
         let drives_arm = link.drives_arm();
         if self.fed_by_arm.replace(drives_arm) != drives_arm {
             plant::expect(drives_arm);

@@ -5,6 +5,7 @@ pub(crate) mod clock;
 pub(crate) mod failure;
 pub(crate) mod memory;
 pub(crate) mod nvic;
+#[path = "../stack.rs"]
 mod stack;
 
 use core::sync::atomic::{AtomicU8, Ordering};
