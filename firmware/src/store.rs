@@ -4,24 +4,35 @@
 //! Two areas of one or more erase blocks each hold a row of places for a
 //! record. A record is written into the next blank place, never over another;
 //! an area is erased only when the one that holds the newest record is the
-//! other. What was cut off in the middle has no valid check sum and is passed
-//! over.
+//! other.
 //!
 //! ```text
-//! place:   number (u32)   its complement (u32)   record (`Calibration::encode`)   0xFF …
+//! place:   number (u32)   its complement (u32)   record (`Calibration::encode`)   0xFF …   mark
 //! ```
 //!
-//! The newest record is the valid one with the highest number. Erasing is slow
-//! (a sector of a large chip: seconds), so [`CalibrationStore::prepare`] does it
-//! at start-up, before there is a watchdog; saving then only writes.
+//! The newest record is the valid one with the highest number. What has no valid
+//! check sum is damaged if it bears the mark, which is written last; without
+//! it, it was cut off in the middle and had never been there.
+//!
+//! Erasing is slow (a sector of a large chip: seconds), so only
+//! [`CalibrationStore::prepare`] does it, at start-up, before there is a tick or a
+//! watchdog. Saving only writes, some milliseconds; where no place is left, it
+//! says so.
 
 use embedded_storage::nor_flash::NorFlash;
-use hapterra_core::phantom::{BadRecord, Calibration, RECORD_BYTES};
+use hapterra_core::phantom::{Calibration, RECORD_BYTES};
 
 /// Number and complement.
 const HEAD: usize = 8;
-/// Bytes of a place: a multiple of 32, the largest write size among the chips.
-pub const PLACE: usize = HEAD + RECORD_BYTES + 24;
+/// The mark: a write of its own on every chip.
+const MARK: [u8; 32] = [0; 32];
+/// Where it is: a multiple of 32, the largest write size among the chips.
+const MARK_AT: usize = HEAD + RECORD_BYTES + 24;
+/// Bytes of a place.
+pub const PLACE: usize = MARK_AT + MARK.len();
+/// Most places of an area that are used: all of them are read to save a record,
+/// and that may take no more than a fraction of the watchdog's time.
+const MOST_PLACES: u32 = 8;
 
 /// What was found in the memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,6 +54,9 @@ pub enum StoreError {
     /// The flash does not erase.
     #[error("the flash cannot be erased")]
     Erase,
+    /// Every place is used: [`CalibrationStore::prepare`] makes room.
+    #[error("there is no room before the next start")]
+    Full,
     /// No place would take it.
     #[error("the flash cannot be written")]
     Write,
@@ -51,8 +65,10 @@ pub enum StoreError {
 /// One place, as read.
 enum Place {
     Blank,
-    Holds(u32, Result<Calibration, BadRecord>),
-    /// Not even a number.
+    Holds(u32, Calibration),
+    /// What was being written when the power went.
+    CutOff,
+    /// Something that was whole once.
     Spoilt,
 }
 
@@ -107,7 +123,7 @@ impl<F: NorFlash> CalibrationStore<F> {
         Ok(())
     }
 
-    /// Stores a record.
+    /// Stores a record. Never erases.
     ///
     /// # Errors
     /// [`StoreError`]; the record before is still there.
@@ -115,18 +131,17 @@ impl<F: NorFlash> CalibrationStore<F> {
         let found = self.look();
         let number = found.newest.map_or(0, |(number, _)| number.wrapping_add(1));
         let place = filled(number, calibration);
-        if self.write_into(found.area, &place) {
-            return Ok(());
+        let mut had_room = false;
+        for area in [found.area, 1 - found.area] {
+            had_room |= self.next_blank(area, 0).is_some();
+            if self.write_into(area, &place) {
+                return Ok(());
+            }
         }
-        // Full: on in the other one, and only that is erased.
-        let other = 1 - found.area;
-        if self.next_blank(other, 0) != Some(0) {
-            self.erase(other)?;
-        }
-        match self.write_into(other, &place) {
-            true => Ok(()),
-            false => Err(StoreError::Write),
-        }
+        Err(match had_room {
+            true => StoreError::Write,
+            false => StoreError::Full,
+        })
     }
 
     /// Writes into the first blank place of an area that takes it.
@@ -147,7 +162,7 @@ impl<F: NorFlash> CalibrationStore<F> {
     }
 
     fn places(&self) -> u32 {
-        self.size / PLACE as u32
+        (self.size / PLACE as u32).min(MOST_PLACES)
     }
 
     fn at(&self, area: usize, place: u32) -> u32 {
@@ -171,15 +186,15 @@ impl<F: NorFlash> CalibrationStore<F> {
         for area in 0..2 {
             for place in 0..self.places() {
                 match self.read(area, place) {
-                    Place::Blank => {}
-                    Place::Holds(number, Ok(calibration)) => {
+                    Place::Blank | Place::CutOff => {}
+                    Place::Holds(number, calibration) => {
                         let newer = |(known, _)| number.wrapping_sub(known) < u32::MAX / 2;
                         if found.newest.is_none_or(newer) {
                             found.newest = Some((number, calibration));
                             found.area = area;
                         }
                     }
-                    Place::Holds(_, Err(_)) | Place::Spoilt => found.spoilt = true,
+                    Place::Spoilt => found.spoilt = true,
                 }
             }
         }
@@ -194,16 +209,22 @@ impl<F: NorFlash> CalibrationStore<F> {
         if bytes.iter().all(|byte| *byte == 0xFF) {
             return Place::Blank;
         }
-        let (head, record) = bytes.split_at(HEAD);
-        let word = |bytes: &[u8]| bytes.first_chunk().copied().map(u32::from_le_bytes);
-        let (Some(number), Some(check)) = (word(head), head.get(4..).and_then(word)) else {
-            return Place::Spoilt;
-        };
-        if check != !number {
-            return Place::Spoilt;
+        let (written, mark) = bytes.split_at(MARK_AT);
+        match record(written) {
+            Some((number, calibration)) => Place::Holds(number, calibration),
+            None if mark.iter().all(|byte| *byte == 0xFF) => Place::CutOff,
+            None => Place::Spoilt,
         }
-        Place::Holds(number, Calibration::decode(record))
     }
+}
+
+/// The record of a place and its number, if both are whole.
+fn record(written: &[u8]) -> Option<(u32, Calibration)> {
+    let (number, rest) = written.split_first_chunk()?;
+    let (check, record) = rest.split_first_chunk()?;
+    let [number, check] = [number, check].map(|word| u32::from_le_bytes(*word));
+    let calibration = Calibration::decode(record).ok()?;
+    (check == !number).then_some((number, calibration))
 }
 
 /// A place's bytes.
@@ -216,6 +237,9 @@ fn filled(number: u32, calibration: &Calibration) -> [u8; PLACE] {
         .into_iter()
         .chain((!number).to_le_bytes());
     for (to, from) in place.iter_mut().zip(head.chain(record.iter().copied())) {
+        *to = from;
+    }
+    for (to, from) in place.iter_mut().skip(MARK_AT).zip(MARK) {
         *to = from;
     }
     place

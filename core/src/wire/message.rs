@@ -18,7 +18,7 @@ use crate::terrain::TileKey;
 use crate::wire::status::{Answer, Status};
 
 /// Version of this table.
-pub const PROTOCOL: u16 = 2;
+pub const PROTOCOL: u16 = 3;
 /// Samples in a telemetry message, at most.
 pub const BATCH: usize = 8;
 /// Length limit of names in a hello, bytes.

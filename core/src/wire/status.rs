@@ -208,6 +208,11 @@ pub enum Refusal {
     /// The device still works on the last request of this kind.
     #[error("the device is still busy with the last request of this kind")]
     Busy,
+    /// The device's memory has no room left; it makes room when it starts.
+    #[error(
+        "the device's memory is full until it is started again: the calibration is in force but not stored"
+    )]
+    MemoryFull,
 }
 
 /// The answer to a request.

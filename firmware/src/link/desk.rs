@@ -12,15 +12,13 @@ use super::Identity;
 use crate::vitals::Vitals;
 
 /// Where storing a calibration stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Storing {
     No,
     /// It waits for the board.
     Wanted,
     /// The board has answered; the host has not been told yet.
-    Done(Result<(), ()>),
-    /// There is no memory; the host has not been told yet.
-    NoMemory,
+    Done(Result<(), Refusal>),
 }
 
 /// What the session itself counts.
@@ -131,14 +129,10 @@ impl Desk {
     }
 
     pub(super) fn stored(&mut self, result: Result<(), Refusal>) {
-        self.storing = match result {
-            Ok(()) => {
-                self.source = CalibrationSource::Stored;
-                Storing::Done(Ok(()))
-            }
-            Err(Refusal::NoMemory) => Storing::NoMemory,
-            Err(_) => Storing::Done(Err(())),
-        };
+        if result.is_ok() {
+            self.source = CalibrationSource::Stored;
+        }
+        self.storing = Storing::Done(result);
     }
 
     /// What the host should hear next, once.
@@ -162,11 +156,8 @@ impl Desk {
     }
 
     fn storing_done(&mut self) -> Option<Answer> {
-        let result = match self.storing {
-            Storing::No | Storing::Wanted => return None,
-            Storing::Done(Ok(())) => Ok(()),
-            Storing::Done(Err(())) => Err(Refusal::MemoryFailed),
-            Storing::NoMemory => Err(Refusal::NoMemory),
+        let Storing::Done(result) = self.storing else {
+            return None;
         };
         self.storing = Storing::No;
         let request = Request::StoreCalibration;

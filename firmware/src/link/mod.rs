@@ -204,7 +204,8 @@ impl<'t, const D: usize> Link<'t, D> {
         self.session.to_store()
     }
 
-    /// How storing it went: [`Refusal::NoMemory`] or [`Refusal::MemoryFailed`].
+    /// How storing it went: [`Refusal::NoMemory`], [`Refusal::MemoryFull`] or
+    /// [`Refusal::MemoryFailed`].
     pub fn stored(&mut self, result: Result<(), Refusal>) {
         self.session.stored(result);
     }

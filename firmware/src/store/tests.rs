@@ -130,9 +130,36 @@ fn nothing_then_something_then_the_latest() {
     let mut store = store(Flash::<8, 2048>::new(4096), 2048);
     assert_eq!(store.load(), Stored::Missing);
     for n in 0..40 {
+        store.prepare().expect("prepared");
         store.save(&numbered(n)).expect("saved");
         assert_eq!(store.load(), Stored::Found(numbered(n)), "{n}");
     }
+}
+
+#[test]
+fn it_never_erases_and_says_when_it_is_full() {
+    full::<8, 2048>(2048, 2048 / PLACE);
+    // A large sector is not used up.
+    full::<32, 8192>(8192, 8);
+}
+
+fn full<const W: usize, const E: usize>(size: usize, places: usize) {
+    let mut store = store(Flash::<W, E>::new(2 * size), size);
+    let places = 2 * places;
+    for n in 0..places {
+        store.flash.steps = 0;
+        store.save(&numbered(n)).expect("saved");
+        assert_eq!(store.flash.steps, PLACE / W, "{n}: erased");
+    }
+    for _ in 0..3 {
+        store.flash.steps = 0;
+        assert_eq!(store.save(&numbered(99)), Err(StoreError::Full));
+        assert_eq!(store.flash.steps, 0);
+        assert_eq!(store.load(), Stored::Found(numbered(places - 1)));
+    }
+    store.prepare().expect("prepared");
+    store.save(&numbered(99)).expect("saved");
+    assert_eq!(store.load(), Stored::Found(numbered(99)));
 }
 
 /// Cuts the power at each step of each of many savings.
@@ -141,6 +168,8 @@ fn cut_everywhere<const W: usize, const E: usize>(size: usize, savings: usize) {
     let mut cuts = 0;
     for n in 0..savings {
         let mut whole = store(flash.clone(), size);
+        whole.prepare().expect("prepared");
+        flash = whole.flash.clone();
         whole.flash.steps = 0;
         whole.save(&numbered(n)).expect("saved");
         for left in 1..=whole.flash.steps {
@@ -151,7 +180,7 @@ fn cut_everywhere<const W: usize, const E: usize>(size: usize, savings: usize) {
             let mut after = store(failing.flash, size);
             let found = after.load();
             let old = match n {
-                0 => [Stored::Missing, Stored::Damaged].contains(&found),
+                0 => found == Stored::Missing,
                 n => found == Stored::Found(numbered(n - 1)),
             };
             let new = found == Stored::Found(numbered(n));
@@ -175,14 +204,26 @@ fn power_lost_at_any_step_leaves_the_old_record_or_the_new() {
     cut_everywhere::<4, 256>(512, 10);
 }
 
+/// As above, for the erasing at start-up.
 #[test]
-fn prepared_it_saves_without_erasing() {
-    let mut store = store(Flash::<8, 2048>::new(4096), 2048);
-    for n in 0..40 {
-        store.prepare().expect("prepared");
-        store.flash.steps = 0;
-        store.save(&numbered(n)).expect("saved");
-        assert!(store.flash.steps <= PLACE / 8, "{n}: erased");
+fn power_lost_while_erasing_leaves_the_newest_record() {
+    let mut full = store(Flash::<4, 256>::new(2 * 1024), 1024);
+    let mut n = 0;
+    while full.save(&numbered(n)).is_ok() {
+        n += 1;
+    }
+    for left in 1..=4 {
+        let mut failing = store(full.flash.clone(), 1024);
+        failing.flash.left = left;
+        let _ = failing.prepare();
+        let mut after = store(failing.flash, 1024);
+        assert_eq!(
+            after.load(),
+            Stored::Found(numbered(n - 1)),
+            "cut at {left}"
+        );
+        after.prepare().expect("prepared");
+        after.save(&numbered(77)).expect("saved");
     }
 }
 
@@ -192,6 +233,7 @@ fn garbage_is_damaged_not_missing_and_can_be_written_over() {
     flash.bytes.fill(0xA5);
     let mut store = store(flash, 2048);
     assert_eq!(store.load(), Stored::Damaged);
+    store.prepare().expect("prepared");
     store.save(&numbered(1)).expect("saved");
     assert_eq!(store.load(), Stored::Found(numbered(1)));
 }

@@ -8,7 +8,10 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Fault;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::message::{Scene, Source, ToDevice};
-use hapterra_core::wire::status::{CalibrationSource, CrashKind, ResetCause, Status};
+use hapterra_core::wire::status::{
+    CalibrationSource, CrashKind, Refusal, Request, ResetCause, Status,
+};
+use hapterra_firmware::store::PLACE;
 use hapterra_image_tests::device::{Device, machines};
 use hapterra_image_tests::elf::Function;
 use hapterra_image_tests::machine::{Machine, Stop};
@@ -139,6 +142,52 @@ fn a_stored_calibration_is_there_after_the_reset() {
             Some(Calibration::PREMIUM_1_5.model),
             "{board}"
         );
+    }
+}
+
+/// Stores a calibration and gives the answer.
+fn store(device: &mut Device<'_>) -> Result<(), Refusal> {
+    let calibration = Calibration::PREMIUM_1_5;
+    device.say(&ToDevice::SetCalibration {
+        calibration,
+        store: true,
+    });
+    device.run_ms(100);
+    let answer = device.answer.take().expect("an answer");
+    assert_eq!(answer.request, Request::StoreCalibration);
+    answer.result
+}
+
+#[test]
+fn a_full_memory_is_not_erased_while_the_watchdog_waits_but_at_the_next_start() {
+    let raster = raster();
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    for machine in machines() {
+        let board = machine.chip.board;
+        let (areas, bytes) = machine.chip.flash.calibrations;
+        let mut device = Device::open(machine, &terrain, scene(&terrain));
+        assert_eq!(store(&mut device), Ok(()), "{board}");
+        let record = device.machine.borrow().bytes(areas[0], PLACE);
+        let places = bytes as usize / PLACE;
+        for area in areas {
+            device
+                .machine
+                .borrow_mut()
+                .patch(area, &record.repeat(places));
+        }
+        // The link going on shows that the watchdog is fed.
+        assert_eq!(store(&mut device), Err(Refusal::MemoryFull), "{board}");
+        device.run_ms(300);
+        let full = device.machine.borrow().bytes(areas[0], PLACE);
+        assert_eq!(full, record, "{board}: nothing was erased");
+        // The start takes as long as the erase, and ends well.
+        let mut again = Device::open(device.reset(), &terrain, scene(&terrain));
+        let status = again.ask_status();
+        assert_eq!(status.calibration, CalibrationSource::Stored, "{board}");
+        let blank = again.machine.borrow().bytes(areas[0], bytes as usize);
+        assert!(blank.iter().all(|byte| *byte == 0xFF), "{board}: no room");
+        assert_eq!(store(&mut again), Ok(()), "{board}");
     }
 }
 

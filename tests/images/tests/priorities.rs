@@ -107,7 +107,7 @@ fn only_programs_that_failed_mask_everything() {
             "HardFault",
             "DefaultHandler",
             // embassy's flash driver, for the one register write that begins an
-            // erase: a dozen instructions, and only while disarmed.
+            // erase: at start-up only, before there is a tick.
             "blocking_erase",
         ];
         for name in maskers {

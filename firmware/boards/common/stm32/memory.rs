@@ -1,6 +1,7 @@
 //! The calibration in flash: two areas at its end, which the memory map keeps
 //! from the image, in the bank that no code runs from. So code runs on while
-//! they are written or erased.
+//! they are written. They are erased at start-up only, before the tick, the
+//! watchdog and the link: on an H743 that takes a second or two.
 
 use core::cell::RefCell;
 
@@ -8,7 +9,7 @@ use embassy_stm32::flash::{Blocking, Error, Flash};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::status::Refusal;
-use hapterra_firmware::store::{CalibrationStore, Stored};
+use hapterra_firmware::store::{CalibrationStore, StoreError, Stored};
 
 use crate::{FLASH_BASE, write_back};
 
@@ -68,6 +69,9 @@ impl Memory {
     /// Stores a record.
     pub(crate) fn save(&self, calibration: &Calibration) -> Result<(), Refusal> {
         let saved = self.0.borrow_mut().save(calibration);
-        saved.map_err(|_| Refusal::MemoryFailed)
+        saved.map_err(|why| match why {
+            StoreError::Full => Refusal::MemoryFull,
+            StoreError::Erase | StoreError::Write => Refusal::MemoryFailed,
+        })
     }
 }
