@@ -11,6 +11,7 @@ pub mod faulty;
 pub mod field;
 pub mod fuzzing;
 pub mod invariants;
+pub mod minima;
 pub mod oracle;
 pub mod scene;
 pub mod soak;

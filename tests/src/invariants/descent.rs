@@ -8,8 +8,8 @@
 use super::surface::{Patch, distance};
 use crate::scene::terrain::Terrain;
 
-/// First step of the walk, cells.
-const STEP: f64 = 1.0 / 1024.0;
+/// First step of the walk, cells: on a wall of 10⁶ the next minimum is not far.
+const STEP: f64 = 1e-9;
 /// A neighbouring patch must lead at least this far, cells.
 const LEAST_WAY: f64 = 1e-11;
 /// Patches at most.

@@ -63,7 +63,8 @@ impl Seen {
     /// Error allowed where the height is not in question: the bound, or four
     /// units in the last place of the largest coordinate of the hand in the
     /// proxy's patch.
-    pub(super) fn allowed(&self) -> f64 {
+    #[must_use]
+    pub fn allowed(&self) -> f64 {
         let reach = (0..3).map(|i| (self.proxy[i] - self.hip[i]).abs());
         let largest = reach.fold(1.0, f64::max) + 1.0;
         ERROR.max(4.0 * f64::from(f32::EPSILON) * largest)

@@ -1,0 +1,221 @@
+//! All local closest points around a place, listed: a second opinion on where a
+//! proxy may rest, found without walking there from where it is.
+//!
+//! In a patch, the nearest point of each ruling is known in closed form, so the
+//! squared distance is a function F of one coordinate. F's slope is looked at in
+//! hundreds of places, dense to 10⁻¹² around those where it may turn within a
+//! short way; each turn from falling to rising is halved to the end of f64. What
+//! is found on a border is kept if no patch that shares it leads on downhill.
+
+use crate::invariants::surface::{Patch, distance};
+use crate::scene::terrain::Terrain;
+
+/// Places looked at in a patch by even steps.
+const STEPS: i32 = 512;
+/// A border nearer than this to a place, in cells, has its other side looked at.
+const NEAR: f64 = 1e-3;
+/// Slopes of the distance along a border's other side that count as none.
+const LEVEL: f64 = 1e-9;
+
+/// The local closest points to `hand` in the patches around a place: in the
+/// patch it is in, and in those whose border it is near.
+#[must_use]
+pub fn around(terrain: &Terrain, hand: [f64; 3], place: [f64; 2]) -> Vec<[f64; 3]> {
+    let cells = |x: f64| {
+        let (low, high) = ((x - NEAR).floor() as i32, (x + NEAR).floor() as i32);
+        low..=high
+    };
+    let patches = cells(place[1])
+        .flat_map(|row| cells(place[0]).map(move |col| [col, row]))
+        .filter_map(|cell| Patch::at(terrain, cell));
+    patches
+        .flat_map(|patch| {
+            let all = in_patch(&patch, hand, place);
+            all.into_iter()
+                .filter(move |at| is_lowest_around(terrain, hand, &patch, *at))
+                .map(move |[x, y]| [x, y, patch.height(x, y)])
+        })
+        .collect()
+}
+
+/// The one of them that is nearest to a point, and how near.
+#[must_use]
+pub fn nearest(all: &[[f64; 3]], point: [f64; 3]) -> Option<([f64; 3], f64)> {
+    let with = all.iter().map(|at| (*at, distance(*at, point)));
+    with.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+fn in_patch(patch: &Patch, hand: [f64; 3], place: [f64; 2]) -> Vec<[f64; 2]> {
+    let low = patch.cell.map(f64::from);
+    // The steeper direction is the one in closed form.
+    let steepest = |axis: usize| {
+        let ends = [[0.0, 0.0], [1.0, 1.0]];
+        let slopes = ends.map(|[u, v]| patch.slopes(low[0] + u, low[1] + v)[axis].abs());
+        slopes[0].max(slopes[1])
+    };
+    let axis = usize::from(steepest(1) > steepest(0));
+    let ruled = Ruled {
+        patch,
+        hand,
+        axis,
+        low,
+    };
+    let places = ruled.places(place[1 - axis] - low[1 - axis]);
+    let slopes: Vec<f64> = places.iter().map(|t| ruled.slope(*t)).collect();
+    let mut found = Vec::new();
+    if slopes[0] >= 0.0 {
+        found.push(0.0);
+    }
+    for i in 1..places.len() {
+        if slopes[i - 1] < 0.0 && slopes[i] >= 0.0 {
+            found.push(ruled.turn(places[i - 1], places[i]));
+        }
+    }
+    if slopes[slopes.len() - 1] < 0.0 {
+        found.push(1.0);
+    }
+    found.into_iter().map(|t| ruled.point(t)).collect()
+}
+
+/// A patch by its rulings along `axis`, each at a `t` of the other one.
+struct Ruled<'p> {
+    patch: &'p Patch,
+    hand: [f64; 3],
+    axis: usize,
+    low: [f64; 2],
+}
+
+impl Ruled<'_> {
+    /// Where along its ruling the nearest point is.
+    fn best(&self, t: f64) -> f64 {
+        let [x, y] = self.at(0.0, t);
+        let slope = self.patch.slopes(x, y)[self.axis];
+        let rise = self.patch.height(x, y) - self.hand[2];
+        let ahead = self.hand[self.axis] - self.low[self.axis];
+        ((ahead - rise * slope) / (1.0 + slope * slope)).clamp(0.0, 1.0)
+    }
+
+    fn at(&self, s: f64, t: f64) -> [f64; 2] {
+        let (x, y) = if self.axis == 0 { (s, t) } else { (t, s) };
+        [self.low[0] + x, self.low[1] + y]
+    }
+
+    fn point(&self, t: f64) -> [f64; 2] {
+        self.at(self.best(t), t)
+    }
+
+    /// Half the slope of F.
+    fn slope(&self, t: f64) -> f64 {
+        let [x, y] = self.point(t);
+        let other = 1 - self.axis;
+        let aside = [x, y][other] - self.hand[other];
+        aside + (self.patch.height(x, y) - self.hand[2]) * self.patch.slopes(x, y)[other]
+    }
+
+    /// Everywhere, and closely around where F may turn.
+    fn places(&self, around: f64) -> Vec<f64> {
+        let [x0, y0] = self.at(0.0, 0.0);
+        let [x1, y1] = self.at(0.0, 1.0);
+        let slopes = [(x0, y0), (x1, y1)].map(|(x, y)| self.patch.slopes(x, y)[self.axis]);
+        // The gap between surface and hand along the ruling through the hand.
+        let ahead = self.hand[self.axis] - self.low[self.axis];
+        let gaps = [0.0, 1.0].map(|t| {
+            let [x, y] = self.at(0.0, t);
+            let slope = self.patch.slopes(x, y)[self.axis];
+            self.patch.height(x, y) + slope * ahead - self.hand[2]
+        });
+        let zero = |[a, b]: [f64; 2]| a / (a - b);
+        let across = self.hand[1 - self.axis] - self.low[1 - self.axis];
+        let centres = [around, across, zero(slopes), zero(gaps), 0.0, 1.0];
+        let mut places: Vec<f64> = (0..=STEPS)
+            .map(|i| f64::from(i) / f64::from(STEPS))
+            .collect();
+        for centre in centres.into_iter().filter(|c| c.is_finite()) {
+            places.push(centre);
+            for quarter in 0..=48 {
+                let off = 10_f64.powf(-f64::from(quarter) / 4.0);
+                places.extend([centre - off, centre + off]);
+            }
+        }
+        places.retain(|t| (0.0..=1.0).contains(t));
+        places.sort_by(f64::total_cmp);
+        places.dedup();
+        places
+    }
+
+    fn turn(&self, mut falling: f64, mut rising: f64) -> f64 {
+        loop {
+            let middle = 0.5 * (falling + rising);
+            if middle == falling || middle == rising {
+                return rising;
+            }
+            if self.slope(middle) >= 0.0 {
+                rising = middle;
+            } else {
+                falling = middle;
+            }
+        }
+    }
+}
+
+/// Whether no patch that shares the place leads on downhill from it.
+fn is_lowest_around(terrain: &Terrain, hand: [f64; 3], own: &Patch, at: [f64; 2]) -> bool {
+    let side = |axis: usize| {
+        let local = at[axis] - f64::from(own.cell[axis]);
+        i32::from(local == 1.0) - i32::from(local == 0.0)
+    };
+    let ways = [side(0), side(1)];
+    let others = [[ways[0], 0], [0, ways[1]], ways];
+    others
+        .into_iter()
+        .filter(|way| *way != [0, 0])
+        .filter_map(|way| {
+            let cell = [own.cell[0] + way[0], own.cell[1] + way[1]];
+            Some((way, Patch::at(terrain, cell)?))
+        })
+        .all(|(way, patch)| !leads_down(&patch, hand, at, way))
+}
+
+/// Whether the distance falls from a place on a patch's border into it.
+fn leads_down(patch: &Patch, hand: [f64; 3], [x, y]: [f64; 2], way: [i32; 2]) -> bool {
+    let rise = patch.height(x, y) - hand[2];
+    let [east, north] = patch.slopes(x, y);
+    let slopes = [(x - hand[0]) + rise * east, (y - hand[1]) + rise * north];
+    let steep = [east, north].map(|m| LEVEL * (1.0 + m.abs()) * (1.0 + rise.abs()));
+    (0..2).any(|axis| way[axis] != 0 && slopes[axis] * f64::from(way[axis]) < -steep[axis])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::terrain::Kind;
+
+    #[test]
+    fn both_sides_of_a_ridge_and_the_bottom_of_a_valley() {
+        let ridge = Terrain::from_fn(Kind::Ridges, [8, 8], |x, _| -((x - 4).abs() as f32));
+        let hand = [4.0, 3.5, -0.001];
+        let all = around(&ridge, hand, [4.0, 3.5]);
+        assert_eq!(all.len(), 2, "{all:?}");
+        let valley = Terrain::from_fn(Kind::Ridges, [8, 8], |x, _| (x - 4).abs() as f32);
+        let all = around(&valley, hand, [4.0, 3.5]);
+        assert!(
+            !all.is_empty() && all.iter().all(|at| *at == [4.0, 3.5, 0.0]),
+            "{all:?}"
+        );
+    }
+
+    #[test]
+    fn a_twist_has_more_than_one() {
+        // z = 8·(u − ½)·(v − ½): from far below the middle, two corners are near.
+        let saddle = Terrain::from_fn(
+            Kind::Twisted,
+            [1, 1],
+            |x, y| {
+                if x == y { 2.0 } else { -2.0 }
+            },
+        );
+        let all = around(&saddle, [0.5, 0.5, -6.0], [0.5, 0.5]);
+        assert_eq!(all.len(), 2, "{all:?}");
+        assert!(all.iter().all(|at| at[2] == -2.0), "{all:?}");
+    }
+}
