@@ -42,8 +42,6 @@ pub struct Contact {
     /// another one comes with a new contact.)
     pub(super) answered: bool,
     pub(super) presence: f32,
-    /// Most that the presence may change in a tick.
-    fade: f32,
     /// A free proxy had to wait, for terrain or for work: the force of the next
     /// contact may not come at once.
     pub(super) late: bool,
@@ -60,6 +58,8 @@ pub struct Contact {
     /// What was felt before the general case had to look, which may take it
     /// several turns in lock-step.
     before: Felt,
+    /// Most that the presence may change in a tick.
+    fade: f32,
 }
 
 impl Default for Contact {
@@ -83,7 +83,6 @@ impl Contact {
             hip: GridPoint::default(),
             answered: false,
             presence: 1.0,
-            fade: presence::RATE_PER_S * rate.tick_s(),
             late: false,
             reached: f32::INFINITY,
             leaps: 0,
@@ -91,6 +90,7 @@ impl Contact {
             sought: GridPoint::default(),
             last: Felt::default(),
             before: Felt::default(),
+            fade: presence::RATE_PER_S * rate.tick_s(),
         }
     }
 
