@@ -12,7 +12,7 @@ use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::{Rule, State};
 use hapterra_core::force::ForceLaw;
-use hapterra_core::guard::{Blockers, Drive, Fault, Limits, Mode, Report, Sense};
+use hapterra_core::guard::{Blockers, Drive, Fault, Limits, Mode, Report, Sense, WORKING_SHARE};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::message::{Sample, Scene, Source, ToDevice};
 use hapterra_core::wire::status::{Answer, BootReport, Refusal, Request, ResetCause};
@@ -150,7 +150,7 @@ impl<'t> Bed<'t> {
             assert!(drive.enabled || most == 0.0, "{most} A while off at {tick}");
         }
         for sample in &self.samples {
-            assert!(sample.force_n.length() <= 8.5);
+            assert!(sample.force_n.length() <= 8.5 * WORKING_SHARE);
             let driven = sample.mode.drives();
             assert!(driven || sample.force_n.length() == 0.0, "{}", sample.tick);
         }

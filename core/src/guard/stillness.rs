@@ -4,22 +4,30 @@
 //! standing encoder is suspicious only in two cases:
 //! - *All* encoders stand to the count for two seconds while a motor has more
 //!   than its continuous current. No hand is that calm under such a force.
-//! - *One* encoder stands while its motor pushes and the other joints travel
-//!   a long way. Sliding on a plane turns joint 2 hardly at all, and friction
-//!   may hold it for a while; but no hand pushes evenly to a twentieth of a
-//!   newton along 40 cm.
+//! - *One* encoder stands, give or take a count, while its motor pushes and the
+//!   other joints travel. A hand trembles by more than a count, so along a way
+//!   that turns one joint only the others still move.
 
 use glam::Vec3;
 
 /// Readings (a millisecond each) that all encoders may stand under load.
 const ALL_STILL: u32 = 2_000;
-/// Counts that the other joints may travel while one stands: about 400 mm.
-const TRAVEL: u32 = 16_000;
+/// Counts that the other joints may travel together while one stands: about
+/// 200 mm. Three times what a hand does that turns one joint only, at up to half
+/// a metre a second, with a tremor of 0.2 mm (measured on the virtual Phantom);
+/// and more than it does rubbing along a straight line without any.
+pub const TRAVEL: u32 = 8_000;
+/// A joint stands while it stays this near, in counts, to where it was: with one
+/// of its two channels dead an encoder still goes one up and one down.
+const BAND: u32 = 1;
 
 /// Watches for motors that push in vain.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stillness {
     all_still: u32,
+    /// How far each joint is from where it began to stand.
+    off: [i32; 3],
+    /// How far the other joints have travelled since.
     others: [u32; 3],
 }
 
@@ -42,11 +50,14 @@ impl Stillness {
         let way = moved.map(i32::unsigned_abs);
         let all = way.iter().fold(0, |sum: u32, w| sum.saturating_add(*w));
         let loaded = load.cmpgt(0.5 * continuous_a);
-        for (axis, (others, own)) in self.others.iter_mut().zip(way).enumerate() {
-            *others = match own == 0 && loaded.test(axis) {
-                true => others.saturating_add(all),
-                false => 0,
-            };
+        let axes = self.off.iter_mut().zip(&mut self.others);
+        for (axis, ((off, others), moved)) in axes.zip(moved).enumerate() {
+            *off = off.saturating_add(moved);
+            if loaded.test(axis) && off.unsigned_abs() <= BAND {
+                *others = others.saturating_add(all - moved.unsigned_abs());
+            } else {
+                (*off, *others) = (0, 0);
+            }
         }
         self.all_still > ALL_STILL || self.others.iter().any(|others| *others > TRAVEL)
     }
@@ -79,6 +90,26 @@ mod tests {
     #[test]
     fn one_encoder_dead_while_its_motor_drives_the_arm_away() {
         let found = ticks_until_found([0, 0, -10], Vec3::Y * 0.7);
-        assert_eq!(found, Some(1_601));
+        assert_eq!(found, Some(801));
+    }
+
+    #[test]
+    fn one_channel_dead_goes_up_and_down_by_a_count() {
+        let mut stillness = Stillness::default();
+        let found = (1..10_000).find(|i| {
+            let moved = [-10, if i % 2 == 0 { 1 } else { -1 }, 0];
+            stillness.look(moved, Vec3::Y * 0.7, CONTINUOUS)
+        });
+        assert_eq!(found, Some(801));
+    }
+
+    #[test]
+    fn a_joint_that_creeps_stands_only_for_a_while() {
+        let mut stillness = Stillness::default();
+        let found = (1..100_000).find(|i| {
+            let moved = [-10, i32::from(i % 60 == 0), 0];
+            stillness.look(moved, Vec3::Y * 0.7, CONTINUOUS)
+        });
+        assert_eq!(found, None);
     }
 }

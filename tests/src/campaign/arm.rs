@@ -141,9 +141,7 @@ impl<'t> Arm<'t> {
     pub fn force_n(&self, currents_a: [f64; 3], weight_nm: [f64; 3]) -> Option<f64> {
         let model = self.plant.model();
         let q = self.plant.q_rad();
-        let spread = libm::cos(q[1] - q[2]);
-        let reach_m = model.l1_m * libm::cos(q[1]) + model.l2_m * libm::sin(q[2]);
-        if spread.abs() < 0.5 || reach_m.abs() < 0.08 {
+        if is_near_singular(model, q) {
             return None;
         }
         let torque = std::array::from_fn(|i| {
@@ -158,8 +156,18 @@ impl<'t> Arm<'t> {
     }
 }
 
+/// Whether the links are within 30° of being in line, or the tip within 80 mm of
+/// the base's axis: there small torques are large forces.
+#[must_use]
+pub fn is_near_singular(model: &PhantomModel, q: [f64; 3]) -> bool {
+    let spread = libm::cos(q[1] - q[2]);
+    let reach_m = model.l1_m * libm::cos(q[1]) + model.l2_m * libm::sin(q[2]);
+    spread.abs() < 0.5 || reach_m.abs() < 0.08
+}
+
 /// F in Jᵀ·F = τ, by Cramer's rule.
-fn force(jacobian: &[[f64; 3]; 3], torque: [f64; 3]) -> [f64; 3] {
+#[must_use]
+pub fn force(jacobian: &[[f64; 3]; 3], torque: [f64; 3]) -> [f64; 3] {
     // Rows of Jᵀ are the columns of J.
     let row = |i: usize| [jacobian[0][i], jacobian[1][i], jacobian[2][i]];
     let [a, b, c] = [row(0), row(1), row(2)];

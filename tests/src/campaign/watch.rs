@@ -1,6 +1,6 @@
 //! What has to hold in every tick, whatever goes wrong.
 
-use hapterra_core::guard::{Drive, Mode, Sense};
+use hapterra_core::guard::{Drive, Mode, Sense, WORKING_SHARE};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::message::Sample;
 
@@ -13,10 +13,6 @@ const SLEW_N: f32 = 1.0;
 const HOTTEST_C: f64 = 112.0;
 /// Room for rounding in comparisons of f32.
 const ROUNDING: f32 = 1e-4;
-/// By this much the force worked out from the currents may be above the clamp: an
-/// encoder that is wrong makes the device push with levers that are not the arm's.
-const LEVERS_N: f64 = 0.5;
-
 /// The largest that was seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extremes {
@@ -110,10 +106,10 @@ impl Watch {
             return Ok(());
         };
         self.extremes.motor_force_n = self.extremes.motor_force_n.max(force);
-        let most = f64::from(self.record.max_force_n) + LEVERS_N;
+        let most = f64::from(self.record.max_force_n);
         match force <= most {
             true => Ok(()),
-            false => Err(format!("the motors make {force:.2} N at the tip")),
+            false => Err(format!("the motors make {force:.3} N at the tip")),
         }
     }
 
@@ -130,7 +126,7 @@ impl Watch {
         if off && force != 0.0 {
             return Err(format!("{force} N with the amplifiers off: {sample:?}"));
         }
-        let clamp = self.record.max_force_n.min(law_n);
+        let clamp = (WORKING_SHARE * self.record.max_force_n).min(law_n);
         if force > clamp * (1.0 + ROUNDING) {
             return Err(format!("{force} N is above the clamp of {clamp} N"));
         }

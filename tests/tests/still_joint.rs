@@ -1,0 +1,104 @@
+//! How far the other joints travel while one stands to the count, in a hand that
+//! is well: what the guard has to let pass before it calls an encoder dead.
+
+use std::f64::consts::TAU;
+
+use hapterra::phantom::{HandModel, PhantomModel, Plant, kinematics};
+use hapterra_core::guard::TRAVEL_WHILE_ONE_STANDS;
+
+/// Turns a second of the tremor of each axis.
+const TREMOR_HZ: [f64; 3] = [8.3, 9.7, 11.2];
+const TICK_S: f64 = 1e-3;
+
+/// Most counts that the others travelled while a joint stayed within a count
+/// of where it was.
+#[derive(Default)]
+struct Stands {
+    at: [i32; 3],
+    others: [u32; 3],
+    last: [i32; 3],
+    most: [u32; 3],
+}
+
+impl Stands {
+    fn look(&mut self, counts: [i32; 3]) {
+        let way: u32 = (0..3).map(|i| counts[i].abs_diff(self.last[i])).sum();
+        self.last = counts;
+        for (axis, count) in counts.into_iter().enumerate() {
+            if count.abs_diff(self.at[axis]) <= 1 {
+                self.others[axis] += way;
+            } else {
+                self.at[axis] = count;
+                self.others[axis] = 0;
+            }
+            self.most[axis] = self.most[axis].max(self.others[axis]);
+        }
+    }
+}
+
+/// A hand that takes the tip along `way` (joint angles by time), trembling.
+fn along(way: impl Fn(f64) -> [f64; 3], tremor_mm: f64, current_a: f64, seconds: f64) -> [u32; 3] {
+    let model = PhantomModel::premium_1_5();
+    let mut plant = Plant::new(model, way(0.0)).held_by(HandModel::default());
+    let target = |t: f64| {
+        let tip = kinematics::tip(&model, way(t));
+        std::array::from_fn(|i| tip[i] + 1e-3 * tremor_mm * (TAU * TREMOR_HZ[i] * t).sin())
+    };
+    let mut stands = Stands::default();
+    let ticks = (seconds / TICK_S) as u32;
+    for tick in 0..ticks {
+        let t = f64::from(tick) * TICK_S;
+        let (now, next): ([f64; 3], [f64; 3]) = (target(t), target(t + TICK_S));
+        plant.aim(now, std::array::from_fn(|i| (next[i] - now[i]) / TICK_S));
+        plant.step([current_a; 3], TICK_S);
+        // The first second settles.
+        if tick == 1_000 {
+            stands = Stands {
+                at: plant.counts(),
+                last: plant.counts(),
+                ..Stands::default()
+            };
+        }
+        stands.look(plant.counts());
+    }
+    stands.most
+}
+
+/// The guard lets pass three times what a hand does.
+fn assert_passes(what: &str, most: [u32; 3]) {
+    eprintln!("{what}: {most:?} counts");
+    let allowed = TRAVEL_WHILE_ONE_STANDS / 3;
+    assert!(most.iter().all(|most| *most <= allowed), "{what}: {most:?}");
+}
+
+/// The hardest case: the other joints have no reason to move but the tremor.
+#[test]
+fn a_hand_that_turns_one_joint_only_trembles_enough() {
+    let ways = [(0.1, 0.3), (0.3, 0.3), (0.8, 0.3), (0.5, 0.03)];
+    for (tremor_mm, (hz, rad)) in [0.2, 0.4].into_iter().flat_map(|t| ways.map(|w| (t, w))) {
+        for joint in 0..3 {
+            let way = |t: f64| {
+                let mut q = [0.1, 0.2, 0.15];
+                q[joint] += rad * (TAU * hz * t).sin();
+                q
+            };
+            let what = format!(
+                "tremor {tremor_mm} mm, joint {} by {rad} rad at {hz} Hz",
+                joint + 1
+            );
+            assert_passes(&what, along(way, tremor_mm, 0.7, 30.0));
+        }
+    }
+}
+
+#[test]
+fn a_wandering_hand_needs_no_tremor() {
+    let way = |t: f64| {
+        [
+            0.25 * (1.9 * t).sin() + 0.1 * (4.1 * t).sin(),
+            0.2 + 0.15 * (1.3 * t).sin(),
+            0.15 + 0.2 * (2.3 * t + 1.0).sin(),
+        ]
+    };
+    assert_passes("wandering", along(way, 0.0, 0.7, 60.0));
+}
