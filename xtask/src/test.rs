@@ -14,6 +14,9 @@ pub(crate) type Image = (&'static Board, PathBuf);
 
 /// `quick` has no images of the real boards, and nothing to build what runs them.
 const WITHOUT_IMAGES: [&str; 2] = ["--exclude", "hapterra-image-tests"];
+/// Otherwise the image tests need probe-rs anyway, and the command is tested with
+/// it, too.
+const WITH_PROBES: [&str; 2] = ["--features", "hapterra/probe"];
 
 /// Builds the images, holds them to their budgets, runs every test of the
 /// workspace on the host with QEMU beside it, and checks the dependencies.
@@ -37,7 +40,7 @@ pub(crate) fn test(quick: bool) -> Result<()> {
         let mut command = cargo();
         command
             .args(["test", "--workspace"])
-            .args(if quick { &WITHOUT_IMAGES[..] } else { &[] })
+            .args(if quick { WITHOUT_IMAGES } else { WITH_PROBES })
             .env("HAPTERRA_QEMU", qemu)
             .env(image::COUNTS_VARIABLE, &counts);
         for (board, path) in &images {
