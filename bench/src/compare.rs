@@ -1,6 +1,7 @@
 //! All variants on one terrain along all paths, interleaved in one run.
 
 use hapterra_core::contact::Rule;
+use hapterra_core::terrain::Window;
 
 use crate::baseline::{GodObject, Paper, Parry, Project, ProxyGraph, Start};
 use crate::grid::Grid;
@@ -124,25 +125,14 @@ impl Error {
     }
 }
 
-type Entry<'a> = (Label, Box<dyn Haptics + 'a>);
+pub(crate) type Entry<'a> = (Label, Box<dyn Haptics + 'a>);
 
 /// Measures every variant on one terrain. `progress` is told each path.
 pub fn compare(grid: &Grid, effort: Effort, mut progress: impl FnMut(&str)) -> Vec<Row> {
     let mut buffers = product::buffers::<SIDE>();
     let window = product::window::<SIDE>(grid, &mut buffers);
-    let mut entries = opponents(grid);
-    let mut ours = |name, rule| {
-        let label = Label {
-            name,
-            family: Family::Ours,
-            // 21 maxima a tile and 8 bytes of pyramid, over 32 × 32 samples.
-            extra_bytes: (21.0 * 4.0 + 8.0) / 1024.0,
-        };
-        let product: Box<dyn Haptics + '_> = Box::new(Product::new(&window, rule));
-        entries.insert(0, (label, product));
-    };
-    ours("hapterra paper rule", Rule::Paper);
-    ours("hapterra swept", Rule::Swept);
+    let mut entries = ours(&window);
+    entries.extend(opponents(grid));
     let mut rows = Vec::new();
     for path in path::all(grid, effort.ticks) {
         progress(path.name);
@@ -151,7 +141,27 @@ pub fn compare(grid: &Grid, effort: Effort, mut progress: impl FnMut(&str)) -> V
     rows
 }
 
-fn opponents(grid: &Grid) -> Vec<Entry<'_>> {
+/// The product's default.
+pub const SWEPT: Label = Label {
+    name: "hapterra swept",
+    family: Family::Ours,
+    // 21 maxima a tile and 8 bytes of pyramid, over 32 × 32 samples.
+    extra_bytes: (21.0 * 4.0 + 8.0) / 1024.0,
+};
+
+/// The product's rules on a held field.
+pub(crate) fn ours<'w, const D: usize>(window: &'w Window<'_, D>) -> Vec<Entry<'w>> {
+    let by_paper = Label {
+        name: "hapterra paper rule",
+        ..SWEPT
+    };
+    vec![
+        (SWEPT, Box::new(Product::new(window, Rule::Swept))),
+        (by_paper, Box::new(Product::new(window, Rule::Paper))),
+    ]
+}
+
+pub(crate) fn opponents(grid: &Grid) -> Vec<Entry<'_>> {
     let label = |name, family, extra_bytes| Label {
         name,
         family,

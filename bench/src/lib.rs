@@ -7,6 +7,7 @@
 //! - [`baseline`]: the opponents, none of which is in the product;
 //! - [`truth`]: the exact closest point in f64, which judges every answer;
 //! - [`compare`]: all variants on one terrain, interleaved;
+//! - [`continuity`]: how much the force changes from one tick to the next;
 //! - [`solver`]: one patch, and the square root, alone;
 //! - [`state`]: what a tick can be doing, for counting instructions;
 //! - [`report`]: the table, the CSV file, the picture.
@@ -16,6 +17,7 @@
 pub mod baseline;
 mod clock;
 pub mod compare;
+pub mod continuity;
 pub mod grid;
 pub mod haptics;
 pub mod path;

@@ -10,7 +10,7 @@ use hapterra::cli::Failure;
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra_bench::compare::{Effort, Row, compare};
 use hapterra_bench::grid::Grid;
-use hapterra_bench::{report, solver};
+use hapterra_bench::{continuity, report, solver};
 use indicatif::ProgressBar;
 
 /// Measure the contact beside other ways to render a height field: time for a
@@ -34,6 +34,10 @@ struct Args {
     #[arg(long)]
     quick: bool,
 
+    /// Only how much the force changes from tick to tick; nothing is timed
+    #[arg(long, conflicts_with_all = ["files", "quick", "png"])]
+    continuity: bool,
+
     /// Write all figures to this CSV file
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     csv: Option<PathBuf>,
@@ -54,6 +58,11 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Failure> {
+    let changes = continuity::measure();
+    if args.continuity {
+        print!("{}", report::continuity(&changes));
+        return write(args, &[], &changes);
+    }
     if cfg!(debug_assertions) {
         eprintln!("note: built without full optimisation; for figures: cargo build --release");
     }
@@ -74,8 +83,9 @@ fn run(args: &Args) -> Result<(), Failure> {
     }
     show(&solver::patches(effort), &mut rows);
     show(&solver::roots(effort), &mut rows);
+    print!("{}", report::continuity(&changes));
     print!("{}", report::summary(&rows));
-    write(args, &rows)
+    write(args, &rows, &changes)
 }
 
 /// Opens every file before anything is measured.
@@ -119,10 +129,10 @@ fn show(measured: &[Row], rows: &mut Vec<Row>) {
     rows.extend_from_slice(measured);
 }
 
-fn write(args: &Args, rows: &[Row]) -> Result<(), Failure> {
+fn write(args: &Args, rows: &[Row], changes: &[continuity::Row]) -> Result<(), Failure> {
     let hint = "check that the folder exists and that you may write there";
     if let Some(file) = &args.csv {
-        report::write_csv(file, rows).map_err(|error| {
+        report::write_csv(file, rows, changes).map_err(|error| {
             let text = format!("cannot write {}: {error}", file.display());
             Failure::new(text).hint(hint)
         })?;

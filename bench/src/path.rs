@@ -44,7 +44,7 @@ pub fn all(grid: &Grid, ticks: usize) -> Vec<Path> {
 #[must_use]
 pub fn slide(grid: &Grid, name: &'static str, step: f64, ticks: usize) -> Path {
     let mut walk = Walk::new(grid, 11);
-    let mut hands = approach(grid, walk.at, -0.1);
+    let mut hands = way_in(grid, walk.at, -0.1);
     let approach = hands.len();
     hands.extend((0..ticks).map(|_| over(grid, walk.on(grid, step), -0.1)));
     Path {
@@ -97,7 +97,7 @@ pub fn random(grid: &Grid, ticks: usize) -> Path {
 #[must_use]
 pub fn resting(grid: &Grid, ticks: usize) -> Path {
     let walk = Walk::new(grid, 14);
-    let mut hands = approach(grid, walk.at, -0.1);
+    let mut hands = way_in(grid, walk.at, -0.1);
     let approach = hands.len();
     let last = hands[approach - 1];
     hands.extend(std::iter::repeat_n(last, ticks));
@@ -201,13 +201,14 @@ fn highest_between(grid: &Grid, from: [f64; 2], to: [f64; 2]) -> f64 {
 }
 
 /// From half a cell above down to `height`.
-fn approach(grid: &Grid, at: [f64; 2], height: f64) -> Vec<Hand> {
+pub(crate) fn way_in(grid: &Grid, at: [f64; 2], height: f64) -> Vec<Hand> {
     (0..=10)
         .map(|i| over(grid, at, 0.5 + f64::from(i) / 10.0 * (height - 0.5)))
         .collect()
 }
 
-fn over(grid: &Grid, [x, y]: [f64; 2], height: f64) -> Hand {
+/// So far above the surface at a place.
+pub(crate) fn over(grid: &Grid, [x, y]: [f64; 2], height: f64) -> Hand {
     Hand::at([x, y, grid.height(x, y) + height])
 }
 

@@ -38,19 +38,28 @@ pub fn window<'t, const D: usize>(grid: &Grid, buffers: &'t mut [Tile]) -> Box<W
                 col: col as i32,
                 row: row as i32,
             };
-            let height = |x: usize, y: usize| {
-                let (x, y) = (col * TILE_CELLS + x, row * TILE_CELLS + y);
-                if x > grid.columns || y > grid.rows {
-                    return f32::NAN;
-                }
-                grid.post(x, y)
-            };
-            spare.fill(key, 0, height).expect("base 0 is in range");
+            fill(grid, key, spare);
             spare = window.install(spare);
             assert!(spare.key().is_none(), "the field fits the window");
         }
     }
     window
+}
+
+/// Fills a tile of `grid`.
+///
+/// # Panics
+/// When the tile lies west or south of the field.
+pub fn fill(grid: &Grid, key: TileKey, tile: &mut Tile) {
+    let [col, row] = [key.col, key.row].map(|n| usize::try_from(n).expect("in the field"));
+    let height = |x: usize, y: usize| {
+        let (x, y) = (col * TILE_CELLS + x, row * TILE_CELLS + y);
+        if x > grid.columns || y > grid.rows {
+            return f32::NAN;
+        }
+        grid.post(x, y)
+    };
+    tile.fill(key, 0, height).expect("base 0 is in range");
 }
 
 /// One of the product's rules.

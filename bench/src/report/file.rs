@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::compare::Row;
+use crate::continuity;
 
 /// The columns.
 pub const HEADER: [&str; 17] = [
@@ -25,11 +26,13 @@ pub const HEADER: [&str; 17] = [
     "extra_bytes_per_sample",
 ];
 
-/// Writes all rows; errors are empty where nothing was felt.
+/// Writes all rows; errors are empty where nothing was felt. The force's changes
+/// come last, as the path "force", their terrain being the ground; they are of
+/// no time.
 ///
 /// # Errors
 /// When the file cannot be written.
-pub fn write_csv(path: &Path, rows: &[Row]) -> Result<(), csv::Error> {
+pub fn write_csv(path: &Path, rows: &[Row], changes: &[continuity::Row]) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_path(path)?;
     writer.write_record(HEADER)?;
     for row in rows {
@@ -54,6 +57,17 @@ pub fn write_csv(path: &Path, rows: &[Row]) -> Result<(), csv::Error> {
         });
         let rest = [row.jump, row.missed, row.unsettled, row.label.extra_bytes];
         record.extend(rest.map(|x| x.to_string()));
+        writer.write_record(&record)?;
+    }
+    for row in changes {
+        let mut record = vec![String::new(); HEADER.len()];
+        record[0] = row.ground.to_owned();
+        record[1] = "force".to_owned();
+        record[2] = row.label.name.to_owned();
+        record[3] = format!("{:?}", row.label.family).to_lowercase();
+        record[13] = row.largest.to_string();
+        record[14] = row.missed.to_string();
+        record[16] = row.label.extra_bytes.to_string();
         writer.write_record(&record)?;
     }
     Ok(writer.flush()?)

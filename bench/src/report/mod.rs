@@ -1,10 +1,12 @@
 //! What was measured, as a table, a CSV file and a picture.
 
+mod continuity;
 mod file;
 mod picture;
 mod summary;
 mod table;
 
+pub use continuity::continuity;
 pub use file::{HEADER, write_csv};
 pub use picture::draw;
 pub use summary::summary;

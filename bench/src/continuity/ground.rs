@@ -1,0 +1,59 @@
+//! What the hand slides over.
+
+use crate::grid::Grid;
+
+/// Patches along a side.
+const SIDE: usize = 64;
+
+/// A kind of ground, by its height above the middle of the field.
+pub(super) struct Ground {
+    /// What it is called in tables.
+    pub(super) name: &'static str,
+    height: fn(f64, f64) -> f64,
+}
+
+/// From the smoothest to the roughest.
+pub(super) const GROUNDS: [Ground; 5] = [
+    // Bilinear as a whole: its patches meet without a crease.
+    Ground {
+        name: "saddle",
+        height: |x, y| 0.05 * x * y,
+    },
+    Ground {
+        name: "smooth",
+        height: |x, y| 1.5 * (0.2 * x).sin() * (0.17 * y).cos(),
+    },
+    // Every patch twisted the other way than its neighbours.
+    Ground {
+        name: "patch edges",
+        height: |x, y| {
+            if (x + y).rem_euclid(2.0) < 0.5 {
+                0.1
+            } else {
+                0.0
+            }
+        },
+    },
+    Ground {
+        name: "ridge",
+        height: |x, y| -0.3 * across(x, y).abs(),
+    },
+    Ground {
+        name: "valley",
+        height: |x, y| 0.3 * across(x, y).abs(),
+    },
+];
+
+/// Cells from a line that crosses the grid obliquely.
+fn across(x: f64, y: f64) -> f64 {
+    0.92 * x - 0.39 * y + 0.2
+}
+
+impl Ground {
+    pub(super) fn grid(&self) -> Grid {
+        let middle = SIDE as f64 / 2.0;
+        Grid::from_fn(self.name, [SIDE; 2], |x, y| {
+            (self.height)(x as f64 - middle, y as f64 - middle) as f32
+        })
+    }
+}

@@ -1,0 +1,201 @@
+//! How much the force changes when the hand moves a hundredth of a cell along the
+//! ground: on smooth ground, over ridges, in valleys, across the edges of
+//! patches, and while a tile arrives.
+//!
+//! What is compared is what is felt, fading included. The hand slides 0.1 cell
+//! below the surface; how it came there is left out.
+
+mod arrival;
+mod ground;
+
+use crate::compare::{Label, opponents, ours};
+use crate::haptics::{Answer, Hand, Haptics};
+use crate::path::{Dice, over, way_in};
+use crate::product;
+use crate::stats::quantiles;
+
+use ground::{GROUNDS, Ground};
+
+/// Cells the hand moves in a tick.
+pub const STEP: f64 = 0.01;
+/// Cells the hand is below the surface.
+pub const DEPTH: f64 = 0.1;
+/// Straight ways over a ground.
+const WAYS: usize = 24;
+/// Ticks on each of them.
+const TICKS: usize = 1000;
+/// The variants.
+const COMPARED: [&str; 7] = [
+    "hapterra swept",
+    "hapterra paper rule",
+    "paper f32",
+    "paper f64",
+    "god-object",
+    "proxy graph",
+    "parry within",
+];
+/// Tiles along the side of the product's window.
+const SIDE: usize = 8;
+
+/// One variant on one ground.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// What the hand slides over.
+    pub ground: &'static str,
+    /// Which variant.
+    pub label: Label,
+    /// Largest change of the stretch in a tick, cells.
+    pub largest: f64,
+    /// 99 % of the ticks change it less, cells.
+    pub p99: f64,
+    /// Part of the ticks that feel nothing.
+    pub missed: f64,
+}
+
+/// Every variant on every ground, and the product while a tile arrives.
+#[must_use]
+pub fn measure() -> Vec<Row> {
+    let mut rows: Vec<Row> = GROUNDS.iter().flat_map(over_ground).collect();
+    rows.extend(arrival::measure());
+    rows
+}
+
+fn over_ground(ground: &Ground) -> Vec<Row> {
+    let grid = ground.grid();
+    let ways = ways(ground);
+    let mut buffers = product::buffers::<SIDE>();
+    let window = product::window::<SIDE>(&grid, &mut buffers);
+    let mut entries = ours(&window);
+    entries.extend(opponents(&grid));
+    // Of the paper's and parry's settings the best, and no copy, which is no contact.
+    entries.retain(|(label, _)| COMPARED.contains(&label.name));
+    let row = |(label, variant): &mut (Label, Box<dyn Haptics + '_>)| {
+        let felt: Vec<Vec<Answer>> = ways
+            .iter()
+            .map(|way| {
+                variant.forget();
+                way.hands.iter().map(|hand| variant.tick(hand)).collect()
+            })
+            .collect();
+        let slid: Vec<&[Answer]> = felt
+            .iter()
+            .zip(&ways)
+            .map(|(answers, way)| &answers[way.approach - 1..])
+            .collect();
+        Row::of(ground.name, *label, &slid)
+    };
+    entries.iter_mut().map(row).collect()
+}
+
+impl Row {
+    /// What is felt in ticks that follow one another, in pieces.
+    fn of(ground: &'static str, label: Label, pieces: &[&[Answer]]) -> Self {
+        let changes: Vec<f64> = pieces
+            .iter()
+            .flat_map(|answers| answers.windows(2).map(|pair| change(&pair[0], &pair[1])))
+            .collect();
+        let felt = pieces.iter().flat_map(|answers| answers.iter());
+        let [p99, largest] = quantiles(changes, [0.99, 1.0]);
+        Self {
+            ground,
+            label,
+            largest,
+            p99,
+            missed: crate::stats::part(felt.map(|answer| !answer.touching)),
+        }
+    }
+}
+
+/// From one stretch to the next, cells.
+fn change(a: &Answer, b: &Answer) -> f64 {
+    let squared = |i: usize| (f64::from(b.stretch[i]) - f64::from(a.stretch[i])).powi(2);
+    (0..3).map(squared).sum::<f64>().sqrt()
+}
+
+/// Down to below the surface, and straight on.
+struct Way {
+    hands: Vec<Hand>,
+    approach: usize,
+}
+
+/// Straight ways every which way, all of them over the middle of the field.
+fn ways(ground: &Ground) -> Vec<Way> {
+    let grid = ground.grid();
+    let mut dice = Dice(17);
+    let middle = [grid.columns as f64 / 2.0, grid.rows as f64 / 2.0];
+    (0..WAYS)
+        .map(|_| {
+            let heading = dice.between(0.0, std::f64::consts::TAU);
+            let aside = dice.between(-3.0, 3.0);
+            let (north, east) = heading.sin_cos();
+            let at = |tick: f64| {
+                let along = STEP * (tick - TICKS as f64 / 2.0);
+                let off = [east * along - north * aside, north * along + east * aside];
+                [middle[0] + off[0], middle[1] + off[1]]
+            };
+            let mut hands = way_in(&grid, at(0.0), -DEPTH);
+            let approach = hands.len();
+            hands.extend((1..=TICKS).map(|tick| over(&grid, at(tick as f64), -DEPTH)));
+            Way { hands, approach }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compare::{Family, SWEPT};
+
+    fn largest(rows: &[Row], ground: &str, name: &str) -> f64 {
+        let is = |row: &&Row| row.ground == ground && row.label.name == name;
+        rows.iter().find(is).expect("it is measured").largest
+    }
+
+    /// No more than the exact closest point itself changes, which f64 shows; and
+    /// the bounds of docs/contact.md.
+    #[test]
+    fn the_force_is_as_continuous_as_the_surface() {
+        let rows = measure();
+        let ours = |ground| largest(&rows, ground, SWEPT.name);
+        for ground in &GROUNDS {
+            let exact = largest(&rows, ground.name, "paper f64");
+            let own = ours(ground.name);
+            assert!(own < 1.01 * exact + 1e-6, "{}: {own} {exact}", ground.name);
+        }
+        let bounds = [
+            ("saddle", 6e-5),
+            ("smooth", 5e-3),
+            ("patch edges", 0.02),
+            ("ridge", 0.052),
+            ("valley", 0.011),
+            ("every tile here", 3e-3),
+            ("tile 0.2 cell late", 0.15),
+            ("tile 0.45 cell late", 0.05),
+            ("tile 1 cell late", 0.012),
+        ];
+        for (ground, bound) in bounds {
+            assert!(ours(ground) < bound, "{ground}: {}", ours(ground));
+        }
+    }
+
+    #[test]
+    fn triangles_have_creases_where_the_surface_has_none() {
+        let rows = measure();
+        for name in ["god-object", "parry within", "proxy graph"] {
+            assert!(largest(&rows, "saddle", name) > 5e-3, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_jump_is_seen() {
+        let still = Answer::touching([0.0, 0.0, 0.1]);
+        let jumped = Answer::touching([0.03, 0.0, 0.14]);
+        let label = Label {
+            name: "",
+            family: Family::Ours,
+            extra_bytes: 0.0,
+        };
+        let row = Row::of("", label, &[&[still, still, jumped], &[Answer::FREE]]);
+        assert!((row.largest - 0.05).abs() < 1e-6 && row.missed == 0.25);
+    }
+}
