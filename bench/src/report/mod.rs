@@ -2,6 +2,7 @@
 
 mod continuity;
 mod file;
+mod labels;
 mod picture;
 mod summary;
 mod table;

@@ -8,16 +8,19 @@ use hapterra::picture::{Canvas, PictureError};
 use plotters::coord::combinators::{IntoLogRange, LogCoord};
 use plotters::drawing::IntoDrawingArea;
 use plotters::element::{Circle, EmptyElement, Text};
-use plotters::style::{Color, RGBColor};
+use plotters::style::{Color, RGBColor, TextStyle};
 use plotters_backend::text_anchor::{HPos, Pos, VPos};
 
+use super::labels::{self, Named, Rect};
 use crate::compare::{Family, Row};
 use crate::stats::quantiles;
 
 /// Errors below this are drawn here: nothing finer can be felt or told apart.
 const FLOOR: f64 = 1e-9;
-/// Distance between labels, finished pixels.
-const LABEL_PX: i32 = 20;
+/// Radius of a variant's point, finished pixels.
+const MARK_PX: i32 = 7;
+/// Radius of a terrain's point, finished pixels.
+const DOT_PX: i32 = 3;
 
 /// Draws one panel for each path on which something is felt. Small points are
 /// terrains, the large one with the name their median.
@@ -98,51 +101,64 @@ fn panel(area: &Area<'_>, path: &str, points: &[Points<'_>]) -> Result<(), Pictu
         y: "error, 99 % below (cells)",
     };
     let mut chart = axes::chart(area, ns.log_scale(), cells.log_scale(), titles)?;
-    let mut taken: Vec<(i32, i32)> = Vec::new();
     for own in points {
         let color = color(own.family);
         let small = own
             .all
             .iter()
-            .map(|at| Circle::new(*at, px(3), color.mix(0.45).filled()));
+            .map(|at| Circle::new(*at, px(DOT_PX), color.mix(0.45).filled()));
         chart.draw_series(small)?;
-        name(&mut chart, own, &color, &mut taken)?;
+    }
+    for own in points {
+        let mark = Circle::new(own.middle(), px(MARK_PX), color(own.family).filled());
+        chart.draw_series([mark])?;
+    }
+    names(&mut chart, points)
+}
+
+/// The names beside the large points.
+fn names(
+    chart: &mut Chart<'_, Logarithmic, Logarithmic>,
+    points: &[Points<'_>],
+) -> Result<(), PictureError> {
+    let plot = chart.plotting_area();
+    let named: Vec<Named> = points
+        .iter()
+        .map(|own| {
+            let (width, height) = plot.estimate_text_size(own.name, &font(own))?;
+            Ok(Named {
+                at: chart.backend_coord(&own.middle()),
+                radius: px(MARK_PX),
+                size: (width as i32, height as i32 + px(4)),
+            })
+        })
+        .collect::<Result<_, PictureError>>()?;
+    let dots: Vec<Rect> = points
+        .iter()
+        .flat_map(|own| &own.all)
+        .map(|at| {
+            let ((x, y), r) = (chart.backend_coord(at), px(DOT_PX));
+            [x - r, y - r, x + r, y + r]
+        })
+        .collect();
+    let (x, y) = plot.get_pixel_range();
+    let places = labels::place(&named, &dots, [x.start, y.start, x.end, y.end], px(6));
+    for ((own, named), (left, top)) in points.iter().zip(&named).zip(places) {
+        let off = (left - named.at.0, top + named.size.1 / 2 - named.at.1);
+        let name = Text::new(own.name.to_owned(), off, font(own));
+        chart.draw_series([EmptyElement::at(own.middle()) + name])?;
     }
     Ok(())
 }
 
-/// The large point and the name beside it, moved down or up to where no other is.
-fn name(
-    chart: &mut Chart<'_, Logarithmic, Logarithmic>,
-    own: &Points<'_>,
-    color: &RGBColor,
-    taken: &mut Vec<(i32, i32)>,
-) -> Result<(), PictureError> {
-    let middle = own.middle();
-    let (x, y) = chart.backend_coord(&middle);
-    let is_free = |shift: i32| {
-        let near = |(other_x, other_y): &(i32, i32)| {
-            (other_x - x).abs() < px(220) && (other_y - (y + shift)).abs() < px(LABEL_PX)
-        };
-        !taken.iter().any(near)
-    };
-    let shifts = (0..40).flat_map(|i| [i * px(5), -i * px(5)]);
-    let shift = shifts
-        .into_iter()
-        .find(|shift| is_free(*shift))
-        .unwrap_or(0);
-    taken.push((x, y + shift));
+fn font(own: &Points<'_>) -> TextStyle<'static> {
+    let color = color(own.family);
     let weight = if own.family == Family::Ours {
-        style::bold(17, color)
+        style::bold(17, &color)
     } else {
-        style::text(17, color)
+        style::text(17, &color)
     };
-    let font = weight.pos(Pos::new(HPos::Left, VPos::Center));
-    let mark = EmptyElement::at(middle)
-        + Circle::new((0, 0), px(7), color.filled())
-        + Text::new(own.name.to_owned(), (px(13), shift), font);
-    chart.draw_series([mark])?;
-    Ok(())
+    weight.pos(Pos::new(HPos::Left, VPos::Center))
 }
 
 fn color(family: Family) -> RGBColor {
