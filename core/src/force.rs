@@ -44,14 +44,15 @@ impl ForceLaw {
 /// shorter than it where it was clamped.
 #[must_use]
 pub fn clamp_length(v: Vec3, limit: f32) -> Vec3 {
+    let squared = v.length_squared();
+    // The usual case; not where the square is too small or too large to tell, or
+    // is that of what is not finite.
+    if squared.is_normal() && squared <= limit * limit {
+        return v;
+    }
     let largest = v.abs().max_element();
     if !v.is_finite() || largest == 0.0 {
         return Vec3::ZERO;
-    }
-    let squared = v.length_squared();
-    // The usual case; not where the square is too small or too large to tell.
-    if squared.is_normal() && squared <= limit * limit {
-        return v;
     }
     // Scaled first, so that squaring cannot overflow.
     let unit = v / largest;
@@ -69,6 +70,11 @@ mod tests {
     fn proportional_below_the_limit() {
         let f = ForceLaw::PREMIUM.force_n(Vec3::new(0.0, 0.0, 4.0));
         assert_eq!(f, Vec3::new(0.0, 0.0, 2.0));
+    }
+
+    fn length(v: Vec3) -> f64 {
+        let squares = v.to_array().map(|x| f64::from(x) * f64::from(x));
+        squares.iter().sum::<f64>().sqrt()
     }
 
     #[test]

@@ -133,6 +133,10 @@ impl GridPoint {
     }
 }
 
+/// Cells that a place may be away from its cell for the quick way: far fewer than
+/// would bring a cell out of range back into it.
+const NEAR: f32 = 1e6;
+
 /// `cell + offset` with the whole cells of `offset` carried over.
 ///
 /// Truncation stands in for `floor`, which the Cortex-M4F has no instruction
@@ -143,6 +147,23 @@ fn carry(cell: i32, offset: f32) -> (i32, f32) {
     if (0.0..1.0).contains(&offset) {
         return (cell.clamp(-MAX_CELL, MAX_CELL), offset);
     }
+    // Next often: a few cells away. Then nothing has to be bounded on the way.
+    if offset.abs() < NEAR {
+        let whole = offset as i32;
+        let floor = whole - i32::from(offset < whole as f32);
+        let frac = offset - floor as f32;
+        let cell = cell.wrapping_add(floor);
+        // -1e-9 + 1 rounds to 1.
+        if frac < 1.0 && cell.unsigned_abs() <= MAX_CELL as u32 {
+            return (cell, frac);
+        }
+    }
+    carry_far(cell, offset)
+}
+
+/// The same for anything at all.
+#[cold]
+fn carry_far(cell: i32, offset: f32) -> (i32, f32) {
     let whole = offset as i32;
     let mut cell = cell.saturating_add(whole);
     let mut frac = offset - whole as f32;
@@ -166,6 +187,34 @@ fn half(a: i32, b: i32, frac_sum: f32) -> (i32, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_quick_ways_carry_to_the_same_bits() {
+        let mut offsets = std::vec![0.0, 1.0, 1e-9, 0.5, NEAR, 1e9, f32::MAX, f32::INFINITY];
+        let mut x = 1e-12_f32;
+        while x < 3e6 {
+            let whole = (x as i32) as f32;
+            offsets.extend([x, whole, whole.next_up(), whole.next_down()]);
+            x *= 1.003_7;
+        }
+        let cells = [
+            0,
+            7,
+            -7,
+            MAX_CELL - 1,
+            MAX_CELL,
+            -MAX_CELL,
+            i32::MAX,
+            i32::MIN,
+        ];
+        for offset in offsets.into_iter().flat_map(|x| [x, -x]) {
+            for cell in cells {
+                let (quick, far) = (carry(cell, offset), carry_far(cell, offset));
+                let bits = |(cell, frac): (i32, f32)| (cell, frac.to_bits());
+                assert_eq!(bits(quick), bits(far), "{cell} + {offset:e}");
+            }
+        }
+    }
 
     #[test]
     fn carries_whole_cells_both_ways() {

@@ -228,17 +228,20 @@ impl<'t, const D: usize> Haptics<'t, D> {
         let lost_counts = self.guard.watch(sense, &around);
         outcome.drive = Drive::default();
         outcome.answers = None;
+        let sample = &mut outcome.sample;
         let (Some(mechanism), Some(pose)) = (mechanism, pose) else {
-            let (hip, felt) = (GridPoint::default(), Felt::default());
-            return self.tell(hip, &felt, Vec3::ZERO, &mut outcome.sample);
+            tell_felt(GridPoint::default(), &Felt::default(), sample);
+            return self.tell(Vec3::ZERO, sample);
         };
-        let (mut hip, mut felt, mut wanted) = Default::default();
+        let mut wanted = Vec3::ZERO;
         if let Some(scene) = &self.scene {
-            hip = place(mechanism, scene, &pose);
-            felt = *self
-                .contact
-                .step(&self.window, hip, scene.rule, Pace::RealTime);
+            let hip = place(mechanism, scene, &pose);
+            let contact = &mut self.contact;
+            let felt = contact.step(&self.window, hip, scene.rule, Pace::RealTime);
             wanted = scene.law.force_n(felt.stretch * scene.cell_mm);
+            tell_felt(hip, felt, sample);
+        } else {
+            tell_felt(GridPoint::default(), &Felt::default(), sample);
         }
         let force_n = self.guard.limit_force(wanted);
         if self.guard.mode().drives() {
@@ -249,7 +252,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         if lost_counts {
             self.zero = None;
         }
-        self.tell(hip, &felt, force_n, &mut outcome.sample);
+        self.tell(force_n, &mut outcome.sample);
     }
 
     /// Replay: the host's point in place of the arm, amplifiers off. The tick
@@ -257,39 +260,44 @@ impl<'t, const D: usize> Haptics<'t, D> {
     fn feel_point(&mut self, outcome: &mut Outcome) {
         outcome.drive = Drive::default();
         outcome.answers = None;
+        let sample = &mut outcome.sample;
         let (Some(scene), Some(point)) = (&self.scene, self.point) else {
-            let (hip, felt) = (GridPoint::default(), Felt::default());
-            return self.tell(hip, &felt, Vec3::ZERO, &mut outcome.sample);
+            tell_felt(GridPoint::default(), &Felt::default(), sample);
+            return self.tell(Vec3::ZERO, sample);
         };
-        let felt = *self
-            .contact
-            .step(&self.window, point.hip, scene.rule, Pace::LockStep);
+        let contact = &mut self.contact;
+        let felt = contact.step(&self.window, point.hip, scene.rule, Pace::LockStep);
         let force_n = scene.law.force_n(felt.stretch * scene.cell_mm);
-        self.tell(point.hip, &felt, force_n, &mut outcome.sample);
+        tell_felt(point.hip, felt, sample);
         if felt.settled {
             outcome.answers = Some(point.seq);
             self.point = None;
         }
+        self.tell(force_n, sample);
     }
 
-    /// Writes what was felt into the sample, all but what the loop around it
-    /// measures.
-    fn tell(&self, hip: GridPoint, felt: &Felt, force_n: Vec3, sample: &mut Sample) {
+    /// Writes where the loop stands into the sample, all but what was felt and
+    /// what the loop around it measures.
+    fn tell(&self, force_n: Vec3, sample: &mut Sample) {
         let mut limits = self.guard.limits();
-        limits.set(Limits::TERRAIN_MISSING, felt.held_up_by.is_some());
+        limits.set(Limits::TERRAIN_MISSING, sample.held_up_by.is_some());
         let fading = self.contact.presence() < 1.0;
         limits.set(Limits::PRESENCE_FADING, fading);
         sample.tick = self.tick;
-        sample.hip = hip;
-        sample.proxy = felt.proxy;
         sample.force_n = force_n;
-        sample.state = felt.state;
-        sample.held_up_by = felt.held_up_by;
         sample.mode = self.guard.mode();
         sample.limits = limits;
         sample.fault = self.guard.fault();
-        sample.work = felt.work;
     }
+}
+
+/// Writes what was felt into the sample.
+fn tell_felt(hip: GridPoint, felt: &Felt, sample: &mut Sample) {
+    sample.hip = hip;
+    sample.proxy = felt.proxy;
+    sample.state = felt.state;
+    sample.held_up_by = felt.held_up_by;
+    sample.work = felt.work;
 }
 
 /// Where the tip is over the terrain.

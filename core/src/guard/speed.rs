@@ -22,6 +22,10 @@ pub(super) struct Speed {
     /// Counts of each axis from one reading to the next within which the tip
     /// is below the limit in every pose.
     surely_slow: [u32; 3],
+    /// By how much the tip's speed by the last two readings alone may differ from
+    /// that by FOAW, mm/s: no slope that it gives is more than a count from the
+    /// last difference.
+    rough_mm_s: f32,
     limit_mm_s: f32,
     too_fast: u32,
     share: f32,
@@ -48,6 +52,7 @@ impl Speed {
             ticks: 0,
             hz: rate.hz() as f32 / every as f32,
             surely_slow: [0; 3],
+            rough_mm_s: 0.0,
             limit_mm_s: 0.0,
             too_fast: 0,
             share: 1.0,
@@ -61,6 +66,7 @@ impl Speed {
         // A third of the limit for each joint, with its longest lever; a count
         // less, for the readings' error.
         let levers_mm = Vec3::new(l1 + l2, l1, l2) * mechanism.radians_per_count().abs();
+        self.rough_mm_s = self.hz * levers_mm.element_sum();
         let counts = self.limit_mm_s / (3.0 * self.hz * levers_mm);
         self.surely_slow = counts.to_array().map(|c| (c as u32).saturating_sub(1));
     }
@@ -87,13 +93,21 @@ impl Speed {
         let moved = [x.wrapping_sub(a), y.wrapping_sub(b), z.wrapping_sub(c)];
         self.latest = counts;
         let slow = |axis: usize| moved[axis].unsigned_abs() <= self.surely_slow[axis];
-        if slow(0) && slow(1) && slow(2) {
+        let rates = |counts: Vec3| counts * self.hz * mechanism.radians_per_count();
+        if slow(0) && slow(1) && slow(2) || {
+            // FOAW costs as much as all the rest of a tick.
+            let [x, y, z] = moved.map(|moved| moved as f32);
+            let rough = pose.tip_velocity_mm_s(rates(Vec3::new(x, y, z)));
+            let most = self.limit_mm_s - self.rough_mm_s;
+            most > 0.0 && rough.length_squared() <= most * most
+        } {
             self.share = 1.0;
             self.too_fast = 0;
             return Look::Moved(moved);
         }
-        let rates = self.readings.velocity() * self.hz * mechanism.radians_per_count();
-        let speed = pose.tip_velocity_mm_s(rates).length();
+        let speed = pose
+            .tip_velocity_mm_s(rates(self.readings.velocity()))
+            .length();
         let over = speed / self.limit_mm_s - 1.0;
         self.share = 1.0 - over.clamp(0.0, 1.0);
         self.too_fast = if over < 1.0 { 0 } else { self.too_fast + 1 };
@@ -107,5 +121,53 @@ impl Speed {
     /// limit, 0 from twice the limit on.
     pub(super) const fn share(&self) -> f32 {
         self.share
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::phantom::Calibration;
+
+    /// A hand that speeds up and slows down at random, past the limit and back.
+    #[test]
+    fn the_rough_look_decides_as_the_close_one() {
+        let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5).expect("valid");
+        let mut rough = Speed::new(TickRate::DEFAULT);
+        rough.configure(&mechanism);
+        let mut close = rough;
+        close.rough_mm_s = f32::INFINITY;
+        close.surely_slow = [0; 3];
+        let (mut counts, mut rates, mut state) = ([0_i32; 3], [0_i32; 3], 1_u32);
+        let mut dice = |sides: u32| {
+            state ^= state << 13;
+            state ^= state >> 17;
+            state ^= state << 5;
+            (state % sides) as i32
+        };
+        let (mut slowed, mut full) = (0, 0);
+        for tick in 0..200_000 {
+            for (count, rate) in counts.iter_mut().zip(&mut rates) {
+                *rate = (*rate + dice(7) - 3).clamp(-60, 60);
+                *count += *rate + dice(3) - 1;
+            }
+            if tick % 400 == 0 {
+                counts = [dice(4_000), dice(4_000), dice(4_000)];
+                rates = [0; 3];
+                rough.restart(counts);
+                close.restart(counts);
+            }
+            let pose = mechanism.pose(counts, [0; 3]);
+            let looks = [&mut rough, &mut close].map(|s| s.look(counts, &mechanism, &pose));
+            assert_eq!(looks[0], looks[1], "{tick}");
+            assert_eq!(rough.share().to_bits(), close.share().to_bits(), "{tick}");
+            assert_eq!(rough.too_fast, close.too_fast, "{tick}");
+            if rough.share() < 1.0 {
+                slowed += 1;
+            } else {
+                full += 1;
+            }
+        }
+        assert!(slowed > 20_000 && full > 20_000, "{slowed} {full}");
     }
 }
