@@ -72,11 +72,6 @@ mod tests {
         assert_eq!(f, Vec3::new(0.0, 0.0, 2.0));
     }
 
-    fn length(v: Vec3) -> f64 {
-        let squares = v.to_array().map(|x| f64::from(x) * f64::from(x));
-        squares.iter().sum::<f64>().sqrt()
-    }
-
     #[test]
     fn a_limit_that_cannot_be_squared_is_kept_all_the_same() {
         let long = Vec3::new(5.1e27, -2e27, 5.1e26);
