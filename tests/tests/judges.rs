@@ -5,6 +5,7 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::{Felt, Pace, Rule, State, WORK_PER_TICK};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
+use hapterra_tests::chance::Chance;
 use hapterra_tests::field::point;
 use hapterra_tests::invariants::judge::Judge;
 use hapterra_tests::invariants::seen::Seen;
@@ -312,22 +313,25 @@ fn other_bits(seen: &[Seen]) -> Vec<Vec<Seen>> {
         .to_vec()
 }
 
-fn only(invariant: Invariant, verdict: Result<(), Violation>) {
+fn only<T: std::fmt::Debug>(invariant: Invariant, verdict: Result<T, Violation>) {
     assert_eq!(verdict.expect_err("forged").invariant, invariant);
 }
 
 #[test]
 fn other_bits_are_found() {
     let (scene, seen, mut buffers) = played(Supply::Held);
-    assert_eq!(twin::repeated(&scene, &seen, &mut buffers), Ok(()));
+    assert_eq!(twin::repeated(&scene, &seen, &mut buffers), Ok(true));
     for forged in other_bits(&seen) {
         let verdict = twin::repeated(&scene, &forged, &mut buffers);
         only(Invariant::Repeatable, verdict);
     }
     let (scene, seen, mut buffers) = played(Supply::Pulled { latency: 2 });
-    assert_eq!(twin::windowed(&scene, &seen, &mut buffers), Ok(()));
+    assert_eq!(
+        twin::windowed(&scene, &seen, &mut buffers, &mut Chance::new(1)),
+        Ok(true)
+    );
     for forged in other_bits(&seen) {
-        let verdict = twin::windowed(&scene, &forged, &mut buffers);
+        let verdict = twin::windowed(&scene, &forged, &mut buffers, &mut Chance::new(1));
         only(Invariant::Window, verdict);
     }
 }
@@ -359,7 +363,7 @@ fn a_scene_that_feels_otherwise_mirrored_is_found() {
             .expect("it settles");
         let mut judge =
             |other: &[Seen]| twin::same_way(&scene, symmetry, &seen, other, &mut buffers);
-        assert_eq!(judge(&other), Ok(()), "{symmetry:?}");
+        assert_eq!(judge(&other), Ok(true), "{symmetry:?}");
         let mut elsewhere = other.clone();
         elsewhere[1] = touching(other[1].hip, {
             let [x, y, z] = other[1].proxy;
@@ -377,8 +381,5 @@ fn a_hand_that_is_never_answered_is_found() {
     let path = vec![ABOVE, BELOW];
     let never = Supply::Pulled { latency: 1 << 30 };
     let scene = Scene::given(flat(), path, Rule::Swept, Pace::LockStep, never);
-    only(
-        Invariant::Settles,
-        scene.run(&mut Buffers::default()).map(|_| ()),
-    );
+    only(Invariant::Settles, scene.run(&mut Buffers::default()));
 }

@@ -9,6 +9,15 @@ fn thousand() -> Tally {
     println!("{tally}");
     let [waiting, free, touching, _] = tally.total().states;
     assert!(waiting > 10_000 && free > 50_000 && touching > 50_000);
+    // Repeated, shifted, in another window, mirrored or turned.
+    let twins = tally.total().twins;
+    assert!(
+        twins
+            .iter()
+            .zip([150, 100, 50, 50])
+            .all(|(n, least)| *n >= least),
+        "{twins:?}"
+    );
     tally
 }
 

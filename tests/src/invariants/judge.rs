@@ -31,6 +31,9 @@ pub struct Measured {
     pub beyond: u64,
     /// Ways that met the surface and yet ended free: around a pole.
     pub around: u64,
+    /// Twins compared to the end: repeated, shifted, in another window, mirrored
+    /// or turned.
+    pub twins: [u64; 4],
 }
 
 /// Looks at the ticks of one scene in turn.

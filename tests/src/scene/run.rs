@@ -3,7 +3,7 @@
 use hapterra_core::contact::{Contact, Felt, Pace, Rule};
 use hapterra_core::grid::GridPoint;
 
-use super::stage::{Buffers, Stage, Supply};
+use super::stage::{Buffers, SIDE, Stage, Supply};
 use super::terrain::{KINDS, Terrain};
 use super::{hand, twin};
 use crate::chance::Chance;
@@ -113,18 +113,20 @@ impl Scene {
         let wanted = |twin: usize| {
             matches!(self.twins, Twins::One(n) if n == twin) || self.twins == Twins::All
         };
+        let mut twins = [false; 4];
         if wanted(0) {
-            twin::repeated(self, &seen, buffers)?;
+            twins[0] = twin::repeated(self, &seen, buffers)?;
         }
         if wanted(1) {
-            twin::shifted(self, buffers, &mut chance)?;
+            twins[1] = twin::shifted(self, buffers, &mut chance)?;
         }
         if wanted(2) {
-            twin::windowed(self, &seen, buffers)?;
+            twins[2] = twin::windowed(self, &seen, buffers, &mut chance)?;
         }
         if wanted(3) || wanted(4) {
-            twin::turned(self, buffers, &mut chance)?;
+            twins[3] = twin::turned(self, buffers, &mut chance)?;
         }
+        judge.measured.twins = twins.map(u64::from);
         Ok(judge.measured)
     }
 
@@ -138,9 +140,23 @@ impl Scene {
         buffers: &mut Buffers,
         shift: [i32; 3],
         supply: Supply,
+        look: impl FnMut(&Seen) -> Result<(), Violation>,
+    ) -> Result<Vec<Seen>, Violation> {
+        self.feel_in::<SIDE>(buffers, shift, supply, look)
+    }
+
+    /// The same with a window of `D × D` tiles.
+    ///
+    /// # Errors
+    /// As [`Self::feel`].
+    pub fn feel_in<const D: usize>(
+        &self,
+        buffers: &mut Buffers,
+        shift: [i32; 3],
+        supply: Supply,
         mut look: impl FnMut(&Seen) -> Result<(), Violation>,
     ) -> Result<Vec<Seen>, Violation> {
-        let mut player = Player::new(self, buffers, shift, supply);
+        let mut player = Player::<D>::new(self, buffers, shift, supply);
         let mut all = Vec::with_capacity(self.path.len());
         for (tick, hip) in self.path.iter().enumerate() {
             let felt = player.feel(*hip).ok_or_else(|| Violation {
@@ -167,18 +183,18 @@ impl Scene {
 }
 
 /// A contact in a scene, tick by tick.
-pub struct Player<'t, 'g> {
+pub struct Player<'t, 'g, const D: usize> {
     /// Its state, for those who want to try a tick twice.
     pub contact: Contact,
     /// Where it feels.
-    pub stage: Stage<'t, 'g>,
+    pub stage: Stage<'t, 'g, D>,
     rule: Rule,
     pace: Pace,
     shift: [i32; 3],
     now: u32,
 }
 
-impl<'t, 'g> Player<'t, 'g> {
+impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
     /// Before the first tick.
     pub fn new(
         scene: &'g Scene,

@@ -6,7 +6,7 @@ use hapterra_core::terrain::{Focus, IN_FLIGHT, Puller, TILE_CELLS, Tile, TileKey
 
 use super::terrain::Terrain;
 
-/// Tiles along the side of the window.
+/// Tiles along the side of the usual window, and of the largest.
 pub const SIDE: usize = 8;
 const CELLS: i32 = TILE_CELLS as i32;
 
@@ -32,22 +32,23 @@ pub enum Supply {
 }
 
 /// A window over a terrain that lies `shift` cells east, north and up.
-pub struct Stage<'t, 'g> {
+pub struct Stage<'t, 'g, const D: usize> {
     /// The window.
-    pub window: Window<'t, SIDE>,
+    pub window: Window<'t, D>,
     terrain: &'g Terrain,
     shift: [i32; 3],
     supply: Supply,
-    puller: Puller<SIDE>,
+    puller: Puller<D>,
     spare: Vec<&'t mut Tile>,
     coming: Vec<(u32, TileKey)>,
 }
 
-impl<'t, 'g> Stage<'t, 'g> {
+impl<'t, 'g, const D: usize> Stage<'t, 'g, D> {
     /// The terrain in place.
     ///
     /// # Panics
-    /// When a terrain that is to be held is larger than the window.
+    /// When a terrain that is to be held is larger than the window, or that than
+    /// the buffers.
     pub fn new(
         buffers: &'t mut Buffers,
         terrain: &'g Terrain,
@@ -83,7 +84,7 @@ impl<'t, 'g> Stage<'t, 'g> {
             first..=(self.shift[axis] + self.terrain.size[axis] - 1) >> 5
         };
         let (cols, rows) = (tiles(0), tiles(1));
-        assert!(cols.clone().count() <= SIDE && rows.clone().count() <= SIDE);
+        assert!(cols.clone().count() <= D && rows.clone().count() <= D);
         for row in rows {
             for col in cols.clone() {
                 self.install(TileKey { level: 0, col, row });

@@ -61,7 +61,8 @@ pub const WALL: f64 = 300.0;
 /// Every so many-th row and column of [`Kind::Walls`] is raised.
 pub const WALL_EVERY: i32 = 23;
 
-/// Samples in rows from the south; what is no height is NaN.
+/// Samples in rows from the south, as a file may have them: what is no height is
+/// a hole.
 #[derive(Clone, Debug)]
 pub struct Terrain {
     /// What it is like.
@@ -91,10 +92,7 @@ impl Terrain {
     #[must_use]
     pub fn from_fn(kind: Kind, size: [i32; 2], height: impl Fn(i32, i32) -> f32) -> Self {
         let row = |y| (0..=size[0]).map(move |x| (x, y));
-        let posts = (0..=size[1]).flat_map(row).map(|(x, y)| {
-            let h = height(x, y);
-            if h.abs() <= TALLEST { h } else { f32::NAN }
-        });
+        let posts = (0..=size[1]).flat_map(row).map(|(x, y)| height(x, y));
         Self {
             kind,
             size,
@@ -120,13 +118,18 @@ impl Terrain {
         }
         let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
         let corners = corners.map(|(east, north)| f64::from(self.post(x + east, y + north)));
-        corners.iter().all(|h| !h.is_nan()).then_some(corners)
+        let tallest = f64::from(TALLEST);
+        corners
+            .iter()
+            .all(|h| h.abs() <= tallest)
+            .then_some(corners)
     }
 
     /// A whole height that no sample exceeds.
     #[must_use]
     pub fn top(&self) -> i32 {
-        let highest = self.posts.iter().fold(f32::NEG_INFINITY, |a, b| a.max(*b));
+        let heights = self.posts.iter().filter(|h| h.abs() <= TALLEST);
+        let highest = heights.fold(f32::NEG_INFINITY, |a, b| a.max(*b));
         if highest == f32::NEG_INFINITY {
             0
         } else {

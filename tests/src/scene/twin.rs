@@ -4,7 +4,7 @@ use hapterra_core::contact::{Pace, Rule};
 
 use super::hand::GRAIN;
 use super::run::{Player, Scene};
-use super::stage::{Buffers, Supply};
+use super::stage::{Buffers, SIDE, Supply};
 use super::symmetry::{self, Symmetry};
 use super::terrain::Kind;
 use crate::chance::Chance;
@@ -13,14 +13,16 @@ use crate::invariants::surface::distance;
 use crate::invariants::{Invariant, Violation};
 
 type Verdict = Result<(), Violation>;
+/// Whether the twin could be compared, to the end.
+type Compared = Result<bool, Violation>;
 
 /// The same again: the same bits.
 ///
 /// # Errors
 /// Where they differ.
-pub fn repeated(scene: &Scene, seen: &[Seen], buffers: &mut Buffers) -> Verdict {
+pub fn repeated(scene: &Scene, seen: &[Seen], buffers: &mut Buffers) -> Compared {
     let again = scene.feel(buffers, [0; 3], scene.supply, |_| Ok(()))?;
-    same_bits(Invariant::Repeatable, seen, &again, [0; 3])
+    same_bits(Invariant::Repeatable, seen, &again, [0; 3]).map(|()| true)
 }
 
 /// Up to 10⁸ cells away: the same bits.
@@ -32,7 +34,7 @@ pub fn repeated(scene: &Scene, seen: &[Seen], buffers: &mut Buffers) -> Verdict 
 ///
 /// # Errors
 /// Where they differ.
-pub fn shifted(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Verdict {
+pub fn shifted(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Compared {
     let whole = match scene.pace {
         Pace::RealTime => 256,
         Pace::LockStep => 32,
@@ -48,20 +50,33 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Ver
     )?;
     let away = scene.feel(buffers, shift, Supply::Pulled { latency: 0 }, |_| Ok(()))?;
     let by = [shift[0] - 256, shift[1] - 256, shift[2]];
-    same_bits(Invariant::Shift, &near, &away, by)
+    same_bits(Invariant::Shift, &near, &away, by).map(|()| true)
 }
 
-/// With the whole field held: the same bits, where waiting leaves no trace.
+/// With a window of 4 × 4 tiles that waits for them, and with the whole field
+/// held: the same bits, where waiting leaves no trace.
 ///
 /// # Errors
 /// Where they differ.
-pub fn windowed(scene: &Scene, seen: &[Seen], buffers: &mut Buffers) -> Verdict {
+pub fn windowed(
+    scene: &Scene,
+    seen: &[Seen],
+    buffers: &mut Buffers,
+    chance: &mut Chance,
+) -> Compared {
     let fits = scene.terrain.size.iter().all(|patches| *patches <= 256);
-    if scene.pace != Pace::LockStep || scene.supply == Supply::Held || !fits {
-        return Ok(());
+    if scene.pace != Pace::LockStep || scene.rule == Rule::Paper || !fits {
+        return Ok(false);
     }
-    let whole = scene.feel(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
-    same_bits(Invariant::Window, seen, &whole, [0; 3])
+    let latency = [0, 1, 5][chance.below(3)];
+    let pulled = Supply::Pulled { latency };
+    let small = scene.feel_in::<4>(buffers, [0; 3], pulled, |_| Ok(()))?;
+    same_bits(Invariant::Window, seen, &small, [0; 3])?;
+    if scene.supply != Supply::Held {
+        let whole = scene.feel(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+        same_bits(Invariant::Window, seen, &whole, [0; 3])?;
+    }
+    Ok(true)
 }
 
 /// Compares two runs of which the second is `shift` cells away.
@@ -103,13 +118,13 @@ const STEEP: f32 = 10.0;
 ///
 /// # Errors
 /// Where they differ for no such reason.
-pub fn turned(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Verdict {
+pub fn turned(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Compared {
     // On a border of the data a hand belongs to the patch in the north-east,
     // mirrored or not; and what is left over of a tick may differ.
     let settles = scene.pace == Pace::LockStep && scene.supply == Supply::Held;
     let plain = scene.terrain.steepest() <= STEEP && scene.terrain.kind != Kind::Holes;
     if !settles || scene.rule == Rule::Paper || !plain {
-        return Ok(());
+        return Ok(false);
     }
     let inside = |p: &[f64; 3]| {
         let within = |axis: usize| p[axis].clamp(0.5, f64::from(scene.terrain.size[axis]) - 0.5);
@@ -137,7 +152,7 @@ pub fn same_way(
     seen: &[Seen],
     other: &[Seen],
     buffers: &mut Buffers,
-) -> Verdict {
+) -> Compared {
     let turned = |p| symmetry.point(&scene.terrain, p);
     for (tick, (a, b)) in seen.iter().zip(other).enumerate() {
         if agree(turned(a.proxy), a, b) {
@@ -149,7 +164,7 @@ pub fn same_way(
             |there| agree(turned(there.proxy), there, b),
             buffers,
         ) {
-            return Ok(());
+            return Ok(false);
         }
         let detail = format!("{symmetry:?}: {a:?} but {b:?}");
         return Err(Violation {
@@ -158,7 +173,7 @@ pub fn same_way(
             detail,
         });
     }
-    Ok(())
+    Ok(true)
 }
 
 /// Rounding apart, the same answer.
@@ -180,7 +195,7 @@ fn is_undecided(
     const HAIRS: [f64; 3] = [1.0, 16.0, 256.0];
     for hair in HAIRS {
         for corner in 0..8 {
-            let mut player = Player::new(scene, buffers, [0; 3], scene.supply);
+            let mut player = Player::<SIDE>::new(scene, buffers, [0; 3], scene.supply);
             let off = |bit: usize| {
                 if corner >> bit & 1 == 0 {
                     GRAIN

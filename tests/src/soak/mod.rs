@@ -101,4 +101,7 @@ fn merge(a: &mut Measured, b: &Measured) {
     a.judged += b.judged;
     a.beyond += b.beyond;
     a.around += b.around;
+    for (a, b) in a.twins.iter_mut().zip(b.twins) {
+        *a += b;
+    }
 }

@@ -96,6 +96,11 @@ impl fmt::Display for Tally {
             self.ticks(),
             self.broken.len()
         )?;
+        let [again, shifted, window, turned] = self.total().twins;
+        writeln!(
+            f,
+            "twins compared: {again} repeated, {shifted} shifted, {window} in another window, {turned} mirrored or turned"
+        )?;
         for (invariant, scenes) in &self.by_invariant {
             writeln!(f, "    {invariant}: {scenes} scenes")?;
         }

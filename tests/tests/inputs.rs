@@ -1,0 +1,157 @@
+//! What the quick soak's scenes are made of, counted: each kind of ground, habit
+//! of the hand and twin that is promised is there, felt, and judged.
+
+use std::collections::BTreeMap;
+
+use hapterra_core::contact::{Rule, State};
+use hapterra_tests::invariants::judge::Judge;
+use hapterra_tests::invariants::seen::Seen;
+use hapterra_tests::invariants::surface::distance;
+use hapterra_tests::scene::run::Scene;
+use hapterra_tests::scene::stage::{Buffers, Supply};
+use hapterra_tests::scene::terrain::{KINDS, Terrain};
+
+/// As `quick_soak.rs`.
+const SEED: u64 = 2026;
+const SCENES: u64 = 200;
+
+type Counts = BTreeMap<&'static str, u64>;
+
+/// What a tick is, by all the names that fit.
+fn names(terrain: &Terrain, before: Option<&Seen>, now: &Seen) -> Vec<&'static str> {
+    let mut names = Vec::new();
+    let mut is = |name, true_of: bool| {
+        if true_of {
+            names.push(name);
+        }
+    };
+    let whole = |c: f64| c == c.round();
+    let [x, y, z] = now.hip;
+    let inside = (0..2).all(|i| (0.0..=f64::from(terrain.size[i])).contains(&now.hip[i]));
+    let rests = now.felt.state == State::Touching && now.felt.settled;
+    let on = |p: [f64; 3]| usize::from(whole(p[0])) + usize::from(whole(p[1]));
+    is("hand on a grid line", inside && on(now.hip) == 1);
+    is("hand over a vertex", inside && on(now.hip) == 2);
+    is("hand off the field", !inside);
+    is(
+        "hand in all three coordinates on the grid",
+        on(now.hip) == 2 && whole(z),
+    );
+    is("proxy rests on an edge", rests && on(now.proxy) == 1);
+    is("proxy rests in a vertex", rests && on(now.proxy) == 2);
+    let exactly = inside && on(now.hip) >= 1 && z == terrain.height_about(x, y);
+    is("hand exactly on an edge of the surface", exactly);
+    let far = distance(now.hip, now.proxy);
+    is("hand 10⁴ cells inside or more", rests && far >= 1e4);
+    is("tile missing", now.felt.held_up_by.is_some());
+    is(
+        "work left over",
+        !now.felt.settled && now.felt.held_up_by.is_none(),
+    );
+    if let Some(before) = before {
+        let way = distance(before.hip, now.hip);
+        let [dx, dy, dz] = [0, 1, 2].map(|i| (now.hip[i] - before.hip[i]).abs());
+        let most = dx.max(dy).max(dz);
+        is("unmoved", way == 0.0);
+        is(
+            "a teleport of 10 to 1,000 cells",
+            (10.0..1e3).contains(&way),
+        );
+        is("a way of 10⁶ cells or more", way >= 1e6);
+        is("a step below 0.01 cell", way > 0.0 && way < 0.01);
+        // One encoder count, or one there and one back, in each axis.
+        let count = |d: f64| [0.0, 0.03, 0.06].iter().any(|c| (d - c).abs() < 1e-6);
+        let trembles = most > 0.029 && [dx, dy, dz].into_iter().all(count);
+        is("trembling by an encoder count", trembles);
+        is("the least step there is", most > 0.0 && most < 2e-6);
+    }
+    names
+}
+
+/// What samples there are on a ground that was touched.
+fn samples(terrain: &Terrain, counts: &mut Counts) {
+    let all = (0..=terrain.size[1])
+        .flat_map(|y| (0..=terrain.size[0]).map(move |x| (x, y)))
+        .map(|(x, y)| terrain.post(x, y));
+    for h in all {
+        let name = match h {
+            h if h.is_nan() => "sample not a number",
+            h if h.is_infinite() => "sample infinite",
+            h if h.abs() >= 5e8 => "sample out of range",
+            h if h.abs() >= 9e5 => "sample a spike of 10⁶",
+            h if h.is_subnormal() => "sample denormal",
+            _ => "sample usual",
+        };
+        *counts.entry(name).or_default() += 1;
+    }
+}
+
+#[test]
+fn all_that_is_promised_is_felt_and_judged() {
+    let mut buffers = Buffers::default();
+    let (mut counts, mut settings) = (Counts::new(), Counts::new());
+    let mut touched = vec![0_u64; KINDS.len()];
+    for number in 0..SCENES {
+        let scene = Scene::random(SEED, number);
+        let mut judge = Judge::new(&scene.terrain, scene.rule);
+        let Ok(seen) = scene.feel(&mut buffers, [0; 3], scene.supply, |_| Ok(())) else {
+            panic!("scene {number} does not settle");
+        };
+        for (i, now) in seen.iter().enumerate() {
+            let _ = judge.all(now);
+            let before = i.checked_sub(1).map(|last| &seen[last]);
+            for name in names(&scene.terrain, before, now) {
+                *counts.entry(name).or_default() += 1;
+            }
+        }
+        let kind = KINDS.iter().position(|kind| *kind == scene.terrain.kind);
+        touched[kind.expect("known")] += judge.measured.states[State::Touching as usize];
+        samples(&scene.terrain, &mut counts);
+        let supply = match scene.supply {
+            Supply::Held => "every tile held",
+            Supply::Pulled { latency: 0 } => "tiles at once",
+            Supply::Pulled { .. } => "tiles late",
+        };
+        let rule = if scene.rule == Rule::Swept {
+            "swept"
+        } else {
+            "paper"
+        };
+        for name in [supply, rule] {
+            *settings.entry(name).or_default() += 1;
+        }
+    }
+    println!("{counts:#?}\n{settings:#?}");
+    for (kind, ticks) in KINDS.iter().zip(&touched) {
+        println!("{kind:?}: {ticks} ticks of touching");
+        assert!(*ticks > 400, "{kind:?}: {ticks}");
+    }
+    let promised = [
+        ("hand on a grid line", 500),
+        ("hand over a vertex", 500),
+        ("hand in all three coordinates on the grid", 50),
+        ("hand exactly on an edge of the surface", 100),
+        ("hand off the field", 500),
+        ("hand 10⁴ cells inside or more", 20),
+        ("proxy rests on an edge", 500),
+        ("proxy rests in a vertex", 500),
+        ("tile missing", 100),
+        ("work left over", 100),
+        ("unmoved", 500),
+        ("a teleport of 10 to 1,000 cells", 500),
+        ("a way of 10⁶ cells or more", 50),
+        ("a step below 0.01 cell", 500),
+        ("trembling by an encoder count", 500),
+        ("the least step there is", 200),
+        ("sample not a number", 500),
+        ("sample infinite", 500),
+        ("sample out of range", 500),
+        ("sample a spike of 10⁶", 500),
+        ("sample denormal", 500),
+    ];
+    for (name, least) in promised {
+        let count = counts.get(name).copied().unwrap_or(0);
+        assert!(count >= least, "{name}: {count}");
+    }
+    assert_eq!(settings.len(), 5, "{settings:?}");
+}
