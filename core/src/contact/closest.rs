@@ -3,14 +3,8 @@
 //! The paper minimises the squared distance D(u, v) by Newton's method in two
 //! variables. That Hessian is indefinite on twisted patches, and the iteration
 //! leaves, cycles or rests on a saddle. Here one variable is eliminated
-//! exactly. With v fixed, the patch is a straight line (a ruling) of slope
-//! m = b + a·v, and its nearest point is known in closed form:
-//!
-//! ```text
-//! g = z(p, 0)·(1 − v) + z(p, 1)·v      height of the ruling's line over the hand's u
-//! z = g / (1 + m²)               height of its nearest point
-//! u = p − m·z                    clamped to [0, 1]
-//! ```
+//! exactly: with v fixed, the patch is a straight line, and its nearest point is
+//! known in closed form ([`super::ruling`]).
 //!
 //! What remains, F(v) = min over u of D(u, v), is continuously differentiable
 //! because D is a parabola in u: a minimum of F is a minimum of D over the
@@ -22,11 +16,10 @@
 //! The steeper of the two directions is the one eliminated: its closed form
 //! gives z without cancellation, where evaluating a steep height at a rounded
 //! v would not.
-//!
-//! The forms matter: written with `g` over `1 + m²` nothing cancels on steep
-//! patches (docs/contact.md has the error analysis).
+//! docs/contact.md has the error analysis.
 
 use super::patch::Patch;
+use super::ruling::{Ruling, ruling};
 
 /// Evaluations of F at most in one pass. Reached only on patches steeper than
 /// about 10⁶; the best point so far is then returned.
@@ -64,61 +57,6 @@ pub struct Nearest {
     pub evaluations: u32,
 }
 
-/// One evaluation of F.
-#[derive(Clone, Copy)]
-struct Ruling {
-    u: f32,
-    v: f32,
-    z: f32,
-    f: f32,
-    /// F′(v)/2
-    slope: f32,
-    /// F″(v)/2
-    curvature: f32,
-    /// Rounding error that `slope` may have.
-    noise: f32,
-}
-
-/// The nearest point of the ruling at `v`, for a hand at `(p, q)` in patch
-/// coordinates.
-#[inline]
-fn ruling(patch: &Patch, (p, q): (f32, f32), v: f32) -> Ruling {
-    let m = patch.slope_u(v);
-    let steepness = 1.0 + m * m;
-    let [sw, _, nw, _] = patch.corners;
-    // The lines of the southern and the northern edge, over the hand's u.
-    let (south, north) = (sw + patch.b[0] * p, nw + patch.b[1] * p);
-    let g = south * (1.0 - v) + north * v;
-    let free_z = g / steepness;
-    let free_u = p - m * free_z;
-    let (u, z, curvature);
-    let mut rounding = 0.0;
-    if (0.0..=1.0).contains(&free_u) {
-        (u, z) = (free_u, free_z);
-        let (zv, za) = (patch.slope_v(u), patch.a * z);
-        curvature = 1.0 + (zv * zv - za * (za + 2.0 * m * zv)) / steepness;
-    } else {
-        u = if free_u > 0.5 { 1.0 } else { 0.0 };
-        z = patch.height(u, v);
-        let zv = patch.slope_v(u);
-        curvature = 1.0 + zv * zv;
-        // The rounding of a steep edge's height shows in the slope.
-        let [sw, se, nw, ne] = patch.corners;
-        let (start, end) = if u > 0.5 { (se, ne) } else { (sw, nw) };
-        rounding = zv.abs() * (start.abs() * (1.0 - v) + end.abs() * v);
-    }
-    let (dv, lift) = (v - q, z * patch.slope_v(u));
-    Ruling {
-        u,
-        v,
-        z,
-        f: (u - p) * (u - p) + dv * dv + z * z,
-        slope: dv + lift,
-        curvature,
-        noise: f32::EPSILON * (dv.abs() + lift.abs() + rounding),
-    }
-}
-
 /// Searches downhill from `start` (in `[0, 1]²`) for a point of the patch from
 /// which no direction inside the patch leads closer to the hand.
 ///
@@ -135,16 +73,13 @@ pub fn nearest_downhill(patch: &Patch, hand: (f32, f32), start: (f32, f32)) -> N
     };
     let mut turned = patch.slope_v(start.0).abs() > patch.slope_u(start.1).abs();
     for _ in 0..MAX_PASSES {
-        let found = if turned {
-            along_v(&patch.transposed(), (hand.1, hand.0), best.u).transposed()
+        let (found, evaluations) = if turned {
+            along_v(&patch.transposed(), (hand.1, hand.0), best.u)
         } else {
             along_v(patch, hand, best.v)
         };
-        best = Nearest {
-            evaluations: best.evaluations + found.evaluations,
-            ..found
-        };
-        if !best.wants_turning(patch, turned) {
+        best = Nearest::of(&found, turned, best.evaluations + evaluations);
+        if !found.wants_turning() {
             break;
         }
         turned = !turned;
@@ -172,16 +107,32 @@ fn snapped(x: f32, hand: f32) -> f32 {
 }
 
 impl Nearest {
+    fn of(found: &Ruling, turned: bool, evaluations: u32) -> Self {
+        let (u, v) = if turned {
+            (found.v, found.u)
+        } else {
+            (found.u, found.v)
+        };
+        Self {
+            u,
+            v,
+            z: found.z,
+            distance_squared: found.f,
+            evaluations,
+        }
+    }
+
+    /// The point put on the border, where it is as good as on it.
     fn snapped(self, patch: &Patch, (p, q): (f32, f32)) -> Self {
         let (u, v) = (snapped(self.u, p), snapped(self.v, q));
         if (u, v) == (self.u, self.v) {
             return self;
         }
         let z = patch.height(u, v);
-        let distance_squared = (u - p) * (u - p) + (v - q) * (v - q) + z * z;
-        if distance_squared > self.distance_squared * TIE + LEAST_F {
+        if (z - self.z).abs() > resolution(p) + resolution(q) {
             return self; // up a steep wall that stands on the border
         }
+        let distance_squared = (u - p) * (u - p) + (v - q) * (v - q) + z * z;
         Self {
             u,
             v,
@@ -190,32 +141,20 @@ impl Nearest {
             ..self
         }
     }
+}
 
-    fn transposed(self) -> Self {
-        Self {
-            u: self.v,
-            v: self.u,
-            ..self
-        }
-    }
-
+impl Ruling {
     /// Whether the eliminated variable ended at a limit while the searched one
     /// did not, or is no longer the steeper one: the other search is then
     /// better conditioned.
-    fn wants_turning(&self, patch: &Patch, turned: bool) -> bool {
-        let inside = |x: f32| x >= RESOLUTION && 1.0 - x >= RESOLUTION;
-        let (m, n) = (patch.slope_u(self.v).abs(), patch.slope_v(self.u).abs());
-        let (eliminated, searched, along, across) = if turned {
-            (self.v, self.u, n, m)
-        } else {
-            (self.u, self.v, m, n)
-        };
-        inside(searched) && (!inside(eliminated) || across > 4.0 * along + 4.0)
+    fn wants_turning(&self) -> bool {
+        let inside = self.v >= RESOLUTION && 1.0 - self.v >= RESOLUTION;
+        inside && (self.at_end || self.across.abs() > 4.0 * self.along.abs() + 4.0)
     }
 }
 
 /// The search with u eliminated, along v from `start`.
-fn along_v(patch: &Patch, hand: (f32, f32), start: f32) -> Nearest {
+fn along_v(patch: &Patch, hand: (f32, f32), start: f32) -> (Ruling, u32) {
     let mut best = ruling(patch, hand, start);
     let mut search = Bracket::downhill_of(&best);
     let mut evaluations = 1;
@@ -225,26 +164,7 @@ fn along_v(patch: &Patch, hand: (f32, f32), start: f32) -> Nearest {
         evaluations += 1;
         search.narrow(&mut best, trial);
     }
-    Nearest {
-        u: best.u_on_the_surface(patch),
-        v: best.v,
-        z: best.z,
-        distance_squared: best.f,
-        evaluations,
-    }
-}
-
-impl Ruling {
-    /// u as its height has it: of a far hand, u = p − m·z keeps no more than p
-    /// does, and on a steep patch that little is a lot of height.
-    fn u_on_the_surface(&self, patch: &Patch) -> f32 {
-        let m = patch.slope_u(self.v);
-        if m.abs() <= 1.0 || self.u == 0.0 || self.u == 1.0 {
-            return self.u;
-        }
-        let off = self.z - patch.height(self.u, self.v);
-        (self.u + off / m).clamp(0.0, 1.0)
-    }
+    (best, evaluations)
 }
 
 /// The side of `best` on which a minimum lies, and how far that side reaches.

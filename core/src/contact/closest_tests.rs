@@ -19,6 +19,12 @@ fn ruling64(patch: &Patch, hand: (f64, f64), v: f64) -> (f64, f64) {
     (u, (v - hand.1) + z * (c + a * u))
 }
 
+fn height64(patch: &Patch, at: &Nearest) -> f64 {
+    let [sw, se, nw, ne] = patch.corners.map(f64::from);
+    let (u, v) = (f64::from(at.u), f64::from(at.v));
+    (sw * (1.0 - u) + se * u) * (1.0 - v) + (nw * (1.0 - u) + ne * u) * v
+}
+
 /// The local minimum of F that lies downhill of `from`, in f64.
 fn minimum64(patch: &Patch, hand: (f64, f64), from: f64) -> (f64, f64) {
     let slope = |v: f64| ruling64(patch, hand, v).1;
@@ -67,7 +73,7 @@ struct Errors {
 fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
     const QUERIES: u32 = 4000;
     let mut dice = Dice(0x5EED);
-    let (mut off, mut worst, mut total, mut most) = (0, 0.0_f64, 0_u64, 0);
+    let (mut wrong, mut worst, mut total, mut most) = (0, 0.0_f64, 0_u64, 0);
     for _ in 0..QUERIES {
         let flat = [0, 1, 2].map(|_| slope * dice.between(-1.0, 1.0));
         let last = flat[1] + flat[2] - flat[0] + twist * dice.between(-1.0, 1.0);
@@ -85,22 +91,19 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
         let hand = (f64::from(hand.0), f64::from(hand.1));
         let truth = minimum64(&patch, hand, f64::from(found.v));
         let error = (f64::from(found.u) - truth.0).hypot(f64::from(found.v) - truth.1);
-        for x in [found.u, found.v] {
-            // Neither on the edge nor off it, no neighbour would be asked: only
-            // up a wall that stands on the edge, where it has nothing to offer.
-            let on_edge = x == 0.0 || x == 1.0;
-            let steep = found.z.abs()
-                < 1e-6 * (patch.slope_u(found.v).abs() + patch.slope_v(found.u).abs());
-            assert!(
-                on_edge || steep || (x > 1.1e-7 && 1.0 - x > 1.2e-7),
-                "{found:?}"
-            );
-        }
+        // However near to an edge: the height is the surface's at that place.
+        let off = (f64::from(found.z) - height64(&patch, &found)).abs();
+        let steepness = f64::from(patch.slope_u(found.v)).hypot(f64::from(patch.slope_v(found.u)));
+        let rounding = 1e-7 * (1.0 + f64::from(found.z).abs());
+        assert!(
+            off / steepness.hypot(1.0) < 3.0 * rounding,
+            "{off:e}: {found:?}"
+        );
         worst = worst.max(error);
-        off += u32::from(error * conditioning(&patch, hand, truth.1) > 2e-6);
+        wrong += u32::from(error * conditioning(&patch, hand, truth.1) > 2e-6);
     }
     Errors {
-        off,
+        off: wrong,
         worst,
         mean_evaluations: total as f64 / f64::from(QUERIES),
         most_evaluations: most,
@@ -116,7 +119,7 @@ fn within_two_millionths_of_a_cell_on_any_slope() {
                 let at = std::format!("slope {slope} depth {depth} twist {twist}");
                 // The few are hands at the centre of curvature of a steep
                 // patch, where f32 cannot tell which way is down.
-                let few = if slope > 1.0 { 20 } else { 0 };
+                let few = if slope > 1.0 { 4 } else { 0 };
                 assert!(errors.off <= few, "{} of 4000 off: {at}", errors.off);
                 assert!(errors.worst < 1e-3, "{:e}: {at}", errors.worst);
                 assert!(

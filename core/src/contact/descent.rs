@@ -13,6 +13,11 @@ const TIE: f32 = 1.0 + 1e-6;
 /// border to be entered.
 const LEAST_WAY: f32 = 2e-7;
 
+/// How near to an edge, in units of what can be told apart, a place is beside it.
+const BESIDE: f32 = 4.0;
+/// Rounding of a slope of the distance, relative to its parts.
+const NOISE: f32 = 1e-6;
+
 /// How a descent ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Descent {
@@ -62,6 +67,8 @@ pub(super) fn descend<const D: usize>(
     may_leave: bool,
     work: &mut Work,
 ) -> Descent {
+    // The search in a patch is done when the way into it is found.
+    let mut entered = None;
     loop {
         let patch = match window.ground(spot.cell) {
             Ground::Patch(corners) => hand.patch(&corners),
@@ -75,11 +82,12 @@ pub(super) fn descend<const D: usize>(
             return Descent::Unfinished(spot, patch.height(spot.u, spot.v));
         }
         let entry = spot;
-        let here = nearest_downhill(&patch, hand.in_patch(spot.cell), (spot.u, spot.v));
-        work.charge(here.evaluations);
+        let here = entered
+            .take()
+            .unwrap_or_else(|| search(&patch, hand, &spot, work));
         (spot.u, spot.v) = (here.u, here.v);
         match best_neighbour(window, hand, &spot, &here, work) {
-            Way::Into(next) => spot = next,
+            Way::Into(next, there) => (spot, entered) = (next, Some(there)),
             Way::Unknown(tile) => {
                 return Descent::HeldUp {
                     at: spot,
@@ -92,6 +100,13 @@ pub(super) fn descend<const D: usize>(
             Way::None => return Descent::Rests(spot, here.z),
         }
     }
+}
+
+/// The search in a patch from a spot of it.
+fn search(patch: &Patch, hand: &Hand, spot: &Spot, work: &mut Work) -> Nearest {
+    let found = nearest_downhill(patch, hand.in_patch(spot.cell), (spot.u, spot.v));
+    work.charge(found.evaluations);
+    found
 }
 
 /// Whether the straight way from `spot` to the hand starts above the surface:
@@ -127,8 +142,8 @@ fn points_off(patch: &Patch, spot: &Spot, (east, north): (f32, f32)) -> bool {
 }
 
 enum Way {
-    /// Downhill goes on from this point of a neighbouring patch.
-    Into(Spot),
+    /// Downhill goes on from this point of a neighbouring patch to that one.
+    Into(Spot, Nearest),
     /// It may go on in a tile (column, row) that is not here.
     Unknown([i32; 2]),
     /// The point is a local minimum of the distance.
@@ -144,7 +159,7 @@ fn best_neighbour<const D: usize>(
 ) -> Way {
     // Up a wall a proxy may stand beside the edge without being on it.
     let (p, q) = hand.in_patch(spot.cell);
-    let border = spot.border_within([resolution(p), resolution(q)]);
+    let border = spot.border_within([p, q].map(|hand| BESIDE * resolution(hand)));
     if border == [0, 0] {
         return Way::None;
     }
@@ -156,22 +171,48 @@ fn best_neighbour<const D: usize>(
             // It might be the better way: the proxy waits to know.
             Ground::Missing => return Way::Unknown(tile_of(entry.cell)),
             Ground::Patch(corners) => {
-                let there = nearest_downhill(
-                    &hand.patch(&corners),
-                    hand.in_patch(entry.cell),
-                    (entry.u, entry.v),
-                );
-                work.charge(there.evaluations + VISIT);
+                let patch = hand.patch(&corners);
+                if !leads_nearer(&patch, hand, &entry, shift) {
+                    continue;
+                }
+                work.charge(VISIT);
+                let there = search(&patch, hand, &entry, work);
                 // Along a shared edge this patch has done its best already.
                 let off_u = (there.u - entry.u).abs() * shift[0].abs() as f32;
                 let off_v = (there.v - entry.v).abs() * shift[1].abs() as f32;
-                let moved = off_u.max(off_v);
-                if moved > LEAST_WAY && there.distance_squared <= least {
+                let moved = off_u.max(off_v) > LEAST_WAY
+                    || there.distance_squared * (TIE * TIE) < here.distance_squared;
+                if moved && there.distance_squared <= least {
                     least = there.distance_squared;
-                    way = Way::Into(entry);
+                    way = Way::Into(entry, there);
                 }
             }
         }
     }
     way
+}
+
+/// Whether the distance falls, or might, from a point of a patch's border into
+/// the patch; `shift` is the way in.
+///
+/// Along the border itself the patch on the other side has done its best.
+fn leads_nearer(patch: &Patch, hand: &Hand, entry: &Spot, shift: [i32; 2]) -> bool {
+    let (p, q) = hand.in_patch(entry.cell);
+    let (u, v) = (entry.u, entry.v);
+    let z = patch.height(u, v);
+    let (zu, zv) = (patch.slope_u(v), patch.slope_v(u));
+    // Up a wall, the last place of a coordinate is a lot of height.
+    let size = patch.corners.map(f32::abs);
+    let rounding = Patch {
+        corners: size,
+        ..*patch
+    }
+    .height(u, v)
+        + zu.abs()
+        + zv.abs();
+    let falls = |way: i32, off: f32, slope: f32| {
+        let (gradient, noise) = (off + z * slope, off.abs() + rounding * slope.abs());
+        way as f32 * gradient <= NOISE * noise
+    };
+    (shift[0] != 0 && falls(shift[0], u - p, zu)) || (shift[1] != 0 && falls(shift[1], v - q, zv))
 }

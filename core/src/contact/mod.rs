@@ -18,6 +18,7 @@ mod glide;
 mod paper;
 mod proxy;
 mod quick;
+mod ruling;
 mod spot;
 mod sweep;
 mod swept;

@@ -108,15 +108,6 @@ fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]])
 fn assert_is_nearest(truth: &Ground64, slope: f64, proxy: [f64; 3], hip: [f64; 3], at: &str) {
     const RING: f64 = 1e-5;
     let d = distance(proxy, hip);
-    // What is as near to an edge as f32 can tell lies on it, or no neighbour
-    // would be asked.
-    for c in [proxy[0], proxy[1]] {
-        let away = (c - c.round()).abs();
-        assert!(
-            away == 0.0 || away > 1e-7,
-            "neither on the edge nor off: {at}"
-        );
-    }
     // Beside an edge, but not on it, the ring would look over a ridge.
     let beside_edge = |c: f64| c != c.round() && (c - c.round()).abs() < 10.0 * RING;
     if slope > 1e3 || beside_edge(proxy[0]) || beside_edge(proxy[1]) {

@@ -102,21 +102,35 @@ struct Line<'p> {
 impl Line<'_> {
     /// The best coordinate along `axis` with the other one fixed.
     fn best(&self, axis: usize, fixed: f64) -> f64 {
+        self.nearest(axis, fixed).0
+    }
+
+    /// That coordinate, and the height above the hand there.
+    ///
+    /// Up a wall of slope m the place knows its height only to m units in its
+    /// last place; the closed form knows it to one.
+    fn nearest(&self, axis: usize, fixed: f64) -> (f64, f64) {
         let low = f64::from(self.patch.cell[axis]);
-        let at = |along: f64| place(axis, along, fixed);
-        let [x, y] = at(low);
-        let (m, start) = (
-            self.patch.slopes(x, y)[axis],
-            self.patch.height(x, y) - self.hand[2],
-        );
+        let above = |along: f64| {
+            let [x, y] = place(axis, along, fixed);
+            self.patch.height(x, y) - self.hand[2]
+        };
+        let [x, y] = place(axis, low, fixed);
+        let m = self.patch.slopes(x, y)[axis];
         let p = self.hand[axis] - low;
-        low + ((p - start * m) / (1.0 + m * m)).clamp(0.0, 1.0)
+        let z = (above(low) + m * p) / (1.0 + m * m);
+        let free = p - m * z;
+        if (0.0..=1.0).contains(&free) {
+            return (low + free, z);
+        }
+        let end = low + free.clamp(0.0, 1.0);
+        (end, above(end))
     }
 
     /// Half the slope of F.
     fn slope(&self, axis: usize, fixed: f64) -> f64 {
-        let [x, y] = place(axis, self.best(axis, fixed), fixed);
-        let z = self.patch.height(x, y) - self.hand[2];
+        let (along, z) = self.nearest(axis, fixed);
+        let [x, y] = place(axis, along, fixed);
         (fixed - self.hand[1 - axis]) + z * self.patch.slopes(x, y)[1 - axis]
     }
 
