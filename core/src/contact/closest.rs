@@ -34,6 +34,11 @@ const TIE: f32 = 1.0 + 1e-6;
 /// A step shorter than this, in cells, that leaves F about the same is judged
 /// by the slope.
 const SHORT: f32 = 1.0 / 64.0;
+/// A step shorter than this, in cells, is not taken: a coordinate near 1 cannot
+/// tell it.
+const LEAST_STEP: f32 = 6e-8;
+/// Newton steps taken at once where single ones get on slowly.
+const STRIDES: f32 = 8.0;
 /// Places in a patch closer than this, in cells, count as the same: what is as
 /// near to an edge lies on it.
 const RESOLUTION: f32 = 1.2e-7;
@@ -148,8 +153,9 @@ impl Ruling {
     /// did not, or is no longer the steeper one: the other search is then
     /// better conditioned.
     fn wants_turning(&self) -> bool {
-        let inside = self.v >= RESOLUTION && 1.0 - self.v >= RESOLUTION;
-        inside && (self.at_end || self.across.abs() > 4.0 * self.along.abs() + 4.0)
+        let inside_by = |margin: f32| self.v > margin && 1.0 - self.v > margin;
+        let steeper = self.across.abs() > 4.0 * self.along.abs() + 4.0;
+        (self.at_end && inside_by(RESOLUTION)) || (steeper && inside_by(0.0))
     }
 }
 
@@ -193,7 +199,7 @@ impl Bracket {
         }
         if best.curvature > 0.0 {
             let step = -best.slope / best.curvature;
-            if best.slope.abs() <= best.noise || best.v + step == best.v {
+            if best.slope.abs() <= best.noise || step.abs() < LEAST_STEP {
                 return None;
             }
             let inside = step.abs() < room.abs();
@@ -202,6 +208,10 @@ impl Bracket {
             }
             if !inside && self.wall_is_end {
                 return Some(self.wall);
+            }
+            // Not to the middle, which may lie beyond a hill.
+            if self.wall_is_end && (STRIDES * step).abs() < 0.5 * room.abs() {
+                return Some(best.v + STRIDES * step);
             }
         }
         let middle = best.v + 0.5 * room;

@@ -94,9 +94,13 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
         // However near to an edge: the height is the surface's at that place.
         let off = (f64::from(found.z) - height64(&patch, &found)).abs();
         let steepness = f64::from(patch.slope_u(found.v)).hypot(f64::from(patch.slope_v(found.u)));
-        let rounding = 1e-7 * (1.0 + f64::from(found.z).abs());
+        let largest = patch
+            .corners
+            .iter()
+            .fold(0.0_f32, |most, h| most.max(h.abs()));
+        let rounding = 4.0 * f64::from(f32::EPSILON * largest);
         assert!(
-            off / steepness.hypot(1.0) < 3.0 * rounding,
+            off < 1e-6 * steepness.hypot(1.0) + rounding,
             "{off:e}: {found:?}"
         );
         worst = worst.max(error);

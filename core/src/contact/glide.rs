@@ -9,9 +9,9 @@
 
 use glam::Vec3;
 
-use super::descent::{leaves, tile_of};
+use super::descent::leaves;
 use super::patch::Patch;
-use super::spot::{Hand, Spot, is_inside};
+use super::spot::{Hand, Spot, is_inside, tile_of};
 use super::track::Track;
 use crate::terrain::{Ground, Window};
 

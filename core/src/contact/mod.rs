@@ -15,6 +15,7 @@ mod descent;
 #[cfg(test)]
 mod dice;
 mod glide;
+mod neighbours;
 mod paper;
 mod proxy;
 mod quick;

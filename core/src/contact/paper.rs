@@ -10,9 +10,9 @@
 use glam::Vec3;
 
 use super::closest::nearest_downhill;
-use super::descent::{neighbours, tile_of};
+use super::neighbours::neighbours;
 use super::patch::Patch;
-use super::spot::{Hand, Spot};
+use super::spot::{Hand, Spot, tile_of};
 use super::work::{VISIT, Work};
 use crate::grid::GridPoint;
 use crate::terrain::{Ground, Window};

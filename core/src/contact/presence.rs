@@ -6,7 +6,7 @@
 //! there the contact is let go. The hand slides off an edge as it would off a
 //! table, without a kick and without being hooked back from underneath.
 
-use super::descent::tile_of;
+use super::spot::tile_of;
 use crate::grid::GridPoint;
 use crate::terrain::{Ground, TILE_CELLS, Window};
 

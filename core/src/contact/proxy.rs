@@ -2,9 +2,8 @@
 
 use glam::Vec3;
 
-use super::descent::tile_of;
 use super::paper::{self, Verdict};
-use super::spot::{Hand, Spot};
+use super::spot::{Hand, Spot, tile_of};
 use super::sweep::Path;
 use super::track::Track;
 use super::work::Work;
@@ -224,8 +223,7 @@ impl Contact {
             } else {
                 self.presence = presence::approach(self.presence, target.presence, self.fade);
                 if self.presence == 0.0 && target.presence == 0.0 {
-                    self.let_go();
-                    return self.waits(window, hip);
+                    return self.starts_anew(window, hip);
                 }
             }
         }
@@ -256,9 +254,16 @@ impl Contact {
         presence::target(window, &hip)
     }
 
-    pub(super) fn let_go(&mut self) {
+    /// Nothing is felt any more. The hand may be above the surface already; to
+    /// look now and not in the next tick is what makes a missing tile leave no
+    /// trace.
+    fn starts_anew<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Felt {
         self.phase = Phase::Waiting;
         self.presence = 1.0;
+        if self.sees_above(window, hip) {
+            return self.flies(hip);
+        }
+        self.waits(window, hip)
     }
 
     /// The contact is lost: what was felt fades away where it was.
@@ -271,8 +276,7 @@ impl Contact {
             };
             return self.fades(window, hip);
         }
-        self.let_go();
-        self.waits(window, hip)
+        self.starts_anew(window, hip)
     }
 
     /// A tick of letting go.
@@ -282,8 +286,7 @@ impl Contact {
             return self.waits(window, hip);
         };
         if self.presence == 0.0 {
-            self.let_go();
-            return self.waits(window, hip);
+            return self.starts_anew(window, hip);
         }
         Felt {
             state: State::LettingGo,

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::patch::Patch;
 use crate::grid::GridPoint;
-use crate::terrain::{Altitude, Corners};
+use crate::terrain::{Altitude, Corners, TileKey};
 
 /// A point on the surface, its height left to the patch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -64,6 +64,12 @@ fn beyond(x: f32, shift: i32) -> f32 {
         1.. => 0.0,
         _ => 1.0,
     }
+}
+
+/// Column and row of the tile that holds a patch.
+pub(super) fn tile_of(cell: [i32; 2]) -> [i32; 2] {
+    let key = TileKey::holding(0, cell);
+    [key.col, key.row]
 }
 
 /// The hand as the patches see it.

@@ -11,8 +11,7 @@ use glam::Vec3;
 use heapless::Vec;
 
 use super::crossing::{first_crossing, next_crossing};
-use super::descent::tile_of;
-use super::spot::{Hand, Spot};
+use super::spot::{Hand, Spot, tile_of};
 use super::work::{LOOK, STRIDE, Work};
 use crate::grid::GridPoint;
 use crate::terrain::{Altitude, Box2, Ground, Window};

@@ -1,6 +1,9 @@
 //! The swept rule: continuous in the air, downhill on the surface.
 
+use glam::Vec3;
+
 use super::descent::{Descent, descend};
+use super::patch::Patch;
 use super::presence::is_far;
 use super::proxy::{Contact, Phase};
 use super::spot::{Hand, Spot};
@@ -146,14 +149,13 @@ impl Contact {
             return None;
         };
         let hand = Hand::new(hip);
-        let mut resume = None;
         let mut held_up_by = None;
         let mut settled = true;
-        let (spot, z) = match descend(window, &hand, spot, may_leave, work) {
-            Descent::Rests(spot, z) => (spot, z),
+        let (spot, z, entry) = match descend(window, &hand, spot, may_leave, work) {
+            Descent::Rests { at, z, entry } => (at, z, entry),
             Descent::Leaves(spot) => {
                 self.leaps += 1;
-                let from = self.point_on(window, &hand, &spot);
+                let from = self.point_on(window, &spot);
                 self.phase = Phase::Sweeping(Path::off_surface(from, hip));
                 return None;
             }
@@ -165,22 +167,26 @@ impl Contact {
                 });
             }
             Descent::HeldUp { at, z, entry, tile } => {
-                (resume, held_up_by, settled) = (Some(entry), Some(tile), false);
-                (at, z)
+                (held_up_by, settled) = (Some(tile), false);
+                (at, z, entry)
             }
             Descent::Unfinished(spot, z) => {
                 // No nearer than after the tick before: rounding, not a way.
                 let f = hand.stretch(&spot, z).length_squared();
                 settled = f >= self.reached;
                 self.reached = f;
-                (spot, z)
+                (spot, z, spot)
             }
         };
-        self.phase = Phase::Touching {
-            spot: resume.unwrap_or(spot),
-            may_leave,
-        };
+        self.phase = Phase::Touching { spot, may_leave };
         let felt = self.touches(window, hip, (spot, z), settled, held_up_by, pace);
+        if felt.held_up_by.is_some() && matches!(self.phase, Phase::Touching { .. }) {
+            // To be taken up again, so that the wait leaves no trace.
+            self.phase = Phase::Touching {
+                spot: entry,
+                may_leave,
+            };
+        }
         if felt.settled && self.presence == 1.0 {
             self.lay_track(window, hip.column());
         }
@@ -206,15 +212,13 @@ impl Contact {
         }
     }
 
-    fn point_on<const D: usize>(
-        &self,
-        window: &Window<'_, D>,
-        hand: &Hand,
-        spot: &Spot,
-    ) -> GridPoint {
+    /// The point of the surface at a spot, no matter how far the hand is.
+    fn point_on<const D: usize>(&self, window: &Window<'_, D>, spot: &Spot) -> GridPoint {
         match window.ground(spot.cell) {
             Ground::Patch(corners) => {
-                hand.point_at(spot, hand.patch(&corners).height(spot.u, spot.v))
+                let height = Patch::new(corners.heights).height(spot.u, spot.v);
+                let [x, y] = spot.cell;
+                GridPoint::new([x, y, corners.base], Vec3::new(spot.u, spot.v, height))
             }
             // `descend` has just stood on it.
             Ground::Hole | Ground::Missing => self.last.proxy,

@@ -16,10 +16,9 @@
 
 use glam::Vec3;
 
-use super::descent::tile_of;
 use super::patch::Patch;
 use super::presence::is_far;
-use super::spot::{Hand, Spot, is_inside};
+use super::spot::{Hand, Spot, is_inside, tile_of};
 use crate::terrain::{Corners, Ground, Window};
 
 /// |a| + |b| + |c| at most, cells a cell: what the rounding of the height then

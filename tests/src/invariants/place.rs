@@ -12,8 +12,11 @@ const FAR: f64 = 1e4;
 impl Judge<'_> {
     pub(super) fn is_on_surface(&mut self, seen: &Seen) -> Verdict {
         let [x, y, z] = seen.proxy;
-        let off = patches_at(self.terrain, x, y)
-            .map(|patch| (z - patch.height(x, y)).abs() / patch.slope(x, y).hypot(1.0));
+        let rounding = seen.rounding_of_corners(self.terrain);
+        let off = patches_at(self.terrain, x, y).map(|patch| {
+            let above = (z - patch.height(x, y)).abs();
+            (above - rounding).max(0.0) / patch.slope(x, y).hypot(1.0)
+        });
         let off = off.fold(f64::INFINITY, f64::min);
         if off > seen.allowed() {
             let detail = format!("by {off:.3e} of {:.3e}: {seen:?}", seen.allowed());

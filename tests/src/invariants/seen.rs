@@ -70,11 +70,17 @@ impl Seen {
         ERROR.max(4.0 * f64::from(f32::EPSILON) * largest)
     }
 
-    /// Error allowed in space: the corners of the patch are coordinates, too.
-    pub(super) fn allowed_in_space(&self, terrain: &Terrain) -> f64 {
+    /// What four units in the last place of the corners of the proxy's patches
+    /// are, in height above the hand: they are coordinates, too.
+    pub(super) fn rounding_of_corners(&self, terrain: &Terrain) -> f64 {
         let [x, y, _] = self.proxy;
         let corners = patches_at(terrain, x, y).flat_map(|patch| patch.corners());
         let highest = corners.fold(0.0, |most, h| (h - self.hip[2]).abs().max(most));
-        self.allowed().max(4.0 * f64::from(f32::EPSILON) * highest)
+        4.0 * f64::from(f32::EPSILON) * highest
+    }
+
+    /// Error allowed in space.
+    pub(super) fn allowed_in_space(&self, terrain: &Terrain) -> f64 {
+        self.allowed().max(self.rounding_of_corners(terrain))
     }
 }

@@ -25,6 +25,11 @@ pub fn repeated(scene: &Scene, seen: &[Seen], buffers: &mut Buffers) -> Compared
     same_bits(Invariant::Repeatable, seen, &again, [0; 3]).map(|()| true)
 }
 
+/// How far beyond the field a shifted scene's hand may be, cells.
+const BESIDE: f64 = 128.0;
+/// How far above or below, cells: farther down than any spike reaches up.
+const DEEP: f64 = 4e6;
+
 /// Up to 10⁸ cells away: the same bits.
 ///
 /// Both runs are away from the origin, so that what lies beyond the field is
@@ -42,6 +47,17 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Com
     let far = [1_000, 30_000, 1_000_000, 100_000_000];
     let mut pick = || far[chance.below(far.len())] / whole * whole;
     let shift = [pick(), pick(), pick() - 50_000_000];
+    // No farther beyond the field than the nearer one is from the origin: what
+    // lies there is asked for, tile by tile.
+    let beside = |p: &[f64; 3]| {
+        let within =
+            |axis: usize| p[axis].clamp(-BESIDE, f64::from(scene.terrain.size[axis]) + BESIDE);
+        [within(0), within(1), p[2].clamp(-DEEP, DEEP)]
+    };
+    let scene = &scene.with(
+        scene.terrain.clone(),
+        scene.path.iter().map(beside).collect(),
+    );
     let near = scene.feel(
         buffers,
         [256, 256, 0],
