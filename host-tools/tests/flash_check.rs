@@ -1,0 +1,46 @@
+//! `hapterra flash --check` on the boards' own images, which `cargo xtask test`
+//! builds and names. Here, as the command has to be built with its feature.
+
+use std::process::{Command, Output};
+
+use hapterra::board::BOARDS;
+
+fn check(board: &str, image: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hapterra"))
+        .args(["flash", "--check", "--board", board, "--image", image])
+        .output()
+        .expect("it runs")
+}
+
+fn told(output: &Output) -> String {
+    let both = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
+    String::from_utf8_lossy(&both).into_owned()
+}
+
+#[test]
+fn an_image_fits_its_board_and_no_smaller_chip() {
+    let images = [
+        ("nucleo-g474re", "HAPTERRA_G474_ELF"),
+        ("nucleo-h743zi2", "HAPTERRA_H743_ELF"),
+        ("nucleo-h743zi2-spi", "HAPTERRA_H743_SPI_ELF"),
+    ];
+    let flashable = BOARDS.iter().filter(|board| board.chip.is_some());
+    assert_eq!(flashable.count(), images.len());
+    for (board, variable) in images {
+        let Some(image) = std::env::var(variable).ok().filter(|path| !path.is_empty()) else {
+            eprintln!("skipped: no image of {board}: {variable} is not set");
+            continue;
+        };
+        let output = check(board, &image);
+        let said = told(&output);
+        assert!(output.status.success(), "{board}: {said}");
+        assert!(said.contains("flash") && said.contains("RAM"), "{said}");
+        // What an H743 has, a G474 has not; the other way round it all is there.
+        if board != images[0].0 {
+            let output = check(images[0].0, &image);
+            let said = told(&output);
+            assert_eq!(output.status.code(), Some(1), "{board}: {said}");
+            assert!(said.contains("built for another board"), "{said}");
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Whether docs/hardware.md says the pins that the boards' sources take. That a
+//! pin can be what it is used for is embassy's types' to see to: the images would
+//! not compile.
+
+use std::collections::BTreeSet;
+
+use hapterra_tests::repository;
+
+/// Names of pins (PA0 to PK15) in a text, each behind `before`.
+fn pins(text: &str, before: &str) -> BTreeSet<String> {
+    let after = text.split(before).skip(1);
+    after
+        .filter_map(|rest| {
+            let word: String = rest
+                .chars()
+                .take_while(char::is_ascii_alphanumeric)
+                .collect();
+            let number = word
+                .strip_prefix('P')?
+                .strip_prefix(|c| ('A'..='K').contains(&c))?;
+            number.parse::<u8>().is_ok().then_some(word)
+        })
+        .collect()
+}
+
+/// The section of the page under a heading.
+fn section<'p>(page: &'p str, heading: &str) -> &'p str {
+    let from = page.find(heading).expect("the heading");
+    let section = &page[from + heading.len()..];
+    section.split("\n## ").next().expect("there is one")
+}
+
+/// Pins in the middle column of a section's table.
+fn wired(page: &str, heading: &str) -> BTreeSet<String> {
+    let rows = section(page, heading)
+        .lines()
+        .filter(|l| l.starts_with("| "));
+    let cells: Vec<String> = rows
+        .filter_map(|row| row.split(" | ").nth(1))
+        .map(|cell| format!(" {cell}"))
+        .collect();
+    pins(&cells.concat(), " ")
+}
+
+fn source(files: &[&str]) -> String {
+    let read = |file: &&str| {
+        let path = repository().join("firmware/boards").join(file);
+        std::fs::read_to_string(path).expect("source")
+    };
+    files.iter().map(read).collect()
+}
+
+#[test]
+fn the_wiring_tables_have_the_pins_that_the_images_take() {
+    let page = std::fs::read_to_string(repository().join("docs/hardware.md")).expect("the page");
+    let taken = |files: &[&str]| {
+        let source = source(files);
+        &pins(&source, "p.") | &pins(&source, "$p.")
+    };
+    let g474 = taken(&["nucleo-g474re/main.rs"]);
+    assert!(g474.len() > 12, "{g474:?}");
+    assert_eq!(wired(&page, "## Wiring: nucleo-g474re\n"), g474);
+    let h743 = taken(&["nucleo-h743zi2/board.rs", "nucleo-h743zi2/outputs.rs"]);
+    assert_eq!(wired(&page, "## Wiring: nucleo-h743zi2\n"), h743);
+    // This page has only what is other than there.
+    let spi = taken(&["nucleo-h743zi2-spi/outputs.rs"]);
+    assert_eq!(spi.len(), 3);
+    assert_eq!(wired(&page, "## Wiring: nucleo-h743zi2-spi\n"), spi);
+}
