@@ -1,6 +1,6 @@
 //! Scenes run twice, the second time so that nothing felt may change.
 
-use hapterra_core::contact::{Pace, Rule};
+use hapterra_core::contact::{Pace, Rule, State};
 
 use super::hand::GRAIN;
 use super::run::{Player, Scene};
@@ -129,8 +129,9 @@ const STEEP: f32 = 10.0;
 /// Mirrored or turned: the same answers to within rounding.
 ///
 /// The core counts from the south-west corner of a patch, so rounding differs.
-/// Where two ways are equally good, or so nearly that rounding decides, the
-/// twins may part; from there on they are not compared.
+/// Where two ways are equally good the twins may part; they are not compared
+/// until both are free again. Where a hair's breadth decides, they are not
+/// compared any more.
 ///
 /// # Errors
 /// Where they differ for no such reason.
@@ -170,8 +171,15 @@ pub fn same_way(
     buffers: &mut Buffers,
 ) -> Compared {
     let turned = |p| symmetry.point(&scene.terrain, p);
+    let mut parted = false;
     for (tick, (a, b)) in seen.iter().zip(other).enumerate() {
+        // Until both are in the hand again.
+        parted &= a.felt.state != State::Free || b.felt.state != State::Free;
+        if parted {
+            continue;
+        }
         if agree(turned(a.proxy), a, b) {
+            parted = !is_near(turned(a.proxy), a, b);
             continue;
         }
         if is_undecided(
@@ -192,13 +200,16 @@ pub fn same_way(
     Ok(true)
 }
 
-/// Rounding apart, the same answer.
+/// Rounding apart, the same answer; or another one that is as near to the hand.
 fn agree(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {
-    let far = distance(a.proxy, a.hip).max(1.0);
-    let near = distance(proxy, b.proxy) <= 1e-4 * far;
     let (da, db) = (distance(a.proxy, a.hip), distance(b.proxy, b.hip));
-    let tie = (da - db).abs() <= 1e-5 * far;
-    a.felt.state == b.felt.state && a.felt.settled == b.felt.settled && (near || tie)
+    let tie = (da - db).abs() <= 1e-5 * da.max(1.0);
+    let same = a.felt.state == b.felt.state && a.felt.settled == b.felt.settled;
+    same && (is_near(proxy, a, b) || tie)
+}
+
+fn is_near(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {
+    distance(proxy, b.proxy) <= 1e-4 * distance(a.proxy, a.hip).max(1.0)
 }
 
 /// Whether a hair's breadth on the way to this tick makes the difference, too.
