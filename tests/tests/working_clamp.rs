@@ -1,5 +1,5 @@
 //! The force at the true tip stays within the record's largest while an encoder is
-//! wrong by what the guard lets pass in a tick, converters' rounding included.
+//! wrong by what the guard lets pass in two ticks, converters' rounding included.
 
 use hapterra::phantom::{PhantomModel, kinematics};
 use hapterra_core::Vec3;
@@ -8,8 +8,8 @@ use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_firmware::amplifier::offset_code;
 use hapterra_tests::campaign::arm::{force, is_near_singular};
 
-/// What an encoder may be off by without having jumped, counts: at 1 kHz.
-const OFF: i32 = (MAX_COUNTS_PER_S / 1_000) as i32;
+/// What an encoder is off by, counts: two jumps at 1 kHz that are let pass.
+const OFF: i32 = 2 * (MAX_COUNTS_PER_S / 1_000) as i32;
 /// The coarsest converter of the boards.
 const DAC_MAX: u16 = 4_095;
 const FULL_SCALE_A: f32 = 5.5;
@@ -40,7 +40,7 @@ fn converted(current_a: f32) -> f64 {
 }
 
 #[test]
-fn an_encoder_off_by_a_ticks_jump_makes_no_force_above_the_records() {
+fn an_encoder_off_by_two_ticks_jumps_makes_no_force_above_the_records() {
     let record = Calibration::PREMIUM_1_5;
     let mechanism = Mechanism::new(&record).expect("valid");
     let model = PhantomModel::premium_1_5();
@@ -79,5 +79,5 @@ fn an_encoder_off_by_a_ticks_jump_makes_no_force_above_the_records() {
     assert!(judged > 100_000, "{judged}");
     assert!(worst <= most, "{worst} N");
     // The bound is not much wider than need be.
-    assert!(worst > 0.97 * most, "{worst} N");
+    assert!(worst > 0.95 * most, "{worst} N");
 }

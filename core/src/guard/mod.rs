@@ -39,10 +39,10 @@ use thermal::Motors;
 /// 0.5 N/mm makes 1 N/ms; what is faster is no hand.
 pub const MAX_SLEW_N_PER_S: f32 = 1_000.0;
 /// Share of the record's largest force that the guard clamps to. An encoder that
-/// is wrong by what a tick's jump may be makes the levers, and with them the
-/// force at the tip, wrong by up to 4.6 %; this keeps it within the record's
-/// (swept in the tests).
-pub const WORKING_SHARE: f32 = 0.95;
+/// is wrong by twice what a tick's jump may be, some 7 mm at the tip, makes the
+/// levers, and with them the force at the tip, wrong by up to 9 %; this keeps it
+/// within the record's (swept in the tests).
+pub const WORKING_SHARE: f32 = 0.9;
 /// Most counts an encoder may move in a second: about 3 m/s at the tip of a
 /// Premium 1.5.
 pub const MAX_COUNTS_PER_S: u32 = 128_000;

@@ -405,9 +405,9 @@ fn the_force_is_clamped_as_a_vector_and_says_so() {
     let mut bench = Bench::armed();
     bench.wanted_n = Vec3::new(30.0, -40.0, 0.0);
     bench.ticks(20);
-    assert!(bench.force_n.length() <= 8.075 && bench.force_n.length() > 8.074);
+    assert!(bench.force_n.length() <= 7.65 && bench.force_n.length() > 7.649);
     let direction = Vec3::new(0.6, -0.8, 0.0);
-    assert!((bench.force_n - 8.075 * direction).length() < 1e-4);
+    assert!((bench.force_n - 7.65 * direction).length() < 1e-4);
     assert!(bench.guard.limits().contains(Limits::FORCE_CLAMPED));
 }
 

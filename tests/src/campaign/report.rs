@@ -19,7 +19,7 @@ table as often as the others, in random order, place and strength. The mishaps a
 
 Held in every tick: no current with the amplifiers off, none above the motor's peak, none that is not a number;
 amplifiers never on with the dead-man switch open, the emergency stop pressed or hardware that failed, in the very
-tick; no force told while disarmed or faulted; force told within the guard's clamp (95 % of the record's 8.5 N), and changing by
+tick; no force told while disarmed or faulted; force told within the guard's clamp (90 % of the record's 8.5 N), and changing by
 at most 1 N a tick; the virtual motors' windings below 112 °C. The force at the tip, worked out from the currents in f64 with the
 true levers and the share of the arm's weight that explains it best, stays within the record's 8.5 N, whatever the
 encoders say: one that is wrong makes the device push with levers that are not the arm's.
