@@ -37,8 +37,12 @@ const SHORT: f32 = 1.0 / 64.0;
 /// A step shorter than this, in cells, is not taken: a coordinate near 1 cannot
 /// tell it.
 const LEAST_STEP: f32 = 6e-8;
-/// Newton steps taken at once where single ones get on slowly.
-const STRIDES: f32 = 8.0;
+/// Steps downhill after which the end of the patch is tried, where halving the
+/// way to it would take as many as a place has bits.
+const DOWNHILL: u32 = 2;
+/// Newton steps taken at once where single ones get on slowly; each time again
+/// so many times as many.
+const STRIDE: f32 = 8.0;
 /// Places in a patch closer than this, in cells, count as the same: what is as
 /// near to an edge lies on it.
 const RESOLUTION: f32 = 1.2e-7;
@@ -180,6 +184,13 @@ struct Bracket {
     wall_is_end: bool,
     /// Newton steps in a row that did not halve the slope.
     lazy: u32,
+    /// Newton steps to take at once next.
+    stride: f32,
+    /// Steps that led on downhill, to no turn.
+    downhill: u32,
+    /// Newton's step back from the wall, where that has not just been tried; not
+    /// a number otherwise.
+    back: f32,
 }
 
 impl Bracket {
@@ -188,6 +199,9 @@ impl Bracket {
             wall: if from.slope < 0.0 { 1.0 } else { 0.0 },
             wall_is_end: true,
             lazy: 0,
+            stride: STRIDE,
+            downhill: 0,
+            back: f32::NAN,
         }
     }
 
@@ -210,9 +224,19 @@ impl Bracket {
                 return Some(self.wall);
             }
             // Not to the middle, which may lie beyond a hill.
-            if self.wall_is_end && (STRIDES * step).abs() < 0.5 * room.abs() {
-                return Some(best.v + STRIDES * step);
+            let stride = self.stride * step;
+            if self.wall_is_end && stride.abs() < 0.5 * room.abs() {
+                return Some(best.v + stride);
             }
+        }
+        if self.wall_is_end && self.downhill >= DOWNHILL {
+            return Some(self.wall);
+        }
+        // Where the eliminated variable reaches its limit F bends sharply, and
+        // only the far side knows how much.
+        let (behind, before) = (self.back - best.v, self.wall - self.back);
+        if behind * before > 0.0 && before.abs() <= behind.abs() {
+            return Some(self.back);
         }
         let middle = best.v + 0.5 * room;
         (middle != best.v && middle != self.wall).then_some(middle)
@@ -230,13 +254,25 @@ impl Bracket {
             self.wall = trial.v;
             self.wall_is_end = false;
             self.lazy = 2; // not that Newton step again
+            let known = trial.curvature > 0.0 && self.back.is_nan();
+            self.back = if known {
+                trial.v - trial.slope / trial.curvature
+            } else {
+                f32::NAN
+            };
             return;
         }
+        self.back = f32::NAN;
         self.lazy = if halved { 0 } else { self.lazy + 1 };
+        if halved {
+            self.stride = STRIDE;
+        }
         if self.lazy > 2 {
-            self.lazy = 0; // the middle has been tried
+            self.lazy = 0; // the middle has been tried, or a stride
+            self.stride *= STRIDE;
         }
         let turned = (trial.slope < 0.0) != (best.slope < 0.0);
+        self.downhill += 1;
         if turned {
             self.wall = best.v;
             self.wall_is_end = false;

@@ -4,7 +4,7 @@
 use super::neighbours::{Way, best_neighbour, search};
 use super::patch::Patch;
 use super::spot::{Hand, Spot, tile_of};
-use super::work::{VISIT, Work};
+use super::work::Work;
 use crate::terrain::{Ground, Window};
 
 /// How a descent ended.
@@ -52,7 +52,7 @@ pub(super) fn descend<const D: usize>(
         if may_leave && leaves(window, hand, &spot, &patch) {
             return Descent::Leaves(spot);
         }
-        if !work.take(VISIT) {
+        if !work.visit() {
             return Descent::Unfinished(spot, patch.height(spot.u, spot.v));
         }
         let entry = spot;
@@ -70,6 +70,7 @@ pub(super) fn descend<const D: usize>(
                     tile,
                 };
             }
+            Way::Later => return Descent::Unfinished(entry, patch.height(entry.u, entry.v)),
             Way::None if may_leave && here.z < 0.0 => return Descent::Leaves(spot),
             Way::None => {
                 return Descent::Rests {

@@ -41,6 +41,8 @@ pub(super) enum Way {
     Into(Spot, Nearest),
     /// It may go on in a tile (column, row) that is not here.
     Unknown([i32; 2]),
+    /// The tick's work is spent: the visit is to be made again.
+    Later,
     /// Nowhere: the point is a local minimum of the distance.
     None,
 }
@@ -86,6 +88,9 @@ pub(super) fn best_neighbour<const D: usize>(
             Ground::Missing => return Way::Unknown(tile_of(entry.cell)),
             Ground::Patch(corners) => hand.patch(&corners),
         };
+        if !work.goes_on() {
+            return Way::Later;
+        }
         let Some(offer) = offer(&patch, hand, entry, shift, here, work) else {
             continue;
         };

@@ -171,11 +171,14 @@ fn local_closest_point<const D: usize>(
     let Some(mut best) = bounded_closest_point(window, hand, start, work)? else {
         return Ok(None);
     };
+    let mut gets_on = false;
     while best.spot.border() != [0, 0] {
-        if !work.take(1) {
+        // One look around in each tick at least, or the next begins as this one.
+        if !work.take(1) && gets_on {
             best.settled = false;
             break;
         }
+        gets_on = true;
         let mut nearer = None;
         let mut least = best.distance_squared;
         for shift in neighbours(best.spot.border()) {

@@ -44,9 +44,9 @@ pub struct Contact {
     /// A free proxy had to wait, for terrain or for work: the force of the next
     /// contact may not come at once.
     pub(super) late: bool,
-    /// Squared distance at which the last unfinished descent of this same
-    /// hand stopped.
-    pub(super) reached: f32,
+    /// The nearest place at which an unfinished descent of this same hand
+    /// stopped, and how many have got no nearer since.
+    pub(super) reached: Option<(GridPoint, u32)>,
     /// How often the proxy has left the surface for this same hand.
     pub(super) leaps: u32,
     /// By the paper's rule: cells on the way to `sought` that were found to be no
@@ -83,7 +83,7 @@ impl Contact {
             answered: false,
             presence: 1.0,
             late: false,
-            reached: f32::INFINITY,
+            reached: None,
             leaps: 0,
             passed: 0,
             sought: GridPoint::default(),

@@ -103,7 +103,7 @@ impl Contact {
             }
             Glide::HeldUp(tile) if pace == Pace::LockStep => {
                 // For the general case this hand, when it comes again, is not new.
-                (self.reached, self.leaps) = (f32::INFINITY, 0);
+                (self.reached, self.leaps) = (None, 0);
                 self.last.held_up_by = Some(tile);
                 self.last.settled = false;
                 self.answered = false;

@@ -11,6 +11,7 @@ use glam::Vec3;
 use heapless::Vec;
 
 use super::crossing::{first_crossing, next_crossing};
+use super::patch::Patch;
 use super::spot::{Hand, Spot, tile_of};
 use super::work::{LOOK, STRIDE, Work};
 use crate::grid::GridPoint;
@@ -21,6 +22,8 @@ use crate::terrain::{Altitude, Box2, Ground, Window};
 const WALK_CELLS: u32 = 4;
 /// Tallest piece, in cells, that is walked.
 const WALK_HEIGHT: u32 = 16;
+/// Rounding of a gap over a tall piece, of its height.
+const TALL_NOISE: f32 = 1e-5;
 /// Halvings that bring the longest possible segment down to a walk, and one.
 const DEPTH: usize = 30;
 
@@ -100,6 +103,8 @@ impl Path {
                 if let Some(ended) = self.walk(window, end, work) {
                     return ended;
                 }
+            } else if is_narrow(span) && self.falls_clear(window, &end, work) {
+                self.over_hole = false;
             } else {
                 // Not full: tested above.
                 let _ = self.ends.push(self.at.midpoint(&end));
@@ -110,6 +115,34 @@ impl Path {
             self.ends.pop();
         }
         Sweep::Clear
+    }
+
+    /// Whether a tall piece over a few cells is clear of them by more than the
+    /// bits that its height costs.
+    fn falls_clear<const D: usize>(
+        &self,
+        window: &Window<'_, D>,
+        end: &GridPoint,
+        work: &mut Work,
+    ) -> bool {
+        let view = Hand::new(self.at);
+        let tall = (end.cell()[2] as f32 - self.at.cell()[2] as f32).abs();
+        let mut steps = Steps::new(&self.at, end);
+        while let Some(step) = steps.next() {
+            let Ground::Patch(corners) = window.ground(step.cell) else {
+                return false;
+            };
+            if !work.take(STRIDE) {
+                return false;
+            }
+            let patch = view.patch(&corners);
+            let above = step.gap(&patch).into_iter().fold(f32::MIN, f32::max);
+            let largest = patch.corners.iter().fold(tall, |most, h| most.max(h.abs()));
+            if above >= -TALL_NOISE * largest {
+                return false;
+            }
+        }
+        true
     }
 
     /// Walks the cells of one short piece.
@@ -140,12 +173,10 @@ impl Path {
                     continue;
                 }
             };
-            let start = patch.height(step.from.0, step.from.1) - step.z_from;
+            let [start, middle, after] = step.gap(&patch);
             if over_hole && start >= 0.0 {
                 return Some(Sweep::Under);
             }
-            let middle = patch.blossom(step.from, step.to) - 0.5 * (step.z_from + step.z_to);
-            let after = patch.height(step.to.0, step.to.1) - step.z_to;
             let crossing = if on_surface && middle < 0.0 {
                 next_crossing(middle, after)
             } else {
@@ -179,9 +210,12 @@ pub(super) fn lower(a: &GridPoint, b: &GridPoint) -> Altitude {
 /// Whether a piece is walked: short, and in height, too, which would otherwise
 /// cost bits.
 fn is_short(span: Box2, from: &GridPoint, to: &GridPoint) -> bool {
+    is_narrow(span) && from.cell()[2].abs_diff(to.cell()[2]) <= WALK_HEIGHT
+}
+
+fn is_narrow(span: Box2) -> bool {
     let across = |axis: usize| span.to[axis].abs_diff(span.from[axis]);
-    let tall = from.cell()[2].abs_diff(to.cell()[2]);
-    across(0).max(across(1)) <= WALK_CELLS && tall <= WALK_HEIGHT
+    across(0).max(across(1)) <= WALK_CELLS
 }
 
 /// The part of a piece that lies in one cell.
@@ -202,6 +236,16 @@ impl Step {
             .max((self.to.1 - self.from.1).abs())
             < TINY
             && (self.z_to - self.z_from).abs() < TINY
+    }
+
+    /// The patch's height over the way, by its Bernstein coefficients.
+    #[inline]
+    fn gap(&self, patch: &Patch) -> [f32; 3] {
+        [
+            patch.height(self.from.0, self.from.1) - self.z_from,
+            patch.blossom(self.from, self.to) - 0.5 * (self.z_from + self.z_to),
+            patch.height(self.to.0, self.to.1) - self.z_to,
+        ]
     }
 
     fn spot(&self, s: f32) -> Spot {

@@ -17,6 +17,9 @@ use crate::terrain::{Box2, Ground, Window};
 /// Times that a proxy may leave the surface for one hand: more is rounding,
 /// from a place to another and back.
 const LEAPS: u32 = 256;
+/// Ticks in a row that get a descent no nearer until it is taken to be at its
+/// end: at the foot of a wall of 10⁶ a place knows its distance only to 10⁻².
+const IDLE: u32 = 4;
 
 impl Contact {
     /// One tick by the swept rule.
@@ -29,7 +32,7 @@ impl Contact {
         work: &mut Work,
     ) -> Felt {
         if moved {
-            (self.reached, self.leaps) = (f32::INFINITY, 0);
+            (self.reached, self.leaps) = (None, 0);
             self.redirect(hip);
         }
         if matches!(self.phase, Phase::LettingGo { .. }) {
@@ -171,10 +174,7 @@ impl Contact {
                 (at, z, entry)
             }
             Descent::Unfinished(spot, z) => {
-                // No nearer than after the tick before: rounding, not a way.
-                let f = hand.stretch(&spot, z).length_squared();
-                settled = f >= self.reached;
-                self.reached = f;
+                settled = self.gets_no_nearer(hand.point_at(&spot, z), &hip);
                 (spot, z, spot)
             }
         };
@@ -191,6 +191,19 @@ impl Contact {
             self.lay_track(window, hip.column());
         }
         Some(felt)
+    }
+
+    /// Whether a descent that stopped unfinished here is rounding, from a place
+    /// to another and back, and no way.
+    fn gets_no_nearer(&mut self, at: GridPoint, hip: &GridPoint) -> bool {
+        if let Some((was, times)) = &mut self.reached
+            && gained(was, &at, hip) <= 0.0
+        {
+            *times += 1;
+            return *times >= IDLE;
+        }
+        self.reached = Some((at, 0));
+        false
     }
 
     /// Remembers the patch of a proxy at rest for the ticks to come.
@@ -224,4 +237,11 @@ impl Contact {
             Ground::Hole | Ground::Missing => self.last.proxy,
         }
     }
+}
+
+/// By how much the squared distance from a hand is less at one point than it was
+/// at another, cells²: of a far hand the squares themselves would not tell.
+fn gained(was: &GridPoint, is: &GridPoint, hand: &GridPoint) -> f32 {
+    let way = was.to(is);
+    way.dot(way + 2.0 * is.to(hand))
 }

@@ -4,8 +4,9 @@
 /// Cortex-M4F.
 ///
 /// Past it the work goes on in the next tick from where it stopped. What has
-/// been begun is ended: a look at a patch and its neighbours may go over.
-pub const WORK_PER_TICK: u32 = 64;
+/// been begun is ended: the search in a patch may go over, and so may the first
+/// visit to a patch and its neighbours.
+pub const WORK_PER_TICK: u32 = 27;
 
 /// Units for coming to a patch; the evaluations there are a unit each.
 pub(super) const VISIT: u32 = 2;
@@ -18,12 +19,16 @@ pub(super) const STRIDE: u32 = 2;
 #[derive(Debug)]
 pub(super) struct Work {
     left: u32,
+    /// The visit under way is the tick's first: it is ended whatever it takes, or
+    /// the next tick would begin as this one.
+    must_end: bool,
 }
 
 impl Work {
     pub(super) const fn new() -> Self {
         Self {
             left: WORK_PER_TICK,
+            must_end: false,
         }
     }
 
@@ -33,6 +38,18 @@ impl Work {
         let some = self.left > 0;
         self.charge(units);
         some
+    }
+
+    /// Begins a visit to a patch; `false` when no unit was left.
+    #[must_use]
+    pub(super) fn visit(&mut self) -> bool {
+        self.must_end = self.left == WORK_PER_TICK;
+        self.take(VISIT)
+    }
+
+    /// Whether a visit may go on.
+    pub(super) const fn goes_on(&self) -> bool {
+        self.left > 0 || self.must_end
     }
 
     /// Charges for what is done already.
