@@ -103,8 +103,8 @@ impl Path {
                 if let Some(ended) = self.walk(window, end, work) {
                     return ended;
                 }
-            } else if is_narrow(span) && self.falls_clear(window, &end, work) {
-                self.over_hole = false;
+            } else if let Some(over_hole) = self.falls_clear(window, span, &end, work) {
+                self.over_hole = over_hole;
             } else {
                 // Not full: tested above.
                 let _ = self.ends.push(self.at.midpoint(&end));
@@ -117,32 +117,43 @@ impl Path {
         Sweep::Clear
     }
 
-    /// Whether a tall piece over a few cells is clear of them by more than the
-    /// bits that its height costs.
+    /// Whether a tall piece ends over a hole; `None` unless it lies over a few
+    /// cells and is clear of them by more than the bits that its height costs.
     fn falls_clear<const D: usize>(
         &self,
         window: &Window<'_, D>,
+        span: Box2,
         end: &GridPoint,
         work: &mut Work,
-    ) -> bool {
+    ) -> Option<bool> {
+        if !is_narrow(span) {
+            return None;
+        }
+        let mut over_hole = self.over_hole;
         let view = Hand::new(self.at);
         let tall = (end.cell()[2] as f32 - self.at.cell()[2] as f32).abs();
         let mut steps = Steps::new(&self.at, end);
         while let Some(step) = steps.next() {
-            let Ground::Patch(corners) = window.ground(step.cell) else {
-                return false;
-            };
             if !work.take(STRIDE) {
-                return false;
+                return None;
             }
+            let corners = match window.ground(step.cell) {
+                Ground::Patch(corners) => corners,
+                Ground::Missing => return None,
+                Ground::Hole => {
+                    over_hole = true;
+                    continue;
+                }
+            };
+            over_hole = false;
             let patch = view.patch(&corners);
             let above = step.gap(&patch).into_iter().fold(f32::MIN, f32::max);
             let largest = patch.corners.iter().fold(tall, |most, h| most.max(h.abs()));
             if above >= -TALL_NOISE * largest {
-                return false;
+                return None;
             }
         }
-        true
+        Some(over_hole)
     }
 
     /// Walks the cells of one short piece.
