@@ -4,7 +4,7 @@
 //! variables. That Hessian is indefinite on twisted patches, and the iteration
 //! leaves, cycles or rests on a saddle. Here one variable is eliminated
 //! exactly: with v fixed, the patch is a straight line, and its nearest point is
-//! known in closed form ([`super::ruling`]).
+//! known in closed form (`ruling.rs`).
 //!
 //! What remains, F(v) = min over u of D(u, v), is continuously differentiable
 //! because D is a parabola in u: a minimum of F is a minimum of D over the
