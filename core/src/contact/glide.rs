@@ -21,16 +21,6 @@ pub(super) const HOPS: u32 = 4;
 /// which way is downhill.
 const LEVEL: f32 = 1e-5;
 
-/// What a way over gentle ground comes to.
-pub(super) enum Glide {
-    /// It ends here.
-    Rests(Rest),
-    /// A tile (column, row) on it is not here.
-    HeldUp([i32; 2]),
-    /// It takes the general search to tell.
-    Unsure,
-}
-
 /// Where a way over gentle ground ends.
 pub(super) struct Rest {
     pub(super) track: Track,
@@ -40,18 +30,13 @@ pub(super) struct Rest {
     pub(super) hops: u32,
 }
 
-/// Where a proxy rests now that rested on a track.
+/// Where a proxy rests now that rested on a track; `None` where it takes the
+/// general search to tell.
+///
+/// # Errors
+/// The tile (column, row) on its way that is not here.
 #[inline(never)]
-pub(super) fn glide<const D: usize>(window: &Window<'_, D>, hand: &Hand, from: &Track) -> Glide {
-    match try_glide(window, hand, from) {
-        Ok(Some(rest)) => Glide::Rests(rest),
-        Ok(None) => Glide::Unsure,
-        Err(tile) => Glide::HeldUp(tile),
-    }
-}
-
-/// As [`glide`]; `None` where it takes the general search to tell.
-fn try_glide<const D: usize>(
+pub(super) fn glide<const D: usize>(
     window: &Window<'_, D>,
     hand: &Hand,
     from: &Track,

@@ -8,7 +8,7 @@
 use glam::Vec3;
 
 use super::Pace;
-use super::glide::{Glide, glide};
+use super::glide::glide;
 use super::proxy::{Contact, Phase};
 use super::spot::Hand;
 use super::sweep::lower;
@@ -90,25 +90,25 @@ impl Contact {
             return false;
         };
         let hand = Hand::new(*hip);
-        let glide = match track.is_under(window, hip.column()) {
+        let glided = match track.is_under(window, hip.column()) {
             Under::Patch => glide(window, &hand, track),
-            Under::Hole => Glide::Unsure,
-            Under::Missing(tile) => Glide::HeldUp(tile),
+            Under::Hole => Ok(None),
+            Under::Missing(tile) => Err(tile),
         };
-        match glide {
-            Glide::Rests(rest) => {
+        match glided {
+            Ok(Some(rest)) => {
                 *track = rest.track;
                 let proxy = hand.point_at(&rest.track.spot, rest.stretch.z);
                 self.rests_at(proxy, rest.stretch, 1 + 2 * rest.hops);
             }
-            Glide::HeldUp(tile) if pace == Pace::LockStep => {
+            Err(tile) if pace == Pace::LockStep => {
                 // For the general case this hand, when it comes again, is not new.
                 (self.reached, self.leaps) = (None, 0);
                 self.last.held_up_by = Some(tile);
                 self.last.settled = false;
                 self.answered = false;
             }
-            Glide::HeldUp(_) | Glide::Unsure => return false,
+            Err(_) | Ok(None) => return false,
         }
         true
     }
