@@ -16,6 +16,7 @@
 //! The steeper of the two directions is the one eliminated: its closed form
 //! gives z without cancellation, where evaluating a steep height at a rounded
 //! v would not.
+//!
 //! docs/contact.md has the error analysis.
 
 use super::patch::Patch;
@@ -45,7 +46,7 @@ const DOWNHILL: u32 = 2;
 const STRIDE: f32 = 8.0;
 /// Places in a patch closer than this, in cells, count as the same: what is as
 /// near to an edge lies on it.
-const RESOLUTION: f32 = 1.2e-7;
+pub(super) const RESOLUTION: f32 = 1.2e-7;
 /// The same for a hand so far off that its coordinates resolve no better.
 const COARSEST: f32 = 0.25;
 /// Squared distance, in cells², below which F is nothing but rounding.

@@ -1,6 +1,6 @@
 //! What the patches around a point of a border have to offer.
 
-use super::closest::{Nearest, nearest_downhill, resolution};
+use super::closest::{Nearest, RESOLUTION, nearest_downhill, resolution};
 use super::patch::Patch;
 use super::spot::{Hand, Spot, tile_of};
 use super::work::{VISIT, Work};
@@ -8,8 +8,6 @@ use crate::terrain::{Ground, Window};
 
 /// Squared distances that differ by less than this part count as equal.
 const LEVEL: f32 = 1e-6;
-/// Rounding of a place in a patch, cells.
-const PLACE: f32 = 1.2e-7;
 /// A neighbour must offer a way at least this long, in cells, away from the
 /// border to be entered.
 const LEAST_WAY: f32 = 2e-7;
@@ -111,14 +109,12 @@ fn offer(
     here: &Nearest,
     work: &mut Work,
 ) -> Option<Offer> {
-    let surely = leads_nearer(patch, hand, &entry, shift)?;
+    let surely = leads_nearer(patch, hand, &entry, shift, here)?;
     work.charge(VISIT);
     let there = search(patch, hand, &entry, work);
     let (p, q) = hand.in_patch(entry.cell);
     let (mut nearer, noise) = gain(here, &there, (p, q), shift);
-    // Up a wall beside the edge it is another place that the distance falls from.
-    let from_here = (here.z - patch.height(entry.u, entry.v)).abs() < BESIDE * PLACE;
-    if surely && from_here {
+    if surely {
         nearer = nearer.max(0.0);
     }
     // Along a shared edge this patch has done its best already.
@@ -135,10 +131,16 @@ fn offer(
 }
 
 /// Whether the distance falls from a point of a patch's border into the patch:
-/// surely, perhaps, or not at all; `shift` is the way in.
+/// surely, from `here` on, perhaps, or not at all; `shift` is the way in.
 ///
 /// Along the border itself the patch on the other side has done its best.
-fn leads_nearer(patch: &Patch, hand: &Hand, entry: &Spot, shift: [i32; 2]) -> Option<bool> {
+fn leads_nearer(
+    patch: &Patch,
+    hand: &Hand,
+    entry: &Spot,
+    shift: [i32; 2],
+    here: &Nearest,
+) -> Option<bool> {
     let (p, q) = hand.in_patch(entry.cell);
     let (u, v) = (entry.u, entry.v);
     let z = patch.height(u, v);
@@ -152,10 +154,12 @@ fn leads_nearer(patch: &Patch, hand: &Hand, entry: &Spot, shift: [i32; 2]) -> Op
     .height(u, v)
         + zu.abs()
         + zv.abs();
+    // Up a wall beside the edge it is another place that the distance falls from.
+    let from_here = (here.z - z).abs() < BESIDE * RESOLUTION;
     let falls = |way: i32, off: f32, slope: f32| {
         let gradient = way as f32 * (off + z * slope);
         let noise = NOISE * (off.abs() + rounding * slope.abs());
-        (way != 0 && gradient <= noise).then_some(gradient < -noise)
+        (way != 0 && gradient <= noise).then_some(from_here && gradient < -noise)
     };
     falls(shift[0], u - p, zu).max(falls(shift[1], v - q, zv))
 }
@@ -174,6 +178,6 @@ fn gain(here: &Nearest, there: &Nearest, (p, q): (f32, f32), shift: [i32; 2]) ->
         here.z + there.z,
     );
     let gain = du * east + dv * north + dz * up;
-    let noise = PLACE * (east.abs() + north.abs() + up * up);
+    let noise = RESOLUTION * (east.abs() + north.abs() + up * up);
     (gain, noise.min(LEVEL * here.distance_squared))
 }
