@@ -1,7 +1,7 @@
 //! How much one tick may do.
 
-/// Units of work a tick may spend; a unit is about two hundred instructions of a
-/// Cortex-M4F.
+/// Units of work a tick may spend; a unit is two to three hundred instructions of
+/// a Cortex-M4F.
 ///
 /// Past it the work goes on in the next tick from where it stopped. What has
 /// been begun is ended: the search in a patch may go over, and so may the first
