@@ -48,24 +48,27 @@ fn encoder(machine: &Machine) -> Function {
     *found.first().expect("a function of its own")
 }
 
-/// Runs, the host reading, until the watchdog bites.
-fn starve(machine: &mut Machine) {
+/// Breaks what the link calls, runs, the host reading, until the watchdog bites,
+/// and puts the code back.
+fn starve_after(device: &Device<'_>, break_it: impl FnOnce(&mut Machine, Function)) {
+    let mut machine = device.machine.borrow_mut();
+    let at = encoder(&machine);
+    break_it(&mut machine, at);
     let stop = machine.run_until(300, |m| {
         let _ = m.take_in(1);
         false
     });
     assert_eq!(stop, Stop::Watchdog);
+    machine.heal(at);
 }
 
 #[test]
 fn a_panic_is_told_after_the_reset_with_its_place() {
     let told = after_reset(|device| {
-        let mut machine = device.machine.borrow_mut();
-        let at = encoder(&machine);
-        let panic = machine.image.functions_like(&["panic_const_rem_by_zero"]);
-        machine.call_instead(at, *panic.first().expect("a function that panics"));
-        starve(&mut machine);
-        machine.heal(at);
+        starve_after(device, |machine, at| {
+            let panic = machine.image.functions_like(&["panic_const_rem_by_zero"]);
+            machine.call_instead(at, *panic.first().expect("a function that panics"));
+        });
     });
     for (machine, status) in told {
         let board = machine.chip.board;
@@ -81,11 +84,9 @@ fn a_panic_is_told_after_the_reset_with_its_place() {
 #[test]
 fn a_hard_fault_is_told_after_the_reset_with_its_address() {
     let told = after_reset(|device| {
-        let mut machine = device.machine.borrow_mut();
-        let at = encoder(&machine);
-        machine.patch(at.address, &[0x00, 0xDE]);
-        starve(&mut machine);
-        machine.heal(at);
+        starve_after(device, |machine, at| {
+            machine.patch(at.address, &[0x00, 0xDE])
+        });
     });
     for (machine, status) in told {
         let board = machine.chip.board;
@@ -106,11 +107,9 @@ fn a_hard_fault_is_told_after_the_reset_with_its_address() {
 #[test]
 fn a_reset_by_the_watchdog_alone_is_told_and_a_crash_only_once() {
     let told = after_reset(|device| {
-        let mut machine = device.machine.borrow_mut();
-        let at = encoder(&machine);
-        machine.patch(at.address, &[0xFE, 0xE7]);
-        starve(&mut machine);
-        machine.heal(at);
+        starve_after(device, |machine, at| {
+            machine.patch(at.address, &[0xFE, 0xE7])
+        });
     });
     for (machine, status) in told {
         let board = machine.chip.board;
