@@ -92,22 +92,14 @@ impl Speed {
         let [x, y, z] = counts;
         let moved = [x.wrapping_sub(a), y.wrapping_sub(b), z.wrapping_sub(c)];
         self.latest = counts;
-        let slow = |axis: usize| moved[axis].unsigned_abs() <= self.surely_slow[axis];
-        let rates = |counts: Vec3| counts * self.hz * mechanism.radians_per_count();
-        if slow(0) && slow(1) && slow(2) || {
-            // FOAW costs as much as all the rest of a tick.
-            let [x, y, z] = moved.map(|moved| moved as f32);
-            let rough = pose.tip_velocity_mm_s(rates(Vec3::new(x, y, z)));
-            let most = self.limit_mm_s - self.rough_mm_s;
-            most > 0.0 && rough.length_squared() <= most * most
-        } {
+        let speed_of =
+            |counts: Vec3| pose.tip_velocity_mm_s(counts * self.hz * mechanism.radians_per_count());
+        if self.is_surely_slow(moved) || self.is_roughly_slow(moved, speed_of) {
             self.share = 1.0;
             self.too_fast = 0;
             return Look::Moved(moved);
         }
-        let speed = pose
-            .tip_velocity_mm_s(rates(self.readings.velocity()))
-            .length();
+        let speed = speed_of(self.readings.velocity()).length();
         let over = speed / self.limit_mm_s - 1.0;
         self.share = 1.0 - over.clamp(0.0, 1.0);
         self.too_fast = if over < 1.0 { 0 } else { self.too_fast + 1 };
@@ -115,6 +107,20 @@ impl Speed {
             true => Look::TooFast,
             false => Look::Moved(moved),
         }
+    }
+
+    /// Whether the tip is below the limit in every pose.
+    fn is_surely_slow(&self, moved: [i32; 3]) -> bool {
+        let slow = |axis: usize| moved[axis].unsigned_abs() <= self.surely_slow[axis];
+        slow(0) && slow(1) && slow(2)
+    }
+
+    /// Whether the last two readings alone tell that it is below the limit: FOAW
+    /// costs as much as all the rest of a tick.
+    fn is_roughly_slow(&self, moved: [i32; 3], speed_of: impl Fn(Vec3) -> Vec3) -> bool {
+        let [x, y, z] = moved.map(|moved| moved as f32);
+        let most = self.limit_mm_s - self.rough_mm_s;
+        most > 0.0 && speed_of(Vec3::new(x, y, z)).length_squared() <= most * most
     }
 
     /// The share of the force that may be made at this speed: 1 up to the
