@@ -15,6 +15,8 @@ struct Request {
     seed: u64,
     segment: Option<u64>,
     report: Option<PathBuf>,
+    /// Of the source that is run, for the report.
+    commit: Option<String>,
 }
 
 fn main() -> ExitCode {
@@ -23,7 +25,7 @@ fn main() -> ExitCode {
         Err(wrong) => {
             eprintln!("error: {wrong}");
             eprintln!(
-                "hint: hapterra-campaign [--seconds N] [--seed S] [--segment K] [--report FILE]"
+                "hint: hapterra-campaign [--seconds N] [--seed S] [--segment K] [--report FILE] [--commit C]"
             );
             return ExitCode::from(2);
         }
@@ -52,6 +54,7 @@ fn request(mut words: impl Iterator<Item = String>) -> Result<Request, String> {
         seed: SEED,
         segment: None,
         report: None,
+        commit: None,
     };
     while let Some(word) = words.next() {
         let value = words.next().ok_or(format!("{word} wants a value"))?;
@@ -65,6 +68,7 @@ fn request(mut words: impl Iterator<Item = String>) -> Result<Request, String> {
             "--seed" => request.seed = number()?,
             "--segment" => request.segment = Some(number()?),
             "--report" => request.report = Some(value.into()),
+            "--commit" => request.commit = Some(value),
             _ => return Err(format!("{word} is no option")),
         }
     }
@@ -89,10 +93,16 @@ fn run(request: &Request) -> Result<Tally, Violation> {
 
 fn finish(request: &Request, tally: &Tally) -> ExitCode {
     print!("{}", tally.table());
+    println!("{:#?}", tally.extremes);
     let Some(path) = &request.report else {
         return ExitCode::SUCCESS;
     };
-    let page = report::page(request.seed, request.seconds, tally);
+    let page = report::page(
+        request.commit.as_deref(),
+        request.seed,
+        request.seconds,
+        tally,
+    );
     match std::fs::write(path, page) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

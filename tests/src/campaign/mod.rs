@@ -14,8 +14,10 @@
 pub mod arm;
 pub mod clock;
 pub mod effect;
+pub mod extremes;
 pub mod host;
 pub mod kind;
+pub mod levers;
 pub mod pipe;
 pub mod report;
 pub mod segment;

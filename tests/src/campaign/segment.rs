@@ -1,6 +1,7 @@
 //! A stretch of the campaign: one device, one arm, every kind of mishap once, in
 //! an order of its own. Nothing but the seed decides what happens.
 
+use hapterra::phantom::PhantomModel;
 use hapterra::raster::Raster;
 use hapterra::synth::{Kind as Look, Synth};
 use hapterra::terrain::{Scale, Terrain};
@@ -20,7 +21,7 @@ use super::host::{Host, Tiles};
 use super::kind::Kind;
 use super::pipe::Unkind;
 use super::tally::{Outcome, Tally};
-use super::watch::Watch;
+use super::watch::{Truth, Watch};
 use crate::chance::Chance;
 
 /// Tiles along the side of the window, as on the smallest board.
@@ -99,6 +100,8 @@ struct Stretch<'t> {
     watch: Watch,
     /// Counts that the encoders are off by.
     lost: [i32; 3],
+    /// What the device was told that they read in its zero pose.
+    zero: [i32; 3],
     dead_man: bool,
     drive: Drive,
     now: u64,
@@ -132,8 +135,9 @@ impl<'t> Stretch<'t> {
             host: Host::new(terrain, scene),
             scene,
             arm,
-            watch: Watch::new(record),
+            watch: Watch::new(record, PhantomModel::premium_1_5()),
             lost: [0; 3],
+            zero: [0; 3],
             dead_man: false,
             drive: Drive::default(),
             now: 0,
@@ -241,7 +245,7 @@ impl<'t> Stretch<'t> {
             match at {
                 30 => self.say(&ToDevice::Disarm),
                 40 => self.say(&ToDevice::ClearFault),
-                50 => self.say(&ToDevice::Zero { counts: self.lost }),
+                50 => self.say_zero(),
                 ASK => self.say(&ToDevice::Arm),
                 PRESS => self.dead_man = true,
                 _ => {}
@@ -258,6 +262,12 @@ impl<'t> Stretch<'t> {
             }
         }
         Ok(false)
+    }
+
+    /// With the arm in its zero pose its encoders would read what they are off by.
+    fn say_zero(&mut self) {
+        self.zero = self.lost;
+        self.say(&ToDevice::Zero { counts: self.zero });
     }
 
     fn say(&mut self, message: &ToDevice<'_>) {
@@ -326,7 +336,13 @@ impl<'t> Stretch<'t> {
         if let Some(error) = self.host.failed.take() {
             return Err(format!("the link broke: {error}"));
         }
-        self.watch.drive(&self.drive, sense, &self.arm)?;
+        let plant = self.arm.plant();
+        let truth = Truth {
+            q_rad: plant.q_rad(),
+            counts: plant.counts(),
+            winding_c: plant.winding_c(),
+        };
+        self.watch.drive(&self.drive, sense, self.zero, &truth)?;
         for sample in std::mem::take(&mut self.host.samples) {
             self.watch.sample(&sample, self.scene.law.max_force_n)?;
         }

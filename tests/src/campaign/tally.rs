@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 
 use hapterra_core::guard::Fault;
 
+use super::extremes::Extremes;
 use super::kind::Kind;
-use super::watch::Extremes;
 
 /// What became of a mishap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,10 +1,19 @@
 //! What has to hold in every tick, whatever goes wrong.
+//!
+//! The currents are held to three bounds, each worked out in f64 from them alone:
+//! - with the levers of the pose that the encoders tell, the force is within the
+//!   guard's clamp, always;
+//! - with the arm's true levers it is within the record's largest force while no
+//!   encoder is off by more than [`OFF_COUNTS`];
+//! - while one is, no program can know the true levers: that force is told.
 
+use hapterra::phantom::{Encoder, PhantomModel};
 use hapterra_core::guard::{Drive, Mode, Sense, WORKING_SHARE};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::message::Sample;
 
-use super::arm::Arm;
+use super::extremes::{Extremes, Misled, OFF_COUNTS};
+use super::levers::{Levers, torques_nm};
 
 /// Largest change of force in a tick, N: the guard's slew limit at 1 kHz.
 const SLEW_N: f32 = 1.0;
@@ -13,60 +22,51 @@ const SLEW_N: f32 = 1.0;
 const HOTTEST_C: f64 = 112.0;
 /// Room for rounding in comparisons of f32.
 const ROUNDING: f32 = 1e-4;
-/// The largest that was seen.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Extremes {
-    /// Force told by the device, N.
-    pub force_n: f64,
-    /// Force worked out from the currents, N.
-    pub motor_force_n: f64,
-    /// Current of a motor, A.
-    pub current_a: f64,
-    /// Change of force from one tick to the next, N.
-    pub slew_n: f64,
-    /// Temperature of a winding of the virtual arm, °C.
-    pub winding_c: f64,
-}
 
-impl Extremes {
-    /// The larger of each.
-    #[must_use]
-    pub fn or(self, other: Self) -> Self {
-        Self {
-            force_n: self.force_n.max(other.force_n),
-            motor_force_n: self.motor_force_n.max(other.motor_force_n),
-            current_a: self.current_a.max(other.current_a),
-            slew_n: self.slew_n.max(other.slew_n),
-            winding_c: self.winding_c.max(other.winding_c),
-        }
-    }
+/// What is true of the arm in a tick, whatever the device is told.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth {
+    /// Joint angles, rad.
+    pub q_rad: [f64; 3],
+    /// What encoders that are right read there, counts.
+    pub counts: [i32; 3],
+    /// Temperatures of the windings, °C.
+    pub winding_c: [f64; 3],
 }
 
 /// Watches one segment.
 pub struct Watch {
     record: Calibration,
+    model: PhantomModel,
     last: Option<Sample>,
     /// The largest so far.
     pub extremes: Extremes,
 }
 
 impl Watch {
-    /// For a device with this calibration.
+    /// For a device with this calibration on such an arm.
     #[must_use]
-    pub fn new(record: Calibration) -> Self {
+    pub fn new(record: Calibration, model: PhantomModel) -> Self {
         Self {
             record,
+            model,
             last: None,
             extremes: Extremes::default(),
         }
     }
 
-    /// Looks at what the amplifiers got in a tick, and at what the device was
-    /// told by its switches.
+    /// Looks at what the amplifiers got in a tick in which the device was told
+    /// `sense`, having been told that `zero` are the counts of its zero pose.
     ///
     /// # Errors
     /// What must not be.
-    pub fn drive(&mut self, drive: &Drive, sense: &Sense, arm: &Arm<'_>) -> Result<(), String> {
+    pub fn drive(
+        &mut self,
+        drive: &Drive,
+        sense: &Sense,
+        zero: [i32; 3],
+        truth: &Truth,
+    ) -> Result<(), String> {
         let currents = drive.currents_a;
         let largest = currents.abs().max_element();
         if !currents.is_finite() {
@@ -83,33 +83,66 @@ impl Watch {
             return Err(format!("amplifiers on with {sense:?}"));
         }
         self.extremes.current_a = self.extremes.current_a.max(f64::from(largest));
-        let hottest = arm.plant().winding_c().into_iter().fold(0.0, f64::max);
+        let hottest = truth.winding_c.into_iter().fold(0.0, f64::max);
         self.extremes.winding_c = self.extremes.winding_c.max(hottest);
         if hottest > HOTTEST_C {
             return Err(format!("a winding of the arm is at {hottest:.1} °C"));
         }
         if drive.enabled {
-            self.motor_force(drive, arm)?;
+            let told = std::array::from_fn(|i| sense.counts[i].wrapping_sub(zero[i]));
+            let torque = torques_nm(&self.model, currents.to_array().map(f64::from));
+            self.force_as_read(torque, told)?;
+            self.force_at_the_tip(torque, told, truth)?;
         }
         Ok(())
     }
 
-    fn motor_force(&mut self, drive: &Drive, arm: &Arm<'_>) -> Result<(), String> {
-        let [_, q2, q3] = arm.plant().q_rad();
-        let weight = [
-            0.0,
-            f64::from(self.record.gravity_2_nm) * libm::cos(q2),
-            f64::from(self.record.gravity_3_nm) * libm::sin(q3),
-        ];
-        let currents = drive.currents_a.to_array().map(f64::from);
-        let Some(force) = arm.force_n(currents, weight) else {
+    /// With the levers that the device believes in.
+    fn force_as_read(&mut self, torque_nm: [f64; 3], told: [i32; 3]) -> Result<(), String> {
+        let angle = |i: usize| Encoder::new(&self.model.drive[i]).angle_rad(told[i]);
+        let q = std::array::from_fn(angle);
+        let Some(levers) = Levers::at(&self.model, &self.record, q) else {
             return Ok(());
         };
-        self.extremes.motor_force_n = self.extremes.motor_force_n.max(force);
-        let most = f64::from(self.record.max_force_n);
-        match force <= most {
+        let force = levers.force_n(torque_nm);
+        self.extremes.read_force_n = self.extremes.read_force_n.max(force);
+        let clamp = f64::from(WORKING_SHARE * self.record.max_force_n * (1.0 + ROUNDING));
+        match force <= clamp {
             true => Ok(()),
-            false => Err(format!("the motors make {force:.3} N at the tip")),
+            false => Err(format!("the motors make {force:.4} N by the encoders")),
+        }
+    }
+
+    /// With the levers that the arm has.
+    fn force_at_the_tip(
+        &mut self,
+        torque_nm: [f64; 3],
+        told: [i32; 3],
+        truth: &Truth,
+    ) -> Result<(), String> {
+        let off = (0..3).map(|i| told[i].abs_diff(truth.counts[i]));
+        let off_counts = off.fold(0, u32::max);
+        let is_misled = off_counts > OFF_COUNTS;
+        self.extremes.misled_ticks += u64::from(is_misled);
+        let Some(levers) = Levers::at(&self.model, &self.record, truth.q_rad) else {
+            self.extremes.singular_ticks += 1;
+            return Ok(());
+        };
+        let force_n = levers.force_n(torque_nm);
+        if is_misled {
+            let misled = Misled {
+                force_n,
+                off_counts,
+            };
+            self.extremes.misled = self.extremes.misled.or(misled);
+            return Ok(());
+        }
+        self.extremes.tip_force_n = self.extremes.tip_force_n.max(force_n);
+        match force_n <= f64::from(self.record.max_force_n) {
+            true => Ok(()),
+            false => Err(format!(
+                "the motors make {force_n:.3} N at the tip, the encoders off by {off_counts} counts"
+            )),
         }
     }
 
