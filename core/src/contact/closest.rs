@@ -81,7 +81,7 @@ pub fn nearest_downhill(patch: &Patch, hand: (f32, f32), start: (f32, f32)) -> N
         distance_squared: f32::INFINITY,
         evaluations: 0,
     };
-    let mut turned = patch.slope_v(start.0).abs() > patch.slope_u(start.1).abs();
+    let mut turned = is_steeper_north(patch, hand, start);
     for _ in 0..MAX_PASSES {
         let (found, evaluations) = if turned {
             along_v(&patch.transposed(), (hand.1, hand.0), best.u)
@@ -95,6 +95,14 @@ pub fn nearest_downhill(patch: &Patch, hand: (f32, f32), start: (f32, f32)) -> N
         turned = !turned;
     }
     best.snapped(patch, hand)
+}
+
+/// Whether the patch is steeper northward than eastward at `start`; of two slopes
+/// alike, as at the foot of a raised corner, the hand's direction is decisive,
+/// which a mirrored scene shares.
+fn is_steeper_north(patch: &Patch, (p, q): (f32, f32), (u, v): (f32, f32)) -> bool {
+    let (east, north) = (patch.slope_u(v).abs(), patch.slope_v(u).abs());
+    north > east || (north == east && (q - v).abs() > (p - u).abs())
 }
 
 /// Places in a patch closer than this, in cells, cannot be told apart for a hand
