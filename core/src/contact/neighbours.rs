@@ -114,12 +114,13 @@ fn offer(
     let there = search(patch, hand, &entry, work);
     let (p, q) = hand.in_patch(entry.cell);
     let (mut nearer, noise) = gain(here, &there, (p, q), shift);
+    let mut least = LEAST_WAY;
     if surely {
-        nearer = nearer.max(0.0);
+        (nearer, least) = (nearer.max(0.0), 0.0);
     }
     // Along a shared edge this patch has done its best already.
     let way = [there.u - entry.u, there.v - entry.v];
-    let moved = (0..2).any(|axis| shift[axis] != 0 && way[axis].abs() > LEAST_WAY);
+    let moved = (0..2).any(|axis| shift[axis] != 0 && way[axis].abs() > least);
     let [east, north] = shift.map(|step| step as f32);
     let toward = east * (p - entry.u) + north * (q - entry.v);
     ((moved && nearer >= -noise) || nearer > noise).then_some(Offer {
@@ -145,15 +146,15 @@ fn leads_nearer(
     let (u, v) = (entry.u, entry.v);
     let z = patch.height(u, v);
     let (zu, zv) = (patch.slope_u(v), patch.slope_v(u));
-    // Up a wall, the last place of a coordinate is a lot of height.
+    // Up a wall, the last place of a coordinate is a lot of height; across the
+    // border there is none, the place is on it.
     let size = patch.corners.map(f32::abs);
-    let rounding = Patch {
+    let heights = Patch {
         corners: size,
         ..*patch
-    }
-    .height(u, v)
-        + zu.abs()
-        + zv.abs();
+    };
+    let along = |way: i32, slope: f32| if way == 0 { slope.abs() } else { 0.0 };
+    let rounding = heights.height(u, v) + along(shift[0], zu) + along(shift[1], zv);
     // Up a wall beside the edge it is another place that the distance falls from.
     let from_here = (here.z - z).abs() < BESIDE * RESOLUTION;
     let falls = |way: i32, off: f32, slope: f32| {
