@@ -57,6 +57,10 @@ fn main() {
     for flag in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
         println!("cargo::rustc-link-arg-bins={flag}");
     }
+    // A symbol that names the board, in the ELF only: `hapterra flash` looks at it.
+    // The linker takes a dash for a minus.
+    let mark = board.replace('-', "_");
+    println!("cargo::rustc-link-arg-bins=--defsym=hapterra.board.{mark}=0");
 }
 
 fn is_enabled(board: &str) -> bool {

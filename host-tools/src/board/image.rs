@@ -6,8 +6,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use object::LittleEndian;
-use object::elf::{EM_ARM, FileHeader32, PT_LOAD};
-use object::read::elf::{FileHeader, ProgramHeader};
+use object::elf::{EM_ARM, FileHeader32, PT_LOAD, SHT_SYMTAB};
+use object::read::elf::{FileHeader, ProgramHeader, Sym};
 use probe_rs::Target;
 use probe_rs::config::{MemoryRegion, Registry};
 
@@ -81,6 +81,20 @@ pub enum ImageError {
         /// Flash or RAM.
         memory: &'static str,
     },
+    /// It was built for another board, or bears no board's mark.
+    #[error(
+        "{} is not for {board}: {}",
+        path.display(),
+        found.as_deref().map_or("it names no board".into(), |found| format!("it was built for {found}"))
+    )]
+    OtherBoard {
+        /// The file.
+        path: PathBuf,
+        /// The board it should be for.
+        board: &'static str,
+        /// The board it names.
+        found: Option<String>,
+    },
     /// probe-rs does not know the chip.
     #[error("the chip {0} is not known")]
     UnknownChip(&'static str, #[source] probe_rs::config::RegistryError),
@@ -105,14 +119,40 @@ impl Image {
             path: path.to_owned(),
             why,
         })?;
-        place(target, segments).map_err(|stray| ImageError::OutOfMemory {
+        let image = place(target, segments).map_err(|stray| ImageError::OutOfMemory {
             path: path.to_owned(),
             chip: chip.to_owned(),
             address: stray.address,
             bytes: stray.bytes,
             memory: if stray.in_flash { "flash" } else { "RAM" },
-        })
+        })?;
+        // Of two chips that hold it both, the wiring still differs.
+        let found = mark(&elf);
+        match found.as_deref() == Some(board.name) {
+            true => Ok(image),
+            false => Err(ImageError::OtherBoard {
+                path: path.to_owned(),
+                board: board.name,
+                found,
+            }),
+        }
     }
+}
+
+/// What the symbol begins with that `firmware/build.rs` gives an image, and goes
+/// on with the board's name, its dashes as underscores.
+const MARK: &str = "hapterra.board.";
+
+/// The board that an ELF says it is for.
+fn mark(elf: &[u8]) -> Option<String> {
+    let header = FileHeader32::<LittleEndian>::parse(elf).ok()?;
+    let sections = header.sections(LittleEndian, elf).ok()?;
+    let table = sections.symbols(LittleEndian, elf, SHT_SYMTAB).ok()?;
+    table.iter().find_map(|symbol| {
+        let name = symbol.name(LittleEndian, table.strings()).ok()?;
+        let board = std::str::from_utf8(name).ok()?.strip_prefix(MARK)?;
+        Some(board.replace('_', "-"))
+    })
 }
 
 /// A loaded segment: where it runs, where it is loaded from, what is in it.

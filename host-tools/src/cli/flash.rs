@@ -141,6 +141,12 @@ mod through_a_probe {
             ImageError::OutOfMemory { .. } => {
                 "it was built for another board: name the right one with --board"
             }
+            ImageError::OtherBoard { found: Some(_), .. } => {
+                "name the board that it was built for with --board, or another image"
+            }
+            ImageError::OtherBoard { found: None, .. } => {
+                "images built from this source name theirs, unless they were stripped: `cargo xtask image BOARD` builds one"
+            }
             ImageError::UnknownChip(..) => "this should not happen: please report it",
         };
         Failure::new(error).hint(hint)
