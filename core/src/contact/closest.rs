@@ -258,7 +258,10 @@ impl Bracket {
         // Close to the minimum F is flat and its rounding decides; the slope
         // still tells.
         let close = (trial.v - best.v).abs() < SHORT && trial.f <= best.f * 1.01 + LEAST_F;
-        let nearer = trial.f <= best.f * TIE || (halved && close);
+        // Near to the hand, the last places of u and v are more than that.
+        let onward = trial.slope * best.slope > 0.0 && trial.slope.abs() < best.slope.abs();
+        let level = onward && trial.f <= best.f + best.f_noise;
+        let nearer = trial.f <= best.f * TIE || (close && (halved || level));
         if !nearer {
             self.wall = trial.v;
             self.wall_is_end = false;

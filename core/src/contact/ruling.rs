@@ -26,6 +26,8 @@ pub(super) struct Ruling {
     pub(super) z: f32,
     /// F(v), the squared distance from the hand, cells².
     pub(super) f: f32,
+    /// What the last places of u and v make of it.
+    pub(super) f_noise: f32,
     /// F′(v)/2
     pub(super) slope: f32,
     /// F″(v)/2
@@ -87,6 +89,7 @@ pub(super) fn ruling(patch: &Patch, (p, q): (f32, f32), v: f32) -> Ruling {
         v,
         z,
         f: du * du + dv * dv + z * z,
+        f_noise: f32::EPSILON * (du.abs() + dv.abs()),
         slope: dv + lift,
         curvature,
         noise: f32::EPSILON * (dv.abs() + lift.abs() + rounding),
