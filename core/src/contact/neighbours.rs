@@ -156,7 +156,7 @@ fn leads_nearer(
     let along = |way: i32, slope: f32| if way == 0 { slope.abs() } else { 0.0 };
     let rounding = heights.height(u, v) + along(shift[0], zu) + along(shift[1], zv);
     // Up a wall beside the edge it is another place that the distance falls from.
-    let from_here = (here.z - z).abs() < BESIDE * RESOLUTION;
+    let from_here = (here.z - z).abs() < BESIDE * RESOLUTION * (1.0 + z.abs());
     let falls = |way: i32, off: f32, slope: f32| {
         let gradient = way as f32 * (off + z * slope);
         let noise = NOISE * (off.abs() + rounding * slope.abs());
