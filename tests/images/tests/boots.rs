@@ -85,7 +85,7 @@ fn a_panic_is_told_after_the_reset_with_its_place() {
 fn a_hard_fault_is_told_after_the_reset_with_its_address() {
     let told = after_reset(|device| {
         starve_after(device, |machine, at| {
-            machine.patch(at.address, &[0x00, 0xDE])
+            machine.patch(at.address, &[0x00, 0xDE]);
         });
     });
     for (machine, status) in told {
@@ -108,7 +108,7 @@ fn a_hard_fault_is_told_after_the_reset_with_its_address() {
 fn a_reset_by_the_watchdog_alone_is_told_and_a_crash_only_once() {
     let told = after_reset(|device| {
         starve_after(device, |machine, at| {
-            machine.patch(at.address, &[0xFE, 0xE7])
+            machine.patch(at.address, &[0xFE, 0xE7]);
         });
     });
     for (machine, status) in told {
