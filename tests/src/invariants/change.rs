@@ -118,7 +118,7 @@ impl Judge<'_> {
 
     pub(super) fn passes_no_wall(&self, before: &Seen, seen: &Seen) -> Verdict {
         let inside = |p: [f64; 3]| {
-            (0..2).all(|axis| (0.0..=f64::from(self.terrain.size[axis])).contains(&p[axis]))
+            (0..2).all(|axis| (0.0..f64::from(self.terrain.size[axis])).contains(&p[axis]))
         };
         let held = |seen: &Seen| seen.felt.state != State::Waiting;
         // Any place on a wall's top is farther from the hand than the proxy was.
