@@ -3,13 +3,14 @@
 
 use hapterra::phantom::{PhantomModel, kinematics};
 use hapterra_core::Vec3;
-use hapterra_core::guard::{LIMIT_MARGIN_RAD, MAX_COUNTS_PER_S, WORKING_SHARE};
+use hapterra_core::guard::{LIMIT_MARGIN_RAD, WORKING_SHARE};
 use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_firmware::amplifier::offset_code;
+use hapterra_tests::campaign::extremes::OFF_COUNTS;
 use hapterra_tests::campaign::levers::{force, is_near_singular};
 
-/// What an encoder is off by, counts: two jumps at 1 kHz that are let pass.
-const OFF: i32 = 2 * (MAX_COUNTS_PER_S / 1_000) as i32;
+/// What an encoder is off by, counts.
+const OFF: i32 = OFF_COUNTS as i32;
 /// The coarsest converter of the boards.
 const DAC_MAX: u16 = 4_095;
 const FULL_SCALE_A: f32 = 5.5;

@@ -1,8 +1,10 @@
 //! The largest of everything that was seen in a campaign.
 
+use hapterra_core::guard::MAX_COUNTS_PER_S;
+
 /// Counts of the encoder that is farthest off up to which the force at the true tip
 /// is held to the record's: two jumps at 1 kHz that the guard lets pass.
-pub const OFF_COUNTS: u32 = 256;
+pub const OFF_COUNTS: u32 = 2 * (MAX_COUNTS_PER_S / 1_000);
 
 /// The force at the true tip while an encoder was wrong by more than
 /// [`OFF_COUNTS`]: told, not judged, as no program can know the arm's levers then.
