@@ -1,6 +1,6 @@
-//! Whether docs/hardware.md says the pins that the boards' sources take. That a
-//! pin can be what it is used for is embassy's types' to see to: the images would
-//! not compile.
+//! Whether the boards' pages say the pins that their sources take. That the images
+//! set them up as the pages say is seen in `tests/images`; that a pin can be what it
+//! is used for is embassy's types' to see to: the images would not compile.
 
 use std::collections::BTreeSet;
 
@@ -52,18 +52,22 @@ fn source(files: &[&str]) -> String {
 
 #[test]
 fn the_wiring_tables_have_the_pins_that_the_images_take() {
-    let page = std::fs::read_to_string(repository().join("docs/hardware.md")).expect("the page");
+    let page = |board: &str| {
+        let path = repository().join(format!("docs/boards/{board}.md"));
+        std::fs::read_to_string(path).expect("the page")
+    };
     let taken = |files: &[&str]| {
         let source = source(files);
         &pins(&source, "p.") | &pins(&source, "$p.")
     };
     let g474 = taken(&["nucleo-g474re/main.rs"]);
     assert!(g474.len() > 12, "{g474:?}");
-    assert_eq!(wired(&page, "## Wiring: nucleo-g474re\n"), g474);
+    assert_eq!(wired(&page("nucleo-g474re"), "# nucleo-g474re\n"), g474);
     let h743 = taken(&["nucleo-h743zi2/board.rs", "nucleo-h743zi2/outputs.rs"]);
-    assert_eq!(wired(&page, "## Wiring: nucleo-h743zi2\n"), h743);
-    // This page has only what is other than there.
+    let page = page("nucleo-h743zi2");
+    assert_eq!(wired(&page, "## Duty cycles"), h743);
+    // This table has only what is other than there.
     let spi = taken(&["nucleo-h743zi2-spi/outputs.rs"]);
     assert_eq!(spi.len(), 3);
-    assert_eq!(wired(&page, "## Wiring: nucleo-h743zi2-spi\n"), spi);
+    assert_eq!(wired(&page, "## A converter on SPI"), spi);
 }

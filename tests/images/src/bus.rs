@@ -11,6 +11,7 @@ use crate::watchdog::Watchdog;
 
 /// Offsets of a GPIO port's registers.
 const MODER: u32 = 0x00;
+const PUPDR: u32 = 0x0C;
 const IDR: u32 = 0x10;
 const ODR: u32 = 0x14;
 const BSRR: u32 = 0x18;
@@ -29,6 +30,18 @@ pub enum Effect {
     Command(usize, i32),
     /// The amplifiers' enable pin.
     Enable(bool),
+}
+
+/// Every pin is analogue but the debugger's, on both chips.
+fn ports_after_reset(gpio: u32) -> HashMap<u32, u32> {
+    let analogue = (0..PORTS).map(|port| (gpio + 0x400 * port + MODER, u32::MAX));
+    let debuggers = [
+        (gpio + MODER, 0xABFF_FFFF),
+        (gpio + PUPDR, 0x6400_0000),
+        (gpio + 0x400 + MODER, 0xFFFF_FEBF),
+        (gpio + 0x400 + PUPDR, 0x0000_0100),
+    ];
+    analogue.chain(debuggers).collect()
 }
 
 /// All peripherals of a chip.
@@ -65,9 +78,11 @@ impl Bus {
         };
         let (flags, power_up, watchdog, _) = chip.reset_flags;
         let cause = if by_watchdog { watchdog } else { power_up };
+        let mut words = ports_after_reset(chip.gpio);
+        words.insert(flags, cause);
         Self {
             chip,
-            words: HashMap::from([(flags, cause)]),
+            words,
             inputs: HashMap::new(),
             timers: chip
                 .timers

@@ -1,0 +1,101 @@
+//! Whether the images set up every pin as its board's page says, alternate function
+//! included, and no other: read from the chip's registers after a reset.
+
+use std::collections::BTreeMap;
+
+use hapterra_image_tests::device::machines;
+use hapterra_image_tests::machine::{Machine, Stop};
+use hapterra_tests::repository;
+
+/// Offsets of a port's registers.
+const MODER: u32 = 0x00;
+const PUPDR: u32 = 0x0C;
+const AFRL: u32 = 0x20;
+
+/// Pins and their modes, as a page has them.
+type Pins = BTreeMap<String, String>;
+
+/// What a page says from a heading to the next: rows of what, pin, signal, mode.
+fn table(page: &str, heading: &str) -> Pins {
+    let from = page.find(heading).expect("the heading");
+    let section = &page[from + heading.len()..];
+    let section = section.split("\n## ").next().expect("there is one");
+    let rows = section.lines().filter_map(|line| {
+        let cells: Vec<_> = line.trim_matches('|').split('|').map(str::trim).collect();
+        let [_, pin, _, mode] = cells[..] else {
+            return None;
+        };
+        pin.starts_with('P')
+            .then(|| (pin.to_owned(), mode.to_owned()))
+    });
+    rows.collect()
+}
+
+/// What the page of a board's image says.
+fn said(board: &str) -> Pins {
+    let page = |name: &str| {
+        let path = repository().join(format!("docs/boards/{name}.md"));
+        std::fs::read_to_string(path).expect("the page")
+    };
+    match board {
+        "nucleo-g474re" => table(&page(board), "# nucleo-g474re"),
+        "nucleo-h743zi2" => table(&page(board), "## Duty cycles"),
+        _ => {
+            let page = page("nucleo-h743zi2");
+            let mut pins = table(&page, "## Duty cycles");
+            pins.retain(|pin, _| !["PE9", "PE11", "PE13"].contains(&pin.as_str()));
+            pins.extend(table(&page, "## A converter on SPI"));
+            pins
+        }
+    }
+}
+
+/// How a pin is set up.
+fn mode(machine: &Machine, port: u32, pin: u32) -> String {
+    let register = |offset| {
+        machine
+            .bus()
+            .read(machine.chip.gpio + 0x400 * port + offset)
+    };
+    let pulled = match register(PUPDR) >> (2 * pin) & 3 {
+        1 => ", pulled up",
+        2 => ", pulled down",
+        _ => "",
+    };
+    let function = register(AFRL + 4 * (pin / 8)) >> (4 * (pin % 8)) & 0xF;
+    let mode = match register(MODER) >> (2 * pin) & 3 {
+        0 => "input".to_owned(),
+        1 => "output".to_owned(),
+        2 => format!("AF{function}"),
+        _ => "analogue".to_owned(),
+    };
+    mode + pulled
+}
+
+/// All pins and how they are set up.
+fn modes(machine: &Machine) -> Pins {
+    let pins = ('A'..='K').zip(0..).flat_map(|(letter, port)| {
+        let name = move |pin| (format!("P{letter}{pin}"), mode(machine, port, pin));
+        (0..16).map(name)
+    });
+    pins.collect()
+}
+
+#[test]
+fn every_pin_is_set_up_as_its_boards_page_says() {
+    for mut machine in machines() {
+        let board = machine.chip.board;
+        let mut expected = modes(&machine);
+        let said = said(board);
+        assert!(said.len() >= 15, "{board}: {said:?}");
+        assert_eq!(machine.run_ms(10), Stop::Time, "{board}");
+        // What the page does not name stays as a reset leaves it.
+        expected.extend(said);
+        let is = modes(&machine);
+        let other = expected
+            .iter()
+            .filter(|(pin, mode)| is.get(*pin) != Some(mode));
+        let other: Vec<_> = other.map(|(pin, mode)| (pin, mode, is.get(pin))).collect();
+        assert!(other.is_empty(), "{board}: pin, page, chip: {other:?}");
+    }
+}
