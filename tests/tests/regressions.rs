@@ -121,3 +121,20 @@ fn a_minimum_just_beyond_an_edge_is_found() {
     ];
     run(terrain, &path, Pace::RealTime, Supply::Held).expect("holds");
 }
+
+/// What faded away was not the last slide's force but the one of the last tick
+/// that had to be searched for: a tile came between the two.
+#[test]
+fn a_contact_lost_after_a_late_tile_fades_from_what_was_felt_last() {
+    let terrain = field([128, 20], |x, _| match x {
+        ..=32 => 0.0,
+        33..=35 => f32::NAN,
+        _ => 2.0,
+    });
+    let mut path = vec![[10.5, 10.5, 4.0]];
+    path.extend((0..16).map(|i| [10.5 + f64::from(i), 10.5, -0.05 * f64::from(i + 1)]));
+    path.push([40.5, 10.5, 0.5]);
+    let supply = Supply::Pulled { latency: 40 };
+    let states = run(terrain, &path, Pace::LockStep, supply).expect("holds");
+    assert_eq!(states.last(), Some(&State::LettingGo));
+}

@@ -56,7 +56,7 @@ pub struct Contact {
     pub(super) last: Felt,
     /// What was felt before the general case had to look, which may take it
     /// several turns in lock-step.
-    before: Felt,
+    pub(super) before: Felt,
     /// Most that the presence may change in a tick.
     fade: f32,
 }

@@ -102,8 +102,10 @@ impl Contact {
                 self.rests_at(proxy, rest.stretch, 1 + 2 * rest.hops);
             }
             Err(tile) if pace == Pace::LockStep => {
-                // For the general case this hand, when it comes again, is not new.
+                // For the general case this hand, when it comes again, is not new,
+                // and what was felt before it is the last slide.
                 (self.reached, self.leaps) = (None, 0);
+                self.before = self.last;
                 self.last.held_up_by = Some(tile);
                 self.last.settled = false;
                 self.answered = false;
