@@ -138,3 +138,28 @@ fn a_contact_lost_after_a_late_tile_fades_from_what_was_felt_last() {
     let states = run(terrain, &path, Pace::LockStep, supply).expect("holds");
     assert_eq!(states.last(), Some(&State::LettingGo));
 }
+
+/// The way from the surface to a hand 1.1·10⁻⁵ cell below it was so short that
+/// it was passed over as the corner that a way touches on leaving an edge.
+#[test]
+fn a_hand_just_below_a_vertex_is_not_let_through() {
+    let rows = [
+        [-297.904_27, 265.127_4, 34.867_683, 109.010_83],
+        [35.195_873, 9.611_267, 268.303_25, 93.524_216],
+        [9.180_015, -154.220_29, 5.923_537_7, -9.108_968],
+        [-94.330_505, 176.391_34, 36.765_614, -243.958_5],
+    ];
+    let terrain = field([3, 3], |x, y| rows[y as usize][x as usize]);
+    let near = |x: f64, y: f64, z: f64| [2.0 + x, 2.0 + y, z];
+    let path = [
+        near(0.0, 0.0, 310.0),
+        near(0.0, 0.0, 5.893_146_514_892_578),
+        near(0.0, 0.03, 5.893_146_514_892_578),
+        near(0.03, 0.03, 5.953_146_934_509_277),
+        near(0.0, -0.03, 5.953_146_934_509_277),
+        near(-0.03, -0.03, 5.953_146_934_509_277),
+        near(0.0, 0.0, 5.923_147_201_538_086),
+    ];
+    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
+    assert_eq!(states.last(), Some(&State::Touching));
+}

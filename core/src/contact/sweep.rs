@@ -171,7 +171,8 @@ impl Path {
             if !work.take(STRIDE) {
                 return Some(Sweep::Unfinished);
             }
-            if on_surface && step.is_tiny() {
+            let is_last = steps.done && self.ends.len() == 1;
+            if on_surface && step.is_tiny() && !is_last {
                 // A corner of a cell, or of a hole, touched on leaving an edge.
                 continue;
             }
