@@ -163,3 +163,17 @@ fn a_hand_just_below_a_vertex_is_not_let_through() {
     let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
     assert_eq!(states.last(), Some(&State::Touching));
 }
+
+/// A way half a cell above a wall of 1.5·10⁶, and as steep, was walked in pieces
+/// of 16 cells.
+#[test]
+fn a_way_along_a_wall_settles() {
+    let terrain = field([3, 3], |x, _| 1.5e6 * x as f32);
+    let path = [
+        [1.5, 1.5, 5e6],
+        [1.0, 1.5, 1_500_000.125],
+        [1.875, 1.5, 2_812_500.5],
+    ];
+    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
+    assert_eq!(states.last(), Some(&State::Free));
+}

@@ -24,6 +24,9 @@ const WALK_CELLS: u32 = 4;
 const WALK_HEIGHT: u32 = 16;
 /// Rounding of a gap over a tall piece, of its height.
 const TALL_NOISE: f32 = 1e-5;
+/// A way whose gap over the ground is less than its own rise by this factor runs
+/// along it.
+const ALONG: f32 = 16.0;
 /// Halvings that bring the longest possible segment down to a walk, and one.
 const DEPTH: usize = 30;
 
@@ -147,9 +150,17 @@ impl Path {
             };
             over_hole = false;
             let patch = view.patch(&corners);
-            let above = step.gap(&patch).into_iter().fold(f32::MIN, f32::max);
+            let gap = step.gap(&patch);
+            let above = gap.into_iter().fold(f32::MIN, f32::max);
             let largest = patch.corners.iter().fold(tall, |most, h| most.max(h.abs()));
-            if above >= -TALL_NOISE * largest {
+            // Along ground as steep as the way, noise in height is next to none
+            // across it.
+            let noise = if step.runs_along(&gap, largest) {
+                0.0
+            } else {
+                TALL_NOISE * largest
+            };
+            if above >= -noise {
                 return None;
             }
         }
@@ -248,6 +259,13 @@ impl Step {
             .max((self.to.1 - self.from.1).abs())
             < TINY
             && (self.z_to - self.z_from).abs() < TINY
+    }
+
+    /// Whether the ground, no corner of which is farther up or down than
+    /// `largest`, rises or falls with the way, `gap` over it.
+    fn runs_along(&self, gap: &[f32; 3], largest: f32) -> bool {
+        let rise = (self.z_to - self.z_from).abs();
+        largest <= ALONG * rise && gap.iter().all(|gap| ALONG * gap.abs() <= rise)
     }
 
     /// The patch's height over the way, by its Bernstein coefficients.
