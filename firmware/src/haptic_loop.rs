@@ -16,6 +16,7 @@ use hapterra_core::terrain::Tile;
 use hapterra_core::tick::{Command, Haptics, Outcome};
 use hapterra_core::wire::message::Source;
 use hapterra_core::wire::status::Health;
+use hapterra_tick::FastTick;
 use heapless::spsc::{Consumer, Producer};
 
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, TickClock};
@@ -103,6 +104,19 @@ where
         }
     }
 
+    /// The board's encoders, for whoever feeds them from outside.
+    pub fn encoders_mut(&mut self) -> &mut E {
+        &mut self.encoders
+    }
+}
+
+impl<'t, E, A, C, const D: usize> HapticLoop<'t, E, A, C, D>
+where
+    E: Encoders,
+    A: Amplifiers,
+    C: TickClock,
+    Haptics<'t, D>: FastTick,
+{
     /// One tick. Returns what the amplifiers were left with.
     pub fn tick(&mut self) -> Drive {
         let began = self.timing.begin(&mut self.clock);
@@ -118,11 +132,6 @@ where
             self.give_to_haptics(Command::Trip(Fault::TickOverrun));
         }
         drive
-    }
-
-    /// The board's encoders, for whoever feeds them from outside.
-    pub fn encoders_mut(&mut self) -> &mut E {
-        &mut self.encoders
     }
 
     fn take_commands(&mut self) {
@@ -162,7 +171,7 @@ where
     fn feel_arm(&mut self, watchdog_live: bool) -> Drive {
         let sense = self.encoders.sense();
         self.haptics
-            .tick_into(&sense, watchdog_live, &mut self.outcome);
+            .tick_fast(&sense, watchdog_live, &mut self.outcome);
         let drive = self.outcome.drive;
         self.drive(&drive);
         if self.feed == Feed::Arm && self.reporter.records_this(&self.outcome.sample) {
@@ -200,7 +209,7 @@ where
             return drive;
         }
         let sense = Sense::default();
-        self.haptics.tick_into(&sense, false, &mut self.outcome);
+        self.haptics.tick_fast(&sense, false, &mut self.outcome);
         self.report(&sense, &drive);
         let mut outcome = self.outcome;
         self.timing.fill(&mut outcome.sample);

@@ -5,7 +5,9 @@
 //! clock does; in real time it calls it a thousand times a second regardless.
 
 use hapterra_core::guard::Drive;
+use hapterra_core::tick::Haptics;
 use hapterra_core::wire::status::BootReport;
+use hapterra_tick::FastTick;
 
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, Sense, TickClock};
 use crate::channels::{Application, Channels, Hardware, Tiles, assemble};
@@ -84,7 +86,10 @@ pub struct Device<C, const D: usize> {
     memory: Stored,
 }
 
-impl<C: TickClock, const D: usize> Device<C, D> {
+impl<C: TickClock, const D: usize> Device<C, D>
+where
+    Haptics<'static, D>: FastTick,
+{
     /// Builds the device in memory that lives as long as the program, such as
     /// a leaked box: tile buffers travel between its halves by reference.
     pub fn new(

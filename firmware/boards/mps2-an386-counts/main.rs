@@ -31,14 +31,14 @@ mod files;
 use core::hint::black_box;
 
 use cortex_m_rt::entry;
-use hapterra_core::contact::{Contact, Felt, Pace, Rule};
-use hapterra_core::grid::GridPoint;
+use hapterra_core::contact::Contact;
 use hapterra_core::guard::{Sense, TickRate};
 use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::terrain::{Tile, Window};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 use hapterra_core::wire::message::{Heights, Scene, Source, TileMessage, ToDevice};
 use hapterra_core::wire::plant::Sensed;
+use hapterra_tick::{FastStep, FastTick};
 use static_cell::ConstStaticCell;
 
 use files::{Frames, Records};
@@ -83,7 +83,8 @@ fn contact(scene: &Scene, frames: &mut Frames, records: &mut Records) {
             }
             ToDevice::Point(point) => {
                 let hip = black_box(point.hip);
-                let (cost, felt) = timer.counted(|| step(&mut contact, &window, hip, scene.rule));
+                let (cost, felt) =
+                    timer.counted(|| window.step_fast(&mut contact, hip, scene.rule));
                 records.add(
                     [cost, felt.state as u32, u32::from(felt.settled), felt.work],
                     felt.stretch,
@@ -93,16 +94,6 @@ fn contact(scene: &Scene, frames: &mut Frames, records: &mut Records) {
             _ => panic!("a walk has tiles and points only"),
         }
     }
-}
-
-#[inline(never)]
-fn step<'c>(
-    contact: &'c mut Contact,
-    window: &Window<'_, WINDOW>,
-    hip: GridPoint,
-    rule: Rule,
-) -> &'c Felt {
-    contact.step(window, hip, rule, Pace::RealTime)
 }
 
 /// The whole tick, from encoder counts to motor currents.
@@ -123,14 +114,14 @@ fn chain(scene: &Scene, frames: &mut Frames, records: &mut Records) {
     let mut outcome = Outcome::default();
     while let Some(Sensed { sense, .. }) = sensed.next() {
         if !armed {
-            arm(&mut haptics, sense);
+            arm(&mut haptics, sense, &mut outcome);
             armed = true;
         }
         let sense = black_box(Sense {
             dead_man: true,
             ..sense
         });
-        let (cost, ()) = timer.counted(|| tick(&mut haptics, &sense, &mut outcome));
+        let (cost, ()) = timer.counted(|| haptics.tick_fast(&sense, true, &mut outcome));
         let sample = &outcome.sample;
         records.add(
             [
@@ -146,7 +137,7 @@ fn chain(scene: &Scene, frames: &mut Frames, records: &mut Records) {
 }
 
 /// Arms as a user does, force fully in.
-fn arm(haptics: &mut Haptics<'static, WINDOW>, at: Sense) {
+fn arm(haptics: &mut Haptics<'static, WINDOW>, at: Sense, outcome: &mut Outcome) {
     let _ = haptics.accept(Command::Zero([0; 3]));
     let _ = haptics.accept(Command::Arm);
     for ticks in 0..2_200 {
@@ -154,14 +145,8 @@ fn arm(haptics: &mut Haptics<'static, WINDOW>, at: Sense) {
             dead_man: ticks > 0,
             ..at
         };
-        let _ = haptics.tick(&sense, true);
+        haptics.tick_fast(&sense, true, outcome);
     }
-}
-
-/// As the product's loop calls it: the outcome has a place that stays.
-#[inline(never)]
-fn tick(haptics: &mut Haptics<'static, WINDOW>, sense: &Sense, outcome: &mut Outcome) {
-    haptics.tick_into(sense, true, outcome);
 }
 
 fn fill(tile: &mut Tile, message: &TileMessage<'_>) {

@@ -47,7 +47,7 @@ use hapterra_firmware::native::ReportedOff;
 use hapterra_firmware::store::Stored;
 use hapterra_firmware::supervisor::{NoWatchdog, Supervisor};
 use hapterra_firmware::vitals::{Part, Vitals};
-use static_cell::ConstStaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 
 use chip::Interrupt;
 use chip::Interrupt as interrupt;
@@ -71,13 +71,15 @@ struct Tick {
     answers: plant::Answers,
 }
 
-/// Carries it there: filled once, before the interrupt is let through.
-static HANDOVER: Mutex<Cell<Option<Tick>>> = Mutex::new(Cell::new(None));
+/// Where that lives.
+static LOOP: StaticCell<Tick> = StaticCell::new();
+/// Carries it to its interrupt: filled once, before that is let through.
+static HANDOVER: Mutex<Cell<Option<&'static mut Tick>>> = Mutex::new(Cell::new(None));
 
 /// The haptic tick, above everything else.
 #[interrupt]
 fn HapticTick() {
-    static mut TICK: Option<Tick> = None;
+    static mut TICK: Option<&'static mut Tick> = None;
     let Some(tick) = TICK else {
         // Raised once by `main`, before there is a tick to be late for.
         *TICK = critical_section::with(|cs| HANDOVER.borrow(cs).take());
@@ -209,6 +211,15 @@ async fn start(link: Link<'static, WINDOW>, vitals: &'static Vitals, port: Plant
 
 #[entry]
 fn main() -> ! {
+    set_up();
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
+
+/// Not inlined: what it needs of the stack is given back when it returns.
+#[inline(never)]
+fn set_up() {
     let (arm, answers, port) = plant::open();
     let hardware = Hardware {
         encoders: arm,
@@ -223,18 +234,15 @@ fn main() -> ! {
         link,
         vitals,
     } = assemble(TILES.take(), CHANNELS.take(), hardware, "mps2-an386");
-    let tick = Tick {
+    let tick = LOOP.init(Tick {
         haptic_loop,
         answers,
-    };
+    });
     critical_section::with(|cs| HANDOVER.borrow(cs).set(Some(tick)));
     let_interrupts_through();
     let spawner = EXECUTOR.start(Interrupt::Executor);
     spawner.spawn(start(link, vitals, port).expect("started once"));
     defmt::info!("mps2-an386 is up");
-    loop {
-        cortex_m::asm::wfi();
-    }
 }
 
 /// The haptic tick above the ceiling of critical sections, the rest below.
