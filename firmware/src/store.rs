@@ -11,8 +11,8 @@
 //! ```
 //!
 //! The newest record is the valid one with the highest number. What has no valid
-//! check sum is damaged if it bears the mark, which is written last; without
-//! it, it was cut off in the middle and had never been there.
+//! check sum, or cannot be read, is damaged if it bears the mark, which is written
+//! last; without it, it was cut off in the middle and had never been there.
 //!
 //! Erasing is slow (a sector of a large chip: seconds), so only
 //! [`CalibrationStore::prepare`] does it, at start-up, before there is a tick or a
@@ -203,16 +203,20 @@ impl<F: NorFlash> CalibrationStore<F> {
 
     fn read(&mut self, area: usize, place: u32) -> Place {
         let mut bytes = [0; PLACE];
-        if self.flash.read(self.at(area, place), &mut bytes).is_err() {
-            return Place::Spoilt;
-        }
-        if bytes.iter().all(|byte| *byte == 0xFF) {
-            return Place::Blank;
-        }
-        let (written, mark) = bytes.split_at(MARK_AT);
+        let at = self.at(area, place);
+        let (written, mark) = bytes.split_at_mut(MARK_AT);
+        // What was being written when the power went may not be readable; what
+        // comes before or after it is.
+        let is_whole = self.flash.read(at, written).is_ok();
+        let is_read = self.flash.read(at + MARK_AT as u32, mark).is_ok();
+        let is_blank = |bytes: &[u8]| bytes.iter().all(|byte| *byte == 0xFF);
+        let is_unmarked = is_read && is_blank(mark);
         match record(written) {
+            _ if !is_whole && is_unmarked => Place::CutOff,
+            _ if !is_whole => Place::Spoilt,
             Some((number, calibration)) => Place::Holds(number, calibration),
-            None if mark.iter().all(|byte| *byte == 0xFF) => Place::CutOff,
+            None if is_unmarked && is_blank(written) => Place::Blank,
+            None if is_unmarked => Place::CutOff,
             None => Place::Spoilt,
         }
     }

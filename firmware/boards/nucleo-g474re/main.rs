@@ -21,6 +21,7 @@
 
 #[path = "../common/critical.rs"]
 mod critical;
+mod flash;
 #[path = "../common/stm32/mod.rs"]
 mod stm32;
 

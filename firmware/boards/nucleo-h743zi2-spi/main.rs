@@ -19,4 +19,4 @@
 mod board;
 mod outputs;
 
-use board::{FLASH_BASE, amplifiers_off, hardware_failed, write_back};
+use board::{FLASH_BASE, amplifiers_off, flash, hardware_failed, write_back};

@@ -3,8 +3,10 @@
 
 #[path = "../common/critical.rs"]
 mod critical;
+#[path = "flash.rs"]
+pub(crate) mod flash;
 #[path = "../common/stm32/mod.rs"]
-mod stm32;
+pub(crate) mod stm32;
 
 use core::cell::Cell;
 
@@ -183,6 +185,7 @@ async fn supervise(
 async fn main(spawner: Spawner) {
     let mut core = cortex_m::Peripherals::take().expect("taken once");
     stm32::nvic::lower_all(&mut core);
+    flash::tell_bus_faults(&mut core);
     // No DMA is used, so the data cache needs no care.
     core.SCB.enable_icache();
     core.SCB.enable_dcache(&mut core.CPUID);

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::chip::{Chip, Commands, UsbKind};
+use crate::chip::{Chip, Commands, Unreadable, UsbKind};
 use crate::converter::Converter;
 use crate::nvic::{self, Nvic};
 use crate::timer::Timer;
@@ -288,7 +288,52 @@ impl Bus {
         }
     }
 
+    /// The chip's flash says that a word of it could not be read.
+    pub fn tell_unreadable(&mut self, address: u32) {
+        let flash = &self.chip.flash;
+        let (register, bits) = match flash.unreadable {
+            Unreadable::Nmi {
+                register,
+                failed,
+                second,
+            } if address >= flash.second_bank => (register, failed | second),
+            Unreadable::Nmi {
+                register, failed, ..
+            } => (register, failed),
+            Unreadable::BusFault { status, .. } => status,
+        };
+        *self.words.entry(register).or_default() |= bits;
+    }
+
+    /// Whether the flash still says that a word of it could not be read.
+    #[must_use]
+    pub fn tells_unreadable(&self) -> bool {
+        let (register, bit) = match self.chip.flash.unreadable {
+            Unreadable::Nmi {
+                register, failed, ..
+            } => (register, failed),
+            Unreadable::BusFault { status, .. } => status,
+        };
+        self.plain(register) & bit != 0
+    }
+
+    /// Registers of the flash's in which what is written as set is cleared.
+    fn clear(&mut self, address: u32, value: u32) -> bool {
+        let register = match self.chip.flash.unreadable {
+            Unreadable::Nmi { register, .. } if register == address => register,
+            Unreadable::BusFault { status, clear } if clear == address => status.0,
+            // Its bits are the hardware's.
+            Unreadable::BusFault { status, .. } => return status.0 == address,
+            Unreadable::Nmi { .. } => return false,
+        };
+        *self.words.entry(register).or_default() &= !value;
+        true
+    }
+
     fn write_plain(&mut self, address: u32, value: u32, mask: u32) {
+        if self.clear(address, value & mask) {
+            return;
+        }
         let (flags, _, _, clear) = self.chip.reset_flags;
         let mut value = self.plain(address) & !mask | value & mask;
         if address == flags && value & clear != 0 {

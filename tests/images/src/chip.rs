@@ -59,6 +59,29 @@ pub enum Commands {
     },
 }
 
+/// What a chip does when the core loads a word of flash that cannot be read.
+#[derive(Clone, Copy, Debug)]
+pub enum Unreadable {
+    /// It loads anything, sets the bit `failed`, and `second` where that is in the
+    /// second bank, and raises the NMI. Writing a bit clears it.
+    Nmi {
+        /// The register.
+        register: u32,
+        /// Its bit.
+        failed: u32,
+        /// Which bank.
+        second: u32,
+    },
+    /// It answers with a bus fault, and sets a bit of the status register, which
+    /// the register after it clears.
+    BusFault {
+        /// The register and its bit.
+        status: (u32, u32),
+        /// The register that clears it.
+        clear: u32,
+    },
+}
+
 /// How a chip's flash is erased, sector by sector, and where the calibrations
 /// are in it.
 #[derive(Clone, Copy, Debug)]
@@ -71,6 +94,12 @@ pub struct Flash {
     pub sector: fn(u32) -> (u32, u32),
     /// Addresses of the two areas with calibrations, and bytes of an area.
     pub calibrations: ([u32; 2], u32),
+    /// First address of the second bank.
+    pub second_bank: u32,
+    /// Bytes of a word, which has a check of its own.
+    pub word: u32,
+    /// What a word that cannot be read does.
+    pub unreadable: Unreadable,
 }
 
 /// Amperes at the ends of every board's range.
@@ -202,6 +231,14 @@ pub static G474: Chip = Chip {
             (0x0800_0000 + page * 2 * KIB, 2 * KIB)
         },
         calibrations: ([0x0807_F000, 0x0807_F800], 2 * KIB),
+        second_bank: 0x0804_0000,
+        word: 8,
+        // FLASH_ECCR: ECCD, BK_ECC.
+        unreadable: Unreadable::Nmi {
+            register: 0x4002_2018,
+            failed: 1 << 31,
+            second: 1 << 21,
+        },
     },
     // DAC1 channels 1 and 2, DAC2 channel 1: DHR12Rx.
     commands: Commands::Converters([0x5000_0808, 0x5000_0814, 0x5000_0C08]),
@@ -272,6 +309,13 @@ pub static H743: Chip = Chip {
             (0x0810_0000 + sector * 128 * KIB, 128 * KIB)
         },
         calibrations: ([0x081C_0000, 0x081E_0000], 128 * KIB),
+        second_bank: 0x0810_0000,
+        word: 32,
+        // FLASH_SR2.DBECCERR2, FLASH_CCR2.
+        unreadable: Unreadable::BusFault {
+            status: (0x5200_2110, 1 << 26),
+            clear: 0x5200_2114,
+        },
     },
     // TIM1_CCR1 to 3, TIM1_ARR.
     commands: Commands::DutyCycles([0x4001_0034, 0x4001_0038, 0x4001_003C], 0x4001_002C),

@@ -115,6 +115,14 @@ impl Image {
         self.symbols.get(name).copied()
     }
 
+    /// The value of the first symbol with all of these in its name.
+    #[must_use]
+    pub fn symbol_like(&self, parts: &[&str]) -> Option<u32> {
+        let fits = |name: &str| parts.iter().all(|part| name.contains(part));
+        let mut all = self.symbols.iter();
+        all.find_map(|(name, value)| fits(name).then_some(*value))
+    }
+
     /// Every instruction with its address; a short one in the upper half-word.
     pub fn instructions(&self) -> impl Iterator<Item = (u32, u32)> {
         let starts: Vec<_> = self.mapping.iter().map(|(a, code)| (*a, *code)).collect();

@@ -1,13 +1,15 @@
 //! The core: reset, exceptions by priority, sleep, time.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use hapterra_tests::usb::{Answer, Handshake, MOMENTS_A_MS, Port};
-use unicorn_engine::{Arch, ArmCpuModel, Context, Mode, Prot, RegisterARM, Unicorn};
+use unicorn_engine::{
+    Arch, ArmCpuModel, Context, HookType, MemType, Mode, Prot, RegisterARM, UcHookId, Unicorn,
+};
 
 use crate::bus::{Bus, Effect};
-use crate::chip::Chip;
+use crate::chip::{Chip, Unreadable};
 use crate::elf::{Function, Image};
 
 /// Where an exception's return leads: no memory is there.
@@ -21,8 +23,16 @@ const EXCEPTION_NS: u64 = 200;
 const NAP_NS: u64 = 5_000;
 /// The Thumb bit of the program status.
 const THUMB: u64 = 1 << 24;
-/// The hard fault's position in the vector table.
+/// Positions in the vector table.
+const NMI: u32 = 2;
 const HARD_FAULT: u32 = 3;
+const BUS_FAULT: u32 = 5;
+/// SHCSR and its bit that lets bus faults through; SHPR1 and where their priority
+/// is in it.
+const BUS_FAULTS_ON: (u32, u32) = (0xE000_ED24, 1 << 17);
+const BUS_FAULTS_PRIORITY: (u32, u32) = (0xE000_ED18, 8);
+/// Where an exception's frame has the place to go back to.
+const PC_IN_FRAME: u32 = 24;
 /// Priority of an execution that no interrupt can be below.
 const THREAD: i16 = 256;
 
@@ -31,6 +41,23 @@ struct Active {
     context: Context,
     vector: u32,
     priority: i16,
+}
+
+/// Whether the core loads a word of flash that cannot be read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Load {
+    #[default]
+    None,
+    /// It is about to, from this address.
+    Of(u32),
+    /// It does.
+    Done,
+}
+
+/// A word of flash that cannot be read.
+struct Spoilt {
+    address: u32,
+    hook: UcHookId,
 }
 
 /// Why the machine stopped.
@@ -55,6 +82,9 @@ pub struct Machine {
     core: Unicorn<'static, ()>,
     bus: Rc<RefCell<Bus>>,
     active: Vec<Active>,
+    spoilt: Vec<Spoilt>,
+    /// A load of a word that cannot be read.
+    load: Rc<Cell<Load>>,
     /// Vectors taken since it was last cleared.
     pub taken: Vec<u32>,
     /// How often a hard fault was taken.
@@ -101,6 +131,8 @@ impl Machine {
             core,
             bus,
             active: vec![],
+            spoilt: vec![],
+            load: Rc::default(),
             taken: vec![],
             hard_faults: 0,
             slice: SLICE,
@@ -201,6 +233,34 @@ impl Machine {
         self.core
             .ctl_remove_cache(from, to)
             .expect("translated code is dropped");
+    }
+
+    /// From now on the flash's word at `address` cannot be read, until it is
+    /// erased: what is left of a write that was cut off.
+    pub fn spoil(&mut self, address: u32) {
+        let bytes = self.chip.flash.word;
+        let load = Rc::clone(&self.load);
+        let on_load = move |core: &mut Unicorn<'_, ()>, _: MemType, _: u64, _: usize, _: i64| {
+            if load.get() == Load::None {
+                load.set(Load::Of(address));
+                // In front of the load.
+                core.emu_stop().expect("stops");
+            }
+            true
+        };
+        let (from, to) = (u64::from(address), u64::from(address + bytes - 1));
+        let hook = self
+            .core
+            .add_mem_hook(HookType::MEM_READ, from, to, on_load);
+        // Code that was translated before does not ask it.
+        self.core
+            .ctl_flush_tb()
+            .expect("translated code is dropped");
+        self.core.ctl_flush_tlb().expect("and what it knows");
+        self.spoilt.push(Spoilt {
+            address,
+            hook: hook.expect("a hook"),
+        });
     }
 
     /// From now on, a call of `function` becomes one of `panicking`, a function
@@ -309,6 +369,9 @@ impl Machine {
         self.watch_masks();
         let pc = self.register(RegisterARM::PC) | 1;
         let ended = self.core.emu_start(pc, EXC_RETURN, 0, self.slice);
+        if let Load::Of(address) = self.load.get() {
+            return self.stumble(address);
+        }
         let pc = self.register(RegisterARM::PC);
         if pc & !1 == EXC_RETURN {
             self.leave();
@@ -329,7 +392,39 @@ impl Machine {
         let sectors = std::mem::take(&mut self.bus().erased);
         for (address, bytes) in sectors {
             self.patch(address, &vec![0xFF; bytes as usize]);
+            let sector = address..address + bytes;
+            let erased = self.spoilt.extract_if(.., |s| sector.contains(&s.address));
+            for Spoilt { hook, .. } in erased {
+                self.core.remove_hook(hook).expect("it was there");
+            }
         }
+    }
+
+    /// What a load of a word that cannot be read leads to.
+    fn stumble(&mut self, address: u32) -> Option<Stop> {
+        self.bus().tell_unreadable(address);
+        match self.chip.flash.unreadable {
+            Unreadable::Nmi { .. } => {
+                // The load is done first.
+                self.load.set(Load::Done);
+                let pc = self.register(RegisterARM::PC) | 1;
+                let done = self.core.emu_start(pc, EXC_RETURN, 0, 1);
+                done.expect("any bits are a word");
+                self.enter(NMI, -2);
+            }
+            Unreadable::BusFault { .. } => {
+                let (on, bit) = BUS_FAULTS_ON;
+                let (register, shift) = BUS_FAULTS_PRIORITY;
+                let priority = (self.bus().read(register) >> shift & 0xF0) as i16;
+                if self.bus().read(on) & bit == 0 || self.priority() <= priority {
+                    self.load.set(Load::None);
+                    return self.fault("bus fault");
+                }
+                self.enter(BUS_FAULT, priority);
+            }
+        }
+        self.load.set(Load::None);
+        None
     }
 
     fn is_ticking(&self) -> bool {
@@ -451,12 +546,14 @@ impl Machine {
         self.set_register(RegisterARM::PC, handler.into());
     }
 
-    /// Back to where the exception came from. BASEPRI and PRIMASK are no part
-    /// of what is restored: a handler that left one set is seen.
+    /// Back to where the exception's frame says, where the handler may have said
+    /// otherwise. BASEPRI and PRIMASK are no part of what is restored: a handler
+    /// that left one set is seen.
     fn leave(&mut self) {
         let Some(active) = self.active.pop() else {
             return;
         };
+        let back = self.word(self.register(RegisterARM::SP) as u32 + PC_IN_FRAME);
         let masks = [RegisterARM::BASEPRI, RegisterARM::PRIMASK];
         let kept = masks.map(|mask| self.register(mask));
         self.core
@@ -465,6 +562,7 @@ impl Machine {
         for (mask, value) in masks.into_iter().zip(kept) {
             self.set_register(mask, value);
         }
+        self.set_register(RegisterARM::PC, u64::from(back) | 1);
     }
 
     fn fault(&mut self, why: &str) -> Option<Stop> {

@@ -190,6 +190,83 @@ fn a_full_memory_is_not_erased_while_the_watchdog_waits_but_at_the_next_start() 
     }
 }
 
+/// Positions in the vector table.
+const NMI: u32 = 2;
+const BUS_FAULT: u32 = 5;
+
+/// A word in the middle of a place's record, of its area's first byte.
+fn middle(machine: &Machine, place: u32) -> u32 {
+    let (areas, _) = machine.chip.flash.calibrations;
+    areas[0] + place * PLACE as u32 + 2 * machine.chip.flash.word
+}
+
+#[test]
+fn what_was_being_written_when_the_power_went_leaves_the_record_before() {
+    let raster = raster();
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    for machine in machines() {
+        let board = machine.chip.board;
+        let mut device = Device::open(machine, &terrain, scene(&terrain));
+        assert_eq!(store(&mut device), Ok(()), "{board}");
+        let cut = middle(&device.machine.borrow(), 1);
+        // Half of a word, and nothing behind it.
+        device.machine.borrow_mut().patch(cut, &[0x5A]);
+        device.machine.borrow_mut().spoil(cut);
+        let mut again = Device::open(device.reset(), &terrain, scene(&terrain));
+        let status = again.ask_status();
+        assert_eq!(status.calibration, CalibrationSource::Stored, "{board}");
+        assert_eq!(status.health.report.fault, Some(Fault::WatchdogReset));
+        assert_eq!(status.boot.crash, None, "{board}");
+        let met = |vector| again.machine.borrow().taken.contains(&vector);
+        assert!(met(NMI) || met(BUS_FAULT), "{board}: it was not read");
+        let told = again.machine.borrow().bus().tells_unreadable();
+        assert!(!told, "{board}: left for the next write to fail by");
+        assert_eq!(store(&mut again), Ok(()), "{board}: no room beside it");
+        assert_eq!(again.machine.borrow().hard_faults, 0, "{board}");
+    }
+}
+
+#[test]
+fn of_a_first_record_that_was_cut_off_nothing_is_left() {
+    let raster = raster();
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    for mut machine in machines() {
+        let board = machine.chip.board;
+        let cut = middle(&machine, 0);
+        machine.patch(cut, &[0x5A]);
+        machine.spoil(cut);
+        let mut device = Device::open(machine, &terrain, scene(&terrain));
+        let status = device.ask_status();
+        assert_eq!(status.calibration, CalibrationSource::None, "{board}");
+        assert_eq!(status.health.report.fault, None, "{board}");
+        assert_eq!(store(&mut device), Ok(()), "{board}: the area was erased");
+    }
+}
+
+#[test]
+fn a_word_of_the_program_that_cannot_be_read_stops_it() {
+    let raster = raster();
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    for machine in machines() {
+        let board = machine.chip.board;
+        let device = Device::open(machine, &terrain, scene(&terrain));
+        let crc = device.machine.borrow().image.symbol_like(&["frame", "CRC"]);
+        let crc = crc.expect("the table of the check sum");
+        device.machine.borrow_mut().spoil(crc + 64 * 4);
+        let mut machine = device.machine.borrow_mut();
+        let stop = machine.run_until(300, |m| {
+            let _ = m.take_in(1);
+            false
+        });
+        assert_eq!(stop, Stop::Watchdog, "{board}");
+        let met = |vector| machine.taken.contains(&vector);
+        assert!(met(NMI) || met(BUS_FAULT), "{board}: it was not read");
+    }
+}
+
 #[test]
 fn a_third_of_the_stack_is_never_used() {
     let raster = raster();

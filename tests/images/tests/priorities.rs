@@ -106,6 +106,7 @@ fn only_programs_that_failed_mask_everything() {
             "rust_begin_unwind",
             "HardFault",
             "DefaultHandler",
+            "unhandled",
             // embassy's flash driver, for the one register write that begins an
             // erase: at start-up only, before there is a tick.
             "blocking_erase",

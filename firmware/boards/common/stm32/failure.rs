@@ -49,6 +49,12 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
 
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
+    unhandled(number)
+}
+
+/// The end of a program that met an exception or interrupt it cannot handle.
+#[inline(never)]
+pub(crate) fn unhandled(number: i16) -> ! {
     stop();
     keep(&CrashRecord::unhandled(number, ticks()));
     defmt::error!("interrupt {} has no handler", number);

@@ -11,9 +11,11 @@ use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::status::Refusal;
 use hapterra_firmware::store::{CalibrationStore, StoreError, Stored};
 
+use crate::flash::read;
 use crate::{FLASH_BASE, write_back};
 
-/// The flash, read past the data cache, which knows nothing of erasing.
+/// The flash, read past the data cache, which knows nothing of erasing, and
+/// read where it may not be readable.
 pub(crate) struct Uncached(pub(crate) Flash<'static, Blocking>);
 
 impl ErrorType for Uncached {
@@ -21,11 +23,18 @@ impl ErrorType for Uncached {
 }
 
 impl ReadNorFlash for Uncached {
-    const READ_SIZE: usize = <Flash<'static, Blocking> as ReadNorFlash>::READ_SIZE;
+    const READ_SIZE: usize = 4;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
-        write_back(FLASH_BASE + offset as usize, bytes.len());
-        self.0.blocking_read(offset, bytes)
+        if offset as usize + bytes.len() > self.capacity() {
+            return Err(Error::Size);
+        }
+        let address = FLASH_BASE + offset as usize;
+        write_back(address, bytes.len());
+        match read(address, bytes) {
+            true => Ok(()),
+            false => Err(Error::Prog),
+        }
     }
 
     fn capacity(&self) -> usize {

@@ -1,0 +1,82 @@
+//! Reading flash that may not be readable: a word that was being written when
+//! the power went.
+//!
+//! The load of such a word ends in a bus fault. One load is allowed to; its
+//! fault goes on behind it. Any other bus fault is a hard fault.
+
+use core::arch::global_asm;
+
+use cortex_m::Peripherals;
+use cortex_m::peripheral::scb::{Exception, SystemHandler};
+use embassy_stm32::pac;
+
+use crate::board::stm32::nvic::OTHERS;
+
+unsafe extern "C" {
+    /// Loads a word; returns whether that was possible.
+    fn hapterra_peek(address: *const u32, into: &mut u32) -> bool;
+}
+
+// The exception's frame, which holds the place to go back to, is on the main
+// stack, the only one there is.
+global_asm!(
+    ".section .text.hapterra_peek, \"ax\", %progbits",
+    ".thumb",
+    ".global hapterra_peek",
+    ".type hapterra_peek, %function",
+    ".thumb_func",
+    "hapterra_peek:",
+    ".Lload:",
+    "ldr r2, [r0]",
+    "str r2, [r1]",
+    "movs r0, #1",
+    "bx lr",
+    ".Lfailed:",
+    "movs r0, #0",
+    "bx lr",
+    ".global BusFault",
+    ".type BusFault, %function",
+    ".thumb_func",
+    "BusFault:",
+    "ldr r0, [sp, #24]", // Where it happened.
+    "adr.w r1, .Lload",
+    "cmp r0, r1",
+    "bne.w HardFault",
+    "adr.w r1, .Lfailed",
+    "str r1, [sp, #24]",
+    "movw r1, #0xED28", // CFSR: what is set is cleared by writing it.
+    "movt r1, #0xE000",
+    "ldr r0, [r1]",
+    "str r0, [r1]",
+    "dsb",
+    "bx lr",
+);
+
+/// Lets bus faults be told from hard faults, below the tick: one in the tick or
+/// in a critical section is a hard fault as before.
+pub(crate) fn tell_bus_faults(core: &mut Peripherals) {
+    // SAFETY: no critical section relies on the priority of a fault.
+    unsafe {
+        core.SCB.set_priority(SystemHandler::BusFault, OTHERS as u8);
+    }
+    core.SCB.enable(Exception::BusFault);
+}
+
+/// Copies `into.len()` bytes of flash from `address` on, both multiples of four.
+/// Returns whether all of them could be read.
+pub(crate) fn read(address: usize, into: &mut [u8]) -> bool {
+    let mut words = (address..).step_by(4).zip(into.chunks_exact_mut(4));
+    let is_read = words.all(|(at, four)| {
+        let mut word = 0;
+        // SAFETY: the caller names words of flash; what cannot be read is told.
+        let is_read = unsafe { hapterra_peek(at as *const u32, &mut word) };
+        four.copy_from_slice(&word.to_le_bytes());
+        is_read
+    });
+    // Left set, these would be taken for a failure of the next write or erase.
+    pac::FLASH.bank(1).ccr().write(|w| {
+        w.set_clr_sneccerr(true);
+        w.set_clr_dbeccerr(true);
+    });
+    is_read
+}
