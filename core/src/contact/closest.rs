@@ -29,12 +29,8 @@ pub const MAX_EVALUATIONS: u32 = 32;
 /// be the better one to eliminate.
 pub const MAX_PASSES: u32 = 3;
 
-/// Distances that differ by less than this, relatively, count as equal: the
-/// rounding of F.
-const TIE: f32 = 1.0 + 1e-6;
-/// A step shorter than this, in cells, that leaves F about the same is judged
-/// by the slope.
-const SHORT: f32 = 1.0 / 64.0;
+/// A Newton step shorter than this, in cells, may be rounding alone.
+const SHORT: f32 = 1e-3;
 /// A step shorter than this, in cells, is not taken: a coordinate near 1 cannot
 /// tell it.
 const LEAST_STEP: f32 = 6e-8;
@@ -49,9 +45,6 @@ const STRIDE: f32 = 8.0;
 pub(super) const RESOLUTION: f32 = 1.2e-7;
 /// The same for a hand so far off that its coordinates resolve no better.
 const COARSEST: f32 = 0.25;
-/// Squared distance, in cells², below which F is nothing but rounding.
-const LEAST_F: f32 = 1e-10;
-
 /// A point of a patch, as the search sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
@@ -135,7 +128,7 @@ impl Nearest {
             u,
             v,
             z: found.z,
-            distance_squared: found.f,
+            distance_squared: found.f(),
             evaluations,
         }
     }
@@ -175,7 +168,7 @@ impl Ruling {
 /// The search with u eliminated, along v from `start`.
 fn along_v(patch: &Patch, hand: (f32, f32), start: f32) -> (Ruling, u32) {
     let mut best = ruling(patch, hand, start);
-    let mut search = Bracket::downhill_of(&best);
+    let mut search = Bracket::downhill_of(&best, patch, hand.0);
     let mut evaluations = 1;
     while evaluations < MAX_EVALUATIONS {
         let Some(v) = search.next(&best) else { break };
@@ -187,7 +180,10 @@ fn along_v(patch: &Patch, hand: (f32, f32), start: f32) -> (Ruling, u32) {
 }
 
 /// The side of `best` on which a minimum lies, and how far that side reaches.
-struct Bracket {
+struct Bracket<'p> {
+    patch: &'p Patch,
+    /// East of the patch's origin, the hand.
+    p: f32,
     wall: f32,
     /// Whether the wall is an end of the patch not yet evaluated.
     wall_is_end: bool,
@@ -202,9 +198,11 @@ struct Bracket {
     back: f32,
 }
 
-impl Bracket {
-    fn downhill_of(from: &Ruling) -> Self {
+impl<'p> Bracket<'p> {
+    fn downhill_of(from: &Ruling, patch: &'p Patch, p: f32) -> Self {
         Self {
+            patch,
+            p,
             wall: if from.slope < 0.0 { 1.0 } else { 0.0 },
             wall_is_end: true,
             lazy: 0,
@@ -222,8 +220,11 @@ impl Bracket {
         }
         if best.curvature > 0.0 {
             let step = -best.slope / best.curvature;
-            if best.slope.abs() <= best.noise || step.abs() < LEAST_STEP {
-                return None;
+            if step.abs() < SHORT {
+                let noise = best.noise(self.patch, self.p).slope;
+                if best.slope.abs() <= noise || step.abs() < LEAST_STEP {
+                    return None;
+                }
             }
             let inside = step.abs() < room.abs();
             if inside && self.lazy < 2 {
@@ -255,13 +256,16 @@ impl Bracket {
     /// else as the new wall.
     fn narrow(&mut self, best: &mut Ruling, trial: Ruling) {
         let halved = trial.slope.abs() <= 0.5 * best.slope.abs();
-        // Close to the minimum F is flat and its rounding decides; the slope
-        // still tells.
-        let close = (trial.v - best.v).abs() < SHORT && trial.f <= best.f * 1.01 + LEAST_F;
-        // Near to the hand, the last places of u and v are more than that.
-        let onward = trial.slope * best.slope > 0.0 && trial.slope.abs() < best.slope.abs();
-        let level = onward && trial.f <= best.f + best.f_noise;
-        let nearer = trial.f <= best.f * TIE || (close && (halved || level));
+        // Where rounding hides which is nearer, the slope still tells.
+        let onward = trial.slope * best.slope > 0.0;
+        let better = onward || trial.slope.abs() <= best.slope.abs();
+        let gain = trial.gain_on(best);
+        let nearer = if (gain > 0.0) == better {
+            better
+        } else {
+            let noise = 2.0 * trial.noise(self.patch, self.p).f;
+            gain > noise || (better && gain >= -noise)
+        };
         if !nearer {
             self.wall = trial.v;
             self.wall_is_end = false;

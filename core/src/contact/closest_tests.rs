@@ -160,3 +160,37 @@ fn warm_started_it_takes_two_evaluations() {
     let next = nearest_downhill(&patch, (0.51, 0.5), (first.u, first.v));
     assert!(next.evaluations <= 3, "{next:?}");
 }
+
+/// Of a hand far off the squared distance itself does not tell which of two
+/// places is nearer, and on a steep twist what cancels hides it, too.
+#[test]
+fn ends_at_a_minimum_where_the_squares_do_not_tell() {
+    type Place = (f32, f32);
+    let cases: [([f32; 4], Place, Place); 3] = [
+        (
+            [-14_186.715, 15_225.447, 11_851.875, -12_628.072],
+            (0.482_250_2, 0.070_614_815),
+            (1.0, 0.546_625_6),
+        ),
+        (
+            [-234_027.72, 259_816.97, 264_532.16, -292_603.38],
+            (63.794_304, 22.952_19),
+            (0.458_400_9, 0.424_977_78),
+        ),
+        (
+            [-89_562.125, 59_899.07, 115_499.164, -77_103.44],
+            (-1_215.528_3, -26.418_83),
+            (0.602_252_4, 0.561_781_17),
+        ),
+    ];
+    for (corners, hand, start) in cases {
+        let patch = Patch::new(corners);
+        let found = nearest_downhill(&patch, hand, start);
+        let far = f64::from(hand.0.abs().max(hand.1.abs()));
+        let hand = (f64::from(hand.0), f64::from(hand.1));
+        let truth = minimum64(&patch, hand, f64::from(found.v));
+        let error = (f64::from(found.u) - truth.0).hypot(f64::from(found.v) - truth.1);
+        let allowed = 2e-6_f64.max(4.0 * f64::from(f32::EPSILON) * (1.0 + far));
+        assert!(error < allowed, "{error:e} of {allowed:e}: {found:?}");
+    }
+}

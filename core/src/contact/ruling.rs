@@ -24,22 +24,26 @@ pub(super) struct Ruling {
     pub(super) v: f32,
     /// Height above the hand, cells.
     pub(super) z: f32,
-    /// F(v), the squared distance from the hand, cells².
-    pub(super) f: f32,
-    /// What the last places of u and v make of it.
-    pub(super) f_noise: f32,
+    /// East and north of the hand, cells.
+    pub(super) off: (f32, f32),
     /// F′(v)/2
     pub(super) slope: f32,
     /// F″(v)/2
     pub(super) curvature: f32,
-    /// Rounding error that `slope` may have.
-    pub(super) noise: f32,
     /// Slope of the ruling itself.
     pub(super) along: f32,
     /// Slope of the patch across the ruling at the point.
     pub(super) across: f32,
     /// Whether the point is an end of the ruling, beyond which it would go on.
     pub(super) at_end: bool,
+}
+
+/// What rounding may make of a ruling.
+pub(super) struct Noise {
+    /// Of F(v), the squared distance from the hand, cells².
+    pub(super) f: f32,
+    /// Of F′(v)/2.
+    pub(super) slope: f32,
 }
 
 /// The nearest point of the ruling at `v`, for a hand at `(p, q)` in patch
@@ -66,35 +70,83 @@ pub(super) fn ruling(patch: &Patch, (p, q): (f32, f32), v: f32) -> Ruling {
         free_u = 1.0 - rest;
     }
     let at_end = !(free_u >= 0.0 && rest >= 0.0);
-    let (u, z, across, curvature, rounding);
+    let (u, z, across, curvature);
     if at_end {
-        let (low, high);
-        (u, z, across, low, high) = if free_u > 0.5 {
-            (1.0, end, patch.c[1], se, ne)
+        (u, z, across) = if free_u > 0.5 {
+            (1.0, end, patch.c[1])
         } else {
-            (0.0, start, patch.c[0], sw, nw)
+            (0.0, start, patch.c[0])
         };
         curvature = 1.0 + across * across;
-        // The rounding of a steep edge's height shows in the slope.
-        rounding = across.abs() * mix(low.abs(), high.abs());
     } else {
-        (u, z, rounding) = (free_u, free_z, 0.0);
+        (u, z) = (free_u, free_z);
         across = patch.c[0] * rest + patch.c[1] * u;
         let za = patch.a * z;
         curvature = 1.0 + (across * across - za * (za + 2.0 * m * across)) * flatness;
     }
-    let (du, dv, lift) = (u - p, v - q, z * across);
+    let (du, dv) = (u - p, v - q);
     Ruling {
         u,
         v,
         z,
-        f: du * du + dv * dv + z * z,
-        f_noise: f32::EPSILON * (du.abs() + dv.abs()),
-        slope: dv + lift,
+        off: (du, dv),
+        slope: dv + z * across,
         curvature,
-        noise: f32::EPSILON * (dv.abs() + lift.abs() + rounding),
         along: m,
         across,
         at_end,
+    }
+}
+
+impl Ruling {
+    /// Squared distance from the hand, cells².
+    pub(super) fn f(&self) -> f32 {
+        let (du, dv) = self.off;
+        du * du + dv * dv + self.z * self.z
+    }
+
+    /// By how much F is less here than at another ruling.
+    ///
+    /// The difference of the squares by their factors: of a far hand the squares
+    /// themselves would tell nothing.
+    pub(super) fn gain_on(&self, other: &Self) -> f32 {
+        let (east, north) = (self.off.0 + other.off.0, self.off.1 + other.off.1);
+        (other.u - self.u) * east
+            + (other.v - self.v) * north
+            + (other.z - self.z) * (other.z + self.z)
+    }
+
+    /// What rounding makes of it, for a hand `p` east.
+    ///
+    /// A ruling's ends and its slope are mixed from the corners and may cancel; of
+    /// a place only the way to the nearer end counts.
+    pub(super) fn noise(&self, patch: &Patch, p: f32) -> Noise {
+        let [sw, se, nw, ne] = patch.corners.map(f32::abs);
+        let mix = |south: f32, north: f32| south * (1.0 - self.v) + north * self.v;
+        let (end, near) = if self.u > 0.5 {
+            (mix(se, ne), 1.0 - self.u)
+        } else {
+            (mix(sw, nw), self.u)
+        };
+        let (z, across) = (self.z.abs(), self.across.abs());
+        let (of_u, of_z) = if self.at_end {
+            (0.0, end)
+        } else {
+            let slope = mix(patch.b[0].abs(), patch.b[1].abs());
+            let flatness = 1.0 / (1.0 + self.along * self.along);
+            let tilt = self.along.abs() * flatness;
+            (
+                near + (end + slope * near) * tilt + slope * z * flatness,
+                (end + slope * (1.0 + p.abs())) * flatness + z * (1.0 + 2.0 * slope * tilt),
+            )
+        };
+        let of_across = patch.a.abs() * of_u + across;
+        let (du, dv) = (self.off.0.abs(), self.off.1.abs());
+        Noise {
+            // At worst: where this hides which is nearer, the slope decides.
+            f: 4.0 * f32::EPSILON * (du * (0.5 + of_u) + z * of_z),
+            // As it is most often: the search is over where this hides the slope.
+            slope: 0.5 * f32::EPSILON * (dv + across * of_z + z * of_across),
+        }
     }
 }
