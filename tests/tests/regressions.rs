@@ -177,3 +177,32 @@ fn a_way_along_a_wall_settles() {
     let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
     assert_eq!(states.last(), Some(&State::Free));
 }
+
+/// A descent that ran out of work on a wall of 10⁶ showed the wall's foot, where
+/// the way into the next patch begins, and went on from there for the next hand.
+#[test]
+fn a_descent_out_of_work_shows_what_it_has_found() {
+    let terrain = field([24, 12], |x, y| match (x, y) {
+        (9 | 11, 6) => 1e6,
+        _ => 0.0,
+    });
+    let path = [
+        [4.661_593_437_194_824, 2.513_711_929_321_289, 2e6],
+        [
+            4.661_593_437_194_824,
+            2.513_711_929_321_289,
+            8.052_639_961_242_676,
+        ],
+        [
+            17.165_724_754_333_496,
+            8.888_124_465_942_383,
+            8.112_886_428_833_008,
+        ],
+        [
+            16.780_225_753_784_18,
+            9.086_384_773_254_395,
+            7.619_668_960_571_289,
+        ],
+    ];
+    run(terrain, &path, Pace::RealTime, Supply::Held).expect("holds");
+}

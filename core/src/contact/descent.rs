@@ -1,6 +1,7 @@
 //! The proxy's way over the surface: downhill in the distance to the hand,
 //! from patch to patch (paper §4.3.2, made exact at edges and vertices).
 
+use super::closest::Nearest;
 use super::neighbours::{Way, best_neighbour, search};
 use super::patch::Patch;
 use super::spot::{Hand, Spot, tile_of};
@@ -23,8 +24,9 @@ pub(super) enum Descent {
         entry: Spot,
         tile: [i32; 2],
     },
-    /// The tick's work is spent; height above the hand.
-    Unfinished(Spot, f32),
+    /// The tick's work is spent: the nearest point so far, its height above the
+    /// hand, and the place to go on from.
+    Unfinished { at: Spot, z: f32, entry: Spot },
     /// There is no surface under the proxy any more; the tile wanted, if it
     /// is missing.
     Lost(Option<[i32; 2]>),
@@ -52,14 +54,19 @@ pub(super) fn descend<const D: usize>(
         if may_leave && leaves(window, hand, &spot, &patch) {
             return Descent::Leaves(spot);
         }
-        if !work.visit() {
-            return Descent::Unfinished(spot, patch.height(spot.u, spot.v));
-        }
         let entry = spot;
+        if !work.visit() {
+            // Beside a wall the way in may begin at its foot.
+            let (at, z) = entered.map_or_else(
+                || (entry, patch.height(entry.u, entry.v)),
+                |there: Nearest| (entry.moved_to(&there), there.z),
+            );
+            return Descent::Unfinished { at, z, entry };
+        }
         let here = entered
             .take()
             .unwrap_or_else(|| search(&patch, hand, &spot, work));
-        (spot.u, spot.v) = (here.u, here.v);
+        spot = entry.moved_to(&here);
         match best_neighbour(window, hand, &spot, &here, work) {
             Way::Into(next, there) => (spot, entered) = (next, Some(there)),
             Way::Unknown(tile) => {
@@ -70,7 +77,13 @@ pub(super) fn descend<const D: usize>(
                     tile,
                 };
             }
-            Way::Later => return Descent::Unfinished(entry, patch.height(entry.u, entry.v)),
+            Way::Later => {
+                return Descent::Unfinished {
+                    at: spot,
+                    z: here.z,
+                    entry,
+                };
+            }
             Way::None if may_leave && here.z < 0.0 => return Descent::Leaves(spot),
             Way::None => {
                 return Descent::Rests {

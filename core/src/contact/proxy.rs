@@ -47,6 +47,9 @@ pub struct Contact {
     /// The nearest place at which an unfinished descent of this same hand
     /// stopped, and how many have got no nearer since.
     pub(super) reached: Option<(GridPoint, u32)>,
+    /// Where the proxy is, when the descent of this same hand goes on from
+    /// somewhere else: a hand that has moved finds it there.
+    pub(super) ahead: Option<Spot>,
     /// How often the proxy has left the surface for this same hand.
     pub(super) leaps: u32,
     /// By the paper's rule: cells on the way to `sought` that were found to be no
@@ -84,6 +87,7 @@ impl Contact {
             presence: 1.0,
             late: false,
             reached: None,
+            ahead: None,
             leaps: 0,
             passed: 0,
             sought: GridPoint::default(),

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::closest::Nearest;
 use super::patch::Patch;
 use crate::grid::GridPoint;
 use crate::terrain::{Altitude, Corners, TileKey};
@@ -26,6 +27,15 @@ impl Spot {
             cell: [self.cell[0] + east, self.cell[1] + north],
             u: beyond(self.u, east),
             v: beyond(self.v, north),
+        }
+    }
+
+    /// Another place of the same patch.
+    pub(super) const fn moved_to(&self, place: &Nearest) -> Self {
+        Self {
+            cell: self.cell,
+            u: place.u,
+            v: place.v,
         }
     }
 

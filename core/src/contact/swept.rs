@@ -59,9 +59,12 @@ impl Contact {
 
     /// The hand has moved: a way under way now leads to its new place.
     fn redirect(&mut self, hip: GridPoint) {
+        let ahead = self.ahead.take();
         match &mut self.phase {
             Phase::Sweeping(path) => *path = Path::through_air(path.at(), hip),
-            Phase::Touching { may_leave, .. } => *may_leave = true,
+            Phase::Touching { spot, may_leave } => {
+                (*spot, *may_leave) = (ahead.unwrap_or(*spot), true);
+            }
             _ => {}
         }
     }
@@ -151,6 +154,7 @@ impl Contact {
         let Phase::Touching { spot, may_leave } = self.phase else {
             return None;
         };
+        self.ahead = None;
         let hand = Hand::new(hip);
         let mut held_up_by = None;
         let mut settled = true;
@@ -173,19 +177,22 @@ impl Contact {
                 (held_up_by, settled) = (Some(tile), false);
                 (at, z, entry)
             }
-            Descent::Unfinished(spot, z) => {
-                settled = self.gets_no_nearer(hand.point_at(&spot, z), &hip);
-                (spot, z, spot)
+            Descent::Unfinished { at, z, entry } => {
+                settled = self.gets_no_nearer(hand.point_at(&at, z), &hip);
+                (at, z, entry)
             }
         };
+        let goes_on = !settled;
         self.phase = Phase::Touching { spot, may_leave };
         let felt = self.touches(window, hip, (spot, z), settled, held_up_by, pace);
-        if felt.held_up_by.is_some() && matches!(self.phase, Phase::Touching { .. }) {
+        let waits = goes_on || felt.held_up_by.is_some();
+        if waits && matches!(self.phase, Phase::Touching { .. }) {
             // To be taken up again, so that the wait leaves no trace.
             self.phase = Phase::Touching {
                 spot: entry,
                 may_leave,
             };
+            self.ahead = Some(spot);
         }
         if felt.settled && self.presence == 1.0 {
             self.lay_track(window, hip.column());
