@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::closest::RESOLUTION;
 use super::descent::{Descent, descend};
 use super::patch::Patch;
 use super::presence::is_far;
@@ -204,7 +205,7 @@ impl Contact {
     /// to another and back, and no way.
     fn gets_no_nearer(&mut self, at: GridPoint, hip: &GridPoint) -> bool {
         if let Some((was, times)) = &mut self.reached
-            && gained(was, &at, hip) <= 0.0
+            && !is_nearer(&at, was, hip)
         {
             *times += 1;
             return *times >= IDLE;
@@ -246,9 +247,11 @@ impl Contact {
     }
 }
 
-/// By how much the squared distance from a hand is less at one point than it was
-/// at another, cells²: of a far hand the squares themselves would not tell.
-fn gained(was: &GridPoint, is: &GridPoint, hand: &GridPoint) -> f32 {
-    let way = was.to(is);
-    way.dot(way + 2.0 * is.to(hand))
+/// Whether one point is nearer to a hand than another was, by more than the last
+/// places of the two may be off: of a far hand the squared distances themselves
+/// would not tell.
+fn is_nearer(is: &GridPoint, was: &GridPoint, hand: &GridPoint) -> bool {
+    let (way, left) = (was.to(is), is.to(hand));
+    let noise = 2.0 * RESOLUTION * (way.abs() + left.abs()).element_sum();
+    way.dot(way + 2.0 * left) > noise
 }
