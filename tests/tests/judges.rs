@@ -188,6 +188,19 @@ fn a_proxy_beside_the_closest_point_is_found() {
     speaks(Invariant::LocalMinimum, &valley, &[], rest(0.0), rest(1e-4));
 }
 
+/// What a patch's corners cost in single precision is allowed where they are
+/// mixed, and not at the foot of one.
+#[test]
+fn a_spike_at_one_corner_excuses_nothing_at_the_others() {
+    let spike = Terrain::from_fn(Kind::Spikes, SIZE, |x, y| {
+        if (x, y) == (11, 11) { 1e6 } else { 2.0 }
+    });
+    let at = |off: f64| touching([10.5, 10.0, 1.0], [10.5 + off, 10.0, 2.0]);
+    for off in [-1e-2, -3e-5, 3e-5, 1e-2] {
+        speaks(Invariant::LocalMinimum, &spike, &[], at(0.0), at(off));
+    }
+}
+
 /// A hand in the ridge, and the closest points of its two sides.
 const IN_RIDGE: [f64; 3] = [19.875, 10.5, 1.0];
 const NEAR_SIDE: [f64; 3] = [19.4375, 10.5, 1.4375];

@@ -47,14 +47,18 @@ impl Judge<'_> {
         self.measured.beyond += 1;
         // On steep ground a unit in the last place of a coordinate is much height:
         // the bound is one in the plane. And how far does the truth move for a
-        // rounding of the hand?
+        // rounding of the hand, or of the heights above it that are mixed there?
         let here = descent::from(self.terrain, seen.hip, start, patch).at;
         let moved = |axis: usize, by: f64| {
             let mut hip = seen.hip;
             hip[axis] += by;
             level(descent::from(self.terrain, hip, start, patch).at, here)
         };
-        let moves = (0..3).flat_map(|axis| [moved(axis, allowed), moved(axis, -allowed)]);
+        let heights = patch.mixed_size(here[0], here[1], seen.hip[2]);
+        let up = allowed.max(4.0 * f64::from(f32::EPSILON) * heights);
+        let moves = [(0, allowed), (1, allowed), (2, up)]
+            .into_iter()
+            .flat_map(|(axis, by)| [moved(axis, by), moved(axis, -by)]);
         let condition = moves.fold(0.0, f64::max);
         let error = level(here, seen.proxy);
         if error > 4.0 * (allowed + condition) {

@@ -55,6 +55,15 @@ impl Patch {
         [self.d, b, c, b + self.c + self.a]
     }
 
+    /// What is mixed for the height above `from` at a place, signs left out: a
+    /// corner that has no part in the place does not count.
+    #[must_use]
+    pub fn mixed_size(&self, x: f64, y: f64, from: f64) -> f64 {
+        let (u, v) = self.local(x, y);
+        let [sw, se, nw, ne] = self.corners().map(|h| (h - from).abs());
+        (1.0 - v) * ((1.0 - u) * sw + u * se) + v * ((1.0 - u) * nw + u * ne)
+    }
+
     /// The twist: how much a slope changes over the patch.
     #[must_use]
     pub fn twist(&self) -> f64 {
