@@ -20,10 +20,10 @@ pub struct Segment {
     pub bytes: Vec<u8>,
 }
 
-/// A function of the image.
+/// A function of the image, or what else bears a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Function {
-    /// Its first instruction, without the Thumb bit.
+    /// Its first byte; of a function without the Thumb bit.
     pub address: u32,
     /// Its length in bytes.
     pub size: u32,
@@ -34,7 +34,7 @@ pub struct Image {
     /// What is loaded.
     pub segments: Vec<Segment>,
     functions: BTreeMap<String, Function>,
-    symbols: BTreeMap<String, u32>,
+    symbols: BTreeMap<String, Function>,
     /// Where code (true) and data in it (false) begin.
     mapping: BTreeMap<u32, bool>,
 }
@@ -65,7 +65,7 @@ impl Image {
             match name.split('.').next() {
                 Some("$t") => drop(mapping.insert(address, true)),
                 Some("$d") => drop(mapping.insert(address, false)),
-                _ => drop(symbols.insert(name, address)),
+                _ => drop(symbols.insert(name, Function { address, size })),
             }
         }
         let segments = header
@@ -112,15 +112,15 @@ impl Image {
     /// The value of a symbol, as a linker script gives them.
     #[must_use]
     pub fn symbol(&self, name: &str) -> Option<u32> {
-        self.symbols.get(name).copied()
+        self.symbols.get(name).map(|symbol| symbol.address)
     }
 
-    /// The value of the first symbol with all of these in its name.
+    /// The first symbol with all of these in its name.
     #[must_use]
-    pub fn symbol_like(&self, parts: &[&str]) -> Option<u32> {
+    pub fn symbol_like(&self, parts: &[&str]) -> Option<Function> {
         let fits = |name: &str| parts.iter().all(|part| name.contains(part));
         let mut all = self.symbols.iter();
-        all.find_map(|(name, value)| fits(name).then_some(*value))
+        all.find_map(|(name, symbol)| fits(name).then_some(*symbol))
     }
 
     /// Every instruction with its address; a short one in the upper half-word.

@@ -255,7 +255,7 @@ fn a_word_of_the_program_that_cannot_be_read_stops_it() {
         let device = Device::open(machine, &terrain, scene(&terrain));
         let crc = device.machine.borrow().image.symbol_like(&["frame", "CRC"]);
         let crc = crc.expect("the table of the check sum");
-        device.machine.borrow_mut().spoil(crc + 64 * 4);
+        device.machine.borrow_mut().spoil(crc.address + 64 * 4);
         let mut machine = device.machine.borrow_mut();
         let stop = machine.run_until(300, |m| {
             let _ = m.take_in(1);

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use hapterra_image_tests::device::machines;
 use hapterra_image_tests::machine::Machine;
+use hapterra_tests::repository;
 use probe_rs::config::{MemoryRegion, Registry, Target};
 
 fn target(machine: &Machine) -> Target {
@@ -107,5 +108,22 @@ fn the_emulated_chip_has_the_memories_of_the_real_one() {
             let there = system || holds(&real, *start, *bytes as usize);
             assert!(there, "{}: {start:#x}", machine.chip.board);
         }
+    }
+}
+
+#[test]
+fn the_boards_pages_say_what_the_tiles_take() {
+    for machine in machines() {
+        let board = machine.chip.board;
+        let page = board.trim_end_matches("-spi");
+        let path = repository().join(format!("docs/boards/{page}.md"));
+        let page = std::fs::read_to_string(path).expect("the page");
+        let tiles = machine
+            .image
+            .symbol_like(&["TILES"])
+            .expect("the tiles")
+            .size;
+        let said = format!("take {},{:03} bytes of RAM", tiles / 1000, tiles % 1000);
+        assert!(page.contains(&said), "{board}: {said}");
     }
 }

@@ -21,6 +21,9 @@ const UNDEFINED: [u8; 2] = [0x00, 0xDE];
 /// The watchdog's time, and what its feeding adds to it, ms.
 const WATCHDOG_MS: u64 = 50;
 const CHECK_MS: u64 = 10;
+/// Longest that amplifiers are on after a task hangs: until the next feeding at
+/// most, and 40 ms from there.
+const OFF_MS: u64 = CHECK_MS + 41;
 
 struct Bench {
     plane: Plane,
@@ -65,10 +68,12 @@ impl Bench {
         device.run_ms(40);
         device.move_to(self.plane.counts_at([100.0, 100.0], 3.0));
         device.run_ms(40);
-        let machine = device.machine.borrow();
+        let mut machine = device.machine.borrow_mut();
         assert!(machine.is_enabled(), "{}: pressed", machine.chip.board);
+        // What comes now comes between two ticks.
+        assert_eq!(machine.run_ticks(1), Stop::Asked);
+        let _ = machine.take_effects();
         drop(machine);
-        let _ = device.machine.borrow_mut().take_effects();
         device
     }
 
@@ -187,16 +192,22 @@ fn a_converter_that_gets_no_frames_takes_two_ticks() {
     });
 }
 
-/// Milliseconds until the watchdog resets a chip in which a function hangs;
-/// none if it never does.
-fn ms_until_reset(machine: &mut Machine, function: Function) -> Option<u64> {
+/// Milliseconds until the amplifiers are off and until the watchdog resets a chip
+/// in which a function hangs; none if it never does.
+fn ms_until_reset(machine: &mut Machine, function: Function) -> Option<(Option<u64>, u64)> {
     machine.patch(function.address, &HANG);
     let before_ns = machine.bus().now_ns;
+    let ms = |machine: &Machine| (machine.bus().now_ns - before_ns) / 1_000_000;
     // Something for the USB stack to do.
     machine.bus().usb.bus_reset();
-    let stop = machine.run_ms(3 * WATCHDOG_MS);
-    let ms = (machine.bus().now_ns - before_ns) / 1_000_000;
-    (stop == Stop::Watchdog).then_some(ms)
+    let mut off = None;
+    let stop = machine.run_until(3 * WATCHDOG_MS, |m| {
+        if off.is_none() && !m.is_enabled() {
+            off = Some(ms(m));
+        }
+        false
+    });
+    (stop == Stop::Watchdog).then_some((off, ms(machine)))
 }
 
 fn assert_in_time(machine: &mut Machine, ms: u64) {
@@ -238,11 +249,12 @@ fn a_task_that_hangs_ends_in_the_watchdogs_reset() {
             let device = bench.press(machine.expect("still there"), &terrain);
             let mut machine = device.machine.borrow_mut();
             match ms_until_reset(&mut machine, *task) {
-                Some(ms) => {
-                    // The tick saw it first: 40 ms after the last feeding.
-                    let off = machine.take_effects().contains(&Effect::Enable(false));
-                    assert!(off, "{board}: left to the reset");
-                    assert_in_time(&mut machine, ms);
+                Some((off, reset)) => {
+                    // The tick sees it first.
+                    let off = off.expect("not left to the reset");
+                    println!("{board}: off after {off} ms, reset after {reset} ms");
+                    assert!(off <= OFF_MS, "{board}: off after {off} ms");
+                    assert_in_time(&mut machine, reset);
                 }
                 None => harmless += 1,
             }
@@ -260,7 +272,8 @@ fn a_tick_that_hangs_ends_in_the_watchdogs_reset() {
         let mut machine = device.machine.borrow_mut();
         let tick = machine.image.functions_like(&["Haptics", "tick_fast"]);
         let tick = *tick.first().expect("the tick is a function of its own");
-        let ms = ms_until_reset(&mut machine, tick).expect("reset");
+        let (off, ms) = ms_until_reset(&mut machine, tick).expect("reset");
+        assert_eq!(off, None, "nobody is left to switch them off");
         assert_in_time(&mut machine, ms);
     });
 }
