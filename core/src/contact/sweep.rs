@@ -134,7 +134,7 @@ impl Path {
         }
         let mut over_hole = self.over_hole;
         let view = Hand::new(self.at);
-        let tall = (end.cell()[2] as f32 - self.at.cell()[2] as f32).abs();
+        let tall = end.cell()[2].abs_diff(self.at.cell()[2]) as f32;
         let mut steps = Steps::new(&self.at, end);
         while let Some(step) = steps.next() {
             if !work.take(STRIDE) {
