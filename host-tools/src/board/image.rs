@@ -115,7 +115,7 @@ impl Image {
             path: path.to_owned(),
             source,
         })?;
-        let segments = segments(&elf).map_err(|why| ImageError::NoImage {
+        let Contents { segments, mark } = contents(&elf).map_err(|why| ImageError::NoImage {
             path: path.to_owned(),
             why,
         })?;
@@ -127,13 +127,12 @@ impl Image {
             memory: if stray.in_flash { "flash" } else { "RAM" },
         })?;
         // Of two chips that hold it both, the wiring still differs.
-        let found = mark(&elf);
-        match found.as_deref() == Some(board.name) {
+        match mark.as_deref() == Some(board.name) {
             true => Ok(image),
             false => Err(ImageError::OtherBoard {
                 path: path.to_owned(),
                 board: board.name,
-                found,
+                found: mark,
             }),
         }
     }
@@ -143,9 +142,25 @@ impl Image {
 /// on with the board's name, its dashes as underscores.
 const MARK: &str = "hapterra.board.";
 
-/// The board that an ELF says it is for.
-fn mark(elf: &[u8]) -> Option<String> {
-    let header = FileHeader32::<LittleEndian>::parse(elf).ok()?;
+/// What an ELF holds of interest.
+struct Contents {
+    segments: Vec<Segment>,
+    /// The board that it says it is for.
+    mark: Option<String>,
+}
+
+fn contents(elf: &[u8]) -> Result<Contents, String> {
+    let header = FileHeader32::<LittleEndian>::parse(elf).map_err(|_| "it is no 32-bit ELF")?;
+    if header.e_machine(LittleEndian) != EM_ARM {
+        return Err("it is not for ARM".into());
+    }
+    Ok(Contents {
+        segments: segments(header, elf)?,
+        mark: mark(header, elf),
+    })
+}
+
+fn mark(header: &FileHeader32<LittleEndian>, elf: &[u8]) -> Option<String> {
     let sections = header.sections(LittleEndian, elf).ok()?;
     let table = sections.symbols(LittleEndian, elf, SHT_SYMTAB).ok()?;
     table.iter().find_map(|symbol| {
@@ -163,11 +178,7 @@ struct Segment {
     bytes: Vec<u8>,
 }
 
-fn segments(elf: &[u8]) -> Result<Vec<Segment>, String> {
-    let header = FileHeader32::<LittleEndian>::parse(elf).map_err(|_| "it is no 32-bit ELF")?;
-    if header.e_machine(LittleEndian) != EM_ARM {
-        return Err("it is not for ARM".into());
-    }
+fn segments(header: &FileHeader32<LittleEndian>, elf: &[u8]) -> Result<Vec<Segment>, String> {
     let headers = header
         .program_headers(LittleEndian, elf)
         .map_err(|error| error.to_string())?;

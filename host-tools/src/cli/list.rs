@@ -31,7 +31,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let chip = board
             .chip
             .map_or(String::new(), |chip| format!(" ({chip})"));
-        println!("  {:<15} {}{chip}", board.name, board.what);
+        println!("  {:<19} {}{chip}", board.name, board.what);
     }
     list_usb();
     list_probes();

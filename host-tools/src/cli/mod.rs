@@ -94,7 +94,9 @@ pub fn main() -> ExitCode {
 /// Diagnostics go to standard error; `RUST_LOG` overrides the `-v` count.
 fn log_to_stderr(verbose: u8) {
     let level = match verbose {
-        0 => "warn",
+        // A probe library warns of each kind of probe that it cannot look for;
+        // what comes of it is said by the error.
+        0 => "warn,probe_rs=error",
         1 => "info",
         2 => "debug",
         _ => "trace",

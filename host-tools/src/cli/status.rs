@@ -212,21 +212,13 @@ fn triple([a, b, c]: [f32; 3], unit: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::link::hello;
     use hapterra_core::guard::Fault;
-    use hapterra_core::wire::message::DeviceHello;
     use hapterra_core::wire::status::{Health, StackFigures, TickFigures};
 
     fn status() -> Status {
         Status {
-            device: DeviceHello {
-                protocol: PROTOCOL,
-                board: "test".try_into().expect("fits"),
-                version: "1".try_into().expect("fits"),
-                window: 4,
-                tick_hz: 1000,
-                clock_hz: 1_000_000,
-                epoch: None,
-            },
+            device: hello(),
             boot: BootReport::default(),
             calibration: CalibrationSource::None,
             model: None,

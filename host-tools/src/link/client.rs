@@ -258,7 +258,7 @@ fn version(theirs: u16) -> LinkError {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::raster::Raster;
     use crate::terrain::Scale;
@@ -266,6 +266,19 @@ mod tests {
     use hapterra_core::force::ForceLaw;
     use hapterra_core::grid::GridPoint;
     use hapterra_core::wire::message::Source;
+
+    /// How a device introduces itself.
+    pub(crate) fn hello() -> DeviceHello {
+        DeviceHello {
+            protocol: PROTOCOL,
+            board: "test".try_into().expect("fits"),
+            version: "1".try_into().expect("fits"),
+            window: 4,
+            tick_hz: 1000,
+            clock_hz: 1_000_000,
+            epoch: None,
+        }
+    }
 
     #[test]
     fn what_is_said_twice_opens_once() {
@@ -275,15 +288,7 @@ mod tests {
         let home = GridPoint::default();
         let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Points, home);
         let mut client = Client::new(&terrain, scene);
-        let hello = ToHost::Hello(DeviceHello {
-            protocol: PROTOCOL,
-            board: "test".try_into().expect("fits"),
-            version: "1".try_into().expect("fits"),
-            window: 4,
-            tick_hz: 1000,
-            clock_hz: 1000,
-            epoch: None,
-        });
+        let hello = ToHost::Hello(hello());
         let taken = ToHost::SceneTaken {
             epoch: scene.epoch,
             accepted: true,

@@ -24,6 +24,8 @@ mod transport;
 mod usb;
 
 pub use bulk::{Bulk, BulkEndpoints, Pipes, is_hapterra};
+#[cfg(test)]
+pub(crate) use client::tests::hello;
 pub use client::{Arming, Client, Event};
 pub use dialogue::Dialogue;
 pub use emulator::{
