@@ -235,6 +235,28 @@ impl Machine {
             .expect("translated code is dropped");
     }
 
+    /// Counts calls of a function and the instructions executed in it, without what
+    /// it calls, from now on.
+    #[must_use]
+    pub fn count(&mut self, function: Function) -> Rc<Cell<(u32, u32)>> {
+        let counted = Rc::new(Cell::new((0, 0)));
+        let into = Rc::clone(&counted);
+        let (from, to) = (function.address, function.address + function.size - 1);
+        let on_instruction = move |_: &mut Unicorn<'_, ()>, at: u64, _: u32| {
+            let (calls, instructions) = into.get();
+            let entered = u32::from(at == u64::from(function.address));
+            into.set((calls + entered, instructions + 1));
+        };
+        let hook = self
+            .core
+            .add_code_hook(from.into(), to.into(), on_instruction);
+        hook.expect("a hook");
+        self.core
+            .ctl_flush_tb()
+            .expect("translated code is dropped");
+        counted
+    }
+
     /// From now on the flash's word at `address` cannot be read, until it is
     /// erased: what is left of a write that was cut off.
     pub fn spoil(&mut self, address: u32) {

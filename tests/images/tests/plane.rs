@@ -9,6 +9,7 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::wire::message::Source;
 use hapterra_image_tests::bus::Effect;
 use hapterra_image_tests::device::{Device, Plane, machines};
+use hapterra_image_tests::machine::Stop;
 
 fn plane() -> Plane {
     Plane {
@@ -66,5 +67,34 @@ fn a_plane_pressed_by_a_millimetre_gives_the_currents_of_the_f64_computation() {
             .filter(|e| matches!(e, Effect::Enable(_)))
             .count();
         assert_eq!(enables, 1, "switched on once and never off");
+    }
+}
+
+/// Most instructions that angles' sines and cosines, the tip and the three levers
+/// may take together.
+const POSE: u32 = 120;
+
+#[test]
+fn the_pose_and_its_trigonometry_cost_what_is_said() {
+    let plane = plane();
+    let raster = Raster::from_fn(201, 201, |_, _| 55.0).expect("raster");
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    let home = scale.to_grid(plane.place.home_mm).expect("addressable");
+    let scene = terrain.scene(plane.law, Rule::Swept, Source::Encoders, home);
+    for machine in machines() {
+        let board = machine.chip.board;
+        let device = Device::arm(machine, &terrain, scene);
+        let mut machine = device.machine.borrow_mut();
+        let pose = machine.image.functions_like(&["Pose", "from_angles"]);
+        let counted = machine.count(*pose.first().expect("a function of its own"));
+        assert_eq!(machine.run_ticks(100), Stop::Asked);
+        let (calls, instructions) = counted.get();
+        let each = instructions / calls;
+        println!("{board}: {each} instructions a pose, {calls} in 100 ticks");
+        assert!(
+            (100..=101).contains(&calls) && (100..=POSE).contains(&each),
+            "{board}"
+        );
     }
 }
