@@ -1,8 +1,8 @@
 //! The proxy: where the hand would be if it could not enter the terrain.
 //!
 //! [`Contact::step`] takes the haptic interface point of one tick and answers
-//! with the proxy (`proxy`, `swept`). Read [`patch`] first, then [`crossing`]
-//! and `sweep` (from free space into contact), then [`closest`] and `descent`
+//! with the proxy (`proxy`, `swept`). Read [`patch`] first, then [`crossing`],
+//! `steps`, `reach` and `sweep` (from free space into contact), then [`closest`] and `descent`
 //! (in contact), [`presence`] (at the borders of the data), and `paper` for the
 //! rule as it was published.
 
@@ -19,8 +19,10 @@ mod neighbours;
 mod paper;
 mod proxy;
 mod quick;
+mod reach;
 mod ruling;
 mod spot;
+mod steps;
 mod sweep;
 mod swept;
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::closest::{Nearest, RESOLUTION, nearest_downhill, resolution};
 use super::patch::Patch;
 use super::spot::{Hand, Spot, tile_of};
-use super::work::{VISIT, Work};
+use super::work::{EVALUATION, VISIT, Work};
 use crate::terrain::{Ground, Window};
 
 /// Squared distances that differ by less than this part count as equal.
@@ -29,7 +29,7 @@ pub(super) fn neighbours([east, north]: [i32; 2]) -> impl Iterator<Item = [i32; 
 /// The search in a patch from a spot of it.
 pub(super) fn search(patch: &Patch, hand: &Hand, spot: &Spot, work: &mut Work) -> Nearest {
     let found = nearest_downhill(patch, hand.in_patch(spot.cell), (spot.u, spot.v));
-    work.charge(found.evaluations);
+    work.charge(EVALUATION * found.evaluations);
     found
 }
 

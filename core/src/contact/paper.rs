@@ -13,7 +13,7 @@ use super::closest::nearest_downhill;
 use super::neighbours::neighbours;
 use super::patch::Patch;
 use super::spot::{Hand, Spot, tile_of};
-use super::work::{VISIT, Work};
+use super::work::{EVALUATION, VISIT, Work};
 use crate::grid::GridPoint;
 use crate::terrain::{Ground, Window};
 
@@ -94,7 +94,7 @@ fn next_candidate<const D: usize>(
         hip
     };
     let (view, hand) = (Hand::new(*low), Hand::new(*hip));
-    let _ = work.take(1);
+    let _ = work.take(EVALUATION);
     if view.altitude().cell() >= window.top() {
         return Candidate::None;
     }
@@ -174,7 +174,7 @@ fn local_closest_point<const D: usize>(
     let mut gets_on = false;
     while best.spot.border() != [0, 0] {
         // One look around in each tick at least, or the next begins as this one.
-        if !work.take(1) && gets_on {
+        if !work.take(EVALUATION) && gets_on {
             best.settled = false;
             break;
         }
@@ -207,7 +207,7 @@ fn bounded_closest_point<const D: usize>(
         Ground::Missing => return Err(tile_of(spot.cell)),
     };
     let found = nearest_downhill(&patch, hand.in_patch(spot.cell), (spot.u, spot.v));
-    work.charge(found.evaluations + VISIT);
+    work.charge(EVALUATION * found.evaluations + VISIT);
     Ok(Some(Found {
         spot: Spot {
             u: found.u,

@@ -13,6 +13,7 @@ use super::proxy::{Contact, Phase};
 use super::spot::Hand;
 use super::sweep::lower;
 use super::track::Under;
+use super::work::{EVALUATION, VISIT};
 use crate::grid::GridPoint;
 use crate::terrain::{Box2, Window};
 
@@ -62,7 +63,7 @@ impl Contact {
             return self.glides_on(window, hip, pace);
         };
         let proxy = hand.point_inside(&track.spot, stretch.z);
-        self.rests_at(proxy, stretch, 1);
+        self.rests_at(proxy, stretch, EVALUATION);
         true
     }
 
@@ -99,7 +100,7 @@ impl Contact {
             Ok(Some(rest)) => {
                 *track = rest.track;
                 let proxy = hand.point_at(&rest.track.spot, rest.stretch.z);
-                self.rests_at(proxy, rest.stretch, 1 + 2 * rest.hops);
+                self.rests_at(proxy, rest.stretch, EVALUATION + VISIT * rest.hops);
             }
             Err(tile) if pace == Pace::LockStep => {
                 // For the general case this hand, when it comes again, is not new,

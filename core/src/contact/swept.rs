@@ -8,12 +8,12 @@ use super::patch::Patch;
 use super::presence::is_far;
 use super::proxy::{Contact, Phase};
 use super::spot::{Hand, Spot};
-use super::sweep::{Path, Sweep, lower};
+use super::sweep::{Path, Sweep};
 use super::track::Track;
 use super::work::Work;
 use super::{Felt, Pace, State};
 use crate::grid::GridPoint;
-use crate::terrain::{Box2, Ground, Window};
+use crate::terrain::{Ground, Window};
 
 /// Times that a proxy may leave the surface for one hand: more is rounding,
 /// from a place to another and back.
@@ -70,7 +70,7 @@ impl Contact {
         }
     }
 
-    /// In free space the proxy is the hand; one look tells whether it still is.
+    /// In free space the proxy is the hand, if it still is.
     ///
     /// Most ways end within the tick; those are not worth storing.
     fn fly<const D: usize>(
@@ -81,10 +81,6 @@ impl Contact {
         work: &mut Work,
     ) -> Option<Felt> {
         let from = self.hip;
-        let span = Box2::around(from.column(), hip.column());
-        if window.is_clear(span, lower(&from, &hip)) {
-            return Some(self.flies(hip));
-        }
         let mut path = Path::through_air(from, hip);
         let ended = path.advance(window, work);
         let at = path.at();

@@ -10,7 +10,7 @@ pub struct Altitude {
 }
 
 impl Altitude {
-    /// `cell + frac`, the fraction in `[0, 1)`.
+    /// `cell + frac`.
     #[must_use]
     pub const fn new(cell: i32, frac: f32) -> Self {
         Self { cell, frac }
@@ -20,6 +20,16 @@ impl Altitude {
     #[must_use]
     pub const fn cell(self) -> i32 {
         self.cell
+    }
+
+    /// The altitude so many cells higher, to within the rounding of `by`.
+    #[must_use]
+    #[inline]
+    pub(crate) fn raised(self, by: f32) -> Self {
+        Self {
+            cell: self.cell,
+            frac: self.frac + by,
+        }
     }
 
     /// `height`, counted in cells from `base`, as seen from this altitude.

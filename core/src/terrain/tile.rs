@@ -16,7 +16,7 @@ pub const POSTS: usize = TILE_CELLS + 1;
 /// Side of the smallest block whose maximum is kept, as a power of two.
 ///
 /// 8 cells: 21 maxima in all, 0.08 byte a sample.
-pub(super) const BLOCK_SHIFT: u32 = 3;
+pub(crate) const BLOCK_SHIFT: u32 = 3;
 const BLOCKS: usize = TILE_CELLS >> BLOCK_SHIFT;
 const QUARTERS: usize = BLOCKS / 2;
 
@@ -158,23 +158,21 @@ impl Tile {
         [south[u], south[u + 1], north[u], north[u + 1]]
     }
 
-    /// The highest corner, above the base, of the patches in the columns and
-    /// rows from `from` to `to` (taken modulo 32), at most two each way. NaN
-    /// samples do not count.
+    /// Whether `low` is above the corners of the patches in the columns and rows
+    /// from `from` to `to` (taken modulo 32), at most two each way. NaN samples do
+    /// not count.
     #[must_use]
     #[inline]
-    pub(super) fn highest_around(&self, from: [i32; 2], to: [i32; 2]) -> f32 {
+    pub(super) fn is_below_around(&self, from: [i32; 2], to: [i32; 2], low: Altitude) -> bool {
         let inside = |c: i32| c as usize % TILE_CELLS;
         let ([u, v], [u1, v1]) = (from.map(inside), to.map(inside));
-        // Not `f32::max`, which costs three instructions to be right about a
-        // NaN on its other side, where there is none here.
-        let higher = |high: f32, post: f32| if post > high { post } else { high };
-        let [south, middle, north] = [v, v + 1, v1 + 1].map(|row| {
+        let low = low.above(self.base);
+        [v, v + 1, v1 + 1].into_iter().all(|row| {
             let row = &self.posts[row];
-            let west = higher(f32::NEG_INFINITY, row[u]);
-            higher(higher(west, row[u + 1]), row[u1 + 1])
-        });
-        higher(higher(south, middle), north)
+            // NaN reaches nothing.
+            let reaches = |post: f32| post >= low;
+            !(reaches(row[u]) || reaches(row[u + 1]) || reaches(row[u1 + 1]))
+        })
     }
 
     /// Lowest whole height, in cells, that no sample of the tile exceeds.

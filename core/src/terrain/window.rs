@@ -134,19 +134,26 @@ impl<'t, const D: usize> Window<'t, D> {
     /// Whether all samples around a box of two patches a side at most are
     /// known to lie below `low`: the nine samples themselves are looked at.
     ///
-    /// `false` also where the box is larger, or not all in one tile of the
-    /// field.
+    /// `false` also where the box is larger, or not all in one tile that is held.
     #[must_use]
     #[inline]
     pub fn is_clear_nearby(&self, span: Box2, low: Altitude) -> bool {
         let Box2 { from, to } = span;
-        let tile_of = |cell: [i32; 2]| cell.map(|c| c >> TILE_SHIFT);
+        let [col, row] = from.map(|c| c >> TILE_SHIFT);
         let small = (to[0] - from[0]) | (to[1] - from[1]) <= 1;
-        if !small || tile_of(from) != tile_of(to) || !self.has_cell(from) {
-            return false;
-        }
-        self.held(from[0] >> TILE_SHIFT, from[1] >> TILE_SHIFT)
-            .is_some_and(|tile| low.up_to(tile.base(), tile.highest_around(from, to)) < 0.0)
+        let in_one_tile = to.map(|c| c >> TILE_SHIFT) == [col, row];
+        small
+            && in_one_tile
+            && self
+                .held(col, row)
+                .is_some_and(|tile| tile.is_below_around(from, to, low))
+    }
+
+    /// Whether everything in one block of 8 × 8 patches is known to lie below
+    /// `low`.
+    #[inline]
+    pub(crate) fn block_is_clear(&self, [col, row]: [i32; 2], low: Altitude) -> bool {
+        self.is_outside(col, row, BLOCK_SHIFT) || self.node_is_below(BLOCK_SHIFT, col, row, low)
     }
 
     fn box_is_clear(&self, span: Box2, low: Altitude) -> bool {

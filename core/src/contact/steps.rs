@@ -1,0 +1,242 @@
+//! The cells under a straight way, one after the other.
+
+use super::patch::Patch;
+use super::spot::Spot;
+use crate::grid::GridPoint;
+
+/// Length, in cells, of a step that is passed over where the way leaves the
+/// surface.
+const TINY: f32 = 1e-5;
+
+/// A way whose gap over the ground is less than its own rise by this factor runs
+/// along it.
+const ALONG: f32 = 16.0;
+
+/// The part of a way that lies in one cell.
+pub(super) struct Step {
+    /// The cell's column and row.
+    pub(super) cell: [i32; 2],
+    /// Where the part begins and ends in it, `[0, 1]`.
+    from: (f32, f32),
+    to: (f32, f32),
+    /// Heights above the start of the way, cells.
+    z_from: f32,
+    z_to: f32,
+}
+
+impl Step {
+    /// Too short for the heights at its ends to differ by more than rounding.
+    pub(super) fn is_tiny(&self) -> bool {
+        (self.to.0 - self.from.0)
+            .abs()
+            .max((self.to.1 - self.from.1).abs())
+            < TINY
+            && (self.z_to - self.z_from).abs() < TINY
+    }
+
+    /// Height of its lower end above the start of the way, cells.
+    #[inline]
+    pub(super) fn low(&self) -> f32 {
+        if self.z_to < self.z_from {
+            self.z_to
+        } else {
+            self.z_from
+        }
+    }
+
+    /// Whether the ground, no corner of which is farther up or down than
+    /// `largest`, rises or falls with the way, `gap` over it.
+    pub(super) fn runs_along(&self, gap: &[f32; 3], largest: f32) -> bool {
+        let rise = (self.z_to - self.z_from).abs();
+        largest <= ALONG * rise && gap.iter().all(|gap| ALONG * gap.abs() <= rise)
+    }
+
+    /// The patch's height over the way, by its Bernstein coefficients.
+    #[inline]
+    pub(super) fn gap(&self, patch: &Patch) -> [f32; 3] {
+        [
+            patch.height(self.from.0, self.from.1) - self.z_from,
+            patch.blossom(self.from, self.to) - 0.5 * (self.z_from + self.z_to),
+            patch.height(self.to.0, self.to.1) - self.z_to,
+        ]
+    }
+
+    pub(super) fn spot(&self, s: f32) -> Spot {
+        let between = |a: f32, b: f32| (a + s * (b - a)).clamp(0.0, 1.0);
+        Spot {
+            cell: self.cell,
+            u: between(self.from.0, self.to.0),
+            v: between(self.from.1, self.to.1),
+        }
+    }
+}
+
+/// The cells under a straight way, in order; each begins exactly where the one
+/// before ended, so that nothing slips through between them.
+pub(super) struct Steps {
+    east: Axis,
+    north: Axis,
+    from: (f32, f32),
+    /// Heights, cells: where the way begins, where it ends, and where the last
+    /// step ended.
+    z_start: f32,
+    z_end: f32,
+    z_from: f32,
+    /// Parts of the way at which the last step began and ended.
+    t_from: f32,
+    t_to: f32,
+    done: bool,
+}
+
+impl Steps {
+    /// The cells under a way.
+    pub(super) fn between(at: &GridPoint, end: &GridPoint) -> Self {
+        let axis = |axis: usize| {
+            let (first, last) = (at.cell()[axis], end.cell()[axis]);
+            let end = last.wrapping_sub(first) as f32 + end.frac()[axis];
+            Axis::new(first, [first, last], [at.frac()[axis], end])
+        };
+        Self::along(axis(0), axis(1), [0.0, at.to(end).z])
+    }
+
+    /// The cells under a way with these axes, between two heights.
+    pub(super) fn along(east: Axis, north: Axis, [z_start, z_end]: [f32; 2]) -> Self {
+        Self {
+            from: (east.at(0.0), north.at(0.0)),
+            east,
+            north,
+            z_start,
+            z_end,
+            z_from: z_start,
+            t_from: 0.0,
+            t_to: 0.0,
+            done: false,
+        }
+    }
+
+    /// Whether the last cell has been given.
+    pub(super) fn is_done(&self) -> bool {
+        self.done
+    }
+
+    /// The part of the way before the last step.
+    pub(super) fn passed(&self) -> f32 {
+        self.t_from
+    }
+
+    #[inline]
+    pub(super) fn next(&mut self) -> Option<Step> {
+        if self.done {
+            return None;
+        }
+        let Self { east, north, .. } = self;
+        let cell = [east.square, north.square];
+        let (from, z_from) = (self.from, self.z_from);
+        self.t_from = self.t_to;
+        let (to, z_to);
+        if east.left | north.left == 0 {
+            self.done = true;
+            (to, z_to) = ((east.ends(), north.ends()), self.z_end);
+        } else if east.t <= north.t {
+            let (t, u, v) = (east.t, east.ahead(), north.at(east.t));
+            (to, z_to) = ((u, v), self.z_start + (self.z_end - self.z_start) * t);
+            (self.from, self.t_to) = ((1.0 - u, v), t);
+            east.crosses();
+        } else {
+            let (t, u, v) = (north.t, east.at(north.t), north.ahead());
+            (to, z_to) = ((u, v), self.z_start + (self.z_end - self.z_start) * t);
+            (self.from, self.t_to) = ((u, 1.0 - v), t);
+            north.crosses();
+        }
+        self.z_from = z_to;
+        Some(Step {
+            cell,
+            from,
+            to,
+            z_from,
+            z_to,
+        })
+    }
+}
+
+/// The squares of a lattice that a way passes along one axis. Places are counted
+/// in sides of a square from an origin that is a square's lower border.
+pub(super) struct Axis {
+    start: f32,
+    end: f32,
+    way: f32,
+    per_way: f32,
+    /// Square now, its lower border, and how many squares are still to come.
+    pub(super) square: i32,
+    floor: f32,
+    pub(super) left: u32,
+    /// +1 or −1: where they lie.
+    toward: i32,
+    /// At which part of the way the next border is reached; infinite when the
+    /// way ends before.
+    pub(super) t: f32,
+}
+
+impl Axis {
+    /// From the first square to the last, from one place to another as seen from
+    /// the `origin` square.
+    #[inline]
+    pub(super) fn new(origin: i32, [first, last]: [i32; 2], [start, end]: [f32; 2]) -> Self {
+        let way = end - start;
+        let mut axis = Self {
+            start,
+            end,
+            way,
+            per_way: 1.0 / way,
+            square: first,
+            floor: first.wrapping_sub(origin) as f32,
+            left: first.abs_diff(last),
+            toward: if last < first { -1 } else { 1 },
+            t: f32::INFINITY,
+        };
+        axis.aim();
+        axis
+    }
+
+    /// Goes over the border ahead.
+    #[inline]
+    pub(super) fn crosses(&mut self) {
+        self.square = self.square.wrapping_add(self.toward);
+        self.floor += self.toward as f32;
+        self.left -= 1;
+        self.aim();
+    }
+
+    #[inline]
+    fn aim(&mut self) {
+        self.t = f32::INFINITY;
+        if self.left > 0 {
+            let t = (self.floor + self.ahead() - self.start) * self.per_way;
+            // A way that ends on its border may have nothing left: 0·∞.
+            self.t = if t <= 1.0 { at_least_0(t) } else { 1.0 };
+        }
+    }
+
+    /// Where in a square the border ahead is.
+    #[inline]
+    fn ahead(&self) -> f32 {
+        if self.toward > 0 { 1.0 } else { 0.0 }
+    }
+
+    /// Where in the square the way is after a part of it.
+    #[inline]
+    pub(super) fn at(&self, t: f32) -> f32 {
+        (self.start + self.way * t - self.floor).clamp(0.0, 1.0)
+    }
+
+    /// Where in the last square the way ends.
+    #[inline]
+    fn ends(&self) -> f32 {
+        (self.end - self.floor).clamp(0.0, 1.0)
+    }
+}
+
+/// Not `f32::max`, which is a call where the processor has no instruction for it.
+fn at_least_0(x: f32) -> f32 {
+    if x > 0.0 { x } else { 0.0 }
+}
