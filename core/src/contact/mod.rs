@@ -2,9 +2,9 @@
 //!
 //! [`Contact::step`] takes the haptic interface point of one tick and answers
 //! with the proxy (`proxy`, `swept`). Read [`patch`] first, then [`crossing`],
-//! `steps`, `reach` and `sweep` (from free space into contact), then [`closest`] and `descent`
-//! (in contact), [`presence`] (at the borders of the data), and `paper` for the
-//! rule as it was published.
+//! `steps`, `reach` and `sweep` (from free space into contact), then [`closest`]
+//! and `descent` (in contact), [`presence`] (at the borders of the data), and
+//! `paper` for the rule as it was published.
 
 pub mod closest;
 pub mod crossing;
