@@ -206,3 +206,26 @@ fn a_descent_out_of_work_shows_what_it_has_found() {
     ];
     run(terrain, &path, Pace::RealTime, Supply::Held).expect("holds");
 }
+
+/// The place at which the proxy left the surface was known to the last place of
+/// its height above the tile's base: 1.5·10⁻⁵ cell under the surface at 138 cells
+/// its way ended where it began, and the hand, 0.6 cell above, was pulled down.
+#[test]
+fn a_hand_that_leaves_high_ground_is_let_go() {
+    let height = |x: i32, y: i32| 140.0 - 0.797_21 * x as f32 - 1.051_4 * y as f32;
+    let count = 1.0 / f64::from(1 << 20);
+    let mut path = vec![[2.5, 2.5, 160.0]];
+    for (x, y) in (1..6).flat_map(|x| (1..6).map(move |y| (x, y))) {
+        let [east, north] = [x, y].map(f64::from);
+        let top = (f64::from(height(x, y)) / count).floor() * count;
+        for (to_east, to_north) in [(-370.0, -13_040.0), (13_040.0, 370.0)] {
+            path.push([east, north, top - count]);
+            let [x, y] = [east + to_east * count, north + to_north * count];
+            path.push([x, y, top + 0.609_375]);
+        }
+    }
+    let terrain = field([6, 6], height);
+    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
+    let wanted = [State::Touching, State::Free];
+    assert!(states[1..].chunks(2).all(|pair| pair == wanted));
+}

@@ -13,7 +13,7 @@ use super::track::Track;
 use super::work::Work;
 use super::{Felt, Pace, State};
 use crate::grid::GridPoint;
-use crate::terrain::{Ground, Window};
+use crate::terrain::{Altitude, Ground, Window};
 
 /// Times that a proxy may leave the surface for one hand: more is rounding,
 /// from a place to another and back.
@@ -233,9 +233,15 @@ impl Contact {
     fn point_on<const D: usize>(&self, window: &Window<'_, D>, spot: &Spot) -> GridPoint {
         match window.ground(spot.cell) {
             Ground::Patch(corners) => {
-                let height = Patch::new(corners.heights).height(spot.u, spot.v);
+                // Counted from a cell nearby: of a high place the fraction has no bits.
+                let patch = Patch::new(corners.heights);
+                let up = corners
+                    .base
+                    .saturating_add(patch.height(spot.u, spot.v) as i32);
+                let near = patch.seen_from(Altitude::new(up, 0.0), corners.base);
+                let height = near.height(spot.u, spot.v);
                 let [x, y] = spot.cell;
-                GridPoint::new([x, y, corners.base], Vec3::new(spot.u, spot.v, height))
+                GridPoint::new([x, y, up], Vec3::new(spot.u, spot.v, height))
             }
             // `descend` has just stood on it.
             Ground::Hole | Ground::Missing => self.last.proxy,
