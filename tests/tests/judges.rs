@@ -383,6 +383,13 @@ fn a_scene_that_feels_otherwise_mirrored_is_found() {
             [x, y, z + 1e-3]
         });
         only(Invariant::Symmetry, judge(&elsewhere));
+        // Held by a hair where the other is free.
+        let mut held = other.clone();
+        held[0] = touching(other[0].hip, {
+            let [x, y, z] = other[0].hip;
+            [x, y, z - 1e-5]
+        });
+        only(Invariant::Symmetry, judge(&held));
         let mut let_go = other;
         let_go[2] = free(let_go[2].hip);
         only(Invariant::Symmetry, judge(&let_go));

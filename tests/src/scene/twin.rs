@@ -8,7 +8,7 @@ use super::stage::{Buffers, SIDE, Supply};
 use super::symmetry::{self, Symmetry};
 use super::terrain::Kind;
 use crate::chance::Chance;
-use crate::invariants::seen::Seen;
+use crate::invariants::seen::{ERROR, Seen};
 use crate::invariants::surface::distance;
 use crate::invariants::{Invariant, Violation};
 
@@ -204,8 +204,13 @@ pub fn same_way(
 fn agree(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {
     let (da, db) = (distance(a.proxy, a.hip), distance(b.proxy, b.hip));
     let tie = (da - db).abs() <= 1e-5 * da.max(1.0);
-    let same = a.felt.state == b.felt.state && a.felt.settled == b.felt.settled;
-    same && (is_near(proxy, a, b) || tie)
+    // A hand in the surface may touch it or be free: nothing is felt either way.
+    let in_hand = |seen: &Seen| {
+        let may = matches!(seen.felt.state, State::Free | State::Touching);
+        may && seen.felt.stretch.length() <= ERROR as f32
+    };
+    let same = a.felt.state == b.felt.state || (in_hand(a) && in_hand(b));
+    same && a.felt.settled == b.felt.settled && (is_near(proxy, a, b) || tie)
 }
 
 fn is_near(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {
