@@ -53,12 +53,12 @@ impl EnabledAmplifiers for ReportedOn {
     }
 }
 
-/// A clock for lock-step: no tick takes any time.
+/// A clock for lock-step: no tick takes any time. So many ticks are a millisecond.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct StoppedClock;
+pub struct StoppedClock<const TICKS_A_MS: u32 = 1>;
 
-impl TickClock for StoppedClock {
-    const HZ: u32 = 1_000_000;
+impl<const TICKS_A_MS: u32> TickClock for StoppedClock<TICKS_A_MS> {
+    const HZ: u32 = 1_000_000 * TICKS_A_MS;
     const PERIOD: u32 = 1_000;
 
     fn now(&self) -> u32 {

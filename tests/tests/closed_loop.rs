@@ -17,7 +17,7 @@ use hapterra_firmware::native::StoppedClock;
 
 /// Runs a device until a tick; every sample it reported.
 fn run(terrain: &Terrain<'_>, scene: Scene, rig: Rig, ticks: u32) -> Vec<Sample> {
-    let device = Native::new(StoppedClock, Some(Box::new(rig.arming())));
+    let device: Native = Native::new(StoppedClock, Some(Box::new(rig.arming())));
     let device = Box::new(device);
     let (mut session, _) =
         Session::open_arming(terrain, scene, Arming::VIRTUAL, device, Patience::REAL_TIME)

@@ -86,7 +86,7 @@ fn telemetry_that_is_lost_is_counted() {
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
     let stage = Stage::set(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("stage");
     let rig = stage.rig().expect("rig");
-    let device = Native::new(StoppedClock, Some(Box::new(rig)));
+    let device: Native = Native::new(StoppedClock, Some(Box::new(rig)));
     let link = Faulty::new(device, Fault::Drop, 10, 3);
     let (scene, link) = (stage.scene(), Box::new(link));
     let (mut session, _) =
@@ -118,7 +118,8 @@ fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
     let stage = Stage::set(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("stage");
     let rig = stage.rig().expect("rig");
-    let device = Rc::new(RefCell::new(Native::new(StoppedClock, Some(Box::new(rig)))));
+    let device: Native = Native::new(StoppedClock, Some(Box::new(rig)));
+    let device = Rc::new(RefCell::new(device));
     let watch = |session: &mut Session<'_>, until: u32| {
         let mut last = Sample::default();
         while last.tick < until {

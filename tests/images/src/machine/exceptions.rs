@@ -1,0 +1,151 @@
+//! Exceptions by priority: into them, and back.
+
+use unicorn_engine::{Context, RegisterARM};
+
+use super::meddling::Load;
+use super::{Machine, Stop, THUMB};
+use crate::chip::Unreadable;
+
+/// Where an exception's return leads: no memory is there.
+pub(super) const EXC_RETURN: u64 = 0xFFFF_FFF8;
+/// Positions in the vector table.
+const NMI: u32 = 2;
+const HARD_FAULT: u32 = 3;
+const BUS_FAULT: u32 = 5;
+/// SHCSR and its bit that lets bus faults through; SHPR1 and where their priority
+/// is in it.
+const BUS_FAULTS_ON: (u32, u32) = (0xE000_ED24, 1 << 17);
+const BUS_FAULTS_PRIORITY: (u32, u32) = (0xE000_ED18, 8);
+/// Where an exception's frame has the place to go back to.
+const PC_IN_FRAME: u32 = 24;
+/// Priority of an execution that no interrupt can be below.
+const THREAD: i16 = 256;
+
+/// An exception under way.
+pub(super) struct Active {
+    pub(super) context: Context,
+    pub(super) vector: u32,
+    pub(super) priority: i16,
+}
+
+impl Machine {
+    /// Priority of what is being executed, masks included.
+    fn priority(&self) -> i16 {
+        let active = self.active.last().map_or(THREAD, |a| a.priority);
+        let base = self.register(RegisterARM::BASEPRI) as i16 & 0xF0;
+        let by_base = if base == 0 { THREAD } else { base };
+        let by_primask = if self.register(RegisterARM::PRIMASK) & 1 != 0 {
+            0
+        } else {
+            THREAD
+        };
+        active.min(by_base).min(by_primask)
+    }
+
+    pub(super) fn take_interrupt(&mut self) {
+        let current = self.priority();
+        let next = self.bus().nvic.deliverable(current);
+        if let Some((interrupt, priority)) = next {
+            self.bus().nvic.take(interrupt);
+            self.enter(interrupt as u32 + 16, priority.into());
+        }
+    }
+
+    /// Stacks what the architecture stacks (with room for the FPU's registers,
+    /// as with lazy stacking) and goes to the vector.
+    fn enter(&mut self, vector: u32, priority: i16) {
+        let context = self.core.context_init().expect("saved");
+        let registers = [
+            RegisterARM::R0,
+            RegisterARM::R1,
+            RegisterARM::R2,
+            RegisterARM::R3,
+            RegisterARM::R12,
+            RegisterARM::LR,
+            RegisterARM::PC,
+            RegisterARM::XPSR,
+        ];
+        let frame: Vec<u8> = registers
+            .iter()
+            .flat_map(|r| (self.register(*r) as u32).to_le_bytes())
+            .collect();
+        let stack = (self.register(RegisterARM::SP) - 26 * 4) & !7;
+        self.core
+            .mem_write(stack, &frame)
+            .expect("the stack is in a memory");
+        let table = {
+            let set = self.bus().read(0xE000_ED08);
+            if set == 0 {
+                self.chip.memories[0].0
+            } else {
+                set
+            }
+        };
+        let handler = self.word(table + 4 * vector);
+        self.active.push(Active {
+            context,
+            vector,
+            priority,
+        });
+        self.taken.push(vector);
+        self.set_register(RegisterARM::EPSR, THUMB);
+        self.set_register(RegisterARM::SP, stack);
+        self.set_register(RegisterARM::LR, EXC_RETURN | 1);
+        self.set_register(RegisterARM::PC, handler.into());
+    }
+
+    /// Back to where the exception's frame says, where the handler may have said
+    /// otherwise. BASEPRI and PRIMASK are no part of what is restored: a handler
+    /// that left one set is seen.
+    pub(super) fn leave(&mut self) {
+        let Some(active) = self.active.pop() else {
+            return;
+        };
+        let back = self.word(self.register(RegisterARM::SP) as u32 + PC_IN_FRAME);
+        let masks = [RegisterARM::BASEPRI, RegisterARM::PRIMASK];
+        let kept = masks.map(|mask| self.register(mask));
+        self.core
+            .context_restore(&active.context)
+            .expect("restored");
+        for (mask, value) in masks.into_iter().zip(kept) {
+            self.set_register(mask, value);
+        }
+        self.set_register(RegisterARM::PC, u64::from(back) | 1);
+    }
+
+    pub(super) fn fault(&mut self, why: &str) -> Option<Stop> {
+        if self.active.iter().any(|a| a.vector == HARD_FAULT) {
+            return Some(Stop::Lockup(format!("{why} at {}", self.place())));
+        }
+        self.hard_faults += 1;
+        self.enter(HARD_FAULT, -1);
+        None
+    }
+
+    /// What a load of a word that cannot be read leads to.
+    pub(super) fn stumble(&mut self, address: u32) -> Option<Stop> {
+        self.bus().tell_unreadable(address);
+        match self.chip.flash.unreadable {
+            Unreadable::Nmi { .. } => {
+                // The load is done first.
+                self.load.set(Load::Done);
+                let pc = self.register(RegisterARM::PC) | 1;
+                let done = self.core.emu_start(pc, EXC_RETURN, 0, 1);
+                done.expect("any bits are a word");
+                self.enter(NMI, -2);
+            }
+            Unreadable::BusFault { .. } => {
+                let (on, bit) = BUS_FAULTS_ON;
+                let (register, shift) = BUS_FAULTS_PRIORITY;
+                let priority = (self.bus().read(register) >> shift & 0xF0) as i16;
+                if self.bus().read(on) & bit == 0 || self.priority() <= priority {
+                    self.load.set(Load::None);
+                    return self.fault("bus fault");
+                }
+                self.enter(BUS_FAULT, priority);
+            }
+        }
+        self.load.set(Load::None);
+        None
+    }
+}

@@ -1,0 +1,246 @@
+//! The core: reset, exceptions by priority, sleep, time.
+
+mod exceptions;
+mod meddling;
+mod running;
+
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+
+use hapterra_tests::usb::{Answer, Handshake, MOMENTS_A_MS, Port};
+use unicorn_engine::{Arch, ArmCpuModel, Mode, Prot, RegisterARM, Unicorn};
+
+use crate::bus::{Bus, Effect};
+use crate::chip::Chip;
+use crate::elf::Image;
+use exceptions::Active;
+use meddling::{Load, Spoilt};
+use running::SLICE;
+
+/// The Thumb bit of the program status.
+const THUMB: u64 = 1 << 24;
+
+/// Why the machine stopped.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// The time is up.
+    Time,
+    /// The watchdog has reset the chip.
+    Watchdog,
+    /// A condition of the caller's.
+    Asked,
+    /// An exception with no way out: where.
+    Lockup(String),
+}
+
+/// A chip with an image in it.
+pub struct Machine {
+    /// The chip.
+    pub chip: &'static Chip,
+    /// What it runs.
+    pub image: Image,
+    core: Unicorn<'static, ()>,
+    bus: Rc<RefCell<Bus>>,
+    active: Vec<Active>,
+    spoilt: Vec<Spoilt>,
+    /// A load of a word that cannot be read.
+    load: Rc<Cell<Load>>,
+    /// Vectors taken since it was last cleared.
+    pub taken: Vec<u32>,
+    /// How often a hard fault was taken.
+    pub hard_faults: u32,
+    /// Instructions between two looks at time and interrupts.
+    pub slice: usize,
+    /// Every so manieth look that finds a critical section entered, or another
+    /// interrupt at work, raises the haptic interrupt out of turn.
+    pub provokes_every: Option<u32>,
+    /// Looks that found one.
+    pub found_busy: u32,
+    /// How often it was raised.
+    pub provoked: u32,
+    /// How often the haptic interrupt was pending and could not be taken
+    /// although no tick was under way.
+    pub delayed: u32,
+    /// Looks that found PRIMASK set although the haptic interrupt was let through.
+    pub masked: u32,
+}
+
+impl Machine {
+    /// A powered-up chip with `image` in its flash, the switches as they are
+    /// when nobody is near: emergency stop not pressed, dead-man not held.
+    #[must_use]
+    pub fn new(chip: &'static Chip, image: Image) -> Self {
+        let model = if chip.is_m7 {
+            ArmCpuModel::CORTEX_M7
+        } else {
+            ArmCpuModel::CORTEX_M4
+        };
+        let mut core = Unicorn::new(Arch::ARM, Mode::MCLASS | Mode::THUMB).expect("a core");
+        core.ctl_set_cpu_model(model as i32).expect("its model");
+        for (address, bytes) in chip.memories {
+            core.mem_map((*address).into(), (*bytes).into(), Prot::ALL)
+                .expect("memory");
+        }
+        let bus = Rc::new(RefCell::new(Bus::new(chip, false)));
+        for (address, bytes) in [(0x4000_0000, 0x2000_0000), (0xE000_0000, 0x10_0000)] {
+            map_peripherals(&mut core, &bus, address, bytes);
+        }
+        let mut machine = Self {
+            chip,
+            image,
+            core,
+            bus,
+            active: vec![],
+            spoilt: vec![],
+            load: Rc::default(),
+            taken: vec![],
+            hard_faults: 0,
+            slice: SLICE,
+            provokes_every: None,
+            found_busy: 0,
+            provoked: 0,
+            delayed: 0,
+            masked: 0,
+        };
+        machine.load();
+        machine.reset(false);
+        machine
+    }
+
+    fn load(&mut self) {
+        let (flash, bytes) = self.chip.memories[0];
+        let erased = vec![0xFF; bytes as usize];
+        self.core.mem_write(flash.into(), &erased).expect("flash");
+        for segment in &self.image.segments {
+            if !segment.bytes.is_empty() {
+                self.core
+                    .mem_write(segment.loaded.into(), &segment.bytes)
+                    .expect("in a memory");
+            }
+        }
+    }
+
+    /// Resets the chip. Memory keeps what it holds.
+    pub fn reset(&mut self, by_watchdog: bool) {
+        let inputs = self.chip;
+        *self.bus.borrow_mut() = Bus::new(self.chip, by_watchdog);
+        self.set_input(inputs.emergency_stop, false);
+        self.set_input(inputs.dead_man, true);
+        self.active.clear();
+        let flash = self.chip.memories[0].0;
+        let (stack, entry) = (self.word(flash), self.word(flash + 4));
+        for register in [
+            RegisterARM::PRIMASK,
+            RegisterARM::BASEPRI,
+            RegisterARM::FAULTMASK,
+        ] {
+            self.set_register(register, 0);
+        }
+        self.set_register(RegisterARM::FPEXC, 0x4000_0000);
+        self.set_register(RegisterARM::EPSR, THUMB);
+        self.set_register(RegisterARM::SP, stack.into());
+        self.set_register(RegisterARM::LR, 0xFFFF_FFFF);
+        self.set_register(RegisterARM::PC, entry.into());
+    }
+
+    /// The peripherals.
+    #[must_use]
+    pub fn bus(&self) -> std::cell::RefMut<'_, Bus> {
+        self.bus.borrow_mut()
+    }
+
+    /// Sets the level at an input pin.
+    pub fn set_input(&mut self, pin: (u32, u32), high: bool) {
+        self.bus().set_input(pin, high);
+    }
+
+    /// Whether the amplifiers are switched on.
+    #[must_use]
+    pub fn is_enabled(&self) -> bool {
+        self.bus().output(self.chip.enable)
+    }
+
+    /// What reached commands and enable pin since this was last asked.
+    #[must_use]
+    pub fn take_effects(&mut self) -> Vec<Effect> {
+        std::mem::take(&mut self.bus().effects)
+    }
+
+    /// A word of memory.
+    #[must_use]
+    pub fn word(&self, address: u32) -> u32 {
+        let mut bytes = [0; 4];
+        self.core
+            .mem_read(address.into(), &mut bytes)
+            .expect("in a memory");
+        u32::from_le_bytes(bytes)
+    }
+
+    /// Bytes of memory.
+    #[must_use]
+    pub fn bytes(&self, address: u32, count: usize) -> Vec<u8> {
+        self.core
+            .mem_read_as_vec(address.into(), count)
+            .expect("in a memory")
+    }
+
+    fn register(&self, register: RegisterARM) -> u64 {
+        self.core.reg_read(register).expect("a register")
+    }
+
+    fn set_register(&mut self, register: RegisterARM, value: u64) {
+        self.core.reg_write(register, value).expect("a register");
+    }
+}
+
+/// The chip at the end of a scripted host's cable.
+impl Port for Machine {
+    fn is_attached(&self) -> bool {
+        self.bus().usb.is_attached()
+    }
+
+    fn bus_reset(&mut self) {
+        self.bus().usb.bus_reset();
+    }
+
+    fn setup(&mut self, request: [u8; 8]) -> Handshake {
+        self.bus().usb.setup(request)
+    }
+
+    fn out(&mut self, endpoint: usize, packet: &[u8]) -> Handshake {
+        self.bus().usb.out(endpoint, packet)
+    }
+
+    fn take_in(&mut self, endpoint: usize) -> Answer {
+        self.bus().usb.take_in(endpoint)
+    }
+
+    fn wait(&mut self) -> Result<(), String> {
+        let until_ns = self.bus().now_ns + 1_000_000 / MOMENTS_A_MS;
+        match self.run_until(1, |m| m.bus().now_ns >= until_ns) {
+            Stop::Asked | Stop::Time => Ok(()),
+            stop => Err(format!("{stop:?}")),
+        }
+    }
+}
+
+fn map_peripherals(core: &mut Unicorn<'static, ()>, bus: &Rc<RefCell<Bus>>, base: u32, size: u64) {
+    let (on_read, on_write) = (Rc::clone(bus), Rc::clone(bus));
+    let read = move |_: &mut Unicorn<'_, ()>, offset: u64, bytes: usize| {
+        let address = base + offset as u32;
+        let word = on_read.borrow_mut().read(address & !3);
+        u64::from(word >> (8 * (address & 3)) & ones(bytes))
+    };
+    let write = move |_: &mut Unicorn<'_, ()>, offset: u64, bytes: usize, value: u64| {
+        let address = base + offset as u32;
+        let shift = 8 * (address & 3);
+        let mut bus = on_write.borrow_mut();
+        bus.write(address & !3, (value as u32) << shift, ones(bytes) << shift);
+    };
+    core.mmio_map(base.into(), size, Some(read), Some(write))
+        .expect("peripherals");
+}
+
+fn ones(bytes: usize) -> u32 {
+    u32::MAX >> (32 - 8 * bytes as u32)
+}

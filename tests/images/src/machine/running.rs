@@ -1,0 +1,159 @@
+//! Time: instructions and sleep between looks at interrupts.
+
+use unicorn_engine::RegisterARM;
+
+use super::exceptions::EXC_RETURN;
+use super::meddling::{Load, Spoilt};
+use super::{Machine, Stop};
+
+/// Instructions between two looks at time and interrupts, where nothing else is
+/// said. An instruction takes 8 ns: 1.36 cycles at 170 MHz.
+pub(super) const SLICE: usize = 200;
+/// Nanoseconds that an exception costs, whatever is done in it.
+const EXCEPTION_NS: u64 = 200;
+/// Nanoseconds between two looks while the core sleeps.
+const NAP_NS: u64 = 5_000;
+
+impl Machine {
+    /// Where the core is.
+    #[must_use]
+    pub fn place(&self) -> String {
+        let pc = self.register(RegisterARM::PC) as u32;
+        format!("{pc:#x} {}", self.image.at(pc))
+    }
+
+    /// Runs for so many milliseconds.
+    pub fn run_ms(&mut self, ms: u64) -> Stop {
+        self.run_until(ms, |_| false)
+    }
+
+    /// Runs until a condition holds, for at most so many milliseconds.
+    pub fn run_until(&mut self, ms: u64, mut is_met: impl FnMut(&mut Self) -> bool) -> Stop {
+        let end_ns = self.bus().now_ns + ms * 1_000_000;
+        loop {
+            if is_met(self) {
+                return Stop::Asked;
+            }
+            let (now_ns, bites) = {
+                let bus = self.bus();
+                (bus.now_ns, bus.watchdog.bites(bus.now_ns))
+            };
+            if bites {
+                return Stop::Watchdog;
+            }
+            if now_ns >= end_ns {
+                return Stop::Time;
+            }
+            if let Some(stop) = self.step() {
+                return stop;
+            }
+        }
+    }
+
+    /// Runs until so many more haptic ticks have begun and ended.
+    pub fn run_ticks(&mut self, ticks: usize) -> Stop {
+        let vector = self.chip.tick_interrupt as u32 + 16;
+        let mut left = ticks;
+        let mut was_in_tick = false;
+        self.run_until(2 * ticks as u64 + 5, move |machine| {
+            let in_tick = machine.active.iter().any(|a| a.vector == vector);
+            left -= usize::from(was_in_tick && !in_tick);
+            was_in_tick = in_tick;
+            left == 0
+        })
+    }
+
+    /// One slice of instructions, or one nap, between looks at interrupts.
+    fn step(&mut self) -> Option<Stop> {
+        self.bus().gather();
+        self.erase();
+        self.provoke();
+        self.take_interrupt();
+        self.watch_masks();
+        let pc = self.register(RegisterARM::PC) | 1;
+        let ended = self.core.emu_start(pc, EXC_RETURN, 0, self.slice);
+        if let Load::Of(address) = self.load.get() {
+            return self.stumble(address);
+        }
+        let pc = self.register(RegisterARM::PC);
+        if pc & !1 == EXC_RETURN {
+            self.leave();
+            self.bus().advance(EXCEPTION_NS);
+            return None;
+        }
+        match ended {
+            Ok(()) => self.bus().advance(8 * self.slice as u64),
+            Err(_) if self.is_waiting() => self.nap(),
+            Err(error) => return self.fault(&format!("{error:?}")),
+        }
+        None
+    }
+
+    /// What the flash was told to erase is gone at once, and the flash busy for
+    /// a while.
+    fn erase(&mut self) {
+        let sectors = std::mem::take(&mut self.bus().erased);
+        for (address, bytes) in sectors {
+            self.patch(address, &vec![0xFF; bytes as usize]);
+            let sector = address..address + bytes;
+            let erased = self.spoilt.extract_if(.., |s| sector.contains(&s.address));
+            for Spoilt { hook, .. } in erased {
+                self.core.remove_hook(hook).expect("it was there");
+            }
+        }
+    }
+
+    fn is_ticking(&self) -> bool {
+        let vector = self.chip.tick_interrupt as u32 + 16;
+        self.active.iter().any(|a| a.vector == vector)
+    }
+
+    fn provoke(&mut self) {
+        let busy = !self.active.is_empty() || self.register(RegisterARM::BASEPRI) != 0;
+        let let_through = self.bus().nvic.is_enabled(self.chip.tick_interrupt);
+        if !busy || !let_through || self.is_ticking() {
+            return;
+        }
+        self.found_busy += 1;
+        if self
+            .provokes_every
+            .is_some_and(|n| self.found_busy.is_multiple_of(n))
+        {
+            self.provoked += 1;
+            self.bus().nvic.pend(self.chip.tick_interrupt);
+        }
+    }
+
+    fn watch_masks(&mut self) {
+        let waits = self.bus().nvic.waits(self.chip.tick_interrupt);
+        self.delayed += u32::from(waits && !self.is_ticking());
+        let let_through = self.bus().nvic.is_enabled(self.chip.tick_interrupt);
+        let masked = self.register(RegisterARM::PRIMASK) & 1 != 0;
+        self.masked += u32::from(let_through && masked);
+    }
+
+    /// Whether the last instruction was a WFE or WFI.
+    fn is_waiting(&self) -> bool {
+        let pc = self.register(RegisterARM::PC) as u32 & !1;
+        let before = |back: u32| {
+            let bytes = self.core.mem_read_as_vec((pc - back).into(), 2);
+            bytes.map(|b| u16::from_le_bytes([b[0], b[1]]))
+        };
+        [0, 2]
+            .iter()
+            .any(|back| matches!(before(*back), Ok(0xBF20 | 0xBF30)))
+    }
+
+    /// Sleeps until an interrupt is pending, at most a moment.
+    fn nap(&mut self) {
+        let pc = self.register(RegisterARM::PC) as u32 & !1;
+        let here = self.word(pc & !3) >> (8 * (pc & 2)) & 0xFFFF;
+        if matches!(here, 0xBF20 | 0xBF30) {
+            self.set_register(RegisterARM::PC, u64::from(pc + 2) | 1);
+        }
+        let mut bus = self.bus();
+        bus.gather();
+        let woken = bus.nvic.has_pending();
+        bus.advance(if woken { EXCEPTION_NS } else { NAP_NS });
+    }
+}
