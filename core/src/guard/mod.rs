@@ -12,11 +12,13 @@
 mod arming;
 mod fault;
 mod flags;
+mod limit;
 mod mode;
 mod rate;
 mod speed;
 mod stillness;
 pub mod thermal;
+mod watch;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -28,10 +30,9 @@ pub use mode::Mode;
 pub use rate::TickRate;
 pub use stillness::TRAVEL as TRAVEL_WHILE_ONE_STANDS;
 
-use crate::force::clamp_length;
 use crate::phantom::{Mechanism, Pose};
 use arming::Arming;
-use speed::{Look, Speed};
+use speed::Speed;
 use stillness::Stillness;
 use thermal::Motors;
 
@@ -251,198 +252,6 @@ impl Guard {
     /// These counts follow from nothing before.
     pub fn restart_counts(&mut self) {
         self.counts = None;
-    }
-
-    /// Looks at everything before anything is driven. Returns whether the
-    /// encoders lost counts, so that the arm has to be zeroed again.
-    pub fn watch(&mut self, sense: &Sense, around: &Surroundings<'_>) -> bool {
-        self.limits = Limits::empty();
-        // Before the arm is zeroed its position means nothing, nor does a jump.
-        let jumped = around.zeroed && self.follow(sense.counts);
-        if jumped {
-            self.trip(Fault::EncoderJump);
-        }
-        if !around.zeroed || jumped {
-            self.counts = None;
-        }
-        if self.motors.is_too_hot() {
-            self.trip(Fault::MotorTooHot);
-        }
-        if self.mode().drives() {
-            self.watch_driven(sense, around);
-        }
-        if !self.mode().drives() {
-            self.watch_undriven(sense, around);
-        }
-        jumped
-    }
-
-    /// Whether an encoder moved farther than it can.
-    fn follow(&mut self, counts: [i32; 3]) -> bool {
-        let most = self.max_counts;
-        let jumped = self.counts.is_some_and(|last| {
-            let mut axes = last.iter().zip(counts);
-            axes.any(|(a, b)| a.abs_diff(b) > most)
-        });
-        self.counts = Some(counts);
-        jumped
-    }
-
-    fn watch_driven(&mut self, sense: &Sense, around: &Surroundings<'_>) {
-        if let Some(fault) = self.found(sense, around) {
-            return self.trip(fault);
-        }
-        if !sense.dead_man {
-            match self.mode() {
-                // The host let go first.
-                Mode::Fading => self.stop(),
-                _ => self.trip(Fault::DeadManReleased),
-            }
-        }
-    }
-
-    /// What must not be while the amplifiers are on.
-    fn found(&mut self, sense: &Sense, around: &Surroundings<'_>) -> Option<Fault> {
-        let Some((mechanism, pose)) = around.arm else {
-            return Some(Fault::CalibrationCorrupt);
-        };
-        if sense.emergency_stop {
-            return Some(Fault::EmergencyStop);
-        }
-        if sense.hardware_failed {
-            return Some(Fault::Hardware);
-        }
-        if !around.watchdog_live {
-            return Some(Fault::TaskStalled);
-        }
-        let limits = &mechanism.calibration().limits;
-        if !limits.each_allows(pose.angles(), LIMIT_MARGIN_RAD) {
-            return Some(Fault::JointLimit);
-        }
-        if !limits.linkage_allows(pose.angles(), LIMIT_MARGIN_RAD) {
-            return Some(Fault::Linkage);
-        }
-        match self.speed.look(sense.counts, mechanism, pose) {
-            Look::NotYet => None,
-            Look::TooFast => Some(Fault::TooFast),
-            Look::Moved(moved) => {
-                let bearable = self.motors.continuous_a();
-                let in_vain = self.stillness.look(moved, self.currents_a, bearable);
-                in_vain.then_some(Fault::NoMotion)
-            }
-        }
-    }
-
-    fn watch_undriven(&mut self, sense: &Sense, around: &Surroundings<'_>) {
-        self.motors.heat(Vec3::ZERO);
-        self.speed.restart(sense.counts);
-        let in_the_way = self.in_the_way(sense, around);
-        self.arming.wait(in_the_way, sense.dead_man);
-        self.blockers = in_the_way | self.arming.by_hand(sense.dead_man);
-    }
-
-    /// What keeps the arm from being armed, besides the user's hand.
-    fn in_the_way(&self, sense: &Sense, around: &Surroundings<'_>) -> Blockers {
-        let outside = around.arm.is_some_and(|(mechanism, pose)| {
-            let limits = &mechanism.calibration().limits;
-            !limits.allow(pose.angles(), LIMIT_MARGIN_RAD)
-        });
-        let bits = [
-            (around.arm.is_none(), Blockers::NO_CALIBRATION),
-            (!around.zeroed, Blockers::NOT_ZEROED),
-            (around.scene == SceneKind::None, Blockers::NO_SCENE),
-            (around.scene == SceneKind::Points, Blockers::REPLAY),
-            (self.fault.is_some(), Blockers::FAULT_LATCHED),
-            (sense.emergency_stop, Blockers::EMERGENCY_STOP),
-            (sense.hardware_failed, Blockers::HARDWARE),
-            (outside, Blockers::OUTSIDE_LIMITS),
-            (!around.watchdog_live, Blockers::WATCHDOG_NOT_LIVE),
-        ];
-        let set = bits.into_iter().filter(|(is, _)| *is);
-        set.fold(Blockers::empty(), |all, (_, bit)| all | bit)
-    }
-
-    /// The force that may be asked of the motors: no longer than the device
-    /// may make, less where the tip is too fast, coming in and going out
-    /// gently, slew-limited; zero unless the amplifiers are on.
-    #[must_use]
-    pub fn limit_force(&mut self, wanted_n: Vec3) -> Vec3 {
-        if !wanted_n.is_finite() {
-            self.trip(Fault::NotANumber);
-        }
-        match self.mode() {
-            Mode::Disarmed | Mode::Requested => return Vec3::ZERO,
-            Mode::Confirming => {
-                self.confirm(wanted_n);
-                return Vec3::ZERO;
-            }
-            Mode::Fading => {
-                self.limits |= Limits::FADING;
-                self.arming.drive();
-                self.force_n = self.held_n * self.arming.gain();
-            }
-            Mode::Ramping | Mode::Armed => self.follow_force(wanted_n),
-        }
-        self.force_n
-    }
-
-    fn confirm(&mut self, wanted_n: Vec3) {
-        let small = wanted_n.length_squared() <= SMALL_FORCE_N * SMALL_FORCE_N;
-        self.arming.confirm(small);
-        self.blockers.set(Blockers::FORCE_TOO_LARGE, !small);
-    }
-
-    fn follow_force(&mut self, wanted_n: Vec3) {
-        let mut aim = clamp_length(wanted_n, self.max_force_n);
-        if aim != wanted_n {
-            self.limits |= Limits::FORCE_CLAMPED;
-        }
-        if self.mode() == Mode::Ramping {
-            self.limits |= Limits::RAMPING;
-            self.arming.drive();
-            aim *= self.arming.gain();
-        }
-        let share = self.speed.share();
-        if share < 1.0 {
-            self.limits |= Limits::SPEED_LIMITED;
-            aim *= share;
-        }
-        let change = aim - self.force_n;
-        let step = clamp_length(change, self.max_slew_n);
-        if step != change {
-            self.limits |= Limits::SLEW_LIMITED;
-        }
-        self.force_n += step;
-    }
-
-    /// The currents that may reach the amplifiers for the next tick: all
-    /// scaled down together so that none exceeds what its motor may have now;
-    /// off unless the amplifiers may be on.
-    #[must_use]
-    pub fn limit_currents(&mut self, wanted_a: Vec3) -> Drive {
-        if !wanted_a.is_finite() {
-            self.trip(Fault::NotANumber);
-        }
-        if !self.mode().drives() {
-            return Drive::default();
-        }
-        let allowed_a = self.motors.allowed_a();
-        let load = wanted_a.abs();
-        self.currents_a = if load.cmple(allowed_a).all() {
-            wanted_a
-        } else {
-            self.limits |= match load.cmple(self.motors.peak_a()).all() {
-                true => Limits::THERMAL_DERATED,
-                false => Limits::CURRENT_LIMITED,
-            };
-            let excess = (load / allowed_a).max_element();
-            (wanted_a / excess).clamp(-allowed_a, allowed_a)
-        };
-        self.motors.heat(self.currents_a);
-        Drive {
-            currents_a: self.currents_a,
-            enabled: true,
-        }
     }
 }
 

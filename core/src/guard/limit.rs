@@ -1,0 +1,91 @@
+//! The bounds of force and currents.
+
+use glam::Vec3;
+
+use super::{Blockers, Drive, Fault, Guard, Limits, Mode, SMALL_FORCE_N};
+use crate::force::clamp_length;
+
+impl Guard {
+    /// The force that may be asked of the motors: no longer than the device
+    /// may make, less where the tip is too fast, coming in and going out
+    /// gently, slew-limited; zero unless the amplifiers are on.
+    #[must_use]
+    pub fn limit_force(&mut self, wanted_n: Vec3) -> Vec3 {
+        if !wanted_n.is_finite() {
+            self.trip(Fault::NotANumber);
+        }
+        match self.mode() {
+            Mode::Disarmed | Mode::Requested => return Vec3::ZERO,
+            Mode::Confirming => {
+                self.confirm(wanted_n);
+                return Vec3::ZERO;
+            }
+            Mode::Fading => {
+                self.limits |= Limits::FADING;
+                self.arming.drive();
+                self.force_n = self.held_n * self.arming.gain();
+            }
+            Mode::Ramping | Mode::Armed => self.follow_force(wanted_n),
+        }
+        self.force_n
+    }
+
+    fn confirm(&mut self, wanted_n: Vec3) {
+        let small = wanted_n.length_squared() <= SMALL_FORCE_N * SMALL_FORCE_N;
+        self.arming.confirm(small);
+        self.blockers.set(Blockers::FORCE_TOO_LARGE, !small);
+    }
+
+    fn follow_force(&mut self, wanted_n: Vec3) {
+        let mut aim = clamp_length(wanted_n, self.max_force_n);
+        if aim != wanted_n {
+            self.limits |= Limits::FORCE_CLAMPED;
+        }
+        if self.mode() == Mode::Ramping {
+            self.limits |= Limits::RAMPING;
+            self.arming.drive();
+            aim *= self.arming.gain();
+        }
+        let share = self.speed.share();
+        if share < 1.0 {
+            self.limits |= Limits::SPEED_LIMITED;
+            aim *= share;
+        }
+        let change = aim - self.force_n;
+        let step = clamp_length(change, self.max_slew_n);
+        if step != change {
+            self.limits |= Limits::SLEW_LIMITED;
+        }
+        self.force_n += step;
+    }
+
+    /// The currents that may reach the amplifiers for the next tick: all
+    /// scaled down together so that none exceeds what its motor may have now;
+    /// off unless the amplifiers may be on.
+    #[must_use]
+    pub fn limit_currents(&mut self, wanted_a: Vec3) -> Drive {
+        if !wanted_a.is_finite() {
+            self.trip(Fault::NotANumber);
+        }
+        if !self.mode().drives() {
+            return Drive::default();
+        }
+        let allowed_a = self.motors.allowed_a();
+        let load = wanted_a.abs();
+        self.currents_a = if load.cmple(allowed_a).all() {
+            wanted_a
+        } else {
+            self.limits |= match load.cmple(self.motors.peak_a()).all() {
+                true => Limits::THERMAL_DERATED,
+                false => Limits::CURRENT_LIMITED,
+            };
+            let excess = (load / allowed_a).max_element();
+            (wanted_a / excess).clamp(-allowed_a, allowed_a)
+        };
+        self.motors.heat(self.currents_a);
+        Drive {
+            currents_a: self.currents_a,
+            enabled: true,
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! What is looked at before anything is driven.
+
+use glam::Vec3;
+
+use super::speed::Look;
+use super::{
+    Blockers, Fault, Guard, LIMIT_MARGIN_RAD, Limits, Mode, SceneKind, Sense, Surroundings,
+};
+
+impl Guard {
+    /// Looks at everything before anything is driven. Returns whether the
+    /// encoders lost counts, so that the arm has to be zeroed again.
+    pub fn watch(&mut self, sense: &Sense, around: &Surroundings<'_>) -> bool {
+        self.limits = Limits::empty();
+        // Before the arm is zeroed its position means nothing, nor does a jump.
+        let jumped = around.zeroed && self.follow(sense.counts);
+        if jumped {
+            self.trip(Fault::EncoderJump);
+        }
+        if !around.zeroed || jumped {
+            self.counts = None;
+        }
+        if self.motors.is_too_hot() {
+            self.trip(Fault::MotorTooHot);
+        }
+        if self.mode().drives() {
+            self.watch_driven(sense, around);
+        }
+        if !self.mode().drives() {
+            self.watch_undriven(sense, around);
+        }
+        jumped
+    }
+
+    /// Whether an encoder moved farther than it can.
+    fn follow(&mut self, counts: [i32; 3]) -> bool {
+        let most = self.max_counts;
+        let jumped = self.counts.is_some_and(|last| {
+            let mut axes = last.iter().zip(counts);
+            axes.any(|(a, b)| a.abs_diff(b) > most)
+        });
+        self.counts = Some(counts);
+        jumped
+    }
+
+    fn watch_driven(&mut self, sense: &Sense, around: &Surroundings<'_>) {
+        if let Some(fault) = self.found(sense, around) {
+            return self.trip(fault);
+        }
+        if !sense.dead_man {
+            match self.mode() {
+                // The host let go first.
+                Mode::Fading => self.stop(),
+                _ => self.trip(Fault::DeadManReleased),
+            }
+        }
+    }
+
+    /// What must not be while the amplifiers are on.
+    fn found(&mut self, sense: &Sense, around: &Surroundings<'_>) -> Option<Fault> {
+        let Some((mechanism, pose)) = around.arm else {
+            return Some(Fault::CalibrationCorrupt);
+        };
+        if sense.emergency_stop {
+            return Some(Fault::EmergencyStop);
+        }
+        if sense.hardware_failed {
+            return Some(Fault::Hardware);
+        }
+        if !around.watchdog_live {
+            return Some(Fault::TaskStalled);
+        }
+        let limits = &mechanism.calibration().limits;
+        if !limits.each_allows(pose.angles(), LIMIT_MARGIN_RAD) {
+            return Some(Fault::JointLimit);
+        }
+        if !limits.linkage_allows(pose.angles(), LIMIT_MARGIN_RAD) {
+            return Some(Fault::Linkage);
+        }
+        match self.speed.look(sense.counts, mechanism, pose) {
+            Look::NotYet => None,
+            Look::TooFast => Some(Fault::TooFast),
+            Look::Moved(moved) => {
+                let bearable = self.motors.continuous_a();
+                let in_vain = self.stillness.look(moved, self.currents_a, bearable);
+                in_vain.then_some(Fault::NoMotion)
+            }
+        }
+    }
+
+    fn watch_undriven(&mut self, sense: &Sense, around: &Surroundings<'_>) {
+        self.motors.heat(Vec3::ZERO);
+        self.speed.restart(sense.counts);
+        let in_the_way = self.in_the_way(sense, around);
+        self.arming.wait(in_the_way, sense.dead_man);
+        self.blockers = in_the_way | self.arming.by_hand(sense.dead_man);
+    }
+
+    /// What keeps the arm from being armed, besides the user's hand.
+    fn in_the_way(&self, sense: &Sense, around: &Surroundings<'_>) -> Blockers {
+        let outside = around.arm.is_some_and(|(mechanism, pose)| {
+            let limits = &mechanism.calibration().limits;
+            !limits.allow(pose.angles(), LIMIT_MARGIN_RAD)
+        });
+        let bits = [
+            (around.arm.is_none(), Blockers::NO_CALIBRATION),
+            (!around.zeroed, Blockers::NOT_ZEROED),
+            (around.scene == SceneKind::None, Blockers::NO_SCENE),
+            (around.scene == SceneKind::Points, Blockers::REPLAY),
+            (self.fault.is_some(), Blockers::FAULT_LATCHED),
+            (sense.emergency_stop, Blockers::EMERGENCY_STOP),
+            (sense.hardware_failed, Blockers::HARDWARE),
+            (outside, Blockers::OUTSIDE_LIMITS),
+            (!around.watchdog_live, Blockers::WATCHDOG_NOT_LIVE),
+        ];
+        let set = bits.into_iter().filter(|(is, _)| *is);
+        set.fold(Blockers::empty(), |all, (_, bit)| all | bit)
+    }
+}
