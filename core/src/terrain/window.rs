@@ -153,7 +153,7 @@ impl<'t, const D: usize> Window<'t, D> {
     /// `low`.
     #[inline]
     pub(crate) fn block_is_clear(&self, [col, row]: [i32; 2], low: Altitude) -> bool {
-        self.is_outside(col, row, BLOCK_SHIFT) || self.node_is_below(BLOCK_SHIFT, col, row, low)
+        self.node_is_below(BLOCK_SHIFT, col, row, low) || self.is_outside(col, row, BLOCK_SHIFT)
     }
 
     fn box_is_clear(&self, span: Box2, low: Altitude) -> bool {
