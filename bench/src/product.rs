@@ -90,7 +90,7 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
     fn tick(&mut self, hand: &Hand) -> Answer {
         let felt = self
             .contact
-            .step(self.window, hand.grid, self.rule, Pace::RealTime);
+            .step(self.window, &hand.grid, self.rule, Pace::RealTime);
         Answer {
             touching: felt.state == State::Touching,
             settled: felt.settled,
@@ -104,7 +104,7 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
         let feel = |hand: &Hand| {
             let felt = self
                 .contact
-                .step(self.window, hand.grid, self.rule, Pace::RealTime);
+                .step(self.window, &hand.grid, self.rule, Pace::RealTime);
             let touching = felt.state == State::Touching;
             let stretch = if touching {
                 hand.grid.to(&felt.proxy)

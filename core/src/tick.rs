@@ -237,7 +237,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         if let Some(scene) = &self.scene {
             let hip = place(mechanism, scene, &pose);
             let contact = &mut self.contact;
-            let felt = contact.step(&self.window, hip, scene.rule, Pace::RealTime);
+            let felt = contact.step(&self.window, &hip, scene.rule, Pace::RealTime);
             wanted = scene.law.force_n(felt.stretch * scene.cell_mm);
             tell_felt(hip, felt, sample);
         } else {
@@ -266,7 +266,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             return self.tell(Vec3::ZERO, sample);
         };
         let contact = &mut self.contact;
-        let felt = contact.step(&self.window, point.hip, scene.rule, Pace::LockStep);
+        let felt = contact.step(&self.window, &point.hip, scene.rule, Pace::LockStep);
         let force_n = scene.law.force_n(felt.stretch * scene.cell_mm);
         tell_felt(point.hip, felt, sample);
         if felt.settled {

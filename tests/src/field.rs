@@ -59,7 +59,7 @@ impl Felted {
         for _ in 0..10_000 {
             let felt = *self
                 .contact
-                .step(&self.window, hip, self.rule, Pace::LockStep);
+                .step(&self.window, &hip, self.rule, Pace::LockStep);
             if felt.settled {
                 return felt;
             }

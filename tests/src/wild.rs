@@ -94,7 +94,7 @@ impl Walk {
                     spare = window.install(spare);
                 }
                 Event::Hand(hip) => {
-                    let answer = contact.step(&window, *hip, self.message.rule, Pace::RealTime);
+                    let answer = contact.step(&window, hip, self.message.rule, Pace::RealTime);
                     felt.push(Counted {
                         instructions: 0,
                         state: answer.state as u32,

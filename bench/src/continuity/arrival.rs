@@ -50,7 +50,7 @@ fn felt(due: u32) -> Vec<Answer> {
     let mut coming: Vec<TileKey> = Vec::new();
     let mut answers = Vec::new();
     for (tick, hand) in (0..).zip(&hands) {
-        let felt = *contact.step(&window, hand.grid, Rule::Swept, Pace::RealTime);
+        let felt = *contact.step(&window, &hand.grid, Rule::Swept, Pace::RealTime);
         answers.push(Answer {
             touching: felt.state == State::Touching,
             settled: felt.settled,

@@ -144,7 +144,7 @@ mod tests {
         let rate = TickRate::new(1_000 * khz).expect("in range");
         let mut contact = Contact::ticking(rate);
         let mut step = |hip: GridPoint| {
-            let felt = *contact.step(&field.window, hip, Rule::Swept, Pace::RealTime);
+            let felt = *contact.step(&field.window, &hip, Rule::Swept, Pace::RealTime);
             (felt.state, contact.presence())
         };
         let above = GridPoint::new([0; 3], Vec3::new(8.5, 10.5, 1.0));

@@ -119,16 +119,16 @@ impl Contact {
     pub fn step<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
-        hip: GridPoint,
+        hip: &GridPoint,
         rule: Rule,
         pace: Pace,
     ) -> &Felt {
-        if self.answered && self.hip.is_same(&hip) {
+        if self.answered && self.hip.is_same(hip) {
             self.last.work = 0;
-        } else if rule == Rule::Swept && self.goes_on(window, &hip, pace) {
-            self.hip = hip;
+        } else if rule == Rule::Swept && self.goes_on(window, hip, pace) {
+            self.hip = *hip;
         } else {
-            self.feel_anew(window, hip, rule, pace);
+            self.feel_anew(window, *hip, rule, pace);
         }
         &self.last
     }

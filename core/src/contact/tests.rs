@@ -74,10 +74,10 @@ fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]])
     let mut seen = [0; 4];
     for (tick, p) in path.iter().enumerate() {
         let hip = point(*p);
-        let mut felt = contact.step(&field.window, hip, Rule::Swept, Pace::LockStep);
+        let mut felt = contact.step(&field.window, &hip, Rule::Swept, Pace::LockStep);
         let mut turns = 0;
         while !felt.settled {
-            felt = contact.step(&field.window, hip, Rule::Swept, Pace::LockStep);
+            felt = contact.step(&field.window, &hip, Rule::Swept, Pace::LockStep);
             turns += 1;
             assert!(turns < 5000, "{name} {tick}: never settles {felt:?}");
         }
@@ -257,10 +257,10 @@ fn proxy_does_not_tunnel_through_a_wall() {
     let field = Field::<2>::held([SIZE, SIZE], two_walls);
     let (above, beyond) = (point([10.0, 30.2, 5.0]), point([40.0, 30.7, 5.0]));
     let mut swept = Contact::new();
-    swept.step(&field.window, above, Rule::Swept, Pace::LockStep);
-    let mut felt = *swept.step(&field.window, beyond, Rule::Swept, Pace::LockStep);
+    swept.step(&field.window, &above, Rule::Swept, Pace::LockStep);
+    let mut felt = *swept.step(&field.window, &beyond, Rule::Swept, Pace::LockStep);
     while !felt.settled {
-        felt = *swept.step(&field.window, beyond, Rule::Swept, Pace::LockStep);
+        felt = *swept.step(&field.window, &beyond, Rule::Swept, Pace::LockStep);
     }
     assert_eq!(felt.state, State::Touching);
     assert!(position(&felt.proxy)[0] < 20.0, "{felt:?}");
@@ -277,8 +277,8 @@ fn shifting_the_scene_changes_no_bit() {
         for p in wander(3, 1500, 0.2, 1.0, 1.5) {
             let hip = point(p);
             let moved = GridPoint::new(hip.cell().map(|c| c + shift), hip.frac());
-            let here = a.step(&near.window, hip, Rule::Swept, Pace::LockStep);
-            let there = b.step(&far.window, moved, Rule::Swept, Pace::LockStep);
+            let here = a.step(&near.window, &hip, Rule::Swept, Pace::LockStep);
+            let there = b.step(&far.window, &moved, Rule::Swept, Pace::LockStep);
             assert_eq!(
                 here.stretch.to_array().map(f32::to_bits),
                 there.stretch.to_array().map(f32::to_bits)

@@ -42,7 +42,7 @@ macro_rules! compiled {
                 hip: GridPoint,
                 rule: Rule,
             ) -> &'c Felt {
-                contact.step(self, hip, rule, Pace::RealTime)
+                contact.step(self, &hip, rule, Pace::RealTime)
             }
         }
     )*};

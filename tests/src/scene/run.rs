@@ -219,7 +219,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
         for _ in 0..PATIENCE {
             let felt = *self
                 .contact
-                .step(&self.stage.window, hip, self.rule, self.pace);
+                .step(&self.stage.window, &hip, self.rule, self.pace);
             self.stage.supply(self.now, &self.contact, &felt, &hip);
             self.now += 1;
             if felt.settled || self.pace == Pace::RealTime {
