@@ -229,3 +229,18 @@ fn a_hand_that_leaves_high_ground_is_let_go() {
     let wanted = [State::Touching, State::Free];
     assert!(states[1..].chunks(2).all(|pair| pair == wanted));
 }
+
+/// A piece of the way ended exactly on the border of the data, far below it: what
+/// had come in from outside was taken for ground that was crossed from above.
+#[test]
+fn a_way_in_over_the_border_is_no_crossing_wherever_its_pieces_end() {
+    let terrain = field([128, 64], |_, _| 2.0);
+    let path = [
+        [119.25, 1.5, 4.0],
+        [119.25, -1.0, 4.0],
+        [119.25, -1.0, 0.375],
+        [3.0, 3.0, -1_000_000.0],
+    ];
+    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
+    assert_eq!(states[1..], [State::Free, State::Free, State::Waiting]);
+}

@@ -114,7 +114,7 @@ impl Path {
                     self.goes_on(window, end, clear, work);
                     continue;
                 }
-                self.passes(window, end);
+                self.passes(window, self.at, end);
             }
             self.at = end;
             self.ends.pop();
@@ -148,13 +148,19 @@ impl Path {
             }
         }
         if self.at != from {
-            self.passes(window, self.at);
+            self.passes(window, from, self.at);
         }
     }
 
-    /// The way is clear up to a place.
-    fn passes<const D: usize>(&mut self, window: &Window<'_, D>, place: GridPoint) {
-        self.over_hole = window.ground(place.column()) == Ground::Hole;
+    /// The way is clear from one place to another.
+    fn passes<const D: usize>(&mut self, window: &Window<'_, D>, from: GridPoint, to: GridPoint) {
+        // On a border, what was passed is the cell before it.
+        let way = from.to(&to);
+        let column = [0, 1].map(|axis| {
+            let enters = to.frac()[axis] == 0.0 && way[axis] > 0.0;
+            to.cell()[axis] - i32::from(enters)
+        });
+        self.over_hole = window.ground(column) == Ground::Hole;
         self.on_surface = false;
     }
 
