@@ -127,3 +127,14 @@ fn the_boards_pages_say_what_the_tiles_take() {
         assert!(page.contains(&said), "{board}: {said}");
     }
 }
+
+#[test]
+fn no_image_holds_where_it_was_built() {
+    for machine in machines() {
+        for segment in &machine.image.segments {
+            let text = String::from_utf8_lossy(&segment.bytes);
+            let way = text.find("/registry/src/");
+            assert_eq!(way, None, "{}", machine.chip.board);
+        }
+    }
+}
