@@ -244,3 +244,16 @@ fn a_way_in_over_the_border_is_no_crossing_wherever_its_pieces_end() {
     let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
     assert_eq!(states[1..], [State::Free, State::Free, State::Waiting]);
 }
+
+/// A hand beside the field goes deep under it, in over its very corner. The look
+/// along that way ended where the field begins, and the way that went on from there
+/// had come from nowhere: it touched from below.
+#[test]
+fn a_way_in_over_the_corner_of_the_field_touches_nothing() {
+    for depth in [50.0, 1e4, 1e8] {
+        let terrain = field([4, 4], |_, _| 0.0);
+        let path = [[1.5, 1.5, 3.0], [-1.0, -1.0, 3.0], [3.0, 3.0, -depth]];
+        let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
+        assert_eq!(states.last(), Some(&State::Waiting), "{depth} cells deep");
+    }
+}

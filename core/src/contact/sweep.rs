@@ -25,6 +25,8 @@ const WALK_CELLS: u32 = 4;
 const WALK_HEIGHT: u32 = 16;
 /// Longest piece, in cells along an axis, that is looked along at once.
 const REACH: u32 = 64;
+/// What the end of a look along a piece may be off, of the piece.
+const ROUNDING: f32 = 4e-6;
 /// Halvings that bring the longest possible segment down to a walk, and one.
 const DEPTH: usize = 30;
 
@@ -130,7 +132,9 @@ impl Path {
         clear: f32,
         work: &mut Work,
     ) {
-        let (from, mut end, mut clear) = (self.at, end, clear);
+        // Not onto the border of the cell in the way: one entered from the side would
+        // then be entered from nowhere.
+        let (from, mut end, mut clear) = (self.at, end, clear - ROUNDING);
         // Once at least, or the next tick would begin as this one.
         loop {
             let middle = self.at.midpoint(&end);
