@@ -257,3 +257,19 @@ fn a_way_in_over_the_corner_of_the_field_touches_nothing() {
         assert_eq!(states.last(), Some(&State::Waiting), "{depth} cells deep");
     }
 }
+
+/// A proxy that could not leave the foot of a spike by rounding was not let go
+/// later either: at rest on level ground it pulled down the hand above it.
+#[test]
+fn a_hand_straight_above_its_proxy_is_let_go() {
+    let mut buffers = Buffers::default();
+    for number in [9, 99, 186] {
+        let scene = Scene::random(91, number);
+        let seen = scene.feel(&mut buffers, [0; 3], scene.supply, |_| Ok(()));
+        for seen in seen.expect("it settles") {
+            let [x, y, z] = [0, 1, 2].map(|axis| seen.hip[axis] - seen.proxy[axis]);
+            let touching = seen.felt.state == State::Touching && seen.felt.settled;
+            assert!(!(touching && x == 0.0 && y == 0.0 && z > 1e-3), "{seen:?}");
+        }
+    }
+}

@@ -156,6 +156,16 @@ impl Contact {
         let mut held_up_by = None;
         let mut settled = true;
         let (spot, z, entry) = match descend(window, &hand, spot, may_leave, work) {
+            // It could not leave where it began, and has come away from there.
+            Descent::Rests { at, z, .. }
+                if !may_leave && z < 0.0 && at != spot && self.leaps < LEAPS =>
+            {
+                self.phase = Phase::Touching {
+                    spot: at,
+                    may_leave: true,
+                };
+                return None;
+            }
             Descent::Rests { at, z, entry } => (at, z, entry),
             Descent::Leaves(spot) => {
                 self.leaps += 1;
