@@ -15,8 +15,8 @@ const SIDE: f32 = (1 << BLOCK_SHIFT) as f32;
 /// Looks along the way from `at` to `end`, a few hundred cells long at most.
 ///
 /// # Errors
-/// The part of the way that is surely clear, where the look ends before: too near
-/// to the ground to tell, a tile missing, or no work left.
+/// The part of the way that is surely clear (none, if below 0), where the look
+/// ends before: too near to the ground to tell, a tile missing, or no work left.
 pub(super) fn look_along<const D: usize>(
     window: &Window<'_, D>,
     at: &GridPoint,
@@ -46,7 +46,8 @@ pub(super) fn look_along<const D: usize>(
             let [u, v] = [&east, &north].map(|axis| cells(axis, [from, to]));
             let mut steps = Steps::along(u, v, heights);
             if !all_clear(window, &view, &mut steps, noise, work) {
-                return Err(from + (to - from) * steps.passed());
+                let part = from + (to - from) * steps.passed();
+                return Err(part - rounding(at, end));
             }
         }
         if is_last {
@@ -59,7 +60,27 @@ pub(super) fn look_along<const D: usize>(
             north.crosses();
         }
     }
-    Err(from)
+    Err(from - rounding(at, end))
+}
+
+/// What the part of a way may be off at which it crosses a border between cells.
+///
+/// A way that goes on beyond a border, and was thought to be before it, would come
+/// into the ground beyond from nowhere and not from the side.
+fn rounding(at: &GridPoint, end: &GridPoint) -> f32 {
+    let way = at.to(end);
+    let [_, longest] = extremes(&[way.x, way.y, 0.0, 0.0]);
+    // Of a place: the block's sides cost three bits, and so does the way's length.
+    let off = 1e-6 + 4e-7 * longest;
+    let crosses = |axis: usize| at.cell()[axis] != end.cell()[axis];
+    let part = |axis: usize| {
+        if crosses(axis) {
+            off / way[axis].abs()
+        } else {
+            0.0
+        }
+    };
+    1e-6 + part(0) + part(1)
 }
 
 /// The blocks under a way along an axis. Their sides cost three bits of the

@@ -25,8 +25,6 @@ const WALK_CELLS: u32 = 4;
 const WALK_HEIGHT: u32 = 16;
 /// Longest piece, in cells along an axis, that is looked along at once.
 const REACH: u32 = 64;
-/// What the end of a look along a piece may be off, of the piece.
-const ROUNDING: f32 = 4e-6;
 /// Halvings that bring the longest possible segment down to a walk, and one.
 const DEPTH: usize = 30;
 
@@ -132,9 +130,7 @@ impl Path {
         clear: f32,
         work: &mut Work,
     ) {
-        // Not onto the border of the cell in the way: one entered from the side would
-        // then be entered from nowhere.
-        let (from, mut end, mut clear) = (self.at, end, clear - ROUNDING);
+        let (from, mut end, mut clear) = (self.at, end, clear);
         // Once at least, or the next tick would begin as this one.
         loop {
             let middle = self.at.midpoint(&end);

@@ -3,7 +3,7 @@
 use std::vec::Vec;
 
 use super::dice::Dice;
-use super::sweep::Sweep;
+use super::sweep::{Path, Sweep};
 use super::work::Work;
 use super::*;
 use crate::terrain::testing::Field;
@@ -366,5 +366,27 @@ fn holds_when_the_hand_jumps() {
         check("holes", holes, 2.0, &teleport(seed, 300, 1.0, 2.0));
         check("noise", noise_100, 200.0, &teleport(seed, 300, 0.0, 100.0));
         check("spikes", spikes, 1e4, &teleport(seed, 300, 0.0, 3.0));
+    }
+}
+
+/// Where a way hardly moves sideways, the look along it knows poorly at which part of
+/// it the field begins; going on from beyond that, it would come from nowhere.
+#[test]
+fn steep_ways_in_over_the_border_cross_nothing() {
+    let mut field = Field::<8>::new([72, 72], |_, _| 0.0);
+    field.hold_around([36, 36]);
+    let mut dice = Dice(1);
+    for way in 0..4000 {
+        let beside = [dice.between(0.0, 72.0), dice.between(-1.0, 0.0), 0.2].map(|x| x as f32);
+        let from = GridPoint::new([0; 3], Vec3::from(beside));
+        let to = GridPoint::new([3, 3, -100_000_000], Vec3::ZERO);
+        let mut path = Path::through_air(from, to);
+        let ended = loop {
+            match path.advance(&field.window, &mut Work::new()) {
+                Sweep::Unfinished => {}
+                ended => break ended,
+            }
+        };
+        assert!(matches!(ended, Sweep::Under), "{way}, {from:?}: {ended:?}");
     }
 }
