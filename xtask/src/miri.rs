@@ -8,13 +8,15 @@ use crate::run::{output, root, run, say, target_dir, timed};
 
 /// Parts of the names of tests that sweep over so much that Miri would take
 /// hours, or arm a device for thousands of ticks.
-const LONG: [&str; 24] = [
+const LONG: [&str; 26] = [
     "within_two_millionths",
     "warm_started_it",
     "a_saddle_is_no_answer",
     "contact::tests::holds",
     "the_first_crossing_is_found",
     "steep_ways_in",
+    "the_quick_ways_carry",
+    "the_rough_look",
     "agrees_with_a_dense_search",
     "shifting_the_scene",
     "ends_where_the_general",
