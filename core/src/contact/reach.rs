@@ -1,5 +1,7 @@
 //! How far along a way nothing is near: a look ahead, block by block.
 
+use glam::Vec3;
+
 use super::spot::Hand;
 use super::steps::{Axis, Step, Steps};
 use super::work::{BLOCK, CELL, ENTER, HEIGHT, Work};
@@ -47,7 +49,7 @@ pub(super) fn look_along<const D: usize>(
             let mut steps = Steps::along(u, v, heights);
             if !all_clear(window, &view, &mut steps, noise, work) {
                 let part = from + (to - from) * steps.passed();
-                return Err(part - rounding(at, end));
+                return Err(part - rounding(at, end, way));
             }
         }
         if is_last {
@@ -60,15 +62,14 @@ pub(super) fn look_along<const D: usize>(
             north.crosses();
         }
     }
-    Err(from - rounding(at, end))
+    Err(from - rounding(at, end, way))
 }
 
 /// What the part of a way may be off at which it crosses a border between cells.
 ///
 /// A way that goes on beyond a border, and was thought to be before it, would come
 /// into the ground beyond from nowhere and not from the side.
-fn rounding(at: &GridPoint, end: &GridPoint) -> f32 {
-    let way = at.to(end);
+fn rounding(at: &GridPoint, end: &GridPoint, way: Vec3) -> f32 {
     let [_, longest] = extremes(&[way.x, way.y, 0.0, 0.0]);
     // Of a place: the block's sides cost three bits, and so does the way's length.
     let off = 1e-6 + 4e-7 * longest;
