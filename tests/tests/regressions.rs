@@ -273,3 +273,49 @@ fn a_hand_straight_above_its_proxy_is_let_go() {
         }
     }
 }
+
+/// Of a hand millions of cells off a place was near to both of its patch's
+/// borders at once, and that was taken for neither: no neighbour was asked.
+#[test]
+fn a_hand_millions_of_cells_away_is_followed_over_every_edge() {
+    let ridge = |x: i32| if x == 20 { 3.0 } else { 0.0 };
+    for far in [1e4, 1e6, 1e8] {
+        let path = [[18.5, 10.5, 4.0], [18.5, 10.5, -0.5], [far, 10.5, 2.5]];
+        let states = run(
+            field([40, 40], move |x, _| ridge(x)),
+            &path,
+            Pace::LockStep,
+            Supply::Held,
+        );
+        let states = states.expect("holds");
+        assert_eq!(states[1..], [State::Touching, State::Free], "{far}");
+    }
+}
+
+/// A way that met a saddle of the checkerboard again and again, each time nearer
+/// to the hand, counted as one from a place to another and back, and the proxy
+/// stayed half-way up the last of them.
+#[test]
+fn a_proxy_leaves_as_often_as_that_leads_nearer() {
+    let terrain = field([1500, 40], |x, y| ((x + y) & 1) as f32);
+    let path = [[92.25, 8.0, 3.0], [92.5, 8.0, 0.5], [796.0, 36.0, 1.0]];
+    let supply = Supply::Pulled { latency: 0 };
+    let states = run(terrain, &path, Pace::LockStep, supply).expect("holds");
+    assert_eq!(states[1..], [State::Touching, State::Free]);
+}
+
+/// Up a wall of 10⁶ a proxy knows its height above the hand to 10⁻¹, and that was
+/// what told whether the hand was free.
+#[test]
+fn a_proxy_up_a_wall_lets_a_hand_go_that_is_beside_it() {
+    let terrain = field([8, 40], |x, y| if (x, y) == (4, 20) { 1e6 } else { 0.0 });
+    let grain = 1.0 / f64::from(1 << 20);
+    let path = [
+        [2.25, 20.0, 3.0],
+        [5.75, 20.0, -grain],
+        [6.0, 20.0, -grain],
+        [6.25, 20.0, 250_000.0 - grain],
+    ];
+    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
+    assert_eq!(states[1..], [State::Touching, State::Touching, State::Free]);
+}

@@ -8,6 +8,9 @@ use super::spot::{Hand, Spot, tile_of};
 use super::work::Work;
 use crate::terrain::{Ground, Window};
 
+/// Rounding of a height, of those it is mixed from, and some more.
+const UNSURE: f32 = 1e-5;
+
 /// How a descent ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Descent {
@@ -32,6 +35,26 @@ pub(super) enum Descent {
     Lost(Option<[i32; 2]>),
 }
 
+/// Where a proxy may leave the surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Leave {
+    Anywhere,
+    /// Not here: it has just tried to, and was held at once.
+    ButAt(Spot),
+    /// It has left too often.
+    Nowhere,
+}
+
+impl Leave {
+    fn is_allowed_at(&self, spot: &Spot) -> bool {
+        match self {
+            Self::Anywhere => true,
+            Self::ButAt(place) => !spot.is_same_place(place),
+            Self::Nowhere => false,
+        }
+    }
+}
+
 /// Moves the proxy from `spot` until it rests, leaves, or may not go on.
 ///
 /// Each step of the loop depends on nothing but the spot and the hand, so a
@@ -40,7 +63,7 @@ pub(super) fn descend<const D: usize>(
     window: &Window<'_, D>,
     hand: &Hand,
     mut spot: Spot,
-    may_leave: bool,
+    leave: Leave,
     work: &mut Work,
 ) -> Descent {
     // The search in a patch is done when the way into it is found.
@@ -51,7 +74,7 @@ pub(super) fn descend<const D: usize>(
             Ground::Hole => return Descent::Lost(None),
             Ground::Missing => return Descent::Lost(Some(tile_of(spot.cell))),
         };
-        if may_leave && leaves(window, hand, &spot, &patch) {
+        if leave.is_allowed_at(&spot) && leaves(window, hand, &spot, &patch) {
             return Descent::Leaves(spot);
         }
         let entry = spot;
@@ -84,7 +107,13 @@ pub(super) fn descend<const D: usize>(
                     entry,
                 };
             }
-            Way::None if may_leave && here.z < 0.0 => return Descent::Leaves(spot),
+            Way::None
+                if leave.is_allowed_at(&spot)
+                    && is_hardly_above(&patch, here.z)
+                    && (here.z < 0.0 || leaves(window, hand, &spot, &patch)) =>
+            {
+                return Descent::Leaves(spot);
+            }
             Way::None => {
                 return Descent::Rests {
                     at: spot,
@@ -94,6 +123,13 @@ pub(super) fn descend<const D: usize>(
             }
         }
     }
+}
+
+/// Whether a proxy that rests `z` cells above the hand may in truth be below it,
+/// and would pull: up a wall it is rounding that tells.
+fn is_hardly_above(patch: &Patch, z: f32) -> bool {
+    let [sw, se, nw, ne] = patch.corners.map(f32::abs);
+    z <= UNSURE * ((sw + se) + (nw + ne))
 }
 
 /// Whether the straight way from `spot` to the hand starts above the surface:

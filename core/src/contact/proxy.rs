@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::descent::Leave;
 use super::paper::{self, Verdict};
 use super::spot::{Hand, Spot, tile_of};
 use super::sweep::Path;
@@ -23,7 +24,7 @@ pub(super) enum Phase {
     /// On a way through the air that is not at its end.
     Sweeping(Path),
     /// On the surface.
-    Touching { spot: Spot, may_leave: bool },
+    Touching { spot: Spot, leave: Leave },
     /// On the surface, where the last tick came to rest, with nothing left to
     /// do and no fading, on a patch that the proxy can be followed over.
     Following(Track),
@@ -50,8 +51,9 @@ pub struct Contact {
     /// Where the proxy is, when the descent of this same hand goes on from
     /// somewhere else: a hand that has moved finds it there.
     pub(super) ahead: Option<Spot>,
-    /// How often the proxy has left the surface for this same hand.
-    pub(super) leaps: u32,
+    /// The nearest place from which the proxy has left the surface for this same
+    /// hand, and how often it has left since from no nearer.
+    pub(super) left: Option<(GridPoint, u32)>,
     /// By the paper's rule: cells on the way to `sought` that were found to be no
     /// candidates before a tile was missing.
     passed: usize,
@@ -88,7 +90,7 @@ impl Contact {
             late: false,
             reached: None,
             ahead: None,
-            leaps: 0,
+            left: None,
             passed: 0,
             sought: GridPoint::default(),
             last: Felt::default(),
@@ -149,7 +151,7 @@ impl Contact {
         if let Phase::Following(track) = &self.phase {
             self.phase = Phase::Touching {
                 spot: track.spot,
-                may_leave: true,
+                leave: Leave::Anywhere,
             };
         }
         let felt = match rule {
@@ -327,7 +329,7 @@ impl Contact {
                 }
                 self.phase = Phase::Touching {
                     spot,
-                    may_leave: true,
+                    leave: Leave::Anywhere,
                 };
                 self.touches(window, hip, (spot, z), settled, None, pace)
             }

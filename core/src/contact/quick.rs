@@ -105,7 +105,7 @@ impl Contact {
             Err(tile) if pace == Pace::LockStep => {
                 // For the general case this hand, when it comes again, is not new,
                 // and what was felt before it is the last slide.
-                (self.reached, self.leaps) = (None, 0);
+                (self.reached, self.left) = (None, None);
                 self.before = self.last;
                 self.last.held_up_by = Some(tile);
                 self.last.settled = false;

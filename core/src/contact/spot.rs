@@ -30,6 +30,15 @@ impl Spot {
         }
     }
 
+    /// Whether it is the very place that `other` is, also as another patch sees it.
+    pub(super) fn is_same_place(&self, other: &Self) -> bool {
+        let place = |spot: &Self| {
+            let [x, y] = spot.cell;
+            GridPoint::new([x, y, 0], Vec3::new(spot.u, spot.v, 0.0))
+        };
+        place(self) == place(other)
+    }
+
     /// Another place of the same patch.
     pub(super) const fn moved_to(&self, place: &Nearest) -> Self {
         Self {
@@ -42,7 +51,14 @@ impl Spot {
     /// As [`Self::border`], for a point that may be as far off as that,
     /// eastward and northward.
     pub(super) fn border_within(&self, [u, v]: [f32; 2]) -> [i32; 2] {
-        let near = |x: f32, by: f32| i32::from(x >= 1.0 - by) - i32::from(x <= by);
+        // The nearer one, where so much would be near to both.
+        let near = |x: f32, by: f32| {
+            if x > 0.5 {
+                i32::from(x >= 1.0 - by)
+            } else {
+                -i32::from(x <= by)
+            }
+        };
         [near(self.u, u), near(self.v, v)]
     }
 

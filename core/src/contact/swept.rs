@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::closest::RESOLUTION;
-use super::descent::{Descent, descend};
+use super::descent::{Descent, Leave, descend};
 use super::patch::Patch;
 use super::presence::is_far;
 use super::proxy::{Contact, Phase};
@@ -15,9 +15,9 @@ use super::{Felt, Pace, State};
 use crate::grid::GridPoint;
 use crate::terrain::{Altitude, Ground, Window};
 
-/// Times that a proxy may leave the surface for one hand: more is rounding,
-/// from a place to another and back.
-const LEAPS: u32 = 256;
+/// Times in a row that a proxy may leave the surface for one hand from where it
+/// is no nearer to it: more is rounding, from a place to another and back.
+const LEAPS: u32 = 32;
 /// Ticks in a row that get a descent no nearer until it is taken to be at its
 /// end: at the foot of a wall of 10⁶ a place knows its distance only to 10⁻².
 const IDLE: u32 = 4;
@@ -33,7 +33,7 @@ impl Contact {
         work: &mut Work,
     ) -> Felt {
         if moved {
-            (self.reached, self.leaps) = (None, 0);
+            (self.reached, self.left) = (None, None);
             self.redirect(hip);
         }
         if matches!(self.phase, Phase::LettingGo { .. }) {
@@ -63,8 +63,8 @@ impl Contact {
         let ahead = self.ahead.take();
         match &mut self.phase {
             Phase::Sweeping(path) => *path = Path::through_air(path.at(), hip),
-            Phase::Touching { spot, may_leave } => {
-                (*spot, *may_leave) = (ahead.unwrap_or(*spot), true);
+            Phase::Touching { spot, leave } => {
+                (*spot, *leave) = (ahead.unwrap_or(*spot), Leave::Anywhere);
             }
             _ => {}
         }
@@ -125,7 +125,7 @@ impl Contact {
                 }
                 self.phase = Phase::Touching {
                     spot,
-                    may_leave: progress && self.leaps < LEAPS,
+                    leave: self.may_leave(spot, progress),
                 };
                 return None;
             }
@@ -141,6 +141,17 @@ impl Contact {
         })
     }
 
+    /// Where a proxy that has hit the surface, at any distance from where its way
+    /// began or not, may leave it again.
+    fn may_leave(&self, hit: Spot, progress: bool) -> Leave {
+        let leaps = self.left.map_or(0, |(_, times)| times);
+        match (leaps < LEAPS, progress) {
+            (false, _) => Leave::Nowhere,
+            (true, false) => Leave::ButAt(hit),
+            (true, true) => Leave::Anywhere,
+        }
+    }
+
     fn touch<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -148,28 +159,18 @@ impl Contact {
         pace: Pace,
         work: &mut Work,
     ) -> Option<Felt> {
-        let Phase::Touching { spot, may_leave } = self.phase else {
+        let Phase::Touching { spot, leave } = self.phase else {
             return None;
         };
         self.ahead = None;
         let hand = Hand::new(hip);
         let mut held_up_by = None;
         let mut settled = true;
-        let (spot, z, entry) = match descend(window, &hand, spot, may_leave, work) {
-            // It could not leave where it began, and has come away from there.
-            Descent::Rests { at, z, .. }
-                if !may_leave && z < 0.0 && at != spot && self.leaps < LEAPS =>
-            {
-                self.phase = Phase::Touching {
-                    spot: at,
-                    may_leave: true,
-                };
-                return None;
-            }
+        let (spot, z, entry) = match descend(window, &hand, spot, leave, work) {
             Descent::Rests { at, z, entry } => (at, z, entry),
             Descent::Leaves(spot) => {
-                self.leaps += 1;
                 let from = self.point_on(window, &spot);
+                gets_no_nearer(&mut self.left, from, &hip);
                 self.phase = Phase::Sweeping(Path::off_surface(from, hip));
                 return None;
             }
@@ -185,39 +186,24 @@ impl Contact {
                 (at, z, entry)
             }
             Descent::Unfinished { at, z, entry } => {
-                settled = self.gets_no_nearer(hand.point_at(&at, z), &hip);
+                let at_last = hand.point_at(&at, z);
+                settled = gets_no_nearer(&mut self.reached, at_last, &hip) >= IDLE;
                 (at, z, entry)
             }
         };
         let goes_on = !settled;
-        self.phase = Phase::Touching { spot, may_leave };
+        self.phase = Phase::Touching { spot, leave };
         let felt = self.touches(window, hip, (spot, z), settled, held_up_by, pace);
         let waits = goes_on || felt.held_up_by.is_some();
         if waits && matches!(self.phase, Phase::Touching { .. }) {
             // To be taken up again, so that the wait leaves no trace.
-            self.phase = Phase::Touching {
-                spot: entry,
-                may_leave,
-            };
+            self.phase = Phase::Touching { spot: entry, leave };
             self.ahead = Some(spot);
         }
         if felt.settled && self.presence == 1.0 {
             self.lay_track(window, hip.column());
         }
         Some(felt)
-    }
-
-    /// Whether a descent that stopped unfinished here is rounding, from a place
-    /// to another and back, and no way.
-    fn gets_no_nearer(&mut self, at: GridPoint, hip: &GridPoint) -> bool {
-        if let Some((was, times)) = &mut self.reached
-            && !is_nearer(&at, was, hip)
-        {
-            *times += 1;
-            return *times >= IDLE;
-        }
-        self.reached = Some((at, 0));
-        false
     }
 
     /// Remembers the patch of a proxy at rest for the ticks to come.
@@ -257,6 +243,19 @@ impl Contact {
             Ground::Hole | Ground::Missing => self.last.proxy,
         }
     }
+}
+
+/// How often in a row a proxy has come to a place no nearer to the hand than the
+/// nearest one, which is kept.
+fn gets_no_nearer(nearest: &mut Option<(GridPoint, u32)>, at: GridPoint, hip: &GridPoint) -> u32 {
+    if let Some((was, times)) = nearest
+        && !is_nearer(&at, was, hip)
+    {
+        *times += 1;
+        return *times;
+    }
+    *nearest = Some((at, 0));
+    0
 }
 
 /// Whether one point is nearer to a hand than another was, by more than the last
