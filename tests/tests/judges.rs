@@ -188,6 +188,26 @@ fn a_proxy_beside_the_closest_point_is_found() {
     speaks(Invariant::LocalMinimum, &valley, &[], rest(0.0), rest(1e-4));
 }
 
+#[test]
+fn a_contact_that_pulls_is_found() {
+    let above = |off: f64| touching([10.5, 10.5, 2.0 - off], ON);
+    let slope = |off: f64| touching([16.5 + off, 10.5, -1.5 - off], [16.5, 10.5, -1.5]);
+    for off in [1e-4, 0.1, 3.0] {
+        for (terrain, seen) in [(flat(), &above as &dyn Fn(f64) -> Seen), (ridge(), &slope)] {
+            speaks(Invariant::HandBelow, &terrain, &[], seen(off), seen(-off));
+        }
+    }
+    // What holds is never taken for it: a valley, the border of the data.
+    let valley = Terrain::from_fn(Kind::Ridges, SIZE, |x, _| (x - 20).abs() as f32);
+    let at_border = |z: f64| touching([40.25, 10.5, z], [40.0, 10.5, 2.0]);
+    for (terrain, honest) in [
+        (valley, touching([20.0, 10.5, -1.0], [20.0, 10.5, 0.0])),
+        (flat(), at_border(1.5)),
+    ] {
+        assert_eq!(told(&terrain, &[honest]), [], "{honest:?}");
+    }
+}
+
 /// What a patch's corners cost in single precision is allowed where they are
 /// mixed, and not at the foot of one.
 #[test]
@@ -232,7 +252,8 @@ fn a_contact_beyond_the_first_crossing_is_found() {
 fn a_contact_with_nothing_crossed_is_found() {
     let before = free(ABOVE);
     let near = [10.625, 10.5, 2.5];
-    let forged = touching(near, [10.625, 10.5, 2.0]);
+    // On the way still, or it would be known for pulling.
+    let forged = with(touching(near, [10.625, 10.5, 2.0]), |f| f.settled = false);
     speaks(Invariant::Freedom, &flat(), &[before], free(near), forged);
 }
 

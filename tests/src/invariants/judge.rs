@@ -101,6 +101,7 @@ impl<'g> Judge<'g> {
         }
         if seen.is_touching() && seen.felt.settled {
             told.extend(self.is_local_minimum(seen).err());
+            told.extend(self.is_hand_below(seen).err());
         }
         if seen.is_free() {
             told.extend(self.is_above(seen, self.before.as_ref()).err());

@@ -30,6 +30,8 @@ pub enum Invariant {
     OnSurface,
     /// Where nothing is left to do, no way on the surface leads nearer.
     LocalMinimum,
+    /// In contact the way from the proxy to the hand leads into the ground.
+    HandBelow,
     /// In contact the proxy is no farther from the hand than where it was.
     Descent,
     /// A contact begins at the first crossing of the hand's way, and is no

@@ -70,15 +70,46 @@ impl Judge<'_> {
         Ok(())
     }
 
+    /// A contact that pulls holds a hand which is free to go: the straight way to
+    /// it starts above the ground, that is above the tangent plane of the patch it
+    /// leads into.
+    pub(super) fn is_hand_below(&self, seen: &Seen) -> Verdict {
+        let way = [0, 1, 2].map(|i| seen.hip[i] - seen.proxy[i]);
+        let level = way[0].hypot(way[1]);
+        let into = |(start, patch): &([f64; 2], Patch)| leads_into(*start, way, patch);
+        let above = self.nearby(seen.proxy).filter(into).map(|(start, patch)| {
+            let [east, north] = patch.slopes(start[0], start[1]);
+            // Of the heights that are mixed, and of a rounded place the slope's.
+            let heights = patch.mixed_size(start[0], start[1], seen.hip[2]);
+            let rounding = 4.0 * f64::from(f32::EPSILON) * heights;
+            let unsure = rounding + 4.0 * ERROR * patch.twist().abs() * level;
+            let above = way[2] - east * way[0] - north * way[1];
+            (above - unsure) / east.hypot(north).hypot(1.0)
+        });
+        // Over a hole there is no ground: the proxy is held at the edge.
+        let above = above.fold(f64::INFINITY, f64::min);
+        if above.is_finite() && above > 4.0 * seen.allowed() {
+            return self.fail(Invariant::HandBelow, format!("by {above:.3e}: {seen:?}"));
+        }
+        Ok(())
+    }
+
+    /// The patches that single precision cannot tell the proxy's place from, and
+    /// where in them it is.
+    fn nearby(&self, proxy: [f64; 3]) -> impl Iterator<Item = ([f64; 2], Patch)> + '_ {
+        let [xs, ys] = [sides(proxy[0]), sides(proxy[1])];
+        let starts = xs
+            .into_iter()
+            .flat_map(move |x| ys.clone().into_iter().map(move |y| [x, y]));
+        starts.flat_map(|start| {
+            patches_at(self.terrain, start[0], start[1]).map(move |patch| (start, patch))
+        })
+    }
+
     /// Distance from the exact closest point: the least over the patches that
     /// single precision cannot tell the proxy's place from.
     fn off_minimum(&self, proxy: [f64; 3], hip: [f64; 3]) -> Option<(f64, Patch, [f64; 2])> {
-        let [xs, ys] = [sides(proxy[0]), sides(proxy[1])];
-        let starts = xs.iter().flat_map(|x| ys.iter().map(|y| [*x, *y]));
-        starts
-            .flat_map(|start| {
-                patches_at(self.terrain, start[0], start[1]).map(move |patch| (start, patch))
-            })
+        self.nearby(proxy)
             .map(|(start, patch)| {
                 let exact = descent::from(self.terrain, hip, start, patch);
                 (distance(exact.at, proxy), patch, start)
@@ -100,6 +131,14 @@ impl Judge<'_> {
         }
         Ok(())
     }
+}
+
+/// Whether a way from a place of a patch leads into it, or along its border.
+fn leads_into(start: [f64; 2], way: [f64; 3], patch: &Patch) -> bool {
+    (0..2).all(|axis| {
+        let place = start[axis] - f64::from(patch.cell[axis]);
+        (place > 0.0 || way[axis] >= 0.0) && (place < 1.0 || way[axis] <= 0.0)
+    })
 }
 
 /// Distance in the plane.
