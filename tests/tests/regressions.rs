@@ -319,3 +319,24 @@ fn a_proxy_up_a_wall_lets_a_hand_go_that_is_beside_it() {
     let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
     assert_eq!(states[1..], [State::Touching, State::Touching, State::Free]);
 }
+
+/// A proxy that left a place 10⁻⁶ cell before the foot of a wall, and was held where
+/// it had begun, counted as having come some way: by parts of so short a step it had.
+#[test]
+fn a_proxy_held_where_it_left_climbs_on() {
+    let terrain = field([8, 8], |x, y| match (x, y) {
+        (4, _) | (_, 5) => 300.0,
+        (3, 3) => -0.669_687,
+        (3, 4) => -0.581_768_7,
+        _ => 0.0,
+    });
+    let path = [
+        [3.0, 3.0, 4.0],
+        [5.0, 2.982_746_124_267_578, -1.391_655_921_936_035_2],
+        [4.0, 2.982_936_859_130_859, 299.406_029_701_232_9],
+        [4.042_195_320_129_395, 4.0, 287.258_709_907_531_74],
+        [4.0, 4.055_518_150_329_59, 300.028_407_096_862_8],
+    ];
+    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
+    assert_eq!(states.last(), Some(&State::Free));
+}

@@ -33,9 +33,8 @@ const DEPTH: usize = 30;
 pub(super) enum Sweep {
     /// The whole way is free.
     Clear,
-    /// The way goes through the surface from above here. `progress` tells
-    /// whether this is any distance from where the sweep began.
-    Hit { spot: Spot, progress: bool },
+    /// The way goes through the surface from above here.
+    Hit(Spot),
     /// The way enters the solid from the side, out of a hole or over the
     /// border of the data: nothing was crossed from above.
     Under,
@@ -203,9 +202,7 @@ impl Path {
                 first_crossing(start, middle, after)
             };
             if let Some(s) = crossing {
-                let progress = !on_surface || s > NO_PROGRESS;
-                let spot = step.spot(s);
-                return Some(Sweep::Hit { spot, progress });
+                return Some(Sweep::Hit(step.spot(s)));
             }
             (over_hole, on_surface) = (false, false);
         }
@@ -213,9 +210,6 @@ impl Path {
         None
     }
 }
-
-/// A crossing within this part of the first cell's way is the start again.
-const NO_PROGRESS: f32 = 1e-6;
 
 /// The lower end of a way.
 #[inline]

@@ -118,14 +118,14 @@ impl Contact {
         let held_up_by = match ended {
             Sweep::Clear => return Some(self.flies(hip)),
             Sweep::Under => return Some(self.loses(window, hip)),
-            Sweep::Hit { spot, progress } => {
+            Sweep::Hit(spot) => {
                 // A hop from the surface to the surface keeps what it had.
                 if core::mem::take(&mut self.late) {
                     self.presence = 0.0;
                 }
                 self.phase = Phase::Touching {
                     spot,
-                    leave: self.may_leave(spot, progress),
+                    leave: self.may_leave(window, &hip, spot),
                 };
                 return None;
             }
@@ -141,14 +141,19 @@ impl Contact {
         })
     }
 
-    /// Where a proxy that has hit the surface, at any distance from where its way
-    /// began or not, may leave it again.
-    fn may_leave(&self, hit: Spot, progress: bool) -> Leave {
-        let leaps = self.left.map_or(0, |(_, times)| times);
-        match (leaps < LEAPS, progress) {
-            (false, _) => Leave::Nowhere,
-            (true, false) => Leave::ButAt(hit),
-            (true, true) => Leave::Anywhere,
+    /// Where a proxy that has hit the surface may leave it again.
+    fn may_leave<const D: usize>(
+        &self,
+        window: &Window<'_, D>,
+        hip: &GridPoint,
+        hit: Spot,
+    ) -> Leave {
+        match &self.left {
+            Some((_, LEAPS..)) => Leave::Nowhere,
+            Some((was, _)) if !is_nearer(&self.point_on(window, &hit), was, hip) => {
+                Leave::ButAt(hit)
+            }
+            _ => Leave::Anywhere,
         }
     }
 

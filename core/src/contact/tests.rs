@@ -199,7 +199,7 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
         };
         let at = std::format!("{name} {from:?} to {to:?}: {swept:?}");
         match (swept, dense_crossing(&truth, position(&a), position(&b))) {
-            (Sweep::Hit { spot, .. }, Some([before, after])) => {
+            (Sweep::Hit(spot), Some([before, after])) => {
                 seen[0] += 1;
                 let x = f64::from(spot.cell[0]) + f64::from(spot.u);
                 let y = f64::from(spot.cell[1]) + f64::from(spot.v);
@@ -217,7 +217,7 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
                     z - line
                 );
             }
-            (Sweep::Hit { spot, .. }, None) => {
+            (Sweep::Hit(spot), None) => {
                 // Grazes between two points of the dense search, or touches.
                 let x = f64::from(spot.cell[0]) + f64::from(spot.u);
                 let y = f64::from(spot.cell[1]) + f64::from(spot.v);
