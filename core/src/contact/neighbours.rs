@@ -6,8 +6,6 @@ use super::spot::{Hand, Spot, tile_of};
 use super::work::{EVALUATION, VISIT, Work};
 use crate::terrain::{Ground, Window};
 
-/// Squared distances that differ by less than this part count as equal.
-const LEVEL: f32 = 1e-6;
 /// A neighbour must offer a way at least this long, in cells, away from the
 /// border to be entered.
 const LEAST_WAY: f32 = 2e-7;
@@ -180,5 +178,5 @@ fn gain(here: &Nearest, there: &Nearest, (p, q): (f32, f32), shift: [i32; 2]) ->
     );
     let gain = du * east + dv * north + dz * up;
     let noise = RESOLUTION * (east.abs() + north.abs() + up * up);
-    (gain, noise.min(LEVEL * here.distance_squared))
+    (gain, noise)
 }
