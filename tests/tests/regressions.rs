@@ -340,3 +340,57 @@ fn a_proxy_held_where_it_left_climbs_on() {
     let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
     assert_eq!(states.last(), Some(&State::Free));
 }
+
+/// Of a hand 0.03 cell off the squared distance was thought to be known better
+/// than the places are that it comes from, and the way over an edge was missed.
+#[test]
+fn a_near_hand_finds_the_way_over_an_edge() {
+    let rows = [
+        [-29.472_837, 13.072_403, -19.966_434, 31.896_08],
+        [21.871_374, -11.741_989, 23.615_377, -18.654_66],
+        [-17.607_483, 18.684_91, -23.617_138, 23.456_934],
+        [20.223_185, -24.345_136, 16.404_583, -16.162_767],
+    ];
+    let terrain = field([3, 3], move |x, y| rows[y as usize][x as usize]);
+    let path = [
+        [1.0, 1.25, 40.0],
+        [
+            0.996_925_354_003_906_2,
+            1.326_526_641_845_703_1,
+            -2.577_595_710_754_394_5,
+        ],
+        [
+            1.003_319_740_295_410_2,
+            1.325_905_799_865_722_7,
+            -2.596_959_114_074_707,
+        ],
+        [
+            1.009_243_965_148_925_8,
+            1.323_417_663_574_218_8,
+            -2.611_005_783_081_054_7,
+        ],
+    ];
+    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
+    assert_eq!(states.last(), Some(&State::Touching));
+}
+
+/// Of a hand 10⁸ cells down a proxy's height above it was known to 8 cells, and a
+/// way down a slope counted as leading no nearer: where it was given up depended
+/// on the window.
+#[test]
+fn a_slope_far_above_the_hand_leads_on_to_its_end() {
+    let slope = field([200, 40], |x, _| -0.56 * x as f32);
+    let path = [[100.5, 2.5, 4.0], [100.5, 2.5, -57.0], [3.0, 3.0, -1e8]];
+    let scene = Scene::given(
+        slope,
+        path.to_vec(),
+        Rule::Swept,
+        Pace::LockStep,
+        Supply::Held,
+    );
+    let mut buffers = Buffers::default();
+    scene.run(&mut buffers).expect("holds");
+    let seen = scene.feel(&mut buffers, [0; 3], Supply::Held, |_| Ok(()));
+    let last = seen.expect("settles").pop().expect("ticks");
+    assert_eq!(last.proxy[..2], [200.0, 3.0]);
+}

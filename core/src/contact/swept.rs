@@ -191,8 +191,8 @@ impl Contact {
                 (at, z, entry)
             }
             Descent::Unfinished { at, z, entry } => {
-                let at_last = hand.point_at(&at, z);
-                settled = gets_no_nearer(&mut self.reached, at_last, &hip) >= IDLE;
+                let there = self.point_at(window, &hand, &at, z);
+                settled = gets_no_nearer(&mut self.reached, there, &hip) >= IDLE;
                 (at, z, entry)
             }
         };
@@ -228,6 +228,25 @@ impl Contact {
         {
             self.phase = Phase::Following(track);
         }
+    }
+
+    /// The point of the surface at a spot, `z` cells above the hand: up a wall that
+    /// height is known better than the place tells it, of a far hand worse.
+    fn point_at<const D: usize>(
+        &self,
+        window: &Window<'_, D>,
+        hand: &Hand,
+        spot: &Spot,
+        z: f32,
+    ) -> GridPoint {
+        if let Ground::Patch(corners) = window.ground(spot.cell) {
+            let patch = Patch::new(corners.heights);
+            let steep = patch.slope_u(spot.v).abs() + patch.slope_v(spot.u).abs();
+            if z.abs() > steep {
+                return self.point_on(window, spot);
+            }
+        }
+        hand.point_at(spot, z)
     }
 
     /// The point of the surface at a spot, no matter how far the hand is.
