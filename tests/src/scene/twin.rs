@@ -8,6 +8,7 @@ use super::stage::{Buffers, SIDE, Supply};
 use super::symmetry::{self, Symmetry};
 use super::terrain::Kind;
 use crate::chance::Chance;
+use crate::invariants::judge::Judge;
 use crate::invariants::seen::{ERROR, Seen};
 use crate::invariants::surface::distance;
 use crate::invariants::{Invariant, Violation};
@@ -126,6 +127,9 @@ pub fn same_bits(invariant: Invariant, seen: &[Seen], other: &[Seen], shift: [i3
 /// cells. On steeper ground rounding decides at nearly every vertex.
 const STEEP: f32 = 10.0;
 
+/// A proxy that moves so many times as far as its hand was moved is elsewhere.
+const JUMP: f64 = 1e3;
+
 /// Mirrored or turned: the same answers to within rounding.
 ///
 /// The core counts from the south-west corner of a patch, so rounding differs.
@@ -155,7 +159,8 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Comp
     let turned = |p| symmetry.point(&scene.terrain, p);
     let path = scene.path.iter().map(|p| turned(*p)).collect();
     let twin = scene.with(symmetry.terrain(&scene.terrain), path);
-    let other = twin.feel(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+    let mut judge = Judge::new(&twin.terrain, twin.rule);
+    let other = twin.feel(buffers, [0; 3], Supply::Held, |seen| judge.look(seen))?;
     same_way(scene, symmetry, &seen, &other, buffers)
 }
 
@@ -182,12 +187,11 @@ pub fn same_way(
             parted = !is_near(turned(a.proxy), a, b);
             continue;
         }
-        if is_undecided(
-            scene,
-            tick,
-            |there| agree(turned(there.proxy), there, b),
-            buffers,
-        ) {
+        let decides = |there: &Seen, hair: f64| {
+            distance(there.proxy, a.proxy) > JUMP * hair * distance(a.proxy, a.hip).max(1.0)
+                || agree(turned(there.proxy), there, b)
+        };
+        if is_undecided(scene, tick, decides, buffers) {
             return Ok(false);
         }
         let detail = format!("{symmetry:?}: {a:?} but {b:?}");
@@ -217,11 +221,12 @@ fn is_near(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {
     distance(proxy, b.proxy) <= 1e-4 * distance(a.proxy, a.hip).max(1.0)
 }
 
-/// Whether a hair's breadth on the way to this tick makes the difference, too.
+/// Whether a hair's breadth on the way to this tick, cells, makes the difference,
+/// too.
 fn is_undecided(
     scene: &Scene,
     tick: usize,
-    agrees: impl Fn(&Seen) -> bool,
+    decides: impl Fn(&Seen, f64) -> bool,
     buffers: &mut Buffers,
 ) -> bool {
     const HAIRS: [f64; 3] = [1.0, 16.0, 256.0];
@@ -240,7 +245,7 @@ fn is_undecided(
                 let hip = [0, 1, 2].map(|i| hip[i] + hair * off(i));
                 felt = player.feel(hip).map(|felt| Seen::new(hip, felt, [0; 3]));
             }
-            if felt.is_some_and(|felt| agrees(&felt)) {
+            if felt.is_some_and(|felt| decides(&felt, hair * GRAIN)) {
                 return true;
             }
         }
