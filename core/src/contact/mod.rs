@@ -14,6 +14,8 @@ pub mod presence;
 mod descent;
 #[cfg(test)]
 mod dice;
+mod exit;
+mod gentle;
 mod glide;
 mod neighbours;
 mod paper;

@@ -12,7 +12,6 @@ use super::glide::glide;
 use super::proxy::{Contact, Phase};
 use super::spot::Hand;
 use super::sweep::lower;
-use super::track::Under;
 use super::work::{EVALUATION, VISIT};
 use crate::grid::GridPoint;
 use crate::terrain::{Box2, Window};
@@ -91,15 +90,9 @@ impl Contact {
             return false;
         };
         let hand = Hand::new(*hip);
-        let glided = match track.is_under(window, hip.column()) {
-            Under::Patch => glide(window, &hand, track),
-            Under::Hole => Ok(None),
-            Under::Missing(tile) => Err(tile),
-        };
-        match glided {
+        match glide(window, &hand, track) {
             Ok(Some(rest)) => {
-                *track = rest.track;
-                let proxy = hand.point_at(&rest.track.spot, rest.stretch.z);
+                let proxy = track.proxy(&hand, rest.stretch.z);
                 self.rests_at(proxy, rest.stretch, EVALUATION + VISIT * rest.hops);
             }
             Err(tile) if pace == Pace::LockStep => {

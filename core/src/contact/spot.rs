@@ -24,7 +24,7 @@ impl Spot {
     #[must_use]
     pub fn across(&self, [east, north]: [i32; 2]) -> Self {
         Self {
-            cell: [self.cell[0] + east, self.cell[1] + north],
+            cell: self.neighbour([east, north]),
             u: beyond(self.u, east),
             v: beyond(self.v, north),
         }
@@ -37,6 +37,12 @@ impl Spot {
             GridPoint::new([x, y, 0], Vec3::new(spot.u, spot.v, 0.0))
         };
         place(self) == place(other)
+    }
+
+    /// The patch so many columns and rows from this one.
+    #[inline]
+    pub(super) const fn neighbour(&self, [east, north]: [i32; 2]) -> [i32; 2] {
+        [self.cell[0] + east, self.cell[1] + north]
     }
 
     /// Another place of the same patch.
@@ -67,6 +73,29 @@ impl Spot {
     #[must_use]
     pub fn border(&self) -> [i32; 2] {
         [side(self.u), side(self.v)]
+    }
+}
+
+impl Spot {
+    /// Whether it is well inside its patch.
+    #[inline]
+    pub(super) fn is_inside(&self) -> bool {
+        is_inside(self.u) && is_inside(self.v)
+    }
+
+    /// Whether the way from here to a hand at `(p, q)` begins in this patch: a
+    /// place on the border may face another.
+    #[inline]
+    pub(super) fn faces(&self, (p, q): (f32, f32)) -> bool {
+        let faces = |hand: f32, x: f32| is_inside(x) || (x < 0.5) == (hand >= x);
+        faces(p, self.u) && faces(q, self.v)
+    }
+
+    /// Whether the patch's tangent plane here passes over a hand at `(p, q)`, over
+    /// which the patch is `above` cells high: the way to it leads into the ground.
+    #[inline]
+    pub(super) fn stays(&self, patch: &Patch, (p, q): (f32, f32), above: f32) -> bool {
+        above >= patch.a * ((p - self.u) * (q - self.v))
     }
 }
 
@@ -112,6 +141,11 @@ impl Hand {
     #[inline]
     pub(super) fn altitude(&self) -> Altitude {
         Altitude::new(self.point.cell()[2], self.point.frac().z)
+    }
+
+    #[inline]
+    pub(super) fn column(&self) -> [i32; 2] {
+        self.point.column()
     }
 
     /// The hand in a patch's coordinates.

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::closest::RESOLUTION;
 use super::descent::{Descent, Leave, descend};
+use super::gentle::Gentle;
 use super::patch::Patch;
 use super::presence::is_far;
 use super::proxy::{Contact, Phase};
@@ -224,9 +225,9 @@ impl Contact {
         // At the very border of a hole the presence is 1, too.
         if matches!(window.ground(known), Ground::Patch(_))
             && let Ground::Patch(corners) = window.ground(spot.cell)
-            && let Some(track) = Track::new(&corners, known, spot)
+            && let Some(gentle) = Gentle::new(&corners)
         {
-            self.phase = Phase::Following(track);
+            self.phase = Phase::Following(Track::new(gentle, known, spot));
         }
     }
 

@@ -1,10 +1,13 @@
 use super::super::closest::nearest_downhill;
 use super::super::dice::Dice;
+use super::super::patch::Patch;
 use super::*;
 use crate::grid::GridPoint;
+use crate::terrain::Corners;
 
 fn track(heights: [f32; 4], spot: Spot) -> Option<Track> {
-    Track::new(&Corners { base: 0, heights }, [0, 0], spot)
+    let gentle = Gentle::new(&Corners { base: 0, heights })?;
+    Some(Track::new(gentle, [0, 0], spot))
 }
 
 fn hand(p: f32, q: f32) -> GridPoint {
@@ -22,9 +25,11 @@ fn follow(heights: [f32; 4], (p, q): (f32, f32), from: (f32, f32)) -> Option<(f3
     let (stretch, u, v) = match track.follow(&hand) {
         Some(stretch) => (stretch, track.spot.u, track.spot.v),
         None => {
-            let to = track.closest(&track.seen_by(&hand), (p, q))?;
+            let patch = track.gentle.seen_by(&hand);
+            let start = (track.spot.u - p, track.spot.v - q);
+            let to = track.gentle.by_newton(&patch, (p, q), start)?;
             let (u, v) = (p + to.x, q + to.y);
-            if !(to.z >= 0.0 && is_inside(u) && is_inside(v) && track.is_convex(to.z)) {
+            if !(to.z >= 0.0 && is_inside(u) && is_inside(v) && track.gentle.is_convex(to.z)) {
                 return None;
             }
             (to, u, v)
