@@ -196,3 +196,7 @@ fn best_way<const D: usize>(
     }
     Ok(Some(best))
 }
+
+#[cfg(test)]
+#[path = "glide_tests.rs"]
+mod tests;
