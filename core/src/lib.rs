@@ -21,6 +21,9 @@
 #[cfg(test)]
 extern crate std;
 
+#[cfg(test)]
+mod cases;
+
 pub mod contact;
 pub mod force;
 pub mod grid;

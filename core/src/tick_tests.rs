@@ -4,6 +4,7 @@ use std::boxed::Box;
 use std::vec::Vec;
 
 use super::*;
+use crate::cases::cases;
 use crate::contact::{Rule, State};
 use crate::force::ForceLaw;
 use crate::guard::{Blockers, Mode};
@@ -349,7 +350,8 @@ fn a_small_window_feels_what_a_whole_one_feels() {
         dice % range
     };
     let mut touched = 0;
-    for seq in 0..400 {
+    const POINTS: u32 = cases(400, 12);
+    for seq in 0..POINTS {
         let jump = if seq % 4 == 0 { 600 } else { 20 };
         let cell = [
             20 + random(jump) as i32,
@@ -366,7 +368,7 @@ fn a_small_window_feels_what_a_whole_one_feels() {
         assert_eq!(a, same, "point {seq} at {hip:?}");
         touched += u32::from(a.state == State::Touching);
     }
-    assert!(touched > 50, "{touched}");
+    assert!(touched > POINTS / 8, "{touched}");
     assert!(
         small.served > large.served,
         "the small window had to fetch again"

@@ -6,35 +6,14 @@ use anyhow::Result;
 
 use crate::run::{output, root, run, say, target_dir, timed};
 
-/// Parts of the names of tests that sweep over so much that Miri would take
-/// hours, or arm a device for thousands of ticks.
-const LONG: [&str; 26] = [
-    "within_two_millionths",
-    "warm_started_it",
-    "a_saddle_is_no_answer",
-    "contact::tests::holds",
-    "the_first_crossing_is_found",
-    "steep_ways_in",
-    "the_quick_ways_carry",
-    "the_rough_look",
-    "agrees_with_a_dense_search",
-    "shifting_the_scene",
-    "ends_where_the_general",
-    "continuous_across_every_border",
+/// Parts of the names of tests that heat a motor for an hour, or go through what an
+/// arm does for minutes, tick by tick. Others do less under Miri (`cases`).
+const LONG: [&str; 5] = [
     "guard::thermal",
+    "every_change_of_mode",
+    "each_fault_is_zero",
     "at_any_rate",
     "that_works_hard",
-    "for_ever",
-    "over_the_workspace",
-    "of_the_workspace",
-    "singular",
-    "trig::tests",
-    "velocity::tests",
-    "stillness::tests",
-    "clear_means_clear",
-    "guard::tests",
-    "tick::tests",
-    "a_small_window_feels",
 ];
 
 /// Runs them; says visibly when Miri is not here and cannot be had.

@@ -43,6 +43,7 @@ pub fn next_crossing(middle: f32, end: f32) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cases::cases;
 
     fn gap(f: (f64, f64, f64), s: f64) -> f64 {
         f.0 * (1.0 - s) * (1.0 - s) + 2.0 * f.1 * s * (1.0 - s) + f.2 * s * s
@@ -50,23 +51,25 @@ mod tests {
 
     #[test]
     fn agrees_with_a_dense_search_over_all_signs() {
+        const POINTS: u32 = cases(4000, 50);
+        let points = f64::from(POINTS);
         let values = [-3.0, -0.7, -1e-3, -1e-20, 0.0, 1e-20, 1e-3, 0.4, 2.0];
         for start in values.into_iter().filter(|v| *v < 0.0) {
             for middle in values {
                 for end in values {
                     let f = (f64::from(start), f64::from(middle), f64::from(end));
-                    let dense = (0..=4000).find(|i| gap(f, f64::from(*i) / 4000.0) >= 0.0);
+                    let dense = (0..=POINTS).find(|i| gap(f, f64::from(*i) / points) >= 0.0);
                     match (first_crossing(start, middle, end), dense) {
                         (Some(s), Some(i)) => {
-                            let (s, i) = (f64::from(s), f64::from(i) / 4000.0);
+                            let (s, i) = (f64::from(s), f64::from(i) / points);
                             assert!(
-                                s <= i + 1e-6 && s >= i - 1.0 / 4000.0 - 1e-6,
+                                s <= i + 1e-6 && s >= i - 1.0 / points - 1e-6,
                                 "{f:?} {s} {i}"
                             );
                         }
                         // A graze between two samples of the dense search.
                         (Some(s), None) => assert!(gap(f, f64::from(s)).abs() < 1e-6, "{f:?} {s}"),
-                        (None, Some(i)) => panic!("missed {f:?} at {i}/4000"),
+                        (None, Some(i)) => panic!("missed {f:?} at {i}/{POINTS}"),
                         (None, None) => {}
                     }
                 }

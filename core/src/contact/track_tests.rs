@@ -2,6 +2,7 @@ use super::super::closest::nearest_downhill;
 use super::super::dice::Dice;
 use super::super::patch::Patch;
 use super::*;
+use crate::cases::cases;
 use crate::grid::GridPoint;
 use crate::terrain::Corners;
 
@@ -41,12 +42,14 @@ fn follow(heights: [f32; 4], (p, q): (f32, f32), from: (f32, f32)) -> Option<(f3
     Some((u, v))
 }
 
+const CASES: u32 = cases(20_000, 200);
+
 /// Patches up to a slope, hands within a tenth of a cell under the last
 /// answer's own hand, and what both ways of solving say.
 fn agree(slope: f64, depths: [f64; 2], bound: f32) -> [u32; 2] {
     let mut dice = Dice(41);
     let mut seen = [0; 2];
-    for _ in 0..20_000 {
+    for _ in 0..CASES {
         let depth = dice.between(depths[0], depths[1]);
         let heights = core::array::from_fn(|_| (depth + dice.between(0.0, slope)) as f32);
         let patch = Patch::new(heights);
@@ -76,7 +79,7 @@ fn ends_where_the_general_search_ends() {
         let [_, gentle] = agree(0.3, depths, 6e-7);
         let [left, steep] = agree(2.0, depths, 1.5e-6);
         assert!(
-            gentle > 8000 && steep > 500 && left > 1000,
+            gentle > CASES * 2 / 5 && steep > CASES / 40 && left > CASES / 20,
             "{gentle} {steep} {left}"
         );
     }

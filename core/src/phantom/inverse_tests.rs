@@ -1,6 +1,7 @@
 //! There and back, everywhere and at the edges.
 
 use super::*;
+use crate::cases::cases;
 use crate::phantom::{JointLimits, Model, Pose};
 
 fn tip(record: &Calibration, q: Vec3) -> Vec3 {
@@ -24,9 +25,9 @@ fn every_tip_of_the_workspace_is_found_again_within_a_micrometre() {
         let record = model.preset();
         let limits = record.limits;
         let (mut worst, mut same, mut poses) = (0.0f32, 0, 0);
-        for q1 in along(&limits, 0, 24) {
-            for q2 in along(&limits, 1, 60) {
-                for q3 in along(&limits, 2, 60) {
+        for q1 in along(&limits, 0, cases(24, 3)) {
+            for q2 in along(&limits, 1, cases(60, 8)) {
+                for q3 in along(&limits, 2, cases(60, 8)) {
                     let q = Vec3::new(q1, q2, q3);
                     if !limits.allow(q, 0.0) {
                         continue;

@@ -1,12 +1,15 @@
 //! The pose against f64, and at its singular places.
 
 use super::*;
+use crate::cases::cases;
 
 const PREMIUM: Calibration = Calibration::PREMIUM_1_5;
 
-/// Every 7th degree or so of the joint limits, and beyond: singular poses too.
+/// Every 7th degree or so (under Miri every 28th) of the joint limits, and beyond: singular poses too.
 fn workspace() -> impl Iterator<Item = [f64; 3]> {
-    let steps = |from: i32, to: i32| (from..=to).step_by(7).map(|d| f64::from(d).to_radians());
+    let each = cases(7, 28) as usize;
+    let steps =
+        move |from: i32, to: i32| (from..=to).step_by(each).map(|d| f64::from(d).to_radians());
     steps(-90, 90).flat_map(move |q1| {
         steps(-124, 119).flat_map(move |q2| steps(-29, 214).map(move |q3| [q1, q2, q3]))
     })
