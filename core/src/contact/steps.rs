@@ -6,7 +6,7 @@ use crate::grid::GridPoint;
 
 /// Length, in cells, of a step that is passed over where the way leaves the
 /// surface.
-const TINY: f32 = 1e-5;
+const TINY: f32 = 1e-6;
 
 /// A way whose gap over the ground is less than its own rise by this factor runs
 /// along it.
