@@ -394,3 +394,22 @@ fn a_slope_far_above_the_hand_leads_on_to_its_end() {
     let last = seen.expect("settles").pop().expect("ticks");
     assert_eq!(last.proxy[..2], [200.0, 3.0]);
 }
+
+/// A way off a slope of 190 passed over its first step, 6·10⁻⁶ cell long, and hit
+/// the sample at the end of that, 10⁻³ cell above the hand.
+#[test]
+fn a_way_off_a_slope_hits_it_where_it_begins() {
+    let around = [
+        [252.283_75, -289.072_75, -194.348_19],
+        [-20.553_705, -98.582_054, 130.245],
+        [-55.067_55, 90.621_895, -271.469_94],
+    ];
+    let terrain = field([8, 8], move |x, y| match (x, y) {
+        (3..=5, 3..=5) => around[y as usize - 3][x as usize - 3],
+        _ => 0.0,
+    });
+    let hand = [4.0, 4.0, -98.583_172_798_156_74];
+    let path = [[4.0, 4.0, -98.082], hand, hand, hand];
+    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
+    assert_eq!(states.last(), Some(&State::Touching));
+}
