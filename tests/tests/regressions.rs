@@ -399,17 +399,6 @@ fn a_slope_far_above_the_hand_leads_on_to_its_end() {
 /// the sample at the end of that, 10⁻³ cell above the hand.
 #[test]
 fn a_way_off_a_slope_hits_it_where_it_begins() {
-    let around = [
-        [252.283_75, -289.072_75, -194.348_19],
-        [-20.553_705, -98.582_054, 130.245],
-        [-55.067_55, 90.621_895, -271.469_94],
-    ];
-    let terrain = field([8, 8], move |x, y| match (x, y) {
-        (3..=5, 3..=5) => around[y as usize - 3][x as usize - 3],
-        _ => 0.0,
-    });
-    let hand = [4.0, 4.0, -98.583_172_798_156_74];
-    let path = [[4.0, 4.0, -98.082], hand, hand, hand];
-    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
-    assert_eq!(states.last(), Some(&State::Touching));
+    let mut buffers = Buffers::default();
+    Scene::random(778, 38_673).run(&mut buffers).expect("holds");
 }
