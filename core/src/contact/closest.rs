@@ -44,7 +44,7 @@ const STRIDE: f32 = 8.0;
 /// near to an edge lies on it.
 pub(super) const RESOLUTION: f32 = 1.2e-7;
 /// The same for a hand so far off that its coordinates resolve no better.
-const COARSEST: f32 = 0.25;
+pub(super) const COARSEST: f32 = 0.25;
 /// A point of a patch, as the search sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {

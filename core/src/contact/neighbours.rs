@@ -1,6 +1,6 @@
 //! What the patches around a point of a border have to offer.
 
-use super::closest::{Nearest, RESOLUTION, nearest_downhill, resolution};
+use super::closest::{COARSEST, Nearest, RESOLUTION, nearest_downhill, resolution};
 use super::patch::Patch;
 use super::spot::{Hand, Spot, tile_of};
 use super::work::{EVALUATION, VISIT, Work};
@@ -71,7 +71,7 @@ pub(super) fn best_neighbour<const D: usize>(
 ) -> Way {
     // Up a wall a proxy may stand beside the edge without being on it.
     let (p, q) = hand.in_patch(spot.cell);
-    let border = spot.border_within([p, q].map(|hand| BESIDE * resolution(hand)));
+    let border = spot.border_within([p, q].map(|hand| (BESIDE * resolution(hand)).min(COARSEST)));
     if border == [0, 0] {
         return Way::None;
     }
@@ -143,6 +143,12 @@ fn leads_nearer(
     let (p, q) = hand.in_patch(entry.cell);
     let (u, v) = (entry.u, entry.v);
     let z = patch.height(u, v);
+    // Of a far hand much is beside an edge, and only where it is as high as that.
+    let beside = [here.u - shift[0] as f32 - u, here.v - shift[1] as f32 - v];
+    let beside = beside[0].abs().max(beside[1].abs()) > BESIDE * RESOLUTION;
+    if beside && (here.z - z).abs() > BESIDE * (resolution(p) + resolution(q)) {
+        return None;
+    }
     let (zu, zv) = (patch.slope_u(v), patch.slope_v(u));
     // Up a wall, the last place of a coordinate is a lot of height; across the
     // border there is none, the place is on it.

@@ -57,14 +57,7 @@ impl Spot {
     /// As [`Self::border`], for a point that may be as far off as that,
     /// eastward and northward.
     pub(super) fn border_within(&self, [u, v]: [f32; 2]) -> [i32; 2] {
-        // The nearer one, where so much would be near to both.
-        let near = |x: f32, by: f32| {
-            if x > 0.5 {
-                i32::from(x >= 1.0 - by)
-            } else {
-                -i32::from(x <= by)
-            }
-        };
+        let near = |x: f32, by: f32| i32::from(x >= 1.0 - by) - i32::from(x <= by);
         [near(self.u, u), near(self.v, v)]
     }
 
