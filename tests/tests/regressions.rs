@@ -402,3 +402,12 @@ fn a_way_off_a_slope_hits_it_where_it_begins() {
     let mut buffers = Buffers::default();
     Scene::random(778, 38_673).run(&mut buffers).expect("holds");
 }
+
+/// Of a hand a million cells off everything in a patch was beside its corner: a
+/// proxy was put on a vertex 70,000 cells up, for the valley beyond it.
+#[test]
+fn a_far_hand_lifts_no_proxy_to_a_vertex() {
+    let mut buffers = Buffers::default();
+    let scene = Scene::random(20_261_126, 38_445);
+    scene.run(&mut buffers).expect("holds");
+}
