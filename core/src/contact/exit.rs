@@ -33,12 +33,12 @@ pub(super) fn over_border(
     sides: [i32; 2],
 ) -> Option<Exit> {
     match sides {
-        [_, 0] | [0, _] => on_border(gentle, patch, hand, cell, sides),
+        [_, 0] | [0, _] => on_edge(gentle, patch, hand, cell, sides),
         corner => over_corner(gentle, patch, hand, cell, corner),
     }
 }
 
-/// The same of a hand beyond a corner: that or one of its edges.
+/// The same of a hand beyond a corner.
 #[inline(never)]
 fn over_corner(
     gentle: &Gentle,
@@ -47,21 +47,21 @@ fn over_corner(
     cell: [i32; 2],
     [east, north]: [i32; 2],
 ) -> Option<Exit> {
-    let shifts = [[east, north], [east, 0], [0, north]];
-    let exit = |shift| on_border(gentle, patch, hand, cell, shift);
-    shifts.into_iter().find_map(exit)
+    let edges = [[east, 0], [0, north]];
+    let exit = |edge| on_edge(gentle, patch, hand, cell, edge);
+    edges.into_iter().find_map(exit)
 }
 
-/// The same, if it lies over this edge or corner.
+/// The same, if it lies on this edge, its corners included.
 #[inline(always)]
-pub(super) fn on_border(
+pub(super) fn on_edge(
     gentle: &Gentle,
     patch: &Patch,
     hand: (f32, f32),
     cell: [i32; 2],
-    shift: [i32; 2],
+    edge: [i32; 2],
 ) -> Option<Exit> {
-    let exit = Exit::nearest(patch, hand, cell, shift)?;
+    let exit = Exit::nearest(patch, hand, cell, edge);
     let is_above = exit.z >= 0.0 && gentle.is_convex(exit.z);
     (is_above && exit.slope(patch, hand) < -LEVEL).then_some(exit)
 }
@@ -77,28 +77,26 @@ pub(super) struct Exit {
 }
 
 impl Exit {
-    /// Over the point of an edge or the corner closest to a hand at `(p, q)`;
-    /// `None` near an edge's ends.
+    /// Over the point of an edge closest to a hand at `(p, q)`: over a corner, if
+    /// that is one of its ends.
     #[inline(always)]
-    fn nearest(patch: &Patch, (p, q): (f32, f32), cell: [i32; 2], shift: [i32; 2]) -> Option<Self> {
-        let [column, row] = shift.map(|toward| usize::from(toward > 0));
-        let ends = [column as f32, row as f32];
+    fn nearest(patch: &Patch, (p, q): (f32, f32), cell: [i32; 2], [east, north]: [i32; 2]) -> Self {
         let [sw, se, nw, ne] = patch.corners;
-        let (u, v, z) = match shift {
-            [_, 0] => {
-                let [south, north] = if column == 0 { [sw, nw] } else { [se, ne] };
-                let (v, z) = foot(q, patch.c[column], [south, north])?;
-                (ends[0], v, z)
-            }
-            [0, _] => {
-                let [west, east] = if row == 0 { [sw, se] } else { [nw, ne] };
-                let (u, z) = foot(p, patch.b[row], [west, east])?;
-                (u, ends[1], z)
-            }
-            _ => (ends[0], ends[1], patch.corners[column + 2 * row]),
-        };
+        let side = |toward: i32| usize::from(toward > 0);
+        let (u, v, z, shift);
+        if north == 0 {
+            let column = side(east);
+            let ends = if column == 0 { [sw, nw] } else { [se, ne] };
+            let (foot, end, height) = foot(q, patch.c[column], ends);
+            (u, v, z, shift) = (column as f32, foot, height, [east, end]);
+        } else {
+            let row = side(north);
+            let ends = if row == 0 { [sw, se] } else { [nw, ne] };
+            let (foot, end, height) = foot(p, patch.b[row], ends);
+            (u, v, z, shift) = (foot, row as f32, height, [end, north]);
+        }
         let at = Spot { cell, u, v };
-        Some(Self { at, z, shift })
+        Self { at, z, shift }
     }
 
     /// The same as the patch beyond sees it.
@@ -149,12 +147,16 @@ impl Exit {
 }
 
 /// The point of an edge, between two heights above the hand, closest to a hand so
-/// far along it, and its height; `None` near the ends.
+/// far along it; which end that is, −1 or 1, or 0; and its height.
 #[inline(always)]
-fn foot(hand: f32, slope: f32, [start, end]: [f32; 2]) -> Option<(f32, f32)> {
+fn foot(hand: f32, slope: f32, [start, end]: [f32; 2]) -> (f32, i32, f32) {
     // From the edge's end: the line's height above a far hand would cancel.
     let x = (hand - slope * start) / (1.0 + slope * slope);
-    is_inside(x).then_some((x, start * (1.0 - x) + end * x))
+    match () {
+        () if is_inside(x) => (x, 0, start * (1.0 - x) + end * x),
+        () if x > 0.5 => (1.0, 1, end),
+        () => (0.0, -1, start),
+    }
 }
 
 #[cfg(test)]
@@ -169,7 +171,7 @@ mod tests {
         let [low, high] = [patch.corners[2], patch.corners[3]].map(f64::from);
         let slope = high - low;
         let truth = (1171.0 - slope * low) / (1.0 + slope * slope);
-        let error = f64::from(exit.expect("on the edge").at.u) - truth;
+        let error = f64::from(exit.at.u) - truth;
         assert!(error.abs() < 1e-4, "{error:e}");
     }
 }

@@ -11,7 +11,7 @@
 use glam::Vec3;
 
 use super::descent::leaves;
-use super::exit::{Exit, LEVEL, beyond, on_border, over_border};
+use super::exit::{Exit, LEVEL, beyond, on_edge, over_border};
 use super::gentle::Gentle;
 use super::spot::{Hand, Spot, is_inside, tile_of};
 use super::track::Track;
@@ -185,7 +185,8 @@ fn best_way<const D: usize>(
             return Ok(None);
         };
         let (patch, place) = (gentle.seen_by(hand), hand.in_patch(cell));
-        if on_border(&gentle, &patch, place, cell, onward).is_some() {
+        let exit = on_edge(&gentle, &patch, place, cell, onward);
+        if exit.is_some_and(|exit| !exit.is_corner()) {
             continue;
         }
         let rises = corner.over(aside).slope(&patch, place) > LEVEL;
