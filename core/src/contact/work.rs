@@ -6,7 +6,7 @@
 /// Past it the work goes on in the next tick from where it stopped. What has
 /// been begun is ended: the search in a patch may go over, and so may the first
 /// visit to a patch and its neighbours.
-pub const WORK_PER_TICK: u32 = 98;
+pub const WORK_PER_TICK: u32 = 90;
 
 /// Units for coming to a patch.
 pub(super) const VISIT: u32 = 8;
