@@ -6,14 +6,13 @@ use anyhow::Result;
 
 use crate::run::{output, root, run, say, target_dir, timed};
 
-/// Parts of the names of tests that heat a motor for an hour, or go through what an
-/// arm does for minutes, tick by tick. Others do less under Miri (`cases`).
-const LONG: [&str; 5] = [
+/// Parts of the names of tests that follow an arm for seconds to hours, tick by
+/// tick. The surveys among the others do less under Miri (core's `cases`).
+const LONG: [&str; 4] = [
+    "guard::tests",
     "guard::thermal",
-    "every_change_of_mode",
-    "each_fault_is_zero",
-    "at_any_rate",
-    "that_works_hard",
+    "guard::stillness",
+    "tick::tests",
 ];
 
 /// Runs them; says visibly when Miri is not here and cannot be had.

@@ -8,7 +8,7 @@ use glam::Vec3;
 
 const SIZE: i32 = 60;
 /// An interpreter takes seconds for a few hundred.
-const TICKS: u32 = if cfg!(miri) { 300 } else { 40_000 };
+const TICKS: u32 = if cfg!(miri) { 60 } else { 40_000 };
 
 /// Heights without any order, up to so many cells.
 fn noise(x: i32, y: i32, most: f64) -> f32 {

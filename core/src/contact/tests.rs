@@ -186,7 +186,7 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
     let truth = Ground64 { height };
     let mut dice = Dice(7);
     let mut seen = [0, 0];
-    const WAYS: u32 = cases(4000, 10);
+    const WAYS: u32 = cases(4000, 6);
     for _ in 0..WAYS {
         let from = [dice.between(0.5, 59.5), dice.between(0.5, 59.5), high];
         let reach = if dice.unit() < 0.5 { 2.0 } else { 60.0 };
