@@ -127,9 +127,19 @@ impl GridPoint {
     #[must_use]
     #[inline]
     pub fn is_same(&self, other: &Self) -> bool {
-        let cell = |i: usize| self.cell[i] ^ other.cell[i];
-        let frac = |i: usize| self.frac[i].to_bits() ^ other.frac[i].to_bits();
-        (cell(0) | cell(1) | cell(2)) as u32 | frac(0) | frac(1) | frac(2) == 0
+        let bits = |point: &Self| {
+            let [x, y, z] = point.cell.map(|cell| cell as u32);
+            let [u, v, w] = point.frac.map(f32::to_bits);
+            [x, y, z, u, v, w]
+        };
+        let ([a, b, c, d, e, f], [g, h, i, j, k, l]) = (bits(self), bits(other));
+        if cfg!(target_pointer_width = "64") {
+            // Two by two: a register holds both.
+            let pair = |low: u32, high: u32| u64::from(high) << 32 | u64::from(low);
+            (pair(a, b) ^ pair(g, h)) | (pair(c, d) ^ pair(i, j)) | (pair(e, f) ^ pair(k, l)) == 0
+        } else {
+            (a ^ g) | (b ^ h) | (c ^ i) | (d ^ j) | (e ^ k) | (f ^ l) == 0
+        }
     }
 }
 
@@ -212,6 +222,23 @@ mod tests {
                 let (quick, far) = (carry(cell, offset), carry_far(cell, offset));
                 let bits = |(cell, frac): (i32, f32)| (cell, frac.to_bits());
                 assert_eq!(bits(quick), bits(far), "{cell} + {offset:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_same_only_if_every_word_is() {
+        let point = GridPoint {
+            cell: [5, -6, 7],
+            frac: [0.25, 0.5, 0.75],
+        };
+        assert!(point.is_same(&point));
+        for i in 0..3 {
+            let (mut moved, mut nudged) = (point, point);
+            moved.cell[i] ^= 1;
+            nudged.frac[i] = nudged.frac[i].next_up();
+            for other in [moved, nudged] {
+                assert!(!point.is_same(&other) && !other.is_same(&point), "{other:?}");
             }
         }
     }
