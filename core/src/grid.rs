@@ -238,7 +238,10 @@ mod tests {
             moved.cell[i] ^= 1;
             nudged.frac[i] = nudged.frac[i].next_up();
             for other in [moved, nudged] {
-                assert!(!point.is_same(&other) && !other.is_same(&point), "{other:?}");
+                assert!(
+                    !point.is_same(&other) && !other.is_same(&point),
+                    "{other:?}"
+                );
             }
         }
     }

@@ -411,3 +411,12 @@ fn a_far_hand_lifts_no_proxy_to_a_vertex() {
     let scene = Scene::random(20_261_126, 38_445);
     scene.run(&mut buffers).expect("holds");
 }
+
+/// A proxy 2·10⁻⁸ cell beside a vertex left for a hand 16,000 cells up, and hit the
+/// ground of the cell that its way crosses for those 2·10⁻⁸ cell.
+#[test]
+fn a_way_up_is_not_stopped_in_a_hairs_breadth() {
+    let mut buffers = Buffers::default();
+    let scene = Scene::random(20_261_128, 2_411);
+    scene.run(&mut buffers).expect("holds");
+}

@@ -8,10 +8,11 @@ use crate::run::{output, root, run, say, target_dir, timed};
 
 /// Parts of the names of tests that follow an arm for seconds to hours, tick by
 /// tick. The surveys among the others do less under Miri (core's `cases`).
-const LONG: [&str; 4] = [
+const LONG: [&str; 5] = [
     "guard::tests",
     "guard::thermal",
     "guard::stillness",
+    "velocity::tests",
     "tick::tests",
 ];
 

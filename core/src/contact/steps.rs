@@ -25,13 +25,13 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// Too short for the heights at its ends to differ by more than rounding.
+    /// Too short to come to other ground than where it begins, and not downward.
     pub(super) fn is_tiny(&self) -> bool {
         (self.to.0 - self.from.0)
             .abs()
             .max((self.to.1 - self.from.1).abs())
             < TINY
-            && (self.z_to - self.z_from).abs() < TINY
+            && self.z_from - self.z_to < TINY
     }
 
     /// Height of its lower end above the start of the way, cells.
