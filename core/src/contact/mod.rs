@@ -28,6 +28,8 @@ mod steps;
 mod sweep;
 mod swept;
 #[cfg(test)]
+mod tally;
+#[cfg(test)]
 mod tests;
 mod track;
 mod work;

@@ -28,6 +28,8 @@ pub(super) fn neighbours([east, north]: [i32; 2]) -> impl Iterator<Item = [i32; 
 pub(super) fn search(patch: &Patch, hand: &Hand, spot: &Spot, work: &mut Work) -> Nearest {
     let found = nearest_downhill(patch, hand.in_patch(spot.cell), (spot.u, spot.v));
     work.charge(EVALUATION * found.evaluations);
+    #[cfg(test)]
+    super::tally::searched(found.evaluations);
     found
 }
 
