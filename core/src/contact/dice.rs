@@ -17,3 +17,29 @@ impl Dice {
         low + (high - low) * self.unit()
     }
 }
+
+/// So many places `step` cells apart, each a turn of up to `turn` rad from the
+/// way before, within a square field of `size` cells and away from its border.
+pub(super) fn wander(
+    dice: Dice,
+    ticks: u32,
+    size: i32,
+    step: f64,
+    turn: f64,
+) -> impl Iterator<Item = [f64; 2]> {
+    let (mut dice, mut heading) = (dice, 0.3_f64);
+    let mut at = [0.5 * f64::from(size); 2];
+    (0..ticks).map(move |_| {
+        heading += dice.between(-turn, turn);
+        let next = [at[0] + step * heading.cos(), at[1] + step * heading.sin()];
+        if next
+            .iter()
+            .all(|x| (4.0..f64::from(size) - 4.0).contains(x))
+        {
+            at = next;
+        } else {
+            heading += 1.0;
+        }
+        at
+    })
+}

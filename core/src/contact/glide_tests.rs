@@ -1,5 +1,5 @@
 use super::super::descent::Leave;
-use super::super::dice::Dice;
+use super::super::dice::{Dice, wander};
 use super::super::proxy::{Contact, Phase};
 use super::super::{Pace, Rule};
 use crate::grid::GridPoint;
@@ -20,24 +20,13 @@ fn noise(x: i32, y: i32, most: f64) -> f32 {
 
 /// The hand half a cell a tick this way and that, under the heights around it.
 fn hands(ground: impl Fn(i32, i32) -> f32) -> impl Iterator<Item = GridPoint> {
-    let mut dice = Dice(61);
-    let (mut at, mut heading) = ([30.0, 30.0], 0.3_f64);
-    (0..TICKS).map(move |_| {
-        heading += dice.between(-0.3, 0.3);
-        let next = [at[0] + 0.5 * heading.cos(), at[1] + 0.5 * heading.sin()];
-        if next
-            .iter()
-            .all(|x| (4.0..f64::from(SIZE) - 4.0).contains(x))
-        {
-            at = next;
-        } else {
-            heading += 1.0;
-        }
+    let mut depths = Dice(62);
+    wander(Dice(61), TICKS, SIZE, 0.5, 0.3).map(move |at| {
         let cell = at.map(|x| x as i32);
         let low = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[x, y]| ground(cell[0] + x, cell[1] + y));
         let low = low.into_iter().fold(f32::INFINITY, f32::min);
         let [x, y] = [0, 1].map(|i| (at[i] - at[i].floor()) as f32);
-        let depth = dice.between(0.0, 0.5) as f32;
+        let depth = depths.between(0.0, 0.5) as f32;
         GridPoint::new([cell[0], cell[1], 0], Vec3::new(x, y, low - depth))
     })
 }

@@ -6,7 +6,7 @@ use std::vec::Vec;
 
 use glam::Vec3;
 
-use super::dice::Dice;
+use super::dice::{Dice, wander};
 use super::work::{EVALUATION, VISIT};
 use super::{Contact, Pace, Rule, State};
 use crate::cases::cases;
@@ -51,21 +51,7 @@ fn hand([x, y]: [f64; 2], above: f64) -> GridPoint {
 
 /// Places one after the other, so many cells apart.
 fn places(step: f64) -> impl Iterator<Item = [f64; 2]> {
-    let mut dice = Dice(71);
-    let (mut at, mut heading) = ([30.0, 30.0], 0.3_f64);
-    (0..TICKS).map(move |_| {
-        heading += dice.between(-0.05, 0.05);
-        let next = [at[0] + step * heading.cos(), at[1] + step * heading.sin()];
-        if next
-            .iter()
-            .all(|x| (4.0..f64::from(SIZE) - 4.0).contains(x))
-        {
-            at = next;
-        } else {
-            heading += 1.0;
-        }
-        at
-    })
+    wander(Dice(71), TICKS, SIZE, step, 0.05)
 }
 
 /// Median and 99th percentile of the patches and of the evaluations, over the
