@@ -3,12 +3,23 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// The spring between the haptic interface point and the proxy (paper §4.3.4),
-/// and the limit of what it may ask for. Immutable while a tick runs.
+/// The spring between the haptic interface point (HIP) and the proxy (paper
+/// §4.3.4), and the limit of what it may ask for. Immutable while a tick runs.
+///
+/// ```
+/// use hapterra_core::{Vec3, force::ForceLaw};
+///
+/// let law = ForceLaw { stiffness_n_per_mm: 0.5, max_force_n: 8.5 };
+/// // The proxy is 4 mm above the HIP: half a newton for each.
+/// assert_eq!(law.force_n(Vec3::Z * 4.0), Vec3::Z * 2.0);
+/// // Farther away the limit is kept, and so is the direction.
+/// let most = law.force_n(Vec3::new(300.0, -400.0, 0.0));
+/// assert!((most - Vec3::new(5.1, -6.8, 0.0)).length() < 1e-5);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ForceLaw {
-    /// Newtons for a millimetre between proxy and hand, as the hand feels it.
+    /// Newtons for a millimetre between the HIP and the proxy.
     pub stiffness_n_per_mm: f32,
     /// Largest force in newtons; the direction is kept.
     pub max_force_n: f32,
@@ -28,13 +39,13 @@ impl ForceLaw {
         ok(self.stiffness_n_per_mm) && ok(self.max_force_n)
     }
 
-    /// Force in newtons for a proxy `stretch_mm` away from the hand.
+    /// Force in newtons for a proxy `displacement_mm` away from the HIP.
     ///
-    /// Along `stretch_mm`, proportional to its length, clamped as a vector.
-    /// Always finite: a stretch that is not gives no force.
+    /// Along `displacement_mm`, proportional to its length, clamped as a vector.
+    /// Always finite: a displacement that is not gives no force.
     #[must_use]
-    pub fn force_n(&self, stretch_mm: Vec3) -> Vec3 {
-        clamp_length(stretch_mm * self.stiffness_n_per_mm, self.max_force_n)
+    pub fn force_n(&self, displacement_mm: Vec3) -> Vec3 {
+        clamp_length(displacement_mm * self.stiffness_n_per_mm, self.max_force_n)
     }
 }
 
@@ -94,17 +105,17 @@ mod tests {
 
     #[test]
     fn clamped_as_a_vector() {
-        for stretch in [
+        for displacement in [
             Vec3::new(300.0, -400.0, 0.0),
             Vec3::splat(3e38),
             Vec3::new(18.0, 0.0, 0.1),
         ] {
-            let f = ForceLaw::PREMIUM.force_n(stretch);
+            let f = ForceLaw::PREMIUM.force_n(displacement);
             assert!(
                 f.length() <= 8.5 && f.length() > 8.499_99,
-                "{stretch} -> {f}"
+                "{displacement} -> {f}"
             );
-            assert!(f.x.signum() == stretch.x.signum());
+            assert!(f.x.signum() == displacement.x.signum());
         }
         let f = ForceLaw::PREMIUM.force_n(Vec3::new(300.0, -400.0, 0.0));
         assert!((f - Vec3::new(5.1, -6.8, 0.0)).length() < 1e-5);

@@ -1,7 +1,43 @@
 //! Height-field haptics for a Phantom, from encoder counts to amplifier
 //! currents, without `std`, allocation or `unsafe`.
 //!
-//! Read the modules in this order to follow the data through one tick:
+//! A haptic interface point (HIP) presses a proxy onto a slope, and the spring
+//! between them makes the force:
+//!
+//! ```
+//! use hapterra_core::Vec3;
+//! use hapterra_core::contact::{Contact, ContactSettings, ContactState};
+//! use hapterra_core::force::ForceLaw;
+//! use hapterra_core::grid::GridPoint;
+//! use hapterra_core::terrain::{FieldSize, FieldStorage};
+//!
+//! // 40 × 40 cells that rise to the east, one cell in four.
+//! let size = FieldSize::new(40, 40);
+//! let mut slope = FieldStorage::<2>::from_fn(size, |x, _y| 0.25 * x as f32)?;
+//! let window = slope.window();
+//!
+//! // The HIP comes down through the air and goes one cell into the ground.
+//! let mut contact = Contact::new(ContactSettings::REAL_TIME);
+//! for height in [9.0, 6.0, 4.125] {
+//!     let hip = GridPoint::new([20, 20, 0], Vec3::new(0.5, 0.5, height));
+//!     contact.step(&window, &hip);
+//! }
+//! let hip = GridPoint::new([20, 20, 0], Vec3::new(0.5, 0.5, 4.125));
+//! let output = contact.step(&window, &hip);
+//! assert_eq!(output.state, ContactState::Touching);
+//!
+//! // At 2 mm a cell: up, and back down the slope.
+//! let force_n = ForceLaw::PREMIUM.force_n(output.displacement * 2.0);
+//! assert!(force_n.z > 0.9 && force_n.x < -0.2 && force_n.y.abs() < 1e-6);
+//! # Ok::<(), hapterra_core::terrain::BadField>(())
+//! ```
+//!
+//! Three longer examples come with the crate: `forces_along_a_path`,
+//! `closed_loop` (the whole tick with a simulated arm) and `serve_tiles` (a host
+//! and a device that exchange the messages of the link in memory).
+//!
+//! Read the modules in this order to follow the data through one tick; each
+//! needs those before it only:
 //!
 //! 1. [`phantom`] turns encoder counts into the tip position, and forces back
 //!    into motor currents.
@@ -10,11 +46,12 @@
 //! 3. [`terrain`] is what the device holds of the height field: a window of
 //!    tiles, and the rule by which it asks the host for more.
 //! 4. [`contact`] moves the proxy over bilinear patches.
-//! 5. [`force`] turns proxy and haptic interface point into newtons.
+//! 5. [`force`] turns proxy and HIP into newtons.
 //! 6. [`guard`] decides what may reach the amplifiers.
-//! 7. [`tick`] is all of it as one pure function, called 1,000 to 10,000 times a
-//!    second ([`guard::TickRate`]).
-//! 8. [`wire`] is what travels between the device and the host.
+//! 7. [`scene`] is what the loop is given to feel, and what it says of a tick.
+//! 8. [`tick`] is all of it as one pure function, called 1,000 to 10,000 times a
+//!    second ([`rate::TickRate`]).
+//! 9. [`wire`] is what travels between the device and the host.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -24,11 +61,19 @@ extern crate std;
 #[cfg(test)]
 mod cases;
 
+/// The README's example, run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub mod contact;
+mod crc;
 pub mod force;
 pub mod grid;
 pub mod guard;
 pub mod phantom;
+pub mod rate;
+pub mod scene;
 pub mod terrain;
 pub mod tick;
 pub mod wire;

@@ -7,13 +7,13 @@
 
 use glam::Vec3;
 
-use crate::contact::{Contact, Felt, Pace};
+use crate::contact::{Contact, ContactOutput, ContactSettings, Execution};
 use crate::grid::GridPoint;
-use crate::guard::{Drive, Fault, Guard, Limits, Report, SceneKind, Sense, Surroundings, TickRate};
+use crate::guard::{Drive, Fault, Guard, Limits, Report, SceneKind, Sense, Surroundings};
 use crate::phantom::{Calibration, Mechanism, Pose, to_device_frame, to_terrain_frame};
+use crate::rate::TickRate;
+use crate::scene::{Health, Point, Sample, Scene, Source};
 use crate::terrain::{Tile, TileKey, Window};
-use crate::wire::message::{Point, Sample, Scene, Source};
-use crate::wire::status::Health;
 
 /// What is handed to the loop between ticks.
 pub enum Command<'t> {
@@ -24,9 +24,9 @@ pub enum Command<'t> {
     DropScene,
     /// A filled tile.
     Tile(&'t mut Tile),
-    /// A hand position to be felt, in a scene fed by points.
+    /// A haptic interface point for one tick, in a scene fed by points.
     Point(Point),
-    /// Arm, once nothing is in the way and the dead-man switch is pressed.
+    /// Arm, once nothing blocks it and the dead-man switch is pressed.
     Arm,
     /// Disarm; force goes out gently.
     Disarm,
@@ -50,6 +50,50 @@ pub struct Outcome {
 }
 
 /// All state of the loop over a window of `D × D` tiles.
+///
+/// Fed by points, it is a replay: no arm is needed, and no force reaches one.
+///
+/// ```
+/// use hapterra_core::Vec3;
+/// use hapterra_core::contact::{ContactState, Rule};
+/// use hapterra_core::force::ForceLaw;
+/// use hapterra_core::grid::GridPoint;
+/// use hapterra_core::guard::Sense;
+/// use hapterra_core::rate::TickRate;
+/// use hapterra_core::scene::{Point, Scene, Source};
+/// use hapterra_core::terrain::{FieldSize, FieldStorage, Tile, TileKey};
+/// use hapterra_core::tick::{Command, Haptics};
+///
+/// let size = FieldSize::new(32, 32);
+/// let (mut storage, mut tile) = (FieldStorage::<1>::new(), Tile::VACANT);
+/// tile.fill_from(TileKey::new(0, 0, 0), 0, size, |_x, _y| 2.0).expect("in range");
+///
+/// let mut haptics = Haptics::new(storage.slots(), TickRate::DEFAULT, None);
+/// let scene = Scene {
+///     epoch: 1,
+///     level: 0,
+///     size,
+///     top: 3,
+///     cell_mm: 1.0,
+///     home: GridPoint::default(),
+///     law: ForceLaw::PREMIUM,
+///     rule: Rule::Swept,
+///     source: Source::Points,
+///     hold_clock: false,
+/// };
+/// assert!(haptics.accept(Command::Scene(scene)).is_none());
+/// assert!(haptics.accept(Command::Tile(&mut tile)).is_some());
+/// let mut sample = Default::default();
+/// for (seq, height) in [(0, 5.0), (1, 1.0)] {
+///     let hip = GridPoint::new([10, 10, 0], Vec3::new(0.5, 0.5, height));
+///     assert!(haptics.accept(Command::Point(Point { seq, hip })).is_none());
+///     let outcome = haptics.tick(&Sense::default(), true);
+///     assert_eq!(outcome.answers, Some(seq));
+///     sample = outcome.sample;
+/// }
+/// // One millimetre deep: half a newton up.
+/// assert_eq!((sample.state, sample.force_n), (ContactState::Touching, Vec3::Z * 0.5));
+/// ```
 pub struct Haptics<'t, const D: usize> {
     rate: TickRate,
     window: Window<'t, D>,
@@ -75,7 +119,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         Self {
             rate,
             window: Window::new(tiles),
-            contact: Contact::ticking(rate),
+            contact: Contact::new(ContactSettings::REAL_TIME.at_rate(rate)),
             guard: Guard::new(rate, found_at_boot),
             mechanism: None,
             zero: None,
@@ -90,10 +134,14 @@ impl<'t, const D: usize> Haptics<'t, D> {
     #[must_use]
     pub fn accept(&mut self, command: Command<'t>) -> Option<&'t mut Tile> {
         match command {
-            Command::Scene(scene) => self.take_scene(scene),
-            Command::DropScene => self.drop_scene(),
+            Command::Scene(scene) => self.take_scene(Some(scene)),
+            Command::DropScene => self.take_scene(None),
             Command::Tile(tile) => return Some(self.take_tile(tile)),
-            Command::Point(point) => self.point = Some(point),
+            Command::Point(Point { seq, hip }) => {
+                // Whatever bits came over the wire.
+                let hip = hip.normalised();
+                self.point = Some(Point { seq, hip });
+            }
             Command::Arm => self.guard.arm(),
             Command::Disarm => self.guard.disarm(),
             Command::Zero(counts) => self.take_zero(counts),
@@ -109,58 +157,61 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.guard.stop();
         self.guard.configure(&mechanism);
         self.mechanism = Some(mechanism);
-        self.contact = Contact::ticking(self.rate);
+        self.contact = self.contact_of(self.scene.as_ref());
     }
 
-    fn take_scene(&mut self, scene: Scene) {
-        if !scene.is_valid() {
-            return;
+    /// A contact that has felt nothing yet, as a scene wants it: points are felt in
+    /// lock-step, an arm in real time.
+    fn contact_of(&self, scene: Option<&Scene>) -> Contact {
+        let rule = scene.map_or_else(Default::default, |scene| scene.rule);
+        let from_points = scene.is_some_and(|scene| scene.source == Source::Points);
+        Contact::new(ContactSettings {
+            rule,
+            execution: if from_points {
+                Execution::LockStep
+            } else {
+                Execution::RealTime
+            },
+            ..ContactSettings::REAL_TIME.at_rate(self.rate)
+        })
+    }
+
+    /// Takes a scene, or drops the one there is: force that was there goes out.
+    fn take_scene(&mut self, scene: Option<Scene>) {
+        match scene {
+            Some(scene) if !scene.is_valid() => return,
+            Some(scene) if scene.source == Source::Points => self.guard.stop(),
+            _ => self.guard.disarm(),
         }
-        match scene.source {
-            Source::Encoders => self.guard.disarm(),
-            Source::Points => self.guard.stop(),
+        if let Some(scene) = scene {
+            self.window.reset(scene.level, scene.size, scene.top);
+            self.tick = 0;
         }
-        self.window.reset(scene.level, scene.size, scene.top);
-        self.contact = Contact::ticking(self.rate);
-        self.scene = Some(scene);
-        self.point = None;
-        self.tick = 0;
-    }
-
-    fn drop_scene(&mut self) {
-        self.guard.disarm();
-        self.contact = Contact::ticking(self.rate);
-        self.scene = None;
+        self.contact = self.contact_of(scene.as_ref());
+        self.scene = scene;
         self.point = None;
     }
 
-    /// Everything looks elsewhere from now on, so nothing is driven meanwhile.
+    /// The tip is somewhere else from now on, so nothing is driven meanwhile.
     fn take_zero(&mut self, counts: [i32; 3]) {
         self.guard.stop();
         self.guard.restart_counts();
-        self.contact = Contact::ticking(self.rate);
+        self.contact = self.contact_of(self.scene.as_ref());
         self.zero = Some(counts);
     }
 
     /// Never lets a tile push out the one under the proxy.
     fn take_tile(&mut self, tile: &'t mut Tile) -> &'t mut Tile {
-        let under_proxy = self
-            .contact
-            .patch()
-            .map(|cell| TileKey::holding(self.window.level(), cell));
-        let evicts = tile.key().is_some_and(|key| {
-            key != under_proxy.unwrap_or(key) && self.window.occupant(key) == under_proxy
-        });
-        if evicts && under_proxy.is_some() {
+        let level = self.window.level();
+        let under_proxy = self.contact.patch();
+        let under_proxy = under_proxy.map(|cell| TileKey::holding(level, cell));
+        if let (Some(under_proxy), Some(key)) = (under_proxy, tile.key())
+            && key != under_proxy
+            && self.window.occupant(key) == Some(under_proxy)
+        {
             return tile;
         }
         self.window.install(tile)
-    }
-
-    /// The latched fault.
-    #[must_use]
-    pub const fn fault(&self) -> Option<Fault> {
-        self.guard.fault()
     }
 
     /// The calibration in force.
@@ -169,25 +220,21 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.mechanism.as_ref().map(Mechanism::calibration)
     }
 
-    /// Where the guard stands and what was measured, after a tick.
+    /// The state of the guard and what was measured, after a tick.
     #[must_use]
     pub fn health(&self, sense: &Sense, drive: &Drive) -> Health {
-        let zero = self.zero.unwrap_or_default();
-        let angles = self
-            .mechanism
-            .as_ref()
-            .map(|m| m.angles(sense.counts, zero));
+        let angles = |m: &Mechanism| m.angles(sense.counts, self.zero.unwrap_or_default());
         Health {
             report: self.guard.report(),
             sense: *sense,
             zero: self.zero,
-            angles_rad: angles.unwrap_or_default(),
+            angles_rad: self.mechanism.as_ref().map(angles).unwrap_or_default(),
             currents_a: drive.currents_a,
             winding_c: self.guard.motors().winding_c(),
         }
     }
 
-    /// Where the guard stands, after a tick.
+    /// The state of the guard after a tick.
     #[must_use]
     pub const fn report(&self) -> Report {
         self.guard.report()
@@ -205,99 +252,105 @@ impl<'t, const D: usize> Haptics<'t, D> {
     pub fn tick_into(&mut self, sense: &Sense, watchdog_live: bool, outcome: &mut Outcome) {
         self.tick = self.tick.wrapping_add(1);
         match &self.scene {
-            Some(scene) if scene.source == Source::Points => self.feel_point(outcome),
-            _ => self.feel_arm(sense, watchdog_live, outcome),
+            Some(scene) if scene.source == Source::Points => self.tick_point(outcome),
+            _ => self.tick_arm(sense, watchdog_live, outcome),
         }
     }
 
     /// The full path: counts, pose, haptic interface point, proxy, force,
     /// torques, currents.
-    fn feel_arm(&mut self, sense: &Sense, watchdog_live: bool, outcome: &mut Outcome) {
+    fn tick_arm(&mut self, sense: &Sense, watchdog_live: bool, outcome: &mut Outcome) {
         let zero = self.zero.unwrap_or_default();
         let mechanism = self.mechanism.as_ref();
         let pose = mechanism.map(|mechanism| mechanism.pose(sense.counts, zero));
-        let around = Surroundings {
-            arm: mechanism.zip(pose.as_ref()),
-            zeroed: self.zero.is_some(),
-            scene: self
-                .scene
-                .as_ref()
-                .map_or(SceneKind::None, |_| SceneKind::Arm),
-            watchdog_live,
-        };
-        let lost_counts = self.guard.watch(sense, &around);
+        let arm = mechanism.zip(pose.as_ref());
+        let lost_counts = self.guard.watch(
+            sense,
+            &Surroundings {
+                arm,
+                zeroed: self.zero.is_some(),
+                scene: match self.scene {
+                    Some(_) => SceneKind::Arm,
+                    None => SceneKind::None,
+                },
+                watchdog_live,
+            },
+        );
         outcome.drive = Drive::default();
         outcome.answers = None;
         let sample = &mut outcome.sample;
-        let (Some(mechanism), Some(pose)) = (mechanism, pose) else {
-            tell_felt(GridPoint::default(), &Felt::default(), sample);
-            return self.tell(Vec3::ZERO, sample);
-        };
         let mut wanted = Vec3::ZERO;
-        if let Some(scene) = &self.scene {
-            let hip = place(mechanism, scene, &pose);
+        if let (Some((mechanism, pose)), Some(scene)) = (arm, &self.scene) {
+            let hip = place(mechanism, scene, pose);
             let contact = &mut self.contact;
-            let felt = contact.step(&self.window, &hip, scene.rule, Pace::RealTime);
-            wanted = scene.law.force_n(felt.stretch * scene.cell_mm);
-            tell_felt(hip, felt, sample);
+            let output = contact.step(&self.window, &hip);
+            wanted = scene.law.force_n(output.displacement * scene.cell_mm);
+            write_output(hip, output, sample);
         } else {
-            tell_felt(GridPoint::default(), &Felt::default(), sample);
+            write_output(GridPoint::default(), &ContactOutput::default(), sample);
         }
-        let force_n = self.guard.limit_force(wanted);
-        if self.guard.mode().drives() {
-            let weight = mechanism.gravity_nm(&pose) * self.guard.gain();
-            let torques = pose.torques_nm(to_device_frame(force_n)) + weight;
-            outcome.drive = self.guard.limit_currents(mechanism.currents_a(torques));
+        let mut force_n = Vec3::ZERO;
+        if let Some((mechanism, pose)) = arm {
+            force_n = self.guard.limit_force(wanted);
+            if self.guard.mode().drives() {
+                let weight = mechanism.gravity_nm(pose) * self.guard.gain();
+                let torques = pose.torques_nm(to_device_frame(force_n)) + weight;
+                outcome.drive = self.guard.limit_currents(mechanism.currents_a(torques));
+            }
+            if lost_counts {
+                self.zero = None;
+            }
         }
-        if lost_counts {
-            self.zero = None;
-        }
-        self.tell(force_n, &mut outcome.sample);
+        self.write_state(force_n, &mut outcome.sample);
     }
 
     /// Replay: the host's point in place of the arm, amplifiers off. The tick
-    /// is repeated until nothing holds it up; only then is the point answered.
-    fn feel_point(&mut self, outcome: &mut Outcome) {
+    /// is repeated until no tile is missing and no work is left; only then is the
+    /// point answered.
+    fn tick_point(&mut self, outcome: &mut Outcome) {
         outcome.drive = Drive::default();
         outcome.answers = None;
         let sample = &mut outcome.sample;
-        let (Some(scene), Some(point)) = (&self.scene, self.point) else {
-            tell_felt(GridPoint::default(), &Felt::default(), sample);
-            return self.tell(Vec3::ZERO, sample);
-        };
-        let contact = &mut self.contact;
-        let felt = contact.step(&self.window, &point.hip, scene.rule, Pace::LockStep);
-        let force_n = scene.law.force_n(felt.stretch * scene.cell_mm);
-        tell_felt(point.hip, felt, sample);
-        if felt.settled {
-            outcome.answers = Some(point.seq);
-            self.point = None;
+        let mut force_n = Vec3::ZERO;
+        if let (Some(scene), Some(point)) = (&self.scene, self.point) {
+            let contact = &mut self.contact;
+            let output = contact.step(&self.window, &point.hip);
+            force_n = scene.law.force_n(output.displacement * scene.cell_mm);
+            write_output(point.hip, output, sample);
+            if output.converged {
+                outcome.answers = Some(point.seq);
+                self.point = None;
+            }
+        } else {
+            write_output(GridPoint::default(), &ContactOutput::default(), sample);
         }
-        self.tell(force_n, sample);
+        self.write_state(force_n, sample);
     }
 
-    /// Writes where the loop stands into the sample, all but what was felt and
-    /// what the loop around it measures.
-    fn tell(&self, force_n: Vec3, sample: &mut Sample) {
-        let mut limits = self.guard.limits();
-        limits.set(Limits::TERRAIN_MISSING, sample.held_up_by.is_some());
-        let fading = self.contact.presence() < 1.0;
-        limits.set(Limits::PRESENCE_FADING, fading);
+    /// Writes the loop's state into the sample: all but the contact's output and what
+    /// the caller measures.
+    fn write_state(&self, force_n: Vec3, sample: &mut Sample) {
+        let Report {
+            mode,
+            mut limits,
+            fault,
+            ..
+        } = self.guard.report();
+        limits.set(Limits::TERRAIN_MISSING, sample.missing_tile.is_some());
+        limits.set(Limits::PRESENCE_FADING, self.contact.boundary_fade() < 1.0);
         sample.tick = self.tick;
         sample.force_n = force_n;
-        sample.mode = self.guard.mode();
-        sample.limits = limits;
-        sample.fault = self.guard.fault();
+        (sample.mode, sample.limits, sample.fault) = (mode, limits, fault);
     }
 }
 
-/// Writes what was felt into the sample.
-fn tell_felt(hip: GridPoint, felt: &Felt, sample: &mut Sample) {
+/// Writes the contact's output into the sample.
+fn write_output(hip: GridPoint, output: &ContactOutput, sample: &mut Sample) {
     sample.hip = hip;
-    sample.proxy = felt.proxy;
-    sample.state = felt.state;
-    sample.held_up_by = felt.held_up_by;
-    sample.work = felt.work;
+    sample.proxy = output.proxy;
+    sample.state = output.state;
+    sample.missing_tile = output.missing_tile;
+    sample.work = output.work;
 }
 
 /// Where the tip is over the terrain.

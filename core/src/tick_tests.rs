@@ -1,14 +1,15 @@
 //! The tick as a whole: arm to currents, and replay through a pulled window.
 
-use std::boxed::Box;
 use std::vec::Vec;
 
 use super::*;
 use crate::cases::cases;
-use crate::contact::{Rule, State};
+use crate::contact::{ContactState, Rule};
 use crate::force::ForceLaw;
+use crate::grid::MAX_CELL;
 use crate::guard::{Blockers, Mode};
-use crate::terrain::{Focus, Puller, TILE_CELLS};
+use crate::terrain::testing::buffers;
+use crate::terrain::{FieldSize, TileDemand, TileRequester};
 
 const SIZE: i32 = 640;
 
@@ -16,7 +17,7 @@ fn scene(source: Source) -> Scene {
     Scene {
         epoch: 1,
         level: 0,
-        size: [SIZE, SIZE],
+        size: FieldSize::new(SIZE, SIZE),
         top: 1 << 20,
         cell_mm: 1.0,
         home: GridPoint::new([320, 320, 5], Vec3::ZERO),
@@ -27,47 +28,48 @@ fn scene(source: Source) -> Scene {
     }
 }
 
-/// A device in memory: the loop, its puller, and a host that always answers.
-struct Device<const D: usize> {
-    haptics: Haptics<'static, D>,
-    puller: Puller<D>,
-    spare: Vec<&'static mut Tile>,
+/// A device in memory: the loop, its tile requester, and a host that always answers.
+struct Device<'t, const D: usize> {
+    haptics: Haptics<'t, D>,
+    requester: TileRequester<D>,
+    spare: Vec<&'t mut Tile>,
     height: fn(i32, i32) -> f32,
-    focus: Focus,
+    demand: TileDemand,
     served: usize,
     dead_man: bool,
 }
 
-impl<const D: usize> Device<D> {
-    fn new(source: Source, height: fn(i32, i32) -> f32) -> Self {
-        let tile = || -> &'static mut Tile { Box::leak(Box::new(Tile::VACANT)) };
-        let tiles = core::array::from_fn(|_| core::array::from_fn(|_| tile()));
-        let mut haptics = Haptics::new(tiles, TickRate::DEFAULT, None);
+impl<'t, const D: usize> Device<'t, D> {
+    fn new(tiles: &'t mut [Tile], source: Source, height: fn(i32, i32) -> f32) -> Self {
+        let mut spare: Vec<_> = tiles.iter_mut().collect();
+        let mut next = || spare.pop().expect("a tile for every slot");
+        let slots = core::array::from_fn(|_| core::array::from_fn(|_| next()));
+        let mut haptics = Haptics::new(slots, TickRate::DEFAULT, None);
         let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5);
         haptics.configure(mechanism.expect("valid"));
         let scene = scene(source);
         assert!(haptics.accept(Command::Scene(scene)).is_none());
-        let mut puller = Puller::new();
-        puller.reset(scene.level, scene.size);
+        let mut requester = TileRequester::new();
+        requester.reset(scene.level, scene.size);
         Self {
             haptics,
-            puller,
-            spare: (0..4).map(|_| tile()).collect(),
+            requester,
+            spare,
             height,
-            focus: Focus::default(),
+            demand: TileDemand::default(),
             served: 0,
             dead_man: false,
         }
     }
 
     /// The same, armed with the arm in its zero pose.
-    fn armed(height: fn(i32, i32) -> f32) -> Self {
-        let mut device = Self::new(Source::Encoders, height);
+    fn armed(tiles: &'t mut [Tile], height: fn(i32, i32) -> f32) -> Self {
+        let mut device = Self::new(tiles, Source::Encoders, height);
         device.arm([0; 3]);
         device
     }
 
-    fn say(&mut self, command: Command<'static>) {
+    fn say(&mut self, command: Command<'t>) {
         assert!(self.haptics.accept(command).is_none());
     }
 
@@ -92,13 +94,16 @@ impl<const D: usize> Device<D> {
             ..Sense::default()
         };
         let outcome = self.haptics.tick(&sense, true);
-        self.focus = Focus {
-            held_up_by: outcome.sample.held_up_by,
+        self.demand = TileDemand {
+            missing_tile: outcome.sample.missing_tile,
             proxy: outcome.sample.proxy.column(),
             hip: outcome.sample.hip.column(),
             velocity: [0.0; 2],
         };
-        while let Some(key) = self.puller.next_request(outcome.sample.tick, &self.focus) {
+        while let Some(key) = self
+            .requester
+            .next_request(outcome.sample.tick, &self.demand)
+        {
             self.serve(key);
         }
         outcome
@@ -106,13 +111,9 @@ impl<const D: usize> Device<D> {
 
     fn serve(&mut self, key: TileKey) {
         let tile = self.spare.pop().expect("as many spares as requests");
-        let (west, south) = (key.col * TILE_CELLS as i32, key.row * TILE_CELLS as i32);
-        let height = self.height;
-        tile.fill(key, 0, |col, row| {
-            height(west + col as i32, south + row as i32)
-        })
-        .unwrap();
-        self.puller.received(key);
+        let size = FieldSize::new(SIZE, SIZE);
+        tile.fill_from(key, 0, size, self.height).unwrap();
+        self.requester.received(key);
         let spent = self.haptics.accept(Command::Tile(tile)).unwrap();
         assert_ne!(
             spent.key(),
@@ -159,14 +160,15 @@ fn dip() -> impl Iterator<Item = [i32; 3]> {
 
 #[test]
 fn pressed_on_a_plane_the_motors_push_back() {
-    let mut device = Device::<4>::armed(plane);
+    let mut tiles = buffers::<4>();
+    let mut device = Device::<4>::armed(&mut tiles, plane);
     let outcomes: Vec<_> = dip().map(|c| device.tick(c)).collect();
-    assert_eq!(outcomes[64].sample.state, State::Free);
+    assert_eq!(outcomes[64].sample.state, ContactState::Free);
     // τ2 = G2·cos q2; I = τ/(11.2 · 0.0234 Nm/A): the weight alone.
     let weight_a = -0.0163 / (11.2 * 0.0234);
     assert!((outcomes[64].drive.currents_a - Vec3::Y * weight_a).length() < 1e-4);
     let last = outcomes.last().unwrap();
-    assert_eq!(last.sample.state, State::Touching);
+    assert_eq!(last.sample.state, ContactState::Touching);
     assert!((last.sample.force_n - Vec3::new(0.0, 0.0, 0.25)).length() < 1e-4);
     // τ2 = l1·F = 209.55 mm · 0.25 N
     let pushed_a = 0.209_55 * 0.25 / (11.2 * 0.0234);
@@ -177,9 +179,14 @@ fn pressed_on_a_plane_the_motors_push_back() {
 
 #[test]
 fn disarmed_the_same_is_felt_by_nobody() {
-    let mut device = Device::<4>::new(Source::Encoders, plane);
+    let mut tiles = buffers::<4>();
+    let mut device = Device::<4>::new(&mut tiles, Source::Encoders, plane);
     let last = dip().map(|c| device.tick(c)).last().unwrap();
-    assert_eq!(last.sample.state, State::Touching, "the contact is there");
+    assert_eq!(
+        last.sample.state,
+        ContactState::Touching,
+        "the contact is there"
+    );
     assert_eq!(last.sample.force_n, Vec3::ZERO);
     assert_eq!(last.drive, Drive::default());
 }
@@ -207,17 +214,19 @@ fn the_weight_of_the_arm_is_held_with_the_sign_of_the_calibration() {
 
 #[test]
 fn begun_inside_the_terrain_there_is_no_force() {
-    let mut device = Device::<4>::armed(plane);
+    let mut tiles = buffers::<4>();
+    let mut device = Device::<4>::armed(&mut tiles, plane);
     for _ in 0..50 {
         let outcome = device.tick([0; 3]);
-        assert_eq!(outcome.sample.state, State::Waiting);
+        assert_eq!(outcome.sample.state, ContactState::Waiting);
         assert_eq!(outcome.sample.force_n, Vec3::ZERO);
     }
 }
 
 #[test]
 fn a_fault_is_latched_until_cleared_and_counts_lost_have_to_be_zeroed() {
-    let mut device = Device::<4>::armed(plane);
+    let mut tiles = buffers::<4>();
+    let mut device = Device::<4>::armed(&mut tiles, plane);
     assert!(device.tick([0; 3]).drive.enabled);
     let outcome = device.tick([5000, 0, 0]);
     assert_eq!(outcome.drive, Drive::default());
@@ -235,8 +244,8 @@ fn a_fault_is_latched_until_cleared_and_counts_lost_have_to_be_zeroed() {
 }
 
 /// Pressed into the plane, with force, armed.
-fn pressed() -> (Device<4>, Vec3) {
-    let mut device = Device::<4>::armed(plane);
+fn pressed(tiles: &mut [Tile]) -> (Device<'_, 4>, Vec3) {
+    let mut device = Device::<4>::armed(tiles, plane);
     let last = dip().map(|c| device.tick(c)).last().unwrap();
     (device, last.sample.force_n)
 }
@@ -248,7 +257,8 @@ fn without_its_scene_or_with_another_force_goes_out_without_a_step() {
         ..scene(Source::Encoders)
     };
     for command in [Command::DropScene, Command::Scene(other), Command::Disarm] {
-        let (mut device, mut last) = pressed();
+        let mut tiles = buffers::<4>();
+        let (mut device, mut last) = pressed(&mut tiles);
         assert!(last.z > 0.2);
         device.say(command);
         let mut ticks = 0;
@@ -263,7 +273,7 @@ fn without_its_scene_or_with_another_force_goes_out_without_a_step() {
             ticks += 1;
         }
         assert!((90..=101).contains(&ticks), "{ticks}");
-        assert_eq!((last, device.haptics.fault()), (Vec3::ZERO, None));
+        assert_eq!((last, device.haptics.report().fault), (Vec3::ZERO, None));
     }
 }
 
@@ -274,11 +284,13 @@ fn settings_a_new_zero_and_a_replay_switch_off_at_once() {
         ..scene(Source::Points)
     };
     for command in [Command::Zero([7, 7, 7]), Command::Scene(points)] {
-        let (mut device, _) = pressed();
+        let mut tiles = buffers::<4>();
+        let (mut device, _) = pressed(&mut tiles);
         device.say(command);
         assert_eq!(device.tick([0; 3]).drive, Drive::default());
     }
-    let (mut device, _) = pressed();
+    let mut tiles = buffers::<4>();
+    let (mut device, _) = pressed(&mut tiles);
     let mechanism = Mechanism::new(&Calibration::PREMIUM_1_0).expect("valid");
     device.haptics.configure(mechanism);
     assert_eq!(device.tick([0; 3]).drive, Drive::default());
@@ -288,7 +300,8 @@ fn settings_a_new_zero_and_a_replay_switch_off_at_once() {
 
 #[test]
 fn without_a_calibration_nothing_is_felt_and_nothing_arms() {
-    let mut device = Device::<4>::new(Source::Encoders, plane);
+    let mut tiles = buffers::<4>();
+    let mut device = Device::<4>::new(&mut tiles, Source::Encoders, plane);
     device.haptics.mechanism = None;
     device.say(Command::Zero([0; 3]));
     device.say(Command::Arm);
@@ -297,7 +310,7 @@ fn without_a_calibration_nothing_is_felt_and_nothing_arms() {
         let outcome = device.tick([0; 3]);
         assert_eq!(
             (outcome.drive, outcome.sample.state),
-            (Drive::default(), State::Waiting)
+            (Drive::default(), ContactState::Waiting)
         );
     }
     let report = device.haptics.report();
@@ -306,11 +319,12 @@ fn without_a_calibration_nothing_is_felt_and_nothing_arms() {
 
 #[test]
 fn a_scene_that_makes_no_sense_is_not_taken() {
-    let mut device = Device::<4>::armed(plane);
+    let mut tiles = buffers::<4>();
+    let mut device = Device::<4>::armed(&mut tiles, plane);
     let good = scene(Source::Encoders);
     let bad = [
         Scene {
-            size: [0, 5],
+            size: FieldSize::new(0, 5),
             ..good
         },
         Scene {
@@ -340,8 +354,10 @@ fn a_scene_that_makes_no_sense_is_not_taken() {
 /// of a tick ran out must not show in what is felt.
 #[test]
 fn a_small_window_feels_what_a_whole_one_feels() {
-    let mut small = Device::<4>::new(Source::Points, hills);
-    let mut large = Device::<32>::new(Source::Points, hills);
+    let mut tiles = buffers::<4>();
+    let mut small = Device::<4>::new(&mut tiles, Source::Points, hills);
+    let mut more_tiles = buffers::<32>();
+    let mut large = Device::<32>::new(&mut more_tiles, Source::Points, hills);
     let mut dice = 12345_u32;
     let mut random = |range: u32| {
         dice ^= dice << 13;
@@ -366,7 +382,7 @@ fn a_small_window_feels_what_a_whole_one_feels() {
             ..b
         };
         assert_eq!(a, same, "point {seq} at {hip:?}");
-        touched += u32::from(a.state == State::Touching);
+        touched += u32::from(a.state == ContactState::Touching);
     }
     assert!(touched > POINTS / 8, "{touched}");
     assert!(
@@ -377,7 +393,8 @@ fn a_small_window_feels_what_a_whole_one_feels() {
 
 #[test]
 fn pushed_over_the_edge_of_the_data_the_force_fades_and_says_why() {
-    let mut device = Device::<4>::armed(edge);
+    let mut tiles = buffers::<4>();
+    let mut device = Device::<4>::armed(&mut tiles, edge);
     // Home is 20 cells from the edge; a count of the first axis is 24 µm.
     for counts in dip() {
         let _ = device.tick(counts);
@@ -401,4 +418,22 @@ fn pushed_over_the_edge_of_the_data_the_force_fades_and_says_why() {
 /// A plane with nothing more than 20 cells east of the middle.
 fn edge(x: i32, _: i32) -> f32 {
     if x > 340 { f32::NAN } else { 5.5 }
+}
+
+/// The wire checks sums, not sense: a damaged host may send any bits.
+#[test]
+fn a_point_of_any_bits_is_a_valid_one_before_it_is_felt() {
+    let mut tiles = buffers::<4>();
+    let mut device = Device::<4>::new(&mut tiles, Source::Points, plane);
+    // Cell (i32::MIN, 100, 9) as zigzag varints, then three fractions.
+    let mut bytes = std::vec![0xFF, 0xFF, 0xFF, 0xFF, 0x0F, 0xC8, 0x01, 0x12];
+    for frac in [f32::NAN, -7.5, f32::INFINITY] {
+        bytes.extend(frac.to_le_bytes());
+    }
+    let hip: GridPoint = postcard::from_bytes(&bytes).expect("nine numbers");
+    assert!(!hip.frac().is_finite());
+    let sample = device.feel(1, hip);
+    assert_eq!(sample.hip.cell(), [-MAX_CELL, 92, MAX_CELL]);
+    assert_eq!(sample.hip.frac(), Vec3::new(0.0, 0.5, 0.0));
+    assert_eq!(sample.force_n, Vec3::ZERO);
 }

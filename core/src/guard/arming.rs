@@ -1,15 +1,15 @@
-//! The way from off to on, and back.
+//! The steps from off to on and back, and how long each may take.
 
 use serde::{Deserialize, Serialize};
 
 use super::flags::Blockers;
 use super::mode::Mode;
-use super::rate::TickRate;
+use crate::rate::TickRate;
 
-/// How long an arm command may wait for what the host cannot change, ms.
-const GRACE_MS: u32 = 50;
+/// How long something may block an arm command before it is refused, ms.
+const BLOCKED_TIMEOUT_MS: u32 = 50;
 /// How long it may wait for the dead-man switch, ms.
-const PATIENCE_MS: u32 = 30_000;
+const SWITCH_TIMEOUT_MS: u32 = 30_000;
 /// For how long the force has to stay small, ms.
 const CONFIRM_MS: u32 = 100;
 /// How long force takes to come in, ms.
@@ -30,63 +30,30 @@ pub struct Decision {
 }
 
 /// Where arming stands, and since when.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Arming {
-    mode: Mode,
+    pub(super) mode: Mode,
     /// Ticks since the mode began.
     since: u32,
-    /// Ticks that something has been in the way of a request.
+    /// Ticks that something has blocked a request.
     blocked: u32,
     /// Whether the request in force has been decided.
     decided: bool,
-    decision: Decision,
+    pub(super) decision: Decision,
     /// The switch was seen open during the request.
     seen_open: bool,
     /// Share of the force that is let through.
-    gain: f32,
-    times: Times,
-}
-
-/// The constants above in ticks.
-#[derive(Clone, Copy, Debug)]
-struct Times {
-    grace: u32,
-    patience: u32,
-    confirm: u32,
-    ramp_step: f32,
-    fade_step: f32,
+    pub(super) gain: f32,
+    rate: TickRate,
 }
 
 impl Arming {
     pub(super) fn new(rate: TickRate) -> Self {
         Self {
-            mode: Mode::Disarmed,
-            since: 0,
-            blocked: 0,
             decided: true,
-            decision: Decision::default(),
-            seen_open: false,
-            gain: 0.0,
-            times: Times {
-                grace: rate.ticks(GRACE_MS),
-                patience: rate.ticks(PATIENCE_MS),
-                confirm: rate.ticks(CONFIRM_MS),
-                ramp_step: 1.0 / rate.ticks(RAMP_MS) as f32,
-                fade_step: 1.0 / rate.ticks(FADE_MS) as f32,
-            },
+            rate,
+            ..Self::default()
         }
-    }
-
-    pub(super) const fn mode(&self) -> Mode {
-        self.mode
-    }
-
-    pub(super) const fn decision(&self) -> Decision {
-        self.decision
-    }
-
-    pub(super) const fn gain(&self) -> f32 {
-        self.gain
     }
 
     fn enter(&mut self, mode: Mode) {
@@ -139,13 +106,13 @@ impl Arming {
         };
     }
 
-    /// Before the amplifiers are on: one tick, with what is in the way of
-    /// arming besides the user's hand.
-    pub(super) fn wait(&mut self, in_the_way: Blockers, dead_man: bool) {
+    /// Before the amplifiers are on: one tick, with what blocks arming besides what
+    /// the user has to do.
+    pub(super) fn wait(&mut self, blockers: Blockers, dead_man: bool) {
         self.since = self.since.saturating_add(1);
         match self.mode {
-            Mode::Requested => self.wait_for_press(in_the_way, dead_man),
-            Mode::Confirming if !in_the_way.is_empty() => self.stop(in_the_way),
+            Mode::Requested => self.wait_for_press(blockers, dead_man),
+            Mode::Confirming if !blockers.is_empty() => self.stop(blockers),
             Mode::Confirming if !dead_man => {
                 self.enter(Mode::Requested);
                 self.seen_open = true;
@@ -154,12 +121,12 @@ impl Arming {
         }
     }
 
-    fn wait_for_press(&mut self, in_the_way: Blockers, dead_man: bool) {
-        if !in_the_way.is_empty() {
+    fn wait_for_press(&mut self, blockers: Blockers, dead_man: bool) {
+        if !blockers.is_empty() {
             self.blocked += 1;
             self.seen_open = false;
-            if self.blocked > self.times.grace {
-                self.stop(in_the_way);
+            if self.blocked > self.rate.ticks(BLOCKED_TIMEOUT_MS) {
+                self.stop(blockers);
             }
             return;
         }
@@ -172,7 +139,7 @@ impl Arming {
         } else if self.seen_open {
             return self.enter(Mode::Confirming);
         }
-        if self.since > self.times.patience {
+        if self.since > self.rate.ticks(SWITCH_TIMEOUT_MS) {
             self.stop(Blockers::empty());
         }
     }
@@ -181,7 +148,7 @@ impl Arming {
     pub(super) fn confirm(&mut self, small: bool) {
         if !small {
             self.since = 0;
-        } else if self.since >= self.times.confirm {
+        } else if self.since >= self.rate.ticks(CONFIRM_MS) {
             self.enter(Mode::Ramping);
             self.gain = 0.0;
         }
@@ -191,14 +158,14 @@ impl Arming {
     pub(super) fn drive(&mut self) {
         match self.mode {
             Mode::Ramping => {
-                self.gain += self.times.ramp_step;
+                self.gain += 1.0 / self.rate.ticks(RAMP_MS) as f32;
                 if self.gain >= 1.0 {
                     self.gain = 1.0;
                     self.enter(Mode::Armed);
                 }
             }
             Mode::Fading => {
-                self.gain -= self.times.fade_step;
+                self.gain -= 1.0 / self.rate.ticks(FADE_MS) as f32;
                 if self.gain <= 0.0 {
                     self.stop(Blockers::HOST_DISARMED);
                 }
@@ -207,8 +174,8 @@ impl Arming {
         }
     }
 
-    /// What the user's hand and the host still have to do.
-    pub(super) fn by_hand(&self, dead_man: bool) -> Blockers {
+    /// What the user and the host still have to do.
+    pub(super) fn user_blockers(&self, dead_man: bool) -> Blockers {
         let host = match self.mode {
             Mode::Disarmed => Blockers::HOST_DISARMED,
             _ => Blockers::empty(),

@@ -64,7 +64,7 @@ bitflags! {
 }
 
 impl Blockers {
-    /// What only the user's hand can change: an arm command waits for it.
+    /// What only the user or the host can change: an arm command waits for it.
     pub const BY_HAND: Self = Self::HOST_DISARMED
         .union(Self::DEAD_MAN_STILL_HELD)
         .union(Self::DEAD_MAN_RELEASED)

@@ -23,7 +23,7 @@ impl Guard {
             Mode::Fading => {
                 self.limits |= Limits::FADING;
                 self.arming.drive();
-                self.force_n = self.held_n * self.arming.gain();
+                self.force_n = self.held_n * self.arming.gain;
             }
             Mode::Ramping | Mode::Armed => self.follow_force(wanted_n),
         }
@@ -44,9 +44,9 @@ impl Guard {
         if self.mode() == Mode::Ramping {
             self.limits |= Limits::RAMPING;
             self.arming.drive();
-            aim *= self.arming.gain();
+            aim *= self.arming.gain;
         }
-        let share = self.speed.share();
+        let share = self.speed.share;
         if share < 1.0 {
             self.limits |= Limits::SPEED_LIMITED;
             aim *= share;
@@ -70,12 +70,12 @@ impl Guard {
         if !self.mode().drives() {
             return Drive::default();
         }
-        let allowed_a = self.motors.allowed_a();
+        let allowed_a = self.motors.allowed_a;
         let load = wanted_a.abs();
         self.currents_a = if load.cmple(allowed_a).all() {
             wanted_a
         } else {
-            self.limits |= match load.cmple(self.motors.peak_a()).all() {
+            self.limits |= match load.cmple(self.motors.peak_a).all() {
                 true => Limits::THERMAL_DERATED,
                 false => Limits::CURRENT_LIMITED,
             };

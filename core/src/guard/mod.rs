@@ -1,22 +1,21 @@
 //! What may reach the amplifiers: every failure ends in zero.
 //!
-//! A tick asks three things in this order: [`Guard::watch`] looks at the inputs
-//! and at what was measured, and decides whether anything may be driven at all;
+//! A tick calls three functions in this order: [`Guard::watch`] checks the inputs
+//! and what was measured, and decides whether anything may be driven at all;
 //! [`Guard::limit_force`] bounds the force; [`Guard::limit_currents`] bounds
 //! the currents.
 //!
 //! [`Fault`]s are latched and switch the amplifiers off. [`Limits`] say why a
 //! force is less than what was asked for. [`Blockers`] say why the arm cannot
-//! be armed. The way from off to on and back is in [`Mode`].
+//! be armed. The steps from off to on and back are in [`Mode`].
 
 mod arming;
 mod fault;
 mod flags;
 mod limit;
 mod mode;
-mod rate;
 mod speed;
-mod stillness;
+mod stall;
 pub mod thermal;
 mod watch;
 
@@ -27,13 +26,13 @@ pub use arming::{Decision, SMALL_FORCE_N};
 pub use fault::Fault;
 pub use flags::{Blockers, Limits};
 pub use mode::Mode;
-pub use rate::TickRate;
-pub use stillness::TRAVEL as TRAVEL_WHILE_ONE_STANDS;
+pub use stall::TRAVEL as TRAVEL_WHILE_ONE_STANDS;
 
 use crate::phantom::{Mechanism, Pose};
+use crate::rate::TickRate;
 use arming::Arming;
-use speed::Speed;
-use stillness::Stillness;
+use speed::SpeedMonitor;
+use stall::StallDetector;
 use thermal::Motors;
 
 /// Most that the force may change, newtons a second. A hand at 2 m/s against
@@ -97,7 +96,7 @@ pub struct Drive {
     pub enabled: bool,
 }
 
-/// Where the guard stands.
+/// The state of the guard after a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Report {
     /// How far arming has come.
@@ -112,7 +111,40 @@ pub struct Report {
     pub decision: Decision,
 }
 
-/// The guard's memory.
+/// What stands between the force that is wanted and the amplifiers.
+///
+/// ```
+/// use hapterra_core::Vec3;
+/// use hapterra_core::guard::{Fault, Guard, Mode, SceneKind, Sense, Surroundings};
+/// use hapterra_core::phantom::{Calibration, Mechanism};
+/// use hapterra_core::rate::TickRate;
+///
+/// let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5)?;
+/// let pose = mechanism.pose([0; 3], [0; 3]);
+/// let mut guard = Guard::new(TickRate::DEFAULT, None);
+/// guard.configure(&mechanism);
+/// guard.arm();
+/// let mut force_n = Vec3::ZERO;
+/// for tick in 0..3_000 {
+///     // The dead-man switch is pressed after a moment.
+///     let sense = Sense { dead_man: tick > 10, ..Sense::default() };
+///     let around = Surroundings {
+///         arm: Some((&mechanism, &pose)),
+///         zeroed: true,
+///         scene: SceneKind::Arm,
+///         watchdog_live: true,
+///     };
+///     guard.watch(&sense, &around);
+///     // Contact begins when the arm is armed; 20 N are more than the arm may make.
+///     let armed = guard.report().mode == Mode::Armed;
+///     force_n = guard.limit_force(if armed { Vec3::Z * 20.0 } else { Vec3::ZERO });
+///     let _ = guard.limit_currents(Vec3::ZERO);
+/// }
+/// assert!((force_n.z - 0.9 * 8.5).abs() < 1e-3);
+/// guard.trip(Fault::Hardware);
+/// assert_eq!(guard.limit_force(Vec3::Z), Vec3::ZERO);
+/// # Ok::<(), hapterra_core::phantom::BadCalibration>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Guard {
     /// Most counts and newtons from one tick to the next.
@@ -129,8 +161,8 @@ pub struct Guard {
     /// While fading: the force at full gain.
     held_n: Vec3,
     currents_a: Vec3,
-    speed: Speed,
-    stillness: Stillness,
+    speed: SpeedMonitor,
+    stall: StallDetector,
     motors: Motors,
 }
 
@@ -150,8 +182,8 @@ impl Guard {
             force_n: Vec3::ZERO,
             held_n: Vec3::ZERO,
             currents_a: Vec3::ZERO,
-            speed: Speed::new(rate),
-            stillness: Stillness::default(),
+            speed: SpeedMonitor::new(rate),
+            stall: StallDetector::default(),
             motors: Motors::new(rate),
         }
     }
@@ -163,39 +195,27 @@ impl Guard {
         self.motors.configure(mechanism.calibration());
     }
 
-    /// The latched fault.
-    #[must_use]
-    pub const fn fault(&self) -> Option<Fault> {
-        self.fault
-    }
-
     /// How far arming has come.
     #[must_use]
     pub const fn mode(&self) -> Mode {
-        self.arming.mode()
-    }
-
-    /// Why the last tick's force was less than asked for.
-    #[must_use]
-    pub const fn limits(&self) -> Limits {
-        self.limits
+        self.arming.mode
     }
 
     /// Share of force and weight that is let through.
     #[must_use]
     pub const fn gain(&self) -> f32 {
-        self.arming.gain()
+        self.arming.gain
     }
 
-    /// Where the guard stands.
+    /// The state of the guard after a tick.
     #[must_use]
     pub const fn report(&self) -> Report {
         Report {
-            mode: self.arming.mode(),
+            mode: self.arming.mode,
             blockers: self.blockers,
             limits: self.limits,
             fault: self.fault,
-            decision: self.arming.decision(),
+            decision: self.arming.decision,
         }
     }
 
@@ -225,7 +245,7 @@ impl Guard {
 
     /// Switches off after force has gone out.
     pub fn disarm(&mut self) {
-        let gain = self.arming.gain();
+        let gain = self.arming.gain;
         if self.mode().drives() && self.mode() != Mode::Fading {
             // At the gain that there is, this is the force that there is.
             self.held_n = if gain > 0.0 {
@@ -246,7 +266,7 @@ impl Guard {
         self.arming.stop(why);
         self.force_n = Vec3::ZERO;
         self.currents_a = Vec3::ZERO;
-        self.stillness = Stillness::default();
+        self.stall = StallDetector::default();
     }
 
     /// These counts follow from nothing before.

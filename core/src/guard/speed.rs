@@ -1,19 +1,18 @@
-//! How fast the tip is, looked at only as closely as need be.
+//! The tip's speed, estimated only as closely as the limit needs it.
 
 use glam::Vec3;
 
-use super::rate::TickRate;
 use crate::phantom::{Mechanism, Pose, Readings};
+use crate::rate::TickRate;
 
 /// The tip may stay above twice the speed limit for this many readings, a
 /// millisecond each.
-const PATIENCE: u32 = 5;
+const MOST_READINGS_TOO_FAST: u32 = 5;
 
 /// Watches the tip's speed, once a millisecond.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Speed {
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SpeedMonitor {
     readings: Readings,
-    latest: [i32; 3],
     /// Ticks between two readings, and since the last.
     every: u32,
     ticks: u32,
@@ -28,12 +27,14 @@ pub(super) struct Speed {
     rough_mm_s: f32,
     limit_mm_s: f32,
     too_fast: u32,
-    share: f32,
+    /// The share of the force that may be made at this speed: 1 up to the limit, 0
+    /// from twice the limit on.
+    pub(super) share: f32,
 }
 
-/// What a tick's look at the speed found.
+/// What a tick's check of the speed found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Look {
+pub(super) enum SpeedCheck {
     /// Between two readings.
     NotYet,
     /// A reading was taken; counts moved since the last.
@@ -42,20 +43,14 @@ pub(super) enum Look {
     TooFast,
 }
 
-impl Speed {
+impl SpeedMonitor {
     pub(super) fn new(rate: TickRate) -> Self {
         let every = rate.ticks(1);
         Self {
-            readings: Readings::default(),
-            latest: [0; 3],
             every,
-            ticks: 0,
             hz: rate.hz() as f32 / every as f32,
-            surely_slow: [0; 3],
-            rough_mm_s: 0.0,
-            limit_mm_s: 0.0,
-            too_fast: 0,
             share: 1.0,
+            ..Self::default()
         }
     }
 
@@ -74,38 +69,39 @@ impl Speed {
     /// Forgets what was: these counts follow from nothing before.
     pub(super) fn restart(&mut self, counts: [i32; 3]) {
         self.readings.restart(counts);
-        self.latest = counts;
         self.ticks = 0;
         self.too_fast = 0;
         self.share = 1.0;
     }
 
     /// Takes a tick's counts.
-    pub(super) fn look(&mut self, counts: [i32; 3], mechanism: &Mechanism, pose: &Pose) -> Look {
+    pub(super) fn check(
+        &mut self,
+        counts: [i32; 3],
+        mechanism: &Mechanism,
+        pose: &Pose,
+    ) -> SpeedCheck {
         self.ticks += 1;
         if self.ticks < self.every {
-            return Look::NotYet;
+            return SpeedCheck::NotYet;
         }
         self.ticks = 0;
         self.readings.take(counts);
-        let [a, b, c] = self.latest;
-        let [x, y, z] = counts;
-        let moved = [x.wrapping_sub(a), y.wrapping_sub(b), z.wrapping_sub(c)];
-        self.latest = counts;
+        let moved = self.readings.moved();
         let speed_of =
             |counts: Vec3| pose.tip_velocity_mm_s(counts * self.hz * mechanism.radians_per_count());
         if self.is_surely_slow(moved) || self.is_roughly_slow(moved, speed_of) {
             self.share = 1.0;
             self.too_fast = 0;
-            return Look::Moved(moved);
+            return SpeedCheck::Moved(moved);
         }
         let speed = speed_of(self.readings.velocity()).length();
         let over = speed / self.limit_mm_s - 1.0;
         self.share = 1.0 - over.clamp(0.0, 1.0);
         self.too_fast = if over < 1.0 { 0 } else { self.too_fast + 1 };
-        match self.too_fast > PATIENCE {
-            true => Look::TooFast,
-            false => Look::Moved(moved),
+        match self.too_fast > MOST_READINGS_TOO_FAST {
+            true => SpeedCheck::TooFast,
+            false => SpeedCheck::Moved(moved),
         }
     }
 
@@ -122,12 +118,6 @@ impl Speed {
         let most = self.limit_mm_s - self.rough_mm_s;
         most > 0.0 && speed_of(Vec3::new(x, y, z)).length_squared() <= most * most
     }
-
-    /// The share of the force that may be made at this speed: 1 up to the
-    /// limit, 0 from twice the limit on.
-    pub(super) const fn share(&self) -> f32 {
-        self.share
-    }
 }
 
 #[cfg(test)]
@@ -140,7 +130,7 @@ mod tests {
     #[test]
     fn the_rough_look_decides_as_the_close_one() {
         let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5).expect("valid");
-        let mut rough = Speed::new(TickRate::DEFAULT);
+        let mut rough = SpeedMonitor::new(TickRate::DEFAULT);
         rough.configure(&mechanism);
         let mut close = rough;
         close.rough_mm_s = f32::INFINITY;
@@ -166,11 +156,11 @@ mod tests {
                 close.restart(counts);
             }
             let pose = mechanism.pose(counts, [0; 3]);
-            let looks = [&mut rough, &mut close].map(|s| s.look(counts, &mechanism, &pose));
+            let looks = [&mut rough, &mut close].map(|s| s.check(counts, &mechanism, &pose));
             assert_eq!(looks[0], looks[1], "{tick}");
-            assert_eq!(rough.share().to_bits(), close.share().to_bits(), "{tick}");
+            assert_eq!(rough.share.to_bits(), close.share.to_bits(), "{tick}");
             assert_eq!(rough.too_fast, close.too_fast, "{tick}");
-            if rough.share() < 1.0 {
+            if rough.share < 1.0 {
                 slowed += 1;
             } else {
                 full += 1;

@@ -198,7 +198,7 @@ fn a_large_force_keeps_it_confirming_and_a_release_goes_back_a_step() {
     bench.sense.dead_man = false;
     bench.tick();
     assert_eq!(
-        (bench.guard.mode(), bench.guard.fault()),
+        (bench.guard.mode(), bench.guard.report().fault),
         (Mode::Requested, None)
     );
     bench.sense.dead_man = true;
@@ -228,11 +228,11 @@ fn force_comes_in_over_two_seconds_at_any_rate() {
         bench.wanted_n = Vec3::Z * 2.0;
         bench.ticks(1_000 * khz);
         assert!((bench.force_n.z - 1.0).abs() < 0.01, "{}", bench.force_n);
-        assert!(bench.guard.limits().contains(Limits::RAMPING));
+        assert!(bench.guard.report().limits.contains(Limits::RAMPING));
         bench.ticks(1_000 * khz + 2);
         assert_eq!(bench.guard.mode(), Mode::Armed);
         assert!((bench.force_n.z - 2.0).abs() < 1e-5);
-        assert_eq!(bench.guard.limits(), Limits::empty());
+        assert_eq!(bench.guard.report().limits, Limits::empty());
     }
 }
 
@@ -311,14 +311,14 @@ fn each_fault_is_zero_within_its_tick_and_latched_until_cleared() {
         let before = bench.sense;
         spoil(&mut bench);
         assert_eq!(bench.tick(), Drive::default(), "{fault:?}");
-        assert_eq!(bench.guard.fault(), Some(fault));
+        assert_eq!(bench.guard.report().fault, Some(fault));
         assert_eq!(bench.force_n, Vec3::ZERO);
         // The cause is gone; the fault is not.
         bench.sense = before;
         (bench.watchdog_live, bench.calibrated) = (true, true);
         bench.wanted_n = Vec3::ZERO;
         bench.ticks(3_000);
-        assert_eq!(bench.guard.fault(), Some(fault));
+        assert_eq!(bench.guard.report().fault, Some(fault));
         bench.guard.arm();
         bench.ticks(3_000);
         assert_eq!(bench.guard.mode(), Mode::Disarmed, "{fault:?}");
@@ -326,7 +326,7 @@ fn each_fault_is_zero_within_its_tick_and_latched_until_cleared() {
         bench.guard.clear();
         bench.ticks(3_000);
         assert_eq!(
-            (bench.guard.fault(), bench.guard.mode()),
+            (bench.guard.report().fault, bench.guard.mode()),
             (None, Mode::Disarmed)
         );
         bench.zeroed = true;
@@ -342,7 +342,7 @@ fn the_first_fault_stays() {
     bench.tick();
     bench.sense.counts = [5_000, 0, 0];
     bench.tick();
-    assert_eq!(bench.guard.fault(), Some(Fault::EmergencyStop));
+    assert_eq!(bench.guard.report().fault, Some(Fault::EmergencyStop));
 }
 
 #[test]
@@ -350,12 +350,12 @@ fn joint_limits_and_linkage_trip_while_armed() {
     // Slowly turned outwards until something happens: a count is 0.1 mrad.
     let turned = |axis: usize, sign: i32| {
         let mut bench = Bench::armed();
-        while bench.guard.fault().is_none() {
+        while bench.guard.report().fault.is_none() {
             bench.sense.counts[axis] += sign * 5;
             bench.tick();
         }
         let q = bench.mechanism.angles(bench.sense.counts, [0; 3]);
-        (bench.guard.fault(), q[axis].to_degrees().abs())
+        (bench.guard.report().fault, q[axis].to_degrees().abs())
     };
     let (fault, degrees) = turned(0, 1);
     assert_eq!(fault, Some(Fault::JointLimit));
@@ -376,15 +376,15 @@ fn a_jumping_encoder_loses_the_zero_and_the_first_reading_is_no_jump() {
     bench.tick();
     bench.sense.counts = [0; 3];
     bench.tick();
-    assert_eq!(bench.guard.fault(), None, "nothing is known yet");
+    assert_eq!(bench.guard.report().fault, None, "nothing is known yet");
     bench.zeroed = true;
     bench.ticks(2);
     bench.sense.counts = [128, -128, 0];
     bench.tick();
-    assert_eq!(bench.guard.fault(), None);
+    assert_eq!(bench.guard.report().fault, None);
     bench.sense.counts = [128, 1, 0];
     bench.tick();
-    assert_eq!(bench.guard.fault(), Some(Fault::EncoderJump));
+    assert_eq!(bench.guard.report().fault, Some(Fault::EncoderJump));
     assert!(!bench.zeroed);
 }
 
@@ -394,10 +394,10 @@ fn at_ten_kilohertz_the_same_speed_is_a_tenth_of_the_counts() {
     bench.tick();
     bench.sense.counts[0] += 13;
     bench.tick();
-    assert_eq!(bench.guard.fault(), None);
+    assert_eq!(bench.guard.report().fault, None);
     bench.sense.counts[0] += 14;
     bench.tick();
-    assert_eq!(bench.guard.fault(), Some(Fault::EncoderJump));
+    assert_eq!(bench.guard.report().fault, Some(Fault::EncoderJump));
 }
 
 #[test]
@@ -408,7 +408,7 @@ fn the_force_is_clamped_as_a_vector_and_says_so() {
     assert!(bench.force_n.length() <= 7.65 && bench.force_n.length() > 7.649);
     let direction = Vec3::new(0.6, -0.8, 0.0);
     assert!((bench.force_n - 7.65 * direction).length() < 1e-4);
-    assert!(bench.guard.limits().contains(Limits::FORCE_CLAMPED));
+    assert!(bench.guard.report().limits.contains(Limits::FORCE_CLAMPED));
 }
 
 #[test]
@@ -417,10 +417,10 @@ fn force_changes_at_the_slew_limit_and_says_so() {
     bench.wanted_n = Vec3::Z * 2.5;
     bench.tick();
     assert!((bench.force_n.z - 1.0).abs() < 1e-6);
-    assert_eq!(bench.guard.limits(), Limits::SLEW_LIMITED);
+    assert_eq!(bench.guard.report().limits, Limits::SLEW_LIMITED);
     bench.ticks(2);
     assert!((bench.force_n.z - 2.5).abs() < 1e-6);
-    assert_eq!(bench.guard.limits(), Limits::empty());
+    assert_eq!(bench.guard.report().limits, Limits::empty());
 }
 
 #[test]
@@ -429,10 +429,16 @@ fn currents_keep_their_direction_at_the_peak_and_say_so() {
     let drive = bench.guard.limit_currents(Vec3::new(16.5, -8.25, 1.65));
     assert!((drive.currents_a - Vec3::new(5.5, -2.75, 0.55)).length() < 1e-5);
     assert!(drive.currents_a.abs().max_element() <= 5.5);
-    assert!(bench.guard.limits().contains(Limits::CURRENT_LIMITED));
+    assert!(
+        bench
+            .guard
+            .report()
+            .limits
+            .contains(Limits::CURRENT_LIMITED)
+    );
     let nothing = bench.guard.limit_currents(Vec3::new(f32::NAN, 0.0, 0.0));
     assert_eq!(nothing, Drive::default());
-    assert_eq!(bench.guard.fault(), Some(Fault::NotANumber));
+    assert_eq!(bench.guard.report().fault, Some(Fault::NotANumber));
 }
 
 #[test]
@@ -444,7 +450,7 @@ fn a_motor_that_works_hard_is_derated_and_says_so_and_stays_below_its_limit() {
         // A hand that trembles: standing still would be another fault.
         bench.sense.counts[1] = (tick as i32 / 50) % 2;
         let drive = bench.tick();
-        let limits = bench.guard.limits();
+        let limits = bench.guard.report().limits;
         if limits.contains(Limits::THERMAL_DERATED) {
             derated = derated.or(Some((tick, drive.currents_a.y)));
         }
@@ -452,7 +458,7 @@ fn a_motor_that_works_hard_is_derated_and_says_so_and_stays_below_its_limit() {
     let (tick, current_a) = derated.expect("derated");
     assert!((1_000..60_000).contains(&tick), "{tick}");
     assert!(current_a < 5.5, "{current_a}");
-    assert_eq!(bench.guard.fault(), None);
+    assert_eq!(bench.guard.report().fault, None);
     let hottest = bench.guard.motors().winding_c().max_element();
     assert!((80.0..110.0).contains(&hottest), "{hottest}");
 }
@@ -465,11 +471,11 @@ fn a_winding_above_its_limit_is_a_fault() {
         bench.guard.motors.heat(Vec3::Y * 5.5);
     }
     assert_eq!(bench.tick(), Drive::default());
-    assert_eq!(bench.guard.fault(), Some(Fault::MotorTooHot));
+    assert_eq!(bench.guard.report().fault, Some(Fault::MotorTooHot));
     // Cleared while it is hot, it trips again; warmth is not forgotten.
     bench.guard.clear();
     bench.tick();
-    assert_eq!(bench.guard.fault(), Some(Fault::MotorTooHot));
+    assert_eq!(bench.guard.report().fault, Some(Fault::MotorTooHot));
 }
 
 /// Joint 2 turned at so many counts a tick while 1 N is wanted.
@@ -489,15 +495,15 @@ fn above_the_speed_limit_force_is_less_and_far_above_it_is_a_fault() {
     // 28.7 µm a count: 30 counts a tick are 0.86 m/s, 52 are 1.49, 80 are 2.3.
     let slow = hurried(30, 40);
     assert_eq!(
-        (slow.force_n.z, slow.guard.limits()),
+        (slow.force_n.z, slow.guard.report().limits),
         (1.0, Limits::empty())
     );
     let fast = hurried(52, 40);
     assert!((fast.force_n.z - 0.51).abs() < 0.02, "{}", fast.force_n);
-    assert_eq!(fast.guard.limits(), Limits::SPEED_LIMITED);
-    assert_eq!(fast.guard.fault(), None);
+    assert_eq!(fast.guard.report().limits, Limits::SPEED_LIMITED);
+    assert_eq!(fast.guard.report().fault, None);
     let thrown = hurried(80, 40);
-    assert_eq!(thrown.guard.fault(), Some(Fault::TooFast));
+    assert_eq!(thrown.guard.report().fault, Some(Fault::TooFast));
 }
 
 #[test]
@@ -506,9 +512,9 @@ fn a_motor_that_pushes_in_vain_is_a_fault() {
     // 2 N on the lever of joint 2 is 1.6 A, above what it can have for ever.
     bench.wanted_n = Vec3::Z * 2.0;
     bench.ticks(1_900);
-    assert_eq!(bench.guard.fault(), None);
+    assert_eq!(bench.guard.report().fault, None);
     bench.ticks(200);
-    assert_eq!(bench.guard.fault(), Some(Fault::NoMotion));
+    assert_eq!(bench.guard.report().fault, Some(Fault::NoMotion));
 }
 
 #[test]
@@ -530,7 +536,7 @@ fn disarmed_by_the_host_force_goes_out_without_a_step() {
         ticks += 1;
     }
     assert!((99..=102).contains(&ticks), "{ticks}");
-    assert_eq!(bench.guard.fault(), None);
+    assert_eq!(bench.guard.report().fault, None);
     // Let go while it fades: off at once, and no fault, the host was first.
     let mut bench = Bench::armed();
     bench.wanted_n = Vec3::Z;
@@ -540,7 +546,7 @@ fn disarmed_by_the_host_force_goes_out_without_a_step() {
     bench.sense.dead_man = false;
     assert_eq!(bench.tick(), Drive::default());
     assert_eq!(
-        (bench.guard.mode(), bench.guard.fault()),
+        (bench.guard.mode(), bench.guard.report().fault),
         (Mode::Disarmed, None)
     );
 }

@@ -9,8 +9,8 @@
 
 use glam::Vec3;
 
-use super::rate::TickRate;
 use crate::phantom::{Calibration, Thermal};
+use crate::rate::TickRate;
 
 /// Air, °C.
 const AIR_C: f32 = 25.0;
@@ -24,53 +24,36 @@ pub const CONTINUOUS_C: f32 = 100.0;
 /// Here the guard trips, °C. Derating alone never comes this far.
 pub const TRIP_C: f32 = 110.0;
 
-/// Peak and continuous currents of the axes, A.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Rating {
-    peak_a: Vec3,
-    continuous_a: Vec3,
-}
-
-/// What a step of the temperatures needs, worked out once.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Step {
-    /// Ticks in a step.
-    ticks: u32,
-    /// K of the winding above the housing for A² flowing for ever.
-    winding_k_per_a2: f32,
-    housing_k_per_a2: f32,
-    /// Share of the way that a step goes.
-    winding: f32,
-    housing: f32,
-}
-
 /// Temperatures of the three motors above the air's, and what follows.
 #[derive(Clone, Copy, Debug)]
 pub struct Motors {
-    rate: TickRate,
-    rating: Rating,
-    step: Step,
+    /// Ticks between two steps of the temperatures.
+    step_ticks: u32,
+    thermal: Thermal,
+    /// What each axis may be given while it is cool, A.
+    pub(super) peak_a: Vec3,
+    /// What each axis may be given for ever, A.
+    pub(super) continuous_a: Vec3,
     winding_k: Vec3,
     housing_k: Vec3,
     /// Σ I² since the last step, A², and of how many ticks.
     squares: Vec3,
     ticks: u32,
-    allowed_a: Vec3,
-    too_hot: bool,
+    /// The most that each axis may be given now, A.
+    pub(super) allowed_a: Vec3,
+    /// Whether a winding is too hot to go on.
+    pub(super) too_hot: bool,
 }
 
 impl Motors {
     /// Motors as cold as the air, that may have no current yet.
     #[must_use]
     pub fn new(rate: TickRate) -> Self {
-        let unknown = Calibration::PREMIUM_1_5.thermal;
         Self {
-            rate,
-            rating: Rating {
-                peak_a: Vec3::ZERO,
-                continuous_a: Vec3::ZERO,
-            },
-            step: Step::new(&unknown, rate),
+            step_ticks: rate.ticks(STEP_MS),
+            thermal: Calibration::PREMIUM_1_5.thermal,
+            peak_a: Vec3::ZERO,
+            continuous_a: Vec3::ZERO,
             winding_k: Vec3::ZERO,
             housing_k: Vec3::ZERO,
             squares: Vec3::ZERO,
@@ -82,12 +65,10 @@ impl Motors {
 
     /// Takes ratings and time constants. How warm they are is not forgotten.
     pub fn configure(&mut self, calibration: &Calibration) {
-        self.rating = Rating {
-            peak_a: calibration.peak_current_a,
-            continuous_a: calibration.continuous_current_a,
-        };
-        self.step = Step::new(&calibration.thermal, self.rate);
-        self.judge();
+        self.thermal = calibration.thermal;
+        self.peak_a = calibration.peak_current_a;
+        self.continuous_a = calibration.continuous_current_a;
+        self.update_limits();
     }
 
     /// Estimated winding temperatures, °C.
@@ -100,65 +81,34 @@ impl Motors {
     pub fn heat(&mut self, currents_a: Vec3) {
         self.squares += currents_a * currents_a;
         self.ticks += 1;
-        if self.ticks >= self.step.ticks {
+        if self.ticks >= self.step_ticks {
             self.advance();
         }
     }
 
     fn advance(&mut self) {
-        let step = &self.step;
+        let thermal = &self.thermal;
         let mean = self.squares / self.ticks as f32;
-        self.winding_k += (mean * step.winding_k_per_a2 - self.winding_k) * step.winding;
-        self.housing_k += (mean * step.housing_k_per_a2 - self.housing_k) * step.housing;
+        let toward = |from: Vec3, k_per_w: f32, time_s: f32| {
+            let step_s = STEP_MS as f32 * 1e-3;
+            // K above the other node for A² flowing for ever, and part of the way.
+            let end = mean * (thermal.resistance_ohm * k_per_w);
+            from + (end - from) * (step_s / time_s)
+        };
+        self.winding_k = toward(self.winding_k, thermal.winding_k_per_w, thermal.winding_s);
+        self.housing_k = toward(self.housing_k, thermal.housing_k_per_w, thermal.housing_s);
         self.squares = Vec3::ZERO;
         self.ticks = 0;
-        self.judge();
+        self.update_limits();
     }
 
-    fn judge(&mut self) {
+    fn update_limits(&mut self) {
         let winding_c = self.winding_c();
         let warm = (winding_c - DERATE_C) / (CONTINUOUS_C - DERATE_C);
-        let less = self.rating.peak_a - self.rating.continuous_a;
-        self.allowed_a = self.rating.peak_a - warm.clamp(Vec3::ZERO, Vec3::ONE) * less;
+        let less = self.peak_a - self.continuous_a;
+        self.allowed_a = self.peak_a - warm.clamp(Vec3::ZERO, Vec3::ONE) * less;
         // Written so that what is not a number is too hot.
         self.too_hot = !winding_c.cmple(Vec3::splat(TRIP_C)).all();
-    }
-
-    /// The most that each axis may be given now, A.
-    #[must_use]
-    pub const fn allowed_a(&self) -> Vec3 {
-        self.allowed_a
-    }
-
-    /// What each axis may be given for ever, A.
-    #[must_use]
-    pub const fn continuous_a(&self) -> Vec3 {
-        self.rating.continuous_a
-    }
-
-    /// What each axis may be given while it is cool, A.
-    #[must_use]
-    pub const fn peak_a(&self) -> Vec3 {
-        self.rating.peak_a
-    }
-
-    /// Whether a winding is too hot to go on.
-    #[must_use]
-    pub const fn is_too_hot(&self) -> bool {
-        self.too_hot
-    }
-}
-
-impl Step {
-    fn new(thermal: &Thermal, rate: TickRate) -> Self {
-        let step_s = STEP_MS as f32 * 1e-3;
-        Self {
-            ticks: rate.ticks(STEP_MS),
-            winding_k_per_a2: thermal.resistance_ohm * thermal.winding_k_per_w,
-            housing_k_per_a2: thermal.resistance_ohm * thermal.housing_k_per_w,
-            winding: step_s / thermal.winding_s,
-            housing: step_s / thermal.housing_s,
-        }
     }
 }
 
@@ -172,7 +122,7 @@ mod tests {
         motors.configure(&Calibration::PREMIUM_1_5);
         let mut given = Vec3::ZERO;
         for _ in 0..seconds * rate.hz() {
-            given = Vec3::splat(wanted_a).min(motors.allowed_a());
+            given = Vec3::splat(wanted_a).min(motors.allowed_a);
             motors.heat(given);
         }
         (motors, given)
@@ -184,7 +134,7 @@ mod tests {
 
     #[test]
     fn without_a_calibration_there_is_no_current() {
-        assert_eq!(Motors::new(TickRate::DEFAULT).allowed_a(), Vec3::ZERO);
+        assert_eq!(Motors::new(TickRate::DEFAULT).allowed_a, Vec3::ZERO);
     }
 
     #[test]
@@ -197,7 +147,7 @@ mod tests {
     #[test]
     fn asked_for_the_peak_for_ever_it_derates_and_never_trips() {
         let (motors, given) = after(khz(1), 3000, 5.5);
-        assert!(!motors.is_too_hot(), "{:?}", motors.winding_c());
+        assert!(!motors.too_hot, "{:?}", motors.winding_c());
         assert!(given.x < 1.4 && given.x >= 1.24, "{given}");
     }
 

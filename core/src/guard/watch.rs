@@ -1,26 +1,26 @@
-//! What is looked at before anything is driven.
+//! The checks of a tick's inputs, before anything is driven.
 
 use glam::Vec3;
 
-use super::speed::Look;
+use super::speed::SpeedCheck;
 use super::{
     Blockers, Fault, Guard, LIMIT_MARGIN_RAD, Limits, Mode, SceneKind, Sense, Surroundings,
 };
 
 impl Guard {
-    /// Looks at everything before anything is driven. Returns whether the
+    /// Checks every input of a tick before anything is driven. Returns whether the
     /// encoders lost counts, so that the arm has to be zeroed again.
     pub fn watch(&mut self, sense: &Sense, around: &Surroundings<'_>) -> bool {
         self.limits = Limits::empty();
         // Before the arm is zeroed its position means nothing, nor does a jump.
-        let jumped = around.zeroed && self.follow(sense.counts);
+        let jumped = around.zeroed && self.has_jumped(sense.counts);
         if jumped {
             self.trip(Fault::EncoderJump);
         }
         if !around.zeroed || jumped {
             self.counts = None;
         }
-        if self.motors.is_too_hot() {
+        if self.motors.too_hot {
             self.trip(Fault::MotorTooHot);
         }
         if self.mode().drives() {
@@ -33,7 +33,7 @@ impl Guard {
     }
 
     /// Whether an encoder moved farther than it can.
-    fn follow(&mut self, counts: [i32; 3]) -> bool {
+    fn has_jumped(&mut self, counts: [i32; 3]) -> bool {
         let most = self.max_counts;
         let jumped = self.counts.is_some_and(|last| {
             let mut axes = last.iter().zip(counts);
@@ -44,7 +44,7 @@ impl Guard {
     }
 
     fn watch_driven(&mut self, sense: &Sense, around: &Surroundings<'_>) {
-        if let Some(fault) = self.found(sense, around) {
+        if let Some(fault) = self.find_fault(sense, around) {
             return self.trip(fault);
         }
         if !sense.dead_man {
@@ -56,8 +56,8 @@ impl Guard {
         }
     }
 
-    /// What must not be while the amplifiers are on.
-    fn found(&mut self, sense: &Sense, around: &Surroundings<'_>) -> Option<Fault> {
+    /// The first fault that may not be while the amplifiers are on.
+    fn find_fault(&mut self, sense: &Sense, around: &Surroundings<'_>) -> Option<Fault> {
         let Some((mechanism, pose)) = around.arm else {
             return Some(Fault::CalibrationCorrupt);
         };
@@ -77,12 +77,12 @@ impl Guard {
         if !limits.linkage_allows(pose.angles(), LIMIT_MARGIN_RAD) {
             return Some(Fault::Linkage);
         }
-        match self.speed.look(sense.counts, mechanism, pose) {
-            Look::NotYet => None,
-            Look::TooFast => Some(Fault::TooFast),
-            Look::Moved(moved) => {
-                let bearable = self.motors.continuous_a();
-                let in_vain = self.stillness.look(moved, self.currents_a, bearable);
+        match self.speed.check(sense.counts, mechanism, pose) {
+            SpeedCheck::NotYet => None,
+            SpeedCheck::TooFast => Some(Fault::TooFast),
+            SpeedCheck::Moved(moved) => {
+                let bearable = self.motors.continuous_a;
+                let in_vain = self.stall.check(moved, self.currents_a, bearable);
                 in_vain.then_some(Fault::NoMotion)
             }
         }
@@ -91,13 +91,13 @@ impl Guard {
     fn watch_undriven(&mut self, sense: &Sense, around: &Surroundings<'_>) {
         self.motors.heat(Vec3::ZERO);
         self.speed.restart(sense.counts);
-        let in_the_way = self.in_the_way(sense, around);
-        self.arming.wait(in_the_way, sense.dead_man);
-        self.blockers = in_the_way | self.arming.by_hand(sense.dead_man);
+        let blockers = self.find_blockers(sense, around);
+        self.arming.wait(blockers, sense.dead_man);
+        self.blockers = blockers | self.arming.user_blockers(sense.dead_man);
     }
 
-    /// What keeps the arm from being armed, besides the user's hand.
-    fn in_the_way(&self, sense: &Sense, around: &Surroundings<'_>) -> Blockers {
+    /// What keeps the arm from being armed, besides what the user has to do.
+    fn find_blockers(&self, sense: &Sense, around: &Surroundings<'_>) -> Blockers {
         let outside = around.arm.is_some_and(|(mechanism, pose)| {
             let limits = &mechanism.calibration().limits;
             !limits.allow(pose.angles(), LIMIT_MARGIN_RAD)

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use glam::Vec3;
+use glam::{BVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::calibration::Calibration;
@@ -10,7 +10,7 @@ use super::calibration::Calibration;
 /// A number of the record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Field {
+pub enum CalibrationField {
     /// [`Calibration::counts_per_turn`].
     CountsPerTurn,
     /// [`Calibration::ratio`].
@@ -59,7 +59,7 @@ pub enum Field {
     MaxSpeed,
 }
 
-impl Field {
+impl CalibrationField {
     /// Smallest and largest value that make sense, and the unit.
     #[must_use]
     pub const fn range(self) -> (f32, f32, &'static str) {
@@ -124,7 +124,7 @@ impl Field {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BadCalibration {
     /// The number that is wrong.
-    pub field: Field,
+    pub field: CalibrationField,
     /// The axis, 1 to 3, where there is one for each.
     pub axis: Option<u8>,
     /// What it is.
@@ -155,97 +155,99 @@ impl Calibration {
     /// # Errors
     /// [`BadCalibration`] names the first that is not.
     pub fn validate(&self) -> Result<(), BadCalibration> {
-        one(Field::CountsPerTurn, self.counts_per_turn)?;
-        each(Field::Ratio, self.ratio)?;
-        signs(Field::EncoderSign, self.encoder_sign)?;
-        signs(Field::MotorSign, self.motor_sign)?;
-        one(Field::L1, self.l1_mm)?;
-        one(Field::L2, self.l2_mm)?;
-        self.validate_angles()?;
-        each(Field::TorqueConstant, self.torque_constant)?;
-        self.validate_currents()?;
-        self.validate_gravity()?;
-        let thermal = &self.thermal;
-        one(Field::Resistance, thermal.resistance_ohm)?;
-        one(Field::WindingResistance, thermal.winding_k_per_w)?;
-        one(Field::HousingResistance, thermal.housing_k_per_w)?;
-        one(Field::WindingTime, thermal.winding_s)?;
-        one(Field::HousingTime, thermal.housing_s)?;
-        one(Field::MaxForce, self.max_force_n)?;
-        one(Field::MaxSpeed, self.max_speed_mm_s)
-    }
-
-    fn validate_angles(&self) -> Result<(), BadCalibration> {
-        let limits = &self.limits;
-        each(Field::MinAngle, limits.min_rad)?;
-        each(Field::MaxAngle, limits.max_rad)?;
-        one(Field::Q2MinusQ3, limits.q2_minus_q3_max_rad)?;
-        one(Field::Q3MinusQ2, limits.q3_minus_q2_max_rad)?;
-        every(Field::MaxAngle, limits.max_rad, |axis, max| {
-            max > limits.min_rad[axis]
-        })?;
-        each(Field::Zero, self.zero_rad)?;
+        let (limits, thermal) = (&self.limits, &self.thermal);
+        let (min, max) = (limits.min_rad, limits.max_rad);
+        one(CalibrationField::CountsPerTurn, self.counts_per_turn)?;
+        each(CalibrationField::Ratio, self.ratio)?;
+        each_is(
+            CalibrationField::EncoderSign,
+            self.encoder_sign,
+            self.encoder_sign.abs().cmpeq(Vec3::ONE),
+        )?;
+        each_is(
+            CalibrationField::MotorSign,
+            self.motor_sign,
+            self.motor_sign.abs().cmpeq(Vec3::ONE),
+        )?;
+        one(CalibrationField::L1, self.l1_mm)?;
+        one(CalibrationField::L2, self.l2_mm)?;
+        each(CalibrationField::MinAngle, min)?;
+        each(CalibrationField::MaxAngle, max)?;
+        one(CalibrationField::Q2MinusQ3, limits.q2_minus_q3_max_rad)?;
+        one(CalibrationField::Q3MinusQ2, limits.q3_minus_q2_max_rad)?;
+        each_is(CalibrationField::MaxAngle, max, max.cmpgt(min))?;
+        each(CalibrationField::Zero, self.zero_rad)?;
         // The arm stands against its stops where some rigs are zeroed.
         let inside = limits.allow(self.zero_rad, 0.05);
-        every(Field::Zero, self.zero_rad, |_, _| inside)
-    }
-
-    fn validate_currents(&self) -> Result<(), BadCalibration> {
-        each(Field::PeakCurrent, self.peak_current_a)?;
-        each(Field::ContinuousCurrent, self.continuous_current_a)?;
-        every(
-            Field::ContinuousCurrent,
-            self.continuous_current_a,
-            |axis, a| a <= self.peak_current_a[axis],
-        )
-    }
-
-    /// Holding the arm must leave motors room to push: half the current that
-    /// they can bear for ever.
-    fn validate_gravity(&self) -> Result<(), BadCalibration> {
-        one(Field::Gravity2, self.gravity_2_nm)?;
-        one(Field::Gravity3, self.gravity_3_nm)?;
-        let bearable = 0.5 * self.continuous_current_a * self.ratio * self.torque_constant;
-        let fits =
-            |field, value: f32, bearable: f32| check(field, None, value, value.abs() <= bearable);
-        fits(Field::Gravity2, self.gravity_2_nm, bearable.y)?;
-        fits(Field::Gravity3, self.gravity_3_nm, bearable.z)
+        each_is(CalibrationField::Zero, self.zero_rad, BVec3::splat(inside))?;
+        each(CalibrationField::TorqueConstant, self.torque_constant)?;
+        let (peak, continuous) = (self.peak_current_a, self.continuous_current_a);
+        each(CalibrationField::PeakCurrent, peak)?;
+        each(CalibrationField::ContinuousCurrent, continuous)?;
+        each_is(
+            CalibrationField::ContinuousCurrent,
+            continuous,
+            continuous.cmple(peak),
+        )?;
+        // Holding the arm must leave motors room to push: half the current that
+        // they can bear for ever.
+        let bearable = 0.5 * continuous * self.ratio * self.torque_constant;
+        let (gravity_2, gravity_3) = (self.gravity_2_nm, self.gravity_3_nm);
+        one(CalibrationField::Gravity2, gravity_2)?;
+        one(CalibrationField::Gravity3, gravity_3)?;
+        check(
+            CalibrationField::Gravity2,
+            None,
+            gravity_2,
+            gravity_2.abs() <= bearable.y,
+        )?;
+        check(
+            CalibrationField::Gravity3,
+            None,
+            gravity_3,
+            gravity_3.abs() <= bearable.z,
+        )?;
+        one(CalibrationField::Resistance, thermal.resistance_ohm)?;
+        one(CalibrationField::WindingResistance, thermal.winding_k_per_w)?;
+        one(CalibrationField::HousingResistance, thermal.housing_k_per_w)?;
+        one(CalibrationField::WindingTime, thermal.winding_s)?;
+        one(CalibrationField::HousingTime, thermal.housing_s)?;
+        one(CalibrationField::MaxForce, self.max_force_n)?;
+        one(CalibrationField::MaxSpeed, self.max_speed_mm_s)
     }
 }
 
-fn check(field: Field, axis: Option<u8>, value: f32, good: bool) -> Result<(), BadCalibration> {
+fn check(
+    field: CalibrationField,
+    axis: Option<u8>,
+    value: f32,
+    good: bool,
+) -> Result<(), BadCalibration> {
     match good {
         true => Ok(()),
         false => Err(BadCalibration { field, axis, value }),
     }
 }
 
-fn in_range(field: Field, value: f32) -> bool {
+/// A number in its range.
+fn one(field: CalibrationField, value: f32) -> Result<(), BadCalibration> {
     let (min, max, _) = field.range();
-    (min..=max).contains(&value)
+    check(field, None, value, (min..=max).contains(&value))
 }
 
-fn one(field: Field, value: f32) -> Result<(), BadCalibration> {
-    check(field, None, value, in_range(field, value))
+/// A number for each axis in its range.
+fn each(field: CalibrationField, values: Vec3) -> Result<(), BadCalibration> {
+    let (min, max, _) = field.range();
+    let (min, max) = (Vec3::splat(min), Vec3::splat(max));
+    each_is(field, values, values.cmpge(min) & values.cmple(max))
 }
 
-fn every(
-    field: Field,
-    values: Vec3,
-    good: impl Fn(usize, f32) -> bool,
-) -> Result<(), BadCalibration> {
-    for (axis, value) in values.to_array().into_iter().enumerate() {
-        check(field, Some(axis as u8 + 1), value, good(axis, value))?;
-    }
-    Ok(())
-}
-
-fn each(field: Field, values: Vec3) -> Result<(), BadCalibration> {
-    every(field, values, |_, value| in_range(field, value))
-}
-
-fn signs(field: Field, values: Vec3) -> Result<(), BadCalibration> {
-    every(field, values, |_, value| value.abs() == 1.0)
+/// A number for each axis that is as it has to be.
+fn each_is(field: CalibrationField, values: Vec3, good: BVec3) -> Result<(), BadCalibration> {
+    (0..3).try_for_each(|axis| {
+        let number = Some(axis as u8 + 1);
+        check(field, number, values[axis], good.test(axis))
+    })
 }
 
 #[cfg(test)]
@@ -254,60 +256,96 @@ mod tests {
     use std::format;
 
     /// A record with one thing wrong, and what should be said of it.
-    type Case = (fn(&mut Calibration), Field, Option<u8>);
+    type Case = (fn(&mut Calibration), CalibrationField, Option<u8>);
 
     #[test]
     fn each_number_that_is_wrong_is_named() {
         let cases: [Case; 24] = [
-            (|c| c.counts_per_turn = 0.0, Field::CountsPerTurn, None),
-            (|c| c.ratio.y = -11.2, Field::Ratio, Some(2)),
-            (|c| c.encoder_sign.x = 0.5, Field::EncoderSign, Some(1)),
-            (|c| c.motor_sign.z = 0.0, Field::MotorSign, Some(3)),
-            (|c| c.zero_rad.x = 1.7, Field::Zero, Some(1)),
-            (|c| c.zero_rad.z = f32::NAN, Field::Zero, Some(3)),
-            (|c| c.l1_mm = f32::INFINITY, Field::L1, None),
-            (|c| c.l2_mm = 0.17, Field::L2, None),
-            (|c| c.limits.min_rad.x = -90.0, Field::MinAngle, Some(1)),
-            (|c| c.limits.max_rad.z = -1.0, Field::MaxAngle, Some(3)),
+            (
+                |c| c.counts_per_turn = 0.0,
+                CalibrationField::CountsPerTurn,
+                None,
+            ),
+            (|c| c.ratio.y = -11.2, CalibrationField::Ratio, Some(2)),
+            (
+                |c| c.encoder_sign.x = 0.5,
+                CalibrationField::EncoderSign,
+                Some(1),
+            ),
+            (
+                |c| c.motor_sign.z = 0.0,
+                CalibrationField::MotorSign,
+                Some(3),
+            ),
+            (|c| c.zero_rad.x = 1.7, CalibrationField::Zero, Some(1)),
+            (|c| c.zero_rad.z = f32::NAN, CalibrationField::Zero, Some(3)),
+            (|c| c.l1_mm = f32::INFINITY, CalibrationField::L1, None),
+            (|c| c.l2_mm = 0.17, CalibrationField::L2, None),
+            (
+                |c| c.limits.min_rad.x = -90.0,
+                CalibrationField::MinAngle,
+                Some(1),
+            ),
+            (
+                |c| c.limits.max_rad.z = -1.0,
+                CalibrationField::MaxAngle,
+                Some(3),
+            ),
             (
                 |c| c.limits.q2_minus_q3_max_rad = 1.6,
-                Field::Q2MinusQ3,
+                CalibrationField::Q2MinusQ3,
                 None,
             ),
             (
                 |c| c.limits.q3_minus_q2_max_rad = 0.0,
-                Field::Q3MinusQ2,
+                CalibrationField::Q3MinusQ2,
                 None,
             ),
-            (|c| c.gravity_2_nm = 2.0, Field::Gravity2, None),
+            (|c| c.gravity_2_nm = 2.0, CalibrationField::Gravity2, None),
             // In range, but more than the motor can hold.
-            (|c| c.gravity_3_nm = 0.9, Field::Gravity3, None),
+            (|c| c.gravity_3_nm = 0.9, CalibrationField::Gravity3, None),
             (
                 |c| c.torque_constant.x = 0.0,
-                Field::TorqueConstant,
+                CalibrationField::TorqueConstant,
                 Some(1),
             ),
-            (|c| c.peak_current_a.y = 99.0, Field::PeakCurrent, Some(2)),
+            (
+                |c| c.peak_current_a.y = 99.0,
+                CalibrationField::PeakCurrent,
+                Some(2),
+            ),
             (
                 |c| c.continuous_current_a.z = 6.0,
-                Field::ContinuousCurrent,
+                CalibrationField::ContinuousCurrent,
                 Some(3),
             ),
-            (|c| c.thermal.resistance_ohm = -1.0, Field::Resistance, None),
+            (
+                |c| c.thermal.resistance_ohm = -1.0,
+                CalibrationField::Resistance,
+                None,
+            ),
             (
                 |c| c.thermal.winding_k_per_w = f32::NAN,
-                Field::WindingResistance,
+                CalibrationField::WindingResistance,
                 None,
             ),
             (
                 |c| c.thermal.housing_k_per_w = 0.0,
-                Field::HousingResistance,
+                CalibrationField::HousingResistance,
                 None,
             ),
-            (|c| c.thermal.winding_s = 0.0, Field::WindingTime, None),
-            (|c| c.thermal.housing_s = 1.0, Field::HousingTime, None),
-            (|c| c.max_force_n = 100.0, Field::MaxForce, None),
-            (|c| c.max_speed_mm_s = 0.0, Field::MaxSpeed, None),
+            (
+                |c| c.thermal.winding_s = 0.0,
+                CalibrationField::WindingTime,
+                None,
+            ),
+            (
+                |c| c.thermal.housing_s = 1.0,
+                CalibrationField::HousingTime,
+                None,
+            ),
+            (|c| c.max_force_n = 100.0, CalibrationField::MaxForce, None),
+            (|c| c.max_speed_mm_s = 0.0, CalibrationField::MaxSpeed, None),
         ];
         for (spoil, field, axis) in cases {
             let mut record = Calibration::PREMIUM_1_5;

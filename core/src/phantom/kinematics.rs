@@ -25,8 +25,8 @@ use super::trig::sin_cos;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     angles: Vec3,
-    sin: Vec3,
-    cos: Vec3,
+    pub(super) sin: Vec3,
+    pub(super) cos: Vec3,
     l1_mm: f32,
     l2_mm: f32,
 }
@@ -51,18 +51,6 @@ impl Pose {
     #[must_use]
     pub const fn angles(&self) -> Vec3 {
         self.angles
-    }
-
-    /// Their sines.
-    #[must_use]
-    pub(super) const fn sin(&self) -> Vec3 {
-        self.sin
-    }
-
-    /// Their cosines.
-    #[must_use]
-    pub(super) const fn cos(&self) -> Vec3 {
-        self.cos
     }
 
     /// Distance of the tip from the base's axis, mm; negative behind it.

@@ -8,6 +8,28 @@ use super::check::BadCalibration;
 use super::kinematics::Pose;
 
 /// A valid record and what follows from it.
+///
+/// From encoder counts to the tip, and from a force there to motor currents:
+///
+/// ```
+/// use hapterra_core::Vec3;
+/// use hapterra_core::phantom::{Calibration, Mechanism};
+///
+/// let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5)?;
+/// let pose = mechanism.pose([0, 0, 0], [0, 0, 0]); // in the zero pose
+/// // Device frame: x toward the user, z up; the fore link hangs down.
+/// assert!((pose.tip_mm() - Vec3::new(209.55, 0.0, -169.545)).length() < 1e-3);
+/// // One newton up at the end of the upper link: 0.20955 Nm in joint 2.
+/// let torques_nm = pose.torques_nm(Vec3::Z);
+/// assert!((torques_nm - Vec3::Y * 0.209_55).length() < 1e-6);
+/// let amperes = mechanism.currents_a(torques_nm);
+/// assert!((amperes.y - 0.209_55 / (11.2 * 0.0234)).abs() < 1e-4);
+///
+/// // And back from a tip to angles and counts.
+/// let angles = mechanism.calibration().joints_at(pose.tip_mm()).expect("in reach");
+/// assert_eq!(mechanism.counts(angles, [0, 0, 0]), [0, 0, 0]);
+/// # Ok::<(), hapterra_core::phantom::BadCalibration>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mechanism {
     calibration: Calibration,
@@ -81,8 +103,8 @@ impl Mechanism {
         let record = &self.calibration;
         Vec3::new(
             0.0,
-            record.gravity_2_nm * pose.cos().y,
-            record.gravity_3_nm * pose.sin().z,
+            record.gravity_2_nm * pose.cos.y,
+            record.gravity_3_nm * pose.sin.z,
         )
     }
 

@@ -3,7 +3,7 @@
 //! Read `calibration` (what is known of an arm), [`Mechanism`] (what follows
 //! from it, worked out outside the tick), [`Pose`] (tip and torques), and
 //! [`Readings`] (velocity). `presets`, `check` and `record` are about the
-//! calibration itself: where to begin, whether it makes sense, how it is kept.
+//! calibration itself: records to begin with, checks, and bytes in memory.
 //!
 //! Two frames. The *device frame* has its origin where the joint axes meet, x
 //! away from the base toward the user, z up. The *terrain frame* is the user's
@@ -20,7 +20,7 @@ mod trig;
 mod velocity;
 
 pub use calibration::{Calibration, JointLimits, Model, Thermal};
-pub use check::{BadCalibration, Field};
+pub use check::{BadCalibration, CalibrationField};
 pub use inverse::Unreachable;
 pub(crate) use kinematics::to_device_frame;
 pub use kinematics::{Pose, to_terrain_frame};

@@ -7,10 +7,11 @@
 //! The check sum covers everything before it. Bytes after it are passed over:
 //! flash is read in larger pieces than it was written.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use serde::{Deserialize, Serialize};
 
 use super::calibration::Calibration;
 use super::check::BadCalibration;
+use crate::crc::CRC;
 
 /// Version of the layout. Any change to [`Calibration`] is a new one.
 pub const VERSION: u16 = 1;
@@ -18,11 +19,15 @@ pub const VERSION: u16 = 1;
 pub const RECORD_BYTES: usize = 256;
 
 const MAGIC: [u8; 4] = *b"HAPC";
-/// Magic and version.
-const HEAD: usize = 6;
 
-/// A few dozen bytes now and then: no table.
-static CRC: Crc<u32, crc::NoTable> = Crc::<u32, crc::NoTable>::new(&CRC_32_ISO_HDLC);
+/// What is written, before the check sum.
+#[derive(Serialize, Deserialize)]
+struct Record {
+    magic: [u8; 4],
+    #[serde(with = "postcard::fixint::le")]
+    version: u16,
+    calibration: Calibration,
+}
 
 /// Why bytes are no calibration record.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -48,19 +53,13 @@ impl Calibration {
     /// Writes the record into `buffer`; returns the bytes to keep.
     #[must_use]
     pub fn encode<'b>(&self, buffer: &'b mut [u8; RECORD_BYTES]) -> &'b [u8] {
-        let length = self.write(buffer).unwrap_or(0); // a record fits, see the test
-        buffer.get(..length).unwrap_or(&[])
-    }
-
-    fn write(&self, buffer: &mut [u8; RECORD_BYTES]) -> Option<usize> {
-        let (head, body) = buffer.split_at_mut_checked(HEAD)?;
-        let (magic, version) = head.split_at_mut_checked(MAGIC.len())?;
-        magic.copy_from_slice(&MAGIC);
-        version.copy_from_slice(&VERSION.to_le_bytes());
-        let end = HEAD + postcard::to_slice(self, body).ok()?.len();
-        let sum = CRC.checksum(buffer.get(..end)?).to_le_bytes();
-        buffer.get_mut(end..end + sum.len())?.copy_from_slice(&sum);
-        Some(end + sum.len())
+        let record = Record {
+            magic: MAGIC,
+            version: VERSION,
+            calibration: *self,
+        };
+        let written = postcard::to_slice_crc32(&record, buffer, CRC.digest());
+        written.map_or(&[], |bytes| bytes) // a record fits, see the test
     }
 
     /// Reads a record and checks it as a whole.
@@ -69,21 +68,16 @@ impl Calibration {
     /// [`BadRecord`].
     pub fn decode(bytes: &[u8]) -> Result<Self, BadRecord> {
         let rest = bytes.strip_prefix(&MAGIC).ok_or(BadRecord::NotARecord)?;
-        let (version, body) = rest.split_first_chunk().ok_or(BadRecord::Damaged)?;
+        let version = rest.first_chunk().ok_or(BadRecord::Damaged)?;
         let found = u16::from_le_bytes(*version);
         if found != VERSION {
             return Err(BadRecord::Version { found });
         }
-        let (record, rest) =
-            postcard::take_from_bytes::<Self>(body).map_err(|_| BadRecord::Damaged)?;
-        let end = bytes.len() - rest.len();
-        let covered = bytes.get(..end).ok_or(BadRecord::Damaged)?;
-        let (sum, _) = rest.split_first_chunk().ok_or(BadRecord::Damaged)?;
-        if CRC.checksum(covered) != u32::from_le_bytes(*sum) {
-            return Err(BadRecord::Damaged);
-        }
-        record.validate().map_err(BadRecord::Invalid)?;
-        Ok(record)
+        let (record, _) = postcard::take_from_bytes_crc32::<Record>(bytes, CRC.digest())
+            .map_err(|_| BadRecord::Damaged)?;
+        let calibration = record.calibration;
+        calibration.validate().map_err(BadRecord::Invalid)?;
+        Ok(calibration)
     }
 }
 

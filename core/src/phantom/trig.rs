@@ -14,7 +14,7 @@ use core::f32::consts::FRAC_PI_2;
 /// error grows with the argument's own rounding; not-a-number stays that.
 #[must_use]
 pub fn sin_cos(x: f32) -> (f32, f32) {
-    // Nearest quarter turn; rounded by hand, the M4F has no `round`.
+    // Nearest quarter turn; rounded here, the M4F has no `round`.
     let turns = x * FRAC_PI_2.recip();
     let quarter = (turns + if turns < 0.0 { -0.5 } else { 0.5 }) as i32;
     let n = quarter as f32;

@@ -97,7 +97,7 @@ impl Readings {
         for i in 1..=self.before.min(WINDOW) {
             let reciprocal = RECIPROCAL.get(i).copied().unwrap_or(0.0);
             let fallen = newest.wrapping_sub(self.ago(i, axis)) as f32;
-            // Compared by hand: `max` and `min` are calls on this processor.
+            // Compared here: `max` and `min` are calls on this processor.
             let lower = (fallen - NOISE) * reciprocal;
             let lower = if lower > low { lower } else { low };
             let upper = (fallen + NOISE) * reciprocal;

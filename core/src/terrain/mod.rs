@@ -1,14 +1,21 @@
 //! What the device holds of the height field, and how it asks for more.
 
-mod ceiling;
-mod pull;
+mod extent;
+mod index;
+mod max_pyramid;
+mod storage;
 #[cfg(test)]
 pub(crate) mod testing;
 mod tile;
+mod tile_requests;
 mod window;
 
-pub use ceiling::{Altitude, Box2};
-pub use pull::{Focus, HORIZON_TICKS, IN_FLIGHT, MARGIN_CELLS, Puller, RETRY_TICKS};
-pub(crate) use tile::BLOCK_SHIFT;
-pub use tile::{BadTile, POSTS, TILE_CELLS, TILE_SHIFT, Tile, TileKey};
+pub use extent::{CellBox, FieldSize};
+pub(crate) use index::{BLOCK_SHIFT, Block};
+pub use index::{TILE_CELLS, TILE_SHIFT, TileIndex, TileKey};
+pub use storage::{BadField, FieldStorage};
+pub use tile::{BadTile, POSTS, Tile};
+pub use tile_requests::{
+    HORIZON_TICKS, IN_FLIGHT, MARGIN_CELLS, RETRY_TICKS, TileDemand, TileRequester,
+};
 pub use window::{Corners, Ground, Window};

@@ -1,51 +1,15 @@
 //! A tile: 32 × 32 patches of terrain, and the maxima that let a sweep skip it.
 
-use serde::{Deserialize, Serialize};
+use super::extent::FieldSize;
+use super::index::{BLOCK_SHIFT, TILE_CELLS, TileKey};
+use crate::grid::{Altitude, Cell, MAX_CELL};
 
-use super::ceiling::Altitude;
-use crate::grid::MAX_CELL;
-
-/// Cells along a tile's side, as a power of two.
-pub const TILE_SHIFT: u32 = 5;
-/// Cells along a tile's side.
-pub const TILE_CELLS: usize = 1 << TILE_SHIFT;
 /// Samples along a tile's side; the last row and column are shared with the
 /// next tile, so that a patch never needs two tiles.
 pub const POSTS: usize = TILE_CELLS + 1;
 
-/// Side of the smallest block whose maximum is kept, as a power of two.
-///
-/// 8 cells: 21 maxima in all, 0.08 byte a sample.
-pub(crate) const BLOCK_SHIFT: u32 = 3;
 const BLOCKS: usize = TILE_CELLS >> BLOCK_SHIFT;
 const QUARTERS: usize = BLOCKS / 2;
-
-/// Which tile: its level, and its column and row counted from the south-west.
-///
-/// Level `L` is the field with every 2ᴸ-th sample; a tile has 32 × 32 cells of
-/// its own level at every level.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct TileKey {
-    /// Decimation level, 0 the finest.
-    pub level: u8,
-    /// Column, counted eastward.
-    pub col: i32,
-    /// Row, counted northward.
-    pub row: i32,
-}
-
-impl TileKey {
-    /// The tile of `level` that holds the patch `cell`.
-    #[must_use]
-    pub const fn holding(level: u8, cell: [i32; 2]) -> Self {
-        Self {
-            level,
-            col: cell[0] >> TILE_SHIFT,
-            row: cell[1] >> TILE_SHIFT,
-        }
-    }
-}
 
 /// Why the bytes of a tile were refused. The buffer is left vacant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,20 +71,56 @@ impl Tile {
         if base.unsigned_abs() > MAX_CELL.unsigned_abs() {
             return Err(BadTile::Base);
         }
-        for (row, posts) in self.posts.iter_mut().enumerate() {
-            for (col, post) in posts.iter_mut().enumerate() {
-                let h = height(col, row);
-                *post = if h.abs() <= MAX_CELL as f32 {
-                    h
-                } else {
-                    f32::NAN
-                };
+        for row in 0..POSTS {
+            for col in 0..POSTS {
+                self.set(col, row, height(col, row));
             }
         }
+        self.close(key, base);
+        Ok(())
+    }
+
+    /// Forgets the tile, and makes every sample a hole.
+    pub(super) fn clear(&mut self) {
+        self.vacate();
+        self.posts = [[f32::NAN; POSTS]; POSTS];
+    }
+
+    /// Sets a sample of a vacant buffer.
+    pub(super) fn set(&mut self, col: usize, row: usize, height: f32) {
+        if let Some(post) = self.posts.get_mut(row).and_then(|row| row.get_mut(col)) {
+            let addressable = height.abs() <= MAX_CELL as f32;
+            *post = if addressable { height } else { f32::NAN };
+        }
+    }
+
+    /// Makes a tile of the samples that were set.
+    pub(super) fn close(&mut self, key: TileKey, base: i32) {
         self.base = base;
         self.measure();
         self.key = Some(key);
-        Ok(())
+    }
+
+    /// Fills the buffer from a function of a sample's column and row in the whole
+    /// field, heights in cells above `base`; beyond the field there are holes.
+    ///
+    /// # Errors
+    /// As [`Self::fill`].
+    pub fn fill_from(
+        &mut self,
+        key: TileKey,
+        base: i32,
+        size: FieldSize,
+        mut height: impl FnMut(i32, i32) -> f32,
+    ) -> Result<(), BadTile> {
+        let first = key.index.first_cell();
+        self.fill(key, base, |col, row| {
+            let (x, y) = (first.x + col as i32, first.y + row as i32);
+            match x <= size.columns && y <= size.rows {
+                true => height(x, y),
+                false => f32::NAN,
+            }
+        })
     }
 
     /// Fills the buffer from little-endian `f32` heights, rows from the south.
@@ -146,14 +146,12 @@ impl Tile {
         self.base
     }
 
-    /// Heights above the base at the corners of the patch in column `u` and
-    /// row `v` (both taken modulo 32): south-west, south-east, north-west,
-    /// north-east.
+    /// Heights above the base at the corners of a patch, whose column and row
+    /// are taken modulo 32: south-west, south-east, north-west, north-east.
     #[must_use]
     #[inline]
-    pub fn corners(&self, u: i32, v: i32) -> [f32; 4] {
-        let u = u as usize % TILE_CELLS;
-        let v = v as usize % TILE_CELLS;
+    pub fn corners(&self, cell: Cell) -> [f32; 4] {
+        let [u, v] = within(cell);
         let (south, north) = (&self.posts[v], &self.posts[v + 1]);
         [south[u], south[u + 1], north[u], north[u + 1]]
     }
@@ -163,9 +161,8 @@ impl Tile {
     /// not count.
     #[must_use]
     #[inline]
-    pub(super) fn is_below_around(&self, from: [i32; 2], to: [i32; 2], low: Altitude) -> bool {
-        let inside = |c: i32| c as usize % TILE_CELLS;
-        let ([u, v], [u1, v1]) = (from.map(inside), to.map(inside));
+    pub(super) fn is_below_around(&self, from: Cell, to: Cell, low: Altitude) -> bool {
+        let ([u, v], [u1, v1]) = (within(from), within(to));
         let low = low.above(self.base);
         [v, v + 1, v1 + 1].into_iter().all(|row| {
             let row = &self.posts[row];
@@ -189,11 +186,10 @@ impl Tile {
     }
 
     /// Whether `low` is above every sample of the 8- or 16-cell block that
-    /// holds cell `(u, v)`.
+    /// holds a cell.
     #[inline]
-    pub(super) fn block_is_below(&self, shift: u32, u: i32, v: i32, low: Altitude) -> bool {
-        let u = u as usize % TILE_CELLS;
-        let v = v as usize % TILE_CELLS;
+    pub(super) fn block_is_below(&self, shift: u32, cell: Cell, low: Altitude) -> bool {
+        let [u, v] = within(cell);
         let top = if shift == BLOCK_SHIFT {
             self.blocks[v >> BLOCK_SHIFT][u >> BLOCK_SHIFT]
         } else {
@@ -203,34 +199,37 @@ impl Tile {
     }
 
     fn measure(&mut self) {
-        for (row, blocks) in self.blocks.iter_mut().enumerate() {
+        let Self { posts, blocks, .. } = self;
+        for (row, blocks) in blocks.iter_mut().enumerate() {
             for (col, block) in blocks.iter_mut().enumerate() {
-                *block = highest_of(&self.posts, col << BLOCK_SHIFT, row << BLOCK_SHIFT);
+                *block = highest_of(
+                    posts,
+                    col << BLOCK_SHIFT,
+                    row << BLOCK_SHIFT,
+                    (1 << BLOCK_SHIFT) + 1,
+                );
             }
         }
         for (row, quarters) in self.quarters.iter_mut().enumerate() {
             for (col, quarter) in quarters.iter_mut().enumerate() {
-                let (south, north) = (&self.blocks[2 * row], &self.blocks[2 * row + 1]);
-                *quarter = south[2 * col]
-                    .max(south[2 * col + 1])
-                    .max(north[2 * col])
-                    .max(north[2 * col + 1]);
+                *quarter = highest_of(&self.blocks, 2 * col, 2 * row, 2);
             }
         }
-        self.highest = self
-            .quarters
-            .as_flattened()
-            .iter()
-            .fold(f32::NEG_INFINITY, |high, q| high.max(*q));
+        self.highest = highest_of(&self.quarters, 0, 0, QUARTERS);
     }
 }
 
-/// Highest sample of the patches of one block; NaN samples do not count.
-fn highest_of(posts: &[[f32; POSTS]; POSTS], col: usize, row: usize) -> f32 {
-    let side = 1 << BLOCK_SHIFT;
-    let rows = posts.iter().skip(row).take(side + 1);
-    rows.flat_map(|posts| posts.iter().skip(col).take(side + 1))
-        .fold(f32::NEG_INFINITY, |high, post| high.max(*post))
+/// A cell's column and row within its tile.
+#[inline]
+fn within(cell: Cell) -> [usize; 2] {
+    [cell.x, cell.y].map(|c| c as usize % TILE_CELLS)
+}
+
+/// Highest of the numbers in a square of them; NaN does not count.
+fn highest_of<const N: usize>(of: &[[f32; N]; N], col: usize, row: usize, side: usize) -> f32 {
+    let rows = of.iter().skip(row).take(side);
+    rows.flat_map(|numbers| numbers.iter().skip(col).take(side))
+        .fold(f32::NEG_INFINITY, |high, number| high.max(*number))
 }
 
 #[cfg(test)]
@@ -238,11 +237,7 @@ mod tests {
     use super::*;
     use std::boxed::Box;
 
-    const KEY: TileKey = TileKey {
-        level: 0,
-        col: 3,
-        row: -2,
-    };
+    const KEY: TileKey = TileKey::new(0, 3, -2);
 
     fn filled(height: impl FnMut(usize, usize) -> f32) -> Box<Tile> {
         let mut tile = Box::new(Tile::VACANT);
@@ -253,8 +248,14 @@ mod tests {
     #[test]
     fn corners_are_the_four_samples_around_a_patch() {
         let tile = filled(|col, row| (col * 100 + row) as f32);
-        assert_eq!(tile.corners(31, 0), [3100.0, 3200.0, 3101.0, 3201.0]);
-        assert_eq!(tile.corners(-1, 32), tile.corners(31, 0));
+        assert_eq!(
+            tile.corners(Cell::new(31, 0)),
+            [3100.0, 3200.0, 3101.0, 3201.0]
+        );
+        assert_eq!(
+            tile.corners(Cell::new(-1, 32)),
+            tile.corners(Cell::new(31, 0))
+        );
     }
 
     #[test]
@@ -265,11 +266,11 @@ mod tests {
             _ => 1.0,
         });
         for (u, v) in [(0, 0), (8, 0), (0, 8), (8, 8)] {
-            assert!(!tile.block_is_below(3, u, v, Altitude::new(105, 0.5)));
-            assert!(tile.block_is_below(3, u, v, Altitude::new(105, 0.75)));
+            assert!(!tile.block_is_below(3, Cell::new(u, v), Altitude::new(105, 0.5)));
+            assert!(tile.block_is_below(3, Cell::new(u, v), Altitude::new(105, 0.75)));
         }
-        assert!(tile.block_is_below(3, 16, 16, Altitude::new(101, 0.25)));
-        assert!(!tile.block_is_below(4, 0, 0, Altitude::new(105, 0.0)));
+        assert!(tile.block_is_below(3, Cell::new(16, 16), Altitude::new(101, 0.25)));
+        assert!(!tile.block_is_below(4, Cell::new(0, 0), Altitude::new(105, 0.0)));
         assert_eq!(tile.top(), 106);
     }
 
@@ -287,7 +288,7 @@ mod tests {
     #[test]
     fn heights_that_cannot_be_addressed_are_holes() {
         let tile = filled(|col, _| if col == 0 { f32::INFINITY } else { 1e30 });
-        assert!(tile.corners(0, 0).iter().all(|h| h.is_nan()));
+        assert!(tile.corners(Cell::new(0, 0)).iter().all(|h| h.is_nan()));
         assert_eq!(tile.top(), i32::MIN);
     }
 }

@@ -1,7 +1,10 @@
-//! The window: the tiles a device holds, in a torus around the hand.
+//! The window: the tiles a device holds, in a torus around the HIP.
 
-use super::ceiling::{Altitude, Box2, Pyramid, wrap};
-use super::tile::{BLOCK_SHIFT, TILE_SHIFT, Tile, TileKey};
+use super::extent::{CellBox, FieldSize};
+use super::index::{BLOCK_SHIFT, Block, TILE_SHIFT, TileIndex, TileKey, wrap};
+use super::max_pyramid::MaxPyramid;
+use super::tile::Tile;
+use crate::grid::{Altitude, Cell};
 
 /// What lies in a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,39 +27,80 @@ pub struct Corners {
 }
 
 /// `D × D` tiles; tile `(col, row)` always lives in slot `(col mod D, row mod D)`.
+/// `D` is a power of two.
+///
+/// ```
+/// use hapterra_core::grid::{Altitude, Cell};
+/// use hapterra_core::terrain::{
+///     CellBox, FieldSize, FieldStorage, Ground, Tile, TileKey, Window,
+/// };
+///
+/// // A field far larger than the window, no sample of which exceeds 5 cells.
+/// let size = FieldSize::new(10_000, 10_000);
+/// let mut storage = FieldStorage::<2>::new();
+/// let mut window = Window::new(storage.slots());
+/// window.reset(0, size, 5);
+/// let cell = Cell::new(7_000, 3_000);
+/// assert_eq!(window.ground(cell), Ground::Missing);
+///
+/// // A tile comes in, and a buffer for the next one goes out.
+/// let mut spare = Tile::VACANT;
+/// let key = TileKey::holding(0, cell);
+/// spare.fill_from(key, 0, size, |_x, _y| 1.5).expect("base 0 is in range");
+/// assert_eq!(window.install(&mut spare).key(), None);
+/// let Ground::Patch(corners) = window.ground(cell) else { panic!("a patch") };
+/// assert_eq!(corners.heights, [1.5; 4]);
+///
+/// // Nothing around the cell reaches two cells up.
+/// let around = CellBox::around(cell, cell.offset(3, 3));
+/// assert!(window.is_clear(around, Altitude::new(2, 0.0)));
+/// ```
 ///
 /// The window owns its buffers as `&mut Tile`. Installing a tile swaps one
 /// reference, so a tick sees the old tile or the new one and nothing is copied.
 pub struct Window<'t, const D: usize> {
     slots: [[&'t mut Tile; D]; D],
-    pyramid: Pyramid<D>,
+    pyramid: MaxPyramid<D>,
     level: u8,
-    size: [i32; 2],
+    size: FieldSize,
     top: i32,
 }
 
 impl<'t, const D: usize> Window<'t, D> {
-    /// A window without a field: every cell is a hole.
+    /// A window without a field: every cell is a hole. What the tiles held is
+    /// forgotten.
     #[must_use]
     pub fn new(slots: [[&'t mut Tile; D]; D]) -> Self {
-        let mut window = Self {
-            slots,
-            pyramid: Pyramid::unknown(),
-            level: 0,
-            size: [0, 0],
-            top: i32::MIN,
-        };
-        window.reset(0, [0, 0], i32::MIN);
+        let none = FieldSize::default();
+        let mut window = Self::holding(slots, none, i32::MIN);
+        window.reset(0, none, i32::MIN);
         window
     }
 
-    /// Forgets every tile and takes a new field: its level, its size in
-    /// patches (east, north), and a whole height in cells no sample exceeds.
-    pub fn reset(&mut self, level: u8, size: [i32; 2], top: i32) {
+    /// A window over a field whose tiles are all in their slots.
+    pub(super) fn holding(slots: [[&'t mut Tile; D]; D], size: FieldSize, top: i32) -> Self {
+        let mut window = Self {
+            slots,
+            pyramid: MaxPyramid::unknown(),
+            level: 0,
+            size,
+            top,
+        };
+        for key in size.tiles() {
+            if let Some(top) = window.held(key).map(Tile::top) {
+                window.renew_maxima(key, top);
+            }
+        }
+        window
+    }
+
+    /// Forgets every tile and takes a new field: its level, its size, and a
+    /// whole height in cells no sample exceeds.
+    pub fn reset(&mut self, level: u8, size: FieldSize, top: i32) {
         for tile in self.slots.as_flattened_mut() {
             tile.vacate();
         }
-        self.pyramid = Pyramid::unknown();
+        self.pyramid = MaxPyramid::unknown();
         self.level = level;
         self.size = size;
         self.top = top;
@@ -70,16 +114,16 @@ impl<'t, const D: usize> Window<'t, D> {
             return tile;
         };
         let top = tile.top();
-        let slot = &mut self.slots[wrap::<D>(key.row)][wrap::<D>(key.col)];
+        let slot = &mut self.slots[wrap::<D>(key.index.row)][wrap::<D>(key.index.col)];
         let spent = core::mem::replace(slot, tile);
-        self.renew_maxima(key, top);
+        self.renew_maxima(key.index, top);
         spent
     }
 
     /// Whether `key` names a tile of this field.
     #[must_use]
     pub fn expects(&self, key: TileKey) -> bool {
-        key.level == self.level && !self.is_outside(key.col, key.row, TILE_SHIFT)
+        key.level == self.level && self.size.has_tile(key.index)
     }
 
     /// The field's level.
@@ -97,20 +141,20 @@ impl<'t, const D: usize> Window<'t, D> {
     /// The tile now in the slot where `key` belongs.
     #[must_use]
     pub fn occupant(&self, key: TileKey) -> Option<TileKey> {
-        self.slots[wrap::<D>(key.row)][wrap::<D>(key.col)].key()
+        self.slots[wrap::<D>(key.index.row)][wrap::<D>(key.index.col)].key()
     }
 
     /// What lies in `cell`.
     #[must_use]
     #[inline]
-    pub fn ground(&self, cell: [i32; 2]) -> Ground {
+    pub fn ground(&self, cell: Cell) -> Ground {
         if !self.has_cell(cell) {
             return Ground::Hole;
         }
-        let Some(tile) = self.held(cell[0] >> TILE_SHIFT, cell[1] >> TILE_SHIFT) else {
+        let Some(tile) = self.held(TileIndex::holding(cell)) else {
             return Ground::Missing;
         };
-        let heights = tile.corners(cell[0], cell[1]);
+        let heights = tile.corners(cell);
         let [sw, se, nw, ne] = heights;
         if (sw + se + nw + ne).is_nan() {
             return Ground::Hole;
@@ -123,55 +167,54 @@ impl<'t, const D: usize> Window<'t, D> {
 
     /// Whether everything in the box is known to lie below `low`.
     ///
-    /// `false` may also mean "cannot tell cheaply". Looks at one number for
-    /// the whole field, then at four nodes at most.
+    /// `false` may also mean "cannot tell cheaply". Compares one number for the
+    /// whole field, then four nodes at most.
     #[must_use]
     #[inline]
-    pub fn is_clear(&self, span: Box2, low: Altitude) -> bool {
+    pub fn is_clear(&self, span: CellBox, low: Altitude) -> bool {
         low.cell() >= self.top || self.box_is_clear(span.clipped(self.size), low)
     }
 
     /// Whether all samples around a box of two patches a side at most are
-    /// known to lie below `low`: the nine samples themselves are looked at.
+    /// known to lie below `low`, by the nine samples themselves.
     ///
     /// `false` also where the box is larger, or not all in one tile that is held.
     #[must_use]
     #[inline]
-    pub fn is_clear_nearby(&self, span: Box2, low: Altitude) -> bool {
-        let Box2 { from, to } = span;
-        let [col, row] = from.map(|c| c >> TILE_SHIFT);
-        let small = (to[0] - from[0]) | (to[1] - from[1]) <= 1;
-        let in_one_tile = to.map(|c| c >> TILE_SHIFT) == [col, row];
+    pub fn is_clear_nearby(&self, span: CellBox, low: Altitude) -> bool {
+        let CellBox { from, to } = span;
+        let tile = TileIndex::holding(from);
+        let small = (to.x - from.x) | (to.y - from.y) <= 1;
         small
-            && in_one_tile
+            && TileIndex::holding(to) == tile
             && self
-                .held(col, row)
+                .held(tile)
                 .is_some_and(|tile| tile.is_below_around(from, to, low))
     }
 
     /// Whether everything in one block of 8 × 8 patches is known to lie below
     /// `low`.
     #[inline]
-    pub(crate) fn block_is_clear(&self, [col, row]: [i32; 2], low: Altitude) -> bool {
-        self.node_is_below(BLOCK_SHIFT, col, row, low) || self.is_outside(col, row, BLOCK_SHIFT)
+    pub(crate) fn block_is_clear(&self, block: Block, low: Altitude) -> bool {
+        let Block { col, row } = block;
+        self.node_is_below(BLOCK_SHIFT, col, row, low) || !self.size.has(col, row, BLOCK_SHIFT)
     }
 
-    fn box_is_clear(&self, span: Box2, low: Altitude) -> bool {
+    fn box_is_clear(&self, span: CellBox, low: Altitude) -> bool {
         if span.is_empty() {
             return true;
         }
         let shift = span.cover_shift(BLOCK_SHIFT);
-        if shift > Pyramid::<D>::top_shift() {
+        if shift > MaxPyramid::<D>::TOP_SHIFT {
             return false;
         }
-        let (from, to) = (span.from.map(|c| c >> shift), span.to.map(|c| c >> shift));
-        self.node_is_below(shift, from[0], from[1], low)
-            && (to[0] == from[0] || self.node_is_below(shift, to[0], from[1], low))
-            && (to[1] == from[1] || self.node_is_below(shift, from[0], to[1], low))
-            && (to == from
-                || to[0] == from[0]
-                || to[1] == from[1]
-                || self.node_is_below(shift, to[0], to[1], low))
+        let node = |cell: Cell| (cell.x >> shift, cell.y >> shift);
+        let ((west, south), (east, north)) = (node(span.from), node(span.to));
+        let is_below = |col, row| self.node_is_below(shift, col, row, low);
+        is_below(west, south)
+            && (east == west || is_below(east, south))
+            && (north == south || is_below(west, north))
+            && (east == west || north == south || is_below(east, north))
     }
 
     fn node_is_below(&self, shift: u32, col: i32, row: i32, low: Altitude) -> bool {
@@ -179,15 +222,19 @@ impl<'t, const D: usize> Window<'t, D> {
             return low.cell() >= self.node_top(shift - TILE_SHIFT, col, row);
         }
         let up = TILE_SHIFT - shift;
-        self.held(col >> up, row >> up)
-            .is_some_and(|tile| tile.block_is_below(shift, col << shift, row << shift, low))
+        let first = Cell::new(col << shift, row << shift);
+        self.held(TileIndex::new(col >> up, row >> up))
+            .is_some_and(|tile| tile.block_is_below(shift, first, low))
     }
 
     /// Whole height no sample under a node exceeds; `i32::MAX` when unknown.
     fn node_top(&self, level: u32, col: i32, row: i32) -> i32 {
-        if self.is_outside(col, row, TILE_SHIFT + level) {
+        if !self.size.has(col, row, TILE_SHIFT + level) {
             i32::MIN
-        } else if self.held(col << level, row << level).is_some() {
+        } else if self
+            .held(TileIndex::new(col << level, row << level))
+            .is_some()
+        {
             // The node is known only while all its tiles are held, so the
             // south-west one tells which node the slot speaks of.
             self.pyramid.node(level, col, row)
@@ -196,10 +243,10 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
-    fn renew_maxima(&mut self, key: TileKey, top: i32) {
-        self.pyramid.set(0, key.col, key.row, top);
-        for level in 1..=Pyramid::<D>::height() {
-            let (col, row) = (key.col >> level, key.row >> level);
+    fn renew_maxima(&mut self, tile: TileIndex, top: i32) {
+        self.pyramid.set(0, tile.col, tile.row, top);
+        for level in 1..=MaxPyramid::<D>::HEIGHT {
+            let (col, row) = (tile.col >> level, tile.row >> level);
             let highest = [(0, 0), (1, 0), (0, 1), (1, 1)]
                 .map(|(east, north)| self.node_top(level - 1, 2 * col + east, 2 * row + north))
                 .into_iter()
@@ -209,23 +256,17 @@ impl<'t, const D: usize> Window<'t, D> {
     }
 
     #[inline]
-    fn held(&self, col: i32, row: i32) -> Option<&Tile> {
-        let tile = &*self.slots[wrap::<D>(row)][wrap::<D>(col)];
+    fn held(&self, index: TileIndex) -> Option<&Tile> {
+        let tile = &*self.slots[wrap::<D>(index.row)][wrap::<D>(index.col)];
         // `install` takes tiles of the field's level only.
-        let is_here = |key: TileKey| key.col == col && key.row == row;
+        let is_here = |key: TileKey| key.index == index;
         tile.key().is_some_and(is_here).then_some(tile)
     }
 
     /// Whether the field has a cell there, be it a hole.
     #[inline]
-    pub(crate) fn has_cell(&self, cell: [i32; 2]) -> bool {
-        // One unsigned comparison an axis catches negative indices too.
-        (cell[0] as u32) < self.size[0] as u32 && (cell[1] as u32) < self.size[1] as u32
-    }
-
-    fn is_outside(&self, col: i32, row: i32, shift: u32) -> bool {
-        let last = self.size.map(|s| (s - 1) >> shift);
-        col < 0 || row < 0 || col > last[0] || row > last[1]
+    pub(crate) fn has_cell(&self, cell: Cell) -> bool {
+        self.size.has_cell(cell)
     }
 }
 
@@ -233,7 +274,7 @@ impl<'t, const D: usize> Window<'t, D> {
 mod tests {
     use super::*;
     use crate::cases::cases;
-    use crate::terrain::testing::Field;
+    use crate::terrain::testing::{SuppliedField, buffers};
     use std::vec::Vec;
 
     /// A field of 20 × 20 tiles whose height is a hash of the sample.
@@ -244,10 +285,10 @@ mod tests {
 
     #[test]
     fn every_held_patch_reads_back_its_samples() {
-        let mut field = Field::<4>::new([640, 640], rough);
-        field.hold_around([100, 70]);
-        for cell in [[100, 70], [95, 63], [96, 64], [127, 95], [64, 32]] {
-            let [x, y] = cell;
+        let mut buffers = buffers::<4>();
+        let mut field = SuppliedField::<4>::over(&mut buffers, FieldSize::new(640, 640), rough);
+        field.hold_around(Cell::new(100, 70));
+        for (x, y) in [(100, 70), (95, 63), (96, 64), (127, 95), (64, 32)] {
             let heights = [
                 rough(x, y),
                 rough(x + 1, y),
@@ -255,31 +296,32 @@ mod tests {
                 rough(x + 1, y + 1),
             ];
             let corners = Corners { base: 0, heights };
-            assert_eq!(field.window.ground(cell), Ground::Patch(corners));
+            assert_eq!(field.window.ground(Cell::new(x, y)), Ground::Patch(corners));
         }
-        assert_eq!(field.window.ground([-1, 0]), Ground::Hole);
-        assert_eq!(field.window.ground([640, 9]), Ground::Hole);
-        assert_eq!(field.window.ground([600, 9]), Ground::Missing);
+        assert_eq!(field.window.ground(Cell::new(-1, 0)), Ground::Hole);
+        assert_eq!(field.window.ground(Cell::new(640, 9)), Ground::Hole);
+        assert_eq!(field.window.ground(Cell::new(600, 9)), Ground::Missing);
     }
 
     #[test]
     fn clear_means_clear_whatever_is_held() {
-        let mut field = Field::<4>::new([640, 640], rough);
+        let mut buffers = buffers::<4>();
+        let mut field = SuppliedField::<4>::over(&mut buffers, FieldSize::new(640, 640), rough);
         let mut seen = [0, 0];
         const EACH: u32 = cases(1, 8);
         for step in (0..4000_i32).step_by(EACH as usize) {
             if step % 97 == 0 {
-                field.hold_around([(step * 5) % 640, (step * 11) % 640]);
+                field.hold_around(Cell::new((step * 5) % 640, (step * 11) % 640));
             }
-            let a = [(step * 7) % 640, (step * 13) % 640];
-            let b = [a[0] + (step % 41) - 20, a[1] + (step * 3 % 57) - 28];
+            let a = Cell::new((step * 7) % 640, (step * 13) % 640);
+            let b = a.offset(step % 41 - 20, step * 3 % 57 - 28);
             let low = Altitude::new(step % 68, 0.5);
-            let span = Box2::around(a, b);
+            let span = CellBox::around(a, b);
             let clear = field.window.is_clear(span, low);
             seen[usize::from(clear)] += 1;
             if clear {
-                for y in span.from[1].max(0)..=span.to[1].min(639) {
-                    for x in span.from[0].max(0)..=span.to[0].min(639) {
+                for y in span.from.y.max(0)..=span.to.y.min(639) {
+                    for x in span.from.x.max(0)..=span.to.x.min(639) {
                         assert!(rough(x, y) < low.cell() as f32 + 0.5, "{span:?} {low:?}");
                     }
                 }
@@ -293,9 +335,11 @@ mod tests {
 
     #[test]
     fn a_held_window_answers_for_long_boxes() {
-        let mut field = Field::<8>::new([256, 256], |_, _| 3.0);
-        field.hold_around([128, 128]);
-        let whole = Box2::around([0, 0], [255, 255]);
+        let mut buffers = buffers::<8>();
+        let mut field =
+            SuppliedField::<8>::over(&mut buffers, FieldSize::new(256, 256), |_, _| 3.0);
+        field.hold_around(Cell::new(128, 128));
+        let whole = CellBox::around(Cell::new(0, 0), Cell::new(255, 255));
         // The field's own bound is higher, so the pyramid has to answer.
         assert!(field.window.is_clear(whole, Altitude::new(4, 0.0)));
         assert!(!field.window.is_clear(whole, Altitude::new(2, 0.9)));
@@ -303,16 +347,17 @@ mod tests {
 
     #[test]
     fn an_installed_tile_gives_its_predecessor_back() {
-        let mut field = Field::<4>::new([640, 640], rough);
-        field.hold_around([20, 20]);
-        let old = TileKey::holding(0, [20, 20]);
-        let new = TileKey { col: 4, ..old };
+        let mut buffers = buffers::<4>();
+        let mut field = SuppliedField::<4>::over(&mut buffers, FieldSize::new(640, 640), rough);
+        field.hold_around(Cell::new(20, 20));
+        let old = TileKey::holding(0, Cell::new(20, 20));
+        let new = TileKey::new(0, 4, old.index.row);
         assert_eq!(field.window.occupant(new), Some(old));
         assert_eq!(field.install(new).key(), Some(old));
         assert_eq!(field.window.occupant(old), Some(new));
         let foreign = TileKey { level: 3, ..old };
         assert_eq!(field.install(foreign).key(), Some(foreign), "refused");
-        let outside = TileKey { col: 20, ..old };
+        let outside = TileKey::new(0, 20, old.index.row);
         assert_eq!(field.install(outside).key(), Some(outside), "refused");
         let keys: Vec<_> = [old, new].map(|k| field.window.occupant(k)).to_vec();
         assert_eq!(keys, [Some(new), Some(new)]);

@@ -1,14 +1,13 @@
 //! Framing: postcard + CRC-32 + COBS, ended by a zero byte.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use heapless::Vec;
 use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
 use serde::{Deserialize, Serialize};
 
+use crate::crc::CRC;
+
 /// Longest frame in bytes, its zero included: a tile and what is around it.
 pub const MAX_FRAME: usize = 4608;
-
-/// The 256-entry table costs 1 KiB of flash and is worth it: a tile is 4.4 kB.
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Why a frame was not understood. It is dropped; the link goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,16 +44,12 @@ pub fn decode<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Result<T, BadFrame> {
 }
 
 /// Collects bytes into frames. `N` is the longest frame it takes.
+#[derive(Default)]
 pub struct FrameReader<const N: usize> {
-    buffer: [u8; N],
-    length: usize,
+    frame: Vec<u8, N>,
     overflowed: bool,
-}
-
-impl<const N: usize> Default for FrameReader<N> {
-    fn default() -> Self {
-        Self::new()
-    }
+    /// The frame was given out: the next byte begins another.
+    ended: bool,
 }
 
 impl<const N: usize> FrameReader<N> {
@@ -62,9 +57,9 @@ impl<const N: usize> FrameReader<N> {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            buffer: [0; N],
-            length: 0,
+            frame: Vec::new(),
             overflowed: false,
+            ended: false,
         }
     }
 
@@ -74,33 +69,26 @@ impl<const N: usize> FrameReader<N> {
     /// bytes (to be read with [`decode`]) or why there are none. Empty frames
     /// are passed over: a sender may put a zero in front to start clean.
     pub fn push(&mut self, bytes: &[u8]) -> (usize, Option<Result<&[u8], BadFrame>>) {
+        if self.ended {
+            (self.ended, self.overflowed) = (false, false);
+            self.frame.clear();
+        }
         let end = bytes.iter().position(|b| *b == 0);
         let body = bytes.get(..end.unwrap_or(bytes.len())).unwrap_or(&[]);
-        let room = self.buffer.get_mut(self.length..self.length + body.len());
-        match room {
-            Some(room) => {
-                room.copy_from_slice(body);
-                self.length += body.len();
-            }
-            None => self.overflowed = true,
-        }
+        self.overflowed |= self.frame.extend_from_slice(body).is_err();
         let Some(end) = end else {
             return (bytes.len(), None);
         };
-        let (length, overflowed) = (self.length, self.overflowed);
-        (self.length, self.overflowed) = (0, false);
-        if overflowed {
+        self.ended = true;
+        if self.overflowed {
             return (end + 1, Some(Err(BadFrame::TooLong)));
         }
-        if length == 0 {
+        if self.frame.is_empty() {
             return (end + 1, None);
         }
-        let frame = self.buffer.get_mut(..length).unwrap_or(&mut []);
-        let decoded = match cobs::decode_in_place(frame) {
-            Ok(n) => frame.get(..n).ok_or(BadFrame::Encoding),
-            Err(_) => Err(BadFrame::Encoding),
-        };
-        (end + 1, Some(decoded))
+        let length = cobs::decode_in_place(&mut self.frame).ok();
+        let decoded = length.and_then(|length| self.frame.get(..length));
+        (end + 1, Some(decoded.ok_or(BadFrame::Encoding)))
     }
 }
 

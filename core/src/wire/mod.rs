@@ -8,15 +8,34 @@
 //! The session: the host says [`message::ToDevice::Hello`]; the device answers
 //! with its own [`message::ToHost::Hello`], or with
 //! [`message::ToHost::Refused`] when the protocol versions differ. The host
-//! then sends a [`message::Scene`]; from there on the device asks for the
+//! then sends a [`Scene`](crate::scene::Scene); from there on the device asks for the
 //! tiles it needs and reports what it feels. Either end may restart at any
 //! time by beginning again with Hello.
 //!
+//! ```
+//! use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
+//! use hapterra_core::wire::hello::{HostHello, PROTOCOL};
+//! use hapterra_core::wire::message::ToDevice;
+//!
+//! let hello = ToDevice::Hello(HostHello { protocol: PROTOCOL });
+//! let mut buffer = [0; 32];
+//! let frame = encode(&hello, &mut buffer).expect("it fits");
+//!
+//! let mut reader = FrameReader::<MAX_FRAME>::new();
+//! let (taken, content) = reader.push(frame);
+//! let content = content.expect("a whole frame").expect("undamaged");
+//! assert_eq!((taken, decode(content)), (frame.len(), Ok(hello)));
+//! ```
+//!
 //! Nothing is driven before the host has asked for it
 //! ([`message::ToDevice::Arm`]) and the dead-man switch was pressed after that;
-//! what is still in the way is told in [`message::ToHost::Guard`].
+//! what still blocks it is told in [`message::ToHost::Guard`].
 
 pub mod frame;
+pub mod hello;
 pub mod message;
 pub mod plant;
 pub mod status;
+
+#[cfg(test)]
+mod bytes_tests;

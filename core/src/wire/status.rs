@@ -1,13 +1,13 @@
-//! What a device says about itself: how it booted, where its guard stands, what
+//! What a device reports about itself: how it booted, the state of its guard, what
 //! it measures.
 
-use glam::Vec3;
 use heapless::String;
 use serde::{Deserialize, Serialize};
 
-use super::message::DeviceHello;
-use crate::guard::{Blockers, Fault, Report, Sense};
+use super::hello::DeviceHello;
+use crate::guard::{Blockers, Fault};
 use crate::phantom::{BadCalibration, Model};
+use crate::scene::Health;
 
 /// Why the board last started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -88,24 +88,6 @@ impl BootReport {
     }
 }
 
-/// Where the loop stands: the guard, and what was measured and driven.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Health {
-    /// The guard.
-    pub report: Report,
-    /// Encoders and safety inputs.
-    pub sense: Sense,
-    /// The counts of the zero pose, once the arm was zeroed.
-    pub zero: Option<[i32; 3]>,
-    /// Joint angles by the calibration, rad; as if zeroed at zero counts where
-    /// that has not been done.
-    pub angles_rad: Vec3,
-    /// Motor currents commanded, A.
-    pub currents_a: Vec3,
-    /// Winding temperatures by the thermal model, °C.
-    pub winding_c: Vec3,
-}
-
 /// Where the calibration in force comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -152,7 +134,7 @@ pub struct Status {
     pub calibration: CalibrationSource,
     /// The calibration's model.
     pub model: Option<Model>,
-    /// The loop, as it last told.
+    /// The loop, as it last reported.
     pub health: Health,
     /// Its ticks.
     pub ticks: TickFigures,

@@ -23,7 +23,7 @@ const BAND: u32 = 1;
 
 /// Watches for motors that push in vain.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Stillness {
+pub(super) struct StallDetector {
     all_still: u32,
     /// How far each joint is from where it began to stand.
     off: [i32; 3],
@@ -31,10 +31,10 @@ pub(super) struct Stillness {
     others: [u32; 3],
 }
 
-impl Stillness {
+impl StallDetector {
     /// Takes how far the encoders moved in a millisecond under these currents.
     /// True if a motor pushes and nothing comes of it.
-    pub(super) fn look(&mut self, moved: [i32; 3], currents_a: Vec3, continuous_a: Vec3) -> bool {
+    pub(super) fn check(&mut self, moved: [i32; 3], currents_a: Vec3, continuous_a: Vec3) -> bool {
         let load = currents_a.abs();
         if load.cmple(0.5 * continuous_a).all() {
             *self = Self::default();
@@ -70,8 +70,8 @@ mod tests {
     const CONTINUOUS: Vec3 = Vec3::splat(1.24);
 
     fn ticks_until_found(moved: [i32; 3], currents_a: Vec3) -> Option<u32> {
-        let mut stillness = Stillness::default();
-        (1..10_000).find(|_| stillness.look(moved, currents_a, CONTINUOUS))
+        let mut detector = StallDetector::default();
+        (1..10_000).find(|_| detector.check(moved, currents_a, CONTINUOUS))
     }
 
     #[test]
@@ -95,20 +95,20 @@ mod tests {
 
     #[test]
     fn one_channel_dead_goes_up_and_down_by_a_count() {
-        let mut stillness = Stillness::default();
+        let mut detector = StallDetector::default();
         let found = (1..10_000).find(|i| {
             let moved = [-10, if i % 2 == 0 { 1 } else { -1 }, 0];
-            stillness.look(moved, Vec3::Y * 0.7, CONTINUOUS)
+            detector.check(moved, Vec3::Y * 0.7, CONTINUOUS)
         });
         assert_eq!(found, Some(801));
     }
 
     #[test]
     fn a_joint_that_creeps_stands_only_for_a_while() {
-        let mut stillness = Stillness::default();
+        let mut detector = StallDetector::default();
         let found = (1..100_000).find(|i| {
             let moved = [-10, i32::from(i % 60 == 0), 0];
-            stillness.look(moved, Vec3::Y * 0.7, CONTINUOUS)
+            detector.check(moved, Vec3::Y * 0.7, CONTINUOUS)
         });
         assert_eq!(found, None);
     }

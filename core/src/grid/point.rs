@@ -1,18 +1,9 @@
-//! Positions over the terrain: an integer cell plus a fraction of it.
-//!
-//! One cell is 1 in x (east), y (north) *and* z (up). The origin is the
-//! south-west sample at height zero. Differences of positions are formed cell
-//! by cell first, so shifting a whole scene by any number of whole cells
-//! changes no bit of what is computed from it.
+//! A position over the terrain.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// Largest cell index, in either direction, that a [`GridPoint`] may have.
-///
-/// A quarter of the `i32` range, so that the difference and the sum of any two
-/// indices are still exact. [`GridPoint::new`] clamps to it.
-pub const MAX_CELL: i32 = 1 << 29;
+use super::cell::{Cell, MAX_CELL};
 
 /// A position in cells: `cell + frac`, with every fraction in `[0, 1)`.
 ///
@@ -68,10 +59,10 @@ impl GridPoint {
         self.cell
     }
 
-    /// The cell's column and row.
+    /// The cell's column and row: which patch the point is over or under.
     #[must_use]
-    pub const fn column(&self) -> [i32; 2] {
-        [self.cell[0], self.cell[1]]
+    pub const fn column(&self) -> Cell {
+        Cell::new(self.cell[0], self.cell[1])
     }
 
     /// Where in its cell the point lies, each component in `[0, 1)`.
@@ -122,8 +113,8 @@ impl GridPoint {
 
     /// Whether this is `other`, bit for bit.
     ///
-    /// The answer of every tick of a hand at rest, so it is written in a way
-    /// that does not become a call of `memcmp`.
+    /// Every tick of a HIP at rest asks it, so it is written in a way that does not
+    /// become a call of `memcmp`.
     #[must_use]
     #[inline]
     pub fn is_same(&self, other: &Self) -> bool {

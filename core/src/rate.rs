@@ -5,6 +5,14 @@
 ///
 /// Whole kilohertz, so that a millisecond is a number of ticks: what has to
 /// happen once a millisecond, or for so many of them, does so at every rate.
+///
+/// ```
+/// use hapterra_core::rate::TickRate;
+///
+/// let fast = TickRate::new(4_000).expect("in range");
+/// assert_eq!(fast.ticks(250), 1_000); // in 250 ms
+/// assert_eq!(TickRate::new(1_500), None);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TickRate(u32);
 
@@ -38,8 +46,8 @@ impl TickRate {
     /// Ticks in some time, at least one.
     #[must_use]
     pub const fn ticks(self, milliseconds: u32) -> u32 {
-        let ticks = self.0 as u64 * milliseconds as u64 / 1000;
-        if ticks == 0 { 1 } else { ticks as u32 }
+        let ticks = (self.0 / 1000).saturating_mul(milliseconds);
+        if ticks == 0 { 1 } else { ticks }
     }
 }
 

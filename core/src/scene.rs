@@ -1,0 +1,119 @@
+//! What a tick is given (scene, points) and what it reports (samples, health).
+//!
+//! These types go into the tick and come out of it, and they travel on the wire
+//! as they are: any change to one of them is a new version of the wire's protocol.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::contact::{ContactState, Rule};
+use crate::force::ForceLaw;
+use crate::grid::{GridPoint, MAX_CELL};
+use crate::guard::{Fault, Limits, Mode, Report, Sense};
+use crate::terrain::{FieldSize, TileIndex};
+
+/// Where the haptic interface point comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Source {
+    /// The Phantom's encoders.
+    #[default]
+    Encoders,
+    /// The host's points, one a tick, in lock-step: replay.
+    Points,
+}
+
+/// A field, its placement under the arm, and the law of its force. Checked as a
+/// whole before it is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scene {
+    /// Names this field, placement and law; tiles carry it.
+    pub epoch: u32,
+    /// Decimation level of the tiles, 0 the finest.
+    pub level: u8,
+    /// Size in cells.
+    pub size: FieldSize,
+    /// A whole height in cells that no sample exceeds.
+    pub top: i32,
+    /// Millimetres of the arm's tip a cell.
+    pub cell_mm: f32,
+    /// The point of the terrain that is at the tip in the home pose.
+    pub home: GridPoint,
+    /// Spring and limit.
+    pub law: ForceLaw,
+    /// Contact rule.
+    pub rule: Rule,
+    /// Where the haptic interface point comes from.
+    pub source: Source,
+    /// On an emulated board: let its clock stand still while the host owes a
+    /// tile, so that a slow host machine makes no difference to the contact.
+    pub hold_clock: bool,
+}
+
+impl Scene {
+    /// Whether every number is one that the loop can work with.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        let top_ok = self.top.unsigned_abs() <= MAX_CELL.unsigned_abs() + 1;
+        let cell_ok = self.cell_mm.is_finite() && self.cell_mm > 0.0;
+        self.size.is_valid() && top_ok && cell_ok && self.law.is_valid()
+    }
+}
+
+/// A haptic interface point (HIP) for one tick.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// Number, repeated in the answer.
+    pub seq: u32,
+    /// The HIP, cells over the terrain.
+    pub hip: GridPoint,
+}
+
+/// One tick's record.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sample {
+    /// Tick since the scene was taken.
+    pub tick: u32,
+    /// Haptic interface point (HIP), cells over the terrain.
+    pub hip: GridPoint,
+    /// Proxy, cells over the terrain.
+    pub proxy: GridPoint,
+    /// Force commanded, newtons: east, north, up. Zero unless the amplifiers
+    /// are on; in a replay, what the scene's law makes.
+    pub force_n: Vec3,
+    /// What the proxy is doing.
+    pub state: ContactState,
+    /// The tile without which the tick could not be completed.
+    pub missing_tile: Option<TileIndex>,
+    /// How far arming has come.
+    pub mode: Mode,
+    /// Why the force is less than the scene asked for.
+    pub limits: Limits,
+    /// Latched fault.
+    pub fault: Option<Fault>,
+    /// Units of contact work spent.
+    pub work: u32,
+    /// What the tick before this one cost, in clock ticks.
+    pub cost: u32,
+    /// The costliest tick so far, in clock ticks.
+    pub worst_cost: u32,
+    /// Ticks so far that began or ended too late.
+    pub late: u32,
+}
+
+/// The state of the loop: the guard's, and what was measured and driven.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Health {
+    /// The guard.
+    pub report: Report,
+    /// Encoders and safety inputs.
+    pub sense: Sense,
+    /// The counts of the zero pose, once the arm was zeroed.
+    pub zero: Option<[i32; 3]>,
+    /// Joint angles by the calibration, rad; as if zeroed at zero counts where
+    /// that has not been done.
+    pub angles_rad: Vec3,
+    /// Motor currents commanded, A.
+    pub currents_a: Vec3,
+    /// Winding temperatures by the thermal model, °C.
+    pub winding_c: Vec3,
+}

@@ -1,0 +1,111 @@
+//! How large a field is, and boxes of its cells.
+
+use serde::{Deserialize, Serialize};
+
+use super::index::{TILE_SHIFT, TileIndex};
+use crate::grid::{Cell, MAX_CELL};
+
+/// The size of a field in cells; it has one more sample each way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FieldSize {
+    /// Cells from west to east.
+    pub columns: i32,
+    /// Cells from south to north.
+    pub rows: i32,
+}
+
+impl FieldSize {
+    /// So many cells from west to east and from south to north.
+    #[must_use]
+    pub const fn new(columns: i32, rows: i32) -> Self {
+        Self { columns, rows }
+    }
+
+    /// Whether it is a size that a field can have: from 1 to [`MAX_CELL`] cells
+    /// each way.
+    #[must_use]
+    pub fn is_valid(self) -> bool {
+        let ok = |cells| (1..=MAX_CELL).contains(&cells);
+        ok(self.columns) && ok(self.rows)
+    }
+
+    /// The north-east tile of the field; (-1, -1) for a field without cells.
+    #[must_use]
+    pub const fn last_tile(self) -> TileIndex {
+        TileIndex::new(
+            (self.columns - 1) >> TILE_SHIFT,
+            (self.rows - 1) >> TILE_SHIFT,
+        )
+    }
+
+    /// The tiles of the field, row by row from the south.
+    pub fn tiles(self) -> impl Iterator<Item = TileIndex> {
+        let last = self.last_tile();
+        (0..=last.row).flat_map(move |row| (0..=last.col).map(move |col| TileIndex::new(col, row)))
+    }
+
+    /// Whether the field has the cell.
+    #[must_use]
+    #[inline]
+    pub const fn has_cell(self, cell: Cell) -> bool {
+        // One unsigned comparison an axis catches negative indices too.
+        (cell.x as u32) < self.columns as u32 && (cell.y as u32) < self.rows as u32
+    }
+
+    /// Whether the field has the tile.
+    #[must_use]
+    pub fn has_tile(self, tile: TileIndex) -> bool {
+        self.has(tile.col, tile.row, TILE_SHIFT)
+    }
+
+    /// Whether some cell of the field lies in a square of 2ˢʰⁱᶠᵗ cells a side,
+    /// given by its column and row among such squares.
+    pub(super) fn has(self, col: i32, row: i32, shift: u32) -> bool {
+        (0..=(self.columns - 1) >> shift).contains(&col)
+            && (0..=(self.rows - 1) >> shift).contains(&row)
+    }
+}
+
+/// A box of cells, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CellBox {
+    /// South-west cell.
+    pub from: Cell,
+    /// North-east cell.
+    pub to: Cell,
+}
+
+impl CellBox {
+    /// The box with these two cells at opposite corners.
+    #[must_use]
+    pub fn around(a: Cell, b: Cell) -> Self {
+        Self {
+            from: Cell::new(a.x.min(b.x), a.y.min(b.y)),
+            to: Cell::new(a.x.max(b.x), a.y.max(b.y)),
+        }
+    }
+
+    /// The part of it inside a field; empty when `from` exceeds `to`.
+    #[must_use]
+    pub(super) fn clipped(self, size: FieldSize) -> Self {
+        Self {
+            from: Cell::new(self.from.x.max(0), self.from.y.max(0)),
+            to: Cell::new(
+                self.to.x.min(size.columns - 1),
+                self.to.y.min(size.rows - 1),
+            ),
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.from.x > self.to.x || self.from.y > self.to.y
+    }
+
+    /// Side, as a power of two, of the smallest block of which at most two in
+    /// each direction cover the box; at least `least`.
+    pub(super) fn cover_shift(&self, least: u32) -> u32 {
+        let extent = (self.to.x - self.from.x).max(self.to.y - self.from.y);
+        (32 - extent.leading_zeros()).max(least)
+    }
+}

@@ -1,0 +1,100 @@
+//! Which tile, and which block of a tile.
+
+use serde::{Deserialize, Serialize};
+
+use crate::grid::Cell;
+
+/// Cells along a tile's side, as a power of two.
+pub const TILE_SHIFT: u32 = 5;
+/// Cells along a tile's side.
+pub const TILE_CELLS: usize = 1 << TILE_SHIFT;
+
+/// Side of the smallest block whose maximum is kept, as a power of two.
+///
+/// 8 cells: 21 maxima a tile, 0.08 byte a sample.
+pub(crate) const BLOCK_SHIFT: u32 = 3;
+
+/// The column and row of a tile of 32 × 32 cells, whatever its level.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct TileIndex {
+    /// Column, counted eastward from the south-west tile of the field.
+    pub col: i32,
+    /// Row, counted northward from the south-west tile of the field.
+    pub row: i32,
+}
+
+impl TileIndex {
+    /// The tile in this column and row.
+    #[must_use]
+    pub const fn new(col: i32, row: i32) -> Self {
+        Self { col, row }
+    }
+
+    /// The tile that holds the patch over `cell`.
+    #[must_use]
+    #[inline]
+    pub const fn holding(cell: Cell) -> Self {
+        Self::new(cell.x >> TILE_SHIFT, cell.y >> TILE_SHIFT)
+    }
+
+    /// The tile's south-west cell.
+    #[must_use]
+    pub const fn first_cell(self) -> Cell {
+        Cell::new(
+            self.col.saturating_mul(TILE_CELLS as i32),
+            self.row.saturating_mul(TILE_CELLS as i32),
+        )
+    }
+}
+
+/// Which tile of which level.
+///
+/// Level `L` is the field with every 2ᴸ-th sample; a tile has 32 × 32 cells of
+/// its own level at every level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct TileKey {
+    /// Decimation level, 0 the finest.
+    pub level: u8,
+    /// Column and row among the tiles of the level.
+    pub index: TileIndex,
+}
+
+impl TileKey {
+    /// The tile of `level` in this column and row.
+    #[must_use]
+    pub const fn new(level: u8, col: i32, row: i32) -> Self {
+        Self {
+            level,
+            index: TileIndex::new(col, row),
+        }
+    }
+
+    /// The tile of `level` that holds the patch over `cell`.
+    #[must_use]
+    pub const fn holding(level: u8, cell: Cell) -> Self {
+        Self {
+            level,
+            index: TileIndex::holding(cell),
+        }
+    }
+}
+
+/// The column and row of a block of 8 × 8 cells, the smallest part of a field
+/// whose maximum is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Block {
+    /// Column, counted eastward.
+    pub(crate) col: i32,
+    /// Row, counted northward.
+    pub(crate) row: i32,
+}
+
+/// A tile's column or row, wrapped onto a torus of `D` × `D` tiles.
+#[inline]
+pub(super) const fn wrap<const D: usize>(index: i32) -> usize {
+    index as usize % D
+}

@@ -1,0 +1,54 @@
+//! The maxima above the tiles: the highest sample of 2ᵏ × 2ᵏ tiles.
+
+use super::index::{TILE_SHIFT, wrap};
+
+/// Maxima over 2ᵏ × 2ᵏ tiles of a torus of `D` × `D`, in whole cells.
+///
+/// Level 0 is a tile. A node of a higher level is known only while all the
+/// tiles under it are held; unknown nodes read as `i32::MAX`, tiles outside
+/// the field as `i32::MIN`.
+///
+/// The first plane is level 0; the second holds levels 1 and up, one after the
+/// other, of which (D² − 1)/3 entries are used.
+pub(super) struct MaxPyramid<const D: usize>([[[i32; D]; D]; 2]);
+
+impl<const D: usize> MaxPyramid<D> {
+    /// log₂ D; a torus that is not a power of two does not compile.
+    pub(super) const HEIGHT: u32 = {
+        assert!(D.is_power_of_two(), "a window's side is a power of two");
+        D.trailing_zeros()
+    };
+    /// Side of the largest block there is a maximum of, as a power of two.
+    pub(super) const TOP_SHIFT: u32 = TILE_SHIFT + Self::HEIGHT;
+
+    pub(super) const fn unknown() -> Self {
+        Self([[[i32::MAX; D]; D]; 2])
+    }
+
+    /// The stored maximum of the node of `level` in torus place `(col, row)`.
+    #[inline]
+    pub(super) fn node(&self, level: u32, col: i32, row: i32) -> i32 {
+        let [plane, row, col] = Self::place(level, col, row);
+        self.0[plane][row][col]
+    }
+
+    /// Stores the maximum of the node of `level` in torus place `(col, row)`.
+    pub(super) fn set(&mut self, level: u32, col: i32, row: i32, top: i32) {
+        let [plane, row, col] = Self::place(level, col, row);
+        self.0[plane][row][col] = top;
+    }
+
+    /// Where a node is: level `k` of the second plane is (D/2ᵏ)² long.
+    #[inline]
+    fn place(level: u32, col: i32, row: i32) -> [usize; 3] {
+        if level == 0 {
+            return [0, wrap::<D>(row), wrap::<D>(col)];
+        }
+        let side = D >> level;
+        // Σ (D/2ʲ)² for 1 ≤ j < level
+        let before = (D * D - 4 * side * side) / 3;
+        let (col, row) = (col as usize & (side - 1), row as usize & (side - 1));
+        let index = before + row * side + col;
+        [1, (index / D) % D, index % D]
+    }
+}

@@ -1,0 +1,291 @@
+//! Memory for a window, and a whole field in it.
+
+use super::extent::FieldSize;
+use super::index::{TILE_CELLS, TileKey};
+use super::tile::Tile;
+use super::window::Window;
+use crate::grid::MAX_CELL;
+
+/// Memory of a window of `D × D` tiles, 4.5 kB each; may hold a whole field.
+///
+/// Without an allocator it lives wherever its owner puts it. On a desktop, put
+/// large ones on the heap: `Box::new(FieldStorage::<16>::new())`, then
+/// [`Self::fill`].
+///
+/// ```
+/// use hapterra_core::grid::Cell;
+/// use hapterra_core::terrain::{FieldSize, FieldStorage, Ground};
+///
+/// // A ramp of 40 × 20 cells that rises by half a cell from cell to cell.
+/// let size = FieldSize::new(40, 20);
+/// let mut ramp = FieldStorage::<2>::from_fn(size, |x, _y| 0.5 * x as f32)?;
+/// let window = ramp.window();
+/// let Ground::Patch(corners) = window.ground(Cell::new(10, 3)) else {
+///     panic!("the field has a surface there");
+/// };
+/// assert_eq!(corners.heights, [5.0, 5.5, 5.0, 5.5]);
+/// # Ok::<(), hapterra_core::terrain::BadField>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct FieldStorage<const D: usize> {
+    tiles: [[Tile; D]; D],
+    size: FieldSize,
+}
+
+/// Why heights are no field that a storage can hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BadField {
+    /// No cells, or more than there is room for.
+    #[error("a field of {} × {} cells; this storage holds from 1 × 1 to {most} × {most}", size.columns, size.rows)]
+    Size {
+        /// The field's size.
+        size: FieldSize,
+        /// Most cells a side.
+        most: i32,
+    },
+    /// More or fewer heights than a field of the size has: so many.
+    #[error("a field of this size has {0} heights: one more than cells each way")]
+    Count(i32),
+}
+
+impl<const D: usize> FieldStorage<D> {
+    /// Most cells a side that a field may have.
+    pub const MOST_CELLS: i32 = {
+        assert!(
+            D <= MAX_CELL as usize / TILE_CELLS,
+            "that many cells cannot be told apart"
+        );
+        (D * TILE_CELLS) as i32
+    };
+
+    /// Storage without a field.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            tiles: [const { [const { Tile::VACANT }; D] }; D],
+            size: FieldSize::new(0, 0),
+        }
+    }
+
+    /// Holds the field that a function makes of a sample's column (eastward) and
+    /// row (northward), both from 0 to the size inclusive: heights in cells, NaN
+    /// for a hole. It is called row by row from the south.
+    ///
+    /// # Errors
+    /// [`BadField::Size`] when the size is not one that fits.
+    pub fn from_fn(
+        size: FieldSize,
+        mut height: impl FnMut(i32, i32) -> f32,
+    ) -> Result<Self, BadField> {
+        let mut storage = Self::new();
+        let columns = size.columns.saturating_add(1).max(1);
+        storage.fill(size, (0..).map(|i| height(i % columns, i / columns)))?;
+        Ok(storage)
+    }
+
+    /// Holds a field of heights in cells, row by row from the south, each row from
+    /// west to east. NaN is a hole.
+    ///
+    /// ```
+    /// # use hapterra_core::terrain::{BadField, FieldSize, FieldStorage};
+    /// // Two cells side by side have three samples in each of two rows.
+    /// let heights = [0.0, 1.0, 0.0, 0.0, 1.0, 0.0];
+    /// let field = FieldStorage::<1>::from_slice(FieldSize::new(2, 1), &heights)?;
+    /// assert_eq!(field.top(), 2);
+    /// let more = FieldStorage::<1>::from_slice(FieldSize::new(2, 2), &heights);
+    /// assert_eq!(more.unwrap_err(), BadField::Count(9));
+    /// # Ok::<(), BadField>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`BadField`] when the size is not one that fits, or there are more or fewer
+    /// heights than a field of this size has.
+    pub fn from_slice(size: FieldSize, heights: &[f32]) -> Result<Self, BadField> {
+        let mut storage = Self::new();
+        let mut heights = heights.iter().copied();
+        storage.fill(size, &mut heights)?;
+        match heights.len() {
+            0 => Ok(storage),
+            _ => Err(BadField::Count(samples(size))),
+        }
+    }
+
+    /// Holds a field of rows of heights, as [`Self::from_slice`].
+    ///
+    /// ```
+    /// # use hapterra_core::terrain::{BadField, FieldSize, FieldStorage};
+    /// let rows = (0..=2).map(|y| [0.0, 0.5 * y as f32]);
+    /// let field = FieldStorage::<1>::from_rows(FieldSize::new(1, 2), rows)?;
+    /// assert_eq!(field.top(), 2);
+    /// # Ok::<(), BadField>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Self::from_slice`] for too few heights; what follows the last is left.
+    pub fn from_rows<R: IntoIterator<Item = f32>>(
+        size: FieldSize,
+        rows: impl IntoIterator<Item = R>,
+    ) -> Result<Self, BadField> {
+        let mut storage = Self::new();
+        storage.fill(size, rows.into_iter().flatten())?;
+        Ok(storage)
+    }
+
+    /// Takes a field in place of the one that is held, in place: for storage that is
+    /// too large to be moved. The heights come as in [`Self::from_slice`].
+    ///
+    /// # Errors
+    /// As [`Self::from_rows`]; nothing is held then.
+    pub fn fill(
+        &mut self,
+        size: FieldSize,
+        heights: impl IntoIterator<Item = f32>,
+    ) -> Result<(), BadField> {
+        self.size = FieldSize::new(0, 0);
+        for tile in self.tiles.as_flattened_mut() {
+            tile.clear();
+        }
+        let fits = |cells: i32| (1..=Self::MOST_CELLS).contains(&cells);
+        if !fits(size.columns) || !fits(size.rows) {
+            let most = Self::MOST_CELLS;
+            return Err(BadField::Size { size, most });
+        }
+        let mut heights = heights.into_iter();
+        for y in 0..=size.rows {
+            for x in 0..=size.columns {
+                let height = heights.next().ok_or(BadField::Count(samples(size)))?;
+                self.set(x as usize, y as usize, height);
+            }
+        }
+        self.size = size;
+        for index in size.tiles() {
+            let tile = &mut self.tiles[index.row as usize][index.col as usize];
+            tile.close(TileKey { level: 0, index }, 0);
+        }
+        Ok(())
+    }
+
+    /// Sets a sample in all tiles that share it.
+    fn set(&mut self, x: usize, y: usize, height: f32) {
+        for (row, v) in shares(y) {
+            for (col, u) in shares(x) {
+                if let Some(tile) = self.tiles.get_mut(row).and_then(|row| row.get_mut(col)) {
+                    tile.set(u, v, height);
+                }
+            }
+        }
+    }
+
+    /// The size of the field that is held; no cells where there is none.
+    #[must_use]
+    pub const fn size(&self) -> FieldSize {
+        self.size
+    }
+
+    /// A whole height in cells that no sample exceeds.
+    #[must_use]
+    pub fn top(&self) -> i32 {
+        let held = self.tiles.as_flattened().iter();
+        let held = held.filter(|tile| tile.key().is_some());
+        held.map(Tile::top).max().unwrap_or(i32::MIN)
+    }
+
+    /// A window over the field that is held: nothing of it is missing.
+    pub fn window(&mut self) -> Window<'_, D> {
+        let (size, top) = (self.size, self.top());
+        let tiles = self.tiles.each_mut();
+        Window::holding(tiles.map(<[Tile; D]>::each_mut), size, top)
+    }
+
+    /// Buffers for [`Window::new`], and for the loop, which
+    /// fill them tile by tile. The field that was held is forgotten.
+    pub fn slots(&mut self) -> [[&mut Tile; D]; D] {
+        self.size = FieldSize::new(0, 0);
+        self.tiles.each_mut().map(<[Tile; D]>::each_mut)
+    }
+}
+
+impl<const D: usize> Default for FieldStorage<D> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Samples of a field.
+fn samples(size: FieldSize) -> i32 {
+    (size.columns + 1).saturating_mul(size.rows + 1)
+}
+
+/// The tiles' columns (or rows) that share a sample's, and its place in each: the
+/// first sample of a tile is the last of the one before.
+fn shares(sample: usize) -> impl Iterator<Item = (usize, usize)> {
+    let (tile, place) = (sample / TILE_CELLS, sample % TILE_CELLS);
+    let before = tile.checked_sub(1).filter(|_| place == 0);
+    let before = before.map(|tile| (tile, TILE_CELLS));
+    core::iter::once((tile, place)).chain(before)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::{Altitude, Cell};
+    use crate::terrain::{CellBox, Corners, Ground};
+    use std::format;
+
+    fn rough(x: i32, y: i32) -> f32 {
+        ((x * 31 + y * 17) % 23) as f32 * 0.25
+    }
+
+    #[test]
+    fn every_patch_reads_back_its_samples_also_across_tiles() {
+        let mut storage = FieldStorage::<2>::from_fn(FieldSize::new(40, 33), rough).unwrap();
+        let window = storage.window();
+        for (x, y) in [(0, 0), (31, 31), (32, 31), (31, 32), (32, 32), (39, 32)] {
+            let heights = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(u, v)| rough(x + u, y + v));
+            let corners = Corners { base: 0, heights };
+            assert_eq!(
+                window.ground(Cell::new(x, y)),
+                Ground::Patch(corners),
+                "{x} {y}"
+            );
+        }
+        assert_eq!(window.ground(Cell::new(40, 0)), Ground::Hole);
+        assert_eq!(window.ground(Cell::new(0, 33)), Ground::Hole);
+    }
+
+    #[test]
+    fn it_fills_whole_tiles_as_well_as_parts_of_them() {
+        let mut storage = FieldStorage::<2>::new();
+        for (columns, rows) in [(64, 64), (1, 1), (32, 33)] {
+            let size = FieldSize::new(columns, rows);
+            let heights = core::iter::repeat_n(2.5, ((columns + 1) * (rows + 1)) as usize);
+            storage.fill(size, heights).unwrap();
+            assert_eq!((storage.size(), storage.top()), (size, 3));
+            let window = storage.window();
+            let whole = CellBox::around(Cell::default(), Cell::new(columns - 1, rows - 1));
+            assert!(window.is_clear(whole, Altitude::new(3, 0.0)));
+            assert!(!window.is_clear(whole, Altitude::new(2, 0.25)));
+            let last = window.ground(whole.to);
+            assert!(matches!(last, Ground::Patch(_)), "{last:?}");
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_an_error_and_leaves_nothing() {
+        let mut storage = FieldStorage::<1>::from_fn(FieldSize::new(5, 5), rough).unwrap();
+        for (columns, rows) in [(33, 1), (1, i32::MAX), (0, 5), (5, i32::MIN)] {
+            let size = FieldSize::new(columns, rows);
+            let error = storage.fill(size, core::iter::repeat(0.0)).unwrap_err();
+            assert_eq!(error, BadField::Size { size, most: 32 });
+            assert_eq!(storage.window().ground(Cell::default()), Ground::Hole);
+        }
+        let size = FieldSize::new(2, 2);
+        let few = FieldStorage::<1>::from_slice(size, &[0.0; 8]).unwrap_err();
+        let many = FieldStorage::<1>::from_slice(size, &[0.0; 10]).unwrap_err();
+        assert_eq!((few, many), (BadField::Count(9), BadField::Count(9)));
+        assert_eq!(
+            format!("{few}"),
+            "a field of this size has 9 heights: one more than cells each way"
+        );
+    }
+}

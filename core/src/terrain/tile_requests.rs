@@ -1,0 +1,262 @@
+//! Which tiles to ask the host for, and when to ask again.
+//!
+//! What the device asks for follows from the tile that the loop lacks, from where
+//! the proxy and the haptic interface point (HIP) are, and from how the HIP moves.
+//! A tile that the HIP cannot reach within [`HORIZON_TICKS`] is not asked for, one
+//! that is held is not asked for again. Time is counted in ticks.
+
+use heapless::Vec;
+
+use super::extent::FieldSize;
+use super::index::{TileIndex, TileKey, wrap};
+use crate::grid::Cell;
+
+/// How far ahead in time the HIP's path is looked at, ticks.
+pub const HORIZON_TICKS: i32 = 200;
+/// Cells around proxy and HIP that are always wanted.
+pub const MARGIN_CELLS: i32 = 12;
+/// A tile asked for and not received is asked for again after this many ticks.
+pub const RETRY_TICKS: u32 = 250;
+/// Tiles asked for and not yet received, at most.
+pub const IN_FLIGHT: usize = 4;
+/// Places along the predicted path around which tiles are wanted.
+const LOOK_AHEAD: i32 = 8;
+
+/// Where the loop needs terrain, as the last tick left it, in cells.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TileDemand {
+    /// The tile without which the tick could not be completed.
+    pub missing_tile: Option<TileIndex>,
+    /// The cell of the proxy.
+    pub proxy: Cell,
+    /// The cell of the haptic interface point.
+    pub hip: Cell,
+    /// Velocity of the haptic interface point, cells a tick.
+    pub velocity: [f32; 2],
+}
+
+/// Decides which tile of a `D × D` window to ask for next. No I/O, no clock.
+///
+/// ```
+/// use hapterra_core::grid::Cell;
+/// use hapterra_core::terrain::{FieldSize, TileDemand, TileKey, TileRequester};
+///
+/// let mut requester = TileRequester::<4>::new();
+/// requester.reset(0, FieldSize::new(10_000, 10_000));
+/// // HIP and proxy are in the middle of a tile and move east, 0.1 cell a tick.
+/// let cell = Cell::new(80, 48);
+/// let demand = TileDemand { proxy: cell, hip: cell, velocity: [0.1, 0.0], ..TileDemand::default() };
+/// assert_eq!(requester.next_request(0, &demand), Some(TileKey::new(0, 2, 1)));
+/// assert_eq!(requester.next_request(0, &demand), Some(TileKey::new(0, 3, 1)));
+/// assert_eq!(requester.next_request(0, &demand), None);
+/// requester.received(TileKey::new(0, 2, 1));
+/// assert_eq!(requester.in_flight(), 1);
+/// ```
+pub struct TileRequester<const D: usize> {
+    level: u8,
+    size: FieldSize,
+    held: [[Option<TileKey>; D]; D],
+    asked: Vec<(TileKey, u32), IN_FLIGHT>,
+}
+
+impl<const D: usize> Default for TileRequester<D> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const D: usize> TileRequester<D> {
+    /// A requester that wants nothing until a field is known.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            level: 0,
+            size: FieldSize::new(0, 0),
+            held: [[None; D]; D],
+            asked: Vec::new(),
+        }
+    }
+
+    /// Takes a new field of `size` patches; nothing of it is held.
+    pub fn reset(&mut self, level: u8, size: FieldSize) {
+        *self = Self::new();
+        self.level = level;
+        self.size = size;
+    }
+
+    /// Forgets what was asked, as after the link was lost; held tiles stay.
+    pub fn forget_asked(&mut self) {
+        self.asked.clear();
+    }
+
+    /// Tiles asked for and not yet received.
+    #[must_use]
+    pub fn in_flight(&self) -> usize {
+        self.asked.len()
+    }
+
+    /// Whether this tile was asked for; an answer nobody asked for is dropped.
+    #[must_use]
+    pub fn awaits(&self, key: TileKey) -> bool {
+        self.asked.iter().any(|(asked, _)| *asked == key)
+    }
+
+    /// The tile was handed to the window.
+    pub fn received(&mut self, key: TileKey) {
+        self.asked.retain(|(asked, _)| *asked != key);
+        *self.slot(key) = Some(key);
+    }
+
+    /// The window did not keep the tile after all.
+    pub fn lost(&mut self, key: TileKey) {
+        self.slot(key).take_if(|held| *held == key);
+    }
+
+    fn slot(&mut self, key: TileKey) -> &mut Option<TileKey> {
+        &mut self.held[wrap::<D>(key.index.row)][wrap::<D>(key.index.col)]
+    }
+
+    /// The next tile to ask for at tick `now`, most urgent first; `None` when
+    /// nothing is wanted or enough is under way. Call until `None`.
+    pub fn next_request(&mut self, now: u32, demand: &TileDemand) -> Option<TileKey> {
+        let is_overdue = |at: &u32| now.wrapping_sub(*at) >= RETRY_TICKS;
+        if let Some((key, at)) = self.asked.iter_mut().find(|(_, at)| is_overdue(at)) {
+            *at = now;
+            return Some(*key);
+        }
+        if self.asked.is_full() {
+            return None;
+        }
+        let key = self.most_urgent(demand)?;
+        self.asked.push((key, now)).ok()?;
+        Some(key)
+    }
+
+    /// The missing tile, tiles around the proxy, around the HIP, along its path.
+    ///
+    /// Only tiles nearer to the centre than half the torus are candidates, so
+    /// that none can push out a tile that is nearer.
+    fn most_urgent(&self, demand: &TileDemand) -> Option<TileKey> {
+        let near_proxy = TileIndex::holding(demand.proxy);
+        let centre = demand.missing_tile.unwrap_or(near_proxy);
+        let ahead = (0..=LOOK_AHEAD).map(|step| {
+            let ticks = (step * HORIZON_TICKS / LOOK_AHEAD) as f32;
+            // The casts saturate, so any velocity gives some cell.
+            let [east, north] = demand.velocity.map(|v| (v * ticks) as i32);
+            demand.hip.offset(east, north)
+        });
+        let mut places = core::iter::once(demand.proxy).chain(ahead);
+        let missing = demand.missing_tile;
+        missing
+            .and_then(|tile| self.candidate(tile, centre))
+            .or_else(|| places.find_map(|cell| self.around(cell, centre)))
+    }
+
+    /// A wanted tile among those within the margin of a cell, its own first.
+    fn around(&self, cell: Cell, centre: TileIndex) -> Option<TileKey> {
+        let m = MARGIN_CELLS;
+        let near = [
+            (0, 0),
+            (-m, 0),
+            (m, 0),
+            (0, -m),
+            (0, m),
+            (-m, -m),
+            (m, -m),
+            (-m, m),
+            (m, m),
+        ];
+        near.iter()
+            .find_map(|(dx, dy)| self.candidate(TileIndex::holding(cell.offset(*dx, *dy)), centre))
+    }
+
+    /// The tile as a request, unless outside, too far, held or asked for.
+    fn candidate(&self, index: TileIndex, centre: TileIndex) -> Option<TileKey> {
+        let TileIndex { col, row } = index;
+        let reach = (D as i32 / 2 - 1).max(0);
+        let level = self.level;
+        let key = TileKey { level, index };
+        let far = col.abs_diff(centre.col).max(row.abs_diff(centre.row)) > reach.unsigned_abs();
+        let held = self.held[wrap::<D>(row)][wrap::<D>(col)] == Some(key);
+        (self.size.has_tile(index) && !far && !held && !self.awaits(key)).then_some(key)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    fn drain(requester: &mut TileRequester<4>, now: u32, demand: &TileDemand) -> Vec<(i32, i32)> {
+        core::iter::from_fn(|| requester.next_request(now, demand))
+            .map(|k| (k.index.col, k.index.row))
+            .collect()
+    }
+
+    fn requester() -> TileRequester<4> {
+        let mut requester = TileRequester::new();
+        requester.reset(0, FieldSize::new(640, 640));
+        requester
+    }
+
+    fn at(x: i32, y: i32) -> TileDemand {
+        TileDemand {
+            proxy: Cell::new(x, y),
+            hip: Cell::new(x, y),
+            ..TileDemand::default()
+        }
+    }
+
+    #[test]
+    fn a_still_hand_wants_only_what_is_within_the_margin() {
+        let mut requester = requester();
+        assert_eq!(drain(&mut requester, 0, &at(48, 48)), [(1, 1)]);
+        requester.received(TileKey::new(0, 1, 1));
+        assert_eq!(drain(&mut requester, 1, &at(48, 48)), []);
+        assert_eq!(drain(&mut requester, 2, &at(60, 48)), [(2, 1)]);
+    }
+
+    #[test]
+    fn what_holds_the_proxy_up_comes_first() {
+        let mut requester = requester();
+        let demand = TileDemand {
+            missing_tile: Some(TileIndex::new(9, 9)),
+            ..at(48, 48)
+        };
+        assert_eq!(drain(&mut requester, 0, &demand)[0], (9, 9));
+    }
+
+    #[test]
+    fn a_moving_hand_wants_what_lies_ahead() {
+        let mut requester = requester();
+        let demand = TileDemand {
+            velocity: [0.3, 0.0],
+            ..at(48, 48)
+        };
+        assert_eq!(drain(&mut requester, 0, &demand), [(1, 1), (2, 1)]);
+    }
+
+    #[test]
+    fn asks_again_after_the_time_out_and_not_before() {
+        let mut requester = requester();
+        assert_eq!(drain(&mut requester, 7, &at(48, 48)), [(1, 1)]);
+        assert_eq!(drain(&mut requester, 6 + RETRY_TICKS, &at(48, 48)), []);
+        assert_eq!(
+            drain(&mut requester, 7 + RETRY_TICKS, &at(48, 48)),
+            [(1, 1)]
+        );
+    }
+
+    #[test]
+    fn never_asks_outside_the_field_nor_for_more_than_the_limit() {
+        let mut requester = requester();
+        let demand = TileDemand {
+            velocity: [-f32::MAX, f32::NAN],
+            ..at(0, 0)
+        };
+        let asked = drain(&mut requester, 0, &demand);
+        assert_eq!(asked, [(0, 0)]);
+        let corner = at(31, 31);
+        assert!(drain(&mut requester, 0, &corner).len() <= IN_FLIGHT);
+    }
+}

@@ -1,0 +1,115 @@
+//! The bytes of messages, pinned: a type in them may be named or built otherwise,
+//! but what travels stays the same.
+
+use std::vec::Vec;
+
+use glam::Vec3;
+use serde::Serialize;
+
+use super::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
+use crate::contact::{ContactState, Rule};
+use crate::force::ForceLaw;
+use crate::grid::GridPoint;
+use crate::guard::{Fault, Limits, Mode};
+use crate::scene::{Sample, Scene, Source};
+use crate::terrain::{FieldSize, TileIndex, TileKey};
+
+fn bytes<T: Serialize>(message: &T) -> Vec<u8> {
+    let mut buffer = [0; 256];
+    let bytes = postcard::to_slice(message, &mut buffer).expect("fits");
+    bytes.to_vec()
+}
+
+/// An `f32` as it travels.
+fn float(x: f32) -> Vec<u8> {
+    x.to_le_bytes().to_vec()
+}
+
+#[test]
+fn a_scene() {
+    let scene = Scene {
+        epoch: 300,
+        level: 2,
+        size: FieldSize::new(640, 129),
+        top: -3,
+        cell_mm: 1.5,
+        home: GridPoint::new([320, -7, 5], Vec3::new(0.25, 0.5, 0.0)),
+        law: ForceLaw::PREMIUM,
+        rule: Rule::Paper,
+        source: Source::Points,
+        hold_clock: true,
+    };
+    let wanted = [
+        std::vec![1, 0xAC, 0x02, 2],
+        std::vec![0x80, 0x0A, 0x82, 0x02, 0x05],
+        float(1.5),
+        std::vec![0x80, 0x05, 0x0D, 0x0A],
+        float(0.25),
+        float(0.5),
+        float(0.0),
+        float(0.5),
+        float(8.5),
+        std::vec![1, 1, 1],
+    ];
+    assert_eq!(bytes(&ToDevice::Scene(scene)), wanted.concat());
+}
+
+#[test]
+fn a_sample() {
+    let sample = Sample {
+        tick: 9,
+        hip: GridPoint::new([1, 2, 3], Vec3::X * 0.5),
+        proxy: GridPoint::new([1, 2, 4], Vec3::X * 0.5),
+        force_n: Vec3::Z,
+        state: ContactState::Touching,
+        missing_tile: Some(TileIndex::new(-1, 70)),
+        mode: Mode::Armed,
+        limits: Limits::TERRAIN_MISSING,
+        fault: Some(Fault::Panicked),
+        work: 200,
+        cost: 1,
+        worst_cost: 2,
+        late: 3,
+    };
+    let place = [float(0.5), float(0.0), float(0.0)].concat();
+    let wanted = [
+        std::vec![9, 2, 4, 6],
+        place.clone(),
+        std::vec![2, 4, 8],
+        place,
+        float(0.0),
+        float(0.0),
+        float(1.0),
+        // State; the tile; mode, limits, fault.
+        std::vec![2, 1, 0x01, 0x8C, 0x01, 4, 0x80, 0x01, 1, 13],
+        std::vec![0xC8, 0x01, 1, 2, 3],
+    ]
+    .concat();
+    assert_eq!(bytes(&sample), wanted);
+    let answer = ToHost::PointAnswer { seq: 5, sample };
+    assert_eq!(bytes(&answer), [std::vec![5, 5], wanted.clone()].concat());
+    let telemetry = Telemetry {
+        first: 6,
+        dropped: 7,
+        samples: core::iter::once(sample).collect(),
+    };
+    let telemetry = bytes(&ToHost::Telemetry(telemetry));
+    assert_eq!(telemetry, [std::vec![4, 6, 7, 1], wanted].concat());
+}
+
+#[test]
+fn a_tile_and_the_request_for_it() {
+    let key = TileKey::new(1, -2, 100);
+    let request = ToHost::Need { epoch: 7, key };
+    assert_eq!(bytes(&request), [3, 7, 1, 3, 0xC8, 0x01]);
+    let tile = ToDevice::Tile(TileMessage {
+        epoch: 7,
+        key,
+        heights: Heights::Flat {
+            base: -1,
+            height: 0.5,
+        },
+    });
+    let wanted = [std::vec![2, 7, 1, 3, 0xC8, 0x01, 1, 1], float(0.5)].concat();
+    assert_eq!(bytes(&tile), wanted);
+}
