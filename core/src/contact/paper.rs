@@ -4,235 +4,139 @@
 //! is a candidate by the lowest height of the whole segment, so the first
 //! candidate may not be the first one hit; and only the sign of the closest
 //! point decides about contact, so a fast sweep passes through a thin peak
-//! (figure 8). In each patch the closest point is found as in
-//! [`super::closest`], not by plain Newton, which would also lose contacts.
+//! (figure 8). The local closest point is found as everywhere in the product
+//! ([`super::closest_point`]), not by plain Newton, which would also lose contacts.
 
 use glam::Vec3;
 
-use super::closest::nearest_downhill;
-use super::neighbours::neighbours;
-use super::patch::Patch;
-use super::spot::{Hand, Spot, tile_of};
-use super::work::{EVALUATION, VISIT, Work};
-use crate::grid::GridPoint;
-use crate::terrain::{Ground, Window};
+use super::budget::{Budget, CELL};
+use super::surface::{HipView, SurfacePoint};
+use crate::grid::{Cell, GridPoint};
+use crate::terrain::{Ground, TileIndex, Window};
 
-/// Cells under a segment that are looked at for a candidate, at most: a hand that
+/// Cells under a segment that are looked at for a candidate, at most: a HIP that
 /// moves farther in a tick passes through whatever comes after.
-const CANDIDATES: usize = 4096;
-/// Distances that differ by less than this, relatively, count as equal.
-const TIE: f32 = 1.0 - 1e-6;
-
-/// What the rule says of one tick.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Verdict {
-    /// In contact, proxy at the local closest point so far, this high above
-    /// the hand, and whether that is the last word.
-    Contact {
-        /// The proxy.
-        spot: Spot,
-        /// Its height above the hand.
-        z: f32,
-        /// Whether the search has ended.
-        settled: bool,
-    },
-    /// Free space: the proxy is the haptic interface point.
-    Free,
-    /// A tile (column, row) is not here.
-    HeldUp([i32; 2]),
-}
+const CANDIDATES: u32 = 4096;
 
 /// What the look for a candidate came to.
-enum Candidate {
-    At(Spot),
+pub(super) enum Candidate {
+    /// The first patch whose highest corner is above the segment's lowest height,
+    /// and the place in it to begin at.
+    At(SurfacePoint),
+    /// None: the proxy is the HIP.
     None,
-    HeldUp([i32; 2]),
+    /// A tile that is not here.
+    Missing(TileIndex),
+    /// The budget is spent.
+    Suspended,
 }
 
-/// One update: candidate, local closest point, collision. `passed` counts the
-/// cells under the segment that were no candidates before a tile was missing.
-pub(super) fn update<const D: usize>(
-    window: &Window<'_, D>,
-    last_contact: Option<Spot>,
-    previous: &GridPoint,
-    hip: &GridPoint,
-    passed: &mut usize,
-    work: &mut Work,
-) -> Verdict {
-    let hand = Hand::new(*hip);
-    let start = match last_contact {
-        Some(spot) => spot,
-        None => match next_candidate(window, previous, hip, passed, work) {
-            Candidate::At(spot) => spot,
-            Candidate::None => return Verdict::Free,
-            Candidate::HeldUp(tile) => return Verdict::HeldUp(tile),
-        },
-    };
-    match local_closest_point(window, &hand, start, work) {
-        Ok(Some(found)) if is_inside(window, &hand, &found) => Verdict::Contact {
-            spot: found.spot,
-            z: found.z,
-            settled: found.settled,
-        },
-        Ok(_) => Verdict::Free,
-        Err(tile) => Verdict::HeldUp(tile),
-    }
+/// Step 1, under way: the cells under a segment, by an incremental line algorithm.
+#[derive(Clone, Debug)]
+pub(super) struct Candidates {
+    /// The segment's ends.
+    pub(super) from: GridPoint,
+    pub(super) to: GridPoint,
+    /// The cell to look at next.
+    cell: Cell,
+    /// +1, −1 or 0: where the segment leads, eastward and northward.
+    step: [i32; 2],
+    /// Fractions of the segment at which the next border is reached.
+    next: [f32; 2],
+    /// Fractions from border to border.
+    each: [f32; 2],
+    /// Cells still to look at.
+    left: u32,
 }
 
-/// Step 1: the first patch under the segment whose highest corner is above the
-/// segment's lowest height.
-fn next_candidate<const D: usize>(
-    window: &Window<'_, D>,
-    previous: &GridPoint,
-    hip: &GridPoint,
-    passed: &mut usize,
-    work: &mut Work,
-) -> Candidate {
-    let low = if previous.is_below(hip) {
-        previous
-    } else {
-        hip
-    };
-    let (view, hand) = (Hand::new(*low), Hand::new(*hip));
-    let _ = work.take(EVALUATION);
-    if view.altitude().cell() >= window.top() {
-        return Candidate::None;
-    }
-    let cells = cells_under(previous, hip).take(CANDIDATES);
-    for cell in cells.skip(*passed) {
-        match window.ground(cell) {
-            Ground::Patch(corners) if view.is_below_any(&corners) => {
-                let (p, q) = hand.in_patch(cell);
-                return Candidate::At(Spot {
-                    cell,
-                    u: p.clamp(0.0, 1.0),
-                    v: q.clamp(0.0, 1.0),
-                });
-            }
-            Ground::Missing => return Candidate::HeldUp(tile_of(cell)),
-            Ground::Patch(_) | Ground::Hole => *passed += 1,
+impl Candidates {
+    pub(super) fn between(from: GridPoint, to: GridPoint) -> Self {
+        let way = from.to(&to);
+        let (start, first, last) = (from.frac(), from.column(), to.column());
+        let step = [(last.x - first.x).signum(), (last.y - first.y).signum()];
+        let each = [way.x.abs().recip(), way.y.abs().recip()];
+        let reached = |start: f32, axis: usize| match step[axis] {
+            0 => f32::INFINITY,
+            1 => (1.0 - start) * each[axis],
+            _ => start * each[axis],
+        };
+        let cells = first.x.abs_diff(last.x) + first.y.abs_diff(last.y) + 1;
+        Self {
+            from,
+            to,
+            cell: first,
+            step,
+            next: [reached(start.x, 0), reached(start.y, 1)],
+            each,
+            left: cells.min(CANDIDATES),
         }
     }
-    Candidate::None
-}
 
-/// The cells under a segment, by an incremental line algorithm.
-fn cells_under(from: &GridPoint, to: &GridPoint) -> impl Iterator<Item = [i32; 2]> + use<> {
-    let way = from.to(to);
-    let (start, mut cell, last) = (from.frac(), from.column(), to.column());
-    let step = [(last[0] - cell[0]).signum(), (last[1] - cell[1]).signum()];
-    let first = |start: f32, way: f32, step: i32| {
-        let border = if step > 0 { 1.0 - start } else { start };
-        if step == 0 {
-            f32::INFINITY
+    /// Goes on to the first candidate.
+    pub(super) fn find<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        budget: &mut Budget,
+    ) -> Candidate {
+        let is_rising = self.from.is_below(&self.to);
+        let low = HipView::new(if is_rising { self.from } else { self.to });
+        if low.altitude().cell() >= window.top() {
+            return Candidate::None;
+        }
+        while self.left > 0 {
+            if !budget.has(CELL) {
+                return Candidate::Suspended;
+            }
+            budget.spend(CELL);
+            match window.ground(self.cell) {
+                Ground::Patch(corners) if low.is_below_any(&corners) => {
+                    let (p, q) = HipView::new(self.to).in_patch(self.cell);
+                    return Candidate::At(SurfacePoint {
+                        cell: self.cell,
+                        u: p.clamp(0.0, 1.0),
+                        v: q.clamp(0.0, 1.0),
+                    });
+                }
+                Ground::Missing => return Candidate::Missing(TileIndex::holding(self.cell)),
+                Ground::Patch(_) | Ground::Hole => self.pass(),
+            }
+        }
+        Candidate::None
+    }
+
+    /// Goes on to the next cell.
+    fn pass(&mut self) {
+        let last = self.to.column();
+        let Cell { x, y } = self.cell;
+        let eastward = y == last.y || (x != last.x && self.next[0] <= self.next[1]);
+        if eastward {
+            self.cell.x += self.step[0];
+            self.next[0] += self.each[0];
         } else {
-            border / way.abs()
+            self.cell.y += self.step[1];
+            self.next[1] += self.each[1];
         }
-    };
-    let mut next = [
-        first(start.x, way.x, step[0]),
-        first(start.y, way.y, step[1]),
-    ];
-    let each = [way.x.abs().recip(), way.y.abs().recip()];
-    let mut left = last[0].abs_diff(cell[0]) + last[1].abs_diff(cell[1]);
-    let mut begun = false;
-    core::iter::from_fn(move || {
-        if !begun {
-            begun = true;
-            return Some(cell);
-        }
-        left = left.checked_sub(1)?;
-        let east = cell[1] == last[1] || (cell[0] != last[0] && next[0] <= next[1]);
-        let axis = usize::from(!east);
-        cell[axis] += step[axis];
-        next[axis] += each[axis];
-        Some(cell)
-    })
+        self.left -= 1;
+    }
 }
 
-/// The closest point of a patch, or of several.
-#[derive(Clone, Copy)]
-struct Found {
-    spot: Spot,
-    patch: Patch,
-    /// Height above the hand.
+/// Step 3: whether the HIP is inside, by the sign of (LCP − HIP)·n, n averaged over
+/// the patches that share the edge or vertex; the local closest point (LCP) is `z`
+/// cells above the HIP.
+pub(super) fn is_inside<const D: usize>(
+    window: &Window<'_, D>,
+    view: &HipView,
+    closest: &SurfacePoint,
     z: f32,
-    distance_squared: f32,
-    settled: bool,
-}
-
-/// Step 2: from patch to patch while the bounded closest point gets nearer.
-fn local_closest_point<const D: usize>(
-    window: &Window<'_, D>,
-    hand: &Hand,
-    start: Spot,
-    work: &mut Work,
-) -> Result<Option<Found>, [i32; 2]> {
-    let Some(mut best) = bounded_closest_point(window, hand, start, work)? else {
-        return Ok(None);
-    };
-    let mut gets_on = false;
-    while best.spot.border() != [0, 0] {
-        // One look around in each tick at least, or the next begins as this one.
-        if !work.take(EVALUATION) && gets_on {
-            best.settled = false;
-            break;
-        }
-        gets_on = true;
-        let mut nearer = None;
-        let mut least = best.distance_squared;
-        for shift in neighbours(best.spot.border()) {
-            let found = bounded_closest_point(window, hand, best.spot.across(shift), work)?;
-            if let Some(found) = found.filter(|found| found.distance_squared < least * TIE) {
-                least = found.distance_squared;
-                nearer = Some(found);
-            }
-        }
-        let Some(next) = nearer else { break };
-        best = next;
-    }
-    Ok(Some(best))
-}
-
-/// The closest point of the patch that a spot is in; `None` over a hole.
-fn bounded_closest_point<const D: usize>(
-    window: &Window<'_, D>,
-    hand: &Hand,
-    spot: Spot,
-    work: &mut Work,
-) -> Result<Option<Found>, [i32; 2]> {
-    let patch = match window.ground(spot.cell) {
-        Ground::Patch(corners) => hand.patch(&corners),
-        Ground::Hole => return Ok(None),
-        Ground::Missing => return Err(tile_of(spot.cell)),
-    };
-    let found = nearest_downhill(&patch, hand.in_patch(spot.cell), (spot.u, spot.v));
-    work.charge(EVALUATION * found.evaluations + VISIT);
-    Ok(Some(Found {
-        spot: Spot {
-            u: found.u,
-            v: found.v,
-            ..spot
-        },
-        patch,
-        z: found.z,
-        distance_squared: found.distance_squared,
-        settled: true,
-    }))
-}
-
-/// Step 3: the sign of (LCP − HIP)·n, n averaged over the patches that share
-/// the edge or vertex.
-fn is_inside<const D: usize>(window: &Window<'_, D>, hand: &Hand, found: &Found) -> bool {
-    let spot = &found.spot;
-    let mut normal = unit(found.patch.normal(spot.u, spot.v));
-    for shift in neighbours(spot.border()) {
-        let over = spot.across(shift);
-        if let Ground::Patch(corners) = window.ground(over.cell) {
-            normal += unit(hand.patch(&corners).normal(over.u, over.v));
+) -> bool {
+    let mut normal = Vec3::ZERO;
+    for side in closest.border().itself_and_neighbours() {
+        let point = closest.across(side);
+        if let Ground::Patch(corners) = window.ground(point.cell) {
+            normal += unit(view.patch(&corners).normal(point.u, point.v));
         }
     }
-    hand.stretch(spot, found.z).dot(normal) > 0.0
+    view.displacement(closest, z).dot(normal) > 0.0
 }
 
 fn unit(v: Vec3) -> Vec3 {

@@ -1,352 +1,608 @@
-//! What the proxy remembers from tick to tick, and what both rules share.
+//! The proxy: what a tick does, and what is remembered from tick to tick.
 
 use glam::Vec3;
 
-use super::descent::Leave;
-use super::paper::{self, Verdict};
-use super::spot::{Hand, Spot, tile_of};
-use super::sweep::Path;
-use super::track::Track;
-use super::work::Work;
-use super::{Felt, Pace, Rule, State, presence};
-use crate::grid::GridPoint;
-use crate::guard::TickRate;
-use crate::terrain::{Ground, Window};
+use super::boundary_fade::{self, approach};
+use super::budget::{Budget, SHORTCUT};
+use super::closest_point::{Descent, Ended, Leave, count_unless_nearer, position_on};
+use super::output::{ContactOutput, ContactState};
+use super::paper::{self, Candidate, Candidates};
+use super::settings::{ContactSettings, Execution, Rule};
+use super::shortcut::{self, Follow};
+use super::surface::{HipView, SurfacePoint};
+use super::sweep::{Path, Swept};
+use crate::grid::{Cell, GridPoint};
+use crate::terrain::{Ground, TileIndex, Window};
 
+/// After so many departures for one HIP without getting nearer to it the proxy may
+/// leave the surface no more: it only moves to and fro by rounding.
+const DEPARTURES: u32 = 32;
+
+/// What the proxy does, with what has to be remembered while it does so.
 // The path is most of a contact's state, and there is no heap to put it on.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
-pub(super) enum Phase {
-    /// The hand has not been above the surface yet.
+enum Phase {
+    /// The HIP has not been above the surface yet.
     Waiting,
-    /// The last tick ended free, with the proxy in the hand.
+    /// The last tick ended free, with the proxy in the HIP.
     Free,
-    /// On a way through the air that is not at its end.
-    Sweeping(Path),
+    /// On a path through the air that is not at its end.
+    Sweeping(Sweeping),
     /// On the surface.
-    Touching { spot: Spot, leave: Leave },
-    /// On the surface, where the last tick came to rest, with nothing left to
-    /// do and no fading, on a patch that the proxy can be followed over.
-    Following(Track),
-    /// What was touched ended: its last force fades away.
-    LettingGo { proxy: GridPoint, stretch: Vec3 },
+    OnSurface(OnSurface),
+    /// The surface ended: the last force fades away.
+    Fading {
+        proxy: GridPoint,
+        displacement: Vec3,
+        fade: f32,
+    },
+    /// By the paper's rule: the cells under a segment are looked at.
+    Seeking { cells: Candidates, was_late: bool },
+}
+
+#[derive(Clone, Debug)]
+struct Sweeping {
+    path: Path,
+    /// The proxy had to wait, for terrain or for work: the force of the contact that
+    /// follows may not come at once.
+    was_late: bool,
+    /// What a hop from the surface to the surface keeps.
+    fade: f32,
+    departures: Departures,
+}
+
+#[derive(Clone, Debug)]
+struct OnSurface {
+    descent: Descent,
+    leave: Leave,
+    /// How much of the force is felt: less than 1 at the boundary of the surface, and
+    /// while a contact comes in after a wait.
+    fade: f32,
+    departures: Departures,
+    /// The proxy is at rest, and the next tick may take the shortcut.
+    follow: Option<Follow>,
+}
+
+/// Whether a tick goes on, or ends with an answer.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Turn {
+    GoesOn,
+    Ends,
+}
+
+/// The nearest place from which the proxy has left the surface for one HIP, and how
+/// often it has left since from where it was no nearer.
+type Departures = Option<(GridPoint, u32)>;
+
+impl OnSurface {
+    const fn at(point: SurfacePoint, fade: f32) -> Self {
+        Self {
+            descent: Descent::from(point),
+            leave: Leave::Anywhere,
+            fade,
+            departures: None,
+            follow: None,
+        }
+    }
 }
 
 /// The proxy and what it remembers from tick to tick.
 #[derive(Clone, Debug)]
 pub struct Contact {
-    pub(super) phase: Phase,
-    pub(super) hip: GridPoint,
-    /// The last answer is the answer again while the hand has not moved: there
+    settings: ContactSettings,
+    phase: Phase,
+    /// The HIP of the last tick.
+    hip: GridPoint,
+    /// The last answer is the answer again while the HIP has not moved: there
     /// is nothing left to do, and no force is fading. (A field does not change;
     /// another one comes with a new contact.)
-    pub(super) answered: bool,
-    pub(super) presence: f32,
-    /// A free proxy had to wait, for terrain or for work: the force of the next
-    /// contact may not come at once.
-    pub(super) late: bool,
-    /// The nearest place at which an unfinished descent of this same hand
-    /// stopped, and how many have got no nearer since.
-    pub(super) reached: Option<(GridPoint, u32)>,
-    /// Where the proxy is, when the descent of this same hand goes on from
-    /// somewhere else: a hand that has moved finds it there.
-    pub(super) ahead: Option<Spot>,
-    /// The nearest place from which the proxy has left the surface for this same
-    /// hand, and how often it has left since from no nearer.
-    pub(super) left: Option<(GridPoint, u32)>,
-    /// By the paper's rule: cells on the way to `sought` that were found to be no
-    /// candidates before a tile was missing.
-    passed: usize,
-    sought: GridPoint,
-    pub(super) last: Felt,
-    /// What was felt before the general case had to look, which may take it
-    /// several turns in lock-step.
-    pub(super) before: Felt,
-    /// Most that the presence may change in a tick.
-    fade: f32,
-}
-
-impl Default for Contact {
-    fn default() -> Self {
-        Self::new()
-    }
+    at_rest: bool,
+    output: ContactOutput,
+    /// What was felt by the last answer that counted, one that did not wait in
+    /// lock-step: where the proxy was, and the displacement to it.
+    felt: Option<(GridPoint, Vec3)>,
 }
 
 impl Contact {
-    /// A contact that waits to see the hand above the surface, at 1 kHz.
+    /// A contact that waits to see the HIP above the surface.
     #[must_use]
-    pub fn new() -> Self {
-        Self::ticking(TickRate::DEFAULT)
-    }
-
-    /// The same at another rate.
-    #[must_use]
-    pub fn ticking(rate: TickRate) -> Self {
+    pub fn new(settings: ContactSettings) -> Self {
         Self {
+            settings,
             phase: Phase::Waiting,
             hip: GridPoint::default(),
-            answered: false,
-            presence: 1.0,
-            late: false,
-            reached: None,
-            ahead: None,
-            left: None,
-            passed: 0,
-            sought: GridPoint::default(),
-            last: Felt::default(),
-            before: Felt::default(),
-            fade: presence::RATE_PER_S * rate.tick_s(),
+            at_rest: false,
+            output: ContactOutput::default(),
+            felt: None,
         }
     }
 
-    /// How much of the surface is there under the hand: less than 1 where its
-    /// force is fading.
+    /// How much of the force is felt: less than 1 where it fades at the boundary of
+    /// the surface, or comes in after a wait.
     #[must_use]
-    pub const fn presence(&self) -> f32 {
-        self.presence
+    pub const fn boundary_fade(&self) -> f32 {
+        match &self.phase {
+            Phase::Sweeping(Sweeping { fade, .. })
+            | Phase::OnSurface(OnSurface { fade, .. })
+            | Phase::Fading { fade, .. } => *fade,
+            _ => 1.0,
+        }
     }
 
     /// The patch the proxy is on, while touching.
     #[must_use]
-    pub fn patch(&self) -> Option<[i32; 2]> {
+    pub const fn patch(&self) -> Option<Cell> {
         match &self.phase {
-            Phase::Touching { spot, .. } => Some(spot.cell),
-            Phase::Following(track) => Some(track.spot.cell),
+            Phase::OnSurface(on) => Some(on.descent.cell()),
             _ => None,
         }
     }
 
-    /// Moves the proxy for a hand at `hip`. Bounded work, finite output.
+    /// Moves the proxy for a HIP, in at most [`super::WORK_PER_TICK`] units of work.
+    ///
+    /// The HIP is in cells: x east, y north, z up, the origin at the south-west sample
+    /// at height zero. How near the proxy is to the surface's closest point is in
+    /// `docs/contact.md`, and the soak judges it in every tick. The answer is finite
+    /// whatever the terrain.
+    ///
+    /// ```
+    /// use hapterra_core::Vec3;
+    /// use hapterra_core::contact::{Contact, ContactSettings, ContactState};
+    /// use hapterra_core::grid::GridPoint;
+    /// use hapterra_core::terrain::{FieldSize, FieldStorage};
+    ///
+    /// // Flat ground at height 2, felt by a HIP that goes down and along.
+    /// let mut field = FieldStorage::<2>::from_fn(FieldSize::new(40, 40), |_, _| 2.0)?;
+    /// let window = field.window();
+    /// let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    /// let hip = |x, z| GridPoint::new([20, 20, 0], Vec3::new(x, 0.5, z));
+    ///
+    /// assert_eq!(contact.step(&window, &hip(0.2, 2.5)).state, ContactState::Free);
+    /// let output = contact.step(&window, &hip(0.4, 1.9));
+    /// assert_eq!(output.state, ContactState::Touching);
+    /// assert!((output.displacement - Vec3::new(0.0, 0.0, 0.1)).length() < 1e-6);
+    /// assert_eq!(output.proxy, hip(0.4, 2.0));
+    /// # Ok::<(), hapterra_core::terrain::BadField>(())
+    /// ```
     #[inline]
     pub fn step<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: &GridPoint,
-        rule: Rule,
-        pace: Pace,
-    ) -> &Felt {
-        if self.answered && self.hip.is_same(hip) {
-            self.last.work = 0;
-        } else if rule == Rule::Swept && self.goes_on(window, hip, pace) {
+    ) -> &ContactOutput {
+        if self.at_rest && self.hip.is_same(hip) {
+            self.output.work = 0;
+        } else if self.takes_shortcut(window, hip) {
             self.hip = *hip;
         } else {
-            self.feel_anew(window, *hip, rule, pace);
+            self.step_in_full(window, *hip);
         }
-        &self.last
+        &self.output
     }
 
-    /// The general case.
+    /// Answers as [`Self::step_in_full`] would, or changes nothing.
+    #[inline]
+    fn takes_shortcut<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
+        match &mut self.phase {
+            Phase::Free if self.at_rest && self.settings.shortcuts => {
+                let is_free = shortcut::is_free(window, &self.hip, hip);
+                if is_free {
+                    self.output.proxy = *hip;
+                    self.output.work = 0;
+                }
+                is_free
+            }
+            Phase::OnSurface(OnSurface {
+                follow: Some(follow),
+                ..
+            }) => {
+                let Some((proxy, displacement)) = follow.to(&HipView::new(*hip)) else {
+                    return false;
+                };
+                self.output.proxy = proxy;
+                self.output.displacement = displacement;
+                self.output.work = SHORTCUT;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// A tick without shortcuts.
     #[inline(never)]
-    fn feel_anew<const D: usize>(
+    fn step_in_full<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) {
+        let mut budget = Budget::new(self.settings.work_per_tick);
+        if self.output.converged || self.settings.execution == Execution::RealTime {
+            let ContactOutput {
+                state,
+                proxy,
+                displacement,
+                ..
+            } = &self.output;
+            let touched = *state == ContactState::Touching;
+            self.felt = touched.then_some((*proxy, *displacement));
+        }
+        if !hip.is_same(&self.hip) {
+            self.redirect(window, hip);
+        }
+        // Bounded by the budget: of the turns that follow one another without work,
+        // none comes back to the one before.
+        while self.turn(window, hip, &mut budget) == Turn::GoesOn {}
+        self.hip = hip;
+        self.at_rest = self.output.converged && self.boundary_fade() == 1.0;
+        self.output.work = budget.spent();
+    }
+
+    /// The HIP has moved: a way under way now leads to its new place.
+    fn redirect<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) {
+        match &mut self.phase {
+            Phase::Sweeping(sweeping) => {
+                sweeping.path = Path::through_air(sweeping.path.at(), hip);
+                sweeping.departures = None;
+            }
+            Phase::OnSurface(on) => {
+                let point = match &on.follow {
+                    Some(follow) => Some(follow.point),
+                    None => {
+                        let nearest = on.descent.nearest(window, &HipView::new(self.hip));
+                        nearest.map(|(point, _)| point)
+                    }
+                };
+                if let Some(point) = point {
+                    on.descent.restart(point);
+                }
+                (on.leave, on.departures, on.follow) = (Leave::Anywhere, None, None);
+            }
+            _ => {}
+        }
+    }
+
+    /// One step of what the proxy does.
+    fn turn<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
-        rule: Rule,
-        pace: Pace,
-    ) {
-        let mut work = Work::new();
-        if self.last.settled || pace == Pace::RealTime {
-            self.before = self.last;
+        budget: &mut Budget,
+    ) -> Turn {
+        match &mut self.phase {
+            Phase::Waiting => self.looks_around(window, hip),
+            Phase::Fading { .. } => self.fades_out(window, hip),
+            Phase::Free if self.settings.rule == Rule::Paper => {
+                let cells = Candidates::between(self.hip, hip);
+                let was_late = false;
+                self.phase = Phase::Seeking { cells, was_late };
+                Turn::GoesOn
+            }
+            Phase::Free => self.flies(window, hip, budget),
+            Phase::Sweeping(_) => self.sweeps(window, hip, budget),
+            Phase::Seeking { .. } => self.seeks(window, hip, budget),
+            Phase::OnSurface(_) => self.descends(window, hip, budget),
         }
-        if let Phase::Following(track) = &self.phase {
-            self.phase = Phase::Touching {
-                spot: track.spot,
-                leave: Leave::Anywhere,
-            };
-        }
-        let felt = match rule {
-            Rule::Swept => self.swept(window, hip, hip != self.hip, pace, &mut work),
-            Rule::Paper => self.paper(window, hip, pace, &mut work),
-        };
-        if felt.settled || pace == Pace::RealTime || rule == Rule::Swept {
-            self.hip = hip;
-        }
-        self.answered = felt.settled && self.presence == 1.0;
-        self.last = Felt {
-            work: work.spent(),
-            ..felt
-        };
     }
 
-    /// Waiting ends when the hand is above the patch it is over, or above
-    /// everything.
-    pub(super) fn sees_above<const D: usize>(
-        &mut self,
-        window: &Window<'_, D>,
-        hip: GridPoint,
-    ) -> bool {
-        let hand = Hand::new(hip);
-        let above_it = || match window.ground(hip.column()) {
-            Ground::Patch(corners) => hand.patch(&corners).height(hip.frac().x, hip.frac().y) < 0.0,
-            Ground::Hole | Ground::Missing => false,
-        };
-        let above = hand.altitude().cell() >= window.top() || above_it();
-        if above {
-            self.phase = Phase::Free;
-            self.hip = hip;
+    /// Waiting ends when the HIP is above the patch it is over, or above everything.
+    fn looks_around<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Turn {
+        let view = HipView::new(hip);
+        let ground = window.ground(hip.column());
+        let is_above = view.altitude().cell() >= window.top()
+            || matches!(&ground, Ground::Patch(corners) if view.is_above(corners));
+        if is_above {
+            return self.becomes_free(hip);
         }
-        above
-    }
-
-    pub(super) fn waits<const D: usize>(&self, window: &Window<'_, D>, hip: GridPoint) -> Felt {
-        let missing = matches!(window.ground(hip.column()), Ground::Missing);
-        Felt {
-            state: State::Waiting,
+        self.phase = Phase::Waiting;
+        let is_missing = ground == Ground::Missing;
+        self.answers(ContactOutput {
             proxy: hip,
-            settled: !missing,
-            held_up_by: missing.then(|| tile_of(hip.column())),
-            ..Felt::default()
-        }
+            converged: !is_missing,
+            missing_tile: is_missing.then(|| TileIndex::holding(hip.column())),
+            ..ContactOutput::default()
+        })
     }
 
-    pub(super) fn flies(&mut self, hip: GridPoint) -> Felt {
+    /// The tick ends with this answer.
+    #[inline]
+    fn answers(&mut self, output: ContactOutput) -> Turn {
+        self.output = output;
+        Turn::Ends
+    }
+
+    /// A free proxy has to wait: it is as far as its path is known to be free.
+    fn waits_at(&mut self, proxy: GridPoint, missing_tile: Option<TileIndex>) -> Turn {
+        self.answers(ContactOutput {
+            state: ContactState::Free,
+            proxy,
+            missing_tile,
+            ..ContactOutput::default()
+        })
+    }
+
+    /// The proxy is free, at the HIP; the tick ends.
+    fn becomes_free(&mut self, hip: GridPoint) -> Turn {
         self.phase = Phase::Free;
-        self.late = false;
-        self.presence = 1.0;
-        Felt {
-            state: State::Free,
+        self.answers(ContactOutput {
+            state: ContactState::Free,
             proxy: hip,
-            settled: true,
-            ..Felt::default()
+            converged: true,
+            ..ContactOutput::default()
+        })
+    }
+
+    /// In free space the proxy is the HIP, if it still is.
+    ///
+    /// Most paths end within the tick; those are not worth storing.
+    fn flies<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        budget: &mut Budget,
+    ) -> Turn {
+        let mut sweeping = Sweeping {
+            path: Path::through_air(self.hip, hip),
+            was_late: false,
+            fade: 1.0,
+            departures: None,
+        };
+        let swept = sweeping.path.advance(window, budget);
+        if matches!(swept, Swept::Missing(_) | Swept::Suspended) {
+            sweeping.was_late = self.settings.execution == Execution::RealTime;
+            let at = sweeping.path.at();
+            self.phase = Phase::Sweeping(sweeping);
+            return self.waits_at(at, swept.missing_tile());
         }
+        self.arrives(window, hip, swept, Departures::None, 1.0)
+    }
+
+    /// Goes on with a path from an earlier tick, or off the surface.
+    fn sweeps<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        budget: &mut Budget,
+    ) -> Turn {
+        let Phase::Sweeping(sweeping) = &mut self.phase else {
+            return Turn::Ends;
+        };
+        let swept = sweeping.path.advance(window, budget);
+        if matches!(swept, Swept::Missing(_) | Swept::Suspended) {
+            sweeping.was_late |= self.settings.execution == Execution::RealTime;
+            let at = sweeping.path.at();
+            return self.waits_at(at, swept.missing_tile());
+        }
+        let fade = if sweeping.was_late {
+            0.0
+        } else {
+            sweeping.fade
+        };
+        let departures = sweeping.departures;
+        self.arrives(window, hip, swept, departures, fade)
+    }
+
+    /// What a path that ended comes to: on the surface the tick goes on.
+    fn arrives<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        swept: Swept,
+        departures: Departures,
+        fade: f32,
+    ) -> Turn {
+        match swept {
+            Swept::Hit(point) => {
+                self.phase = Phase::OnSurface(OnSurface {
+                    leave: may_leave(window, &HipView::new(hip), point, &departures),
+                    departures,
+                    ..OnSurface::at(point, fade)
+                });
+                Turn::GoesOn
+            }
+            Swept::Under => self.loses_contact(window, hip),
+            Swept::Clear | Swept::Missing(_) | Swept::Suspended => self.becomes_free(hip),
+        }
+    }
+
+    /// On the surface: downhill to the closest point.
+    fn descends<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        budget: &mut Budget,
+    ) -> Turn {
+        let Phase::OnSurface(on) = &mut self.phase else {
+            return Turn::Ends;
+        };
+        let view = HipView::new(hip);
+        let is_paper = self.settings.rule == Rule::Paper;
+        let leave = if is_paper { Leave::Nowhere } else { on.leave };
+        let waits = self.settings.execution == Execution::LockStep;
+        match on.descent.advance(window, &view, leave, waits, budget) {
+            Ended::Rests if is_paper => self.decides(window, &view, hip),
+            Ended::Rests => self.touches(window, hip, true, None),
+            Ended::Missing(tile) => self.touches(window, hip, false, Some(tile)),
+            Ended::Suspended => self.touches(window, hip, false, None),
+            Ended::Leaves => self.leaves(window, &view, hip),
+            Ended::Lost(_) if is_paper => self.becomes_free(hip),
+            Ended::Lost(tile) => {
+                let turn = self.loses_contact(window, hip);
+                self.output.missing_tile = self.output.missing_tile.or(tile);
+                turn
+            }
+        }
+    }
+
+    /// From the surface into the air, straight to the HIP.
+    fn leaves<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        hip: GridPoint,
+    ) -> Turn {
+        let Phase::OnSurface(on) = &mut self.phase else {
+            return Turn::Ends;
+        };
+        // The descent has just stood on a patch there.
+        let nearest = on.descent.nearest(window, view);
+        let from = nearest.and_then(|(point, _)| position_on(window, &point));
+        let from = from.unwrap_or(self.output.proxy);
+        let mut departures = on.departures;
+        count_unless_nearer(&mut departures, from, view);
+        self.phase = Phase::Sweeping(Sweeping {
+            path: Path::off_surface(from, hip),
+            was_late: false,
+            fade: on.fade,
+            departures,
+        });
+        Turn::GoesOn
     }
 
     /// The answer in contact, faded where the surface ends.
-    pub(super) fn touches<const D: usize>(
+    fn touches<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
-        (spot, z): (Spot, f32),
-        settled: bool,
-        held_up_by: Option<[i32; 2]>,
-        pace: Pace,
-    ) -> Felt {
-        let (mut settled, mut held_up_by) = (settled, held_up_by);
-        if settled || pace == Pace::RealTime {
-            let target = self.presence_target(window, hip, &spot);
-            if let (Pace::LockStep, Some(tile)) = (pace, target.missing) {
-                (settled, held_up_by) = (false, Some(tile));
+        mut converged: bool,
+        mut missing_tile: Option<TileIndex>,
+    ) -> Turn {
+        let is_real_time = self.settings.execution == Execution::RealTime;
+        let most = boundary_fade::RATE_PER_S * self.settings.rate.tick_s();
+        let view = HipView::new(hip);
+        let Phase::OnSurface(on) = &mut self.phase else {
+            return Turn::Ends;
+        };
+        let Some((point, z)) = on.descent.nearest(window, &view) else {
+            return Turn::Ends;
+        };
+        if converged || is_real_time {
+            let target = boundary_fade::target(window, &hip, point.cell);
+            if let (Some(tile), false) = (target.missing, is_real_time) {
+                (converged, missing_tile) = (false, Some(tile));
             } else {
-                self.presence = presence::approach(self.presence, target.presence, self.fade);
-                if self.presence == 0.0 && target.presence == 0.0 {
-                    return self.starts_anew(window, hip);
+                on.fade = approach(on.fade, target.fade, most);
+                if on.fade == 0.0 && target.fade == 0.0 {
+                    // The HIP may be above the surface already; to look now and not in
+                    // the next tick is what makes a missing tile leave no trace.
+                    return self.looks_around(window, hip);
                 }
             }
         }
-        let hand = Hand::new(hip);
-        Felt {
-            state: State::Touching,
-            proxy: hand.point_at(&spot, z),
-            stretch: hand.stretch(&spot, z) * self.presence,
-            settled,
-            held_up_by,
+        let displacement = view.displacement(&point, z) * on.fade;
+        // A proxy that has stayed in its patch is likely to stay for another tick.
+        let [x, y, _] = self.output.proxy.cell();
+        let stayed = point.cell == Cell::new(x, y);
+        let may_follow = self.settings.shortcuts && self.settings.rule == Rule::Swept;
+        if converged && on.fade == 1.0 && stayed && may_follow {
+            on.follow = Follow::from(window, point, hip.column());
+        }
+        self.output = ContactOutput {
+            state: ContactState::Touching,
+            proxy: view.position(&point, z),
+            displacement,
+            converged,
+            missing_tile,
             work: 0,
-        }
-    }
-
-    /// Nearly always the hand is over the patch that the proxy is on.
-    fn presence_target<const D: usize>(
-        &self,
-        window: &Window<'_, D>,
-        hip: GridPoint,
-        spot: &Spot,
-    ) -> presence::Target {
-        if spot.cell == hip.column() || presence::is_far(spot.cell, hip.column()) {
-            return presence::Target {
-                presence: 1.0,
-                missing: None,
-            };
-        }
-        presence::target(window, &hip)
-    }
-
-    /// Nothing is felt any more. The hand may be above the surface already; to
-    /// look now and not in the next tick is what makes a missing tile leave no
-    /// trace.
-    fn starts_anew<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Felt {
-        self.phase = Phase::Waiting;
-        self.presence = 1.0;
-        if self.sees_above(window, hip) {
-            return self.flies(hip);
-        }
-        self.waits(window, hip)
+        };
+        Turn::Ends
     }
 
     /// The contact is lost: what was felt fades away where it was.
-    pub(super) fn loses<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Felt {
-        if self.before.state == State::Touching {
-            self.presence = 1.0;
-            self.phase = Phase::LettingGo {
-                proxy: self.before.proxy,
-                stretch: self.before.stretch,
-            };
-            return self.fades(window, hip);
-        }
-        self.starts_anew(window, hip)
-    }
-
-    /// A tick of letting go.
-    pub(super) fn fades<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Felt {
-        self.presence = presence::approach(self.presence, 0.0, self.fade);
-        let Phase::LettingGo { proxy, stretch } = self.phase else {
-            return self.waits(window, hip);
+    fn loses_contact<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Turn {
+        let Some((proxy, displacement)) = self.felt else {
+            return self.looks_around(window, hip);
         };
-        if self.presence == 0.0 {
-            return self.starts_anew(window, hip);
-        }
-        Felt {
-            state: State::LettingGo,
+        self.phase = Phase::Fading {
             proxy,
-            stretch: stretch * self.presence,
-            settled: true,
-            ..Felt::default()
-        }
+            displacement,
+            fade: 1.0,
+        };
+        self.fades_out(window, hip)
     }
 
-    fn paper<const D: usize>(
+    /// A tick of fading out.
+    fn fades_out<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Turn {
+        let most = boundary_fade::RATE_PER_S * self.settings.rate.tick_s();
+        if let Phase::Fading {
+            proxy,
+            displacement,
+            fade,
+        } = &mut self.phase
+        {
+            *fade = approach(*fade, 0.0, most);
+            if *fade > 0.0 {
+                self.output = ContactOutput {
+                    state: ContactState::Fading,
+                    proxy: *proxy,
+                    displacement: *displacement * *fade,
+                    converged: true,
+                    ..ContactOutput::default()
+                };
+                return Turn::Ends;
+            }
+        }
+        self.looks_around(window, hip)
+    }
+
+    /// By the paper's rule: the first candidate under the segment.
+    fn seeks<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
-        pace: Pace,
-        work: &mut Work,
-    ) -> Felt {
-        let last = match self.phase {
-            Phase::Touching { spot, .. } => Some(spot),
-            _ => None,
+        budget: &mut Budget,
+    ) -> Turn {
+        let Phase::Seeking { cells, was_late } = &mut self.phase else {
+            return Turn::Ends;
         };
-        if hip != self.sought || self.last.settled {
-            (self.passed, self.sought) = (0, hip);
-        }
-        if matches!(self.phase, Phase::Waiting) && !self.sees_above(window, hip) {
-            return self.waits(window, hip);
-        }
-        let previous = self.hip;
-        match paper::update(window, last, &previous, &hip, &mut self.passed, work) {
-            Verdict::Free => self.flies(hip),
-            Verdict::Contact { spot, z, settled } => {
-                if core::mem::take(&mut self.late) {
-                    self.presence = 0.0;
-                }
-                self.phase = Phase::Touching {
-                    spot,
-                    leave: Leave::Anywhere,
-                };
-                self.touches(window, hip, (spot, z), settled, None, pace)
+        let missing_tile = match cells.find(window, budget) {
+            Candidate::At(point) => {
+                let fade = if *was_late { 0.0 } else { 1.0 };
+                self.phase = Phase::OnSurface(OnSurface::at(point, fade));
+                return Turn::GoesOn;
             }
-            Verdict::HeldUp(tile) if last.is_some() => Felt {
-                settled: false,
-                held_up_by: Some(tile),
-                ..self.last
-            },
-            Verdict::HeldUp(tile) => {
-                self.late |= pace == Pace::RealTime;
-                Felt {
-                    state: State::Free,
-                    proxy: previous,
-                    held_up_by: Some(tile),
-                    ..Felt::default()
-                }
+            Candidate::None if cells.to == hip => return self.becomes_free(hip),
+            Candidate::None => {
+                // The HIP has moved on meanwhile.
+                *cells = Candidates::between(cells.to, hip);
+                return Turn::GoesOn;
             }
+            Candidate::Missing(tile) => Some(tile),
+            Candidate::Suspended => None,
+        };
+        *was_late |= self.settings.execution == Execution::RealTime;
+        let from = cells.from;
+        self.waits_at(from, missing_tile)
+    }
+
+    /// By the paper's rule: the closest point decides about contact.
+    fn decides<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        hip: GridPoint,
+    ) -> Turn {
+        let Phase::OnSurface(on) = &self.phase else {
+            return Turn::Ends;
+        };
+        match on.descent.nearest(window, view) {
+            Some((point, z)) if paper::is_inside(window, view, &point, z) => {
+                self.touches(window, hip, true, None)
+            }
+            _ => self.becomes_free(hip),
         }
+    }
+}
+
+/// Where a proxy that has hit the surface may leave it again.
+fn may_leave<const D: usize>(
+    window: &Window<'_, D>,
+    view: &HipView,
+    hit: SurfacePoint,
+    departures: &Departures,
+) -> Leave {
+    let is_nearer = |before: &GridPoint| {
+        position_on(window, &hit).is_some_and(|position| view.is_nearer(&position, before))
+    };
+    match departures {
+        Some((_, DEPARTURES..)) => Leave::Nowhere,
+        Some((before, _)) if !is_nearer(before) => Leave::ButAt(hit),
+        _ => Leave::Anywhere,
     }
 }

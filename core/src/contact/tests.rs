@@ -2,12 +2,16 @@
 
 use std::vec::Vec;
 
+use super::budget::Budget;
 use super::dice::Dice;
-use super::sweep::{Path, Sweep};
-use super::work::Work;
+use super::sweep::{Path, Swept};
 use super::*;
 use crate::cases::cases;
+use crate::grid::Cell;
+use crate::grid::GridPoint;
+use crate::terrain::FieldSize;
 use crate::terrain::testing::Field;
+use glam::Vec3;
 
 fn hash(x: i32, y: i32) -> f64 {
     let mut h = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
@@ -20,7 +24,7 @@ fn hash(x: i32, y: i32) -> f64 {
 }
 
 const SIZE: i32 = 60;
-/// Ways of the hand over each kind of ground.
+/// Paths of the HIP over each kind of ground.
 const SEEDS: core::ops::RangeInclusive<u64> = 1..=cases(20, 1) as u64;
 
 /// A terrain and its surface in f64.
@@ -71,35 +75,37 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 /// Runs a trajectory to the end of every tick and checks each answer.
 fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]]) -> [u32; 4] {
-    let field = Field::<2>::held([SIZE, SIZE], height);
+    let field = Field::<2>::held(FieldSize::new(SIZE, SIZE), height);
     let truth = Ground64 { height };
-    let mut contact = Contact::new();
+    let mut contact = Contact::new(ContactSettings::LOCK_STEP);
     let mut seen = [0; 4];
     for (tick, p) in path.iter().enumerate() {
         let hip = point(*p);
-        let mut felt = contact.step(&field.window, &hip, Rule::Swept, Pace::LockStep);
+        let mut felt = contact.step(&field.window, &hip);
         let mut turns = 0;
-        while !felt.settled {
-            felt = contact.step(&field.window, &hip, Rule::Swept, Pace::LockStep);
+        while !felt.converged {
+            felt = contact.step(&field.window, &hip);
             turns += 1;
             assert!(turns < 5000, "{name} {tick}: never settles {felt:?}");
         }
         let (x, proxy) = (position(&hip), position(&felt.proxy));
         seen[felt.state as usize] += 1;
         let at = std::format!("{name} tick {tick} hip {x:?} {felt:?}");
-        assert!(felt.stretch.is_finite(), "{at}");
+        assert!(felt.displacement.is_finite(), "{at}");
         match felt.state {
-            State::Waiting | State::Free => assert_eq!(felt.stretch, Vec3::ZERO, "{at}"),
+            ContactState::Waiting | ContactState::Free => {
+                assert_eq!(felt.displacement, Vec3::ZERO, "{at}");
+            }
             // What it was on is not there any more.
-            State::LettingGo => {}
-            State::Touching => {
+            ContactState::Fading => {}
+            ContactState::Touching => {
                 let z = truth.beside(proxy);
                 let bound = 2e-6 + slope * 3e-7 + z.abs() * 5e-7;
                 assert!((proxy[2] - z).abs() < bound, "off the surface: {at} {z}");
                 assert_is_nearest(&truth, slope, proxy, x, &at);
             }
         }
-        if let (State::Free, Some(z)) = (felt.state, truth.at(x[0], x[1])) {
+        if let (ContactState::Free, Some(z)) = (felt.state, truth.at(x[0], x[1])) {
             let bound = 2e-6 + slope * 3e-7 + z.abs() * 5e-7;
             assert!(x[2] > z - bound, "free below the surface: {at} {z}");
         }
@@ -107,7 +113,7 @@ fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]])
     seen
 }
 
-/// No point of the surface right around the proxy is nearer to the hand.
+/// No point of the surface right around the proxy is nearer to the HIP.
 fn assert_is_nearest(truth: &Ground64, slope: f64, proxy: [f64; 3], hip: [f64; 3], at: &str) {
     const RING: f64 = 1e-5;
     let d = distance(proxy, hip);
@@ -133,7 +139,7 @@ fn assert_is_nearest(truth: &Ground64, slope: f64, proxy: [f64; 3], hip: [f64; 3
     }
 }
 
-/// A hand that wanders, at `step` cells a tick, around height `mid` ± `span`.
+/// A HIP that wanders, at `step` cells a tick, around height `mid` ± `span`.
 fn wander(seed: u64, ticks: u32, step: f64, mid: f64, span: f64) -> Vec<[f64; 3]> {
     let mut dice = Dice(seed);
     let mut p = [30.0, 30.0, mid + span];
@@ -182,7 +188,7 @@ fn dense_crossing(truth: &Ground64, from: [f64; 3], to: [f64; 3]) -> Option<[[f6
 
 /// Random segments that start above everything.
 fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, high: f64) {
-    let field = Field::<2>::held([SIZE, SIZE], height);
+    let field = Field::<2>::held(FieldSize::new(SIZE, SIZE), height);
     let truth = Ground64 { height };
     let mut dice = Dice(7);
     let mut seen = [0, 0];
@@ -196,19 +202,19 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
             dice.between(low, high),
         ];
         let (a, b) = (point(from), point(to));
-        let mut path = sweep::Path::through_air(a, b);
+        let mut path = Path::through_air(a, b);
         let swept = loop {
-            match path.advance(&field.window, &mut Work::new()) {
-                Sweep::Unfinished => {}
+            match path.advance(&field.window, &mut Budget::new(WORK_PER_TICK)) {
+                Swept::Suspended => {}
                 ended => break ended,
             }
         };
         let at = std::format!("{name} {from:?} to {to:?}: {swept:?}");
         match (swept, dense_crossing(&truth, position(&a), position(&b))) {
-            (Sweep::Hit(spot), Some([before, after])) => {
+            (Swept::Hit(point), Some([before, after])) => {
                 seen[0] += 1;
-                let x = f64::from(spot.cell[0]) + f64::from(spot.u);
-                let y = f64::from(spot.cell[1]) + f64::from(spot.v);
+                let x = f64::from(point.cell.x) + f64::from(point.u);
+                let y = f64::from(point.cell.y) + f64::from(point.v);
                 // On the way, and not after the dense search has seen it.
                 let way = ((to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2)).sqrt();
                 let gone = ((x - from[0]).powi(2) + (y - from[1]).powi(2)).sqrt();
@@ -223,14 +229,14 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
                     z - line
                 );
             }
-            (Sweep::Hit(spot), None) => {
+            (Swept::Hit(point), None) => {
                 // Grazes between two points of the dense search, or touches.
-                let x = f64::from(spot.cell[0]) + f64::from(spot.u);
-                let y = f64::from(spot.cell[1]) + f64::from(spot.v);
+                let x = f64::from(point.cell.x) + f64::from(point.u);
+                let y = f64::from(point.cell.y) + f64::from(point.v);
                 assert!(truth.at(x, y).is_some(), "{at}");
             }
-            (Sweep::Clear, None) => seen[1] += 1,
-            (Sweep::Clear, Some([_, after])) => {
+            (Swept::Clear, None) => seen[1] += 1,
+            (Swept::Clear, Some([_, after])) => {
                 let z = truth.at(after[0], after[1]).unwrap_or(f64::NAN);
                 assert!(
                     z - after[2] < 4e-6 * (1.0 + slope),
@@ -261,34 +267,37 @@ fn two_walls(x: i32, _: i32) -> f32 {
 
 #[test]
 fn proxy_does_not_tunnel_through_a_wall() {
-    let field = Field::<2>::held([SIZE, SIZE], two_walls);
+    let field = Field::<2>::held(FieldSize::new(SIZE, SIZE), two_walls);
     let (above, beyond) = (point([10.0, 30.2, 5.0]), point([40.0, 30.7, 5.0]));
-    let mut swept = Contact::new();
-    swept.step(&field.window, &above, Rule::Swept, Pace::LockStep);
-    let mut felt = *swept.step(&field.window, &beyond, Rule::Swept, Pace::LockStep);
-    while !felt.settled {
-        felt = *swept.step(&field.window, &beyond, Rule::Swept, Pace::LockStep);
+    let mut swept = Contact::new(ContactSettings::LOCK_STEP);
+    swept.step(&field.window, &above);
+    let mut felt = *swept.step(&field.window, &beyond);
+    while !felt.converged {
+        felt = *swept.step(&field.window, &beyond);
     }
-    assert_eq!(felt.state, State::Touching);
+    assert_eq!(felt.state, ContactState::Touching);
     assert!(position(&felt.proxy)[0] < 20.0, "{felt:?}");
-    assert!(felt.stretch.x < -19.0);
+    assert!(felt.displacement.x < -19.0);
 }
 
 #[test]
 fn shifting_the_scene_changes_no_bit() {
     for shift in [1000, 100_000, 100_000_000] {
         let shift = shift / 32 * 32; // whole tiles, so that one function serves
-        let near = Field::<2>::held([SIZE, SIZE], rough);
+        let near = Field::<2>::held(FieldSize::new(SIZE, SIZE), rough);
         let far = Field::<2>::shifted(SIZE, shift, rough);
-        let (mut a, mut b) = (Contact::new(), Contact::new());
+        let (mut a, mut b) = (
+            Contact::new(ContactSettings::LOCK_STEP),
+            Contact::new(ContactSettings::LOCK_STEP),
+        );
         for p in wander(3, cases(1500, 30), 0.2, 1.0, 1.5) {
             let hip = point(p);
             let moved = GridPoint::new(hip.cell().map(|c| c + shift), hip.frac());
-            let here = a.step(&near.window, &hip, Rule::Swept, Pace::LockStep);
-            let there = b.step(&far.window, &moved, Rule::Swept, Pace::LockStep);
+            let here = a.step(&near.window, &hip);
+            let there = b.step(&far.window, &moved);
             assert_eq!(
-                here.stretch.to_array().map(f32::to_bits),
-                there.stretch.to_array().map(f32::to_bits)
+                here.displacement.to_array().map(f32::to_bits),
+                there.displacement.to_array().map(f32::to_bits)
             );
             assert_eq!(here.proxy.frac(), there.proxy.frac());
             assert_eq!(here.state, there.state);
@@ -406,7 +415,7 @@ fn holds_on_spikes_and_holes() {
 }
 
 #[test]
-fn holds_when_the_hand_jumps() {
+fn holds_when_the_hip_jumps() {
     for seed in SEEDS {
         check("flat", flat, 0.0, &teleport(seed, cases(300, 15), 2.0, 2.0));
         check(
@@ -446,8 +455,8 @@ fn holds_when_the_hand_jumps() {
 /// it the field begins; going on from beyond that, it would come from nowhere.
 #[test]
 fn steep_ways_in_over_the_border_cross_nothing() {
-    let mut field = Field::<8>::new([72, 72], |_, _| 0.0);
-    field.hold_around([36, 36]);
+    let mut field = Field::<8>::new(FieldSize::new(72, 72), |_, _| 0.0);
+    field.hold_around(Cell::new(36, 36));
     let mut dice = Dice(1);
     for way in 0..cases(1000, 10) {
         let beside = [dice.between(0.0, 72.0), dice.between(-1.0, 0.0), 0.2].map(|x| x as f32);
@@ -455,11 +464,127 @@ fn steep_ways_in_over_the_border_cross_nothing() {
         let to = GridPoint::new([3, 3, -100_000_000], Vec3::ZERO);
         let mut path = Path::through_air(from, to);
         let ended = loop {
-            match path.advance(&field.window, &mut Work::new()) {
-                Sweep::Unfinished => {}
+            match path.advance(&field.window, &mut Budget::new(WORK_PER_TICK)) {
+                Swept::Suspended => {}
                 ended => break ended,
             }
         };
-        assert!(matches!(ended, Sweep::Under), "{way}, {from:?}: {ended:?}");
+        assert!(matches!(ended, Swept::Under), "{way}, {from:?}: {ended:?}");
+    }
+}
+
+/// A ground, the height around which it is felt, and how far up and down from there.
+type FeltGround = (fn(i32, i32) -> f32, f64, f64);
+
+/// Ground of every kind.
+const GROUNDS: [FeltGround; 7] = [
+    (flat, 2.0, 0.6),
+    (hills, 0.0, 3.5),
+    (rough, 1.0, 1.2),
+    (noise_100, 0.0, 120.0),
+    (checkerboard, 0.5, 1.0),
+    (spikes, 0.0, 1.5),
+    (holes, 1.0, 1.5),
+];
+
+/// What two contacts with other settings answer to the same path, tick by tick, each
+/// as often as it takes.
+fn side_by_side(
+    one: ContactSettings,
+    other: ContactSettings,
+    mut look: impl FnMut(&ContactOutput, &ContactOutput, [u32; 2]),
+) {
+    for (height, mid, span) in GROUNDS {
+        let field = Field::<2>::held(FieldSize::new(SIZE, SIZE), height);
+        let mut contacts = [one, other].map(Contact::new);
+        // Most of the time below the surface, once it was seen from above.
+        let above = [[30.0, 30.0, 2e4]].into_iter();
+        for step in [0.01, 0.3, 2.0] {
+            let below = wander(5, cases(1500, 20), step, mid - 0.6 * span, 0.6 * span);
+            for p in above.clone().chain(below) {
+                let hip = point(p);
+                let mut turns = [0; 2];
+                let answers = [0, 1].map(|i| {
+                    loop {
+                        turns[i] += 1;
+                        let output = *contacts[i].step(&field.window, &hip);
+                        if output.converged {
+                            return output;
+                        }
+                        assert!(turns[i] < 10_000, "{hip:?} never converges");
+                    }
+                });
+                look(&answers[0], &answers[1], turns);
+            }
+        }
+    }
+}
+
+fn bits(output: &ContactOutput) -> (ContactState, GridPoint, [u32; 3]) {
+    let displacement = output.displacement.to_array().map(f32::to_bits);
+    (output.state, output.proxy, displacement)
+}
+
+#[test]
+fn the_shortcuts_change_no_bit() {
+    let without = ContactSettings {
+        shortcuts: false,
+        ..ContactSettings::LOCK_STEP
+    };
+    let (mut ticks, mut shorter) = (0, 0);
+    side_by_side(ContactSettings::LOCK_STEP, without, |with, without, _| {
+        assert_eq!(bits(with), bits(without));
+        ticks += 1;
+        shorter += u32::from(with.work < without.work);
+    });
+    assert!(shorter > ticks / 10, "{shorter} of {ticks} took a shortcut");
+}
+
+#[test]
+fn a_tick_cut_short_anywhere_ends_on_the_same_bits() {
+    let whole = ContactSettings {
+        work_per_tick: u32::MAX / 2,
+        ..ContactSettings::LOCK_STEP
+    };
+    let mut cut = 0;
+    for work_per_tick in [ContactSettings::LEAST_WORK, WORK_PER_TICK] {
+        let short = ContactSettings {
+            work_per_tick,
+            ..ContactSettings::LOCK_STEP
+        };
+        side_by_side(whole, short, |whole, short, turns| {
+            assert_eq!(bits(whole), bits(short));
+            assert_eq!(turns[0], 1);
+            assert!(short.work <= work_per_tick);
+            cut += u32::from(turns[1] > 1);
+        });
+    }
+    assert!(cut > cases(500, 5), "{cut} ticks were cut short");
+}
+
+/// Tents whose top is a vertex, an edge eastward or northward; one side of the edge
+/// is steeper.
+#[test]
+fn on_an_edge_or_vertex_the_steepest_way_down_decides() {
+    let tent = |x: i32, y: i32, at: i32| -> f32 {
+        let side = |c: i32, gentle: f32, steep: f32| match c - at {
+            d if d < 0 => gentle * d as f32,
+            d => -steep * d as f32,
+        };
+        side(x, 0.1, 0.4) + side(y, 0.15, 0.3)
+    };
+    for mirrored in [[false, false], [true, false], [false, true], [true, true]] {
+        let field = Field::<2>::held(FieldSize::new(SIZE, SIZE), move |x, y| {
+            let turned = |c: i32, turned: bool| if turned { SIZE - c } else { c };
+            tent(turned(x, mirrored[0]), turned(y, mirrored[1]), 30)
+        });
+        let mut contact = Contact::new(ContactSettings::LOCK_STEP);
+        contact.step(&field.window, &point([30.0, 30.0, 1.0]));
+        let output = *contact.step(&field.window, &point([30.0, 30.0, -0.2]));
+        assert_eq!(output.state, ContactState::Touching);
+        let toward = |way: f32, mirrored: bool| if mirrored { -way } else { way };
+        let [east, north, _] = output.displacement.to_array();
+        assert!(toward(east, mirrored[0]) > 0.0, "{mirrored:?} {output:?}");
+        assert!(toward(north, mirrored[1]) > 0.0, "{mirrored:?} {output:?}");
     }
 }

@@ -1,30 +1,29 @@
-//! One straight line of a patch, and its point nearest to the hand.
+//! One ruling of a patch, and its point closest to the HIP.
 //!
-//! With v fixed, a patch is a straight line (a ruling) of slope m = b + a·v,
-//! and its nearest point is known in closed form:
+//! With v fixed, a patch is a straight line, a ruling, of slope m = b + a·v,
+//! and its closest point to a HIP at (p, q) is known in closed form:
 //!
 //! ```text
-//! g = z(p, v)                    height of the ruling's line over the hand's u
-//! z = g / (1 + m²)               height of its nearest point
+//! g = z(p, v)                    height of the ruling's line over the HIP
+//! z = g / (1 + m²)               height of its closest point
 //! u = p − m·z                    clamped to [0, 1]
 //! ```
 //!
 //! On a steep ruling u is taken from the height instead, (z − z(0, v))/m, and
 //! 1 − u likewise from the other end: both then are right to the last place
-//! however near to an end, or however far from the hand, the point is. Height
+//! however near to an end, or however far from the HIP, the point is. Height
 //! and slopes across come from the two, with nothing cancelled.
 
-use super::patch::Patch;
+use crate::contact::surface::patch::Patch;
 
-/// A ruling's nearest point, and how the distance changes from ruling to
-/// ruling.
-#[derive(Clone, Copy)]
+/// A ruling's closest point, and how the distance changes from ruling to ruling.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Ruling {
     pub(super) u: f32,
     pub(super) v: f32,
-    /// Height above the hand, cells.
+    /// Height above the HIP, cells.
     pub(super) z: f32,
-    /// East and north of the hand, cells.
+    /// East and north of the HIP, cells.
     pub(super) off: (f32, f32),
     /// F′(v)/2
     pub(super) slope: f32,
@@ -40,74 +39,68 @@ pub(super) struct Ruling {
 
 /// What rounding may make of a ruling.
 pub(super) struct Noise {
-    /// Of F(v), the squared distance from the hand, cells².
+    /// Of F(v), the squared distance from the HIP, cells².
     pub(super) f: f32,
     /// Of F′(v)/2.
     pub(super) slope: f32,
 }
 
-/// The nearest point of the ruling at `v`, for a hand at `(p, q)` in patch
-/// coordinates.
-#[inline]
-pub(super) fn ruling(patch: &Patch, (p, q): (f32, f32), v: f32) -> Ruling {
-    let left = 1.0 - v;
-    let mix = |south: f32, north: f32| south * left + north * v;
-    let [sw, se, nw, ne] = patch.corners;
-    let (start, end, m) = (mix(sw, nw), mix(se, ne), mix(patch.b[0], patch.b[1]));
-    let flatness = 1.0 / (1.0 + m * m);
-    let free_z = (start + m * p) * flatness;
-    let (mut free_u, mut rest) = if m.abs() <= 1.0 {
-        let u = p - m * free_z;
-        (u, 1.0 - u)
-    } else {
-        let run = 1.0 / m;
-        ((free_z - start) * run, (end - free_z) * run)
-    };
-    // The larger one adds nothing to what the smaller one knows.
-    if free_u < rest {
-        rest = 1.0 - free_u;
-    } else {
-        free_u = 1.0 - rest;
-    }
-    let at_end = !(free_u >= 0.0 && rest >= 0.0);
-    let (u, z, across, curvature);
-    if at_end {
-        (u, z, across) = if free_u > 0.5 {
-            (1.0, end, patch.c[1])
-        } else {
-            (0.0, start, patch.c[0])
-        };
-        curvature = 1.0 + across * across;
-    } else {
-        (u, z) = (free_u, free_z);
-        across = patch.c[0] * rest + patch.c[1] * u;
-        let za = patch.a * z;
-        curvature = 1.0 + (across * across - za * (za + 2.0 * m * across)) * flatness;
-    }
-    let (du, dv) = (u - p, v - q);
-    Ruling {
-        u,
-        v,
-        z,
-        off: (du, dv),
-        slope: dv + z * across,
-        curvature,
-        along: m,
-        across,
-        at_end,
-    }
-}
-
 impl Ruling {
-    /// Squared distance from the hand, cells².
-    pub(super) fn f(&self) -> f32 {
-        let (du, dv) = self.off;
-        du * du + dv * dv + self.z * self.z
+    /// The closest point of the ruling at `v`, for a HIP at `(p, q)` in patch
+    /// coordinates.
+    #[inline]
+    pub(super) fn at(patch: &Patch, (p, q): (f32, f32), v: f32) -> Self {
+        let left = 1.0 - v;
+        let mix = |south: f32, north: f32| south * left + north * v;
+        let [sw, se, nw, ne] = patch.corners;
+        let (start, end, m) = (mix(sw, nw), mix(se, ne), mix(patch.b[0], patch.b[1]));
+        let flatness = 1.0 / (1.0 + m * m);
+        let free_z = (start + m * p) * flatness;
+        let (mut free_u, mut rest) = if m.abs() <= 1.0 {
+            let u = p - m * free_z;
+            (u, 1.0 - u)
+        } else {
+            let run = 1.0 / m;
+            ((free_z - start) * run, (end - free_z) * run)
+        };
+        // The larger one adds nothing to what the smaller one knows.
+        if free_u < rest {
+            rest = 1.0 - free_u;
+        } else {
+            free_u = 1.0 - rest;
+        }
+        let at_end = !(free_u >= 0.0 && rest >= 0.0);
+        let (u, z, across, curvature);
+        if at_end {
+            (u, z, across) = if free_u > 0.5 {
+                (1.0, end, patch.c[1])
+            } else {
+                (0.0, start, patch.c[0])
+            };
+            curvature = 1.0 + across * across;
+        } else {
+            (u, z) = (free_u, free_z);
+            across = patch.c[0] * rest + patch.c[1] * u;
+            let za = patch.a * z;
+            curvature = 1.0 + (across * across - za * (za + 2.0 * m * across)) * flatness;
+        }
+        let (du, dv) = (u - p, v - q);
+        Self {
+            u,
+            v,
+            z,
+            off: (du, dv),
+            slope: dv + z * across,
+            curvature,
+            along: m,
+            across,
+            at_end,
+        }
     }
 
     /// By how much F is less here than at another ruling.
     ///
-    /// The difference of the squares by their factors: of a far hand the squares
+    /// The difference of the squares by their factors: of a far HIP the squares
     /// themselves would tell nothing.
     pub(super) fn gain_on(&self, other: &Self) -> f32 {
         let (east, north) = (self.off.0 + other.off.0, self.off.1 + other.off.1);
@@ -116,12 +109,12 @@ impl Ruling {
             + (other.z - self.z) * (other.z + self.z)
     }
 
-    /// What rounding makes of it, for a hand `p` east.
+    /// What rounding makes of it, for a HIP `p` east.
     ///
     /// A ruling's ends and its slope are mixed from the corners and may cancel; of
     /// a place only the way to the nearer end counts.
     pub(super) fn noise(&self, patch: &Patch, p: f32) -> Noise {
-        let [sw, se, nw, ne] = patch.corners.map(f32::abs);
+        let [sw, se, nw, ne] = patch.with_sizes().corners;
         let mix = |south: f32, north: f32| south * (1.0 - self.v) + north * self.v;
         let (end, near) = if self.u > 0.5 {
             (mix(se, ne), 1.0 - self.u)

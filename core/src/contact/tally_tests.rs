@@ -1,4 +1,4 @@
-//! What a tick looks at, by what the hand does: patches searched, and
+//! What a tick looks at, by what the HIP does: patches searched, and
 //! evaluations of the distance there.
 
 use core::cell::Cell;
@@ -6,15 +6,16 @@ use std::vec::Vec;
 
 use glam::Vec3;
 
+use super::budget::SHORTCUT;
 use super::dice::{Dice, wander};
-use super::work::{EVALUATION, VISIT};
-use super::{Contact, Pace, Rule, State};
+use super::{Contact, ContactSettings, ContactState};
 use crate::cases::cases;
 use crate::grid::GridPoint;
+use crate::terrain::FieldSize;
 use crate::terrain::testing::Field;
 
 std::thread_local! {
-    /// Patches and evaluations of the general search.
+    /// Patches and evaluations of the searches.
     static SEARCHED: Cell<[u32; 2]> = const { Cell::new([0; 2]) };
 }
 
@@ -36,8 +37,8 @@ fn height(x: i32, y: i32) -> f32 {
     (1.5 * hills) as f32 + 0.02 * rough as f32
 }
 
-/// A hand so high over a place, or so deep under it.
-fn hand([x, y]: [f64; 2], above: f64) -> GridPoint {
+/// A HIP so high over a place, or so deep under it.
+fn hip([x, y]: [f64; 2], above: f64) -> GridPoint {
     let cell = [x, y].map(|c| c as i32);
     let [u, v] = [x - x.floor(), y - y.floor()];
     let post = |i: i32, j: i32| f64::from(height(cell[0] + i, cell[1] + j));
@@ -55,24 +56,20 @@ fn places(step: f64) -> impl Iterator<Item = [f64; 2]> {
 }
 
 /// Median and 99th percentile of the patches and of the evaluations, over the
-/// ticks of these hands that end in a state.
-fn looked_at(hands: impl Iterator<Item = GridPoint>, state: State) -> [[u32; 2]; 2] {
-    let field = Field::<2>::held([SIZE; 2], height);
-    let mut contact = Contact::new();
+/// ticks of these HIPs that end in a state.
+fn looked_at(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u32; 2]; 2] {
+    let field = Field::<2>::held(FieldSize::new(SIZE, SIZE), height);
+    let mut contact = Contact::new(ContactSettings::LOCK_STEP);
     let above = GridPoint::new([30, 30, 9], Vec3::ZERO);
-    let mut step =
-        |hand: &GridPoint| *contact.step(&field.window, hand, Rule::Swept, Pace::LockStep);
+    let mut step = |hip: &GridPoint| *contact.step(&field.window, hip);
     step(&above);
     let (mut patches, mut evaluations) = (Vec::new(), Vec::new());
-    for hand in hands {
+    for hip in hips {
         SEARCHED.set([0; 2]);
-        let felt = step(&hand);
+        let felt = step(&hip);
         let searched = match SEARCHED.get() {
-            // Followed: an evaluation in every patch it comes to.
-            [0, _] if felt.state == State::Touching && felt.work > 0 => {
-                let hops = (felt.work - EVALUATION) / VISIT;
-                [1 + hops, 1 + hops]
-            }
+            // The shortcut: one evaluation.
+            [0, _] if felt.state == ContactState::Touching && felt.work == SHORTCUT => [1, 1],
             searched => searched,
         };
         if felt.state == state {
@@ -90,48 +87,48 @@ fn looked_at(hands: impl Iterator<Item = GridPoint>, state: State) -> [[u32; 2];
 #[test]
 fn a_tick_looks_at_no_more_than_it_needs() {
     let high = |[x, y]: [f64; 2]| GridPoint::new([x as i32, y as i32, 9], Vec3::ZERO);
-    let flies = |above: f64| places(0.5).map(move |at| hand(at, above));
-    let slides = |step: f64| places(step).map(|at| hand(at, -0.1));
-    let taps = places(0.03).flat_map(|at| [hand(at, 0.2), hand(at, -0.1)]);
+    let flies = |above: f64| places(0.5).map(move |at| hip(at, above));
+    let slides = |step: f64| places(step).map(|at| hip(at, -0.1));
+    let taps = places(0.03).flat_map(|at| [hip(at, 0.2), hip(at, -0.1)]);
     // An encoder count of 0.03 cell, one way or the other.
     let mut dice = Dice(72);
     let mut count = || 0.03 * dice.between(-1.5, 1.5).round();
-    let trembles = (0..TICKS).map(|_| hand([30.4 + count(), 30.5 + count()], count() - 0.1));
-    let rests = (0..TICKS).map(|_| hand([30.4, 30.5], -0.1));
+    let trembles = (0..TICKS).map(|_| hip([30.4 + count(), 30.5 + count()], count() - 0.1));
+    let rests = (0..TICKS).map(|_| hip([30.4, 30.5], -0.1));
     let states = [
         (
             "unmoved",
-            looked_at(rests, State::Touching),
+            looked_at(rests, ContactState::Touching),
             [[0, 0], [0, 0]],
         ),
         (
             "free high",
-            looked_at(places(0.5).map(high), State::Free),
+            looked_at(places(0.5).map(high), ContactState::Free),
             [[0, 0], [0, 0]],
         ),
         (
             "free low",
-            looked_at(flies(1.0), State::Free),
+            looked_at(flies(1.0), ContactState::Free),
             [[0, 0], [0, 0]],
         ),
         (
             "first contact",
-            looked_at(taps, State::Touching),
+            looked_at(taps, ContactState::Touching),
             [[1, 2], [2, 5]],
         ),
         (
             "slides 0.01",
-            looked_at(slides(0.01), State::Touching),
+            looked_at(slides(0.01), ContactState::Touching),
             [[1, 2], [1, 2]],
         ),
         (
             "slides 0.5",
-            looked_at(slides(0.5), State::Touching),
+            looked_at(slides(0.5), ContactState::Touching),
             [[2, 4], [2, 8]],
         ),
         (
             "trembles",
-            looked_at(trembles, State::Touching),
+            looked_at(trembles, ContactState::Touching),
             [[1, 1], [1, 1]],
         ),
     ];

@@ -1,23 +1,24 @@
 //! The search in one patch against bisection in f64.
 
+use super::super::MAX_EVALUATIONS;
 use super::*;
 use crate::cases::cases;
 use crate::contact::dice::Dice;
 
 /// F′(v)/2 and the point of the ruling at `v`, in f64, for coefficients as f32
 /// holds them.
-fn ruling64(patch: &Patch, hand: (f64, f64), v: f64) -> (f64, f64) {
+fn ruling64(patch: &Patch, hip: (f64, f64), v: f64) -> (f64, f64) {
     let [a, b, c, d] = [patch.a, patch.b[0], patch.c[0], patch.corners[0]].map(f64::from);
     let m = b + a * v;
-    let free_z = (d + b * hand.0 + (c + a * hand.0) * v) / (1.0 + m * m);
-    let free_u = hand.0 - m * free_z;
+    let free_z = (d + b * hip.0 + (c + a * hip.0) * v) / (1.0 + m * m);
+    let free_u = hip.0 - m * free_z;
     let u = free_u.clamp(0.0, 1.0);
     let z = if u == free_u {
         free_z
     } else {
         d + b * u + (c + a * u) * v
     };
-    (u, (v - hand.1) + z * (c + a * u))
+    (u, (v - hip.1) + z * (c + a * u))
 }
 
 fn height64(patch: &Patch, at: &Nearest) -> f64 {
@@ -27,8 +28,8 @@ fn height64(patch: &Patch, at: &Nearest) -> f64 {
 }
 
 /// The local minimum of F that lies downhill of `from`, in f64.
-fn minimum64(patch: &Patch, hand: (f64, f64), from: f64) -> (f64, f64) {
-    let slope = |v: f64| ruling64(patch, hand, v).1;
+fn minimum64(patch: &Patch, hip: (f64, f64), from: f64) -> (f64, f64) {
+    let slope = |v: f64| ruling64(patch, hip, v).1;
     let way = if slope(from) < 0.0 { 1.0 } else { -1.0 };
     let (mut low, mut step) = (from, 1e-10);
     let mut high = loop {
@@ -48,17 +49,17 @@ fn minimum64(patch: &Patch, hand: (f64, f64), from: f64) -> (f64, f64) {
             }
         }
     }
-    (ruling64(patch, hand, high).0, high)
+    (ruling64(patch, hip, high).0, high)
 }
 
 /// How strongly F curves at its minimum: the error of a flat minimum is the
 /// rounding of F′ over this.
-fn conditioning(patch: &Patch, hand: (f64, f64), v: f64) -> f64 {
+fn conditioning(patch: &Patch, hip: (f64, f64), v: f64) -> f64 {
     let h = 1e-5;
     if v < h || v > 1.0 - h {
         return 1.0;
     }
-    let slope = |v: f64| ruling64(patch, hand, v).1;
+    let slope = |v: f64| ruling64(patch, hip, v).1;
     ((slope(v + h) - slope(v - h)) / (2.0 * h)).abs().min(1.0)
 }
 
@@ -70,7 +71,7 @@ struct Errors {
     most_evaluations: u32,
 }
 
-/// Random patches of a slope, hands at a depth below them, random starts.
+/// Random patches of a slope, HIPs at a depth below them, random starts.
 fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
     const QUERIES: u32 = cases(4000, 1);
     let mut dice = Dice(0x5EED);
@@ -82,15 +83,15 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
         let above = Patch::new(corners);
         let (u, v) = (dice.unit() as f32, dice.unit() as f32);
         let down = above.normal(u, v).normalize() * depth as f32;
-        let hand = (u - down.x, v - down.y);
-        let hand_z = above.height(u, v) - down.z;
-        let patch = Patch::new(corners.map(|h| h - hand_z));
+        let hip = (u - down.x, v - down.y);
+        let hip_z = above.height(u, v) - down.z;
+        let patch = Patch::new(corners.map(|h| h - hip_z));
         let start = (dice.unit() as f32, dice.unit() as f32);
-        let found = nearest_downhill(&patch, hand, start);
+        let found = nearest_downhill(&patch, hip, start);
         total += u64::from(found.evaluations);
         most = most.max(found.evaluations);
-        let hand = (f64::from(hand.0), f64::from(hand.1));
-        let truth = minimum64(&patch, hand, f64::from(found.v));
+        let hip = (f64::from(hip.0), f64::from(hip.1));
+        let truth = minimum64(&patch, hip, f64::from(found.v));
         let error = (f64::from(found.u) - truth.0).hypot(f64::from(found.v) - truth.1);
         // However near to an edge: the height is the surface's at that place.
         let off = (f64::from(found.z) - height64(&patch, &found)).abs();
@@ -105,7 +106,7 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
             "{off:e}: {found:?}"
         );
         worst = worst.max(error);
-        wrong += u32::from(error * conditioning(&patch, hand, truth.1) > 2e-6);
+        wrong += u32::from(error * conditioning(&patch, hip, truth.1) > 2e-6);
     }
     Errors {
         off: wrong,
@@ -123,7 +124,7 @@ fn within_two_millionths_of_a_cell_on_any_slope() {
             for twist in [0.0, 1e-9, slope, 3.0 * slope] {
                 let errors = survey(slope, depth, twist);
                 let at = std::format!("slope {slope} depth {depth} twist {twist}");
-                // The few are hands at the centre of curvature of a steep
+                // The few are HIPs at the centre of curvature of a steep
                 // patch, where f32 cannot tell which way is down.
                 let few = if slope > 1.0 { 4 } else { 0 };
                 assert!(errors.off <= few, "{} of 4000 off: {at}", errors.off);
@@ -144,7 +145,7 @@ fn within_two_millionths_of_a_cell_on_any_slope() {
 
 #[test]
 fn a_saddle_is_no_answer() {
-    // Hand in the middle under a strongly twisted patch: (½, ½) is stationary.
+    // HIP in the middle under a strongly twisted patch: (½, ½) is stationary.
     let patch = Patch::new([4.0, -2.0, -2.0, 4.0].map(|h| h + 1.0));
     let found = nearest_downhill(&patch, (0.5, 0.5), (0.5, 0.5));
     assert!(
@@ -152,7 +153,8 @@ fn a_saddle_is_no_answer() {
         "{found:?}"
     );
     let at_saddle = patch.height(0.5, 0.5).powi(2);
-    assert!(found.distance_squared < at_saddle);
+    let distance_squared = (found.u - 0.5).powi(2) + (found.v - 0.5).powi(2) + found.z.powi(2);
+    assert!(distance_squared < at_saddle);
 }
 
 #[test]
@@ -163,7 +165,7 @@ fn warm_started_it_takes_two_evaluations() {
     assert!(next.evaluations <= 3, "{next:?}");
 }
 
-/// Of a hand far off the squared distance itself does not tell which of two
+/// Of a HIP far off the squared distance itself does not tell which of two
 /// places is nearer, and on a steep twist what cancels hides it, too.
 #[test]
 fn ends_at_a_minimum_where_the_squares_do_not_tell() {
@@ -185,12 +187,12 @@ fn ends_at_a_minimum_where_the_squares_do_not_tell() {
             (0.602_252_4, 0.561_781_17),
         ),
     ];
-    for (corners, hand, start) in cases {
+    for (corners, hip, start) in cases {
         let patch = Patch::new(corners);
-        let found = nearest_downhill(&patch, hand, start);
-        let far = f64::from(hand.0.abs().max(hand.1.abs()));
-        let hand = (f64::from(hand.0), f64::from(hand.1));
-        let truth = minimum64(&patch, hand, f64::from(found.v));
+        let found = nearest_downhill(&patch, hip, start);
+        let far = f64::from(hip.0.abs().max(hip.1.abs()));
+        let hip = (f64::from(hip.0), f64::from(hip.1));
+        let truth = minimum64(&patch, hip, f64::from(found.v));
         let error = (f64::from(found.u) - truth.0).hypot(f64::from(found.v) - truth.1);
         let allowed = 2e-6_f64.max(4.0 * f64::from(f32::EPSILON) * (1.0 + far));
         assert!(error < allowed, "{error:e} of {allowed:e}: {found:?}");

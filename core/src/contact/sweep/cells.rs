@@ -1,25 +1,17 @@
-//! The cells under a straight way, one after the other.
+//! The cells under a straight path, one after the other.
 
-use super::patch::Patch;
-use super::spot::Spot;
-use crate::grid::GridPoint;
+use crate::contact::surface::SurfacePoint;
+use crate::contact::surface::patch::Patch;
+use crate::contact::tolerance::{RUNS_ALONG, TINY_STEP};
+use crate::grid::{Cell, GridPoint};
 
-/// Length, in cells, of a step that is passed over where the way leaves the
-/// surface.
-const TINY: f32 = 1e-6;
-
-/// A way whose gap over the ground is less than its own rise by this factor runs
-/// along it.
-const ALONG: f32 = 16.0;
-
-/// The part of a way that lies in one cell.
+/// The part of a path over one cell.
 pub(super) struct Step {
-    /// The cell's column and row.
-    pub(super) cell: [i32; 2],
+    pub(super) cell: Cell,
     /// Where the part begins and ends in it, `[0, 1]`.
     from: (f32, f32),
     to: (f32, f32),
-    /// Heights above the start of the way, cells.
+    /// Heights above the start of the path, cells.
     z_from: f32,
     z_to: f32,
 }
@@ -30,11 +22,11 @@ impl Step {
         (self.to.0 - self.from.0)
             .abs()
             .max((self.to.1 - self.from.1).abs())
-            < TINY
-            && self.z_from - self.z_to < TINY
+            < TINY_STEP
+            && self.z_from - self.z_to < TINY_STEP
     }
 
-    /// Height of its lower end above the start of the way, cells.
+    /// Height of its lower end above the start of the path, cells.
     #[inline]
     pub(super) fn low(&self) -> f32 {
         if self.z_to < self.z_from {
@@ -45,13 +37,13 @@ impl Step {
     }
 
     /// Whether the ground, no corner of which is farther up or down than
-    /// `largest`, rises or falls with the way, `gap` over it.
+    /// `largest`, rises or falls with the path, `gap` over it.
     pub(super) fn runs_along(&self, gap: &[f32; 3], largest: f32) -> bool {
         let rise = (self.z_to - self.z_from).abs();
-        largest <= ALONG * rise && gap.iter().all(|gap| ALONG * gap.abs() <= rise)
+        largest <= RUNS_ALONG * rise && gap.iter().all(|gap| RUNS_ALONG * gap.abs() <= rise)
     }
 
-    /// The patch's height over the way, by its Bernstein coefficients.
+    /// The patch's height over the path, cells, as Bernstein coefficients.
     #[inline]
     pub(super) fn gap(&self, patch: &Patch) -> [f32; 3] {
         [
@@ -61,9 +53,10 @@ impl Step {
         ]
     }
 
-    pub(super) fn spot(&self, s: f32) -> Spot {
+    /// The point of the surface under a fraction of this part.
+    pub(super) fn point(&self, s: f32) -> SurfacePoint {
         let between = |a: f32, b: f32| (a + s * (b - a)).clamp(0.0, 1.0);
-        Spot {
+        SurfacePoint {
             cell: self.cell,
             u: between(self.from.0, self.to.0),
             v: between(self.from.1, self.to.1),
@@ -71,25 +64,25 @@ impl Step {
     }
 }
 
-/// The cells under a straight way, in order; each begins exactly where the one
+/// The cells under a straight path, in order; each begins exactly where the one
 /// before ended, so that nothing slips through between them.
 pub(super) struct Steps {
     east: Axis,
     north: Axis,
     from: (f32, f32),
-    /// Heights, cells: where the way begins, where it ends, and where the last
+    /// Heights, cells: where the path begins, where it ends, and where the last
     /// step ended.
     z_start: f32,
     z_end: f32,
     z_from: f32,
-    /// Parts of the way at which the last step began and ended.
+    /// Fractions of the path at which the last step began and ended.
     t_from: f32,
     t_to: f32,
     done: bool,
 }
 
 impl Steps {
-    /// The cells under a way.
+    /// The cells under a path.
     pub(super) fn between(at: &GridPoint, end: &GridPoint) -> Self {
         let axis = |axis: usize| {
             let (first, last) = (at.cell()[axis], end.cell()[axis]);
@@ -99,7 +92,7 @@ impl Steps {
         Self::along(axis(0), axis(1), [0.0, at.to(end).z])
     }
 
-    /// The cells under a way with these axes, between two heights.
+    /// The cells under a path with these axes, between two heights.
     pub(super) fn along(east: Axis, north: Axis, [z_start, z_end]: [f32; 2]) -> Self {
         Self {
             from: (east.at(0.0), north.at(0.0)),
@@ -119,7 +112,7 @@ impl Steps {
         self.done
     }
 
-    /// The part of the way before the last step.
+    /// The fraction of the path before the last step.
     pub(super) fn passed(&self) -> f32 {
         self.t_from
     }
@@ -130,7 +123,7 @@ impl Steps {
             return None;
         }
         let Self { east, north, .. } = self;
-        let cell = [east.square, north.square];
+        let cell = Cell::new(east.square, north.square);
         let (from, z_from) = (self.from, self.z_from);
         self.t_from = self.t_to;
         let (to, z_to);
@@ -159,7 +152,7 @@ impl Steps {
     }
 }
 
-/// The squares of a lattice that a way passes along one axis. Places are counted
+/// The squares of a lattice that a path passes along one axis. Places are counted
 /// in sides of a square from an origin that is a square's lower border.
 pub(super) struct Axis {
     start: f32,
@@ -172,8 +165,8 @@ pub(super) struct Axis {
     pub(super) left: u32,
     /// +1 or −1: where they lie.
     toward: i32,
-    /// At which part of the way the next border is reached; infinite when the
-    /// way ends before.
+    /// At which fraction of the path the next border is reached; infinite when the
+    /// path ends before.
     pub(super) t: f32,
 }
 
@@ -212,7 +205,7 @@ impl Axis {
         self.t = f32::INFINITY;
         if self.left > 0 {
             let t = (self.floor + self.ahead() - self.start) * self.per_way;
-            // A way that ends on its border may have nothing left: 0·∞.
+            // A path that ends on its border may have nothing left: 0·∞.
             self.t = if t <= 1.0 { at_least_0(t) } else { 1.0 };
         }
     }
@@ -223,13 +216,13 @@ impl Axis {
         if self.toward > 0 { 1.0 } else { 0.0 }
     }
 
-    /// Where in the square the way is after a part of it.
+    /// Where in the square the path is after a fraction of it.
     #[inline]
     pub(super) fn at(&self, t: f32) -> f32 {
         (self.start + self.way * t - self.floor).clamp(0.0, 1.0)
     }
 
-    /// Where in the last square the way ends.
+    /// Where in the last square the path ends.
     #[inline]
     fn ends(&self) -> f32 {
         (self.end - self.floor).clamp(0.0, 1.0)

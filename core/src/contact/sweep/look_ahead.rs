@@ -1,37 +1,36 @@
-//! How far along a way nothing is near: a look ahead, block by block.
+//! How far along a path nothing is near: a look ahead, block by block.
 
 use glam::Vec3;
 
-use super::spot::Hand;
-use super::steps::{Axis, Step, Steps};
-use super::work::{BLOCK, CELL, ENTER, HEIGHT, Work};
+use super::cells::{Axis, Step, Steps};
+use crate::contact::budget::{BLOCK, BLOCK_CELLS, Budget, CELL, GAP};
+use crate::contact::surface::HipView;
+use crate::contact::tolerance::PATH_NOISE;
 use crate::grid::GridPoint;
-use crate::terrain::{BLOCK_SHIFT, Ground, Window};
+use crate::terrain::{BLOCK_SHIFT, Block, Ground, Window};
 
-/// Rounding of a height over a long way, of the way's length: places on it are
-/// known to 2⁻²⁰ of that, and so are heights on slopes as steep as it is long.
-const NOISE: f32 = 1e-5;
 /// Cells along a block's side.
 const SIDE: f32 = (1 << BLOCK_SHIFT) as f32;
 
-/// Looks along the way from `at` to `end`, a few hundred cells long at most.
+/// Looks along the path from `at` to `end`, a few hundred cells long at most.
 ///
 /// # Errors
-/// The part of the way that is surely clear (none, if below 0), where the look
-/// ends before: too near to the ground to tell, a tile missing, or no work left.
+/// The fraction of the path that is surely clear (none, if below 0), where the look
+/// ends before: too near to the ground to tell, a tile missing, or the budget spent.
 pub(super) fn look_along<const D: usize>(
     window: &Window<'_, D>,
     at: &GridPoint,
     end: &GridPoint,
-    work: &mut Work,
+    budget: &mut Budget,
 ) -> Result<(), f32> {
-    let view = Hand::new(*at);
+    let view = HipView::new(*at);
     let way = at.to(end);
     let [_, longest] = extremes(&[way.x, way.y, way.z, 0.0]);
-    let noise = NOISE * longest;
+    let noise = PATH_NOISE * longest;
     let [mut east, mut north] = [0, 1].map(|axis| blocks(at, end, axis));
     let mut from = 0.0;
-    while work.take(BLOCK) {
+    while budget.has(BLOCK) {
+        budget.spend(BLOCK);
         let is_last = east.left | north.left == 0;
         let to = if is_last {
             1.0
@@ -41,13 +40,15 @@ pub(super) fn look_along<const D: usize>(
             north.t
         };
         let low = way.z * if way.z < 0.0 { to } else { from };
-        let block = [east.square, north.square];
+        let block = Block {
+            col: east.square,
+            row: north.square,
+        };
         if !window.block_is_clear(block, view.altitude().raised(low - noise)) {
-            work.charge(ENTER);
             let heights = [way.z * from, way.z * to];
             let [u, v] = [&east, &north].map(|axis| cells(axis, [from, to]));
             let mut steps = Steps::along(u, v, heights);
-            if !all_clear(window, &view, &mut steps, noise, work) {
+            if !all_clear(window, &view, &mut steps, noise, budget) {
                 let part = from + (to - from) * steps.passed();
                 return Err(part - rounding(at, end, way));
             }
@@ -65,13 +66,14 @@ pub(super) fn look_along<const D: usize>(
     Err(from - rounding(at, end, way))
 }
 
-/// What the part of a way may be off at which it crosses a border between cells.
+/// What the fraction of a path may be off at which it crosses a border between
+/// cells.
 ///
-/// A way that goes on beyond a border, and was thought to be before it, would come
+/// A path that goes on beyond a border, and was thought to be before it, would come
 /// into the ground beyond from nowhere and not from the side.
 fn rounding(at: &GridPoint, end: &GridPoint, way: Vec3) -> f32 {
     let [_, longest] = extremes(&[way.x, way.y, 0.0, 0.0]);
-    // Of a place: the block's sides cost three bits, and so does the way's length.
+    // Of a place: the block's sides cost three bits, and so does the path's length.
     let off = 1e-6 + 4e-7 * longest;
     let crosses = |axis: usize| at.cell()[axis] != end.cell()[axis];
     let part = |axis: usize| {
@@ -84,7 +86,7 @@ fn rounding(at: &GridPoint, end: &GridPoint, way: Vec3) -> f32 {
     1e-6 + part(0) + part(1)
 }
 
-/// The blocks under a way along an axis. Their sides cost three bits of the
+/// The blocks under a path along an axis. Their sides cost three bits of the
 /// place, which a look ahead can spare.
 fn blocks(at: &GridPoint, end: &GridPoint, axis: usize) -> Axis {
     let [first, last] = [at, end].map(|point| point.cell()[axis] >> BLOCK_SHIFT);
@@ -94,7 +96,7 @@ fn blocks(at: &GridPoint, end: &GridPoint, axis: usize) -> Axis {
     Axis::new(first, [first, last], places)
 }
 
-/// The cells in a block under a part of a way along an axis.
+/// The cells in a block under a part of a path along an axis.
 fn cells(block: &Axis, part: [f32; 2]) -> Axis {
     let origin = block.square << BLOCK_SHIFT;
     let places = part.map(|t| block.at(t) * SIDE);
@@ -102,17 +104,21 @@ fn cells(block: &Axis, part: [f32; 2]) -> Axis {
     Axis::new(origin, places.map(cell), places)
 }
 
-/// Whether the way is clear of all cells by more than rounding; it is up to the
+/// Whether the path is clear of all cells by more than rounding; it is up to the
 /// last step taken.
 fn all_clear<const D: usize>(
     window: &Window<'_, D>,
-    view: &Hand,
+    view: &HipView,
     steps: &mut Steps,
     noise: f32,
-    work: &mut Work,
+    budget: &mut Budget,
 ) -> bool {
+    if !budget.has(BLOCK_CELLS) {
+        return false;
+    }
+    budget.spend(BLOCK_CELLS);
     while let Some(step) = steps.next() {
-        if !work.take(CELL) || !is_clear(window, view, &step, noise, work) {
+        if !is_clear(window, view, &step, noise, budget) {
             return false;
         }
     }
@@ -121,11 +127,15 @@ fn all_clear<const D: usize>(
 
 fn is_clear<const D: usize>(
     window: &Window<'_, D>,
-    view: &Hand,
+    view: &HipView,
     step: &Step,
     noise: f32,
-    work: &mut Work,
+    budget: &mut Budget,
 ) -> bool {
+    if !budget.has(CELL) {
+        return false;
+    }
+    budget.spend(CELL);
     let corners = match window.ground(step.cell) {
         Ground::Patch(corners) => corners,
         Ground::Missing => return false,
@@ -136,14 +146,17 @@ fn is_clear<const D: usize>(
     if highest < step.low() - noise {
         return true;
     }
-    work.charge(HEIGHT);
+    if !budget.has(GAP) {
+        return false;
+    }
+    budget.spend(GAP);
     let gap = step.gap(&patch);
     let noise = if step.runs_along(&gap, largest) {
-        // Along ground as steep as the way, noise in height is next to none across
+        // Along ground as steep as the path, noise in height is next to none across
         // it.
         0.0
-    } else if largest * NOISE > noise {
-        largest * NOISE
+    } else if largest * PATH_NOISE > noise {
+        largest * PATH_NOISE
     } else {
         noise
     };

@@ -1,0 +1,196 @@
+//! How much of the force is felt at the boundary of the surface.
+//!
+//! In contact the proxy is held at the edge of a hole, at the border of the
+//! data, and before a tile that is not here. The force then fades with the
+//! distance of the *HIP* from the nearest patch, to nothing at [`REACH`], and
+//! there the contact ends. The HIP slides off an edge as off a
+//! table, without a kick and without being hooked back from underneath.
+//!
+//! The boundary fade is a factor on the force: 1 where all of it is felt, 0 where
+//! nothing is.
+
+use crate::grid::{Cell, GridPoint};
+use crate::terrain::{Ground, TILE_CELLS, TileIndex, Window};
+
+/// Distance of the HIP from the nearest patch, in cells, at which nothing is felt.
+pub const REACH: f32 = 0.5;
+/// Most that the boundary fade may change in a second, either way: from all to
+/// nothing in 32 ms.
+pub const RATE_PER_S: f32 = 31.25;
+/// Most that it may change in a tick at 1 kHz.
+pub const RATE: f32 = RATE_PER_S / 1_000.0;
+/// Cells, along an axis, from the proxy at which a HIP is too far off for what
+/// lies under it to matter: all of the force is then felt.
+///
+/// A tile's side less one: what is looked at, a neighbour of the HIP's patch
+/// included, never shares a slot of the window with the tile under the proxy.
+pub const FAR: u32 = TILE_CELLS as u32 - 1;
+
+/// Whether the cell under the HIP is too far from the proxy's to matter.
+#[inline]
+pub(super) fn is_far(proxy: Cell, hip: Cell) -> bool {
+    proxy.x.abs_diff(hip.x).max(proxy.y.abs_diff(hip.y)) >= FAR
+}
+
+/// What the boundary fade should come to, and what is not known about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Target {
+    /// 1 over a patch, less beside one, 0 farther than [`REACH`] from any: continuous
+    /// in the HIP within [`FAR`] of the proxy's cell, and 1 beyond. What is missing
+    /// counts as not there.
+    pub(super) fade: f32,
+    /// A tile that might make it more.
+    pub(super) missing: Option<TileIndex>,
+}
+
+impl Target {
+    const ALL: Self = Self {
+        fade: 1.0,
+        missing: None,
+    };
+}
+
+/// The target for a HIP, whose proxy is on the patch in a cell.
+pub(super) fn target<const D: usize>(
+    window: &Window<'_, D>,
+    hip: &GridPoint,
+    proxy: Cell,
+) -> Target {
+    // Nearly always the HIP is over the patch that the proxy is on.
+    if proxy == hip.column() || is_far(proxy, hip.column()) {
+        return Target::ALL;
+    }
+    beside_patches(window, hip)
+}
+
+fn beside_patches<const D: usize>(window: &Window<'_, D>, hip: &GridPoint) -> Target {
+    let mut missing = None;
+    let mut is_patch = |cell| match window.ground(cell) {
+        Ground::Patch(_) => true,
+        Ground::Hole => false,
+        Ground::Missing => {
+            missing = Some(TileIndex::holding(cell));
+            false
+        }
+    };
+    let Cell { x, y } = hip.column();
+    if is_patch(Cell::new(x, y)) {
+        return Target::ALL;
+    }
+    let (p, q) = (hip.frac().x, hip.frac().y);
+    let mut nearest = REACH * REACH;
+    for north in -1..=1 {
+        for east in -1..=1 {
+            if is_patch(Cell::new(x + east, y + north)) {
+                let (du, dv) = (gap(p, east), gap(q, north));
+                nearest = nearest.min(du * du + dv * dv);
+            }
+        }
+    }
+    Target {
+        fade: 1.0 - libm::sqrtf(nearest) / REACH,
+        missing,
+    }
+}
+
+/// Distance along one axis from a place in a cell to a neighbouring cell.
+fn gap(place: f32, toward: i32) -> f32 {
+    match toward {
+        1 => 1.0 - place,
+        -1 => place,
+        _ => 0.0,
+    }
+}
+
+/// A boundary fade moved toward its target, by at most `most`, which is positive.
+pub(super) fn approach(fade: f32, target: f32, most: f32) -> f32 {
+    fade + (target - fade).max(-most).min(most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cases::cases;
+    use crate::contact::{Contact, ContactSettings, ContactState};
+    use crate::rate::TickRate;
+    use crate::terrain::FieldSize;
+    use crate::terrain::testing::Field;
+    use glam::Vec3;
+
+    fn hole_at_10_10() -> Field<2> {
+        Field::held(FieldSize::new(40, 40), |x, y| {
+            if (10..=11).contains(&x) && (10..=11).contains(&y) {
+                f32::NAN
+            } else {
+                0.0
+            }
+        })
+    }
+
+    fn at(x: f32, y: f32) -> GridPoint {
+        GridPoint::new([0; 3], Vec3::new(x, y, -1.0))
+    }
+
+    #[test]
+    fn full_over_a_patch_and_none_far_from_one() {
+        let field = hole_at_10_10();
+        assert_eq!(beside_patches(&field.window, &at(8.99, 10.5)).fade, 1.0);
+        assert_eq!(beside_patches(&field.window, &at(10.5, 10.5)).fade, 0.0);
+        assert_eq!(beside_patches(&field.window, &at(-3.0, 5.0)).fade, 0.0);
+    }
+
+    #[test]
+    fn a_missing_tile_is_named() {
+        let field = Field::<2>::new(FieldSize::new(100, 100), |_, _| 0.0);
+        let there = beside_patches(&field.window, &at(40.5, 5.5));
+        assert_eq!(
+            (there.fade, there.missing),
+            (0.0, Some(TileIndex::new(1, 0)))
+        );
+    }
+
+    #[test]
+    fn continuous_across_every_border() {
+        let field = hole_at_10_10();
+        let mut last = beside_patches(&field.window, &at(7.0, 9.2)).fade;
+        let steps = cases(6000, 300);
+        let step = 6.0 / steps as f32;
+        for i in 1..=steps {
+            let now = beside_patches(&field.window, &at(7.0 + i as f32 * step, 9.2)).fade;
+            assert!((now - last).abs() < 3.0 * step, "at {i}");
+            last = now;
+        }
+        assert!((beside_patches(&field.window, &at(40.25, 5.0)).fade - 0.5).abs() < 1e-6);
+    }
+
+    /// Milliseconds that a HIP which is moved into the hole goes on feeling
+    /// its edge, and the largest change of the boundary fade in a tick.
+    fn faded_after(khz: u32) -> (f32, f32) {
+        let field = hole_at_10_10();
+        let rate = TickRate::new(1_000 * khz).expect("in range");
+        let mut contact = Contact::new(ContactSettings::REAL_TIME.at_rate(rate));
+        let mut step = |hip: GridPoint| {
+            let felt = *contact.step(&field.window, &hip);
+            (felt.state, contact.boundary_fade())
+        };
+        let above = GridPoint::new([0; 3], Vec3::new(8.5, 10.5, 1.0));
+        assert_eq!(step(above).0, ContactState::Free);
+        assert_eq!(step(at(8.5, 10.5)).0, ContactState::Touching);
+        let (mut last, mut most, mut ticks) = (1.0, 0.0f32, 0);
+        while let (ContactState::Touching, fade) = step(at(10.5, 10.5)) {
+            most = most.max(last - fade);
+            last = fade;
+            ticks += 1;
+        }
+        (ticks as f32 / khz as f32, most)
+    }
+
+    #[test]
+    fn as_long_at_ten_kilohertz_as_at_one() {
+        for khz in [1, 2, 5, 10] {
+            let (ms, most) = faded_after(khz);
+            assert!((30.9..=32.1).contains(&ms), "{khz} kHz: {ms} ms");
+            assert!(most <= 1.001 * RATE / khz as f32, "{khz} kHz: {most}");
+        }
+    }
+}

@@ -1,0 +1,387 @@
+//! Where downhill goes on from a point of a patch's border.
+//!
+//! The distance to the HIP has a slope into each patch that meets there, and its
+//! way goes on in the one into which the slope is steepest: in a mirrored scene
+//! that is the mirrored patch. What a neighbour is said to offer is searched for
+//! before the way goes there.
+
+use super::on_patch::{Nearest, PatchSearch, resolution};
+use crate::contact::budget::{Budget, SLOPE};
+use crate::contact::surface::patch::Patch;
+use crate::contact::surface::{HipView, Side, SurfacePoint};
+use crate::contact::tolerance::{
+    BESIDE, COARSEST_RESOLUTION, EQUALLY_STEEP, LEAST_WAY, RESOLUTION, SLOPE_NOISE,
+};
+use crate::terrain::{Ground, TileIndex, Window};
+
+/// Where downhill goes on from the closest point of a patch.
+pub(super) enum Onward {
+    /// Into a neighbouring patch, as [`Asking::best`] has it.
+    Into,
+    /// It may go on in a tile that is not here.
+    Missing(TileIndex),
+    /// The budget is spent.
+    Suspended,
+    /// Nowhere: the point is a local minimum of the distance.
+    Nowhere,
+}
+
+/// What a neighbouring patch has to offer.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Offer {
+    /// Where the way enters the neighbour.
+    pub(super) entry: SurfacePoint,
+    /// The neighbour's closest point.
+    pub(super) closest: Nearest,
+    /// By how much the squared distance gets less, cells².
+    gain: f32,
+    /// The rounding of that.
+    noise: f32,
+    /// Whether it gets less by more than the last places of both points may be off.
+    pub(super) is_surely_nearer: bool,
+    /// How far the HIP is that way, cells: of two ways as good as each other
+    /// the one toward it is taken, however the scene is turned.
+    toward: f32,
+    /// Slope of the distance into the neighbour, of half the squared distance,
+    /// squared, cells².
+    steepness: f32,
+}
+
+impl Offer {
+    fn is_better_than(&self, other: &Self) -> bool {
+        let (more, noise) = (self.gain - other.gain, self.noise + other.noise);
+        more > noise || (more >= -noise && self.toward > other.toward)
+    }
+}
+
+/// A neighbour into which the distance falls.
+// One that is filled in, not an option that is moved: that costs 150 instructions.
+struct Neighbour {
+    side: Side,
+    entry: SurfacePoint,
+    patch: Patch,
+    /// Squared slope of half the squared distance into it, cells²; 0 where
+    /// rounding hides it, and below 0 where there is no such neighbour.
+    steepness: f32,
+    /// That of the next less steep neighbour.
+    runner_up: f32,
+    /// Its bit in [`Asking::asked`].
+    bit: u8,
+}
+
+/// Asks the neighbours of a patch, from its closest point, which is on or beside
+/// its border: the steepest way down first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Asking {
+    /// Neighbours asked already, a bit each in the order of [`Side::neighbour`].
+    asked: u8,
+    /// The best offer so far.
+    pub(super) best: Option<Offer>,
+    /// A neighbour is being searched.
+    is_searching: bool,
+}
+
+/// Where the asking begins: the closest point of a patch.
+pub(super) struct From<'d> {
+    pub(super) at: &'d SurfacePoint,
+    pub(super) here: &'d Nearest,
+}
+
+impl Asking {
+    /// No neighbour was asked yet.
+    pub(super) const NONE: Self = Self {
+        asked: 0,
+        best: None,
+        is_searching: false,
+    };
+
+    /// Forgets what was asked.
+    #[inline]
+    pub(super) const fn restart(&mut self) {
+        self.asked = 0;
+        self.best = None;
+        self.is_searching = false;
+    }
+
+    /// Goes on until it is known where downhill goes on. `search` is where a
+    /// neighbour is searched.
+    #[inline]
+    pub(super) fn advance<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        from: &From<'_>,
+        search: &mut PatchSearch,
+        budget: &mut Budget,
+    ) -> Onward {
+        // Up a wall a proxy may stand beside the edge without being on it.
+        let (p, q) = view.in_patch(from.at.cell);
+        let beside = |hip: f32| smaller(BESIDE * resolution(hip), COARSEST_RESOLUTION);
+        let border = from.at.border_within([beside(p), beside(q)]);
+        if border == Side::NONE {
+            return Onward::Nowhere;
+        }
+        self.over_border(window, view, from, border, search, budget)
+    }
+
+    #[inline(never)]
+    fn over_border<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        from: &From<'_>,
+        border: Side,
+        search: &mut PatchSearch,
+        budget: &mut Budget,
+    ) -> Onward {
+        loop {
+            let mut next = Neighbour {
+                side: Side::NONE,
+                entry: *from.at,
+                patch: Patch::new([0.0; 4]),
+                steepness: -1.0,
+                runner_up: -1.0,
+                bit: 0,
+            };
+            if let Err(why) = self.steepest(window, view, from, border, budget, &mut next) {
+                return why;
+            }
+            if next.steepness < 0.0 {
+                break;
+            }
+            if self.has_steeper_than(next.steepness) {
+                break;
+            }
+            let hip = view.in_patch(next.entry.cell);
+            if !self.is_searching {
+                search.restart((next.entry.u, next.entry.v));
+            }
+            let Some(closest) = search.advance(&next.patch, hip, budget) else {
+                self.is_searching = true;
+                return Onward::Suspended;
+            };
+            self.is_searching = false;
+            self.asked |= next.bit;
+            if let Some(offer) = offer(&next, hip, from.here, closest)
+                && self
+                    .best
+                    .as_ref()
+                    .is_none_or(|best| offer.is_better_than(best))
+            {
+                self.best = Some(offer);
+            }
+            if self.has_steeper_than(next.runner_up) {
+                break; // the others need not be looked at again
+            }
+        }
+        if self.best.is_some() {
+            Onward::Into
+        } else {
+            Onward::Nowhere
+        }
+    }
+
+    /// Whether the best offer is down a way that is steeper than another.
+    #[inline]
+    fn has_steeper_than(&self, steepness: f32) -> bool {
+        let is_steeper = |best: &Offer| steepness < best.steepness * (1.0 - EQUALLY_STEEP);
+        self.best.as_ref().is_some_and(is_steeper)
+    }
+
+    /// Makes `next` the neighbour, of those not asked yet, with the steepest way down.
+    ///
+    /// # Errors
+    /// Why it cannot be told now.
+    #[inline]
+    fn steepest<const D: usize>(
+        &self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        from: &From<'_>,
+        border: Side,
+        budget: &mut Budget,
+        next: &mut Neighbour,
+    ) -> Result<(), Onward> {
+        for place in 0..3 {
+            let (side, bit) = (border.neighbour(place), 1 << place);
+            if side == Side::NONE || self.asked & bit != 0 {
+                continue;
+            }
+            if !budget.has(SLOPE) {
+                return Err(Onward::Suspended);
+            }
+            budget.spend(SLOPE);
+            let entry = from.at.across(side);
+            let patch = match window.ground(entry.cell) {
+                Ground::Hole => continue,
+                // It might be the better way: the proxy waits to know.
+                Ground::Missing => return Err(Onward::Missing(TileIndex::holding(entry.cell))),
+                Ground::Patch(corners) => view.patch(&corners),
+            };
+            let Some(steepness) = fall_into(&patch, view, &entry, side, from.here) else {
+                continue;
+            };
+            if steepness > next.steepness {
+                *next = Neighbour {
+                    side,
+                    entry,
+                    patch,
+                    steepness,
+                    runner_up: next.steepness,
+                    bit,
+                };
+            } else if steepness > next.runner_up {
+                next.runner_up = steepness;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Not `f32::min`, which is a call where the processor has no instruction for it.
+#[inline]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// How steeply the distance falls from a point of a patch's border into the
+/// patch: the squared slope of half the squared distance, cells²; 0 where
+/// rounding hides it; `None` where it does not fall. `side` is the way in.
+///
+/// Along the border the patch on the other side is at its minimum already: only the
+/// way across counts.
+fn fall_into(
+    patch: &Patch,
+    view: &HipView,
+    entry: &SurfacePoint,
+    side: Side,
+    here: &Nearest,
+) -> Option<f32> {
+    let (p, q) = view.in_patch(entry.cell);
+    let (u, v) = (entry.u, entry.v);
+    let z = patch.height(u, v);
+    // For a far HIP a place counts as beside the edge from far off, but only where the
+    // edge is as high as the place is.
+    let beside = [
+        here.u - side.east as f32 - u,
+        here.v - side.north as f32 - v,
+    ];
+    let far = BESIDE * RESOLUTION;
+    let beside = beside[0].abs() > far || beside[1].abs() > far;
+    if beside && (here.z - z).abs() > BESIDE * (resolution(p) + resolution(q)) {
+        return None;
+    }
+    let (zu, zv) = (patch.slope_u(v), patch.slope_v(u));
+    // Up a wall, the last place of a coordinate is a lot of height; across the
+    // border there is none, the place is on it.
+    let sizes = patch.with_sizes();
+    let along = |way: i32, slope: f32| if way == 0 { slope.abs() } else { 0.0 };
+    let rounding = sizes.height(u, v) + along(side.east, zu) + along(side.north, zv);
+    // Up a wall beside the edge the slope at the edge says nothing of the place itself.
+    let from_here = (here.z - z).abs() < BESIDE * RESOLUTION * (1.0 + z.abs());
+    let falls = |way: i32, off: f32, slope: f32| {
+        let gradient = way as f32 * (off + z * slope);
+        let noise = SLOPE_NOISE * (off.abs() + rounding * slope.abs());
+        let surely = from_here && gradient < -noise;
+        (way != 0 && gradient <= noise).then_some(if surely { gradient * gradient } else { 0.0 })
+    };
+    match (falls(side.east, u - p, zu), falls(side.north, v - q, zv)) {
+        (Some(east), Some(north)) => Some(east + north),
+        (east, north) => east.or(north),
+    }
+}
+
+/// What a neighbour has to offer, whose closest point to a HIP at `hip`, in its
+/// coordinates, is this one; `None` if nothing.
+fn offer(next: &Neighbour, hip: (f32, f32), here: &Nearest, closest: Nearest) -> Option<Offer> {
+    let Neighbour {
+        side,
+        entry,
+        steepness,
+        ..
+    } = *next;
+    let (mut gain, noise, places) = gain(here, &closest, hip, side);
+    let is_surely_nearer = gain > noise && gain > places;
+    let mut least = LEAST_WAY;
+    if steepness > 0.0 {
+        (gain, least) = (-smaller(-gain, 0.0), 0.0);
+    }
+    // Along the shared border the patch on the other side is at its minimum already.
+    let leads_off = |side: i32, from: f32, to: f32| side != 0 && (to - from).abs() > least;
+    let moved =
+        leads_off(side.east, entry.u, closest.u) || leads_off(side.north, entry.v, closest.v);
+    let toward = side.east as f32 * (hip.0 - entry.u) + side.north as f32 * (hip.1 - entry.v);
+    ((moved && gain >= -noise) || gain > noise).then_some(Offer {
+        entry,
+        closest,
+        gain,
+        noise,
+        is_surely_nearer,
+        toward,
+        steepness,
+    })
+}
+
+/// By how much the squared distance from a HIP at `(p, q)` is less `there` than
+/// `here`, which is in the patch on the other side of a border; the rounding of
+/// that; and what the last places of both points make of it.
+///
+/// The difference of the squares by their factors: of a far HIP the squares
+/// themselves would tell nothing.
+fn gain(here: &Nearest, there: &Nearest, (p, q): (f32, f32), side: Side) -> (f32, f32, f32) {
+    let (u, v) = (here.u - side.east as f32, here.v - side.north as f32);
+    let (du, dv, dz) = (u - there.u, v - there.v, here.z - there.z);
+    let (east, north, up) = (
+        u + there.u - 2.0 * p,
+        v + there.v - 2.0 * q,
+        here.z + there.z,
+    );
+    let gain = du * east + dv * north + dz * up;
+    let noise = RESOLUTION * (east.abs() + north.abs() + up * up);
+    let moved = du.abs() + dv.abs() + dz.abs();
+    let left = (there.u - p).abs() + (there.v - q).abs() + there.z.abs();
+    (gain, noise, 2.0 * RESOLUTION * (moved + left))
+}
+
+/// The same point in the patch into which the distance falls most steeply, of
+/// those that meet at it; as it was where it falls into none.
+///
+/// # Errors
+/// The tile of one of them that is not here.
+pub(super) fn in_steepest_patch<const D: usize>(
+    window: &Window<'_, D>,
+    view: &HipView,
+    at: &SurfacePoint,
+) -> Result<SurfacePoint, TileIndex> {
+    let mut best = (*at, 0.0);
+    let border = at.border();
+    for side in border.itself_and_neighbours() {
+        let point = at.across(side);
+        let patch = match window.ground(point.cell) {
+            Ground::Hole => continue,
+            Ground::Missing => return Err(TileIndex::holding(point.cell)),
+            Ground::Patch(corners) => view.patch(&corners),
+        };
+        let steepness = steepness_at(&patch, view.in_patch(point.cell), &point);
+        if steepness > best.1 * (1.0 + EQUALLY_STEEP) {
+            best = (point, steepness);
+        }
+    }
+    Ok(best.0)
+}
+
+/// How steeply the distance to a HIP at `(p, q)` falls from a point of a patch in
+/// the patch's own directions: the squared slope of half the squared distance,
+/// cells².
+fn steepness_at(patch: &Patch, (p, q): (f32, f32), at: &SurfacePoint) -> f32 {
+    let z = patch.height(at.u, at.v);
+    let east = (at.u - p) + z * patch.slope_u(at.v);
+    let north = (at.v - q) + z * patch.slope_v(at.u);
+    let border = at.border();
+    // On a border only the way back into the patch counts.
+    let falls = |border: i32, slope: f32| {
+        let outward = border as f32 * slope < 0.0;
+        if outward { 0.0 } else { slope * slope }
+    };
+    falls(border.east, east) + falls(border.north, north)
+}

@@ -1,0 +1,13 @@
+//! The closest point to the HIP: of a ruling, of a patch, of the surface.
+
+mod beyond_border;
+mod on_convex_patch;
+mod on_patch;
+mod on_ruling;
+mod on_surface;
+mod ruling_search;
+
+pub(super) use on_convex_patch::Convexity;
+pub use on_patch::{MAX_PASSES, Nearest, nearest_downhill};
+pub(super) use on_surface::{Descent, Ended, Leave, count_unless_nearer, passes_over, position_on};
+pub use ruling_search::MAX_EVALUATIONS;

@@ -1,0 +1,256 @@
+//! The closest point of a patch over which the squared distance is convex.
+//!
+//! While a·z is small the squared distance to the HIP is convex, so there is one
+//! minimum, and where a search for it begins does not matter. It begins at the
+//! place over a shallow HIP: there half the gradient is z·∇z, so that the
+//! Hessian's first step has a closed form.
+
+// `!(a <= b)` is how what is not a number is left to the search by rulings.
+#![allow(clippy::neg_cmp_op_on_partial_ord)]
+
+use crate::contact::surface::Side;
+use crate::contact::surface::is_well_inside;
+use crate::contact::surface::patch::Patch;
+use crate::contact::tolerance::{CONVEX, LEVEL, NEWTON_ERROR, SHALLOW, STEEPEST_CONVEX};
+
+/// Newton steps at most where the first two were not exact enough.
+const STEPS: u32 = 4;
+
+/// What makes a patch one over which Newton's method may be used. It depends on
+/// the patch's shape alone, not on its height above the HIP.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::contact) struct Convexity {
+    /// |a| + |b| + |c|: no two points of the patch differ by more in height.
+    steepest: f32,
+    /// |a|
+    twist: f32,
+    /// Depth of the HIP, in cells, up to which the search begins over it.
+    shallow: f32,
+    /// Height above the HIP of any one point of the patch, in cells, up to which
+    /// the squared distance is convex all over the patch.
+    convex: f32,
+    /// Change of the Hessian, at most, over a step of a cell: the error that
+    /// Newton's method leaves after a step s is `bend`·s² at most.
+    bend: f32,
+}
+
+/// A place in a patch and its height above the HIP, cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::contact) struct Place {
+    pub(in crate::contact) u: f32,
+    pub(in crate::contact) v: f32,
+    pub(in crate::contact) z: f32,
+}
+
+impl Convexity {
+    /// `None` if the patch is too steep.
+    #[inline]
+    pub(in crate::contact) fn of(patch: &Patch) -> Option<Self> {
+        let twist = patch.a.abs();
+        let steepest = twist + patch.b[0].abs() + patch.c[0].abs();
+        if !(steepest <= STEEPEST_CONVEX) {
+            return None;
+        }
+        Some(Self {
+            steepest,
+            twist,
+            shallow: SHALLOW / steepest,
+            convex: CONVEX / twist - steepest,
+            // The rows of the Hessian's derivative are 2a(zv, …) and 2a(zu, zu + zv).
+            bend: 6.0 * twist * steepest,
+        })
+    }
+
+    /// Whether the squared distance is convex all over the patch, a point of which
+    /// is `z` cells above the HIP.
+    #[inline]
+    fn all_over(&self, z: f32) -> bool {
+        z <= self.convex
+    }
+
+    /// Whether the squared distance is convex between two places, the second one
+    /// `to.z` cells above the HIP, and wherever a path downhill may swing out to.
+    fn between(&self, (u, v): (f32, f32), to: &Place) -> bool {
+        let moved = (to.u - u).abs().max((to.v - v).abs());
+        // A sublevel set around a minimum, of a function whose curvature lies
+        // between ½ and L, is √(2L) times as wide as it is narrow.
+        let swing = 2.0 * libm::sqrtf(1.5 + 2.0 * self.steepest * self.steepest);
+        let rise = (self.steepest * (swing * moved)).min(self.steepest);
+        self.twist * (to.z + rise) <= CONVEX
+    }
+
+    /// The closest point of the patch, and of what it would be beyond its borders, to
+    /// a shallow HIP at `hip`, in patch coordinates; `height` is that of the patch's
+    /// polynomial over the HIP. `None` where one Hessian is not enough, or the
+    /// distance not convex.
+    #[inline]
+    pub(in crate::contact) fn closest_at_once(
+        &self,
+        patch: &Patch,
+        hip: (f32, f32),
+        height: f32,
+    ) -> Option<Place> {
+        if !(height <= self.shallow) {
+            return None;
+        }
+        let (place, is_exact) = self.by_one_hessian(patch, hip, height);
+        (is_exact && place.z >= 0.0 && self.all_over(place.z)).then_some(place)
+    }
+
+    /// The closest point to a HIP at `hip`, in patch coordinates, for a proxy at
+    /// `from`; `None` where it takes the search by rulings to tell.
+    pub(super) fn closest(
+        &self,
+        patch: &Patch,
+        hip: (f32, f32),
+        from: (f32, f32),
+    ) -> Option<Place> {
+        let height = patch.polynomial(hip.0, hip.1);
+        let (mut place, mut is_exact) = if height <= self.shallow {
+            self.by_one_hessian(patch, hip, height)
+        } else {
+            let place = Place {
+                u: from.0,
+                v: from.1,
+                z: height,
+            };
+            (place, false)
+        };
+        loop {
+            let side = side_beyond(&place);
+            if side != Side::NONE {
+                let on_border = self.closest_on_border(patch, hip, side);
+                if is_exact || on_border.is_some() {
+                    return on_border;
+                }
+            } else if is_exact {
+                let convex = self.all_over(place.z) || self.between(from, &place);
+                return (place.z >= 0.0 && convex).then_some(place);
+            }
+            (place, is_exact) = (self.by_newton(patch, hip, place)?, true);
+        }
+    }
+
+    /// Where the patch, and what it would be beyond its borders, is closest to the
+    /// HIP, by two steps with one Hessian; and whether the error is within
+    /// [`NEWTON_ERROR`].
+    #[inline(always)]
+    fn by_one_hessian(&self, patch: &Patch, (p, q): (f32, f32), height: f32) -> (Place, bool) {
+        let slope = patch.b[0] + patch.a * q;
+        let (zu, zv) = (slope, patch.c[0] + patch.a * p);
+        // Where the distance is only height, half its gradient is z·(zu, zv).
+        let (uu, vv) = (1.0 + zu * zu, 1.0 + zv * zv);
+        let uv = zu * zv + patch.a * height;
+        let scale = 1.0 / (uu * vv - uv * uv);
+        let drop = height * scale;
+        let (du, dv) = ((zv * uv - zu * vv) * drop, (zu * uv - zv * uu) * drop);
+        // The gradient that is left there, and what the same Hessian makes of it.
+        let (zu, zv) = (zu + patch.a * dv, zv + patch.a * du);
+        let z = height + (slope * du + zv * dv);
+        let (gu, gv) = (z * zu + du, z * zv + dv);
+        let (eu, ev) = ((gv * uv - gu * vv) * scale, (gu * uv - gv * uu) * scale);
+        // The first step's error, less by what the Hessian has changed over it.
+        let (first, second) = (du * du + dv * dv, eu * eu + ev * ev);
+        let is_exact = (self.bend * self.bend) * (first * second) <= NEWTON_ERROR * NEWTON_ERROR;
+        let place = Place {
+            u: p + (du + eu),
+            v: q + (dv + ev),
+            z: z + (zu * eu + zv * ev),
+        };
+        (place, is_exact)
+    }
+
+    /// Newton's method (eq. 8-11) from a place; `None` where [`STEPS`] are not
+    /// enough.
+    fn by_newton(&self, patch: &Patch, (p, q): (f32, f32), from: Place) -> Option<Place> {
+        let (mut u, mut v) = (from.u, from.v);
+        for _ in 0..STEPS {
+            let (zu, zv) = (patch.b[0] + patch.a * v, patch.c[0] + patch.a * u);
+            let z = (patch.corners[0] + patch.b[0] * u) + zv * v;
+            // Half the gradient and the Hessian of the squared distance.
+            let (gu, gv) = (z * zu + (u - p), z * zv + (v - q));
+            let (uu, vv) = (1.0 + zu * zu, 1.0 + zv * zv);
+            let uv = zu * zv + patch.a * z;
+            let scale = 1.0 / (uu * vv - uv * uv);
+            let (eu, ev) = ((gv * uv - gu * vv) * scale, (gu * uv - gv * uu) * scale);
+            (u, v) = (u + eu, v + ev);
+            if self.bend * (eu * eu + ev * ev) <= NEWTON_ERROR {
+                let z = patch.polynomial(u, v);
+                return Some(Place { u, v, z });
+            }
+        }
+        None
+    }
+
+    /// The patch's closest point, if it lies on an edge or vertex toward a side.
+    ///
+    /// A point of an edge from which the distance falls out of the patch is the
+    /// patch's minimum, as the distance is convex; so is a vertex from which it
+    /// falls out over both edges.
+    fn closest_on_border(&self, patch: &Patch, hip: (f32, f32), side: Side) -> Option<Place> {
+        let edges = [Side { north: 0, ..side }, Side { east: 0, ..side }];
+        edges
+            .into_iter()
+            .filter(|edge| *edge != Side::NONE)
+            .find_map(|edge| {
+                let (place, side) = closest_on_edge(patch, hip, edge);
+                let is_above = place.z >= 0.0 && self.all_over(place.z);
+                (is_above && falls_out(patch, hip, &place, side)).then_some(place)
+            })
+    }
+}
+
+/// On which side of its patch a place lies beyond the border, or beside it.
+fn side_beyond(place: &Place) -> Side {
+    let [east, north] = [place.u, place.v].map(|x| match () {
+        () if is_well_inside(x) => 0,
+        () if x > 0.5 => 1,
+        () => -1,
+    });
+    Side { east, north }
+}
+
+/// The point of an edge closest to a HIP, and the side on which it lies: toward a
+/// vertex, if it is one.
+#[inline(always)]
+fn closest_on_edge(patch: &Patch, (p, q): (f32, f32), edge: Side) -> (Place, Side) {
+    let [sw, se, nw, ne] = patch.corners;
+    if edge.north == 0 {
+        let column = usize::from(edge.east > 0);
+        let ends = if column == 0 { [sw, nw] } else { [se, ne] };
+        let (v, z, north) = closest_on_line(q, patch.c[column], ends);
+        let u = column as f32;
+        (Place { u, v, z }, Side { north, ..edge })
+    } else {
+        let row = usize::from(edge.north > 0);
+        let ends = if row == 0 { [sw, se] } else { [nw, ne] };
+        let (u, z, east) = closest_on_line(p, patch.b[row], ends);
+        let v = row as f32;
+        (Place { u, v, z }, Side { east, ..edge })
+    }
+}
+
+/// The point of an edge, between two heights above the HIP, closest to a HIP so
+/// far along it: its coordinate, its height, and which end it is (−1, 1, or 0).
+#[inline(always)]
+fn closest_on_line(hip: f32, slope: f32, [start, end]: [f32; 2]) -> (f32, f32, i32) {
+    // From the edge's end: the line's height above a far HIP would cancel.
+    let x = (hip - slope * start) / (1.0 + slope * slope);
+    match () {
+        () if is_well_inside(x) => (x, start * (1.0 - x) + end * x, 0),
+        () if x > 0.5 => (1.0, end, 1),
+        () => (0.0, start, -1),
+    }
+}
+
+/// Whether the distance surely falls out of the patch at a place of its border.
+#[inline(always)]
+fn falls_out(patch: &Patch, (p, q): (f32, f32), place: &Place, side: Side) -> bool {
+    let falls = |toward: i32, slope: f32| toward == 0 || toward as f32 * slope < -LEVEL;
+    falls(side.east, (place.u - p) + place.z * patch.slope_u(place.v))
+        && falls(side.north, (place.v - q) + place.z * patch.slope_v(place.u))
+}
+
+#[cfg(test)]
+#[path = "on_convex_patch_tests.rs"]
+mod tests;

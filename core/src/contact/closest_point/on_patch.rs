@@ -1,0 +1,294 @@
+//! The closest point of one patch to the HIP (paper §4.3.2, eq. 8-11).
+//!
+//! The paper minimises the squared distance D(u, v) by Newton's method in two
+//! variables. Where the patch is gentle that is what is done here, too
+//! (`on_convex_patch`). On twisted patches that Hessian is indefinite, and the
+//! iteration leaves, cycles or rests on a saddle. There one variable is
+//! eliminated exactly: with v fixed, the patch is a straight line, a ruling, whose
+//! closest point is known in closed form (`on_ruling`).
+//!
+//! What remains, F(v) = min over u of D(u, v), is continuously differentiable
+//! because D is a parabola in u: a minimum of F is a minimum of D over the
+//! square, edges and corners included, and no saddle of D is one.
+//!
+//! The steeper of the two directions is the one eliminated: its closed form
+//! gives z without cancellation, where evaluating a steep height at a rounded
+//! v would not.
+//!
+//! `docs/contact.md` has the error analysis.
+
+use super::on_convex_patch::Convexity;
+use super::on_ruling::Ruling;
+use super::ruling_search::RulingSearch;
+use crate::contact::budget::{Budget, CONVEX, RULING};
+use crate::contact::surface::patch::Patch;
+use crate::contact::tolerance::{COARSEST_RESOLUTION, RESOLUTION};
+
+/// Searches by rulings at most: one, and one more each time the other variable
+/// turns out to be the better one to eliminate.
+pub const MAX_PASSES: u32 = 3;
+
+/// A point of a patch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nearest {
+    /// Eastward coordinate in the patch, `[0, 1]`.
+    pub u: f32,
+    /// Northward coordinate in the patch, `[0, 1]`.
+    pub v: f32,
+    /// Height above the HIP, cells.
+    pub z: f32,
+    /// Evaluations of the distance spent on it.
+    pub evaluations: u32,
+}
+
+/// Searches downhill from `start` (in `[0, 1]²`) for a point of the patch from
+/// which no direction inside the patch leads closer to the HIP.
+///
+/// `hip` is the haptic interface point in patch coordinates (u, v); it may lie
+/// outside the unit square. The heights of `patch` count from it. Finite input
+/// gives a finite answer. Up to slope 1 it is within 2·10⁻⁶ cell of the exact point;
+/// above, 4 in 4,000 are not (`within_two_millionths_of_a_cell_on_any_slope`).
+///
+/// ```
+/// use hapterra_core::contact::closest_point::nearest_downhill;
+/// use hapterra_core::contact::surface::patch::Patch;
+///
+/// // A plane that rises by half a cell eastward, 0.1 to 0.6 cell above the HIP.
+/// let plane = Patch::new([0.1, 0.6, 0.1, 0.6]);
+/// let nearest = nearest_downhill(&plane, (0.5, 0.25), (0.5, 0.25));
+/// let height = 0.1 + 0.5 * 0.5;
+/// assert!((nearest.u - (0.5 - 0.5 * height / 1.25)).abs() < 1e-6);
+/// assert!((nearest.z - height / 1.25).abs() < 1e-6);
+/// ```
+#[must_use]
+pub fn nearest_downhill(patch: &Patch, hip: (f32, f32), start: (f32, f32)) -> Nearest {
+    let mut search = PatchSearch::from(start);
+    let mut budget = Budget::new(u32::MAX);
+    // Without a limit it comes to its end.
+    search
+        .advance(patch, hip, &mut budget)
+        .unwrap_or_else(|| search.so_far(patch))
+}
+
+/// A search in one patch that can be cut short after any evaluation, and gone on
+/// with later to the same bits.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PatchSearch {
+    /// The closest place of the passes that have ended, or where the search begins.
+    best: (f32, f32),
+    /// Its height above the HIP, if it was searched for.
+    z: Option<f32>,
+    evaluations: u32,
+    passes: u32,
+    /// Whether u and v are exchanged, once that is decided.
+    turned: Option<bool>,
+    /// The pass under way.
+    rulings: Option<RulingSearch>,
+}
+
+impl PatchSearch {
+    /// A search from a place in the patch.
+    pub(super) const fn from(start: (f32, f32)) -> Self {
+        Self {
+            best: start,
+            z: None,
+            evaluations: 0,
+            passes: 0,
+            turned: None,
+            rulings: None,
+        }
+    }
+
+    /// Another search, from a place in another patch or for another HIP.
+    #[inline]
+    pub(super) const fn restart(&mut self, start: (f32, f32)) {
+        self.best = start;
+        self.z = None;
+        (self.evaluations, self.passes) = (0, 0);
+        self.turned = None;
+        self.rulings = None;
+    }
+
+    /// Goes on to the end; `None` where the budget ends before.
+    #[inline]
+    pub(super) fn advance(
+        &mut self,
+        patch: &Patch,
+        hip: (f32, f32),
+        budget: &mut Budget,
+    ) -> Option<Nearest> {
+        if self.turned.is_none() {
+            if !budget.has(CONVEX) {
+                return None;
+            }
+            budget.spend(CONVEX);
+            if let Some(place) = closest_if_convex(patch, hip, self.best) {
+                #[cfg(test)]
+                crate::contact::tally::searched(1);
+                return Some(place);
+            }
+        }
+        let found = self.by_rulings(patch, hip, budget)?;
+        #[cfg(test)]
+        crate::contact::tally::searched(found.evaluations);
+        Some(found)
+    }
+
+    #[inline(never)]
+    fn by_rulings(
+        &mut self,
+        patch: &Patch,
+        hip: (f32, f32),
+        budget: &mut Budget,
+    ) -> Option<Nearest> {
+        loop {
+            let (u, v) = self.best;
+            let turned = *self
+                .turned
+                .get_or_insert_with(|| is_steeper_north(patch, hip, (u, v)));
+            let found = if turned {
+                self.pass(&patch.transposed(), (hip.1, hip.0), u, budget)?
+            } else {
+                self.pass(patch, hip, v, budget)?
+            };
+            self.rulings = None;
+            self.best = exchanged_if(turned, (found.u, found.v));
+            self.z = Some(found.z);
+            self.passes += 1;
+            if !wants_turning(&found) || self.passes == MAX_PASSES {
+                return Some(self.so_far(patch).snapped(patch, hip));
+            }
+            self.turned = Some(!turned);
+        }
+    }
+
+    /// One pass with u eliminated, from the ruling at `start`.
+    fn pass(
+        &mut self,
+        patch: &Patch,
+        hip: (f32, f32),
+        start: f32,
+        budget: &mut Budget,
+    ) -> Option<Ruling> {
+        let search = match &mut self.rulings {
+            Some(search) => search,
+            begins if budget.has(RULING) => {
+                budget.spend(RULING);
+                self.evaluations += 1;
+                begins.insert(RulingSearch::from(patch, hip, start))
+            }
+            _ => return None,
+        };
+        while let Some(v) = search.next(patch, hip) {
+            if !budget.has(RULING) {
+                return None;
+            }
+            budget.spend(RULING);
+            self.evaluations += 1;
+            search.look_at(patch, hip, v);
+        }
+        Some(search.best)
+    }
+
+    /// The closest point found so far.
+    pub(super) fn so_far(&self, patch: &Patch) -> Nearest {
+        let (place, z) = match &self.rulings {
+            Some(search) => {
+                let best = &search.best;
+                let turned = self.turned == Some(true);
+                (exchanged_if(turned, (best.u, best.v)), Some(best.z))
+            }
+            None => (self.best, self.z),
+        };
+        Nearest {
+            u: place.0,
+            v: place.1,
+            z: z.unwrap_or_else(|| patch.height(place.0, place.1)),
+            evaluations: self.evaluations,
+        }
+    }
+}
+
+/// The closest point of a patch that is convex enough for Newton's method.
+fn closest_if_convex(patch: &Patch, hip: (f32, f32), from: (f32, f32)) -> Option<Nearest> {
+    let place = Convexity::of(patch)?.closest(patch, hip, from)?;
+    Some(Nearest {
+        u: place.u,
+        v: place.v,
+        z: place.z,
+        evaluations: 1,
+    })
+}
+
+const fn exchanged_if(turned: bool, (u, v): (f32, f32)) -> (f32, f32) {
+    if turned { (v, u) } else { (u, v) }
+}
+
+/// Whether the patch is steeper northward than eastward at a place; of two slopes
+/// alike, as at the foot of a raised corner, the HIP's direction is decisive,
+/// which a mirrored scene shares.
+fn is_steeper_north(patch: &Patch, (p, q): (f32, f32), (u, v): (f32, f32)) -> bool {
+    let (east, north) = (patch.slope_u(v).abs(), patch.slope_v(u).abs());
+    north > east || (north == east && (q - v).abs() > (p - u).abs())
+}
+
+/// Whether the eliminated variable ended at a limit while the searched one did
+/// not, or is no longer the steeper one: the other search is then better
+/// conditioned.
+fn wants_turning(found: &Ruling) -> bool {
+    let inside_by = |margin: f32| found.v > margin && 1.0 - found.v > margin;
+    let steeper = found.across.abs() > 4.0 * found.along.abs() + 4.0;
+    (found.at_end && inside_by(RESOLUTION)) || (steeper && inside_by(0.0))
+}
+
+/// Places in a patch closer than this, in cells, cannot be told apart for a HIP at
+/// coordinate `hip`.
+pub(super) fn resolution(hip: f32) -> f32 {
+    // Not `f32::min`, which is a call where the processor has no instruction for it.
+    let resolution = RESOLUTION * (1.0 + 2.0 * hip.abs());
+    if resolution < COARSEST_RESOLUTION {
+        resolution
+    } else {
+        COARSEST_RESOLUTION
+    }
+}
+
+/// A coordinate, put on the border where it is as near to it as can be told for
+/// a HIP at coordinate `hip`.
+fn snapped(x: f32, hip: f32) -> f32 {
+    let resolution = resolution(hip);
+    if x < resolution {
+        0.0
+    } else if 1.0 - x < resolution {
+        1.0
+    } else {
+        x
+    }
+}
+
+impl Nearest {
+    /// No point yet.
+    pub(super) const NONE: Self = Self {
+        u: 0.0,
+        v: 0.0,
+        z: 0.0,
+        evaluations: 0,
+    };
+
+    /// The point put on the border, where it is as good as on it.
+    fn snapped(self, patch: &Patch, (p, q): (f32, f32)) -> Self {
+        let (u, v) = (snapped(self.u, p), snapped(self.v, q));
+        if (u, v) == (self.u, self.v) {
+            return self;
+        }
+        let z = patch.height(u, v);
+        if (z - self.z).abs() > resolution(p) + resolution(q) {
+            return self; // up a steep wall that stands on the border
+        }
+        Self { u, v, z, ..self }
+    }
+}
+
+#[cfg(test)]
+#[path = "on_patch_tests.rs"]
+mod tests;

@@ -1,0 +1,384 @@
+//! The closest point of the surface to the HIP: downhill in the distance, from
+//! patch to patch (paper §4.3.2, made exact at edges and vertices).
+
+use glam::Vec3;
+
+use super::beyond_border::{Asking, From, Onward, in_steepest_patch};
+use super::on_patch::{Nearest, PatchSearch};
+use crate::contact::budget::{ARRIVAL, Budget, SLOPE};
+use crate::contact::surface::patch::Patch;
+use crate::contact::surface::{HipView, Side, SurfacePoint};
+use crate::contact::tolerance::HEIGHT_NOISE;
+use crate::grid::{Altitude, Cell, GridPoint};
+use crate::terrain::{Ground, TileIndex, Window};
+
+/// Patches entered in a row without getting nearer to the HIP until the descent is
+/// taken to be at its end: at the foot of a wall of 10⁶ a place knows its distance
+/// only to 10⁻².
+const IDLE: u32 = 16;
+
+/// How a descent ended.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::contact) enum Ended {
+    /// No direction on the surface leads closer to the HIP, which is below; or patches
+    /// were entered [`IDLE`] times for nothing; or the proxy may not leave.
+    Rests,
+    /// From here the straight way to the HIP leads off the surface.
+    Leaves,
+    /// The next patch is in a tile that is not here.
+    Missing(TileIndex),
+    /// The budget is spent.
+    Suspended,
+    /// There is no surface under the proxy any more; the tile wanted, if it
+    /// is missing.
+    Lost(Option<TileIndex>),
+}
+
+/// Where a proxy may leave the surface.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::contact) enum Leave {
+    /// Anywhere.
+    Anywhere,
+    /// Not here: it has just tried to, and was held at once.
+    ButAt(SurfacePoint),
+    /// Nowhere: it has left too often, or the rule does not know of leaving.
+    Nowhere,
+}
+
+impl Leave {
+    fn is_allowed_at(&self, point: &SurfacePoint) -> bool {
+        match self {
+            Self::Anywhere => true,
+            Self::ButAt(place) => !point.is_same_place(place),
+            Self::Nowhere => false,
+        }
+    }
+}
+
+/// A proxy's way downhill to one HIP.
+///
+/// It can be cut short after any piece of work and gone on with later to the same
+/// bits: what it does next depends on nothing but what is kept here, the terrain
+/// and the HIP.
+#[derive(Clone, Debug)]
+pub(in crate::contact) struct Descent {
+    /// Where the patch was entered; where its closest point is, once that is known.
+    at: SurfacePoint,
+    stage: Stage,
+    /// The patch's closest point, in the stages that know it.
+    here: Nearest,
+    /// The search in this patch, or in a neighbour.
+    search: PatchSearch,
+    asking: Asking,
+    /// The nearest place so far, and patches entered since without getting nearer.
+    idle: Option<(GridPoint, u32)>,
+}
+
+/// What the descent does next in a patch. What it needs for that is beside it in
+/// [`Descent`]: writing it anew with every patch would cost more than the search.
+#[derive(Clone, Copy, Debug)]
+enum Stage {
+    /// The patch was entered.
+    Arrived,
+    /// The patch was entered, and its closest point is known.
+    ArrivedKnowing,
+    /// Its closest point is searched for.
+    Searching,
+    /// The neighbours are asked.
+    Asking,
+}
+
+impl Descent {
+    /// A way downhill from a point of the surface.
+    pub(in crate::contact) const fn from(at: SurfacePoint) -> Self {
+        Self {
+            at,
+            stage: Stage::Arrived,
+            here: Nearest::NONE,
+            search: PatchSearch::from((0.0, 0.0)),
+            asking: Asking::NONE,
+            idle: None,
+        }
+    }
+
+    /// Another way, from a point of the surface to another HIP.
+    pub(in crate::contact) const fn restart(&mut self, at: SurfacePoint) {
+        self.at = at;
+        self.stage = Stage::Arrived;
+        self.idle = None;
+    }
+
+    /// The patch that the proxy is on.
+    pub(in crate::contact) const fn cell(&self) -> Cell {
+        self.at.cell
+    }
+
+    /// The nearest point found so far and its height above the HIP; `None` where
+    /// its patch is not there.
+    pub(in crate::contact) fn nearest<const D: usize>(
+        &self,
+        window: &Window<'_, D>,
+        view: &HipView,
+    ) -> Option<(SurfacePoint, f32)> {
+        let nearest = match self.stage {
+            Stage::Asking | Stage::ArrivedKnowing => self.here,
+            Stage::Arrived => {
+                let patch = patch_at(window, view, &self.at).ok()?;
+                return Some((self.at, patch.height(self.at.u, self.at.v)));
+            }
+            Stage::Searching => self.search.so_far(&patch_at(window, view, &self.at).ok()?),
+        };
+        Some((self.at.moved_to(nearest.u, nearest.v), nearest.z))
+    }
+
+    /// Goes on until the proxy rests, leaves, or may not go on. A proxy that
+    /// `waits` for a missing tile also waits where it could go another way.
+    pub(in crate::contact) fn advance<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        leave: Leave,
+        waits: bool,
+        budget: &mut Budget,
+    ) -> Ended {
+        loop {
+            let patch = match patch_at(window, view, &self.at) {
+                Ok(patch) => patch,
+                Err(tile) => return Ended::Lost(tile),
+            };
+            if matches!(self.stage, Stage::Arrived | Stage::ArrivedKnowing) {
+                let cell = self.at.cell;
+                if let Some(ended) = self.arrive(window, view, &patch, leave, waits, budget) {
+                    return ended;
+                }
+                if self.at.cell != cell {
+                    continue;
+                }
+            }
+            if matches!(self.stage, Stage::Searching) {
+                let hip = view.in_patch(self.at.cell);
+                let Some(here) = self.search.advance(&patch, hip, budget) else {
+                    return Ended::Suspended;
+                };
+                self.here = here;
+                self.knows_here();
+            }
+            let from = From {
+                at: &self.at,
+                here: &self.here,
+            };
+            match self
+                .asking
+                .advance(window, view, &from, &mut self.search, budget)
+            {
+                Onward::Into => {
+                    if let Some(ended) = self.enter(window, view) {
+                        return ended;
+                    }
+                }
+                Onward::Missing(tile) => return Ended::Missing(tile),
+                Onward::Suspended => return Ended::Suspended,
+                Onward::Nowhere => return self.ends(window, view, &patch, leave),
+            }
+        }
+    }
+
+    /// A patch was entered: is it the end of the surface's way, and if not, where
+    /// does the search begin?
+    fn arrive<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        patch: &Patch,
+        leave: Leave,
+        waits: bool,
+        budget: &mut Budget,
+    ) -> Option<Ended> {
+        let is_known = matches!(self.stage, Stage::ArrivedKnowing);
+        let on_border = !is_known && self.at.border() != Side::NONE;
+        let units = if on_border {
+            ARRIVAL + 4 * SLOPE
+        } else {
+            ARRIVAL
+        };
+        if !budget.has(units) {
+            return Some(Ended::Suspended);
+        }
+        budget.spend(units);
+        if leave.is_allowed_at(&self.at) && leads_off(window, view, &self.at, patch) {
+            return Some(Ended::Leaves);
+        }
+        if is_known {
+            self.knows_here();
+            return None;
+        }
+        if on_border {
+            match in_steepest_patch(window, view, &self.at) {
+                Ok(point) => self.at = point,
+                Err(tile) if waits => return Some(Ended::Missing(tile)),
+                Err(_) => {}
+            }
+        }
+        self.search.restart((self.at.u, self.at.v));
+        self.stage = Stage::Searching;
+        None
+    }
+
+    /// The patch's closest point is known: the neighbours are asked next.
+    #[inline]
+    const fn knows_here(&mut self) {
+        self.at = self.at.moved_to(self.here.u, self.here.v);
+        self.asking.restart();
+        self.stage = Stage::Asking;
+    }
+
+    /// The way goes on in a neighbouring patch, whose closest point is known.
+    fn enter<const D: usize>(&mut self, window: &Window<'_, D>, view: &HipView) -> Option<Ended> {
+        let Some(offer) = &self.asking.best else {
+            return Some(Ended::Rests);
+        };
+        // Once a patch was entered for nothing, only the nearest place of all counts.
+        if self.idle.is_some() || !offer.is_surely_nearer {
+            let position = position(window, view, &self.at, self.here.z);
+            if count_unless_nearer(&mut self.idle, position, view) >= IDLE {
+                return Some(Ended::Rests);
+            }
+        }
+        self.at = offer.entry;
+        self.here = offer.closest;
+        self.stage = Stage::ArrivedKnowing;
+        None
+    }
+
+    /// No neighbour offers a way.
+    fn ends<const D: usize>(
+        &self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        patch: &Patch,
+        leave: Leave,
+    ) -> Ended {
+        let z = self.here.z;
+        let leaves = leave.is_allowed_at(&self.at)
+            && is_hardly_above(patch, z)
+            && (z < 0.0 || leads_off(window, view, &self.at, patch));
+        if leaves { Ended::Leaves } else { Ended::Rests }
+    }
+}
+
+/// The patch of a point, as the HIP sees it.
+///
+/// # Errors
+/// There is none; the tile that is missing, if that is why.
+fn patch_at<const D: usize>(
+    window: &Window<'_, D>,
+    view: &HipView,
+    point: &SurfacePoint,
+) -> Result<Patch, Option<TileIndex>> {
+    match window.ground(point.cell) {
+        Ground::Patch(corners) => Ok(view.patch(&corners)),
+        Ground::Hole => Err(None),
+        Ground::Missing => Err(Some(TileIndex::holding(point.cell))),
+    }
+}
+
+/// Whether a proxy that rests `z` cells above the HIP may in truth be below it,
+/// and would pull: up a wall rounding decides.
+fn is_hardly_above(patch: &Patch, z: f32) -> bool {
+    let [sw, se, nw, ne] = patch.with_sizes().corners;
+    z <= HEIGHT_NOISE * ((sw + se) + (nw + ne))
+}
+
+/// Whether the straight way from a point to the HIP begins above the surface:
+/// above the one-sided slope of the patch it leads into.
+fn leads_off<const D: usize>(
+    window: &Window<'_, D>,
+    view: &HipView,
+    at: &SurfacePoint,
+    patch: &Patch,
+) -> bool {
+    let (p, q) = view.in_patch(at.cell);
+    let (east, north) = (p - at.u, q - at.v);
+    let border = at.border();
+    let toward = |border: i32, way: f32| if border as f32 * way > 0.0 { border } else { 0 };
+    let side = Side {
+        east: toward(border.east, east),
+        north: toward(border.north, north),
+    };
+    if side == Side::NONE {
+        return passes_over(patch, at, (east, north));
+    }
+    let entered = at.across(side);
+    match patch_at(window, view, &entered) {
+        Ok(patch) => passes_over(&patch, &entered, (east, north)),
+        // At the border of the data the proxy is held; see `boundary_fade`.
+        Err(_) => false,
+    }
+}
+
+/// Whether the HIP, so far east and north of a point, lies above the tangent plane
+/// of the patch there.
+#[inline]
+pub(in crate::contact) fn passes_over(
+    patch: &Patch,
+    at: &SurfacePoint,
+    (east, north): (f32, f32),
+) -> bool {
+    let rise = patch.slope_u(at.v) * east + patch.slope_v(at.u) * north;
+    patch.height(at.u, at.v) + rise < 0.0
+}
+
+/// The position of a point of the surface, `z` cells above the HIP: up a wall that
+/// height is known better than the place tells it, of a far HIP worse.
+fn position<const D: usize>(
+    window: &Window<'_, D>,
+    view: &HipView,
+    at: &SurfacePoint,
+    z: f32,
+) -> GridPoint {
+    let steep = patch_at(window, view, at).map_or(f32::INFINITY, |patch| {
+        patch.slope_u(at.v).abs() + patch.slope_v(at.u).abs()
+    });
+    position_on(window, at)
+        .filter(|_| z.abs() > steep)
+        .unwrap_or_else(|| view.position(at, z))
+}
+
+/// The position of a point of the surface, no matter how far the HIP is; `None`
+/// where there is no patch.
+pub(in crate::contact) fn position_on<const D: usize>(
+    window: &Window<'_, D>,
+    at: &SurfacePoint,
+) -> Option<GridPoint> {
+    let Ground::Patch(corners) = window.ground(at.cell) else {
+        return None;
+    };
+    // Counted from a cell nearby: of a high place the fraction has no bits.
+    let patch = Patch::new(corners.heights);
+    let up = corners.base.saturating_add(patch.height(at.u, at.v) as i32);
+    let near = patch.seen_from(Altitude::new(up, 0.0), corners.base);
+    let height = near.height(at.u, at.v);
+    Some(GridPoint::new(
+        [at.cell.x, at.cell.y, up],
+        Vec3::new(at.u, at.v, height),
+    ))
+}
+
+/// Counts how often in a row a position is no nearer to the HIP than the nearest
+/// one before, which is kept in `nearest`.
+pub(in crate::contact) fn count_unless_nearer(
+    nearest: &mut Option<(GridPoint, u32)>,
+    position: GridPoint,
+    view: &HipView,
+) -> u32 {
+    match nearest {
+        Some((before, times)) if !view.is_nearer(&position, before) => {
+            *times += 1;
+            *times
+        }
+        _ => {
+            *nearest = Some((position, 0));
+            0
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! What one tick of the contact answers.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::grid::GridPoint;
+use crate::terrain::TileIndex;
+
+/// What the proxy is doing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ContactState {
+    /// The HIP has not been seen above the surface yet: no force.
+    #[default]
+    Waiting,
+    /// The proxy is free: it is where the HIP is, or on its way there.
+    Free,
+    /// The proxy is on the surface and the HIP below it.
+    Touching,
+    /// The surface that the proxy was on has come to an end: the last force fades
+    /// away.
+    Fading,
+}
+
+/// One tick's answer.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactOutput {
+    /// What the proxy is doing.
+    pub state: ContactState,
+    /// Where the proxy is.
+    pub proxy: GridPoint,
+    /// From the HIP to the proxy in cells, times the boundary fade: what the spring
+    /// stretches by. Zero unless touching or fading.
+    pub displacement: Vec3,
+    /// Whether the tick did all there was to do for this HIP.
+    pub converged: bool,
+    /// The tile whose absence held the tick up.
+    pub missing_tile: Option<TileIndex>,
+    /// Units of work spent; more than [`super::WORK_PER_TICK`] would be a fault.
+    pub work: u32,
+}

@@ -1,0 +1,86 @@
+//! The surface as the haptic interface point (HIP) sees it.
+
+use glam::Vec3;
+
+use super::patch::Patch;
+use super::point::SurfacePoint;
+use crate::contact::tolerance::RESOLUTION;
+use crate::grid::{Altitude, Cell, GridPoint};
+use crate::terrain::Corners;
+
+/// A point to see patches from, with its place in their coordinates and their
+/// heights counted from its own: the HIP, or where a path of the HIP begins.
+#[derive(Clone, Copy)]
+pub(in crate::contact) struct HipView {
+    hip: GridPoint,
+}
+
+impl HipView {
+    pub(in crate::contact) const fn new(hip: GridPoint) -> Self {
+        Self { hip }
+    }
+
+    #[inline]
+    pub(in crate::contact) fn altitude(&self) -> Altitude {
+        Altitude::new(self.hip.cell()[2], self.hip.frac().z)
+    }
+
+    /// The cell that the HIP is over.
+    #[inline]
+    pub(in crate::contact) fn column(&self) -> Cell {
+        self.hip.column()
+    }
+
+    /// The HIP in a patch's coordinates.
+    #[inline]
+    pub(in crate::contact) fn in_patch(&self, cell: Cell) -> (f32, f32) {
+        let local = self.hip.seen_from([cell.x, cell.y, 0]);
+        (local.x, local.y)
+    }
+
+    /// The patch of these corners, with heights counted from the HIP.
+    #[inline]
+    pub(in crate::contact) fn patch(&self, corners: &Corners) -> Patch {
+        Patch::new(corners.heights).seen_from(self.altitude(), corners.base)
+    }
+
+    /// Whether any of these corners is above the HIP.
+    pub(in crate::contact) fn is_below_any(&self, corners: &Corners) -> bool {
+        let up = |height: &f32| self.altitude().up_to(corners.base, *height);
+        corners.heights.iter().any(|height| up(height) > 0.0)
+    }
+
+    /// Whether the HIP is above the patch of these corners, which it is over.
+    pub(in crate::contact) fn is_above(&self, corners: &Corners) -> bool {
+        let place = self.hip.frac();
+        self.patch(corners).height(place.x, place.y) < 0.0
+    }
+
+    /// The position of a point of the surface, `z` cells above the HIP.
+    #[inline]
+    pub(in crate::contact) fn position(&self, point: &SurfacePoint, z: f32) -> GridPoint {
+        let cell = [point.cell.x, point.cell.y, self.hip.cell()[2]];
+        let height = self.hip.frac().z + z;
+        if point.is_well_inside() {
+            // Only the height may carry: fewer instructions for the same bits.
+            return GridPoint::over(cell, [point.u, point.v], height);
+        }
+        GridPoint::new(cell, Vec3::new(point.u, point.v, height))
+    }
+
+    /// From the HIP to a point of the surface, `z` cells above it.
+    #[inline]
+    pub(in crate::contact) fn displacement(&self, point: &SurfacePoint, z: f32) -> Vec3 {
+        let (p, q) = self.in_patch(point.cell);
+        Vec3::new(point.u - p, point.v - q, z)
+    }
+
+    /// Whether one position is nearer to the HIP than another, by more than the
+    /// last places of the two may be off: of a far HIP the squared distances
+    /// themselves would not tell.
+    pub(in crate::contact) fn is_nearer(&self, this: &GridPoint, other: &GridPoint) -> bool {
+        let (way, left) = (other.to(this), this.to(&self.hip));
+        let noise = 2.0 * RESOLUTION * (way.abs() + left.abs()).element_sum();
+        way.dot(way + 2.0 * left) > noise
+    }
+}

@@ -1,0 +1,9 @@
+//! From free space to the surface: the first crossing of the HIP's path.
+
+pub mod intersect;
+
+mod cells;
+mod look_ahead;
+mod path;
+
+pub(super) use path::{Path, Swept, lower};
