@@ -1,6 +1,6 @@
 //! The tick rate that an image is built for.
 
-/// Whole kilohertz up to ten: `hapterra_core::guard::TickRate` takes no others.
+/// Whole kilohertz up to ten: `hapterra_core::rate::TickRate` takes no others.
 const KILOHERTZ: std::ops::RangeInclusive<u32> = 1..=10;
 
 /// Ticks a second for a board whose tick timer counts `counts_a_second` times:
@@ -34,7 +34,7 @@ pub(crate) fn tick_hz(
 #[cfg(test)]
 mod tests {
     use super::tick_hz;
-    use hapterra_core::guard::TickRate;
+    use hapterra_core::rate::TickRate;
 
     /// The tick timers of the two chips.
     const G474: u32 = 42_500_000;

@@ -1,15 +1,16 @@
 //! The hardware seam: what a board gives to the application.
 //!
 //! The link is any pair of [`embedded_io_async::Read`] and
-//! [`embedded_io_async::Write`]. Encoders, amplifiers, tick timer and watchdog
-//! have no trait in embedded-hal and get one here; where a board's amplifiers
-//! are pins and duty cycles, [`crate::amplifier`] builds them on embedded-hal's.
+//! [`embedded_io_async::Write`]. embedded-hal has no traits for encoders,
+//! amplifiers and tick timer; they are here. [`crate::amplifier`]
+//! builds amplifiers from embedded-hal's pins, duty cycles and SPI.
 
 pub use hapterra_core::guard::Sense;
+use hapterra_core::rate::TickRate;
 
 /// The encoders and safety inputs.
 pub trait Encoders {
-    /// Reads everything the tick needs, as of now. Bounded and never waits.
+    /// Reads everything the tick needs, as of now. Bounded, never waits.
     fn sense(&mut self) -> Sense;
 }
 
@@ -41,22 +42,22 @@ pub trait TickClock {
     const HZ: u32;
     /// Counts between two ticks.
     const PERIOD: u32;
+    /// The tick rate. A board whose rate core does not know does not compile.
+    const RATE: TickRate = match TickRate::new(Self::HZ / Self::PERIOD) {
+        Some(rate) => rate,
+        None => panic!("the tick rate is 1 to 10 kHz"),
+    };
 
-    /// A free-running counter that wraps around.
+    /// Returns a free-running counter that wraps around.
     fn now(&self) -> u32;
 
-    /// Counts since the current tick's timer event, at most [`Self::PERIOD`].
+    /// Returns the counts since the current tick's timer event, at most
+    /// [`Self::PERIOD`].
     fn since_due(&self) -> u32;
 
     /// Acknowledges the timer event that this tick answers.
     fn begin_tick(&mut self);
 
-    /// Whether the next tick's event has come already: this one ran over.
+    /// Whether the next tick's event has already come: this tick ran over.
     fn next_is_due(&self) -> bool;
-}
-
-/// A timer that resets the board unless it is fed.
-pub trait Watchdog {
-    /// Starts the watchdog's time anew.
-    fn feed(&mut self);
 }

@@ -1,17 +1,17 @@
-//! Endless counts from the 16-bit counters of encoder timers.
+//! Endless encoder counts from the 16-bit counters of encoder timers.
 
 /// Follows a counter that wraps around at 2^16.
 ///
-/// Exact while the counter moves less than 32,768 counts between two readings:
-/// at one reading a millisecond that is 8 motor turns, hundreds of times a
-/// Phantom's top speed.
+/// The count is exact while the counter moves less than 32,768 counts between two
+/// readings. With a reading each millisecond that is 8 motor turns, hundreds of
+/// times a Phantom's top speed.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Unwrapped {
+pub struct EndlessCount {
     last: u16,
     total: i32,
 }
 
-impl Unwrapped {
+impl EndlessCount {
     /// Takes the counter's present reading and returns the total count.
     pub fn follow(&mut self, reading: u16) -> i32 {
         let moved = reading.wrapping_sub(self.last).cast_signed();
@@ -27,7 +27,7 @@ mod tests {
 
     #[test]
     fn counts_on_through_the_wrap_in_both_directions() {
-        let mut count = Unwrapped::default();
+        let mut count = EndlessCount::default();
         let mut truth = 0;
         for step in [5, -10, 30_000, 30_000, 30_000, -32_768, -32_000, 32_767] {
             truth += step;

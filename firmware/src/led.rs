@@ -1,14 +1,14 @@
-//! What the status LED says.
+//! What the status LED shows.
 
 use hapterra_core::guard::{Fault, Mode, Report};
 
-/// What there is to say.
+/// A pattern of the status LED.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Signal {
+pub enum LedPattern {
     /// Off: a short flash every two seconds.
     #[default]
     Disarmed,
-    /// Asked to arm, waits for the dead-man switch or for a small force: four
+    /// Asked to arm; it waits for the dead-man switch or for a small force: four
     /// flashes a second.
     Waiting,
     /// Amplifiers on: lit.
@@ -19,13 +19,15 @@ pub enum Signal {
     Fault(u8),
 }
 
-/// Of a fault's flashes, ms.
+/// Length of a fault's flash, ms.
 const FLASH: u32 = 200;
+/// From one flash of a fault to the next, ms.
 const FLASH_AND_GAP: u32 = 500;
+/// After the last flash of a fault, ms.
 const PAUSE: u32 = 1_500;
 
-impl Signal {
-    /// What the guard's report and the contact come to.
+impl LedPattern {
+    /// The pattern for the guard's report, and for whether the HIP touches.
     #[must_use]
     pub const fn of(report: &Report, touching: bool) -> Self {
         match (report.fault, report.mode) {
@@ -37,7 +39,7 @@ impl Signal {
         }
     }
 
-    /// Whether the LED is lit at a time, in milliseconds from anywhere.
+    /// Whether the LED is lit at the time `ms`, in milliseconds from any origin.
     #[must_use]
     pub const fn is_lit(self, ms: u32) -> bool {
         match self {
@@ -52,37 +54,13 @@ impl Signal {
             }
         }
     }
-
-    /// As one number, to be handed on by a single store.
-    #[must_use]
-    pub const fn to_bits(self) -> u8 {
-        match self {
-            Self::Disarmed => 0,
-            Self::Waiting => 1,
-            Self::On => 2,
-            Self::Touching => 3,
-            Self::Fault(number) => 0x80 | number,
-        }
-    }
-
-    /// Back from [`Self::to_bits`].
-    #[must_use]
-    pub const fn from_bits(bits: u8) -> Self {
-        match bits {
-            1 => Self::Waiting,
-            2 => Self::On,
-            3 => Self::Touching,
-            0x80.. => Self::Fault(bits & 0x7F),
-            _ => Self::Disarmed,
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn flashes(signal: Signal, ms: u32) -> usize {
+    fn flashes(signal: LedPattern, ms: u32) -> usize {
         let lit = |at: &u32| signal.is_lit(*at);
         (1..ms).filter(|at| lit(at) && !lit(&(at - 1))).count()
     }
@@ -91,7 +69,7 @@ mod tests {
     fn a_fault_flashes_its_number_and_pauses() {
         for fault in Fault::ALL {
             let number = fault.number();
-            let signal = Signal::Fault(number);
+            let signal = LedPattern::Fault(number);
             let round = u32::from(number) * FLASH_AND_GAP + PAUSE;
             // From one pause to the next.
             let shown = (round - 1..2 * round - 1)
@@ -105,21 +83,20 @@ mod tests {
     #[test]
     fn every_signal_looks_different_within_ten_seconds() {
         let mut all = vec![
-            Signal::Disarmed,
-            Signal::Waiting,
-            Signal::On,
-            Signal::Touching,
+            LedPattern::Disarmed,
+            LedPattern::Waiting,
+            LedPattern::On,
+            LedPattern::Touching,
         ];
-        all.extend(Fault::ALL.map(|fault| Signal::Fault(fault.number())));
+        all.extend(Fault::ALL.map(|fault| LedPattern::Fault(fault.number())));
         let looks: Vec<Vec<bool>> = all
             .iter()
             .map(|signal| (0..10_000).map(|ms| signal.is_lit(ms)).collect())
             .collect();
         for (i, look) in looks.iter().enumerate() {
             assert!(!looks[..i].contains(look), "{:?}", all[i]);
-            assert_eq!(Signal::from_bits(all[i].to_bits()), all[i]);
         }
-        assert_eq!(flashes(Signal::Disarmed, 10_000), 4);
+        assert_eq!(flashes(LedPattern::Disarmed, 10_000), 4);
     }
 
     #[test]
@@ -128,9 +105,9 @@ mod tests {
             mode: Mode::Armed,
             ..Report::default()
         };
-        assert_eq!(Signal::of(&report, false), Signal::On);
-        assert_eq!(Signal::of(&report, true), Signal::Touching);
+        assert_eq!(LedPattern::of(&report, false), LedPattern::On);
+        assert_eq!(LedPattern::of(&report, true), LedPattern::Touching);
         report.fault = Some(Fault::EmergencyStop);
-        assert_eq!(Signal::of(&report, true), Signal::Fault(5));
+        assert_eq!(LedPattern::of(&report, true), LedPattern::Fault(5));
     }
 }

@@ -7,23 +7,33 @@
 //!   ┌───────────────────── haptic_loop (timer interrupt) ────────────────┐
 //!   │  commands ─▶ Haptics::accept     Haptics::tick ─▶ record, spent    │
 //!   └───────▲───────────────────────────────────────────────────┬────────┘
-//!           │      single-producer queues (channels), no lock   │
+//!           │           single-producer queues, no lock         │
 //!   ┌───────┴───────────────────── link (task) ─────────────────▼────────┐
-//!   │  frames ─▶ session ─▶ scenes, tiles, points    focus ─▶ requests   │
+//!   │  frames ─▶ scenes, tiles, points, arming       tiles ─▶ requests   │
 //!   └───────▲──────────────────────────────────────────────────┬─────────┘
 //!           │                                                  ▼
 //!        from host                                          to host
 //! ```
 //!
-//! [`board`] is the hardware seam; [`channels`] builds the application from it;
-//! [`vitals`] and [`supervisor`] keep the watchdog; [`store`] keeps the
-//! calibration; [`crash`] is what is left of a program that ended; [`native`] is the same application as a value in a host program, without
-//! interrupts or tasks. The images are in `boards/`.
+//! | module | what is in it |
+//! | --- | --- |
+//! | [`app`] | assembles the application from what a board brings |
+//! | [`board`], [`amplifier`], [`encoder`], [`led`] | the hardware seam, and what boards share |
+//! | `queues` | the queues between the two halves, and what travels in them |
+//! | [`haptic_loop`] | the timer interrupt: encoders, the pure tick, amplifiers |
+//! | [`link`] | the conversation with the host: requests, tiles, telemetry |
+//! | [`usb`] | the link's USB interface |
+//! | [`monitor`] | check-ins and counters; whether the watchdog is fed |
+//! | [`store`] | the calibration record in flash |
+//! | [`crash`] | how a program ended, kept over the reset |
+//! | [`native`] | the same application as a value in a host program |
+//!
+//! The images are in `boards/`.
 //!
 //! # Priorities
 //!
-//! From the top. A critical section masks everything from "ceiling" down, by
-//! BASEPRI; the haptic interrupt is above and is delayed by nothing.
+//! From the most urgent down. A critical section masks everything from "ceiling"
+//! down, by BASEPRI; the haptic interrupt is above and nothing delays it.
 //!
 //! | priority | what | may |
 //! | --- | --- | --- |
@@ -34,42 +44,40 @@
 //! | MPS2 `0xC0`; STM32 thread | executor: link, USB stack, supervisor, plant line | log, wait |
 //! | thread | MPS2: sleep | |
 //!
-//! On the STM32 embassy leaves interrupts at priority 0. The images put every
-//! one of them below the ceiling before any is let through.
+//! embassy leaves the interrupts of an STM32 at priority 0. The images put every one
+//! of them below the ceiling before any is enabled.
 //!
 //! # Time
 //!
-//! The application's time is the number of ticks; time-outs are counted in
-//! them. A scene that sets [`hold_clock`] wants that a tile which the host owes
-//! takes no time, and a replay wants no time to pass between its points:
-//! [`link::Link::may_stand_still`] says when. The emulated board then stops its
-//! two timers, which are all it knows of time; the native device is not ticked;
-//! a real board cannot stop time and goes on. Nothing that depends on how fast
-//! the host is can then be felt, and a run repeats to the last bit.
+//! The application's time is the number of ticks, and time-outs are counted in
+//! ticks. In a scene that sets [`hold_clock`], a tile that the host owes takes no
+//! time; in a replay, no time passes between two points.
+//! [`link::Link::may_stand_still`] says when that is so. The emulated board then
+//! stops its two timers, which are all it knows of time; the native device is not
+//! ticked; a real board cannot stop time and goes on. So the host's speed changes
+//! nothing that is felt, and a run repeats to the last bit.
 //!
-//! Where time stands still, a time-out never comes. A frame that arrives
-//! damaged is answered by asking again at once; a frame that is lost without a
-//! trace is not noticed, so `hold_clock` is for links that lose nothing
-//! (sockets, pipes).
+//! While time stands still, no time-out comes. The device requests a tile again at
+//! once when a frame arrives damaged, but it cannot notice a frame that is lost
+//! without a trace. So `hold_clock` is for links that lose nothing: sockets, pipes.
 //!
-//! [`hold_clock`]: hapterra_core::wire::message::Scene::hold_clock
+//! [`hold_clock`]: hapterra_core::scene::Scene::hold_clock
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
 pub mod amplifier;
+pub mod app;
 pub mod board;
-pub mod channels;
 pub mod crash;
 pub mod encoder;
 pub mod haptic_loop;
 pub mod led;
 pub mod link;
+pub mod monitor;
 pub mod native;
+mod queues;
 pub mod store;
-pub mod supervisor;
-mod timing;
 pub mod usb;
-pub mod vitals;
 
 // The build script's, for its tests.
 #[cfg(test)]

@@ -1,27 +1,24 @@
 //! The application as a value, for a host program: no interrupts, no tasks.
 //!
-//! The caller moves bytes and calls [`Device::tick`]. In lock-step it does so
-//! only while [`Device::may_stand_still`] is false, as the emulated board's
-//! clock does; in real time it calls it a thousand times a second regardless.
+//! The caller moves bytes and calls [`Device::tick`]. In lock-step it calls that only
+//! while [`Link::may_stand_still`] is false, as the emulated board's clock does; in
+//! real time it calls it a thousand times a second regardless.
 
 use hapterra_core::guard::Drive;
-use hapterra_core::tick::Haptics;
 use hapterra_core::wire::status::BootReport;
-use hapterra_tick::FastTick;
 
+use crate::app::{Application, Hardware, TileBuffers, WorkingMemory, assemble};
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, Sense, TickClock};
-use crate::channels::{Application, Channels, Hardware, Tiles, assemble};
 use crate::haptic_loop::HapticLoop;
 use crate::link::Link;
+use crate::monitor::{Monitor, Part};
 use crate::store::Stored;
-use crate::supervisor::{NoWatchdog, Supervisor};
-use crate::vitals::Part;
 
-/// Encoders and switches that read what they were last given.
+/// Encoders and switches that read what the caller last set.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Given(pub Sense);
+pub struct VirtualEncoders(pub Sense);
 
-impl Encoders for Given {
+impl Encoders for VirtualEncoders {
     fn sense(&mut self) -> Sense {
         self.0
     }
@@ -29,31 +26,32 @@ impl Encoders for Given {
 
 /// Amplifiers whose currents the caller of the tick takes from its result.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct ReportedOff;
+pub struct VirtualAmplifiersOff;
 
-/// As [`ReportedOff`], on.
+/// The same as [`VirtualAmplifiersOff`], on.
 #[derive(Clone, Copy, Debug)]
-pub struct ReportedOn;
+pub struct VirtualAmplifiersOn;
 
-impl Amplifiers for ReportedOff {
-    type Enabled = ReportedOn;
+impl Amplifiers for VirtualAmplifiersOff {
+    type Enabled = VirtualAmplifiersOn;
 
-    fn enable(self) -> ReportedOn {
-        ReportedOn
+    fn enable(self) -> VirtualAmplifiersOn {
+        VirtualAmplifiersOn
     }
 }
 
-impl EnabledAmplifiers for ReportedOn {
-    type Disabled = ReportedOff;
+impl EnabledAmplifiers for VirtualAmplifiersOn {
+    type Disabled = VirtualAmplifiersOff;
 
     fn write(&mut self, _currents_a: [f32; 3]) {}
 
-    fn disable(self) -> ReportedOff {
-        ReportedOff
+    fn disable(self) -> VirtualAmplifiersOff {
+        VirtualAmplifiersOff
     }
 }
 
-/// A clock for lock-step: no tick takes any time. So many ticks are a millisecond.
+/// A clock for lock-step, in which no tick takes any time, at `TICKS_A_MS` ticks a
+/// millisecond.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StoppedClock<const TICKS_A_MS: u32 = 1>;
 
@@ -76,32 +74,30 @@ impl<const TICKS_A_MS: u32> TickClock for StoppedClock<TICKS_A_MS> {
     }
 }
 
-/// A device in the host's memory, with a window of `D × D` tiles and a clock
-/// `C`.
+/// A device in the host's memory, with a window of `D × D` tiles and a clock `C`.
 pub struct Device<C, const D: usize> {
-    haptic_loop: HapticLoop<'static, Given, ReportedOff, C, D>,
-    link: Link<'static, D>,
-    supervisor: Supervisor<'static, NoWatchdog>,
+    haptic_loop: HapticLoop<'static, VirtualEncoders, VirtualAmplifiersOff, C, D>,
+    /// The device's end of the link. [`Device::receive`] takes bytes for it, because the
+    /// link's task then runs, too.
+    pub link: Link<'static, D>,
+    monitor: &'static Monitor,
     /// What the device remembers without power.
-    memory: Stored,
+    stored: Stored,
 }
 
-impl<C: TickClock, const D: usize> Device<C, D>
-where
-    Haptics<'static, D>: FastTick,
-{
-    /// Builds the device in memory that lives as long as the program, such as
-    /// a leaked box: tile buffers travel between its halves by reference.
+impl<C: TickClock, const D: usize> Device<C, D> {
+    /// Builds the device in memory that lives as long as the program, such as a
+    /// leaked box, because its halves hand tile buffers to each other by reference.
     pub fn new(
-        tiles: &'static mut Tiles<D>,
-        channels: &'static mut Channels<'static>,
+        tiles: &'static mut TileBuffers<D>,
+        memory: &'static mut WorkingMemory<'static>,
         clock: C,
         calibration: Stored,
         boot: BootReport,
     ) -> Self {
         let hardware = Hardware {
-            encoders: Given::default(),
-            amplifiers: ReportedOff,
+            encoders: VirtualEncoders::default(),
+            amplifiers: VirtualAmplifiersOff,
             clock,
             calibration,
             boot,
@@ -109,78 +105,50 @@ where
         let Application {
             haptic_loop,
             link,
-            vitals,
-        } = assemble(tiles, channels, hardware, "native");
+            monitor,
+        } = assemble(tiles, memory, hardware, "native");
         Self {
             haptic_loop,
             link,
-            supervisor: Supervisor::new(vitals, NoWatchdog, &[Part::Tick, Part::Link]),
-            memory: calibration,
+            monitor,
+            stored: calibration,
         }
     }
 
     /// What the device would find in its memory if it were restarted now.
     #[must_use]
     pub const fn memory(&self) -> &Stored {
-        &self.memory
+        &self.stored
     }
 
-    /// Takes bytes from the host; see [`Link::receive`].
+    /// Takes bytes from the host ([`Link::receive`]) and runs the link's task.
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
         let taken = self.link.receive(bytes);
-        self.turn();
+        self.poll();
         taken
     }
 
-    fn turn(&mut self) {
+    fn poll(&mut self) {
         if let Some(calibration) = self.link.to_store() {
-            self.memory = Stored::Found(calibration);
+            self.stored = Stored::Found(calibration);
             self.link.stored(Ok(()));
         }
-        self.link.turn();
+        self.link.poll();
     }
 
-    /// Moves bytes for the host into `into`; see [`Link::transmit`].
-    pub fn transmit(&mut self, into: &mut [u8]) -> usize {
-        self.link.transmit(into)
-    }
-
-    /// One tick with these encoders and switches; returns what the amplifiers
-    /// got.
+    /// Runs one tick with these encoders and switches, then the link's task. Returns
+    /// what the amplifiers got.
     pub fn tick(&mut self, sense: Sense) -> Drive {
         let drive = self.tick_alone(sense);
-        self.turn();
-        self.supervisor.check();
+        self.poll();
+        // No watchdog is behind this, but the tick wants to see one fed.
+        let _ = self.monitor.may_feed_watchdog(&[Part::Tick, Part::Link]);
         drive
     }
 
-    /// As [`Device::tick`], with the task of the link hanging.
+    /// Runs one tick alone, as if the link's task hung.
     pub fn tick_alone(&mut self, sense: Sense) -> Drive {
         self.haptic_loop.encoders_mut().0 = sense;
         self.haptic_loop.tick()
-    }
-
-    /// Whether nothing can happen before the host has spoken; see
-    /// [`Link::may_stand_still`].
-    #[must_use]
-    pub fn may_stand_still(&self) -> bool {
-        self.link.may_stand_still()
-    }
-
-    /// Whether the arm is in use; see [`Link::drives_arm`].
-    #[must_use]
-    pub fn drives_arm(&self) -> bool {
-        self.link.drives_arm()
-    }
-
-    /// Whether the host has said goodbye and everything is sent.
-    #[must_use]
-    pub fn has_ended(&self) -> bool {
-        self.link.has_ended()
-    }
-
-    /// The transport was interrupted; see [`Link::interrupted`].
-    pub fn interrupted(&mut self) {
-        self.link.interrupted();
     }
 }

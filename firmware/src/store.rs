@@ -10,28 +10,29 @@
 //! place:   number (u32)   its complement (u32)   record (`Calibration::encode`)   0xFF …   mark
 //! ```
 //!
-//! The newest record is the valid one with the highest number. What has no valid
-//! check sum, or cannot be read, is damaged if it bears the mark, which is written
-//! last; without it, it was cut off in the middle and had never been there.
+//! The newest record is the valid one with the highest number. The mark is written
+//! last. A place without a valid check sum, or one that cannot be read, is damaged if it
+//! has the mark. Without the mark its write was cut off, and the record counts as never
+//! written.
 //!
 //! Erasing is slow (a sector of a large chip: seconds), so only
 //! [`CalibrationStore::prepare`] does it, at start-up, before there is a tick or a
-//! watchdog. Saving only writes, some milliseconds; where no place is left, it
-//! says so.
+//! watchdog. Saving only writes, which takes some milliseconds; where no place is left,
+//! it says so.
 
 use embedded_storage::nor_flash::NorFlash;
 use hapterra_core::phantom::{Calibration, RECORD_BYTES};
 
 /// Number and complement.
 const HEAD: usize = 8;
-/// The mark: a write of its own on every chip.
+/// The mark, a write of its own on every chip.
 const MARK: [u8; 32] = [0; 32];
-/// Where it is: a multiple of 32, the largest write size among the chips.
+/// Where the mark is in a place: a multiple of 32, the largest write size of the chips.
 const MARK_AT: usize = HEAD + RECORD_BYTES + 24;
 /// Bytes of a place.
 pub const PLACE: usize = MARK_AT + MARK.len();
-/// Most places of an area that are used: all of them are read to save a record,
-/// and that may take no more than a fraction of the watchdog's time.
+/// The most places of an area that are used. Saving a record reads all of them, which may
+/// take no more than a fraction of the watchdog's time.
 const MOST_PLACES: u32 = 8;
 
 /// What was found in the memory.
@@ -62,23 +63,25 @@ pub enum StoreError {
     Write,
 }
 
-/// One place, as read.
+/// What a place holds.
 enum Place {
     Blank,
-    Holds(u32, Calibration),
-    /// What was being written when the power went.
+    /// A record and its number.
+    Record(u32, Calibration),
+    /// A record that was being written when the power went.
     CutOff,
-    /// Something that was whole once.
-    Spoilt,
+    /// A record that was whole once.
+    Damaged,
 }
 
-/// The newest record and where things go on.
+/// What the two areas hold.
 #[derive(Default)]
-struct Found {
+struct Contents {
+    /// The newest record and its number.
     newest: Option<(u32, Calibration)>,
-    /// The area it is in.
+    /// The area that the newest record is in.
     area: usize,
-    spoilt: bool,
+    has_damage: bool,
 }
 
 /// Keeps calibration records in two areas of a flash.
@@ -91,8 +94,8 @@ pub struct CalibrationStore<F> {
 }
 
 impl<F: NorFlash> CalibrationStore<F> {
-    /// Over two areas of `size` bytes that begin at `areas`: whole erase
-    /// blocks of this flash and nobody else's.
+    /// Makes a store over two areas of `size` bytes that begin at `areas`: whole erase
+    /// blocks of this flash, used for nothing else.
     pub const fn new(flash: F, areas: [u32; 2], size: u32) -> Self {
         assert!(PLACE.is_multiple_of(F::WRITE_SIZE) && size as usize >= PLACE);
         assert!((size as usize).is_multiple_of(F::ERASE_SIZE));
@@ -101,21 +104,21 @@ impl<F: NorFlash> CalibrationStore<F> {
 
     /// Reads the newest record.
     pub fn load(&mut self) -> Stored {
-        let found = self.look();
+        let found = self.scan();
         match found.newest {
             Some((_, calibration)) => Stored::Found(calibration),
-            None if found.spoilt => Stored::Damaged,
+            None if found.has_damage => Stored::Damaged,
             None => Stored::Missing,
         }
     }
 
-    /// Erases the area that the newest record is not in, unless it is blank.
-    /// To be called at start-up.
+    /// Erases the area that the newest record is not in, unless it is blank. Called at
+    /// start-up.
     ///
     /// # Errors
     /// [`StoreError::Erase`].
     pub fn prepare(&mut self) -> Result<(), StoreError> {
-        let found = self.look();
+        let found = self.scan();
         let spare = usize::from(found.newest.is_some()) ^ found.area;
         if self.next_blank(spare, 0) != Some(0) {
             self.erase(spare)?;
@@ -128,9 +131,9 @@ impl<F: NorFlash> CalibrationStore<F> {
     /// # Errors
     /// [`StoreError`]; the record before is still there.
     pub fn save(&mut self, calibration: &Calibration) -> Result<(), StoreError> {
-        let found = self.look();
+        let found = self.scan();
         let number = found.newest.map_or(0, |(number, _)| number.wrapping_add(1));
-        let place = filled(number, calibration);
+        let place = encoded(number, calibration);
         let mut had_room = false;
         for area in [found.area, 1 - found.area] {
             had_room |= self.next_blank(area, 0).is_some();
@@ -144,7 +147,7 @@ impl<F: NorFlash> CalibrationStore<F> {
         })
     }
 
-    /// Writes into the first blank place of an area that takes it.
+    /// Writes into the first blank place of an area that keeps what is written.
     fn write_into(&mut self, area: usize, bytes: &[u8; PLACE]) -> bool {
         let mut from = 0;
         while let Some(place) = self.next_blank(area, from) {
@@ -181,20 +184,20 @@ impl<F: NorFlash> CalibrationStore<F> {
         erased.map_err(|_| StoreError::Erase)
     }
 
-    fn look(&mut self) -> Found {
-        let mut found = Found::default();
+    fn scan(&mut self) -> Contents {
+        let mut found = Contents::default();
         for area in 0..2 {
             for place in 0..self.places() {
                 match self.read(area, place) {
                     Place::Blank | Place::CutOff => {}
-                    Place::Holds(number, calibration) => {
+                    Place::Record(number, calibration) => {
                         let newer = |(known, _)| number.wrapping_sub(known) < u32::MAX / 2;
                         if found.newest.is_none_or(newer) {
                             found.newest = Some((number, calibration));
                             found.area = area;
                         }
                     }
-                    Place::Spoilt => found.spoilt = true,
+                    Place::Damaged => found.has_damage = true,
                 }
             }
         }
@@ -205,25 +208,25 @@ impl<F: NorFlash> CalibrationStore<F> {
         let mut bytes = [0; PLACE];
         let at = self.at(area, place);
         let (written, mark) = bytes.split_at_mut(MARK_AT);
-        // What was being written when the power went may not be readable; what
-        // comes before or after it is.
+        // A part that was being written when the power went may not be readable; the
+        // parts before and behind it are.
         let is_whole = self.flash.read(at, written).is_ok();
         let is_read = self.flash.read(at + MARK_AT as u32, mark).is_ok();
         let is_blank = |bytes: &[u8]| bytes.iter().all(|byte| *byte == 0xFF);
         let is_unmarked = is_read && is_blank(mark);
-        match record(written) {
+        match decoded(written) {
             _ if !is_whole && is_unmarked => Place::CutOff,
-            _ if !is_whole => Place::Spoilt,
-            Some((number, calibration)) => Place::Holds(number, calibration),
+            _ if !is_whole => Place::Damaged,
+            Some((number, calibration)) => Place::Record(number, calibration),
             None if is_unmarked && is_blank(written) => Place::Blank,
             None if is_unmarked => Place::CutOff,
-            None => Place::Spoilt,
+            None => Place::Damaged,
         }
     }
 }
 
-/// The record of a place and its number, if both are whole.
-fn record(written: &[u8]) -> Option<(u32, Calibration)> {
+/// Decodes a place's record and number; nothing unless both are whole.
+fn decoded(written: &[u8]) -> Option<(u32, Calibration)> {
     let (number, rest) = written.split_first_chunk()?;
     let (check, record) = rest.split_first_chunk()?;
     let [number, check] = [number, check].map(|word| u32::from_le_bytes(*word));
@@ -231,8 +234,8 @@ fn record(written: &[u8]) -> Option<(u32, Calibration)> {
     (check == !number).then_some((number, calibration))
 }
 
-/// A place's bytes.
-fn filled(number: u32, calibration: &Calibration) -> [u8; PLACE] {
+/// Encodes a record and its number as a place's bytes.
+fn encoded(number: u32, calibration: &Calibration) -> [u8; PLACE] {
     let mut place = [0xFF; PLACE];
     let mut buffer = [0; RECORD_BYTES];
     let record = calibration.encode(&mut buffer);

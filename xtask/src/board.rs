@@ -94,8 +94,8 @@ pub(crate) static BOARDS: [Board; 4] = [
         known_indirect: &[],
         known_calls: QUEUES,
         memories: &[
-            // Zero-wait SRAM in the place of flash: held to what fits the G474.
-            memory("flash", 0x0000_0000, 4096 * KIB, 128 * KIB),
+            // Zero-wait SRAM in the place of flash: held to what the G474 is held to.
+            memory("flash", 0x0000_0000, 4096 * KIB, 192 * KIB),
             memory("RAM", 0x2000_0000, 4096 * KIB, 1536 * KIB),
         ],
     },
@@ -107,7 +107,7 @@ pub(crate) static BOARDS: [Board; 4] = [
         known_indirect: &[],
         known_calls: G474_QUEUES,
         memories: &[
-            memory("flash", 0x0800_0000, 512 * KIB, 128 * KIB),
+            memory("flash", 0x0800_0000, 512 * KIB, 192 * KIB),
             // 16 KiB stay for the stack.
             memory("RAM", 0x2000_0000, 128 * KIB, 112 * KIB),
         ],

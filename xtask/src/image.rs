@@ -13,50 +13,35 @@ use crate::setup::toolchain::{TARGET, Toolchain};
 /// All boards share a target directory: cargo keeps the same crate with other
 /// features apart, so they do not undo each other's work.
 pub(crate) fn build(toolchain: Toolchain, board: &Board) -> Result<PathBuf> {
-    build_binary(toolchain, package_words(board), board.name)
+    build_binary(toolchain, board, board.name)
 }
 
 /// Builds the image that counts instructions on the emulated board.
 pub(crate) fn build_counts(toolchain: Toolchain) -> Result<PathBuf> {
-    build_binary(toolchain, counts_words(), COUNTS)
+    build_binary(toolchain, EMULATED, COUNTS)
 }
 
-fn build_binary(toolchain: Toolchain, words: [String; 6], name: &str) -> Result<PathBuf> {
-    let mut command = toolchain.cargo("build");
-    command.arg("--release").args(words);
-    run(&mut command)?;
-    let folder = toolchain.target_dir().join(TARGET).join("release");
-    Ok(folder.join(name))
-}
-
-/// Binary that counts instructions, and the variable that tells tests where it is.
-const COUNTS: &str = "mps2-an386-counts";
+/// The binary that counts instructions, and the variable that tells tests where it is.
+pub(crate) const COUNTS: &str = "mps2-an386-counts";
 pub(crate) const COUNTS_VARIABLE: &str = "HAPTERRA_MPS2_COUNTS_ELF";
 
-/// The words that choose the counting binary.
-pub(crate) fn counts_words() -> [String; 6] {
-    let mut words = package_words(EMULATED);
-    words[5] = format!("--bin={COUNTS}");
-    words
+fn build_binary(toolchain: Toolchain, board: &Board, binary: &str) -> Result<PathBuf> {
+    let mut command = toolchain.cargo("build");
+    command.arg("--release").args(package_words(board, binary));
+    run(&mut command)?;
+    let folder = toolchain.target_dir().join(TARGET).join("release");
+    Ok(folder.join(binary))
 }
 
-/// The words that choose a board's binary.
-pub(crate) fn package_words(board: &Board) -> [String; 6] {
-    let words = [
-        "--package",
-        "hapterra-firmware",
-        "--no-default-features",
-        "--features",
-    ];
-    let [package, firmware, bare, features] = words.map(String::from);
-    let feature = format!("board-{}", board.name);
+/// The words that choose a binary of the firmware, built for a board.
+pub(crate) fn package_words(board: &Board, binary: &str) -> [String; 6] {
     [
-        package,
-        firmware,
-        bare,
-        features,
-        feature,
-        format!("--bin={}", board.name),
+        "--package".into(),
+        "hapterra-firmware".into(),
+        "--no-default-features".into(),
+        "--features".into(),
+        format!("board-{}", board.name),
+        format!("--bin={binary}"),
     ]
 }
 
@@ -67,13 +52,13 @@ mod tests {
 
     #[test]
     fn the_feature_and_the_binary_follow_the_board() {
-        let line = package_words(&BOARDS[1]).join(" ");
+        let line = package_words(&BOARDS[1], BOARDS[1].name).join(" ");
         assert_eq!(
             line,
             "--package hapterra-firmware --no-default-features --features board-nucleo-g474re --bin=nucleo-g474re"
         );
         assert_eq!(
-            counts_words()[4..],
+            package_words(EMULATED, COUNTS)[4..],
             ["board-mps2-an386", "--bin=mps2-an386-counts"]
         );
     }

@@ -1,10 +1,10 @@
 //! A critical section that cannot delay the haptic interrupt.
 //!
-//! The usual single-core one masks everything through PRIMASK. This one raises
-//! BASEPRI to [`CEILING`], the priority just below the haptic interrupt's: all
-//! other interrupts wait, that one does not. In return the haptic interrupt
-//! must never enter a critical section nor share anything guarded by one; it
-//! talks to the rest through single-producer queues only.
+//! The usual one for a single core masks everything through PRIMASK. This one raises
+//! BASEPRI to [`CEILING`], the priority just below the haptic interrupt's: all other
+//! interrupts wait, the haptic one does not. In return the haptic interrupt must never
+//! enter a critical section nor share anything that one guards; it reaches the rest
+//! through single-producer queues only.
 
 use core::sync::atomic::{Ordering, compiler_fence};
 

@@ -12,14 +12,14 @@ unsafe extern "C" {
     static _stack_end: u32;
 }
 
-/// Size and high-water mark in bytes. Reads the unused part once, at most all
-/// of it.
+/// Returns the size of the stack and its high-water mark, in bytes. Reads the unused
+/// part once, at most all of it.
 pub(crate) fn figures() -> (u32, u32) {
     let (top, bottom) = (&raw const _stack_start, &raw const _stack_end);
     let mut unused = bottom;
-    // SAFETY: addresses from the linker's, which are those of the stack, whole
-    // words in RAM. The part that is read is below the stack pointer, so nobody
-    // writes it meanwhile but an interrupt, which only makes it count as used.
+    // SAFETY: the linker's addresses are those of the stack: whole words in RAM. The
+    // part that is read is below the stack pointer, so only an interrupt may write it
+    // meanwhile, which makes it count as used.
     while unused < top && unsafe { ptr::read_volatile(unused) } == STACK_PAINT_VALUE {
         unused = unused.wrapping_add(1);
     }

@@ -61,19 +61,11 @@ impl Frames {
 }
 
 /// The file of records.
-pub(crate) struct Records {
-    file: File,
-    chunk: [u8; 4 * RECORD * 64],
-    length: usize,
-}
+pub(crate) struct Records(File);
 
 impl Records {
     pub(crate) fn create(path: &CStr) -> Self {
-        Self {
-            file: File::create(path).expect("the folder can be written to"),
-            chunk: [0; 4 * RECORD * 64],
-            length: 0,
-        }
+        Self(File::create(path).expect("the folder can be written to"))
     }
 
     pub(crate) fn add(&mut self, first: [u32; 4], vector: Vec3, at: &GridPoint) {
@@ -82,19 +74,10 @@ impl Records {
             .chain(vector.to_array().map(f32::to_bits))
             .chain(at.cell().map(i32::cast_unsigned))
             .chain(at.frac().to_array().map(f32::to_bits));
-        for word in words {
-            self.chunk[self.length..self.length + 4].copy_from_slice(&word.to_le_bytes());
-            self.length += 4;
+        let mut bytes = [0; 4 * RECORD];
+        for (four, word) in bytes.chunks_exact_mut(4).zip(words) {
+            four.copy_from_slice(&word.to_le_bytes());
         }
-        if self.length == self.chunk.len() {
-            self.flush();
-        }
-    }
-
-    /// Writes what is still held.
-    pub(crate) fn flush(&mut self) {
-        let all = &self.chunk[..self.length];
-        self.file.write_all(all).expect("written");
-        self.length = 0;
+        self.0.write_all(&bytes).expect("written");
     }
 }

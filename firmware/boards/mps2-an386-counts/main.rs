@@ -1,7 +1,7 @@
 //! Counts the instructions of single ticks on the emulated Cortex-M4F.
 //!
-//! Not a product: the same core, compiled in the same way, called in a loop over
-//! a walk that the host wrote, between two looks at a timer.
+//! Not a product: it calls the same core, compiled in the same way, in a loop over
+//! scenes that the host wrote, between two looks at a timer.
 //!
 //! ```text
 //! qemu-system-arm -M mps2-an386 -nographic -monitor none \
@@ -14,9 +14,9 @@
 //! exact.
 //!
 //! In its working folder it finds, through semihosting:
-//! - `walk.frames`: [`ToDevice`] frames as on the link: a scene, then tiles and
-//!   points in the order of events. Fed by points, each is one
-//!   [`Contact::step`] in real time.
+//! - `replay.frames`: [`ToDevice`] frames as on the link: a scene, then tiles and
+//!   points in the order they come. Fed by points, each point is one
+//!   [`Contact::step`] in real time, and another scene may follow.
 //! - `counts.frames`, for a scene fed by encoders: [`Sensed`] frames, each one
 //!   [`Haptics::tick`], count to current, once the arm was armed where the
 //!   first of them is.
@@ -25,23 +25,32 @@
 #![no_std]
 #![no_main]
 
-mod bare;
+#[path = "../mps2-an386/failure.rs"]
+mod failure;
 mod files;
+#[allow(dead_code)] // This image uses only some of them.
+#[path = "../mps2-an386/registers.rs"]
+mod registers;
+mod stopwatch;
 
 use core::hint::black_box;
 
 use cortex_m_rt::entry;
-use hapterra_core::contact::Contact;
-use hapterra_core::guard::{Sense, TickRate};
+use hapterra_core::contact::{Contact, ContactOutput, ContactSettings};
+use hapterra_core::grid::GridPoint;
+use hapterra_core::guard::Sense;
 use hapterra_core::phantom::{Calibration, Mechanism};
+use hapterra_core::rate::TickRate;
+use hapterra_core::scene::{Scene, Source};
 use hapterra_core::terrain::{Tile, Window};
 use hapterra_core::tick::{Command, Haptics, Outcome};
-use hapterra_core::wire::message::{Heights, Scene, Source, TileMessage, ToDevice};
+use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::plant::Sensed;
-use hapterra_tick::{FastStep, FastTick};
+use hapterra_firmware::link::fill_tile;
 use static_cell::ConstStaticCell;
 
 use files::{Frames, Records};
+use stopwatch::Stopwatch;
 
 /// Tiles along the side of the window, as in the product's image.
 const WINDOW: usize = 16;
@@ -55,45 +64,64 @@ static SPARE: ConstStaticCell<Tile> = ConstStaticCell::new(Tile::VACANT);
 
 #[entry]
 fn main() -> ! {
-    let mut frames = Frames::open(c"walk.frames");
+    let mut frames = Frames::open(c"replay.frames");
     let Some(ToDevice::Scene(scene)) = frames.next() else {
-        panic!("the walk does not begin with a scene");
+        panic!("the replay does not begin with a scene");
     };
     let mut records = Records::create(c"ticks.bin");
     match scene.source {
-        Source::Points => contact(&scene, &mut frames, &mut records),
+        Source::Points => contact(scene, &mut frames, &mut records),
         Source::Encoders => chain(&scene, &mut frames, &mut records),
     }
-    records.flush();
     semihosting::process::exit(0)
 }
 
-/// The contact alone: each point is one step.
-fn contact(scene: &Scene, frames: &mut Frames, records: &mut Records) {
+/// The contact alone, scene after scene: each point is one step.
+fn contact(mut scene: Scene, frames: &mut Frames, records: &mut Records) {
     let mut window = Window::new(TILES.take().each_mut().map(|row| row.each_mut()));
     window.reset(scene.level, scene.size, scene.top);
     let mut spare = SPARE.take();
-    let mut contact = Contact::new();
-    let timer = bare::timer();
+    let mut contact = Contact::new(ContactSettings::REAL_TIME.with_rule(scene.rule));
+    let stopwatch = Stopwatch::start();
     while let Some(message) = frames.next() {
         match message {
+            ToDevice::Scene(next) => {
+                scene = next;
+                window.reset(scene.level, scene.size, scene.top);
+                contact = Contact::new(ContactSettings::REAL_TIME.with_rule(scene.rule));
+            }
             ToDevice::Tile(tile) => {
-                fill(spare, &tile);
+                fill_tile(spare, &tile).expect("the host made it well");
                 spare = window.install(spare);
             }
             ToDevice::Point(point) => {
                 let hip = black_box(point.hip);
-                let (cost, felt) =
-                    timer.counted(|| window.step_fast(&mut contact, hip, scene.rule));
+                let (cost, felt) = stopwatch.counted(|| step(&window, &mut contact, hip));
                 records.add(
-                    [cost, felt.state as u32, u32::from(felt.settled), felt.work],
-                    felt.stretch,
+                    [
+                        cost,
+                        felt.state as u32,
+                        u32::from(felt.converged),
+                        felt.work,
+                    ],
+                    felt.displacement,
                     &felt.proxy,
                 );
             }
-            _ => panic!("a walk has tiles and points only"),
+            _ => panic!("a replay has scenes, tiles and points only"),
         }
     }
+}
+
+/// A step of the contact in real time. A function of its own, so that its caller is
+/// compiled the same whatever the step is.
+#[inline(never)]
+fn step<'c>(
+    window: &Window<'_, WINDOW>,
+    contact: &'c mut Contact,
+    hip: GridPoint,
+) -> &'c ContactOutput {
+    contact.step(window, &hip)
 }
 
 /// The whole tick, from encoder counts to motor currents.
@@ -105,11 +133,11 @@ fn chain(scene: &Scene, frames: &mut Frames, records: &mut Records) {
     let mut spare = Some(SPARE.take());
     while let Some(ToDevice::Tile(tile)) = frames.next() {
         let buffer = spare.take().expect("every tile gives a buffer back");
-        fill(buffer, &tile);
+        fill_tile(buffer, &tile).expect("the host made it well");
         spare = haptics.accept(Command::Tile(buffer));
     }
     let mut sensed = Frames::open(c"counts.frames");
-    let timer = bare::timer();
+    let stopwatch = Stopwatch::start();
     let mut armed = false;
     let mut outcome = Outcome::default();
     while let Some(Sensed { sense, .. }) = sensed.next() {
@@ -121,7 +149,7 @@ fn chain(scene: &Scene, frames: &mut Frames, records: &mut Records) {
             dead_man: true,
             ..sense
         });
-        let (cost, ()) = timer.counted(|| haptics.tick_fast(&sense, true, &mut outcome));
+        let (cost, ()) = stopwatch.counted(|| tick(&mut haptics, &sense, &mut outcome));
         let sample = &outcome.sample;
         records.add(
             [
@@ -145,15 +173,12 @@ fn arm(haptics: &mut Haptics<'static, WINDOW>, at: Sense, outcome: &mut Outcome)
             dead_man: ticks > 0,
             ..at
         };
-        haptics.tick_fast(&sense, true, outcome);
+        tick(haptics, &sense, outcome);
     }
 }
 
-fn fill(tile: &mut Tile, message: &TileMessage<'_>) {
-    let filled = match message.heights {
-        Heights::Hole => tile.fill(message.key, 0, |_, _| f32::NAN),
-        Heights::Flat { base, height } => tile.fill(message.key, base, |_, _| height),
-        Heights::Samples { base, bytes } => tile.load(message.key, base, bytes),
-    };
-    filled.expect("the host made it well");
+/// A tick with the watchdog fed. A function of its own, as [`step`] is.
+#[inline(never)]
+fn tick(haptics: &mut Haptics<'static, WINDOW>, sense: &Sense, outcome: &mut Outcome) {
+    haptics.tick_into(sense, true, outcome);
 }

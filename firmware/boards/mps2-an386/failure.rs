@@ -7,7 +7,7 @@ use cortex_m_rt::{ExceptionFrame, exception};
 use hapterra_core::wire::frame::encode;
 use hapterra_core::wire::plant::Currents;
 
-use crate::chip::{Uart, plant_uart};
+use crate::registers::{Uart, plant_uart};
 
 /// Register reads that a byte may take; then nobody is listening.
 const PATIENCE: u32 = 1_000_000;
@@ -33,8 +33,8 @@ unsafe fn DefaultHandler(number: i16) -> ! {
     semihosting::process::exit(1)
 }
 
-/// Tells the plant that there is no current, past everything that may be
-/// broken: no interrupt, no task, no queue.
+/// Tells the plant that there is no current, past everything that may be broken: without
+/// interrupt, task or queue.
 fn amplifiers_off() {
     static ONCE: AtomicBool = AtomicBool::new(false);
     cortex_m::interrupt::disable();

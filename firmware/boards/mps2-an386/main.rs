@@ -18,83 +18,56 @@
 // Interrupt handlers bear the names of the vectors.
 #![allow(non_snake_case)]
 
+#[path = "../common/application.rs"]
+mod application;
 mod chip;
 #[path = "../common/critical.rs"]
 mod critical;
 mod failure;
 mod plant;
+mod registers;
 mod serial;
 #[path = "../common/stack.rs"]
 mod stack;
 mod time;
+mod vectors;
 
-use core::cell::{Cell, RefCell};
+use core::cell::Cell;
 
 use cortex_m::peripheral::NVIC;
 use cortex_m_rt::{entry, interrupt};
-use critical_section::Mutex;
 use defmt_semihosting as _;
 use embassy_executor::{InterruptExecutor, Spawner};
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::signal::Signal;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::status::BootReport;
-use hapterra_firmware::channels::{Application, Channels, Hardware, Tiles, assemble};
-use hapterra_firmware::haptic_loop::HapticLoop;
+use hapterra_firmware::app::Hardware;
 use hapterra_firmware::link::Link;
-use hapterra_firmware::link::task::{LinkHost, run};
-use hapterra_firmware::native::ReportedOff;
+use hapterra_firmware::link::task::{LinkBoard, run};
+use hapterra_firmware::monitor::{Monitor, Part};
+use hapterra_firmware::native::VirtualAmplifiersOff;
 use hapterra_firmware::store::Stored;
-use hapterra_firmware::supervisor::{NoWatchdog, Supervisor};
-use hapterra_firmware::vitals::{Part, Vitals};
-use static_cell::{ConstStaticCell, StaticCell};
 
-use chip::Interrupt;
-use chip::Interrupt as interrupt;
-use plant::{PlantArm, PlantPort};
+use application::{Loop, TICK_DONE};
+use chip::WINDOW;
+use plant::PlantPort;
 use serial::Serial;
 use time::Reason;
+use vectors::Interrupt;
+use vectors::Interrupt as interrupt;
 
-/// Tiles along the side of the window.
-const WINDOW: usize = 16;
-
-static TILES: ConstStaticCell<Tiles<WINDOW>> = ConstStaticCell::new(Tiles::new());
-static CHANNELS: ConstStaticCell<Channels<'static>> = ConstStaticCell::new(Channels::new());
-static LINK: Serial = Serial::new(chip::link_uart);
-static PLANT: Serial = Serial::new(chip::plant_uart);
+static LINK: Serial = Serial::new(registers::link_uart);
+static PLANT: Serial = Serial::new(registers::plant_uart);
 static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
-static TICK_DONE: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-
-/// What the haptic interrupt owns.
-struct Tick {
-    haptic_loop: HapticLoop<'static, PlantArm, ReportedOff, time::Clock, WINDOW>,
-    answers: plant::Answers,
-}
-
-/// Where that lives.
-static LOOP: StaticCell<Tick> = StaticCell::new();
-/// Carries it to its interrupt: filled once, before that is let through.
-static HANDOVER: Mutex<Cell<Option<&'static mut Tick>>> = Mutex::new(Cell::new(None));
 
 /// The haptic tick, above everything else.
 #[interrupt]
 fn HapticTick() {
-    static mut TICK: Option<&'static mut Tick> = None;
-    let Some(tick) = TICK else {
-        // Raised once by `main`, before there is a tick to be late for.
-        *TICK = critical_section::with(|cs| HANDOVER.borrow(cs).take());
-        return;
-    };
-    let drive = tick.haptic_loop.tick();
-    let arm = tick.haptic_loop.encoders_mut();
-    if let Some(number) = arm.sensed.take() {
-        tick.answers.give(number, drive);
-        if !arm.has_counts() {
-            time::hold(Reason::Plant);
-        }
+    static mut LOOP: Option<&'static mut Loop> = None;
+    if let Some((haptic_loop, drive)) = application::tick(LOOP) {
+        haptic_loop.encoders_mut().answer(drive);
+        // Waking a task takes a critical section: an interrupt below does it.
+        NVIC::pend(Interrupt::TickDone);
     }
-    // Waking a task takes a critical section: left to an interrupt below.
-    NVIC::pend(Interrupt::TickDone);
 }
 
 #[interrupt]
@@ -129,54 +102,49 @@ fn Executor() {
     unsafe { EXECUTOR.on_interrupt() };
 }
 
-/// Turns of the link between two looks at the stack.
-const STACK_TURNS: u32 = 1_000;
+/// Polls of the link between two measurements of the stack.
+const STACK_POLLS: u32 = 1_000;
 
-/// What this board has to do with the link.
+/// What the link's task needs from this board.
 struct Emulated {
-    vitals: &'static Vitals,
-    turns: Cell<u32>,
-    fed_by_arm: Cell<bool>,
-    supervisor: RefCell<Supervisor<'static, NoWatchdog>>,
+    monitor: &'static Monitor,
+    polls: Cell<u32>,
+    drives_arm: Cell<bool>,
 }
 
 impl Emulated {
-    /// Nothing but its own host watches this board, so the supervisor needs no
-    /// task of its own.
-    fn new(vitals: &'static Vitals) -> Self {
-        let parts = &[Part::Tick, Part::Link];
+    fn new(monitor: &'static Monitor) -> Self {
         Self {
-            vitals,
-            turns: Cell::new(0),
-            fed_by_arm: Cell::new(false),
-            supervisor: RefCell::new(Supervisor::new(vitals, NoWatchdog, parts)),
+            monitor,
+            polls: Cell::new(0),
+            drives_arm: Cell::new(false),
         }
     }
 
     fn measure_stack(&self) {
-        let turns = self.turns.get().wrapping_add(1);
-        self.turns.set(turns);
-        if turns.is_multiple_of(STACK_TURNS) {
-            let (size, high_water) = stack::figures();
-            self.vitals.measure_stack(size, high_water);
+        let polls = self.polls.get().wrapping_add(1);
+        self.polls.set(polls);
+        if polls.is_multiple_of(STACK_POLLS) {
+            self.monitor.measure_stack(stack::figures());
         }
     }
 }
 
-impl LinkHost for Emulated {
+impl LinkBoard for Emulated {
     async fn tick_done(&self) {
         TICK_DONE.wait().await;
     }
 
-    fn after_turn<const D: usize>(&self, link: &Link<'_, D>) {
+    fn after_poll<const D: usize>(&self, link: &Link<'_, D>) {
         if link.has_ended() {
             defmt::info!("the host said goodbye");
             semihosting::process::exit(0);
         }
-        self.supervisor.borrow_mut().check();
+        // No watchdog is behind this, but the tick wants to see one fed.
+        let _ = self.monitor.may_feed_watchdog(&[Part::Tick, Part::Link]);
         self.measure_stack();
         let drives_arm = link.drives_arm();
-        if self.fed_by_arm.replace(drives_arm) != drives_arm {
+        if self.drives_arm.replace(drives_arm) != drives_arm {
             plant::expect(drives_arm);
         }
         if link.may_stand_still() {
@@ -188,9 +156,9 @@ impl LinkHost for Emulated {
 }
 
 #[embassy_executor::task]
-async fn serve_link(mut link: Link<'static, WINDOW>, vitals: &'static Vitals) {
+async fn serve_link(mut link: Link<'static, WINDOW>, monitor: &'static Monitor) {
     let (rx, tx) = LINK.open();
-    run(&mut link, rx, tx, &Emulated::new(vitals)).await;
+    run(&mut link, rx, tx, &Emulated::new(monitor)).await;
 }
 
 #[embassy_executor::task]
@@ -202,10 +170,10 @@ async fn serve_plant(port: PlantPort) {
 /// Starts the other tasks, which cannot be handed over from outside: what they
 /// hold between two awaits stays on this executor.
 #[embassy_executor::task]
-async fn start(link: Link<'static, WINDOW>, vitals: &'static Vitals, port: PlantPort) {
+async fn start(link: Link<'static, WINDOW>, monitor: &'static Monitor, port: PlantPort) {
     // SAFETY: called from a task of the executor that is meant.
     let spawner = unsafe { Spawner::for_current_executor().await };
-    spawner.spawn(serve_link(link, vitals).expect("started once"));
+    spawner.spawn(serve_link(link, monitor).expect("started once"));
     spawner.spawn(serve_plant(port).expect("started once"));
 }
 
@@ -217,36 +185,27 @@ fn main() -> ! {
     }
 }
 
-/// Not inlined: what it needs of the stack is given back when it returns.
+/// Sets the board up. Not inlined, so that it gives its stack back when it returns.
 #[inline(never)]
 fn set_up() {
-    let (arm, answers, port) = plant::open();
+    let (encoders, port) = plant::open();
     let hardware = Hardware {
-        encoders: arm,
-        amplifiers: ReportedOff,
+        encoders,
+        amplifiers: VirtualAmplifiersOff,
         clock: time::start(),
         // There is no memory; the virtual Phantom is a Premium 1.5.
         calibration: Stored::Found(Calibration::PREMIUM_1_5),
         boot: BootReport::default(),
     };
-    let Application {
-        haptic_loop,
-        link,
-        vitals,
-    } = assemble(TILES.take(), CHANNELS.take(), hardware, "mps2-an386");
-    let tick = LOOP.init(Tick {
-        haptic_loop,
-        answers,
-    });
-    critical_section::with(|cs| HANDOVER.borrow(cs).set(Some(tick)));
-    let_interrupts_through();
+    let (link, monitor) = application::assemble(hardware, "mps2-an386");
+    enable_interrupts();
     let spawner = EXECUTOR.start(Interrupt::Executor);
-    spawner.spawn(start(link, vitals, port).expect("started once"));
+    spawner.spawn(start(link, monitor, port).expect("started once"));
     defmt::info!("mps2-an386 is up");
 }
 
-/// The haptic tick above the ceiling of critical sections, the rest below.
-fn let_interrupts_through() {
+/// Enables the haptic tick above the ceiling of critical sections, the rest below.
+fn enable_interrupts() {
     let mut core = cortex_m::Peripherals::take().expect("taken once");
     let map = [
         (Interrupt::HapticTick, critical::HAPTIC),
@@ -263,8 +222,7 @@ fn let_interrupts_through() {
         unsafe { core.NVIC.set_priority(interrupt, priority) };
     }
     for (interrupt, _) in map.iter().filter(|(i, _)| *i != Interrupt::Executor) {
-        // SAFETY: their handlers are ready; the executor's is let through by
-        // the executor itself.
+        // SAFETY: their handlers are ready; the executor enables its own.
         unsafe { NVIC::unmask(*interrupt) };
     }
     NVIC::pend(Interrupt::HapticTick);

@@ -1,8 +1,8 @@
-//! The virtual Phantom at the other end of UART1: it sends what encoders and
-//! switches say in a tick and gets the currents of that tick.
+//! The virtual Phantom at the other end of UART1: it sends what encoders and switches
+//! read in a tick and gets the currents of that tick.
 //!
-//! In a scene felt through the encoders every tick waits for its counts: from
-//! the end of one tick until the counts of the next are there, the board's time
+//! In a scene that is rendered through the encoders every tick waits for its counts:
+//! from the end of one tick until the counts of the next are there, the board's time
 //! stands still. However long the plant computes, its answer is in time.
 
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -28,27 +28,28 @@ static COUNTS: ConstStaticCell<Queue<Sensed, 4>> = ConstStaticCell::new(Queue::n
 static CURRENTS: ConstStaticCell<Queue<Currents, 4>> = ConstStaticCell::new(Queue::new());
 /// Whether counts wait for a tick.
 static COUNTS_WAIT: AtomicBool = AtomicBool::new(false);
-/// A tick has left its currents.
+/// Raised when a tick has left its currents.
 pub(crate) static ANSWERED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
 /// Connects the interrupt's side of the line with the task's.
-pub(crate) fn open() -> (PlantArm, Answers, PlantPort) {
+pub(crate) fn open() -> (PlantEncoders, PlantPort) {
     let (to_tick, counts) = COUNTS.take().split();
     let (to_plant, currents) = CURRENTS.take().split();
-    let arm = PlantArm {
+    let encoders = PlantEncoders {
         counts,
+        currents: to_plant,
         latest: Sense::default(),
-        sensed: None,
+        unanswered: None,
     };
     let port = PlantPort {
         counts: to_tick,
         currents,
     };
-    (arm, Answers(to_plant), port)
+    (encoders, port)
 }
 
-/// Says whether the scene is felt through the encoders, so that ticks have to
-/// wait for counts.
+/// Takes whether the scene is rendered through the encoders, so that ticks have to wait
+/// for counts.
 pub(crate) fn expect(counts: bool) {
     if counts && !COUNTS_WAIT.load(Ordering::Acquire) {
         time::hold(Reason::Plant);
@@ -58,42 +59,42 @@ pub(crate) fn expect(counts: bool) {
 }
 
 /// The virtual Phantom's encoders, as the tick reads them.
-pub(crate) struct PlantArm {
+pub(crate) struct PlantEncoders {
     counts: Consumer<'static, Sensed>,
+    currents: Producer<'static, Currents>,
     latest: Sense,
     /// The number of the tick whose counts were read and not yet answered.
-    pub(crate) sensed: Option<u32>,
+    unanswered: Option<u32>,
 }
 
-impl PlantArm {
-    pub(crate) fn has_counts(&self) -> bool {
-        self.counts.ready()
-    }
-}
-
-impl Encoders for PlantArm {
+impl Encoders for PlantEncoders {
     fn sense(&mut self) -> Sense {
         if let Some(Sensed { tick, sense }) = self.counts.dequeue() {
             self.latest = sense;
-            self.sensed = Some(tick);
+            self.unanswered = Some(tick);
         }
         COUNTS_WAIT.store(self.counts.ready(), Ordering::Release);
         self.latest
     }
 }
 
-/// Takes the currents of a tick from the interrupt.
-pub(crate) struct Answers(Producer<'static, Currents>);
-
-impl Answers {
-    pub(crate) fn give(&mut self, tick: u32, drive: Drive) {
+impl PlantEncoders {
+    /// Answers the counts that were read with the currents of their tick. Time stands
+    /// still until there are counts for the next.
+    pub(crate) fn answer(&mut self, drive: Drive) {
+        let Some(tick) = self.unanswered.take() else {
+            return;
+        };
         // Full only if the plant sends on without waiting for answers.
-        let _ = self.0.enqueue(Currents {
+        let _ = self.currents.enqueue(Currents {
             tick,
             currents_a: drive.currents_a.to_array(),
             enabled: drive.enabled,
             tick_ns: time::Clock::PERIOD * (1_000_000_000 / time::Clock::HZ),
         });
+        if !self.counts.ready() {
+            time::hold(Reason::Plant);
+        }
     }
 }
 

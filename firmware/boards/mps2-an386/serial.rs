@@ -11,7 +11,7 @@ use embassy_sync::pipe::Pipe;
 use embassy_sync::signal::Signal;
 use embedded_io_async::{ErrorType, Read, Write};
 
-use crate::chip::Uart;
+use crate::registers::Uart;
 
 /// What an interrupt handler and the two halves of one port share.
 pub(crate) struct Serial {

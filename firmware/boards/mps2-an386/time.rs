@@ -2,16 +2,16 @@
 //!
 //! QEMU runs with `-icount shift=3,sleep=off`: an instruction takes 8 ns of
 //! emulated time (125 million a second, what a 170 MHz Cortex-M4F does at 1.36
-//! cycles an instruction), and sleeping costs no real time. All that the board
-//! knows of time are its two timers, so stopping both stops its time. That is
-//! how lock-step works: while somebody outside has to answer first, there is a
-//! reason to [`hold`], and the time the answer takes does not exist.
+//! cycles an instruction), and sleeping costs no real time. The board's two timers are
+//! all that it knows of time, so stopping both stops its time. That is how lock-step
+//! works: while the host or the virtual Phantom has to answer first, there is a reason
+//! to [`hold`], and the answer takes no time.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
 use hapterra_firmware::board::TickClock;
 
-use crate::chip::{TIMER_HZ, Timer, clock_timer, tick_timer};
+use crate::registers::{TIMER_HZ, Timer, clock_timer, tick_timer};
 
 /// Counts between two ticks at 1 kHz.
 const PERIOD: u32 = TIMER_HZ / 1000;

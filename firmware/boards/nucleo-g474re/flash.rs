@@ -1,8 +1,8 @@
-//! Reading flash that may not be readable: a word that was being written when
-//! the power went.
+//! Reads flash that may not be readable: a word that was being written when the power
+//! went.
 //!
-//! The chip then reads anything, and raises its NMI. The calibrations have bank 2
-//! for themselves, so an NMI about that bank is about them.
+//! The chip then loads anything and raises its NMI. The calibrations have bank 2 for
+//! themselves, so an NMI about that bank is about them.
 
 use core::slice;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -30,8 +30,8 @@ unsafe fn NonMaskableInt() {
     dsb();
 }
 
-/// Copies `into.len()` bytes of flash from `address` on. Returns whether all of
-/// them could be read.
+/// Copies `into.len()` bytes of flash from `address` on and returns whether all of them
+/// could be read.
 pub(crate) fn read(address: usize, into: &mut [u8]) -> bool {
     FAILED.store(false, Ordering::SeqCst);
     // SAFETY: the caller names bytes of flash, where any bits are bytes.

@@ -11,8 +11,7 @@ use embassy_stm32::peripherals::{PE11, PE12, PE14, SPI4};
 use embassy_stm32::spi::mode::Master;
 use embassy_stm32::spi::{Config, MODE_1, Spi};
 use embassy_stm32::time::Hertz;
-use embedded_hal::spi::{self, ErrorKind, SpiBus};
-use hapterra_firmware::amplifier::Ad5754;
+use hapterra_firmware::amplifier::{Ad5754, FrameBus};
 
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-h743zi2-spi";
@@ -25,14 +24,14 @@ const FRAME: usize = 3;
 /// bus' 120 MHz at least, so this is 33 µs, twenty frames.
 const PATIENCE: u32 = 1_000;
 
-/// Set for good when a frame did not go out: what the converter holds is then
-/// not known, and the tick switches off.
+/// Set for good when a frame did not go out: what the converter holds is then unknown,
+/// and the tick switches off.
 static FAILED: AtomicBool = AtomicBool::new(false);
 
-pub(crate) type Outputs = Ad5754<Bus, Output<'static>>;
+pub(crate) type Outputs = Ad5754<Bus>;
 
-/// Takes what is needed out of the chip's peripherals. A macro, as a function
-/// cannot take some of them.
+/// Takes what is needed out of the chip's peripherals. A macro, because a function
+/// would have to take all of them.
 macro_rules! take_outputs {
     ($p:ident) => {
         crate::outputs::new($p.SPI4, $p.PE12, $p.PE14, $p.PE11)
@@ -51,8 +50,14 @@ pub(crate) fn new(
     config.frequency = Hertz(SPI_HZ);
     config.gpio_speed = Speed::High;
     let spi = Spi::new_blocking_txonly(spi, clock, data, config);
-    let sync = Output::new(sync, Level::High, Speed::High);
-    Ad5754::new(Bus::new(spi), sync)
+    REGISTERS.cr1().modify(|w| w.set_spe(false));
+    // Nothing comes back, so nothing can overrun.
+    REGISTERS.cfg2().modify(|w| w.set_comm(Comm::TRANSMITTER));
+    REGISTERS.cr2().write(|w| w.set_tsize(FRAME as u16));
+    Ad5754(Bus {
+        sync: Output::new(sync, Level::High, Speed::High),
+        _spi: spi,
+    })
 }
 
 /// Whether a frame did not go out.
@@ -62,39 +67,22 @@ pub(crate) fn failed() -> bool {
 
 /// SPI4, frame by frame.
 ///
-/// embassy sets it up, but does not send: its waiting has no bound. Here a frame
-/// is sent as the reference manual (RM0433, 50.4.9) has it for a known number
-/// of bytes, and waited for at most [`PATIENCE`] looks.
+/// embassy sets the bus up but does not send, because its waiting has no bound. Here a
+/// frame is sent as the reference manual (RM0433, 50.4.9) has it for a known number of
+/// bytes, and waited for at most [`PATIENCE`] looks.
 pub(crate) struct Bus {
+    sync: Output<'static>,
     /// Keeps clock and pins as they were set up.
     _spi: Spi<'static, Blocking, Master>,
 }
 
-impl Bus {
-    fn new(spi: Spi<'static, Blocking, Master>) -> Self {
-        REGISTERS.cr1().modify(|w| w.set_spe(false));
-        // Nothing comes back, so nothing can overrun.
-        REGISTERS.cfg2().modify(|w| w.set_comm(Comm::TRANSMITTER));
-        REGISTERS.cr2().write(|w| w.set_tsize(FRAME as u16));
-        Self { _spi: spi }
-    }
-}
-
-impl spi::ErrorType for Bus {
-    type Error = ErrorKind;
-}
-
-impl SpiBus for Bus {
-    fn read(&mut self, _: &mut [u8]) -> Result<(), ErrorKind> {
-        Err(ErrorKind::Other)
-    }
-
-    /// Sends a frame of three bytes and waits until it is out.
-    fn write(&mut self, frame: &[u8]) -> Result<(), ErrorKind> {
+impl FrameBus for Bus {
+    fn send(&mut self, frame: [u8; FRAME]) {
+        self.sync.set_low();
         REGISTERS.cr1().modify(|w| w.set_spe(true));
         REGISTERS.cr1().modify(|w| w.set_cstart(true));
-        for byte in frame.iter().take(FRAME) {
-            REGISTERS.txdr8().write_value(*byte);
+        for byte in frame {
+            REGISTERS.txdr8().write_value(byte);
         }
         let sent = (0..PATIENCE).any(|_| REGISTERS.sr().read().eot());
         REGISTERS.ifcr().write(|w| {
@@ -102,22 +90,9 @@ impl SpiBus for Bus {
             w.set_txtfc(true);
         });
         REGISTERS.cr1().modify(|w| w.set_spe(false));
-        if sent {
-            return Ok(());
+        self.sync.set_high();
+        if !sent {
+            FAILED.store(true, Ordering::Relaxed);
         }
-        FAILED.store(true, Ordering::Relaxed);
-        Err(ErrorKind::Other)
-    }
-
-    fn transfer(&mut self, _: &mut [u8], _: &[u8]) -> Result<(), ErrorKind> {
-        Err(ErrorKind::Other)
-    }
-
-    fn transfer_in_place(&mut self, _: &mut [u8]) -> Result<(), ErrorKind> {
-        Err(ErrorKind::Other)
-    }
-
-    fn flush(&mut self) -> Result<(), ErrorKind> {
-        Ok(())
     }
 }

@@ -1,8 +1,8 @@
-//! Reading flash that may not be readable: a word that was being written when
-//! the power went.
+//! Reads flash that may not be readable: a word that was being written when the power
+//! went.
 //!
-//! The load of such a word ends in a bus fault. One load is allowed to; its
-//! fault goes on behind it. Any other bus fault is a hard fault.
+//! Loading such a word raises a bus fault. One load may do so: after its fault the
+//! program goes on behind it. Any other bus fault becomes a hard fault.
 
 use core::arch::global_asm;
 
@@ -10,7 +10,7 @@ use cortex_m::Peripherals;
 use cortex_m::peripheral::scb::{Exception, SystemHandler};
 use embassy_stm32::pac;
 
-use crate::board::stm32::nvic::OTHERS;
+use crate::stm32::priorities::OTHERS;
 
 unsafe extern "C" {
     /// Loads a word; returns whether that was possible.
@@ -52,23 +52,23 @@ global_asm!(
     "bx lr",
 );
 
-/// Lets bus faults be told from hard faults, below the tick: one in the tick or
-/// in a critical section is a hard fault as before.
+/// Enables the bus fault's own handler, below the tick: a bus fault in the tick or in a
+/// critical section is a hard fault as before.
 pub(crate) fn tell_bus_faults(core: &mut Peripherals) {
-    // SAFETY: no critical section relies on the priority of a fault.
+    // SAFETY: no critical section relies on a fault's priority.
     unsafe {
         core.SCB.set_priority(SystemHandler::BusFault, OTHERS as u8);
     }
     core.SCB.enable(Exception::BusFault);
 }
 
-/// Copies `into.len()` bytes of flash from `address` on, both multiples of four.
-/// Returns whether all of them could be read.
+/// Copies `into.len()` bytes of flash from `address` on, both multiples of four, and
+/// returns whether all of them could be read.
 pub(crate) fn read(address: usize, into: &mut [u8]) -> bool {
     let mut words = (address..).step_by(4).zip(into.chunks_exact_mut(4));
     let is_read = words.all(|(at, four)| {
         let mut word = 0;
-        // SAFETY: the caller names words of flash; what cannot be read is told.
+        // SAFETY: the caller names words of flash; a fault of the load is handled.
         let is_read = unsafe { hapterra_peek(at as *const u32, &mut word) };
         four.copy_from_slice(&word.to_le_bytes());
         is_read

@@ -14,8 +14,22 @@
 //! | status LED | PB0 | the board's green LD1 |
 #![no_std]
 #![no_main]
+// Interrupt handlers bear the names of the vectors.
+#![allow(non_snake_case)]
 
-mod board;
+#[path = "../common/application.rs"]
+mod application;
+mod chip;
+mod flash;
 mod outputs;
+#[path = "../common/stm32/mod.rs"]
+mod stm32;
 
-use board::{FLASH_BASE, amplifiers_off, flash, hardware_failed, write_back};
+use embassy_stm32::interrupt;
+
+/// The haptic tick, above everything else.
+#[interrupt]
+fn TIM7() {
+    static mut LOOP: Option<&'static mut application::Loop> = None;
+    stm32::start::on_haptic_interrupt(LOOP);
+}

@@ -1,18 +1,12 @@
 //! Commands as duty cycles of TIM1.
 
-use core::convert::Infallible;
-
-use embassy_stm32::Peri;
 use embassy_stm32::gpio::OutputType;
-use embassy_stm32::pac;
-use embassy_stm32::pac::common::{RW, Reg};
-use embassy_stm32::pac::timer::regs::Ccr1ch;
 use embassy_stm32::peripherals::{PE9, PE11, PE13, TIM1};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
-use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm, SimplePwmChannel};
-use embedded_hal::pwm::{self, SetDutyCycle};
-use hapterra_firmware::amplifier::DutyCycle;
+use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm, SimplePwmChannels};
+use embassy_stm32::{Peri, pac};
+use hapterra_firmware::amplifier::{CurrentOutputs, duty_code};
 
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-h743zi2";
@@ -20,11 +14,16 @@ pub(crate) const BOARD: &str = "nucleo-h743zi2";
 /// less a command is delayed, and the coarser it is read.
 const PWM_HZ: u32 = 5_000;
 
-/// 10 % and 90 % are the ends of the range, 50 % is no current.
-pub(crate) type Outputs = [DutyCycle<Compare>; 3];
+/// Three duty cycles: 10 % and 90 % are the ends of the range, 50 % is no current.
+pub(crate) struct Outputs {
+    /// Keeps the channels as they were set up.
+    _channels: SimplePwmChannels<'static, TIM1>,
+    /// Counts of a duty cycle of 100 %.
+    max: u16,
+}
 
-/// Takes what is needed out of the chip's peripherals. A macro, as a function
-/// cannot take some of them.
+/// Takes what is needed out of the chip's peripherals. A macro, because a function
+/// would have to take all of them.
 macro_rules! take_outputs {
     ($p:ident) => {
         crate::outputs::new($p.TIM1, $p.PE9, $p.PE11, $p.PE13)
@@ -38,7 +37,7 @@ pub(crate) fn new(
     second: Peri<'static, PE11>,
     third: Peri<'static, PE13>,
 ) -> Outputs {
-    let pwm = SimplePwm::new(
+    let mut channels = SimplePwm::new(
         timer,
         Some(PwmPin::new(first, OutputType::PushPull)),
         Some(PwmPin::new(second, OutputType::PushPull)),
@@ -48,45 +47,27 @@ pub(crate) fn new(
         CountingMode::EdgeAlignedUp,
     )
     .split();
-    [(0, pwm.ch1), (1, pwm.ch2), (2, pwm.ch3)].map(|(index, mut channel)| {
+    for channel in [&mut channels.ch1, &mut channels.ch2, &mut channels.ch3] {
         channel.enable();
-        DutyCycle(Compare {
-            max: channel.max_duty_cycle() as u16,
-            _channel: channel,
-            register: pac::TIM1.ccr(index),
-        })
-    })
+    }
+    Outputs {
+        max: channels.ch1.max_duty_cycle() as u16,
+        _channels: channels,
+    }
 }
 
-/// A timer does not fail in a way that it could tell.
+impl CurrentOutputs for Outputs {
+    /// Writes the registers: embassy's own way asserts the duty cycle at each write,
+    /// and nothing in a tick may panic.
+    fn set(&mut self, fractions: [f32; 3]) {
+        let [first, second, third] = fractions.map(|fraction| duty_code(fraction, self.max));
+        pac::TIM1.ccr(0).write(|w| w.set_ccr(first));
+        pac::TIM1.ccr(1).write(|w| w.set_ccr(second));
+        pac::TIM1.ccr(2).write(|w| w.set_ccr(third));
+    }
+}
+
+/// Whether the outputs have failed: a timer cannot tell.
 pub(crate) const fn failed() -> bool {
     false
-}
-
-/// A compare register as a duty cycle.
-pub(crate) struct Compare {
-    /// Keeps the channel as it was set up.
-    _channel: SimplePwmChannel<'static, TIM1>,
-    /// Its register: embassy's own way asserts the duty cycle at each write, and
-    /// nothing in a tick may panic.
-    register: Reg<Ccr1ch, RW>,
-    max: u16,
-}
-
-// SAFETY: the register belongs to the channel, which can be sent as well.
-unsafe impl Send for Compare {}
-
-impl pwm::ErrorType for Compare {
-    type Error = Infallible;
-}
-
-impl SetDutyCycle for Compare {
-    fn max_duty_cycle(&self) -> u16 {
-        self.max
-    }
-
-    fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
-        self.register.write(|w| w.set_ccr(duty));
-        Ok(())
-    }
 }

@@ -6,9 +6,6 @@
 //! the channel in bits 18-16, then the value. Outputs A, B and C command axes 1
 //! to 3; D stays powered down.
 
-use embedded_hal::digital::OutputPin;
-use embedded_hal::spi::SpiBus;
-
 use super::CurrentOutputs;
 
 /// Registers, where they are in a frame's first byte.
@@ -22,35 +19,31 @@ const BIPOLAR_10_V: u16 = 0b100;
 /// Channels A, B and C on, and the reference.
 const POWER_UP: u16 = 0b1_0111;
 
-/// The converter behind a bus of its own and its SYNC pin.
-pub struct Ad5754<B, S> {
-    bus: B,
-    sync: S,
+/// The way to a converter: it sends frames.
+pub trait FrameBus {
+    /// Sends a frame of three bytes with SYNC low, and lets SYNC rise whatever happened:
+    /// the part ignores a frame that was cut short. The part clocks data in on the
+    /// falling edge (mode 1), at 30 MHz at most.
+    ///
+    /// A failure is not told here: the bus reports it through
+    /// [`Sense::hardware_failed`](crate::board::Sense), which switches off.
+    fn send(&mut self, frame: [u8; 3]);
 }
 
-impl<B: SpiBus, S: OutputPin> Ad5754<B, S> {
-    /// The bus clocks data in on the falling edge (mode 1), at 30 MHz at most.
-    pub const fn new(bus: B, sync: S) -> Self {
-        Self { bus, sync }
-    }
+/// The converter behind a bus of its own.
+pub struct Ad5754<B>(pub B);
 
-    /// Sends a frame. What a bus or a pin of this chip says of a failure is not
-    /// looked at here: whoever made the bus keeps it for
-    /// [`Sense::hardware_failed`](crate::board::Sense), which switches off.
+impl<B: FrameBus> Ad5754<B> {
     fn write(&mut self, head: u8, value: u16) {
         let [high, low] = value.to_be_bytes();
-        let _ = self.sync.set_low();
-        let _ = self.bus.write(&[head, high, low]);
-        let _ = self.bus.flush();
-        // Let go whatever happened: a frame that was cut short is ignored.
-        let _ = self.sync.set_high();
+        self.0.send([head, high, low]);
     }
 }
 
-impl<B: SpiBus, S: OutputPin> CurrentOutputs for Ad5754<B, S> {
-    /// Zero on every channel, then ±10 V, then power: a converter whose supply
-    /// comes and goes with the power stages' has forgotten all of it. The
-    /// outputs may take 10 µs to settle after this.
+impl<B: FrameBus> CurrentOutputs for Ad5754<B> {
+    /// Writes zero to every channel, then the range of ±10 V, then power. A converter
+    /// that is powered with the power stages has forgotten all of it. The outputs may
+    /// take 10 µs to settle afterwards.
     fn prepare(&mut self) {
         self.write(DATA | ALL, 0);
         self.write(RANGE | ALL, BIPOLAR_10_V);
@@ -82,55 +75,17 @@ mod tests {
     use crate::board::{Amplifiers, EnabledAmplifiers};
     use core::cell::RefCell;
     use core::convert::Infallible;
-    use embedded_hal::{digital, spi};
+    use embedded_hal::digital::{self, OutputPin};
     use std::rc::Rc;
-    use std::vec;
     use std::vec::Vec;
 
-    /// What was on the wires: a frame for each time that SYNC was low.
+    /// The frames that were sent.
     #[derive(Clone, Default)]
-    struct Wires(Rc<RefCell<Vec<Vec<u8>>>>);
+    struct Wires(Rc<RefCell<Vec<[u8; 3]>>>);
 
-    impl spi::ErrorType for Wires {
-        type Error = Infallible;
-    }
-
-    impl SpiBus for Wires {
-        fn read(&mut self, _: &mut [u8]) -> Result<(), Infallible> {
-            unreachable!("nothing is read")
-        }
-
-        fn write(&mut self, bytes: &[u8]) -> Result<(), Infallible> {
-            let mut frames = self.0.borrow_mut();
-            frames.last_mut().expect("SYNC is low").extend(bytes);
-            Ok(())
-        }
-
-        fn transfer(&mut self, _: &mut [u8], _: &[u8]) -> Result<(), Infallible> {
-            unreachable!("nothing is read")
-        }
-
-        fn transfer_in_place(&mut self, _: &mut [u8]) -> Result<(), Infallible> {
-            unreachable!("nothing is read")
-        }
-
-        fn flush(&mut self) -> Result<(), Infallible> {
-            Ok(())
-        }
-    }
-
-    impl digital::ErrorType for Wires {
-        type Error = Infallible;
-    }
-
-    impl OutputPin for Wires {
-        fn set_low(&mut self) -> Result<(), Infallible> {
-            self.0.borrow_mut().push(vec![]);
-            Ok(())
-        }
-
-        fn set_high(&mut self) -> Result<(), Infallible> {
-            Ok(())
+    impl FrameBus for Wires {
+        fn send(&mut self, frame: [u8; 3]) {
+            self.0.borrow_mut().push(frame);
         }
     }
 
@@ -154,7 +109,7 @@ mod tests {
     #[test]
     fn it_is_zero_before_it_has_a_range_and_has_one_before_power() {
         let wires = Wires::default();
-        let off = Off::new(Ad5754::new(wires.clone(), wires.clone()), Enable, 5.0);
+        let off = Off::new(Ad5754(wires.clone()), Enable, 5.0);
         let set_up = [[0x04, 0x00, 0x00], [0x0C, 0x00, 0x04], [0x10, 0x00, 0x17]];
         let zero = [[0, 0, 0], [1, 0, 0], [2, 0, 0]];
         assert_eq!(wires.0.take(), [set_up, zero].concat());
@@ -166,7 +121,7 @@ mod tests {
     #[test]
     fn currents_become_three_frames_one_a_channel() {
         let wires = Wires::default();
-        let converter = Ad5754::new(wires.clone(), wires.clone());
+        let converter = Ad5754(wires.clone());
         let mut on = Off::new(converter, Enable, 5.0).enable();
         wires.0.take();
         on.write([2.5, -2.5, f32::NAN]);

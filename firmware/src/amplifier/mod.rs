@@ -1,63 +1,42 @@
 //! Amplifiers made of three current outputs and an enable pin, on
 //! embedded-hal's traits, so that a board only names its pins.
 //!
-//! | output | commands by |
+//! | output | code |
 //! | --- | --- |
-//! | [`offset_code`] | a converter on the chip, behind an offset stage |
-//! | [`DutyCycle`] | a duty cycle of 10 to 90 % |
-//! | [`Ad5754`] | a quad converter on SPI, ±10 V |
+//! | a converter on the chip, behind an offset stage | [`offset_code`] |
+//! | a duty cycle of 10 to 90 % | [`duty_code`] |
+//! | a quad converter on SPI, ±10 V ([`Ad5754`]) | [`bipolar_code`] |
 
 mod ad5754;
 
 use embedded_hal::digital::OutputPin;
-use embedded_hal::pwm::SetDutyCycle;
 
-pub use ad5754::{Ad5754, bipolar_code};
+pub use ad5754::{Ad5754, FrameBus, bipolar_code};
 
 use crate::board::{Amplifiers, EnabledAmplifiers};
 
-/// One channel that commands a current as a fraction of full scale.
-pub trait CurrentOutput {
-    /// Commands `fraction` of the amplifier's full-scale current, in -1..=1.
-    fn set(&mut self, fraction: f32);
-}
-
-/// The outputs of all three axes.
+/// The outputs that command the currents of all three axes.
 pub trait CurrentOutputs {
-    /// Makes them ready, with no current commanded: at start-up, and each time
-    /// before the power stages are switched on.
+    /// Makes the outputs ready, with no current commanded: at start-up, and each
+    /// time before the power stages are switched on.
     fn prepare(&mut self) {}
 
     /// Commands these fractions of the full-scale current, each in -1..=1.
     fn set(&mut self, fractions: [f32; 3]);
 }
 
-impl<O: CurrentOutput> CurrentOutputs for [O; 3] {
-    fn set(&mut self, fractions: [f32; 3]) {
-        for (output, fraction) in self.iter_mut().zip(fractions) {
-            output.set(fraction);
-        }
-    }
+/// The compare count for `fraction` of full scale, -1..=1, of a timer whose duty cycle
+/// is 100 % at `max` counts: for an amplifier that reads 10 % as the largest negative
+/// current and 90 % as the largest positive one (Maxon ESCON). Anything outside that
+/// range is a broken wire to it. Rounded to the nearest count: cut off, full scale
+/// would fall below 10 %.
+#[must_use]
+pub fn duty_code(fraction: f32, max: u16) -> u16 {
+    (f32::from(max) * (0.5 + 0.4 * fraction) + 0.5) as u16
 }
 
-/// An amplifier that reads its command from a duty cycle, 10 % for the largest
-/// negative current and 90 % for the largest positive one (Maxon ESCON).
-/// Anything outside 10-90 % is a broken wire to it.
-pub struct DutyCycle<P>(pub P);
-
-impl<P: SetDutyCycle> CurrentOutput for DutyCycle<P> {
-    fn set(&mut self, fraction: f32) {
-        let max = f32::from(self.0.max_duty_cycle());
-        // To the nearest step: cut off, full scale would fall below 10 %.
-        let duty = max * (0.5 + 0.4 * fraction) + 0.5;
-        // A duty cycle that the timer refuses leaves the last one; the ones
-        // computed here are below `max_duty_cycle`, which is all it may refuse.
-        let _ = self.0.set_duty_cycle(duty as u16);
-    }
-}
-
-/// A converter code for `fraction` of full scale, -1..=1, where the middle of
-/// `0..=max` is no current. Rounded to the nearest code, at most half off.
+/// The converter code for `fraction` of full scale, -1..=1, where the middle of
+/// `0..=max` is no current. Rounded to the nearest code, at most half a code off.
 #[must_use]
 pub fn offset_code(fraction: f32, max: u16) -> u16 {
     let middle = f32::from(max) / 2.0;
@@ -134,12 +113,11 @@ mod tests {
     use core::cell::RefCell;
     use core::convert::Infallible;
     use embedded_hal::digital;
-    use embedded_hal::pwm;
     use std::rc::Rc;
     use std::string::String;
     use std::vec::Vec;
 
-    /// What was written, in order: "1" and "0" for the pin, numbers for duties.
+    /// What was written, in order: "on" and "off" for the pin, numbers for duties.
     type Log = Rc<RefCell<Vec<String>>>;
 
     struct Fake(Log);
@@ -160,25 +138,19 @@ mod tests {
         }
     }
 
-    impl pwm::ErrorType for Fake {
-        type Error = Infallible;
-    }
+    /// Outputs that are duty cycles of 1,000 counts.
+    struct Duties(Log);
 
-    impl SetDutyCycle for Fake {
-        fn max_duty_cycle(&self) -> u16 {
-            1000
-        }
-
-        fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
-            self.0.borrow_mut().push(duty.to_string());
-            Ok(())
+    impl CurrentOutputs for Duties {
+        fn set(&mut self, fractions: [f32; 3]) {
+            let codes = fractions.map(|fraction| duty_code(fraction, 1000).to_string());
+            self.0.borrow_mut().extend(codes);
         }
     }
 
-    fn amplifiers() -> (Off<[DutyCycle<Fake>; 3], Fake>, Log) {
+    fn amplifiers() -> (Off<Duties, Fake>, Log) {
         let log = Log::default();
-        let output = || DutyCycle(Fake(log.clone()));
-        let off = Off::new([output(), output(), output()], Fake(log.clone()), 5.0);
+        let off = Off::new(Duties(log.clone()), Fake(log.clone()), 5.0);
         assert_eq!(log.take(), ["off", "500", "500", "500"]);
         (off, log)
     }

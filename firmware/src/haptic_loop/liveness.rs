@@ -1,15 +1,15 @@
-//! Whether the watchdog is being fed, seen from the tick.
+//! Whether the watchdog is being fed, as the tick sees it.
 //!
-//! The watchdog itself resets a board whose tasks hang. The tick need not wait
-//! for that: it sees that nobody feeds it and switches off first.
+//! The watchdog resets a board whose tasks hang. The tick need not wait for that:
+//! it sees that nothing feeds the watchdog and switches off first.
 
-use hapterra_core::guard::TickRate;
+use hapterra_core::rate::TickRate;
 
-/// The watchdog has to be fed at least this often, ms: less than the 50 ms
-/// after which a board's watchdog resets it.
+/// Longest time between two feedings, ms: less than the 50 ms after which a board's
+/// watchdog resets it.
 pub(super) const STALL_MS: u32 = 40;
 
-/// Follows the count of feedings.
+/// Follows the count of feedings, tick by tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Liveness {
     limit: u32,
@@ -27,7 +27,8 @@ impl Liveness {
         }
     }
 
-    /// One tick with the count as it is now: whether the watchdog is live.
+    /// Takes the count of feedings as of this tick and returns whether the watchdog is
+    /// live.
     pub(super) fn tick(&mut self, fed: u32) -> bool {
         if fed != self.fed {
             self.fed = fed;

@@ -1,63 +1,66 @@
-//! What of the loop is told to the link, and how often.
+//! What the loop tells the link, and how often.
 //!
-//! Samples a thousand times a second whatever the tick rate: a link that is
-//! full of samples has no room for tiles. Where the loop stands, ten times a
-//! second, and at once when it changes.
+//! Samples go out a thousand times a second whatever the tick rate, because a link
+//! that is full of samples has no room for tiles. Where the guard stands goes out
+//! ten times a second, and at once when it changes.
 
-use hapterra_core::guard::{Fault, Report, TickRate};
-use hapterra_core::wire::message::Sample;
+use hapterra_core::guard::{Fault, Report};
+use hapterra_core::rate::TickRate;
+use hapterra_core::scene::Sample;
 
-/// Between two tellings of where the loop stands, ms.
-const TELL_MS: u32 = 100;
+/// Time between two reports of where the guard stands, ms.
+const REPORT_MS: u32 = 100;
 
-/// Decides what is told.
+/// Decides which samples and reports are sent.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reporter {
-    /// Ticks between two samples, and since the last.
-    record_every: u32,
-    ticks: u32,
-    tell_every: u32,
-    untold: u32,
-    told: u64,
+    /// Ticks between two samples.
+    sample_every: u32,
+    ticks_since_sample: u32,
+    /// Ticks between two reports of which nothing has changed.
+    report_every: u32,
+    ticks_since_report: u32,
+    last_report: u64,
 }
 
 impl Reporter {
     pub(super) fn new(rate: TickRate) -> Self {
         Self {
-            record_every: rate.ticks(1),
-            ticks: 0,
-            tell_every: rate.ticks(TELL_MS),
-            untold: 0,
-            // No report has this: modes are few.
-            told: u64::MAX,
+            sample_every: rate.ticks(1),
+            ticks_since_sample: 0,
+            report_every: rate.ticks(REPORT_MS),
+            ticks_since_report: 0,
+            // No report has this value: there are few modes.
+            last_report: u64::MAX,
         }
     }
 
     /// Whether this tick's sample is sent.
-    pub(super) fn records_this(&mut self, sample: &Sample) -> bool {
-        // The first of a scene is always one.
-        self.ticks = if sample.tick == 1 { 0 } else { self.ticks + 1 };
-        if self.ticks >= self.record_every {
-            self.ticks = 0;
-        }
-        self.ticks == 0
+    pub(super) fn sends_sample(&mut self, sample: &Sample) -> bool {
+        // The first sample of a scene is always sent.
+        let is_first = sample.tick == 1;
+        self.ticks_since_sample = match self.ticks_since_sample + 1 {
+            ticks if is_first || ticks >= self.sample_every => 0,
+            ticks => ticks,
+        };
+        self.ticks_since_sample == 0
     }
 
-    /// Whether it is to be told now that the guard stands here.
-    pub(super) fn reports_this(&mut self, report: &Report) -> bool {
-        self.untold = self.untold.saturating_add(1);
-        self.untold >= self.tell_every || self.told != without_limits(report)
+    /// Whether this tick's report is sent.
+    pub(super) fn sends_report(&mut self, report: &Report) -> bool {
+        self.ticks_since_report = self.ticks_since_report.saturating_add(1);
+        self.ticks_since_report >= self.report_every || self.last_report != without_limits(report)
     }
 
-    /// It was told.
-    pub(super) fn reported(&mut self, report: &Report) {
-        self.untold = 0;
-        self.told = without_limits(report);
+    /// This report was sent.
+    pub(super) fn sent_report(&mut self, report: &Report) {
+        self.ticks_since_report = 0;
+        self.last_report = without_limits(report);
     }
 }
 
-/// The report in a number. Limits come and go with every touch, and each
-/// sample has them.
+/// Packs a report into a number, without its limits: they come and go with every
+/// touch, and each sample has them.
 fn without_limits(report: &Report) -> u64 {
     let fault = report.fault.map_or(0, Fault::number);
     u64::from(report.blockers.bits())
@@ -81,7 +84,7 @@ mod tests {
                 ..Sample::default()
             };
             let sent: Vec<u32> = (1..=5 * khz)
-                .filter(|tick| reporter.records_this(&sample(*tick)))
+                .filter(|tick| reporter.sends_sample(&sample(*tick)))
                 .collect();
             assert_eq!(sent, Vec::from_iter((0..5).map(|ms| 1 + ms * khz)));
         }
@@ -97,8 +100,8 @@ mod tests {
                 report.mode = Mode::Requested;
             }
             report.limits.toggle(Limits::FORCE_CLAMPED);
-            if reporter.reports_this(&report) {
-                reporter.reported(&report);
+            if reporter.sends_report(&report) {
+                reporter.sent_report(&report);
                 told += 1;
             }
         }

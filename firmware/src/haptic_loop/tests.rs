@@ -6,35 +6,36 @@ use std::vec::Vec;
 use hapterra_core::Vec3;
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
-use hapterra_core::grid::GridPoint;
-use hapterra_core::guard::TickRate;
+use hapterra_core::grid::{Cell, GridPoint};
 use hapterra_core::phantom::{Calibration, Mechanism};
-use hapterra_core::terrain::TileKey;
-use hapterra_core::wire::message::{Point, Scene};
+use hapterra_core::rate::TickRate;
+use hapterra_core::scene::{Point, Scene};
+use hapterra_core::terrain::{FieldSize, Tile, TileKey};
 
 use super::*;
-use crate::channels::{Channels, Tiles};
-use crate::link::LinkEnds;
-use crate::native::{Given, ReportedOff, StoppedClock};
+use crate::app::{TileBuffers, WorkingMemory};
+use crate::native::{StoppedClock, VirtualAmplifiersOff, VirtualEncoders};
+use crate::queues::LinkEnds;
 
-type Loop = HapticLoop<'static, Given, ReportedOff, StoppedClock, 4>;
+type Loop = HapticLoop<'static, VirtualEncoders, VirtualAmplifiersOff, StoppedClock, 4>;
 
 fn looped(source: Source) -> (Loop, LinkEnds<'static>) {
-    let tiles = Box::leak(Box::new(Tiles::<4>::new()));
-    let (loop_ends, mut link_ends, _) = Box::leak(Box::new(Channels::new())).split();
+    let tiles = Box::leak(Box::new(TileBuffers::<4>::VACANT));
+    let memory = Box::leak(Box::new(WorkingMemory::new()));
+    let (loop_ends, mut link_ends) = memory.queues.split();
     let mut haptics = Haptics::new(tiles.split().0, TickRate::DEFAULT, None);
     haptics.configure(Mechanism::new(&Calibration::PREMIUM_1_5).expect("valid"));
     let haptic_loop = HapticLoop::new(
         haptics,
         loop_ends,
-        Given::default(),
-        ReportedOff,
+        VirtualEncoders::default(),
+        VirtualAmplifiersOff,
         StoppedClock,
     );
     let scene = Scene {
         epoch: 1,
         level: 0,
-        size: [640, 640],
+        size: FieldSize::new(640, 640),
         top: 3,
         cell_mm: 1.0,
         home: GridPoint::new([100, 100, 10], Vec3::ZERO),
@@ -47,7 +48,7 @@ fn looped(source: Source) -> (Loop, LinkEnds<'static>) {
     (haptic_loop, link_ends)
 }
 
-fn drain(link_ends: &mut LinkEnds<'_>) -> Vec<Record> {
+fn drain(link_ends: &mut LinkEnds<'_>) -> Vec<TickRecord> {
     core::iter::from_fn(|| link_ends.records.dequeue()).collect()
 }
 
@@ -57,7 +58,7 @@ fn samples_that_find_no_room_are_counted() {
     for _ in 0..200 {
         haptic_loop.tick();
     }
-    let dropped = link_ends.vitals.dropped();
+    let dropped = link_ends.monitor.dropped();
     assert!(dropped > 100);
     assert_eq!(drain(&mut link_ends).len() as u32 + dropped, 200);
 }
@@ -73,7 +74,7 @@ fn an_answer_that_finds_no_room_is_kept_until_it_does() {
         haptic_loop.tick();
     }
     let tile = Box::leak(Box::new(Tile::VACANT));
-    let key = TileKey::holding(0, [100, 100]);
+    let key = TileKey::holding(0, Cell::new(100, 100));
     tile.fill(key, 1, |_, _| 0.5).unwrap();
     assert!(link_ends.commands.enqueue(Command::Tile(tile)).is_ok());
     for _ in 0..5 {

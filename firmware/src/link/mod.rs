@@ -1,224 +1,265 @@
 //! The device's end of the link, as a state machine without I/O.
 //!
 //! Bytes from the host go in through [`Link::receive`], bytes for the host come
-//! out of [`Link::transmit`], and [`Link::turn`] does what is due in between.
+//! out of [`Link::transmit`], and [`Link::poll`] does what is due in between.
 //! Nothing here waits and nothing reads a clock: time is the loop's tick count.
 //! [`task::run`] wraps it for a board's reader and writer; tests and the native
-//! device call it directly, so every fault of a link can be played to it byte
-//! by byte.
+//! device call it directly, so that a test can play every fault of a link byte by
+//! byte.
 //!
 //! What it promises:
 //! - Answers and requests go before telemetry. When the writer is slow,
 //!   telemetry is dropped and counted, nothing else.
-//! - A tile buffer is asked of the host only if there is one to put it in.
-//! - Frames that are damaged, unasked for, or of another scene change nothing.
+//! - A tile is requested only if there is a buffer to put it in.
+//! - Frames that are damaged, not requested, or of another scene change nothing.
 //! - A hello at any time (after a zero, which ends what an earlier host may
-//!   have left unfinished) begins a session anew and keeps the scene and every
+//!   have left unfinished) opens a new session and keeps the scene and every
 //!   tile that is held, so a host that comes back goes on where it was.
 
-mod desk;
-mod focus;
+mod device_state;
 mod log;
-mod outbox;
-mod session;
+mod poll;
+mod requests;
 pub mod task;
 #[cfg(test)]
 mod tests;
+mod tiles;
+mod tx_queue;
 
-use hapterra_core::phantom::{Calibration, Mechanism};
-use hapterra_core::terrain::Tile;
+use hapterra_core::contact::ContactState;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::{Point, Sample, Scene, Source};
+use hapterra_core::terrain::{Tile, TileDemand, TileRequester};
 use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode};
-use hapterra_core::wire::message::{DeviceHello, PROTOCOL};
-use hapterra_core::wire::status::{BootReport, Health, Refusal};
-use heapless::spsc::{Consumer, Producer};
+use hapterra_core::wire::message::ToHost;
+use hapterra_core::wire::status::{Answer, Refusal, Request};
+use heapless::{Deque, Vec};
 
-use crate::board::TickClock;
-use crate::channels::{Record, SPARES};
-use crate::led::Signal;
-use crate::vitals::Vitals;
-use outbox::Outbox;
-pub use session::POINTS_AHEAD;
-use session::{Backlog, Session};
+use crate::led::LedPattern;
+use crate::queues::{LinkEnds, SPARES, TickRecord};
+pub(crate) use device_state::DeviceState;
+pub use tiles::fill_tile;
+use tx_queue::TxQueue;
 
-/// What is known of the device when it starts.
-#[derive(Clone, Debug)]
-pub(crate) struct Identity {
-    hello: DeviceHello,
-    boot: BootReport,
-    calibration: Option<Calibration>,
-}
-
-impl Identity {
-    /// Takes the board's name, cut to what the message holds, how it started,
-    /// and the arm that it knows.
-    pub(crate) fn new<C: TickClock>(
-        board: &str,
-        boot: BootReport,
-        mechanism: Option<&Mechanism>,
-    ) -> Self {
-        let hello = DeviceHello {
-            protocol: PROTOCOL,
-            board: name(board),
-            version: name(env!("CARGO_PKG_VERSION")),
-            window: 0,
-            tick_hz: C::HZ / C::PERIOD,
-            clock_hz: C::HZ,
-            epoch: None,
-        };
-        Self {
-            hello,
-            boot,
-            calibration: mechanism.map(|mechanism| *mechanism.calibration()),
-        }
-    }
-}
-
-fn name<const N: usize>(text: &str) -> heapless::String<N> {
-    let mut name = heapless::String::new();
-    // Stops at the first character that does not fit.
-    let _ = text.chars().try_for_each(|c| name.push(c));
-    name
-}
-
-/// The queues to and from the loop, as the link holds them.
-pub(crate) struct LinkEnds<'t> {
-    pub(crate) commands: Producer<'t, Command<'t>>,
-    pub(crate) spent: Consumer<'t, &'t mut Tile>,
-    pub(crate) records: Consumer<'t, Record>,
-    pub(crate) settings: Producer<'t, Mechanism>,
-    pub(crate) healths: Consumer<'t, Health>,
-    pub(crate) vitals: &'t Vitals,
-}
+/// Samples kept for the writer; beyond them, new ones are dropped.
+const SAMPLES: usize = 16;
+/// Points a host may send ahead; beyond them, they are dropped.
+pub const POINTS_AHEAD: usize = 16;
 
 /// The link's large buffers.
 pub(crate) struct Buffers {
     reader: FrameReader<MAX_FRAME>,
-    outbox: Outbox,
-    backlog: Backlog,
+    tx: TxQueue,
+    /// Samples on their way to the writer.
+    samples: Deque<Sample, SAMPLES>,
 }
 
 impl Buffers {
     pub(crate) const fn new() -> Self {
         Self {
             reader: FrameReader::new(),
-            outbox: Outbox::new(),
-            backlog: Backlog::new(),
+            tx: TxQueue::new(),
+            samples: Deque::new(),
         }
     }
 }
 
+/// Where the conversation with a host stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum SessionState {
+    /// No host has said hello, or one of another protocol did.
+    Closed,
+    /// A host has said hello.
+    Open,
+    /// The host has said goodbye.
+    Ended,
+}
+
+/// Where the points of a replay stand.
+#[derive(Clone, Copy, Debug, Default)]
+struct ReplayProgress {
+    /// The number of the point that the loop is rendering.
+    under_way: Option<u32>,
+    /// The last answer, for a host that missed it.
+    last: Option<TickRecord>,
+}
+
 /// The device's end of the link, for a window of `D × D` tiles.
 pub struct Link<'t, const D: usize> {
-    reader: &'t mut FrameReader<MAX_FRAME>,
-    session: Session<'t, D>,
+    /// `None` only while a message that was read borrows from it.
+    reader: Option<&'t mut FrameReader<MAX_FRAME>>,
+    tx: &'t mut TxQueue,
+    samples: &'t mut Deque<Sample, SAMPLES>,
+    ends: LinkEnds<'t>,
+    session: SessionState,
+    /// What is known of arming, calibration and status.
+    device: DeviceState,
+    scene: Option<Scene>,
+    requester: TileRequester<D>,
+    /// The millisecond in which the tile requester last had nothing to request, while
+    /// nothing has changed since. Its search is long, so it does not run at every
+    /// tick.
+    nothing_to_request_at: Option<u32>,
+    focus: Option<TileDemand>,
+    last_record: TickRecord,
+    spare: Vec<&'t mut Tile, SPARES>,
+    points: Deque<Point, POINTS_AHEAD>,
+    replay: ReplayProgress,
+    /// Samples packed into telemetry in this session.
+    packed: u32,
+    /// Samples dropped here; the monitor counts those that the loop dropped.
+    dropped: u32,
+    bad_frames: u32,
 }
 
 impl<'t, const D: usize> Link<'t, D> {
     pub(crate) fn new(
-        identity: Identity,
+        device: DeviceState,
         spare: [&'t mut Tile; SPARES],
         ends: LinkEnds<'t>,
         buffers: &'t mut Buffers,
     ) -> Self {
-        let Buffers {
-            reader,
-            outbox,
-            backlog,
-        } = buffers;
         Self {
-            reader,
-            session: Session::new(identity, spare, ends, outbox, backlog),
+            reader: Some(&mut buffers.reader),
+            tx: &mut buffers.tx,
+            samples: &mut buffers.samples,
+            ends,
+            session: SessionState::Closed,
+            device,
+            scene: None,
+            requester: TileRequester::new(),
+            nothing_to_request_at: None,
+            focus: None,
+            last_record: TickRecord::default(),
+            spare: spare.into_iter().collect(),
+            points: Deque::new(),
+            replay: ReplayProgress::default(),
+            packed: 0,
+            dropped: 0,
+            bad_frames: 0,
         }
     }
 
     /// Takes bytes from the host and acts on every frame that ends in them.
     ///
-    /// Returns how many were taken. Fewer than given, even none, while the loop
-    /// or the writer has to catch up first: offer the rest again after a turn.
+    /// Returns how many were taken. Fewer than given, even none, are taken while
+    /// the loop or the writer has to catch up first: offer the rest again after a
+    /// poll.
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
         let mut taken = 0;
         while let Some(rest) = bytes.get(taken..).filter(|rest| !rest.is_empty()) {
-            if !self.session.has_room() {
+            if !self.has_room() {
                 break;
             }
-            let (n, frame) = self.reader.push(rest);
+            let Some(reader) = self.reader.take() else {
+                break;
+            };
+            let (n, frame) = reader.push(rest);
             taken += n;
             match frame.map(|frame| frame.and_then(decode)) {
-                Some(Ok(message)) => self.session.on_message(message),
-                Some(Err(bad)) => self.session.on_bad_frame(bad),
+                Some(Ok(message)) => self.on_message(message),
+                Some(Err(bad)) => self.on_bad_frame(bad),
                 None => {}
             }
+            self.reader = Some(reader);
         }
         taken
     }
 
-    /// Does what is due: collects what the loop left, asks for tiles, hands on
-    /// the next point, packs telemetry.
-    pub fn turn(&mut self) {
-        self.session.turn();
-    }
-
-    /// Moves bytes that are to be sent next into `into`; returns how many.
-    /// They count as sent.
-    pub fn transmit(&mut self, into: &mut [u8]) -> usize {
-        self.session.transmit(into)
+    /// Whether a message can be acted on: it may need one command and one answer.
+    fn has_room(&self) -> bool {
+        self.ends.commands.ready() && self.tx.has_room()
     }
 
     /// The transport was interrupted: what was under way is lost.
     pub fn interrupted(&mut self) {
-        *self.reader = FrameReader::new();
-        self.session.interrupted();
+        if let Some(reader) = &mut self.reader {
+            **reader = FrameReader::new();
+        }
+        self.forget_conversation();
     }
 
     /// Whether there is nothing for the loop to do until the host has spoken.
     ///
     /// True without a scene, between the points of a replay, and, in a scene
     /// that asks for it ([`Scene::hold_clock`]), while the host owes a tile. An
-    /// emulated board then lets its clock stand still, and whoever runs the
-    /// device in lock-step does not tick; a real board goes on ticking.
-    ///
-    /// [`Scene::hold_clock`]: hapterra_core::wire::message::Scene::hold_clock
+    /// emulated board then stops its clock, and whoever runs the device in lock-step
+    /// does not tick; a real board goes on ticking.
     #[must_use]
     pub fn may_stand_still(&self) -> bool {
-        self.session.may_stand_still()
+        let waits = match &self.scene {
+            None => true,
+            Some(scene) if scene.source == Source::Points => self.replay.under_way.is_none(),
+            Some(scene) if scene.hold_clock && self.requester.in_flight() > 0 => return true,
+            Some(_) => false,
+        };
+        // What was told to the loop has to reach it, and force has to go out.
+        waits
+            && self.ends.commands.is_empty()
+            && self.ends.settings.is_empty()
+            && self.device.is_at_rest()
     }
 
-    /// Whether the arm is in use: the scene in force is felt through the
+    /// Whether the scene in force is rendered through the encoders.
+    fn renders_arm(&self) -> bool {
+        self.scene.is_some_and(|s| s.source == Source::Encoders)
+    }
+
+    /// Whether the arm is in use: the scene in force is rendered through the
     /// encoders, or force is still going out.
     #[must_use]
     pub fn drives_arm(&self) -> bool {
-        self.session.drives_arm()
+        self.renders_arm() || self.device.drives()
     }
 
-    /// What the board's status LED has to say.
+    /// What the board's status LED shows.
     #[must_use]
-    pub fn signal(&self) -> Signal {
-        self.session.signal()
+    pub fn led_pattern(&self) -> LedPattern {
+        let touching = self.last_record.sample.state == ContactState::Touching;
+        LedPattern::of(&self.device.health.report, touching)
     }
 
     /// A calibration that the host wants stored in the board's memory, until
     /// [`Self::stored`] tells how that went. The arm is disarmed.
     #[must_use]
     pub fn to_store(&self) -> Option<Calibration> {
-        self.session.to_store()
+        self.device.to_store()
     }
 
-    /// How storing it went: [`Refusal::NoMemory`], [`Refusal::MemoryFull`] or
-    /// [`Refusal::MemoryFailed`].
+    /// Takes how storing the calibration went: [`Refusal::NoMemory`],
+    /// [`Refusal::MemoryFull`] or [`Refusal::MemoryFailed`].
     pub fn stored(&mut self, result: Result<(), Refusal>) {
-        self.session.stored(result);
+        self.device.stored(result);
     }
 
-    /// Whether the host has said goodbye and everything is sent.
+    /// Whether the host has said goodbye, everything is sent and no force is left.
     #[must_use]
     pub fn has_ended(&self) -> bool {
-        self.session.has_ended()
+        let sent = self.samples.is_empty() && self.tx.is_empty();
+        self.session == SessionState::Ended && sent && !self.device.drives()
     }
 
-    /// Frames so far that were not understood.
-    #[must_use]
-    pub const fn bad_frames(&self) -> u32 {
-        self.session.bad_frames()
+    fn command(&mut self, command: Command<'t>) {
+        // Whoever leads here has asked `has_room`.
+        let _ = self.ends.commands.enqueue(command);
+    }
+
+    fn say(&mut self, message: &ToHost) {
+        // Whoever leads here has asked `has_room`.
+        self.tx.push(message);
+    }
+
+    fn answer(&mut self, request: Request, result: Result<(), Refusal>) {
+        self.say(&ToHost::Answer(Answer { request, result }));
+    }
+
+    /// Answers a point with what the loop rendered there.
+    fn answer_point(&mut self, record: TickRecord) {
+        let is_open = self.session == SessionState::Open;
+        if let Some(seq) = record.answers.filter(|_| is_open) {
+            let sample = record.sample;
+            self.say(&ToHost::PointAnswer { seq, sample });
+        }
     }
 }

@@ -15,16 +15,16 @@ use super::Link;
 /// Bytes moved at once in either direction.
 const CHUNK: usize = 64;
 
-/// What the board has to do with the link.
-pub trait LinkHost {
+/// What the link's task needs from the board.
+pub trait LinkBoard {
     /// Waits for the next tick to have ended.
     fn tick_done(&self) -> impl Future<Output = ()>;
 
-    /// Called after every turn, with the link as it then stands.
-    fn after_turn<const D: usize>(&self, link: &Link<'_, D>);
+    /// Called after every poll, with the link as it then stands.
+    fn after_poll<const D: usize>(&self, link: &Link<'_, D>);
 
-    /// Stores a calibration in the board's memory. The watchdog goes on
-    /// watching: what takes long has to wait, not to block.
+    /// Stores a calibration in the board's memory. The watchdog goes on watching, so
+    /// what takes long has to wait, not to block.
     fn store(&self, _calibration: &Calibration) -> impl Future<Output = Result<(), Refusal>> {
         core::future::ready(Err(Refusal::NoMemory))
     }
@@ -33,14 +33,14 @@ pub trait LinkHost {
 /// Serves the link for ever.
 ///
 /// Reading and writing go on side by side, so that a host that does not read
-/// cannot keep the device from reading, nor the link from its turns. A reader
-/// that gives no bytes says that the transport was interrupted; a writer that
-/// fails likewise.
+/// cannot keep the device from reading, nor the link from being polled. A reader
+/// that gives no bytes says that the transport was interrupted, and so does a writer
+/// that fails.
 pub async fn run<const D: usize>(
     link: &mut Link<'_, D>,
     mut rx: impl Read,
     mut tx: impl Write,
-    board: &impl LinkHost,
+    board: &impl LinkBoard,
 ) {
     let link = RefCell::new(link);
     let work = Signal::<NoopRawMutex, ()>::new();
@@ -73,8 +73,8 @@ pub async fn run<const D: usize>(
                 link.borrow_mut().stored(result);
             }
             loop {
-                link.borrow_mut().turn();
-                board.after_turn(&**link.borrow());
+                link.borrow_mut().poll();
+                board.after_poll(&**link.borrow());
                 room.signal(());
                 let n = link.borrow_mut().transmit(&mut chunk);
                 if n == 0 {
@@ -83,21 +83,21 @@ pub async fn run<const D: usize>(
                 let bytes = chunk.get(..n).unwrap_or(&[]);
                 // A host that does not read, or is gone, holds the writer up
                 // for as long as it likes. The link goes on with the loop.
-                let turning = async {
+                let polling = async {
                     loop {
                         board.tick_done().await;
-                        link.borrow_mut().turn();
+                        link.borrow_mut().poll();
                         room.signal(());
                     }
                 };
-                let sent = select(tx.write_all(bytes), turning).await;
+                let sent = select(tx.write_all(bytes), polling).await;
                 if let Either::First(Err(_)) = sent {
                     link.borrow_mut().interrupted();
                 }
             }
             let _ = tx.flush().await;
             // The last byte of a session may have been what ended it.
-            board.after_turn(&**link.borrow());
+            board.after_poll(&**link.borrow());
         }
     };
     join(reading, writing).await;

@@ -1,7 +1,7 @@
 //! The link against a scripted host in memory: every fault byte by byte.
 
 mod buffers;
-mod desk;
+mod device_state;
 mod faults;
 mod rig;
 mod session;

@@ -1,4 +1,4 @@
-//! What the device says of itself.
+//! The USB device: its descriptors and the two ends of the link.
 
 use embassy_usb::driver::Driver;
 use embassy_usb::msos::{
@@ -6,59 +6,49 @@ use embassy_usb::msos::{
 };
 use embassy_usb::{Builder, Config, UsbDevice};
 
-use super::known::Known;
-use super::packets::Packets;
+use super::bulk_stream::BulkStream;
+use super::endpoint_filter::EndpointFilter;
 use super::{
     INTERFACE_CLASS, INTERFACE_GUIDS, MSOS_VENDOR_CODE, PACKET, PRODUCT, PRODUCT_ID, VENDOR_ID,
 };
 
-/// Room for the descriptors, and for the data of control transfers.
-pub struct Descriptors {
+/// Room for the descriptors and for the data of control transfers.
+pub struct DescriptorBuffers {
     config: [u8; 64],
     bos: [u8; 64],
     msos: [u8; 256],
     control: [u8; 64],
 }
 
-impl Descriptors {
+impl DescriptorBuffers {
     /// Empty room.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            config: [0; 64],
-            bos: [0; 64],
-            msos: [0; 256],
-            control: [0; 64],
-        }
-    }
+    pub const EMPTY: Self = Self {
+        config: [0; 64],
+        bos: [0; 64],
+        msos: [0; 256],
+        control: [0; 64],
+    };
 }
 
-impl Default for Descriptors {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-/// The device's end of USB: the stack, to be run for ever, and the two ends of
-/// the link.
-pub type Parts<'d, D> = (
-    UsbDevice<'d, Known<D>>,
-    Packets<<D as Driver<'d>>::EndpointOut>,
-    Packets<<D as Driver<'d>>::EndpointIn>,
+/// The USB stack, which its task runs for ever, and the two ends of the link.
+pub type UsbParts<'d, D> = (
+    UsbDevice<'d, EndpointFilter<D>>,
+    BulkStream<<D as Driver<'d>>::EndpointOut>,
+    BulkStream<<D as Driver<'d>>::EndpointIn>,
 );
 
-/// Describes the device on `driver` and takes it apart.
+/// Describes the device on `driver` and returns its parts.
 pub fn device<'d, D: Driver<'d>>(
     driver: D,
     serial_number: &'d str,
-    buffers: &'d mut Descriptors,
-) -> Parts<'d, D> {
+    buffers: &'d mut DescriptorBuffers,
+) -> UsbParts<'d, D> {
     let mut config = Config::new(VENDOR_ID, PRODUCT_ID);
     config.manufacturer = Some("hapterra");
     config.product = Some(PRODUCT);
     config.serial_number = Some(serial_number);
     let mut builder = Builder::new(
-        Known(driver),
+        EndpointFilter(driver),
         config,
         &mut buffers.config,
         &mut buffers.bos,
@@ -79,7 +69,7 @@ pub fn device<'d, D: Driver<'d>>(
     drop(function);
     (
         builder.build(),
-        Packets::new(from_host),
-        Packets::new(to_host),
+        BulkStream::new(from_host),
+        BulkStream::new(to_host),
     )
 }

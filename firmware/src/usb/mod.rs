@@ -7,18 +7,18 @@
 //! that follows a script.
 
 #[cfg(feature = "usb")]
+mod bulk_stream;
+#[cfg(feature = "usb")]
 mod device;
 #[cfg(feature = "usb")]
-mod known;
-#[cfg(feature = "usb")]
-mod packets;
+mod endpoint_filter;
 
 #[cfg(feature = "usb")]
-pub use device::{Descriptors, Parts, device};
+pub use bulk_stream::BulkStream;
 #[cfg(feature = "usb")]
-pub use known::Known;
+pub use device::{DescriptorBuffers, UsbParts, device};
 #[cfg(feature = "usb")]
-pub use packets::Packets;
+pub use endpoint_filter::EndpointFilter;
 
 /// Vendor: pid.codes, shared by open-source projects.
 pub const VENDOR_ID: u16 = 0x1209;

@@ -1,4 +1,4 @@
-//! What the core finds at the addresses of its peripherals.
+//! The peripherals of a chip, at their addresses.
 
 use std::collections::HashMap;
 
@@ -106,11 +106,11 @@ impl Bus {
         for timer in &mut self.timers {
             timer.advance(self.now_ns);
         }
-        self.gather();
+        self.raise_interrupts();
     }
 
     /// Peripherals' lines become pending interrupts.
-    pub fn gather(&mut self) {
+    pub fn raise_interrupts(&mut self) {
         for (timer, at) in self.timers.iter().zip(self.chip.timers) {
             if let Some(interrupt) = at.interrupt.filter(|_| timer.is_asserting()) {
                 self.nvic.pend(interrupt);
@@ -122,7 +122,7 @@ impl Bus {
     }
 
     /// Sets the counters of axes 1 to 3.
-    pub fn feed_encoders(&mut self, counts: [i32; 3]) {
+    pub fn set_encoders(&mut self, counts: [i32; 3]) {
         for (name, count) in self.chip.encoders.into_iter().zip(counts) {
             let found = self.chip.timers.iter().position(|t| t.name == name);
             if let Some(timer) = found.and_then(|i| self.timers.get_mut(i)) {
@@ -289,7 +289,7 @@ impl Bus {
     }
 
     /// The chip's flash says that a word of it could not be read.
-    pub fn tell_unreadable(&mut self, address: u32) {
+    pub fn report_unreadable(&mut self, address: u32) {
         let flash = &self.chip.flash;
         let (register, bits) = match flash.unreadable {
             Unreadable::Nmi {
@@ -307,7 +307,7 @@ impl Bus {
 
     /// Whether the flash still says that a word of it could not be read.
     #[must_use]
-    pub fn tells_unreadable(&self) -> bool {
+    pub fn reports_unreadable(&self) -> bool {
         let (register, bit) = match self.chip.flash.unreadable {
             Unreadable::Nmi {
                 register, failed, ..

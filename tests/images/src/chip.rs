@@ -11,7 +11,8 @@ pub struct TimerAt {
     pub interrupt: Option<usize>,
 }
 
-/// "When these bits are set, those read as set, too."
+/// A status that follows a request: when some bits of a register are set, others read as
+/// set, too.
 #[derive(Clone, Copy, Debug)]
 pub struct Follows {
     /// The register that is read.

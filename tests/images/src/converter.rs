@@ -58,13 +58,13 @@ impl Converter {
         }
         match self.frame[..] {
             [head, high, low] if rises && !self.is_cut => {
-                self.obey(head >> 3, head & 7, u16::from_be_bytes([high, low]))
+                self.execute(head >> 3, head & 7, u16::from_be_bytes([high, low]))
             }
             _ => None,
         }
     }
 
-    fn obey(&mut self, register: u8, channel: u8, value: u16) -> Option<(usize, i32)> {
+    fn execute(&mut self, register: u8, channel: u8, value: u16) -> Option<(usize, i32)> {
         let code = i32::from(value.cast_signed());
         match (register, usize::from(channel)) {
             (DATA, _) if channel == ALL => self.codes = [code; 4],

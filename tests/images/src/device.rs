@@ -1,4 +1,4 @@
-//! A board on the bench: powered up, plugged in, an arm in someone's hand.
+//! A board that is powered up and plugged in, with an arm that a test moves.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -6,11 +6,14 @@ use std::time::Duration;
 
 use hapterra::link::{Bulk, BulkEndpoints, Event, Patience, Session};
 use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
-use hapterra::terrain::Terrain;
+use hapterra::raster::Raster;
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Mode, Report};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::message::{Sample, Scene, ToDevice};
+use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::status::{Answer, Status};
 use hapterra_tests::usb::host::{Found, ScriptedPipes, enumerate};
 
@@ -38,6 +41,32 @@ pub fn machines() -> Vec<Machine> {
         path.map(|path| Machine::new(chip, Image::read(path.as_ref())))
     };
     CHIPS.iter().filter_map(image).collect()
+}
+
+/// Opens a scene over `raster`, a millimetre a cell, on every board there is an image
+/// for. The HIP's home is at `home_mm`.
+///
+/// # Panics
+/// When the scene cannot be.
+pub fn on_each_board(
+    raster: &Raster,
+    home_mm: [f64; 3],
+    mut then: impl FnMut(Machine, &Terrain<'_>, Scene),
+) {
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let terrain = Terrain::new(raster, scale, 0).expect("terrain");
+    let home = scale.to_grid(home_mm).expect("addressable");
+    let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
+    for machine in machines() {
+        then(machine, &terrain, scene);
+    }
+}
+
+/// Rough ground, and a home above its middle.
+#[must_use]
+pub fn rough_ground() -> (Raster, [f64; 3]) {
+    let raster = Raster::from_fn(257, 257, |x, y| ((x * y) % 7) as f32);
+    (raster.expect("raster"), [128.0, 128.0, 40.0])
 }
 
 /// A device with a session, felt through its encoders.
@@ -71,7 +100,7 @@ impl<'t> Device<'t> {
         let link = Box::new(Bulk(pipes));
         // No verdict depends on how fast this machine is.
         let (session, _) =
-            Session::open(terrain, scene, link, Patience::EMULATED).expect("a session");
+            Session::open(terrain, scene, None, link, Patience::EMULATED).expect("a session");
         let mut device = Self {
             machine,
             session,
@@ -187,7 +216,7 @@ impl<'t> Device<'t> {
             for (now, then) in self.counts.iter_mut().zip(counts) {
                 *now += (then - *now).clamp(-COUNTS_PER_TICK, COUNTS_PER_TICK);
             }
-            self.machine.borrow().bus().feed_encoders(self.counts);
+            self.machine.borrow().bus().set_encoders(self.counts);
             self.run_ms(1);
         }
     }

@@ -1,4 +1,4 @@
-//! What a test wants to know of an image.
+//! An image's segments and symbols, read from its ELF.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -99,6 +99,28 @@ impl Image {
         let fits = |name: &str| parts.iter().all(|part| name.contains(part));
         let all = self.functions().filter(|(name, _)| fits(name));
         all.map(|(_, function)| function).collect()
+    }
+
+    /// The first function whose name has all of `parts` in it.
+    ///
+    /// # Panics
+    /// When there is none: the test relies on a function of its own.
+    #[must_use]
+    pub fn function_like(&self, parts: &[&str]) -> Function {
+        let found = self.functions_like(parts);
+        *found.first().expect("a function of its own")
+    }
+
+    /// The function that the link calls for every message it sends.
+    #[must_use]
+    pub fn message_encoder(&self) -> Function {
+        self.function_like(&["wire", "frame", "encode"])
+    }
+
+    /// A function of core's that panics and takes only a source location.
+    #[must_use]
+    pub fn panicking(&self) -> Function {
+        self.function_like(&["panic_const_rem_by_zero"])
     }
 
     /// The name of the function that holds `address`.

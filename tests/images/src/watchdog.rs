@@ -18,7 +18,7 @@ pub struct Watchdog {
 }
 
 impl Watchdog {
-    /// A register; all statuses say done.
+    /// Reads a register; no status says busy.
     #[must_use]
     pub fn read(&self, offset: u32) -> u32 {
         match offset {
@@ -39,16 +39,16 @@ impl Watchdog {
         }
     }
 
-    /// Nanoseconds that it may go unfed.
+    /// The longest time between two feedings, ns.
     #[must_use]
-    pub fn patience_ns(&self) -> u64 {
+    pub fn timeout_ns(&self) -> u64 {
         let divider = 4 << self.prescaler;
         (u64::from(self.reload) + 1) * divider * 1_000_000_000 / LSI_HZ
     }
 
-    /// Whether it resets the chip.
+    /// Whether it resets the chip now.
     #[must_use]
-    pub fn bites(&self, now_ns: u64) -> bool {
-        self.running && now_ns - self.fed_ns >= self.patience_ns()
+    pub fn has_expired(&self, now_ns: u64) -> bool {
+        self.running && now_ns - self.fed_ns >= self.timeout_ns()
     }
 }

@@ -1,73 +1,58 @@
 //! What a board knows of itself after it was reset: why, how the program before
 //! ended, and its calibration. And how much of its stack it needs.
 
-use hapterra::raster::Raster;
-use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::Rule;
-use hapterra_core::force::ForceLaw;
+use hapterra::terrain::Terrain;
 use hapterra_core::guard::Fault;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::message::{Scene, Source, ToDevice};
+use hapterra_core::scene::Scene;
+use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::status::{
     CalibrationSource, CrashKind, Refusal, Request, ResetCause, Status,
 };
 use hapterra_firmware::store::PLACE;
-use hapterra_image_tests::device::{Device, machines};
+use hapterra_image_tests::device::{Device, on_each_board, rough_ground};
 use hapterra_image_tests::elf::Function;
 use hapterra_image_tests::machine::{Machine, Stop};
 use hapterra_tests::usb::Port;
 
-fn raster() -> Raster {
-    Raster::from_fn(257, 257, |x, y| ((x * y) % 7) as f32).expect("raster")
-}
-
-fn scene(terrain: &Terrain<'_>) -> Scene {
-    let scale = Scale::new(1.0, 1.0).expect("scale");
-    let home = scale.to_grid([128.0, 128.0, 40.0]).expect("addressable");
-    terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home)
+/// Does something with every board, over rough ground.
+fn on_each(then: impl FnMut(Machine, &Terrain<'_>, Scene)) {
+    let (raster, home_mm) = rough_ground();
+    on_each_board(&raster, home_mm, then);
 }
 
 /// Opens a board, lets something be done to it, and asks it after the reset.
-fn after_reset(mut ruin: impl FnMut(&mut Device<'_>)) -> Vec<(Machine, Status)> {
-    let raster = raster();
-    let scale = Scale::new(1.0, 1.0).expect("scale");
-    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-    let ask = |machine: Machine| {
-        let mut device = Device::open(machine, &terrain, scene(&terrain));
-        ruin(&mut device);
-        let mut again = Device::open(device.reset(), &terrain, scene(&terrain));
+fn after_reset(mut disturb: impl FnMut(&mut Device<'_>)) -> Vec<(Machine, Status)> {
+    let mut all = vec![];
+    on_each(|machine, terrain, scene| {
+        let mut device = Device::open(machine, terrain, scene);
+        disturb(&mut device);
+        let mut again = Device::open(device.reset(), terrain, scene);
         let status = again.ask_status();
-        (again.reset(), status)
-    };
-    machines().into_iter().map(ask).collect()
+        all.push((again.reset(), status));
+    });
+    all
 }
 
-/// A function that the link calls for every message it sends.
-fn encoder(machine: &Machine) -> Function {
-    let found = machine.image.functions_like(&["wire", "frame", "encode"]);
-    *found.first().expect("a function of its own")
-}
-
-/// Breaks what the link calls, runs, the host reading, until the watchdog bites,
+/// Breaks what the link calls, runs, the host reading, until the watchdog has_expired,
 /// and puts the code back.
-fn starve_after(device: &Device<'_>, break_it: impl FnOnce(&mut Machine, Function)) {
+fn run_until_watchdog(device: &Device<'_>, break_it: impl FnOnce(&mut Machine, Function)) {
     let mut machine = device.machine.borrow_mut();
-    let at = encoder(&machine);
+    let at = machine.image.message_encoder();
     break_it(&mut machine, at);
     let stop = machine.run_until(300, |m| {
         let _ = m.take_in(1);
         false
     });
     assert_eq!(stop, Stop::Watchdog);
-    machine.heal(at);
+    machine.restore(at);
 }
 
 #[test]
 fn a_panic_is_told_after_the_reset_with_its_place() {
     let told = after_reset(|device| {
-        starve_after(device, |machine, at| {
-            let panic = machine.image.functions_like(&["panic_const_rem_by_zero"]);
-            machine.call_instead(at, *panic.first().expect("a function that panics"));
+        run_until_watchdog(device, |machine, at| {
+            machine.call_instead(at, machine.image.panicking());
         });
     });
     for (machine, status) in told {
@@ -84,7 +69,7 @@ fn a_panic_is_told_after_the_reset_with_its_place() {
 #[test]
 fn a_hard_fault_is_told_after_the_reset_with_its_address() {
     let told = after_reset(|device| {
-        starve_after(device, |machine, at| {
+        run_until_watchdog(device, |machine, at| {
             machine.patch(at.address, &[0x00, 0xDE]);
         });
     });
@@ -94,7 +79,7 @@ fn a_hard_fault_is_told_after_the_reset_with_its_address() {
         assert_eq!(crash.kind, CrashKind::HardFault, "{board}");
         assert_eq!(
             machine.image.at(crash.pc),
-            machine.image.at(encoder(&machine).address)
+            machine.image.at(machine.image.message_encoder().address)
         );
         assert_eq!(
             status.health.report.fault,
@@ -107,7 +92,7 @@ fn a_hard_fault_is_told_after_the_reset_with_its_address() {
 #[test]
 fn a_reset_by_the_watchdog_alone_is_told_and_a_crash_only_once() {
     let told = after_reset(|device| {
-        starve_after(device, |machine, at| {
+        run_until_watchdog(device, |machine, at| {
             machine.patch(at.address, &[0xFE, 0xE7]);
         });
     });
@@ -159,13 +144,10 @@ fn store(device: &mut Device<'_>) -> Result<(), Refusal> {
 
 #[test]
 fn a_full_memory_is_not_erased_while_the_watchdog_waits_but_at_the_next_start() {
-    let raster = raster();
-    let scale = Scale::new(1.0, 1.0).expect("scale");
-    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-    for machine in machines() {
+    on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
         let (areas, bytes) = machine.chip.flash.calibrations;
-        let mut device = Device::open(machine, &terrain, scene(&terrain));
+        let mut device = Device::open(machine, terrain, scene);
         assert_eq!(store(&mut device), Ok(()), "{board}");
         let record = device.machine.borrow().bytes(areas[0], PLACE);
         let places = bytes as usize / PLACE;
@@ -181,13 +163,13 @@ fn a_full_memory_is_not_erased_while_the_watchdog_waits_but_at_the_next_start() 
         let full = device.machine.borrow().bytes(areas[0], PLACE);
         assert_eq!(full, record, "{board}: nothing was erased");
         // The start takes as long as the erase, and ends well.
-        let mut again = Device::open(device.reset(), &terrain, scene(&terrain));
+        let mut again = Device::open(device.reset(), terrain, scene);
         let status = again.ask_status();
         assert_eq!(status.calibration, CalibrationSource::Stored, "{board}");
         let blank = again.machine.borrow().bytes(areas[0], bytes as usize);
         assert!(blank.iter().all(|byte| *byte == 0xFF), "{board}: no room");
         assert_eq!(store(&mut again), Ok(()), "{board}");
-    }
+    });
 }
 
 /// Positions in the vector table.
@@ -202,60 +184,58 @@ fn middle(machine: &Machine, place: u32) -> u32 {
 
 #[test]
 fn what_was_being_written_when_the_power_went_leaves_the_record_before() {
-    let raster = raster();
-    let scale = Scale::new(1.0, 1.0).expect("scale");
-    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-    for machine in machines() {
+    on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
-        let mut device = Device::open(machine, &terrain, scene(&terrain));
+        let mut device = Device::open(machine, terrain, scene);
         assert_eq!(store(&mut device), Ok(()), "{board}");
         let cut = middle(&device.machine.borrow(), 1);
         // Half of a word, and nothing behind it.
         device.machine.borrow_mut().patch(cut, &[0x5A]);
-        device.machine.borrow_mut().spoil(cut);
-        let mut again = Device::open(device.reset(), &terrain, scene(&terrain));
+        device.machine.borrow_mut().make_unreadable(cut);
+        let mut again = Device::open(device.reset(), terrain, scene);
         let status = again.ask_status();
         assert_eq!(status.calibration, CalibrationSource::Stored, "{board}");
         assert_eq!(status.health.report.fault, Some(Fault::WatchdogReset));
         assert_eq!(status.boot.crash, None, "{board}");
         let met = |vector| again.machine.borrow().taken.contains(&vector);
         assert!(met(NMI) || met(BUS_FAULT), "{board}: it was not read");
-        let told = again.machine.borrow().bus().tells_unreadable();
+        let told = again.machine.borrow().bus().reports_unreadable();
         assert!(!told, "{board}: left for the next write to fail by");
         assert_eq!(store(&mut again), Ok(()), "{board}: no room beside it");
         assert_eq!(again.machine.borrow().hard_faults, 0, "{board}");
-    }
+    });
 }
 
 #[test]
 fn of_a_first_record_that_was_cut_off_nothing_is_left() {
-    let raster = raster();
-    let scale = Scale::new(1.0, 1.0).expect("scale");
-    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-    for mut machine in machines() {
+    on_each(|mut machine, terrain, scene| {
         let board = machine.chip.board;
         let cut = middle(&machine, 0);
         machine.patch(cut, &[0x5A]);
-        machine.spoil(cut);
-        let mut device = Device::open(machine, &terrain, scene(&terrain));
+        machine.make_unreadable(cut);
+        let mut device = Device::open(machine, terrain, scene);
         let status = device.ask_status();
         assert_eq!(status.calibration, CalibrationSource::None, "{board}");
         assert_eq!(status.health.report.fault, None, "{board}");
         assert_eq!(store(&mut device), Ok(()), "{board}: the area was erased");
-    }
+    });
 }
 
 #[test]
 fn a_word_of_the_program_that_cannot_be_read_stops_it() {
-    let raster = raster();
-    let scale = Scale::new(1.0, 1.0).expect("scale");
-    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-    for machine in machines() {
+    on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
-        let device = Device::open(machine, &terrain, scene(&terrain));
-        let crc = device.machine.borrow().image.symbol_like(&["frame", "CRC"]);
+        let device = Device::open(machine, terrain, scene);
+        let crc = device
+            .machine
+            .borrow()
+            .image
+            .symbol_like(&["hapterra_core", "crc", "CRC"]);
         let crc = crc.expect("the table of the check sum");
-        device.machine.borrow_mut().spoil(crc.address + 64 * 4);
+        device
+            .machine
+            .borrow_mut()
+            .make_unreadable(crc.address + 64 * 4);
         let mut machine = device.machine.borrow_mut();
         let stop = machine.run_until(300, |m| {
             let _ = m.take_in(1);
@@ -264,17 +244,14 @@ fn a_word_of_the_program_that_cannot_be_read_stops_it() {
         assert_eq!(stop, Stop::Watchdog, "{board}");
         let met = |vector| machine.taken.contains(&vector);
         assert!(met(NMI) || met(BUS_FAULT), "{board}: it was not read");
-    }
+    });
 }
 
 #[test]
 fn a_third_of_the_stack_is_never_used() {
-    let raster = raster();
-    let scale = Scale::new(1.0, 1.0).expect("scale");
-    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-    for machine in machines() {
+    on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
-        let mut device = Device::arm(machine, &terrain, scene(&terrain));
+        let mut device = Device::arm(machine, terrain, scene);
         device.move_to([300, -200, 250]);
         device.run_ms(1_200);
         let stack = device.ask_status().stack;
@@ -285,5 +262,5 @@ fn a_third_of_the_stack_is_never_used() {
         assert!(stack.size >= 12 * 1024, "{board}: {stack:?}");
         assert!(stack.high_water > 500, "{board}: {stack:?}");
         assert!(3 * stack.high_water <= 2 * stack.size, "{board}: {stack:?}");
-    }
+    });
 }

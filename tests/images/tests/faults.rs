@@ -7,7 +7,7 @@ use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Fault;
-use hapterra_core::wire::message::{Scene, Source};
+use hapterra_core::scene::{Scene, Source};
 use hapterra_image_tests::bus::Effect;
 use hapterra_image_tests::chip::Commands;
 use hapterra_image_tests::device::{Device, Plane, machines};
@@ -122,37 +122,48 @@ fn assert_off_came_first(machine: &mut Machine) {
     assert!(!after.contains(&Effect::Enable(true)), "stays off");
 }
 
+/// The host is told this fault.
+fn assert_told(device: &mut Device<'_>, fault: Fault) {
+    device.run_ms(40);
+    let told = device.latest.and_then(|sample| sample.fault);
+    assert_eq!(told, Some(fault));
+}
+
+/// What is done to the machine switches the amplifiers off in one tick, and they stay
+/// off after `undo`; the host is told this fault.
+fn assert_trips_in_one_tick(
+    device: &mut Device<'_>,
+    fault: Fault,
+    disturb: impl FnOnce(&mut Machine),
+    undo: impl FnOnce(&mut Machine),
+) {
+    let mut machine = device.machine.borrow_mut();
+    disturb(&mut machine);
+    assert_eq!(ticks_until_off(&mut machine, 2), 1);
+    undo(&mut machine);
+    machine.run_ticks(20);
+    assert_off_came_first(&mut machine);
+    assert!(!machine.is_enabled(), "latched");
+    drop(machine);
+    assert_told(device, fault);
+}
+
 #[test]
 fn the_emergency_stop_takes_one_tick() {
     Bench::new().on_each(|device| {
-        let mut machine = device.machine.borrow_mut();
-        let pin = machine.chip.emergency_stop;
-        machine.set_input(pin, true);
-        assert_eq!(ticks_until_off(&mut machine, 2), 1);
-        machine.set_input(pin, false);
-        machine.run_ticks(20);
-        assert_off_came_first(&mut machine);
-        assert!(!machine.is_enabled(), "latched");
-        drop(machine);
-        device.run_ms(40);
-        let fault = device.latest.and_then(|sample| sample.fault);
-        assert_eq!(fault, Some(Fault::EmergencyStop));
+        let pin = device.machine.borrow().chip.emergency_stop;
+        let press = |machine: &mut Machine| machine.set_input(pin, true);
+        let release = |machine: &mut Machine| machine.set_input(pin, false);
+        assert_trips_in_one_tick(device, Fault::EmergencyStop, press, release);
     });
 }
 
 #[test]
 fn letting_the_dead_man_switch_go_takes_one_tick() {
     Bench::new().on_each(|device| {
-        let mut machine = device.machine.borrow_mut();
-        let pin = machine.chip.dead_man;
-        machine.set_input(pin, true);
-        assert_eq!(ticks_until_off(&mut machine, 2), 1);
-        machine.run_ticks(20);
-        assert_off_came_first(&mut machine);
-        drop(machine);
-        device.run_ms(40);
-        let fault = device.latest.and_then(|sample| sample.fault);
-        assert_eq!(fault, Some(Fault::DeadManReleased));
+        let pin = device.machine.borrow().chip.dead_man;
+        let release = |machine: &mut Machine| machine.set_input(pin, true);
+        assert_trips_in_one_tick(device, Fault::DeadManReleased, release, |_| {});
     });
 }
 
@@ -162,15 +173,8 @@ fn an_encoder_that_jumps_takes_one_tick() {
         Bench::new().on_each(|device| {
             let mut counts = device.counts;
             counts[axis] += 400;
-            let mut machine = device.machine.borrow_mut();
-            machine.bus().feed_encoders(counts);
-            assert_eq!(ticks_until_off(&mut machine, 2), 1);
-            machine.run_ticks(20);
-            assert_off_came_first(&mut machine);
-            drop(machine);
-            device.run_ms(40);
-            let fault = device.latest.and_then(|sample| sample.fault);
-            assert_eq!(fault, Some(Fault::EncoderJump));
+            let jump = |machine: &mut Machine| machine.bus().set_encoders(counts);
+            assert_trips_in_one_tick(device, Fault::EncoderJump, jump, |_| {});
         });
     }
 }
@@ -186,9 +190,7 @@ fn a_converter_that_gets_no_frames_takes_two_ticks() {
         // The tick in which it is found out has read its inputs already.
         assert_eq!(ticks_until_off(&mut machine, 3), 2);
         drop(machine);
-        device.run_ms(40);
-        let fault = device.latest.and_then(|sample| sample.fault);
-        assert_eq!(fault, Some(Fault::Hardware));
+        assert_told(device, Fault::Hardware);
     });
 }
 
@@ -211,7 +213,7 @@ fn ms_until_reset(machine: &mut Machine, function: Function) -> Option<(Option<u
 }
 
 fn assert_in_time(machine: &mut Machine, ms: u64) {
-    let patience = machine.bus().watchdog.patience_ns() / 1_000_000;
+    let patience = machine.bus().watchdog.timeout_ns() / 1_000_000;
     assert!(
         (WATCHDOG_MS..WATCHDOG_MS + 2).contains(&patience),
         "{patience} ms"
@@ -270,8 +272,7 @@ fn a_task_that_hangs_ends_in_the_watchdogs_reset() {
 fn a_tick_that_hangs_ends_in_the_watchdogs_reset() {
     Bench::new().on_each(|device| {
         let mut machine = device.machine.borrow_mut();
-        let tick = machine.image.functions_like(&["Haptics", "tick_fast"]);
-        let tick = *tick.first().expect("the tick is a function of its own");
+        let tick = machine.image.function_like(&["HapticLoop", "run_tick"]);
         let (off, ms) = ms_until_reset(&mut machine, tick).expect("reset");
         assert_eq!(off, None, "nobody is left to switch them off");
         assert_in_time(&mut machine, ms);
@@ -291,17 +292,11 @@ fn assert_off_at_once_and_for_good(machine: &mut Machine) {
     assert_eq!(machine.take_effects(), [], "nothing after it");
 }
 
-/// A function that the link calls for every message it sends.
-fn encoder(machine: &Machine) -> Function {
-    let found = machine.image.functions_like(&["wire", "frame", "encode"]);
-    *found.first().expect("a function of its own")
-}
-
 #[test]
 fn a_hard_fault_switches_the_amplifiers_off_before_anything_else() {
     Bench::new().on_each(|device| {
         let mut machine = device.machine.borrow_mut();
-        let at = encoder(&machine);
+        let at = machine.image.message_encoder();
         machine.patch(at.address, &UNDEFINED);
         assert_off_at_once_and_for_good(&mut machine);
         assert_eq!(machine.hard_faults, 1);
@@ -312,9 +307,8 @@ fn a_hard_fault_switches_the_amplifiers_off_before_anything_else() {
 fn a_panic_switches_the_amplifiers_off_before_anything_else() {
     Bench::new().on_each(|device| {
         let mut machine = device.machine.borrow_mut();
-        let at = encoder(&machine);
-        let panic = machine.image.functions_like(&["panic_const_rem_by_zero"]);
-        let panic = *panic.first().expect("a function that panics");
+        let at = machine.image.message_encoder();
+        let panic = machine.image.panicking();
         machine.call_instead(at, panic);
         assert_off_at_once_and_for_good(&mut machine);
         assert_eq!(machine.hard_faults, 0);

@@ -3,12 +3,10 @@
 
 use hapterra::phantom::{PhantomModel, Placement};
 use hapterra::raster::Raster;
-use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::{Rule, State};
+use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
-use hapterra_core::wire::message::Source;
 use hapterra_image_tests::bus::Effect;
-use hapterra_image_tests::device::{Device, Plane, machines};
+use hapterra_image_tests::device::{Device, Plane, on_each_board};
 use hapterra_image_tests::machine::Stop;
 
 fn plane() -> Plane {
@@ -28,13 +26,9 @@ fn a_plane_pressed_by_a_millimetre_gives_the_currents_of_the_f64_computation() {
     let plane = plane();
     let height = |x: u32, y: u32| 55.0 + 0.25 * x as f32 - 0.125 * y as f32;
     let raster = Raster::from_fn(201, 201, height).expect("raster");
-    let scale = Scale::new(1.0, 1.0).expect("scale");
-    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-    let home = scale.to_grid(plane.place.home_mm).expect("addressable");
-    let scene = terrain.scene(plane.law, Rule::Swept, Source::Encoders, home);
-    for machine in machines() {
+    on_each_board(&raster, plane.place.home_mm, |machine, terrain, scene| {
         let chip = machine.chip;
-        let mut device = Device::arm(machine, &terrain, scene);
+        let mut device = Device::arm(machine, terrain, scene);
         device.wait_for_full_force();
         let mut worst = 0.0f64;
         for at in [[100.0, 100.0], [70.0, 90.0], [131.5, 118.25], [88.0, 60.0]] {
@@ -44,7 +38,12 @@ fn a_plane_pressed_by_a_millimetre_gives_the_currents_of_the_f64_computation() {
             device.run_ms(40);
             let sample = device.latest.expect("telemetry");
             assert_eq!(sample.fault, None, "{}", chip.board);
-            assert_eq!(sample.state, State::Touching, "{}: {sample:?}", chip.board);
+            assert_eq!(
+                sample.state,
+                ContactState::Touching,
+                "{}: {sample:?}",
+                chip.board
+            );
             let truth = plane.currents_a(device.counts);
             assert!(truth.iter().any(|a| a.abs() > 0.1), "{truth:?}");
             let expected = truth.map(|a| device.machine.borrow().bus().code(a));
@@ -67,7 +66,7 @@ fn a_plane_pressed_by_a_millimetre_gives_the_currents_of_the_f64_computation() {
             .filter(|e| matches!(e, Effect::Enable(_)))
             .count();
         assert_eq!(enables, 1, "switched on once and never off");
-    }
+    });
 }
 
 /// Most instructions that angles' sines and cosines, the tip and the three levers
@@ -78,16 +77,12 @@ const POSE: u32 = 120;
 fn the_pose_and_its_trigonometry_cost_what_is_said() {
     let plane = plane();
     let raster = Raster::from_fn(201, 201, |_, _| 55.0).expect("raster");
-    let scale = Scale::new(1.0, 1.0).expect("scale");
-    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-    let home = scale.to_grid(plane.place.home_mm).expect("addressable");
-    let scene = terrain.scene(plane.law, Rule::Swept, Source::Encoders, home);
-    for machine in machines() {
+    on_each_board(&raster, plane.place.home_mm, |machine, terrain, scene| {
         let board = machine.chip.board;
-        let device = Device::arm(machine, &terrain, scene);
+        let device = Device::arm(machine, terrain, scene);
         let mut machine = device.machine.borrow_mut();
-        let pose = machine.image.functions_like(&["Pose", "from_angles"]);
-        let counted = machine.count(*pose.first().expect("a function of its own"));
+        let pose = machine.image.function_like(&["Pose", "from_angles"]);
+        let counted = machine.count(pose);
         assert_eq!(machine.run_ticks(100), Stop::Asked);
         let (calls, instructions) = counted.get();
         let each = instructions / calls;
@@ -96,5 +91,5 @@ fn the_pose_and_its_trigonometry_cost_what_is_said() {
             (100..=101).contains(&calls) && (100..=POSE).contains(&each),
             "{board}"
         );
-    }
+    });
 }

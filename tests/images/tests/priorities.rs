@@ -3,12 +3,7 @@
 
 use std::fmt::Write;
 
-use hapterra::raster::Raster;
-use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::Rule;
-use hapterra_core::force::ForceLaw;
-use hapterra_core::wire::message::Source;
-use hapterra_image_tests::device::{Device, machines};
+use hapterra_image_tests::device::{Device, machines, on_each_board, rough_ground};
 use hapterra_image_tests::machine::{Machine, Stop};
 
 /// The highest priority that critical sections hold back.
@@ -124,22 +119,18 @@ fn only_programs_that_failed_mask_everything() {
 
 #[test]
 fn a_tick_raised_in_any_critical_section_or_interrupt_is_not_delayed() {
-    let raster = Raster::from_fn(257, 257, |x, y| ((x * y) % 7) as f32).expect("raster");
-    let scale = Scale::new(1.0, 1.0).expect("scale");
-    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-    let home = scale.to_grid([128.0, 128.0, 40.0]).expect("addressable");
-    let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
-    for mut machine in machines() {
+    let (raster, home_mm) = rough_ground();
+    on_each_board(&raster, home_mm, |mut machine, terrain, scene| {
         let board = machine.chip.board;
         // Fine enough to find the shortest sections, odd enough to find all.
         machine.slice = 13;
-        machine.provokes_every = Some(11);
+        machine.raises_tick_every = Some(11);
         // Tiles on their way in, telemetry on its way out.
-        let device = Device::open(machine, &terrain, scene);
+        let device = Device::open(machine, terrain, scene);
         let machine = device.machine.borrow();
-        println!("{board}: raised {} times out of turn", machine.provoked);
-        assert!(machine.provoked > 200, "{board}: {}", machine.provoked);
+        println!("{board}: raised {} times out of turn", machine.raised);
+        assert!(machine.raised > 200, "{board}: {}", machine.raised);
         assert_eq!(machine.delayed, 0, "{board}");
         assert_eq!(machine.masked, 0, "{board}: PRIMASK");
-    }
+    });
 }

@@ -2,28 +2,30 @@
 
 use cortex_m::Peripherals;
 use cortex_m::peripheral::DWT;
+use embassy_stm32::peripherals::TIM7;
 use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::{Peri, pac};
 use hapterra_firmware::board::TickClock;
 
-use super::TickTimer;
+/// The timer of the haptic tick, on every chip.
+pub(crate) type TickTimer = TIM7;
 
-/// Ticks a second. `build.rs` has seen to it that it is one of the rates that
-/// this board can have.
+/// Ticks a second. `build.rs` has checked that the board can have this rate.
 const TICK_HZ: u32 = match u32::from_str_radix(env!("HAPTERRA_TICK_HZ"), 10) {
     Ok(hz) => hz,
     Err(_) => panic!("build.rs writes a number"),
 };
 
-/// Divides the timer's clock before it is counted.
+/// Divides the timer's clock before the timer counts it.
 const DIVIDER: u16 = 4;
 
-/// `HZ` core cycles a second, `PER_COUNT` of them in a count of the timer.
-pub(crate) struct Clock<const HZ: u32, const PER_COUNT: u32> {
+/// The tick's timer and the cycle counter of a core with `HZ` cycles a second, of which
+/// `PER_COUNT` are one count of the timer.
+pub(crate) struct CycleClock<const HZ: u32, const PER_COUNT: u32> {
     timer: Timer<'static, TickTimer>,
 }
 
-impl<const HZ: u32, const PER_COUNT: u32> Clock<HZ, PER_COUNT> {
+impl<const HZ: u32, const PER_COUNT: u32> CycleClock<HZ, PER_COUNT> {
     /// The auto-reload register. Exact, where a frequency asked of embassy
     /// would be rounded.
     const RELOAD: u16 = {
@@ -35,8 +37,7 @@ impl<const HZ: u32, const PER_COUNT: u32> Clock<HZ, PER_COUNT> {
         (counts_a_second / TICK_HZ - 1) as u16
     };
 
-    /// Sets the timer up, to be started by [`start`], and starts the cycle
-    /// counter.
+    /// Sets the timer up, which [`start`] starts, and starts the cycle counter.
     pub(crate) fn new(timer: Peri<'static, TickTimer>, core: &mut Peripherals) -> Self {
         core.DCB.enable_trace();
         DWT::unlock();
@@ -52,12 +53,12 @@ impl<const HZ: u32, const PER_COUNT: u32> Clock<HZ, PER_COUNT> {
     }
 }
 
-/// Starts the timer, which its owner, the loop, has been moved away with.
+/// Starts the timer. Its owner, the loop, is already with the interrupt.
 pub(crate) fn start() {
     pac::TIM7.cr1().modify(|w| w.set_cen(true));
 }
 
-impl<const HZ: u32, const PER_COUNT: u32> TickClock for Clock<HZ, PER_COUNT> {
+impl<const HZ: u32, const PER_COUNT: u32> TickClock for CycleClock<HZ, PER_COUNT> {
     const HZ: u32 = HZ;
     const PERIOD: u32 = HZ / TICK_HZ;
 

@@ -3,24 +3,27 @@
 use std::boxed::Box;
 use std::vec::Vec;
 
+use hapterra_core::scene::Source;
 use hapterra_core::terrain::{Tile, TileKey};
 use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::{FrameReader, decode};
-use hapterra_core::wire::message::{PROTOCOL, Source, ToDevice, ToHost};
+use hapterra_core::wire::hello::PROTOCOL;
+use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::status::BootReport;
 
 use super::rig::{D, frame, hello, scene, tile};
-use crate::channels::{Channels, Record, SPARES, Tiles};
-use crate::haptic_loop::LoopEnds;
-use crate::link::{Identity, Link};
+use crate::app::{TileBuffers, WorkingMemory};
+use crate::link::{DeviceState, Link};
 use crate::native::StoppedClock;
+use crate::queues::{LoopEnds, SPARES, TickRecord};
 
 /// A link in a session, and the loop's ends of its queues.
 fn link() -> (Link<'static, D>, LoopEnds<'static>) {
-    let tiles = Box::leak(Box::new(Tiles::<D>::new()));
-    let (loop_ends, link_ends, buffers) = Box::leak(Box::new(Channels::new())).split();
-    let identity = Identity::new::<StoppedClock>("test", BootReport::default(), None);
-    let mut link = Link::new(identity, tiles.split().1, link_ends, buffers);
+    let tiles = Box::leak(Box::new(TileBuffers::<D>::VACANT));
+    let memory = Box::leak(Box::new(WorkingMemory::new()));
+    let (loop_ends, link_ends) = memory.queues.split();
+    let device = DeviceState::new::<StoppedClock, D>("test", BootReport::default(), None);
+    let mut link = Link::new(device, tiles.split().1, link_ends, &mut memory.link);
     let scene = scene(Source::Encoders);
     for message in [hello(PROTOCOL), frame(&ToDevice::Scene(scene))] {
         assert_eq!(link.receive(&message), message.len());
@@ -28,9 +31,9 @@ fn link() -> (Link<'static, D>, LoopEnds<'static>) {
     (link, loop_ends)
 }
 
-/// Turns the link and reads which tiles it asks for.
+/// Polls the link and reads which tiles it asks for.
 fn asked(link: &mut Link<'static, D>) -> Vec<TileKey> {
-    link.turn();
+    link.poll();
     let mut reader = FrameReader::<2048>::new();
     let mut bytes = [0; 4096];
     let n = link.transmit(&mut bytes);
@@ -61,9 +64,9 @@ fn tiles_handed_over(loop_ends: &mut LoopEnds<'static>) -> Vec<&'static mut Tile
     tiles
 }
 
-/// What the loop says when the hand is `column` tiles east of the first.
-fn at(column: i32) -> Record {
-    let mut record = Record::default();
+/// What the loop says when the HIP is `column` tiles east of the first.
+fn at(column: i32) -> TickRecord {
+    let mut record = TickRecord::default();
     let cell = [column * 32 + 16, 100, 5];
     record.sample.hip = hapterra_core::grid::GridPoint::new(cell, hapterra_core::Vec3::ZERO);
     record.sample.proxy = record.sample.hip;
@@ -74,7 +77,7 @@ fn at(column: i32) -> Record {
 fn no_more_tiles_are_asked_for_than_there_are_buffers() {
     let (mut link, mut loop_ends) = link();
     let mut total = 0;
-    // The loop sleeps: no buffer comes back, wherever the hand goes.
+    // The loop sleeps: no buffer comes back, wherever the HIP goes.
     for column in 0..12 {
         assert!(loop_ends.records.enqueue(at(column)).is_ok());
         for key in asked(&mut link) {

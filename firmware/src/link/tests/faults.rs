@@ -4,10 +4,10 @@ use std::collections::HashSet;
 use std::vec;
 use std::vec::Vec;
 
+use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_core::terrain::RETRY_TICKS;
-use hapterra_core::wire::message::{
-    BATCH, Heights, PROTOCOL, Sample, Scene, Source, TileMessage, ToDevice, ToHost,
-};
+use hapterra_core::wire::hello::PROTOCOL;
+use hapterra_core::wire::message::{BATCH, Heights, TileMessage, ToDevice, ToHost};
 
 use super::rig::{Rig, frame, hello, point, scene, tile};
 
@@ -131,7 +131,10 @@ fn a_tile_that_was_received_is_not_replaced_by_a_late_double() {
     // The first point is answered twice.
     let felt = rig.descend(40);
     let asked = rig.needs();
-    let unique: HashSet<_> = asked.iter().map(|key| (key.col, key.row)).collect();
+    let unique: HashSet<_> = asked
+        .iter()
+        .map(|key| (key.index.col, key.index.row))
+        .collect();
     assert_eq!(
         asked.len(),
         unique.len(),
@@ -144,7 +147,7 @@ fn a_tile_that_was_received_is_not_replaced_by_a_late_double() {
 fn joined_in_the_middle_of_a_frame() {
     for cut in [1, 2, 100, 4000] {
         let mut rig = Rig::new();
-        let key = hapterra_core::terrain::TileKey::holding(0, [0, 0]);
+        let key = hapterra_core::terrain::TileKey::new(0, 0, 0);
         rig.send(&tile(7, key)[cut..]);
         rig.send(&hello(PROTOCOL));
         rig.run(1);
@@ -190,7 +193,7 @@ fn a_host_that_dies_is_felt_on_and_one_that_returns_goes_on() {
     for _ in 0..1000 {
         assert!(rig.device.tick(rig.sense).enabled, "rendering goes on");
     }
-    rig.device.interrupted();
+    rig.device.link.interrupted();
     rig.writer = usize::MAX;
     rig.heard.clear();
     rig.send(&hello(PROTOCOL));
@@ -229,7 +232,7 @@ fn a_host_that_returns_with_another_scene_starts_afresh() {
 fn tiles_of_another_scene_and_tiles_nobody_asked_for_are_dropped() {
     let mut rig = Rig::asking(scene(Source::Points));
     let asked = rig.needs()[0];
-    let unasked = hapterra_core::terrain::TileKey { col: 9, ..asked };
+    let unasked = hapterra_core::terrain::TileKey::new(asked.level, 9, asked.index.row);
     rig.send(&tile(6, asked));
     rig.send(&tile(7, unasked));
     rig.send(&point(0, 0.0, 2.0));
@@ -284,13 +287,13 @@ fn where_time_stands_still_a_damaged_tile_is_asked_for_at_once() {
         ..scene(Source::Encoders)
     };
     let mut rig = Rig::asking(held);
-    assert!(rig.device.may_stand_still());
+    assert!(rig.device.link.may_stand_still());
     let mut bytes = tile(7, rig.needs()[0]);
     bytes[9] ^= 1;
     rig.send(&bytes);
     rig.answers_tiles = true;
     rig.run(20);
-    assert!(!rig.device.may_stand_still(), "time goes on");
+    assert!(!rig.device.link.may_stand_still(), "time goes on");
 }
 
 #[test]

@@ -10,15 +10,14 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Mode, Report, Sense};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::terrain::TileKey;
+use hapterra_core::scene::{Point, Sample, Scene, Source};
+use hapterra_core::terrain::{FieldSize, TileKey};
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
-use hapterra_core::wire::message::{
-    Heights, HostHello, PROTOCOL, Point, Sample, Scene, Source, Telemetry, TileMessage, ToDevice,
-    ToHost,
-};
+use hapterra_core::wire::hello::{HostHello, PROTOCOL};
+use hapterra_core::wire::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::status::{Answer, BootReport, Refusal, Request, Status};
 
-use crate::channels::{Channels, Tiles};
+use crate::app::{TileBuffers, WorkingMemory};
 use crate::native::{Device, StoppedClock};
 use crate::store::Stored;
 
@@ -31,8 +30,8 @@ pub(super) const HELLO: HostHello = HostHello { protocol: PROTOCOL };
 /// A device without a host. Its memory is leaked, as a board's is never freed.
 fn device(stored: Stored, boot: BootReport) -> Device<StoppedClock, D> {
     Device::new(
-        Box::leak(Box::new(Tiles::new())),
-        Box::leak(Box::new(Channels::new())),
+        Box::leak(Box::new(TileBuffers::VACANT)),
+        Box::leak(Box::new(WorkingMemory::new())),
         StoppedClock,
         stored,
         boot,
@@ -44,7 +43,7 @@ pub(super) fn scene(source: Source) -> Scene {
     Scene {
         epoch: 7,
         level: 0,
-        size: [640, 640],
+        size: FieldSize::new(640, 640),
         top: 3,
         cell_mm: 1.0,
         home: GridPoint::new([100, 100, 10], Vec3::ZERO),
@@ -172,7 +171,7 @@ impl Rig {
             self.deliver();
             self.listen();
             self.deliver();
-            if !self.device.may_stand_still() {
+            if !self.device.link.may_stand_still() {
                 self.device.tick(self.sense);
             }
         }
@@ -183,7 +182,7 @@ impl Rig {
     pub(super) fn say_goodbye(&mut self) {
         self.send(&frame(&ToDevice::Bye));
         self.deliver();
-        assert!(!self.device.has_ended());
+        assert!(!self.device.link.has_ended());
         self.writer = usize::MAX;
         self.listen();
     }
@@ -200,7 +199,7 @@ impl Rig {
         let mut chunk = [0; 64];
         while left > 0 {
             let room = left.min(chunk.len());
-            let n = self.device.transmit(&mut chunk[..room]);
+            let n = self.device.link.transmit(&mut chunk[..room]);
             if n == 0 {
                 return;
             }
@@ -236,7 +235,7 @@ impl Rig {
 
     pub(super) fn felt(&self) -> Vec<(u32, Sample)> {
         let felt = |m: &ToHost| match m {
-            ToHost::Felt { seq, sample } => Some((*seq, *sample)),
+            ToHost::PointAnswer { seq, sample } => Some((*seq, *sample)),
             _ => None,
         };
         self.heard.iter().filter_map(felt).collect()

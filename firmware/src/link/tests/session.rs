@@ -2,12 +2,15 @@
 
 use std::vec::Vec;
 
-use hapterra_core::contact::State;
+use hapterra_core::contact::ContactState;
 use hapterra_core::guard::{Fault, Limits};
-use hapterra_core::wire::message::{PROTOCOL, Sample, Scene, Source, Telemetry, ToDevice, ToHost};
+use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::wire::hello::PROTOCOL;
+use hapterra_core::wire::message::{Telemetry, ToDevice, ToHost};
 
 use super::rig::{D, Rig, frame, hello, point, scene};
-use crate::link::outbox::{LONGEST_URGENT, Outbox};
+use crate::link::tx_queue::{LONGEST_URGENT, TxQueue};
+use hapterra_core::terrain::TileIndex;
 
 #[test]
 fn introduces_itself() {
@@ -29,7 +32,7 @@ fn a_replay_feels_every_point_once_and_in_order() {
     assert_eq!(numbers, Vec::from_iter(0..40));
     // The plane is at 1.5: point 30 is 0.5 below it.
     let (_, sample) = felt[30];
-    assert_eq!(sample.state, State::Touching);
+    assert_eq!(sample.state, ContactState::Touching);
     assert!((sample.force_n.z - 0.25).abs() < 1e-5, "{sample:?}");
 }
 
@@ -84,7 +87,7 @@ fn time_may_stand_still_while_a_tile_is_owed_only_if_the_scene_says_so() {
     for hold_clock in [false, true] {
         let mut rig = Rig::new();
         rig.answers_tiles = false;
-        assert!(rig.device.may_stand_still(), "without a scene");
+        assert!(rig.device.link.may_stand_still(), "without a scene");
         rig.send(&hello(PROTOCOL));
         rig.send(&frame(&ToDevice::Scene(Scene {
             hold_clock,
@@ -92,14 +95,14 @@ fn time_may_stand_still_while_a_tile_is_owed_only_if_the_scene_says_so() {
         })));
         rig.run(10);
         assert!(!rig.needs().is_empty());
-        assert_eq!(rig.device.may_stand_still(), hold_clock);
+        assert_eq!(rig.device.link.may_stand_still(), hold_clock);
         let key = rig.needs()[0];
         for key in rig.needs() {
             rig.send(&super::rig::tile(7, key));
         }
         rig.answers_tiles = true;
         rig.run(10);
-        assert!(!rig.device.may_stand_still(), "{key:?} was sent");
+        assert!(!rig.device.link.may_stand_still(), "{key:?} was sent");
     }
 }
 
@@ -111,7 +114,7 @@ fn goodbye_comes_after_everything_was_said() {
     rig.writer = 0;
     rig.run(20);
     rig.say_goodbye();
-    assert!(rig.device.has_ended());
+    assert!(rig.device.link.has_ended());
     let samples: usize = rig.telemetry().iter().map(|t| t.samples.len()).sum();
     assert!(samples >= 40, "the last, short batch came too: {samples}");
 }
@@ -120,7 +123,7 @@ fn goodbye_comes_after_everything_was_said() {
 fn the_longest_messages_fit_their_places() {
     let sample = Sample {
         tick: u32::MAX,
-        held_up_by: Some([i32::MIN; 2]),
+        missing_tile: Some(TileIndex::new(i32::MIN, i32::MIN)),
         fault: Some(Fault::Hardware),
         limits: Limits::all(),
         work: u32::MAX,
@@ -131,17 +134,17 @@ fn the_longest_messages_fit_their_places() {
         proxy: far(),
         ..Sample::default()
     };
-    let mut outbox = Outbox::new();
+    let mut queue = TxQueue::new();
     let seq = u32::MAX;
-    assert!(outbox.push(&ToHost::Felt { seq, sample }));
-    let length = outbox.take(&mut [0; 4096]);
+    assert!(queue.push(&ToHost::PointAnswer { seq, sample }));
+    let length = queue.take(&mut [0; 4096]);
     assert!(length <= LONGEST_URGENT, "{length}");
     let telemetry = Telemetry {
         first: u32::MAX,
         dropped: u32::MAX,
         samples: [sample; 8].into_iter().collect(),
     };
-    assert!(outbox.push_telemetry(telemetry));
+    assert!(queue.push_telemetry(telemetry));
 }
 
 fn far() -> hapterra_core::grid::GridPoint {

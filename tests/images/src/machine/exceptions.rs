@@ -1,8 +1,8 @@
-//! Exceptions by priority: into them, and back.
+//! Enters exceptions by priority and returns from them.
 
 use unicorn_engine::{Context, RegisterARM};
 
-use super::meddling::Load;
+use super::fault_injection::Load;
 use super::{Machine, Stop, THUMB};
 use crate::chip::Unreadable;
 
@@ -94,9 +94,8 @@ impl Machine {
         self.set_register(RegisterARM::PC, handler.into());
     }
 
-    /// Back to where the exception's frame says, where the handler may have said
-    /// otherwise. BASEPRI and PRIMASK are no part of what is restored: a handler
-    /// that left one set is seen.
+    /// Returns to the place in the exception's frame, which the handler may have changed.
+    /// BASEPRI and PRIMASK are not restored, so a handler that leaves one set is seen.
     pub(super) fn leave(&mut self) {
         let Some(active) = self.active.pop() else {
             return;
@@ -122,9 +121,9 @@ impl Machine {
         None
     }
 
-    /// What a load of a word that cannot be read leads to.
-    pub(super) fn stumble(&mut self, address: u32) -> Option<Stop> {
-        self.bus().tell_unreadable(address);
+    /// Raises what the chip raises when the core loads a word that cannot be read.
+    pub(super) fn fail_load(&mut self, address: u32) -> Option<Stop> {
+        self.bus().report_unreadable(address);
         match self.chip.flash.unreadable {
             Unreadable::Nmi { .. } => {
                 // The load is done first.

@@ -1,7 +1,7 @@
 //! The core: reset, exceptions by priority, sleep, time.
 
 mod exceptions;
-mod meddling;
+mod fault_injection;
 mod running;
 
 use std::cell::{Cell, RefCell};
@@ -14,7 +14,7 @@ use crate::bus::{Bus, Effect};
 use crate::chip::Chip;
 use crate::elf::Image;
 use exceptions::Active;
-use meddling::{Load, Spoilt};
+use fault_injection::{Load, UnreadableWord};
 use running::SLICE;
 
 /// The Thumb bit of the program status.
@@ -29,7 +29,7 @@ pub enum Stop {
     Watchdog,
     /// A condition of the caller's.
     Asked,
-    /// An exception with no way out: where.
+    /// A fault in the handler of a hard fault, and where.
     Lockup(String),
 }
 
@@ -42,7 +42,7 @@ pub struct Machine {
     core: Unicorn<'static, ()>,
     bus: Rc<RefCell<Bus>>,
     active: Vec<Active>,
-    spoilt: Vec<Spoilt>,
+    unreadable: Vec<UnreadableWord>,
     /// A load of a word that cannot be read.
     load: Rc<Cell<Load>>,
     /// Vectors taken since it was last cleared.
@@ -51,13 +51,13 @@ pub struct Machine {
     pub hard_faults: u32,
     /// Instructions between two looks at time and interrupts.
     pub slice: usize,
-    /// Every so manieth look that finds a critical section entered, or another
-    /// interrupt at work, raises the haptic interrupt out of turn.
-    pub provokes_every: Option<u32>,
-    /// Looks that found one.
+    /// The haptic interrupt is raised out of turn at every n-th look that finds the core
+    /// in a critical section or in another interrupt.
+    pub raises_tick_every: Option<u32>,
+    /// Looks that found the core there.
     pub found_busy: u32,
-    /// How often it was raised.
-    pub provoked: u32,
+    /// How often the haptic interrupt was raised out of turn.
+    pub raised: u32,
     /// How often the haptic interrupt was pending and could not be taken
     /// although no tick was under way.
     pub delayed: u32,
@@ -91,14 +91,14 @@ impl Machine {
             core,
             bus,
             active: vec![],
-            spoilt: vec![],
+            unreadable: vec![],
             load: Rc::default(),
             taken: vec![],
             hard_faults: 0,
             slice: SLICE,
-            provokes_every: None,
+            raises_tick_every: None,
             found_busy: 0,
-            provoked: 0,
+            raised: 0,
             delayed: 0,
             masked: 0,
         };

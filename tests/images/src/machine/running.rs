@@ -1,9 +1,9 @@
-//! Time: instructions and sleep between looks at interrupts.
+//! Runs the core: instructions and sleep between looks at interrupts.
 
 use unicorn_engine::RegisterARM;
 
 use super::exceptions::EXC_RETURN;
-use super::meddling::{Load, Spoilt};
+use super::fault_injection::{Load, UnreadableWord};
 use super::{Machine, Stop};
 
 /// Instructions between two looks at time and interrupts, where nothing else is
@@ -12,7 +12,7 @@ pub(super) const SLICE: usize = 200;
 /// Nanoseconds that an exception costs, whatever is done in it.
 const EXCEPTION_NS: u64 = 200;
 /// Nanoseconds between two looks while the core sleeps.
-const NAP_NS: u64 = 5_000;
+const SLEEP_NS: u64 = 5_000;
 
 impl Machine {
     /// Where the core is.
@@ -34,11 +34,11 @@ impl Machine {
             if is_met(self) {
                 return Stop::Asked;
             }
-            let (now_ns, bites) = {
+            let (now_ns, has_expired) = {
                 let bus = self.bus();
-                (bus.now_ns, bus.watchdog.bites(bus.now_ns))
+                (bus.now_ns, bus.watchdog.has_expired(bus.now_ns))
             };
-            if bites {
+            if has_expired {
                 return Stop::Watchdog;
             }
             if now_ns >= end_ns {
@@ -63,17 +63,17 @@ impl Machine {
         })
     }
 
-    /// One slice of instructions, or one nap, between looks at interrupts.
+    /// One slice of instructions, or one sleep, between looks at interrupts.
     fn step(&mut self) -> Option<Stop> {
-        self.bus().gather();
+        self.bus().raise_interrupts();
         self.erase();
-        self.provoke();
+        self.raise_tick();
         self.take_interrupt();
         self.watch_masks();
         let pc = self.register(RegisterARM::PC) | 1;
         let ended = self.core.emu_start(pc, EXC_RETURN, 0, self.slice);
         if let Load::Of(address) = self.load.get() {
-            return self.stumble(address);
+            return self.fail_load(address);
         }
         let pc = self.register(RegisterARM::PC);
         if pc & !1 == EXC_RETURN {
@@ -83,21 +83,22 @@ impl Machine {
         }
         match ended {
             Ok(()) => self.bus().advance(8 * self.slice as u64),
-            Err(_) if self.is_waiting() => self.nap(),
+            Err(_) if self.is_waiting() => self.sleep(),
             Err(error) => return self.fault(&format!("{error:?}")),
         }
         None
     }
 
-    /// What the flash was told to erase is gone at once, and the flash busy for
-    /// a while.
+    /// Erases at once what the flash was told to erase; the flash stays busy for a while.
     fn erase(&mut self) {
         let sectors = std::mem::take(&mut self.bus().erased);
         for (address, bytes) in sectors {
             self.patch(address, &vec![0xFF; bytes as usize]);
             let sector = address..address + bytes;
-            let erased = self.spoilt.extract_if(.., |s| sector.contains(&s.address));
-            for Spoilt { hook, .. } in erased {
+            let erased = self
+                .unreadable
+                .extract_if(.., |s| sector.contains(&s.address));
+            for UnreadableWord { hook, .. } in erased {
                 self.core.remove_hook(hook).expect("it was there");
             }
         }
@@ -108,7 +109,7 @@ impl Machine {
         self.active.iter().any(|a| a.vector == vector)
     }
 
-    fn provoke(&mut self) {
+    fn raise_tick(&mut self) {
         let busy = !self.active.is_empty() || self.register(RegisterARM::BASEPRI) != 0;
         let let_through = self.bus().nvic.is_enabled(self.chip.tick_interrupt);
         if !busy || !let_through || self.is_ticking() {
@@ -116,10 +117,10 @@ impl Machine {
         }
         self.found_busy += 1;
         if self
-            .provokes_every
+            .raises_tick_every
             .is_some_and(|n| self.found_busy.is_multiple_of(n))
         {
-            self.provoked += 1;
+            self.raised += 1;
             self.bus().nvic.pend(self.chip.tick_interrupt);
         }
     }
@@ -145,15 +146,15 @@ impl Machine {
     }
 
     /// Sleeps until an interrupt is pending, at most a moment.
-    fn nap(&mut self) {
+    fn sleep(&mut self) {
         let pc = self.register(RegisterARM::PC) as u32 & !1;
         let here = self.word(pc & !3) >> (8 * (pc & 2)) & 0xFFFF;
         if matches!(here, 0xBF20 | 0xBF30) {
             self.set_register(RegisterARM::PC, u64::from(pc + 2) | 1);
         }
         let mut bus = self.bus();
-        bus.gather();
+        bus.raise_interrupts();
         let woken = bus.nvic.has_pending();
-        bus.advance(if woken { EXCEPTION_NS } else { NAP_NS });
+        bus.advance(if woken { EXCEPTION_NS } else { SLEEP_NS });
     }
 }

@@ -1,20 +1,20 @@
-//! What a tick costs, and whether it came in time, by the board's own timers.
+//! What a tick costs and whether it came in time, by the board's own timers.
 
-use hapterra_core::wire::message::Sample;
+use hapterra_core::scene::Sample;
 
 use crate::board::TickClock;
 
-/// A tick that begins later than this part of the period is late: nothing is
-/// above the haptic interrupt, so only masked interrupts could hold it up.
+/// A tick that begins later than this part of the period is late. Nothing is above
+/// the haptic interrupt, so only masked interrupts could have delayed it.
 const LATE_PART: u32 = 100;
 
-/// A tick's beginning, by the free-running clock.
+/// When a tick began, by the free-running clock.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Began(u32);
+pub(super) struct TickStart(u32);
 
-/// Cost and lateness so far. Costs in counts of the board's clock.
+/// Cost and lateness so far; costs in counts of the board's clock.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Timing {
+pub(super) struct Timing {
     latest_begin: u32,
     cost: u32,
     worst_cost: u32,
@@ -22,7 +22,7 @@ pub(crate) struct Timing {
 }
 
 impl Timing {
-    pub(crate) const fn new<C: TickClock>() -> Self {
+    pub(super) const fn new<C: TickClock>() -> Self {
         Self {
             latest_begin: C::PERIOD / LATE_PART,
             cost: 0,
@@ -31,9 +31,9 @@ impl Timing {
         }
     }
 
-    /// Acknowledges the timer and looks at how long ago it was due.
-    pub(crate) fn begin<C: TickClock>(&mut self, clock: &mut C) -> Began {
-        let began = Began(clock.now());
+    /// Acknowledges the timer and counts a tick that is late.
+    pub(super) fn begin<C: TickClock>(&mut self, clock: &mut C) -> TickStart {
+        let began = TickStart(clock.now());
         if clock.since_due() > self.latest_begin {
             self.late = self.late.saturating_add(1);
         }
@@ -41,8 +41,8 @@ impl Timing {
         began
     }
 
-    /// Takes the cost. True if the next tick is already due: an overrun.
-    pub(crate) fn end<C: TickClock>(&mut self, clock: &C, began: Began) -> bool {
+    /// Measures the cost. Returns whether the next tick is already due: an overrun.
+    pub(super) fn end<C: TickClock>(&mut self, clock: &C, began: TickStart) -> bool {
         self.cost = clock.now().wrapping_sub(began.0);
         self.worst_cost = self.worst_cost.max(self.cost);
         let overrun = clock.next_is_due();
@@ -52,9 +52,9 @@ impl Timing {
         overrun
     }
 
-    /// Writes the figures into a sample. Its own tick has not ended, so the
-    /// cost is the one before it's.
-    pub(crate) const fn fill(&self, sample: &mut Sample) {
+    /// Writes the figures into a sample. The sample's own tick has not ended, so the
+    /// cost is that of the tick before it.
+    pub(super) const fn fill(&self, sample: &mut Sample) {
         sample.cost = self.cost;
         sample.worst_cost = self.worst_cost;
         sample.late = self.late;

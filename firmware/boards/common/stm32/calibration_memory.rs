@@ -1,7 +1,7 @@
-//! The calibration in flash: two areas at its end, which the memory map keeps
-//! from the image, in the bank that no code runs from. So code runs on while
-//! they are written. They are erased at start-up only, before the tick, the
-//! watchdog and the link: on an H743 that takes a second or two.
+//! The calibration in flash: two areas at its end, which the memory map keeps from the
+//! image, in the bank that no code runs from. So code runs on while they are written.
+//! They are erased at start-up only, before the tick, the watchdog and the link: on an
+//! H743 that takes a second or two.
 
 use core::cell::RefCell;
 
@@ -11,12 +11,15 @@ use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::status::Refusal;
 use hapterra_firmware::store::{CalibrationStore, StoreError, Stored};
 
+use crate::chip::{CALIBRATIONS, CALIBRATIONS_SIZE, write_back};
 use crate::flash::read;
-use crate::{FLASH_BASE, write_back};
 
-/// The flash, read past the data cache, which knows nothing of erasing, and
-/// read where it may not be readable.
-pub(crate) struct Uncached(pub(crate) Flash<'static, Blocking>);
+/// First address of flash, on every chip.
+const FLASH_BASE: usize = 0x0800_0000;
+
+/// The flash, read past the data cache, which does not notice an erase, and read where
+/// it may not be readable.
+struct Uncached(Flash<'static, Blocking>);
 
 impl ErrorType for Uncached {
     type Error = Error;
@@ -56,18 +59,13 @@ impl NorFlash for Uncached {
 }
 
 /// The board's memory for calibrations.
-pub(crate) struct Memory(RefCell<CalibrationStore<Uncached>>);
+pub(crate) struct CalibrationMemory(RefCell<CalibrationStore<Uncached>>);
 
-impl Memory {
-    /// Over two areas of `size` bytes from `areas` on, counted from the
-    /// beginning of flash. Gives what is stored, and sees to it that there is
-    /// room for the next: erasing takes long, and now nobody waits.
-    pub(crate) fn open(
-        flash: Flash<'static, Blocking>,
-        areas: [u32; 2],
-        size: u32,
-    ) -> (Self, Stored) {
-        let mut store = CalibrationStore::new(Uncached(flash), areas, size);
+impl CalibrationMemory {
+    /// Opens the memory and returns what is stored. Makes room for the next record,
+    /// because erasing takes long, and now nothing waits.
+    pub(crate) fn open(flash: Flash<'static, Blocking>) -> (Self, Stored) {
+        let mut store = CalibrationStore::new(Uncached(flash), CALIBRATIONS, CALIBRATIONS_SIZE);
         let stored = store.load();
         if store.prepare().is_err() {
             defmt::warn!("the memory for calibrations cannot be erased");

@@ -1,7 +1,7 @@
-//! Keeps requests about endpoints that there are not from the driver.
+//! Keeps requests about endpoints that do not exist from the USB driver.
 //!
-//! A host may ask to halt any of 32 endpoints. embassy's stack passes that on
-//! as it is, and drivers answer a number they do not have with a panic.
+//! A host may ask to halt any of 32 endpoints. embassy's stack passes the request on
+//! unchecked, and a driver panics at an endpoint number that it does not have.
 
 use embassy_usb::driver::{
     Bus, Driver, EndpointAddress, EndpointAllocError, EndpointType, Event, Unsupported,
@@ -10,14 +10,14 @@ use embassy_usb::driver::{
 /// The highest endpoint number in use.
 const LAST: usize = 1;
 
-/// A driver that only hears of endpoints it has.
-pub struct Known<D>(pub(super) D);
+/// A driver that gets requests only about endpoints that it has.
+pub struct EndpointFilter<D>(pub(super) D);
 
-impl<'d, D: Driver<'d>> Driver<'d> for Known<D> {
+impl<'d, D: Driver<'d>> Driver<'d> for EndpointFilter<D> {
     type EndpointOut = D::EndpointOut;
     type EndpointIn = D::EndpointIn;
     type ControlPipe = D::ControlPipe;
-    type Bus = KnownBus<D::Bus>;
+    type Bus = FilteredBus<D::Bus>;
 
     fn alloc_endpoint_out(
         &mut self,
@@ -41,14 +41,14 @@ impl<'d, D: Driver<'d>> Driver<'d> for Known<D> {
 
     fn start(self, control_size: u16) -> (Self::Bus, Self::ControlPipe) {
         let (bus, pipe) = self.0.start(control_size);
-        (KnownBus(bus), pipe)
+        (FilteredBus(bus), pipe)
     }
 }
 
-/// The bus of a [`Known`] driver.
-pub struct KnownBus<B>(B);
+/// The bus of an [`EndpointFilter`] driver.
+pub struct FilteredBus<B>(B);
 
-impl<B: Bus> Bus for KnownBus<B> {
+impl<B: Bus> Bus for FilteredBus<B> {
     async fn enable(&mut self) {
         self.0.enable().await;
     }

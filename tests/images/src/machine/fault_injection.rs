@@ -1,4 +1,4 @@
-//! What tests do to an image that runs.
+//! Faults that tests inject into a running image.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -13,14 +13,14 @@ use crate::elf::Function;
 pub(super) enum Load {
     #[default]
     None,
-    /// It is about to, from this address.
+    /// It is about to load from this address.
     Of(u32),
-    /// It does.
+    /// It has loaded.
     Done,
 }
 
 /// A word of flash that cannot be read.
-pub(super) struct Spoilt {
+pub(super) struct UnreadableWord {
     pub(super) address: u32,
     pub(super) hook: UcHookId,
 }
@@ -61,7 +61,7 @@ impl Machine {
 
     /// From now on the flash's word at `address` cannot be read, until it is
     /// erased: what is left of a write that was cut off.
-    pub fn spoil(&mut self, address: u32) {
+    pub fn make_unreadable(&mut self, address: u32) {
         let bytes = self.chip.flash.word;
         let load = Rc::clone(&self.load);
         let on_load = move |core: &mut Unicorn<'_, ()>, _: MemType, _: u64, _: usize, _: i64| {
@@ -81,7 +81,7 @@ impl Machine {
             .ctl_flush_tb()
             .expect("translated code is dropped");
         self.core.ctl_flush_tlb().expect("and what it knows");
-        self.spoilt.push(Spoilt {
+        self.unreadable.push(UnreadableWord {
             address,
             hook: hook.expect("a hook"),
         });
@@ -113,7 +113,7 @@ impl Machine {
     }
 
     /// Puts a function's own code back.
-    pub fn heal(&mut self, function: Function) {
+    pub fn restore(&mut self, function: Function) {
         let holds = |s: &&crate::elf::Segment| {
             (s.runs..s.runs + s.bytes.len() as u32).contains(&function.address)
         };

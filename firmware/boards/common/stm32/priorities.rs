@@ -4,14 +4,17 @@ use cortex_m::Peripherals;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::pac::Interrupt;
 
-/// Every interrupt that is not the haptic one. embassy leaves interrupts at
-/// priority 0, where critical sections by BASEPRI would not hold them back.
+use super::clock;
+
+/// The priority of every interrupt that is not the haptic one. embassy leaves
+/// interrupts at priority 0, where critical sections by BASEPRI would not hold them
+/// back.
 pub(crate) const OTHERS: Priority = Priority::P6;
 
-/// Puts every interrupt below the ceiling of critical sections. To be called
-/// before any is let through; the haptic one is lifted above afterwards.
+/// Puts every interrupt below the ceiling of critical sections, before any is enabled.
+/// [`start_tick`] lifts the haptic one above it afterwards.
 pub(crate) fn lower_all(core: &mut Peripherals) {
-    // All there can be; those that a chip does not have ignore it.
+    // All that there can be; a chip ignores those that it does not have.
     for priority in core.NVIC.ipr.iter().take(240) {
         // SAFETY: no interrupt is enabled yet, so no critical section and no
         // handler relies on the priorities as they were.
@@ -19,8 +22,8 @@ pub(crate) fn lower_all(core: &mut Peripherals) {
     }
 }
 
-/// Lets the haptic interrupt through, above the ceiling of critical sections,
-/// and `done`, which it raises, below. Then starts the timer.
+/// Enables the haptic interrupt, above the ceiling of critical sections, and `done`,
+/// which the haptic one raises, below. Then starts the timer.
 pub(crate) fn start_tick(haptic: Interrupt, done: Interrupt) {
     haptic.set_priority(Priority::P0);
     haptic.pend();
@@ -29,5 +32,5 @@ pub(crate) fn start_tick(haptic: Interrupt, done: Interrupt) {
         // sections do not hold back, enters none after its first, raised call.
         unsafe { interrupt.enable() };
     }
-    super::clock::start();
+    clock::start();
 }

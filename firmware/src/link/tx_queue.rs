@@ -1,23 +1,23 @@
-//! What waits to be sent: answers and requests first, telemetry after.
+//! Frames that wait to be sent: answers and requests first, telemetry after.
 
 use hapterra_core::wire::frame::encode;
 use hapterra_core::wire::message::{Telemetry, ToHost};
 
 /// Bytes kept for answers and requests.
 const URGENT: usize = 1152;
-/// The longest of those, which is `Status` with every number at its longest.
+/// The longest urgent frame: `Status` with every number at its longest.
 pub(super) const LONGEST_URGENT: usize = 448;
 /// The longest telemetry frame: eight samples, every number at its longest.
 const LONGEST_TELEMETRY: usize = 1280;
 
 /// Bytes of whole frames on their way out.
-struct Pending<const N: usize> {
+struct Frames<const N: usize> {
     bytes: [u8; N],
     sent: usize,
     end: usize,
 }
 
-impl<const N: usize> Pending<N> {
+impl<const N: usize> Frames<N> {
     const fn new() -> Self {
         Self {
             bytes: [0; N],
@@ -34,7 +34,7 @@ impl<const N: usize> Pending<N> {
         N - (self.end - self.sent)
     }
 
-    /// Appends a frame; false if it does not fit.
+    /// Appends a frame. Returns false if it does not fit.
     fn push(&mut self, message: &ToHost) -> bool {
         self.bytes.copy_within(self.sent..self.end, 0);
         (self.sent, self.end) = (0, self.end - self.sent);
@@ -58,64 +58,64 @@ impl<const N: usize> Pending<N> {
 }
 
 /// Frames waiting for the writer, in two classes that never mix bytes.
-pub(crate) struct Outbox {
-    urgent: Pending<URGENT>,
-    telemetry: Pending<LONGEST_TELEMETRY>,
-    /// A zero goes first, so that whatever was cut off before is ended.
-    fence: bool,
+pub(super) struct TxQueue {
+    urgent: Frames<URGENT>,
+    telemetry: Frames<LONGEST_TELEMETRY>,
+    /// Whether a zero goes first, which ends a frame that was cut off before.
+    starts_clean: bool,
 }
 
-impl Outbox {
-    pub(crate) const fn new() -> Self {
+impl TxQueue {
+    pub(super) const fn new() -> Self {
         Self {
-            urgent: Pending::new(),
-            telemetry: Pending::new(),
-            fence: false,
+            urgent: Frames::new(),
+            telemetry: Frames::new(),
+            starts_clean: false,
         }
     }
 
-    /// Drops everything, as for a new session.
-    pub(crate) fn clear(&mut self) {
+    /// Drops everything, for a new session.
+    pub(super) fn clear(&mut self) {
         *self = Self::new();
-        self.fence = true;
+        self.starts_clean = true;
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
-        self.urgent.is_empty() && self.telemetry.is_empty() && !self.fence
+    pub(super) fn is_empty(&self) -> bool {
+        self.urgent.is_empty() && self.telemetry.is_empty() && !self.starts_clean
     }
 
-    /// Whether any one answer or request surely fits.
-    pub(crate) fn has_room(&self) -> bool {
+    /// Whether any one answer or request fits for sure.
+    pub(super) fn has_room(&self) -> bool {
         self.urgent.room() >= LONGEST_URGENT
     }
 
     /// Whether the writer has caught up with telemetry.
-    pub(crate) fn wants_telemetry(&self) -> bool {
+    pub(super) fn wants_telemetry(&self) -> bool {
         self.telemetry.is_empty()
     }
 
-    /// Queues an answer or a request; false if there was no room.
-    pub(crate) fn push(&mut self, message: &ToHost) -> bool {
+    /// Queues an answer or a request. Returns false if there was no room.
+    pub(super) fn push(&mut self, message: &ToHost) -> bool {
         self.urgent.push(message)
     }
 
     /// Queues the one telemetry message there is room for.
-    pub(crate) fn push_telemetry(&mut self, telemetry: Telemetry) -> bool {
+    pub(super) fn push_telemetry(&mut self, telemetry: Telemetry) -> bool {
         self.telemetry.is_empty() && self.telemetry.push(&ToHost::Telemetry(telemetry))
     }
 
-    /// Moves bytes to be sent next into `into`; returns how many.
-    pub(crate) fn take(&mut self, into: &mut [u8]) -> usize {
-        if self.fence {
+    /// Moves the bytes that are sent next into `into` and returns how many.
+    pub(super) fn take(&mut self, into: &mut [u8]) -> usize {
+        if self.starts_clean {
             let Some(first) = into.first_mut() else {
                 return 0;
             };
             *first = 0;
-            self.fence = false;
+            self.starts_clean = false;
             return 1;
         }
-        // A frame that was begun is finished first; telemetry only ever holds
-        // one, and `urgent` is always sent to its end.
+        // A frame that has begun is finished first. The telemetry holds at most
+        // one, and the urgent frames are always sent to their end.
         if self.telemetry.sent > 0 && !self.telemetry.is_empty() {
             return self.telemetry.take(into);
         }
@@ -138,11 +138,11 @@ mod tests {
     }
 
     /// Takes `n` bytes, or fewer if there are no more.
-    fn take(outbox: &mut Outbox, n: usize) -> Vec<u8> {
+    fn take(queue: &mut TxQueue, n: usize) -> Vec<u8> {
         let mut bytes = Vec::new();
         while bytes.len() < n {
             let mut byte = [0];
-            if outbox.take(&mut byte) == 0 {
+            if queue.take(&mut byte) == 0 {
                 break;
             }
             bytes.extend(byte);
@@ -164,42 +164,42 @@ mod tests {
     #[test]
     fn a_request_goes_before_telemetry_but_never_into_it() {
         let telemetry = || ToHost::Telemetry(Telemetry::default());
-        let mut outbox = Outbox::new();
-        outbox.push_telemetry(Telemetry::default());
-        outbox.push(&refused(1));
-        let all = take(&mut outbox, 4096);
+        let mut queue = TxQueue::new();
+        queue.push_telemetry(Telemetry::default());
+        queue.push(&refused(1));
+        let all = take(&mut queue, 4096);
         assert_eq!(understood(&all), [refused(1), telemetry()]);
 
-        outbox.push_telemetry(Telemetry::default());
-        let mut all = take(&mut outbox, 2);
-        outbox.push(&refused(1));
-        all.extend(take(&mut outbox, 4096));
+        queue.push_telemetry(Telemetry::default());
+        let mut all = take(&mut queue, 2);
+        queue.push(&refused(1));
+        all.extend(take(&mut queue, 4096));
         assert_eq!(understood(&all), [telemetry(), refused(1)]);
     }
 
     #[test]
     fn what_was_cut_off_does_not_take_the_next_frame_with_it() {
-        let mut outbox = Outbox::new();
-        outbox.push(&refused(1));
-        let mut all = take(&mut outbox, 3);
-        outbox.clear();
-        outbox.push(&refused(2));
-        all.extend(take(&mut outbox, 4096));
+        let mut queue = TxQueue::new();
+        queue.push(&refused(1));
+        let mut all = take(&mut queue, 3);
+        queue.clear();
+        queue.push(&refused(2));
+        all.extend(take(&mut queue, 4096));
         assert_eq!(understood(&all), [refused(2)]);
     }
 
     #[test]
     fn full_is_full_until_something_was_taken() {
-        let mut outbox = Outbox::new();
+        let mut queue = TxQueue::new();
         let mut pushed = 0;
-        while outbox.has_room() {
-            assert!(outbox.push(&refused(pushed)));
+        while queue.has_room() {
+            assert!(queue.push(&refused(pushed)));
             pushed += 1;
         }
         assert!(pushed > 20);
-        let first = take(&mut outbox, LONGEST_URGENT);
-        assert!(outbox.has_room());
-        let rest = take(&mut outbox, 4096);
+        let first = take(&mut queue, LONGEST_URGENT);
+        assert!(queue.has_room());
+        let rest = take(&mut queue, 4096);
         let all: Vec<_> = (0..pushed).map(refused).collect();
         assert_eq!(understood(&[first, rest].concat()), all);
     }

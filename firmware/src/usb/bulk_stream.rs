@@ -6,13 +6,13 @@ use embedded_io_async::{ErrorKind, ErrorType, Read, Write};
 use super::PACKET;
 
 /// A bulk endpoint as a stream of bytes.
-pub struct Packets<E> {
+pub struct BulkStream<E> {
     endpoint: E,
-    /// Whether the host has the interface in use, as far as this end knows.
+    /// Whether the host uses the interface, as far as this end knows.
     up: bool,
 }
 
-impl<E: Endpoint> Packets<E> {
+impl<E: Endpoint> BulkStream<E> {
     pub(super) const fn new(endpoint: E) -> Self {
         Self {
             endpoint,
@@ -20,7 +20,7 @@ impl<E: Endpoint> Packets<E> {
         }
     }
 
-    /// Waits for the host to take the interface into use.
+    /// Waits until the host uses the interface.
     async fn until_up(&mut self) {
         if !self.up {
             self.endpoint.wait_enabled().await;
@@ -29,13 +29,13 @@ impl<E: Endpoint> Packets<E> {
     }
 }
 
-impl<E> ErrorType for Packets<E> {
+impl<E> ErrorType for BulkStream<E> {
     type Error = ErrorKind;
 }
 
-impl<E: EndpointOut> Read for Packets<E> {
-    /// One packet. Nothing (0) when the host has gone; the next call waits
-    /// until it is back. `bytes` holds a packet, or what exceeds it is an error.
+impl<E: EndpointOut> Read for BulkStream<E> {
+    /// Reads one packet. Returns 0 when the host has gone; the next call waits until
+    /// it is back. A packet longer than `bytes` is an error.
     async fn read(&mut self, bytes: &mut [u8]) -> Result<usize, ErrorKind> {
         self.until_up().await;
         loop {
@@ -53,8 +53,8 @@ impl<E: EndpointOut> Read for Packets<E> {
     }
 }
 
-impl<E: EndpointIn> Write for Packets<E> {
-    /// One packet, never a full one: a host's read ends with a short packet.
+impl<E: EndpointIn> Write for BulkStream<E> {
+    /// Writes one packet, never a full one: a host's read ends with a short packet.
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
         self.until_up().await;
         let packet = bytes.get(..PACKET - 1).unwrap_or(bytes);

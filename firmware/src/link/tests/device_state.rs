@@ -1,14 +1,15 @@
 //! Arming, calibration and status, as a host sees them.
 
 use hapterra_core::guard::{Blockers, Fault, Mode};
-use hapterra_core::phantom::{Calibration, Field, Model};
-use hapterra_core::wire::message::{Source, ToDevice, ToHost};
+use hapterra_core::phantom::{Calibration, CalibrationField, Model};
+use hapterra_core::scene::Source;
+use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::status::{
     BootReport, CalibrationSource, Crash, CrashKind, Refusal, Request, ResetCause,
 };
 
 use super::rig::{Rig, scene};
-use crate::link::outbox::{LONGEST_URGENT, Outbox};
+use crate::link::tx_queue::{LONGEST_URGENT, TxQueue};
 use crate::store::Stored;
 
 fn set(calibration: Calibration, store: bool) -> ToDevice<'static> {
@@ -105,7 +106,7 @@ fn a_calibration_is_checked_put_in_force_and_stored() {
     let [Err(Refusal::Calibration(why))] = rig.answers(Request::SetCalibration)[..] else {
         panic!("{:?}", rig.answers(Request::SetCalibration));
     };
-    assert_eq!(why.field, Field::L1);
+    assert_eq!(why.field, CalibrationField::L1);
     assert_eq!(rig.status().model, Some(Model::Premium15), "as before");
 
     rig.say(&set(Calibration::PREMIUM_3_0, false));
@@ -180,14 +181,14 @@ fn goodbye_lets_the_force_go_out_and_drops_the_scene() {
     let mut rig = Rig::armed();
     rig.say(&ToDevice::Bye);
     rig.run(1);
-    assert!(!rig.device.has_ended(), "force is going out");
+    assert!(!rig.device.link.has_ended(), "force is going out");
     let mut ticks = 0;
     while rig.device.tick(rig.sense).enabled {
         ticks += 1;
     }
     assert!((90..=101).contains(&ticks), "{ticks}");
     rig.run(20);
-    assert!(rig.device.has_ended());
+    assert!(rig.device.link.has_ended());
     rig.say(&ToDevice::Hello(super::rig::HELLO));
     rig.heard.clear();
     rig.run(2);
@@ -204,7 +205,7 @@ fn while_force_goes_out_time_does_not_stand_still() {
     let mut ticks = 0;
     loop {
         rig.run(1);
-        if rig.device.may_stand_still() {
+        if rig.device.link.may_stand_still() {
             break;
         }
         ticks += 1;
@@ -261,9 +262,9 @@ fn the_status_at_its_longest_fits_its_place() {
         ToHost::Status(status),
         ToHost::Calibration(Some(Calibration::PREMIUM_3_0)),
     ] {
-        let mut outbox = Outbox::new();
-        assert!(outbox.push(&message));
-        let length = outbox.take(&mut [0; 4096]);
+        let mut queue = TxQueue::new();
+        assert!(queue.push(&message));
+        let length = queue.take(&mut [0; 4096]);
         std::eprintln!("{length} bytes");
         assert!(length <= LONGEST_URGENT, "{length}");
     }

@@ -1,0 +1,74 @@
+//! Starts a board: sets its parts up, assembles the application, and starts its tasks
+//! and then its tick.
+
+use defmt_rtt as _;
+use embassy_executor::Spawner;
+use embassy_stm32::interrupt;
+use embassy_stm32::pac::Interrupt;
+use embassy_stm32::wdg::IndependentWatchdog;
+use hapterra_core::wire::status::BootReport;
+use hapterra_firmware::amplifier::Off;
+use hapterra_firmware::app::Hardware;
+use hapterra_firmware::usb::{DescriptorBuffers, device};
+use static_cell::ConstStaticCell;
+
+use super::calibration_memory::CalibrationMemory;
+use super::{failure, priorities, tasks};
+use crate::application::{self, Loop, TICK_DONE};
+use crate::chip::{self, Clock};
+use crate::outputs::BOARD;
+
+/// Current in amperes that the ends of an output's range stand for.
+const FULL_SCALE_A: f32 = 5.5;
+/// Time after which the watchdog resets the chip, microseconds.
+const WATCHDOG_US: u32 = 50_000;
+
+static DESCRIPTORS: ConstStaticCell<DescriptorBuffers> =
+    ConstStaticCell::new(DescriptorBuffers::EMPTY);
+
+/// What the haptic interrupt does; `slot` is its own variable.
+pub(crate) fn on_haptic_interrupt(slot: &mut Option<&'static mut Loop>) {
+    if application::tick(slot).is_some() {
+        // Waking a task takes a critical section: an interrupt below does it.
+        cortex_m::peripheral::NVIC::pend(Interrupt::TIM6_DAC);
+    }
+}
+
+/// Raised by the haptic interrupt when a tick has ended; TIM6 itself is not used.
+#[interrupt]
+fn TIM6_DAC() {
+    failure::count_tick();
+    TICK_DONE.signal(());
+}
+
+#[embassy_executor::main]
+async fn main(spawner: Spawner) {
+    let mut core = cortex_m::Peripherals::take().expect("taken once");
+    priorities::lower_all(&mut core);
+    chip::prepare(&mut core);
+    let parts = chip::take(embassy_stm32::init(chip::configuration()));
+    let boot = BootReport {
+        cause: chip::take_reset_cause(),
+        crash: failure::take_record(),
+    };
+    let (memory, calibration) = CalibrationMemory::open(parts.flash);
+    let hardware = Hardware {
+        encoders: parts.encoders,
+        amplifiers: Off::new(parts.outputs, parts.enable, FULL_SCALE_A),
+        clock: Clock::new(parts.timer, &mut core),
+        calibration,
+        boot,
+    };
+    let (link, monitor) = application::assemble(hardware, BOARD);
+
+    let serial_number = embassy_stm32::uid::uid_hex();
+    let (usb, rx, tx) = device(parts.usb, serial_number, DESCRIPTORS.take());
+    spawner.spawn(tasks::serve_usb(usb, monitor).expect("started once"));
+    spawner.spawn(tasks::serve_link(link, rx, tx, memory).expect("started once"));
+
+    priorities::start_tick(chip::HAPTIC_INTERRUPT, Interrupt::TIM6_DAC);
+    let mut watchdog = IndependentWatchdog::new(parts.watchdog, WATCHDOG_US);
+    watchdog.unleash();
+    spawner.spawn(tasks::supervise(monitor, watchdog, parts.led).expect("started once"));
+    defmt::info!("{} is up", BOARD);
+}

@@ -1,0 +1,100 @@
+//! The tasks of a board: the USB stack, the link, the supervisor.
+
+use core::cell::Cell;
+
+use embassy_futures::join::join;
+use embassy_stm32::gpio::Output;
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_sync::blocking_mutex::CriticalSectionMutex;
+use embassy_time::{Duration, Ticker};
+use embassy_usb::UsbDevice;
+use embassy_usb::driver::Driver;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::status::Refusal;
+use hapterra_firmware::led::LedPattern;
+use hapterra_firmware::link::Link;
+use hapterra_firmware::link::task::{LinkBoard, run};
+use hapterra_firmware::monitor::{Monitor, Part};
+use hapterra_firmware::usb::{BulkStream, EndpointFilter};
+
+use super::calibration_memory::CalibrationMemory;
+use super::stack;
+use crate::application::TICK_DONE;
+use crate::chip::{UsbDriver, WINDOW, WatchdogTimer};
+
+/// How often parts check in and the supervisor looks, milliseconds.
+const CHECK_MS: u32 = 10;
+/// How often the stack is measured, milliseconds.
+const STACK_MS: u32 = 1_000;
+
+/// What the LED shows: the link sets it, the supervisor shows it.
+static LED: CriticalSectionMutex<Cell<LedPattern>> =
+    CriticalSectionMutex::new(Cell::new(LedPattern::Disarmed));
+
+/// What the link's task needs from the board. A real board goes on ticking whatever
+/// the link does.
+struct Board(CalibrationMemory);
+
+impl LinkBoard for Board {
+    async fn tick_done(&self) {
+        TICK_DONE.wait().await;
+    }
+
+    fn after_poll<const D: usize>(&self, link: &Link<'_, D>) {
+        LED.lock(|led| led.set(link.led_pattern()));
+    }
+
+    async fn store(&self, calibration: &Calibration) -> Result<(), Refusal> {
+        self.0.save(calibration)
+    }
+}
+
+/// Serves the link for ever.
+#[embassy_executor::task]
+pub(crate) async fn serve_link(
+    mut link: Link<'static, WINDOW>,
+    rx: BulkStream<<UsbDriver as Driver<'static>>::EndpointOut>,
+    tx: BulkStream<<UsbDriver as Driver<'static>>::EndpointIn>,
+    memory: CalibrationMemory,
+) {
+    run(&mut link, rx, tx, &Board(memory)).await;
+}
+
+/// Runs the USB stack for ever and checks in for it.
+#[embassy_executor::task]
+pub(crate) async fn serve_usb(
+    mut device: UsbDevice<'static, EndpointFilter<UsbDriver>>,
+    monitor: &'static Monitor,
+) {
+    let checking_in = async {
+        let mut ticker = Ticker::every(Duration::from_millis(CHECK_MS.into()));
+        loop {
+            monitor.check_in(Part::Usb);
+            ticker.next().await;
+        }
+    };
+    join(device.run(), checking_in).await;
+}
+
+/// Feeds the watchdog while all parts run, measures the stack, and shows the LED's
+/// pattern, for ever.
+#[embassy_executor::task]
+pub(crate) async fn supervise(
+    monitor: &'static Monitor,
+    mut watchdog: IndependentWatchdog<'static, WatchdogTimer>,
+    mut led: Output<'static>,
+) {
+    let mut ticker = Ticker::every(Duration::from_millis(CHECK_MS.into()));
+    let mut ms = 0_u32;
+    loop {
+        ticker.next().await;
+        if monitor.may_feed_watchdog(&[Part::Tick, Part::Link, Part::Usb]) {
+            watchdog.pet();
+        }
+        if ms.is_multiple_of(STACK_MS) {
+            monitor.measure_stack(stack::figures());
+        }
+        ms = ms.wrapping_add(CHECK_MS);
+        led.set_level(LED.lock(Cell::get).is_lit(ms).into());
+    }
+}

@@ -1,0 +1,72 @@
+//! Registers of the ARM MPS2 with the AN386 image, as the manual of the CMSDK
+//! (ARM DDI 0479) lays them out: no package ships a register crate for it.
+
+use vcell::VolatileCell;
+
+/// Counts a second of both timers: the board's 25 MHz clock.
+pub(crate) const TIMER_HZ: u32 = 25_000_000;
+
+/// A CMSDK APB timer: counts down, reloads after zero.
+#[repr(C)]
+pub(crate) struct Timer {
+    /// [`Timer::RUN`] and [`Timer::INTERRUPT`].
+    pub(crate) control: VolatileCell<u32>,
+    pub(crate) value: VolatileCell<u32>,
+    pub(crate) reload: VolatileCell<u32>,
+    /// Reads 1 while the interrupt is pending; writing 1 clears it.
+    pub(crate) pending: VolatileCell<u32>,
+}
+
+impl Timer {
+    pub(crate) const RUN: u32 = 1 << 0;
+    pub(crate) const INTERRUPT: u32 = 1 << 3;
+}
+
+/// A CMSDK APB UART, one byte deep in either direction.
+#[repr(C)]
+pub(crate) struct Uart {
+    pub(crate) data: VolatileCell<u32>,
+    /// [`Uart::TX_FULL`] and [`Uart::RX_FULL`].
+    pub(crate) state: VolatileCell<u32>,
+    /// Bit 0 transmitter, bit 1 receiver, bits 2 and 3 their interrupts.
+    pub(crate) control: VolatileCell<u32>,
+    /// Pending interrupts in bits 0 (sent) and 1 (received); writing 1 clears.
+    pub(crate) pending: VolatileCell<u32>,
+    pub(crate) divider: VolatileCell<u32>,
+}
+
+impl Uart {
+    pub(crate) const TX_FULL: u32 = 1 << 0;
+    pub(crate) const RX_FULL: u32 = 1 << 1;
+    pub(crate) const ENABLE: u32 = 0b0011;
+    pub(crate) const TX_INTERRUPT: u32 = 1 << 2;
+    pub(crate) const RX_INTERRUPT: u32 = 1 << 3;
+    pub(crate) const SENT: u32 = 1 << 0;
+    pub(crate) const RECEIVED: u32 = 1 << 1;
+}
+
+/// TIMER0: the timer of the haptic tick.
+pub(crate) fn tick_timer() -> &'static Timer {
+    // SAFETY: TIMER0 of the memory map, four words, always there and only ever
+    // accessed through volatile cells. `VolatileCell` is not `Sync`, so the
+    // reference itself cannot leave the context that asked for it.
+    unsafe { &*(0x4000_0000 as *const Timer) }
+}
+
+/// TIMER1: the free-running timer that measures what a tick costs.
+pub(crate) fn clock_timer() -> &'static Timer {
+    // SAFETY: TIMER1 of the memory map; as for `tick_timer`.
+    unsafe { &*(0x4000_1000 as *const Timer) }
+}
+
+/// UART0: the link to the host.
+pub(crate) fn link_uart() -> &'static Uart {
+    // SAFETY: UART0 of the memory map, five words; as for `tick_timer`.
+    unsafe { &*(0x4000_4000 as *const Uart) }
+}
+
+/// UART1: the virtual Phantom, encoder counts in and currents out.
+pub(crate) fn plant_uart() -> &'static Uart {
+    // SAFETY: UART1 of the memory map, five words; as for `tick_timer`.
+    unsafe { &*(0x4000_5000 as *const Uart) }
+}

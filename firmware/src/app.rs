@@ -1,0 +1,128 @@
+//! Assembles the application from what a board brings: the haptic loop for the
+//! timer interrupt and the link for its task, over memory that stays in its place.
+
+use hapterra_core::guard::Fault;
+use hapterra_core::phantom::Mechanism;
+use hapterra_core::terrain::Tile;
+use hapterra_core::tick::Haptics;
+use hapterra_core::wire::status::BootReport;
+
+use crate::board::{Amplifiers, Encoders, TickClock};
+use crate::haptic_loop::HapticLoop;
+use crate::link::{Buffers, DeviceState, Link};
+use crate::monitor::Monitor;
+use crate::queues::{Queues, SPARES};
+use crate::store::Stored;
+
+/// All tile buffers of a device with a window of `D × D` tiles.
+pub struct TileBuffers<const D: usize> {
+    window: [[Tile; D]; D],
+    spare: [Tile; SPARES],
+}
+
+impl<const D: usize> TileBuffers<D> {
+    /// Vacant buffers.
+    pub const VACANT: Self = Self {
+        window: [const { [const { Tile::VACANT }; D] }; D],
+        spare: [const { Tile::VACANT }; SPARES],
+    };
+
+    /// Splits the buffers into the window's and the spare ones.
+    pub(crate) fn split(&mut self) -> ([[&mut Tile; D]; D], [&mut Tile; SPARES]) {
+        let window = self.window.each_mut().map(|row| row.each_mut());
+        (window, self.spare.each_mut())
+    }
+}
+
+/// The application's memory besides its tiles: the queues and the link's large
+/// buffers. It is placed once, because moving it would need as much stack.
+pub struct WorkingMemory<'t> {
+    pub(crate) queues: Queues<'t>,
+    pub(crate) link: Buffers,
+}
+
+impl WorkingMemory<'_> {
+    /// Makes empty memory.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            queues: Queues::new(),
+            link: Buffers::new(),
+        }
+    }
+}
+
+impl Default for WorkingMemory<'_> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What a board brings to the application.
+pub struct Hardware<E, A, C> {
+    /// The encoders.
+    pub encoders: E,
+    /// The amplifiers, off.
+    pub amplifiers: A,
+    /// The tick's timer and the clock.
+    pub clock: C,
+    /// The Phantom's calibration record, as the board's memory has it.
+    pub calibration: Stored,
+    /// What the board found when it started.
+    pub boot: BootReport,
+}
+
+/// The application's two halves, and the monitor of both.
+pub struct Application<'t, E, A: Amplifiers, C, const D: usize> {
+    /// For the timer interrupt.
+    pub haptic_loop: HapticLoop<'t, E, A, C, D>,
+    /// For the link's task.
+    pub link: Link<'t, D>,
+    /// For the task that feeds the watchdog.
+    pub monitor: &'t Monitor,
+}
+
+/// Builds the application in the given memory. `board` is the name by which the
+/// host knows the board.
+///
+/// A stored calibration that cannot be used latches
+/// [`Fault::CalibrationCorrupt`], unless the board starts with a worse fault.
+pub fn assemble<'t, E, A, C, const D: usize>(
+    tiles: &'t mut TileBuffers<D>,
+    memory: &'t mut WorkingMemory<'t>,
+    hardware: Hardware<E, A, C>,
+    board: &str,
+) -> Application<'t, E, A, C, D>
+where
+    E: Encoders,
+    A: Amplifiers,
+    C: TickClock,
+{
+    let (loop_ends, link_ends) = memory.queues.split();
+    let monitor = loop_ends.monitor;
+    let (window, spare) = tiles.split();
+    let mechanism = match &hardware.calibration {
+        Stored::Found(calibration) => Mechanism::new(calibration).ok(),
+        Stored::Missing | Stored::Damaged => None,
+    };
+    let damaged = hardware.calibration != Stored::Missing && mechanism.is_none();
+    let found = damaged.then_some(Fault::CalibrationCorrupt);
+    let mut haptics = Haptics::new(window, C::RATE, hardware.boot.fault().or(found));
+    if let Some(mechanism) = mechanism {
+        haptics.configure(mechanism);
+    }
+    let haptic_loop = HapticLoop::new(
+        haptics,
+        loop_ends,
+        hardware.encoders,
+        hardware.amplifiers,
+        hardware.clock,
+    );
+    let device = DeviceState::new::<C, D>(board, hardware.boot, mechanism.as_ref());
+    let link = Link::new(device, spare, link_ends, &mut memory.link);
+    Application {
+        haptic_loop,
+        link,
+        monitor,
+    }
+}

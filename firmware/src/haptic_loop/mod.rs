@@ -1,0 +1,240 @@
+//! The haptic loop, which the timer interrupt calls 1,000 to 10,000 times a second.
+//!
+//! It does only I/O and book-keeping around [`Haptics::tick_into`]: take what the
+//! link brought, read the encoders, tick, write the amplifiers, leave a record,
+//! measure what that cost. Everything it does is bounded and nothing waits.
+
+mod liveness;
+mod reporter;
+mod timing;
+
+use core::mem;
+
+use hapterra_core::guard::{Drive, Fault, Sense};
+use hapterra_core::scene::Source;
+use hapterra_core::tick::{Command, Haptics, Outcome};
+
+use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, TickClock};
+use crate::monitor::Part;
+use crate::queues::{LoopEnds, TickRecord};
+use liveness::Liveness;
+use reporter::Reporter;
+use timing::Timing;
+
+/// The most commands taken in one tick; the rest wait for the next.
+const COMMANDS_PER_TICK: usize = 4;
+
+/// Where the HIP's position comes from at the moment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum HipSource {
+    /// There is no scene: nothing is rendered and nothing recorded. The guard
+    /// still looks at the arm.
+    None,
+    /// The encoders.
+    Encoders,
+    /// Points over the link; whether one is being rendered.
+    Points { pending: bool },
+}
+
+/// The amplifiers in either of their states.
+enum Power<A: Amplifiers> {
+    Off(A),
+    On(A::Enabled),
+}
+
+/// The haptic loop over a board's encoders `E`, amplifiers `A` and clock `C`,
+/// with a window of `D × D` tiles.
+pub struct HapticLoop<'t, E, A: Amplifiers, C, const D: usize> {
+    haptics: Haptics<'t, D>,
+    ends: LoopEnds<'t>,
+    encoders: E,
+    /// `None` only while the amplifiers change state.
+    power: Option<Power<A>>,
+    clock: C,
+    timing: Timing,
+    hip_source: HipSource,
+    /// The last tick's outcome, kept in its place so that it need not be copied.
+    outcome: Outcome,
+    liveness: Liveness,
+    reporter: Reporter,
+    /// An answer that found the queue full. No other tick runs before it is out.
+    unsent: Option<TickRecord>,
+}
+
+impl<'t, E, A, C, const D: usize> HapticLoop<'t, E, A, C, D>
+where
+    E: Encoders,
+    A: Amplifiers,
+    C: TickClock,
+{
+    pub(crate) fn new(
+        haptics: Haptics<'t, D>,
+        ends: LoopEnds<'t>,
+        encoders: E,
+        amplifiers: A,
+        clock: C,
+    ) -> Self {
+        Self {
+            haptics,
+            ends,
+            encoders,
+            power: Some(Power::Off(amplifiers)),
+            clock,
+            timing: Timing::new::<C>(),
+            hip_source: HipSource::None,
+            outcome: Outcome::default(),
+            liveness: Liveness::new(C::RATE),
+            reporter: Reporter::new(C::RATE),
+            unsent: None,
+        }
+    }
+
+    /// Gives access to the board's encoders, for whoever sets them from outside.
+    pub fn encoders_mut(&mut self) -> &mut E {
+        &mut self.encoders
+    }
+
+    /// Runs one tick. Returns what the amplifiers were left with.
+    pub fn tick(&mut self) -> Drive {
+        let began = self.timing.begin(&mut self.clock);
+        self.ends.monitor.count_tick();
+        self.ends.monitor.check_in(Part::Tick);
+        if let Some(record) = self.unsent.take() {
+            self.answer(record);
+            return Drive::default();
+        }
+        self.take_commands();
+        let drive = self.render();
+        if self.timing.end(&self.clock, began) {
+            self.give_to_haptics(Command::Trip(Fault::TickOverrun));
+        }
+        drive
+    }
+
+    fn take_commands(&mut self) {
+        if let Some(mechanism) = self.ends.settings.dequeue() {
+            self.haptics.configure(mechanism);
+        }
+        for _ in 0..COMMANDS_PER_TICK {
+            let Some(command) = self.ends.commands.dequeue() else {
+                return;
+            };
+            match &command {
+                Command::Scene(scene) => {
+                    self.hip_source = match scene.source {
+                        Source::Encoders => HipSource::Encoders,
+                        Source::Points => HipSource::Points { pending: false },
+                    };
+                }
+                Command::DropScene => self.hip_source = HipSource::None,
+                Command::Point(_) => self.hip_source = HipSource::Points { pending: true },
+                _ => {}
+            }
+            self.give_to_haptics(command);
+        }
+    }
+
+    fn give_to_haptics(&mut self, command: Command<'t>) {
+        if let Some(tile) = self.haptics.accept(command) {
+            // The queue has room for every buffer there is.
+            let _ = self.ends.spent.enqueue(tile);
+        }
+    }
+
+    fn render(&mut self) -> Drive {
+        let live = self.liveness.tick(self.ends.monitor.fed());
+        match self.hip_source {
+            HipSource::Encoders | HipSource::None => self.render_arm(live),
+            HipSource::Points { pending } => self.render_point(pending),
+        }
+    }
+
+    /// Runs the pure tick. A function of its own, and there once: the tick's code
+    /// is most of an image.
+    #[inline(never)]
+    fn run_tick(&mut self, sense: &Sense, watchdog_live: bool) {
+        self.haptics
+            .tick_into(sense, watchdog_live, &mut self.outcome);
+    }
+
+    fn render_arm(&mut self, watchdog_live: bool) -> Drive {
+        let sense = self.encoders.sense();
+        self.run_tick(&sense, watchdog_live);
+        let drive = self.outcome.drive;
+        self.drive(&drive);
+        let is_rendered = self.hip_source == HipSource::Encoders;
+        if is_rendered && self.reporter.sends_sample(&self.outcome.sample) {
+            let record = self.record(None);
+            if self.ends.records.enqueue(record).is_err() {
+                self.ends.monitor.count_dropped();
+            }
+        }
+        self.report(&sense, &drive);
+        drive
+    }
+
+    fn render_point(&mut self, pending: bool) -> Drive {
+        let drive = Drive::default();
+        self.drive(&drive);
+        if !pending {
+            return drive;
+        }
+        let sense = Sense::default();
+        self.run_tick(&sense, false);
+        self.report(&sense, &drive);
+        let record = self.record(self.outcome.answers);
+        if record.answers.is_some() {
+            self.hip_source = HipSource::Points { pending: false };
+            self.answer(record);
+        } else {
+            // It only tells the link what holds the point up; the next one will, too.
+            let _ = self.ends.records.enqueue(record);
+        }
+        drive
+    }
+
+    fn record(&mut self, answers: Option<u32>) -> TickRecord {
+        self.timing.fill(&mut self.outcome.sample);
+        TickRecord {
+            sample: self.outcome.sample,
+            answers,
+        }
+    }
+
+    /// Reports where the guard stands, at once when that has changed and ten times a
+    /// second. Where the queue is full the next tick reports.
+    fn report(&mut self, sense: &Sense, drive: &Drive) {
+        let report = self.haptics.report();
+        if self.reporter.sends_report(&report) && self.ends.health.ready() {
+            // There is room.
+            let _ = self.ends.health.enqueue(self.haptics.health(sense, drive));
+            self.reporter.sent_report(&report);
+        }
+    }
+
+    /// Sends an answer, or keeps it for the next tick: answers are never lost.
+    fn answer(&mut self, record: TickRecord) {
+        self.unsent = self.ends.records.enqueue(record).err();
+    }
+
+    /// Brings the amplifiers to what the tick asks for.
+    fn drive(&mut self, drive: &Drive) {
+        let power = self.power.take().map(|power| match (power, drive.enabled) {
+            (Power::Off(off), false) => Power::Off(off),
+            (Power::On(on), false) => Power::Off(on.disable()),
+            (Power::Off(off), true) => Power::On(written(off.enable(), drive)),
+            (Power::On(on), true) => Power::On(written(on, drive)),
+        });
+        // An assignment would drop what is there, which is nothing; but with it
+        // the drivers' destructors, which can panic, would be part of the tick.
+        mem::forget(mem::replace(&mut self.power, power));
+    }
+}
+
+fn written<A: EnabledAmplifiers>(mut amplifiers: A, drive: &Drive) -> A {
+    amplifiers.write(drive.currents_a.to_array());
+    amplifiers
+}
+
+#[cfg(test)]
+mod tests;

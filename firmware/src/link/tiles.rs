@@ -1,0 +1,113 @@
+//! Tiles on their way: which ones the link requests, and whose buffer is where.
+
+use hapterra_core::terrain::{BadTile, IN_FLIGHT, Tile, TileDemand};
+use hapterra_core::tick::Command;
+use hapterra_core::wire::frame::BadFrame;
+use hapterra_core::wire::message::{Heights, TileMessage, ToHost};
+
+use super::{Link, SessionState};
+use crate::queues::TickRecord;
+
+impl<'t, const D: usize> Link<'t, D> {
+    /// Takes back the tile buffers that the loop is done with.
+    pub(super) fn reclaim_buffers(&mut self) {
+        while let Some(tile) = self.ends.spent.dequeue() {
+            self.nothing_to_request_at = None;
+            // A tile that the window refused comes back under its own key, a tile
+            // that it replaced under the replaced one's: neither is held.
+            if let Some(key) = tile.key() {
+                self.requester.lost(key);
+            }
+            self.give_back(tile);
+        }
+    }
+
+    fn give_back(&mut self, tile: &'t mut Tile) {
+        // There are no more buffers than places.
+        let _ = self.spare.push(tile);
+    }
+
+    /// Checks a tile in a spare buffer and hands it to the loop.
+    pub(super) fn take_tile(&mut self, message: &TileMessage<'_>) {
+        let ours = self.scene.is_some_and(|s| s.epoch == message.epoch);
+        if !ours || !self.requester.awaits(message.key) {
+            return;
+        }
+        self.reclaim_buffers();
+        let Some(tile) = self.spare.pop() else {
+            return;
+        };
+        let key = message.key;
+        if fill_tile(tile, message).is_err() {
+            tile.vacate();
+            self.give_back(tile);
+            return self.on_bad_frame(BadFrame::Content);
+        }
+        self.requester.received(key);
+        self.command(Command::Tile(tile));
+    }
+
+    /// Requests tiles, each with a buffer that waits for it.
+    pub(super) fn request_tiles(&mut self) {
+        let (SessionState::Open, Some(scene)) = (self.session, self.scene) else {
+            return;
+        };
+        let focus = self.focus.unwrap_or_else(|| TileDemand {
+            proxy: scene.home.column(),
+            hip: scene.home.column(),
+            ..TileDemand::default()
+        });
+        let now = self.ends.monitor.ticks() / self.device.ticks_per_ms();
+        if self.nothing_to_request_at == Some(now) {
+            return;
+        }
+        while self.tx.has_room() && self.has_buffer_for_another() {
+            let Some(key) = self.requester.next_request(now, &focus) else {
+                self.nothing_to_request_at = Some(now);
+                return;
+            };
+            let epoch = scene.epoch;
+            self.say(&ToHost::Need { epoch, key });
+        }
+    }
+
+    /// Whether another tile may be requested. With the most requests under way the
+    /// tile requester only repeats them.
+    fn has_buffer_for_another(&self) -> bool {
+        let in_flight = self.requester.in_flight();
+        self.spare.len() > in_flight || in_flight == IN_FLIGHT
+    }
+}
+
+/// Fills a tile buffer from the host's message.
+///
+/// # Errors
+/// When the message's heights are not those of a tile. The buffer is then to be vacated.
+pub fn fill_tile(tile: &mut Tile, message: &TileMessage<'_>) -> Result<(), BadTile> {
+    let key = message.key;
+    match message.heights {
+        Heights::Hole => tile.fill(key, 0, |_, _| f32::NAN),
+        Heights::Flat { base, height } => tile.fill(key, base, |_, _| height),
+        Heights::Samples { base, bytes } => tile.load(key, base, bytes),
+    }
+}
+
+/// Says where the loop needs terrain after `record`, which followed `last`. The
+/// velocity is in cells a millisecond, the tile requester's unit of time, at every tick rate.
+pub(super) fn focus(last: &TickRecord, record: &TickRecord, ticks_per_ms: u32) -> TileDemand {
+    let (last, sample) = (&last.sample, &record.sample);
+    let ticks = sample.tick.wrapping_sub(last.tick);
+    // A new scene counts its ticks from one again: that gives no velocity.
+    let velocity = if ticks == 0 || ticks > 100 * ticks_per_ms {
+        [0.0; 2]
+    } else {
+        let step = last.hip.to(&sample.hip) * (ticks_per_ms as f32 / ticks as f32);
+        [step.x, step.y]
+    };
+    TileDemand {
+        missing_tile: sample.missing_tile,
+        proxy: sample.proxy.column(),
+        hip: sample.hip.column(),
+        velocity,
+    }
+}

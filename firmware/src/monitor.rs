@@ -1,0 +1,147 @@
+//! What the application's parts tell about themselves: that they run, and what they
+//! count. It decides whether the watchdog is fed; the tick and the status message read it.
+
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+/// A part of the application that has to check in before the watchdog is fed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The haptic tick.
+    Tick = 0,
+    /// The link's task.
+    Link = 1,
+    /// The USB stack's task.
+    Usb = 2,
+}
+
+impl Part {
+    const fn bit(self) -> u32 {
+        1 << self as u32
+    }
+}
+
+/// Check-ins and counters, shared by all parts: single loads and stores, no lock.
+#[derive(Debug, Default)]
+pub struct Monitor {
+    ticks: AtomicU32,
+    dropped: AtomicU32,
+    checked_in: AtomicU32,
+    fed: AtomicU32,
+    stack_size: AtomicU32,
+    stack_high_water: AtomicU32,
+}
+
+impl Monitor {
+    /// Makes a monitor before anything has happened.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            ticks: AtomicU32::new(0),
+            dropped: AtomicU32::new(0),
+            checked_in: AtomicU32::new(0),
+            fed: AtomicU32::new(0),
+            stack_size: AtomicU32::new(0),
+            stack_high_water: AtomicU32::new(0),
+        }
+    }
+
+    /// A part says that it runs. Each watched part calls this at least every few
+    /// milliseconds, from any priority.
+    pub fn check_in(&self, part: Part) {
+        self.checked_in.fetch_or(part.bit(), Relaxed);
+    }
+
+    /// Whether the watchdog is to be fed now: all of `parts` have checked in since this
+    /// was last true. Asked a few times within the watchdog's time.
+    ///
+    /// A named part that never checks in leads to a reset; a part that is not named is
+    /// not watched. The tick sees from the count of feedings whether the watchdog is
+    /// being fed.
+    #[must_use]
+    pub fn may_feed_watchdog(&self, parts: &[Part]) -> bool {
+        let all = parts.iter().fold(0, |bits, part| bits | part.bit());
+        if self.checked_in.load(Relaxed) & all != all {
+            return false;
+        }
+        self.checked_in.fetch_and(!all, Relaxed);
+        self.fed.fetch_add(1, Relaxed);
+        true
+    }
+
+    pub(crate) fn count_tick(&self) {
+        self.ticks.fetch_add(1, Relaxed);
+    }
+
+    /// Returns the ticks since the start, wrapping.
+    #[must_use]
+    pub fn ticks(&self) -> u32 {
+        self.ticks.load(Relaxed)
+    }
+
+    /// Counts a sample that found the record queue full.
+    pub(crate) fn count_dropped(&self) {
+        self.dropped.fetch_add(1, Relaxed);
+    }
+
+    pub(crate) fn dropped(&self) -> u32 {
+        self.dropped.load(Relaxed)
+    }
+
+    /// Returns how often the watchdog was fed, wrapping.
+    pub(crate) fn fed(&self) -> u32 {
+        self.fed.load(Relaxed)
+    }
+
+    /// Takes the size of the board's stack and how much of it was ever used,
+    /// bytes.
+    pub fn measure_stack(&self, (size, high_water): (u32, u32)) {
+        self.stack_size.store(size, Relaxed);
+        self.stack_high_water.store(high_water, Relaxed);
+    }
+
+    /// Returns the size of the stack and how much of it was ever used, bytes.
+    #[must_use]
+    pub fn stack(&self) -> (u32, u32) {
+        (
+            self.stack_size.load(Relaxed),
+            self.stack_high_water.load(Relaxed),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PARTS: [Part; 3] = [Part::Tick, Part::Link, Part::Usb];
+
+    #[test]
+    fn every_part_but_one_does_not_feed_the_watchdog() {
+        for hung in PARTS {
+            let monitor = Monitor::new();
+            for _ in 0..3 {
+                for part in PARTS.into_iter().filter(|part| *part != hung) {
+                    monitor.check_in(part);
+                }
+                assert!(!monitor.may_feed_watchdog(&PARTS), "{hung:?}");
+            }
+            monitor.check_in(hung);
+            assert!(monitor.may_feed_watchdog(&PARTS), "{hung:?} came back");
+            assert_eq!(monitor.fed(), 1);
+            monitor.check_in(hung);
+            let again = monitor.may_feed_watchdog(&PARTS);
+            assert!(!again, "all have to check in again");
+        }
+    }
+
+    #[test]
+    fn what_is_not_watched_does_not_matter() {
+        let monitor = Monitor::new();
+        let watched = &PARTS[..2];
+        monitor.check_in(Part::Tick);
+        monitor.check_in(Part::Usb);
+        assert!(!monitor.may_feed_watchdog(watched));
+        monitor.check_in(Part::Link);
+        assert!(monitor.may_feed_watchdog(watched));
+    }
+}

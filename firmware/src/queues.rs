@@ -1,0 +1,106 @@
+//! The queues between the haptic loop and the link, and what travels in them.
+//!
+//! The loop runs in an interrupt, the link in a task below it. Single-producer
+//! queues and the counters of [`Monitor`] are all that they share: neither half
+//! ever waits for a lock, and no tile is reachable from both halves at once.
+
+use hapterra_core::phantom::Mechanism;
+use hapterra_core::scene::Health;
+use hapterra_core::scene::Sample;
+use hapterra_core::terrain::{IN_FLIGHT, Tile};
+use hapterra_core::tick::Command;
+use heapless::spsc::{Consumer, Producer, Queue};
+
+use crate::monitor::Monitor;
+
+/// Tile buffers besides the window's: one for each tile on its way.
+pub(crate) const SPARES: usize = IN_FLIGHT;
+/// Slots of the command queue, one of which stays empty.
+const COMMANDS: usize = 16;
+/// Slots of the record queue: the link may sleep through this many ticks.
+const RECORDS: usize = 32;
+/// Slots of the settings queue: one set of settings at a time.
+const SETTINGS: usize = 2;
+/// Slots of the health queue: one report at a time.
+const HEALTH: usize = 2;
+
+/// One tick as the loop reports it to the link.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct TickRecord {
+    /// What the tick measured and computed.
+    pub(crate) sample: Sample,
+    /// The number of the point that this tick answers.
+    pub(crate) answers: Option<u32>,
+}
+
+/// All queues between the loop and the link.
+pub(crate) struct Queues<'t> {
+    commands: Queue<Command<'t>, COMMANDS>,
+    /// Room for every buffer that can be on its way back.
+    spent: Queue<&'t mut Tile, { SPARES + 1 }>,
+    records: Queue<TickRecord, RECORDS>,
+    settings: Queue<Mechanism, SETTINGS>,
+    health: Queue<Health, HEALTH>,
+    monitor: Monitor,
+}
+
+/// The ends of the queues that the haptic loop holds.
+pub(crate) struct LoopEnds<'t> {
+    pub(crate) commands: Consumer<'t, Command<'t>>,
+    pub(crate) spent: Producer<'t, &'t mut Tile>,
+    pub(crate) records: Producer<'t, TickRecord>,
+    pub(crate) settings: Consumer<'t, Mechanism>,
+    pub(crate) health: Producer<'t, Health>,
+    pub(crate) monitor: &'t Monitor,
+}
+
+/// The ends of the queues that the link holds.
+pub(crate) struct LinkEnds<'t> {
+    pub(crate) commands: Producer<'t, Command<'t>>,
+    pub(crate) spent: Consumer<'t, &'t mut Tile>,
+    pub(crate) records: Consumer<'t, TickRecord>,
+    pub(crate) settings: Producer<'t, Mechanism>,
+    pub(crate) health: Consumer<'t, Health>,
+    pub(crate) monitor: &'t Monitor,
+}
+
+impl<'t> Queues<'t> {
+    /// Makes empty queues.
+    pub(crate) const fn new() -> Self {
+        Self {
+            commands: Queue::new(),
+            spent: Queue::new(),
+            records: Queue::new(),
+            settings: Queue::new(),
+            health: Queue::new(),
+            monitor: Monitor::new(),
+        }
+    }
+
+    /// Splits every queue into the loop's end and the link's end.
+    pub(crate) fn split(&'t mut self) -> (LoopEnds<'t>, LinkEnds<'t>) {
+        let commands = self.commands.split();
+        let spent = self.spent.split();
+        let records = self.records.split();
+        let settings = self.settings.split();
+        let health = self.health.split();
+        let monitor = &self.monitor;
+        let loop_ends = LoopEnds {
+            commands: commands.1,
+            spent: spent.0,
+            records: records.0,
+            settings: settings.1,
+            health: health.0,
+            monitor,
+        };
+        let link_ends = LinkEnds {
+            commands: commands.0,
+            spent: spent.1,
+            records: records.1,
+            settings: settings.0,
+            health: health.1,
+            monitor,
+        };
+        (loop_ends, link_ends)
+    }
+}
