@@ -6,7 +6,9 @@ use plotters::coord::cartesian::Cartesian2d;
 use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
 use plotters::drawing::DrawingArea;
-use plotters::style::TRANSPARENT;
+use plotters::element::Text;
+use plotters::style::{TRANSPARENT, TextStyle};
+use plotters_backend::text_anchor::{HPos, Pos, VPos};
 use std::ops::Range;
 
 use super::canvas::{Pen, PictureError};
@@ -71,6 +73,21 @@ where
         .y_desc(titles.y)
         .draw()?;
     Ok(chart)
+}
+
+/// Writes a line of type; the middle of its height is at `at`, its `side` at that place.
+///
+/// # Errors
+/// As `plotters`.
+pub fn write(
+    area: &Area<'_>,
+    text: &str,
+    at: (i32, i32),
+    style: TextStyle<'_>,
+    side: HPos,
+) -> Result<(), PictureError> {
+    let style = style.pos(Pos::new(side, VPos::Center));
+    Ok(area.draw(&Text::new(text.to_owned(), at, style))?)
 }
 
 /// A number as a person writes it on an axis: at most six digits, powers of

@@ -1,28 +1,27 @@
-//! A drawing backend for `plotters`: strokes, discs and type with soft edges
-//! on an RGB image twice the final size in each direction.
+//! A drawing backend for `plotters`: `tiny-skia` draws with soft edges, `lettering`
+//! sets the type.
 
+use plotters_backend::text_anchor::{HPos, VPos};
 use plotters_backend::{
     BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind,
+    FontStyle,
 };
 use std::convert::Infallible;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use tiny_skia::{
+    FillRule, LineCap, LineJoin, Paint, PathBuilder, PixmapMut, Rect, Stroke, Transform,
+};
 
-use super::style;
-
-/// Drawing coordinates per pixel of the finished picture.
-pub const SCALE: i32 = 2;
+use super::lettering::TextLine;
+use super::style::SCALE;
+use crate::output::{Output, OutputError};
 
 /// A picture could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
     /// The file could not be made or filled.
-    #[error("cannot write the picture {path}: {source}")]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    #[error("{0}: {source}", source = .0.source)]
+    Write(OutputError),
     /// `plotters` gave up, for example on an area without room.
     #[error("cannot lay out the picture: {0}")]
     Layout(String),
@@ -38,142 +37,118 @@ impl<E: std::error::Error + Send + Sync> From<plotters::drawing::DrawingAreaErro
 
 /// The image that is drawn on.
 pub struct Canvas {
-    width: i32,
-    height: i32,
-    pixels: Vec<[u8; 3]>,
+    width: u32,
+    height: u32,
+    /// Red, green, blue and an alpha that is always opaque, row by row from the top.
+    rgba: Vec<u8>,
 }
 
 impl Canvas {
-    /// A blank sheet of a finished size in pixels.
+    /// A white sheet of a finished size in pixels.
     #[must_use]
     pub fn new(width: u16, height: u16) -> Self {
-        let (width, height) = (i32::from(width) * SCALE, i32::from(height) * SCALE);
-        let plotters::style::RGBColor(r, g, b) = style::PAPER;
         Self {
-            width,
-            height,
-            pixels: vec![[r, g, b]; width as usize * height as usize],
+            width: width.into(),
+            height: height.into(),
+            rgba: vec![u8::MAX; 4 * usize::from(width) * usize::from(height)],
         }
     }
 
     /// The backend to hand to `plotters`.
     pub fn pen(&mut self) -> Pen<'_> {
-        style::register_fonts();
         Pen { canvas: self }
     }
 
     /// The finished size in pixels.
     #[must_use]
     pub fn size(&self) -> (u32, u32) {
-        let pixels = |n: i32| (n / SCALE).unsigned_abs();
-        (pixels(self.width), pixels(self.height))
+        (self.width, self.height)
     }
 
     /// The finished picture, RGB, row by row from the top.
     #[must_use]
     pub fn to_rgb(&self) -> Vec<u8> {
-        let (width, height) = self.size();
-        let (scale, stride) = (SCALE as usize, self.width as usize);
-        let mut rgb = Vec::with_capacity((width * height * 3) as usize);
-        for row in 0..height as usize {
-            for column in 0..width as usize {
-                let mut sum = [0u32; 3];
-                for y in 0..scale {
-                    let from = (row * scale + y) * stride + column * scale;
-                    for pixel in &self.pixels[from..from + scale] {
-                        for (sum, value) in sum.iter_mut().zip(pixel) {
-                            *sum += u32::from(*value);
-                        }
-                    }
-                }
-                let count = (scale * scale) as u32;
-                rgb.extend(sum.map(|s| ((s + count / 2) / count) as u8));
-            }
-        }
-        rgb
+        let pixels = self.rgba.as_chunks::<4>().0;
+        let rgb = pixels.iter().map(|[r, g, b, _]| [*r, *g, *b]);
+        rgb.flatten().collect()
     }
 
-    /// Writes the finished picture as a PNG file.
+    /// Writes the finished picture as a PNG file, which appears when it is complete.
     ///
     /// # Errors
     /// [`PictureError::Write`] if the file cannot be made or filled.
     pub fn save(&self, path: &Path) -> Result<(), PictureError> {
-        self.encode(path).map_err(|source| PictureError::Write {
+        let mut output = Output::create(path).map_err(PictureError::Write)?;
+        let encoded = self.encode(&mut output).map_err(|source| OutputError {
             path: path.to_owned(),
             source,
-        })
+        });
+        let finished = encoded.and_then(|()| output.finish());
+        finished.map_err(PictureError::Write)
     }
 
-    fn encode(&self, path: &Path) -> std::io::Result<()> {
-        let (width, height) = self.size();
-        let file = std::io::BufWriter::new(std::fs::File::create(path)?);
-        let mut encoder = png::Encoder::new(file, width, height);
+    fn encode(&self, output: &mut Output) -> std::io::Result<()> {
+        let mut encoder = png::Encoder::new(output, self.width, self.height);
         encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
         let mut writer = encoder.write_header()?;
         writer.write_image_data(&self.to_rgb())?;
         Ok(writer.finish()?)
     }
 
-    fn blend(&mut self, x: i32, y: i32, rgb: (u8, u8, u8), alpha: f64) {
-        if x < 0 || y < 0 || x >= self.width || y >= self.height || alpha <= 0.0 {
-            return;
-        }
-        let pixel = &mut self.pixels[(y * self.width + x) as usize];
-        let ink = [rgb.0, rgb.1, rgb.2];
-        for (old, new) in pixel.iter_mut().zip(ink) {
-            let mixed = f64::from(*old) + (f64::from(new) - f64::from(*old)) * alpha.min(1.0);
-            *old = mixed.round() as u8;
+    /// Fills a path in drawing coordinates that are first moved by `place`.
+    fn fill(&mut self, path: Option<tiny_skia::Path>, ink: BackendColor, place: Transform) {
+        let pixmap = PixmapMut::from_bytes(&mut self.rgba, self.width, self.height);
+        if let Some((mut pixmap, path)) = pixmap.zip(path) {
+            let place = place.post_concat(to_pixels());
+            pixmap.fill_path(&path, &paint(ink), FillRule::Winding, place, None);
         }
     }
 
-    /// A line with round ends, from the distance of each pixel to it.
-    fn stroke(&mut self, from: BackendCoord, to: BackendCoord, width: f64, ink: BackendColor) {
-        let half = 0.5 * width;
-        let reach = half.ceil() as i32 + 1;
-        let (ax, ay) = (f64::from(from.0), f64::from(from.1));
-        let (dx, dy) = (f64::from(to.0) - ax, f64::from(to.1) - ay);
-        let length2 = dx * dx + dy * dy;
-        for y in (from.1.min(to.1) - reach).max(0)..=(from.1.max(to.1) + reach).min(self.height - 1)
-        {
-            for x in
-                (from.0.min(to.0) - reach).max(0)..=(from.0.max(to.0) + reach).min(self.width - 1)
-            {
-                let (px, py) = (f64::from(x) - ax, f64::from(y) - ay);
-                let along = if length2 > 0.0 {
-                    ((px * dx + py * dy) / length2).clamp(0.0, 1.0)
-                } else {
-                    0.0
-                };
-                let distance = (px - along * dx).hypot(py - along * dy);
-                self.blend(x, y, ink.rgb, ink.alpha * (half + 0.5 - distance).min(1.0));
-            }
-        }
-    }
-
-    /// A level or upright line, sharp on the finished picture's pixels.
-    fn rule(&mut self, from: BackendCoord, to: BackendCoord, width: i32, ink: BackendColor) {
-        let snap = |at: i32| at.div_euclid(SCALE) * SCALE - (width / 2).div_euclid(SCALE) * SCALE;
-        let ((x0, y0), (x1, y1)) = if from.1 == to.1 {
-            let top = snap(from.1);
-            ((from.0.min(to.0), top), (from.0.max(to.0), top + width - 1))
-        } else {
-            let left = snap(from.0);
-            (
-                (left, from.1.min(to.1)),
-                (left + width - 1, from.1.max(to.1)),
-            )
+    /// Draws along a path in drawing coordinates, with round joins and ends.
+    fn stroke(&mut self, path: Option<tiny_skia::Path>, style: &impl BackendStyle) {
+        let stroke = Stroke {
+            width: style.stroke_width() as f32,
+            line_cap: LineCap::Round,
+            line_join: LineJoin::Round,
+            ..Stroke::default()
         };
-        self.fill((x0, y0), (x1, y1), ink);
-    }
-
-    fn fill(&mut self, upper_left: BackendCoord, bottom_right: BackendCoord, ink: BackendColor) {
-        for y in upper_left.1.max(0)..=bottom_right.1.min(self.height - 1) {
-            for x in upper_left.0.max(0)..=bottom_right.0.min(self.width - 1) {
-                self.blend(x, y, ink.rgb, ink.alpha);
-            }
+        let pixmap = PixmapMut::from_bytes(&mut self.rgba, self.width, self.height);
+        if let Some((mut pixmap, path)) = pixmap.zip(path) {
+            pixmap.stroke_path(&path, &paint(style.color()), &stroke, to_pixels(), None);
         }
     }
+}
+
+/// From drawing coordinates to finished pixels.
+fn to_pixels() -> Transform {
+    let scale = 1.0 / SCALE as f32;
+    Transform::from_scale(scale, scale)
+}
+
+fn paint(ink: BackendColor) -> Paint<'static> {
+    let (r, g, b) = ink.rgb;
+    let mut paint = Paint::default();
+    paint.set_color_rgba8(r, g, b, (255.0 * ink.alpha).round() as u8);
+    paint
+}
+
+/// A path through the middles of points.
+fn polyline(points: impl IntoIterator<Item = BackendCoord>) -> PathBuilder {
+    let mut path = PathBuilder::new();
+    for (x, y) in points {
+        let (x, y) = (x as f32 + 0.5, y as f32 + 0.5);
+        if path.is_empty() {
+            path.move_to(x, y);
+        } else {
+            path.line_to(x, y);
+        }
+    }
+    path
+}
+
+fn set<T: BackendTextStyle>(text: &str, style: &T) -> TextLine {
+    let bold = matches!(style.style(), FontStyle::Bold);
+    TextLine::new(text, bold, style.size() as f32)
 }
 
 /// The [`Canvas`] as `plotters` sees it.
@@ -187,10 +162,8 @@ impl DrawingBackend for Pen<'_> {
     type ErrorType = Infallible;
 
     fn get_size(&self) -> (u32, u32) {
-        (
-            self.canvas.width.unsigned_abs(),
-            self.canvas.height.unsigned_abs(),
-        )
+        let scale = SCALE.unsigned_abs();
+        (self.canvas.width * scale, self.canvas.height * scale)
     }
 
     fn ensure_prepared(&mut self) -> Drawn {
@@ -202,47 +175,48 @@ impl DrawingBackend for Pen<'_> {
     }
 
     fn draw_pixel(&mut self, at: BackendCoord, color: BackendColor) -> Drawn {
-        self.canvas.blend(at.0, at.1, color.rgb, color.alpha);
-        Ok(())
+        self.draw_rect(at, at, &color, true)
     }
 
+    /// A level or upright line is sharp on the finished picture's pixels.
     fn draw_line<S: BackendStyle>(
         &mut self,
         from: BackendCoord,
         to: BackendCoord,
         style: &S,
     ) -> Drawn {
-        let (ink, width) = (style.color(), style.stroke_width());
-        if from.0 == to.0 || from.1 == to.1 {
-            self.canvas.rule(from, to, width.cast_signed(), ink);
-        } else {
-            self.canvas.stroke(from, to, f64::from(width), ink);
-        }
-        Ok(())
+        let width = style.stroke_width().cast_signed();
+        let sharp = |at: i32| {
+            let first = at.div_euclid(SCALE) * SCALE - (width / 2).div_euclid(SCALE) * SCALE;
+            [first, first + width - 1]
+        };
+        let along = |a: i32, b: i32| [a.min(b), a.max(b)];
+        let ([left, right], [top, bottom]) = match (from.0 == to.0, from.1 == to.1) {
+            (_, true) => (along(from.0, to.0), sharp(from.1)),
+            (true, false) => (sharp(from.0), along(from.1, to.1)),
+            (false, false) => return self.draw_path([from, to], style),
+        };
+        self.draw_rect((left, top), (right, bottom), &style.color(), true)
     }
 
     fn draw_rect<S: BackendStyle>(
         &mut self,
-        upper_left: BackendCoord,
-        bottom_right: BackendCoord,
+        (left, top): BackendCoord,
+        (right, bottom): BackendCoord,
         style: &S,
         fill: bool,
     ) -> Drawn {
         if fill {
-            self.canvas.fill(upper_left, bottom_right, style.color());
+            let [left, top] = [left, top].map(|edge| edge as f32);
+            let [right, bottom] = [right, bottom].map(|edge| edge as f32 + 1.0);
+            let path = Rect::from_ltrb(left, top, right, bottom).map(PathBuilder::from_rect);
+            self.canvas.fill(path, style.color(), Transform::identity());
             return Ok(());
         }
-        let ((left, top), (right, bottom)) = (upper_left, bottom_right);
-        let (ink, width) = (style.color(), style.stroke_width().cast_signed());
-        for (from, to) in [
-            ((left, top), (right, top)),
-            ((left, bottom), (right, bottom)),
-            ((left, top), (left, bottom)),
-            ((right, top), (right, bottom)),
-        ] {
-            self.canvas.rule(from, to, width, ink);
-        }
-        Ok(())
+        self.draw_line((left, top), (right, top), style)?;
+        self.draw_line((left, bottom), (right, bottom), style)?;
+        self.draw_line((left, top), (left, bottom), style)?;
+        self.draw_line((right, top), (right, bottom), style)
     }
 
     fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
@@ -250,15 +224,7 @@ impl DrawingBackend for Pen<'_> {
         path: I,
         style: &S,
     ) -> Drawn {
-        let (ink, width) = (style.color(), f64::from(style.stroke_width()));
-        let mut path = path.into_iter();
-        let Some(mut from) = path.next() else {
-            return Ok(());
-        };
-        for to in path {
-            self.canvas.stroke(from, to, width, ink);
-            from = to;
-        }
+        self.canvas.stroke(polyline(path).finish(), style);
         Ok(())
     }
 
@@ -269,30 +235,44 @@ impl DrawingBackend for Pen<'_> {
         style: &S,
         fill: bool,
     ) -> Drawn {
-        let (ink, radius) = (style.color(), f64::from(radius));
+        let (x, y) = (center.0 as f32 + 0.5, center.1 as f32 + 0.5);
+        let path = PathBuilder::from_circle(x, y, radius as f32);
         if fill {
-            self.canvas.stroke(center, center, 2.0 * radius, ink);
-            return Ok(());
-        }
-        let half = 0.5 * f64::from(style.stroke_width());
-        let reach = (radius + half).ceil() as i32 + 1;
-        for y in -reach..=reach {
-            for x in -reach..=reach {
-                let off = (f64::from(x).hypot(f64::from(y)) - radius).abs();
-                let alpha = ink.alpha * (half + 0.5 - off).min(1.0);
-                self.canvas
-                    .blend(center.0 + x, center.1 + y, ink.rgb, alpha);
-            }
+            self.canvas.fill(path, style.color(), Transform::identity());
+        } else {
+            self.canvas.stroke(path, style);
         }
         Ok(())
     }
 
+    fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        corners: I,
+        style: &S,
+    ) -> Drawn {
+        let path = polyline(corners).finish();
+        self.canvas.fill(path, style.color(), Transform::identity());
+        Ok(())
+    }
+
     fn draw_text<T: BackendTextStyle>(&mut self, text: &str, style: &T, at: BackendCoord) -> Drawn {
-        let ink = style.color();
-        style::set_type(text, style, |x, y, coverage| {
-            let alpha = ink.alpha * f64::from(coverage);
-            self.canvas.blend(at.0 + x, at.1 + y, ink.rgb, alpha);
-        });
+        let line = set(text, style);
+        let anchor = style.anchor();
+        let left = match anchor.h_pos {
+            HPos::Left => 0.0,
+            HPos::Center => -0.5 * line.width,
+            HPos::Right => -line.width,
+        };
+        let baseline = match anchor.v_pos {
+            VPos::Top => line.height,
+            VPos::Center => 0.5 * line.height,
+            VPos::Bottom => 0.0,
+        };
+        let turn = style.transform();
+        let ((ax, ay), (bx, by)) = (turn.transform(1, 0), turn.transform(0, 1));
+        let [ax, ay, bx, by, x, y] = [ax, ay, bx, by, at.0, at.1].map(|v| v as f32);
+        let place = Transform::from_row(ax, ay, bx, by, x, y).pre_translate(left, baseline);
+        self.canvas.fill(line.outline, style.color(), place);
         Ok(())
     }
 
@@ -301,16 +281,21 @@ impl DrawingBackend for Pen<'_> {
         text: &str,
         style: &T,
     ) -> Result<(u32, u32), DrawingErrorKind<Infallible>> {
-        let (width, height) = style::text_size(text, style);
-        Ok((width.ceil() as u32, height.ceil() as u32))
+        let line = set(text, style);
+        Ok((line.width.ceil() as u32, line.height.ceil() as u32))
     }
 
+    /// Each pixel of the bitmap becomes one finished pixel.
     fn blit_bitmap(&mut self, at: BackendCoord, size: (u32, u32), rgb: &[u8]) -> Drawn {
-        let width = size.0.max(1) as usize;
-        for (i, pixel) in rgb.as_chunks::<3>().0.iter().enumerate() {
-            let (x, y) = ((i % width) as i32, (i / width) as i32);
-            let ink = (pixel[0], pixel[1], pixel[2]);
-            self.canvas.blend(at.0 + x, at.1 + y, ink, 1.0);
+        let (x, y) = (at.0 / SCALE, at.1 / SCALE);
+        let (width, height) = (self.canvas.width as i32, self.canvas.height as i32);
+        let rows = rgb.chunks_exact(3 * size.0.max(1) as usize);
+        for (y, row) in (y..height).zip(rows).filter(|(y, _)| *y >= 0) {
+            let pixels = (x..width).zip(row.as_chunks::<3>().0);
+            for (x, pixel) in pixels.filter(|(x, _)| *x >= 0) {
+                let place = 4 * (y * width + x) as usize;
+                self.canvas.rgba[place..place + 3].copy_from_slice(pixel);
+            }
         }
         Ok(())
     }
@@ -319,6 +304,7 @@ impl DrawingBackend for Pen<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::picture::style;
     use plotters::prelude::*;
 
     fn pixel(canvas: &Canvas, x: u32, y: u32) -> [u8; 3] {

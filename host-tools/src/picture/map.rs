@@ -1,25 +1,25 @@
-//! The map: relief, the path of the hand and of the proxy, where the map lies.
+//! The map: relief, the paths of HIP and proxy, and where the map lies.
 
-use plotters::element::{Circle, Drawable, PointCollection, Rectangle, Text};
+use plotters::element::{Circle, Drawable, PointCollection, Rectangle};
 use plotters::prelude::DrawingBackend;
 use plotters::style::{Color, RGBColor, WHITE};
-use plotters_backend::text_anchor::{HPos, Pos, VPos};
+use plotters_backend::text_anchor::HPos;
 use plotters_backend::{BackendCoord, DrawingErrorKind};
 
 use super::axes::{self, Area, Chart, Titles};
-use super::canvas::{PictureError, SCALE};
+use super::canvas::PictureError;
 use super::line;
-use super::relief::{self, Field, Relief};
-use super::session::Sample;
-use super::style::{self, HIP, INK, PROXY, px, stroke};
-use super::window::Window;
+use super::map_view::MapView;
+use super::relief::{self, Relief, Surface};
+use super::style::{self, HIP, INK, PROXY, SCALE, px, stroke};
+use crate::replay::Record;
 
 /// Draws the map into an area whose chart part has the window's proportions.
 pub(super) fn draw(
     area: &Area<'_>,
-    field: &Field<'_>,
-    window: &Window,
-    samples: &[Sample],
+    surface: &Surface<'_>,
+    window: &MapView,
+    records: &[Record],
 ) -> Result<Relief, PictureError> {
     let titles = Titles {
         x: "east (mm)",
@@ -29,11 +29,11 @@ pub(super) fn draw(
     let north = window.south..window.south + window.height;
     let mut chart = axes::chart(area, east, north, titles)?;
     let (columns, rows) = window.map_px();
-    let relief = relief::shade(field, window, columns, rows);
+    let relief = relief::shade(surface, window, columns, rows);
     let ground = chart.plotting_area().strip_coord_spec();
-    ground.draw(&Image::of(&relief))?;
+    ground.draw(&Image(&relief))?;
     let pixel_mm = window.width / f64::from(columns);
-    paths(&mut chart, samples, pixel_mm)?;
+    paths(&mut chart, records, pixel_mm)?;
     let (width, height) = ground.dim_in_pixel();
     let corner = (width.cast_signed() - 1, height.cast_signed() - 1);
     let frame = stroke(&style::SOFT_INK, 1.0);
@@ -41,26 +41,22 @@ pub(super) fn draw(
     Ok(relief)
 }
 
-/// The proxy as a ribbon and the hand as a line on it, so that both are seen
-/// where they lie over each other.
-fn paths(chart: &mut Chart<'_>, samples: &[Sample], pixel_mm: f64) -> Result<(), PictureError> {
+/// The proxy's path as a ribbon and the HIP's as a line on it, so that both are
+/// seen where they lie over each other.
+fn paths(chart: &mut Chart<'_>, records: &[Record], pixel_mm: f64) -> Result<(), PictureError> {
     let flat = |p: [f64; 3]| (p[0], p[1]);
-    let hand = line::path(samples.iter().map(|s| Some(flat(s.hip_mm))), pixel_mm);
-    let touched = samples
+    let hip = line::path(records.iter().map(|r| Some(flat(r.hip_mm))), pixel_mm);
+    let touched = records
         .iter()
-        .map(|s| s.contact.then_some(flat(s.proxy_mm)));
+        .map(|r| r.contact.then_some(flat(r.proxy_mm)));
     let proxy = line::path(touched, pixel_mm);
     line::draw(chart, &proxy, stroke(&WHITE, 8.0))?;
-    line::draw(chart, &hand, stroke(&WHITE, 4.5))?;
+    line::draw(chart, &hip, stroke(&WHITE, 4.5))?;
     line::draw(chart, &proxy, stroke(&PROXY, 5.5))?;
-    line::draw(chart, &hand, stroke(&HIP, 2.0))?;
-    for (sample, name, color) in [
-        (samples.first(), "start", WHITE),
-        (samples.last(), "end", HIP),
-    ] {
-        if let Some(sample) = sample {
-            mark(chart, flat(sample.hip_mm), name, color)?;
-        }
+    line::draw(chart, &hip, stroke(&HIP, 2.0))?;
+    if let (Some(first), Some(last)) = (records.first(), records.last()) {
+        mark(chart, flat(first.hip_mm), "start", WHITE)?;
+        mark(chart, flat(last.hip_mm), "end", HIP)?;
     }
     Ok(())
 }
@@ -78,7 +74,7 @@ fn mark(
     let (x, y) = (x - ranges.0.start, y - ranges.1.start);
     plain.draw(&Circle::new((x, y), px(7), HIP.filled()))?;
     plain.draw(&Circle::new((x, y), px(4), color.filled()))?;
-    let font = style::bold(18, &INK).pos(Pos::new(HPos::Left, VPos::Center));
+    let font = style::bold(18, &INK);
     let (width, _) = plain.estimate_text_size(name, &font)?;
     let (width, room) = (width.cast_signed(), plain.dim_in_pixel().0.cast_signed());
     // To the left of the dot where there is no room to its right.
@@ -92,24 +88,23 @@ fn mark(
         (left + width + px(4), y + px(12)),
     ];
     plain.draw(&Rectangle::new(plate, WHITE.mix(0.75).filled()))?;
-    plain.draw(&Text::new(name.to_owned(), (left, y), font))?;
-    Ok(())
+    axes::write(&plain, name, (left, y), font, HPos::Left)
 }
 
 /// The whole terrain, small, with the map's window framed; as large as the
 /// area allows.
 pub(super) fn inset(
     area: &Area<'_>,
-    field: &Field<'_>,
-    window: &Window,
+    surface: &Surface<'_>,
+    window: &MapView,
 ) -> Result<(), PictureError> {
-    let whole = Window::whole(field.size_mm);
+    let whole = MapView::whole(surface.size_mm);
     let (room_x, room_y) = area.dim_in_pixel();
     let pixels = |n: u32| f64::from(n.cast_signed() / SCALE);
     let scale = (pixels(room_x) / whole.width).min(pixels(room_y) / whole.height);
     let size = |extent: f64| ((extent * scale) as i32).max(4);
-    let relief = relief::shade(field, &whole, size(whole.width), size(whole.height));
-    area.draw(&Image::of(&relief))?;
+    let relief = relief::shade(surface, &whole, size(whole.width), size(whole.height));
+    area.draw(&Image(&relief))?;
     let place = |east: f64, north: f64| {
         let x = east * scale * f64::from(SCALE);
         let y = (whole.height - north) * scale * f64::from(SCALE);
@@ -130,53 +125,25 @@ pub(super) fn inset(
 
 /// A relief at the upper left of an area, each of its pixels one finished
 /// pixel.
-struct Image {
-    corner: [(i32, i32); 1],
-    size: (u32, u32),
-    rgb: Vec<u8>,
-}
+struct Image<'r>(&'r Relief);
 
-impl Image {
-    fn of(relief: &Relief) -> Self {
-        let scale = SCALE as usize;
-        let row_bytes = relief.columns as usize * 3;
-        let mut rgb = Vec::with_capacity(relief.rgb.len() * scale * scale);
-        for row in relief.rgb.chunks_exact(row_bytes.max(1)) {
-            let wide: Vec<u8> = row
-                .as_chunks::<3>()
-                .0
-                .iter()
-                .flat_map(|pixel| std::iter::repeat_n(*pixel, scale).flatten())
-                .collect();
-            (0..scale).for_each(|_| rgb.extend_from_slice(&wide));
-        }
-        Self {
-            corner: [(0, 0)],
-            size: (px(relief.columns) as u32, px(relief.rows) as u32),
-            rgb,
-        }
-    }
-}
-
-impl<'a> PointCollection<'a, (i32, i32)> for &'a Image {
-    type Point = &'a (i32, i32);
-    type IntoIter = std::slice::Iter<'a, (i32, i32)>;
+impl<'a> PointCollection<'a, (i32, i32)> for &'a Image<'_> {
+    type Point = (i32, i32);
+    type IntoIter = [(i32, i32); 1];
 
     fn point_iter(self) -> Self::IntoIter {
-        self.corner.iter()
+        [(0, 0)]
     }
 }
 
-impl<DB: DrawingBackend> Drawable<DB> for Image {
+impl<DB: DrawingBackend> Drawable<DB> for Image<'_> {
     fn draw<I: Iterator<Item = BackendCoord>>(
         &self,
         mut at: I,
         backend: &mut DB,
         _: (u32, u32),
     ) -> Result<(), DrawingErrorKind<DB::ErrorType>> {
-        match at.next() {
-            Some(at) => backend.blit_bitmap(at, self.size, &self.rgb),
-            None => Ok(()),
-        }
+        let size = (self.0.columns as u32, self.0.rows as u32);
+        at.try_for_each(|at| backend.blit_bitmap(at, size, &self.0.rgb))
     }
 }

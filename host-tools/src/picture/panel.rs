@@ -1,15 +1,15 @@
 //! Beside the map: the key, the colour scale, where the map lies, and figures.
 
-use plotters::element::{Circle, PathElement, Rectangle, Text};
-use plotters::style::{Color, WHITE};
-use plotters_backend::text_anchor::{HPos, Pos, VPos};
+use plotters::element::{Circle, PathElement, Rectangle};
+use plotters::style::{Color, ShapeStyle, WHITE};
+use plotters_backend::text_anchor::HPos;
 
 use super::axes::{self, Area};
 use super::canvas::PictureError;
 use super::map;
-use super::relief::{self, Field, Relief};
+use super::map_view::MapView;
+use super::relief::{self, Relief, Surface};
 use super::style::{self, HIP, INK, PROXY, SOFT_INK, SURFACE, TOUCHING, TOUCHING_INK, px, stroke};
-use super::window::Window;
 
 /// Height of a line of text, finished pixels.
 const LINE_PX: i32 = 30;
@@ -20,15 +20,15 @@ const WIDE_PX: i32 = 330;
 pub(super) fn draw(
     area: &Area<'_>,
     relief: &Relief,
-    field: &Field<'_>,
-    window: &Window,
+    surface: &Surface<'_>,
+    window: &MapView,
     facts: &[(String, String)],
 ) -> Result<(), PictureError> {
     let mut y = px(8);
     y = key(area, y, relief.holes)? + px(16);
     y = scale(area, y, relief)? + px(20);
     y = figures(area, y, facts)? + px(20);
-    if !window.shows_all(field.size_mm) {
+    if !window.shows_all(surface.size_mm) {
         heading(area, y, "Where the map lies")?;
         let (width, height) = area.dim_in_pixel();
         let top = y + px(20);
@@ -36,64 +36,65 @@ pub(super) fn draw(
         if rest > px(60) {
             let width = width.cast_signed().min(px(WIDE_PX));
             let place = area.clone().shrink((0, top), (width, rest.min(px(300))));
-            map::inset(&place, field, window)?;
+            map::inset(&place, surface, window)?;
         }
     }
     Ok(())
 }
 
 fn heading(area: &Area<'_>, y: i32, name: &str) -> Result<(), PictureError> {
-    let font = style::bold(18, &INK).pos(Pos::new(HPos::Left, VPos::Center));
-    area.draw(&Text::new(name.to_owned(), (0, y), font))?;
-    Ok(())
+    axes::write(area, name, (0, y), style::bold(18, &INK), HPos::Left)
 }
 
 fn label(area: &Area<'_>, x: i32, y: i32, text: &str, side: HPos) -> Result<(), PictureError> {
-    let font = style::text(18, &SOFT_INK).pos(Pos::new(side, VPos::Center));
-    area.draw(&Text::new(text.to_owned(), (x, y), font))?;
-    Ok(())
+    axes::write(area, text, (x, y), style::text(18, &SOFT_INK), side)
 }
 
 /// What the lines and colours mean.
 fn key(area: &Area<'_>, top: i32, holes: bool) -> Result<i32, PictureError> {
-    let (left, right, text) = (0, px(40), px(54));
-    let across = |y: i32| vec![(left + px(3), y), (right - px(3), y)];
-    let patch = |y: i32| [(left, y - px(8)), (right, y + px(8))];
+    let right = px(40);
     let mut y = top + px(4);
-    area.draw(&PathElement::new(across(y), stroke(&HIP, 2.0)))?;
-    label(area, text, y, "hand (haptic interface point)", HPos::Left)?;
-    y += px(LINE_PX);
-    area.draw(&PathElement::new(across(y), stroke(&PROXY, 5.5)))?;
-    label(area, text, y, "proxy, while in contact", HPos::Left)?;
-    y += px(LINE_PX);
-    area.draw(&Rectangle::new(patch(y), style::GROUND.filled()))?;
-    let rim = vec![(left, y - px(8)), (right, y - px(8))];
-    area.draw(&PathElement::new(rim, stroke(&SURFACE, 2.0)))?;
-    label(area, text, y, "surface under the hand", HPos::Left)?;
-    y += px(LINE_PX);
-    area.draw(&Rectangle::new(
-        patch(y),
-        TOUCHING.mix(TOUCHING_INK).filled(),
-    ))?;
-    label(area, text, y, "time in contact", HPos::Left)?;
-    y += px(LINE_PX);
-    for (x, inner) in [(px(10), WHITE), (px(30), HIP)] {
-        area.draw(&Circle::new((x, y), px(7), HIP.filled()))?;
-        area.draw(&Circle::new((x, y), px(4), inner.filled()))?;
-    }
-    label(area, text, y, "start and end", HPos::Left)?;
-    y += px(LINE_PX);
-    if holes {
-        for row in 0..16 {
-            for column in 0..40 {
-                let at = (px(column), y + px(row - 8));
-                let cell = [at, (at.0 + 1, at.1 + 1)];
-                let color = relief::hole(column, row);
-                area.draw(&Rectangle::new(cell, color.filled()))?;
-            }
-        }
-        label(area, text, y, "no data (a hole)", HPos::Left)?;
+    let mut entry = |name: &str, sign: &dyn Fn(i32) -> Result<(), PictureError>| {
+        sign(y)?;
+        label(area, px(54), y, name, HPos::Left)?;
         y += px(LINE_PX);
+        Ok::<(), PictureError>(())
+    };
+    let line = |from: i32, to: i32, y: i32, style: ShapeStyle| {
+        Ok(area.draw(&PathElement::new(vec![(from, y), (to, y)], style))?)
+    };
+    let patch = |y: i32, style: ShapeStyle| {
+        Ok(area.draw(&Rectangle::new([(0, y - px(8)), (right, y + px(8))], style))?)
+    };
+    entry("HIP (haptic interface point)", &|y| {
+        line(px(3), right - px(3), y, stroke(&HIP, 2.0))
+    })?;
+    entry("proxy, while in contact", &|y| {
+        line(px(3), right - px(3), y, stroke(&PROXY, 5.5))
+    })?;
+    entry("surface under the HIP", &|y| {
+        patch(y, style::GROUND.filled())?;
+        line(0, right, y - px(8), stroke(&SURFACE, 2.0))
+    })?;
+    entry("time in contact", &|y| {
+        patch(y, TOUCHING.mix(TOUCHING_INK).filled())
+    })?;
+    entry("start and end", &|y| {
+        for (x, inner) in [(px(10), WHITE), (px(30), HIP)] {
+            area.draw(&Circle::new((x, y), px(7), HIP.filled()))?;
+            area.draw(&Circle::new((x, y), px(4), inner.filled()))?;
+        }
+        Ok(())
+    })?;
+    if holes {
+        entry("no data (a hole)", &|y| {
+            for (row, column) in (0..16).flat_map(|row| (0..40).map(move |column| (row, column))) {
+                let (x, y) = (px(column), y + px(row - 8));
+                let pixel = [(x, y), (x + px(1) - 1, y + px(1) - 1)];
+                area.draw(&Rectangle::new(pixel, relief::hole(column, row).filled()))?;
+            }
+            Ok(())
+        })?;
     }
     Ok(y)
 }
@@ -103,12 +104,10 @@ fn scale(area: &Area<'_>, top: i32, relief: &Relief) -> Result<i32, PictureError
     heading(area, top, "Height of the surface (mm)")?;
     let width = area.dim_in_pixel().0.cast_signed().min(px(WIDE_PX));
     let (bar_top, bar_bottom) = (top + px(18), top + px(34));
-    for x in 0..width {
+    for x in (0..width).step_by(px(1) as usize) {
         let color = relief::tint(f64::from(x) / f64::from(width));
-        area.draw(&Rectangle::new(
-            [(x, bar_top), (x, bar_bottom)],
-            color.filled(),
-        ))?;
+        let strip = [(x, bar_top), (x + px(1) - 1, bar_bottom)];
+        area.draw(&Rectangle::new(strip, color.filled()))?;
     }
     let y = bar_bottom + px(16);
     let (low, high) = relief.range_mm;
@@ -134,8 +133,7 @@ fn figures(area: &Area<'_>, top: i32, facts: &[(String, String)]) -> Result<i32,
     let mut y = top + px(LINE_PX);
     for (name, value) in facts {
         label(area, 0, y, name, HPos::Left)?;
-        let font = style::bold(18, &INK).pos(Pos::new(HPos::Right, VPos::Center));
-        area.draw(&Text::new(value.clone(), (width, y), font))?;
+        axes::write(area, value, (width, y), style::bold(18, &INK), HPos::Right)?;
         y += px(LINE_PX);
     }
     Ok(y)

@@ -1,17 +1,17 @@
 //! Shaded relief: a colour for height, a shade for slope.
 //!
 //! The work depends on the picture's size only: each pixel takes the mean of
-//! at most 3 × 3 samples spread over the ground it covers, whatever the size
-//! of the field, and nothing is copied.
+//! at most 3 × 3 heights spread over the ground it covers, whatever the size
+//! of the surface, and nothing is copied.
 
 use plotters::style::RGBColor;
 
+use super::map_view::MapView;
 use super::style::{self, PAPER};
-use super::window::Window;
 
-/// A terrain as a picture sees it.
+/// The surface that a picture shows.
 #[derive(Clone, Copy)]
-pub struct Field<'a> {
+pub struct Surface<'a> {
     /// Height in mm at (east, north) in mm; `None` in a hole and off the data.
     pub height_mm: &'a dyn Fn(f64, f64) -> Option<f64>,
     /// Extent east and north from the south-west sample, mm.
@@ -23,7 +23,7 @@ pub struct Field<'a> {
 /// Samples a pixel in each direction, at most.
 const MAX_SAMPLES: u32 = 3;
 /// Slopes are exaggerated until this share of them is below 45°.
-const GENTLE_SHARE: f64 = 0.85;
+const BELOW_45_SHARE: f64 = 0.85;
 /// But not more than this.
 const MAX_EXAGGERATION: f64 = 30.0;
 /// Directions towards the lights (east, north, up) and their strengths: the
@@ -73,28 +73,26 @@ pub(super) fn hole(x: i32, y: i32) -> RGBColor {
     }
 }
 
-/// Shades a window of a field into an image.
-pub(super) fn shade(field: &Field<'_>, window: &Window, columns: i32, rows: i32) -> Relief {
-    let grid = Grid::sample(field, window, columns, rows);
+/// Shades a window of a surface into an image.
+pub(super) fn shade(surface: &Surface<'_>, window: &MapView, columns: i32, rows: i32) -> Relief {
+    let grid = PixelHeights::sample(surface, window, columns, rows);
     let range_mm = grid.range();
     let exaggeration = grid.exaggeration();
     let mut rgb = Vec::with_capacity((columns * rows * 3) as usize);
     let mut holes = false;
-    for y in 0..rows {
-        for x in 0..columns {
-            let RGBColor(r, g, b) = match grid.at(x, y) {
-                Some(height) => {
-                    let t = (height - range_mm.0) / (range_mm.1 - range_mm.0).max(1e-9);
-                    lit(tint(t), grid.slope(x, y).map(|s| s * exaggeration))
-                }
-                None if grid.outside(field, window, x, y) => PAPER,
-                None => {
-                    holes = true;
-                    hole(x, y)
-                }
-            };
-            rgb.extend([r, g, b]);
-        }
+    for (x, y) in places(columns, rows, 1) {
+        let RGBColor(r, g, b) = match grid.at(x, y) {
+            Some(height) => {
+                let t = (height - range_mm.0) / (range_mm.1 - range_mm.0).max(1e-9);
+                lit(tint(t), grid.slope(x, y).map(|s| s * exaggeration))
+            }
+            None if grid.outside(surface, window, x, y) => PAPER,
+            None => {
+                holes = true;
+                hole(x, y)
+            }
+        };
+        rgb.extend([r, g, b]);
     }
     Relief {
         columns,
@@ -128,37 +126,32 @@ fn lit(tint: RGBColor, slope: [f64; 2]) -> RGBColor {
 }
 
 /// Mean heights of the pixels, row 0 in the north.
-struct Grid {
+struct PixelHeights {
     columns: i32,
     rows: i32,
     pixel_mm: f64,
     heights: Vec<Option<f64>>,
 }
 
-impl Grid {
-    fn sample(field: &Field<'_>, window: &Window, columns: i32, rows: i32) -> Self {
+impl PixelHeights {
+    fn sample(surface: &Surface<'_>, window: &MapView, columns: i32, rows: i32) -> Self {
         let step = [
             window.width / f64::from(columns),
             window.height / f64::from(rows),
         ];
-        let wanted = (step[0] / field.cell_mm).ceil().max(1.0);
+        let wanted = (step[0] / surface.cell_mm).ceil().max(1.0);
         let samples = (wanted as u32).min(MAX_SAMPLES);
         let north = window.south + window.height;
-        let mut heights = Vec::with_capacity((columns * rows) as usize);
-        for y in 0..rows {
-            for x in 0..columns {
-                let corner = [
-                    window.west + f64::from(x) * step[0],
-                    north - f64::from(y + 1) * step[1],
-                ];
-                heights.push(mean(field, corner, step, samples));
-            }
-        }
+        let heights = places(columns, rows, 1).map(|(x, y)| {
+            let west = window.west + f64::from(x) * step[0];
+            let south = north - f64::from(y + 1) * step[1];
+            mean(surface, [west, south], step, samples)
+        });
         Self {
             columns,
             rows,
             pixel_mm: step[0],
-            heights,
+            heights: heights.collect(),
         }
     }
 
@@ -185,52 +178,56 @@ impl Grid {
     /// Heights that nearly all pixels lie between: one spike does not make the
     /// rest one colour.
     fn range(&self) -> (f64, f64) {
-        let mut known: Vec<f64> = self.heights.iter().flatten().copied().collect();
-        if known.is_empty() {
-            return (0.0, 1.0);
-        }
-        known.sort_by(f64::total_cmp);
-        let share = |s: f64| known[((known.len() - 1) as f64 * s) as usize];
-        (share(0.002), share(0.998))
+        let known = sorted(self.heights.iter().flatten().copied());
+        quantile(&known, 0.002)
+            .zip(quantile(&known, 0.998))
+            .unwrap_or((0.0, 1.0))
     }
 
     fn exaggeration(&self) -> f64 {
-        let slope = |x, y| self.at(x, y).map(|_| self.slope(x, y));
-        let mut steepness: Vec<f64> = (0..self.rows)
-            .step_by(3)
-            .flat_map(|y| {
-                (0..self.columns)
-                    .step_by(3)
-                    .filter_map(move |x| slope(x, y))
-            })
-            .map(|[east, north]| east.hypot(north))
-            .filter(|s| *s > 0.0)
-            .collect();
-        if steepness.is_empty() {
-            return 1.0;
-        }
-        steepness.sort_by(f64::total_cmp);
-        let gentle = steepness[((steepness.len() - 1) as f64 * GENTLE_SHARE) as usize];
-        (1.0 / gentle).clamp(0.2, MAX_EXAGGERATION)
+        let slopes = places(self.columns, self.rows, 3)
+            .filter(|&(x, y)| self.at(x, y).is_some())
+            .map(|(x, y)| self.slope(x, y));
+        let steepness = slopes.map(|[east, north]| east.hypot(north));
+        let slope = quantile(&sorted(steepness.filter(|s| *s > 0.0)), BELOW_45_SHARE);
+        slope.map_or(1.0, |slope| (1.0 / slope).clamp(0.2, MAX_EXAGGERATION))
     }
 
     /// Whether a pixel's middle lies off the data, rather than in a hole.
-    fn outside(&self, field: &Field<'_>, window: &Window, x: i32, y: i32) -> bool {
+    fn outside(&self, surface: &Surface<'_>, window: &MapView, x: i32, y: i32) -> bool {
         let east = window.west + (f64::from(x) + 0.5) * self.pixel_mm;
         let north = window.south + window.height - (f64::from(y) + 0.5) * self.pixel_mm;
-        !(0.0..=field.size_mm[0]).contains(&east) || !(0.0..=field.size_mm[1]).contains(&north)
+        !(0.0..=surface.size_mm[0]).contains(&east) || !(0.0..=surface.size_mm[1]).contains(&north)
     }
+}
+
+/// Every `step`-th pixel of every `step`-th row, row by row from the north.
+fn places(columns: i32, rows: i32, step: usize) -> impl Iterator<Item = (i32, i32)> {
+    let rows = (0..rows).step_by(step);
+    rows.flat_map(move |y| (0..columns).step_by(step).map(move |x| (x, y)))
+}
+
+fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+/// The value that a `share` of sorted ones do not exceed.
+fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    Some(sorted[(last as f64 * share) as usize])
 }
 
 /// Mean of the known among `samples`² heights in a pixel; a pixel that is half
 /// hole is a hole.
-fn mean(field: &Field<'_>, corner: [f64; 2], step: [f64; 2], samples: u32) -> Option<f64> {
+fn mean(surface: &Surface<'_>, corner: [f64; 2], step: [f64; 2], samples: u32) -> Option<f64> {
     let (mut sum, mut known) = (0.0, 0);
     let at =
         |i: u32, axis: usize| corner[axis] + (f64::from(i) + 0.5) / f64::from(samples) * step[axis];
     for j in 0..samples {
         for i in 0..samples {
-            let height = (field.height_mm)(at(i, 0), at(j, 1)).filter(|h| h.is_finite());
+            let height = (surface.height_mm)(at(i, 0), at(j, 1)).filter(|h| h.is_finite());
             sum += height.unwrap_or(0.0);
             known += u32::from(height.is_some());
         }
@@ -255,12 +252,12 @@ mod tests {
             let r = (x - 50.0).hypot(y - 50.0);
             (r > 12.0).then_some(100.0 - r)
         };
-        let field = Field {
+        let field = Surface {
             height_mm: &height,
             size_mm: [100.0, 100.0],
             cell_mm: 1.0,
         };
-        let relief = shade(&field, &Window::whole(field.size_mm), 100, 100);
+        let relief = shade(&field, &MapView::whole(field.size_mm), 100, 100);
         assert!(brightness(&relief, 30, 30) > brightness(&relief, 70, 70) + 100);
         assert!(relief.holes);
         let RGBColor(r, ..) = hole(50, 50);
@@ -271,7 +268,7 @@ mod tests {
     fn a_pixel_that_is_mostly_hole_is_a_hole() {
         let field = |known: &'static dyn Fn(f64) -> bool| {
             let height = move |x: f64, _: f64| known(x).then_some(2.0);
-            let field = Field {
+            let field = Surface {
                 height_mm: &height,
                 size_mm: [3.0, 3.0],
                 cell_mm: 1.0,
@@ -289,24 +286,24 @@ mod tests {
             asked.set(asked.get() + 1);
             Some(x.sin() + y.cos())
         };
-        let field = Field {
+        let field = Surface {
             height_mm: &height,
             size_mm: [1e6, 1e6],
             cell_mm: 1.0,
         };
-        shade(&field, &Window::whole(field.size_mm), 200, 100);
+        shade(&field, &MapView::whole(field.size_mm), 200, 100);
         assert!(asked.get() <= 200 * 100 * 9);
     }
 
     #[test]
     fn nothing_but_holes_and_wild_heights_still_shade() {
         for height in [None, Some(f64::INFINITY), Some(0.0), Some(1e30)] {
-            let field = Field {
+            let field = Surface {
                 height_mm: &|_, _| height,
                 size_mm: [10.0, 10.0],
                 cell_mm: 1.0,
             };
-            let relief = shade(&field, &Window::whole(field.size_mm), 20, 20);
+            let relief = shade(&field, &MapView::whole(field.size_mm), 20, 20);
             assert_eq!(relief.rgb.len(), 1200);
         }
     }

@@ -8,7 +8,7 @@ fn hills(x: f64, y: f64) -> Option<f64> {
     far.then(|| 12.0 * libm::sin(x / 17.0) * libm::cos(y / 13.0))
 }
 
-fn walk() -> Vec<Sample> {
+fn walk() -> Vec<Record> {
     (0..4000)
         .map(|i| {
             let t_s = 1e-3 * f64::from(i);
@@ -17,7 +17,7 @@ fn walk() -> Vec<Sample> {
             let depth = 3.0 * libm::sin(3.0 * t_s);
             let contact = depth > 0.0;
             let up = if contact { 0.5 * depth } else { 0.0 };
-            Sample {
+            Record {
                 t_s,
                 hip_mm: [x, y, ground - depth],
                 proxy_mm: [x, y, ground - if contact { 0.0 } else { depth }],
@@ -28,16 +28,16 @@ fn walk() -> Vec<Sample> {
         .collect()
 }
 
-fn session<'a>(samples: &'a [Sample], size_mm: [f64; 2]) -> Session<'a> {
-    Session {
+fn session<'a>(records: &'a [Record], size_mm: [f64; 2]) -> SessionPicture<'a> {
+    SessionPicture {
         title: "Hills",
         subtitle: "by formula · 1 cell = 1 mm",
-        field: Field {
+        surface: Surface {
             height_mm: &hills,
             size_mm,
             cell_mm: 1.0,
         },
-        samples,
+        records,
         facts: &[],
     }
 }
@@ -52,9 +52,9 @@ fn count(canvas: &Canvas, color: plotters::style::RGBColor, rows: [i32; 2]) -> u
 }
 
 #[test]
-fn a_session_shows_hand_and_proxy_on_map_and_profile() {
+fn a_session_shows_hip_and_proxy_on_map_and_profile() {
     let samples = walk();
-    let canvas = draw_session(&session(&samples, [100.0, 90.0])).expect("drawn");
+    let canvas = session(&samples, [100.0, 90.0]).draw().expect("drawn");
     let bottom = canvas.size().1.cast_signed();
     let forces = bottom - MARGIN_PX - FORCES_PX;
     let heights = forces - GAP_PX - HEIGHTS_PX;
@@ -65,14 +65,14 @@ fn a_session_shows_hand_and_proxy_on_map_and_profile() {
         assert!(seen > 900, "{color:?} in rows {part:?}: {seen}");
     }
     assert!(count(&canvas, style::INK, [forces, bottom]) > 900);
-    let empty = draw_session(&session(&[], [100.0, 90.0])).expect("drawn");
+    let empty = session(&[], [100.0, 90.0]).draw().expect("drawn");
     assert_eq!(count(&empty, HIP, profile), 0);
 }
 
 #[test]
 fn the_file_reads_back_with_the_size_it_was_drawn() {
     let samples = walk();
-    let drawn = draw_session(&session(&samples, [5000.0, 3000.0])).expect("drawn");
+    let drawn = session(&samples, [5000.0, 3000.0]).draw().expect("drawn");
     let path = std::env::temp_dir().join(format!("hapterra-{}.png", std::process::id()));
     drawn.save(&path).expect("written");
     let file = std::io::BufReader::new(std::fs::File::open(&path).expect("there"));
@@ -91,7 +91,7 @@ fn odd_sessions_are_drawn_too() {
     wild[9].force_n = [f64::INFINITY, 0.0, 0.0];
     for samples in [&one[..], &still, &wild] {
         for size in [[100.0, 90.0], [1e5, 2.0], [3.0, 2000.0]] {
-            draw_session(&session(samples, size)).expect("drawn");
+            session(samples, size).draw().expect("drawn");
         }
     }
 }

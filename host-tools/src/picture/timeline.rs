@@ -1,61 +1,53 @@
 //! Height and force against time.
 
-use plotters::element::{Rectangle, Text};
+use plotters::element::{Polygon, Rectangle, Text};
 use plotters::style::{Color, RGBColor, ShapeStyle};
 use plotters_backend::text_anchor::{HPos, Pos, VPos};
 use std::ops::Range;
 
 use super::axes::{self, Area, Chart, Titles};
-use super::canvas::{PictureError, SCALE};
+use super::canvas::PictureError;
 use super::line;
-use super::relief::{self, Field};
-use super::session::Sample;
+use super::relief::{self, Surface};
 use super::style::{
-    self, GROUND, HIP, INK, PROXY, SERIES, SURFACE, TOUCHING, TOUCHING_INK, px, stroke,
+    self, GROUND, HIP, INK, PROXY, SCALE, SERIES, SURFACE, TOUCHING, TOUCHING_INK, px, stroke,
 };
+use crate::replay::Record;
 
-/// Height of the surface under the hand, of the hand and of the proxy.
+/// Heights of the surface under the HIP, of the HIP and of the proxy.
 pub(super) fn heights(
     area: &Area<'_>,
-    field: &Field<'_>,
-    samples: &[Sample],
+    surface: &Surface<'_>,
+    records: &[Record],
     time: &Range<f64>,
 ) -> Result<(), PictureError> {
-    let surface = |s: &Sample| (field.height_mm)(s.hip_mm[0], s.hip_mm[1]);
-    let seen = samples
+    let below = |r: &Record| (surface.height_mm)(r.hip_mm[0], r.hip_mm[1]);
+    let seen = records
         .iter()
-        .flat_map(|s| [Some(s.hip_mm[2]), Some(s.proxy_mm[2]), surface(s)]);
+        .flat_map(|r| [Some(r.hip_mm[2]), Some(r.proxy_mm[2]), below(r)]);
     let range = axes::spread(seen.flatten(), 0.08);
     let titles = Titles {
         x: "",
         y: "height (mm)",
     };
-    let mut chart = axes::chart(area, time.clone(), range.clone(), titles)?;
-    let columns = area.dim_in_pixel().0 / SCALE as u32;
-    touching(&mut chart, samples, time, &range)?;
-    let holes = samples.iter().map(|s| (s.t_s, surface(s).is_none()));
-    bands(&mut chart, holes, time, &range, relief::HOLE.filled())?;
-    let ground = line::curve(samples.iter().map(|s| (s.t_s, surface(s))), time, columns);
-    fill_below(&mut chart, &ground, range.start)?;
-    let touched = |s: &Sample| s.contact.then_some(s.proxy_mm[2]);
-    let proxy = line::curve(samples.iter().map(|s| (s.t_s, touched(s))), time, columns);
-    let hand = samples.iter().map(|s| (s.t_s, Some(s.hip_mm[2])));
-    let hand = line::curve(hand, time, columns);
-    line::draw(&mut chart, &ground, stroke(&SURFACE, 1.5))?;
-    line::draw(&mut chart, &proxy, stroke(&PROXY, 4.0))?;
-    line::draw(&mut chart, &hand, stroke(&HIP, 1.8))
+    let mut plot = Plot::new(area, records, time, range, titles)?;
+    plot.bands(|r| below(r).is_none(), relief::HOLE.filled())?;
+    plot.fill_below(below)?;
+    plot.line(below, stroke(&SURFACE, 1.5))?;
+    plot.line(|r| r.contact.then_some(r.proxy_mm[2]), stroke(&PROXY, 4.0))?;
+    plot.line(|r| Some(r.hip_mm[2]), stroke(&HIP, 1.8))
 }
 
 /// The force's size, and its parts as thin lines.
 pub(super) fn forces(
     area: &Area<'_>,
-    samples: &[Sample],
+    records: &[Record],
     time: &Range<f64>,
 ) -> Result<(), PictureError> {
     let size = |f: [f64; 3]| f.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let all = samples
+    let all = records
         .iter()
-        .flat_map(|s| s.force_n.into_iter().chain([size(s.force_n), 0.0, 0.5]));
+        .flat_map(|r| r.force_n.into_iter().chain([size(r.force_n), 0.0, 0.5]));
     let range = axes::spread(all, 0.06);
     // Room for the key.
     let range = range.start..range.end + 0.12 * (range.end - range.start);
@@ -63,18 +55,12 @@ pub(super) fn forces(
         x: "time (s)",
         y: "force (N)",
     };
-    let mut chart = axes::chart(area, time.clone(), range.clone(), titles)?;
-    let columns = area.dim_in_pixel().0 / SCALE as u32;
-    touching(&mut chart, samples, time, &range)?;
-    for (axis, color) in PARTS.iter().enumerate() {
-        let part = samples.iter().map(|s| (s.t_s, Some(s.force_n[axis])));
-        let part = line::curve(part, time, columns);
-        line::draw(&mut chart, &part, stroke(&color.1, 1.5))?;
+    let mut plot = Plot::new(area, records, time, range, titles)?;
+    for (axis, (_, color)) in PARTS.iter().enumerate() {
+        plot.line(|r| Some(r.force_n[axis]), stroke(color, 1.5))?;
     }
-    let whole = samples.iter().map(|s| (s.t_s, Some(size(s.force_n))));
-    let whole = line::curve(whole, time, columns);
-    line::draw(&mut chart, &whole, stroke(&INK, 2.2))?;
-    key(&chart)
+    plot.line(|r| Some(size(r.force_n)), stroke(&INK, 2.2))?;
+    key(&plot.chart)
 }
 
 /// The parts of the force: name and colour.
@@ -93,49 +79,75 @@ fn key(chart: &Chart<'_>) -> Result<(), PictureError> {
     Ok(())
 }
 
-/// Light bands behind the times of contact.
-fn touching(
-    chart: &mut Chart<'_>,
-    samples: &[Sample],
-    time: &Range<f64>,
-    range: &Range<f64>,
-) -> Result<(), PictureError> {
-    let when = samples.iter().map(|s| (s.t_s, s.contact));
-    bands(
-        chart,
-        when,
-        time,
-        range,
-        TOUCHING.mix(TOUCHING_INK).filled(),
-    )
+/// A chart of something against time.
+struct Plot<'a, 'r> {
+    chart: Chart<'a>,
+    records: &'r [Record],
+    time: &'r Range<f64>,
+    /// Of the upright axis.
+    range: Range<f64>,
+    /// Finished pixels from side to side.
+    columns: u32,
 }
 
-/// A band from top to bottom for each run of times.
-fn bands(
-    chart: &mut Chart<'_>,
-    when: impl Iterator<Item = (f64, bool)>,
-    time: &Range<f64>,
-    range: &Range<f64>,
-    style: ShapeStyle,
-) -> Result<(), PictureError> {
-    let runs = line::runs(when, (time.end - time.start) * 2e-3);
-    chart.draw_series(
-        runs.into_iter()
-            .map(|(from, to)| Rectangle::new([(from, range.start), (to, range.end)], style)),
-    )?;
-    Ok(())
-}
+impl<'a, 'r> Plot<'a, 'r> {
+    /// Axes, and light bands behind the times of contact.
+    fn new(
+        area: &Area<'a>,
+        records: &'r [Record],
+        time: &'r Range<f64>,
+        range: Range<f64>,
+        titles: Titles<'_>,
+    ) -> Result<Self, PictureError> {
+        let mut plot = Self {
+            chart: axes::chart(area, time.clone(), range.clone(), titles)?,
+            records,
+            time,
+            range,
+            columns: area.dim_in_pixel().0 / SCALE as u32,
+        };
+        plot.bands(|r| r.contact, TOUCHING.mix(TOUCHING_INK).filled())?;
+        Ok(plot)
+    }
 
-/// Ground under a profile.
-fn fill_below(
-    chart: &mut Chart<'_>,
-    profile: &[Vec<(f64, f64)>],
-    floor: f64,
-) -> Result<(), PictureError> {
-    let strips = profile.iter().flat_map(|piece| piece.windows(2));
-    chart.draw_series(strips.map(|pair| {
-        let top = 0.5 * (pair[0].1 + pair[1].1);
-        Rectangle::new([(pair[0].0, top), (pair[1].0, floor)], GROUND.filled())
-    }))?;
-    Ok(())
+    /// A band from top to bottom for each run of times.
+    fn bands(
+        &mut self,
+        when: impl Fn(&Record) -> bool,
+        style: ShapeStyle,
+    ) -> Result<(), PictureError> {
+        let points = self.records.iter().map(|r| (r.t_s, when(r)));
+        let runs = line::runs(points, (self.time.end - self.time.start) * 2e-3);
+        let Range { start, end } = self.range;
+        let bands = runs.into_iter();
+        let bands = bands.map(|(from, to)| Rectangle::new([(from, start), (to, end)], style));
+        self.chart.draw_series(bands)?;
+        Ok(())
+    }
+
+    /// Ground under a profile.
+    fn fill_below(&mut self, profile: impl Fn(&Record) -> Option<f64>) -> Result<(), PictureError> {
+        let floor = self.range.start;
+        let ground = self.curve(profile).into_iter().map(|piece| {
+            let (first, last) = (piece[0].0, piece[piece.len() - 1].0);
+            let floor = [(last, floor), (first, floor)];
+            Polygon::new([&piece[..], &floor].concat(), GROUND.filled())
+        });
+        self.chart.draw_series(ground)?;
+        Ok(())
+    }
+
+    fn line(
+        &mut self,
+        value: impl Fn(&Record) -> Option<f64>,
+        style: ShapeStyle,
+    ) -> Result<(), PictureError> {
+        let curve = self.curve(value);
+        line::draw(&mut self.chart, &curve, style)
+    }
+
+    fn curve(&self, value: impl Fn(&Record) -> Option<f64>) -> Vec<Vec<(f64, f64)>> {
+        let points = self.records.iter().map(|r| (r.t_s, value(r)));
+        line::curve(points, self.time, self.columns)
+    }
 }

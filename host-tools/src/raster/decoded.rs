@@ -1,7 +1,12 @@
 //! What a decoder hands over, and what every format's result must satisfy.
 
-use super::samples::{HoleMask, Widen, with_samples};
-use super::{CellSize, Fault, LARGEST_HEIGHT, Samples};
+use super::BadRaster;
+use super::geometry::CellSize;
+use super::samples::{HoleMask, SampleValue, Samples, with_samples};
+
+/// No height is larger than this (in the file's vertical unit), whatever the
+/// planet: such a sample is a no-data value that the file forgot to declare.
+pub const LARGEST_HEIGHT: f64 = 1e30;
 
 /// What a decoder hands over: samples in file order and all that the file says
 /// about them.
@@ -35,16 +40,22 @@ pub(super) struct Decoded {
     pub(super) remarks: Vec<String>,
 }
 
+/// Columns and rows as numbers of samples that can be addressed.
+///
+/// # Errors
+/// [`BadRaster::AbsurdSize`] when there are more than a `u32` can count.
+pub(super) fn sides(columns: u64, rows: u64) -> Result<(u32, u32), BadRaster> {
+    match (u32::try_from(columns), u32::try_from(rows)) {
+        (Ok(columns), Ok(rows)) => Ok((columns, rows)),
+        _ => Err(BadRaster::AbsurdSize(format!("{columns} × {rows} samples"))),
+    }
+}
+
 impl Decoded {
     /// Plain heights, north row first, with nothing else known.
-    pub(super) fn new(
-        format: impl Into<String>,
-        columns: u32,
-        rows: u32,
-        samples: Samples,
-    ) -> Self {
+    pub(super) fn new(format: String, (columns, rows): (u32, u32), samples: Samples) -> Self {
         Self {
-            format: format.into(),
+            format,
             columns,
             rows,
             samples,
@@ -63,7 +74,7 @@ impl Decoded {
 
 /// Range of the heights and number of holes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Summary {
+pub struct HeightSummary {
     /// Lowest height in the file's vertical unit.
     pub lowest: f64,
     /// Highest height in the file's vertical unit.
@@ -75,19 +86,19 @@ pub struct Summary {
 impl Decoded {
     /// Checks what every format must satisfy, and summarises the heights. `no_data`
     /// replaces what the file says.
-    pub(super) fn check(&mut self, no_data: Option<f64>) -> Result<Summary, Fault> {
+    pub(super) fn check(&mut self, no_data: Option<f64>) -> Result<HeightSummary, BadRaster> {
         let (columns, rows) = (u64::from(self.columns), u64::from(self.rows));
         if columns < 2 || rows < 2 {
-            return Err(Fault::TooSmall { columns, rows });
+            return Err(BadRaster::TooSmall { columns, rows });
         }
         if columns.checked_mul(rows) != u64::try_from(self.samples.len()).ok() {
-            return Err(Fault::damaged(format!(
+            return Err(BadRaster::damaged(format!(
                 "{} samples where {columns} × {rows} were promised",
                 self.samples.len()
             )));
         }
         if !(self.scale.is_finite() && self.offset.is_finite()) || self.scale == 0.0 {
-            return Err(Fault::damaged(format!(
+            return Err(BadRaster::damaged(format!(
                 "heights are stored with scale {} and offset {}",
                 self.scale, self.offset
             )));
@@ -102,7 +113,7 @@ impl Decoded {
     /// Height of a stored value; NaN in a hole.
     pub(super) fn height_of(&self, stored: f64, index: usize) -> f64 {
         let hole = self.no_data == Some(stored)
-            || self.mask.as_ref().is_some_and(|mask| mask.is_hole(index));
+            || self.mask.as_ref().is_some_and(|mask| mask.contains(index));
         if hole {
             f64::NAN
         } else {
@@ -112,8 +123,8 @@ impl Decoded {
 }
 
 /// One pass over all samples: range, holes, and the first that is no height.
-fn summarise(source: &Decoded) -> Result<Summary, Fault> {
-    let mut summary = Summary {
+fn summarise(source: &Decoded) -> Result<HeightSummary, BadRaster> {
+    let mut summary = HeightSummary {
         lowest: f64::INFINITY,
         highest: f64::NEG_INFINITY,
         holes: 0,
@@ -134,14 +145,14 @@ fn summarise(source: &Decoded) -> Result<Summary, Fault> {
     });
     if let Some((index, value)) = absurd {
         let columns = source.columns as usize;
-        return Err(Fault::NotANumber {
+        return Err(BadRaster::NotANumber {
             column: (index % columns) as u64,
             row: (index / columns) as u64,
             value,
         });
     }
     if summary.lowest > summary.highest {
-        return Err(Fault::AllNoData {
+        return Err(BadRaster::AllNoData {
             samples: summary.holes,
         });
     }

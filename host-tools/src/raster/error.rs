@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 #[error("{fault} ({})", path.display())]
 pub struct Error {
     path: PathBuf,
-    fault: Fault,
+    fault: BadRaster,
 }
 
 impl Error {
-    pub(super) fn new(path: &Path, fault: Fault) -> Self {
+    pub(super) fn new(path: &Path, fault: BadRaster) -> Self {
         Self {
             path: path.to_path_buf(),
             fault,
@@ -24,7 +24,7 @@ impl Error {
     }
 
     /// What is wrong with it.
-    pub fn fault(&self) -> &Fault {
+    pub fn fault(&self) -> &BadRaster {
         &self.fault
     }
 }
@@ -32,7 +32,7 @@ impl Error {
 /// What is wrong with a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Fault {
+pub enum BadRaster {
     /// The operating system does not let us read it.
     #[error("cannot read the file: {0}")]
     Unreadable(std::io::Error),
@@ -94,7 +94,7 @@ pub enum Fault {
     DecoderFailed(&'static str),
 }
 
-impl Fault {
+impl BadRaster {
     /// Damage described in place.
     pub(super) fn damaged(what: impl Into<String>) -> Self {
         Self::Damaged(what.into())

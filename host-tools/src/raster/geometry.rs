@@ -37,6 +37,18 @@ pub struct CellSize {
 }
 
 impl CellSize {
+    /// A size whose unit the file states, east and north; `latitude` is that of the
+    /// middle of the field, in degrees.
+    pub(super) fn stated((east, north): (f64, f64), unit: CellUnit, latitude: Option<f64>) -> Self {
+        Self {
+            east,
+            north,
+            unit,
+            latitude,
+            certainty: Certainty::Stated,
+        }
+    }
+
     /// The cell's sides (east, north) in metres.
     ///
     /// Degrees are converted at the middle latitude φ of the field with the
@@ -63,7 +75,7 @@ impl CellSize {
 
     /// The side in metres of the square cell that stands for this one.
     ///
-    /// The hand feels square cells. One that is not square on the ground (10 m
+    /// Felt cells are square. One that is not square on the ground (10 m
     /// by 30 m, or an arc second away from the equator) is felt as the square of
     /// the same area, so that its mean slope is kept.
     pub fn square_metres(&self) -> f64 {
@@ -91,16 +103,13 @@ impl CellSize {
         });
         let degrees = on_earth && east < 0.5 && north < 0.5;
         let latitude = corner.map(|(_, y)| y + extent.1 / 2.0).filter(|_| degrees);
+        let unit = match degrees {
+            true => CellUnit::Degree,
+            false => CellUnit::Length { metres: 1.0 },
+        };
         Self {
-            east,
-            north,
-            unit: if degrees {
-                CellUnit::Degree
-            } else {
-                CellUnit::Length { metres: 1.0 }
-            },
-            latitude,
             certainty: Certainty::UnitAssumed,
+            ..Self::stated((east, north), unit, latitude)
         }
     }
 

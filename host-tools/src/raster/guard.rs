@@ -4,29 +4,29 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::sync::Once;
 
-use super::{Decoded, Fault};
+use super::BadRaster;
 
 thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs a decoder; a panic inside becomes [`Fault::DecoderFailed`] and prints
+/// Runs a decoder; a panic inside becomes [`BadRaster::DecoderFailed`] and prints
 /// nothing.
 ///
-/// The decoders of image and science formats are other people's code fed with
-/// whatever is on the user's disk, and some answer a damaged file with an
-/// overflow or an index out of range. All sizes are checked before a decoder
+/// The decoders of image and science formats are other people's code that is given
+/// whatever is on the user's disk. Some answer a damaged file with an overflow or an
+/// index out of range. All sizes are checked before a decoder
 /// runs; this is for what such checks cannot foresee. A decoder owns all it
 /// touches, so nothing half-done outlives the panic.
-pub(super) fn guarded(
+pub(super) fn guarded<T>(
     decoder: &'static str,
-    decode: impl FnOnce() -> Result<Decoded, Fault>,
-) -> Result<Decoded, Fault> {
+    decode: impl FnOnce() -> Result<T, BadRaster>,
+) -> Result<T, BadRaster> {
     silence_guarded_panics();
     let outer = GUARDED.replace(true);
     let outcome = catch_unwind(AssertUnwindSafe(decode));
     GUARDED.set(outer);
-    outcome.unwrap_or(Err(Fault::DecoderFailed(decoder)))
+    outcome.unwrap_or(Err(BadRaster::DecoderFailed(decoder)))
 }
 
 /// Keeps the panics of guarded decoders off the user's screen; all others are
@@ -51,8 +51,8 @@ mod tests {
 
     #[test]
     fn a_panic_in_a_decoder_is_an_error() {
-        let outcome = guarded("test", || panic!("index out of range"));
-        assert!(matches!(outcome, Err(Fault::DecoderFailed("test"))));
+        let outcome: Result<(), BadRaster> = guarded("test", || panic!("index out of range"));
+        assert!(matches!(outcome, Err(BadRaster::DecoderFailed("test"))));
         assert!(!GUARDED.get());
     }
 }

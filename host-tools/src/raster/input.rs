@@ -1,75 +1,77 @@
 //! The bytes to decode: a file, or what was packed inside one.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
-use std::path::Path;
-use std::sync::Arc;
+use std::io::{BufRead, BufReader, Cursor, Error, ErrorKind, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
 
-use netcdf_reader::{BytesStorage, DynStorage, FileStorage};
+use super::BadRaster;
 
-use super::Fault;
+/// Deflate packs at most this many bytes into one.
+pub(super) const DEFLATE_RATIO: u64 = 1040;
 
 /// A buffered reader that a decoder may move about in.
 pub(super) trait ReadSeek: BufRead + Seek {}
 impl<T: BufRead + Seek> ReadSeek for T {}
 
 /// The bytes to decode, and the name that goes with them.
-pub(super) struct Input {
-    /// File name without folders, which may tell format and place.
+pub(super) struct FileBytes {
     name: String,
-    /// Number of bytes.
+    extension: String,
     len: u64,
     data: Data,
 }
 
-enum Data {
-    File(File),
+/// Where the bytes are.
+pub(super) enum Data {
+    /// In an open file at a path.
+    File(File, PathBuf),
+    /// In memory.
     Memory(Vec<u8>),
 }
 
-impl Input {
+impl FileBytes {
     /// A file on disk.
-    pub(super) fn open(path: &Path) -> Result<Self, Fault> {
-        let file = File::open(path).map_err(Fault::Unreadable)?;
-        let metadata = file.metadata().map_err(Fault::Unreadable)?;
+    pub(super) fn open(path: &Path) -> Result<Self, BadRaster> {
+        let file = File::open(path).map_err(BadRaster::Unreadable)?;
+        let metadata = file.metadata().map_err(BadRaster::Unreadable)?;
         if metadata.is_dir() {
-            let error = std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder");
-            return Err(Fault::Unreadable(error));
+            let error = Error::new(ErrorKind::IsADirectory, "it is a folder");
+            return Err(BadRaster::Unreadable(error));
         }
         if !metadata.is_file() {
             // A pipe has no end to seek to, and may never end at all.
-            let error = std::io::Error::other("it is not a regular file");
-            return Err(Fault::Unreadable(error));
+            let error = Error::other("it is not a regular file");
+            return Err(BadRaster::Unreadable(error));
         }
-        Ok(Self {
-            name: path
-                .file_name()
-                .map(|name| name.to_string_lossy().into_owned())
-                .unwrap_or_default(),
-            len: metadata.len(),
-            data: Data::File(file),
-        })
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let data = Data::File(file, path.to_owned());
+        Ok(Self::new(&name, metadata.len(), data))
     }
 
     /// Bytes unpacked from another file.
     pub(super) fn unpacked(name: &str, bytes: Vec<u8>) -> Self {
+        let name = name.rsplit(['/', '\\']).next().unwrap_or(name);
+        Self::new(name, bytes.len() as u64, Data::Memory(bytes))
+    }
+
+    fn new(name: &str, len: u64, data: Data) -> Self {
+        let extension = name.rsplit_once('.').map(|(_, end)| end.to_lowercase());
         Self {
-            name: name.rsplit(['/', '\\']).next().unwrap_or(name).to_owned(),
-            len: bytes.len() as u64,
-            data: Data::Memory(bytes),
+            name: name.to_owned(),
+            extension: extension.unwrap_or_default(),
+            len,
+            data,
         }
     }
 
+    /// The file's name without folders, which may tell format and place.
     pub(super) fn name(&self) -> &str {
         &self.name
     }
 
     /// What follows the last dot of the name, in lower case.
-    pub(super) fn extension(&self) -> String {
-        match self.name.rsplit_once('.') {
-            Some((_, extension)) => extension.to_lowercase(),
-            None => String::new(),
-        }
+    pub(super) fn extension(&self) -> &str {
+        &self.extension
     }
 
     /// Number of bytes.
@@ -77,12 +79,18 @@ impl Input {
         self.len
     }
 
+    /// Where the bytes are, for decoders that read anywhere.
+    pub(super) fn data(&self) -> &Data {
+        &self.data
+    }
+
     /// A buffered reader at the start.
-    pub(super) fn reader(&self) -> Result<Box<dyn ReadSeek + '_>, Fault> {
+    pub(super) fn reader(&self) -> Result<Box<dyn ReadSeek + '_>, BadRaster> {
         Ok(match &self.data {
-            Data::File(file) => {
+            Data::File(file, _) => {
                 let mut file = file;
-                file.seek(SeekFrom::Start(0)).map_err(Fault::Unreadable)?;
+                file.seek(SeekFrom::Start(0))
+                    .map_err(BadRaster::Unreadable)?;
                 Box::new(BufReader::with_capacity(1 << 16, file))
             }
             Data::Memory(bytes) => Box::new(Cursor::new(bytes.as_slice())),
@@ -90,31 +98,29 @@ impl Input {
     }
 
     /// The first bytes, up to `count` of them.
-    pub(super) fn head(&self, count: u64) -> Result<Vec<u8>, Fault> {
+    pub(super) fn head(&self, count: u64) -> Result<Vec<u8>, BadRaster> {
         let mut head = Vec::new();
         self.reader()?
             .take(count)
             .read_to_end(&mut head)
-            .map_err(Fault::Unreadable)?;
+            .map_err(BadRaster::Unreadable)?;
         Ok(head)
     }
 
-    /// The bytes as a store that can be read anywhere, for the NetCDF reader.
-    pub(super) fn storage(&self) -> Result<DynStorage, Fault> {
-        Ok(match &self.data {
-            Data::File(file) => {
-                let file = file.try_clone().map_err(Fault::Unreadable)?;
-                Arc::new(
-                    FileStorage::from_file(file)
-                        .map_err(|error| Fault::Unreadable(std::io::Error::other(error)))?,
-                )
-            }
-            Data::Memory(bytes) => Arc::new(BytesStorage::from_owner(bytes.clone())),
-        })
-    }
-
-    /// All bytes. Only for formats whose decoder cannot read piece by piece.
-    pub(super) fn bytes(&self) -> Result<Vec<u8>, Fault> {
-        self.head(u64::MAX)
+    /// Checks that so many samples, packed with deflate at its best, fit into the
+    /// bytes there are, before room is made for them.
+    ///
+    /// # Errors
+    /// [`BadRaster::AbsurdSize`].
+    pub(super) fn check_holds(&self, columns: u32, rows: u32, bytes: u64) -> Result<(), BadRaster> {
+        let samples = u64::from(columns) * u64::from(rows);
+        let room = self.len.saturating_mul(DEFLATE_RATIO);
+        match samples.checked_mul(bytes) {
+            Some(promised) if promised <= room => Ok(()),
+            _ => Err(BadRaster::AbsurdSize(format!(
+                "{columns} × {rows} samples in a file of {} bytes",
+                self.len
+            ))),
+        }
     }
 }

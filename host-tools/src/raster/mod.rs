@@ -2,7 +2,7 @@
 //!
 //! | format | read by | notes |
 //! |---|---|---|
-//! | GeoTIFF, TIFF, BigTIFF, COG | `tiff` | first full image, first band |
+//! | GeoTIFF, TIFF, BigTIFF, COG | `tiff-reader` | first full image, first band |
 //! | SRTM `.hgt`, also zipped or gzipped | here | place from the name |
 //! | Esri ASCII `.asc` | here | |
 //! | PNG | `png` | grey, grey + alpha, depth in the alpha of a colour picture |
@@ -11,42 +11,37 @@
 //! | USGS ASCII `.dem` | here | |
 //! | NumPy `.npy`, `.npz` | `npyz` | |
 //!
+//! Each format is one file or folder of `formats`, and one line in its table. From a
+//! path to samples: `open` unpacks (`archive`), asks the table, and lets the format
+//! decode (`input`, `read`) into `decoded`; [`Raster`] answers from that.
+//!
 //! **Holes.** No-data as the format states it, NaN, masked samples and tiles
 //! that a sparse file leaves out are holes: [`Raster::height`] is NaN there. An
 //! infinite sample is an error: it is neither a height nor a declared hole.
 
 mod archive;
-mod asc;
 mod decoded;
 mod error;
+mod format;
+mod formats;
 mod geometry;
 mod guard;
-mod hgt;
 mod input;
-mod netcdf;
-mod npy;
 mod open;
 mod options;
-mod png;
-mod raw;
+mod read;
 mod samples;
-mod tiff;
-mod usgs_dem;
 
 use std::path::Path;
 
-pub use decoded::Summary;
-pub use error::{Error, Fault};
+pub use decoded::{HeightSummary, LARGEST_HEIGHT};
+pub use error::{BadRaster, Error};
 pub use geometry::{CellSize, CellUnit, Certainty};
-pub use options::{Endian, OpenOptions, PngChannel, RawLayout, RawSample};
-pub use samples::Samples;
+pub use options::{OpenOptions, PngChannel, RawLayout};
+pub use samples::{Endian, SampleType, Samples};
 
 use decoded::Decoded;
-use samples::{Widen, with_samples};
-
-/// No height is larger than this (in the file's vertical unit), whatever the
-/// planet: such a sample is a no-data value that the file forgot to declare.
-pub const LARGEST_HEIGHT: f64 = 1e30;
+use samples::{SampleValue, with_samples};
 
 /// A height field held once, in the compact type of its file.
 ///
@@ -55,7 +50,7 @@ pub const LARGEST_HEIGHT: f64 = 1e30;
 #[derive(Clone, Debug)]
 pub struct Raster {
     source: Decoded,
-    summary: Summary,
+    summary: HeightSummary,
 }
 
 impl Raster {
@@ -81,25 +76,20 @@ impl Raster {
         columns: u32,
         rows: u32,
         mut height: impl FnMut(u32, u32) -> f32,
-    ) -> Result<Self, Fault> {
+    ) -> Result<Self, BadRaster> {
         let mut samples = Vec::with_capacity(columns as usize * rows as usize);
         for row in 0..rows {
             samples.extend((0..columns).map(|column| height(column, row)));
         }
-        let mut decoded = Decoded::new("made in memory", columns, rows, Samples::F32(samples));
+        let mut decoded = Decoded::new("made in memory".into(), (columns, rows), samples.into());
         decoded.south_up = true;
         decoded.metres_per_vertical_unit = Some(1.0);
-        decoded.cell = Some(CellSize {
-            east: 1.0,
-            north: 1.0,
-            unit: CellUnit::Length { metres: 1.0 },
-            latitude: None,
-            certainty: Certainty::Stated,
-        });
+        let metre = CellUnit::Length { metres: 1.0 };
+        decoded.cell = Some(CellSize::stated((1.0, 1.0), metre, None));
         Self::checked(decoded, None)
     }
 
-    fn checked(mut source: Decoded, no_data: Option<f64>) -> Result<Self, Fault> {
+    fn checked(mut source: Decoded, no_data: Option<f64>) -> Result<Self, BadRaster> {
         let summary = source.check(no_data)?;
         Ok(Self { source, summary })
     }
@@ -117,48 +107,46 @@ impl Raster {
     /// The height at a sample in the file's vertical unit; NaN in a hole and
     /// outside the field. Row 0 is the southernmost.
     pub fn height(&self, column: u32, row: u32) -> f64 {
-        if column >= self.columns() || row >= self.rows() {
-            return f64::NAN;
-        }
-        let index = self.index(column, row);
-        with_samples!(&self.source.samples, values => {
-            self.source.height_of(values[index].widen(), index)
-        })
+        let mut height = [f64::NAN];
+        self.copy_row(0, row, column, &mut height);
+        height[0]
     }
 
-    /// Copies the heights of a row from `first_column` eastwards, one for each
-    /// place in `heights`: the same values as [`Raster::height`].
-    pub fn copy_row(&self, row: u32, first_column: u32, heights: &mut [f64]) {
+    /// Copies heights of a row from `first_column` eastwards, one for each place in
+    /// `heights`: the same values as [`Raster::height`].
+    ///
+    /// Level *L* is the field with every 2ᴸ-th sample; row and column count in it.
+    pub fn copy_row(&self, level: u8, row: u32, first_column: u32, heights: &mut [f64]) {
         heights.fill(f64::NAN);
-        if row >= self.rows() {
+        let (columns, rows) = (u64::from(self.columns()), u64::from(self.rows()));
+        let step = 1_u64.checked_shl(level.into()).unwrap_or(u64::MAX);
+        let row = u64::from(row).saturating_mul(step);
+        if row >= rows {
             return;
         }
-        let inside = self.columns().saturating_sub(first_column) as usize;
+        let file_row = if self.source.south_up {
+            row
+        } else {
+            rows - 1 - row
+        };
         with_samples!(&self.source.samples, values => {
-            for (column, height) in (first_column..).zip(heights.iter_mut().take(inside)) {
-                let index = self.index(column, row);
+            for (column, height) in (u64::from(first_column)..).zip(heights) {
+                let column = column.saturating_mul(step);
+                if column >= columns {
+                    return;
+                }
+                let file_column = match self.source.east_first {
+                    true => columns - 1 - column,
+                    false => column,
+                };
+                let index = (file_row * columns + file_column) as usize;
                 *height = self.source.height_of(values[index].widen(), index);
             }
         });
     }
 
-    /// Where the sample at a column and row of the field is in the file.
-    fn index(&self, column: u32, row: u32) -> usize {
-        let file_row = if self.source.south_up {
-            row
-        } else {
-            self.rows() - 1 - row
-        };
-        let file_column = if self.source.east_first {
-            self.columns() - 1 - column
-        } else {
-            column
-        };
-        file_row as usize * self.columns() as usize + file_column as usize
-    }
-
     /// Range of the heights and number of holes.
-    pub fn summary(&self) -> Summary {
+    pub fn summary(&self) -> HeightSummary {
         self.summary
     }
 

@@ -1,119 +1,85 @@
-//! Which decoder a file is for: its content decides, then its extension.
+//! From a path to decoded samples: unpacks, tells the format, decodes.
 
 use std::path::Path;
 
+use super::archive::{self, Zip};
+use super::format::{Claim, Format};
+use super::formats::{FORMATS, has_terrain_extension, npy, raw};
 use super::guard::guarded;
-use super::input::Input;
-use super::{Decoded, Fault, OpenOptions};
-use super::{archive, asc, hgt, netcdf, npy, png, raw, tiff, usgs_dem};
+use super::input::FileBytes;
+use super::{BadRaster, Decoded, OpenOptions};
 
-/// Enough of a file to tell every format with a signature.
+/// Enough of a file to tell every format by its beginning.
 const HEAD_BYTES: u64 = 1024;
 
-/// Decodes a file.
-pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, Fault> {
-    let input = Input::open(path)?;
+/// Decodes a file, which may be packed.
+pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+    let input = FileBytes::open(path)?;
     if let Some(layout) = options.raw {
         return raw::decode(&input, layout);
     }
-    decode_input(&input, options, Packing::Allowed)
-}
-
-/// Whether what is at hand may be an archive: archives inside archives are not
-/// opened, so that unpacking ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Packing {
-    /// A file on disk.
-    Allowed,
-    /// Something that was already unpacked.
-    Unpacked,
-}
-
-/// Decodes bytes, which may be packed.
-pub(super) fn decode_input(
-    input: &Input,
-    options: &OpenOptions,
-    packing: Packing,
-) -> Result<Decoded, Fault> {
     let head = input.head(HEAD_BYTES)?;
-    if head.is_empty() {
-        return Err(Fault::Truncated("it is empty".into()));
+    if archive::is_zip(&head) {
+        let mut zip = guarded("ZIP", || Zip::open(&input))?;
+        if zip.is_numpy(input.extension()) {
+            return guarded("NumPy", || npy::decode_npz(&mut zip));
+        }
+        let unpacked = guarded("ZIP", || zip.only_entry(has_terrain_extension))?;
+        decode_packed("ZIP", &unpacked, options)
+    } else if archive::is_gzip(&head) {
+        let unpacked = guarded("gzip", || archive::unpack_gzip(&input))?;
+        decode_packed("gzip", &unpacked, options)
+    } else {
+        decode_plain(&input, &head, options)
     }
-    let format = recognise(&head, &input.extension()).ok_or(Fault::UnknownFormat)?;
-    tracing::debug!(?format, name = input.name(), "recognised");
-    match format {
-        Format::Tiff => guarded("TIFF", || tiff::decode(input)),
-        Format::Png => guarded("PNG", || png::decode(input, options.png_channel)),
-        Format::NetCdf => guarded("NetCDF", || netcdf::decode(input)),
-        Format::Npy => guarded("NumPy", || npy::decode_npy(input)),
-        Format::Asc => asc::decode(input),
-        Format::UsgsDem => usgs_dem::decode(input),
-        Format::Hgt => hgt::decode(input),
-        Format::Zip | Format::Gzip if packing == Packing::Unpacked => Err(Fault::Unsupported {
+}
+
+/// Archives inside archives are not opened, so that unpacking ends.
+fn decode_packed(
+    packing: &str,
+    input: &FileBytes,
+    options: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
+    let head = input.head(HEAD_BYTES)?;
+    if archive::is_zip(&head) || archive::is_gzip(&head) {
+        return Err(BadRaster::Unsupported {
             format: "archive",
             feature: "an archive inside an archive".into(),
-        }),
-        Format::Zip => guarded("ZIP", || archive::decode_zip(input, options)),
-        Format::Gzip => guarded("gzip", || archive::decode_gzip(input, options)),
-        Format::RawWithoutLayout => Err(Fault::RawSizeMissing),
-        Format::NotWhatItIsNamed(name) => Err(Fault::damaged(format!(
-            "its name says {name}, its content does not begin like one"
-        ))),
+        });
     }
+    let mut decoded = decode_plain(input, &head, options)?;
+    decoded.format = format!("{} in {packing}", decoded.format);
+    Ok(decoded)
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
-    Tiff,
-    Png,
-    NetCdf,
-    Npy,
-    Zip,
-    Gzip,
-    Asc,
-    UsgsDem,
-    Hgt,
-    RawWithoutLayout,
-    NotWhatItIsNamed(&'static str),
+fn decode_plain(
+    input: &FileBytes,
+    head: &[u8],
+    options: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
+    if head.is_empty() {
+        return Err(BadRaster::Truncated("it is empty".into()));
+    }
+    let format = recognise(head, input.extension())?;
+    tracing::debug!(format.name, name = input.name(), "recognised");
+    guarded(format.name, || (format.decode)(input, options))
 }
 
-fn recognise(head: &[u8], extension: &str) -> Option<Format> {
-    let signatures: [(&[u8], Format); 13] = [
-        (b"II*\0", Format::Tiff),
-        (b"MM\0*", Format::Tiff),
-        (b"II+\0", Format::Tiff),
-        (b"MM\0+", Format::Tiff),
-        (b"\x89PNG\r\n\x1a\n", Format::Png),
-        (b"CDF\x01", Format::NetCdf),
-        (b"CDF\x02", Format::NetCdf),
-        (b"CDF\x05", Format::NetCdf),
-        (b"\x89HDF\r\n\x1a\n", Format::NetCdf),
-        (b"\x93NUMPY", Format::Npy),
-        (b"PK\x03\x04", Format::Zip),
-        (b"PK\x05\x06", Format::Zip),
-        (b"\x1f\x8b", Format::Gzip),
-    ];
-    let by_signature = signatures
+/// The content decides, then the extension.
+fn recognise(head: &[u8], extension: &str) -> Result<&'static Format, BadRaster> {
+    if let Some(format) = FORMATS.iter().find(|format| (format.begins)(head)) {
+        return Ok(format);
+    }
+    let mut claims = FORMATS
         .iter()
-        .find(|(signature, _)| head.starts_with(signature))
-        .map(|&(_, format)| format);
-    if by_signature.is_some() {
-        return by_signature;
+        .filter_map(|format| Some((format, format.claim(extension)?)));
+    match claims.next() {
+        Some((format, Claim::Decides)) => Ok(format),
+        Some((format, Claim::Promises)) => Err(BadRaster::damaged(format!(
+            "its name says {}, its content does not begin like one",
+            format.name
+        ))),
+        _ if raw::EXTENSIONS.contains(&extension) => Err(BadRaster::RawSizeMissing),
+        _ => Err(BadRaster::UnknownFormat),
     }
-    if asc::looks_like_header(head) {
-        return Some(Format::Asc);
-    }
-    if usgs_dem::looks_like_header(head) {
-        return Some(Format::UsgsDem);
-    }
-    Some(match extension {
-        "hgt" => Format::Hgt,
-        "asc" => Format::Asc,
-        "dem" => Format::UsgsDem,
-        "tif" | "tiff" => Format::NotWhatItIsNamed("TIFF"),
-        "png" => Format::NotWhatItIsNamed("PNG"),
-        "nc" => Format::NotWhatItIsNamed("NetCDF"),
-        "raw" | "bin" | "r16" | "r32" => Format::RawWithoutLayout,
-        _ => return None,
-    })
 }

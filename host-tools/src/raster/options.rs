@@ -1,5 +1,7 @@
 //! What the user may say about a file that the file does not say itself.
 
+use super::samples::{Endian, SampleType};
+
 /// How to open a file. The default believes the file.
 #[derive(Clone, Debug, Default)]
 pub struct OpenOptions {
@@ -21,40 +23,9 @@ pub struct RawLayout {
     /// Samples from north to south.
     pub rows: u32,
     /// Type of a sample.
-    pub sample: RawSample,
+    pub sample: SampleType,
     /// Byte order of a sample.
     pub endian: Endian,
-}
-
-/// Type of a raw sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum RawSample {
-    /// 8-bit unsigned
-    U8,
-    /// 8-bit signed
-    I8,
-    /// 16-bit unsigned
-    U16,
-    /// 16-bit signed
-    I16,
-    /// 32-bit unsigned
-    U32,
-    /// 32-bit signed
-    I32,
-    /// 32-bit IEEE float
-    F32,
-    /// 64-bit IEEE float
-    F64,
-}
-
-/// Byte order.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Endian {
-    /// Least significant byte first
-    #[default]
-    Little,
-    /// Most significant byte first
-    Big,
 }
 
 /// A channel of a picture.

@@ -1,27 +1,91 @@
 //! The samples of a file, held once, in the file's own compact type.
 
-/// Samples in file order (row after row), in the file's own type.
-///
-/// Half floats are held as `f32` and 64-bit integers as `f64` (exact to 2^53).
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Samples {
-    /// 8-bit unsigned.
-    U8(Vec<u8>),
-    /// 8-bit signed.
-    I8(Vec<i8>),
-    /// 16-bit unsigned.
-    U16(Vec<u16>),
-    /// 16-bit signed.
-    I16(Vec<i16>),
-    /// 32-bit unsigned.
-    U32(Vec<u32>),
-    /// 32-bit signed.
-    I32(Vec<i32>),
-    /// 32-bit IEEE float.
-    F32(Vec<f32>),
-    /// 64-bit IEEE float.
-    F64(Vec<f64>),
+/// Declares the types a sample may have, one line a type.
+macro_rules! sample_types {
+    ($($(#[$about:meta])* $variant:ident($type:ty) = $name:literal,)*) => {
+        /// Samples in file order (row after row), in the file's own type.
+        ///
+        /// Half floats are held as `f32` and 64-bit integers as `f64` (exact to 2^53).
+        #[derive(Clone, Debug, PartialEq)]
+        #[non_exhaustive]
+        pub enum Samples {
+            $($(#[$about])* $variant(Vec<$type>),)*
+        }
+
+        /// The type of a sample.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+        pub enum SampleType {
+            $($(#[$about])* $variant,)*
+        }
+
+        impl SampleType {
+            /// Bytes that a sample of this type takes.
+            pub const fn bytes(self) -> u64 {
+                match self {
+                    $(Self::$variant => size_of::<$type>() as u64,)*
+                }
+            }
+
+            /// No samples of this type, to be filled.
+            pub(super) const fn none(self) -> Samples {
+                match self {
+                    $(Self::$variant => Samples::$variant(Vec::new()),)*
+                }
+            }
+        }
+
+        impl Samples {
+            /// Name of the sample type, as `int16`.
+            pub const fn type_name(&self) -> &'static str {
+                match self {
+                    $(Self::$variant(_) => $name,)*
+                }
+            }
+        }
+
+        $(impl From<Vec<$type>> for Samples {
+            fn from(values: Vec<$type>) -> Self {
+                Self::$variant(values)
+            }
+        }
+
+        impl SampleValue for $type {
+            fn widen(self) -> f64 {
+                f64::from(self)
+            }
+
+            fn nearest(value: f64) -> Self {
+                value as $type
+            }
+
+            fn from_bytes(bytes: &[u8], endian: Endian) -> Self {
+                let bytes = bytes.try_into().unwrap_or_default();
+                match endian {
+                    Endian::Little => <$type>::from_le_bytes(bytes),
+                    Endian::Big => <$type>::from_be_bytes(bytes),
+                }
+            }
+        })*
+    };
+}
+
+sample_types! {
+    /// 8-bit unsigned
+    U8(u8) = "uint8",
+    /// 8-bit signed
+    I8(i8) = "int8",
+    /// 16-bit unsigned
+    U16(u16) = "uint16",
+    /// 16-bit signed
+    I16(i16) = "int16",
+    /// 32-bit unsigned
+    U32(u32) = "uint32",
+    /// 32-bit signed
+    I32(i32) = "int32",
+    /// 32-bit IEEE float
+    F32(f32) = "float32",
+    /// 64-bit IEEE float
+    F64(f64) = "float64",
 }
 
 /// Runs `$body` with `$values` bound to the vector inside, whatever its type.
@@ -41,6 +105,28 @@ macro_rules! with_samples {
 }
 pub(super) use with_samples;
 
+/// Byte order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Endian {
+    /// Least significant byte first
+    #[default]
+    Little,
+    /// Most significant byte first
+    Big,
+}
+
+/// One sample of a type that [`Samples`] can hold.
+pub(super) trait SampleValue: Copy {
+    /// The same number.
+    fn widen(self) -> f64;
+
+    /// The number of this type that is nearest to `value`.
+    fn nearest(value: f64) -> Self;
+
+    /// The sample stored in as many bytes as the type has.
+    fn from_bytes(bytes: &[u8], endian: Endian) -> Self;
+}
+
 impl Samples {
     /// Number of samples.
     pub fn len(&self) -> usize {
@@ -54,21 +140,7 @@ impl Samples {
 
     /// Bytes that the samples take in memory.
     pub fn bytes(&self) -> usize {
-        with_samples!(self, values => std::mem::size_of_val(values.as_slice()))
-    }
-
-    /// Name of the sample type, as `int16`.
-    pub fn type_name(&self) -> &'static str {
-        match self {
-            Self::U8(_) => "uint8",
-            Self::I8(_) => "int8",
-            Self::U16(_) => "uint16",
-            Self::I16(_) => "int16",
-            Self::U32(_) => "uint32",
-            Self::I32(_) => "int32",
-            Self::F32(_) => "float32",
-            Self::F64(_) => "float64",
-        }
+        with_samples!(self, values => size_of_val(values.as_slice()))
     }
 
     /// The no-data value as this type would hold it, so that comparing samples
@@ -77,16 +149,10 @@ impl Samples {
     /// A float32 file's no-data is often written with the digits of a double
     /// (-3.4028234663852886e+38): it is rounded to `f32` first.
     pub(super) fn comparable_no_data(&self, value: f64) -> Option<f64> {
-        let held = match self {
-            Self::F32(_) => f64::from(value as f32),
-            Self::F64(_) => value,
-            Self::U8(_) => f64::from(value as u8),
-            Self::I8(_) => f64::from(value as i8),
-            Self::U16(_) => f64::from(value as u16),
-            Self::I16(_) => f64::from(value as i16),
-            Self::U32(_) => f64::from(value as u32),
-            Self::I32(_) => f64::from(value as i32),
-        };
+        fn held<T: SampleValue>(_: &[T], value: f64) -> f64 {
+            T::nearest(value).widen()
+        }
+        let held = with_samples!(self, values => held(values, value));
         // NaN needs no rule: it is a hole in every float file. An integer type
         // that had to change the value cannot hold it.
         let same = matches!(self, Self::F32(_)) || held == value;
@@ -94,47 +160,6 @@ impl Samples {
     }
 }
 
-/// A sample widened to `f64`.
-pub(super) trait Widen: Copy {
-    /// The same number.
-    fn widen(self) -> f64;
-}
-
-macro_rules! widen {
-    ($($sample:ty),*) => {
-        $(impl Widen for $sample {
-            fn widen(self) -> f64 {
-                f64::from(self)
-            }
-        })*
-    };
-}
-widen!(u8, i8, u16, i16, u32, i32, f32, f64);
-
 /// One bit a sample: the holes that no sample value marks (alpha 0 in a grey
 /// picture, a tile that a sparse file leaves out).
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct HoleMask {
-    words: Vec<u64>,
-}
-
-impl HoleMask {
-    /// A mask of `samples` samples, none of them holes.
-    pub(super) fn new(samples: usize) -> Self {
-        Self {
-            words: vec![0; samples.div_ceil(64)],
-        }
-    }
-
-    pub(super) fn set(&mut self, index: usize) {
-        if let Some(word) = self.words.get_mut(index / 64) {
-            *word |= 1 << (index % 64);
-        }
-    }
-
-    pub(super) fn is_hole(&self, index: usize) -> bool {
-        self.words
-            .get(index / 64)
-            .is_some_and(|word| word >> (index % 64) & 1 == 1)
-    }
-}
+pub(super) type HoleMask = fixedbitset::FixedBitSet;

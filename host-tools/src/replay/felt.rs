@@ -5,7 +5,9 @@ use std::time::{Duration, SystemTime};
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::wire::message::{DeviceHello, Point, Sample, Source, ToDevice};
+use hapterra_core::scene::{Point, Sample, Source};
+use hapterra_core::wire::hello::DeviceHello;
+use hapterra_core::wire::message::ToDevice;
 
 use crate::link::{Event, LinkError, Patience, Session, Tally, Transport};
 use crate::terrain::Terrain;
@@ -37,7 +39,7 @@ impl<'t> Replayer<'t> {
         // A device that holds the scene of an earlier replay would go on from
         // where that ended.
         scene.epoch ^= nonce();
-        let (session, device) = Session::open(terrain, scene, transport, patience)?;
+        let (session, device) = Session::open(terrain, scene, None, transport, patience)?;
         Ok(Self {
             terrain,
             session,
@@ -64,7 +66,7 @@ impl<'t> Replayer<'t> {
         self.session.tally()
     }
 
-    /// What the loop feels with the hand at `hip` next.
+    /// What the loop feels with the HIP at `hip` next.
     ///
     /// # Errors
     /// [`LinkError`]; the replay cannot go on after one.
@@ -89,12 +91,7 @@ impl<'t> Replayer<'t> {
                 .poll(Duration::from_millis(100), &mut |event| match event {
                     Event::Felt { seq, sample } if seq == expected => answer = Some(*sample),
                     Event::Opened { resumed, .. } => opened_again = Some(resumed),
-                    Event::Felt { .. }
-                    | Event::Sample(_)
-                    | Event::Guard(_)
-                    | Event::Status(_)
-                    | Event::Calibration(_)
-                    | Event::Answer(_) => {}
+                    _ => {}
                 })?;
             match opened_again {
                 Some(false) => return Err(LinkError::Restarted),

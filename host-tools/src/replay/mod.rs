@@ -1,4 +1,4 @@
-//! Replay: a trajectory of the hand goes through the loop tick by tick, and
+//! Replay: a trajectory of the HIP goes through the loop tick by tick, and
 //! what was felt comes out. Also the recording that `run` and `demo` write,
 //! which has the same format.
 //!
@@ -69,7 +69,7 @@ pub fn replay_file(
     let mut summary = Summary::default();
     while let Some(row) = rows.next_row()? {
         let sample = replayer.feel(row.hip)?;
-        let record = Record::of_row(&row, &sample, &scale);
+        let record = Record::new(row.t_s, row.hip_mm, &sample, &scale);
         recording.write(&record, &[&state_name(sample.state)])?;
         summary.rows += 1;
         summary.in_contact += u64::from(record.contact);
@@ -96,12 +96,12 @@ pub fn on_native<'t>(
 
 /// A state's name in a recording.
 #[must_use]
-pub fn state_name(state: hapterra_core::contact::State) -> &'static str {
-    use hapterra_core::contact::State;
+pub fn state_name(state: hapterra_core::contact::ContactState) -> &'static str {
+    use hapterra_core::contact::ContactState;
     match state {
-        State::Waiting => "waiting",
-        State::Free => "free",
-        State::Touching => "touching",
-        State::LettingGo => "letting go",
+        ContactState::Waiting => "waiting",
+        ContactState::Free => "free",
+        ContactState::Touching => "touching",
+        ContactState::Fading => "letting go",
     }
 }

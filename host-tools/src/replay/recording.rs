@@ -3,15 +3,14 @@
 use std::fmt::Display;
 use std::io::Write;
 
-use hapterra_core::contact::State;
-use hapterra_core::wire::message::Sample;
+use hapterra_core::contact::ContactState;
+use hapterra_core::scene::Sample;
 
-use super::Row;
 use crate::output::{Output, OutputError};
 use crate::terrain::Scale;
 
 /// The columns of every recording; more may follow.
-pub(super) const COLUMNS: &str =
+const COLUMNS: &str =
     "t_s,x_mm,y_mm,z_mm,contact,proxy_x_mm,proxy_y_mm,proxy_z_mm,force_x_n,force_y_n,force_z_n";
 
 /// One row of a recording.
@@ -19,23 +18,17 @@ pub(super) const COLUMNS: &str =
 pub struct Record {
     /// Time, s.
     pub t_s: f64,
-    /// Where the hand was, mm.
+    /// Where the HIP was, mm; terrain frame.
     pub hip_mm: [f64; 3],
     /// Whether the surface was touched.
     pub contact: bool,
-    /// Where the proxy was, mm: in the hand unless touching.
+    /// Where the proxy was, mm: at the HIP unless touching.
     pub proxy_mm: [f64; 3],
     /// Force on the hand, N.
     pub force_n: [f64; 3],
 }
 
 impl Record {
-    /// What was felt at a row of a trajectory.
-    #[must_use]
-    pub fn of_row(row: &Row, sample: &Sample, scale: &Scale) -> Self {
-        Self::new(row.t_s, row.hip_mm, sample, scale)
-    }
-
     /// What was felt in a tick of a device with `tick_hz` ticks a second.
     #[must_use]
     pub fn of_tick(sample: &Sample, tick_hz: u32, scale: &Scale) -> Self {
@@ -43,8 +36,10 @@ impl Record {
         Self::new(t_s, scale.to_mm(&sample.hip), sample, scale)
     }
 
-    fn new(t_s: f64, hip_mm: [f64; 3], sample: &Sample, scale: &Scale) -> Self {
-        let contact = sample.state == State::Touching;
+    /// What was felt at a time, s, with the HIP at a place, mm.
+    #[must_use]
+    pub fn new(t_s: f64, hip_mm: [f64; 3], sample: &Sample, scale: &Scale) -> Self {
+        let contact = sample.state == ContactState::Touching;
         Self {
             t_s,
             hip_mm,
@@ -81,16 +76,16 @@ impl Recording {
     /// When the file cannot be written.
     pub fn write(&mut self, record: &Record, more: &[&dyn Display]) -> Result<(), OutputError> {
         self.flush_line()?;
-        let mut number = |x: f64| {
+        let contact = f64::from(u8::from(record.contact));
+        let place = [record.t_s]
+            .into_iter()
+            .chain(record.hip_mm)
+            .chain([contact]);
+        for number in place.chain(record.proxy_mm).chain(record.force_n) {
             // The shortest digits that read back to the same value. Writing to
             // a vector cannot fail.
-            let _ = write!(self.line, "{x},");
-        };
-        number(record.t_s);
-        record.hip_mm.into_iter().for_each(&mut number);
-        number(f64::from(u8::from(record.contact)));
-        record.proxy_mm.into_iter().for_each(&mut number);
-        record.force_n.into_iter().for_each(&mut number);
+            let _ = write!(self.line, "{number},");
+        }
         for value in more {
             let _ = write!(self.line, "{value},");
         }

@@ -13,80 +13,45 @@ use crate::terrain::Scale;
 /// columns are passed over, so what was recorded can be replayed.
 pub(super) const COLUMNS: [&str; 4] = ["t_s", "x_mm", "y_mm", "z_mm"];
 
-/// One position of the hand.
+/// One position of the HIP.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
     /// Time, s.
     pub t_s: f64,
-    /// Position of the hand, mm: east, north, up.
+    /// Position of the HIP, mm: east, north, up.
     pub hip_mm: [f64; 3],
     /// The same on the grid.
     pub hip: GridPoint,
 }
 
-/// What is wrong with a trajectory, and where.
+/// What is wrong with which trajectory.
 #[derive(Debug, thiserror::Error)]
-pub enum TrajectoryError {
-    /// It cannot be read.
-    #[error("cannot read the trajectory {}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        #[source]
-        source: io::Error,
-    },
-    /// The first line is not the header.
+#[error("{}: {fault}", path.display())]
+pub struct TrajectoryError {
+    path: PathBuf,
+    fault: TrajectoryFault,
+}
+
+/// What is wrong with a trajectory, and where. Lines count from 1.
+#[derive(Debug, thiserror::Error)]
+enum TrajectoryFault {
+    #[error("cannot read the trajectory: {0}")]
+    Unreadable(io::Error),
     #[error(
-        "{}: line 1 is not the header of a trajectory: `{found}` where `t_s,x_mm,y_mm,z_mm` is expected",
-        path.display()
+        "line 1 is not the header of a trajectory: `{0}` where `t_s,x_mm,y_mm,z_mm` is expected"
     )]
-    Header {
-        /// The file.
-        path: PathBuf,
-        /// The line that was there.
-        found: String,
-    },
-    /// A row has more or fewer columns than the header.
-    #[error("{}: line {line} has {found} columns where the header has {expected}", path.display())]
+    Header(String),
+    #[error("line {line} has {found} columns where the header has {expected}")]
     Columns {
-        /// The file.
-        path: PathBuf,
-        /// Line, counted from 1.
         line: u64,
-        /// Columns there.
         found: usize,
-        /// Columns of the header.
         expected: usize,
     },
-    /// Something that is not a finite number.
-    #[error("{}: line {line}, column {column}: `{found}` is not a finite number", path.display())]
-    Number {
-        /// The file.
-        path: PathBuf,
-        /// Line, counted from 1.
+    #[error("line {line}, column {column}: {what}")]
+    Field {
         line: u64,
-        /// The column's name.
         column: &'static str,
-        /// What was there.
-        found: String,
-    },
-    /// A position farther out than can be addressed.
-    #[error(
-        "{}: line {line}, column {column}: {mm} mm is farther than {MAX_CELL} cells of {cell_mm} mm from the origin",
-        path.display()
-    )]
-    FarAway {
-        /// The file.
-        path: PathBuf,
-        /// Line, counted from 1.
-        line: u64,
-        /// The column's name.
-        column: &'static str,
-        /// The position.
-        mm: f64,
-        /// The cell.
-        cell_mm: f64,
+        what: String,
     },
 }
 
@@ -106,9 +71,9 @@ impl Trajectory<File> {
     /// # Errors
     /// [`TrajectoryError`].
     pub fn open(path: &Path, scale: Scale) -> Result<Self, TrajectoryError> {
-        let file = File::open(path).map_err(|source| TrajectoryError::Unreadable {
+        let file = File::open(path).map_err(|error| TrajectoryError {
             path: path.to_owned(),
-            source,
+            fault: TrajectoryFault::Unreadable(error),
         })?;
         Self::read(file, path, scale)
     }
@@ -143,10 +108,8 @@ impl<R: Read + Seek> Trajectory<R> {
         let names: Vec<_> = self.record.iter().map(String::from_utf8_lossy).collect();
         let fits = names.len() >= COLUMNS.len() && names.iter().zip(COLUMNS).all(|(a, b)| a == b);
         if !fits {
-            return Err(TrajectoryError::Header {
-                path: self.path.clone(),
-                found: shown(&names.join(",")),
-            });
+            let found = shown(&names.join(","));
+            return Err(self.wrong(TrajectoryFault::Header(found)));
         }
         self.columns = names.len();
         Ok(())
@@ -161,12 +124,12 @@ impl<R: Read + Seek> Trajectory<R> {
             return Ok(None);
         }
         if self.record.len() != self.columns {
-            return Err(TrajectoryError::Columns {
-                path: self.path.clone(),
+            let fault = TrajectoryFault::Columns {
                 line: self.line(),
                 found: self.record.len(),
                 expected: self.columns,
-            });
+            };
+            return Err(self.wrong(fault));
         }
         let t_s = self.number(0)?;
         let hip_mm = [self.number(1)?, self.number(2)?, self.number(3)?];
@@ -178,12 +141,20 @@ impl<R: Read + Seek> Trajectory<R> {
     }
 
     fn read_record(&mut self) -> Result<bool, TrajectoryError> {
-        self.reader
-            .read_byte_record(&mut self.record)
-            .map_err(|error| TrajectoryError::Unreadable {
-                path: self.path.clone(),
-                source: io::Error::other(error),
-            })
+        let read = self.reader.read_byte_record(&mut self.record);
+        read.map_err(|error| self.wrong(TrajectoryFault::Unreadable(io::Error::other(error))))
+    }
+
+    fn wrong(&self, fault: TrajectoryFault) -> TrajectoryError {
+        TrajectoryError {
+            path: self.path.clone(),
+            fault,
+        }
+    }
+
+    fn wrong_field(&mut self, column: usize, what: String) -> TrajectoryError {
+        let (line, column) = (self.line(), COLUMNS[column]);
+        self.wrong(TrajectoryFault::Field { line, column, what })
     }
 
     /// The line of the present row, for a message: the reader is not usable
@@ -212,24 +183,18 @@ impl<R: Read + Seek> Trajectory<R> {
             return Ok(number);
         }
         let found = shown(&String::from_utf8_lossy(field));
-        Err(TrajectoryError::Number {
-            path: self.path.clone(),
-            line: self.line(),
-            column: COLUMNS[column],
-            found,
-        })
+        Err(self.wrong_field(column, format!("`{found}` is not a finite number")))
     }
 
     fn far(&mut self, hip_mm: [f64; 3]) -> TrajectoryError {
-        let far = |mm: &f64| (mm / self.scale.cell_mm()).abs() > f64::from(MAX_CELL);
+        let cell_mm = self.scale.cell_mm();
+        let far = |mm: &f64| (mm / cell_mm).abs() > f64::from(MAX_CELL);
         let axis = hip_mm.iter().position(far).unwrap_or(0);
-        TrajectoryError::FarAway {
-            path: self.path.clone(),
-            line: self.line(),
-            column: COLUMNS[axis + 1],
-            mm: hip_mm[axis],
-            cell_mm: self.scale.cell_mm(),
-        }
+        let what = format!(
+            "{} mm is farther than {MAX_CELL} cells of {cell_mm} mm from the origin",
+            hip_mm[axis]
+        );
+        self.wrong_field(axis + 1, what)
     }
 
     /// Time is passed on, not used; that it runs backwards is worth a word.

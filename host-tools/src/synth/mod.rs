@@ -1,15 +1,18 @@
 //! Terrains made by formula, for trying and testing: any size, seeded, and the
 //! same to the last bit on every machine.
 
+mod format;
 mod hash;
 mod kinds;
 mod room;
+mod rows;
 mod write;
 
 pub use room::NoRoom;
-pub use write::{Grid, WriteError, write};
+pub use rows::{Grid, Interrupted};
+pub use write::{WriteError, WriteFault, write};
 
-use crate::raster::{Fault, Raster};
+use crate::raster::{BadRaster, Raster};
 
 /// What a terrain looks like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -68,7 +71,7 @@ impl Synth {
     ///
     /// # Errors
     /// When there are fewer than 2 × 2 samples or the amplitude is not finite.
-    pub fn raster(&self, columns: u32, rows: u32) -> Result<Raster, Fault> {
+    pub fn raster(&self, columns: u32, rows: u32) -> Result<Raster, BadRaster> {
         Raster::from_fn(columns, rows, |column, row| self.height(column, row))
     }
 }

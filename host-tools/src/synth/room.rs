@@ -1,11 +1,10 @@
 //! Whether a file will fit, before the disk is full of its first half.
 
-use std::fmt;
-use std::io;
 use std::path::Path;
 
 use super::Synth;
-use super::write::{Format, Grid, append_row, write_asc_row};
+use super::format::WrittenFormat;
+use super::rows::{Grid, append_row, write_asc_row};
 use crate::output::folder_of;
 
 /// Samples that are made to see how long they are as text.
@@ -14,7 +13,8 @@ const SAMPLED: u32 = 4096;
 const DEFLATE_AT_BEST: u64 = 1032;
 
 /// A disk with too little room.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("it takes {:.1} GB and {:.1} GB are free there", *needed as f64 / 1e9, *free as f64 / 1e9)]
 pub struct NoRoom {
     /// Bytes that the file takes, or would take at least.
     pub needed: u64,
@@ -22,16 +22,14 @@ pub struct NoRoom {
     pub free: u64,
 }
 
-impl fmt::Display for NoRoom {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [needed, free] = [self.needed, self.free].map(|bytes| bytes as f64 / 1e9);
-        write!(f, "it takes {needed:.1} GB and {free:.1} GB are free there")
-    }
-}
-
 /// Fails if the folder's file system has less room than the file takes. Where the
 /// system does not tell, or the output is a pipe or device, the writing decides.
-pub(super) fn check(path: &Path, format: Format, synth: &Synth, grid: &Grid) -> Result<(), NoRoom> {
+pub(super) fn check(
+    path: &Path,
+    format: WrittenFormat,
+    synth: &Synth,
+    grid: &Grid,
+) -> Result<(), NoRoom> {
     let goes_to_a_disk =
         std::fs::metadata(path).is_ok_and(|there| there.is_file()) || !path.exists();
     let Some(free) = goes_to_a_disk.then(|| free_at(path)).flatten() else {
@@ -52,36 +50,23 @@ fn free_at(path: &Path) -> Option<u64> {
 
 /// Bytes of the file: exact but for the header as a GeoTIFF, by the length of the first
 /// samples as text, and as a PNG what the best compression would leave.
-fn bytes(format: Format, synth: &Synth, grid: &Grid) -> u64 {
+fn bytes(format: WrittenFormat, synth: &Synth, grid: &Grid) -> u64 {
     let samples = u64::from(grid.columns) * u64::from(grid.rows);
     match format {
-        Format::GeoTiff => samples.saturating_mul(size_of::<f32>() as u64),
-        Format::EsriAscii => {
+        WrittenFormat::GeoTiff => samples.saturating_mul(size_of::<f32>() as u64),
+        WrittenFormat::EsriAscii => {
             let columns = grid.columns.min(SAMPLED);
             let mut row = Vec::new();
             append_row(synth, columns, grid.rows / 2, &mut row);
-            let mut text = Length(0);
-            // Counting cannot fail.
+            let mut text = Vec::new();
+            // Writing to a vector cannot fail.
             let _ = write_asc_row(&mut text, &row);
-            (u128::from(samples) * u128::from(text.0) / u128::from(columns.max(1)))
+            let text = text.len() as u128;
+            (u128::from(samples) * text / u128::from(columns.max(1)))
                 .try_into()
                 .unwrap_or(u64::MAX)
         }
-        Format::Png => samples.saturating_mul(size_of::<u16>() as u64) / DEFLATE_AT_BEST,
-    }
-}
-
-/// Counts what is written to it.
-struct Length(u64);
-
-impl io::Write for Length {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0 += bytes.len() as u64;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
+        WrittenFormat::Png => samples.saturating_mul(size_of::<u16>() as u64) / DEFLATE_AT_BEST,
     }
 }
 
@@ -102,9 +87,9 @@ mod tests {
         };
         write(&path, &synth, &grid, &mut || true).expect("written");
         let format = match name {
-            "a.tif" => Format::GeoTiff,
-            "a.asc" => Format::EsriAscii,
-            _ => Format::Png,
+            "a.tif" => WrittenFormat::GeoTiff,
+            "a.asc" => WrittenFormat::EsriAscii,
+            _ => WrittenFormat::Png,
         };
         let length = std::fs::metadata(&path).expect("there").len();
         (bytes(format, &synth, &grid), length)

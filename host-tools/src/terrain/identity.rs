@@ -2,7 +2,7 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-use hapterra_core::wire::message::Scene;
+use hapterra_core::scene::Scene;
 
 use super::Scale;
 use crate::raster::Raster;
@@ -15,7 +15,7 @@ pub(super) fn fingerprint(raster: &Raster) -> u64 {
     let mut heights = vec![0.0; raster.columns() as usize];
     let mut bytes = vec![0; 8 * heights.len()];
     for row in 0..raster.rows() {
-        raster.copy_row(row, 0, &mut heights);
+        raster.copy_row(0, row, 0, &mut heights);
         for (to, height) in bytes.chunks_exact_mut(8).zip(&heights) {
             to.copy_from_slice(&height.to_le_bytes());
         }

@@ -1,7 +1,7 @@
-//! A raster as the device sees it: scaled to the hand, counted in cells, cut
+//! A raster as the device sees it: at a scale, counted in cells, cut
 //! into tiles.
 //!
-//! [`Scale`] turns the file's units into what the hand feels; [`Terrain`]
+//! [`Scale`] turns the file's units into millimetres of the arm and into cells; [`Terrain`]
 //! is a raster at that scale and one level of detail, with its tiles made one
 //! by one when they are asked for: nothing of the raster is copied or kept.
 

@@ -5,8 +5,9 @@ use std::cell::OnceCell;
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
-use hapterra_core::terrain::{POSTS, TILE_CELLS, TileKey};
-use hapterra_core::wire::message::{Heights, Scene, Source};
+use hapterra_core::scene::{Scene, Source};
+use hapterra_core::terrain::{FieldSize, POSTS, TILE_CELLS, TileKey};
+use hapterra_core::wire::message::Heights;
 
 use super::{BadScale, Scale, identity};
 use crate::raster::Raster;
@@ -142,7 +143,7 @@ impl<'r> Terrain<'r> {
         let mut scene = Scene {
             epoch: 0,
             level: self.level,
-            size: self.size,
+            size: FieldSize::new(self.size[0], self.size[1]),
             top: self.top,
             cell_mm: self.scale.cell_mm() as f32,
             home,
@@ -180,8 +181,8 @@ impl<'r> Terrain<'r> {
     pub fn has(&self, key: TileKey) -> bool {
         let last = self.size.map(|s| (s - 1) / TILE_CELLS as i32);
         key.level == self.level
-            && (0..=last[0]).contains(&key.col)
-            && (0..=last[1]).contains(&key.row)
+            && (0..=last[0]).contains(&key.index.col)
+            && (0..=last[1]).contains(&key.index.row)
     }
 
     /// The heights of a tile, as they go on the link; `None` if there is no
@@ -192,12 +193,12 @@ impl<'r> Terrain<'r> {
             return None;
         }
         self.read(key, &mut buffer.heights);
-        let Some((low, high)) = range(buffer.heights.as_slice()) else {
+        let Some((low, high, known)) = range(buffer.heights.as_slice()) else {
             return Some(Heights::Hole);
         };
         let base = base(low, high);
         let relative = |height: f64| (height - f64::from(base)) as f32;
-        if low == high && self.is_whole(key, &buffer.heights) {
+        if low == high && known == self.samples_in(key) {
             return Some(Heights::Flat {
                 base,
                 height: relative(low),
@@ -215,37 +216,22 @@ impl<'r> Terrain<'r> {
     /// Copies the tile's samples, in cells; NaN in holes and off the data.
     fn read(&self, key: TileKey, heights: &mut [f64; POSTS * POSTS]) {
         let first = |index: i32| index as u32 * TILE_CELLS as u32;
-        let (west, south) = (first(key.col), first(key.row));
+        let (west, south) = (first(key.index.col), first(key.index.row));
         for (row, line) in (south..).zip(heights.chunks_exact_mut(POSTS)) {
-            if self.level == 0 {
-                self.raster.copy_row(row, west, line);
-            } else {
-                for (column, height) in (west..).zip(line.iter_mut()) {
-                    *height = self.decimated(column, row);
-                }
-            }
+            self.raster.copy_row(self.level, row, west, line);
             for height in line {
                 *height = self.scale.height_cells(*height);
             }
         }
     }
 
-    fn decimated(&self, column: u32, row: u32) -> f64 {
-        if column > self.size[0] as u32 || row > self.size[1] as u32 {
-            return f64::NAN;
-        }
-        self.raster.height(column << self.level, row << self.level)
-    }
-
-    /// Whether every sample of the tile that lies in the field has a height.
-    fn is_whole(&self, key: TileKey, heights: &[f64; POSTS * POSTS]) -> bool {
+    /// How many samples of the tile lie in the field.
+    fn samples_in(&self, key: TileKey) -> usize {
         let inside = |index: i32, size: i32| {
             let first = index * TILE_CELLS as i32;
             (size + 1 - first).min(POSTS as i32) as usize
         };
-        let (columns, rows) = (inside(key.col, self.size[0]), inside(key.row, self.size[1]));
-        let lines = heights.chunks_exact(POSTS).take(rows);
-        !lines.flat_map(|line| &line[..columns]).any(|h| h.is_nan())
+        inside(key.index.col, self.size[0]) * inside(key.index.row, self.size[1])
     }
 }
 
@@ -259,12 +245,12 @@ fn place(cells: f64, patches: i32) -> Option<(u32, f64)> {
     Some((patch as u32, cells - patch))
 }
 
-/// Lowest and highest height; `None` if there is none.
-fn range(heights: &[f64]) -> Option<(f64, f64)> {
+/// Lowest and highest height, and how many there are; `None` if there is none.
+fn range(heights: &[f64]) -> Option<(f64, f64, usize)> {
     let known = heights.iter().copied().filter(|h| !h.is_nan());
     known.fold(None, |range, h| {
-        let (low, high) = range.unwrap_or((h, h));
-        Some((low.min(h), high.max(h)))
+        let (low, high, count) = range.unwrap_or((h, h, 0));
+        Some((low.min(h), high.max(h), count + 1))
     })
 }
 

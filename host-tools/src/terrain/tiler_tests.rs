@@ -3,7 +3,7 @@
 use super::*;
 
 fn key(level: u8, col: i32, row: i32) -> TileKey {
-    TileKey { level, col, row }
+    TileKey::new(level, col, row)
 }
 
 fn unit() -> Scale {

@@ -1,0 +1,147 @@
+//! Which part of the terrain a map shows, and how large it becomes.
+
+/// A rectangle on the map, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct MapView {
+    pub(super) west: f64,
+    pub(super) south: f64,
+    pub(super) width: f64,
+    pub(super) height: f64,
+}
+
+/// Most finished pixels of a map.
+pub(super) const MAP_PX: (f64, f64) = (1096.0, 800.0);
+/// A path that crosses this share of the terrain is shown on all of it.
+const WHOLE_SHARE: f64 = 0.55;
+/// So is any path on a terrain of at most this many cells in each direction.
+const SMALL_CELLS: f64 = 160.0;
+/// Air around a path, as a share of its extent.
+const MARGIN: f64 = 0.25;
+/// Fewest cells shown.
+const FEWEST_CELLS: f64 = 24.0;
+
+impl MapView {
+    const fn new(west: f64, south: f64, width: f64, height: f64) -> Self {
+        Self {
+            west,
+            south,
+            width,
+            height,
+        }
+    }
+
+    /// The whole of a terrain.
+    pub(super) fn whole(size_mm: [f64; 2]) -> Self {
+        Self::new(0.0, 0.0, size_mm[0], size_mm[1])
+    }
+
+    /// The smallest rectangle around points; `None` without any.
+    pub(super) fn around(points: impl Iterator<Item = [f64; 2]>) -> Option<Self> {
+        let finite = points.filter(|p| p.iter().all(|v| v.is_finite()));
+        let (low, high) = finite.fold(None, |bounds, p| {
+            let (low, high) = bounds.unwrap_or((p, p));
+            let low = [f64::min(low[0], p[0]), f64::min(low[1], p[1])];
+            Some((low, [f64::max(high[0], p[0]), f64::max(high[1], p[1])]))
+        })?;
+        Some(Self::new(
+            low[0],
+            low[1],
+            high[0] - low[0],
+            high[1] - low[1],
+        ))
+    }
+
+    /// The view for a path on a terrain: all of it when it is small or the
+    /// path goes far, else the path with some room, in the map's proportions
+    /// and inside the terrain.
+    pub(super) fn choose(path: Option<Self>, size_mm: [f64; 2], cell_mm: f64) -> Self {
+        let whole = Self::whole(size_mm);
+        let Some(path) = path else {
+            return whole;
+        };
+        let small = whole.width.max(whole.height) <= SMALL_CELLS * cell_mm;
+        let far =
+            path.width > WHOLE_SHARE * whole.width || path.height > WHOLE_SHARE * whole.height;
+        if small || far {
+            return whole.union(path);
+        }
+        let room = |extent: f64| (extent * (1.0 + MARGIN)).max(FEWEST_CELLS * cell_mm);
+        let (width, height) = (room(path.width), room(path.height));
+        let aspect = MAP_PX.0 / MAP_PX.1;
+        let (width, height) = (width.max(height * aspect), height.max(width / aspect));
+        let (west, width) = inside(path.west + 0.5 * path.width, width, whole.width);
+        let (south, height) = inside(path.south + 0.5 * path.height, height, whole.height);
+        Self::new(west, south, width, height).union(path)
+    }
+
+    /// Finished pixels of the map: as large as fits, true to scale.
+    pub(super) fn map_px(&self) -> (i32, i32) {
+        let scale = (MAP_PX.0 / self.width).min(MAP_PX.1 / self.height);
+        let pixels = |extent: f64| ((extent * scale).round() as i32).max(40);
+        (pixels(self.width), pixels(self.height))
+    }
+
+    pub(super) fn shows_all(&self, size_mm: [f64; 2]) -> bool {
+        self.width >= size_mm[0] && self.height >= size_mm[1]
+    }
+
+    fn union(self, other: Self) -> Self {
+        let west = self.west.min(other.west);
+        let south = self.south.min(other.south);
+        let east = (self.west + self.width).max(other.west + other.width);
+        let north = (self.south + self.height).max(other.south + other.height);
+        Self::new(west, south, east - west, north - south)
+    }
+}
+
+/// Start and length of an interval around `centre`, moved or cut to lie
+/// between zero and `limit`.
+fn inside(centre: f64, length: f64, limit: f64) -> (f64, f64) {
+    let length = length.min(limit);
+    ((centre - 0.5 * length).clamp(0.0, limit - length), length)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn path(west: f64, south: f64, width: f64, height: f64) -> Option<MapView> {
+        Some(MapView {
+            west,
+            south,
+            width,
+            height,
+        })
+    }
+
+    #[test]
+    fn small_terrains_and_long_paths_are_shown_whole() {
+        let all = MapView::whole([100.0, 80.0]);
+        assert_eq!(
+            MapView::choose(path(40., 40., 3., 3.), [100., 80.], 1.0),
+            all
+        );
+        let all = MapView::whole([1000.0, 800.0]);
+        assert_eq!(
+            MapView::choose(path(10., 40., 900., 3.), [1000., 800.], 1.0),
+            all
+        );
+        assert_eq!(MapView::choose(None, [1000.0, 800.0], 1.0), all);
+    }
+
+    #[test]
+    fn a_short_path_in_a_corner_gets_a_view_inside_the_terrain() {
+        let view = MapView::choose(path(2., 3., 80., 40.), [10_000., 6000.], 1.0);
+        assert_eq!((view.west, view.south), (0.0, 0.0));
+        assert!(view.width >= 100.0 && view.width < 140.0, "{view:?}");
+        let aspect = view.width / view.height;
+        assert!((aspect - MAP_PX.0 / MAP_PX.1).abs() < 1e-9);
+        assert!(!view.shows_all([10_000.0, 6000.0]));
+    }
+
+    #[test]
+    fn a_path_off_the_data_is_still_in_view() {
+        let view = MapView::choose(path(-30., 10., 20., 20.), [1000., 800.], 1.0);
+        assert!(view.west <= -30.0 && view.map_px().0 >= 40);
+    }
+}

@@ -1,0 +1,103 @@
+//! SRTM height tiles: big-endian 16-bit samples, nothing else. Size and place
+//! follow from the file's length and name.
+
+use crate::raster::decoded::Decoded;
+use crate::raster::format::{Claim, Format};
+use crate::raster::input::FileBytes;
+use crate::raster::read::read_samples;
+use crate::raster::{BadRaster, CellSize, CellUnit, Endian, SampleType};
+
+/// SRTM tiles: nothing but their name tells them.
+pub(super) const FORMAT: Format = Format {
+    name: "SRTM",
+    begins: |_| false,
+    extensions: &[("hgt", Claim::Decides)],
+    decode: |input, _| decode(input),
+};
+
+/// What SRTM writes where there is no height.
+const VOID: f64 = -32768.0;
+
+/// A tile covers one degree by one degree and shares its borders with the next.
+fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
+    let (columns, rows) = size(input.len())?;
+    let reader = &mut *input.reader()?;
+    let count = u64::from(columns) * u64::from(rows);
+    let samples = read_samples(reader, count, SampleType::I16, Endian::Big)?;
+    let format = "SRTM height tile, int16".to_owned();
+    let mut decoded = Decoded::new(format, (columns, rows), samples);
+    decoded.no_data = Some(VOID);
+    decoded.metres_per_vertical_unit = Some(1.0);
+    let latitude = south_latitude(input.name()).map(|south| south + 0.5);
+    if latitude.is_none() {
+        decoded.remarks.push(
+            "the name does not say where the tile is (as N44W072.hgt does): \
+             its cells are taken to be square"
+                .into(),
+        );
+    }
+    let cells = [columns, rows].map(|samples| f64::from(samples.max(2) - 1));
+    let degrees = (1.0 / cells[0], 1.0 / cells[1]);
+    decoded.cell = Some(CellSize::stated(degrees, CellUnit::Degree, latitude));
+    Ok(decoded)
+}
+
+/// Columns and rows of a tile of so many bytes.
+fn size(bytes: u64) -> Result<(u32, u32), BadRaster> {
+    // Above 50° some producers halve the columns.
+    if bytes == 2 * 1801 * 3601 {
+        return Ok((1801, 3601));
+    }
+    let side = (bytes / 2).isqrt();
+    match u32::try_from(side) {
+        Ok(side) if u64::from(side) * u64::from(side) * 2 == bytes => Ok((side, side)),
+        _ => Err(BadRaster::Truncated(format!(
+            "{bytes} bytes are no square of 16-bit samples; a 3 arc-second tile \
+             has 2884802, a 1 arc-second tile 25934402"
+        ))),
+    }
+}
+
+/// The tile's southern edge in degrees from a name as `N44W072.hgt` or
+/// `s05e100.SRTMGL1.hgt`.
+fn south_latitude(name: &str) -> Option<f64> {
+    let name = name.to_ascii_uppercase();
+    let bytes = name.as_bytes();
+    let digits = |range: std::ops::Range<usize>| -> Option<f64> {
+        let text = name.get(range)?;
+        let all_digits = text.bytes().all(|byte| byte.is_ascii_digit());
+        text.parse().ok().filter(|_| all_digits)
+    };
+    let latitude = digits(1..3).filter(|&degrees| degrees <= 90.0)?;
+    digits(4..7).filter(|&degrees| degrees <= 180.0)?;
+    match (bytes[0], bytes[3]) {
+        (b'N', b'E' | b'W') => Some(latitude),
+        (b'S', b'E' | b'W') => Some(-latitude),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_tells_the_latitude() {
+        assert_eq!(south_latitude("N44W072.hgt"), Some(44.0));
+        assert_eq!(south_latitude("s05e100.SRTMGL1.hgt"), Some(-5.0));
+        assert_eq!(south_latitude("mountain.hgt"), None);
+        assert_eq!(south_latitude("N99E000.hgt"), None);
+        assert_eq!(south_latitude("é4W072.hgt"), None);
+        assert_eq!(south_latitude(""), None);
+    }
+
+    #[test]
+    fn a_length_tells_the_size() {
+        assert_eq!(size(2 * 1201 * 1201).unwrap(), (1201, 1201));
+        assert_eq!(size(2 * 3601 * 3601).unwrap(), (3601, 3601));
+        assert_eq!(size(2 * 1801 * 3601).unwrap(), (1801, 3601));
+        assert_eq!(size(2 * 5 * 5).unwrap(), (5, 5));
+        assert!(size(2 * 5 * 5 + 1).is_err());
+        assert!(size(2 * 5 * 6).is_err());
+    }
+}

@@ -1,0 +1,13 @@
+//! Attributes of a variable.
+
+use netcdf_reader::NcVariable;
+
+/// An attribute that is a number.
+pub(super) fn number(variable: &NcVariable, attribute: &str) -> Option<f64> {
+    variable.attribute(attribute)?.value.as_f64()
+}
+
+/// An attribute that is a text.
+pub(super) fn text(variable: &NcVariable, attribute: &str) -> Option<String> {
+    variable.attribute(attribute)?.value.as_string()
+}

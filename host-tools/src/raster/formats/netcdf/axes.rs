@@ -1,0 +1,95 @@
+//! Cell size and orientation of a grid, from its coordinate variables.
+
+use netcdf_reader::{NcFile, NcVariable};
+
+use super::attributes::text;
+use crate::raster::decoded::Decoded;
+use crate::raster::geometry::metres_in;
+use crate::raster::{BadRaster, CellSize, CellUnit};
+
+/// Cell size and orientation from the coordinate variables.
+pub(super) fn place(
+    file: &NcFile,
+    heights: &NcVariable,
+    decoded: &mut Decoded,
+) -> Result<(), BadRaster> {
+    // A GMT grid with pixels for samples runs from north to south all the same:
+    // only the coordinates tell the order of rows.
+    let [y, x] = heights
+        .dimensions()
+        .last_chunk()
+        .ok_or_else(|| BadRaster::NotAHeightField("it has no two dimensions".into()))?;
+    let (Some(north), Some(east)) = (
+        axis(file, &y.name, decoded.rows),
+        axis(file, &x.name, decoded.columns),
+    ) else {
+        decoded
+            .remarks
+            .push("no coordinates: its first row is taken to be the northernmost".into());
+        return Ok(());
+    };
+    decoded.south_up = north.step > 0.0;
+    decoded.east_first = east.step < 0.0;
+    for axis in [&north, &east] {
+        if axis.uneven {
+            decoded.remarks.push(format!(
+                "coordinates {} are not evenly spaced: they are taken to be",
+                axis.name
+            ));
+        }
+    }
+    let steps = (east.step.abs(), north.step.abs());
+    let unit = (east.unit.as_deref(), north.unit.as_deref());
+    let latitude = (north.low + north.high) / 2.0;
+    decoded.cell = Some(match unit {
+        (Some(east), Some(_)) if east.to_lowercase().starts_with("degree") => {
+            CellSize::stated(steps, CellUnit::Degree, Some(latitude))
+        }
+        (Some(east), Some(_)) if metres_in(east).is_some() => {
+            let metres = metres_in(east).unwrap_or(1.0);
+            CellSize::stated(steps, CellUnit::Length { metres }, None)
+        }
+        _ => {
+            let extent = (east.high - east.low, north.high - north.low);
+            CellSize::guessed(steps, Some((east.low, north.low)), extent)
+        }
+    });
+    Ok(())
+}
+
+struct Axis {
+    name: String,
+    step: f64,
+    low: f64,
+    high: f64,
+    uneven: bool,
+    unit: Option<String>,
+}
+
+fn axis(file: &NcFile, name: &str, samples: u32) -> Option<Axis> {
+    let variable = file.variable(name).ok()?;
+    if variable.shape() != [u64::from(samples)] {
+        return None;
+    }
+    let values = file
+        .read_variable_as_f64(name)
+        .ok()?
+        .into_raw_vec_and_offset()
+        .0;
+    let (&first, &last) = (values.first()?, values.last()?);
+    let step = (last - first) / f64::from(samples.max(2) - 1);
+    if !step.is_finite() || step == 0.0 {
+        return None;
+    }
+    let uneven = values
+        .windows(2)
+        .any(|pair| ((pair[1] - pair[0]) / step - 1.0).abs() > 0.01);
+    Some(Axis {
+        name: name.to_owned(),
+        step,
+        low: first.min(last),
+        high: first.max(last),
+        uneven,
+        unit: text(variable, "units"),
+    })
+}

@@ -1,0 +1,159 @@
+//! NetCDF grids, classic and NetCDF-4, as GMT and the climate conventions (COARDS,
+//! CF) write them.
+
+mod attributes;
+mod axes;
+
+use std::sync::Arc;
+
+use netcdf_reader::{
+    BytesStorage, DynStorage, FileStorage, NcFile, NcReadable, NcType, NcVariable,
+};
+
+use super::height_name;
+use crate::raster::decoded::{Decoded, sides};
+use crate::raster::format::{Claim, Format, starts_with_any};
+use crate::raster::geometry::metres_in;
+use crate::raster::input::{Data, FileBytes};
+use crate::raster::samples::{HoleMask, SampleValue, with_samples};
+use crate::raster::{BadRaster, SampleType, Samples};
+use attributes::{number, text};
+
+/// NetCDF 3 (three variants) and NetCDF-4, which is HDF5.
+pub(super) const FORMAT: Format = Format {
+    name: "NetCDF",
+    begins: |head| {
+        let signatures: [&[u8]; 4] = [b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF\r\n\x1a\n"];
+        starts_with_any(head, &signatures)
+    },
+    extensions: &[("nc", Claim::Promises), ("grd", Claim::Suggests)],
+    decode: |input, _| decode(input),
+};
+
+/// What people call the variable with the heights.
+const HEIGHT_NAMES: &str = "z elevation elev topo topography height altitude dem relief bedrock \
+                            surface band1";
+
+/// Reads the grid's height variable.
+fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
+    let file = NcFile::from_storage(storage(input)?).map_err(|error| fault(&error))?;
+    let variables = file.variables().map_err(|error| fault(&error))?;
+    let heights = choose(variables)?;
+    let size = size(heights)?;
+    let sample = sample_type(heights)
+        .ok_or_else(|| BadRaster::NotAHeightField(format!("{} is no number", heights.name())))?;
+    input.check_holds(size.0, size.1, sample.bytes())?;
+    let samples: Samples = with_samples!(sample.none(), none => {
+        read_values(none, &file, heights)?.into()
+    });
+    let format = format!(
+        "NetCDF, variable {}, {}",
+        heights.name(),
+        samples.type_name()
+    );
+    let mut decoded = Decoded::new(format, size, samples);
+    mark_missing(&mut decoded, heights);
+    decoded.scale = number(heights, "scale_factor").unwrap_or(1.0);
+    decoded.offset = number(heights, "add_offset").unwrap_or(0.0);
+    decoded.metres_per_vertical_unit = text(heights, "units").and_then(|unit| metres_in(&unit));
+    axes::place(&file, heights, &mut decoded)?;
+    Ok(decoded)
+}
+
+/// The bytes as a store that can be read anywhere.
+fn storage(input: &FileBytes) -> Result<DynStorage, BadRaster> {
+    Ok(match input.data() {
+        Data::File(file, _) => {
+            let file = file.try_clone().map_err(BadRaster::Unreadable)?;
+            let storage = FileStorage::from_file(file);
+            Arc::new(storage.map_err(|error| BadRaster::Unreadable(std::io::Error::other(error)))?)
+        }
+        Data::Memory(bytes) => Arc::new(BytesStorage::from_owner(bytes.clone())),
+    })
+}
+
+/// The height variable: two-dimensional but for leading dimensions of length
+/// one, by its name or because there is no other.
+fn choose(variables: &[NcVariable]) -> Result<&NcVariable, BadRaster> {
+    let grids: Vec<&NcVariable> = variables
+        .iter()
+        .filter(|variable| size(variable).is_ok() && sample_type(variable).is_some())
+        .collect();
+    let names: Vec<&str> = grids.iter().map(|variable| variable.name()).collect();
+    Ok(grids[height_name::choose("variable", &names, HEIGHT_NAMES)?])
+}
+
+/// Columns and rows.
+fn size(variable: &NcVariable) -> Result<(u32, u32), BadRaster> {
+    match variable.shape().split_last_chunk() {
+        Some((leading, &[rows, columns])) if leading.iter().all(|&length| length == 1) => {
+            sides(columns, rows)
+        }
+        _ => Err(BadRaster::NotAHeightField(format!(
+            "{} has no two dimensions",
+            variable.name()
+        ))),
+    }
+}
+
+fn sample_type(variable: &NcVariable) -> Option<SampleType> {
+    Some(match variable.dtype() {
+        NcType::Byte => SampleType::I8,
+        NcType::UByte => SampleType::U8,
+        NcType::Short => SampleType::I16,
+        NcType::UShort => SampleType::U16,
+        NcType::Int => SampleType::I32,
+        NcType::UInt => SampleType::U32,
+        NcType::Float => SampleType::F32,
+        NcType::Double => SampleType::F64,
+        _ => return None,
+    })
+}
+
+/// Reads a variable's values, of the type that `_none` has.
+fn read_values<T: NcReadable>(
+    _none: Vec<T>,
+    file: &NcFile,
+    variable: &NcVariable,
+) -> Result<Vec<T>, BadRaster> {
+    let array = file.read_variable::<T>(variable.name());
+    match array
+        .map_err(|error| fault(&error))?
+        .into_raw_vec_and_offset()
+    {
+        (values, None | Some(0)) => Ok(values),
+        _ => Err(BadRaster::damaged(
+            "the variable does not start with its first sample",
+        )),
+    }
+}
+
+/// `_FillValue`, else `missing_value`, else what the format writes where nothing
+/// was written; both where they differ.
+fn mark_missing(decoded: &mut Decoded, variable: &NcVariable) {
+    let fill = number(variable, "_FillValue");
+    let missing = number(variable, "missing_value");
+    let default = match decoded.samples {
+        Samples::I16(_) => Some(-32767.0),
+        Samples::I32(_) => Some(-2_147_483_647.0),
+        Samples::F32(_) | Samples::F64(_) => Some(9.969_209_968_386_869e36),
+        _ => None,
+    };
+    decoded.no_data = fill.or(missing).or(default);
+    let second = missing.and_then(|value| decoded.samples.comparable_no_data(value));
+    if let Some(second) = second.filter(|_| fill.is_some() && fill != missing) {
+        let mut mask = HoleMask::with_capacity(decoded.samples.len());
+        with_samples!(&decoded.samples, values => {
+            for (index, value) in values.iter().enumerate() {
+                if value.widen() == second {
+                    mask.insert(index);
+                }
+            }
+        });
+        decoded.mask = Some(mask);
+    }
+}
+
+fn fault(error: &netcdf_reader::Error) -> BadRaster {
+    BadRaster::Damaged(format!("NetCDF: {error}"))
+}

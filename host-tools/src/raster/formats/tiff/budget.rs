@@ -1,0 +1,49 @@
+//! Whether a file can hold what its header promises, before room is made for it.
+
+use super::layout::Layout;
+use crate::raster::BadRaster;
+
+/// Room that a sparse file's holes may take beyond its data, so that a small file
+/// does not fill a machine's memory with nothing.
+const SPARSE_FLOOR: u64 = 64 << 20;
+const SPARSE_RATIO: u64 = 1024;
+
+/// Checks the promised size against the bytes that are stored for it.
+pub(super) fn check(layout: &Layout, file_bytes: u64) -> Result<(), BadRaster> {
+    let (columns, rows) = (u64::from(layout.columns), u64::from(layout.rows));
+    let absurd = |why: &str| BadRaster::AbsurdSize(format!("{columns} × {rows} samples {why}"));
+    let stored = layout
+        .first_band()
+        .ok_or_else(|| absurd("have no place in its index"))?;
+    if stored.iter().all(|&bytes| bytes == 0) {
+        return Err(BadRaster::AllNoData {
+            samples: columns * rows,
+        });
+    }
+    // Both sides of a product are at most 2^32 and a texel at most 2^19 bytes.
+    let ratio = u128::from(layout.compression.1);
+    let texel = u128::from(layout.texel_bytes());
+    let image = u128::from(columns) * u128::from(rows) * texel;
+    let promised = stored.iter().map(|&bytes| u128::from(bytes)).sum::<u128>() * ratio;
+    let in_file = u128::from(file_bytes) * ratio;
+    if u128::from(layout.chunk.0) * texel > in_file {
+        return Err(absurd("in rows longer than the file could hold"));
+    }
+    let missing = stored.iter().filter(|&&bytes| bytes == 0).count();
+    let holes = if missing == 0 {
+        0
+    } else {
+        let chunk = u128::from(layout.chunk.0) * u128::from(layout.chunk.1) * texel;
+        let room = promised.min(in_file) * u128::from(SPARSE_RATIO);
+        (missing as u128 * chunk).min(room.max(u128::from(SPARSE_FLOOR)))
+    };
+    if image > promised.saturating_add(holes) {
+        return Err(absurd("are more than the bytes in its index can hold"));
+    }
+    if image > in_file.saturating_add(holes) {
+        return Err(BadRaster::Truncated(format!(
+            "{columns} × {rows} samples do not fit into its {file_bytes} bytes"
+        )));
+    }
+    Ok(())
+}

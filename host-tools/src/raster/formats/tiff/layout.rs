@@ -1,0 +1,165 @@
+//! How an image's samples are stored, and whether they can be heights.
+
+use tiff_reader::{ByteOrder, Ifd, PhotometricInterpretation};
+
+use super::fault::{fault, unsupported};
+use crate::raster::BadRaster;
+
+/// How an image's samples are stored.
+#[derive(Debug)]
+pub(super) struct Layout {
+    pub(super) columns: u32,
+    pub(super) rows: u32,
+    /// Type of a sample.
+    pub(super) stored: (SampleFormat, u16),
+    pub(super) bands: u16,
+    /// Name, and how many bytes one stored byte may hold.
+    pub(super) compression: (&'static str, u64),
+    /// Each band has its own chunks.
+    planar: bool,
+    tiled: bool,
+    /// Columns and rows of a strip or tile.
+    pub(super) chunk: (u32, u32),
+    /// Bytes stored for each chunk; 0 for one that a sparse file leaves out.
+    chunk_bytes: Vec<u64>,
+}
+
+/// What the bits of a sample mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SampleFormat {
+    Unsigned,
+    Signed,
+    Float,
+}
+
+/// Name of a compression, and how many bytes one stored byte may hold.
+fn compression(code: u16) -> Result<(&'static str, u64), BadRaster> {
+    let refused = match code {
+        1 => return Ok(("uncompressed", 1)),
+        5 => return Ok(("lzw", 2048)),
+        8 => return Ok(("deflate", 1040)),
+        32773 => return Ok(("packbits", 64)),
+        32946 => return Ok(("olddeflate", 1040)),
+        // Zstandard repeats a block of 128 KiB with a few bytes.
+        50000 => return Ok(("zstd", 40_000)),
+        6 | 7 => "JPEG compression",
+        34887 => "LERC compression",
+        34925 => "LZMA compression",
+        50001 => "WebP compression",
+        50002 | 52546 => "JPEG XL compression",
+        _ => return Err(unsupported(format!("compression {code}"))),
+    };
+    Err(unsupported(refused.into()))
+}
+
+impl Layout {
+    /// Reads and checks the layout of an image.
+    pub(super) fn read(image: &Ifd) -> Result<Self, BadRaster> {
+        let (columns, rows) = (image.width(), image.height());
+        if columns == 0 || rows == 0 {
+            return Err(BadRaster::damaged(format!(
+                "TIFF: an image of {columns} × {rows}"
+            )));
+        }
+        let bands = image.samples_per_pixel();
+        refuse_colour(image, bands)?;
+        let (tiled, chunk, chunk_bytes) = match (image.tile_width(), image.tile_height()) {
+            (Some(width), Some(height)) => (true, (width, height), image.tile_byte_counts()),
+            _ => {
+                let height = image.rows_per_strip().min(rows);
+                (false, (columns, height), image.strip_byte_counts())
+            }
+        };
+        if chunk.0 == 0 || chunk.1 == 0 {
+            return Err(BadRaster::damaged("TIFF: strips or tiles without samples"));
+        }
+        Ok(Self {
+            columns,
+            rows,
+            stored: stored_type(image)?,
+            bands,
+            compression: compression(image.compression())?,
+            planar: image.planar_configuration() == 2,
+            tiled,
+            chunk,
+            chunk_bytes: chunk_bytes
+                .ok_or_else(|| BadRaster::damaged("TIFF: it does not say where its samples are"))?,
+        })
+    }
+
+    /// Chunks from west to east.
+    pub(super) fn chunks_across(&self) -> u32 {
+        self.columns.div_ceil(self.chunk.0)
+    }
+
+    /// Bytes stored for each chunk of the first band; `None` when the index has
+    /// too few.
+    pub(super) fn first_band(&self) -> Option<&[u64]> {
+        let down = self.rows.div_ceil(self.chunk.1);
+        let chunks = u64::from(self.chunks_across()) * u64::from(down);
+        self.chunk_bytes.get(..usize::try_from(chunks).ok()?)
+    }
+
+    /// Bytes of the samples that are stored together: one of each band, or of one
+    /// band only where each has its own chunks.
+    pub(super) fn texel_bytes(&self) -> u64 {
+        let bands = if self.planar { 1 } else { self.bands };
+        u64::from(self.stored.1 / 8) * u64::from(bands)
+    }
+
+    /// The variant in words.
+    pub(super) fn described(&self, order: ByteOrder) -> String {
+        let sample = match self.stored.0 {
+            SampleFormat::Unsigned => "uint",
+            SampleFormat::Signed => "int",
+            SampleFormat::Float => "float",
+        };
+        let (bits, compression) = (self.stored.1, self.compression.0);
+        let chunks = match self.chunk {
+            (columns, rows) if self.tiled => format!("{columns} × {rows} tiles"),
+            _ => "strips".into(),
+        };
+        let order = match order {
+            ByteOrder::BigEndian => ", big-endian",
+            ByteOrder::LittleEndian => "",
+        };
+        format!("TIFF, {sample}{bits}, {compression}, {chunks}{order}")
+    }
+}
+
+/// Colours are no heights, however many bands they have.
+fn refuse_colour(image: &Ifd, bands: u16) -> Result<(), BadRaster> {
+    use PhotometricInterpretation as Meaning;
+    let what = match image.photometric_interpretation_enum() {
+        Some(Meaning::MinIsBlack | Meaning::MinIsWhite) => return Ok(()),
+        Some(Meaning::Rgb) => format!("a colour image of {bands} bands"),
+        Some(Meaning::Palette) => "an image with a palette".into(),
+        Some(Meaning::YCbCr) => "a colour image (YCbCr)".into(),
+        Some(Meaning::Separated) => "a colour image (CMYK)".into(),
+        Some(Meaning::Mask) => "a transparency mask".into(),
+        _ => "an image of unknown interpretation".into(),
+    };
+    Err(BadRaster::NotAHeightField(what))
+}
+
+fn stored_type(image: &Ifd) -> Result<(SampleFormat, u16), BadRaster> {
+    let first = |values: Vec<u16>| values.first().copied().unwrap_or(1);
+    let bits = first(image.bits_per_sample().map_err(fault)?);
+    let format = match first(image.sample_format().map_err(fault)?) {
+        1 => SampleFormat::Unsigned,
+        2 => SampleFormat::Signed,
+        3 => SampleFormat::Float,
+        _ => {
+            let what = "samples that are no real numbers".into();
+            return Err(BadRaster::NotAHeightField(what));
+        }
+    };
+    match bits {
+        1 if format != SampleFormat::Float => {
+            Err(BadRaster::NotAHeightField("one bit a sample".into()))
+        }
+        8 if format == SampleFormat::Float => Err(unsupported("8 bits a sample".into())),
+        8 | 16 | 32 | 64 => Ok((format, bits)),
+        _ => Err(unsupported(format!("{bits} bits a sample"))),
+    }
+}

@@ -1,0 +1,76 @@
+//! The samples of a file, row by row, so that a terrain may be larger than memory.
+
+use std::io::{self, Write};
+
+use super::Synth;
+
+/// How much of a terrain is written, and how large it is on the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    /// Samples from west to east, at least 2.
+    pub columns: u32,
+    /// Samples from south to north, at least 2.
+    pub rows: u32,
+    /// Side of a cell in metres; heights are in metres too.
+    pub cell_m: f64,
+}
+
+/// The caller did not want to go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("interrupted")]
+pub struct Interrupted;
+
+/// The rows of a grid, made one by one from north to south.
+pub(super) struct Rows<'a> {
+    synth: &'a Synth,
+    pub(super) grid: &'a Grid,
+    go_on: &'a mut dyn FnMut() -> bool,
+    /// Rows not made yet.
+    pub(super) left: u32,
+    heights: Vec<f32>,
+}
+
+impl<'a> Rows<'a> {
+    pub(super) fn new(
+        synth: &'a Synth,
+        grid: &'a Grid,
+        go_on: &'a mut dyn FnMut() -> bool,
+    ) -> Self {
+        Self {
+            synth,
+            grid,
+            go_on,
+            left: grid.rows,
+            heights: Vec::new(),
+        }
+    }
+
+    /// The next row's heights; `None` after the southernmost.
+    pub(super) fn next(&mut self) -> Result<Option<&[f32]>, Interrupted> {
+        let Some(row) = self.left.checked_sub(1) else {
+            return Ok(None);
+        };
+        self.left = row;
+        self.heights.clear();
+        append_row(self.synth, self.grid.columns, row, &mut self.heights);
+        if (self.go_on)() {
+            Ok(Some(&self.heights))
+        } else {
+            Err(Interrupted)
+        }
+    }
+}
+
+/// Appends a row's heights; rows are counted from the south.
+pub(super) fn append_row(synth: &Synth, columns: u32, row: u32, heights: &mut Vec<f32>) {
+    heights.extend((0..columns).map(|column| synth.height(column, row)));
+}
+
+/// One row as text.
+pub(super) fn write_asc_row(out: &mut dyn Write, heights: &[f32]) -> io::Result<()> {
+    for (column, height) in heights.iter().enumerate() {
+        let separator = if column == 0 { "" } else { " " };
+        write!(out, "{separator}{height}")?;
+    }
+    writeln!(out)
+}
