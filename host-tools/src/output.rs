@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
+use tempfile::TempPath;
 
 /// An output file cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -21,39 +21,10 @@ pub struct OutputError {
 /// behind.
 pub struct Output {
     path: PathBuf,
-    writer: BufWriter<Sink>,
-}
-
-enum Sink {
-    /// Beside the file that it will replace.
-    Beside(NamedTempFile),
-    /// A pipe or device: there is nothing to replace.
-    Straight(File),
-}
-
-impl Write for Sink {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            Self::Beside(file) => file.write(bytes),
-            Self::Straight(file) => file.write(bytes),
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Self::Beside(file) => file.flush(),
-            Self::Straight(file) => file.flush(),
-        }
-    }
-}
-
-impl Seek for Sink {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        match self {
-            Self::Beside(file) => file.seek(to),
-            Self::Straight(file) => file.seek(to),
-        }
-    }
+    writer: BufWriter<File>,
+    /// Where it is written, beside the file that it will replace; none for a
+    /// pipe or device, where there is nothing to replace.
+    beside: Option<TempPath>,
 }
 
 impl Output {
@@ -66,19 +37,19 @@ impl Output {
             path: path.to_owned(),
             source,
         };
-        let sink = match std::fs::metadata(path) {
-            Ok(there) if there.is_dir() => {
-                return Err(failed(io::Error::other("it is a folder")));
-            }
+        let opened = match std::fs::metadata(path) {
+            Ok(there) if there.is_dir() => Err(io::Error::other("it is a folder")),
             Ok(there) if !there.is_file() => {
                 let file = File::options().write(true).open(path);
-                Sink::Straight(file.map_err(failed)?)
+                file.map(|file| (file, None))
             }
-            _ => Sink::Beside(temporary(path).map_err(failed)?),
+            _ => temporary(path).map(|(file, place)| (file, Some(place))),
         };
+        let (file, beside) = opened.map_err(failed)?;
         Ok(Self {
             path: path.to_owned(),
-            writer: BufWriter::with_capacity(1 << 16, sink),
+            writer: BufWriter::with_capacity(1 << 16, file),
+            beside,
         })
     }
 
@@ -95,9 +66,9 @@ impl Output {
     pub fn finish(self) -> Result<(), OutputError> {
         let path = self.path;
         let finished = self.writer.into_inner().map_err(|error| error.into_error());
-        let placed = finished.and_then(|sink| match sink {
-            Sink::Beside(file) => file.persist(&path).map(drop).map_err(|error| error.error),
-            Sink::Straight(mut file) => file.flush(),
+        let placed = finished.and_then(|mut file| match self.beside {
+            Some(beside) => beside.persist(&path).map_err(|error| error.error),
+            None => file.flush(),
         });
         placed.map_err(|source| OutputError { path, source })
     }
@@ -128,13 +99,15 @@ pub fn folder_of(path: &Path) -> &Path {
     }
 }
 
-fn temporary(path: &Path) -> io::Result<NamedTempFile> {
+fn temporary(path: &Path) -> io::Result<(File, TempPath)> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".hapterra-").suffix(".partial");
     // Readable by whom the user's mask says, as any other file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder_of(path))
+    builder
+        .tempfile_in(folder_of(path))
+        .map(tempfile::NamedTempFile::into_parts)
 }
 
 #[cfg(test)]

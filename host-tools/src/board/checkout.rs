@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::Board;
+use super::boards::Board;
 
 /// A checkout of the project.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,12 +48,6 @@ impl Checkout {
         })
     }
 
-    /// Its folder.
-    #[must_use]
-    pub fn root(&self) -> &Path {
-        &self.root
-    }
-
     /// Builds the image of a board and gives the ELF's path.
     ///
     /// # Errors
@@ -88,7 +82,7 @@ mod tests {
     fn a_checkout_is_found_from_any_folder_in_it_and_nowhere_else() {
         let here = Path::new(env!("CARGO_MANIFEST_DIR"));
         let found = Checkout::around(&here.join("src/board")).expect("this is one");
-        assert_eq!(Some(found.root()), here.parent());
+        assert_eq!(Some(found.root.as_path()), here.parent());
         let elsewhere = tempfile::tempdir().expect("a folder");
         assert_eq!(Checkout::around(elsewhere.path()), None);
     }

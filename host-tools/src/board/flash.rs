@@ -5,7 +5,7 @@ use probe_rs::flashing::{DownloadOptions, FlashError as WriteError, FlashProgres
 use probe_rs::probe::list::{Accessibility, Lister};
 use probe_rs::probe::{DebugProbeError, DebugProbeInfo, DebugProbeSelector};
 
-use super::Image;
+use super::image::Image;
 
 /// An image was written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub struct Flashed {
     pub bytes: usize,
 }
 
-/// How far it is: bytes done of bytes to do, in the phase at hand.
+/// How far the writing is, bytes over all phases so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// Bytes done.
@@ -31,18 +31,18 @@ pub enum FlashError {
     /// No probe at all.
     #[error("no debug probe: looked for ST-LINK, CMSIS-DAP, J-Link and other probes on USB")]
     NoProbe,
-    /// None with this name.
+    /// No probe has the name that was asked for.
     #[error("no debug probe is {wanted}: there is {}", there.join(", "))]
     NoSuchProbe {
-        /// What was asked for.
+        /// The name that was asked for.
         wanted: String,
-        /// What there is.
+        /// The names of the probes that are there.
         there: Vec<String>,
     },
-    /// Several, and none was named.
+    /// Several probes are there, and none was named.
     #[error("several debug probes: {}", .0.join(", "))]
     ManyProbes(Vec<String>),
-    /// The user may not open it.
+    /// The probe is there, but this user may not open it.
     #[error("the debug probe {0} is there, but this user may not open it")]
     Forbidden(String),
     /// The name of a probe is not one.

@@ -11,7 +11,7 @@ use object::read::elf::{FileHeader, ProgramHeader, Sym};
 use probe_rs::Target;
 use probe_rs::config::{MemoryRegion, Registry};
 
-use super::Board;
+use super::boards::Board;
 
 /// An image that fits its chip.
 #[derive(Debug)]
@@ -61,7 +61,7 @@ pub enum ImageError {
     NoImage {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// What is wrong with the file.
         why: String,
     },
     /// Part of it would lie where the chip has no memory of that kind.
@@ -76,7 +76,7 @@ pub enum ImageError {
         chip: String,
         /// Where the part begins.
         address: u64,
-        /// How long it is.
+        /// How long the part is, bytes.
         bytes: u64,
         /// Flash or RAM.
         memory: &'static str,
@@ -350,7 +350,10 @@ mod tests {
     #[test]
     fn every_board_with_a_chip_is_known_to_probe_rs() {
         let registry = Registry::from_builtin_families();
-        for chip in super::super::BOARDS.iter().filter_map(|board| board.chip) {
+        for chip in super::super::boards::BOARDS
+            .iter()
+            .filter_map(|board| board.chip)
+        {
             registry.get_target_by_name(chip).expect(chip);
         }
     }

@@ -1,9 +1,14 @@
 //! The weight on joints 2 and 3, from poses in which something that reads its
 //! force holds the arm still.
 
+use glam::DVec3;
 use hapterra_core::phantom::Calibration;
 
-use super::{Arm, FitError};
+use super::arm::Arm;
+use super::fit_error::FitError;
+
+/// Newtons of a gram's weight, at the standard acceleration of free fall.
+pub const N_PER_GRAM: f64 = 9.806_65e-3;
 
 /// An arm held still, the motors off.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,7 +19,7 @@ pub struct Still {
     pub force_n: [f64; 3],
 }
 
-/// What the poses tell.
+/// The weights on joints 2 and 3 that explain the poses best, Nm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GravityFit {
     /// As [`Calibration::gravity_2_nm`].
@@ -42,9 +47,12 @@ pub fn fit_gravity(record: &Calibration, poses: &[Still]) -> Result<GravityFit, 
     let arm = Arm::of(record);
     // (how much of the weight is felt, torque) of each pose.
     let felt = |still: &Still| {
-        let [_, two, three] = arm.torques_nm(still.q_rad, still.force_n);
-        let [_, q2, q3] = still.q_rad;
-        [(libm::cos(q2), two), (libm::sin(q3), three)]
+        let (q_rad, force_n) = (DVec3::from(still.q_rad), DVec3::from(still.force_n));
+        let torque = arm.torques_nm(q_rad, force_n);
+        [
+            (libm::cos(q_rad.y), torque.y),
+            (libm::sin(q_rad.z), torque.z),
+        ]
     };
     let felt: Vec<_> = poses.iter().map(felt).collect();
     let weight = |joint: usize| {
@@ -58,14 +66,12 @@ pub fn fit_gravity(record: &Calibration, poses: &[Still]) -> Result<GravityFit, 
         }
     };
     let (gravity_2_nm, gravity_3_nm) = (weight(0)?, weight(1)?);
-    let left = felt.iter().map(|[two, three]| {
-        let (a, b) = (
-            two.1 - gravity_2_nm * two.0,
-            three.1 - gravity_3_nm * three.0,
-        );
-        a * a + b * b
-    });
-    let left: f64 = left.sum();
+    let weights = [gravity_2_nm, gravity_3_nm];
+    let left: f64 = felt
+        .iter()
+        .flat_map(|pose| pose.iter().zip(weights))
+        .map(|((share, torque), weight)| (torque - weight * share).powi(2))
+        .sum();
     Ok(GravityFit {
         gravity_2_nm,
         gravity_3_nm,

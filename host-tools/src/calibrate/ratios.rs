@@ -2,10 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use hapterra_core::Vec3;
+use glam::{DMat3, DVec3};
 use hapterra_core::phantom::Calibration;
 
-use super::{Arm, FitError};
+use super::arm::Arm;
+use super::fit_error::FitError;
 
 /// A move of the tip along a ruler.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,13 +15,13 @@ pub struct Check {
     pub from: [i32; 3],
     /// Counts since the zero pose where it ended.
     pub to: [i32; 3],
-    /// Along what.
+    /// Along which direction.
     pub direction: Direction,
-    /// How far, by the ruler, mm.
+    /// The length of the move as read off the ruler, mm; negative the other way.
     pub mm: f64,
 }
 
-/// Along what the tip was moved.
+/// The direction in which the tip was moved along a ruler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// To the user's right: joint 1.
@@ -37,11 +38,11 @@ impl Direction {
 
     /// The unit vector, device frame.
     #[must_use]
-    pub const fn unit(self) -> [f64; 3] {
+    pub const fn unit(self) -> DVec3 {
         match self {
-            Self::TowardsUser => [1.0, 0.0, 0.0],
-            Self::Right => [0.0, 1.0, 0.0],
-            Self::Up => [0.0, 0.0, 1.0],
+            Self::TowardsUser => DVec3::X,
+            Self::Right => DVec3::Y,
+            Self::Up => DVec3::Z,
         }
     }
 
@@ -56,13 +57,13 @@ impl Direction {
     }
 }
 
-/// What the checks tell.
+/// The ratios and signs that explain the checks best.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RatioFit {
     /// Motor turns a joint turn.
-    pub ratio: [f64; 3],
+    pub ratio: DVec3,
     /// +1 where counts rise with the joint's angle, −1 where they fall.
-    pub sign: [f64; 3],
+    pub sign: DVec3,
     /// Root mean square of what is left over, mm.
     pub off_mm: f64,
 }
@@ -72,8 +73,8 @@ impl RatioFit {
     /// where an encoder's sign turns over, the motor's does not follow: that is
     /// its wiring's.
     pub fn apply(&self, record: &mut Calibration) {
-        record.ratio = Vec3::from_array(self.ratio.map(|ratio| ratio as f32));
-        record.encoder_sign = Vec3::from_array(self.sign.map(|sign| sign as f32));
+        record.ratio = self.ratio.as_vec3();
+        record.encoder_sign = self.sign.as_vec3();
     }
 }
 
@@ -107,16 +108,10 @@ pub fn fit_ratios(record: &Calibration, checks: &[Check]) -> Result<RatioFit, Fi
     }
     let arm = Arm::of(record);
     let per_turn = f64::from(record.counts_per_turn);
-    let begin = record
-        .ratio
-        .to_array()
-        .map(|r| TAU / (per_turn * f64::from(r)));
+    let begin = TAU / (per_turn * record.ratio.as_dvec3());
     let tries = (0..8).map(|signs| {
-        let signed = std::array::from_fn(|i| match signs >> i & 1 {
-            0 => begin[i],
-            _ => -begin[i],
-        });
-        descend(&arm, checks, signed)
+        let sign = |joint: u32| if signs >> joint & 1 == 0 { 1.0 } else { -1.0 };
+        descend(&arm, checks, begin * DVec3::new(sign(0), sign(1), sign(2)))
     });
     let best = tries.reduce(|best, next| if next.1 < best.1 { next } else { best });
     let (rad_per_count, square) = best.unwrap_or((begin, f64::INFINITY));
@@ -125,85 +120,52 @@ pub fn fit_ratios(record: &Calibration, checks: &[Check]) -> Result<RatioFit, Fi
         return Err(FitError::NoRatios { off_mm });
     }
     Ok(RatioFit {
-        ratio: rad_per_count.map(|k| TAU / (per_turn * k.abs())),
-        sign: rad_per_count.map(f64::signum),
+        ratio: TAU / (per_turn * rad_per_count.abs()),
+        sign: rad_per_count.signum(),
         off_mm,
     })
 }
 
 /// Gauss-Newton from a starting point; where it ends, and the squares left.
-fn descend(arm: &Arm, checks: &[Check], start: [f64; 3]) -> ([f64; 3], f64) {
+fn descend(arm: &Arm, checks: &[Check], start: DVec3) -> (DVec3, f64) {
     let mut at = start;
     for _ in 0..STEPS {
-        let (mut normal, mut gradient) = ([[0.0; 3]; 3], [0.0; 3]);
+        let (mut normal, mut gradient) = (DMat3::ZERO, DVec3::ZERO);
         for check in checks {
             let here = left_over(arm, check, at);
-            let slopes: [[f64; 3]; 3] = std::array::from_fn(|i| {
-                let h = 1e-6 * start[i];
-                let mut beside = at;
-                beside[i] += h;
-                let there = left_over(arm, check, beside);
-                std::array::from_fn(|row| (there[row] - here[row]) / h)
-            });
-            for i in 0..3 {
-                gradient[i] += dot(slopes[i], here);
-                for j in 0..3 {
-                    normal[i][j] += dot(slopes[i], slopes[j]);
-                }
-            }
+            let slope = |joint: DVec3| {
+                let h = 1e-6 * start.dot(joint);
+                (left_over(arm, check, at + h * joint) - here) / h
+            };
+            let slopes =
+                DMat3::from_cols_array_2d(&DVec3::AXES.map(|joint| slope(joint).to_array()));
+            gradient += slopes.transpose() * here;
+            normal += slopes.transpose() * slopes;
         }
-        let Some(step) = solve(normal, gradient) else {
+        let step = normal.inverse() * gradient;
+        if !step.is_finite() {
             break;
-        };
+        }
         // Never more than half of what a count is worth, and never through zero.
-        let longest = (0..3).map(|i| (step[i] / at[i]).abs()).fold(0.0, f64::max);
-        let share = f64::min(1.0, 0.5 / longest.max(1e-300));
-        (0..3).for_each(|i| at[i] -= share * step[i]);
+        let longest = (step / at).abs().max_element();
+        at -= step * f64::min(1.0, 0.5 / longest.max(1e-300));
         if longest < 1e-12 {
             break;
         }
     }
-    let squares = checks.iter().map(|check| {
-        let left = left_over(arm, check, at);
-        dot(left, left)
-    });
+    let squares = checks
+        .iter()
+        .map(|check| left_over(arm, check, at).length_squared());
     (at, squares.sum())
 }
 
 /// What the move by the encoders and the move by the ruler differ in, mm; what
 /// lies across the ruler counts less.
-fn left_over(arm: &Arm, check: &Check, rad_per_count: [f64; 3]) -> [f64; 3] {
+fn left_over(arm: &Arm, check: &Check, rad_per_count: DVec3) -> DVec3 {
     let tip = |counts| arm.tip_mm(arm.angles(rad_per_count, counts));
-    let (from, to) = (tip(check.from), tip(check.to));
-    let unit = check.direction.unit();
-    let moved: [f64; 3] = std::array::from_fn(|i| to[i] - from[i]);
-    let along = dot(moved, unit);
-    std::array::from_fn(|i| {
-        let across = moved[i] - along * unit[i];
-        ACROSS * across + (along - check.mm) * unit[i]
-    })
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// Solves a symmetric system by Cramer's rule; none where it is singular.
-fn solve(m: [[f64; 3]; 3], v: [f64; 3]) -> Option<[f64; 3]> {
-    let determinant = |m: [[f64; 3]; 3]| {
-        let minor = |a: usize, b: usize| m[1][a] * m[2][b] - m[1][b] * m[2][a];
-        m[0][0] * minor(1, 2) - m[0][1] * minor(0, 2) + m[0][2] * minor(0, 1)
-    };
-    let whole = determinant(m);
-    let solution = std::array::from_fn(|column| {
-        let mut replaced = m;
-        (0..3).for_each(|row| replaced[row][column] = v[row]);
-        determinant(replaced) / whole
-    });
-    solution
-        .iter()
-        .all(|x: &f64| x.is_finite())
-        .then_some(solution)
+    let (moved, unit) = (tip(check.to) - tip(check.from), check.direction.unit());
+    let along = moved.dot(unit);
+    ACROSS * (moved - along * unit) + (along - check.mm) * unit
 }
 
 #[cfg(test)]
@@ -212,39 +174,28 @@ mod tests {
 
     /// Counts since the zero pose at a tip position, for an arm with other ratios
     /// than the preset's.
-    fn counts(arm: &Arm, rad_per_count: [f64; 3], wanted_mm: [f64; 3]) -> [i32; 3] {
+    fn counts(arm: &Arm, rad_per_count: DVec3, wanted_mm: DVec3) -> [i32; 3] {
         let mut q = arm.zero_rad;
         for _ in 0..100 {
             let at = arm.tip_mm(q);
-            let slopes: [[f64; 3]; 3] = std::array::from_fn(|j| {
-                let mut beside = q;
-                beside[j] += 1e-7;
-                let there = arm.tip_mm(beside);
-                std::array::from_fn(|i| (there[i] - at[i]) / 1e-7)
-            });
-            let rows = std::array::from_fn(|i| std::array::from_fn(|j| slopes[j][i]));
-            let wrong = std::array::from_fn(|i| wanted_mm[i] - at[i]);
-            let step = solve(rows, wrong).expect("not singular");
-            (0..3).for_each(|i| q[i] += step[i]);
+            let slope = |along: DVec3| (arm.tip_mm(q + 1e-7 * along) - at) / 1e-7;
+            let slopes = DMat3::from_cols(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z));
+            q += slopes.inverse() * (wanted_mm - at);
         }
-        std::array::from_fn(|i| libm::round((q[i] - arm.zero_rad[i]) / rad_per_count[i]) as i32)
+        let turned = ((q - arm.zero_rad) / rad_per_count).round();
+        turned.to_array().map(|counts| counts as i32)
     }
 
     fn checks(factor: [f64; 3], error_mm: f64) -> Vec<Check> {
         let record = Calibration::PREMIUM_1_5;
         let arm = Arm::of(&record);
-        let ratio = record.ratio.to_array().map(f64::from);
-        let k = std::array::from_fn(|i| TAU / (4096.0 * ratio[i] * factor[i]));
+        let k = TAU / (4096.0 * record.ratio.as_dvec3() * DVec3::from(factor));
         let home = arm.tip_mm(arm.zero_rad);
-        let check = |direction: Direction| {
-            let unit = direction.unit();
-            let end = std::array::from_fn(|i| home[i] + 80.0 * unit[i]);
-            Check {
-                from: [0; 3],
-                to: counts(&arm, k, end),
-                direction,
-                mm: 80.0 + error_mm,
-            }
+        let check = |direction: Direction| Check {
+            from: [0; 3],
+            to: counts(&arm, k, home + 80.0 * direction.unit()),
+            direction,
+            mm: 80.0 + error_mm,
         };
         Direction::ALL.map(check).to_vec()
     }

@@ -3,7 +3,12 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
-use super::{Attendant, Direction, Review, Stopped};
+use glam::DVec3;
+
+use super::gravity::N_PER_GRAM;
+use super::ratios::Direction;
+use super::review::Review;
+use super::walk::{Attendant, Stopped};
 use crate::phantom::{HandModel, PhantomModel, Plant, kinematics};
 
 /// How long a pose is held until everything is still, s.
@@ -23,6 +28,8 @@ pub struct VirtualUser {
     counts: Rc<Cell<[i32; 3]>>,
     /// How much every reading of the ruler is off, mm.
     pub ruler_off_mm: f64,
+    /// Takes what the user says, a line at a time.
+    pub says: fn(&str),
 }
 
 impl VirtualUser {
@@ -36,6 +43,7 @@ impl VirtualUser {
             plant: plant.held_by(HandModel::default()),
             counts,
             ruler_off_mm: 0.0,
+            says: |line| tracing::info!("{line}"),
         }
     }
 
@@ -52,13 +60,13 @@ impl VirtualUser {
         Self::new(model)
     }
 
-    /// What the encoders read, also later.
+    /// The cell that holds what the encoders read, counts; it follows the arm.
     #[must_use]
     pub fn counts(&self) -> Rc<Cell<[i32; 3]>> {
         Rc::clone(&self.counts)
     }
 
-    /// The arm as it truly is.
+    /// The arm with its true ratios, signs and weights.
     #[must_use]
     pub fn model(&self) -> &PhantomModel {
         self.plant.model()
@@ -66,29 +74,26 @@ impl VirtualUser {
 
     /// Leads the tip to a point by hand and holds it there.
     fn lead(&mut self, to_m: [f64; 3]) {
-        let from = self.plant.tip_m();
+        let from = DVec3::from(self.plant.tip_m());
         let ticks = (SETTLE_S * 1e3) as u32;
         for tick in 0..ticks {
             // There in the first quarter of the time, then only held.
             let share = f64::min(1.0, 4.0 * f64::from(tick) / f64::from(ticks));
-            let at = std::array::from_fn(|i| from[i] + share * (to_m[i] - from[i]));
-            self.plant.aim(at, [0.0; 3]);
+            let at = from.lerp(DVec3::from(to_m), share);
+            self.plant.aim(at.to_array(), [0.0; 3]);
             self.plant.step([0.0; 3], 1e-3);
         }
         self.counts.set(self.plant.counts());
-    }
-
-    fn home_m(&self) -> [f64; 3] {
-        kinematics::tip(self.plant.model(), [0.0; 3])
     }
 }
 
 impl Attendant for VirtualUser {
     fn hear(&mut self, line: &str) {
-        tracing::info!("{line}");
+        (self.says)(&format!("  {line}"));
     }
 
     fn zero_pose(&mut self) -> Result<(), Stopped> {
+        (self.says)("into the zero pose");
         // In its rest, exactly: no hand is as precise.
         self.plant.put([0.0; 3]);
         self.counts.set(self.plant.counts());
@@ -96,29 +101,31 @@ impl Attendant for VirtualUser {
     }
 
     fn move_along(&mut self, direction: Direction, about_mm: f64) -> Result<f64, Stopped> {
-        let before = self.plant.tip_m();
-        let unit = direction.unit();
-        self.lead(std::array::from_fn(|i| {
-            before[i] + 1e-3 * about_mm * unit[i]
-        }));
-        let after = self.plant.tip_m();
-        let moved = (0..3)
-            .map(|i| unit[i] * (after[i] - before[i]))
-            .sum::<f64>();
-        Ok(1e3 * moved + self.ruler_off_mm)
+        let (before, unit) = (DVec3::from(self.plant.tip_m()), direction.unit());
+        self.lead((before + 1e-3 * about_mm * unit).to_array());
+        let moved = unit.dot(DVec3::from(self.plant.tip_m()) - before);
+        let read_mm = 1e3 * moved + self.ruler_off_mm;
+        (self.says)(&format!("{read_mm:.1} mm {}", direction.words()));
+        Ok(read_mm)
     }
 
     fn hold_still(&mut self, number: usize) -> Result<Option<[f64; 2]>, Stopped> {
         let Some(from_home) = POSES_MM.get(number - 1) else {
             return Ok(None);
         };
-        let home = self.home_m();
-        self.lead(std::array::from_fn(|i| home[i] + 1e-3 * from_home[i]));
+        let home = DVec3::from(kinematics::tip(self.plant.model(), [0.0; 3]));
+        self.lead((home + 1e-3 * DVec3::from(*from_home)).to_array());
         let [towards, _, up] = self.plant.hand_force_n();
+        let grams = [up, towards].map(|newtons| newtons / N_PER_GRAM);
+        (self.says)(&format!(
+            "pose {number}: {:.1} g upwards, {:.1} g towards the user",
+            grams[0], grams[1]
+        ));
         Ok(Some([up, towards]))
     }
 
-    fn agrees(&mut self, _: &Review) -> Result<bool, Stopped> {
+    fn agrees(&mut self, review: &Review) -> Result<bool, Stopped> {
+        (self.says)(review.to_string().trim_end());
         Ok(true)
     }
 }

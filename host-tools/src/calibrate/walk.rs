@@ -1,10 +1,12 @@
-//! The walk through a calibration.
+//! The steps of a calibration in their order, whoever moves the arm.
 
 use hapterra_core::phantom::Calibration;
 
-use super::{
-    Arm, Check, Direction, FitError, GravityFit, RatioFit, Still, fit_gravity, fit_ratios,
-};
+use super::arm::Arm;
+use super::fit_error::FitError;
+use super::gravity::{Still, fit_gravity};
+use super::ratios::{Check, Direction, fit_ratios};
+use super::review::Review;
 
 /// How far the tip is to be moved along the ruler, mm.
 const ABOUT_MM: f64 = 80.0;
@@ -68,27 +70,12 @@ pub enum WalkError<E: std::error::Error + 'static> {
     Refused,
 }
 
-/// What was found, for looking at before it is taken.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Review {
-    /// The record that the walk began with.
-    pub before: Calibration,
-    /// The record that it came to.
-    pub after: Calibration,
-    /// The counts of the zero pose.
-    pub zero: [i32; 3],
-    /// The ratios, if they were measured.
-    pub ratios: Option<RatioFit>,
-    /// The weights, if they were measured.
-    pub gravity: Option<GravityFit>,
-}
-
-/// What is to be measured.
+/// Which parts of the record are measured; the zero pose always is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
-    /// The ratios.
+    /// Whether the cable ratios and encoder signs are measured.
     pub ratios: bool,
-    /// The weights.
+    /// Whether the weights on joints 2 and 3 are measured.
     pub gravity: bool,
 }
 
@@ -168,17 +155,14 @@ impl<E: std::error::Error + 'static> Walk<'_, E> {
 
     fn poses(&mut self, record: &Calibration) -> Result<Vec<Still>, WalkError<E>> {
         let arm = Arm::of(record);
-        let rad_per_count = record
-            .counts_per_radian()
-            .to_array()
-            .map(|counts| 1.0 / f64::from(counts));
+        let rad_per_count = 1.0 / record.counts_per_radian().as_dvec3();
         let mut poses = Vec::new();
         for number in 1..=POSES {
             let Some([up, towards]) = self.attendant.hold_still(number)? else {
                 break;
             };
             poses.push(Still {
-                q_rad: arm.angles(rad_per_count, self.since_zero()?),
+                q_rad: arm.angles(rad_per_count, self.since_zero()?).to_array(),
                 force_n: [towards, 0.0, up],
             });
         }

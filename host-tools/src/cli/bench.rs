@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use super::Failure;
+use super::failure::{Failure, OrHint};
 
 /// Arguments of `hapterra bench`.
 #[derive(Debug, clap::Args)]
@@ -35,14 +35,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             command
         }
         (None, None) => {
-            let error = format!("{PROGRAM} is not beside this program");
-            return Err(Failure::new(error).hint(HINT));
+            return Err(format!("{PROGRAM} is not beside this program")).or_hint(HINT);
         }
     };
     let status = command
         .args(&args.arguments)
         .status()
-        .map_err(|error| Failure::new(format!("cannot run {PROGRAM}: {error}")).hint(HINT))?;
+        .map_err(|error| format!("cannot run {PROGRAM}: {error}"))
+        .or_hint(HINT)?;
     if status.success() {
         return Ok(());
     }

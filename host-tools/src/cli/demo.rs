@@ -6,21 +6,22 @@ use std::time::Duration;
 
 use clap::ValueHint;
 
-use super::emulation::{Emulation, explain_link};
-use super::feel::Feel;
-use super::input::{Input, Reading};
-use super::report::{self, Report};
-use super::{Failure, interrupt};
+use super::failure::{Failure, OrHint};
+use super::options::emulated_board::{EmulatedBoard, RunsOn};
+use super::options::rendering::Rendering;
+use super::options::terrain_file::{ReadingOptions, TerrainFile};
+use super::session_summary::{self, SessionSummary};
+use super::terminal::{interrupt, progress};
 use crate::link::{
-    Arming, Emulator, Event, HostClock, LinkError, Native, Patience, Session, Transport,
-    serve_plant,
+    Arming, Event, HostClock, LinkError, Native, Patience, Session, Transport, move_arm_while,
 };
-use crate::live::{Figures, Stage, StageError, suggest};
-use crate::output::Output;
-use crate::phantom::Rig;
+use crate::output::{Output, OutputError};
+use crate::phantom::HeldPhantom;
+use crate::place::{PlacedTerrain, PlacingError, suggest_scale};
 use crate::raster::Raster;
 use crate::replay::{Record, Recording, state_name};
 use crate::synth::{Kind, Synth};
+use crate::telemetry::SampleLog;
 use crate::terrain::Scale;
 
 /// Samples along the side of the terrain that the demo makes itself.
@@ -37,11 +38,11 @@ pub struct Args {
 
     /// What the file does not say itself.
     #[command(flatten)]
-    pub reading: Reading,
+    pub reading: ReadingOptions,
 
     /// Where the loop runs
-    #[arg(long, value_enum, default_value_t)]
-    pub device: Where,
+    #[arg(long, value_enum, default_value = "emulated")]
+    pub device: RunsOn,
 
     /// Folder for the picture and the recording
     #[arg(long, value_name = "DIR", default_value = "demo", value_hint = ValueHint::DirPath)]
@@ -54,21 +55,11 @@ pub struct Args {
     /// How it feels. Without a stated height the demo chooses one that suits
     /// the hand, and says which.
     #[command(flatten)]
-    pub feel: Feel,
+    pub rendering: Rendering,
 
     /// The emulated board.
     #[command(flatten)]
-    pub emulation: Emulation,
-}
-
-/// Where the loop runs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Where {
-    /// On the emulated Cortex-M4F board
-    #[default]
-    Emulated,
-    /// In this program: the application compiled for this machine
-    Native,
+    pub board: EmulatedBoard,
 }
 
 /// Runs the demonstration.
@@ -77,30 +68,28 @@ pub enum Where {
 /// What is wrong with the file, the device or the output folder.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (raster, name) = terrain_of(args)?;
-    let law = args.feel.law()?;
+    let (law, rule) = (args.rendering.law()?, args.rendering.rule());
     let mut scale = scale_of(args, &raster)?;
+    // Heights that nobody asked for may as well be lower.
+    let may_lower = args.rendering.height_mm_per_unit.is_none();
     for _ in 0..HALVINGS {
-        let terrain = args.feel.terrain(&raster, scale)?;
-        match Stage::set(&terrain, law, args.feel.rule()) {
-            Ok(stage) => return show(args, &stage, &name),
-            // Heights that nobody asked for may as well be lower.
-            Err(StageError::OutOfReach(_)) if args.feel.height_mm_per_unit.is_none() => {
+        let terrain = args.rendering.terrain(&raster, scale)?;
+        match PlacedTerrain::new(&terrain, law, rule) {
+            Ok(placed) => return show(args, &placed, &name),
+            Err(PlacingError::OutOfReach(_)) if may_lower => {
                 let lower = 0.5 * scale.height_mm_per_unit();
                 scale = Scale::new(scale.cell_mm(), lower).map_err(Failure::new)?;
             }
-            Err(error) => return Err(too_tall(error)),
+            Err(error) => return Err(error.into()),
         }
     }
-    Err(too_tall("the terrain is too tall for the arm"))
-}
-
-fn too_tall(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Failure {
-    Failure::new(error).hint("choose a smaller --height-mm-per-unit or --cell-mm")
+    Err("the terrain is too tall for the arm")
+        .or_hint("choose a smaller --height-mm-per-unit or --cell-mm")
 }
 
 fn terrain_of(args: &Args) -> Result<(Raster, String), Failure> {
     if let Some(file) = &args.file {
-        let input = Input {
+        let input = TerrainFile {
             file: file.clone(),
             reading: args.reading.clone(),
         };
@@ -113,163 +102,132 @@ fn terrain_of(args: &Args) -> Result<(Raster, String), Failure> {
 
 /// The scale as stated, or one that suits the hand.
 fn scale_of(args: &Args, raster: &Raster) -> Result<Scale, Failure> {
-    if args.feel.height_mm_per_unit.is_some() {
-        return args.feel.scale(raster);
+    if args.rendering.height_mm_per_unit.is_some() {
+        return args.rendering.scale(raster);
     }
-    suggest(raster, args.feel.cell_mm)
-        .map(|suggestion| suggestion.scale)
-        .map_err(|error| Failure::new(error).hint("choose another --cell-mm"))
+    let suggested = suggest_scale(raster, args.rendering.cell_mm);
+    Ok(suggested.or_hint("choose another --cell-mm")?.scale)
 }
 
+/// What to do where a file of the demo cannot be written.
+const OTHER_FOLDER: &str = "name another folder with --out";
+
 /// Runs the tour and shows what was felt.
-fn show(args: &Args, stage: &Stage<'_>, name: &str) -> Result<(), Failure> {
-    std::fs::create_dir_all(&args.out).map_err(|error| {
-        Failure::new(format!("cannot make {}: {error}", args.out.display()))
-            .hint("name another folder with --out")
-    })?;
-    let how = report::how(stage.terrain());
-    println!("terrain        {name}: {how}");
-    let rig = stage.rig().map_err(Failure::new)?;
-    let stop = args.seconds.unwrap_or(f64::MAX).min(stage.duration_s());
+fn show(args: &Args, placed: &PlacedTerrain<'_>, name: &str) -> Result<(), Failure> {
+    std::fs::create_dir_all(&args.out)
+        .map_err(|error| format!("cannot make {}: {error}", args.out.display()))
+        .or_hint(OTHER_FOLDER)?;
+    let terrain = placed.terrain();
+    println!(
+        "terrain        {name}: {}",
+        session_summary::in_words(terrain)
+    );
+    let arm = placed.held_phantom();
+    let stop_s = args.seconds.unwrap_or(f64::MAX).min(placed.duration_s());
     interrupt::listen();
-    let felt = match args.device {
-        Where::Native => native(stage, rig, stop),
-        Where::Emulated => emulated(args, stage, rig, stop),
-    }?;
+    let toured = match args.device {
+        RunsOn::Native => {
+            let device = Native::new(HostClock::default(), Some(Box::new(arm)));
+            tour(placed, Box::new(device), Patience::REAL_TIME, stop_s)?
+        }
+        RunsOn::Emulated => tour_emulated(args, placed, arm, stop_s)?,
+    };
     let stem = Path::new(name)
         .file_stem()
         .map_or(name.into(), |s| s.to_string_lossy());
     let recording = args.out.join(format!("{stem}.csv"));
     let picture = args.out.join(format!("{stem}.png"));
-    write(&felt, &recording)?;
-    felt.report.print();
-    report::draw(
-        &picture,
-        stage.terrain(),
-        (name, &how),
-        &felt.records,
-        &felt.report,
-    )?;
+    write(&toured.rows, &recording).or_hint(OTHER_FOLDER)?;
+    let summary = &toured.summary;
+    print!("{}", summary.text());
+    let records: Vec<Record> = toured.rows.iter().map(|(record, _)| *record).collect();
+    summary.draw(&picture, terrain, name, &records)?;
     println!("recording      {}", recording.display());
     println!("picture        {}", picture.display());
-    match felt.report.figures.fault {
+    match summary.figures.fault {
         None => Ok(()),
-        Some(fault) => Err(Failure::new(format!(
+        Some(fault) => Err(format!(
             "the device latched fault {} ({fault:?})",
             fault.number()
         ))
-        .hint("this should not happen with a virtual arm: please report it")),
+        .or_hint("this should not happen with a virtual arm: please report it"),
     }
 }
 
-/// All that was felt.
-struct Felt {
-    records: Vec<Record>,
-    states: Vec<&'static str>,
-    report: Report,
+/// All that was felt on a tour.
+struct Toured {
+    /// The rows of the recording, with the state of the contact.
+    rows: Vec<(Record, &'static str)>,
+    summary: SessionSummary,
 }
 
-fn native(stage: &Stage<'_>, rig: Rig, stop_s: f64) -> Result<Felt, Failure> {
-    let device = Native::new(HostClock::default(), Some(Box::new(rig)));
-    feel(stage, Box::new(device), Patience::REAL_TIME, stop_s).map_err(explain_link)
-}
-
-/// The board in an emulator, the arm in a thread of its own.
-fn emulated(args: &Args, stage: &Stage<'_>, mut rig: Rig, stop_s: f64) -> Result<Felt, Failure> {
-    let (emulator, lines) = args.emulation.start()?;
-    let (link, mut plant) = (lines.link, lines.plant);
-    let done = std::sync::atomic::AtomicBool::new(false);
-    let stopped = || done.load(std::sync::atomic::Ordering::Relaxed);
-    let felt = std::thread::scope(|scope| {
-        scope.spawn(|| {
-            if let Err(error) = serve_plant(&mut plant, &mut rig, &stopped) {
-                // At the end the board goes first.
-                tracing::debug!("the plant's line ended: {error}");
+/// Tours on the board in an emulator, the arm in a thread of its own.
+fn tour_emulated(
+    args: &Args,
+    placed: &PlacedTerrain<'_>,
+    mut arm: HeldPhantom,
+    stop_s: f64,
+) -> Result<Toured, Failure> {
+    let (emulator, mut lines) = args.board.start()?;
+    let report = "please report it with the file";
+    move_arm_while(&mut lines.plant, &mut arm, || {
+        match tour(placed, Box::new(lines.link), Patience::EMULATED, stop_s) {
+            Ok(toured) => {
+                // The arm is still there while the board lets its force go out.
+                let status = emulator.finish().map_err(Failure::new)?;
+                let ended_well = status.success().then_some(toured);
+                ended_well
+                    .ok_or_else(|| format!("the emulated board ended with {status}"))
+                    .or_hint(report)
             }
-        });
-        let felt = feel(stage, Box::new(link), Patience::EMULATED, stop_s);
-        let stop = || done.store(true, std::sync::atomic::Ordering::Relaxed);
-        if let Err(error) = felt {
-            stop();
-            return Err(explain_emulated(error, emulator));
+            // A link that broke because the board ended is the board's failure.
+            Err(error) => match emulator.failure() {
+                Some(said) => Err(format!("the emulated board failed: {said}")).or_hint(report),
+                None => Err(error.into()),
+            },
         }
-        // The arm is still there while the board lets its force go out.
-        let status = emulator.finish();
-        stop();
-        let status = status.map_err(Failure::new)?;
-        if !status.success() {
-            return Err(
-                Failure::new(format!("the emulated board ended with {status}"))
-                    .hint("please report it with the file"),
-            );
-        }
-        felt.map_err(explain_link)
-    })?;
-    Ok(felt)
-}
-
-/// A link that broke because the board ended is the board's failure.
-fn explain_emulated(error: LinkError, emulator: Emulator) -> Failure {
-    match emulator.failure() {
-        Some(said) => Failure::new(format!("the emulated board failed: {said}"))
-            .hint("please report it with the file"),
-        None => explain_link(error),
-    }
+    })
 }
 
 /// Serves the terrain until the tour has come to its end.
-fn feel(
-    stage: &Stage<'_>,
+fn tour(
+    placed: &PlacedTerrain<'_>,
     transport: Box<dyn Transport + '_>,
     patience: Patience,
     stop_s: f64,
-) -> Result<Felt, LinkError> {
-    let terrain = stage.terrain();
-    let (mut session, device) =
-        Session::open_arming(terrain, stage.scene(), Arming::VIRTUAL, transport, patience)?;
-    println!("device         {}", report::device(&device));
-    let stop_tick = (stop_s * f64::from(device.tick_hz)).ceil() as u32;
-    let progress = report::progress(u64::from(stop_tick));
-    let (mut records, mut states) = (Vec::new(), Vec::new());
-    let mut figures = Figures::default();
-    let mut tick = 0;
-    while tick < stop_tick && !interrupt::requested() {
+) -> Result<Toured, LinkError> {
+    let (terrain, scene, arming) = (placed.terrain(), placed.scene(), Some(Arming::VIRTUAL));
+    let (mut session, device) = Session::open(terrain, scene, arming, transport, patience)?;
+    println!("device         {}", session_summary::device(&device));
+    let stop_tick = (stop_s * f64::from(device.tick_hz)).ceil() as u64;
+    let template = "feeling {bar:30} {human_pos} of {human_len} ticks, {elapsed}";
+    let progress = progress::bar(Some(stop_tick), template);
+    let (mut log, mut rows) = (SampleLog::new(terrain, &device), Vec::new());
+    while log.ticks() < stop_tick && !interrupt::requested() {
         session.poll(Duration::from_millis(100), &mut |event| {
-            let Event::Sample(sample) = event else {
-                return;
-            };
-            let record = Record::of_tick(sample, device.tick_hz, terrain.scale());
-            figures.take(sample, &record, terrain);
-            tick = sample.tick;
-            records.push(record);
-            states.push(state_name(sample.state));
+            if let Event::Sample(sample) = event {
+                rows.push((log.take(sample), state_name(sample.state)));
+            }
         })?;
-        progress.set_position(u64::from(tick));
+        progress.set_position(log.ticks());
     }
     progress.finish_and_clear();
-    let report = Report {
-        ticks: u64::from(tick),
+    let summary = SessionSummary {
+        ticks: log.ticks(),
         device,
-        figures,
+        figures: log.figures(),
         tally: session.tally().clone(),
     };
     session.say_goodbye()?;
     // Lets a device in memory or behind a slow line hear it.
     let _ = session.poll(Duration::from_millis(10), &mut |_| {});
-    Ok(Felt {
-        records,
-        states,
-        report,
-    })
+    Ok(Toured { rows, summary })
 }
 
-fn write(felt: &Felt, path: &Path) -> Result<(), Failure> {
-    let write = || {
-        let mut recording = Recording::new(Output::create(path)?, &["state"]);
-        for (record, state) in felt.records.iter().zip(&felt.states) {
-            recording.write(record, &[state])?;
-        }
-        recording.finish()
-    };
-    write().map_err(|error| Failure::new(error).hint("name another folder with --out"))
+fn write(rows: &[(Record, &'static str)], path: &Path) -> Result<(), OutputError> {
+    let mut recording = Recording::new(Output::create(path)?, &["state"]);
+    for (record, state) in rows {
+        recording.write(record, &[state])?;
+    }
+    recording.finish()
 }

@@ -3,16 +3,45 @@
 use std::error::Error;
 use std::fmt::Write as _;
 
+/// Any error, as the standard library boxes it.
+type AnyError = Box<dyn Error + Send + Sync>;
+
 /// An error as the user sees it: `error: …` and, where there is one, `hint: …`.
 #[derive(Debug)]
 pub struct Failure {
-    error: Box<dyn Error + Send + Sync>,
+    error: AnyError,
     hint: Option<String>,
+}
+
+/// An error that tells by itself what to do next; `?` makes a [`Failure`] of it.
+pub trait Hint {
+    /// What to do next, in the imperative.
+    fn hint(&self) -> String;
+}
+
+impl<E: Hint + Error + Send + Sync + 'static> From<E> for Failure {
+    fn from(error: E) -> Self {
+        let hint = error.hint();
+        Self::new(error).hint(hint)
+    }
+}
+
+/// A result whose error becomes a [`Failure`] where the hint depends on the
+/// command, not on the error.
+pub(super) trait OrHint<T> {
+    /// The value, or the failure with what to do next, in the imperative.
+    fn or_hint(self, next_step: impl Into<String>) -> Result<T, Failure>;
+}
+
+impl<T, E: Into<AnyError>> OrHint<T> for Result<T, E> {
+    fn or_hint(self, next_step: impl Into<String>) -> Result<T, Failure> {
+        self.map_err(|error| Failure::new(error).hint(next_step))
+    }
 }
 
 impl Failure {
     /// A failure with no hint yet. The error's message says what failed and on what.
-    pub fn new(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+    pub fn new(error: impl Into<AnyError>) -> Self {
         Self {
             error: error.into(),
             hint: None,
@@ -26,7 +55,7 @@ impl Failure {
         self
     }
 
-    /// The lines shown to the user.
+    /// The lines shown to the user: the error with its causes, then the hint.
     pub fn text(&self) -> String {
         let mut text = format!("error: {}", self.error);
         let mut cause = self.error.source();

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::ValueHint;
 
-use super::Failure;
+use super::failure::Failure;
 use crate::board::{BOARDS, Board};
 
 /// Arguments of `hapterra flash`.
@@ -70,35 +70,31 @@ pub(super) const WITHOUT: &str = "in a checkout type: cargo install --path host-
 mod through_a_probe {
     use std::path::PathBuf;
 
-    use indicatif::{ProgressBar, ProgressStyle};
-
-    use super::super::Failure;
+    use super::super::failure::{Failure, OrHint};
+    use super::super::terminal::progress;
     use super::Args;
-    use crate::board::{Checkout, FlashError, Image, ImageError, flash};
+    use crate::board::{Checkout, Image, flash};
 
     pub(super) fn run(args: &Args) -> Result<(), Failure> {
         let path = image(args)?;
-        let image = Image::read(args.board, &path).map_err(explain_image)?;
+        let image = Image::read(args.board, &path)?;
         println!("image          {}", path.display());
         for place in &image.placed {
-            println!(
-                "{:<14} {} of {} bytes at {:#010x}",
-                if place.is_flash { "flash" } else { "RAM" },
-                place.bytes,
-                place.memory.end - place.memory.start,
-                place.memory.start
-            );
+            let (start, bytes) = (place.memory.start, place.bytes);
+            let all = place.memory.end - start;
+            let kind = if place.is_flash { "flash" } else { "RAM" };
+            println!("{kind:<14} {bytes} of {all} bytes at {start:#010x}");
         }
         if args.check {
             return Ok(());
         }
-        let bar = ProgressBar::new(0).with_style(style());
+        let bar = progress::bar(Some(0), "{bar:30} {bytes} of {total_bytes}");
         let flashed = flash(&image, args.probe.as_deref(), &mut |progress| {
             bar.set_length(progress.of);
             bar.set_position(progress.done);
         });
         bar.finish_and_clear();
-        let flashed = flashed.map_err(explain)?;
+        let flashed = flashed?;
         println!("probe          {}", flashed.probe);
         println!(
             "written        {} bytes to {}, read back and equal; it was started",
@@ -112,68 +108,14 @@ mod through_a_probe {
             return Ok(path.clone());
         }
         let here = std::env::current_dir().map_err(Failure::new)?;
-        let Some(checkout) = Checkout::around(&here) else {
-            let board = args.board.name;
-            return Err(Failure::new(format!(
-                "no image of {board}: looked for the project's source around {}",
-                here.display()
-            ))
-            .hint("name one with --image ELF, or run this inside a checkout"));
-        };
-        checkout
-            .build(args.board)
-            .map_err(|error| Failure::new(error).hint("what cargo said above tells why"))
-    }
-
-    fn style() -> ProgressStyle {
-        // The template is constant; the default style is no worse a fallback.
-        ProgressStyle::with_template("{bar:30} {bytes} of {total_bytes}")
-            .unwrap_or_else(|_| ProgressStyle::default_bar())
-    }
-
-    fn explain_image(error: ImageError) -> Failure {
-        let hint = match &error {
-            ImageError::Emulated(_) => "`hapterra demo` runs it",
-            ImageError::Unreadable { .. } => "check the path given with --image",
-            ImageError::NoImage { .. } => {
-                "name the ELF that `cargo xtask image BOARD` prints with --image"
-            }
-            ImageError::OutOfMemory { .. } => {
-                "it was built for another board: name the right one with --board"
-            }
-            ImageError::OtherBoard { found: Some(_), .. } => {
-                "name the board that it was built for with --board, or another image"
-            }
-            ImageError::OtherBoard { found: None, .. } => {
-                "images built from this source name theirs, unless they were stripped: `cargo xtask image BOARD` builds one"
-            }
-            ImageError::UnknownChip(..) => "this should not happen: please report it",
-        };
-        Failure::new(error).hint(hint)
-    }
-
-    fn explain(error: FlashError) -> Failure {
-        let hint = match &error {
-            FlashError::NoProbe => {
-                "plug the Nucleo's ST-LINK connector in with a data cable; `hapterra list` shows what is seen"
-            }
-            FlashError::NoSuchProbe { .. }
-            | FlashError::ManyProbes(_)
-            | FlashError::Selector(_) => "name one as --probe VID:PID:SERIAL",
-            FlashError::Forbidden(_) => {
-                "install probe-rs' udev rules (https://probe.rs/docs/getting-started/probe-setup/), then plug it in again"
-            }
-            FlashError::Probe { .. } => {
-                "close other programs that use it (an IDE, probe-rs, OpenOCD), then plug it in again"
-            }
-            FlashError::Chip { .. } => {
-                "check that the board has power, that it is the board named, and that the probe's jumpers are on"
-            }
-            FlashError::Write { .. } => {
-                "try again; if it stays so, the chip's flash is protected or worn out"
-            }
-        };
-        Failure::new(error).hint(hint)
+        let checkout = Checkout::around(&here)
+            .ok_or_else(|| {
+                let (board, here) = (args.board.name, here.display());
+                format!("no image of {board}: looked for the project's source around {here}")
+            })
+            .or_hint("name one with --image ELF, or run this inside a checkout")?;
+        let built = checkout.build(args.board);
+        built.or_hint("what cargo said above tells why")
     }
 }
 

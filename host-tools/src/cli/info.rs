@@ -6,16 +6,16 @@ use serde::Serialize;
 
 use hapterra_core::terrain::{POSTS, TILE_CELLS};
 
-use super::Failure;
-use super::input::Input;
+use super::failure::Failure;
+use super::options::terrain_file::TerrainFile;
 use crate::raster::{CellSize, CellUnit, Certainty, Raster};
 
 /// Arguments of `hapterra info`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The terrain.
+    /// The terrain file.
     #[command(flatten)]
-    pub input: Input,
+    pub terrain: TerrainFile,
 
     /// Print one JSON object
     #[arg(long)]
@@ -27,13 +27,11 @@ pub struct Args {
 /// # Errors
 /// When the file cannot be opened as a height field.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let raster = args.input.open()?;
-    let report = Report::new(&args.input, &raster);
+    let raster = args.terrain.open()?;
+    let report = FileReport::new(&args.terrain, &raster);
     if args.json {
-        println!(
-            "{}",
-            serde_json::to_string_pretty(&report).map_err(Failure::new)?
-        );
+        let json = serde_json::to_string_pretty(&report).map_err(Failure::new)?;
+        println!("{json}");
     } else {
         print!("{}", report.text());
     }
@@ -42,7 +40,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 /// What is shown; the fields' names are those of the JSON.
 #[derive(Serialize)]
-struct Report {
+struct FileReport {
     file: String,
     format: String,
     /// Samples from west to east.
@@ -72,7 +70,7 @@ struct Cell {
     /// Ground length of both sides in metres.
     east_m: f64,
     north_m: f64,
-    /// Side of the square cell the hand feels.
+    /// Side of the square cell that is felt, m on the ground.
     felt_m: f64,
 }
 
@@ -87,8 +85,8 @@ struct Level {
     bytes: u64,
 }
 
-impl Report {
-    fn new(input: &Input, raster: &Raster) -> Self {
+impl FileReport {
+    fn new(input: &TerrainFile, raster: &Raster) -> Self {
         let summary = raster.summary();
         Self {
             file: input.file.display().to_string(),
@@ -116,15 +114,14 @@ impl Report {
         line("file", self.file.clone());
         line("format", self.format.clone());
         line("size", format!("{} × {} samples", self.columns, self.rows));
-        line(
-            "cell",
-            self.cell.as_ref().map_or("unknown".into(), Cell::text),
-        );
+        let cell = self.cell.as_ref();
+        line("cell", cell.map_or("unknown".into(), Cell::text));
         line("heights", self.heights());
-        line("no data", {
-            let share = 100.0 * self.no_data as f64 / samples as f64;
-            format!("{} samples ({share:.2} %)", self.no_data)
-        });
+        let share = 100.0 * self.no_data as f64 / samples as f64;
+        line(
+            "no data",
+            format!("{} samples ({share:.2} %)", self.no_data),
+        );
         line("memory", format!("{} bytes", self.bytes));
         for level in &self.levels {
             line(&format!("level {}", level.level), level.text());
@@ -169,14 +166,14 @@ impl Cell {
         } else {
             " (unit assumed)"
         };
+        let (east_m, north_m, felt_m) = (self.east_m, self.north_m, self.felt_m);
         let stored = format!("{} × {} {}{assumed}", self.east, self.north, self.unit);
-        let square = (self.east_m - self.north_m).abs() <= 1e-6 * self.north_m;
+        let square = (east_m - north_m).abs() <= 1e-6 * north_m;
         match (square, self.unit) {
             (true, "metre") => stored,
-            (true, _) => format!("{stored}, {:.3} m on the ground", self.felt_m),
+            (true, _) => format!("{stored}, {felt_m:.3} m on the ground"),
             (false, _) => format!(
-                "{stored}, {:.3} × {:.3} m on the ground, felt as {:.3} m squares",
-                self.east_m, self.north_m, self.felt_m
+                "{stored}, {east_m:.3} × {north_m:.3} m on the ground, felt as {felt_m:.3} m squares"
             ),
         }
     }

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use super::emulation::link_hint;
-use super::{Failure, report};
+use super::failure::{Failure, Hint};
+use super::session_summary;
 use crate::board::{BOARDS, probes};
 use crate::link::{Dialogue, LinkError, Tcp, Transport, Usb, tcp_address};
 
@@ -102,9 +102,9 @@ fn list_emulated(args: &Args) {
 /// The device behind a link, in words.
 fn who(link: Box<dyn Transport>) -> Result<String, LinkError> {
     let dialogue = Dialogue::open(link, PATIENCE)?;
-    Ok(report::device(dialogue.device()))
+    Ok(session_summary::device(dialogue.device()))
 }
 
 fn told(error: &LinkError) -> String {
-    format!("{error}; {}", link_hint(error))
+    format!("{error}; {}", error.hint())
 }

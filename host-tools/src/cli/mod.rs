@@ -1,24 +1,25 @@
 //! The `hapterra` command line: one file a subcommand, each with its `Args`
 //! and a `run`.
+//!
+//! - [`options`]: what several subcommands let their user say;
+//! - `terminal`: progress, Ctrl-C, and prompts while a command runs;
+//! - [`failure`] and `hints`: what an error looks like, and what to do about it.
 
-mod arming;
 pub mod bench;
 pub mod calibrate;
 pub mod demo;
-pub mod device;
-pub mod emulation;
 pub mod failure;
-pub mod feel;
 pub mod flash;
+mod hints;
 pub mod info;
-pub mod input;
-mod interrupt;
 pub mod list;
+pub mod options;
 pub mod replay;
-mod report;
 pub mod run;
+mod session_summary;
 pub mod status;
 pub mod synth;
+mod terminal;
 
 use std::process::ExitCode;
 

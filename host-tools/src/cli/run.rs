@@ -6,23 +6,25 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use clap::ValueHint;
-use hapterra_core::wire::message::{DeviceHello, Sample};
+use hapterra_core::scene::Sample;
+use hapterra_core::wire::hello::DeviceHello;
 use indicatif::ProgressBar;
 
-use super::arming::ArmingDesk;
-use super::emulation::explain_link;
-use super::feel::Feel;
-use super::input::Input;
-use super::report::{self, Report};
-use super::{Failure, interrupt};
+use super::failure::{Failure, OrHint};
+use super::options::rendering::Rendering;
+use super::options::terrain_file::TerrainFile;
+use super::session_summary::{self, SessionSummary};
+use super::terminal::arming_prompts::ArmingPrompts;
+use super::terminal::interrupt;
 use crate::link::{
-    Arming, Event, HostClock, LinkError, Native, Patience, Session, Target, Tcp, Transport, Usb,
+    Arming, DeviceAddress, Event, HostClock, LinkError, Native, Patience, Session, Tcp, Transport,
     serve_plant,
 };
-use crate::live::{Figures, Stage, Timeline};
 use crate::output::{Output, OutputError};
-use crate::phantom::Rig;
+use crate::phantom::HeldPhantom;
+use crate::place::PlacedTerrain;
 use crate::replay::{Record, Recording, state_name};
+use crate::telemetry::SampleLog;
 
 /// Between two tries to find a device that is gone.
 const RETRY: Duration = Duration::from_millis(500);
@@ -34,14 +36,14 @@ const LINE_EVERY: Duration = Duration::from_secs(2);
 /// Arguments of `hapterra run`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The terrain.
+    /// The terrain file.
     #[command(flatten)]
-    pub input: Input,
+    pub terrain: TerrainFile,
 
     /// Device: usb, tcp:HOST:PORT, or native (the application in this program,
     /// with a virtual Phantom in a scripted hand)
     #[arg(long, default_value = "usb")]
-    pub device: Target,
+    pub device: DeviceAddress,
 
     /// Where the emulated board's plant line is, for a virtual Phantom in a
     /// scripted hand: tcp:HOST:PORT
@@ -56,15 +58,15 @@ pub struct Args {
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
 
-    /// How it feels.
+    /// How the terrain feels.
     #[command(flatten)]
-    pub feel: Feel,
+    pub rendering: Rendering,
 }
 
 fn parse_plant(text: &str) -> Result<String, String> {
     match text.parse()? {
-        Target::Tcp(address) => Ok(address),
-        Target::Usb | Target::Native => Err("the plant's line is tcp:HOST:PORT".into()),
+        DeviceAddress::Tcp(address) => Ok(address),
+        _ => Err("the plant's line is tcp:HOST:PORT".into()),
     }
 }
 
@@ -74,145 +76,125 @@ fn parse_plant(text: &str) -> Result<String, String> {
 /// What is wrong with the file, or no device there at the beginning. A device
 /// that goes later is waited for.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let raster = args.input.open()?;
-    let scale = args.feel.scale(&raster)?;
-    let terrain = args.feel.terrain(&raster, scale)?;
-    let stage = Stage::set(&terrain, args.feel.law()?, args.feel.rule()).map_err(|error| {
-        Failure::new(error).hint("choose a smaller --height-mm-per-unit or --cell-mm")
-    })?;
+    let raster = args.terrain.open()?;
+    let scale = args.rendering.scale(&raster)?;
+    let terrain = args.rendering.terrain(&raster, scale)?;
+    let placed = PlacedTerrain::new(&terrain, args.rendering.law()?, args.rendering.rule())?;
     interrupt::listen();
     let Some(address) = &args.plant else {
-        return serve(args, &stage);
+        return serve(args, &placed);
     };
-    let rig = stage.rig().map_err(Failure::new)?;
+    let arm = placed.held_phantom();
     let done = OnceLock::new();
     std::thread::scope(|scope| {
-        scope.spawn(|| move_arm(address, rig, &done));
-        let served = serve(args, &stage);
+        scope.spawn(|| move_arm(address, arm, &done));
+        let served = serve(args, &placed);
         // The arm is still there while the board lets its force go out.
         let _ = done.set(Instant::now() + LINGER);
         served
     })
 }
 
-/// The virtual Phantom at a board's plant line, which may come and go; until
-/// the line ends after the session has, or the time that `done` names.
-fn move_arm(address: &str, mut rig: Rig, done: &OnceLock<Instant>) {
+/// Moves the virtual Phantom at a board's plant line, which may come and go;
+/// until the line ends after the session has, or the time that `done` names.
+fn move_arm(address: &str, mut arm: HeldPhantom, done: &OnceLock<Instant>) {
     let stop = || done.get().is_some_and(|by| Instant::now() >= *by);
     while done.get().is_none() {
         let ended = Tcp::connect(address)
-            .map_err(|error| error.to_string())
-            .and_then(|mut line| {
-                serve_plant(&mut line, &mut rig, &stop).map_err(|error| error.to_string())
-            });
+            .and_then(|mut line| serve_plant(&mut line, &mut arm, &stop).map_err(LinkError::Gone));
         if let Err(why) = ended {
-            tracing::info!("the plant's line at {address}: {why}");
+            tracing::info!("the plant's line at {address}: {}", described(&why));
             std::thread::sleep(RETRY);
         }
     }
 }
 
-fn serve(args: &Args, stage: &Stage<'_>) -> Result<(), Failure> {
-    let transport = connect(args, stage)?;
+/// Whether the arm is virtual, held by a hand that follows a script.
+fn is_scripted(args: &Args) -> bool {
+    args.plant.is_some() || args.device == DeviceAddress::Native
+}
+
+fn serve(args: &Args, placed: &PlacedTerrain<'_>) -> Result<(), Failure> {
+    let transport = connect(args, placed)?;
+    let scripted = is_scripted(args);
     // A virtual arm was switched on in its zero pose; where a real one was,
     // its user has to say.
-    let scripted = args.plant.is_some() || args.device == Target::Native;
     let arming = match scripted {
         true => Arming::VIRTUAL,
         false => Arming::default(),
     };
-    let opened = Session::open_arming(
-        stage.terrain(),
-        stage.scene(),
-        arming,
-        transport,
-        Patience::REAL_TIME,
-    );
-    let (mut session, device) = opened.map_err(explain_link)?;
-    println!(
-        "terrain        {}: {}",
-        args.input.name(),
-        report::how(stage.terrain())
-    );
-    println!("device         {}", report::device(&device));
-    let mut watch = Watch::new(args, stage, &device)?;
-    let mut desk = ArmingDesk::at_the_terminal();
+    let (terrain, scene) = (placed.terrain(), placed.scene());
+    let (mut session, device) =
+        Session::open(terrain, scene, Some(arming), transport, Patience::REAL_TIME)?;
+    let how = session_summary::in_words(terrain);
+    println!("terrain        {}: {how}", args.terrain.name());
+    println!("device         {}", session_summary::device(&device));
+    let mut watch = Watch::new(args, placed, &device)?;
+    let mut prompts = ArmingPrompts::at_the_terminal();
     while !watch.is_over() {
         let polled = session.poll(Duration::from_millis(50), &mut |event| {
-            desk.hear(&event);
+            prompts.on_event(&event);
             watch.take(event);
         });
-        let lines = desk.lines();
         // A scripted hand needs no telling.
-        for line in lines.iter().filter(|_| !scripted) {
+        for line in prompts.lines().iter().filter(|_| !scripted) {
             watch.status.suspend(|| eprintln!("{line}"));
         }
         let polled = polled.and_then(|()| {
-            let mut messages = desk.messages().into_iter();
+            let mut messages = prompts.messages().into_iter();
             messages.try_for_each(|message| session.say(&message))
         });
         watch.show(&session);
         match polled {
-            Err(error) if error.is_passing() => wait_for(args, stage, &mut session, error)?,
-            other => other.map_err(explain_link)?,
+            Err(error) if error.is_passing() => wait_for(args, placed, &mut session, error)?,
+            other => other?,
         }
     }
     watch.status.finish_and_clear();
-    let report = Report {
-        ticks: watch.time.ticks(),
+    let summary = SessionSummary {
+        ticks: watch.log.ticks(),
         device,
-        figures: watch.figures,
+        figures: watch.log.figures(),
         tally: session.tally().clone(),
     };
     // It goes on rendering what it holds; telling it is a courtesy.
     let _ = session.say_goodbye();
-    report.print();
+    print!("{}", summary.text());
     watch.finish(args)
 }
 
-fn connect<'t>(args: &Args, stage: &Stage<'t>) -> Result<Box<dyn Transport + 't>, Failure> {
-    Ok(match &args.device {
-        Target::Usb => Box::new(Usb::connect().map_err(explain_link)?),
-        Target::Tcp(address) => Box::new(Tcp::connect(address).map_err(explain_link)?),
-        Target::Native => {
-            let rig = stage.rig().map_err(Failure::new)?;
-            Box::new(Native::new(HostClock::default(), Some(Box::new(rig))))
-        }
-    })
+fn connect<'t>(
+    args: &Args,
+    placed: &PlacedTerrain<'t>,
+) -> Result<Box<dyn Transport + 't>, Failure> {
+    let native = || Native::new(HostClock::default(), Some(Box::new(placed.held_phantom())));
+    Ok(args.device.connect(native)?)
 }
 
 /// The device is gone: says so, waits for it and resumes.
 fn wait_for<'t>(
     args: &Args,
-    stage: &Stage<'t>,
+    placed: &PlacedTerrain<'t>,
     session: &mut Session<'t>,
     why: LinkError,
 ) -> Result<(), Failure> {
-    eprintln!(
-        "{}; waiting for {} (Ctrl-C ends)",
-        described(&why),
-        args.device
-    );
+    let (why, device) = (described(&why), &args.device);
+    eprintln!("{why}; waiting for {device} (Ctrl-C ends)");
     let began = Instant::now();
     while !interrupt::requested() {
-        if let Ok(transport) = connect(args, stage) {
-            match session.resume(transport) {
-                Ok(device) => {
-                    let again = match device.epoch == Some(session.scene().epoch) {
-                        true => "goes on where it was",
-                        false => "was restarted and begins anew",
-                    };
-                    eprintln!(
-                        "the device is back after {:.1?}: it {again}",
-                        began.elapsed()
-                    );
-                    return Ok(());
-                }
-                Err(error) if error.is_passing() => {}
-                Err(error) => return Err(explain_link(error)),
+        match connect(args, placed).map(|transport| session.resume(transport)) {
+            Ok(Ok(device)) => {
+                let again = match device.epoch == Some(session.scene().epoch) {
+                    true => "goes on where it was",
+                    false => "was restarted and begins anew",
+                };
+                let after = began.elapsed();
+                eprintln!("the device is back after {after:.1?}: it {again}");
+                return Ok(());
             }
+            Ok(Err(error)) if !error.is_passing() => return Err(error.into()),
+            _ => std::thread::sleep(RETRY),
         }
-        std::thread::sleep(RETRY);
     }
     Ok(())
 }
@@ -225,12 +207,10 @@ fn described(error: &LinkError) -> String {
 }
 
 /// What is seen and recorded of a session while it goes on.
-struct Watch<'a, 't> {
-    stage: &'a Stage<'t>,
-    time: Timeline,
-    tick_hz: u32,
+struct Watch<'t> {
+    log: SampleLog<'t>,
     stop_s: f64,
-    figures: Figures,
+    /// The latest sample and its row.
     latest: Option<(Sample, Record)>,
     recording: Option<Recording>,
     failed: Option<OutputError>,
@@ -238,26 +218,24 @@ struct Watch<'a, 't> {
     line_due: Instant,
 }
 
-impl<'a, 't> Watch<'a, 't> {
-    fn new(args: &Args, stage: &'a Stage<'t>, device: &DeviceHello) -> Result<Self, Failure> {
+/// What to do where the recording cannot be written.
+const OTHER_FILE: &str = "name another file with --record";
+
+impl<'t> Watch<'t> {
+    fn new(args: &Args, placed: &PlacedTerrain<'t>, device: &DeviceHello) -> Result<Self, Failure> {
         let columns = ["state", "tick", "work", "cost", "late"];
         let output = args.record.as_deref().map(Output::create).transpose();
-        let output =
-            output.map_err(|error| Failure::new(error).hint("name another file with --record"))?;
-        let scripted = args.plant.is_some() || args.device == Target::Native;
-        let script_s = if scripted {
-            stage.duration_s()
-        } else {
-            f64::MAX
+        let script_s = match is_scripted(args) {
+            true => placed.duration_s(),
+            false => f64::MAX,
         };
         Ok(Self {
-            stage,
-            time: Timeline::new(device.tick_hz),
-            tick_hz: device.tick_hz,
+            log: SampleLog::new(placed.terrain(), device),
             stop_s: args.seconds.unwrap_or(f64::MAX).min(script_s),
-            figures: Figures::default(),
             latest: None,
-            recording: output.map(|output| Recording::new(output, &columns)),
+            recording: output
+                .or_hint(OTHER_FILE)?
+                .map(|output| Recording::new(output, &columns)),
             failed: None,
             status: ProgressBar::new_spinner(),
             line_due: Instant::now() + LINE_EVERY,
@@ -265,18 +243,14 @@ impl<'a, 't> Watch<'a, 't> {
     }
 
     fn is_over(&self) -> bool {
-        let at_s = self.time.ticks() as f64 / f64::from(self.tick_hz.max(1));
-        interrupt::requested() || self.failed.is_some() || at_s >= self.stop_s
+        interrupt::requested() || self.failed.is_some() || self.log.t_s() >= self.stop_s
     }
 
     fn take(&mut self, event: Event<'_>) {
         let Event::Sample(sample) = event else {
             return;
         };
-        let terrain = self.stage.terrain();
-        let mut record = Record::of_tick(sample, self.tick_hz, terrain.scale());
-        record.t_s = self.time.at(sample);
-        self.figures.take(sample, &record, terrain);
+        let record = self.log.take(sample);
         if let Some(recording) = &mut self.recording {
             let state = state_name(sample.state);
             let more: [&dyn std::fmt::Display; 5] = [
@@ -296,18 +270,13 @@ impl<'a, 't> Watch<'a, 't> {
         let Some((sample, record)) = &self.latest else {
             return;
         };
-        let force = record.force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
-        let [x, y, z] = record.hip_mm;
-        let tally = session.tally();
-        let fault = sample
-            .fault
-            .map_or(String::new(), |f| format!(", FAULT {f:?}"));
+        let force = glam::DVec3::from(record.force_n).length();
+        let ([x, y, z], t_s, state) = (record.hip_mm, record.t_s, state_name(sample.state));
+        let (tally, fault) = (session.tally(), sample.fault);
+        let (tiles, lost) = (tally.tiles, tally.lost + tally.dropped);
+        let fault = fault.map_or(String::new(), |f| format!(", FAULT {f:?}"));
         let line = format!(
-            "{:8.3} s  {:8}  hand {x:.1} {y:.1} {z:.1} mm  {force:.2} N  {} tiles  {} lost{fault}",
-            record.t_s,
-            state_name(sample.state),
-            tally.tiles,
-            tally.lost + tally.dropped
+            "{t_s:8.3} s  {state:8}  HIP {x:.1} {y:.1} {z:.1} mm  {force:.2} N  {tiles} tiles  {lost} lost{fault}"
         );
         if std::io::stderr().is_terminal() {
             self.status.set_message(line);
@@ -324,7 +293,7 @@ impl<'a, 't> Watch<'a, 't> {
             (None, Some(recording)) => recording.finish(),
             (None, None) => Ok(()),
         };
-        ended.map_err(|error| Failure::new(error).hint("name another file with --record"))?;
+        ended.or_hint(OTHER_FILE)?;
         if let Some(path) = &args.record {
             println!("recording      {}", path.display());
         }

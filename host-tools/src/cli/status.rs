@@ -1,14 +1,14 @@
 //! `hapterra status`: how a device is, and what to do about it.
 
-use hapterra_core::guard::Blockers;
-use hapterra_core::wire::message::{PROTOCOL, ToDevice};
+use hapterra_core::wire::hello::PROTOCOL;
+use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::status::{
     BootReport, CalibrationSource, Crash, CrashKind, ResetCause, Status,
 };
 
-use super::device::Device;
-use super::emulation::explain_link;
-use super::{Failure, report};
+use super::failure::Failure;
+use super::options::device::Device;
+use super::session_summary;
 
 /// Arguments of `hapterra status`.
 #[derive(Debug, clap::Args)]
@@ -33,57 +33,43 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     args.device.talk(|dialogue| {
         if args.disarm {
-            let answer = dialogue.request(&ToDevice::Disarm).map_err(explain_link)?;
-            answer.map_err(Failure::new)?;
+            dialogue.request(&ToDevice::Disarm)?.map_err(Failure::new)?;
         }
-        let status = dialogue.fresh_status().map_err(explain_link)?;
-        for (name, value) in lines(&status) {
-            println!("{name:<14} {value}");
-        }
+        print!("{}", text(&dialogue.fresh_status()?));
         if args.clear {
-            let answer = dialogue
-                .request(&ToDevice::ClearFault)
-                .map_err(explain_link)?;
+            let answer = dialogue.request(&ToDevice::ClearFault)?;
             answer.map_err(Failure::new)?;
-            let after = dialogue.fresh_status().map_err(explain_link)?;
-            println!(
-                "cleared        {}",
-                match after.health.report.fault {
-                    None => "no fault is latched any more".to_owned(),
-                    Some(fault) => format!("but {fault:?} is there again: {}", fault.what_to_do()),
-                }
-            );
+            let cleared = match dialogue.fresh_status()?.health.report.fault {
+                None => "no fault is latched any more".to_owned(),
+                Some(fault) => format!("but {fault:?} is there again: {}", fault.what_to_do()),
+            };
+            println!("cleared        {cleared}");
         }
         Ok(())
     })
 }
 
 /// What an emulated board says that nobody has given anything to do.
-const NO_TICK: &str =
-    "no tick has run yet: the time of an emulated board stands still until it has a scene";
+const NO_TICK: &str = "arm            no tick has run yet: the time of an emulated board stands still until it has a scene\n";
 
-type Line = (&'static str, String);
-
-fn lines(status: &Status) -> Vec<Line> {
-    let mut lines = vec![
-        ("device", report::device(&status.device)),
-        (
-            "link",
-            format!(
-                "protocol {} on the device, {PROTOCOL} here; {} frames not understood, {} samples dropped",
-                status.device.protocol, status.bad_frames, status.dropped
-            ),
-        ),
-        ("calibration", calibration(status)),
-    ];
-    lines.extend(boot(&status.boot));
-    if status.ticks.run == 0 {
-        lines.push(("arm", NO_TICK.into()));
-        return lines;
-    }
-    lines.extend(guard(status));
-    lines.extend(measured(status));
-    lines
+/// The status as it is printed: a name and what there is to say, a line each.
+fn text(status: &Status) -> String {
+    let device = session_summary::device(&status.device);
+    let arm = match status.ticks.run {
+        0 => NO_TICK.to_owned(),
+        _ => guard(status) + &measured(status),
+    };
+    format!(
+        "device         {device}\n\
+         link           protocol {} on the device, {PROTOCOL} here; {} frames not understood, {} samples dropped\n\
+         calibration    {}\n\
+         {}{arm}",
+        status.device.protocol,
+        status.bad_frames,
+        status.dropped,
+        calibration(status),
+        boot(&status.boot),
+    )
 }
 
 fn calibration(status: &Status) -> String {
@@ -97,7 +83,7 @@ fn calibration(status: &Status) -> String {
     }
 }
 
-fn boot(boot: &BootReport) -> Vec<Line> {
+fn boot(boot: &BootReport) -> String {
     let cause = match boot.cause {
         ResetCause::Unknown => "for a reason that it does not tell",
         ResetCause::PowerOn => "when power came up",
@@ -106,115 +92,85 @@ fn boot(boot: &BootReport) -> Vec<Line> {
         ResetCause::Watchdog => "by the watchdog",
         ResetCause::BrownOut => "after its supply was too low for a moment: check it",
     };
-    let mut lines = vec![("started", cause.to_owned())];
-    if let Some(crash) = &boot.crash {
-        lines.push(("crashed before", crashed(crash)));
-    }
-    lines
+    let crash = boot.crash.as_ref().map_or(String::new(), crashed);
+    format!("started        {cause}\n{crash}")
 }
 
 fn crashed(crash: &Crash) -> String {
-    let Crash {
-        pc,
-        lr,
-        status,
-        line,
-        tick,
-        file,
-        ..
-    } = crash;
+    let (pc, lr, status, tick) = (crash.pc, crash.lr, crash.status, crash.tick);
     let what = match crash.kind {
-        CrashKind::Panic => format!("a panic at line {line} of …{file}"),
+        CrashKind::Panic => format!("a panic at line {} of …{}", crash.line, crash.file),
         CrashKind::HardFault => format!("a hard fault, status {status:#010x}"),
         CrashKind::UnhandledInterrupt => format!("interrupt {status} without a handler"),
     };
-    format!("{what}; pc {pc:#010x}, lr {lr:#010x}, tick {tick}: please report it")
+    format!("crashed before {what}; pc {pc:#010x}, lr {lr:#010x}, tick {tick}: please report it\n")
 }
 
-fn guard(status: &Status) -> Vec<Line> {
+/// Where the guard stands, what blocks it, its fault and its limits.
+fn guard(status: &Status) -> String {
     let report = &status.health.report;
     let on = if report.mode.drives() { "on" } else { "off" };
-    let mut lines = vec![("arm", format!("{:?}, amplifiers {on}", report.mode))];
-    lines.extend(blockers(report.blockers).map(|text| ("blocked by", text)));
-    match report.fault {
-        None => lines.push(("fault", "none".into())),
-        Some(fault) => {
-            let number = fault.number();
-            lines.push(("fault", format!("{number} {fault:?}: {}", fault.meaning())));
-            lines.push(("what to do", fault.what_to_do().into()));
-        }
+    let mut text = format!("arm            {:?}, amplifiers {on}\n", report.mode);
+    for (name, meaning) in report.blockers.meanings() {
+        text += &format!("blocked by     {name}: {meaning}\n");
     }
-    let limits = report.limits.meanings();
-    lines.extend(limits.map(|(name, meaning)| ("limited", format!("{name}: {meaning}"))));
-    lines
+    text += &match report.fault {
+        None => "fault          none\n".into(),
+        Some(fault) => format!(
+            "fault          {} {fault:?}: {}\nwhat to do     {}\n",
+            fault.number(),
+            fault.meaning(),
+            fault.what_to_do()
+        ),
+    };
+    for (name, meaning) in report.limits.meanings() {
+        text += &format!("limited        {name}: {meaning}\n");
+    }
+    text
 }
 
-/// What keeps the arm from being armed, by name, with what to do.
-pub(super) fn blockers(blockers: Blockers) -> impl Iterator<Item = String> {
-    blockers
-        .meanings()
-        .map(|(name, meaning)| format!("{name}: {meaning}"))
-}
-
-fn measured(status: &Status) -> Vec<Line> {
-    let health = &status.health;
+/// What encoders, switches, motors and the loop's own clock tell.
+fn measured(status: &Status) -> String {
+    let (health, ticks) = (&status.health, &status.ticks);
     let [a, b, c] = health.sense.counts;
     let zeroed = match health.zero {
         Some([a, b, c]) => format!("zeroed at {a} {b} {c}"),
         None => "not zeroed".to_owned(),
     };
-    let degrees = health.angles_rad.to_array().map(f32::to_degrees);
-    let held = |is| if is { "held" } else { "not held" };
-    let pressed = |is| if is { "pressed" } else { "not pressed" };
-    let ticks = &status.ticks;
+    let three = |[a, b, c]: [f32; 3]| format!("{a:.2} {b:.2} {c:.2}");
+    let not = |is| if is { "" } else { "not " };
     let us = |counts: u32| 1e6 * f64::from(counts) / f64::from(status.device.clock_hz.max(1));
     let stack = match status.stack.size {
         0 => "not measured".to_owned(),
         size => format!("{} of {size} bytes used at most", status.stack.high_water),
     };
-    vec![
-        ("encoders", format!("{a} {b} {c} counts, {zeroed}")),
-        (
-            "joints",
-            format!("{:.2} {:.2} {:.2}°", degrees[0], degrees[1], degrees[2]),
-        ),
-        (
-            "switches",
-            format!(
-                "dead-man {}, emergency stop {}",
-                held(health.sense.dead_man),
-                pressed(health.sense.emergency_stop)
-            ),
-        ),
-        ("currents", triple(health.currents_a.to_array(), "A")),
-        (
-            "motors",
-            triple(health.winding_c.to_array(), "°C by the thermal model"),
-        ),
-        (
-            "ticks",
-            format!(
-                "{} run, {} late; the last cost {:.1} µs, the costliest {:.1} µs",
-                ticks.run,
-                ticks.late,
-                us(ticks.cost),
-                us(ticks.worst_cost)
-            ),
-        ),
-        ("stack", stack),
-    ]
-}
-
-fn triple([a, b, c]: [f32; 3], unit: &str) -> String {
-    format!("{a:.2} {b:.2} {c:.2} {unit}")
+    format!(
+        "encoders       {a} {b} {c} counts, {zeroed}\n\
+         joints         {}°\n\
+         switches       dead-man {}held, emergency stop {}pressed\n\
+         currents       {} A\n\
+         motors         {} °C by the thermal model\n\
+         ticks          {} run, {} late; the last cost {:.1} µs, the costliest {:.1} µs\n\
+         stack          {stack}\n",
+        three(health.angles_rad.to_array().map(f32::to_degrees)),
+        not(health.sense.dead_man),
+        not(health.sense.emergency_stop),
+        three(health.currents_a.to_array()),
+        three(health.winding_c.to_array()),
+        ticks.run,
+        ticks.late,
+        us(ticks.cost),
+        us(ticks.worst_cost),
+    )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::link::hello;
-    use hapterra_core::guard::Fault;
-    use hapterra_core::wire::status::{Health, StackFigures, TickFigures};
+    use hapterra_core::guard::{Blockers, Fault};
+    use hapterra_core::scene::Health;
+    use hapterra_core::wire::status::{StackFigures, TickFigures};
 
     fn status() -> Status {
         Status {
@@ -233,13 +189,6 @@ mod tests {
         }
     }
 
-    fn text(status: &Status) -> String {
-        let lines = lines(status).into_iter();
-        lines
-            .map(|(name, value)| format!("{name}: {value}\n"))
-            .collect()
-    }
-
     #[test]
     fn a_fault_is_shown_with_its_number_meaning_and_what_to_do() {
         let mut status = status();
@@ -247,7 +196,7 @@ mod tests {
         status.health.report.blockers = Blockers::FAULT_LATCHED | Blockers::NOT_ZEROED;
         let text = text(&status);
         for part in [
-            "fault: 3 EncoderJump: an encoder moved",
+            "fault          3 EncoderJump: an encoder moved",
             "zero the arm again",
             "FAULT_LATCHED",
             "NOT_ZEROED",

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::ValueHint;
-use indicatif::{ProgressBar, ProgressStyle};
 
-use super::input::parse_size;
-use super::{Failure, interrupt};
-use crate::synth::{Grid, Kind, Synth, WriteError, write};
+use super::failure::Failure;
+use super::options::terrain_file::parse_size;
+use super::terminal::{interrupt, progress};
+use crate::synth::{Grid, Kind, Synth, write};
 
 /// Arguments of `hapterra synth`.
 #[derive(Debug, clap::Args)]
@@ -54,17 +54,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         rows,
         cell_m: args.cell_m,
     };
-    let progress = rows_bar(rows);
+    let progress = progress::bar(Some(rows.into()), "{bar:30} {pos}/{len} rows, {eta} left");
     interrupt::listen();
     let written = write(&args.output, &synth, &grid, &mut || {
         progress.inc(1);
         !interrupt::requested()
     });
     progress.finish_and_clear();
-    written.map_err(|error| {
-        let hint = hint(&error);
-        Failure::new(error).hint(hint)
-    })?;
+    written?;
     println!(
         "wrote {}: {columns} × {rows} samples",
         args.output.display()
@@ -72,28 +69,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-fn rows_bar(rows: u32) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} rows, {eta} left");
-    ProgressBar::new(u64::from(rows))
-        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-}
-
 fn parse_length(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(length) if length > 0.0 && length <= 1e9 => Ok(length),
         _ => Err("metres, above 0 and at most 1e9".into()),
-    }
-}
-
-fn hint(error: &WriteError) -> &'static str {
-    match error {
-        WriteError::Output(_) => {
-            "check that the folder exists and has room, and that you may write there"
-        }
-        WriteError::NoRoom { .. } => "make it smaller with --size, or name a file on a larger disk",
-        WriteError::Interrupted => "nothing was written",
-        WriteError::UnknownExtension { .. } => "name the output .tif for a GeoTIFF",
-        WriteError::TooHighForPng { .. } => "lower --amplitude, or write a .tif",
-        WriteError::Encoder { .. } => "make it smaller with --size",
     }
 }

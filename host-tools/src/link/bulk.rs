@@ -8,8 +8,7 @@ use hapterra_firmware::usb::{INTERFACE_CLASS, PACKET, PRODUCT, PRODUCT_ID, VENDO
 use nusb::descriptors::{ConfigurationDescriptor, InterfaceDescriptor, TransferType};
 use nusb::transfer::Direction;
 
-use super::Transport;
-use super::transport::is_time_out;
+use super::transport::{Transport, is_time_out};
 
 /// Most bytes in a transfer, a multiple of the packet size.
 pub(super) const TRANSFER: usize = 64 * PACKET;

@@ -2,16 +2,19 @@
 
 use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
-use hapterra_core::wire::message::{
-    DeviceHello, HostHello, PROTOCOL, Sample, Scene, TileMessage, ToDevice, ToHost,
-};
+use hapterra_core::scene::{Sample, Scene};
+use hapterra_core::terrain::TileKey;
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, encode};
+use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
+use hapterra_core::wire::message::{TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::status::{Answer, Status};
 
-use super::{LinkError, Tally};
+use super::error::LinkError;
+use super::messages::next_message;
+use super::tally::Tally;
 use crate::terrain::{Terrain, TileBuffer};
 
-/// What came from the device.
+/// A message from the device, as it concerns whoever uses the session.
 #[derive(Debug)]
 pub enum Event<'e> {
     /// The scene is in force. `resumed` tells whether the device held it
@@ -22,13 +25,13 @@ pub enum Event<'e> {
         /// Whether it goes on with the scene it held.
         resumed: bool,
     },
-    /// What was felt in one tick of a scene fed by the encoders.
+    /// The sample of one tick of a scene whose HIP comes from the encoders.
     Sample(&'e Sample),
-    /// What was felt at a point of a replay.
+    /// The sample at one point of a replay.
     Felt {
-        /// The point's number.
+        /// The number that the host gave the point.
         seq: u32,
-        /// What was felt.
+        /// HIP, proxy, force and state at the point.
         sample: &'e Sample,
     },
     /// Where the device's guard stands; told at the beginning of a session and
@@ -55,16 +58,16 @@ impl Arming {
     pub const VIRTUAL: Self = Self { zero: Some([0; 3]) };
 }
 
-/// Where the conversation stands. What does not belong to the stage is a
-/// duplicate of something earlier and changes nothing.
+/// What the host waits for at the beginning of a session. An answer that is
+/// not waited for is a duplicate of something earlier and changes nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
-    /// Nothing said yet, or the scene is in force.
-    Settled,
-    /// Hello was said.
-    Greeted,
-    /// The device said hello, too, and was sent the scene.
-    Placed,
+enum Awaited {
+    /// Nothing: no hello was said yet, or the scene is in force.
+    Nothing,
+    /// The device's hello.
+    Hello,
+    /// That the device takes the scene that it was sent.
+    SceneTaken,
 }
 
 /// Serves one terrain to one device. Bytes from the device go into
@@ -79,32 +82,26 @@ pub struct Client<'t> {
     tile: TileBuffer,
     /// The device of the present session.
     device: Option<DeviceHello>,
-    stage: Stage,
+    awaited: Awaited,
     tally: Tally,
 }
 
 impl<'t> Client<'t> {
-    /// A client that has not said anything yet.
+    /// A client that has not said anything yet. It arms the device at the
+    /// beginning of each session, if `arming` says how.
     #[must_use]
-    pub fn new(terrain: &'t Terrain<'t>, scene: Scene) -> Self {
+    pub fn new(terrain: &'t Terrain<'t>, scene: Scene, arming: Option<Arming>) -> Self {
         Self {
             terrain,
             scene,
-            arming: None,
+            arming,
             reader: Box::default(),
             frame: Box::new([0; MAX_FRAME]),
             tile: TileBuffer::default(),
             device: None,
-            stage: Stage::Settled,
+            awaited: Awaited::Nothing,
             tally: Tally::default(),
         }
-    }
-
-    /// The same client, arming the device at the beginning of each session.
-    #[must_use]
-    pub fn arming(mut self, arming: Arming) -> Self {
-        self.arming = Some(arming);
-        self
     }
 
     /// The scene that is served.
@@ -113,7 +110,7 @@ impl<'t> Client<'t> {
         &self.scene
     }
 
-    /// What went over the link so far.
+    /// Counts of what went over the link so far.
     #[must_use]
     pub const fn tally(&self) -> &Tally {
         &self.tally
@@ -123,7 +120,7 @@ impl<'t> Client<'t> {
     pub fn greet(&mut self, out: &mut Vec<u8>) {
         // A zero first ends whatever may have been under way.
         out.push(0);
-        self.stage = Stage::Greeted;
+        self.awaited = Awaited::Hello;
         let protocol = PROTOCOL;
         self.say(&ToDevice::Hello(HostHello { protocol }), out);
     }
@@ -144,16 +141,13 @@ impl<'t> Client<'t> {
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
     ) -> Result<(), LinkError> {
-        while !bytes.is_empty() {
-            let (taken, frame) = self.reader.push(bytes);
-            bytes = bytes.get(taken..).unwrap_or(&[]);
-            match frame.map(|frame| frame.and_then(decode::<ToHost>)) {
-                Some(Ok(message)) => self.on_message(message, out, on)?,
-                Some(Err(bad)) => {
+        while let Some(message) = next_message(&mut self.reader, &mut bytes) {
+            match message {
+                Ok(message) => self.on_message(message, out, on)?,
+                Err(bad) => {
                     self.tally.bad_frames += 1;
                     tracing::debug!(?bad, "a frame was not understood");
                 }
-                None => {}
             }
         }
         Ok(())
@@ -167,19 +161,24 @@ impl<'t> Client<'t> {
     ) -> Result<(), LinkError> {
         match message {
             ToHost::Hello(device) if device.protocol != PROTOCOL => {
-                return Err(version(device.protocol));
+                return Err(LinkError::version(device.protocol));
             }
-            ToHost::Refused { protocol } => return Err(version(protocol)),
-            ToHost::Hello(device) if self.stage == Stage::Greeted => {
+            ToHost::Refused { protocol } => return Err(LinkError::version(protocol)),
+            ToHost::Hello(device) if self.awaited == Awaited::Hello => {
                 self.device = Some(device);
-                self.stage = Stage::Placed;
+                self.awaited = Awaited::SceneTaken;
                 self.say(&ToDevice::Scene(self.scene), out);
-                self.say_arming(out);
+                if let Some(Arming { zero }) = self.arming {
+                    if let Some(counts) = zero {
+                        self.say(&ToDevice::Zero { counts }, out);
+                    }
+                    self.say(&ToDevice::Arm, out);
+                }
             }
             ToHost::SceneTaken { epoch, accepted }
-                if epoch == self.scene.epoch && self.stage == Stage::Placed =>
+                if epoch == self.scene.epoch && self.awaited == Awaited::SceneTaken =>
             {
-                self.stage = Stage::Settled;
+                self.awaited = Awaited::Nothing;
                 self.on_scene_taken(accepted, on)?;
             }
             ToHost::Need { epoch, key } if epoch == self.scene.epoch => self.on_need(key, out),
@@ -188,7 +187,7 @@ impl<'t> Client<'t> {
                     telemetry.samples.iter().for_each(|s| on(Event::Sample(s)));
                 }
             }
-            ToHost::Felt { seq, sample } => on(Event::Felt {
+            ToHost::PointAnswer { seq, sample } => on(Event::Felt {
                 seq,
                 sample: &sample,
             }),
@@ -200,16 +199,6 @@ impl<'t> Client<'t> {
             ToHost::Hello(_) | ToHost::SceneTaken { .. } | ToHost::Need { .. } => {}
         }
         Ok(())
-    }
-
-    fn say_arming(&mut self, out: &mut Vec<u8>) {
-        let Some(arming) = self.arming else {
-            return;
-        };
-        if let Some(counts) = arming.zero {
-            self.say(&ToDevice::Zero { counts }, out);
-        }
-        self.say(&ToDevice::Arm, out);
     }
 
     fn on_scene_taken(
@@ -228,7 +217,7 @@ impl<'t> Client<'t> {
         Ok(())
     }
 
-    fn on_need(&mut self, key: hapterra_core::terrain::TileKey, out: &mut Vec<u8>) {
+    fn on_need(&mut self, key: TileKey, out: &mut Vec<u8>) {
         let Some(heights) = self.terrain.tile(key, &mut self.tile) else {
             tracing::warn!(?key, "the device asked for a tile that there is not");
             return;
@@ -250,13 +239,6 @@ fn framed<'b>(message: &ToDevice<'_>, frame: &'b mut [u8; MAX_FRAME]) -> &'b [u8
     encode(message, frame).unwrap_or(&[])
 }
 
-fn version(theirs: u16) -> LinkError {
-    LinkError::Version {
-        ours: PROTOCOL,
-        theirs,
-    }
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
@@ -265,7 +247,7 @@ pub(crate) mod tests {
     use hapterra_core::contact::Rule;
     use hapterra_core::force::ForceLaw;
     use hapterra_core::grid::GridPoint;
-    use hapterra_core::wire::message::Source;
+    use hapterra_core::scene::Source;
 
     /// How a device introduces itself.
     pub(crate) fn hello() -> DeviceHello {
@@ -287,7 +269,7 @@ pub(crate) mod tests {
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
         let home = GridPoint::default();
         let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Points, home);
-        let mut client = Client::new(&terrain, scene);
+        let mut client = Client::new(&terrain, scene, None);
         let hello = ToHost::Hello(hello());
         let taken = ToHost::SceneTaken {
             epoch: scene.epoch,

@@ -4,11 +4,13 @@
 use std::time::{Duration, Instant};
 
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
-use hapterra_core::wire::message::{DeviceHello, HostHello, PROTOCOL, ToDevice, ToHost};
+use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
+use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::status::{Refusal, Request, Status};
 
-use super::{LinkError, Transport};
+use super::error::LinkError;
+use super::messages::{Inbox, send};
+use super::transport::Transport;
 
 /// Between two tries to be understood.
 const AGAIN: Duration = Duration::from_millis(400);
@@ -16,18 +18,16 @@ const AGAIN: Duration = Duration::from_millis(400);
 /// In this time a device tells where it stands at least once.
 const MOMENT: Duration = Duration::from_millis(150);
 
-/// A conversation with a device. It keeps the scene that it holds.
+/// A conversation with a device. The device keeps the scene that it holds.
 pub struct Dialogue<'t> {
     line: Line<'t>,
     device: DeviceHello,
 }
 
-/// Messages both ways.
+/// Messages both ways, and how long an answer may take.
 struct Line<'t> {
     transport: Box<dyn Transport + 't>,
-    reader: Box<FrameReader<MAX_FRAME>>,
-    /// What came after the last answer.
-    unread: Vec<u8>,
+    inbox: Inbox,
     patience: Duration,
 }
 
@@ -39,8 +39,7 @@ impl<'t> Dialogue<'t> {
     pub fn open(transport: Box<dyn Transport + 't>, patience: Duration) -> Result<Self, LinkError> {
         let mut line = Line {
             transport,
-            reader: Box::default(),
-            unread: Vec::new(),
+            inbox: Inbox::default(),
             patience,
         };
         // A zero first ends whatever may have been under way.
@@ -49,23 +48,20 @@ impl<'t> Dialogue<'t> {
         let device = line.ask(&hello, |message| match message {
             ToHost::Hello(device) if device.protocol == PROTOCOL => Some(Ok(device)),
             ToHost::Hello(DeviceHello { protocol, .. }) | ToHost::Refused { protocol } => {
-                Some(Err(LinkError::Version {
-                    ours: PROTOCOL,
-                    theirs: protocol,
-                }))
+                Some(Err(LinkError::version(protocol)))
             }
             _ => None,
         })??;
         Ok(Self { line, device })
     }
 
-    /// The device.
+    /// How the device introduced itself.
     #[must_use]
     pub const fn device(&self) -> &DeviceHello {
         &self.device
     }
 
-    /// How it is.
+    /// The state of the device as it answers: guard, calibration, ticks, stack.
     ///
     /// # Errors
     /// [`LinkError`].
@@ -76,7 +72,7 @@ impl<'t> Dialogue<'t> {
         })
     }
 
-    /// How it is after a moment, so that nothing that happened before is still on
+    /// As [`Dialogue::status`], after a moment, so that nothing that happened before is still on
     /// its way.
     ///
     /// # Errors
@@ -88,7 +84,7 @@ impl<'t> Dialogue<'t> {
         }
     }
 
-    /// The calibration in force.
+    /// The calibration in force on the device; none where it has none.
     ///
     /// # Errors
     /// [`LinkError`].
@@ -146,7 +142,7 @@ impl Line<'_> {
     ) -> Result<T, LinkError> {
         let began = Instant::now();
         loop {
-            self.say(message)?;
+            send(&mut *self.transport, message).map_err(LinkError::Gone)?;
             match self.wait_for(AGAIN.min(self.patience), &mut answer) {
                 Err(LinkError::Silent(_)) if began.elapsed() < self.patience => {}
                 Err(LinkError::Silent(_)) => return Err(LinkError::Silent(began.elapsed())),
@@ -155,48 +151,27 @@ impl Line<'_> {
         }
     }
 
-    fn say(&mut self, message: &ToDevice<'_>) -> Result<(), LinkError> {
-        let mut frame = [0; MAX_FRAME];
-        let bytes = encode(message, &mut frame).unwrap_or(&[]); // the longest message fits
-        self.transport.send(bytes).map_err(LinkError::Gone)
-    }
-
     fn wait_for<T>(
         &mut self,
         patience: Duration,
         answer: &mut impl FnMut(ToHost) -> Option<T>,
     ) -> Result<T, LinkError> {
         let began = Instant::now();
-        let mut incoming = [0; 1024];
+        let wait = Duration::from_millis(50);
         loop {
-            while let Some(message) = self.next_message() {
-                if let Some(found) = answer(message) {
-                    return Ok(found);
+            let next = self.inbox.next(&mut *self.transport, wait);
+            match next.map_err(LinkError::Gone)? {
+                Some(message) => {
+                    if let Some(found) = answer(message) {
+                        return Ok(found);
+                    }
                 }
-            }
-            if began.elapsed() >= patience {
-                return Err(LinkError::Silent(began.elapsed()));
-            }
-            let received = self
-                .transport
-                .receive(&mut incoming, Duration::from_millis(50))
-                .map_err(LinkError::Gone)?;
-            self.unread.extend(incoming.iter().take(received));
-        }
-    }
-
-    /// The next message of what was received. What is not understood is the rest
-    /// of something earlier.
-    fn next_message(&mut self) -> Option<ToHost> {
-        while !self.unread.is_empty() {
-            let (taken, frame) = self.reader.push(&self.unread);
-            let message = frame.and_then(|frame| frame.and_then(decode::<ToHost>).ok());
-            self.unread.drain(..taken);
-            if message.is_some() {
-                return message;
+                None if began.elapsed() >= patience => {
+                    return Err(LinkError::Silent(began.elapsed()));
+                }
+                None => {}
             }
         }
-        None
     }
 }
 
@@ -211,6 +186,7 @@ fn answers(wanted: Request) -> impl FnMut(ToHost) -> Option<Result<(), Refusal>>
 mod tests {
     use super::*;
     use crate::link::Native;
+    use hapterra_core::wire::frame::{MAX_FRAME, encode};
     use std::io;
 
     const PATIENCE: Duration = Duration::from_secs(20);

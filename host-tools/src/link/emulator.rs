@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use super::Tcp;
+use super::tcp::Tcp;
 
 /// Environment variable that names the image when no option does.
 pub const IMAGE_VARIABLE: &str = "HAPTERRA_MPS2_ELF";
@@ -71,9 +71,9 @@ pub struct Emulator {
 /// The two lines of an emulated board.
 #[derive(Debug)]
 pub struct Lines {
-    /// The link.
+    /// The link to the host.
     pub link: Tcp,
-    /// Encoders and amplifiers.
+    /// The plant line: encoder counts to the board, currents from it.
     pub plant: Tcp,
 }
 
@@ -83,28 +83,18 @@ impl Emulator {
     /// # Errors
     /// [`EmulatorError`] says which part is missing or what QEMU said.
     pub fn start(qemu: &Path, image: &Path) -> Result<(Self, Lines), EmulatorError> {
-        std::fs::File::open(image).map_err(|source| EmulatorError::Image {
-            path: image.to_owned(),
-            source,
-        })?;
+        let path = image.to_owned();
+        std::fs::File::open(image).map_err(|source| EmulatorError::Image { path, source })?;
+        let path = qemu.to_owned();
         let lines = [listen()?, listen()?];
-        let child = command(qemu, image, &lines)
-            .spawn()
-            .map_err(|source| EmulatorError::Qemu {
-                path: qemu.to_owned(),
-                source,
-            })?;
-        let mut emulator = Self {
-            child,
-            path: qemu.to_owned(),
+        let mut emulator = match command(qemu, image, &lines).spawn() {
+            Ok(child) => Self { child, path },
+            Err(source) => return Err(EmulatorError::Qemu { path, source }),
         };
         let deadline = Instant::now() + START;
         let [link, plant] = lines.map(|line| emulator.accept(&line, deadline));
-        let lines = Lines {
-            link: link?,
-            plant: plant?,
-        };
-        Ok((emulator, lines))
+        let (link, plant) = (link?, plant?);
+        Ok((emulator, Lines { link, plant }))
     }
 
     /// Waits for the board to end by itself, as it does after a goodbye; ends
@@ -130,12 +120,7 @@ impl Emulator {
         // The link breaks a moment before the process has ended.
         std::thread::sleep(Duration::from_millis(200));
         let status = self.child.try_wait().ok().flatten()?;
-        let mut said = String::new();
-        if let Some(mut stderr) = self.child.stderr.take() {
-            // What cannot be read is not shown.
-            let _ = stderr.read_to_string(&mut said);
-        }
-        Some(format!("{status}; {}", said.trim()))
+        Some(format!("{status}; {}", self.said().trim()))
     }
 
     fn accept(&mut self, line: &TcpListener, deadline: Instant) -> Result<Tcp, EmulatorError> {
@@ -145,9 +130,8 @@ impl Emulator {
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
                 Err(error) => return Err(EmulatorError::Listen(error)),
             }
-            let ended = self.child.try_wait().ok().flatten();
-            if let Some(status) = ended {
-                return Err(self.not_up(format!("{status}")));
+            if let Some(status) = self.child.try_wait().ok().flatten() {
+                return Err(self.not_up(status.to_string()));
             }
             if Instant::now() > deadline {
                 // What it wrote can only be read to the end once it has ended.
@@ -158,20 +142,23 @@ impl Emulator {
         }
     }
 
-    fn not_up(&mut self, how: String) -> EmulatorError {
+    /// What QEMU has written on its standard error, read to the end.
+    fn said(&mut self) -> String {
         let mut said = String::new();
         if let Some(mut stderr) = self.child.stderr.take() {
             // What cannot be read is not shown.
             let _ = stderr.read_to_string(&mut said);
         }
-        let said = match said.trim() {
+        said
+    }
+
+    fn not_up(&mut self, how: String) -> EmulatorError {
+        let said = match self.said().trim() {
             "" => how,
             words => words.to_owned(),
         };
-        EmulatorError::NotUp {
-            path: self.path.clone(),
-            said,
-        }
+        let path = self.path.clone();
+        EmulatorError::NotUp { path, said }
     }
 }
 
@@ -184,11 +171,9 @@ impl Drop for Emulator {
 }
 
 fn listen() -> Result<TcpListener, EmulatorError> {
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(EmulatorError::Listen)?;
-    listener
-        .set_nonblocking(true)
-        .map_err(EmulatorError::Listen)?;
-    Ok(listener)
+    let bound = TcpListener::bind((Ipv4Addr::LOCALHOST, 0));
+    let listener = bound.and_then(|listener| listener.set_nonblocking(true).map(|()| listener));
+    listener.map_err(EmulatorError::Listen)
 }
 
 fn command(qemu: &Path, image: &Path, lines: &[TcpListener; 2]) -> Command {

@@ -3,6 +3,8 @@
 use std::io;
 use std::time::Duration;
 
+use hapterra_core::wire::hello::PROTOCOL;
+
 /// Why there is no link, or no longer.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
@@ -14,7 +16,7 @@ pub enum LinkError {
         /// What was found instead.
         why: String,
     },
-    /// The transport broke.
+    /// The transport broke while the device was in use.
     #[error("the device is gone")]
     Gone(#[source] io::Error),
     /// The transport stands, but nobody answers.
@@ -42,6 +44,14 @@ pub enum LinkError {
 }
 
 impl LinkError {
+    /// The device speaks another protocol than this program.
+    pub(super) const fn version(theirs: u16) -> Self {
+        Self::Version {
+            ours: PROTOCOL,
+            theirs,
+        }
+    }
+
     /// Whether trying again later can help.
     #[must_use]
     pub const fn is_passing(&self) -> bool {

@@ -7,13 +7,13 @@ use std::time::{Duration, Instant};
 use hapterra_core::guard::{Drive, Sense};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::status::BootReport;
+use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::board::TickClock;
-use hapterra_firmware::channels::{Channels, Tiles};
 use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
 
-use super::Transport;
-use crate::phantom::Rig;
+use super::transport::Transport;
+use crate::phantom::HeldPhantom;
 
 /// Tiles along the side of the window, as on the emulated board.
 const WINDOW: usize = 16;
@@ -53,11 +53,11 @@ impl TickClock for HostClock {
 /// A device in memory, in lock-step: its time passes while the host waits for
 /// it to say something, and only as long as it waits for nothing itself.
 ///
-/// Without a rig the arm rests in its home pose, and nobody holds the
+/// Without an arm of its own the device's arm rests in its home pose, and nobody holds the
 /// dead-man switch.
 pub struct Native<C: TickClock = StoppedClock> {
     device: Device<C, WINDOW>,
-    rig: Option<Box<Rig>>,
+    arm: Option<Box<HeldPhantom>>,
     sense: Sense,
     drive: Drive,
     meddler: Option<Meddler>,
@@ -81,24 +81,29 @@ impl Native<StoppedClock> {
 }
 
 impl<C: TickClock> Native<C> {
-    /// A device whose arm is `rig`, a Premium 1.5, with that calibration in
+    /// A device whose arm is `arm`, a Premium 1.5, with that calibration in
     /// its memory.
     #[must_use]
-    pub fn new(clock: C, rig: Option<Box<Rig>>) -> Self {
+    pub fn new(clock: C, arm: Option<Box<HeldPhantom>>) -> Self {
         let stored = Stored::Found(Calibration::PREMIUM_1_5);
-        Self::started(clock, rig, stored, BootReport::default())
+        Self::started(clock, arm, stored, BootReport::default())
     }
 
     /// A device that finds this in its memory, and this about its start.
     #[must_use]
-    pub fn started(clock: C, rig: Option<Box<Rig>>, stored: Stored, boot: BootReport) -> Self {
+    pub fn started(
+        clock: C,
+        arm: Option<Box<HeldPhantom>>,
+        stored: Stored,
+        boot: BootReport,
+    ) -> Self {
         // The two halves of the application hand tile buffers to each other by
         // reference, for as long as the program runs.
-        let tiles = Box::leak(Box::new(Tiles::new()));
-        let channels = Box::leak(Box::new(Channels::new()));
+        let tiles = Box::leak(Box::new(TileBuffers::VACANT));
+        let memory = Box::leak(Box::new(WorkingMemory::new()));
         let mut native = Self {
-            device: Device::new(tiles, channels, clock, stored, boot),
-            rig,
+            device: Device::new(tiles, memory, clock, stored, boot),
+            arm,
             sense: Sense::default(),
             drive: Drive::default(),
             meddler: None,
@@ -106,7 +111,7 @@ impl<C: TickClock> Native<C> {
             ticks: 0,
             pending: VecDeque::new(),
         };
-        native.feel_arm();
+        native.read_sensors();
         native
     }
 
@@ -114,7 +119,7 @@ impl<C: TickClock> Native<C> {
     #[must_use]
     pub fn meddled_with(mut self, meddler: Meddler) -> Self {
         self.meddler = Some(meddler);
-        self.meddle();
+        self.read_sensors();
         self
     }
 
@@ -126,10 +131,10 @@ impl<C: TickClock> Native<C> {
         self
     }
 
-    /// The arm.
+    /// The virtual arm, if the device has one.
     #[must_use]
-    pub fn rig(&self) -> Option<&Rig> {
-        self.rig.as_deref()
+    pub fn arm(&self) -> Option<&HeldPhantom> {
+        self.arm.as_deref()
     }
 
     /// What the amplifiers got in the last tick.
@@ -154,22 +159,18 @@ impl<C: TickClock> Native<C> {
     fn tick(&mut self) {
         self.drive = self.device.tick(self.sense);
         self.ticks += 1;
-        if let Some(rig) = self.rig.as_mut().filter(|_| self.device.drives_arm()) {
+        if let Some(arm) = self.arm.as_mut().filter(|_| self.device.link.drives_arm()) {
             let currents_a = self.drive.currents_a.to_array().map(f64::from);
-            rig.step(currents_a, f64::from(C::PERIOD) / f64::from(C::HZ));
+            arm.step(currents_a, f64::from(C::PERIOD) / f64::from(C::HZ));
         }
-        self.feel_arm();
-        self.meddle();
+        self.read_sensors();
     }
 
-    /// What encoders and switches say now.
-    fn feel_arm(&mut self) {
-        if let Some(rig) = &self.rig {
-            self.sense = rig.sense();
+    /// Reads what encoders and switches say now, or what the meddler makes of it.
+    fn read_sensors(&mut self) {
+        if let Some(arm) = &self.arm {
+            self.sense = arm.sense();
         }
-    }
-
-    fn meddle(&mut self) {
         if let Some(meddler) = &mut self.meddler {
             meddler(self.ticks, &mut self.sense, &self.drive);
         }
@@ -178,7 +179,7 @@ impl<C: TickClock> Native<C> {
     /// Lets the device do what it has to do before it can take more.
     fn make_room(&mut self) {
         let mut chunk = [0; 512];
-        let said = self.device.transmit(&mut chunk);
+        let said = self.device.link.transmit(&mut chunk);
         self.pending.extend(chunk.iter().take(said));
         if said == 0 {
             self.tick();
@@ -203,8 +204,8 @@ impl<C: TickClock> Transport for Native<C> {
             return io::Read::read(&mut self.pending, into);
         }
         for _ in 0..TICKS_A_CALL {
-            let said = self.device.transmit(into);
-            if said > 0 || (self.device.may_stand_still() && !self.restless) {
+            let said = self.device.link.transmit(into);
+            if said > 0 || (self.device.link.may_stand_still() && !self.restless) {
                 return Ok(said);
             }
             self.tick();

@@ -1,10 +1,15 @@
-//! A client over a transport, patient with both.
+//! A client over a transport: greets, waits, and greets again after silence.
 
 use std::time::{Duration, Instant};
 
-use hapterra_core::wire::message::{DeviceHello, Scene, ToDevice};
+use hapterra_core::scene::Scene;
+use hapterra_core::wire::hello::DeviceHello;
+use hapterra_core::wire::message::ToDevice;
 
-use super::{Arming, Client, Event, LinkError, Tally, Transport};
+use super::client::{Arming, Client, Event};
+use super::error::LinkError;
+use super::tally::Tally;
+use super::transport::Transport;
 use crate::terrain::Terrain;
 
 /// How long a device may be quiet.
@@ -43,42 +48,21 @@ pub struct Session<'t> {
 }
 
 impl<'t> Session<'t> {
-    /// Shakes hands and puts the scene in force.
+    /// Shakes hands, puts the scene in force and asks the device to arm, if
+    /// `arming` says how.
     ///
     /// # Errors
     /// [`LinkError`]: nobody answers, another protocol, a scene refused.
     pub fn open(
         terrain: &'t Terrain<'t>,
         scene: Scene,
-        transport: Box<dyn Transport + 't>,
-        patience: Patience,
-    ) -> Result<(Self, DeviceHello), LinkError> {
-        Self::open_with(Client::new(terrain, scene), transport, patience)
-    }
-
-    /// As [`Session::open`], and asks the device to arm.
-    ///
-    /// # Errors
-    /// As [`Session::open`].
-    pub fn open_arming(
-        terrain: &'t Terrain<'t>,
-        scene: Scene,
-        arming: Arming,
-        transport: Box<dyn Transport + 't>,
-        patience: Patience,
-    ) -> Result<(Self, DeviceHello), LinkError> {
-        let client = Client::new(terrain, scene).arming(arming);
-        Self::open_with(client, transport, patience)
-    }
-
-    fn open_with(
-        client: Client<'t>,
+        arming: Option<Arming>,
         transport: Box<dyn Transport + 't>,
         patience: Patience,
     ) -> Result<(Self, DeviceHello), LinkError> {
         let now = Instant::now();
         let mut session = Self {
-            client,
+            client: Client::new(terrain, scene, arming),
             transport,
             patience,
             heard: now,
@@ -106,7 +90,7 @@ impl<'t> Session<'t> {
         self.client.scene()
     }
 
-    /// What went over the link so far.
+    /// Counts of what went over the link so far.
     #[must_use]
     pub const fn tally(&self) -> &Tally {
         self.client.tally()
@@ -153,14 +137,16 @@ impl<'t> Session<'t> {
         self.heard = Instant::now();
         self.greet()?;
         let mut opened = None;
-        while opened.is_none() {
+        loop {
             self.poll(Duration::from_millis(100), &mut |event| {
                 if let Event::Opened { device, .. } = event {
                     opened = Some(device.clone());
                 }
             })?;
+            if let Some(device) = opened {
+                return Ok(device);
+            }
         }
-        opened.ok_or(LinkError::Silent(self.patience.give_up))
     }
 
     fn greet(&mut self) -> Result<(), LinkError> {

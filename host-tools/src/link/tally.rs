@@ -71,7 +71,7 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hapterra_core::wire::message::Sample;
+    use hapterra_core::scene::Sample;
 
     fn batch(first: u32, dropped: u32) -> Telemetry {
         Telemetry {

@@ -1,10 +1,7 @@
-//! Byte streams to a device.
+//! What a byte stream to a device is, whatever it runs over.
 
-use std::io::{self, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::io;
 use std::time::Duration;
-
-use super::LinkError;
 
 /// A byte stream to a device.
 pub trait Transport {
@@ -20,70 +17,6 @@ pub trait Transport {
     /// # Errors
     /// When the device is gone.
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize>;
-}
-
-/// The link of an emulated board, or of a board behind a network.
-#[derive(Debug)]
-pub struct Tcp {
-    stream: TcpStream,
-    wait: Duration,
-}
-
-/// How long a connection may take, and how long the device may leave bytes
-/// unread before it counts as gone.
-const TIMEOUT: Duration = Duration::from_secs(5);
-
-impl Tcp {
-    /// Connects to `HOST:PORT`.
-    ///
-    /// # Errors
-    /// [`LinkError::Absent`] says where it looked.
-    pub fn connect(address: &str) -> Result<Self, LinkError> {
-        let absent = |why: io::Error| LinkError::Absent {
-            looked_for: format!("a device at {address} (TCP)"),
-            why: why.to_string(),
-        };
-        let mut failure = io::Error::other("the name has no address");
-        for socket in address.to_socket_addrs().map_err(absent)? {
-            match TcpStream::connect_timeout(&socket, TIMEOUT) {
-                Ok(stream) => return Self::over(stream).map_err(absent),
-                Err(error) => failure = error,
-            }
-        }
-        Err(absent(failure))
-    }
-
-    /// Takes a connection that stands already.
-    ///
-    /// # Errors
-    /// When the connection cannot be configured.
-    pub fn over(stream: TcpStream) -> io::Result<Self> {
-        stream.set_nodelay(true)?;
-        stream.set_nonblocking(false)?;
-        stream.set_write_timeout(Some(TIMEOUT))?;
-        let wait = TIMEOUT;
-        stream.set_read_timeout(Some(wait))?;
-        Ok(Self { stream, wait })
-    }
-}
-
-impl Transport for Tcp {
-    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.stream.write_all(bytes)
-    }
-
-    fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
-        let wait = wait.max(Duration::from_micros(1)); // zero would be for ever
-        if wait != self.wait {
-            self.stream.set_read_timeout(Some(wait))?;
-            self.wait = wait;
-        }
-        match self.stream.read(into) {
-            Ok(0) => Err(io::ErrorKind::ConnectionReset.into()),
-            Err(error) if is_time_out(&error) => Ok(0),
-            other => other,
-        }
-    }
 }
 
 /// Whether a read ended because nothing came in time.

@@ -9,18 +9,18 @@ use nusb::io::{EndpointRead, EndpointWrite};
 use nusb::transfer::{self, In, Out};
 
 use super::bulk::{Bulk, BulkEndpoints, Pipes, TRANSFER, is_hapterra};
-use super::{LinkError, Transport};
+use super::error::LinkError;
 
 /// Transfers under way from the device, so that none of its packets waits.
 const TRANSFERS: usize = 4;
 /// How long the board may leave a transfer unread before it counts as gone.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// A hapterra board.
-pub struct Usb(Bulk<SystemPipes>);
+/// A hapterra board on USB.
+pub type Usb = Bulk<SystemPipes>;
 
-/// Its pipes, by the system's USB.
-struct SystemPipes {
+/// A board's two bulk pipes, by the system's USB.
+pub struct SystemPipes {
     reader: EndpointRead<transfer::Bulk>,
     writer: EndpointWrite<transfer::Bulk>,
 }
@@ -31,13 +31,12 @@ impl Usb {
     /// # Errors
     /// [`LinkError::Absent`] says what was looked for and what is there.
     pub fn connect() -> Result<Self, LinkError> {
-        let (found, looked_at) = Self::list();
-        match found.first() {
-            Some(info) => Self::open(info),
-            None => Err(absent(match looked_at {
-                0 => "no USB devices at all are visible here".into(),
-                n => format!("{n} USB devices, none of them a hapterra board"),
-            })),
+        match Self::list() {
+            (found, _) if !found.is_empty() => Self::open(&found[0]),
+            (_, 0) => Err(absent("no USB devices at all are visible here".into())),
+            (_, n) => Err(absent(format!(
+                "{n} USB devices, none of them a hapterra board"
+            ))),
         }
     }
 
@@ -49,7 +48,7 @@ impl Usb {
         (devices.into_iter().filter(is_board).collect(), count)
     }
 
-    /// What is looked for, in words.
+    /// What is looked for on USB, in words: its vendor and product numbers.
     #[must_use]
     pub fn looked_for() -> String {
         format!("a hapterra board on USB ({VENDOR_ID:04x}:{PRODUCT_ID:04x})")
@@ -70,13 +69,11 @@ impl Usb {
     pub fn open(info: &nusb::DeviceInfo) -> Result<Self, LinkError> {
         let cannot = |error: nusb::Error| absent(format!("found it, but cannot open it: {error}"));
         let device = info.open().wait().map_err(cannot)?;
-        let endpoints = match device.active_configuration() {
-            Ok(configuration) => BulkEndpoints::find(&configuration),
-            Err(error) => return Err(absent(format!("found it, but {error}"))),
-        };
-        let Some(endpoints) = endpoints else {
-            return Err(absent("found it, but it has no bulk endpoints".into()));
-        };
+        let configuration = device.active_configuration();
+        let configuration =
+            configuration.map_err(|error| absent(format!("found it, but {error}")))?;
+        let endpoints = BulkEndpoints::find(&configuration)
+            .ok_or_else(|| absent("found it, but it has no bulk endpoints".into()))?;
         let interface = device
             .detach_and_claim_interface(endpoints.interface)
             .wait()
@@ -84,10 +81,10 @@ impl Usb {
         let input = interface.endpoint::<transfer::Bulk, In>(endpoints.input);
         let output = interface.endpoint::<transfer::Bulk, Out>(endpoints.output);
         let (input, output) = (input.map_err(cannot)?, output.map_err(cannot)?);
-        Ok(Self(Bulk(SystemPipes {
+        Ok(Bulk(SystemPipes {
             reader: input.reader(TRANSFER).with_num_transfers(TRANSFERS),
             writer: output.writer(TRANSFER).with_write_timeout(WRITE_TIMEOUT),
-        })))
+        }))
     }
 }
 
@@ -100,16 +97,6 @@ impl Pipes for SystemPipes {
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
         self.reader.set_read_timeout(wait);
         self.reader.read(into)
-    }
-}
-
-impl Transport for Usb {
-    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.0.send(bytes)
-    }
-
-    fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
-        self.0.receive(into, wait)
     }
 }
 

@@ -3,7 +3,7 @@
 
 use libm::exp;
 
-use super::AxisDrive;
+use super::model::AxisDrive;
 
 /// One joint's amplifier and motor.
 #[derive(Clone, Copy, Debug, PartialEq)]

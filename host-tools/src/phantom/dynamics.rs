@@ -6,8 +6,8 @@
 
 use glam::{DMat3, DVec3};
 
-use super::PhantomModel;
 use super::kinematics::Pose;
+use super::model::PhantomModel;
 
 /// The equations of motion of one model.
 #[derive(Clone, Copy, Debug)]
@@ -30,29 +30,7 @@ impl Dynamics {
         }
     }
 
-    /// The mass matrix at a pose, rows first, kg·m².
-    #[must_use]
-    pub fn mass_matrix(&self, q_rad: [f64; 3]) -> [[f64; 3]; 3] {
-        // Symmetric: rows and columns are the same.
-        self.mass(&Pose::new(DVec3::from(q_rad))).to_cols_array_2d()
-    }
-
-    /// Torque that holds the arm against its weight at a pose, N·m.
-    #[must_use]
-    pub fn gravity_nm(&self, q_rad: [f64; 3]) -> [f64; 3] {
-        self.gravity(&Pose::new(DVec3::from(q_rad))).to_array()
-    }
-
-    /// Kinetic plus potential energy, J. The stops' springs are not included.
-    #[must_use]
-    pub fn energy_j(&self, q_rad: [f64; 3], rate_rad_s: [f64; 3]) -> f64 {
-        let pose = Pose::new(DVec3::from(q_rad));
-        let rate = DVec3::from(rate_rad_s);
-        let lumped = &self.model.lumped;
-        let lift = lumped.g2 * pose.s[1] - lumped.g3 * pose.c[2];
-        0.5 * rate.dot(self.mass(&pose) * rate) + self.model.gravity_m_s2 * lift
-    }
-
+    /// The mass matrix at a pose, kg·m²; symmetric.
     pub(super) fn mass(&self, pose: &Pose) -> DMat3 {
         let l = &self.model.lumped;
         let ([_, s2, s3], [_, c2, c3]) = (pose.s, pose.c);
@@ -66,6 +44,7 @@ impl Dynamics {
         )
     }
 
+    /// Torque that holds the arm against its weight at a pose, N·m.
     pub(super) fn gravity(&self, pose: &Pose) -> DVec3 {
         let (g, l) = (self.model.gravity_m_s2, &self.model.lumped);
         DVec3::new(0.0, g * l.g2 * pose.c[1], g * l.g3 * pose.s[2])
@@ -117,11 +96,22 @@ mod tests {
 
     const Q: [f64; 3] = [0.3, 0.4, -0.2];
 
+    impl Dynamics {
+        /// Kinetic plus potential energy, J. The stops' springs are not included.
+        pub(in crate::phantom) fn energy_j(&self, q_rad: [f64; 3], rate_rad_s: [f64; 3]) -> f64 {
+            let pose = Pose::new(DVec3::from(q_rad));
+            let rate = DVec3::from(rate_rad_s);
+            let lumped = &self.model.lumped;
+            let lift = lumped.g2 * pose.s[1] - lumped.g3 * pose.c[2];
+            0.5 * rate.dot(self.mass(&pose) * rate) + self.model.gravity_m_s2 * lift
+        }
+    }
+
     #[test]
     fn tip_inertia_near_home_is_a_few_tens_of_grams() {
         let model = PhantomModel::premium_1_5();
-        let mass = Dynamics::new(model).mass_matrix([0.0; 3]);
-        let grams = |joint: usize, arm: f64| 1e3 * mass[joint][joint] / (arm * arm);
+        let mass = Dynamics::new(model).mass(&Pose::new(DVec3::ZERO));
+        let grams = |joint: usize, arm: f64| 1e3 * mass.col(joint)[joint] / (arm * arm);
         for (joint, arm) in [(0, model.l1_m), (1, model.l1_m), (2, model.l2_m)] {
             let tip = grams(joint, arm);
             // Joint 1 also turns the base with its two motors.
@@ -132,7 +122,7 @@ mod tests {
     #[test]
     fn gravity_is_the_slope_of_the_energy() {
         let dynamics = Dynamics::new(PhantomModel::premium_1_5());
-        let torque = dynamics.gravity_nm(Q);
+        let torque = dynamics.gravity(&Pose::new(DVec3::from(Q)));
         for joint in 0..3 {
             let (mut low, mut high) = (Q, Q);
             low[joint] -= 1e-5;

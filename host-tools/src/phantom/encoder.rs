@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use super::AxisDrive;
+use super::model::AxisDrive;
 
 /// One joint's quadrature counter (HEDM-5500: 1,024 lines, 4,096 counts).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3};
 use libm::{acos, atan2, sincos};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::PhantomModel;
+use super::model::PhantomModel;
 
 /// Sines and cosines of a pose, worked out once.
 #[derive(Clone, Copy, Debug)]

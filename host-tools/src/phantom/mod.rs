@@ -10,6 +10,10 @@
 //! script ─ target ─ hand ─ tip force ──┘            (plant)
 //! ```
 //!
+//! [`HeldPhantom`] is the whole of it: the arm ([`Plant`]), the person's hand
+//! on it ([`Hand`]) and the plan that the hand follows ([`Script`], which
+//! [`Touch`] and [`TourPlan`] write).
+//!
 //! Nothing here reads a clock or draws a random number, and the trigonometry
 //! is `libm`'s, so the same inputs give the same bits on every machine.
 //!
@@ -25,12 +29,12 @@ mod dynamics;
 mod encoder;
 mod friction;
 mod hand;
+mod held_phantom;
 pub mod kinematics;
 mod model;
 mod motor;
 mod placement;
 mod plant;
-mod rig;
 mod script;
 mod touch;
 mod tour;
@@ -39,11 +43,11 @@ pub use amplifier::Amplifier;
 pub use dynamics::Dynamics;
 pub use encoder::Encoder;
 pub use hand::{Hand, HandModel};
+pub use held_phantom::HeldPhantom;
 pub use model::{AxisDrive, JointLimits, Lumped, Motor, PhantomModel, STANDARD_GRAVITY};
 pub use motor::MotorTemperature;
-pub use placement::Placement;
+pub use placement::{OutOfReach, Placement};
 pub use plant::{MAX_SUBSTEP_S, Plant};
-pub use rig::{OutOfReach, Rig};
 pub use script::{Script, Target};
 pub use touch::{Surface, Touch};
 pub use tour::{Tour, TourPlan};

@@ -140,25 +140,6 @@ impl PhantomModel {
             }),
         }
     }
-
-    /// The same arm without weight.
-    #[must_use]
-    pub fn weightless(self) -> Self {
-        Self {
-            gravity_m_s2: 0.0,
-            ..self
-        }
-    }
-
-    /// The same arm without Coulomb and viscous friction.
-    #[must_use]
-    pub fn frictionless(self) -> Self {
-        Self {
-            coulomb_nm: [0.0; 3],
-            viscous_nms_per_rad: [0.0; 3],
-            ..self
-        }
-    }
 }
 
 impl JointLimits {
@@ -228,6 +209,25 @@ impl Motor {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl PhantomModel {
+        /// The same arm without weight.
+        pub(in crate::phantom) fn weightless(self) -> Self {
+            Self {
+                gravity_m_s2: 0.0,
+                ..self
+            }
+        }
+
+        /// The same arm without Coulomb and viscous friction.
+        pub(in crate::phantom) fn frictionless(self) -> Self {
+            Self {
+                coulomb_nm: [0.0; 3],
+                viscous_nms_per_rad: [0.0; 3],
+                ..self
+            }
+        }
+    }
 
     #[test]
     fn lumped_terms_agree_with_the_published_sums() {

@@ -3,7 +3,7 @@
 //! Only watched, never acted upon: protecting the motor is the guard's job,
 //! and this is how a test sees whether it did.
 
-use super::Motor;
+use super::model::Motor;
 
 /// Copper's resistance rises by this much a kelvin.
 const COPPER_PER_K: f64 = 0.003_93;

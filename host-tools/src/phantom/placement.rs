@@ -3,13 +3,28 @@
 //! The user faces the device, so east is the device's +y, north is −x and up
 //! is +z.
 
-use super::{PhantomModel, kinematics};
+use super::kinematics;
+use super::model::PhantomModel;
+use super::script::Script;
 
 /// Lays the terrain frame (mm) onto the device frame (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// The terrain point at the tip of the arm in its home pose `q = 0`, mm
     /// east, north, up.
+    pub home_mm: [f64; 3],
+}
+
+/// The script asks for a point that the arm cannot get to.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "the arm cannot reach ({:.1}, {:.1}, {:.1}) mm of the terrain, with ({:.1}, {:.1}, {:.1}) mm at its home",
+    .at_mm[0], .at_mm[1], .at_mm[2], .home_mm[0], .home_mm[1], .home_mm[2]
+)]
+pub struct OutOfReach {
+    /// The point, mm, terrain frame.
+    pub at_mm: [f64; 3],
+    /// The terrain point at the arm's home, mm.
     pub home_mm: [f64; 3],
 }
 
@@ -47,11 +62,26 @@ impl Placement {
         [-north, east, up]
     }
 
-    /// Whether the arm gets to a terrain point within its stops.
-    #[must_use]
-    pub fn reaches(&self, model: &PhantomModel, terrain_mm: [f64; 3]) -> bool {
-        kinematics::inverse(model, self.to_device_m(model, terrain_mm))
-            .is_some_and(|q| kinematics::within_stops(model, q))
+    /// The joint angles that bring the tip to a terrain point, rad.
+    ///
+    /// # Errors
+    /// [`OutOfReach`]: the point lies beyond the links or the stops.
+    pub fn joints_at(&self, model: &PhantomModel, at_mm: [f64; 3]) -> Result<[f64; 3], OutOfReach> {
+        kinematics::inverse(model, self.to_device_m(model, at_mm))
+            .filter(|q| kinematics::within_stops(model, *q))
+            .ok_or(OutOfReach {
+                at_mm,
+                home_mm: self.home_mm,
+            })
+    }
+
+    /// Whether the arm gets to every point of a script.
+    ///
+    /// # Errors
+    /// [`OutOfReach`] names the first corner that it does not get to.
+    pub fn check(&self, model: &PhantomModel, script: &Script) -> Result<(), OutOfReach> {
+        let mut corners = script.corners_mm();
+        corners.try_for_each(|at_mm| self.joints_at(model, at_mm).map(drop))
     }
 }
 
@@ -100,8 +130,8 @@ mod tests {
             [-90., 50., 40.],
             [90., 50., -40.],
         ] {
-            assert!(place.reaches(&model, corner), "{corner:?}");
+            assert!(place.joints_at(&model, corner).is_ok(), "{corner:?}");
         }
-        assert!(!place.reaches(&model, [1000.0, 0.0, 0.0]));
+        assert!(place.joints_at(&model, [1000.0, 0.0, 0.0]).is_err());
     }
 }

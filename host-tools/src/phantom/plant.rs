@@ -8,9 +8,14 @@
 
 use glam::{DMat3, DVec3};
 
+use super::amplifier::Amplifier;
+use super::dynamics::Dynamics;
+use super::encoder::Encoder;
 use super::friction;
+use super::hand::{Hand, HandModel};
 use super::kinematics::{self, Pose};
-use super::{Amplifier, Dynamics, Encoder, Hand, HandModel, MotorTemperature, PhantomModel};
+use super::model::PhantomModel;
+use super::motor::MotorTemperature;
 
 /// Longest step of the integration, s.
 pub const MAX_SUBSTEP_S: f64 = 50e-6;
@@ -51,13 +56,6 @@ impl Plant {
     #[must_use]
     pub fn held_by(mut self, hand: HandModel) -> Self {
         self.hand = Some(Hand::new(hand, self.tip_m()));
-        self
-    }
-
-    /// The same arm with the joints turning, rad/s.
-    #[must_use]
-    pub fn moving(mut self, rate_rad_s: [f64; 3]) -> Self {
-        self.rate = DVec3::from(rate_rad_s);
         self
     }
 
@@ -125,45 +123,20 @@ impl Plant {
         self.q.to_array()
     }
 
-    /// True joint rates, rad/s. Exactly zero while friction holds a joint.
-    #[must_use]
-    pub fn rate_rad_s(&self) -> [f64; 3] {
-        self.rate.to_array()
-    }
-
     /// True tip position, m, device frame.
     #[must_use]
     pub fn tip_m(&self) -> [f64; 3] {
         kinematics::tip(&self.model, self.q.to_array())
     }
 
-    /// True tip velocity, m/s, device frame.
-    #[must_use]
-    pub fn tip_speed_m_s(&self) -> [f64; 3] {
-        let pose = Pose::new(self.q);
-        (kinematics::jacobian_at(&self.model, &pose) * self.rate).to_array()
-    }
-
     /// Force of the hand on the tip, N, device frame; zero without a hand.
     #[must_use]
     pub fn hand_force_n(&self) -> [f64; 3] {
-        let (tip, speed) = (self.tip_m().into(), self.tip_speed_m_s().into());
+        let pose = Pose::new(self.q);
+        let tip = kinematics::tip_at(&self.model, &pose);
+        let speed = kinematics::jacobian_at(&self.model, &pose) * self.rate;
         self.hand
             .map_or([0.0; 3], |hand| hand.force_on_tip(tip, speed).to_array())
-    }
-
-    /// Force that the motors make at the tip at rest, N, device frame: the
-    /// solution of `τ = Jᵀ·F`. Not finite in a singular pose.
-    #[must_use]
-    pub fn motor_force_n(&self) -> [f64; 3] {
-        let jacobian = kinematics::jacobian_at(&self.model, &Pose::new(self.q));
-        (jacobian.transpose().inverse() * self.torque()).to_array()
-    }
-
-    /// Currents that flow, A.
-    #[must_use]
-    pub fn currents_a(&self) -> [f64; 3] {
-        self.amplifiers.map(|a| a.current_a())
     }
 
     /// Winding temperatures, °C.
@@ -172,17 +145,10 @@ impl Plant {
         self.motors.map(|m| m.winding_c())
     }
 
-    /// Kinetic plus potential energy of the arm (no hand, no stops), J.
-    #[must_use]
-    pub fn energy_j(&self) -> f64 {
-        self.dynamics
-            .energy_j(self.q.to_array(), self.rate.to_array())
-    }
-
     fn substep(&mut self, h: f64) {
         // The torque in the middle of the substep stands for all of it.
         self.advance_currents(0.5 * h);
-        let torque = self.torque();
+        let torque = DVec3::from(self.amplifiers.map(|a| a.torque_nm()));
         self.kick(torque, 0.5 * h);
         self.q += self.rate * h;
         if let Some(hand) = &mut self.hand {
@@ -190,10 +156,6 @@ impl Plant {
         }
         self.kick(torque, 0.5 * h);
         self.advance_currents(0.5 * h);
-    }
-
-    fn torque(&self) -> DVec3 {
-        DVec3::from(self.amplifiers.map(|a| a.torque_nm()))
     }
 
     fn advance_currents(&mut self, h: f64) {

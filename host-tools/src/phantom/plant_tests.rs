@@ -2,6 +2,34 @@
 
 use super::*;
 
+/// What only tests ask of an arm.
+impl Plant {
+    /// The same arm with the joints turning, rad/s.
+    pub(in crate::phantom) fn moving(mut self, rate_rad_s: [f64; 3]) -> Self {
+        self.rate = DVec3::from(rate_rad_s);
+        self
+    }
+
+    /// True joint rates, rad/s. Exactly zero while friction holds a joint.
+    pub(in crate::phantom) fn rate_rad_s(&self) -> [f64; 3] {
+        self.rate.to_array()
+    }
+
+    /// Force that the motors make at the tip at rest, N, device frame: the
+    /// solution of `τ = Jᵀ·F`. Not finite in a singular pose.
+    pub(in crate::phantom) fn motor_force_n(&self) -> [f64; 3] {
+        let jacobian = kinematics::jacobian_at(&self.model, &Pose::new(self.q));
+        (jacobian.transpose().inverse() * DVec3::from(self.amplifiers.map(|a| a.torque_nm())))
+            .to_array()
+    }
+
+    /// Kinetic plus potential energy of the arm (no hand, no stops), J.
+    pub(in crate::phantom) fn energy_j(&self) -> f64 {
+        self.dynamics
+            .energy_j(self.q.to_array(), self.rate.to_array())
+    }
+}
+
 fn premium() -> PhantomModel {
     PhantomModel::premium_1_5()
 }
@@ -53,7 +81,7 @@ fn friction_takes_energy_until_the_arm_rests() {
 fn a_joint_stops_after_the_angle_that_friction_allows() {
     let mut model = premium().weightless();
     model.viscous_nms_per_rad = [0.0; 3];
-    let inertia = Dynamics::new(model).mass_matrix([0.0; 3])[0][0];
+    let inertia = Dynamics::new(model).mass(&Pose::new(DVec3::ZERO)).x_axis.x;
     let mut plant = Plant::new(model, [0.0; 3]).moving([1.0, 0.0, 0.0]);
     coast(&mut plant, 2000);
     let expected = 0.5 * inertia / 0.01;
@@ -68,7 +96,7 @@ fn a_joint_stops_after_the_angle_that_friction_allows() {
 fn a_loaded_arm_under_its_friction_does_not_creep() {
     let level = [0.0, 1.0, 0.6];
     let model = premium();
-    let held = Dynamics::new(model).gravity_nm(level);
+    let held = Dynamics::new(model).gravity(&Pose::new(level.into()));
     assert!(held[1].abs() < 0.01 && held[2].abs() > 0.01, "{held:?}");
     // The motor carries what friction cannot.
     let per_amp = model.drive[2].ratio * model.drive[2].motor.kt_nm_per_a;

@@ -1,5 +1,5 @@
-//! Where the hand wants to be, as a function of time: legs along polylines
-//! with smooth starts and ends, in terrain millimetres.
+//! Where the person's hand wants to be, as a function of time: legs along
+//! polylines with smooth starts and ends, mm, terrain frame.
 
 use glam::DVec3;
 

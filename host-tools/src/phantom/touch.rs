@@ -4,7 +4,8 @@
 //! by what the wall, the grip and the arm give way together. It "knows" the
 //! surface, as a person does who has felt it before.
 
-use super::{HandModel, Script};
+use super::hand::HandModel;
+use super::script::Script;
 
 /// Height of the surface in mm at (east, north) in mm; `None` in a hole.
 pub type Surface<'a> = &'a dyn Fn(f64, f64) -> Option<f64>;

@@ -1,6 +1,12 @@
 //! The demonstration that suits a terrain: where to touch it and how.
 
-use super::{HandModel, OutOfReach, PhantomModel, Placement, Rig, Script, Surface, Touch};
+use glam::DVec3;
+
+use super::hand::HandModel;
+use super::model::PhantomModel;
+use super::placement::{OutOfReach, Placement};
+use super::script::Script;
+use super::touch::{Surface, Touch};
 
 /// Half the size of the place that is touched, east and north, mm: most of
 /// what a Premium 1.5 reaches at any height.
@@ -57,43 +63,35 @@ impl TourPlan<'_> {
     /// [`OutOfReach`] if even a small tour has points beyond the arm's reach:
     /// the terrain is too tall for the hand.
     pub fn plan(&self) -> Result<Tour, OutOfReach> {
-        let mut best: Result<(f64, Tour), Option<OutOfReach>> = Err(None);
+        let mut best: Option<(f64, Tour)> = None;
+        let mut first_failure = None;
         for shrink in SHRINK {
             let limit = |i: usize| f64::min(HALF_MM[i], 0.5 * INSIDE * self.size_mm[i]);
             let half = [0, 1].map(|i| shrink * limit(i));
             let line = winding(self.best_place(half), half);
             let (known, tour) = (self.known(&line), self.at(&line));
-            best = match (best, tour.check(&self.model)) {
-                (Ok(best), Ok(())) if best.0 >= known => Ok(best),
-                (_, Ok(())) => Ok((known, tour)),
-                (Err(first), Err(far)) => Err(first.or(Some(far))),
-                (Ok(best), Err(_)) => Ok(best),
-            };
-            if matches!(&best, Ok((known, _)) if *known >= HARDLY_ANY_HOLES) {
+            match tour.placement.check(&self.model, &tour.script) {
+                Ok(()) if best.as_ref().is_none_or(|best| known > best.0) => {
+                    best = Some((known, tour));
+                }
+                Ok(()) => {}
+                Err(far) => first_failure = first_failure.or(Some(far)),
+            }
+            if best.as_ref().is_some_and(|best| best.0 >= HARDLY_ANY_HOLES) {
                 break;
             }
         }
-        best.map(|(_, tour)| tour).map_err(|far| {
-            far.unwrap_or(OutOfReach {
+        best.map(|(_, tour)| tour)
+            .ok_or(first_failure.unwrap_or(OutOfReach {
                 at_mm: [0.0; 3],
                 home_mm: [0.0; 3],
-            })
-        })
+            }))
     }
 
     /// Share of a line that lies on known ground.
     fn known(&self, line: &[[f64; 2]]) -> f64 {
         let known = line.iter().filter(|p| (self.surface)(p[0], p[1]).is_some());
         known.count() as f64 / line.len() as f64
-    }
-
-    /// The rig of the tour, hand on the arm at the first point.
-    ///
-    /// # Errors
-    /// As [`TourPlan::plan`].
-    pub fn rig(&self) -> Result<Rig, OutOfReach> {
-        let tour = self.plan()?;
-        Rig::new(self.model, self.hand, tour.placement, tour.script)
     }
 
     fn at(&self, line: &[[f64; 2]]) -> Tour {
@@ -106,12 +104,9 @@ impl TourPlan<'_> {
             .tap(3, STRONG * self.push_n)
             .lift(12.0)
             .finish();
-        Tour {
-            placement: Placement {
-                home_mm: middle(&script),
-            },
-            script,
-        }
+        let home_mm = middle(&script);
+        let placement = Placement { home_mm };
+        Tour { script, placement }
     }
 
     fn best_place(&self, half: [f64; 2]) -> [f64; 2] {
@@ -121,11 +116,8 @@ impl TourPlan<'_> {
         };
         let places = (0..PLACES * PLACES).map(|i| [along(i % PLACES, 0), along(i / PLACES, 1)]);
         let scored = places.map(|place| (self.worth(place, half), place));
-        scored
-            .reduce(|best, next| if next.0 > best.0 { next } else { best })
-            .map_or([0.5 * self.size_mm[0], 0.5 * self.size_mm[1]], |best| {
-                best.1
-            })
+        let best = scored.reduce(|best, next| if next.0 > best.0 { next } else { best });
+        best.map_or(self.size_mm.map(|side| 0.5 * side), |best| best.1)
     }
 
     /// How good a place is: known ground counts most, then relief up to what
@@ -145,29 +137,12 @@ impl TourPlan<'_> {
     }
 }
 
-impl Tour {
-    fn check(&self, model: &PhantomModel) -> Result<(), OutOfReach> {
-        let mut corners = self.script.corners_mm();
-        match corners.find(|at| !self.placement.reaches(model, *at)) {
-            None => Ok(()),
-            Some(at_mm) => Err(OutOfReach {
-                at_mm,
-                home_mm: self.placement.home_mm,
-            }),
-        }
-    }
-}
-
 /// The middle of the box around a script.
 fn middle(script: &Script) -> [f64; 3] {
-    let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
-    for corner in script.corners_mm() {
-        for axis in 0..3 {
-            low[axis] = low[axis].min(corner[axis]);
-            high[axis] = high[axis].max(corner[axis]);
-        }
-    }
-    std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]))
+    let corners = || script.corners_mm().map(DVec3::from);
+    let low = corners().fold(DVec3::MAX, DVec3::min);
+    let high = corners().fold(DVec3::MIN, DVec3::max);
+    (0.5 * (low + high)).to_array()
 }
 
 /// One and a half waves from west to east.

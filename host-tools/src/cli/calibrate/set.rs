@@ -6,30 +6,43 @@ use hapterra_core::Vec3;
 use hapterra_core::phantom::Calibration;
 
 /// A number of the record and its new value.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Setting {
-    name: &'static str,
+    number: Number,
+    /// The joint of a number that each joint has, 0 to 2.
     axis: usize,
     value: f32,
 }
 
-/// Names, and whether each axis has one of its own (`ratio-1`).
-const NAMES: [(&str, bool); 15] = [
-    ("counts-per-turn", false),
-    ("ratio", true),
-    ("encoder-sign", true),
-    ("motor-sign", true),
-    ("zero-deg", true),
-    ("min-deg", true),
-    ("max-deg", true),
-    ("l1-mm", false),
-    ("l2-mm", false),
-    ("gravity-2-nm", false),
-    ("gravity-3-nm", false),
-    ("torque-constant", true),
-    ("peak-a", true),
-    ("max-force-n", false),
-    ("max-speed-mm-s", false),
+/// Where a number stands in the record.
+#[derive(Clone, Copy, Debug)]
+enum Number {
+    /// One for the whole arm.
+    One(fn(&mut Calibration) -> &mut f32),
+    /// One a joint.
+    Joint(fn(&mut Calibration) -> &mut Vec3),
+    /// One a joint, set in degrees and kept in radians.
+    JointDegrees(fn(&mut Calibration) -> &mut Vec3),
+}
+use Number::{Joint, JointDegrees, One};
+
+/// Every number that can be set, by name; `ratio` is `ratio-1` to `ratio-3`.
+const NUMBERS: [(&str, Number); 15] = [
+    ("counts-per-turn", One(|r| &mut r.counts_per_turn)),
+    ("ratio", Joint(|r| &mut r.ratio)),
+    ("encoder-sign", Joint(|r| &mut r.encoder_sign)),
+    ("motor-sign", Joint(|r| &mut r.motor_sign)),
+    ("zero-deg", JointDegrees(|r| &mut r.zero_rad)),
+    ("min-deg", JointDegrees(|r| &mut r.limits.min_rad)),
+    ("max-deg", JointDegrees(|r| &mut r.limits.max_rad)),
+    ("l1-mm", One(|r| &mut r.l1_mm)),
+    ("l2-mm", One(|r| &mut r.l2_mm)),
+    ("gravity-2-nm", One(|r| &mut r.gravity_2_nm)),
+    ("gravity-3-nm", One(|r| &mut r.gravity_3_nm)),
+    ("torque-constant", Joint(|r| &mut r.torque_constant)),
+    ("peak-a", Joint(|r| &mut r.peak_current_a)),
+    ("max-force-n", One(|r| &mut r.max_force_n)),
+    ("max-speed-mm-s", One(|r| &mut r.max_speed_mm_s)),
 ];
 
 impl FromStr for Setting {
@@ -39,46 +52,39 @@ impl FromStr for Setting {
         let (name, value) = text.split_once('=').ok_or("a setting is NAME=VALUE")?;
         let value = value.trim().parse();
         let value = value.map_err(|_| format!("{name}: the value is no number"))?;
-        let known = NAMES.iter().find_map(|(known, by_axis)| match by_axis {
-            false => (*known == name).then_some((*known, 0)),
-            true => {
-                let axis = name.strip_prefix(known)?.strip_prefix('-')?;
-                let axis: usize = axis.parse().ok()?;
-                (1..=3).contains(&axis).then(|| (*known, axis - 1))
-            }
+        let known = NUMBERS.iter().find_map(|(known, number)| {
+            let rest = name.strip_prefix(known)?;
+            let axis = match (number, rest) {
+                (One(_), "") => 0,
+                (Joint(_) | JointDegrees(_), "-1" | "-2" | "-3") => {
+                    usize::from(rest.as_bytes()[1] - b'1')
+                }
+                _ => return None,
+            };
+            Some((*number, axis))
         });
-        let (name, axis) = known.ok_or_else(|| {
-            let names = NAMES.map(|(name, by_axis)| match by_axis {
-                true => format!("{name}-1…3"),
-                false => name.to_owned(),
+        let (number, axis) = known.ok_or_else(|| {
+            let names = NUMBERS.map(|(name, number)| match number {
+                One(_) => name.to_owned(),
+                Joint(_) | JointDegrees(_) => format!("{name}-1…3"),
             });
             format!("no number is called {name}: there are {}", names.join(", "))
         })?;
-        Ok(Self { name, axis, value })
+        Ok(Self {
+            number,
+            axis,
+            value,
+        })
     }
 }
 
 impl Setting {
     /// Changes the record; whether it makes sense is looked at as a whole.
     pub(super) fn apply(&self, record: &mut Calibration) {
-        let value = self.value;
-        let put = |vector: &mut Vec3, value| vector[self.axis] = value;
-        match self.name {
-            "counts-per-turn" => record.counts_per_turn = value,
-            "ratio" => put(&mut record.ratio, value),
-            "encoder-sign" => put(&mut record.encoder_sign, value),
-            "motor-sign" => put(&mut record.motor_sign, value),
-            "zero-deg" => put(&mut record.zero_rad, value.to_radians()),
-            "min-deg" => put(&mut record.limits.min_rad, value.to_radians()),
-            "max-deg" => put(&mut record.limits.max_rad, value.to_radians()),
-            "l1-mm" => record.l1_mm = value,
-            "l2-mm" => record.l2_mm = value,
-            "gravity-2-nm" => record.gravity_2_nm = value,
-            "gravity-3-nm" => record.gravity_3_nm = value,
-            "torque-constant" => put(&mut record.torque_constant, value),
-            "peak-a" => put(&mut record.peak_current_a, value),
-            "max-force-n" => record.max_force_n = value,
-            _ => record.max_speed_mm_s = value,
+        match self.number {
+            One(number) => *number(record) = self.value,
+            Joint(numbers) => numbers(record)[self.axis] = self.value,
+            JointDegrees(numbers) => numbers(record)[self.axis] = self.value.to_radians(),
         }
     }
 }
@@ -104,11 +110,10 @@ mod tests {
 
     #[test]
     fn every_name_changes_something() {
-        for (name, by_axis) in NAMES {
-            let name = if by_axis {
-                format!("{name}-3")
-            } else {
-                name.into()
+        for (name, number) in NUMBERS {
+            let name = match number {
+                One(_) => name.to_owned(),
+                Joint(_) | JointDegrees(_) => format!("{name}-3"),
             };
             let mut record = Calibration::PREMIUM_1_5;
             let setting: Setting = format!("{name}=0.123").parse().expect("a setting");

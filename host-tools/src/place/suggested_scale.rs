@@ -1,4 +1,4 @@
-//! A scale at which a terrain feels good without anybody having said one.
+//! A scale at which a terrain feels good, for when the user states none.
 
 use crate::raster::Raster;
 use crate::terrain::{BadScale, Scale};
@@ -21,8 +21,8 @@ const SAMPLES: u32 = 24;
 
 /// A scale, and how it came about.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Suggestion {
-    /// The scale.
+pub struct SuggestedScale {
+    /// The suggested scale.
     pub scale: Scale,
     /// How much higher the terrain is than at its true proportions.
     pub exaggeration: f64,
@@ -36,83 +36,81 @@ pub struct Suggestion {
 ///
 /// # Errors
 /// A stated cell that no terrain can be scaled with.
-pub fn suggest(raster: &Raster, cell_mm: Option<f64>) -> Result<Suggestion, BadScale> {
+pub fn suggest_scale(raster: &Raster, cell_mm: Option<f64>) -> Result<SuggestedScale, BadScale> {
     let longest = raster.columns().max(raster.rows()) - 1;
     let fitting = (LENGTH_MM / f64::from(longest)).clamp(CELL_MM.0, CELL_MM.1);
     let cell_mm = cell_mm.unwrap_or((fitting * 2.0).round() / 2.0);
     let plain = Scale::true_to(raster, cell_mm)?;
     let relief_mm = usual_relief(raster, cell_mm) * plain.height_mm_per_unit();
     let good = (GOOD_MM.0..=GOOD_MM.1).contains(&relief_mm) || relief_mm <= 0.0;
-    let wanted = if good { 1.0 } else { AIM_MM / relief_mm };
-    let bearable = STEEP / plain.height_cells(great_slope(raster));
-    // Slopes that are steep by themselves are the terrain's own.
-    let exaggeration = if good {
-        1.0
-    } else {
-        round(wanted.min(bearable.max(1.0)))
+    let exaggeration = match good {
+        true => 1.0,
+        false => {
+            let bearable = STEEP / plain.height_cells(great_slope(raster));
+            // Slopes that are steep by themselves are the terrain's own.
+            round(f64::min(AIM_MM / relief_mm, bearable.max(1.0)))
+        }
     };
     let height = plain.height_mm_per_unit() * exaggeration;
-    Ok(Suggestion {
+    Ok(SuggestedScale {
         scale: Scale::new(cell_mm, height)?,
         exaggeration,
     })
 }
 
+/// The cells of a square grid of `count` × `count`.
+fn square(count: u32) -> impl Iterator<Item = [u32; 2]> {
+    (0..count * count).map(move |i| [i % count, i / count])
+}
+
+/// The `i`-th of `count` whole numbers spread evenly from 0 to `room`.
+fn spread(i: u32, count: u32, room: u32) -> u32 {
+    (u64::from(room) * u64::from(i) / u64::from(count - 1)) as u32
+}
+
+/// The value that `tenths` tenths of the values are below; zero of nothing.
+fn quantile(mut values: Vec<f64>, tenths: usize) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let index = values.len() * tenths / 10;
+    values.get(index).copied().unwrap_or(0.0)
+}
+
 /// The median relief, in vertical units, of places as large as a hand's reach
 /// that have any.
 fn usual_relief(raster: &Raster, cell_mm: f64) -> f64 {
-    let extent = |axis: usize, samples: u32| {
-        let cells = (HAND_MM[axis] / cell_mm).ceil().min(f64::from(samples - 1));
-        cells.max(1.0) as u32
-    };
-    let (width, height) = (extent(0, raster.columns()), extent(1, raster.rows()));
-    let spread =
-        |i: u32, room: u32| (u64::from(room) * u64::from(i) / u64::from(PLACES - 1)) as u32;
-    let mut reliefs = Vec::new();
-    for i in 0..PLACES * PLACES {
-        let west = spread(i % PLACES, raster.columns() - 1 - width);
-        let south = spread(i / PLACES, raster.rows() - 1 - height);
-        reliefs.extend(relief(raster, [west, south], [width, height]));
-    }
-    reliefs.sort_by(f64::total_cmp);
-    reliefs.get(reliefs.len() / 2).copied().unwrap_or(0.0)
+    let last = [raster.columns() - 1, raster.rows() - 1];
+    let size = [0, 1].map(|axis| {
+        let cells = (HAND_MM[axis] / cell_mm).ceil();
+        cells.min(f64::from(last[axis])).max(1.0) as u32
+    });
+    let corner =
+        |place: [u32; 2]| [0, 1].map(|axis| spread(place[axis], PLACES, last[axis] - size[axis]));
+    let reliefs = square(PLACES).filter_map(|place| relief(raster, corner(place), size));
+    quantile(reliefs.collect(), 5)
 }
 
 /// Relief of a place, if most of it is known and it is not flat.
 fn relief(raster: &Raster, corner: [u32; 2], size: [u32; 2]) -> Option<f64> {
-    let at = |axis: usize, i: u32| {
-        corner[axis] + (u64::from(size[axis]) * u64::from(i) / u64::from(SAMPLES - 1)) as u32
-    };
-    let heights = (0..SAMPLES * SAMPLES)
-        .map(|i| raster.height(at(0, i % SAMPLES), at(1, i / SAMPLES)))
-        .filter(|height| !height.is_nan());
-    let (mut known, mut low, mut high) = (0, f64::MAX, f64::MIN);
-    for height in heights {
-        known += 1;
-        (low, high) = (low.min(height), high.max(height));
-    }
-    (2 * known > SAMPLES * SAMPLES && high > low).then_some(high - low)
+    let known: Vec<f64> = square(SAMPLES)
+        .map(|at| [0, 1].map(|axis| corner[axis] + spread(at[axis], SAMPLES, size[axis])))
+        .map(|[x, y]| raster.height(x, y))
+        .filter(|height| !height.is_nan())
+        .collect();
+    let low = known.iter().copied().fold(f64::MAX, f64::min);
+    let high = known.iter().copied().fold(f64::MIN, f64::max);
+    (2 * known.len() > (SAMPLES * SAMPLES) as usize && high > low).then_some(high - low)
 }
 
 /// The slope, in vertical units a cell, that one in ten of those that are not
 /// flat exceeds.
 fn great_slope(raster: &Raster) -> f64 {
     const ALONG: u32 = 200;
-    let at = |i: u32, samples: u32| {
-        (u64::from(samples - 2) * u64::from(i) / u64::from(ALONG - 1)) as u32
-    };
-    let mut slopes: Vec<f64> = (0..ALONG * ALONG)
-        .map(|i| {
-            let (x, y) = (
-                at(i % ALONG, raster.columns()),
-                at(i / ALONG, raster.rows()),
-            );
-            (raster.height(x + 1, y) - raster.height(x, y)).abs()
-        })
-        .filter(|slope| *slope > 0.0)
-        .collect();
-    slopes.sort_by(f64::total_cmp);
-    slopes.get(slopes.len() * 9 / 10).copied().unwrap_or(0.0)
+    let slopes = square(ALONG).map(|[i, j]| {
+        let x = spread(i, ALONG, raster.columns() - 2);
+        let y = spread(j, ALONG, raster.rows() - 2);
+        (raster.height(x + 1, y) - raster.height(x, y)).abs()
+    });
+    quantile(slopes.filter(|slope| *slope > 0.0).collect(), 9)
 }
 
 /// The largest of 1, 2, 5, 10, … (and 0.5, 0.2, …) not above `x`.
@@ -151,7 +149,7 @@ mod tests {
                 height * ((x as f32 * 0.05).sin() + (y as f32 * 0.07).cos())
             });
             let raster = raster.expect("raster");
-            let suggestion = suggest(&raster, None).expect("valid");
+            let suggestion = suggest_scale(&raster, None).expect("valid");
             let relief = usual_relief(&raster, 1.0) * suggestion.scale.height_mm_per_unit();
             assert!((8.0..=50.0).contains(&relief), "{height}: {relief} mm");
             assert_eq!(suggestion.scale.cell_mm(), 1.0);
@@ -161,12 +159,12 @@ mod tests {
     #[test]
     fn small_and_flat_and_mostly_unknown_terrains_have_a_scale() {
         let flat = Raster::from_fn(2, 2, |_, _| 3.0).expect("raster");
-        let suggestion = suggest(&flat, None).expect("valid");
+        let suggestion = suggest_scale(&flat, None).expect("valid");
         assert_eq!(
             (suggestion.scale.cell_mm(), suggestion.exaggeration),
             (5.0, 1.0)
         );
         let holes = Raster::from_fn(50, 50, |x, y| if x + y > 8 { f32::NAN } else { x as f32 });
-        assert!(suggest(&holes.expect("raster"), Some(2.0)).is_ok());
+        assert!(suggest_scale(&holes.expect("raster"), Some(2.0)).is_ok());
     }
 }

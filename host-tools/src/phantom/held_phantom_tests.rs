@@ -1,7 +1,7 @@
 //! A closed loop: encoders to a plain spring wall to currents, 1 kHz.
 
 use super::*;
-use crate::phantom::{Encoder, Touch};
+use crate::phantom::{Encoder, Touch, kinematics};
 use glam::{DMat3, DVec3};
 
 const WALL_N_PER_MM: f64 = 0.5;
@@ -21,35 +21,44 @@ fn wall_currents(model: &PhantomModel, placement: &Placement, counts: [i32; 3]) 
     })
 }
 
+/// True height of the tip, mm, terrain frame.
+fn height_mm(arm: &HeldPhantom) -> f64 {
+    let plant = &arm.plant;
+    arm.placement.to_terrain_mm(plant.model(), plant.tip_m())[2]
+}
+
 /// Runs the loop until a time, telling `watch` the height and force each tick.
-fn run(rig: &mut Rig, until_s: f64, mut watch: impl FnMut(f64, [f64; 3])) {
-    while rig.t_s() < until_s {
-        let currents = wall_currents(rig.plant().model(), &rig.placement(), rig.counts());
-        rig.step(currents, TICK_S);
-        watch(rig.tip_mm()[2], rig.motor_force_n());
+fn run(arm: &mut HeldPhantom, until_s: f64, mut watch: impl FnMut(f64, [f64; 3])) {
+    while arm.t_s < until_s {
+        let currents = wall_currents(arm.plant().model(), &arm.placement, arm.plant.counts());
+        arm.step(currents, TICK_S);
+        watch(
+            height_mm(arm),
+            Placement::turn_to_terrain(arm.plant.motor_force_n()),
+        );
     }
 }
 
-fn press_and_lift(model: PhantomModel) -> (Rig, f64) {
+fn press_and_lift(model: PhantomModel) -> (HeldPhantom, f64) {
     let hand = HandModel::default();
     let touch = Touch::start(&|_, _| Some(0.0), &hand, WALL_N_PER_MM, [5.0, -3.0], 10.0);
     let pressed = touch.press(2.0, 1.5);
     let until_s = pressed.script().duration_s();
     let script = pressed.lift(10.0).finish();
     let placement = Placement { home_mm: [0.0; 3] };
-    let rig = Rig::new(model, hand, placement, script).expect("in reach");
-    (rig, until_s)
+    let arm = HeldPhantom::new(model, hand, placement, script).expect("in reach");
+    (arm, until_s)
 }
 
 #[test]
 fn pressed_with_two_newtons_it_rests_at_four_millimetres() {
-    let (mut rig, until) = press_and_lift(PhantomModel::premium_1_5().weightless());
+    let (mut arm, until) = press_and_lift(PhantomModel::premium_1_5().weightless());
     let mut last = Vec::new();
-    run(&mut rig, until, |height, force| last.push((height, force)));
+    run(&mut arm, until, |height, force| last.push((height, force)));
     let settled = &last[last.len() - 300..];
     // Friction carries at most 0.01 N·m on an arm of 0.21 m against the wall's
     // and the hand's springs together; the encoder is half a count off.
-    let friction_n = 0.01 / rig.plant().model().l1_m;
+    let friction_n = 0.01 / arm.plant().model().l1_m;
     let hand_n_per_mm = 1e-3 / HandModel::default().give_m_per_n();
     let bound_mm = friction_n / (WALL_N_PER_MM + hand_n_per_mm) + 0.015;
     for (height, force) in settled {
@@ -70,12 +79,13 @@ fn pressed_with_two_newtons_it_rests_at_four_millimetres() {
 
 #[test]
 fn lifted_there_is_no_force() {
-    let (mut rig, _) = press_and_lift(PhantomModel::premium_1_5().weightless());
-    let end = rig.script().duration_s() + 0.5;
-    run(&mut rig, end, |_, _| {});
-    assert!(rig.finished());
-    assert!((rig.tip_mm()[2] - 10.0).abs() < 0.5, "{:?}", rig.tip_mm());
-    run(&mut rig, end + 0.2, |_, force| {
+    let (mut arm, _) = press_and_lift(PhantomModel::premium_1_5().weightless());
+    let end = arm.script.duration_s() + 0.5;
+    run(&mut arm, end, |_, _| {});
+    assert!(arm.t_s >= arm.begin_s + arm.script.duration_s());
+    let height = height_mm(&arm);
+    assert!((height - 10.0).abs() < 0.5, "{height}");
+    run(&mut arm, end + 0.2, |_, force| {
         assert!(DVec3::from(force).length() < 1e-9, "{force:?}");
     });
 }
@@ -90,9 +100,10 @@ fn tapped_it_stays_stable() {
         .finish();
     let placement = Placement { home_mm: [0.0; 3] };
     let until = script.duration_s();
-    let mut rig = Rig::new(PhantomModel::premium_1_5(), hand, placement, script).expect("reach");
+    let mut arm =
+        HeldPhantom::new(PhantomModel::premium_1_5(), hand, placement, script).expect("reach");
     let mut highest_n = 0.0f64;
-    run(&mut rig, until, |height, force| {
+    run(&mut arm, until, |height, force| {
         highest_n = highest_n.max(force[2]);
         assert!(height > -12.0 && height < 20.0);
     });
@@ -103,7 +114,7 @@ fn tapped_it_stays_stable() {
 fn names_the_point_it_cannot_reach() {
     let script = Script::start([0.0; 3]).go([0.0, 400.0, 0.0], 50.0);
     let placement = Placement { home_mm: [0.0; 3] };
-    let error = Rig::new(
+    let error = HeldPhantom::new(
         PhantomModel::premium_1_5(),
         HandModel::default(),
         placement,

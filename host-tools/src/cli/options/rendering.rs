@@ -3,14 +3,14 @@
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 
-use super::Failure;
+use crate::cli::failure::{Failure, OrHint};
 use crate::raster::Raster;
-use crate::terrain::{Scale, Terrain, TerrainError};
+use crate::terrain::{Scale, Terrain};
 
 /// How the terrain feels.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Feel")]
-pub struct Feel {
+pub struct Rendering {
     /// Hand millimetres a cell [default: 1]
     #[arg(long, value_name = "MM")]
     pub cell_mm: Option<f64>,
@@ -34,12 +34,12 @@ pub struct Feel {
 
     /// Contact rule
     #[arg(long, value_enum, default_value_t)]
-    pub contact: Contact,
+    pub contact: ContactRule,
 }
 
 /// Contact rule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Contact {
+pub enum ContactRule {
     /// Continuous: nothing passes through the surface
     #[default]
     Swept,
@@ -47,7 +47,7 @@ pub enum Contact {
     Paper,
 }
 
-impl Feel {
+impl Rendering {
     /// The scale: as stated, the rest by default.
     ///
     /// # Errors
@@ -58,9 +58,7 @@ impl Feel {
             Some(height) => Scale::new(cell_mm, height),
             None => Scale::true_to(raster, cell_mm),
         };
-        scale.map_err(|error| {
-            Failure::new(error).hint("choose another --cell-mm or --height-mm-per-unit")
-        })
+        scale.or_hint("choose another --cell-mm or --height-mm-per-unit")
     }
 
     /// The terrain at a scale.
@@ -68,16 +66,7 @@ impl Feel {
     /// # Errors
     /// Heights or a size that positions cannot say, or a level too high.
     pub fn terrain<'r>(&self, raster: &'r Raster, scale: Scale) -> Result<Terrain<'r>, Failure> {
-        Terrain::new(raster, scale, self.level).map_err(|error| {
-            let hint = match error {
-                TerrainError::NoSuchLevel { .. } => "choose a lower --level",
-                TerrainError::TooLarge(_) => "cut a smaller part out of the file",
-                TerrainError::TooTall { .. } | TerrainError::Scale(_) => {
-                    "choose a smaller --height-mm-per-unit, a larger --cell-mm, or name the file's no-data value with --no-data"
-                }
-            };
-            Failure::new(error).hint(hint)
-        })
+        Ok(Terrain::new(raster, scale, self.level)?)
     }
 
     /// The force law.
@@ -89,21 +78,24 @@ impl Feel {
             stiffness_n_per_mm: self.stiffness_n_per_mm,
             max_force_n: self.max_force_n,
         };
-        law.is_valid().then_some(law).ok_or_else(|| {
-            Failure::new(format!(
-                "a stiffness of {} N/mm and a limit of {} N: both must be finite and not negative",
-                law.stiffness_n_per_mm, law.max_force_n
-            ))
-            .hint("leave --stiffness-n-per-mm and --max-force-n out for 0.5 N/mm and 8.5 N")
-        })
+        let ForceLaw {
+            stiffness_n_per_mm: k,
+            max_force_n: limit,
+        } = law;
+        law.is_valid()
+            .then_some(law)
+            .ok_or_else(|| {
+                format!("a stiffness of {k} N/mm and a limit of {limit} N: both must be finite and not negative")
+            })
+            .or_hint("leave --stiffness-n-per-mm and --max-force-n out for 0.5 N/mm and 8.5 N")
     }
 
     /// The contact rule.
     #[must_use]
     pub const fn rule(&self) -> Rule {
         match self.contact {
-            Contact::Swept => Rule::Swept,
-            Contact::Paper => Rule::Paper,
+            ContactRule::Swept => Rule::Swept,
+            ContactRule::Paper => Rule::Paper,
         }
     }
 }

@@ -10,7 +10,7 @@ static REQUESTED: AtomicBool = AtomicBool::new(false);
 const INTERRUPTED: i32 = 130;
 
 /// Listens from now on.
-pub(super) fn listen() {
+pub(in crate::cli) fn listen() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let listening = ctrlc::set_handler(|| {
@@ -27,6 +27,6 @@ pub(super) fn listen() {
 
 /// Whether an end was asked for.
 #[must_use]
-pub(super) fn requested() -> bool {
+pub(in crate::cli) fn requested() -> bool {
     REQUESTED.load(Ordering::Relaxed)
 }

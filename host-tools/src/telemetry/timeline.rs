@@ -1,6 +1,6 @@
-//! Time over several lives of a device.
+//! Time since the beginning of a session, over all restarts of its device.
 
-use hapterra_core::wire::message::Sample;
+use hapterra_core::scene::Sample;
 
 /// Seconds from the samples' ticks, which begin anew when a device does.
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,8 @@
-//! What was felt, in numbers.
+//! Figures of what was felt in a session: means and maxima.
 
-use hapterra_core::contact::State;
+use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Fault;
-use hapterra_core::wire::message::Sample;
+use hapterra_core::scene::Sample;
 
 use crate::replay::Record;
 use crate::terrain::Terrain;
@@ -23,19 +23,19 @@ impl Mean {
         self.max = self.max.max(value);
     }
 
-    /// The mean; zero of nothing.
+    /// The mean; zero where there was no value.
     #[must_use]
     pub fn mean(&self) -> f64 {
         self.sum / self.count.max(1) as f64
     }
 
-    /// The largest; zero of nothing.
+    /// The largest value; zero where there was none.
     #[must_use]
     pub const fn max(&self) -> f64 {
         self.max
     }
 
-    /// How many there were.
+    /// How many values were taken.
     #[must_use]
     pub const fn count(&self) -> u64 {
         self.count
@@ -51,13 +51,13 @@ pub struct Figures {
     pub late: u32,
     /// Force in contact, N.
     pub force_n: Mean,
-    /// Distance from hand to proxy in contact, mm.
+    /// Distance from HIP to proxy in contact, mm.
     pub penetration_mm: Mean,
     /// Distance of the proxy's height from the bilinear surface in `f64`, mm.
     pub height_error_mm: Mean,
     /// Cost of a tick, in counts of the device's clock.
     pub cost: Mean,
-    /// The latest fault.
+    /// The fault in the latest sample, if one was latched.
     pub fault: Option<Fault>,
 }
 
@@ -70,7 +70,7 @@ impl Figures {
         if sample.tick > 1 {
             self.cost.take(f64::from(sample.cost)); // the tick's before this
         }
-        if sample.state != State::Touching {
+        if sample.state != ContactState::Touching {
             return;
         }
         let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();

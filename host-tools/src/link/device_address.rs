@@ -1,11 +1,17 @@
-//! Which device: as the user names it.
+//! Which device, as the user names it, and the way to it.
 
 use std::fmt;
 use std::str::FromStr;
 
+use super::error::LinkError;
+use super::native::{HostClock, Native};
+use super::tcp::Tcp;
+use super::transport::Transport;
+use super::usb::Usb;
+
 /// A device by the name that the command line gives it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Target {
+pub enum DeviceAddress {
     /// A board on USB.
     Usb,
     /// `tcp:HOST:PORT`: an emulated board, or one behind a network.
@@ -14,7 +20,24 @@ pub enum Target {
     Native,
 }
 
-impl FromStr for Target {
+impl DeviceAddress {
+    /// Connects to the device; `native` makes the one in this program's memory.
+    ///
+    /// # Errors
+    /// [`LinkError::Absent`] says where it looked.
+    pub fn connect<'t>(
+        &self,
+        native: impl FnOnce() -> Native<HostClock>,
+    ) -> Result<Box<dyn Transport + 't>, LinkError> {
+        Ok(match self {
+            Self::Usb => Box::new(Usb::connect()?),
+            Self::Tcp(address) => Box::new(Tcp::connect(address)?),
+            Self::Native => Box::new(native()),
+        })
+    }
+}
+
+impl FromStr for DeviceAddress {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -38,7 +61,7 @@ pub(crate) fn tcp_address(text: &str) -> Result<String, String> {
     }
 }
 
-impl fmt::Display for Target {
+impl fmt::Display for DeviceAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Usb => f.write_str("usb"),
@@ -54,9 +77,9 @@ mod tests {
 
     #[test]
     fn names_of_devices() {
-        assert_eq!("usb".parse(), Ok(Target::Usb));
-        assert_eq!("native".parse(), Ok(Target::Native));
-        let tcp = "tcp:localhost:4000".parse::<Target>();
+        assert_eq!("usb".parse(), Ok(DeviceAddress::Usb));
+        assert_eq!("native".parse(), Ok(DeviceAddress::Native));
+        let tcp = "tcp:localhost:4000".parse::<DeviceAddress>();
         assert_eq!(tcp.map(|t| t.to_string()), Ok("tcp:localhost:4000".into()));
         for bad in [
             "",
@@ -66,7 +89,7 @@ mod tests {
             "tcp:a:99999",
             "serial",
         ] {
-            assert!(bad.parse::<Target>().is_err(), "{bad}");
+            assert!(bad.parse::<DeviceAddress>().is_err(), "{bad}");
         }
     }
 }

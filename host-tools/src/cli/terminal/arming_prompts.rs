@@ -2,17 +2,16 @@
 //! Enter for "go on": clear the fault, zero the arm, ask to arm.
 
 use std::io::{BufRead, IsTerminal};
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, channel};
 
 use hapterra_core::guard::{Blockers, Mode, Report};
 use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::status::{Refusal, Request};
 
-use super::status::blockers;
 use crate::link::Event;
 
 /// Leads the user from disarmed to armed.
-pub(super) struct ArmingDesk {
+pub(in crate::cli) struct ArmingPrompts {
     enter: Receiver<()>,
     report: Option<Report>,
     /// Enter was pressed with the arm in its zero pose: its counts are asked for.
@@ -22,9 +21,9 @@ pub(super) struct ArmingDesk {
     lines: Vec<String>,
 }
 
-impl ArmingDesk {
+impl ArmingPrompts {
     /// Listens to the terminal, if there is one.
-    pub(super) fn at_the_terminal() -> Self {
+    pub(in crate::cli) fn at_the_terminal() -> Self {
         let (pressed, enter) = channel();
         if std::io::stdin().is_terminal() {
             std::thread::spawn(move || {
@@ -43,20 +42,19 @@ impl ArmingDesk {
             enter,
             report: None,
             zeroing: false,
-            say: Vec::new(),
-            lines: Vec::new(),
+            say: vec![],
+            lines: vec![],
         }
     }
 
     /// Takes what the device tells.
-    pub(super) fn hear(&mut self, event: &Event<'_>) {
+    pub(in crate::cli) fn on_event(&mut self, event: &Event<'_>) {
         match event {
-            Event::Guard(report) => self.stands(report),
+            Event::Guard(report) => self.on_guard_report(report),
             Event::Answer(answer) => match (answer.request, &answer.result) {
                 (Request::Arm, Err(Refusal::Blocked(why))) => {
                     self.lines.push("not armed:".into());
-                    self.lines
-                        .extend(blockers(*why).map(|line| format!("  {line}")));
+                    self.name(*why);
                     self.ask_for_enter(*why);
                 }
                 (request, Err(refused)) => self.lines.push(format!("{request:?}: {refused}")),
@@ -74,19 +72,17 @@ impl ArmingDesk {
     }
 
     /// Says how the guard stands, where that is news.
-    fn stands(&mut self, report: &Report) {
+    fn on_guard_report(&mut self, report: &Report) {
         let before = self.report.replace(*report);
-        let same = before.is_some_and(|b| {
-            (b.mode, b.fault) == (report.mode, report.fault) && b.blockers == report.blockers
-        });
-        if same {
+        let news = |r: &Report| (r.mode, r.fault, r.blockers);
+        if before.as_ref().map(news) == Some(news(report)) {
             return;
         }
         let was = before.and_then(|before| before.fault);
         if let Some(fault) = report.fault.filter(|_| was != report.fault) {
-            let number = fault.number();
+            let (number, meaning) = (fault.number(), fault.meaning());
             self.lines
-                .push(format!("FAULT {number} {fault:?}: {}", fault.meaning()));
+                .push(format!("FAULT {number} {fault:?}: {meaning}"));
             self.lines.push(format!("  {}", fault.what_to_do()));
             return self.ask_for_enter(report.blockers);
         }
@@ -94,9 +90,7 @@ impl ArmingDesk {
             // What is in the way besides is refused, or gone, in a moment.
             Mode::Requested if Blockers::BY_HAND.contains(report.blockers) => {
                 self.lines.push("ready to arm; waits for your hand:".into());
-                let hand = report.blockers;
-                self.lines
-                    .extend(blockers(hand).map(|line| format!("  {line}")));
+                self.name(report.blockers);
             }
             Mode::Confirming if report.blockers.contains(Blockers::FORCE_TOO_LARGE) => {
                 let what = Blockers::FORCE_TOO_LARGE.meaning();
@@ -111,6 +105,13 @@ impl ArmingDesk {
         }
     }
 
+    /// Names what is in the way of arming, with what to do, a line each.
+    fn name(&mut self, blockers: Blockers) {
+        let lines = blockers.meanings();
+        self.lines
+            .extend(lines.map(|(name, meaning)| format!("  {name}: {meaning}")));
+    }
+
     fn ask_for_enter(&mut self, why: Blockers) {
         self.lines.push(match why.contains(Blockers::NOT_ZEROED) {
             true => "put the arm into its zero pose, hold it there and press Enter".into(),
@@ -119,8 +120,9 @@ impl ArmingDesk {
     }
 
     /// What is to be said to the device now.
-    pub(super) fn messages(&mut self) -> Vec<ToDevice<'static>> {
-        if self.enter_pressed() {
+    pub(in crate::cli) fn messages(&mut self) -> Vec<ToDevice<'static>> {
+        // Where there is no terminal nobody presses anything.
+        if self.enter.try_recv().is_ok() {
             let report = self.report.unwrap_or_default();
             if report.fault.is_some() {
                 self.say.push(ToDevice::ClearFault);
@@ -134,16 +136,8 @@ impl ArmingDesk {
         std::mem::take(&mut self.say)
     }
 
-    fn enter_pressed(&self) -> bool {
-        // Gone: there is no terminal.
-        !matches!(
-            self.enter.try_recv(),
-            Err(TryRecvError::Empty | TryRecvError::Disconnected)
-        )
-    }
-
     /// What is to be said to the user now.
-    pub(super) fn lines(&mut self) -> Vec<String> {
+    pub(in crate::cli) fn lines(&mut self) -> Vec<String> {
         std::mem::take(&mut self.lines)
     }
 }
@@ -164,55 +158,60 @@ mod tests {
     #[test]
     fn an_arm_that_is_not_zeroed_is_told_and_enter_asks_for_its_counts() {
         let (press, enter) = channel();
-        let mut desk = ArmingDesk::listening(enter);
+        let mut prompts = ArmingPrompts::listening(enter);
         let report = Report {
             blockers: Blockers::NOT_ZEROED,
             ..Report::default()
         };
-        desk.hear(&Event::Guard(&report));
-        desk.hear(&Event::Answer(&refused(Blockers::NOT_ZEROED)));
-        let told = desk.lines().join("\n");
+        prompts.on_event(&Event::Guard(&report));
+        prompts.on_event(&Event::Answer(&refused(Blockers::NOT_ZEROED)));
+        let told = prompts.lines().join("\n");
         assert!(
             told.contains("NOT_ZEROED") && told.contains("press Enter"),
             "{told}"
         );
-        assert_eq!(desk.messages(), []);
+        assert_eq!(prompts.messages(), []);
         press.send(()).expect("listening");
-        assert_eq!(desk.messages(), [ToDevice::Status]);
+        assert_eq!(prompts.messages(), [ToDevice::Status]);
     }
 
     #[test]
     fn that_it_waits_for_the_hand_is_told_once() {
         let (_press, enter) = channel();
-        let mut desk = ArmingDesk::listening(enter);
+        let mut prompts = ArmingPrompts::listening(enter);
         let waits = |more| Report {
             mode: Mode::Requested,
             blockers: Blockers::DEAD_MAN_RELEASED | more,
             ..Report::default()
         };
-        desk.hear(&Event::Guard(&waits(Blockers::WATCHDOG_NOT_LIVE)));
-        assert!(desk.lines().is_empty());
-        desk.hear(&Event::Guard(&waits(Blockers::empty())));
-        let told = desk.lines().join("\n");
+        prompts.on_event(&Event::Guard(&waits(Blockers::WATCHDOG_NOT_LIVE)));
+        assert!(prompts.lines().is_empty());
+        prompts.on_event(&Event::Guard(&waits(Blockers::empty())));
+        let told = prompts.lines().join("\n");
         assert!(told.contains("press it"), "{told}");
-        desk.hear(&Event::Guard(&waits(Blockers::empty())));
-        assert!(desk.lines().is_empty());
+        prompts.on_event(&Event::Guard(&waits(Blockers::empty())));
+        assert!(prompts.lines().is_empty());
     }
 
     #[test]
     fn a_fault_is_told_once_and_enter_clears_it_and_arms() {
         let (press, enter) = channel();
-        let mut desk = ArmingDesk::listening(enter);
+        let mut prompts = ArmingPrompts::listening(enter);
         let report = Report {
             fault: Some(Fault::DeadManReleased),
             blockers: Blockers::FAULT_LATCHED,
             ..Report::default()
         };
-        desk.hear(&Event::Guard(&report));
-        assert!(desk.lines().join("\n").contains("FAULT 6 DeadManReleased"));
-        desk.hear(&Event::Guard(&report));
-        assert!(desk.lines().is_empty());
+        prompts.on_event(&Event::Guard(&report));
+        assert!(
+            prompts
+                .lines()
+                .join("\n")
+                .contains("FAULT 6 DeadManReleased")
+        );
+        prompts.on_event(&Event::Guard(&report));
+        assert!(prompts.lines().is_empty());
         press.send(()).expect("listening");
-        assert_eq!(desk.messages(), [ToDevice::ClearFault, ToDevice::Arm]);
+        assert_eq!(prompts.messages(), [ToDevice::ClearFault, ToDevice::Arm]);
     }
 }

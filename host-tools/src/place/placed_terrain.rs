@@ -1,32 +1,28 @@
-//! A terrain in front of the arm, and a hand that tours it.
+//! A terrain in front of the arm, with the tour of a scripted hand over it.
 
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
-use hapterra_core::grid::GridPoint;
-use hapterra_core::wire::message::{Scene, Source};
+use hapterra_core::scene::{Scene, Source};
 
-use crate::phantom::{HandModel, OutOfReach, PhantomModel, Rig, Tour, TourPlan};
+use crate::phantom::{HandModel, HeldPhantom, OutOfReach, PhantomModel, TourPlan};
 use crate::terrain::Terrain;
 
-/// Force of the hand's slide, N; it presses with twice as much.
+/// Force of the hand's slide, N; it presses with half as much again.
 const PUSH_N: f64 = 1.0;
 /// Rest after the tour, s.
 const REST_S: f64 = 0.25;
 
-/// A terrain, how it feels, and where it lies.
-pub struct Stage<'t> {
+/// A terrain, how it feels, and a held Premium 1.5 in whose reach it lies.
+pub struct PlacedTerrain<'t> {
     terrain: &'t Terrain<'t>,
-    law: ForceLaw,
-    rule: Rule,
-    model: PhantomModel,
-    hand: HandModel,
-    tour: Tour,
-    home: GridPoint,
+    scene: Scene,
+    arm: HeldPhantom,
+    duration_s: f64,
 }
 
 /// Why a terrain cannot be put in front of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum StageError {
+pub enum PlacingError {
     /// No part of it is within the arm's reach.
     #[error("the terrain is too tall for the arm: {0}")]
     OutOfReach(#[from] OutOfReach),
@@ -35,13 +31,13 @@ pub enum StageError {
     FarAway([f64; 3]),
 }
 
-impl<'t> Stage<'t> {
+impl<'t> PlacedTerrain<'t> {
     /// Finds the place with the fewest holes and enough relief and puts it in
     /// the middle of the arm's reach.
     ///
     /// # Errors
-    /// [`StageError`].
-    pub fn set(terrain: &'t Terrain<'t>, law: ForceLaw, rule: Rule) -> Result<Self, StageError> {
+    /// [`PlacingError`].
+    pub fn new(terrain: &'t Terrain<'t>, law: ForceLaw, rule: Rule) -> Result<Self, PlacingError> {
         let (model, hand) = (PhantomModel::premium_1_5(), HandModel::default());
         let surface = |east: f64, north: f64| terrain.height_mm(east, north);
         let tour = TourPlan {
@@ -54,22 +50,18 @@ impl<'t> Stage<'t> {
         }
         .plan()?;
         let home_mm = tour.placement.home_mm;
-        let home = terrain
-            .scale()
-            .to_grid(home_mm)
-            .ok_or(StageError::FarAway(home_mm))?;
+        let home = terrain.scale().to_grid(home_mm);
+        let home = home.ok_or(PlacingError::FarAway(home_mm))?;
+        let duration_s = HeldPhantom::ARMED_S + tour.script.duration_s() + REST_S;
         Ok(Self {
             terrain,
-            law,
-            rule,
-            model,
-            hand,
-            tour,
-            home,
+            scene: terrain.scene(law, rule, Source::Encoders, home),
+            arm: HeldPhantom::new(model, hand, tour.placement, tour.script)?.arming(),
+            duration_s,
         })
     }
 
-    /// The terrain.
+    /// The terrain that is placed.
     #[must_use]
     pub const fn terrain(&self) -> &'t Terrain<'t> {
         self.terrain
@@ -77,25 +69,20 @@ impl<'t> Stage<'t> {
 
     /// The scene that the arm feels.
     #[must_use]
-    pub fn scene(&self) -> Scene {
-        self.terrain
-            .scene(self.law, self.rule, Source::Encoders, self.home)
+    pub const fn scene(&self) -> Scene {
+        self.scene
     }
 
-    /// The virtual Phantom with the hand on it, at the beginning of its tour;
-    /// it lets the device arm first.
-    ///
-    /// # Errors
-    /// [`StageError::OutOfReach`].
-    pub fn rig(&self) -> Result<Rig, StageError> {
-        let script = self.tour.script.clone();
-        let rig = Rig::new(self.model, self.hand, self.tour.placement, script)?;
-        Ok(rig.arming())
+    /// The virtual Phantom, held at the beginning of the tour by a hand that
+    /// lets the device arm first.
+    #[must_use]
+    pub fn held_phantom(&self) -> HeldPhantom {
+        self.arm.clone()
     }
 
     /// How long the tour takes with arming before it and a rest at its end, s.
     #[must_use]
-    pub fn duration_s(&self) -> f64 {
-        Rig::ARMED_S + self.tour.script.duration_s() + REST_S
+    pub const fn duration_s(&self) -> f64 {
+        self.duration_s
     }
 }

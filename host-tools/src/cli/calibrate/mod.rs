@@ -1,0 +1,206 @@
+//! `hapterra calibrate`: the walk through a calibration, and records in files.
+
+mod questions;
+mod set;
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::ValueHint;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use hapterra_core::phantom::{Calibration, Model, RECORD_BYTES};
+use hapterra_core::wire::message::ToDevice;
+
+use super::failure::{Failure, OrHint};
+use super::options::device::{Device, DeviceChoice};
+use crate::calibrate::{Attendant, Plan, VirtualUser, walk};
+use crate::link::{DeviceAddress, Dialogue, HostClock, Native};
+use crate::output::{Output, OutputError};
+use questions::UserAtTerminal;
+use set::Setting;
+
+/// How long a device in this program may take to answer.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Arguments of `hapterra calibrate`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The device.
+    #[command(flatten)]
+    pub device: Device,
+
+    /// Begin with this model's preset [default: what the device holds, else premium-1.5]
+    #[arg(long, value_name = "MODEL", value_parser = models())]
+    pub model: Option<Model>,
+
+    /// Begin with the record in this file
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, conflicts_with = "model")]
+    pub from: Option<PathBuf>,
+
+    /// Change a number of the record before the walk, as --set ratio-1=13.2
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub set: Vec<Setting>,
+
+    /// Do not measure anything: take the record as it is
+    #[arg(long)]
+    pub no_walk: bool,
+
+    /// Do not measure the ratios
+    #[arg(long)]
+    pub skip_ratios: bool,
+
+    /// Do not measure gravity
+    #[arg(long)]
+    pub skip_gravity: bool,
+
+    /// Write the record to this file, too
+    #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub output: Option<PathBuf>,
+
+    /// Do not store the record on the device
+    #[arg(long)]
+    pub no_store: bool,
+
+    /// Agree to the record without being asked
+    #[arg(long)]
+    pub yes: bool,
+}
+
+/// Models with a preset: the name on the command line, what it is, the model.
+const MODELS: [(&str, &str, Model); 4] = [
+    ("premium-1.0", "Phantom Premium 1.0", Model::Premium10),
+    ("premium-1.5", "Phantom Premium 1.5", Model::Premium15),
+    ("premium-3.0", "Phantom Premium 3.0", Model::Premium30),
+    ("omni", "Phantom Omni, also called Touch", Model::Omni),
+];
+
+fn models() -> impl TypedValueParser<Value = Model> {
+    let names = MODELS.map(|(name, what, _)| PossibleValue::new(name).help(what));
+    PossibleValuesParser::new(names).try_map(|name| {
+        let model = MODELS.iter().find(|model| model.0 == name);
+        model.map(|model| model.2).ok_or("no such model")
+    })
+}
+
+/// Calibrates.
+///
+/// # Errors
+/// No device, measurements that do not fit together, a record that the device
+/// refuses.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    if args.device.device != DeviceChoice::There(DeviceAddress::Native) {
+        let mut user = UserAtTerminal::new(args.yes);
+        return args
+            .device
+            .talk(|dialogue| calibrate(args, dialogue, &mut user));
+    }
+    // In memory: a virtual user shows how it goes.
+    let mut user = VirtualUser::with_a_stylus();
+    user.says = |line| println!("{line}");
+    let counts = user.counts();
+    let device = Native::new(HostClock::default(), None)
+        .meddled_with(Box::new(move |_, sense, _| sense.counts = counts.get()))
+        .restless();
+    if !args.no_walk {
+        println!("a virtual user calibrates a virtual Phantom that differs from its preset");
+    }
+    let mut dialogue = Dialogue::open(Box::new(device), PATIENCE)?;
+    calibrate(args, &mut dialogue, &mut user)
+}
+
+fn calibrate(
+    args: &Args,
+    dialogue: &mut Dialogue<'_>,
+    attendant: &mut dyn Attendant,
+) -> Result<(), Failure> {
+    let (begin, whence) = begin(args, dialogue)?;
+    println!("begins with    {whence}");
+    if dialogue.status()?.health.report.mode.drives() {
+        return Err("the amplifiers are on").or_hint("disarm first: hapterra status --disarm");
+    }
+    let (mut record, mut zero) = (begin, None);
+    if !args.no_walk {
+        let plan = Plan {
+            ratios: !args.skip_ratios,
+            gravity: !args.skip_gravity,
+        };
+        let mut counts = || Ok(dialogue.fresh_status()?.health.sense.counts);
+        let review = walk(&begin, plan, attendant, &mut counts)?;
+        (record, zero) = (review.after, Some(review.zero));
+    }
+    if let Some(path) = &args.output {
+        write(path, &record).or_hint("name another file with --output")?;
+        println!("written        {}", path.display());
+    }
+    hand_over(args, dialogue, record)?;
+    if let Some(counts) = zero {
+        let zeroed = dialogue.request(&ToDevice::Zero { counts })?;
+        zeroed.map_err(Failure::new)?;
+        println!("zeroed         the arm, until the device is switched off");
+    }
+    Ok(())
+}
+
+/// The record to begin with, and where it is from.
+fn begin(args: &Args, dialogue: &mut Dialogue<'_>) -> Result<(Calibration, String), Failure> {
+    let held = dialogue.calibration()?;
+    let (mut record, whence) = match (&args.from, args.model, held) {
+        (Some(path), _, _) => (read(path)?, path.display().to_string()),
+        (None, Some(model), _) => (model.preset(), format!("the preset of {model:?}")),
+        (None, None, Some(held)) => (held, format!("what the device holds ({:?})", held.model)),
+        (None, None, None) => (
+            Model::Premium15.preset(),
+            "the preset of Premium15 (the device holds none; --model chooses another)".into(),
+        ),
+    };
+    for setting in &args.set {
+        setting.apply(&mut record);
+    }
+    let valid = record.validate();
+    valid
+        .map_err(|bad| format!("the record cannot be used: {bad}"))
+        .or_hint("change it with --set NAME=VALUE")?;
+    Ok((record, whence))
+}
+
+/// Puts the record in force on the device, and has it stored there unless
+/// `--no-store` says otherwise.
+fn hand_over(
+    args: &Args,
+    dialogue: &mut Dialogue<'_>,
+    calibration: Calibration,
+) -> Result<(), Failure> {
+    let (answer, until) = match args.no_store {
+        true => {
+            let message = ToDevice::SetCalibration {
+                calibration,
+                store: false,
+            };
+            (dialogue.request(&message)?, "until it is switched off")
+        }
+        false => (dialogue.store(calibration)?, "and stored there"),
+    };
+    answer.or_hint("see hapterra status; the record can be kept in a file with --output FILE")?;
+    println!("in force       on the device, {until}");
+    Ok(())
+}
+
+fn read(path: &Path) -> Result<Calibration, Failure> {
+    let bytes = std::fs::read(path)
+        .map_err(|error| format!("cannot read {}: {error}", path.display()))
+        .or_hint("check the path given with --from")?;
+    Calibration::decode(&bytes)
+        .map_err(|bad| format!("{}: {bad}", path.display()))
+        .or_hint("name a file that hapterra calibrate --output has written")
+}
+
+fn write(path: &Path, record: &Calibration) -> Result<(), OutputError> {
+    let mut output = Output::create(path)?;
+    let written = output.write_all(record.encode(&mut [0; RECORD_BYTES]));
+    written.map_err(|source| OutputError {
+        path: path.to_owned(),
+        source,
+    })?;
+    output.finish()
+}

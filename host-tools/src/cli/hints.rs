@@ -1,0 +1,226 @@
+//! What to do next about each error of the library: one table an error type.
+//!
+//! A hint that depends on the command's own options stands in that command.
+
+use super::failure::Hint;
+use crate::calibrate::{FitError, WalkError};
+use crate::link::{EmulatorError, LinkError};
+use crate::place::PlacingError;
+use crate::raster::{BadRaster, Error};
+use crate::replay::ReplayError;
+use crate::synth::{WriteError, WriteFault};
+use crate::terrain::TerrainError;
+
+/// For what no user can have caused.
+const REPORT: &str = "this should not happen: please report it with the file and the options";
+
+impl Hint for Error {
+    fn hint(&self) -> String {
+        let path = self.path();
+        let stem = path.file_stem().unwrap_or(path.as_os_str());
+        let convert = format!(
+            "gdal_translate \"{}\" \"{}-converted.tif\"",
+            path.display(),
+            stem.to_string_lossy()
+        );
+        let hint = match self.fault() {
+            BadRaster::UnknownFormat => {
+                return format!(
+                    "convert it to GeoTIFF: {convert}; or say how raw samples lie with --raw-size WxH"
+                );
+            }
+            BadRaster::Unsupported { .. } => {
+                return format!("convert it to a plain GeoTIFF: {convert} -co COMPRESS=DEFLATE");
+            }
+            BadRaster::NotAHeightField(_) => {
+                return format!(
+                    "take a file with one band of heights, or pick the band: {convert} -b 1"
+                );
+            }
+            BadRaster::NotANumber { value, .. } => {
+                return format!("if that stands for no data, say so: --no-data {value}");
+            }
+            BadRaster::DecoderFailed(_) => {
+                return format!("get the file again, or convert it: {convert}");
+            }
+            BadRaster::Unreadable(_) => "check the path and that you may read the file",
+            BadRaster::RawSizeMissing => {
+                "say how the samples lie: --raw-size WxH --raw-type i16 --raw-endian little"
+            }
+            BadRaster::AmbiguousChannels(_) => {
+                "say which channel holds the height: --png-channel red|green|blue|alpha|grey"
+            }
+            BadRaster::TooSmall { .. } => "take a larger part of the terrain",
+            BadRaster::AllNoData { .. } => {
+                "check that the file covers your area, or name another no-data value with --no-data"
+            }
+            BadRaster::AbsurdSize(_) | BadRaster::Damaged(_) | BadRaster::Truncated(_) => {
+                "get the file again; where it came from, `gdalinfo -checksum` tells whether it is whole"
+            }
+        };
+        hint.into()
+    }
+}
+
+impl Hint for TerrainError {
+    fn hint(&self) -> String {
+        let hint = match self {
+            Self::NoSuchLevel { .. } => "choose a lower --level",
+            Self::TooLarge(_) => "cut a smaller part out of the file",
+            Self::TooTall { .. } | Self::Scale(_) => {
+                "choose a smaller --height-mm-per-unit, a larger --cell-mm, or name the file's no-data value with --no-data"
+            }
+        };
+        hint.into()
+    }
+}
+
+impl Hint for PlacingError {
+    fn hint(&self) -> String {
+        "choose a smaller --height-mm-per-unit or --cell-mm".into()
+    }
+}
+
+impl Hint for WriteError {
+    fn hint(&self) -> String {
+        let hint = match self.fault {
+            WriteFault::Io(_) => {
+                "check that the folder exists and has room, and that you may write there"
+            }
+            WriteFault::NoRoom(_) => "make it smaller with --size, or name a file on a larger disk",
+            WriteFault::Interrupted(_) => "nothing was written",
+            WriteFault::UnknownExtension => "name the output .tif for a GeoTIFF",
+            WriteFault::TooHighForPng(_) => "lower --amplitude, or write a .tif",
+            WriteFault::Encoder(_) => "make it smaller with --size",
+        };
+        hint.into()
+    }
+}
+
+impl Hint for ReplayError {
+    fn hint(&self) -> String {
+        let hint = match self {
+            Self::Link(error) => return error.hint(),
+            Self::Trajectory(_) => {
+                "a trajectory is CSV: the header t_s,x_mm,y_mm,z_mm, then four numbers a line"
+            }
+            Self::Output(_) => "name a file in a folder that you may write to with --output",
+            Self::Interrupted => "nothing was written",
+        };
+        hint.into()
+    }
+}
+
+impl Hint for LinkError {
+    fn hint(&self) -> String {
+        let hint = match self {
+            Self::Absent { looked_for, .. } if looked_for.contains("USB") => {
+                "plug the board in, check its cable and that you may open it (on Linux the udev rule host-tools/udev/70-hapterra.rules); or try --device native"
+            }
+            Self::Absent { .. } => "start the emulated board there, or try --device native",
+            Self::Gone(_) | Self::Silent(_) | Self::Restarted => {
+                "check the device and its cable, then start again"
+            }
+            Self::Version { ours, theirs } if theirs < ours => {
+                "flash the firmware that belongs to this command"
+            }
+            Self::Version { .. } => "install the hapterra command that belongs to the firmware",
+            Self::SceneRefused | Self::Stuck(_) => REPORT,
+        };
+        hint.into()
+    }
+}
+
+impl Hint for EmulatorError {
+    fn hint(&self) -> String {
+        let hint = match self {
+            Self::NoImage | Self::Image { .. } => {
+                "`cargo xtask demo` builds the image and names it; or say --image ELF"
+            }
+            Self::Qemu { .. } => {
+                "install QEMU for ARM (`cargo xtask demo` does, or type: sudo apt-get install qemu-system-arm), or say --qemu PATH"
+            }
+            Self::NotUp { .. } => {
+                "check that the image is the mps2-an386 one: `cargo xtask demo` builds it anew"
+            }
+            Self::Listen(_) => "check that this program may open sockets on 127.0.0.1",
+        };
+        hint.into()
+    }
+}
+
+impl Hint for WalkError<LinkError> {
+    fn hint(&self) -> String {
+        let hint = match self {
+            Self::Counts(error) => return error.hint(),
+            Self::Fit(FitError::NotMoved { .. }) => {
+                "move the tip by 80 mm or so in each direction; if you did, check that joint's encoder cable"
+            }
+            Self::Fit(FitError::NoRatios { .. }) => {
+                "measure again, along the ruler and in the direction asked for; check the link lengths with --set l1-mm=… and --set l2-mm=…"
+            }
+            Self::Fit(FitError::NoWeight { .. }) => {
+                "hold the arm in more different poses, or leave gravity out with --skip-gravity"
+            }
+            Self::Stopped(_) | Self::Refused => {
+                "start again when you are ready: hapterra calibrate"
+            }
+        };
+        hint.into()
+    }
+}
+
+#[cfg(feature = "probe")]
+mod of_the_probe {
+    use super::Hint;
+    use crate::board::{FlashError, ImageError};
+
+    impl Hint for ImageError {
+        fn hint(&self) -> String {
+            let hint = match self {
+                Self::Emulated(_) => "`hapterra demo` runs it",
+                Self::Unreadable { .. } => "check the path given with --image",
+                Self::NoImage { .. } => {
+                    "name the ELF that `cargo xtask image BOARD` prints with --image"
+                }
+                Self::OutOfMemory { .. } => {
+                    "it was built for another board: name the right one with --board"
+                }
+                Self::OtherBoard { found: Some(_), .. } => {
+                    "name the board that it was built for with --board, or another image"
+                }
+                Self::OtherBoard { found: None, .. } => {
+                    "images built from this source name theirs, unless they were stripped: `cargo xtask image BOARD` builds one"
+                }
+                Self::UnknownChip(..) => "this should not happen: please report it",
+            };
+            hint.into()
+        }
+    }
+
+    impl Hint for FlashError {
+        fn hint(&self) -> String {
+            let hint = match self {
+                Self::NoProbe => {
+                    "plug the Nucleo's ST-LINK connector in with a data cable; `hapterra list` shows what is seen"
+                }
+                Self::NoSuchProbe { .. } | Self::ManyProbes(_) | Self::Selector(_) => {
+                    "name one as --probe VID:PID:SERIAL"
+                }
+                Self::Forbidden(_) => {
+                    "install probe-rs' udev rules (https://probe.rs/docs/getting-started/probe-setup/), then plug it in again"
+                }
+                Self::Probe { .. } => {
+                    "close other programs that use it (an IDE, probe-rs, OpenOCD), then plug it in again"
+                }
+                Self::Chip { .. } => {
+                    "check that the board has power, that it is the board named, and that the probe's jumpers are on"
+                }
+                Self::Write { .. } => {
+                    "try again; if it stays so, the chip's flash is protected or worn out"
+                }
+            };
+            hint.into()
+        }
+    }
+}

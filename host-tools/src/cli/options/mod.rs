@@ -1,0 +1,7 @@
+//! Options that several subcommands share: which terrain file, how it feels,
+//! which device, how to start the emulated board.
+
+pub mod device;
+pub mod emulated_board;
+pub mod rendering;
+pub mod terrain_file;

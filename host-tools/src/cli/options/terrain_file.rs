@@ -1,0 +1,112 @@
+//! The terrain file argument and its options, shared by every subcommand that
+//! reads one.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::ValueHint;
+use indicatif::ProgressBar;
+
+use crate::cli::failure::Failure;
+use crate::raster::{Endian, OpenOptions, PngChannel, Raster, RawLayout, SampleType};
+
+/// Where `--help` lists these options.
+const INPUT: &str = "Input";
+
+/// A terrain file, and what the user says about it that it does not say itself.
+#[derive(Clone, Debug, clap::Args)]
+pub struct TerrainFile {
+    /// Terrain file: GeoTIFF, .hgt, .asc, PNG, NetCDF, USGS .dem, .npy/.npz, or raw samples
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub file: PathBuf,
+
+    /// What the file does not say itself.
+    #[command(flatten)]
+    pub reading: ReadingOptions,
+}
+
+/// What the user says about a terrain file that it does not say itself.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ReadingOptions {
+    /// The file is raw samples, north row first: WIDTHxHEIGHT
+    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = INPUT)]
+    pub raw_size: Option<(u32, u32)>,
+
+    /// Type of a raw sample
+    #[arg(long, value_enum, default_value = "i16", requires = "raw_size", help_heading = INPUT)]
+    pub raw_type: SampleType,
+
+    /// Byte order of a raw sample
+    #[arg(long, value_enum, default_value = "little", requires = "raw_size", help_heading = INPUT)]
+    pub raw_endian: Endian,
+
+    /// Stored value that means no data (replaces what the file says)
+    #[arg(long, allow_negative_numbers = true, value_name = "VALUE", help_heading = INPUT)]
+    pub no_data: Option<f64>,
+
+    /// Channel of a PNG that holds the height
+    #[arg(long, value_enum, value_name = "CHANNEL", help_heading = INPUT)]
+    pub png_channel: Option<PngChannel>,
+}
+
+impl TerrainFile {
+    /// Opens the terrain, showing on a terminal that it takes a while.
+    ///
+    /// # Errors
+    /// What is wrong with the file, and what to do next.
+    pub fn open(&self) -> Result<Raster, Failure> {
+        let waiting = ProgressBar::new_spinner().with_message(format!("reading {}", self.name()));
+        waiting.enable_steady_tick(Duration::from_millis(200));
+        let opened = Raster::open(&self.file, &self.reading.options());
+        waiting.finish_and_clear();
+        let raster = opened?;
+        tracing::info!(format = raster.format(), "read {}", self.name());
+        Ok(raster)
+    }
+
+    /// The file's name without folders.
+    pub fn name(&self) -> String {
+        self.file
+            .file_name()
+            .unwrap_or(self.file.as_os_str())
+            .to_string_lossy()
+            .into_owned()
+    }
+}
+
+impl ReadingOptions {
+    fn options(&self) -> OpenOptions {
+        OpenOptions {
+            raw: self.raw_size.map(|(columns, rows)| RawLayout {
+                columns,
+                rows,
+                sample: self.raw_type,
+                endian: self.raw_endian,
+            }),
+            png_channel: self.png_channel,
+            no_data: self.no_data,
+        }
+    }
+}
+
+/// A size in samples, as `512x400`, or `512` for a square.
+pub(in crate::cli) fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let parts = text.split_once(['x', 'X', '×']).unwrap_or((text, text));
+    match (parts.0.trim().parse(), parts.1.trim().parse()) {
+        (Ok(width), Ok(height)) if width > 0 && height > 0 => Ok((width, height)),
+        _ => Err("a size is WIDTHxHEIGHT in samples, as 512x400".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes() {
+        assert_eq!(parse_size("512x400"), Ok((512, 400)));
+        assert_eq!(parse_size("7"), Ok((7, 7)));
+        assert!(parse_size("0x4").is_err());
+        assert!(parse_size("4x").is_err());
+    }
+}

@@ -1,0 +1,138 @@
+//! What `demo` and `run` say about a session at its end.
+
+use std::path::Path;
+
+use hapterra_core::wire::hello::DeviceHello;
+
+use super::failure::{Failure, OrHint};
+use crate::link::{INSTRUCTIONS_PER_COUNT, Tally};
+use crate::picture::{SessionPicture, Surface};
+use crate::replay::Record;
+use crate::telemetry::Figures;
+use crate::terrain::Terrain;
+
+/// The board whose clock counts instructions.
+const EMULATED: &str = "mps2-an386";
+
+/// Figures of a session and of its link.
+#[derive(Clone, Debug)]
+pub(super) struct SessionSummary {
+    /// Ticks run since the scene was taken.
+    pub(super) ticks: u64,
+    pub(super) device: DeviceHello,
+    pub(super) figures: Figures,
+    pub(super) tally: Tally,
+}
+
+impl SessionSummary {
+    /// The table that is printed, one figure a line.
+    pub(super) fn text(&self) -> String {
+        let (figures, tally, ticks) = (&self.figures, &self.tally, self.ticks);
+        let (force, depth, off) = (
+            figures.force_n,
+            figures.penetration_mm,
+            figures.height_error_mm,
+        );
+        let (mean_cost, worst_cost, unit) = self.cost();
+        let mut text = format!(
+            "ticks          {ticks} run, {} late\n\
+             tiles          {} fetched ({} bytes), {} of them again\n\
+             telemetry      {} samples, {} lost on the link, {} dropped by the device\n\
+             contact        {} of {} ticks\n\
+             force          mean {:.3} N, max {:.3} N in contact\n\
+             penetration    mean {:.3} mm, max {:.3} mm\n\
+             proxy height   mean error {:.3e} mm, max {:.3e} mm against the bilinear surface in f64\n\
+             tick cost      mean {mean_cost:.0}, worst {worst_cost:.0} {unit}\n",
+            figures.late,
+            tally.tiles,
+            tally.tile_bytes,
+            tally.again,
+            tally.samples,
+            tally.lost,
+            tally.dropped,
+            force.count(),
+            figures.samples,
+            force.mean(),
+            force.max(),
+            depth.mean(),
+            depth.max(),
+            off.mean(),
+            off.max(),
+        );
+        let (bad, sessions) = (tally.bad_frames, tally.sessions);
+        if bad > 0 || sessions > 1 {
+            text += &format!("link           {bad} frames not understood, {sessions} sessions\n");
+        }
+        text
+    }
+
+    /// Mean and worst cost of a tick, and what they are counted in.
+    fn cost(&self) -> (f64, f64, &'static str) {
+        let (a_count, unit) = match self.device.board.as_str() {
+            EMULATED => (INSTRUCTIONS_PER_COUNT, "instructions of the Cortex-M4F"),
+            _ => {
+                let hz = f64::from(self.device.clock_hz.max(1));
+                (1e9 / hz, "ns of the device's clock")
+            }
+        };
+        let cost = self.figures.cost;
+        (a_count * cost.mean(), a_count * cost.max(), unit)
+    }
+
+    /// The figures that go beside the picture.
+    fn facts(&self) -> Vec<(String, String)> {
+        let (mean_cost, _, unit) = self.cost();
+        let unit = unit.split(' ').next().unwrap_or_default();
+        let force = self.figures.force_n.mean();
+        let facts = [
+            ("mean force", format!("{force:.2} N")),
+            ("ticks late", self.figures.late.to_string()),
+            ("tiles fetched", self.tally.tiles.to_string()),
+            ("tick cost", format!("{mean_cost:.0} {unit}")),
+        ];
+        facts.map(|(name, value)| (name.to_owned(), value)).to_vec()
+    }
+
+    /// Draws the picture of the session into a file.
+    pub(super) fn draw(
+        &self,
+        path: &Path,
+        terrain: &Terrain<'_>,
+        title: &str,
+        records: &[Record],
+    ) -> Result<(), Failure> {
+        let height_mm = |east: f64, north: f64| terrain.height_mm(east, north);
+        let picture = SessionPicture {
+            title,
+            subtitle: &format!("{}; felt by {}", in_words(terrain), device(&self.device)),
+            surface: Surface {
+                height_mm: &height_mm,
+                size_mm: terrain.size_mm(),
+                cell_mm: terrain.scale().cell_mm(),
+            },
+            records,
+            facts: &self.facts(),
+        };
+        picture.save(path).or_hint("name another folder with --out")
+    }
+}
+
+/// A terrain and its scale, in words.
+pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
+    let (raster, scale) = (terrain.raster(), terrain.scale());
+    let proportions = match raster.cells_per_vertical_unit() {
+        Some(true_cells) => match scale.height_cells(1.0) / true_cells {
+            times if (times - 1.0).abs() < 1e-9 => "heights true to scale".to_owned(),
+            times => format!("heights × {}", (times * 1e6).round() / 1e6),
+        },
+        None => format!("{} mm a vertical unit", scale.height_mm_per_unit()),
+    };
+    let (columns, rows, cell_mm) = (raster.columns(), raster.rows(), scale.cell_mm());
+    format!("{columns} × {rows} samples, {cell_mm} mm a cell, {proportions}")
+}
+
+/// A device in words.
+pub(super) fn device(hello: &DeviceHello) -> String {
+    let (board, version, w, hz) = (&hello.board, &hello.version, hello.window, hello.tick_hz);
+    format!("{board} {version}, window of {w} × {w} tiles, {hz} ticks a second")
+}

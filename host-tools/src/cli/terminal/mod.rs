@@ -1,0 +1,6 @@
+//! What happens at the terminal while a command runs: progress, Ctrl-C, and
+//! the prompts that lead to an armed arm.
+
+pub(super) mod arming_prompts;
+pub(super) mod interrupt;
+pub(super) mod progress;

@@ -1,0 +1,65 @@
+//! Whole messages over a byte stream.
+
+use std::io;
+use std::time::Duration;
+
+use hapterra_core::wire::frame::{BadFrame, FrameReader, MAX_FRAME, decode, encode};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::transport::Transport;
+
+/// Sends a message of at most [`MAX_FRAME`] bytes; every message is.
+pub(super) fn send(transport: &mut dyn Transport, message: &impl Serialize) -> io::Result<()> {
+    let mut frame = [0; MAX_FRAME];
+    transport.send(encode(message, &mut frame).unwrap_or(&[]))
+}
+
+/// Takes the next message out of `bytes`, which keep what comes after it; none
+/// where no message ends in them.
+pub(super) fn next_message<T: DeserializeOwned>(
+    reader: &mut FrameReader<MAX_FRAME>,
+    bytes: &mut &[u8],
+) -> Option<Result<T, BadFrame>> {
+    while !bytes.is_empty() {
+        let (taken, frame) = reader.push(bytes);
+        *bytes = bytes.get(taken..).unwrap_or(&[]);
+        if let Some(frame) = frame {
+            return Some(frame.and_then(decode));
+        }
+    }
+    None
+}
+
+/// Messages as they come from a transport, one at a time.
+#[derive(Default)]
+pub(super) struct Inbox {
+    reader: Box<FrameReader<MAX_FRAME>>,
+    /// Received and not read yet.
+    unread: Vec<u8>,
+}
+
+impl Inbox {
+    /// The next message; none where none has come after waiting for at most
+    /// `wait`. What is not understood is the rest of something earlier.
+    ///
+    /// # Errors
+    /// When the device is gone.
+    pub(super) fn next<T: DeserializeOwned>(
+        &mut self,
+        transport: &mut dyn Transport,
+        wait: Duration,
+    ) -> io::Result<Option<T>> {
+        if self.unread.is_empty() {
+            let mut incoming = [0; 1024];
+            let received = transport.receive(&mut incoming, wait)?;
+            self.unread.extend(incoming.iter().take(received));
+        }
+        let mut bytes = self.unread.as_slice();
+        let found =
+            std::iter::from_fn(|| next_message(&mut self.reader, &mut bytes)).find_map(Result::ok);
+        let read = self.unread.len() - bytes.len();
+        self.unread.drain(..read);
+        Ok(found)
+    }
+}

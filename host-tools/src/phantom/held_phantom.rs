@@ -1,0 +1,96 @@
+//! A virtual Phantom in somebody's hand: all that a device has outside of
+//! itself. A hand follows a script, and the terrain lies in front of both.
+
+use hapterra_core::guard::Sense;
+
+use super::hand::HandModel;
+use super::model::PhantomModel;
+use super::placement::{OutOfReach, Placement};
+use super::plant::Plant;
+use super::script::Script;
+
+/// When a hand that waits for the arm to be armed presses the dead-man switch,
+/// s.
+const PRESS_S: f64 = 0.5;
+/// A scripted hand on a virtual Phantom over a placed terrain.
+#[derive(Clone, Debug)]
+pub struct HeldPhantom {
+    plant: Plant,
+    placement: Placement,
+    script: Script,
+    /// When the script begins, s.
+    begin_s: f64,
+    t_s: f64,
+}
+
+impl HeldPhantom {
+    /// Puts the tip, and the hand on it, at the script's first point.
+    ///
+    /// # Errors
+    /// [`OutOfReach`] names the first corner of the script that lies beyond
+    /// the links or the stops.
+    pub fn new(
+        model: PhantomModel,
+        hand: HandModel,
+        placement: Placement,
+        script: Script,
+    ) -> Result<Self, OutOfReach> {
+        placement.check(&model, &script)?;
+        let start_mm = script.target(0.0).position_mm;
+        let q = placement.joints_at(&model, start_mm)?;
+        Ok(Self {
+            plant: Plant::new(model, q).held_by(hand),
+            placement,
+            script,
+            begin_s: 0.0,
+            t_s: 0.0,
+        })
+    }
+
+    /// The same hand, first letting the device arm: it rests at the script's
+    /// first point, presses the dead-man switch after half a second, holds it
+    /// from then on, and begins its script [`Self::ARMED_S`] after the start.
+    #[must_use]
+    pub fn arming(mut self) -> Self {
+        self.begin_s = Self::ARMED_S;
+        self
+    }
+
+    /// When a script begins whose hand lets the device arm first, s: after the
+    /// device has confirmed and force has come in.
+    pub const ARMED_S: f64 = 3.0;
+
+    /// What encoders and switches say now.
+    #[must_use]
+    pub fn sense(&self) -> Sense {
+        Sense {
+            counts: self.plant.counts(),
+            dead_man: self.begin_s > 0.0 && self.t_s >= PRESS_S,
+            emergency_stop: false,
+            hardware_failed: false,
+        }
+    }
+
+    /// Applies current commands (A) for `dt_s` seconds while the hand follows
+    /// its script, and reads the encoders at the end.
+    pub fn step(&mut self, currents_a: [f64; 3], dt_s: f64) -> [i32; 3] {
+        let target = self.script.target(self.t_s - self.begin_s);
+        let at_m = self
+            .placement
+            .to_device_m(self.plant.model(), target.position_mm);
+        let speed_m_s = Placement::turn_to_device(target.speed_mm_s).map(|v| v * 1e-3);
+        self.plant.aim(at_m, speed_m_s);
+        self.t_s += dt_s;
+        self.plant.step(currents_a, dt_s)
+    }
+
+    /// The arm and its hand.
+    #[must_use]
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+}
+
+#[cfg(test)]
+#[path = "held_phantom_tests.rs"]
+mod tests;

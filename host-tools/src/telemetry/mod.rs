@@ -1,0 +1,11 @@
+//! What a device reports while it is touched: times over restarts
+//! ([`Timeline`]), rows in hand millimetres ([`SampleLog`]), figures of the
+//! whole session ([`Figures`]).
+
+mod figures;
+mod sample_log;
+mod timeline;
+
+pub use figures::{Figures, Mean};
+pub use sample_log::SampleLog;
+pub use timeline::Timeline;
