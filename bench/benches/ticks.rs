@@ -40,8 +40,8 @@ fn path(grid: &Grid, name: &'static str) -> Path {
 /// The time shown is for the whole path; the items are ticks.
 fn run(bencher: Bencher<'_, '_>, path: &Path, variant: &mut dyn Haptics) {
     bencher
-        .counter(ItemsCount::new(path.hands.len()))
-        .bench_local(|| variant.time(&path.hands));
+        .counter(ItemsCount::new(path.hips.len()))
+        .bench_local(|| variant.time(&path.hips));
 }
 
 #[divan::bench(args = PATHS)]

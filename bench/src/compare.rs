@@ -8,7 +8,7 @@ use crate::grid::Grid;
 use crate::haptics::{Answer, Haptics};
 use crate::path::{self, Path};
 use crate::product::{self, Copy, Product, SIDE};
-use crate::stats::{interleave, part, quantiles};
+use crate::stats::{interleave, part, quantiles, timing};
 use crate::truth::{self, Verdict};
 
 /// How much is measured.
@@ -79,12 +79,12 @@ pub struct Row {
     pub ratio: f64,
     /// Of the answers judged; `None` where nothing was felt.
     pub error: Option<Error>,
-    /// Largest change of the stretch from one tick to the next, cells.
+    /// Largest change of the displacement from one tick to the next, cells.
     pub jump: f64,
     /// Part of the ticks below the surface that felt nothing.
     pub missed: f64,
     /// Part of the ticks in which work was left over.
-    pub unsettled: f64,
+    pub unconverged: f64,
 }
 
 /// Errors against the truth.
@@ -162,58 +162,65 @@ pub(crate) fn ours<'w, const D: usize>(window: &'w Window<'_, D>) -> Vec<Entry<'
 }
 
 pub(crate) fn opponents(grid: &Grid) -> Vec<Entry<'_>> {
-    let label = |name, family, extra_bytes| Label {
-        name,
-        family,
-        extra_bytes,
-    };
-    let paper = |name| label(name, Family::Paper, 0.0);
-    let triangles = |name, extra| label(name, Family::Triangles, extra);
-    let last = Start::LastPoint;
-    vec![
-        (paper(PLAIN), Box::new(Paper::<f32>::new(grid, last, 10))),
+    use Family::{Bound, Triangles};
+    let single = |start, newton_steps| Box::new(Paper::<f32>::new(grid, start, newton_steps));
+    let (last, centre) = (Start::LastPoint, Start::Centre);
+    let double = Box::new(Paper::<f64>::new(grid, last, 20));
+    let parry = |project| Box::new(Parry::new(grid, project));
+    // parry has its own copy of the heights and a byte of status a cell.
+    let entries: [(&'static str, Family, f64, Box<dyn Haptics + '_>); 10] = [
+        (PLAIN, Family::Paper, 0.0, single(last, 10)),
+        ("paper f64", Family::Paper, 0.0, double),
         (
-            paper("paper f64"),
-            Box::new(Paper::<f64>::new(grid, last, 20)),
+            "paper f32, centre, 10",
+            Family::Paper,
+            0.0,
+            single(centre, 10),
         ),
         (
-            paper("paper f32, centre, 10"),
-            Box::new(Paper::<f32>::new(grid, Start::Centre, 10)),
+            "paper f32, centre, 3",
+            Family::Paper,
+            0.0,
+            single(centre, 3),
         ),
         (
-            paper("paper f32, centre, 3"),
-            Box::new(Paper::<f32>::new(grid, Start::Centre, 3)),
+            "paper f32, last point, 1",
+            Family::Paper,
+            0.0,
+            single(last, 1),
         ),
+        ("god-object", Triangles, 0.0, Box::new(GodObject::new(grid))),
         (
-            paper("paper f32, last point, 1"),
-            Box::new(Paper::<f32>::new(grid, last, 1)),
-        ),
-        (triangles("god-object", 0.0), Box::new(GodObject::new(grid))),
-        (
-            triangles("proxy graph", 0.0),
+            "proxy graph",
+            Triangles,
+            0.0,
             Box::new(ProxyGraph::new(grid)),
         ),
-        // Its own copy of the heights and a byte of status a cell.
+        ("parry within", Triangles, 5.0, parry(Project::Within)),
+        ("parry", Triangles, 5.0, parry(Project::Anywhere)),
         (
-            triangles("parry within", 5.0),
-            Box::new(Parry::new(grid, Project::Within)),
-        ),
-        (
-            triangles("parry", 5.0),
-            Box::new(Parry::new(grid, Project::Anywhere)),
-        ),
-        (
-            label("copy of the last answer", Family::Bound, 0.0),
+            "copy of the last answer",
+            Bound,
+            0.0,
             Box::new(Copy::default()),
         ),
-    ]
+    ];
+    let labelled = entries.map(|(name, family, extra_bytes, variant)| {
+        let label = Label {
+            name,
+            family,
+            extra_bytes,
+        };
+        (label, variant)
+    });
+    labelled.into()
 }
 
 fn along(grid: &Grid, path: &Path, entries: &mut [Entry<'_>], effort: Effort) -> Vec<Row> {
     let is_bound = |label: &Label| label.family == Family::Bound && path.name != "unmoved";
     let times = interleave(entries.len(), effort.rounds, |index| {
-        let elapsed = entries[index].1.time(&path.hands);
-        elapsed.as_secs_f64() * 1e9 / path.hands.len() as f64
+        let elapsed = entries[index].1.time(&path.hips);
+        elapsed.as_secs_f64() * 1e9 / path.hips.len() as f64
     });
     let plain = entries.iter().position(|(label, _)| label.name == PLAIN);
     let plain = times[plain.unwrap_or(0)].clone();
@@ -221,18 +228,18 @@ fn along(grid: &Grid, path: &Path, entries: &mut [Entry<'_>], effort: Effort) ->
         .iter_mut()
         .zip(&times)
         .map(|((label, variant), times)| {
-            let answers = variant.answers(&path.hands);
-            let ratios = times.iter().zip(&plain).map(|(own, plain)| own / plain);
+            let answers = variant.answers(&path.hips);
+            let (ns, ratio) = timing(times, &plain);
             Row {
                 terrain: grid.name.clone(),
                 path: path.name,
                 label: *label,
-                ns: quantiles(times.clone(), [0.25, 0.5, 0.75]),
-                ratio: quantiles(ratios.collect(), [0.5])[0],
+                ns,
+                ratio,
                 error: error(grid, path, &answers, effort.judged),
                 jump: largest_jump(&answers[path.approach.saturating_sub(1)..]),
                 missed: missed(grid, path, &answers),
-                unsettled: part(answers.iter().map(|answer| !answer.settled)),
+                unconverged: part(answers.iter().map(|answer| !answer.converged)),
             }
         });
     rows.filter(|row| !is_bound(&row.label)).collect()
@@ -241,29 +248,24 @@ fn along(grid: &Grid, path: &Path, entries: &mut [Entry<'_>], effort: Effort) ->
 fn error(grid: &Grid, path: &Path, answers: &[Answer], judged: usize) -> Option<Error> {
     let every = answers.len().div_ceil(judged.max(1));
     let verdicts = path
-        .hands
+        .hips
         .iter()
         .zip(answers)
         .step_by(every)
         .filter(|(_, answer)| answer.touching)
-        .filter_map(|(hand, answer)| truth::judge(grid, hand, answer));
+        .filter_map(|(hip, answer)| truth::judge(grid, hip, answer));
     Error::of(&verdicts.collect::<Vec<_>>())
 }
 
 fn largest_jump(answers: &[Answer]) -> f64 {
-    let squared = |pair: &[Answer]| {
-        (0..3)
-            .map(|i| f64::from(pair[1].stretch[i]) - f64::from(pair[0].stretch[i]))
-            .map(|d| d * d)
-            .sum::<f64>()
-    };
-    answers.windows(2).map(squared).fold(0.0, f64::max).sqrt()
+    let changes = answers.windows(2).map(|pair| pair[0].change(&pair[1]));
+    changes.fold(0.0, f64::max)
 }
 
-/// The first hand is above the surface, so one below it should be felt.
+/// The first HIP is above the surface, so one below it should be felt.
 fn missed(grid: &Grid, path: &Path, answers: &[Answer]) -> f64 {
-    let below = path.hands.iter().zip(answers).filter(|(hand, _)| {
-        let [x, y, z] = hand.wide;
+    let below = path.hips.iter().zip(answers).filter(|(hip, _)| {
+        let [x, y, z] = hip.wide;
         grid.height(x, y) - z > 1e-3
     });
     part(below.map(|(_, answer)| !answer.touching))

@@ -64,7 +64,7 @@ impl Grid {
         let mut grid = Self::from_fn(&name.to_string_lossy(), size, |x, y| {
             if row_of.0 != y as u32 {
                 row_of.0 = y as u32;
-                raster.copy_row(first[1] + y as u32, first[0], &mut row_of.1);
+                raster.copy_row(0, first[1] + y as u32, first[0], &mut row_of.1);
             }
             let height = row_of.1[x];
             filled += u64::from(height.is_nan());

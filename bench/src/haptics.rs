@@ -10,7 +10,7 @@ use crate::clock::Stopwatch;
 
 /// One haptic interface point, ready for every variant's arithmetic.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hand {
+pub struct Hip {
     /// Cell and fraction.
     pub grid: GridPoint,
     /// The same point, exactly.
@@ -19,7 +19,7 @@ pub struct Hand {
     pub single: [f32; 3],
 }
 
-impl Hand {
+impl Hip {
     /// The point of the grid next to `[x, y, z]` in cells.
     #[must_use]
     pub fn at(point: [f64; 3]) -> Self {
@@ -41,28 +41,37 @@ impl Hand {
 pub struct Answer {
     /// Whether there is a force.
     pub touching: bool,
-    /// Whether all there was to do for this hand was done.
-    pub settled: bool,
-    /// From the hand to the proxy, cells.
-    pub stretch: [f32; 3],
+    /// Whether all there was to do for this HIP was done.
+    pub converged: bool,
+    /// From the HIP to the proxy, cells.
+    pub displacement: [f32; 3],
 }
 
 impl Answer {
     /// Nothing is felt.
     pub const FREE: Self = Self {
         touching: false,
-        settled: true,
-        stretch: [0.0; 3],
+        converged: true,
+        displacement: [0.0; 3],
     };
 
-    /// The proxy is `stretch` away from the hand.
+    /// The proxy is `displacement` away from the HIP.
     #[must_use]
-    pub const fn touching(stretch: [f32; 3]) -> Self {
+    pub const fn touching(displacement: [f32; 3]) -> Self {
         Self {
             touching: true,
-            settled: true,
-            stretch,
+            converged: true,
+            displacement,
         }
+    }
+}
+
+impl Answer {
+    /// From this displacement to another, cells.
+    #[must_use]
+    pub fn change(&self, other: &Self) -> f64 {
+        let off = |i: usize| f64::from(other.displacement[i]) - f64::from(self.displacement[i]);
+        (0..3).map(|i| off(i).powi(2)).sum::<f64>().sqrt()
     }
 }
 
@@ -72,21 +81,21 @@ pub trait Haptics {
     fn forget(&mut self);
 
     /// One tick.
-    fn tick(&mut self, hand: &Hand) -> Answer;
+    fn tick(&mut self, hip: &Hip) -> Answer;
 
     /// Time for a whole path, from nothing.
-    fn time(&mut self, path: &[Hand]) -> Duration {
+    fn time(&mut self, path: &[Hip]) -> Duration {
         self.forget();
         let watch = Stopwatch::start();
-        for hand in path {
-            black_box(self.tick(black_box(hand)));
+        for hip in path {
+            black_box(self.tick(black_box(hip)));
         }
         watch.elapsed()
     }
 
     /// What is felt along a path, from nothing.
-    fn answers(&mut self, path: &[Hand]) -> Vec<Answer> {
+    fn answers(&mut self, path: &[Hip]) -> Vec<Answer> {
         self.forget();
-        path.iter().map(|hand| self.tick(hand)).collect()
+        path.iter().map(|hip| self.tick(hip)).collect()
     }
 }

@@ -1,7 +1,7 @@
 //! Run time against error: hapterra's contact and honest opponents on the same
-//! terrain, under the same hand, in the same run.
+//! terrain, under the same HIP, in the same run.
 //!
-//! - [`grid`] and [`path`]: the terrains and the ways of the hand;
+//! - [`grid`] and [`path`]: the terrains and the paths of the HIP;
 //! - [`haptics`]: what every variant is asked and answers;
 //! - [`product`]: our own rules;
 //! - [`baseline`]: the opponents, none of which is in the product;

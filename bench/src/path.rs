@@ -1,17 +1,27 @@
-//! The ways of the hand: seeded, and placed by the surface they are over.
+//! The paths of the HIP: seeded, and placed by the surface they are over.
 
 use crate::grid::Grid;
-use crate::haptics::Hand;
+use crate::haptics::Hip;
 
-/// A hand's way over one terrain.
+/// A HIP's way over one terrain.
 #[derive(Clone, Debug)]
 pub struct Path {
     /// What it is called in tables.
     pub name: &'static str,
     /// One haptic interface point a tick; the first is above the surface.
-    pub hands: Vec<Hand>,
+    pub hips: Vec<Hip>,
     /// How many of them, at the beginning, come down from above the surface.
     pub approach: usize,
+}
+
+impl Path {
+    const fn new(name: &'static str, hips: Vec<Hip>, approach: usize) -> Self {
+        Self {
+            name,
+            hips,
+            approach,
+        }
+    }
 }
 
 /// Cells kept free at the border of the field.
@@ -44,31 +54,22 @@ pub fn all(grid: &Grid, ticks: usize) -> Vec<Path> {
 #[must_use]
 pub fn slide(grid: &Grid, name: &'static str, step: f64, ticks: usize) -> Path {
     let mut walk = Walk::new(grid, 11);
-    let mut hands = way_in(grid, walk.at, -0.1);
-    let approach = hands.len();
-    hands.extend((0..ticks).map(|_| over(grid, walk.on(grid, step), -0.1)));
-    Path {
-        name,
-        hands,
-        approach,
-    }
+    let mut hips = way_in(grid, walk.at, -0.1);
+    let approach = hips.len();
+    hips.extend((0..ticks).map(|_| over(grid, walk.on(grid, step), -0.1)));
+    Path::new(name, hips, approach)
 }
 
 /// Taps half a cell deep every hundred ticks, wandering slowly.
 #[must_use]
 pub fn tapping(grid: &Grid, ticks: usize) -> Path {
     let mut walk = Walk::new(grid, 12);
-    let mut hands = vec![over(grid, walk.at, 0.5)];
-    hands.extend((0..ticks).map(|tick| {
+    let mut hips = vec![over(grid, walk.at, 0.5)];
+    hips.extend((0..ticks).map(|tick| {
         let phase = tick as f64 * (std::f64::consts::TAU / 100.0);
         over(grid, walk.on(grid, 0.02), 0.5 * phase.cos())
     }));
-    let name = "tapping";
-    Path {
-        name,
-        hands,
-        approach: 0,
-    }
+    Path::new("tapping", hips, 0)
 }
 
 /// Jumps up to 0.3 cell every way, mostly near the surface.
@@ -76,8 +77,8 @@ pub fn tapping(grid: &Grid, ticks: usize) -> Path {
 pub fn random(grid: &Grid, ticks: usize) -> Path {
     let mut walk = Walk::new(grid, 13);
     let mut height = 0.5;
-    let mut hands = vec![over(grid, walk.at, height)];
-    hands.extend((0..ticks).map(|_| {
+    let mut hips = vec![over(grid, walk.at, height)];
+    hips.extend((0..ticks).map(|_| {
         walk.heading = walk.dice.between(0.0, std::f64::consts::TAU);
         let step = walk.dice.between(0.0, 0.3);
         height += walk.dice.between(-0.3, 0.3);
@@ -85,31 +86,21 @@ pub fn random(grid: &Grid, ticks: usize) -> Path {
         height -= 2.0 * (height - height.clamp(-1.0, 1.0));
         over(grid, walk.on(grid, step), height)
     }));
-    let name = "random";
-    Path {
-        name,
-        hands,
-        approach: 0,
-    }
+    Path::new("random", hips, 0)
 }
 
 /// Rests 0.1 cell below the surface and does not move by one bit.
 #[must_use]
 pub fn resting(grid: &Grid, ticks: usize) -> Path {
     let walk = Walk::new(grid, 14);
-    let mut hands = way_in(grid, walk.at, -0.1);
-    let approach = hands.len();
-    let last = hands[approach - 1];
-    hands.extend(std::iter::repeat_n(last, ticks));
-    let name = "unmoved";
-    Path {
-        name,
-        hands,
-        approach,
-    }
+    let mut hips = way_in(grid, walk.at, -0.1);
+    let approach = hips.len();
+    let last = hips[approach - 1];
+    hips.extend(std::iter::repeat_n(last, ticks));
+    Path::new("unmoved", hips, approach)
 }
 
-/// How high a hand flies.
+/// How high a HIP flies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flight {
     /// One cell above the surface under it.
@@ -123,19 +114,15 @@ pub enum Flight {
 pub fn flight(grid: &Grid, name: &'static str, flight: Flight, ticks: usize) -> Path {
     let mut walk = Walk::new(grid, 15);
     let high = f64::from(grid.top()) + 2.0;
-    let mut hands = Vec::with_capacity(ticks);
-    while hands.len() < ticks {
+    let mut hips = Vec::with_capacity(ticks);
+    while hips.len() < ticks {
         let at = walk.on(grid, 0.5);
-        hands.push(match flight {
+        hips.push(match flight {
             Flight::Low => over(grid, at, 1.0),
-            Flight::High => Hand::at([at[0], at[1], high]),
+            Flight::High => Hip::at([at[0], at[1], high]),
         });
     }
-    Path {
-        name,
-        hands,
-        approach: 0,
-    }
+    Path::new(name, hips, 0)
 }
 
 /// Sweeps of `length` cells in one tick each, there and back, half a cell
@@ -152,7 +139,7 @@ pub fn sweeps(grid: &Grid, name: &'static str, length: f64, ticks: usize) -> Opt
     let ways = ways.min(ticks / (2 * THERE_AND_BACK)).max(4);
     let mut dice = Dice(16);
     let sky = f64::from(grid.top()) + 2.0;
-    let mut hands = Vec::new();
+    let mut hips = Vec::new();
     for _ in 0..ways {
         let (from, to) = loop {
             let from = [
@@ -169,18 +156,14 @@ pub fn sweeps(grid: &Grid, name: &'static str, length: f64, ticks: usize) -> Opt
             }
         };
         let low = highest_between(grid, from, to) + 0.5;
-        hands.push(Hand::at([from[0], from[1], sky]));
+        hips.push(Hip::at([from[0], from[1], sky]));
         for _ in 0..THERE_AND_BACK {
-            hands.push(Hand::at([from[0], from[1], low]));
-            hands.push(Hand::at([to[0], to[1], low]));
+            hips.push(Hip::at([from[0], from[1], low]));
+            hips.push(Hip::at([to[0], to[1], low]));
         }
-        hands.push(Hand::at([to[0], to[1], sky]));
+        hips.push(Hip::at([to[0], to[1], sky]));
     }
-    Some(Path {
-        name,
-        hands,
-        approach: 0,
-    })
+    Some(Path::new(name, hips, 0))
 }
 
 /// The highest sample beside a straight way: an upper bound of the surface.
@@ -201,15 +184,15 @@ fn highest_between(grid: &Grid, from: [f64; 2], to: [f64; 2]) -> f64 {
 }
 
 /// From half a cell above down to `height`.
-pub(crate) fn way_in(grid: &Grid, at: [f64; 2], height: f64) -> Vec<Hand> {
+pub(crate) fn way_in(grid: &Grid, at: [f64; 2], height: f64) -> Vec<Hip> {
     (0..=10)
         .map(|i| over(grid, at, 0.5 + f64::from(i) / 10.0 * (height - 0.5)))
         .collect()
 }
 
 /// So far above the surface at a place.
-pub(crate) fn over(grid: &Grid, [x, y]: [f64; 2], height: f64) -> Hand {
-    Hand::at([x, y, grid.height(x, y) + height])
+pub(crate) fn over(grid: &Grid, [x, y]: [f64; 2], height: f64) -> Hip {
+    Hip::at([x, y, grid.height(x, y) + height])
 }
 
 fn inside(grid: &Grid, [x, y]: [f64; 2]) -> bool {

@@ -1,10 +1,10 @@
 //! The product's own contact over a window that holds the whole field.
 
-use hapterra_core::contact::{Contact, Pace, Rule, State};
-use hapterra_core::terrain::{TILE_CELLS, Tile, TileKey, Window};
+use hapterra_core::contact::{Contact, ContactSettings, ContactState, Rule};
+use hapterra_core::terrain::{FieldSize, TILE_CELLS, Tile, TileKey, Window};
 
 use crate::grid::Grid;
-use crate::haptics::{Answer, Hand, Haptics};
+use crate::haptics::{Answer, Haptics, Hip};
 
 /// Tiles along the window's side: enough for [`crate::grid::LARGEST_SIDE`], so
 /// that no variant ever waits for terrain.
@@ -16,6 +16,25 @@ pub fn buffers<const D: usize>() -> Vec<Tile> {
     vec![Tile::VACANT; D * D + 1]
 }
 
+/// A window over `grid` that holds nothing yet, and a buffer to fill first.
+///
+/// # Panics
+/// When there are fewer buffers than [`buffers`] makes.
+#[must_use]
+pub fn empty<'t, const D: usize>(
+    grid: &Grid,
+    buffers: &'t mut [Tile],
+) -> (Box<Window<'t, D>>, &'t mut Tile) {
+    let mut buffers = buffers.iter_mut();
+    let mut next = || buffers.next().expect("a buffer for every slot");
+    let spare = next();
+    let slots = std::array::from_fn(|_| std::array::from_fn(|_| next()));
+    let mut window = Box::new(Window::new(slots));
+    let size = FieldSize::new(grid.columns as i32, grid.rows as i32);
+    window.reset(0, size, grid.top().floor() as i32 + 1);
+    (window, spare)
+}
+
 /// A window that holds all of `grid`.
 ///
 /// # Panics
@@ -23,21 +42,10 @@ pub fn buffers<const D: usize>() -> Vec<Tile> {
 /// large.
 #[must_use]
 pub fn window<'t, const D: usize>(grid: &Grid, buffers: &'t mut [Tile]) -> Box<Window<'t, D>> {
-    let mut buffers = buffers.iter_mut();
-    let mut next = || buffers.next().expect("a buffer for every slot");
-    let mut spare = next();
-    let mut window = Box::new(Window::new(std::array::from_fn(|_| {
-        std::array::from_fn(|_| next())
-    })));
-    let size = [grid.columns as i32, grid.rows as i32];
-    window.reset(0, size, grid.top().floor() as i32 + 1);
+    let (mut window, mut spare) = empty(grid, buffers);
     for row in 0..grid.rows.div_ceil(TILE_CELLS) {
         for col in 0..grid.columns.div_ceil(TILE_CELLS) {
-            let key = TileKey {
-                level: 0,
-                col: col as i32,
-                row: row as i32,
-            };
+            let key = TileKey::new(0, col as i32, row as i32);
             fill(grid, key, spare);
             spare = window.install(spare);
             assert!(spare.key().is_none(), "the field fits the window");
@@ -51,7 +59,8 @@ pub fn window<'t, const D: usize>(grid: &Grid, buffers: &'t mut [Tile]) -> Box<W
 /// # Panics
 /// When the tile lies west or south of the field.
 pub fn fill(grid: &Grid, key: TileKey, tile: &mut Tile) {
-    let [col, row] = [key.col, key.row].map(|n| usize::try_from(n).expect("in the field"));
+    let [col, row] =
+        [key.index.col, key.index.row].map(|n| usize::try_from(n).expect("in the field"));
     let height = |x: usize, y: usize| {
         let (x, y) = (col * TILE_CELLS + x, row * TILE_CELLS + y);
         if x > grid.columns || y > grid.rows {
@@ -60,6 +69,10 @@ pub fn fill(grid: &Grid, key: TileKey, tile: &mut Tile) {
         grid.post(x, y)
     };
     tile.fill(key, 0, height).expect("base 0 is in range");
+}
+
+fn contact(rule: Rule) -> Contact {
+    Contact::new(ContactSettings::REAL_TIME.with_rule(rule))
 }
 
 /// One of the product's rules.
@@ -75,7 +88,7 @@ impl<'w, 't, const D: usize> Product<'w, 't, D> {
     pub fn new(window: &'w Window<'t, D>, rule: Rule) -> Self {
         Self {
             window,
-            contact: Contact::new(),
+            contact: contact(rule),
             rule,
         }
     }
@@ -83,49 +96,45 @@ impl<'w, 't, const D: usize> Product<'w, 't, D> {
 
 impl<const D: usize> Haptics for Product<'_, '_, D> {
     fn forget(&mut self) {
-        self.contact = Contact::new();
+        self.contact = contact(self.rule);
     }
 
     #[inline]
-    fn tick(&mut self, hand: &Hand) -> Answer {
-        let felt = self
-            .contact
-            .step(self.window, &hand.grid, self.rule, Pace::RealTime);
+    fn tick(&mut self, hip: &Hip) -> Answer {
+        let felt = self.contact.step(self.window, &hip.grid);
         Answer {
-            touching: felt.state == State::Touching,
-            settled: felt.settled,
-            stretch: felt.stretch.to_array(),
+            touching: felt.state == ContactState::Touching,
+            converged: felt.converged,
+            displacement: felt.displacement.to_array(),
         }
     }
 
     /// To be judged: the proxy itself, before any fading.
-    fn answers(&mut self, path: &[Hand]) -> Vec<Answer> {
+    fn answers(&mut self, path: &[Hip]) -> Vec<Answer> {
         self.forget();
-        let feel = |hand: &Hand| {
-            let felt = self
-                .contact
-                .step(self.window, &hand.grid, self.rule, Pace::RealTime);
-            let touching = felt.state == State::Touching;
-            let stretch = if touching {
-                hand.grid.to(&felt.proxy)
+        let feel = |hip: &Hip| {
+            let felt = self.contact.step(self.window, &hip.grid);
+            let touching = felt.state == ContactState::Touching;
+            let displacement = if touching {
+                hip.grid.to(&felt.proxy)
             } else {
-                felt.stretch
+                felt.displacement
             };
             Answer {
                 touching,
-                settled: felt.settled,
-                stretch: stretch.to_array(),
+                converged: felt.converged,
+                displacement: displacement.to_array(),
             }
         };
         path.iter().map(feel).collect()
     }
 }
 
-/// The least that a tick can do: see that the hand has not moved, and give the
-/// last answer again. Right for a hand that rests and for nothing else.
+/// The least that a tick can do: see that the HIP has not moved, and give the
+/// last answer again. Right for a HIP that rests and for nothing else.
 #[derive(Default)]
 pub struct Copy {
-    last: Option<(Hand, Answer)>,
+    last: Option<(Hip, Answer)>,
 }
 
 impl Haptics for Copy {
@@ -134,11 +143,11 @@ impl Haptics for Copy {
     }
 
     #[inline]
-    fn tick(&mut self, hand: &Hand) -> Answer {
+    fn tick(&mut self, hip: &Hip) -> Answer {
         match &self.last {
-            Some((known, answer)) if known.grid == hand.grid => *answer,
+            Some((known, answer)) if known.grid == hip.grid => *answer,
             _ => {
-                self.last = Some((*hand, Answer::touching([0.0, 0.0, 0.1])));
+                self.last = Some((*hip, Answer::touching([0.0, 0.0, 0.1])));
                 Answer::FREE
             }
         }

@@ -1,21 +1,21 @@
-//! What a tick can be doing: one way of the hand for each state, in which the
+//! What a tick can be doing: one path of the HIP for each state, in which the
 //! ticks of that state are marked.
 
 use crate::grid::Grid;
-use crate::haptics::Hand;
+use crate::haptics::Hip;
 use crate::path::{self, Flight, Path};
 
 /// Ticks of a state that are counted.
 pub const TICKS: usize = 2000;
 
-/// A state's name and its way of the hand.
+/// A state's name and its path of the HIP.
 pub type Make = fn(&Grid) -> Vec<Step>;
 
-/// One tick: the hand, and whether the tick is one of the state's own.
+/// One tick: the HIP, and whether the tick is one of the state's own.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
-    /// Where the hand is.
-    pub hand: Hand,
+    /// Where the HIP is.
+    pub hip: Hip,
     /// Whether it counts.
     pub counts: bool,
 }
@@ -48,38 +48,38 @@ pub fn terrain() -> Grid {
 
 /// The last [`TICKS`] of a path count.
 fn last(path: Path) -> Vec<Step> {
-    let uncounted = path.hands.len().saturating_sub(TICKS).max(1);
-    let step = |(tick, hand): (usize, &Hand)| Step {
-        hand: *hand,
+    let uncounted = path.hips.len().saturating_sub(TICKS).max(1);
+    let step = |(tick, hip): (usize, &Hip)| Step {
+        hip: *hip,
         counts: tick >= uncounted,
     };
-    path.hands.iter().enumerate().map(step).collect()
+    path.hips.iter().enumerate().map(step).collect()
 }
 
 /// Up and down through the surface; going down counts.
 fn first_contact(grid: &Grid) -> Vec<Step> {
-    let above = path::slide(grid, "", 0.03, TICKS).hands;
-    let step = |hand: &Hand| {
-        let [x, y, _] = hand.wide;
-        let at = |height| Hand::at([x, y, grid.height(x, y) + height]);
+    let above = path::slide(grid, "", 0.03, TICKS).hips;
+    let step = |hip: &Hip| {
+        let [x, y, _] = hip.wide;
+        let at = |height| Hip::at([x, y, grid.height(x, y) + height]);
         let (free, touching) = (at(0.2), at(-0.1));
-        [(free, false), (touching, true)].map(|(hand, counts)| Step { hand, counts })
+        [(free, false), (touching, true)].map(|(hip, counts)| Step { hip, counts })
     };
     above[above.len() - TICKS..].iter().flat_map(step).collect()
 }
 
-/// Pressed on one spot, the hand trembles by one encoder count of 0.03 mm, with
+/// Pressed on one spot, the HIP trembles by one encoder count of 0.03 mm, with
 /// cells of 1 mm.
 fn resting(grid: &Grid) -> Vec<Step> {
     const COUNT: f64 = 0.03;
     let mut steps = last(path::resting(grid, TICKS));
     let mut dice = path::Dice(31);
     for step in steps.iter_mut().filter(|step| step.counts) {
-        let tremble = step.hand.wide.map(|x| {
+        let tremble = step.hip.wide.map(|x| {
             let counts = dice.between(-1.5, 1.5).round();
             x + counts * COUNT
         });
-        step.hand = Hand::at(tremble);
+        step.hip = Hip::at(tremble);
     }
     steps
 }

@@ -18,6 +18,14 @@ pub(crate) fn interleave(
     measured
 }
 
+/// The quartiles of what was measured, and the median over the rounds of its ratio
+/// to another's.
+pub(crate) fn timing(own: &[f64], other: &[f64]) -> ([f64; 3], f64) {
+    let ratios = own.iter().zip(other).map(|(own, other)| own / other);
+    let [ratio] = quantiles(ratios.collect(), [0.5]);
+    (quantiles(own.to_vec(), [0.25, 0.5, 0.75]), ratio)
+}
+
 /// Which part of the answers is yes.
 pub(crate) fn part(of: impl Iterator<Item = bool>) -> f64 {
     let (mut yes, mut all) = (0_u32, 0_u32);

@@ -7,7 +7,7 @@
 use std::hint::black_box;
 use std::process::ExitCode;
 
-use hapterra_bench::haptics::{Answer, Hand, Haptics};
+use hapterra_bench::haptics::{Answer, Haptics, Hip};
 use hapterra_bench::product::{self, Product};
 use hapterra_bench::state::{STATES, terrain};
 use hapterra_core::contact::Rule;
@@ -29,10 +29,10 @@ fn main() -> ExitCode {
     let mut ticks = 0;
     for step in make(&grid) {
         if step.counts {
-            black_box(counted_tick(&mut product, &step.hand));
+            black_box(counted_tick(&mut product, &step.hip));
             ticks += 1;
         } else {
-            black_box(product.tick(&step.hand));
+            black_box(product.tick(&step.hip));
         }
     }
     println!("{ticks}");
@@ -41,6 +41,6 @@ fn main() -> ExitCode {
 
 /// The name by which the counter knows when to count.
 #[inline(never)]
-fn counted_tick(product: &mut Product<'_, '_, SIDE>, hand: &Hand) -> Answer {
-    product.tick(hand)
+fn counted_tick(product: &mut Product<'_, '_, SIDE>, hip: &Hip) -> Answer {
+    product.tick(hip)
 }

@@ -43,7 +43,7 @@ fn kept() -> Vec<Row> {
                 error,
                 jump: number(13),
                 missed: number(14),
-                unsettled: number(15),
+                unconverged: number(15),
             }
         })
         .collect()

@@ -1,5 +1,5 @@
-//! The emulated Cortex-M4F as a counter of instructions: a walk goes in, and
-//! what each tick cost and felt comes out.
+//! The emulated Cortex-M4F as a counter of instructions: scenes go in, and what
+//! each tick cost and answered comes out.
 //!
 //! The image is `firmware/boards/mps2-an386-counts`. `cargo xtask test` and
 //! `cargo xtask counts` build it and name it.
@@ -12,9 +12,10 @@ use std::process::{Command, Stdio};
 use hapterra_core::Vec3;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Sense;
-use hapterra_core::terrain::{POSTS, TILE_CELLS, TileKey};
+use hapterra_core::scene::{Point, Scene};
+use hapterra_core::terrain::{FieldSize, POSTS, TileKey};
 use hapterra_core::wire::frame::{MAX_FRAME, encode};
-use hapterra_core::wire::message::{Heights, Point, Scene, TileMessage, ToDevice};
+use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::plant::Sensed;
 use serde::Serialize;
 
@@ -37,25 +38,43 @@ pub struct CountingBoard {
     image: PathBuf,
 }
 
-/// What happens on a walk.
+/// What happens in a replay.
 #[derive(Clone, Copy, Debug)]
 pub enum Event {
     /// A tile arrives.
     Tile(TileKey),
-    /// A tick with the hand here.
-    Hand(GridPoint),
+    /// A tick with the HIP here.
+    Hip(GridPoint),
 }
 
-/// What one tick cost and felt.
+/// A field that the host cuts into tiles.
+pub trait Samples {
+    /// The height of a sample of the field in cells, by column and row; NaN is a
+    /// hole.
+    fn sample(&self, column: i32, row: i32) -> f32;
+}
+
+/// A scene for the contact alone: tiles and HIPs in the order they come.
+#[derive(Clone, Copy)]
+pub struct Replay<'a> {
+    /// As the device is told of it.
+    pub scene: &'a Scene,
+    /// Where the tiles are cut from.
+    pub field: &'a dyn Samples,
+    /// What happens.
+    pub events: &'a [Event],
+}
+
+/// What one tick cost and answered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counted {
     /// Instructions, the call and the return included.
     pub instructions: u32,
-    /// The number of its [`hapterra_core::contact::State`].
+    /// The number of its [`hapterra_core::contact::ContactState`].
     pub state: u32,
     /// Whether all there was to do was done; fed by encoders, whether the
     /// amplifiers are on.
-    pub settled: bool,
+    pub converged: bool,
     /// Units of work.
     pub work: u32,
     /// Stretch in cells; fed by encoders, force in newtons.
@@ -76,22 +95,29 @@ impl CountingBoard {
         Some(Self { qemu, image })
     }
 
-    /// Steps of the contact alone over a field whose samples are `height` cells
-    /// above `base`; NaN is a hole.
+    /// Steps the contact alone, in real time, through one replay after the other;
+    /// gives the ticks of each.
     ///
     /// # Panics
     /// When the emulated program fails.
     #[must_use]
-    pub fn contact(
-        &self,
-        scene: &Scene,
-        base: i32,
-        height: &dyn Fn(i32, i32) -> f32,
-        events: &[Event],
-    ) -> Vec<Counted> {
+    pub fn contact(&self, replays: &[Replay<'_>]) -> Vec<Vec<Counted>> {
         let folder = tempfile::tempdir().expect("a folder");
-        write_walk(folder.path(), scene, base, height, events);
-        self.run(folder.path())
+        write_replays(folder.path(), replays);
+        let mut ticks = self.run(folder.path()).into_iter();
+        let is_tick = |event: &&Event| matches!(event, Event::Hip(_));
+        let lengths = replays
+            .iter()
+            .map(|replay| replay.events.iter().filter(is_tick).count());
+        let each: Vec<Vec<Counted>> = lengths
+            .map(|length| {
+                let own: Vec<Counted> = ticks.by_ref().take(length).collect();
+                assert_eq!(own.len(), length, "a record of every tick");
+                own
+            })
+            .collect();
+        assert_eq!(ticks.next(), None, "no record of more ticks");
+        each
     }
 
     /// Whole ticks, count to current; every tile is held before the first, and
@@ -100,15 +126,15 @@ impl CountingBoard {
     /// # Panics
     /// When the emulated program fails.
     #[must_use]
-    pub fn chain(
-        &self,
-        scene: &Scene,
-        height: &dyn Fn(i32, i32) -> f32,
-        counts: &[[i32; 3]],
-    ) -> Vec<Counted> {
+    pub fn chain(&self, scene: &Scene, field: &dyn Samples, counts: &[[i32; 3]]) -> Vec<Counted> {
         let folder = tempfile::tempdir().expect("a folder");
         let tiles: Vec<Event> = tiles(scene.size).map(Event::Tile).collect();
-        write_walk(folder.path(), scene, 0, height, &tiles);
+        let held = Replay {
+            scene,
+            field,
+            events: &tiles,
+        };
+        write_replays(folder.path(), &[held]);
         let mut frames = Frames::create(&folder.path().join("counts.frames"));
         for (tick, counts) in (0..).zip(counts) {
             let sense = Sense {
@@ -146,10 +172,9 @@ impl CountingBoard {
 }
 
 /// The keys of all tiles of a field.
-pub fn tiles([columns, rows]: [i32; 2]) -> impl Iterator<Item = TileKey> {
-    let last = |patches: i32| (patches - 1) / TILE_CELLS as i32;
-    (0..=last(rows))
-        .flat_map(move |row| (0..=last(columns)).map(move |col| TileKey { level: 0, col, row }))
+pub fn tiles(size: FieldSize) -> impl Iterator<Item = TileKey> {
+    let last = size.last_tile();
+    (0..=last.row).flat_map(move |row| (0..=last.col).map(move |col| TileKey::new(0, col, row)))
 }
 
 fn counted(words: &[u32]) -> Counted {
@@ -160,50 +185,46 @@ fn counted(words: &[u32]) -> Counted {
     Counted {
         instructions: (nanoseconds as f64 / f64::from(1 << SHIFT)).round() as u32,
         state: words[1],
-        settled: words[2] != 0,
+        converged: words[2] != 0,
         work: words[3],
         vector: vector(4),
         proxy: GridPoint::new(cell, vector(10)),
     }
 }
 
-fn write_walk(
-    folder: &Path,
-    scene: &Scene,
-    base: i32,
-    height: &dyn Fn(i32, i32) -> f32,
-    events: &[Event],
-) {
-    let mut frames = Frames::create(&folder.join("walk.frames"));
-    frames.add(&ToDevice::Scene(*scene));
-    for (seq, event) in (0..).zip(events) {
-        match event {
-            Event::Hand(hip) => frames.add(&ToDevice::Point(Point { seq, hip: *hip })),
-            Event::Tile(key) => {
-                let bytes = tile_bytes(scene.size, *key, height);
-                let bytes = &bytes[..];
-                frames.add(&ToDevice::Tile(TileMessage {
-                    epoch: scene.epoch,
-                    key: *key,
-                    heights: Heights::Samples { base, bytes },
-                }));
+fn write_replays(folder: &Path, replays: &[Replay<'_>]) {
+    let mut frames = Frames::create(&folder.join("replay.frames"));
+    for replay in replays {
+        frames.add(&ToDevice::Scene(*replay.scene));
+        for (seq, event) in (0..).zip(replay.events) {
+            match event {
+                Event::Hip(hip) => frames.add(&ToDevice::Point(Point { seq, hip: *hip })),
+                Event::Tile(key) => {
+                    let bytes = tile_bytes(replay.scene.size, *key, replay.field);
+                    let heights = Heights::Samples {
+                        base: 0,
+                        bytes: &bytes,
+                    };
+                    frames.add(&ToDevice::Tile(TileMessage {
+                        epoch: replay.scene.epoch,
+                        key: *key,
+                        heights,
+                    }));
+                }
             }
         }
     }
     frames.close();
 }
 
-fn tile_bytes(size: [i32; 2], key: TileKey, height: &dyn Fn(i32, i32) -> f32) -> Vec<u8> {
-    let side = TILE_CELLS as i32;
+fn tile_bytes(size: FieldSize, key: TileKey, field: &dyn Samples) -> Vec<u8> {
+    let first = key.index.first_cell();
     let post = |i: usize| {
-        let (x, y) = (
-            key.col * side + (i % POSTS) as i32,
-            key.row * side + (i / POSTS) as i32,
-        );
-        if x > size[0] || y > size[1] {
+        let (x, y) = (first.x + (i % POSTS) as i32, first.y + (i / POSTS) as i32);
+        if x > size.columns || y > size.rows {
             f32::NAN
         } else {
-            height(x, y)
+            field.sample(x, y)
         }
     };
     (0..POSTS * POSTS)

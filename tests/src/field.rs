@@ -1,21 +1,20 @@
 //! A field of patches held whole by the product's own window.
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::{Contact, Felt, Pace, Rule};
+use hapterra_core::contact::{Contact, ContactOutput, ContactSettings, Rule};
 use hapterra_core::grid::GridPoint;
-use hapterra_core::terrain::{TILE_CELLS, Tile, TileKey, Window};
+use hapterra_core::terrain::{FieldSize, TILE_CELLS, Tile, TileKey, Window};
 
 /// Tiles along the side of the window: fields up to 256 × 256 patches.
 const SIDE: usize = 8;
 
 /// A proxy over a field given by a function of the sample.
-pub struct Felted {
+pub struct FieldContact {
     window: Window<'static, SIDE>,
     contact: Contact,
-    rule: Rule,
 }
 
-impl Felted {
+impl FieldContact {
     /// `size × size` patches; NaN is a hole.
     ///
     /// # Panics
@@ -24,7 +23,7 @@ impl Felted {
     pub fn new(size: i32, rule: Rule, height: impl Fn(i32, i32) -> f32) -> Self {
         let tile = || -> &'static mut Tile { Box::leak(Box::new(Tile::VACANT)) };
         let mut window = Window::new(std::array::from_fn(|_| std::array::from_fn(|_| tile())));
-        window.reset(0, [size, size], 1 << 28);
+        window.reset(0, FieldSize::new(size, size), 1 << 28);
         let cells = TILE_CELLS as i32;
         let tiles = (size + cells - 1) / cells;
         assert!(tiles <= SIDE as i32, "the field is larger than the window");
@@ -32,7 +31,7 @@ impl Felted {
             let filled = tile();
             let sample = |c: usize, r: usize| (col * cells + c as i32, row * cells + r as i32);
             filled
-                .fill(TileKey { level: 0, col, row }, 0, |c, r| {
+                .fill(TileKey::new(0, col, row), 0, |c, r| {
                     let (x, y) = sample(c, r);
                     if x > size || y > size {
                         f32::NAN
@@ -45,22 +44,19 @@ impl Felted {
         }
         Self {
             window,
-            contact: Contact::new(),
-            rule,
+            contact: Contact::new(ContactSettings::LOCK_STEP.with_rule(rule)),
         }
     }
 
-    /// Moves the hand and answers when all there is to do for it is done.
+    /// Moves the HIP and answers when all there is to do for it is done.
     ///
     /// # Panics
     /// When that takes more than 10,000 ticks.
-    pub fn feel(&mut self, hip: [f64; 3]) -> Felt {
+    pub fn feel(&mut self, hip: [f64; 3]) -> ContactOutput {
         let hip = point(hip);
         for _ in 0..10_000 {
-            let felt = *self
-                .contact
-                .step(&self.window, &hip, self.rule, Pace::LockStep);
-            if felt.settled {
+            let felt = *self.contact.step(&self.window, &hip);
+            if felt.converged {
                 return felt;
             }
         }

@@ -9,6 +9,7 @@ pub mod counting;
 pub mod emulation;
 pub mod faulty;
 pub mod field;
+pub mod figures;
 pub mod fuzzing;
 pub mod invariants;
 pub mod minima;
@@ -17,7 +18,6 @@ pub mod scene;
 pub mod soak;
 pub mod usb;
 pub mod walk;
-pub mod wild;
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;

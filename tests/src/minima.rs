@@ -17,10 +17,10 @@ const NEAR: f64 = 1e-3;
 /// Slopes of the distance along a border's other side that count as none.
 const LEVEL: f64 = 1e-9;
 
-/// The local closest points to `hand` in the patches around a place: in the
+/// The local closest points to `hip` in the patches around a place: in the
 /// patch it is in, and in those whose border it is near.
 #[must_use]
-pub fn around(terrain: &Terrain, hand: [f64; 3], place: [f64; 2]) -> Vec<[f64; 3]> {
+pub fn around(terrain: &Terrain, hip: [f64; 3], place: [f64; 2]) -> Vec<[f64; 3]> {
     let cells = |x: f64| {
         let (low, high) = ((x - NEAR).floor() as i32, (x + NEAR).floor() as i32);
         low..=high
@@ -30,9 +30,9 @@ pub fn around(terrain: &Terrain, hand: [f64; 3], place: [f64; 2]) -> Vec<[f64; 3
         .filter_map(|cell| Patch::at(terrain, cell));
     patches
         .flat_map(|patch| {
-            let all = in_patch(&patch, hand, place);
+            let all = in_patch(&patch, hip, place);
             all.into_iter()
-                .filter(move |at| is_lowest_around(terrain, hand, &patch, *at))
+                .filter(move |at| is_lowest_around(terrain, hip, &patch, *at))
                 .map(move |[x, y]| [x, y, patch.height(x, y)])
         })
         .collect()
@@ -45,7 +45,7 @@ pub fn nearest(all: &[[f64; 3]], point: [f64; 3]) -> Option<([f64; 3], f64)> {
     with.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-fn in_patch(patch: &Patch, hand: [f64; 3], place: [f64; 2]) -> Vec<[f64; 2]> {
+fn in_patch(patch: &Patch, hip: [f64; 3], place: [f64; 2]) -> Vec<[f64; 2]> {
     let low = patch.cell.map(f64::from);
     // The steeper direction is the one in closed form.
     let steepest = |axis: usize| {
@@ -56,7 +56,7 @@ fn in_patch(patch: &Patch, hand: [f64; 3], place: [f64; 2]) -> Vec<[f64; 2]> {
     let axis = usize::from(steepest(1) > steepest(0));
     let ruled = Ruled {
         patch,
-        hand,
+        hip,
         axis,
         low,
     };
@@ -80,7 +80,7 @@ fn in_patch(patch: &Patch, hand: [f64; 3], place: [f64; 2]) -> Vec<[f64; 2]> {
 /// A patch by its rulings along `axis`, each at a `t` of the other one.
 struct Ruled<'p> {
     patch: &'p Patch,
-    hand: [f64; 3],
+    hip: [f64; 3],
     axis: usize,
     low: [f64; 2],
 }
@@ -90,8 +90,8 @@ impl Ruled<'_> {
     fn best(&self, t: f64) -> f64 {
         let [x, y] = self.at(0.0, t);
         let slope = self.patch.slopes(x, y)[self.axis];
-        let rise = self.patch.height(x, y) - self.hand[2];
-        let ahead = self.hand[self.axis] - self.low[self.axis];
+        let rise = self.patch.height(x, y) - self.hip[2];
+        let ahead = self.hip[self.axis] - self.low[self.axis];
         ((ahead - rise * slope) / (1.0 + slope * slope)).clamp(0.0, 1.0)
     }
 
@@ -108,8 +108,8 @@ impl Ruled<'_> {
     fn slope(&self, t: f64) -> f64 {
         let [x, y] = self.point(t);
         let other = 1 - self.axis;
-        let aside = [x, y][other] - self.hand[other];
-        aside + (self.patch.height(x, y) - self.hand[2]) * self.patch.slopes(x, y)[other]
+        let aside = [x, y][other] - self.hip[other];
+        aside + (self.patch.height(x, y) - self.hip[2]) * self.patch.slopes(x, y)[other]
     }
 
     /// Everywhere, and closely around where F may turn.
@@ -117,15 +117,15 @@ impl Ruled<'_> {
         let [x0, y0] = self.at(0.0, 0.0);
         let [x1, y1] = self.at(0.0, 1.0);
         let slopes = [(x0, y0), (x1, y1)].map(|(x, y)| self.patch.slopes(x, y)[self.axis]);
-        // The gap between surface and hand along the ruling through the hand.
-        let ahead = self.hand[self.axis] - self.low[self.axis];
+        // The gap between surface and HIP along the ruling through the HIP.
+        let ahead = self.hip[self.axis] - self.low[self.axis];
         let gaps = [0.0, 1.0].map(|t| {
             let [x, y] = self.at(0.0, t);
             let slope = self.patch.slopes(x, y)[self.axis];
-            self.patch.height(x, y) + slope * ahead - self.hand[2]
+            self.patch.height(x, y) + slope * ahead - self.hip[2]
         });
         let zero = |[a, b]: [f64; 2]| a / (a - b);
-        let across = self.hand[1 - self.axis] - self.low[1 - self.axis];
+        let across = self.hip[1 - self.axis] - self.low[1 - self.axis];
         let centres = [around, across, zero(slopes), zero(gaps), 0.0, 1.0];
         let mut places: Vec<f64> = (0..=STEPS)
             .map(|i| f64::from(i) / f64::from(STEPS))
@@ -159,7 +159,7 @@ impl Ruled<'_> {
 }
 
 /// Whether no patch that shares the place leads on downhill from it.
-fn is_lowest_around(terrain: &Terrain, hand: [f64; 3], own: &Patch, at: [f64; 2]) -> bool {
+fn is_lowest_around(terrain: &Terrain, hip: [f64; 3], own: &Patch, at: [f64; 2]) -> bool {
     let side = |axis: usize| {
         let local = at[axis] - f64::from(own.cell[axis]);
         i32::from(local == 1.0) - i32::from(local == 0.0)
@@ -173,14 +173,14 @@ fn is_lowest_around(terrain: &Terrain, hand: [f64; 3], own: &Patch, at: [f64; 2]
             let cell = [own.cell[0] + way[0], own.cell[1] + way[1]];
             Some((way, Patch::at(terrain, cell)?))
         })
-        .all(|(way, patch)| !leads_down(&patch, hand, at, way))
+        .all(|(way, patch)| !leads_down(&patch, hip, at, way))
 }
 
 /// Whether the distance falls from a place on a patch's border into it.
-fn leads_down(patch: &Patch, hand: [f64; 3], [x, y]: [f64; 2], way: [i32; 2]) -> bool {
-    let rise = patch.height(x, y) - hand[2];
+fn leads_down(patch: &Patch, hip: [f64; 3], [x, y]: [f64; 2], way: [i32; 2]) -> bool {
+    let rise = patch.height(x, y) - hip[2];
     let [east, north] = patch.slopes(x, y);
-    let slopes = [(x - hand[0]) + rise * east, (y - hand[1]) + rise * north];
+    let slopes = [(x - hip[0]) + rise * east, (y - hip[1]) + rise * north];
     let steep = [east, north].map(|m| LEVEL * (1.0 + m.abs()) * (1.0 + rise.abs()));
     (0..2).any(|axis| way[axis] != 0 && slopes[axis] * f64::from(way[axis]) < -steep[axis])
 }
@@ -193,11 +193,11 @@ mod tests {
     #[test]
     fn both_sides_of_a_ridge_and_the_bottom_of_a_valley() {
         let ridge = Terrain::from_fn(Kind::Ridges, [8, 8], |x, _| -((x - 4).abs() as f32));
-        let hand = [4.0, 3.5, -0.001];
-        let all = around(&ridge, hand, [4.0, 3.5]);
+        let hip = [4.0, 3.5, -0.001];
+        let all = around(&ridge, hip, [4.0, 3.5]);
         assert_eq!(all.len(), 2, "{all:?}");
         let valley = Terrain::from_fn(Kind::Ridges, [8, 8], |x, _| (x - 4).abs() as f32);
-        let all = around(&valley, hand, [4.0, 3.5]);
+        let all = around(&valley, hip, [4.0, 3.5]);
         assert!(
             !all.is_empty() && all.iter().all(|at| *at == [4.0, 3.5, 0.0]),
             "{all:?}"

@@ -48,15 +48,15 @@ impl<'h> Oracle<'h> {
     }
 
     /// By how much a point of the surface within `reach` of `from` is closer
-    /// to the hand than the surface at `from` is: zero at a local closest point
+    /// to the HIP than the surface at `from` is: zero at a local closest point
     /// if `reach` is short of the next one.
     ///
     /// Dense search in circles of shrinking radius.
     #[must_use]
-    pub fn closer_nearby(&self, hand: [f64; 3], from: [f64; 2], reach: f64) -> f64 {
+    pub fn closer_nearby(&self, hip: [f64; 3], from: [f64; 2], reach: f64) -> f64 {
         let distance = |x: f64, y: f64| {
             self.surface(x, y).map_or(f64::INFINITY, |z| {
-                ((x - hand[0]).powi(2) + (y - hand[1]).powi(2) + (z - hand[2]).powi(2)).sqrt()
+                ((x - hip[0]).powi(2) + (y - hip[1]).powi(2) + (z - hip[2]).powi(2)).sqrt()
             })
         };
         let here = distance(from[0], from[1]);

@@ -1,10 +1,10 @@
-//! Hands on the loose: trajectories that wander about a surface.
+//! Random trajectories that wander about a surface.
 
 use hapterra::terrain::Terrain;
 
 use crate::chance::Chance;
 
-/// Random steps over a terrain in hand millimetres, mostly near the surface:
+/// Random steps over a terrain in millimetres, mostly near the surface:
 /// pressing, sliding, jumping, lifting, holding still. Starts above everything.
 #[must_use]
 pub fn wander(terrain: &Terrain<'_>, seed: u64, rows: usize, margin_cells: f64) -> Vec<[f64; 3]> {

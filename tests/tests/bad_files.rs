@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use hapterra::raster::{Fault, OpenOptions, Raster};
+use hapterra::raster::{BadRaster, OpenOptions, Raster};
 use hapterra_tests::{hapterra_binary, shared};
 
 /// Address space a child may use. The program itself takes some 100 MB of it.
@@ -131,12 +131,12 @@ fn what_is_no_terrain_file_at_all_is_said_to_be_that() {
     let missing = Raster::open(folder.join("missing.tif"), &OpenOptions::default());
     assert!(matches!(
         missing.expect_err("missing").fault(),
-        Fault::Unreadable(_)
+        BadRaster::Unreadable(_)
     ));
     let itself = Raster::open(&folder, &OpenOptions::default());
     assert!(matches!(
         itself.expect_err("a folder").fault(),
-        Fault::Unreadable(_)
+        BadRaster::Unreadable(_)
     ));
     std::fs::remove_dir_all(&folder).expect("the tries are removed");
 }
@@ -223,7 +223,8 @@ fn damaged_copies_of_good_files_never_panic() {
                 match Raster::open(&copy, &OpenOptions::default()) {
                     Ok(_) => opened += 1,
                     Err(error) => {
-                        panicked += usize::from(matches!(error.fault(), Fault::DecoderFailed(_)));
+                        panicked +=
+                            usize::from(matches!(error.fault(), BadRaster::DecoderFailed(_)));
                     }
                 }
             }

@@ -5,7 +5,7 @@ use hapterra::phantom::{Encoder, PhantomModel, kinematics};
 use hapterra_core::Vec3;
 use hapterra_core::guard::{Drive, Fault, Mode, Sense};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::message::Sample;
+use hapterra_core::scene::Sample;
 use hapterra_tests::campaign::extremes::OFF_COUNTS;
 use hapterra_tests::campaign::watch::{Truth, Watch};
 

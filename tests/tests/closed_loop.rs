@@ -4,24 +4,30 @@
 use std::time::Duration;
 
 use hapterra::link::{Arming, Event, Native, Patience, Session};
-use hapterra::live::{Figures, Stage};
-use hapterra::phantom::{HandModel, PhantomModel, Placement, Rig, Script, Touch};
+use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
+use hapterra::place::PlacedTerrain;
 use hapterra::raster::Raster;
 use hapterra::replay::Record;
 use hapterra::synth::{Kind, Synth};
+use hapterra::telemetry::Figures;
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::{Rule, State};
+use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
-use hapterra_core::wire::message::{Sample, Scene, Source};
+use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_firmware::native::StoppedClock;
 
 /// Runs a device until a tick; every sample it reported.
-fn run(terrain: &Terrain<'_>, scene: Scene, rig: Rig, ticks: u32) -> Vec<Sample> {
+fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec<Sample> {
     let device: Native = Native::new(StoppedClock, Some(Box::new(rig.arming())));
     let device = Box::new(device);
-    let (mut session, _) =
-        Session::open_arming(terrain, scene, Arming::VIRTUAL, device, Patience::REAL_TIME)
-            .expect("opened");
+    let (mut session, _) = Session::open(
+        terrain,
+        scene,
+        Some(Arming::VIRTUAL),
+        device,
+        Patience::REAL_TIME,
+    )
+    .expect("opened");
     let mut samples = Vec::new();
     while samples.last().is_none_or(|last: &Sample| last.tick < ticks) {
         let mut take = |event: Event<'_>| {
@@ -48,11 +54,11 @@ fn press(stiffness_n_per_mm: f32) -> (Vec<Sample>, usize, Scale) {
         Touch::start(&|_, _| Some(20.0), &hand, wall, [100.0, 100.0], 10.0).press(2.0, 1.5);
     let lift_s = pressed.script().duration_s();
     let script: Script = pressed.lift(10.0).finish().wait(0.5);
-    let ticks = ((Rig::ARMED_S + script.duration_s()) * 1e3) as u32;
+    let ticks = ((HeldPhantom::ARMED_S + script.duration_s()) * 1e3) as u32;
     let home_mm = [100.0, 100.0, 24.0];
     // With all its weight, which the device holds.
     let model = PhantomModel::premium_1_5();
-    let rig = Rig::new(model, hand, Placement { home_mm }, script).expect("in reach");
+    let rig = HeldPhantom::new(model, hand, Placement { home_mm }, script).expect("in reach");
     let law = ForceLaw {
         stiffness_n_per_mm,
         max_force_n: 8.5,
@@ -60,7 +66,11 @@ fn press(stiffness_n_per_mm: f32) -> (Vec<Sample>, usize, Scale) {
     let home = scale.to_grid(home_mm).expect("addressable");
     let scene = terrain.scene(law, Rule::Swept, Source::Encoders, home);
     let samples = run(&terrain, scene, rig, ticks);
-    (samples, ((Rig::ARMED_S + lift_s) * 1e3) as usize, scale)
+    (
+        samples,
+        ((HeldPhantom::ARMED_S + lift_s) * 1e3) as usize,
+        scale,
+    )
 }
 
 #[test]
@@ -73,7 +83,7 @@ fn pressed_on_a_plane_with_two_newtons_it_rests_at_the_depth_the_stiffness_says(
         let hand_n_per_mm = 1e-3 / HandModel::default().give_m_per_n();
         let bound_mm = 0.01 / 0.2095 / (f64::from(stiffness) + hand_n_per_mm) + 0.03;
         for sample in &samples[lift - 300..lift - 5] {
-            assert_eq!(sample.state, State::Touching);
+            assert_eq!(sample.state, ContactState::Touching);
             let depth = 20.0 - scale.to_mm(&sample.hip)[2];
             assert!(
                 (depth - expected_mm).abs() < bound_mm,
@@ -89,7 +99,7 @@ fn pressed_on_a_plane_with_two_newtons_it_rests_at_the_depth_the_stiffness_says(
 fn lifted_there_is_no_force() {
     let (samples, _, _) = press(0.5);
     let end = &samples[samples.len() - 300..];
-    assert!(end.iter().all(|s| s.state == State::Free));
+    assert!(end.iter().all(|s| s.state == ContactState::Free));
     assert!(end.iter().all(|s| s.force_n.length() == 0.0));
 }
 
@@ -102,10 +112,10 @@ fn slid_across_terrain_the_proxy_stays_on_the_surface_and_the_force_in_bounds() 
         let raster = Synth::new(kind, 2, 30.0).raster(400, 400).expect("raster");
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-        let stage = Stage::set(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("stage");
-        let ticks = (stage.duration_s() * 1e3) as u32;
-        let rig = stage.rig().expect("rig");
-        let samples = run(&terrain, stage.scene(), rig, ticks);
+        let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("placed");
+        let ticks = (placed.duration_s() * 1e3) as u32;
+        let rig = placed.held_phantom();
+        let samples = run(&terrain, placed.scene(), rig, ticks);
         let mut figures = Figures::default();
         for sample in &samples {
             let record = Record::of_tick(sample, 1000, &scale);
@@ -122,6 +132,9 @@ fn slid_across_terrain_the_proxy_stays_on_the_surface_and_the_force_in_bounds() 
         assert!((0.3..3.0).contains(&figures.force_n.mean()));
         assert!(figures.force_n.max() <= 8.5);
         let last = samples.last().expect("samples");
-        assert_eq!((last.state, last.force_n.length()), (State::Free, 0.0));
+        assert_eq!(
+            (last.state, last.force_n.length()),
+            (ContactState::Free, 0.0)
+        );
     }
 }

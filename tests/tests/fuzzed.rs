@@ -1,10 +1,16 @@
 //! The bodies of the fuzz targets, driven without a fuzzer: bytes at random, and
 //! inputs that make sense with some of their bytes changed. The same every time.
 
+use std::panic::catch_unwind;
+
 use hapterra_core::Vec3;
+use hapterra_core::contact::WORK_PER_TICK;
+use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
+use hapterra_core::scene::{Point, Source};
 use hapterra_core::terrain::TileKey;
-use hapterra_core::wire::message::{Heights, Point, Source, TileMessage, ToDevice};
+use hapterra_core::tick::Outcome;
+use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_tests::chance::Chance;
 use hapterra_tests::fuzzing::{tick, wire};
 
@@ -58,16 +64,33 @@ fn no_bytes_break_the_tick() {
     }
 }
 
+/// What the fuzz target looks at is shown to be looked at: a tick is changed in one
+/// way, and refused.
+#[test]
+fn a_tick_that_may_not_be_is_refused() {
+    let refuses = |change: fn(&mut Outcome)| {
+        let mut outcome = Outcome::default();
+        change(&mut outcome);
+        catch_unwind(|| tick::look(&outcome, &ForceLaw::PREMIUM)).is_err()
+    };
+    assert!(!refuses(|_| ()));
+    assert!(!refuses(|o| o.sample.work = WORK_PER_TICK));
+    assert!(refuses(|o| o.sample.work = WORK_PER_TICK + 1));
+    assert!(refuses(|o| o.sample.force_n.x = 8.6));
+    assert!(refuses(|o| o.sample.force_n.z = f32::NAN));
+    assert!(refuses(|o| o.drive.currents_a.y = 0.1));
+    assert!(refuses(|o| {
+        o.drive.enabled = true;
+        o.drive.currents_a.y = 100.0;
+    }));
+}
+
 /// Whole messages on the line, cut into the target's chunks.
 fn sensible_talk(chance: &mut Chance) -> Vec<u8> {
     let samples = [0.5f32.to_le_bytes(); 33 * 33].concat();
     let mut line = Vec::new();
     for seq in 0..1 + chance.below(6) as u32 {
-        let key = TileKey {
-            level: 0,
-            col: chance.below(3) as i32,
-            row: 0,
-        };
+        let key = TileKey::new(0, chance.below(3) as i32, 0);
         let heights = match chance.below(3) {
             0 => Heights::Samples {
                 base: 1,
@@ -87,7 +110,7 @@ fn sensible_talk(chance: &mut Chance) -> Vec<u8> {
                 key,
                 heights,
             }),
-            1 => ToDevice::Scene(hapterra_core::wire::message::Scene {
+            1 => ToDevice::Scene(hapterra_core::scene::Scene {
                 epoch: seq,
                 source: Source::Encoders,
                 ..wire::scene()

@@ -1,14 +1,14 @@
 //! What the quick soak's scenes are made of, counted: each kind of ground, habit
-//! of the hand and twin that is promised is there, felt, and judged.
+//! of the HIP and twin that is promised is there, felt, and judged.
 
 use std::collections::BTreeMap;
 
-use hapterra_core::contact::{Rule, State};
+use hapterra_core::contact::{ContactState, Rule};
 use hapterra_tests::invariants::judge::Judge;
 use hapterra_tests::invariants::seen::Seen;
 use hapterra_tests::invariants::surface::distance;
 use hapterra_tests::scene::run::Scene;
-use hapterra_tests::scene::stage::{Buffers, Supply};
+use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::terrain::{KINDS, Terrain};
 
 /// As `quick_soak.rs`.
@@ -28,25 +28,25 @@ fn names(terrain: &Terrain, before: Option<&Seen>, now: &Seen) -> Vec<&'static s
     let whole = |c: f64| c == c.round();
     let [x, y, z] = now.hip;
     let inside = (0..2).all(|i| (0.0..=f64::from(terrain.size[i])).contains(&now.hip[i]));
-    let rests = now.felt.state == State::Touching && now.felt.settled;
+    let rests = now.felt.state == ContactState::Touching && now.felt.converged;
     let on = |p: [f64; 3]| usize::from(whole(p[0])) + usize::from(whole(p[1]));
-    is("hand on a grid line", inside && on(now.hip) == 1);
-    is("hand over a vertex", inside && on(now.hip) == 2);
-    is("hand off the field", !inside);
+    is("HIP on a grid line", inside && on(now.hip) == 1);
+    is("HIP over a vertex", inside && on(now.hip) == 2);
+    is("HIP off the field", !inside);
     is(
-        "hand in all three coordinates on the grid",
+        "HIP in all three coordinates on the grid",
         on(now.hip) == 2 && whole(z),
     );
     is("proxy rests on an edge", rests && on(now.proxy) == 1);
     is("proxy rests in a vertex", rests && on(now.proxy) == 2);
     let exactly = inside && on(now.hip) >= 1 && z == terrain.height_about(x, y);
-    is("hand exactly on an edge of the surface", exactly);
+    is("HIP exactly on an edge of the surface", exactly);
     let far = distance(now.hip, now.proxy);
-    is("hand 10⁴ cells inside or more", rests && far >= 1e4);
-    is("tile missing", now.felt.held_up_by.is_some());
+    is("HIP 10⁴ cells inside or more", rests && far >= 1e4);
+    is("tile missing", now.felt.missing_tile.is_some());
     is(
         "work left over",
-        !now.felt.settled && now.felt.held_up_by.is_none(),
+        !now.felt.converged && now.felt.missing_tile.is_none(),
     );
     if let Some(before) = before {
         let way = distance(before.hip, now.hip);
@@ -105,7 +105,7 @@ fn all_that_is_promised_is_felt_and_judged() {
             }
         }
         let kind = KINDS.iter().position(|kind| *kind == scene.terrain.kind);
-        touched[kind.expect("known")] += judge.measured.states[State::Touching as usize];
+        touched[kind.expect("known")] += judge.measured.states[ContactState::Touching as usize];
         samples(&scene.terrain, &mut counts);
         let supply = match scene.supply {
             Supply::Held => "every tile held",
@@ -127,12 +127,12 @@ fn all_that_is_promised_is_felt_and_judged() {
         assert!(*ticks > 400, "{kind:?}: {ticks}");
     }
     let promised = [
-        ("hand on a grid line", 500),
-        ("hand over a vertex", 500),
-        ("hand in all three coordinates on the grid", 50),
-        ("hand exactly on an edge of the surface", 100),
-        ("hand off the field", 500),
-        ("hand 10⁴ cells inside or more", 20),
+        ("HIP on a grid line", 500),
+        ("HIP over a vertex", 500),
+        ("HIP in all three coordinates on the grid", 50),
+        ("HIP exactly on an edge of the surface", 100),
+        ("HIP off the field", 500),
+        ("HIP 10⁴ cells inside or more", 20),
         ("proxy rests on an edge", 500),
         ("proxy rests in a vertex", 500),
         ("tile missing", 100),

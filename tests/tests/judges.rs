@@ -1,8 +1,9 @@
-//! Each invariant's judge speaks when it should, and no other does: honest
-//! observations are forged in one way, and judged.
+//! For each invariant a test feeds the judge one false observation and checks that
+//! this invariant, and only this one, reports it. The honest observation beside it is
+//! reported by none.
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::{Felt, Pace, Rule, State, WORK_PER_TICK};
+use hapterra_core::contact::{ContactOutput, ContactState, Execution, Rule, WORK_PER_TICK};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_tests::chance::Chance;
@@ -11,7 +12,7 @@ use hapterra_tests::invariants::judge::Judge;
 use hapterra_tests::invariants::seen::Seen;
 use hapterra_tests::invariants::{Invariant, Violation};
 use hapterra_tests::scene::run::Scene;
-use hapterra_tests::scene::stage::{Buffers, Supply};
+use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::symmetry;
 use hapterra_tests::scene::terrain::{Kind, Terrain};
 use hapterra_tests::scene::twin;
@@ -39,45 +40,49 @@ fn walls() -> Terrain {
     })
 }
 
-fn felt(state: State, proxy: [f64; 3], stretch: [f64; 3]) -> Felt {
-    Felt {
+fn felt(state: ContactState, proxy: [f64; 3], displacement: [f64; 3]) -> ContactOutput {
+    ContactOutput {
         state,
         proxy: point(proxy),
-        stretch: Vec3::from_array(stretch.map(|s| s as f32)),
-        settled: true,
-        held_up_by: None,
+        displacement: Vec3::from_array(displacement.map(|s| s as f32)),
+        converged: true,
+        missing_tile: None,
         work: 3,
     }
 }
 
 fn waiting(hip: [f64; 3]) -> Seen {
-    Seen::new(hip, felt(State::Waiting, hip, [0.0; 3]), [0; 3])
+    Seen::new(hip, felt(ContactState::Waiting, hip, [0.0; 3]), [0; 3])
 }
 
 fn free(hip: [f64; 3]) -> Seen {
-    Seen::new(hip, felt(State::Free, hip, [0.0; 3]), [0; 3])
+    Seen::new(hip, felt(ContactState::Free, hip, [0.0; 3]), [0; 3])
 }
 
 /// With that part of the spring felt.
-fn faded(hip: [f64; 3], proxy: [f64; 3], presence: f64) -> Seen {
-    let stretch = [0, 1, 2].map(|i| presence * (proxy[i] - hip[i]));
-    Seen::new(hip, felt(State::Touching, proxy, stretch), [0; 3])
+fn faded(hip: [f64; 3], proxy: [f64; 3], fade: f64) -> Seen {
+    let displacement = [0, 1, 2].map(|i| fade * (proxy[i] - hip[i]));
+    Seen::new(
+        hip,
+        felt(ContactState::Touching, proxy, displacement),
+        [0; 3],
+    )
 }
 
 fn touching(hip: [f64; 3], proxy: [f64; 3]) -> Seen {
     faded(hip, proxy, 1.0)
 }
 
-fn letting_go(hip: [f64; 3], stretch: [f64; 3]) -> Seen {
+fn letting_go(hip: [f64; 3], displacement: [f64; 3]) -> Seen {
     Seen::new(
         hip,
-        felt(State::LettingGo, [10.5, 10.5, 2.0], stretch),
+        felt(ContactState::Fading, [10.5, 10.5, 2.0], displacement),
         [0; 3],
     )
 }
 
 /// The same answer with something changed, and the forces that follow from it.
-fn with(seen: Seen, change: impl FnOnce(&mut Felt)) -> Seen {
+fn with(seen: Seen, change: impl FnOnce(&mut ContactOutput)) -> Seen {
     let mut felt = seen.felt;
     change(&mut felt);
     Seen::new(seen.hip, felt, [0; 3])
@@ -92,9 +97,9 @@ fn forged_position() -> GridPoint {
     decode(bytes.expect("a frame").expect("undamaged")).expect("a position")
 }
 
-/// Everything the judge says about the last of these ticks; nothing about those
-/// before.
-fn told(terrain: &Terrain, ticks: &[Seen]) -> Vec<Violation> {
+/// All that the judge reports of the last of these ticks. It must report nothing of
+/// those before.
+fn reports(terrain: &Terrain, ticks: &[Seen]) -> Vec<Violation> {
     let mut judge = Judge::new(terrain, Rule::Swept);
     let (last, before) = ticks.split_last().expect("there are ticks");
     for seen in before {
@@ -103,9 +108,16 @@ fn told(terrain: &Terrain, ticks: &[Seen]) -> Vec<Violation> {
     judge.all(last)
 }
 
-/// The forgery is found by that judge alone, and what was honest by none.
-fn speaks(invariant: Invariant, terrain: &Terrain, before: &[Seen], honest: Seen, forged: Seen) {
-    let all = |last| told(terrain, &[before, &[last]].concat());
+/// Checks that the judge reports the forged tick by this invariant alone, and the
+/// honest tick by none.
+fn reports_only(
+    invariant: Invariant,
+    terrain: &Terrain,
+    before: &[Seen],
+    honest: Seen,
+    forged: Seen,
+) {
+    let all = |last| reports(terrain, &[before, &[last]].concat());
     assert_eq!(all(honest), [], "{invariant:?}, honest");
     let found: Vec<_> = all(forged).iter().map(|v| v.invariant).collect();
     assert_eq!(found, [invariant], "{forged:?}");
@@ -121,16 +133,18 @@ fn an_answer_that_is_no_answer_is_found() {
     use Invariant::{Clamp, Consistent, Finite, Work};
     let terrain = flat();
     let honest = touching(BELOW, ON);
-    let forgeries: [(Invariant, Seen); 12] = [
-        (Finite, with(honest, |f| f.stretch.z = f32::NAN)),
-        (Finite, with(honest, |f| f.stretch.x = f32::INFINITY)),
+    let forgeries: [(Invariant, Seen); 13] = [
+        (Finite, with(honest, |f| f.displacement.z = f32::NAN)),
+        (Finite, with(honest, |f| f.displacement.x = f32::INFINITY)),
         (Finite, with(honest, |f| f.proxy = forged_position())),
+        // One unit more than there is, and as many as a count that wraps would tell.
         (Work, with(honest, |f| f.work = WORK_PER_TICK + 1)),
+        (Work, with(honest, |f| f.work = u32::MAX)),
         // A force without a contact, away from the way to the proxy, too strong.
-        (Consistent, with(honest, |f| f.stretch.x = 0.01)),
-        (Consistent, with(honest, |f| f.stretch.z = -0.5)),
-        (Consistent, with(honest, |f| f.stretch.z = 0.501)),
-        (Consistent, with(waiting(BELOW), |f| f.stretch.z = 0.1)),
+        (Consistent, with(honest, |f| f.displacement.x = 0.01)),
+        (Consistent, with(honest, |f| f.displacement.z = -0.5)),
+        (Consistent, with(honest, |f| f.displacement.z = 0.501)),
+        (Consistent, with(waiting(BELOW), |f| f.displacement.z = 0.1)),
         // The law's forces: too long, of another spring, the other way, no number.
         (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, z * 1.000_01])),
         (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, -z])),
@@ -138,12 +152,18 @@ fn an_answer_that_is_no_answer_is_found() {
         (Clamp, forces(honest, |_| [0.0, 0.0, f64::NAN])),
     ];
     for (invariant, forged) in forgeries {
-        speaks(invariant, &terrain, &[], honest, forged);
+        reports_only(invariant, &terrain, &[], honest, forged);
     }
-    let off_hand = with(free(ABOVE), |f| f.proxy = point([10.5, 10.5, 3.001]));
-    speaks(Consistent, &terrain, &[], free(ABOVE), off_hand);
-    let pressing = with(free(ABOVE), |f| f.stretch.z = 1e-3);
-    speaks(Consistent, &terrain, &[], free(ABOVE), pressing);
+    let all_spent = with(honest, |f| f.work = WORK_PER_TICK);
+    assert_eq!(
+        reports(&terrain, &[all_spent]),
+        [],
+        "all there is may be spent"
+    );
+    let off_hip = with(free(ABOVE), |f| f.proxy = point([10.5, 10.5, 3.001]));
+    reports_only(Consistent, &terrain, &[], free(ABOVE), off_hip);
+    let pressing = with(free(ABOVE), |f| f.displacement.z = 1e-3);
+    reports_only(Consistent, &terrain, &[], free(ABOVE), pressing);
 }
 
 fn forces(seen: Seen, change: impl Fn([f64; 3]) -> [f64; 3]) -> Seen {
@@ -158,7 +178,7 @@ fn a_proxy_off_the_surface_is_found() {
     let honest = touching(BELOW, ON);
     for off in [-1e-4, -3e-6, 3e-6, 1e-4] {
         let forged = touching(BELOW, [10.5, 10.5, 2.0 + off]);
-        speaks(Invariant::OnSurface, &flat(), &[], honest, forged);
+        reports_only(Invariant::OnSurface, &flat(), &[], honest, forged);
     }
 }
 
@@ -168,14 +188,14 @@ fn a_proxy_beside_the_closest_point_is_found() {
     let level = |off: f64| touching(BELOW, [10.5 + off, 10.5, 2.0]);
     let slope = |off: f64| touching([17.0, 10.5, -2.0], [16.5 + off, 10.5, -1.5 + off]);
     for off in [-1e-2, -3e-5, 3e-5, 1e-2] {
-        speaks(
+        reports_only(
             Invariant::LocalMinimum,
             &flat(),
             &[],
             level(0.0),
             level(off),
         );
-        speaks(
+        reports_only(
             Invariant::LocalMinimum,
             &ridge(),
             &[],
@@ -185,7 +205,7 @@ fn a_proxy_beside_the_closest_point_is_found() {
     }
     let valley = Terrain::from_fn(Kind::Ridges, SIZE, |x, _| (x - 20).abs() as f32);
     let rest = |off: f64| touching([20.0, 10.5, -1.0], [20.0 + off, 10.5, off]);
-    speaks(Invariant::LocalMinimum, &valley, &[], rest(0.0), rest(1e-4));
+    reports_only(Invariant::LocalMinimum, &valley, &[], rest(0.0), rest(1e-4));
 }
 
 #[test]
@@ -194,7 +214,7 @@ fn a_contact_that_pulls_is_found() {
     let slope = |off: f64| touching([16.5 + off, 10.5, -1.5 - off], [16.5, 10.5, -1.5]);
     for off in [1e-4, 0.1, 3.0] {
         for (terrain, seen) in [(flat(), &above as &dyn Fn(f64) -> Seen), (ridge(), &slope)] {
-            speaks(Invariant::HandBelow, &terrain, &[], seen(off), seen(-off));
+            reports_only(Invariant::HipBelow, &terrain, &[], seen(off), seen(-off));
         }
     }
     // What holds is never taken for it: a valley, the border of the data.
@@ -204,7 +224,7 @@ fn a_contact_that_pulls_is_found() {
         (valley, touching([20.0, 10.5, -1.0], [20.0, 10.5, 0.0])),
         (flat(), at_border(1.5)),
     ] {
-        assert_eq!(told(&terrain, &[honest]), [], "{honest:?}");
+        assert_eq!(reports(&terrain, &[honest]), [], "{honest:?}");
     }
 }
 
@@ -217,11 +237,11 @@ fn a_spike_at_one_corner_excuses_nothing_at_the_others() {
     });
     let at = |off: f64| touching([10.5, 10.0, 1.0], [10.5 + off, 10.0, 2.0]);
     for off in [-1e-2, -3e-5, 3e-5, 1e-2] {
-        speaks(Invariant::LocalMinimum, &spike, &[], at(0.0), at(off));
+        reports_only(Invariant::LocalMinimum, &spike, &[], at(0.0), at(off));
     }
 }
 
-/// A hand in the ridge, and the closest points of its two sides.
+/// A HIP in the ridge, and the closest points of its two sides.
 const IN_RIDGE: [f64; 3] = [19.875, 10.5, 1.0];
 const NEAR_SIDE: [f64; 3] = [19.4375, 10.5, 1.4375];
 const FAR_SIDE: [f64; 3] = [20.4375, 10.5, 1.5625];
@@ -231,7 +251,7 @@ fn a_proxy_that_goes_over_a_ridge_to_be_farther_off_is_found() {
     let honest = touching(IN_RIDGE, NEAR_SIDE);
     let forged = touching(IN_RIDGE, FAR_SIDE);
     let before = touching([19.75, 10.5, 1.0], [19.375, 10.5, 1.375]);
-    speaks(Invariant::Descent, &ridge(), &[before], honest, forged);
+    reports_only(Invariant::Descent, &ridge(), &[before], honest, forged);
 }
 
 #[test]
@@ -239,7 +259,7 @@ fn a_contact_beyond_the_first_crossing_is_found() {
     let honest = touching(IN_RIDGE, NEAR_SIDE);
     let forged = touching(IN_RIDGE, FAR_SIDE);
     let before = free([18.875, 10.5, 1.5]);
-    speaks(
+    reports_only(
         Invariant::FirstCrossing,
         &ridge(),
         &[before],
@@ -253,12 +273,12 @@ fn a_contact_with_nothing_crossed_is_found() {
     let before = free(ABOVE);
     let near = [10.625, 10.5, 2.5];
     // On the way still, or it would be known for pulling.
-    let forged = with(touching(near, [10.625, 10.5, 2.0]), |f| f.settled = false);
-    speaks(Invariant::Freedom, &flat(), &[before], free(near), forged);
+    let forged = with(touching(near, [10.625, 10.5, 2.0]), |f| f.converged = false);
+    reports_only(Invariant::Freedom, &flat(), &[before], free(near), forged);
 }
 
 #[test]
-fn a_free_hand_below_the_surface_is_found() {
+fn a_free_hip_below_the_surface_is_found() {
     for depth in [1.0 / 65536.0, 0.5, 100.0] {
         let below = [10.5, 10.5, 2.0 - depth];
         let honest = touching(below, ON);
@@ -266,7 +286,7 @@ fn a_free_hand_below_the_surface_is_found() {
             let forged = free(below);
             // So far a fall is known to fewer digits.
             if depth < 10.0 || before.is_empty() {
-                speaks(Invariant::AboveSurface, &flat(), before, honest, forged);
+                reports_only(Invariant::AboveSurface, &flat(), before, honest, forged);
             }
         }
     }
@@ -275,7 +295,7 @@ fn a_free_hand_below_the_surface_is_found() {
 #[test]
 fn a_contact_out_of_nowhere_is_found() {
     let (before, forged) = (waiting(BELOW), touching(BELOW, ON));
-    speaks(
+    reports_only(
         Invariant::SeenAbove,
         &flat(),
         &[before],
@@ -289,40 +309,46 @@ fn a_wall_that_is_passed_is_found() {
     let before = free([20.5, 10.5, 3.0]);
     let honest = free([21.5, 10.5, 3.0]);
     let forged = free([25.5, 10.5, 3.0]);
-    speaks(Invariant::Wall, &walls(), &[before], honest, forged);
+    reports_only(Invariant::Wall, &walls(), &[before], honest, forged);
     // And by a proxy that stays on the ground.
     let before = touching([20.5, 10.5, -0.5], [20.5, 10.5, 0.0]);
     let honest = touching([21.5, 10.5, -0.5], [21.5, 10.5, 0.0]);
     let forged = touching([25.5, 10.5, -0.5], [25.5, 10.5, 0.0]);
-    speaks(Invariant::Wall, &walls(), &[before], honest, forged);
+    reports_only(Invariant::Wall, &walls(), &[before], honest, forged);
 }
 
 #[test]
 fn a_force_that_comes_or_goes_at_once_is_found() {
     let before = touching(BELOW, ON);
-    let fades = |presence| faded(BELOW, ON, presence);
+    let fades = |fade| faded(BELOW, ON, fade);
     let terrain = &flat();
-    let speaks = |before: &[Seen], honest, forged| {
-        speaks(Invariant::Fade, terrain, before, honest, forged);
+    let reports_only = |before: &[Seen], honest, forged| {
+        reports_only(Invariant::Fade, terrain, before, honest, forged);
     };
-    speaks(&[before], fades(0.97), fades(0.95));
-    speaks(&[fades(0.5)], fades(0.53), fades(0.55));
+    reports_only(&[before], fades(0.97), fades(0.95));
+    reports_only(&[fades(0.5)], fades(0.53), fades(0.55));
     // Let go at once.
-    speaks(&[before], fades(1.0), waiting(BELOW));
+    reports_only(&[before], fades(1.0), waiting(BELOW));
     // Letting go too fast, coming back, and turning.
     let go = |part: f64| letting_go(BELOW, [0.0, 0.0, 0.5 * part]);
-    speaks(&[before], go(0.97), go(0.9));
-    speaks(&[before, go(0.97)], go(0.95), go(0.99));
+    reports_only(&[before], go(0.97), go(0.9));
+    reports_only(&[before, go(0.97)], go(0.95), go(0.99));
     let turned = letting_go(BELOW, [0.01, 0.0, 0.475]);
-    speaks(&[before, go(0.97)], go(0.95), turned);
-    speaks(&[before, go(0.97), go(0.95)], go(0.92), waiting(BELOW));
+    reports_only(&[before, go(0.97)], go(0.95), turned);
+    reports_only(&[before, go(0.97), go(0.95)], go(0.92), waiting(BELOW));
 }
 
-/// A scene of a few hands, and what it feels.
+/// A scene of a few HIPs, and what it feels.
 fn played(supply: Supply) -> (Scene, Vec<Seen>, Buffers) {
     // Down into a side of the ridge, along it, and up again.
     let path = [3.0, 0.0, 0.25, 3.0].map(|z| [18.5 + 0.5 * z, 10.5, z]);
-    let scene = Scene::given(ridge(), path.to_vec(), Rule::Swept, Pace::LockStep, supply);
+    let scene = Scene::given(
+        ridge(),
+        path.to_vec(),
+        Rule::Swept,
+        Execution::LockStep,
+        supply,
+    );
     let mut buffers = Buffers::default();
     let seen = scene
         .feel(&mut buffers, [0; 3], supply, |_| Ok(()))
@@ -332,11 +358,11 @@ fn played(supply: Supply) -> (Scene, Vec<Seen>, Buffers) {
 
 /// Any one bit of an answer, changed.
 fn other_bits(seen: &[Seen]) -> Vec<Vec<Seen>> {
-    let changes: [fn(&mut Felt); 4] = [
-        |f| f.stretch.z = f32::from_bits(f.stretch.z.to_bits() ^ 1),
+    let changes: [fn(&mut ContactOutput); 4] = [
+        |f| f.displacement.z = f32::from_bits(f.displacement.z.to_bits() ^ 1),
         |f| f.proxy = f.proxy.midpoint(&point([0.0, 0.0, 0.0])),
-        |f| f.state = State::Waiting,
-        |f| f.stretch.x = -0.0,
+        |f| f.state = ContactState::Waiting,
+        |f| f.displacement.x = -0.0,
     ];
     changes
         .map(|change| {
@@ -418,9 +444,9 @@ fn a_scene_that_feels_otherwise_mirrored_is_found() {
 }
 
 #[test]
-fn a_hand_that_is_never_answered_is_found() {
+fn a_hip_that_is_never_answered_is_found() {
     let path = vec![ABOVE, BELOW];
     let never = Supply::Pulled { latency: 1 << 30 };
-    let scene = Scene::given(flat(), path, Rule::Swept, Pace::LockStep, never);
+    let scene = Scene::given(flat(), path, Rule::Swept, Execution::LockStep, never);
     only(Invariant::Settles, scene.run(&mut Buffers::default()));
 }

@@ -7,17 +7,19 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use hapterra::link::{Arming, Event, LinkError, Native, Patience, Session, Transport};
-use hapterra::live::Stage;
+use hapterra::place::PlacedTerrain;
 use hapterra::raster::Raster;
 use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::{Rule, State};
+use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Mode;
+use hapterra_core::scene::Sample;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
-use hapterra_core::wire::message::{HostHello, PROTOCOL, Sample, ToDevice, ToHost};
+use hapterra_core::wire::hello::{HostHello, PROTOCOL};
+use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_firmware::native::StoppedClock;
 use hapterra_tests::faulty::{Fault, Faulty, Shared};
 use hapterra_tests::walk::wander;
@@ -38,7 +40,7 @@ fn unit() -> Scale {
     Scale::new(1.0, 1.0).expect("scale")
 }
 
-fn felt(sample: &Sample) -> (GridPoint, GridPoint, [u32; 3], State) {
+fn felt(sample: &Sample) -> (GridPoint, GridPoint, [u32; 3], ContactState) {
     let bits = sample.force_n.to_array().map(f32::to_bits);
     (sample.hip, sample.proxy, bits, sample.state)
 }
@@ -84,13 +86,13 @@ fn a_bad_link_changes_nothing_that_is_felt() {
 fn telemetry_that_is_lost_is_counted() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
-    let stage = Stage::set(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("stage");
-    let rig = stage.rig().expect("rig");
+    let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("placed");
+    let rig = placed.held_phantom();
     let device: Native = Native::new(StoppedClock, Some(Box::new(rig)));
     let link = Faulty::new(device, Fault::Drop, 10, 3);
-    let (scene, link) = (stage.scene(), Box::new(link));
+    let (scene, link) = (placed.scene(), Box::new(link));
     let (mut session, _) =
-        Session::open_arming(&terrain, scene, Arming::VIRTUAL, link, AT_ONCE).expect("opened");
+        Session::open(&terrain, scene, Some(Arming::VIRTUAL), link, AT_ONCE).expect("opened");
     let mut last = 0;
     while last < 4000 {
         session
@@ -116,8 +118,8 @@ fn telemetry_that_is_lost_is_counted() {
 fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
-    let stage = Stage::set(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("stage");
-    let rig = stage.rig().expect("rig");
+    let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("placed");
+    let rig = placed.held_phantom();
     let device: Native = Native::new(StoppedClock, Some(Box::new(rig)));
     let device = Rc::new(RefCell::new(device));
     let watch = |session: &mut Session<'_>, until: u32| {
@@ -134,23 +136,27 @@ fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
         last
     };
     let link = || Box::new(Shared(Rc::clone(&device)));
-    let scene = stage.scene();
+    let scene = placed.scene();
     let (mut session, hello) =
-        Session::open_arming(&terrain, scene, Arming::VIRTUAL, link(), AT_ONCE).expect("opened");
+        Session::open(&terrain, scene, Some(Arming::VIRTUAL), link(), AT_ONCE).expect("opened");
     assert_eq!(hello.epoch, None);
     let before = watch(&mut session, 4500);
     assert_eq!(before.mode, Mode::Armed);
-    assert_eq!(before.state, State::Touching);
+    assert_eq!(before.state, ContactState::Touching);
     let fetched = session.tally().tiles;
     drop(session);
     // It dies in the middle of a frame, and is away for half a second.
     device.borrow_mut().send(&[7; 30]).expect("sent");
     device.borrow_mut().pass(500);
     let (mut session, hello) =
-        Session::open(&terrain, stage.scene(), link(), AT_ONCE).expect("opened again");
-    assert_eq!(hello.epoch, Some(stage.scene().epoch), "the scene was kept");
+        Session::open(&terrain, placed.scene(), None, link(), AT_ONCE).expect("opened again");
+    assert_eq!(
+        hello.epoch,
+        Some(placed.scene().epoch),
+        "the scene was kept"
+    );
     let after = watch(&mut session, before.tick + 700);
-    assert_eq!(after.state, State::Touching);
+    assert_eq!(after.state, ContactState::Touching);
     assert!(after.tick >= before.tick + 500, "its time went on");
     assert_eq!((after.mode, after.fault), (Mode::Armed, None));
     let again = session.tally().tiles;

@@ -9,16 +9,23 @@ use hapterra::raster::Raster;
 use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::{Rule, State};
+use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
-use hapterra_core::wire::message::Sample;
+use hapterra_core::scene::Sample;
 use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::hapterra_binary;
 use hapterra_tests::walk::wander;
 
 /// What has to be the same: all but the work and the time it took, which
 /// depend on when a tile came.
-type Felt = ([i32; 3], [u32; 3], [i32; 3], [u32; 3], [u32; 3], State);
+type Felt = (
+    [i32; 3],
+    [u32; 3],
+    [i32; 3],
+    [u32; 3],
+    [u32; 3],
+    ContactState,
+);
 
 fn felt(sample: &Sample) -> Felt {
     let bits = |v: hapterra_core::Vec3| v.to_array().map(f32::to_bits);
@@ -78,7 +85,10 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
         for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
             assert_eq!(expected, got, "{name}, {rule:?}: row {i} at {:?}", path[i]);
         }
-        let touched = got.iter().filter(|felt| felt.5 == State::Touching).count();
+        let touched = got
+            .iter()
+            .filter(|felt| felt.5 == ContactState::Touching)
+            .count();
         assert!(touched > 50, "{name}: the walk hardly touches");
         board.say_goodbye().expect("said");
         let status = emulator.finish().expect("ended");

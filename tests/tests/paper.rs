@@ -1,11 +1,11 @@
 //! The statements of *Height Field Haptics*, one by one.
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::closest::nearest_downhill;
-use hapterra_core::contact::patch::Patch;
-use hapterra_core::contact::{Rule, State};
+use hapterra_core::contact::closest_point::nearest_downhill;
+use hapterra_core::contact::surface::patch::Patch;
+use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
-use hapterra_tests::field::{Felted, position};
+use hapterra_tests::field::{FieldContact, position};
 
 fn rolling(x: i32, y: i32) -> f32 {
     ((f64::from(x) * 0.37).sin() + (f64::from(y) * 0.23).cos()) as f32
@@ -29,9 +29,9 @@ fn eq_1_to_5_the_patch_is_uva_plus_ub_plus_vc_plus_d() {
 
 #[test]
 fn eq_6_and_7_on_the_unit_grid_x_and_y_are_u_and_v_plus_the_cell() {
-    let mut hand = Felted::new(64, Rule::Paper, |_, _| 1.0);
-    hand.feel([37.25, 12.75, 2.0]);
-    let felt = hand.feel([37.25, 12.75, 0.9]);
+    let mut contact = FieldContact::new(64, Rule::Paper, |_, _| 1.0);
+    contact.feel([37.25, 12.75, 2.0]);
+    let felt = contact.feel([37.25, 12.75, 0.9]);
     assert_eq!(position(&felt.proxy), [37.25, 12.75, 1.0]);
 }
 
@@ -59,7 +59,7 @@ fn eq_8_to_11_at_the_local_closest_point_the_partial_derivatives_vanish() {
 #[test]
 fn section_4_3_2_outside_the_square_the_bounded_closest_point_is_on_an_edge_or_vertex() {
     let patch = Patch::new(CORNERS.map(|h| h - 0.4));
-    for hand in [
+    for hip in [
         (-0.5, 0.4),
         (1.7, 0.4),
         (0.4, -0.6),
@@ -67,10 +67,10 @@ fn section_4_3_2_outside_the_square_the_bounded_closest_point_is_on_an_edge_or_v
         (-1.0, -1.0),
         (2.0, 2.0),
     ] {
-        let found = nearest_downhill(&patch, hand, (0.5, 0.5));
+        let found = nearest_downhill(&patch, hip, (0.5, 0.5));
         let distance = |u: f32, v: f32| {
             let z = f64::from(patch.height(u, v));
-            f64::from(u - hand.0).powi(2) + f64::from(v - hand.1).powi(2) + z * z
+            f64::from(u - hip.0).powi(2) + f64::from(v - hip.1).powi(2) + z * z
         };
         let edges = (0..=1000).flat_map(|i| {
             let t = i as f32 / 1000.0;
@@ -80,24 +80,24 @@ fn section_4_3_2_outside_the_square_the_bounded_closest_point_is_on_an_edge_or_v
             .map(|(u, v)| distance(u, v))
             .fold(f64::INFINITY, f64::min);
         let on_border = [found.u, found.v].iter().any(|x| *x == 0.0 || *x == 1.0);
-        assert!(on_border, "{hand:?} {found:?}");
+        assert!(on_border, "{hip:?} {found:?}");
         assert!(
             distance(found.u, found.v) < nearest + 1e-6,
-            "{hand:?} {found:?}"
+            "{hip:?} {found:?}"
         );
     }
 }
 
 #[test]
-fn step_1_no_patch_higher_than_the_segment_means_free_space_and_the_proxy_is_the_hand() {
+fn step_1_no_patch_higher_than_the_segment_means_free_space_and_the_proxy_is_the_hip() {
     for rule in [Rule::Paper, Rule::Swept] {
-        let mut hand = Felted::new(64, rule, rolling);
+        let mut contact = FieldContact::new(64, rule, rolling);
         for i in 0..100 {
             let hip = [5.0 + 0.5 * f64::from(i), 20.0, 2.25];
-            let felt = hand.feel(hip);
-            assert_eq!(felt.state, State::Free);
+            let felt = contact.feel(hip);
+            assert_eq!(felt.state, ContactState::Free);
             assert_eq!(position(&felt.proxy), hip);
-            assert_eq!(felt.stretch, Vec3::ZERO);
+            assert_eq!(felt.displacement, Vec3::ZERO);
         }
     }
 }
@@ -105,11 +105,11 @@ fn step_1_no_patch_higher_than_the_segment_means_free_space_and_the_proxy_is_the
 #[test]
 fn step_2_the_search_goes_on_over_edges_and_vertices() {
     for rule in [Rule::Paper, Rule::Swept] {
-        let mut hand = Felted::new(64, rule, |x, _| 0.1 * x as f32);
-        hand.feel([10.5, 10.5, 3.0]);
-        hand.feel([10.5, 10.5, 1.0]);
+        let mut contact = FieldContact::new(64, rule, |x, _| 0.1 * x as f32);
+        contact.feel([10.5, 10.5, 3.0]);
+        contact.feel([10.5, 10.5, 1.0]);
         // Diagonally over many patches in one tick.
-        let felt = hand.feel([17.2, 14.8, 1.2]);
+        let felt = contact.feel([17.2, 14.8, 1.2]);
         let proxy = position(&felt.proxy);
         // The foot of the perpendicular on the plane z = x/10.
         let foot = (17.2 + 0.1 * 1.2) / 1.01;
@@ -121,11 +121,11 @@ fn step_2_the_search_goes_on_over_edges_and_vertices() {
 #[test]
 fn step_2_concave_places_rest_on_an_edge_or_a_vertex() {
     for rule in [Rule::Paper, Rule::Swept] {
-        let mut valley = Felted::new(64, rule, |x, _| (x - 20).abs() as f32);
+        let mut valley = FieldContact::new(64, rule, |x, _| (x - 20).abs() as f32);
         valley.feel([20.3, 10.5, 2.0]);
         let felt = valley.feel([20.1, 10.5, -0.5]);
         assert_eq!(position(&felt.proxy)[0], 20.0, "the edge");
-        let mut pit = Felted::new(64, rule, |x, y| (x - 20).abs().max((y - 20).abs()) as f32);
+        let mut pit = FieldContact::new(64, rule, |x, y| (x - 20).abs().max((y - 20).abs()) as f32);
         pit.feel([20.2, 20.1, 2.0]);
         let felt = pit.feel([20.05, 19.95, -0.5]);
         assert_eq!(position(&felt.proxy)[..2], [20.0, 20.0], "the vertex");
@@ -134,14 +134,14 @@ fn step_2_concave_places_rest_on_an_edge_or_a_vertex() {
 
 #[test]
 fn step_3_the_sign_of_the_way_out_along_the_normal_decides() {
-    let mut hand = Felted::new(64, Rule::Paper, rolling);
+    let mut contact = FieldContact::new(64, Rule::Paper, rolling);
     let mut both = [0, 0];
     for i in 0..600 {
         let t = f64::from(i) * 0.01;
         let (x, y) = (20.0 + 3.0 * t.sin(), 30.0 + t);
         let z = surface(x, y) + 0.2 * (7.0 * t).cos();
-        let felt = hand.feel([x, y, z]);
-        let touching = felt.state == State::Touching;
+        let felt = contact.feel([x, y, z]);
+        let touching = felt.state == ContactState::Touching;
         both[usize::from(touching)] += 1;
         assert_eq!(touching, z < surface(x, y), "tick {i}");
     }
@@ -160,13 +160,13 @@ fn surface(x: f64, y: f64) -> f64 {
 fn step_4_the_force_is_along_the_way_out_and_proportional_to_its_length() {
     let law = ForceLaw::PREMIUM;
     for rule in [Rule::Paper, Rule::Swept] {
-        let mut hand = Felted::new(64, rule, rolling);
-        hand.feel([30.5, 30.5, 3.0]);
+        let mut contact = FieldContact::new(64, rule, rolling);
+        contact.feel([30.5, 30.5, 3.0]);
         for depth in [0.01, 0.1, 0.5] {
             let hip = [30.5, 30.5, surface(30.5, 30.5) - depth];
-            let felt = hand.feel(hip);
+            let felt = contact.feel(hip);
             let proxy = position(&felt.proxy);
-            let force = law.force_n(felt.stretch);
+            let force = law.force_n(felt.displacement);
             for axis in 0..3 {
                 let expected = 0.5 * (proxy[axis] - hip[axis]);
                 assert!((f64::from(force[axis]) - expected).abs() < 1e-6);
@@ -182,18 +182,18 @@ fn walls(x: i32, _: i32) -> f32 {
 
 #[test]
 fn figure_8_a_fast_sweep_does_not_pass_through_what_is_thin() {
-    let mut hand = Felted::new(64, Rule::Swept, walls);
-    hand.feel([10.0, 30.3, 3.0]);
-    let felt = hand.feel([50.0, 30.7, 3.0]);
-    assert_eq!(felt.state, State::Touching);
+    let mut contact = FieldContact::new(64, Rule::Swept, walls);
+    contact.feel([10.0, 30.3, 3.0]);
+    let felt = contact.feel([50.0, 30.7, 3.0]);
+    assert_eq!(felt.state, ContactState::Touching);
     let proxy = position(&felt.proxy);
     assert!(
         proxy[0] > 19.0 && proxy[0] < 20.0,
         "stopped by the first wall: {proxy:?}"
     );
-    // And stays there until the hand comes back.
-    let felt = hand.feel([40.0, 31.0, 3.0]);
+    // And stays there until the HIP comes back.
+    let felt = contact.feel([40.0, 31.0, 3.0]);
     assert!(position(&felt.proxy)[0] < 20.0);
-    let felt = hand.feel([15.0, 31.0, 3.0]);
-    assert_eq!(felt.state, State::Free);
+    let felt = contact.feel([15.0, 31.0, 3.0]);
+    assert_eq!(felt.state, ContactState::Free);
 }

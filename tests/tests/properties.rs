@@ -5,10 +5,10 @@
 //! kept in `properties.proptest-regressions` and run first the next time; what
 //! they taught has a test of its own in `regressions.rs`.
 
-use hapterra_core::contact::{Pace, Rule};
-use hapterra_tests::scene::hand::GRAIN;
+use hapterra_core::contact::{Execution, Rule};
+use hapterra_tests::scene::hip_path::GRAIN;
 use hapterra_tests::scene::run::Scene;
-use hapterra_tests::scene::stage::{Buffers, Supply};
+use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::terrain::{Kind, Terrain};
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -29,7 +29,7 @@ fn terrain(heights: &[f32]) -> Terrain {
     })
 }
 
-/// Ground that a hand knows: slopes up to four.
+/// Ground that a HIP knows: slopes up to four.
 fn gentle() -> impl Strategy<Value = Vec<f32>> {
     let height = prop_oneof![
         Just(0.0_f32),
@@ -69,9 +69,9 @@ fn path() -> impl Strategy<Value = Vec<[f64; 3]>> {
         (-8..=12_i32).prop_map(|quarters| f64::from(quarters) / 4.0),
         (-3.0..3.0_f64).prop_map(|z| (z / GRAIN).round() * GRAIN),
     ];
-    let hand = (coordinate(), coordinate(), height).prop_map(|(x, y, z)| [x, y, z]);
+    let hip = (coordinate(), coordinate(), height).prop_map(|(x, y, z)| [x, y, z]);
     // Seen above everything first.
-    vec(hand, 1..30).prop_map(|mut path| {
+    vec(hip, 1..30).prop_map(|mut path| {
         path.insert(0, [3.5, 3.5, 4e6]);
         path.insert(1, [3.5, 3.5, 4.0]);
         path
@@ -82,8 +82,8 @@ fn rule() -> impl Strategy<Value = Rule> {
     prop_oneof![4 => Just(Rule::Swept), 1 => Just(Rule::Paper)]
 }
 
-fn pace() -> impl Strategy<Value = Pace> {
-    prop_oneof![Just(Pace::RealTime), Just(Pace::LockStep)]
+fn execution() -> impl Strategy<Value = Execution> {
+    prop_oneof![Just(Execution::RealTime), Just(Execution::LockStep)]
 }
 
 fn holds(scene: &Scene) -> Result<(), TestCaseError> {
@@ -106,23 +106,23 @@ proptest! {
 
     #[test]
     fn everything_holds_on_gentle_ground(
-        heights in gentle(), path in path(), rule in rule(), pace in pace(),
+        heights in gentle(), path in path(), rule in rule(), execution in execution(),
     ) {
-        holds(&Scene::given(terrain(&heights), path, rule, pace, Supply::Held))?;
+        holds(&Scene::given(terrain(&heights), path, rule, execution, Supply::Held))?;
     }
 
     #[test]
     fn everything_holds_on_wild_ground(
-        heights in wild(), path in path(), rule in rule(), pace in pace(),
+        heights in wild(), path in path(), rule in rule(), execution in execution(),
     ) {
-        holds(&Scene::given(terrain(&heights), path, rule, pace, Supply::Held))?;
+        holds(&Scene::given(terrain(&heights), path, rule, execution, Supply::Held))?;
     }
 
     #[test]
     fn everything_holds_while_tiles_arrive(
-        heights in gentle(), path in path(), pace in pace(), latency in 0..4_u32,
+        heights in gentle(), path in path(), execution in execution(), latency in 0..4_u32,
     ) {
         let supply = Supply::Pulled { latency };
-        holds(&Scene::given(terrain(&heights), path, Rule::Swept, pace, supply))?;
+        holds(&Scene::given(terrain(&heights), path, Rule::Swept, execution, supply))?;
     }
 }

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hapterra::raster::{CellUnit, Fault, OpenOptions, PngChannel, Raster};
+use hapterra::raster::{BadRaster, CellUnit, OpenOptions, PngChannel, Raster};
 use hapterra_tests::shared;
 
 const COLUMNS: usize = 512;
@@ -121,7 +121,7 @@ fn raw_samples_decode_with_a_stated_layout() {
     let Some(folder) = shared("dem/variants") else {
         return;
     };
-    use hapterra::raster::{Endian, RawLayout, RawSample};
+    use hapterra::raster::{Endian, RawLayout, SampleType};
     let open_raw = |sample, columns, name: &str, no_data| {
         let options = OpenOptions {
             raw: Some(RawLayout {
@@ -136,16 +136,16 @@ fn raw_samples_decode_with_a_stated_layout() {
         Raster::open(folder.join(name), &options)
     };
     let name = "tujunga_i16_holes.raw";
-    let raster = open_raw(RawSample::I16, 512, name, Some(-32768.0)).expect(name);
+    let raster = open_raw(SampleType::I16, 512, name, Some(-32768.0)).expect(name);
     assert_heights(&raster, &truth_i16(&folder, name), name);
     let name = "tujunga_f32_nan.raw";
-    let raster = open_raw(RawSample::F32, 512, name, None).expect(name);
+    let raster = open_raw(SampleType::F32, 512, name, None).expect(name);
     assert_heights(&raster, &truth_f32(&folder), name);
 
-    let wrong = open_raw(RawSample::I16, 513, name, None).expect_err("another size");
-    assert!(matches!(wrong.fault(), Fault::Damaged(_)), "{wrong}");
-    let short = open_raw(RawSample::F64, 512, name, None).expect_err("too short");
-    assert!(matches!(short.fault(), Fault::Truncated(_)), "{short}");
+    let wrong = open_raw(SampleType::I16, 513, name, None).expect_err("another size");
+    assert!(matches!(wrong.fault(), BadRaster::Damaged(_)), "{wrong}");
+    let short = open_raw(SampleType::F64, 512, name, None).expect_err("too short");
+    assert!(matches!(short.fault(), BadRaster::Truncated(_)), "{short}");
 }
 
 #[test]
@@ -303,7 +303,7 @@ fn a_large_file_is_held_once_in_its_own_type() {
         .fold(0.0, f64::max);
     assert_eq!(highest, 8752.0);
     let mut row = vec![0.0; 8];
-    raster.copy_row(3358, 10_796, &mut row);
+    raster.copy_row(0, 3358, 10_796, &mut row);
     assert_eq!(row[3], raster.height(10_799, 3358));
     assert!(
         row[4..].iter().all(|height| height.is_nan()),
@@ -318,7 +318,10 @@ fn files_too_small_for_a_surface_are_refused() {
     };
     for name in ["odd_1x1.tif", "odd_1xN.tif"] {
         let error = Raster::open(folder.join(name), &OpenOptions::default()).expect_err(name);
-        assert!(matches!(error.fault(), Fault::TooSmall { .. }), "{error}");
+        assert!(
+            matches!(error.fault(), BadRaster::TooSmall { .. }),
+            "{error}"
+        );
     }
     assert_eq!(open(&folder.join("odd_2x2.tif")).columns(), 2);
 }
@@ -340,7 +343,9 @@ fn third_party_tiffs_are_read_or_refused_for_what_they_are() {
             Err(error) => assert!(
                 matches!(
                     error.fault(),
-                    Fault::NotAHeightField(_) | Fault::TooSmall { .. } | Fault::AllNoData { .. }
+                    BadRaster::NotAHeightField(_)
+                        | BadRaster::TooSmall { .. }
+                        | BadRaster::AllNoData { .. }
                 ),
                 "{error}"
             ),
@@ -383,7 +388,7 @@ fn a_colour_picture_needs_its_channel_named() {
     };
     let error = Raster::open(&path, &options).expect_err("there is no grey channel");
     assert!(
-        matches!(error.fault(), Fault::AmbiguousChannels(_)),
+        matches!(error.fault(), BadRaster::AmbiguousChannels(_)),
         "{error}"
     );
 }

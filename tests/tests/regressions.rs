@@ -1,9 +1,9 @@
 //! What random scenes found, as small as it gets, each by the name of its cause.
 
-use hapterra_core::contact::{Pace, Rule, State};
+use hapterra_core::contact::{ContactState, Execution, Rule};
 use hapterra_tests::invariants::Violation;
 use hapterra_tests::scene::run::Scene;
-use hapterra_tests::scene::stage::{Buffers, Supply};
+use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::terrain::{Kind, Terrain};
 
 fn field(size: [i32; 2], height: impl Fn(i32, i32) -> f32) -> Terrain {
@@ -14,10 +14,10 @@ fn field(size: [i32; 2], height: impl Fn(i32, i32) -> f32) -> Terrain {
 fn run(
     terrain: Terrain,
     path: &[[f64; 3]],
-    pace: Pace,
+    execution: Execution,
     supply: Supply,
-) -> Result<Vec<State>, Violation> {
-    let scene = Scene::given(terrain, path.to_vec(), Rule::Swept, pace, supply);
+) -> Result<Vec<ContactState>, Violation> {
+    let scene = Scene::given(terrain, path.to_vec(), Rule::Swept, execution, supply);
     let mut buffers = Buffers::default();
     scene.run(&mut buffers)?;
     let seen = scene.feel(&mut buffers, [0; 3], supply, |_| Ok(()))?;
@@ -40,8 +40,8 @@ fn a_proxy_on_the_east_border_leaves_as_on_the_west_one() {
         [0.5, 2.0, -2.502_653_121_948_242],
         [0.5, 0.5, 1.737_531_661_987_304_7],
     ];
-    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
-    assert_eq!(states.last(), Some(&State::Free));
+    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    assert_eq!(states.last(), Some(&ContactState::Free));
 }
 
 /// The edge of flat ground, reached from a patch with a spike of 10⁶, was
@@ -60,21 +60,21 @@ fn ground_beside_a_spike_is_felt_where_it_is() {
         [1.0, 0.0, 0.0],
         [2.0, 5.25, 0.0],
     ];
-    run(terrain, &path, Pace::RealTime, Supply::Held).expect("holds");
+    run(terrain, &path, Execution::RealTime, Supply::Held).expect("holds");
 }
 
-/// The tile under the hand and the tile under the proxy share a place in the
+/// The tile under the HIP and the tile under the proxy share a place in the
 /// window; a replay waited for ever for both.
 #[test]
-fn a_hand_one_window_away_from_its_proxy_does_not_hold_a_replay_up() {
+fn a_hip_one_window_away_from_its_proxy_does_not_hold_a_replay_up() {
     let terrain = field([600, 40], |x, _| if x == 101 { 500.0 } else { 0.0 });
     let path = [[90.5, 20.5, 1.0], [360.5, 20.5, -0.5], [361.5, 20.5, -0.5]];
     let supply = Supply::Pulled { latency: 0 };
-    let states = run(terrain, &path, Pace::LockStep, supply).expect("holds");
-    assert_eq!(states[1..], [State::Touching; 2]);
+    let states = run(terrain, &path, Execution::LockStep, supply).expect("holds");
+    assert_eq!(states[1..], [ContactState::Touching; 2]);
 }
 
-/// The way from the proxy to the hand led over a hole into the solid behind it,
+/// The way from the proxy to the HIP led over a hole into the solid behind it,
 /// and the contact was dropped with all its force at once.
 #[test]
 fn a_way_over_a_hole_into_the_solid_ends_a_contact_without_a_kick() {
@@ -102,10 +102,10 @@ fn a_way_over_a_hole_into_the_solid_ends_a_contact_without_a_kick() {
     let along = |i: i32| 9.5 - f64::from(i) / 16.0;
     path.extend((0..88).map(|i| [along(i), 1.0625, 0.0]));
     path.extend((0..64).map(|i| [4.0, 1.03125, f64::from(i) / 64.0]));
-    run(terrain, &path, Pace::RealTime, Supply::Held).expect("holds");
+    run(terrain, &path, Execution::RealTime, Supply::Held).expect("holds");
 }
 
-/// The closest point 4·10⁻⁵ cell beyond the edge that the hand stands over.
+/// The closest point 4·10⁻⁵ cell beyond the edge that the HIP stands over.
 #[test]
 fn a_minimum_just_beyond_an_edge_is_found() {
     let rows = [
@@ -119,7 +119,7 @@ fn a_minimum_just_beyond_an_edge_is_found() {
         [2.5, 2.5, 1e4],
         [1.948_299_407_958_984_4, 1.0, -1.016_087_532_043_457],
     ];
-    run(terrain, &path, Pace::RealTime, Supply::Held).expect("holds");
+    run(terrain, &path, Execution::RealTime, Supply::Held).expect("holds");
 }
 
 /// What faded away was not the last slide's force but the one of the last tick
@@ -135,14 +135,14 @@ fn a_contact_lost_after_a_late_tile_fades_from_what_was_felt_last() {
     path.extend((0..16).map(|i| [10.5 + f64::from(i), 10.5, -0.05 * f64::from(i + 1)]));
     path.push([40.5, 10.5, 0.5]);
     let supply = Supply::Pulled { latency: 40 };
-    let states = run(terrain, &path, Pace::LockStep, supply).expect("holds");
-    assert_eq!(states.last(), Some(&State::LettingGo));
+    let states = run(terrain, &path, Execution::LockStep, supply).expect("holds");
+    assert_eq!(states.last(), Some(&ContactState::Fading));
 }
 
-/// The way from the surface to a hand 1.1·10⁻⁵ cell below it was so short that
+/// The way from the surface to a HIP 1.1·10⁻⁵ cell below it was so short that
 /// it was passed over as the corner that a way touches on leaving an edge.
 #[test]
-fn a_hand_just_below_a_vertex_is_not_let_through() {
+fn a_hip_just_below_a_vertex_is_not_let_through() {
     let rows = [
         [-297.904_27, 265.127_4, 34.867_683, 109.010_83],
         [35.195_873, 9.611_267, 268.303_25, 93.524_216],
@@ -160,8 +160,8 @@ fn a_hand_just_below_a_vertex_is_not_let_through() {
         near(-0.03, -0.03, 5.953_146_934_509_277),
         near(0.0, 0.0, 5.923_147_201_538_086),
     ];
-    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
-    assert_eq!(states.last(), Some(&State::Touching));
+    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    assert_eq!(states.last(), Some(&ContactState::Touching));
 }
 
 /// A way half a cell above a wall of 1.5·10⁶, and as steep, was walked in pieces
@@ -174,12 +174,12 @@ fn a_way_along_a_wall_settles() {
         [1.0, 1.5, 1_500_000.125],
         [1.875, 1.5, 2_812_500.5],
     ];
-    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
-    assert_eq!(states.last(), Some(&State::Free));
+    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    assert_eq!(states.last(), Some(&ContactState::Free));
 }
 
 /// A descent that ran out of work on a wall of 10⁶ showed the wall's foot, where
-/// the way into the next patch begins, and went on from there for the next hand.
+/// the way into the next patch begins, and went on from there for the next HIP.
 #[test]
 fn a_descent_out_of_work_shows_what_it_has_found() {
     let terrain = field([24, 12], |x, y| match (x, y) {
@@ -204,14 +204,14 @@ fn a_descent_out_of_work_shows_what_it_has_found() {
             7.619_668_960_571_289,
         ],
     ];
-    run(terrain, &path, Pace::RealTime, Supply::Held).expect("holds");
+    run(terrain, &path, Execution::RealTime, Supply::Held).expect("holds");
 }
 
 /// The place at which the proxy left the surface was known to the last place of
 /// its height above the tile's base: 1.5·10⁻⁵ cell under the surface at 138 cells
-/// its way ended where it began, and the hand, 0.6 cell above, was pulled down.
+/// its way ended where it began, and the HIP, 0.6 cell above, was pulled down.
 #[test]
-fn a_hand_that_leaves_high_ground_is_let_go() {
+fn a_hip_that_leaves_high_ground_is_let_go() {
     let height = |x: i32, y: i32| 140.0 - 0.797_21 * x as f32 - 1.051_4 * y as f32;
     let count = 1.0 / f64::from(1 << 20);
     let mut path = vec![[2.5, 2.5, 160.0]];
@@ -225,8 +225,8 @@ fn a_hand_that_leaves_high_ground_is_let_go() {
         }
     }
     let terrain = field([6, 6], height);
-    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
-    let wanted = [State::Touching, State::Free];
+    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    let wanted = [ContactState::Touching, ContactState::Free];
     assert!(states[1..].chunks(2).all(|pair| pair == wanted));
 }
 
@@ -241,11 +241,18 @@ fn a_way_in_over_the_border_is_no_crossing_wherever_its_pieces_end() {
         [119.25, -1.0, 0.375],
         [3.0, 3.0, -1_000_000.0],
     ];
-    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
-    assert_eq!(states[1..], [State::Free, State::Free, State::Waiting]);
+    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    assert_eq!(
+        states[1..],
+        [
+            ContactState::Free,
+            ContactState::Free,
+            ContactState::Waiting
+        ]
+    );
 }
 
-/// A hand beside the field goes deep under it, in over its very corner. The look
+/// A HIP beside the field goes deep under it, in over its very corner. The look
 /// along that way ended where the field begins, and the way that went on from there
 /// had come from nowhere: it touched from below.
 #[test]
@@ -253,61 +260,69 @@ fn a_way_in_over_the_corner_of_the_field_touches_nothing() {
     for depth in [50.0, 1e4, 1e8] {
         let terrain = field([4, 4], |_, _| 0.0);
         let path = [[1.5, 1.5, 3.0], [-1.0, -1.0, 3.0], [3.0, 3.0, -depth]];
-        let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
-        assert_eq!(states.last(), Some(&State::Waiting), "{depth} cells deep");
+        let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+        assert_eq!(
+            states.last(),
+            Some(&ContactState::Waiting),
+            "{depth} cells deep"
+        );
     }
 }
 
 /// A proxy that could not leave the foot of a spike by rounding was not let go
-/// later either: at rest on level ground it pulled down the hand above it.
+/// later either: at rest on level ground it pulled down the HIP above it.
 #[test]
-fn a_hand_straight_above_its_proxy_is_let_go() {
+fn a_hip_straight_above_its_proxy_is_let_go() {
     let mut buffers = Buffers::default();
     for number in [9, 99, 186] {
         let scene = Scene::random(91, number);
         let seen = scene.feel(&mut buffers, [0; 3], scene.supply, |_| Ok(()));
         for seen in seen.expect("it settles") {
             let [x, y, z] = [0, 1, 2].map(|axis| seen.hip[axis] - seen.proxy[axis]);
-            let touching = seen.felt.state == State::Touching && seen.felt.settled;
+            let touching = seen.felt.state == ContactState::Touching && seen.felt.converged;
             assert!(!(touching && x == 0.0 && y == 0.0 && z > 1e-3), "{seen:?}");
         }
     }
 }
 
-/// Of a hand millions of cells off a place was near to both of its patch's
+/// Of a HIP millions of cells off a place was near to both of its patch's
 /// borders at once, and that was taken for neither: no neighbour was asked.
 #[test]
-fn a_hand_millions_of_cells_away_is_followed_over_every_edge() {
+fn a_hip_millions_of_cells_away_is_followed_over_every_edge() {
     let ridge = |x: i32| if x == 20 { 3.0 } else { 0.0 };
     for far in [1e4, 1e6, 1e8] {
         let path = [[18.5, 10.5, 4.0], [18.5, 10.5, -0.5], [far, 10.5, 2.5]];
         let states = run(
             field([40, 40], move |x, _| ridge(x)),
             &path,
-            Pace::LockStep,
+            Execution::LockStep,
             Supply::Held,
         );
         let states = states.expect("holds");
-        assert_eq!(states[1..], [State::Touching, State::Free], "{far}");
+        assert_eq!(
+            states[1..],
+            [ContactState::Touching, ContactState::Free],
+            "{far}"
+        );
     }
 }
 
 /// A way that met a saddle of the checkerboard again and again, each time nearer
-/// to the hand, counted as one from a place to another and back, and the proxy
+/// to the HIP, counted as one from a place to another and back, and the proxy
 /// stayed half-way up the last of them.
 #[test]
 fn a_proxy_leaves_as_often_as_that_leads_nearer() {
     let terrain = field([1500, 40], |x, y| ((x + y) & 1) as f32);
     let path = [[92.25, 8.0, 3.0], [92.5, 8.0, 0.5], [796.0, 36.0, 1.0]];
     let supply = Supply::Pulled { latency: 0 };
-    let states = run(terrain, &path, Pace::LockStep, supply).expect("holds");
-    assert_eq!(states[1..], [State::Touching, State::Free]);
+    let states = run(terrain, &path, Execution::LockStep, supply).expect("holds");
+    assert_eq!(states[1..], [ContactState::Touching, ContactState::Free]);
 }
 
-/// Up a wall of 10⁶ a proxy knows its height above the hand to 10⁻¹, and that was
-/// what told whether the hand was free.
+/// Up a wall of 10⁶ a proxy knows its height above the HIP to 10⁻¹, and that was
+/// what told whether the HIP was free.
 #[test]
-fn a_proxy_up_a_wall_lets_a_hand_go_that_is_beside_it() {
+fn a_proxy_up_a_wall_lets_a_hip_go_that_is_beside_it() {
     let terrain = field([8, 40], |x, y| if (x, y) == (4, 20) { 1e6 } else { 0.0 });
     let grain = 1.0 / f64::from(1 << 20);
     let path = [
@@ -316,8 +331,15 @@ fn a_proxy_up_a_wall_lets_a_hand_go_that_is_beside_it() {
         [6.0, 20.0, -grain],
         [6.25, 20.0, 250_000.0 - grain],
     ];
-    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
-    assert_eq!(states[1..], [State::Touching, State::Touching, State::Free]);
+    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    assert_eq!(
+        states[1..],
+        [
+            ContactState::Touching,
+            ContactState::Touching,
+            ContactState::Free
+        ]
+    );
 }
 
 /// A proxy that left a place 10⁻⁶ cell before the foot of a wall, and was held where
@@ -337,14 +359,14 @@ fn a_proxy_held_where_it_left_climbs_on() {
         [4.042_195_320_129_395, 4.0, 287.258_709_907_531_74],
         [4.0, 4.055_518_150_329_59, 300.028_407_096_862_8],
     ];
-    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
-    assert_eq!(states.last(), Some(&State::Free));
+    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    assert_eq!(states.last(), Some(&ContactState::Free));
 }
 
-/// Of a hand 0.03 cell off the squared distance was thought to be known better
+/// Of a HIP 0.03 cell off the squared distance was thought to be known better
 /// than the places are that it comes from, and the way over an edge was missed.
 #[test]
-fn a_near_hand_finds_the_way_over_an_edge() {
+fn a_near_hip_finds_the_way_over_an_edge() {
     let rows = [
         [-29.472_837, 13.072_403, -19.966_434, 31.896_08],
         [21.871_374, -11.741_989, 23.615_377, -18.654_66],
@@ -370,22 +392,22 @@ fn a_near_hand_finds_the_way_over_an_edge() {
             -2.611_005_783_081_054_7,
         ],
     ];
-    let states = run(terrain, &path, Pace::LockStep, Supply::Held).expect("holds");
-    assert_eq!(states.last(), Some(&State::Touching));
+    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    assert_eq!(states.last(), Some(&ContactState::Touching));
 }
 
-/// Of a hand 10⁸ cells down a proxy's height above it was known to 8 cells, and a
+/// Of a HIP 10⁸ cells down a proxy's height above it was known to 8 cells, and a
 /// way down a slope counted as leading no nearer: where it was given up depended
 /// on the window.
 #[test]
-fn a_slope_far_above_the_hand_leads_on_to_its_end() {
+fn a_slope_far_above_the_hip_leads_on_to_its_end() {
     let slope = field([200, 40], |x, _| -0.56 * x as f32);
     let path = [[100.5, 2.5, 4.0], [100.5, 2.5, -57.0], [3.0, 3.0, -1e8]];
     let scene = Scene::given(
         slope,
         path.to_vec(),
         Rule::Swept,
-        Pace::LockStep,
+        Execution::LockStep,
         Supply::Held,
     );
     let mut buffers = Buffers::default();
@@ -396,23 +418,23 @@ fn a_slope_far_above_the_hand_leads_on_to_its_end() {
 }
 
 /// A way off a slope of 190 passed over its first step, 6·10⁻⁶ cell long, and hit
-/// the sample at the end of that, 10⁻³ cell above the hand.
+/// the sample at the end of that, 10⁻³ cell above the HIP.
 #[test]
 fn a_way_off_a_slope_hits_it_where_it_begins() {
     let mut buffers = Buffers::default();
     Scene::random(778, 38_673).run(&mut buffers).expect("holds");
 }
 
-/// Of a hand a million cells off everything in a patch was beside its corner: a
+/// Of a HIP a million cells off everything in a patch was beside its corner: a
 /// proxy was put on a vertex 70,000 cells up, for the valley beyond it.
 #[test]
-fn a_far_hand_lifts_no_proxy_to_a_vertex() {
+fn a_far_hip_lifts_no_proxy_to_a_vertex() {
     let mut buffers = Buffers::default();
     let scene = Scene::random(20_261_126, 38_445);
     scene.run(&mut buffers).expect("holds");
 }
 
-/// A proxy 2·10⁻⁸ cell beside a vertex left for a hand 16,000 cells up, and hit the
+/// A proxy 2·10⁻⁸ cell beside a vertex left for a HIP 16,000 cells up, and hit the
 /// ground of the cell that its way crosses for those 2·10⁻⁸ cell.
 #[test]
 fn a_way_up_is_not_stopped_in_a_hairs_breadth() {

@@ -5,9 +5,9 @@ use hapterra::raster::{OpenOptions, Raster};
 use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::{Rule, State};
+use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
-use hapterra_core::wire::message::Sample;
+use hapterra_core::scene::Sample;
 use hapterra_tests::oracle::Oracle;
 use hapterra_tests::shared;
 use hapterra_tests::walk::wander;
@@ -15,7 +15,7 @@ use hapterra_tests::walk::wander;
 /// Distance of the proxy from the surface, cells: a few roundings of a height
 /// that is stored relative to its tile.
 const ON_SURFACE: f64 = 2e-5;
-/// By how much some other point near the proxy may be closer to the hand,
+/// By how much some other point near the proxy may be closer to the HIP,
 /// cells.
 const CLOSEST: f64 = 1e-6;
 /// How far that other point is looked for, cells, and not past the border of
@@ -70,7 +70,7 @@ fn judge(raster: &Raster, scale: Scale, rule: Rule, seed: u64, rows: usize) -> u
         let sample = feel(&mut replayer, hip_mm);
         let (hip, proxy) = mm(&sample, &scale);
         let force = sample.force_n.to_array().map(f64::from);
-        if sample.state != State::Touching {
+        if sample.state != ContactState::Touching {
             assert_eq!(force, [0.0; 3], "a force without contact at {hip_mm:?}");
             continue;
         }
@@ -92,15 +92,18 @@ fn judge(raster: &Raster, scale: Scale, rule: Rule, seed: u64, rows: usize) -> u
             closer < CLOSEST,
             "{closer} closer than {proxy_c:?} to {hip_c:?}"
         );
-        let stretch_mm: [f64; 3] = std::array::from_fn(|i| proxy[i] - hip[i]);
+        let displacement_mm: [f64; 3] = std::array::from_fn(|i| proxy[i] - hip[i]);
         let k = f64::from(law.stiffness_n_per_mm);
-        let full = (k * length(stretch_mm)).min(f64::from(law.max_force_n));
-        // The force follows the stretch; near a hole it may be faded.
-        assert!(length(force) <= full + FORCE_N, "{force:?} {stretch_mm:?}");
+        let full = (k * length(displacement_mm)).min(f64::from(law.max_force_n));
+        // The force follows the displacement; near a hole it may be faded.
+        assert!(
+            length(force) <= full + FORCE_N,
+            "{force:?} {displacement_mm:?}"
+        );
         if oracle.is_known_around(hip_c[0], hip_c[1], 40.0) {
-            let share = full / length(stretch_mm).max(1e-12);
+            let share = full / length(displacement_mm).max(1e-12);
             for axis in 0..3 {
-                assert!((force[axis] - share * stretch_mm[axis]).abs() < FORCE_N);
+                assert!((force[axis] - share * displacement_mm[axis]).abs() < FORCE_N);
             }
         } else {
             near_holes += 1;
@@ -165,19 +168,19 @@ fn contact_begins_and_ends_at_the_surface() {
             let top = f64::from(terrain.top()) * scale.cell_mm() + 1.0;
             feel(&mut replayer, [x, y, top]);
             let above = feel(&mut replayer, [x, y, ground + gap]);
-            assert_eq!(above.state, State::Free, "{rule:?} {i}");
+            assert_eq!(above.state, ContactState::Free, "{rule:?} {i}");
             let below = feel(&mut replayer, [x, y, ground - gap]);
-            assert_eq!(below.state, State::Touching, "{rule:?} {i}");
+            assert_eq!(below.state, ContactState::Touching, "{rule:?} {i}");
             assert!(below.force_n.z > 0.0);
             let again = feel(&mut replayer, [x, y, ground + 2.0 * gap]);
-            assert_eq!(again.state, State::Free, "{rule:?} {i}");
+            assert_eq!(again.state, ContactState::Free, "{rule:?} {i}");
             feel(&mut replayer, [x, y, top]);
         }
     }
 }
 
 #[test]
-fn no_force_until_the_hand_has_been_above() {
+fn no_force_until_the_hip_has_been_above() {
     let raster = synthetic(Kind::Plane);
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
     let mut replayer = on_native(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("opened");
@@ -186,12 +189,12 @@ fn no_force_until_the_hand_has_been_above() {
         let sample = feel(&mut replayer, [60.0, 50.0, ground - depth]);
         assert_eq!(
             (sample.state, sample.force_n.length()),
-            (State::Waiting, 0.0)
+            (ContactState::Waiting, 0.0)
         );
     }
     feel(&mut replayer, [60.0, 50.0, ground + 0.1]);
     let sample = feel(&mut replayer, [60.0, 50.0, ground - 1.0]);
-    assert_eq!(sample.state, State::Touching);
+    assert_eq!(sample.state, ContactState::Touching);
 }
 
 /// A terrain with a hole of 20 × 20 samples in its middle.
@@ -213,7 +216,11 @@ fn over_a_hole_and_off_the_data_there_is_nothing_to_feel() {
             for step in 0..40 {
                 let z = 20.0 - f64::from(step);
                 let sample = feel(&mut replayer, [place[0], place[1], z]);
-                assert_ne!(sample.state, State::Touching, "{rule:?} {place:?} {z}");
+                assert_ne!(
+                    sample.state,
+                    ContactState::Touching,
+                    "{rule:?} {place:?} {z}"
+                );
                 assert_eq!(sample.force_n.length(), 0.0);
             }
         }
@@ -237,7 +244,10 @@ fn the_edge_of_a_hole_lets_go_without_a_kick_and_does_not_hook() {
         largest_step = largest_step.max((sample.force_n - last.force_n).length());
         last = sample;
     }
-    assert_eq!((last.state, last.force_n.length()), (State::Waiting, 0.0));
+    assert_eq!(
+        (last.state, last.force_n.length()),
+        (ContactState::Waiting, 0.0)
+    );
     assert!(largest_step < 0.03, "a kick of {largest_step} N in a tick");
     while x > 30.0 {
         x -= 0.05;
@@ -258,7 +268,7 @@ fn a_fast_sweep_does_not_pass_through_a_peak() {
         feel(&mut replayer, [36.0, 32.3, 5.0])
     };
     let swept = sweep();
-    assert_eq!(swept.state, State::Touching);
+    assert_eq!(swept.state, ContactState::Touching);
     let proxy = terrain.scale().to_mm(&swept.proxy);
     assert!(proxy[0] < 30.0, "stopped on the near side: {proxy:?}");
     assert!(swept.force_n.x < -3.0, "{:?}", swept.force_n);

@@ -1,17 +1,17 @@
 //! Random walks judged a second time: by a list of all places a proxy may rest
-//! (`hapterra_tests::minima`), and by looking densely at the hand's ways.
+//! (`hapterra_tests::minima`), and by looking densely at the HIP paths.
 
 use hapterra::raster::{OpenOptions, Raster};
-use hapterra_core::contact::{Pace, Rule, State};
+use hapterra_core::contact::{ContactState, Execution, Rule};
 use hapterra_tests::chance::Chance;
 use hapterra_tests::invariants::judge::Judge;
 use hapterra_tests::invariants::seen::Seen;
 use hapterra_tests::invariants::surface::{Patch, distance};
 use hapterra_tests::invariants::{Invariant, descent};
 use hapterra_tests::minima;
-use hapterra_tests::scene::hand;
+use hapterra_tests::scene::hip_path;
 use hapterra_tests::scene::run::Scene;
-use hapterra_tests::scene::stage::{Buffers, Supply};
+use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::terrain::{Kind, Terrain};
 use hapterra_tests::shared;
 
@@ -26,7 +26,7 @@ struct Found {
     disputed: Vec<usize>,
     /// Contacts that began.
     began: u64,
-    /// Of those, farther from the hand than where its way first is below ground.
+    /// Of those, farther from the HIP than where its way first is below ground.
     late: Vec<usize>,
     /// Free ways that are below ground somewhere: around or over what they met.
     dipped: u64,
@@ -67,9 +67,9 @@ fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
 /// Whether a proxy at rest is at a local closest point, by the bound that the
 /// judge has, too; `None` where there is nothing to be said.
 fn rests_right(terrain: &Terrain, seen: &Seen) -> Option<bool> {
-    let stretch = distance(seen.proxy, seen.hip);
-    let rests = seen.felt.state == State::Touching && seen.felt.settled;
-    if !rests || !(2e-6..=1e4).contains(&stretch) {
+    let displacement = distance(seen.proxy, seen.hip);
+    let rests = seen.felt.state == ContactState::Touching && seen.felt.converged;
+    if !rests || !(2e-6..=1e4).contains(&displacement) {
         return None;
     }
     let place = [seen.proxy[0], seen.proxy[1]];
@@ -82,7 +82,7 @@ fn rests_right(terrain: &Terrain, seen: &Seen) -> Option<bool> {
         return Some(true);
     }
     let level = |a: [f64; 3], b: [f64; 3]| (a[0] - b[0]).hypot(a[1] - b[1]);
-    // How far the truth moves when the hand does by as much as is allowed.
+    // How far the truth moves when the HIP does by as much as is allowed.
     let moved = (0..6).filter_map(|i| {
         let mut hip = seen.hip;
         hip[i / 2] += if i % 2 == 0 { allowed } else { -allowed };
@@ -92,12 +92,12 @@ fn rests_right(terrain: &Terrain, seen: &Seen) -> Option<bool> {
     Some(level(at, seen.proxy) <= 4.0 * (allowed + condition))
 }
 
-/// Looks at the hand's way every 256th of a cell.
+/// Looks at the path of the HIP every 256th of a cell.
 fn ways(terrain: &Terrain, before: &Seen, now: &Seen, tick: usize, found: &mut Found) {
-    let was_free = before.felt.state == State::Free && before.felt.settled;
+    let was_free = before.felt.state == ContactState::Free && before.felt.converged;
     let length = distance(before.hip, now.hip);
     // A longer way is looked at no more than so often.
-    if !was_free || !now.felt.settled || length > 500.0 {
+    if !was_free || !now.felt.converged || length > 500.0 {
         return;
     }
     let steps = (256.0 * length).ceil().max(1.0) as u32;
@@ -112,14 +112,14 @@ fn ways(terrain: &Terrain, before: &Seen, now: &Seen, tick: usize, found: &mut F
     };
     let first = (0..=steps).map(at).find(is_below);
     match now.felt.state {
-        State::Touching => {
+        ContactState::Touching => {
             found.began += 1;
             let most = first.map_or(length, |p| distance(p, now.hip));
             if distance(now.proxy, now.hip) > most + 1e-2 + 4.0 * now.allowed() {
                 found.late.push(tick);
             }
         }
-        State::Free => found.dipped += u64::from(first.is_some()),
+        ContactState::Free => found.dipped += u64::from(first.is_some()),
         _ => {}
     }
 }
@@ -131,7 +131,7 @@ fn a_proxy_beside_its_place_is_seen_there() {
         [20.5, 20.25, 9.0],
         [20.5, 20.25, ground.height_about(20.5, 20.25) - 0.5],
     ];
-    let scene = Scene::given(ground, path, Rule::Swept, Pace::LockStep, Supply::Held);
+    let scene = Scene::given(ground, path, Rule::Swept, Execution::LockStep, Supply::Held);
     let seen = scene.feel(&mut Buffers::default(), [0; 3], Supply::Held, |_| Ok(()));
     let honest = seen.expect("it settles")[1];
     assert_eq!(rests_right(&scene.terrain, &honest), Some(true));
@@ -186,12 +186,12 @@ fn on_real_terrain_every_proxy_rests_at_a_closest_point() {
             let mut chance = Chance::new(5);
             let mut total = Found::default();
             for _ in 0..12 {
-                let path = hand::walk(&terrain, &mut chance, 1000);
+                let path = hip_path::random(&terrain, &mut chance, 1000);
                 let scene = Scene::given(
                     terrain.clone(),
                     path,
                     Rule::Swept,
-                    Pace::LockStep,
+                    Execution::LockStep,
                     Supply::Held,
                 );
                 let found = look(&scene, &mut Buffers::default());
@@ -217,7 +217,7 @@ fn cut(raster: &Raster, steepness: f64) -> Terrain {
     let rows: Vec<Vec<f64>> = (0..height)
         .map(|row| {
             let mut heights = vec![0.0; width as usize];
-            raster.copy_row(first[1] + row, first[0], &mut heights);
+            raster.copy_row(0, first[1] + row, first[0], &mut heights);
             heights
         })
         .collect();
@@ -228,10 +228,10 @@ fn cut(raster: &Raster, steepness: f64) -> Terrain {
 }
 
 /// A walk whose first step was 2⁻¹⁰ cell stepped over the minimum it stood on, on
-/// a wall of 10⁶ with the hand some 10⁻⁶ cell inside.
+/// a wall of 10⁶ with the HIP some 10⁻⁶ cell inside.
 #[test]
 fn the_judge_stays_where_it_is_when_that_is_a_closest_point() {
-    const HANDS: [(u64, [f64; 3]); 5] = [
+    const HIPS: [(u64, [f64; 3]); 5] = [
         (
             317,
             [
@@ -273,13 +273,13 @@ fn the_judge_stays_where_it_is_when_that_is_a_closest_point() {
             ],
         ),
     ];
-    for (number, hand) in HANDS {
+    for (number, hip) in HIPS {
         let spikes = Scene::random(2026, number).terrain;
-        let all = minima::around(&spikes, hand, [hand[0], hand[1]]);
-        let (at, _) = minima::nearest(&all, hand).expect("there is one");
+        let all = minima::around(&spikes, hip, [hip[0], hip[1]]);
+        let (at, _) = minima::nearest(&all, hip).expect("there is one");
         let cell = [at[0].floor() as i32, at[1].floor() as i32];
         let patch = Patch::at(&spikes, cell).expect("inside");
-        let there = descent::from(&spikes, hand, [at[0], at[1]], patch).at;
+        let there = descent::from(&spikes, hip, [at[0], at[1]], patch).at;
         assert!(distance(there, at) < 1e-6, "{there:?} from {at:?}");
     }
 }

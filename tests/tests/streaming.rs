@@ -4,7 +4,7 @@
 use hapterra::raster::Raster;
 use hapterra::replay::on_native;
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::{Rule, State};
+use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
 
 const SIDE: u32 = 4096;
@@ -39,7 +39,7 @@ fn a_field_of_4096_by_4096_streams_through_a_window() {
         let above = if i == 0 { 30.0 } else { -0.5 };
         let hip = terrain.scale().to_grid([x, y, ground + above]);
         let sample = replayer.feel(hip.expect("addressable")).expect("felt");
-        touched += u32::from(sample.state == State::Touching);
+        touched += u32::from(sample.state == ContactState::Touching);
         assert!(sample.force_n.is_finite());
     }
     assert_eq!(touched, steps as u32 - 1, "lost contact on the way");

@@ -6,13 +6,15 @@ use std::time::Duration;
 use hapterra::link::{
     Arming, Emulator, Event, INSTRUCTIONS_PER_COUNT, Patience, Session, serve_plant,
 };
-use hapterra::live::{Mean, Stage};
+use hapterra::place::PlacedTerrain;
 use hapterra::synth::{Kind, Synth};
+use hapterra::telemetry::Mean;
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::{Rule, State};
+use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Mode;
-use hapterra_core::wire::message::{Sample, ToDevice};
+use hapterra_core::scene::Sample;
+use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::status::Status;
 use hapterra_tests::emulation::emulated_board;
 
@@ -27,17 +29,17 @@ fn felt() -> Option<(Vec<Sample>, Status)> {
         .raster(400, 400)
         .expect("raster");
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
-    let stage = Stage::set(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("stage");
-    let mut rig = stage.rig().expect("rig");
+    let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("placed");
+    let mut rig = placed.held_phantom();
     let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
     let mut plant = lines.plant;
-    let ticks = (1e3 * stage.duration_s()) as u32;
+    let ticks = (1e3 * placed.duration_s()) as u32;
     let felt = std::thread::scope(|scope| {
         // Until the board goes.
         scope.spawn(move || serve_plant(&mut plant, &mut rig, &|| false));
         let link = Box::new(lines.link);
-        let (scene, patience) = (stage.scene(), Patience::EMULATED);
-        let opened = Session::open_arming(&terrain, scene, Arming::VIRTUAL, link, patience);
+        let (scene, patience) = (placed.scene(), Patience::EMULATED);
+        let opened = Session::open(&terrain, scene, Some(Arming::VIRTUAL), link, patience);
         let (mut session, _) = opened.expect("opened");
         let (mut samples, mut status): (Vec<Sample>, Option<Status>) = (vec![], None);
         let mut asked = false;
@@ -82,9 +84,9 @@ fn a_tick_in_contact_stays_within_its_budget_and_the_stack_too() {
         // A sample tells what the tick before it cost.
         let (sample, cost) = (&pair[0], f64::from(pair[1].cost));
         let kind = match (sample.mode, sample.state) {
-            (Mode::Armed, State::Free) => 1,
-            (Mode::Armed, State::Waiting) => 2,
-            (Mode::Armed, State::Touching) => 3,
+            (Mode::Armed, ContactState::Free) => 1,
+            (Mode::Armed, ContactState::Waiting) => 2,
+            (Mode::Armed, ContactState::Touching) => 3,
             _ => 0,
         };
         costs[kind].1.take(cost * INSTRUCTIONS_PER_COUNT);

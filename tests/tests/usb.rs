@@ -10,8 +10,10 @@ use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
+use hapterra_core::scene::Source;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
-use hapterra_core::wire::message::{HostHello, PROTOCOL, Source, ToDevice, ToHost};
+use hapterra_core::wire::hello::{HostHello, PROTOCOL};
+use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_firmware::usb::{INTERFACE_GUIDS, MSOS_VENDOR_CODE, PRODUCT, PRODUCT_ID, VENDOR_ID};
 use hapterra_tests::usb::board::{Board, SERIAL};
 use hapterra_tests::usb::host::{
@@ -226,7 +228,13 @@ fn visit(then: impl FnOnce(&mut Session<'_>, &Rc<RefCell<Board>>)) {
     let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
     let (board, found) = enumerated();
     let board = Rc::new(RefCell::new(board));
-    let opened = Session::open(&terrain, scene, link(&board, &found), Patience::EMULATED);
+    let opened = Session::open(
+        &terrain,
+        scene,
+        None,
+        link(&board, &found),
+        Patience::EMULATED,
+    );
     let (mut session, device) = opened.expect("opened");
     assert_eq!(device.board, "scripted");
     then(&mut session, &board);

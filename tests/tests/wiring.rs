@@ -60,10 +60,10 @@ fn the_wiring_tables_have_the_pins_that_the_images_take() {
         let source = source(files);
         &pins(&source, "p.") | &pins(&source, "$p.")
     };
-    let g474 = taken(&["nucleo-g474re/main.rs"]);
+    let g474 = taken(&["nucleo-g474re/chip.rs", "nucleo-g474re/outputs.rs"]);
     assert!(g474.len() > 12, "{g474:?}");
     assert_eq!(wired(&page("nucleo-g474re"), "# nucleo-g474re\n"), g474);
-    let h743 = taken(&["nucleo-h743zi2/board.rs", "nucleo-h743zi2/outputs.rs"]);
+    let h743 = taken(&["nucleo-h743zi2/chip.rs", "nucleo-h743zi2/outputs.rs"]);
     let page = page("nucleo-h743zi2");
     assert_eq!(wired(&page, "## Duty cycles"), h743);
     // This table has only what is other than there.

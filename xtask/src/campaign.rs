@@ -5,7 +5,7 @@ use std::process::Command;
 
 use anyhow::Result;
 
-use crate::run::{cargo, root, run, timed};
+use crate::run::{cargo, output, root, run, timed};
 
 /// Runs the campaign with the user's words; without a segment the report goes to
 /// `docs/campaign.md`.
@@ -30,22 +30,20 @@ pub(crate) fn campaign(words: impl Iterator<Item = OsString>) -> Result<()> {
 
 /// What the source is, if git knows: the report says so.
 fn commit() -> Option<String> {
-    let said = |words: &[&str]| {
-        let output = Command::new("git").args(words).current_dir(root()).output();
-        let output = output.ok().filter(|output| output.status.success())?;
-        Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
-    };
-    let commit = said(&["rev-parse", "--short", "HEAD"])?;
+    let git = |words: &[&str]| output(Command::new("git").args(words).current_dir(root()));
+    let commit = git(&["rev-parse", "--short", "HEAD"])?;
     // The report itself may be there, not committed yet.
-    let changed = said(&[
+    let tracked = [
         "status",
         "--porcelain",
         "--untracked-files=no",
         "--",
         ":!docs",
-    ])?;
-    Some(match changed.is_empty() {
-        true => commit,
-        false => format!("{commit}, changed"),
-    })
+    ];
+    let changed = if git(&tracked)?.trim().is_empty() {
+        ""
+    } else {
+        ", changed"
+    };
+    Some(format!("{}{changed}", commit.trim()))
 }

@@ -1,10 +1,9 @@
 //! `cargo xtask fuzz TARGET MINUTES`: libFuzzer on the tick or on the wire.
 
-use std::process::Command;
-
 use anyhow::{Context, Result, bail};
 
-use crate::run::{on_path, output, root, run, say, target_dir, timed};
+use crate::nightly;
+use crate::run::{on_path, output, root, run, target_dir, timed};
 
 /// The programs in `fuzz/fuzz_targets`.
 const TARGETS: [&str; 2] = ["tick", "wire"];
@@ -25,19 +24,22 @@ pub(crate) fn fuzz(target: &str, minutes: &str) -> Result<()> {
         );
     }
     let seconds = seconds(minutes)?;
-    has_nightly()?;
+    // For its sanitizers.
+    nightly::ready(&["--version"], "")?;
     has_cargo_fuzz()?;
     if on_path("c++").is_none() {
         bail!("libFuzzer wants a C++ compiler; on Debian: apt-get install g++");
     }
     timed(&format!("fuzzing {target} for {minutes} minutes"), || {
-        run(nightly(&["fuzz", "run", "--fuzz-dir", ".", target, "--"])
-            .current_dir(root().join("fuzz"))
-            .arg(format!("-max_total_time={seconds}"))
-            .arg(format!("-max_len={LONGEST}"))
-            .arg(format!("-timeout={PATIENCE_S}"))
-            .arg("-print_final_stats=1")
-            .env("CARGO_TARGET_DIR", target_dir()))
+        run(
+            nightly::cargo(&["fuzz", "run", "--fuzz-dir", ".", target, "--"])
+                .current_dir(root().join("fuzz"))
+                .arg(format!("-max_total_time={seconds}"))
+                .arg(format!("-max_len={LONGEST}"))
+                .arg(format!("-timeout={PATIENCE_S}"))
+                .arg("-print_final_stats=1")
+                .env("CARGO_TARGET_DIR", target_dir()),
+        )
     })
 }
 
@@ -47,39 +49,12 @@ fn seconds(minutes: &str) -> Result<u64> {
     Ok((60.0 * minutes).ceil() as u64)
 }
 
-/// The nightly compiler's cargo, whichever runs this program.
-fn nightly(words: &[&str]) -> Command {
-    let mut command = Command::new("cargo");
-    command
-        .arg("+nightly")
-        .args(words)
-        .env_remove("CARGO")
-        .env_remove("RUSTUP_TOOLCHAIN");
-    command
-}
-
-fn has_nightly() -> Result<()> {
-    const WORDS: [&str; 5] = ["toolchain", "install", "nightly", "--profile", "minimal"];
-    let is_here = || output(&mut nightly(&["--version"])).is_some();
-    if is_here() {
-        return Ok(());
-    }
-    say("installing: rustup toolchain install nightly --profile minimal");
-    if output(Command::new("rustup").args(WORDS)).is_none() || !is_here() {
-        bail!(
-            "no nightly compiler, whose sanitizers libFuzzer needs; with rustup, type: rustup {}",
-            WORDS.join(" ")
-        );
-    }
-    Ok(())
-}
-
 fn has_cargo_fuzz() -> Result<()> {
-    if output(&mut nightly(&["fuzz", "--version"])).is_some() {
+    if output(&mut nightly::cargo(&["fuzz", "--version"])).is_some() {
         return Ok(());
     }
     timed("installing: cargo install cargo-fuzz --locked", || {
-        run(&mut nightly(&["install", "cargo-fuzz", "--locked"]))
+        run(&mut nightly::cargo(&["install", "cargo-fuzz", "--locked"]))
     })
 }
 

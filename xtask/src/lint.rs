@@ -2,8 +2,8 @@
 
 use anyhow::{Context, Result};
 
-use crate::board::BOARDS;
-use crate::image::{counts_words, package_words};
+use crate::board::{BOARDS, EMULATED};
+use crate::image::{COUNTS, package_words};
 use crate::run::{cargo, run, timed};
 use crate::setup::{emulator, toolchain};
 
@@ -28,14 +28,13 @@ pub(crate) fn lint() -> Result<()> {
     })?;
     let toolchain = toolchain::ready()?;
     toolchain.with_clippy()?;
-    let counts = ("the counting image", counts_words());
-    let boards = BOARDS.iter().map(|b| (b.name, package_words(b)));
-    for (name, words) in boards.chain([counts]) {
-        timed(&format!("clippy for {name}"), || {
+    let boards = BOARDS.iter().map(|board| (board, board.name));
+    for (board, binary) in boards.chain([(EMULATED, COUNTS)]) {
+        timed(&format!("clippy for {binary}"), || {
             let mut command = toolchain.cargo("clippy");
             command
                 .arg("--release")
-                .args(&words)
+                .args(package_words(board, binary))
                 .args(["--", "-D", "warnings"]);
             run(&mut command)
         })?;

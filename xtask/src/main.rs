@@ -13,6 +13,7 @@ mod fuzz;
 mod image;
 mod lint;
 mod miri;
+mod nightly;
 mod panics;
 mod run;
 mod setup;

@@ -1,13 +1,13 @@
 //! The god-object on triangles (Zilles & Salisbury 1995): it moves straight
-//! toward the hand; each facet in its way becomes a constraint plane, and its
-//! goal the point nearest to the hand that satisfies all of them.
+//! toward the HIP; each facet in its way becomes a constraint plane, and its
+//! goal the point nearest to the HIP that satisfies all of them.
 //!
 //! In f64, so that it cannot fall through a facet by rounding.
 
 use super::line::Line;
 use super::triangle::{Facet, Plane};
 use crate::grid::Grid;
-use crate::haptics::{Answer, Hand, Haptics};
+use crate::haptics::{Answer, Haptics, Hip};
 
 /// Facets that may hold it at once.
 const PLANES: usize = 3;
@@ -17,7 +17,7 @@ const BELOW: f64 = 1e-12;
 /// The algorithm's state.
 pub struct GodObject<'g> {
     grid: &'g Grid,
-    hand: Option<[f64; 3]>,
+    hip: Option<[f64; 3]>,
     god: [f64; 3],
     answer: Answer,
 }
@@ -28,7 +28,7 @@ impl<'g> GodObject<'g> {
     pub const fn new(grid: &'g Grid) -> Self {
         Self {
             grid,
-            hand: None,
+            hip: None,
             god: [0.0; 3],
             answer: Answer::FREE,
         }
@@ -94,19 +94,19 @@ impl<'g> GodObject<'g> {
 
 impl Haptics for GodObject<'_> {
     fn forget(&mut self) {
-        self.hand = None;
+        self.hip = None;
         self.answer = Answer::FREE;
     }
 
     #[inline]
-    fn tick(&mut self, hand: &Hand) -> Answer {
-        let hand = hand.wide;
-        match self.hand.replace(hand) {
+    fn tick(&mut self, hip: &Hip) -> Answer {
+        let hip = hip.wide;
+        match self.hip.replace(hip) {
             None => {
-                self.god = hand;
+                self.god = hip;
                 return self.answer;
             }
-            Some(last) if last == hand && !self.answer.touching => return self.answer,
+            Some(last) if last == hip && !self.answer.touching => return self.answer,
             Some(_) => {}
         }
         let mut facets = [Facet {
@@ -114,7 +114,7 @@ impl Haptics for GodObject<'_> {
             upper: false,
         }; PLANES];
         let mut planes = [Plane::default(); PLANES];
-        let (mut held, mut goal) = (0, hand);
+        let (mut held, mut goal) = (0, hip);
         while let Some((hit, facet, plane)) = self.first_hit(&self.god, &goal, &facets[..held]) {
             self.god = hit;
             if held == PLANES {
@@ -123,50 +123,50 @@ impl Haptics for GodObject<'_> {
             }
             (facets[held], planes[held]) = (facet, plane);
             held += 1;
-            goal = nearest_on(&planes[..held], &hand);
+            goal = nearest_on(&planes[..held], &hip);
         }
         self.god = goal;
         self.answer = if held == 0 {
             Answer::FREE
         } else {
-            Answer::touching([0, 1, 2].map(|i| (goal[i] - hand[i]) as f32))
+            Answer::touching([0, 1, 2].map(|i| (goal[i] - hip[i]) as f32))
         };
         self.answer
     }
 }
 
-/// The point nearest to the hand on all planes; a plane that would pull the
+/// The point nearest to the HIP on all planes; a plane that would pull the
 /// god-object toward itself from outside is let go.
 #[inline]
-fn nearest_on(planes: &[Plane], hand: &[f64; 3]) -> [f64; 3] {
+fn nearest_on(planes: &[Plane], hip: &[f64; 3]) -> [f64; 3] {
     match planes {
-        [one] => along(hand, one, push(one, hand)),
+        [one] => along(hip, one, push(one, hip)),
         [first, second] => {
             let (n, m) = (first.normal(), second.normal());
             let (nn, mm, nm) = (dot(&n, &n), dot(&m, &m), dot(&n, &m));
             let det = nn * mm - nm * nm;
-            let (g, h) = (first.above(hand), second.above(hand));
+            let (g, h) = (first.above(hip), second.above(hip));
             let (s, t) = ((g * mm - h * nm) / det, (h * nn - g * nm) / det);
             if det <= 1e-14 * nn * mm || s < 0.0 {
-                along(hand, second, push(second, hand))
+                along(hip, second, push(second, hip))
             } else if t < 0.0 {
-                along(hand, first, push(first, hand))
+                along(hip, first, push(first, hip))
             } else {
-                let part = along(hand, first, s);
+                let part = along(hip, first, s);
                 along(&part, second, t)
             }
         }
         [first, second, third] => meeting_point(first, second, third)
-            .unwrap_or_else(|| nearest_on(&[*second, *third], hand)),
-        _ => *hand,
+            .unwrap_or_else(|| nearest_on(&[*second, *third], hip)),
+        _ => *hip,
     }
 }
 
-/// How many normals away from the plane the hand is.
+/// How many normals away from the plane the HIP is.
 #[inline]
-fn push(plane: &Plane, hand: &[f64; 3]) -> f64 {
+fn push(plane: &Plane, hip: &[f64; 3]) -> f64 {
     let normal = plane.normal();
-    plane.above(hand) / dot(&normal, &normal)
+    plane.above(hip) / dot(&normal, &normal)
 }
 
 #[inline]

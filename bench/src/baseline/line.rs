@@ -20,10 +20,10 @@ impl<R: Real> Line<R> {
         let last = to.map(R::whole);
         let axis = |i: usize| {
             let way = to[i] - from[i];
-            let each = R::ONE / way.abs();
+            let each = R::one() / way.abs();
             let inside = from[i] - R::from_whole(cell[i]);
-            let first = if way > R::ZERO {
-                R::ONE - inside
+            let first = if way > R::zero() {
+                R::one() - inside
             } else {
                 inside
             };

@@ -1,11 +1,18 @@
-//! The paper's algorithm as published (§4.3), plainly: Newton in two
-//! variables, the bounded point over edges and vertices, averaged normals,
-//! the candidate patch by the lowest height of the whole segment.
+//! The paper's algorithm as published (§4.3), as plainly as it can be written: Newton
+//! in two variables, the bounded point over edges and vertices, averaged normals, the
+//! candidate patch by the lowest height of the whole segment.
+//!
+//! This is the yardstick of the speed tables ("× plain"), in single or double
+//! precision, over a field that is all there and has no holes. The product's own
+//! paper rule is another thing: it finds the closest point by the product's solver,
+//! ends within a tick's work, and waits for tiles.
+
+use num_traits::clamp;
 
 use super::line::Line;
 use super::real::Real;
 use crate::grid::Grid;
-use crate::haptics::{Answer, Hand, Haptics};
+use crate::haptics::{Answer, Haptics, Hip};
 
 /// Where Newton starts in the patch that held the last closest point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,8 +41,8 @@ struct Place<R> {
     cell: [i32; 2],
     u: R,
     v: R,
-    /// From the hand to this place.
-    stretch: [R; 3],
+    /// From the HIP to this place.
+    displacement: [R; 3],
     squared: R,
     /// Toward which neighbours it lies on the border.
     border: [i32; 2],
@@ -46,7 +53,7 @@ pub struct Paper<'g, R> {
     grid: &'g Grid,
     start: Start,
     iterations: u32,
-    last_hand: Option<[R; 3]>,
+    last_hip: Option<[R; 3]>,
     contact: Option<Place<R>>,
     answer: Answer,
 }
@@ -59,7 +66,7 @@ impl<'g, R: Real> Paper<'g, R> {
             grid,
             start,
             iterations,
-            last_hand: None,
+            last_hip: None,
             contact: None,
             answer: Answer::FREE,
         }
@@ -82,26 +89,19 @@ impl<'g, R: Real> Paper<'g, R> {
             })
     }
 
-    /// Step 2 in one patch: Newton, and outside the patch the bounded point.
+    /// Step 2 in one patch.
     #[inline]
-    fn closest_in(&self, cell: [i32; 2], hand: &[R; 3], start: (R, R)) -> Place<R> {
-        let patch = self.patch(cell);
-        let local = [
-            hand[0] - R::from_whole(cell[0]),
-            hand[1] - R::from_whole(cell[1]),
-            hand[2],
-        ];
-        let inside = |x: R| x >= R::ZERO && x <= R::ONE;
-        match patch.newton(&local, start, self.iterations) {
-            Some((u, v)) if inside(u) && inside(v) => patch.place(cell, &local, u, v),
-            _ => patch.bounded(cell, &local),
-        }
+    fn closest_in(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R)) -> Place<R> {
+        let [x, y] = cell.map(R::from_whole);
+        let local = [hip[0] - x, hip[1] - y, hip[2]];
+        self.patch(cell)
+            .closest(cell, &local, start, self.iterations)
     }
 
     /// Step 2 across patches.
     #[inline]
-    fn closest(&self, cell: [i32; 2], hand: &[R; 3], start: (R, R)) -> Place<R> {
-        let mut here = self.closest_in(cell, hand, start);
+    fn closest(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R)) -> Place<R> {
+        let mut here = self.closest_in(cell, hip, start);
         let middle = (R::HALF, R::HALF);
         for _ in 0..PATCHES {
             if here.border == [0, 0] {
@@ -109,7 +109,7 @@ impl<'g, R: Real> Paper<'g, R> {
             }
             let mut best = here;
             for cell in around(&here).filter(|cell| self.grid.has(*cell)) {
-                let there = self.closest_in(cell, hand, middle);
+                let there = self.closest_in(cell, hip, middle);
                 if there.squared < best.squared {
                     best = there;
                 }
@@ -127,7 +127,7 @@ impl<'g, R: Real> Paper<'g, R> {
     fn is_inside(&self, place: &Place<R>) -> bool {
         let normal = self.patch(place.cell).normal(place.u, place.v);
         if place.border == [0, 0] {
-            return dot(&place.stretch, &normal) > R::ZERO;
+            return dot(&place.displacement, &normal) > R::zero();
         }
         let mut sum = unit(normal);
         for cell in around(place).filter(|cell| self.grid.has(*cell)) {
@@ -135,44 +135,44 @@ impl<'g, R: Real> Paper<'g, R> {
                 if cell[i] == place.cell[i] {
                     x
                 } else {
-                    R::ONE - x
+                    R::one() - x
                 }
             };
             let (u, v) = (across(place.u, 0), across(place.v, 1));
             let normal = unit(self.patch(cell).normal(u, v));
             sum = [0, 1, 2].map(|i| sum[i] + normal[i]);
         }
-        dot(&place.stretch, &sum) > R::ZERO
+        dot(&place.displacement, &sum) > R::zero()
     }
 }
 
 impl<R: Real> Haptics for Paper<'_, R> {
     fn forget(&mut self) {
-        self.last_hand = None;
+        self.last_hip = None;
         self.contact = None;
         self.answer = Answer::FREE;
     }
 
     #[inline]
-    fn tick(&mut self, hand: &Hand) -> Answer {
-        let hand = R::hand(hand);
-        let Some(last) = self.last_hand.replace(hand) else {
+    fn tick(&mut self, hip: &Hip) -> Answer {
+        let hip = R::hip(hip);
+        let Some(last) = self.last_hip.replace(hip) else {
             return self.answer;
         };
-        if last == hand {
+        if last == hip {
             return self.answer;
         }
         let middle = (R::HALF, R::HALF);
         let start = match (&self.contact, self.start) {
             (Some(place), Start::LastPoint) => Some((place.cell, (place.u, place.v))),
             (Some(place), Start::Centre) => Some((place.cell, middle)),
-            (None, _) => self.candidate(&last, &hand).map(|cell| (cell, middle)),
+            (None, _) => self.candidate(&last, &hip).map(|cell| (cell, middle)),
         };
         self.contact = start
-            .map(|(cell, start)| self.closest(cell, &hand, start))
+            .map(|(cell, start)| self.closest(cell, &hip, start))
             .filter(|place| self.is_inside(place));
         self.answer = self.contact.as_ref().map_or(Answer::FREE, |place| {
-            Answer::touching(place.stretch.map(R::single))
+            Answer::touching(place.displacement.map(R::single))
         });
         self.answer
     }
@@ -209,7 +209,17 @@ impl<R: Real> Patch<R> {
 
     #[inline]
     fn normal(&self, u: R, v: R) -> [R; 3] {
-        [-(self.b + self.a * v), -(self.c + self.a * u), R::ONE]
+        [-(self.b + self.a * v), -(self.c + self.a * u), R::one()]
+    }
+
+    /// Newton's point, or where that is outside the patch the bounded one.
+    #[inline]
+    fn closest(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R), iterations: u32) -> Place<R> {
+        let inside = |x: R| x >= R::zero() && x <= R::one();
+        match self.newton(hip, start, iterations) {
+            Some((u, v)) if inside(u) && inside(v) => self.place(cell, hip, u, v),
+            _ => self.bounded(cell, hip),
+        }
     }
 
     /// eq. 8-11. `None` where the Jacobian is singular.
@@ -220,10 +230,10 @@ impl<R: Real> Patch<R> {
             let (zu, zv) = (self.b + self.a * v, self.c + self.a * u);
             let lift = self.height(u, v) - *r;
             let (fu, fv) = (u - *p + lift * zu, v - *q + lift * zv);
-            let (uu, vv) = (R::ONE + zu * zu, R::ONE + zv * zv);
+            let (uu, vv) = (R::one() + zu * zu, R::one() + zv * zv);
             let uv = lift * self.a + zu * zv;
             let det = uu * vv - uv * uv;
-            if det == R::ZERO {
+            if det == R::zero() {
                 return None;
             }
             let (du, dv) = ((fu * vv - fv * uv) / det, (fv * uu - fu * uv) / det);
@@ -237,20 +247,20 @@ impl<R: Real> Patch<R> {
 
     /// The nearest point over the four edges, vertices included.
     #[inline]
-    fn bounded(&self, cell: [i32; 2], hand: &[R; 3]) -> Place<R> {
-        let [p, q, r] = *hand;
+    fn bounded(&self, cell: [i32; 2], hip: &[R; 3]) -> Place<R> {
+        let [p, q, r] = *hip;
         let along_u = |v: R| {
             let (slope, start) = (self.b + self.a * v, self.d + self.c * v);
-            let u = (p - (start - r) * slope) / (R::ONE + slope * slope);
-            self.place(cell, hand, u.unit(), v)
+            let u = (p - (start - r) * slope) / (R::one() + slope * slope);
+            self.place(cell, hip, clamp(u, R::zero(), R::one()), v)
         };
         let along_v = |u: R| {
             let (slope, start) = (self.c + self.a * u, self.d + self.b * u);
-            let v = (q - (start - r) * slope) / (R::ONE + slope * slope);
-            self.place(cell, hand, u, v.unit())
+            let v = (q - (start - r) * slope) / (R::one() + slope * slope);
+            self.place(cell, hip, u, clamp(v, R::zero(), R::one()))
         };
-        let mut best = along_u(R::ZERO);
-        for other in [along_u(R::ONE), along_v(R::ZERO), along_v(R::ONE)] {
+        let mut best = along_u(R::zero());
+        for other in [along_u(R::one()), along_v(R::zero()), along_v(R::one())] {
             if other.squared < best.squared {
                 best = other;
             }
@@ -259,33 +269,27 @@ impl<R: Real> Patch<R> {
     }
 
     #[inline]
-    fn place(&self, cell: [i32; 2], hand: &[R; 3], u: R, v: R) -> Place<R> {
-        let stretch = [u - hand[0], v - hand[1], self.height(u, v) - hand[2]];
-        let side = |x: R| i32::from(x == R::ONE) - i32::from(x == R::ZERO);
+    fn place(&self, cell: [i32; 2], hip: &[R; 3], u: R, v: R) -> Place<R> {
+        let displacement = [u - hip[0], v - hip[1], self.height(u, v) - hip[2]];
+        let side = |x: R| i32::from(x == R::one()) - i32::from(x == R::zero());
         Place {
             cell,
             u,
             v,
-            stretch,
-            squared: dot(&stretch, &stretch),
+            displacement,
+            squared: dot(&displacement, &displacement),
             border: [side(u), side(v)],
         }
     }
 }
 
 /// Step 2 in one patch, for the solver's own comparison: the place in the unit
-/// square that Newton and the bounded point find from the middle.
+/// square that is found from the middle.
 #[inline]
-pub fn newton<R: Real>(corners: [R; 4], hand: [R; 3], iterations: u32) -> (R, R) {
-    let patch = Patch::new(corners);
-    let inside = |x: R| x >= R::ZERO && x <= R::ONE;
-    match patch.newton(&hand, (R::HALF, R::HALF), iterations) {
-        Some((u, v)) if inside(u) && inside(v) => (u, v),
-        _ => {
-            let place = patch.bounded([0, 0], &hand);
-            (place.u, place.v)
-        }
-    }
+pub fn newton<R: Real>(corners: [R; 4], hip: [R; 3], iterations: u32) -> (R, R) {
+    let middle = (R::HALF, R::HALF);
+    let place = Patch::new(corners).closest([0, 0], &hip, middle, iterations);
+    (place.u, place.v)
 }
 
 #[inline]

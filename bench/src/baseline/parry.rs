@@ -1,4 +1,4 @@
-//! parry3d's height field: a ray from the last hand to this one while free,
+//! parry3d's height field: a ray from the last HIP to this one while free,
 //! the nearest point while in contact.
 
 use parry3d::math::Vector;
@@ -8,7 +8,7 @@ use parry3d::utils::Array2;
 
 use super::triangle::Facet;
 use crate::grid::Grid;
-use crate::haptics::{Answer, Hand, Haptics};
+use crate::haptics::{Answer, Haptics, Hip};
 
 /// Which call finds the nearest point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub enum Project {
     /// `project_local_point`
     Anywhere,
     /// `project_local_point_with_max_dist`, no farther than the last answer
-    /// and the hand's motion since allow.
+    /// and the HIP's motion since allow.
     Within,
 }
 
@@ -25,8 +25,8 @@ pub struct Parry<'g> {
     grid: &'g Grid,
     field: HeightField,
     project: Project,
-    hand: Option<Hand>,
-    /// Distance from the hand to the surface, while in contact.
+    hip: Option<Hip>,
+    /// Distance from the HIP to the surface, while in contact.
     depth: Option<f32>,
     answer: Answer,
 }
@@ -47,7 +47,7 @@ impl<'g> Parry<'g> {
             grid,
             field: HeightField::new(heights, scale),
             project,
-            hand: None,
+            hip: None,
             depth: None,
             answer: Answer::FREE,
         }
@@ -63,29 +63,29 @@ impl<'g> Parry<'g> {
         )
     }
 
-    /// Whether the way from the last hand to this one is free.
+    /// Whether the way from the last HIP to this one is free.
     #[inline]
     fn is_free(&self, from: Vector, to: Vector) -> bool {
         let ray = Ray::new(from, to - from);
         self.field.cast_local_ray(&ray, 1.0, false).is_none()
     }
 
-    /// Whether the hand is below the triangles: parry has no call for that.
+    /// Whether the HIP is below the triangles: parry has no call for that.
     #[inline]
-    fn is_below(&self, hand: &Hand) -> bool {
-        let facet = Facet::under(hand.wide[0], hand.wide[1]);
-        self.grid.has(facet.cell) && facet.plane(self.grid).above(&hand.wide) > 0.0
+    fn is_below(&self, hip: &Hip) -> bool {
+        let facet = Facet::under(hip.wide[0], hip.wide[1]);
+        self.grid.has(facet.cell) && facet.plane(self.grid).above(&hip.wide) > 0.0
     }
 
     #[inline]
-    fn nearest(&self, hand: Vector, motion: f32) -> Option<Vector> {
+    fn nearest(&self, hip: Vector, motion: f32) -> Option<Vector> {
         let projection = match (self.project, self.depth) {
             (Project::Within, Some(depth)) => {
                 let reach = depth + motion + 1e-3;
                 self.field
-                    .project_local_point_with_max_dist(hand, false, reach)
+                    .project_local_point_with_max_dist(hip, false, reach)
             }
-            _ => Some(self.field.project_local_point(hand, false)),
+            _ => Some(self.field.project_local_point(hip, false)),
         };
         projection.map(|projection| projection.point)
     }
@@ -93,30 +93,30 @@ impl<'g> Parry<'g> {
 
 impl Haptics for Parry<'_> {
     fn forget(&mut self) {
-        self.hand = None;
+        self.hip = None;
         self.depth = None;
         self.answer = Answer::FREE;
     }
 
     #[inline]
-    fn tick(&mut self, hand: &Hand) -> Answer {
-        let Some(last) = self.hand.replace(*hand) else {
+    fn tick(&mut self, hip: &Hip) -> Answer {
+        let Some(last) = self.hip.replace(*hip) else {
             return self.answer;
         };
-        if last.grid == hand.grid {
+        if last.grid == hip.grid {
             return self.answer;
         }
-        let (from, to) = (self.local(last.single), self.local(hand.single));
+        let (from, to) = (self.local(last.single), self.local(hip.single));
         let touches = match self.depth {
-            Some(_) => self.is_below(hand),
-            None => !self.is_free(from, to) && self.is_below(hand),
+            Some(_) => self.is_below(hip),
+            None => !self.is_free(from, to) && self.is_below(hip),
         };
         let nearest = touches.then(|| self.nearest(to, (to - from).length()));
         self.answer = match nearest.flatten() {
             Some(point) => {
-                let stretch = point - to;
-                self.depth = Some(stretch.length());
-                Answer::touching([stretch.x, stretch.z, stretch.y])
+                let displacement = point - to;
+                self.depth = Some(displacement.length());
+                Answer::touching([displacement.x, displacement.z, displacement.y])
             }
             None => {
                 self.depth = None;

@@ -1,10 +1,10 @@
 //! The proxy graph (Walker & Salisbury 2003): in contact the proxy lives on
 //! the edges and vertices of the triangulated field only, and moves from one
-//! to the next while that brings it nearer to the hand.
+//! to the next while that brings it nearer to the HIP.
 
 use super::triangle::Facet;
 use crate::grid::Grid;
-use crate::haptics::{Answer, Hand, Haptics};
+use crate::haptics::{Answer, Haptics, Hip};
 
 /// Moves in one tick, at most.
 const MOVES: u32 = 4096;
@@ -18,7 +18,7 @@ struct Node {
     to: [i32; 2],
     /// Place on it, `[0, 1]`.
     t: f64,
-    stretch: [f64; 3],
+    displacement: [f64; 3],
     squared: f64,
 }
 
@@ -28,7 +28,7 @@ const SPOKES: [[i32; 2]; 6] = [[1, 0], [0, 1], [-1, 1], [-1, 0], [0, -1], [1, -1
 /// The algorithm's state.
 pub struct ProxyGraph<'g> {
     grid: &'g Grid,
-    hand: Option<[f64; 3]>,
+    hip: Option<[f64; 3]>,
     node: Option<Node>,
     answer: Answer,
 }
@@ -39,7 +39,7 @@ impl<'g> ProxyGraph<'g> {
     pub const fn new(grid: &'g Grid) -> Self {
         Self {
             grid,
-            hand: None,
+            hip: None,
             node: None,
             answer: Answer::FREE,
         }
@@ -54,34 +54,34 @@ impl<'g> ProxyGraph<'g> {
 
     /// The nearest point of one edge.
     #[inline]
-    fn on_edge(&self, post: [i32; 2], to: [i32; 2], hand: &[f64; 3]) -> Option<Node> {
+    fn on_edge(&self, post: [i32; 2], to: [i32; 2], hip: &[f64; 3]) -> Option<Node> {
         let end = [post[0] + to[0], post[1] + to[1]];
         let (low, high) = (self.post(post)?, self.post(end)?);
         let (dx, dy, dz) = (f64::from(to[0]), f64::from(to[1]), high - low);
         let from = [
-            f64::from(post[0]) - hand[0],
-            f64::from(post[1]) - hand[1],
-            low - hand[2],
+            f64::from(post[0]) - hip[0],
+            f64::from(post[1]) - hip[1],
+            low - hip[2],
         ];
         let along = -(from[0] * dx + from[1] * dy + from[2] * dz);
         let t = (along / (dx * dx + dy * dy + dz * dz)).clamp(0.0, 1.0);
-        let stretch = [from[0] + t * dx, from[1] + t * dy, from[2] + t * dz];
+        let displacement = [from[0] + t * dx, from[1] + t * dy, from[2] + t * dz];
         Some(Node {
             post,
             to,
             t,
-            stretch,
-            squared: stretch.iter().map(|x| x * x).sum(),
+            displacement,
+            squared: displacement.iter().map(|x| x * x).sum(),
         })
     }
 
     /// The edges within one move: all at a vertex, or the other two of each
     /// triangle that shares the edge.
     #[inline]
-    fn nearer(&self, node: &Node, hand: &[f64; 3]) -> Option<Node> {
+    fn nearer(&self, node: &Node, hip: &[f64; 3]) -> Option<Node> {
         let mut best = *node;
         let mut look = |post: [i32; 2], to: [i32; 2]| {
-            if let Some(there) = self.on_edge(post, to, hand)
+            if let Some(there) = self.on_edge(post, to, hip)
                 && there.squared < best.squared * (1.0 - 1e-12)
             {
                 best = there;
@@ -105,9 +105,9 @@ impl<'g> ProxyGraph<'g> {
     }
 
     #[inline]
-    fn descend(&self, mut node: Node, hand: &[f64; 3]) -> Node {
+    fn descend(&self, mut node: Node, hip: &[f64; 3]) -> Node {
         for _ in 0..MOVES {
-            match self.nearer(&node, hand) {
+            match self.nearer(&node, hip) {
                 Some(next) => node = next,
                 None => break,
             }
@@ -115,40 +115,40 @@ impl<'g> ProxyGraph<'g> {
         node
     }
 
-    /// How far the triangles lie above the hand.
+    /// How far the triangles lie above the HIP.
     #[inline]
-    fn depth(&self, hand: &[f64; 3]) -> Option<f64> {
-        let facet = Facet::under(hand[0], hand[1]);
+    fn depth(&self, hip: &[f64; 3]) -> Option<f64> {
+        let facet = Facet::under(hip[0], hip[1]);
         let held = self.grid.has(facet.cell);
-        held.then(|| facet.plane(self.grid).above(hand))
+        held.then(|| facet.plane(self.grid).above(hip))
     }
 }
 
 impl Haptics for ProxyGraph<'_> {
     fn forget(&mut self) {
-        self.hand = None;
+        self.hip = None;
         self.node = None;
         self.answer = Answer::FREE;
     }
 
     #[inline]
-    fn tick(&mut self, hand: &Hand) -> Answer {
-        let hand = hand.wide;
-        if self.hand.replace(hand) == Some(hand) {
+    fn tick(&mut self, hip: &Hip) -> Answer {
+        let hip = hip.wide;
+        if self.hip.replace(hip) == Some(hip) {
             return self.answer;
         }
-        if self.depth(&hand).is_none_or(|depth| depth <= 0.0) {
+        if self.depth(&hip).is_none_or(|depth| depth <= 0.0) {
             self.node = None;
             self.answer = Answer::FREE;
             return self.answer;
         }
         let start = match &self.node {
-            Some(node) => self.on_edge(node.post, node.to, &hand),
-            None => self.on_edge([hand[0] as i32, hand[1] as i32], SPOKES[0], &hand),
+            Some(node) => self.on_edge(node.post, node.to, &hip),
+            None => self.on_edge([hip[0] as i32, hip[1] as i32], SPOKES[0], &hip),
         };
-        self.node = start.map(|start| self.descend(start, &hand));
+        self.node = start.map(|start| self.descend(start, &hip));
         self.answer = self.node.map_or(Answer::FREE, |node| {
-            Answer::touching(node.stretch.map(|x| x as f32))
+            Answer::touching(node.displacement.map(|x| x as f32))
         });
         self.answer
     }

@@ -1,4 +1,4 @@
-//! What the hand slides over.
+//! What the HIP slides over.
 
 use crate::grid::Grid;
 

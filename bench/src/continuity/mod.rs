@@ -1,25 +1,23 @@
-//! How much the force changes when the hand moves a hundredth of a cell along the
+//! How much the force changes when the HIP moves a hundredth of a cell along the
 //! ground: on smooth ground, over ridges, in valleys, across the edges of
 //! patches, and while a tile arrives.
 //!
-//! What is compared is what is felt, fading included. The hand slides 0.1 cell
+//! What is compared is what is felt, fading included. The HIP slides 0.1 cell
 //! below the surface; how it came there is left out.
 
 mod arrival;
 mod ground;
+mod row;
 
 use crate::compare::{Label, opponents, ours};
-use crate::haptics::{Answer, Hand, Haptics};
+use crate::haptics::{Answer, Haptics, Hip};
 use crate::path::{Dice, over, way_in};
 use crate::product;
-use crate::stats::quantiles;
 
 use ground::{GROUNDS, Ground};
+use row::SIDE;
+pub use row::{DEPTH, Row, STEP};
 
-/// Cells the hand moves in a tick.
-pub const STEP: f64 = 0.01;
-/// Cells the hand is below the surface.
-pub const DEPTH: f64 = 0.1;
 /// Straight ways over a ground.
 const WAYS: usize = 24;
 /// Ticks on each of them.
@@ -34,24 +32,6 @@ const COMPARED: [&str; 7] = [
     "proxy graph",
     "parry within",
 ];
-/// Tiles along the side of the product's window.
-const SIDE: usize = 8;
-
-/// One variant on one ground.
-#[derive(Clone, Debug)]
-pub struct Row {
-    /// What the hand slides over.
-    pub ground: &'static str,
-    /// Which variant.
-    pub label: Label,
-    /// Largest change of the stretch in a tick, cells.
-    pub largest: f64,
-    /// 99 % of the ticks change it less, cells.
-    pub p99: f64,
-    /// Part of the ticks that feel nothing.
-    pub missed: f64,
-}
-
 /// Every variant on every ground, and the product while a tile arrives.
 #[must_use]
 pub fn measure() -> Vec<Row> {
@@ -74,7 +54,7 @@ fn over_ground(ground: &Ground) -> Vec<Row> {
             .iter()
             .map(|way| {
                 variant.forget();
-                way.hands.iter().map(|hand| variant.tick(hand)).collect()
+                way.hips.iter().map(|hip| variant.tick(hip)).collect()
             })
             .collect();
         let slid: Vec<&[Answer]> = felt
@@ -87,34 +67,9 @@ fn over_ground(ground: &Ground) -> Vec<Row> {
     entries.iter_mut().map(row).collect()
 }
 
-impl Row {
-    /// What is felt in ticks that follow one another, in pieces.
-    fn of(ground: &'static str, label: Label, pieces: &[&[Answer]]) -> Self {
-        let changes: Vec<f64> = pieces
-            .iter()
-            .flat_map(|answers| answers.windows(2).map(|pair| change(&pair[0], &pair[1])))
-            .collect();
-        let felt = pieces.iter().flat_map(|answers| answers.iter());
-        let [p99, largest] = quantiles(changes, [0.99, 1.0]);
-        Self {
-            ground,
-            label,
-            largest,
-            p99,
-            missed: crate::stats::part(felt.map(|answer| !answer.touching)),
-        }
-    }
-}
-
-/// From one stretch to the next, cells.
-fn change(a: &Answer, b: &Answer) -> f64 {
-    let squared = |i: usize| (f64::from(b.stretch[i]) - f64::from(a.stretch[i])).powi(2);
-    (0..3).map(squared).sum::<f64>().sqrt()
-}
-
 /// Down to below the surface, and straight on.
 struct Way {
-    hands: Vec<Hand>,
+    hips: Vec<Hip>,
     approach: usize,
 }
 
@@ -133,10 +88,10 @@ fn ways(ground: &Ground) -> Vec<Way> {
                 let off = [east * along - north * aside, north * along + east * aside];
                 [middle[0] + off[0], middle[1] + off[1]]
             };
-            let mut hands = way_in(&grid, at(0.0), -DEPTH);
-            let approach = hands.len();
-            hands.extend((1..=TICKS).map(|tick| over(&grid, at(tick as f64), -DEPTH)));
-            Way { hands, approach }
+            let mut hips = way_in(&grid, at(0.0), -DEPTH);
+            let approach = hips.len();
+            hips.extend((1..=TICKS).map(|tick| over(&grid, at(tick as f64), -DEPTH)));
+            Way { hips, approach }
         })
         .collect()
 }

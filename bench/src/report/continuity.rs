@@ -19,7 +19,7 @@ pub fn continuity(rows: &[Row]) -> String {
         }
     }
     let mut text = format!(
-        "\nlargest change of the force in a tick, and 99 % of them, cells of stretch; the hand {DEPTH} cell deep moves {STEP} cell a tick\n\n"
+        "\nlargest change of the force in a tick, and 99 % of them, cells of stretch; the HIP {DEPTH} cell deep moves {STEP} cell a tick\n\n"
     );
     let names: Vec<&str> = variants.iter().map(|label| label.name).collect();
     // Writing to a String cannot fail.

@@ -55,7 +55,7 @@ pub fn write_csv(path: &Path, rows: &[Row], changes: &[continuity::Row]) -> Resu
             ]
             .map(|x| x.to_string()),
         });
-        let rest = [row.jump, row.missed, row.unsettled, row.label.extra_bytes];
+        let rest = [row.jump, row.missed, row.unconverged, row.label.extra_bytes];
         record.extend(rest.map(|x| x.to_string()));
         writer.write_record(&record)?;
     }

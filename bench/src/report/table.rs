@@ -47,12 +47,12 @@ fn line(row: &Row) -> String {
         0.0 => "none".to_owned(),
         part => format!("{:.1} %", 100.0 * part),
     };
-    let unsettled = match row.unsettled {
+    let unconverged = match row.unconverged {
         0.0 => String::new(),
         part => format!("  ({:.1} % of ticks left work over)", 100.0 * part),
     };
     format!(
-        "{timing}{felt} | {:>5.2} | {missed:>6} | {:>8.2}{unsettled}",
+        "{timing}{felt} | {:>5.2} | {missed:>6} | {:>8.2}{unconverged}",
         row.jump, row.label.extra_bytes
     )
 }

@@ -1,16 +1,16 @@
-//! The whole tick: encoder counts, pose, hand, contact, force, guard, torques,
+//! The whole tick: encoder counts, pose, HIP, contact, force, guard, torques,
 //! currents.
 
 use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
 use hapterra_bench::grid::Grid;
 use hapterra_bench::path::Dice;
 use hapterra_bench::state::{TICKS, terrain};
-use hapterra_core::contact::State;
-use hapterra_core::wire::message::{Scene, Source};
+use hapterra_core::contact::ContactState;
+use hapterra_core::scene::{Scene, Source};
 use hapterra_tests::counting::CountingBoard;
 
-use super::contact::scene;
-use super::table::{Row, Target};
+use super::contact::{GridSamples, scene};
+use super::table::{Row, Target, Tick};
 
 /// Ticks on the way down, which do not count.
 const APPROACH: usize = 50;
@@ -31,7 +31,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     let mut at = [0.0, 0.0];
     let mut slide = |speed: f64| {
         heading += dice.between(-0.05, 0.05);
-        // Inside a hand's breadth: turned back at the border of it.
+        // Within 40 mm of home: turned back at the border of that.
         if f64::hypot(at[0], at[1]) > 40.0 {
             heading = f64::atan2(-at[1], -at[0]);
         }
@@ -45,9 +45,10 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     let mut dice = Dice(22);
     let mut tremble = || dice.between(-1.5, 1.5).round() as i32;
     let resting = (0..TICKS).map(|_| rested.map(|count| count + tremble()));
+    let resting: Vec<_> = resting.collect();
     let in_contact = Target {
         median: Some(2500),
-        p99: Some(2500),
+        p99: Some(3500),
         max: Some(10_000),
     };
     let in_the_air = Target {
@@ -55,28 +56,26 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
         p99: None,
         ..in_contact
     };
+    let row = |name, target, counts: &[_], state| arm.row(board, name, target, counts, state);
     vec![
-        arm.row(board, "chain, free", in_the_air, &free, State::Free),
-        arm.row(
-            board,
+        row("chain, free", in_the_air, &free, ContactState::Free),
+        row(
             "chain, sliding",
             in_contact,
             &sliding,
-            State::Touching,
+            ContactState::Touching,
         ),
-        arm.row(
-            board,
+        row(
             "chain, sliding fast",
             in_contact,
             &fast,
-            State::Touching,
+            ContactState::Touching,
         ),
-        arm.row(
-            board,
+        row(
             "chain, resting",
             in_contact,
-            &resting.collect::<Vec<_>>(),
-            State::Touching,
+            &resting,
+            ContactState::Touching,
         ),
     ]
 }
@@ -110,7 +109,7 @@ impl<'g> Arm<'g> {
 
     fn scene(&self) -> Scene {
         let [x, y, z] = self.placement.home_mm;
-        let home = hapterra_bench::haptics::Hand::at([x, y, z]).grid;
+        let home = hapterra_bench::haptics::Hip::at([x, y, z]).grid;
         Scene {
             home,
             source: Source::Encoders,
@@ -126,7 +125,7 @@ impl<'g> Arm<'g> {
         name: &str,
         target: Target,
         counts: &[[i32; 3]],
-        state: State,
+        state: ContactState,
     ) -> Row {
         let pose = |counts: &[i32; 3]| {
             let angle = |axis: usize| Encoder::new(&self.model.drive[axis]).angle_rad(counts[axis]);
@@ -139,12 +138,17 @@ impl<'g> Arm<'g> {
             self.counts_at([x, y, z + above])
         });
         let all: Vec<_> = down.chain(counts.iter().copied()).collect();
-        let post = |x: i32, y: i32| self.grid.post(x as usize, y as usize);
-        let ticks = board.chain(&self.scene(), &post, &all);
+        let ticks = board.chain(&self.scene(), &GridSamples(self.grid), &all);
         assert_eq!(ticks.len(), all.len());
-        let ticks = ticks.iter().skip(APPROACH);
-        let there = ticks.filter(|tick| tick.state == state as u32 && tick.settled);
-        let there: Vec<u32> = there.map(|tick| tick.instructions).collect();
+        let ticks = ticks.iter().enumerate().skip(APPROACH);
+        let there = ticks.filter(|(_, tick)| tick.state == state as u32 && tick.converged);
+        let there = there.map(|(index, tick)| Tick {
+            instructions: tick.instructions,
+            units: 0,
+            scene: None,
+            index,
+        });
+        let there: Vec<Tick> = there.collect();
         assert!(
             there.len() > counts.len() * 9 / 10,
             "{name}: {}",

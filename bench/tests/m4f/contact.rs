@@ -1,18 +1,18 @@
-//! The states of the contact alone: the same ways of the hand as in the counts
+//! The states of the contact alone: the same paths of the HIP as in the counts
 //! on the host, and the long sweeps.
 
 use hapterra_bench::grid::Grid;
-use hapterra_bench::haptics::Hand;
+use hapterra_bench::haptics::Hip;
 use hapterra_bench::path;
 use hapterra_bench::state::{STATES, Step, TICKS, terrain};
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::terrain::TileKey;
-use hapterra_core::wire::message::{Scene, Source};
-use hapterra_tests::counting::{CountingBoard, Event, tiles};
+use hapterra_core::scene::{Scene, Source};
+use hapterra_core::terrain::{FieldSize, TileKey};
+use hapterra_tests::counting::{CountingBoard, Event, Replay, Samples, tiles};
 
-use super::table::{Row, Target};
+use super::table::{Row, Target, Tick};
 
 /// Targets by state.
 fn target(state: &str) -> Target {
@@ -24,7 +24,7 @@ fn target(state: &str) -> Target {
     match state {
         "unmoved" => of(Some(80), None),
         "free high" | "free low" => of(Some(200), None),
-        "sliding" => of(Some(900), Some(1500)),
+        "sliding" => of(Some(300), Some(1500)),
         _ => of(None, None),
     }
 }
@@ -39,7 +39,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     // As far as a device's window reaches.
     let wide = Grid::fractal("512 × 512", [512, 512], 6, 1.0);
     let sweeps = path::sweeps(&wide, "", 500.0, TICKS).expect("500 cells fit");
-    let sweeps: Vec<Step> = every(&sweeps.hands);
+    let sweeps: Vec<Step> = every(&sweeps.hips);
     rows.push(row(
         board,
         &wide,
@@ -49,7 +49,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     ));
     // Farther than it reaches the tiles are not there: the way is held up.
     let long = Grid::fractal("5120 × 64", [5120, 64], 6, 1.0);
-    let near = tiles([512, 64]);
+    let near = tiles(FieldSize::new(512, 64));
     rows.push(row(board, &long, "sweep 5000, held up", &far(&long), near));
     rows
 }
@@ -61,23 +61,41 @@ fn row(
     steps: &[Step],
     tiles: impl Iterator<Item = TileKey>,
 ) -> Row {
-    let hands = steps.iter().map(|step| Event::Hand(step.hand.grid));
-    let events: Vec<Event> = tiles.map(Event::Tile).chain(hands).collect();
-    let post = |x: i32, y: i32| grid.post(x as usize, y as usize);
-    let ticks = board.contact(&scene(grid), 0, &post, &events);
-    assert_eq!(ticks.len(), steps.len());
-    let counted = steps.iter().zip(&ticks).filter(|(step, _)| step.counts);
-    let instructions = counted.map(|(_, tick)| tick.instructions).collect();
-    Row::new(state, target(state), instructions)
+    let hips = steps.iter().map(|step| Event::Hip(step.hip.grid));
+    let events: Vec<Event> = tiles.map(Event::Tile).chain(hips).collect();
+    let replay = Replay {
+        scene: &scene(grid),
+        field: &GridSamples(grid),
+        events: &events,
+    };
+    let ticks = board.contact(&[replay]).concat();
+    let counted = steps.iter().zip(ticks.iter().enumerate());
+    let counted = counted.filter(|(step, _)| step.counts);
+    let ticks = counted.map(|(_, (index, tick))| Tick {
+        instructions: tick.instructions,
+        units: tick.work,
+        scene: None,
+        index,
+    });
+    Row::new(state, target(state), ticks.collect())
+}
+
+/// A grid, cut into tiles for the board.
+pub(crate) struct GridSamples<'g>(pub(crate) &'g Grid);
+
+impl Samples for GridSamples<'_> {
+    fn sample(&self, column: i32, row: i32) -> f32 {
+        self.0.post(column as usize, row as usize)
+    }
 }
 
 /// All but the first of them count.
-fn every(hands: &[Hand]) -> Vec<Step> {
-    let step = |(tick, hand): (usize, &Hand)| Step {
-        hand: *hand,
+fn every(hips: &[Hip]) -> Vec<Step> {
+    let step = |(tick, hip): (usize, &Hip)| Step {
+        hip: *hip,
         counts: tick > 0,
     };
-    hands.iter().enumerate().map(step).collect()
+    hips.iter().enumerate().map(step).collect()
 }
 
 /// Down at the western end, then 5,000 cells east at once, and back.
@@ -89,8 +107,8 @@ fn far(grid: &Grid) -> Vec<Step> {
         let at = [dice.between(4.0, 60.0), dice.between(4.0, 60.0)];
         let low = f64::from(grid.top()) - 0.5;
         let mut step = |x: f64, z: f64, counts| {
-            let hand = Hand::at([x, at[1], z]);
-            steps.push(Step { hand, counts });
+            let hip = Hip::at([x, at[1], z]);
+            steps.push(Step { hip, counts });
         };
         step(at[0], sky, false);
         step(at[0], low, false);
@@ -99,8 +117,8 @@ fn far(grid: &Grid) -> Vec<Step> {
     steps
 }
 
-fn size(grid: &Grid) -> [i32; 2] {
-    [grid.columns as i32, grid.rows as i32]
+fn size(grid: &Grid) -> FieldSize {
+    FieldSize::new(grid.columns as i32, grid.rows as i32)
 }
 
 /// A scene of points over the field.

@@ -2,5 +2,5 @@
 
 pub(crate) mod chain;
 pub(crate) mod contact;
+pub(crate) mod soak;
 pub(crate) mod table;
-pub(crate) mod wild;

@@ -8,6 +8,25 @@ const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/instructions-m4f.csv")
 /// [`LEEWAY`] instructions: another compiler may take a few.
 const TOLERANCE: f64 = 0.05;
 const LEEWAY: f64 = 10.0;
+/// What a unit of work costs is told over ticks that spent at least so many: in
+/// shorter ones what every tick takes would count as much as the units.
+const UNITS: u32 = 8;
+/// The columns, after the state's name.
+const COUNTS: [&str; 3] = ["median", "p99", "max"];
+const COLUMNS: [&str; 12] = [
+    "state",
+    COUNTS[0],
+    COUNTS[1],
+    COUNTS[2],
+    "target median",
+    "target p99",
+    "target max",
+    "least per unit",
+    "most per unit",
+    "units of worst",
+    "scene of worst",
+    "tick of worst",
+];
 
 /// What was set as a target, instructions a tick.
 #[derive(Clone, Copy, Debug, Default)]
@@ -20,15 +39,56 @@ pub(crate) struct Target {
     pub(crate) max: Option<u32>,
 }
 
+/// What one tick cost.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tick {
+    /// Instructions, the call and the return included.
+    pub(crate) instructions: u32,
+    /// Units of work; 0 where more than the contact was counted.
+    pub(crate) units: u32,
+    /// The number of its scene in the soak.
+    pub(crate) scene: Option<u64>,
+    /// Its place among the ticks of its scene.
+    pub(crate) index: usize,
+}
+
 /// One state's ticks.
 #[derive(Clone, Debug)]
 pub(crate) struct Row {
-    /// Its name.
-    pub(crate) state: String,
+    state: String,
     /// Instructions: median, 99th percentile, most.
-    pub(crate) counts: [u32; 3],
+    counts: [u32; 3],
     /// What they were meant to be.
-    pub(crate) target: Target,
+    target: [Option<u32>; 3],
+    /// The ticks with the least and the most instructions a unit of work.
+    per_unit: Option<[Tick; 2]>,
+    worst: Tick,
+    /// The kept row is over more ticks: only its largest count binds this one.
+    is_part: bool,
+}
+
+impl Tick {
+    fn per_unit(&self) -> f64 {
+        f64::from(self.instructions) / f64::from(self.units)
+    }
+}
+
+impl fmt::Display for Tick {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            instructions,
+            units,
+            scene,
+            index,
+        } = self;
+        let scene = scene
+            .map(|scene| format!("scene {scene}, "))
+            .unwrap_or_default();
+        write!(
+            f,
+            "{instructions} instructions and {units} units in {scene}tick {index}"
+        )
+    }
 }
 
 impl Row {
@@ -36,16 +96,49 @@ impl Row {
     pub(crate) const TITLES: &str =
         "state                              median     p99     max   target";
 
-    /// From the counts of its ticks.
-    pub(crate) fn new(state: &str, target: Target, mut ticks: Vec<u32>) -> Self {
+    /// From its ticks.
+    pub(crate) fn new(state: &str, target: Target, mut ticks: Vec<Tick>) -> Self {
         assert!(ticks.len() >= 100, "{state}: {} ticks", ticks.len());
-        ticks.sort_unstable();
+        let long = || ticks.iter().filter(|tick| tick.units >= UNITS).copied();
+        let by_cost = |a: &Tick, b: &Tick| a.per_unit().total_cmp(&b.per_unit());
+        let (least, most) = (long().min_by(by_cost), long().max_by(by_cost));
+        let per_unit = least.zip(most).map(|(least, most)| [least, most]);
+        ticks.sort_unstable_by_key(|tick| (tick.instructions, tick.scene, tick.index));
         let at = |share: f64| ticks[((ticks.len() - 1) as f64 * share).round() as usize];
         Self {
             state: state.to_owned(),
-            counts: [at(0.5), at(0.99), at(1.0)],
-            target,
+            counts: [0.5, 0.99, 1.0].map(|share| at(share).instructions),
+            target: [target.median, target.p99, target.max],
+            per_unit,
+            worst: at(1.0),
+            is_part: false,
         }
+    }
+
+    /// The row of some of the ticks that the kept table's row is over.
+    pub(crate) fn of_a_part(self) -> Self {
+        Self {
+            is_part: true,
+            ..self
+        }
+    }
+
+    /// Its cells, as [`COLUMNS`] names them.
+    fn record(&self) -> Vec<String> {
+        let of = |number: Option<u32>| number.map(|n| n.to_string()).unwrap_or_default();
+        let per_unit = |i: usize| {
+            self.per_unit
+                .map(|ticks| format!("{:.1}", ticks[i].per_unit()))
+        };
+        let mut record = vec![self.state.clone()];
+        record.extend(self.counts.map(|count| count.to_string()));
+        record.extend(self.target.map(of));
+        record.extend([0, 1].map(|i| per_unit(i).unwrap_or_default()));
+        record.push(self.worst.units.to_string());
+        let scene = self.worst.scene.map(|scene| scene.to_string());
+        record.push(scene.unwrap_or_default());
+        record.push(self.worst.index.to_string());
+        record
     }
 }
 
@@ -53,29 +146,35 @@ impl fmt::Display for Row {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [median, p99, max] = self.counts;
         write!(f, "{:32} {median:8} {p99:7} {max:7}  ", self.state)?;
-        let targets = [self.target.median, self.target.p99, self.target.max];
-        let names = ["median", "p99", "max"];
-        for ((target, name), count) in targets.iter().zip(names).zip(self.counts) {
+        for ((target, name), count) in self.target.iter().zip(COUNTS).zip(self.counts) {
             if let Some(target) = target {
                 let verdict = if count <= *target { "met" } else { "missed" };
                 write!(f, " {name} ≤ {target} {verdict}")?;
             }
         }
-        Ok(())
+        let Some([least, most]) = self.per_unit else {
+            return Ok(());
+        };
+        write!(f, "\n        worst: {}", self.worst)?;
+        let [from, to] = [least, most].map(|tick| tick.per_unit());
+        write!(
+            f,
+            "\n        a unit: {from:.0} to {to:.0} instructions, most: {most}"
+        )
     }
 }
 
-/// The kept table: `state,median,p99,max` and the targets beside them.
+/// The kept table: by state, its median, 99th percentile and largest count.
 pub(crate) struct Table(Vec<(String, [f64; 3])>);
 
 impl Table {
     /// Reads it.
     pub(crate) fn kept() -> Self {
-        type Record = (String, f64, f64, f64, String, String, String);
         let mut table = csv::Reader::from_path(TABLE).expect("the table is there");
-        let rows = table.deserialize::<Record>().map(|row| {
-            let (state, median, p99, max, ..) = row.expect("state and counts");
-            (state, [median, p99, max])
+        let rows = table.records().map(|row| {
+            let row = row.expect("a row");
+            let count = |i: usize| row[i].parse().expect("a count");
+            (row[0].to_owned(), [count(1), count(2), count(3)])
         });
         Self(rows.collect())
     }
@@ -83,39 +182,37 @@ impl Table {
     /// Writes it anew.
     pub(crate) fn write(rows: &[Row]) {
         let mut table = csv::Writer::from_path(TABLE).expect("the table can be written");
-        let titles = ["state", "median", "p99", "max"];
-        let targets = ["target median", "target p99", "target max"];
-        table
-            .write_record(titles.iter().chain(&targets))
-            .expect("written");
+        table.write_record(COLUMNS).expect("written");
         for row in rows {
-            let counts = row.counts.map(|count| count.to_string());
-            let target = [row.target.median, row.target.p99, row.target.max]
-                .map(|target| target.map(|t| t.to_string()).unwrap_or_default());
-            let record = std::iter::once(&row.state).chain(&counts).chain(&target);
-            table.write_record(record).expect("written");
+            table.write_record(row.record()).expect("written");
         }
     }
 
-    /// A sentence for each count that is more than the table allows.
+    /// A sentence for each count that is more than the table allows, or than a target
+    /// that the table meets.
     pub(crate) fn worse(&self, rows: &[Row]) -> Vec<String> {
-        let mut worse = Vec::new();
-        for row in rows {
-            let kept = self.0.iter().find(|(state, _)| *state == row.state);
-            let Some((_, kept)) = kept else {
-                worse.push(format!("{}: not in the table", row.state));
-                continue;
-            };
-            for ((name, kept), count) in ["median", "p99", "max"].iter().zip(kept).zip(row.counts) {
-                let count = f64::from(count);
-                if count > kept * (1.0 + TOLERANCE) && count > kept + LEEWAY {
-                    worse.push(format!(
-                        "{}: {name} {count} instructions, {kept} in the table",
-                        row.state
-                    ));
-                }
-            }
-        }
-        worse
+        rows.iter().flat_map(|row| self.worse_row(row)).collect()
+    }
+
+    fn worse_row(&self, row: &Row) -> Vec<String> {
+        let kept = self.0.iter().find(|(state, _)| *state == row.state);
+        let Some((_, kept)) = kept else {
+            return vec![format!("{}: not in the table", row.state)];
+        };
+        let binding = if row.is_part { 2..3 } else { 0..3 };
+        let is_worse = |i: &usize| {
+            let (count, kept) = (f64::from(row.counts[*i]), kept[*i]);
+            let target = row.target[*i].map_or(f64::INFINITY, f64::from);
+            let misses = kept <= target && count > target;
+            misses || (count > kept * (1.0 + TOLERANCE) && count > kept + LEEWAY)
+        };
+        let told = |i: usize| {
+            let (name, count, kept) = (COUNTS[i], row.counts[i], kept[i]);
+            format!(
+                "{}: {name} {count} instructions, {kept} in the table",
+                row.state
+            )
+        };
+        binding.filter(is_worse).map(told).collect()
     }
 }

@@ -6,7 +6,7 @@ use std::io::{IsTerminal, Write, stderr};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use hapterra_tests::scene::stage::Buffers;
+use hapterra_tests::scene::supply::Buffers;
 use hapterra_tests::soak::{Found, Tally, Until, run, soak};
 
 /// Violations of each invariant that are told in full.

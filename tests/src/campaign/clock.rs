@@ -5,23 +5,23 @@ use std::rc::Rc;
 
 use hapterra_firmware::board::TickClock;
 
-/// What the clock says in the tick at hand.
+/// What the clock says in the present tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Hands {
+pub struct Reading {
     /// Counts since the tick was due.
     pub since_due: u32,
     /// Whether the next tick is due before this one is done.
     pub overrun: bool,
 }
 
-/// A clock in lock-step whose hands are set from outside.
+/// A clock in lock-step that is set from outside.
 #[derive(Clone, Debug, Default)]
-pub struct SetClock(Rc<Cell<Hands>>);
+pub struct SetClock(Rc<Cell<Reading>>);
 
 impl SetClock {
-    /// Sets the hands for the next tick.
-    pub fn set(&self, hands: Hands) {
-        self.0.set(hands);
+    /// Sets what it says in the next tick.
+    pub fn set(&self, reading: Reading) {
+        self.0.set(reading);
     }
 }
 

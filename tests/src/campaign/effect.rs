@@ -4,10 +4,11 @@ use hapterra_core::contact::Rule;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Sense;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::message::{Heights, Point, TileMessage, ToDevice};
+use hapterra_core::scene::Point;
+use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 
 use super::arm::Mood;
-use super::clock::Hands;
+use super::clock::Reading;
 use super::host::Tiles;
 use super::kind::Kind;
 use super::pipe::Unkind;
@@ -124,17 +125,17 @@ impl Mishap {
 
     /// What it does to the clock.
     #[must_use]
-    pub fn hands(&self) -> Hands {
+    pub fn reading(&self) -> Reading {
         match self.kind {
-            Kind::TickOverrun => Hands {
+            Kind::TickOverrun => Reading {
                 since_due: 0,
                 overrun: true,
             },
-            Kind::LateTicks => Hands {
+            Kind::LateTicks => Reading {
                 since_due: 11 + (900.0 * self.size) as u32,
                 overrun: false,
             },
-            _ => Hands::default(),
+            _ => Reading::default(),
         }
     }
 
@@ -184,11 +185,11 @@ impl Mishap {
             }),
             3 => ToDevice::Tile(TileMessage {
                 epoch: epoch.wrapping_add(chance.below(2) as u32),
-                key: hapterra_core::terrain::TileKey {
-                    level: 0,
-                    col: chance.below(20) as i32,
-                    row: chance.below(20) as i32,
-                },
+                key: hapterra_core::terrain::TileKey::new(
+                    0,
+                    chance.below(20) as i32,
+                    chance.below(20) as i32,
+                ),
                 heights: Heights::Flat {
                     base: 1_000,
                     height: 0.0,

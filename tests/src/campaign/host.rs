@@ -2,9 +2,10 @@
 
 use hapterra::link::{Client, Event, LinkError};
 use hapterra::terrain::Terrain;
+use hapterra_core::scene::{Sample, Scene};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
-use hapterra_core::wire::message::{Heights, Sample, Scene, TileMessage, ToDevice, ToHost};
+use hapterra_core::wire::message::{Heights, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::status::Status;
 
 use super::pipe::{Pipe, Unkind};
@@ -52,7 +53,7 @@ impl<'t> Host<'t> {
     pub fn new(terrain: &'t Terrain<'t>, scene: Scene) -> Self {
         Self {
             terrain,
-            client: Client::new(terrain, scene),
+            client: Client::new(terrain, scene, None),
             reader: Box::default(),
             to_device: Pipe::default(),
             to_host: Pipe::default(),
@@ -67,7 +68,7 @@ impl<'t> Host<'t> {
 
     /// Forgets everything and begins anew with another scene.
     pub fn restart(&mut self, scene: Scene, now: u64, chance: &mut Chance) {
-        self.client = Client::new(self.terrain, scene);
+        self.client = Client::new(self.terrain, scene, None);
         *self.reader = FrameReader::new();
         self.greet(now, chance);
     }

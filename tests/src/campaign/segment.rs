@@ -8,14 +8,15 @@ use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Drive, Mode, Sense};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::message::{Scene, Source, ToDevice};
+use hapterra_core::scene::{Scene, Source};
+use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::status::{BootReport, Status};
-use hapterra_firmware::channels::{Channels, Tiles as Buffers};
+use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::native::Device;
 use hapterra_firmware::store::Stored;
 
 use super::arm::{Arm, Mood};
-use super::clock::{Hands, SetClock};
+use super::clock::{Reading, SetClock};
 use super::effect::{Mishap, RULE};
 use super::host::{Host, Tiles};
 use super::kind::Kind;
@@ -114,17 +115,11 @@ impl<'t> Stretch<'t> {
         let record = Calibration::PREMIUM_1_5;
         // The two halves of the application hand tile buffers to each other by
         // reference, for as long as the program runs.
-        let buffers = Box::leak(Box::new(Buffers::new()));
-        let channels = Box::leak(Box::new(Channels::new()));
+        let tiles = Box::leak(Box::new(TileBuffers::VACANT));
+        let memory = Box::leak(Box::new(WorkingMemory::new()));
         let clock = SetClock::default();
         let stored = Stored::Found(record);
-        let device = Device::new(
-            buffers,
-            channels,
-            clock.clone(),
-            stored,
-            BootReport::default(),
-        );
+        let device = Device::new(tiles, memory, clock.clone(), stored, BootReport::default());
         let arm = Arm::new(terrain, &mut chance);
         let scene = scene(terrain, &arm, &mut chance);
         Self {
@@ -294,19 +289,19 @@ impl<'t> Stretch<'t> {
             *count += lost;
         }
         let (mut unkind, mut tiles) = (Unkind::default(), Tiles::Sent);
-        let (mut hands, mut stalls) = (Hands::default(), false);
+        let (mut reading, mut stalls) = (Reading::default(), false);
         if let Some(mishap) = mishap {
             mishap.meddle(&mut sense, &mut self.lost, self.now, &mut self.chance);
             (unkind, tiles) = (mishap.unkind(), mishap.tiles());
-            (hands, stalls) = (mishap.hands(), mishap.stalls());
+            (reading, stalls) = (mishap.reading(), mishap.stalls());
             if mishap.unplugs(self.now) {
-                self.device.interrupted();
+                self.device.link.interrupted();
             }
             if let Some(message) = mishap.misplaced(&mut self.chance, self.scene.epoch) {
                 self.host.say(&message, self.now, &unkind, &mut self.chance);
             }
         }
-        self.clock.set(hands);
+        self.clock.set(reading);
         let device = &mut self.device;
         self.drive = if stalls {
             device.tick_alone(sense)
@@ -319,7 +314,7 @@ impl<'t> Stretch<'t> {
         let length = if stalls {
             0
         } else {
-            self.device.transmit(&mut said)
+            self.device.link.transmit(&mut said)
         };
         let said = &said[..length];
         self.host

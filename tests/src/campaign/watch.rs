@@ -10,7 +10,7 @@
 use hapterra::phantom::{Encoder, PhantomModel};
 use hapterra_core::guard::{Drive, Mode, Sense, WORKING_SHARE};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::message::Sample;
+use hapterra_core::scene::Sample;
 
 use super::extremes::{Extremes, Misled, OFF_COUNTS};
 use super::levers::{Levers, torques_nm};

@@ -4,11 +4,12 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::{Rule, WORK_PER_TICK};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
-use hapterra_core::guard::{Fault, Sense, TickRate};
+use hapterra_core::guard::{Fault, Sense};
 use hapterra_core::phantom::{Calibration, Mechanism};
-use hapterra_core::terrain::{Tile, TileKey};
+use hapterra_core::rate::TickRate;
+use hapterra_core::scene::{Point, Scene, Source};
+use hapterra_core::terrain::{FieldSize, Tile, TileKey};
 use hapterra_core::tick::{Command, Haptics, Outcome};
-use hapterra_core::wire::message::{Point, Scene, Source};
 
 use super::bytes::Bytes;
 
@@ -80,7 +81,7 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
     let mut scene = Scene {
         epoch: 1,
         level: 0,
-        size: [64, 64],
+        size: FieldSize::new(64, 64),
         top: 1 << 20,
         cell_mm: 1.0,
         home: GridPoint::new([30, 30, 2], Vec3::ZERO),
@@ -98,7 +99,7 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
         hold_clock: false,
     };
     if kind & 4 != 0 {
-        scene.size = [bytes.int(), bytes.int()];
+        scene.size = FieldSize::new(bytes.int(), bytes.int());
         scene.top = bytes.int();
     }
     if kind & 8 != 0 {
@@ -113,11 +114,11 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
 }
 
 fn fill(tile: &mut Tile, bytes: &mut Bytes<'_>) {
-    let key = TileKey {
-        level: bytes.byte() / 128,
-        col: i32::from(bytes.byte() % 4) - 1,
-        row: i32::from(bytes.byte() % 4) - 1,
-    };
+    let key = TileKey::new(
+        bytes.byte() / 128,
+        i32::from(bytes.byte() % 4) - 1,
+        i32::from(bytes.byte() % 4) - 1,
+    );
     let base = if bytes.byte() == 255 { bytes.int() } else { 0 };
     let heights: Vec<f32> = (0..7).map(|_| bytes.height()).collect();
     // A tile that is refused is left vacant, which the loop refuses in turn.
@@ -135,7 +136,11 @@ fn position(bytes: &mut Bytes<'_>) -> GridPoint {
     GridPoint::new(cell.map(i32::from), offset - Vec3::new(0.0, 0.0, 4.0))
 }
 
-fn look(outcome: &Outcome, law: &ForceLaw) {
+/// Looks at what one tick gave, felt by `law`.
+///
+/// # Panics
+/// When no tick may give that.
+pub fn look(outcome: &Outcome, law: &ForceLaw) {
     let (sample, drive) = (&outcome.sample, &outcome.drive);
     let force = sample.force_n.as_dvec3().length();
     // A limit smaller than any normal number is kept to no more than that.

@@ -5,14 +5,17 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Sense;
 use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::{Scene, Source};
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
-use hapterra_core::wire::message::{HostHello, PROTOCOL, Scene, Source, ToDevice, ToHost};
+use hapterra_core::wire::hello::{HostHello, PROTOCOL};
+use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::status::BootReport;
-use hapterra_firmware::channels::{Channels, Tiles};
+use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
 
 use super::bytes::Bytes;
+use hapterra_core::terrain::FieldSize;
 
 /// A device that lives as long as the thread: its memory cannot be had back.
 pub struct Wire {
@@ -23,8 +26,8 @@ pub struct Wire {
 impl Default for Wire {
     fn default() -> Self {
         let device = Device::new(
-            Box::leak(Box::new(Tiles::new())),
-            Box::leak(Box::new(Channels::new())),
+            Box::leak(Box::new(TileBuffers::VACANT)),
+            Box::leak(Box::new(WorkingMemory::new())),
             StoppedClock,
             Stored::Found(Calibration::PREMIUM_1_5),
             BootReport::default(),
@@ -56,7 +59,7 @@ impl Wire {
                 0 => self.hear(chunk),
                 // In a frame whose check sum fits, so that its content is read.
                 1 | 2 => self.hear(&framed(chunk)),
-                _ => self.device.interrupted(),
+                _ => self.device.link.interrupted(),
             }
             let sense = Sense {
                 counts: [i32::from(kind), 0, 0],
@@ -65,14 +68,14 @@ impl Wire {
             };
             let drive = self.device.tick(sense);
             assert!(drive.currents_a.is_finite(), "{drive:?}");
-            assert!(self.device.drives_arm() || !drive.enabled, "{drive:?}");
+            assert!(self.device.link.drives_arm() || !drive.enabled, "{drive:?}");
             self.listen();
         }
     }
 
     /// A new session, whatever was heard before.
     fn begin(&mut self) {
-        self.device.interrupted();
+        self.device.link.interrupted();
         self.hear(&[0]);
         let hello = HostHello { protocol: PROTOCOL };
         self.hear(&message(&ToDevice::Hello(hello)));
@@ -100,7 +103,7 @@ impl Wire {
     fn listen(&mut self) {
         let mut chunk = [0; 256];
         for _ in 0..10_000 {
-            let n = self.device.transmit(&mut chunk);
+            let n = self.device.link.transmit(&mut chunk);
             if n == 0 {
                 return;
             }
@@ -168,7 +171,7 @@ pub fn scene() -> Scene {
     Scene {
         epoch: 7,
         level: 0,
-        size: [64, 64],
+        size: FieldSize::new(64, 64),
         top: 100,
         cell_mm: 1.0,
         home: GridPoint::default(),

@@ -1,6 +1,6 @@
 //! What a tick says, by itself.
 
-use hapterra_core::contact::{State, WORK_PER_TICK};
+use hapterra_core::contact::{ContactState, WORK_PER_TICK};
 use hapterra_core::grid::MAX_CELL;
 
 use super::Invariant;
@@ -18,7 +18,7 @@ impl Judge<'_> {
         let (cell, frac) = (felt.proxy.cell(), felt.proxy.frac());
         let valid = cell.iter().all(|c| c.abs() <= MAX_CELL)
             && frac.to_array().iter().all(|f| (0.0..1.0).contains(f));
-        if !felt.stretch.is_finite() || !valid {
+        if !felt.displacement.is_finite() || !valid {
             return self.fail(Invariant::Finite, format!("{felt:?}"));
         }
         Ok(())
@@ -31,16 +31,16 @@ impl Judge<'_> {
         Ok(())
     }
 
-    /// No force but of a contact; a free proxy in the hand; a contact's stretch
+    /// No force but of a contact; a free proxy in the HIP; a contact's displacement
     /// a part of the way to the proxy. (A tick of the paper's rule that could not
     /// be done gives the last answer again.)
     pub(super) fn is_consistent(&self, seen: &Seen, swept: bool) -> Verdict {
         let felt = &seen.felt;
-        let none = felt.stretch.to_array() == [0.0; 3];
-        let free_at_hand = !seen.is_free() || seen.proxy == seen.hip;
-        let may_press = seen.is_touching() || felt.state == State::LettingGo;
+        let none = felt.displacement.to_array() == [0.0; 3];
+        let free_at_hip = !seen.is_free() || seen.proxy == seen.hip;
+        let may_press = seen.is_touching() || felt.state == ContactState::Fading;
         let is_part = !(swept && seen.is_touching()) || is_part_of_the_way(seen);
-        if (!may_press && !none) || !free_at_hand || !is_part {
+        if (!may_press && !none) || !free_at_hip || !is_part {
             return self.fail(Invariant::Consistent, format!("{seen:?}"));
         }
         Ok(())
@@ -48,11 +48,11 @@ impl Judge<'_> {
 
     /// The force is the spring's, or as long as the clamp.
     pub(super) fn is_clamped(&self, seen: &Seen) -> Verdict {
-        let stretch = seen.felt.stretch.as_dvec3().to_array();
+        let displacement = seen.felt.displacement.as_dvec3().to_array();
         let most = f64::from(LAW.max_force_n);
         for (cell_mm, force) in CELLS_MM.iter().zip(seen.force_n) {
             let rate = f64::from(LAW.stiffness_n_per_mm) * f64::from(*cell_mm);
-            let spring = stretch.map(|s| s * rate);
+            let spring = displacement.map(|s| s * rate);
             let part = (most / length(spring)).min(1.0);
             let off = distance(force, spring.map(|f| f * part));
             // Half a unit in the last place is what its own length may be off.
@@ -60,7 +60,7 @@ impl Judge<'_> {
             let error = FORCE_ERROR * length(spring).min(most) + f64::from(f32::MIN_POSITIVE);
             let is_off = !(0.0..=error).contains(&off);
             if is_long || is_off {
-                let detail = format!("{force:?} N at {cell_mm} mm a cell from {stretch:?}");
+                let detail = format!("{force:?} N at {cell_mm} mm a cell from {displacement:?}");
                 return self.fail(Invariant::Clamp, detail);
             }
         }
@@ -72,11 +72,11 @@ fn length(v: [f64; 3]) -> f64 {
     distance(v, [0.0; 3])
 }
 
-/// Whether the stretch is the way from the hand to the proxy, times a presence
+/// Whether the displacement is the way from the HIP to the proxy, times a boundary fade
 /// in `[0, 1]`.
 fn is_part_of_the_way(seen: &Seen) -> bool {
     let way = [0, 1, 2].map(|i| seen.proxy[i] - seen.hip[i]);
-    let felt = seen.felt.stretch.as_dvec3().to_array();
+    let felt = seen.felt.displacement.as_dvec3().to_array();
     let whole = length(way);
     let part = if whole > 0.0 {
         (length(felt) / whole).min(1.0)

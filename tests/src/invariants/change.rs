@@ -1,7 +1,7 @@
 //! How a tick goes on from the one before.
 
-use hapterra_core::contact::State;
-use hapterra_core::contact::presence::RATE;
+use hapterra_core::contact::ContactState;
+use hapterra_core::contact::boundary_fade::RATE;
 
 use super::judge::{Judge, Verdict};
 use super::seen::Seen;
@@ -12,13 +12,13 @@ use crate::scene::terrain::{Kind, WALL, WALL_EVERY};
 /// Distances that differ by less than this part count as equal: the squared
 /// distance is compared to 10⁻⁶ in each patch on the way.
 const TIE: f64 = 4e-6;
-/// A hand that moves no farther than this in a tick, in cells, is in the same
+/// A HIP that moves no farther than this in a tick, in cells, is in the same
 /// contact as before.
 const NEAR: f64 = 0.1;
 
 impl Judge<'_> {
     pub(super) fn was_seen_above(&self, before: &Seen, seen: &Seen) -> Verdict {
-        if before.felt.state == State::Waiting && seen.is_touching() {
+        if before.felt.state == ContactState::Waiting && seen.is_touching() {
             return self.fail(Invariant::SeenAbove, format!("{before:?} then {seen:?}"));
         }
         Ok(())
@@ -31,17 +31,17 @@ impl Judge<'_> {
             return Ok(()); // a new contact may come at once
         }
         let rate = f64::from(RATE) + 1e-3;
-        let broken = match (before.presence(), seen.presence()) {
+        let broken = match (before.boundary_fade(), seen.boundary_fade()) {
             (Some(was), Some(is)) => hopped < 2.0 * NEAR && (is - was).abs() > rate,
             // Let go: there was next to nothing left.
-            (Some(was), None) => seen.felt.state == State::Waiting && was > rate,
+            (Some(was), None) => seen.felt.state == ContactState::Waiting && was > rate,
             (None, _) => false,
         };
         if broken {
             let detail = format!(
                 "{:?} to {:?}: {before:?} then {seen:?}",
-                before.presence(),
-                seen.presence()
+                before.boundary_fade(),
+                seen.boundary_fade()
             );
             return self.fail(Invariant::Fade, detail);
         }
@@ -50,8 +50,8 @@ impl Judge<'_> {
 
     /// What was felt last fades to nothing in equal steps.
     pub(super) fn lets_go_gently(&mut self, before: &Seen, seen: &Seen) -> Verdict {
-        let felt = |seen: &Seen| seen.felt.stretch.as_dvec3().length();
-        let lets_go = |seen: &Seen| seen.felt.state == State::LettingGo;
+        let felt = |seen: &Seen| seen.felt.displacement.as_dvec3().length();
+        let lets_go = |seen: &Seen| seen.felt.state == ContactState::Fading;
         if lets_go(seen) && !lets_go(before) {
             self.let_go_from = felt(before);
         }
@@ -59,7 +59,7 @@ impl Judge<'_> {
         let most = (f64::from(RATE) + 1e-3) * self.let_go_from;
         let ends = lets_go(before) || lets_go(seen);
         // It gets less, and does not turn.
-        let [was, is] = [before, seen].map(|seen| seen.felt.stretch.as_dvec3());
+        let [was, is] = [before, seen].map(|seen| seen.felt.displacement.as_dvec3());
         let turned = was.cross(is).length() > 1e-6 * was.length() * is.length().max(1e-6);
         if ends && (turned || !(-1e-6..=most + 1e-6).contains(&step)) {
             let detail = format!("a step of {step:.3e}, {before:?} then {seen:?}");
@@ -70,7 +70,7 @@ impl Judge<'_> {
 
     pub(super) fn descends(&self, before: &Seen, seen: &Seen) -> Verdict {
         // A proxy that waits for a tile goes on from where it entered its patch.
-        let waited = before.felt.held_up_by.is_some();
+        let waited = before.felt.missing_tile.is_some();
         if !(before.is_touching() && seen.is_touching()) || waited {
             return Ok(());
         }
@@ -120,8 +120,8 @@ impl Judge<'_> {
         let inside = |p: [f64; 3]| {
             (0..2).all(|axis| (0.0..f64::from(self.terrain.size[axis])).contains(&p[axis]))
         };
-        let held = |seen: &Seen| seen.felt.state != State::Waiting;
-        // Any place on a wall's top is farther from the hand than the proxy was.
+        let held = |seen: &Seen| seen.felt.state != ContactState::Waiting;
+        // Any place on a wall's top is farther from the HIP than the proxy was.
         let out_of_reach = WALL - seen.hip[2] > distance(before.proxy, seen.hip) + 1.0;
         if self.terrain.kind != Kind::Walls
             || !(held(before) && held(seen) && out_of_reach)

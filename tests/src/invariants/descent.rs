@@ -5,8 +5,7 @@
 //! downhill in small steps until its slope turns, that interval is halved to the
 //! end of f64, and the next patch is taken if that leads nearer. Slow and plain.
 
-use super::surface::{Patch, distance};
-use crate::scene::terrain::Terrain;
+use super::surface::{Corners, Patch, distance};
 
 /// First step of the walk, cells: on a wall of 10⁶ the next minimum is not far.
 const STEP: f64 = 1e-9;
@@ -20,7 +19,7 @@ const PATCHES: usize = 10_000;
 pub struct Closest {
     /// The point.
     pub at: [f64; 3],
-    /// Its distance from the hand.
+    /// Its distance from the HIP.
     pub distance: f64,
     /// Patches gone through.
     pub patches: usize,
@@ -28,17 +27,17 @@ pub struct Closest {
 
 /// Descends from a place in a patch.
 #[must_use]
-pub fn from(terrain: &Terrain, hand: [f64; 3], start: [f64; 2], patch: Patch) -> Closest {
+pub fn from(field: &impl Corners, hip: [f64; 3], start: [f64; 2], patch: Patch) -> Closest {
     let (mut patch, mut at) = (patch, start);
     let mut patches = 1;
     loop {
-        at = descend(&patch, hand, at);
-        let here = squared(&patch, hand, at);
-        let next = neighbours(terrain, &patch, at)
+        at = descend(&patch, hip, at);
+        let here = squared(&patch, hip, at);
+        let next = neighbours(field, &patch, at)
             .filter_map(|there| {
-                let end = descend(&there, hand, at);
+                let end = descend(&there, hip, at);
                 let moved = (end[0] - at[0]).abs().max((end[1] - at[1]).abs());
-                let f = squared(&there, hand, end);
+                let f = squared(&there, hip, end);
                 (moved > LEAST_WAY && f < here).then_some((f, there))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0));
@@ -51,17 +50,17 @@ pub fn from(terrain: &Terrain, hand: [f64; 3], start: [f64; 2], patch: Patch) ->
     let at = [at[0], at[1], patch.height(at[0], at[1])];
     Closest {
         at,
-        distance: distance(at, hand),
+        distance: distance(at, hip),
         patches,
     }
 }
 
 /// The other patches that share a point.
-fn neighbours<'g>(
-    terrain: &'g Terrain,
+fn neighbours<'f, F: Corners>(
+    field: &'f F,
     patch: &Patch,
     at: [f64; 2],
-) -> impl Iterator<Item = Patch> + use<'g> {
+) -> impl Iterator<Item = Patch> + use<'f, F> {
     let side = |axis: usize| {
         let local = at[axis] - f64::from(patch.cell[axis]);
         i32::from(local == 1.0) - i32::from(local == 0.0)
@@ -72,16 +71,16 @@ fn neighbours<'g>(
     shifts.dedup(); // on an edge, two of them are the same
     shifts
         .into_iter()
-        .filter_map(move |shift| Patch::at(terrain, [cell[0] + shift[0], cell[1] + shift[1]]))
+        .filter_map(move |shift| Patch::at(field, [cell[0] + shift[0], cell[1] + shift[1]]))
 }
 
-fn squared(patch: &Patch, hand: [f64; 3], [x, y]: [f64; 2]) -> f64 {
-    distance([x, y, patch.height(x, y)], hand).powi(2)
+fn squared(patch: &Patch, hip: [f64; 3], [x, y]: [f64; 2]) -> f64 {
+    distance([x, y, patch.height(x, y)], hip).powi(2)
 }
 
 /// Downhill inside one patch.
-fn descend(patch: &Patch, hand: [f64; 3], start: [f64; 2]) -> [f64; 2] {
-    let line = Line { patch, hand };
+fn descend(patch: &Patch, hip: [f64; 3], start: [f64; 2]) -> [f64; 2] {
+    let line = Line { patch, hip };
     // The steeper direction in closed form: it is the one that needs it.
     let [east, north] = patch.slopes(start[0], start[1]);
     if north.abs() > east.abs() {
@@ -96,7 +95,7 @@ fn descend(patch: &Patch, hand: [f64; 3], start: [f64; 2]) -> [f64; 2] {
 /// being the best for it.
 struct Line<'p> {
     patch: &'p Patch,
-    hand: [f64; 3],
+    hip: [f64; 3],
 }
 
 impl Line<'_> {
@@ -105,7 +104,7 @@ impl Line<'_> {
         self.nearest(axis, fixed).0
     }
 
-    /// That coordinate, and the height above the hand there.
+    /// That coordinate, and the height above the HIP there.
     ///
     /// Up a wall of slope m the place knows its height only to m units in its
     /// last place; the closed form knows it to one.
@@ -113,11 +112,11 @@ impl Line<'_> {
         let low = f64::from(self.patch.cell[axis]);
         let above = |along: f64| {
             let [x, y] = place(axis, along, fixed);
-            self.patch.height(x, y) - self.hand[2]
+            self.patch.height(x, y) - self.hip[2]
         };
         let [x, y] = place(axis, low, fixed);
         let m = self.patch.slopes(x, y)[axis];
-        let p = self.hand[axis] - low;
+        let p = self.hip[axis] - low;
         let z = (above(low) + m * p) / (1.0 + m * m);
         let free = p - m * z;
         if (0.0..=1.0).contains(&free) {
@@ -131,7 +130,7 @@ impl Line<'_> {
     fn slope(&self, axis: usize, fixed: f64) -> f64 {
         let (along, z) = self.nearest(axis, fixed);
         let [x, y] = place(axis, along, fixed);
-        (fixed - self.hand[1 - axis]) + z * self.patch.slopes(x, y)[1 - axis]
+        (fixed - self.hip[1 - axis]) + z * self.patch.slopes(x, y)[1 - axis]
     }
 
     /// Downhill from `start` to where F turns.

@@ -15,10 +15,10 @@ pub struct Measured {
     /// Ticks waiting, free, touching and letting go.
     pub states: [u64; 4],
     /// Ticks that left work over.
-    pub unsettled: u64,
+    pub unconverged: u64,
     /// Most units of work in a tick.
     pub work: u32,
-    /// Largest distance of a proxy from the surface, cells, with the hand within
+    /// Largest distance of a proxy from the surface, cells, with the HIP within
     /// a few cells.
     pub off_surface: f64,
     /// Largest distance from the exact closest point, cells, among those within
@@ -34,6 +34,25 @@ pub struct Measured {
     /// Twins compared to the end: repeated, shifted, in another window, mirrored
     /// or turned.
     pub twins: [u64; 4],
+}
+
+impl Measured {
+    /// Adds what another judge measured.
+    pub fn add(&mut self, other: &Self) {
+        for (own, other) in self.states.iter_mut().zip(other.states) {
+            *own += other;
+        }
+        for (own, other) in self.twins.iter_mut().zip(other.twins) {
+            *own += other;
+        }
+        self.unconverged += other.unconverged;
+        self.work = self.work.max(other.work);
+        self.off_surface = self.off_surface.max(other.off_surface);
+        self.off_minimum = self.off_minimum.max(other.off_minimum);
+        self.judged += other.judged;
+        self.beyond += other.beyond;
+        self.around += other.around;
+    }
 }
 
 /// Looks at the ticks of one scene in turn.
@@ -76,7 +95,7 @@ impl<'g> Judge<'g> {
     pub fn all(&mut self, seen: &Seen) -> Vec<Violation> {
         let felt = &seen.felt;
         self.measured.states[felt.state as usize] += 1;
-        self.measured.unsettled += u64::from(!felt.settled);
+        self.measured.unconverged += u64::from(!felt.converged);
         self.measured.work = self.measured.work.max(felt.work);
         let mut told = Vec::new();
         told.extend(self.is_finite(seen).err());
@@ -99,9 +118,9 @@ impl<'g> Judge<'g> {
         if !swept {
             return;
         }
-        if seen.is_touching() && seen.felt.settled {
+        if seen.is_touching() && seen.felt.converged {
             told.extend(self.is_local_minimum(seen).err());
-            told.extend(self.is_hand_below(seen).err());
+            told.extend(self.is_hip_below(seen).err());
         }
         if seen.is_free() {
             told.extend(self.is_above(seen, self.before.as_ref()).err());

@@ -1,8 +1,9 @@
-//! What must hold in every tick, on any terrain, for any hand, judged in f64 by
-//! methods that are none of the product's.
+//! What must hold in every tick, on any terrain, for any path of the HIP. It is judged
+//! in f64, by methods that are none of the product's.
 //!
-//! [`judge`] is the list; [`seen`] is what it looks at, [`surface`], [`crossing`]
-//! and [`descent`] are what it knows about the terrain. Everything is in cells.
+//! [`judge`] lists the invariants in the order they are judged. [`seen`] is one tick as
+//! the judge sees it; [`surface`], [`crossing`] and [`descent`] are what the judge
+//! knows about the terrain. All lengths are in cells.
 
 mod answer;
 mod change;
@@ -13,47 +14,51 @@ mod place;
 pub mod seen;
 pub mod surface;
 
-/// What a tick may not break.
+/// What every tick must keep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Invariant {
-    /// The answer is finite and a valid position.
+    /// The answer is finite, and the proxy is a valid position.
     Finite,
-    /// The force is the spring's, within the clamp.
+    /// The force is the spring's force, or as long as the clamp allows.
     Clamp,
-    /// The tick's work is within its bound.
+    /// The tick spends at most `WORK_PER_TICK` units of work.
     Work,
-    /// State, stretch and proxy fit each other.
+    /// State, displacement and proxy fit each other: there is no force without a
+    /// contact, a free proxy is at the HIP, and the force points to the proxy.
     Consistent,
-    /// A hand that repeats its tick gets to the end of it.
+    /// A tick that is repeated for the same HIP comes to its end.
     Settles,
     /// In contact the proxy is on the surface.
     OnSurface,
-    /// Where nothing is left to do, no way on the surface leads nearer.
+    /// Where a tick leaves no work over, no way along the surface leads from the
+    /// proxy nearer to the HIP.
     LocalMinimum,
-    /// In contact the way from the proxy to the hand leads into the ground.
-    HandBelow,
-    /// In contact the proxy is no farther from the hand than where it was.
+    /// In contact the straight way from the proxy to the HIP leads into the ground:
+    /// no contact pulls.
+    HipBelow,
+    /// While a contact lasts, the proxy is no farther from the HIP than its last
+    /// place is.
     Descent,
-    /// A contact begins at the first crossing of the hand's way, and is no
-    /// farther from the hand than that.
+    /// A contact begins at the first crossing of the HIP's path with the surface, and
+    /// is no farther from the HIP than that.
     FirstCrossing,
-    /// A way that crosses nothing stays free.
+    /// A HIP whose path crosses nothing stays free.
     Freedom,
-    /// No free hand is below the surface.
+    /// No free HIP is below the surface.
     AboveSurface,
-    /// There is no contact before the hand has been seen above the surface.
+    /// No contact begins before the HIP was seen above the surface.
     SeenAbove,
-    /// A wall is not passed.
+    /// The proxy passes no wall.
     Wall,
     /// The force fades in and out at a bounded rate.
     Fade,
     /// The same input gives the same bits.
     Repeatable,
-    /// Shifted by whole cells, the scene gives the same bits.
+    /// A scene shifted by whole cells gives the same bits.
     Shift,
-    /// A small window that waits for tiles feels what a whole one feels.
+    /// A small window that waits for tiles gives the bits of a window that holds all.
     Window,
-    /// Mirrored and turned, the scene feels the same.
+    /// A scene that is mirrored or turned gives the same answers, mirrored or turned.
     Symmetry,
 }
 

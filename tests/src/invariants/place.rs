@@ -5,7 +5,7 @@ use super::seen::{ERROR, Seen};
 use super::surface::{Patch, distance, patches_at};
 use super::{Invariant, descent};
 
-/// Hands farther from the surface than this, in cells, are so far that distances
+/// HIPs farther from the surface than this, in cells, are so far that distances
 /// to all that is near the proxy count as equal.
 const FAR: f64 = 1e4;
 
@@ -33,7 +33,7 @@ impl Judge<'_> {
             return Ok(()); // off the surface: said before
         };
         self.measured.judged += 1;
-        // Within the bound of the hand itself there is no force to be wrong about.
+        // Within the bound of the HIP itself there is no force to be wrong about.
         if !(ERROR..=FAR).contains(&distance(seen.proxy, seen.hip)) {
             return Ok(());
         }
@@ -47,7 +47,7 @@ impl Judge<'_> {
         self.measured.beyond += 1;
         // On steep ground a unit in the last place of a coordinate is much height:
         // the bound is one in the plane. And how far does the truth move for a
-        // rounding of the hand, or of the heights above it that are mixed there?
+        // rounding of the HIP, or of the heights above it that are mixed there?
         let here = descent::from(self.terrain, seen.hip, start, patch).at;
         let moved = |axis: usize, by: f64| {
             let mut hip = seen.hip;
@@ -70,10 +70,10 @@ impl Judge<'_> {
         Ok(())
     }
 
-    /// A contact that pulls holds a hand which is free to go: the straight way to
+    /// A contact that pulls holds a HIP which is free to go: the straight way to
     /// it starts above the ground, that is above the tangent plane of the patch it
     /// leads into.
-    pub(super) fn is_hand_below(&self, seen: &Seen) -> Verdict {
+    pub(super) fn is_hip_below(&self, seen: &Seen) -> Verdict {
         let way = [0, 1, 2].map(|i| seen.hip[i] - seen.proxy[i]);
         let level = way[0].hypot(way[1]);
         let into = |(start, patch): &([f64; 2], Patch)| leads_into(*start, way, patch);
@@ -89,7 +89,7 @@ impl Judge<'_> {
         // Over a hole there is no ground: the proxy is held at the edge.
         let above = above.fold(f64::INFINITY, f64::min);
         if above.is_finite() && above > 4.0 * seen.allowed() {
-            return self.fail(Invariant::HandBelow, format!("by {above:.3e}: {seen:?}"));
+            return self.fail(Invariant::HipBelow, format!("by {above:.3e}: {seen:?}"));
         }
         Ok(())
     }
@@ -119,7 +119,7 @@ impl Judge<'_> {
 
     pub(super) fn is_above(&self, seen: &Seen, before: Option<&Seen>) -> Verdict {
         let [x, y, z] = seen.hip;
-        // On a line of the grid the hand is over the patch to the north-east.
+        // On a line of the grid the HIP is over the patch to the north-east.
         let Some(patch) = Patch::at(self.terrain, [x.floor() as i32, y.floor() as i32]) else {
             return Ok(());
         };

@@ -1,6 +1,6 @@
 //! One tick as the judge sees it, and how exact it has to be.
 
-use hapterra_core::contact::{Felt, State};
+use hapterra_core::contact::{ContactOutput, ContactState};
 use hapterra_core::force::ForceLaw;
 
 use super::surface::{distance, patches_at};
@@ -11,7 +11,7 @@ use crate::scene::terrain::Terrain;
 pub const ERROR: f64 = 2e-6;
 /// Stretches shorter than this, in cells, tell nothing about a fade.
 const SHORT: f64 = 1e-3;
-/// The law that turns stretches into forces, and the sizes of a cell it does so for.
+/// The law that turns displacements into forces, and the sizes of a cell it does so for.
 pub const LAW: ForceLaw = ForceLaw::PREMIUM;
 /// Millimetres of a cell.
 pub const CELLS_MM: [f32; 3] = [1e-3, 1.0, 1e3];
@@ -19,10 +19,10 @@ pub const CELLS_MM: [f32; 3] = [1e-3, 1.0, 1e3];
 /// One tick as the judge sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
-    /// The hand.
+    /// The HIP.
     pub hip: [f64; 3],
     /// The answer.
-    pub felt: Felt,
+    pub felt: ContactOutput,
     /// The proxy, where the terrain was made.
     pub proxy: [f64; 3],
     /// The force that the product's law gives for it, N, by [`CELLS_MM`].
@@ -32,36 +32,36 @@ pub struct Seen {
 impl Seen {
     /// A tick over a terrain that lies `shift` cells away.
     #[must_use]
-    pub fn new(hip: [f64; 3], felt: Felt, shift: [i32; 3]) -> Self {
+    pub fn new(hip: [f64; 3], felt: ContactOutput, shift: [i32; 3]) -> Self {
         let at = position(&felt.proxy);
         Self {
             hip,
             felt,
             proxy: [0, 1, 2].map(|i| at[i] - f64::from(shift[i])),
             force_n: CELLS_MM.map(|cell_mm| {
-                let force = LAW.force_n(felt.stretch * cell_mm);
+                let force = LAW.force_n(felt.displacement * cell_mm);
                 force.as_dvec3().to_array()
             }),
         }
     }
 
     pub(super) fn is_free(&self) -> bool {
-        self.felt.state == State::Free && self.felt.settled
+        self.felt.state == ContactState::Free && self.felt.converged
     }
 
     pub(super) fn is_touching(&self) -> bool {
-        self.felt.state == State::Touching
+        self.felt.state == ContactState::Touching
     }
 
     /// What part of the spring is felt; `None` where it is too short to tell.
-    pub(super) fn presence(&self) -> Option<f64> {
+    pub(super) fn boundary_fade(&self) -> Option<f64> {
         let whole = distance(self.proxy, self.hip);
-        let felt = self.felt.stretch.as_dvec3().length();
+        let felt = self.felt.displacement.as_dvec3().length();
         (self.is_touching() && whole > SHORT).then(|| felt / whole)
     }
 
     /// Error allowed where the height is not in question: the bound, or four
-    /// units in the last place of the largest coordinate of the hand in the
+    /// units in the last place of the largest coordinate of the HIP in the
     /// proxy's patch.
     #[must_use]
     pub fn allowed(&self) -> f64 {
@@ -71,7 +71,7 @@ impl Seen {
     }
 
     /// What four units in the last place of the corners of the proxy's patches
-    /// are, in height above the hand: they are coordinates, too.
+    /// are, in height above the HIP: they are coordinates, too.
     pub(super) fn rounding_of_corners(&self, terrain: &Terrain) -> f64 {
         let [x, y, _] = self.proxy;
         let corners = patches_at(terrain, x, y).flat_map(|patch| patch.corners());

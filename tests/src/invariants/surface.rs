@@ -2,6 +2,19 @@
 
 use crate::scene::terrain::Terrain;
 
+/// A field whose patches can be asked for by their cells.
+pub trait Corners {
+    /// Heights of a patch's corners in cells: south-west, south-east, north-west,
+    /// north-east; `None` where there is no patch.
+    fn corners(&self, cell: [i32; 2]) -> Option<[f64; 4]>;
+}
+
+impl Corners for Terrain {
+    fn corners(&self, cell: [i32; 2]) -> Option<[f64; 4]> {
+        self.patch(cell)
+    }
+}
+
 /// One patch, heights as they are: z = d + b·u + c·v + a·u·v.
 #[derive(Clone, Copy, Debug)]
 pub struct Patch {
@@ -16,8 +29,8 @@ pub struct Patch {
 impl Patch {
     /// The patch in a cell, unless there is none.
     #[must_use]
-    pub fn at(terrain: &Terrain, cell: [i32; 2]) -> Option<Self> {
-        let [sw, se, nw, ne] = terrain.patch(cell)?;
+    pub fn at(field: &impl Corners, cell: [i32; 2]) -> Option<Self> {
+        let [sw, se, nw, ne] = field.corners(cell)?;
         Some(Self {
             cell,
             a: (ne - nw) - (se - sw),

@@ -1,8 +1,10 @@
-//! Scenes: a terrain, a way of the hand, and how the tiles come.
+//! Scenes: a terrain, a path of the HIP, and how the tiles come.
 
-pub mod hand;
+pub mod hip_path;
+pub mod judged;
+pub mod recorded;
 pub mod run;
-pub mod stage;
+pub mod supply;
 pub mod symmetry;
 pub mod terrain;
 pub mod twin;

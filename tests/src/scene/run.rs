@@ -1,41 +1,43 @@
-//! A scene by its seed and number, and the run of it under the judge's eyes.
+//! A scene by its seed and number, and the run of it, tick by tick.
 
-use hapterra_core::contact::{Contact, Felt, Pace, Rule};
+use hapterra_core::contact::{Contact, ContactOutput, ContactSettings, Execution, Rule};
 use hapterra_core::grid::GridPoint;
 
-use super::stage::{Buffers, SIDE, Stage, Supply};
+use super::hip_path;
+use super::supply::{Buffers, SIDE, SuppliedWindow, Supply};
 use super::terrain::{KINDS, Terrain};
-use super::{hand, twin};
 use crate::chance::Chance;
 use crate::field::point;
-use crate::invariants::judge::{Judge, Measured};
 use crate::invariants::seen::Seen;
 use crate::invariants::{Invariant, Violation};
 
-/// Ticks that one hand may be repeated for in lock-step.
+/// Ticks that one HIP may be repeated for in lock-step.
 const PATIENCE: usize = 20_000;
 
-/// A terrain, a way of the hand, and the settings it is felt with.
+/// A terrain, a path of the HIP, and the settings it is felt with.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// What is felt.
     pub terrain: Terrain,
-    /// The hand, cells.
+    /// The HIP, cells.
     pub path: Vec<[f64; 3]>,
     /// The contact rule.
     pub rule: Rule,
     /// Whether a tick is repeated until it is done.
-    pub pace: Pace,
+    pub execution: Execution,
     /// How the tiles come.
     pub supply: Supply,
+    /// Whether the contact takes its shortcuts.
+    pub shortcuts: bool,
     /// Which of the twins are run beside it.
-    twins: Twins,
-    seed: u64,
+    pub(super) twins: Twins,
+    /// What the twins' own choices follow from.
+    pub(super) seed: u64,
 }
 
 /// Which twins a scene is compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Twins {
+pub(super) enum Twins {
     /// One of them, or none: scenes of a soak are many.
     One(usize),
     /// Each.
@@ -62,21 +64,22 @@ impl Scene {
         };
         let terrain = Terrain::new(kind, size, chance.bits());
         let ticks = 300 + chance.below(500);
-        let path = hand::walk(&terrain, &mut chance, ticks);
+        let path = hip_path::random(&terrain, &mut chance, ticks);
         // The paper's rule wants the whole way at once, and its ticks do not go on.
         let paper = chance.below(12) == 0 && supply == Supply::Held;
         let rule = if paper { Rule::Paper } else { Rule::Swept };
-        let pace = if chance.below(2) == 0 {
-            Pace::RealTime
+        let execution = if chance.below(2) == 0 {
+            Execution::RealTime
         } else {
-            Pace::LockStep
+            Execution::LockStep
         };
         Self {
             terrain,
             path,
             rule,
-            pace,
+            execution,
             supply,
+            shortcuts: true,
             twins: Twins::One(if paper { 0 } else { chance.below(6) }),
             seed: chance.bits(),
         }
@@ -88,46 +91,30 @@ impl Scene {
         terrain: Terrain,
         path: Vec<[f64; 3]>,
         rule: Rule,
-        pace: Pace,
+        execution: Execution,
         supply: Supply,
     ) -> Self {
         Self {
             terrain,
             path,
             rule,
-            pace,
+            execution,
             supply,
+            shortcuts: true,
             twins: Twins::All,
             seed: 1,
         }
     }
 
-    /// Runs it with every check.
-    ///
-    /// # Errors
-    /// The first violation.
-    pub fn run(&self, buffers: &mut Buffers) -> Result<Measured, Violation> {
-        let mut judge = Judge::new(&self.terrain, self.rule);
-        let seen = self.feel(buffers, [0; 3], self.supply, |seen| judge.look(seen))?;
-        let mut chance = Chance::new(self.seed);
-        let wanted = |twin: usize| {
-            matches!(self.twins, Twins::One(n) if n == twin) || self.twins == Twins::All
-        };
-        let mut twins = [false; 4];
-        if wanted(0) {
-            twins[0] = twin::repeated(self, &seen, buffers)?;
+    /// What its contact is told.
+    #[must_use]
+    pub const fn settings(&self) -> ContactSettings {
+        ContactSettings {
+            rule: self.rule,
+            execution: self.execution,
+            shortcuts: self.shortcuts,
+            ..ContactSettings::REAL_TIME
         }
-        if wanted(1) {
-            twins[1] = twin::shifted(self, buffers, &mut chance)?;
-        }
-        if wanted(2) {
-            twins[2] = twin::windowed(self, &seen, buffers, &mut chance)?;
-        }
-        if wanted(3) || wanted(4) {
-            twins[3] = twin::turned(self, buffers, &mut chance)?;
-        }
-        judge.measured.twins = twins.map(u64::from);
-        Ok(judge.measured)
     }
 
     /// Runs it over the terrain shifted by so many cells, and lets `look` see
@@ -171,7 +158,7 @@ impl Scene {
         Ok(all)
     }
 
-    /// The same settings over another terrain, with another way of the hand.
+    /// The same settings over another terrain, with another path of the HIP.
     #[must_use]
     pub fn with(&self, terrain: Terrain, path: Vec<[f64; 3]>) -> Self {
         Self {
@@ -187,9 +174,8 @@ pub struct Player<'t, 'g, const D: usize> {
     /// Its state, for those who want to try a tick twice.
     pub contact: Contact,
     /// Where it feels.
-    pub stage: Stage<'t, 'g, D>,
-    rule: Rule,
-    pace: Pace,
+    pub supplied: SuppliedWindow<'t, 'g, D>,
+    execution: Execution,
     shift: [i32; 3],
     now: u32,
 }
@@ -203,27 +189,26 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
         supply: Supply,
     ) -> Self {
         Self {
-            contact: Contact::new(),
-            stage: Stage::new(buffers, &scene.terrain, shift, supply),
-            rule: scene.rule,
-            pace: scene.pace,
+            contact: Contact::new(scene.settings()),
+            supplied: SuppliedWindow::new(buffers, &scene.terrain, shift, supply),
+            execution: scene.execution,
             shift,
             now: 0,
         }
     }
 
-    /// One hand: one tick, or in lock-step as many as it takes. `None` when
-    /// those do not end.
-    pub fn feel(&mut self, hip: [f64; 3]) -> Option<Felt> {
+    /// One HIP: one tick, or in lock-step as many as it takes. `None` when those do
+    /// not end. The work is that of the tick which spent most.
+    pub fn feel(&mut self, hip: [f64; 3]) -> Option<ContactOutput> {
         let hip = shifted(hip, self.shift);
+        let mut work = 0;
         for _ in 0..PATIENCE {
-            let felt = *self
-                .contact
-                .step(&self.stage.window, &hip, self.rule, self.pace);
-            self.stage.supply(self.now, &self.contact, &felt, &hip);
+            let felt = *self.contact.step(&self.supplied.window, &hip);
+            self.supplied.supply(self.now, &self.contact, &felt, &hip);
             self.now += 1;
-            if felt.settled || self.pace == Pace::RealTime {
-                return Some(felt);
+            work = work.max(felt.work);
+            if felt.converged || self.execution == Execution::RealTime {
+                return Some(ContactOutput { work, ..felt });
             }
         }
         None

@@ -32,7 +32,7 @@ pub enum Kind {
     Steps,
     /// A twist from 10⁻⁹ to 10⁶ in each patch.
     Twisted,
-    /// A few raised rows and columns, far higher than any hand.
+    /// A few raised rows and columns, far higher than any HIP.
     Walls,
     /// Gentle ground with a little noise: what a scan looks like.
     Scan,

@@ -1,10 +1,10 @@
 //! Scenes run twice, the second time so that nothing felt may change.
 
-use hapterra_core::contact::{Pace, Rule, State};
+use hapterra_core::contact::{ContactState, Execution, Rule};
 
-use super::hand::GRAIN;
+use super::hip_path::GRAIN;
 use super::run::{Player, Scene};
-use super::stage::{Buffers, SIDE, Supply};
+use super::supply::{Buffers, SIDE, Supply};
 use super::symmetry::{self, Symmetry};
 use super::terrain::Kind;
 use crate::chance::Chance;
@@ -17,16 +17,20 @@ type Verdict = Result<(), Violation>;
 /// Whether the twin could be compared, to the end.
 type Compared = Result<bool, Violation>;
 
-/// The same again: the same bits.
+/// The same again, with the contact's shortcuts switched off: the same bits.
 ///
 /// # Errors
 /// Where they differ.
 pub fn repeated(scene: &Scene, seen: &[Seen], buffers: &mut Buffers) -> Compared {
+    let scene = Scene {
+        shortcuts: false,
+        ..scene.clone()
+    };
     let again = scene.feel(buffers, [0; 3], scene.supply, |_| Ok(()))?;
     same_bits(Invariant::Repeatable, seen, &again, [0; 3]).map(|()| true)
 }
 
-/// How far beyond the field a shifted scene's hand may be, cells.
+/// How far beyond the field a shifted scene's HIP may be, cells.
 const BESIDE: f64 = 128.0;
 /// How far above or below, cells: farther down than any spike reaches up.
 const DEEP: f64 = 4e6;
@@ -41,9 +45,9 @@ const DEEP: f64 = 4e6;
 /// # Errors
 /// Where they differ.
 pub fn shifted(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Compared {
-    let whole = match scene.pace {
-        Pace::RealTime => 256,
-        Pace::LockStep => 32,
+    let whole = match scene.execution {
+        Execution::RealTime => 256,
+        Execution::LockStep => 32,
     };
     let far = [1_000, 30_000, 1_000_000, 100_000_000];
     let mut pick = || far[chance.below(far.len())] / whole * whole;
@@ -82,7 +86,7 @@ pub fn windowed(
     chance: &mut Chance,
 ) -> Compared {
     let fits = scene.terrain.size.iter().all(|patches| *patches <= 256);
-    if scene.pace != Pace::LockStep || scene.rule == Rule::Paper || !fits {
+    if scene.execution != Execution::LockStep || scene.rule == Rule::Paper || !fits {
         return Ok(false);
     }
     let latency = [0, 1, 5][chance.below(3)];
@@ -106,7 +110,7 @@ pub fn same_bits(invariant: Invariant, seen: &[Seen], other: &[Seen], shift: [i3
             let (cell, frac) = (seen.felt.proxy.cell(), seen.felt.proxy.frac());
             (
                 seen.felt.state,
-                seen.felt.stretch.to_array().map(f32::to_bits),
+                seen.felt.displacement.to_array().map(f32::to_bits),
                 [0, 1, 2].map(|i| cell[i] - shift[i]),
                 frac.to_array().map(f32::to_bits),
             )
@@ -127,7 +131,7 @@ pub fn same_bits(invariant: Invariant, seen: &[Seen], other: &[Seen], shift: [i3
 /// cells. On steeper ground rounding decides at nearly every vertex.
 const STEEP: f32 = 10.0;
 
-/// A proxy that moves so many times as far as its hand was moved is elsewhere.
+/// A proxy that moves so many times as far as its HIP was moved is elsewhere.
 const JUMP: f64 = 1e3;
 
 /// Mirrored or turned: the same answers to within rounding.
@@ -140,9 +144,9 @@ const JUMP: f64 = 1e3;
 /// # Errors
 /// Where they differ for no such reason.
 pub fn turned(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Compared {
-    // On a border of the data a hand belongs to the patch in the north-east,
+    // On a border of the data a HIP belongs to the patch in the north-east,
     // mirrored or not; and what is left over of a tick may differ.
-    let settles = scene.pace == Pace::LockStep && scene.supply == Supply::Held;
+    let settles = scene.execution == Execution::LockStep && scene.supply == Supply::Held;
     let plain = scene.terrain.steepest() <= STEEP && scene.terrain.kind != Kind::Holes;
     if !settles || scene.rule == Rule::Paper || !plain {
         return Ok(false);
@@ -178,8 +182,8 @@ pub fn same_way(
     let turned = |p| symmetry.point(&scene.terrain, p);
     let mut parted = false;
     for (tick, (a, b)) in seen.iter().zip(other).enumerate() {
-        // Until both are in the hand again.
-        parted &= a.felt.state != State::Free || b.felt.state != State::Free;
+        // Until both are in the HIP again.
+        parted &= a.felt.state != ContactState::Free || b.felt.state != ContactState::Free;
         if parted {
             continue;
         }
@@ -204,17 +208,17 @@ pub fn same_way(
     Ok(true)
 }
 
-/// Rounding apart, the same answer; or another one that is as near to the hand.
+/// Rounding apart, the same answer; or another one that is as near to the HIP.
 fn agree(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {
     let (da, db) = (distance(a.proxy, a.hip), distance(b.proxy, b.hip));
     let tie = (da - db).abs() <= 1e-5 * da.max(1.0);
-    // A hand in the surface may touch it or be free: nothing is felt either way.
-    let in_hand = |seen: &Seen| {
-        let may = matches!(seen.felt.state, State::Free | State::Touching);
-        may && seen.felt.stretch.length() <= ERROR as f32
+    // A HIP in the surface may touch it or be free: nothing is felt either way.
+    let at_hip = |seen: &Seen| {
+        let may = matches!(seen.felt.state, ContactState::Free | ContactState::Touching);
+        may && seen.felt.displacement.length() <= ERROR as f32
     };
-    let same = a.felt.state == b.felt.state || (in_hand(a) && in_hand(b));
-    same && a.felt.settled == b.felt.settled && (is_near(proxy, a, b) || tie)
+    let same = a.felt.state == b.felt.state || (at_hip(a) && at_hip(b));
+    same && a.felt.converged == b.felt.converged && (is_near(proxy, a, b) || tie)
 }
 
 fn is_near(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {

@@ -11,11 +11,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-pub use tally::{Broken, Found, Tally};
+pub use tally::{Broken, Found, MostWork, Tally};
 
-use crate::invariants::judge::Measured;
 use crate::scene::run::Scene;
-use crate::scene::stage::Buffers;
+use crate::scene::supply::Buffers;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
@@ -86,22 +85,5 @@ pub fn run(seed: u64, number: u64, buffers: &mut Buffers) -> Found {
             let said = said.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()));
             Found::Broke(kind, "Panic".to_owned(), said.unwrap_or_default())
         }
-    }
-}
-
-/// Adds up what two judges measured.
-fn merge(a: &mut Measured, b: &Measured) {
-    for (a, b) in a.states.iter_mut().zip(b.states) {
-        *a += b;
-    }
-    a.unsettled += b.unsettled;
-    a.work = a.work.max(b.work);
-    a.off_surface = a.off_surface.max(b.off_surface);
-    a.off_minimum = a.off_minimum.max(b.off_minimum);
-    a.judged += b.judged;
-    a.beyond += b.beyond;
-    a.around += b.around;
-    for (a, b) in a.twins.iter_mut().zip(b.twins) {
-        *a += b;
     }
 }

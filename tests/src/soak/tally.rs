@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use super::merge;
+use hapterra_core::contact::WORK_PER_TICK;
+
 use crate::invariants::judge::Measured;
 use crate::scene::terrain::{KINDS, Kind};
 
@@ -29,6 +30,15 @@ pub struct Broken {
     pub what: String,
 }
 
+/// The largest work of a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MostWork {
+    /// Units.
+    pub units: u32,
+    /// The number of the scene that the tick belongs to.
+    pub number: u64,
+}
+
 /// All scenes so far.
 #[derive(Clone, Debug, Default)]
 pub struct Tally {
@@ -36,6 +46,8 @@ pub struct Tally {
     pub scenes: u64,
     /// Violations.
     pub broken: Vec<Broken>,
+    /// The tick that spent most, among the scenes in which everything held.
+    pub most_work: Option<MostWork>,
     by_kind: BTreeMap<usize, Measured>,
     by_invariant: BTreeMap<String, u64>,
 }
@@ -57,7 +69,11 @@ impl Tally {
             }
             Found::Held(kind, measured) => {
                 let row = KINDS.iter().position(|k| *k == kind).unwrap_or(0);
-                merge(self.by_kind.entry(row).or_default(), &measured);
+                self.by_kind.entry(row).or_default().add(&measured);
+                if self.most_work.is_none_or(|most| measured.work > most.units) {
+                    let units = measured.work;
+                    self.most_work = Some(MostWork { units, number });
+                }
             }
         }
     }
@@ -67,7 +83,7 @@ impl Tally {
     pub fn total(&self) -> Measured {
         let mut total = Measured::default();
         for measured in self.by_kind.values() {
-            merge(&mut total, measured);
+            total.add(measured);
         }
         total
     }
@@ -96,6 +112,12 @@ impl fmt::Display for Tally {
             self.ticks(),
             self.broken.len()
         )?;
+        if let Some(MostWork { units, number }) = self.most_work {
+            writeln!(
+                f,
+                "largest work of a tick: {units} of {WORK_PER_TICK} units, in scene {number}"
+            )?;
+        }
         let [again, shifted, window, turned] = self.total().twins;
         writeln!(
             f,
@@ -114,6 +136,6 @@ fn row(f: &mut fmt::Formatter<'_>, name: &str, m: &Measured) -> fmt::Result {
     writeln!(
         f,
         "{name:13} {ticks:10} {waiting:10} {free:10} {touching:10} {:10} {:5}  {:11.2e}  {:11.2e} {:10} {:8}",
-        m.unsettled, m.work, m.off_surface, m.off_minimum, m.beyond, m.around
+        m.unconverged, m.work, m.off_surface, m.off_minimum, m.beyond, m.around
     )
 }

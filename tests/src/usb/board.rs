@@ -1,7 +1,7 @@
 //! The application with embassy's USB stack over the scripted wire: the code
 //! of the real boards from the link's task down to the endpoints.
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 use std::future::Future;
 use std::pin::Pin;
 use std::rc::Rc;
@@ -13,16 +13,15 @@ use embassy_sync::signal::Signal;
 use embassy_usb_driver::Event;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::status::BootReport;
-use hapterra_firmware::board::{Sense, Watchdog};
-use hapterra_firmware::channels::{Application, Channels, Hardware, Tiles, assemble};
+use hapterra_firmware::app::{Application, Hardware, TileBuffers, WorkingMemory, assemble};
+use hapterra_firmware::board::Sense;
 use hapterra_firmware::haptic_loop::HapticLoop;
 use hapterra_firmware::link::Link;
-use hapterra_firmware::link::task::{LinkHost, run};
-use hapterra_firmware::native::{Given, ReportedOff, StoppedClock};
+use hapterra_firmware::link::task::{LinkBoard, run};
+use hapterra_firmware::monitor::{Monitor, Part};
+use hapterra_firmware::native::{StoppedClock, VirtualAmplifiersOff, VirtualEncoders};
 use hapterra_firmware::store::Stored;
-use hapterra_firmware::supervisor::Supervisor;
-use hapterra_firmware::usb::{Descriptors, device};
-use hapterra_firmware::vitals::Part;
+use hapterra_firmware::usb::{DescriptorBuffers, device};
 
 use super::driver::{ScriptedDriver, Wire};
 use super::{Answer, Handshake, MOMENTS_A_MS, Port};
@@ -38,33 +37,22 @@ pub const SERIAL: &str = "0123456789ABCDEF";
 #[derive(Clone)]
 struct TickDone(Rc<Signal<NoopRawMutex, ()>>);
 
-impl LinkHost for TickDone {
+impl LinkBoard for TickDone {
     async fn tick_done(&self) {
         self.0.wait().await;
     }
 
-    fn after_turn<const D: usize>(&self, _link: &Link<'_, D>) {}
+    fn after_poll<const D: usize>(&self, _link: &Link<'_, D>) {}
 }
 
 /// A board without a chip.
 pub struct Board {
     wire: Rc<RefCell<Wire>>,
     tasks: Pin<Box<dyn Future<Output = ()>>>,
-    haptic_loop: HapticLoop<'static, Given, ReportedOff, StoppedClock, WINDOW>,
-    supervisor: Supervisor<'static, Fed>,
-    fed: Fed,
+    haptic_loop: HapticLoop<'static, VirtualEncoders, VirtualAmplifiersOff, StoppedClock, WINDOW>,
+    monitor: &'static Monitor,
     done: TickDone,
     moments: u64,
-}
-
-/// A watchdog that remembers being fed.
-#[derive(Clone, Default)]
-struct Fed(Rc<Cell<bool>>);
-
-impl Watchdog for Fed {
-    fn feed(&mut self) {
-        self.0.set(true);
-    }
 }
 
 impl Board {
@@ -73,25 +61,24 @@ impl Board {
     #[must_use]
     pub fn plugged_in() -> Self {
         let hardware = Hardware {
-            encoders: Given::default(),
-            amplifiers: ReportedOff,
+            encoders: VirtualEncoders::default(),
+            amplifiers: VirtualAmplifiersOff,
             clock: StoppedClock,
             calibration: Stored::Found(Calibration::PREMIUM_1_5),
             boot: BootReport::default(),
         };
-        let tiles = Box::leak(Box::new(Tiles::new()));
-        let channels = Box::leak(Box::new(Channels::new()));
+        let tiles = Box::leak(Box::new(TileBuffers::VACANT));
+        let memory = Box::leak(Box::new(WorkingMemory::new()));
         let Application {
             haptic_loop,
             mut link,
-            vitals,
-        } = assemble(tiles, channels, hardware, "scripted");
+            monitor,
+        } = assemble(tiles, memory, hardware, "scripted");
         let wire = Rc::new(RefCell::new(Wire::default()));
         wire.borrow_mut().report(Event::PowerDetected);
         let driver = ScriptedDriver(Rc::clone(&wire), [0; 2]);
-        let buffers = Box::leak(Box::new(Descriptors::new()));
+        let buffers = Box::leak(Box::new(DescriptorBuffers::EMPTY));
         let (mut stack, rx, tx) = device(driver, SERIAL, buffers);
-        let fed = Fed::default();
         let done = TickDone(Rc::new(Signal::new()));
         let host = done.clone();
         let tasks = Box::pin(async move {
@@ -102,8 +89,7 @@ impl Board {
             wire,
             tasks,
             haptic_loop,
-            supervisor: Supervisor::new(vitals, fed.clone(), &[Part::Tick, Part::Link]),
-            fed,
+            monitor,
             done,
             moments: 0,
         }
@@ -111,7 +97,7 @@ impl Board {
 
     /// Sets the encoders' counts.
     pub fn feed_encoders(&mut self, counts: [i32; 3]) {
-        *self.haptic_loop.encoders_mut() = Given(Sense {
+        *self.haptic_loop.encoders_mut() = VirtualEncoders(Sense {
             counts,
             ..Sense::default()
         });
@@ -133,9 +119,7 @@ impl Board {
     /// Whether the watchdog is fed now: loop and link have lived since it was
     /// asked last.
     pub fn is_alive(&mut self) -> bool {
-        self.fed.0.take();
-        self.supervisor.check();
-        self.fed.0.take()
+        self.monitor.may_feed_watchdog(&[Part::Tick, Part::Link])
     }
 
     fn settle(&mut self) {

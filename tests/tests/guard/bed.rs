@@ -5,14 +5,15 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use hapterra::link::{Arming, Event, Native, Patience, Session};
-use hapterra::phantom::{HandModel, PhantomModel, Placement, Rig, Script, Touch};
+use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
 use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Drive, Report, Sense, WORKING_SHARE};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::message::{Sample, Scene, Source, ToDevice};
+use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::status::{Answer, BootReport};
 use hapterra_firmware::native::StoppedClock;
 use hapterra_firmware::store::Stored;
@@ -22,7 +23,7 @@ use hapterra_tests::faulty::Shared;
 pub(crate) const PLANE_MM: f64 = 20.0;
 pub(crate) const MIDDLE_MM: [f64; 2] = [100.0, 100.0];
 /// When the script begins, in ticks, and when a press has settled.
-pub(crate) const BEGIN: u64 = (1e3 * Rig::ARMED_S) as u64;
+pub(crate) const BEGIN: u64 = (1e3 * HeldPhantom::ARMED_S) as u64;
 pub(crate) const PRESSED: u64 = BEGIN + 1_500;
 
 /// What goes wrong, by tick.
@@ -57,7 +58,7 @@ impl<'t> Bed<'t> {
         let [x, y] = MIDDLE_MM;
         let home_mm = [x, y, PLANE_MM + 4.0];
         let model = PhantomModel::premium_1_5();
-        let rig = Rig::new(model, HandModel::default(), Placement { home_mm }, script);
+        let rig = HeldPhantom::new(model, HandModel::default(), Placement { home_mm }, script);
         let rig = rig.expect("in reach").arming();
         let log = Log::default();
         let seen = Rc::clone(&log);
@@ -87,10 +88,7 @@ impl<'t> Bed<'t> {
     pub(crate) fn open(&mut self, arming: Option<Arming>) {
         let link = Box::new(Shared(Rc::clone(&self.device)));
         let (terrain, scene, patience) = (self.terrain, self.scene, Patience::REAL_TIME);
-        let opened = match arming {
-            Some(arming) => Session::open_arming(terrain, scene, arming, link, patience),
-            None => Session::open(terrain, scene, link, patience),
-        };
+        let opened = Session::open(terrain, scene, arming, link, patience);
         self.session = Some(opened.expect("opened").0);
     }
 

@@ -3,7 +3,7 @@
 use hapterra::phantom::{HandModel, Touch};
 use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::State;
+use hapterra_core::contact::ContactState;
 use hapterra_core::guard::{Drive, Limits, Mode, Sense};
 use hapterra_core::wire::message::ToDevice;
 
@@ -64,7 +64,10 @@ fn without_its_host_it_goes_on_and_fades_at_the_edge_of_what_it_holds() {
     // Let go at the edge, the surface is felt again once the hand has been
     // above it.
     assert_eq!((last.mode, last.fault), (Mode::Armed, None));
-    assert_eq!((last.state, last.held_up_by), (State::Waiting, None));
+    assert_eq!(
+        (last.state, last.missing_tile),
+        (ContactState::Waiting, None)
+    );
     // And while the host was away the device knew why there was less force.
     let reasons = bed.samples.iter().map(|s| s.limits);
     let why = reasons.fold(Limits::empty(), |all, limits| all | limits);

@@ -9,7 +9,8 @@ mod rates;
 use hapterra::phantom::Script;
 use hapterra_core::guard::{Blockers, Fault, Limits, Mode};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::message::{Sample, ToDevice};
+use hapterra_core::scene::Sample;
+use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::status::{Answer, BootReport, Refusal, Request, ResetCause};
 use hapterra_firmware::store::Stored;
 use std::cell::RefCell;
@@ -199,7 +200,7 @@ fn motors_that_work_hard_are_derated_and_stay_cool_enough() {
     assert_eq!(bed.samples.last().and_then(|s| s.fault), None);
     // The plant's own, independent thermal model.
     let device = bed.device.borrow();
-    let hottest = device.rig().expect("a rig").plant().winding_c();
+    let hottest = device.arm().expect("an arm").plant().winding_c();
     assert!(hottest.iter().all(|c| *c < 110.0), "{hottest:?}");
     assert!(hottest.iter().any(|c| *c > 75.0), "{hottest:?}");
 }

@@ -1,11 +1,11 @@
 //! Other tick rates.
 
 use hapterra::link::{Arming, Event, Native, Patience, Session};
-use hapterra::phantom::{HandModel, PhantomModel, Placement, Rig};
+use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement};
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Fault, Mode};
-use hapterra_core::wire::message::{Sample, Source};
+use hapterra_core::scene::{Sample, Source};
 use hapterra_firmware::native::StoppedClock;
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -21,7 +21,7 @@ fn at_ten_kilohertz_all_of_it_takes_as_long_and_feels_the_same() {
     let home_mm = [x, y, PLANE_MM + 4.0];
     let model = PhantomModel::premium_1_5();
     let (hand, place) = (HandModel::default(), Placement { home_mm });
-    let rig = Rig::new(model, hand, place, press(1.0).finish()).expect("in reach");
+    let rig = HeldPhantom::new(model, hand, place, press(1.0).finish()).expect("in reach");
     let off = Rc::new(RefCell::new(None));
     let seen = Rc::clone(&off);
     let released = 10 * PRESSED;
@@ -36,7 +36,7 @@ fn at_ten_kilohertz_all_of_it_takes_as_long_and_feels_the_same() {
     let home = terrain.scale().to_grid(home_mm).expect("addressable");
     let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
     let (arming, link) = (Arming::VIRTUAL, Box::new(device));
-    let opened = Session::open_arming(&terrain, scene, arming, link, Patience::REAL_TIME);
+    let opened = Session::open(&terrain, scene, Some(arming), link, Patience::REAL_TIME);
     let (mut session, hello) = opened.expect("opened");
     assert_eq!(hello.tick_hz, 10_000);
     let mut samples: Vec<Sample> = Vec::new();

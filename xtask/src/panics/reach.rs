@@ -1,48 +1,37 @@
 //! What can be reached from one node of a graph, and on which way.
 
-use std::collections::VecDeque;
-
-/// The nodes reached, each with the node it was first reached from.
+/// The nodes reached, nearest first, each with the place in this list of the node
+/// that it was first reached from; the root has none.
 #[derive(Debug)]
-pub(crate) struct Reached {
-    order: Vec<usize>,
-    /// By node: none where it was not reached; the root is its own parent.
-    parents: Vec<Option<usize>>,
-}
+pub(crate) struct Reached(Vec<(usize, Option<usize>)>);
 
-/// Everything reachable from `root`, nearest first.
+/// Everything reachable from `root`.
 pub(crate) fn from(root: usize, callees: impl Fn(usize) -> Vec<usize>) -> Reached {
-    let mut parents = vec![];
-    let mut order = vec![];
-    let mut next = VecDeque::from([(root, root)]);
-    while let Some((node, parent)) = next.pop_front() {
-        if parents.len() <= node {
-            parents.resize(node + 1, None);
+    let mut reached = vec![(root, None)];
+    let mut place = 0;
+    while let Some(&(node, _)) = reached.get(place) {
+        for callee in callees(node) {
+            if reached.iter().all(|(known, _)| *known != callee) {
+                reached.push((callee, Some(place)));
+            }
         }
-        if parents[node].is_some() {
-            continue;
-        }
-        parents[node] = Some(parent);
-        order.push(node);
-        next.extend(callees(node).into_iter().map(|callee| (callee, node)));
+        place += 1;
     }
-    Reached { order, parents }
+    Reached(reached)
 }
 
 impl Reached {
     /// All nodes, nearest first.
     pub(crate) fn all(&self) -> impl Iterator<Item = usize> + Clone + '_ {
-        self.order.iter().copied()
+        self.0.iter().map(|(node, _)| *node)
     }
 
-    /// The node from which `node` was first reached; none for the root.
-    fn parent(&self, node: usize) -> Option<usize> {
-        self.parents[node].filter(|&parent| parent != node)
-    }
-
-    /// The way from the root to `node`, both included.
+    /// The shortest way from the root to `node`, both included; empty where it was
+    /// not reached.
     pub(crate) fn chain(&self, node: usize) -> Vec<usize> {
-        let mut chain: Vec<_> = std::iter::successors(Some(node), |&n| self.parent(n)).collect();
+        let last = self.0.iter().position(|(known, _)| *known == node);
+        let places = std::iter::successors(last, |place| self.0[*place].1);
+        let mut chain: Vec<_> = places.map(|place| self.0[place].0).collect();
         chain.reverse();
         chain
     }
@@ -58,6 +47,7 @@ mod tests {
         let reached = from(0, |n| graph[n].to_vec());
         assert_eq!(reached.all().collect::<Vec<_>>(), [0, 1, 2, 3]);
         assert_eq!(reached.chain(3), [0, 2, 3]);
-        assert_eq!(reached.parent(0), None);
+        assert_eq!(reached.chain(0), [0]);
+        assert!(reached.chain(4).is_empty());
     }
 }

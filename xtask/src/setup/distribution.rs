@@ -6,21 +6,10 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 
-use super::packages::{self, Packages};
-use crate::run::{on_path, output, root, say};
-
-const PACKAGES: Packages = Packages {
-    apt: Some("rustc-web cargo-web rust-web-src lld"),
-    dnf: None,
-    pacman: None,
-    brew: None,
-};
-const CLIPPY_PACKAGES: Packages = Packages {
-    apt: Some("rust-web-clippy"),
-    ..PACKAGES
-};
+use super::packages::{self, found_or_installed};
+use crate::run::{on_path, output, root};
 
 /// The workspace's `rust-version`, as a compiler would tell it.
 const NEEDED: &str = concat!("rustc ", env!("CARGO_PKG_RUST_VERSION"));
@@ -52,36 +41,32 @@ pub(crate) fn cargo() -> Command {
 
 /// Sees to it that it is there, whole and recent enough.
 pub(crate) fn ready() -> Result<()> {
-    if let Err(missing) = is_whole() {
-        say(format!("the distribution's Rust: {missing}"));
-        packages::install(&PACKAGES)?;
-    }
-    is_whole()
+    found_or_installed(is_whole, &packages::RUST).context("the distribution's Rust")
 }
 
 /// Sees to it that its clippy is there.
 pub(crate) fn with_clippy() -> Result<()> {
-    if Path::new(CLIPPY).is_file() {
-        return Ok(());
-    }
-    packages::install(&CLIPPY_PACKAGES)
+    let is_here = || {
+        ensure!(Path::new(CLIPPY).is_file(), "no {CLIPPY}");
+        Ok(())
+    };
+    found_or_installed(is_here, &packages::CLIPPY)
 }
 
 /// Fails with what is missing.
 pub(crate) fn is_whole() -> Result<()> {
     let version = output(Command::new(RUSTC).arg("--version"));
     let version = version.with_context(|| format!("no {RUSTC}"))?;
-    if minor(&version) < minor(NEEDED) {
-        bail!("{} is too old", version.trim());
-    }
+    let is_recent = minor(&version) >= minor(NEEDED);
+    ensure!(is_recent, "{} is too old", version.trim());
     let sysroot = output(Command::new(RUSTC).args(["--print", "sysroot"])).unwrap_or_default();
     let sources = Path::new(sysroot.trim()).join("lib/rustlib/src/rust/library/core");
-    if !sources.is_dir() {
-        bail!("no library sources at {}", sources.display());
-    }
-    if !Path::new(CARGO).is_file() {
-        bail!("no {CARGO}");
-    }
+    ensure!(
+        sources.is_dir(),
+        "no library sources at {}",
+        sources.display()
+    );
+    ensure!(Path::new(CARGO).is_file(), "no {CARGO}");
     on_path("ld.lld").context("no ld.lld on the PATH")?;
     Ok(())
 }

@@ -1,135 +1,112 @@
-//! The system's package manager.
+//! What the commands need from the system: what each is called by the package
+//! managers, and one way to install it.
 
 use std::process::Command;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 
 use crate::run::{on_path, output, run_quietly, say, shown};
 
-/// What one thing is called by each package manager; `None` where it has no package.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Packages {
-    /// Debian, Ubuntu.
-    pub(crate) apt: Option<&'static str>,
-    /// Fedora.
-    pub(crate) dnf: Option<&'static str>,
-    /// Arch.
-    pub(crate) pacman: Option<&'static str>,
-    /// Homebrew on macOS.
-    pub(crate) brew: Option<&'static str>,
-}
+/// What one thing is called by each of the [`MANAGERS`]; empty where it has no
+/// package.
+pub(crate) type Packages = [&'static str; MANAGERS.len()];
 
-/// A package manager this program can call.
-#[derive(Debug)]
-struct Manager {
-    program: &'static str,
-    verb: &'static str,
-    /// Options that keep it from asking and from installing what is not needed.
-    unattended: &'static [&'static str],
-    needs_root: bool,
-}
-
-const MANAGERS: [Manager; 4] = [
-    Manager {
-        program: "apt-get",
-        verb: "install",
-        unattended: &["-y", "--no-install-recommends"],
-        needs_root: true,
-    },
-    Manager {
-        program: "dnf",
-        verb: "install",
-        unattended: &["-y"],
-        needs_root: true,
-    },
-    Manager {
-        program: "pacman",
-        verb: "-S",
-        unattended: &["--noconfirm", "--needed"],
-        needs_root: true,
-    },
-    Manager {
-        program: "brew",
-        verb: "install",
-        unattended: &[],
-        needs_root: false,
-    },
+/// The package managers of Debian, Fedora, Arch and macOS: the command that installs,
+/// and the options that keep it from asking and from installing what is not needed.
+const MANAGERS: [(&str, &str); 4] = [
+    ("apt-get install", "-y --no-install-recommends"),
+    ("dnf install", "-y"),
+    ("pacman -S", "--noconfirm --needed"),
+    ("brew install", ""),
 ];
 
-impl Packages {
-    fn of(&self, manager: &str) -> Option<&'static str> {
-        match manager {
-            "apt-get" => self.apt,
-            "dnf" => self.dnf,
-            "pacman" => self.pacman,
-            _ => self.brew,
-        }
-    }
+pub(crate) const QEMU: Packages = [
+    "qemu-system-arm",
+    "qemu-system-arm",
+    "qemu-system-arm",
+    "qemu",
+];
+pub(crate) const CMAKE_AND_LIBCLANG: Packages = [
+    "cmake libclang-dev",
+    "cmake clang-devel",
+    "cmake clang",
+    "cmake llvm",
+];
+pub(crate) const RUST: Packages = ["rustc-web cargo-web rust-web-src lld", "", "", ""];
+pub(crate) const CLIPPY: Packages = ["rust-web-clippy", "", "", ""];
+
+/// What `find` finds; where it finds nothing, `packages` are installed, and it looks
+/// again.
+pub(crate) fn found_or_installed<T>(
+    find: impl Fn() -> Result<T>,
+    packages: &Packages,
+) -> Result<T> {
+    find().or_else(|missing| {
+        say(format!("{missing:#}"));
+        install(packages)?;
+        find()
+    })
 }
 
 /// Installs `wanted` with the first package manager found.
 ///
 /// The error says what to type, where there is something to type.
-pub(crate) fn install(wanted: &Packages) -> Result<()> {
-    let Some(manager) = MANAGERS.iter().find(|m| on_path(m.program).is_some()) else {
+fn install(wanted: &Packages) -> Result<()> {
+    let mut managers = MANAGERS.iter().zip(wanted);
+    let here = managers.find(|((install, _), _)| on_path(program(install)).is_some());
+    let Some(((install, unattended), names)) = here else {
         bail!("no package manager known to this program (apt-get, dnf, pacman, brew) is here");
     };
-    let Some(names) = wanted.of(manager.program) else {
-        bail!("{} has no package for it", manager.program);
+    let program = program(install);
+    ensure!(!names.is_empty(), "{program} has no package for it");
+    let line = format!("{install} {unattended} {names}");
+    let attempt = || {
+        let mut command = with_rights(&line)?;
+        say(format!("installing: {}", shown(&command)));
+        run_quietly(command.env("DEBIAN_FRONTEND", "noninteractive"))
     };
-    manager
-        .install(names)
-        .with_context(|| format!("type: {}", manager.typed(names)))
-}
-
-impl Manager {
-    fn install(&self, names: &str) -> Result<()> {
-        let prefix = rights(self.needs_root)?;
-        let attempt = || -> Result<()> {
-            let mut command = prefixed(&prefix, self.program);
-            command
-                .arg(self.verb)
-                .args(self.unattended)
-                .args(names.split(' '));
-            command.env("DEBIAN_FRONTEND", "noninteractive");
-            say(format!("installing: {}", shown(&command)));
-            run_quietly(&mut command)
-        };
-        let first = attempt();
-        if first.is_ok() || self.program != "apt-get" {
-            return first;
+    let done = attempt().or_else(|why| {
+        if program != "apt-get" {
+            return Err(why);
         }
         say("refreshing apt's package lists, then once more");
         // A failing list of some third party must not stop the one needed here.
-        let _ = run_quietly(prefixed(&prefix, self.program).arg("update"));
+        let _ = run_quietly(&mut with_rights("apt-get update")?);
         attempt()
-    }
-
-    /// What a person would type.
-    fn typed(&self, names: &str) -> String {
-        let sudo = if self.needs_root { "sudo " } else { "" };
-        format!("{sudo}{} {} {names}", self.program, self.verb)
-    }
+    });
+    done.with_context(|| format!("type: {}", typed(install, names)))
 }
 
-/// What comes before a command that needs root: nothing for root, else `sudo -n`.
-fn rights(needs_root: bool) -> Result<Vec<&'static str>> {
+fn program(line: &str) -> &str {
+    line.split(' ').next().unwrap_or(line)
+}
+
+/// All managers but brew install for the whole system.
+fn needs_root(line: &str) -> bool {
+    program(line) != "brew"
+}
+
+/// What a person would type.
+fn typed(install: &str, names: &str) -> String {
+    let sudo = if needs_root(install) { "sudo " } else { "" };
+    format!("{sudo}{install} {names}")
+}
+
+/// The command of a line of plain words, with `sudo -n` before it where it needs root
+/// and this is not root.
+fn with_rights(line: &str) -> Result<Command> {
     let is_root = output(Command::new("id").arg("-u")).is_some_and(|id| id.trim() == "0");
-    if !needs_root || is_root {
-        return Ok(vec![]);
+    if is_root || !needs_root(line) {
+        let mut command = Command::new(program(line));
+        command.args(line.split_whitespace().skip(1));
+        return Ok(command);
     }
     // -n: never ask for a password in the middle of someone's build.
-    if output(Command::new("sudo").args(["-n", "true"])).is_some() {
-        return Ok(vec!["sudo", "-n"]);
-    }
-    bail!("not root here, and sudo would ask for a password")
-}
-
-fn prefixed(prefix: &[&str], program: &str) -> Command {
-    let mut words = prefix.iter().copied().chain([program]);
-    let mut command = Command::new(words.next().unwrap_or(program));
-    command.args(words);
-    command
+    let mut command = Command::new("sudo");
+    let may = output(Command::new("sudo").args(["-n", "true"])).is_some();
+    ensure!(may, "not root here, and sudo would ask for a password");
+    command.arg("-n").args(line.split_whitespace());
+    Ok(command)
 }
 
 #[cfg(test)]
@@ -138,7 +115,7 @@ mod tests {
 
     #[test]
     fn what_to_type_is_short_and_asks_for_root_where_needed() {
-        let lines = MANAGERS.each_ref().map(|m| m.typed("qemu"));
+        let lines = MANAGERS.map(|(install, _)| typed(install, "qemu"));
         assert_eq!(
             lines,
             [
@@ -151,11 +128,14 @@ mod tests {
     }
 
     #[test]
-    fn a_prefix_comes_before_the_program() {
-        assert_eq!(
-            shown(prefixed(&["sudo", "-n"], "dnf").arg("x")),
-            "sudo -n dnf x"
-        );
-        assert_eq!(shown(&prefixed(&[], "brew")), "brew");
+    fn a_line_is_run_word_by_word() {
+        let command = with_rights("brew install  cmake llvm").unwrap();
+        assert_eq!(shown(&command), "brew install cmake llvm");
+    }
+
+    #[test]
+    fn what_is_found_is_not_installed() {
+        let found = found_or_installed(|| Ok(1), &["", "", "", ""]);
+        assert_eq!(found.unwrap(), 1);
     }
 }

@@ -5,15 +5,8 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use super::packages::{self, Packages};
-use crate::run::{on_path, output, say};
-
-const PACKAGES: Packages = Packages {
-    apt: Some("qemu-system-arm"),
-    dnf: Some("qemu-system-arm"),
-    pacman: Some("qemu-system-arm"),
-    brew: Some("qemu"),
-};
+use super::packages::{self, found_or_installed};
+use crate::run::{on_path, output};
 
 const PROGRAM: &str = "qemu-system-arm";
 const MACHINE: &str = "mps2-an386";
@@ -24,22 +17,18 @@ pub(crate) fn ready() -> Result<PathBuf> {
     if let Some(given) = std::env::var_os("HAPTERRA_QEMU") {
         return checked(given.into()).context("HAPTERRA_QEMU names it");
     }
-    if let Some(found) = find() {
-        return checked(found);
-    }
-    say(format!("{PROGRAM} is not here"));
-    packages::install(&PACKAGES).context(
+    let found = found_or_installed(find, &packages::QEMU).context(
         "QEMU cannot be installed from here: get it from https://www.qemu.org/download/, \
          then put qemu-system-arm on the PATH or its path in HAPTERRA_QEMU",
     )?;
-    let found = find().with_context(|| format!("installed, but {PROGRAM} is not on the PATH"))?;
     checked(found)
 }
 
-fn find() -> Option<PathBuf> {
+fn find() -> Result<PathBuf> {
     // Windows' installer leaves the PATH alone.
     let installed = PathBuf::from(r"C:\Program Files\qemu\qemu-system-arm.exe");
-    on_path(PROGRAM).or_else(|| installed.is_file().then_some(installed))
+    let found = on_path(PROGRAM).or_else(|| installed.is_file().then_some(installed));
+    found.with_context(|| format!("{PROGRAM} is not on the PATH"))
 }
 
 fn checked(qemu: PathBuf) -> Result<PathBuf> {

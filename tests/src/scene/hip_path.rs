@@ -1,4 +1,4 @@
-//! Ways of the hand over a terrain, wild and gentle.
+//! Random paths of the HIP over a terrain, wild and gentle.
 
 use super::terrain::{Terrain, WALL_EVERY};
 use crate::chance::Chance;
@@ -9,7 +9,7 @@ pub const GRAIN: f64 = 1.0 / (1 << 20) as f64;
 /// An encoder count at the tip, cells of a millimetre.
 const COUNT: f64 = 0.03;
 
-/// What the hand does for a while.
+/// What the HIP does for a while.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Habit {
     /// Steps of one length near the surface.
@@ -49,34 +49,34 @@ const HABITS: [Habit; 10] = [
 
 /// `ticks` positions in cells; the first is high above everything.
 #[must_use]
-pub fn walk(terrain: &Terrain, chance: &mut Chance, ticks: usize) -> Vec<[f64; 3]> {
+pub fn random(terrain: &Terrain, chance: &mut Chance, ticks: usize) -> Vec<[f64; 3]> {
     let size = terrain.size.map(f64::from);
     let sky = f64::from(terrain.top()).min(1e7) + 2.0;
     let at = [chance.between(1.0, size[0]), chance.between(1.0, size[1])];
-    let mut hand = Hand {
+    let mut walker = Walker {
         terrain,
         size,
         chance,
         path: vec![],
         at,
     };
-    hand.put(at[0], at[1], sky);
-    while hand.path.len() < ticks {
-        let habit = match hand.chance.below(20) {
+    walker.put(at[0], at[1], sky);
+    while walker.path.len() < ticks {
+        let habit = match walker.chance.below(20) {
             n if n < HABITS.len() => HABITS[n],
             _ => Habit::Wander,
         };
-        hand.go_on(habit);
-        if hand.chance.below(6) == 0 {
-            let [x, y] = hand.at;
-            hand.put(x, y, sky);
+        walker.go_on(habit);
+        if walker.chance.below(6) == 0 {
+            let [x, y] = walker.at;
+            walker.put(x, y, sky);
         }
     }
-    hand.path.truncate(ticks);
-    hand.path
+    walker.path.truncate(ticks);
+    walker.path
 }
 
-struct Hand<'a> {
+struct Walker<'a> {
     terrain: &'a Terrain,
     size: [f64; 2],
     chance: &'a mut Chance,
@@ -84,7 +84,7 @@ struct Hand<'a> {
     at: [f64; 2],
 }
 
-impl Hand<'_> {
+impl Walker<'_> {
     fn put(&mut self, x: f64, y: f64, z: f64) {
         self.at = [x, y];
         self.path

@@ -1,8 +1,10 @@
 //! The product's window over a terrain: held whole, or pulled tile by tile.
 
-use hapterra_core::contact::{Contact, Felt};
+use hapterra_core::contact::{Contact, ContactOutput};
 use hapterra_core::grid::GridPoint;
-use hapterra_core::terrain::{Focus, IN_FLIGHT, Puller, TILE_CELLS, Tile, TileKey, Window};
+use hapterra_core::terrain::{
+    FieldSize, IN_FLIGHT, TILE_CELLS, Tile, TileDemand, TileKey, TileRequester, Window,
+};
 
 use super::terrain::Terrain;
 
@@ -10,12 +12,20 @@ use super::terrain::Terrain;
 pub const SIDE: usize = 8;
 const CELLS: i32 = TILE_CELLS as i32;
 
-/// Memory for a stage; may be used again and again.
+/// Memory for a window; may be used again and again.
 pub struct Buffers(Vec<Tile>);
+
+impl Buffers {
+    /// For windows of up to `side × side` tiles.
+    #[must_use]
+    pub fn new(side: usize) -> Self {
+        Self(vec![Tile::VACANT; side * side + IN_FLIGHT])
+    }
+}
 
 impl Default for Buffers {
     fn default() -> Self {
-        Self(vec![Tile::VACANT; SIDE * SIDE + IN_FLIGHT])
+        Self::new(SIDE)
     }
 }
 
@@ -32,18 +42,20 @@ pub enum Supply {
 }
 
 /// A window over a terrain that lies `shift` cells east, north and up.
-pub struct Stage<'t, 'g, const D: usize> {
+pub struct SuppliedWindow<'t, 'g, const D: usize> {
     /// The window.
     pub window: Window<'t, D>,
     terrain: &'g Terrain,
     shift: [i32; 3],
     supply: Supply,
-    puller: Puller<D>,
+    requester: TileRequester<D>,
     spare: Vec<&'t mut Tile>,
     coming: Vec<(u32, TileKey)>,
+    /// Tiles put into the window since this was last emptied, in that order.
+    pub installed: Vec<TileKey>,
 }
 
-impl<'t, 'g, const D: usize> Stage<'t, 'g, D> {
+impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
     /// The terrain in place.
     ///
     /// # Panics
@@ -59,23 +71,25 @@ impl<'t, 'g, const D: usize> Stage<'t, 'g, D> {
         let mut next = || tiles.next().expect("there is one for every slot");
         let slots = std::array::from_fn(|_| std::array::from_fn(|_| next()));
         let mut window = Window::new(slots);
-        let size = [0, 1].map(|axis| terrain.size[axis] + shift[axis]);
+        let [columns, rows] = terrain.size;
+        let size = FieldSize::new(columns + shift[0], rows + shift[1]);
         window.reset(0, size, terrain.top() + shift[2]);
-        let mut puller = Puller::new();
-        puller.reset(0, size);
-        let mut stage = Self {
+        let mut requester = TileRequester::new();
+        requester.reset(0, size);
+        let mut supplied = Self {
             window,
             terrain,
             shift,
             supply,
-            puller,
+            requester,
             spare: tiles.collect(),
             coming: Vec::new(),
+            installed: Vec::new(),
         };
         if supply == Supply::Held {
-            stage.hold_all();
+            supplied.hold_all();
         }
-        stage
+        supplied
     }
 
     fn hold_all(&mut self) {
@@ -87,7 +101,7 @@ impl<'t, 'g, const D: usize> Stage<'t, 'g, D> {
         assert!(cols.clone().count() <= D && rows.clone().count() <= D);
         for row in rows {
             for col in cols.clone() {
-                self.install(TileKey { level: 0, col, row });
+                self.install(TileKey::new(0, col, row));
             }
         }
     }
@@ -98,26 +112,27 @@ impl<'t, 'g, const D: usize> Stage<'t, 'g, D> {
         let terrain = self.terrain;
         tile.fill(key, dz, |col, row| {
             terrain.post(
-                key.col * CELLS + col as i32 - dx,
-                key.row * CELLS + row as i32 - dy,
+                key.index.col * CELLS + col as i32 - dx,
+                key.index.row * CELLS + row as i32 - dy,
             )
         })
         .expect("the base is in range");
         self.spare.push(self.window.install(tile));
+        self.installed.push(key);
     }
 
     /// Asks for what the tick showed to be wanted, and takes what has come.
-    pub fn supply(&mut self, now: u32, contact: &Contact, felt: &Felt, hip: &GridPoint) {
+    pub fn supply(&mut self, now: u32, contact: &Contact, felt: &ContactOutput, hip: &GridPoint) {
         let Supply::Pulled { latency } = self.supply else {
             return;
         };
-        let focus = Focus {
-            held_up_by: felt.held_up_by,
+        let focus = TileDemand {
+            missing_tile: felt.missing_tile,
             proxy: felt.proxy.column(),
             hip: hip.column(),
             velocity: [0.0; 2],
         };
-        while let Some(key) = self.puller.next_request(now, &focus) {
+        while let Some(key) = self.requester.next_request(now, &focus) {
             self.coming.push((now + latency, key));
         }
         let mut arrived = Vec::new();
@@ -137,9 +152,9 @@ impl<'t, 'g, const D: usize> Stage<'t, 'g, D> {
     fn take(&mut self, key: TileKey, contact: &Contact) {
         let under_proxy = contact.patch().map(|cell| TileKey::holding(0, cell));
         let occupant = self.window.occupant(key);
-        self.puller.received(key);
+        self.requester.received(key);
         if under_proxy.is_some() && under_proxy != Some(key) && occupant == under_proxy {
-            return self.puller.lost(key);
+            return self.requester.lost(key);
         }
         self.install(key);
     }

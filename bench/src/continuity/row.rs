@@ -1,0 +1,46 @@
+//! What is told of one variant on one ground, and how the HIP slides there.
+
+use crate::compare::Label;
+use crate::haptics::Answer;
+use crate::stats::{part, quantiles};
+
+/// Cells the HIP moves in a tick.
+pub const STEP: f64 = 0.01;
+/// Cells the HIP is below the surface.
+pub const DEPTH: f64 = 0.1;
+/// Tiles along the side of the product's window.
+pub(super) const SIDE: usize = 8;
+
+/// One variant on one ground.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// What the HIP slides over.
+    pub ground: &'static str,
+    /// Which variant.
+    pub label: Label,
+    /// Largest change of the displacement in a tick, cells.
+    pub largest: f64,
+    /// 99 % of the ticks change it less, cells.
+    pub p99: f64,
+    /// Part of the ticks that feel nothing.
+    pub missed: f64,
+}
+
+impl Row {
+    /// What is felt in ticks that follow one another, in pieces.
+    pub(super) fn of(ground: &'static str, label: Label, pieces: &[&[Answer]]) -> Self {
+        let changes: Vec<f64> = pieces
+            .iter()
+            .flat_map(|answers| answers.windows(2).map(|pair| pair[0].change(&pair[1])))
+            .collect();
+        let felt = pieces.iter().flat_map(|answers| answers.iter());
+        let [p99, largest] = quantiles(changes, [0.99, 1.0]);
+        Self {
+            ground,
+            label,
+            largest,
+            p99,
+            missed: part(felt.map(|answer| !answer.touching)),
+        }
+    }
+}

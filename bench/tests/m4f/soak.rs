@@ -1,0 +1,106 @@
+//! Ticks of the soak's scenes: every kind of terrain, every habit of the HIP, tiles
+//! that are held and tiles that come late.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
+
+use hapterra_core::contact::Rule;
+use hapterra_tests::counting::CountingBoard;
+use hapterra_tests::scene::recorded::Recorded;
+use hapterra_tests::scene::terrain::{KINDS, Kind};
+
+use super::table::{Row, Target, Tick};
+
+/// The scenes are those of this seed, from number 0.
+const SEED: u64 = 2026;
+/// Scenes, of some 550 ticks each, behind the kept table: five minutes on two cores.
+pub(crate) const ALL: u64 = 10_000;
+/// Scenes when the tests are run: half a minute. A path has some fifteen habits of
+/// the HIP out of ten, and there are 14 kinds of terrain, so each is among them
+/// hundreds of times, or some fifty.
+pub(crate) const PART: u64 = 1000;
+/// Scenes that the emulated processor replays at once.
+const BATCH: u64 = 20;
+/// Scenes of every kind of terrain, and of the paper's rule, at least.
+const OF_EACH: usize = 30;
+/// Most instructions that a tick of the contact may take on any scene: with the
+/// chain around it a tick at 10 kHz then fits a processor of 170 MHz.
+const MOST: u32 = 12_000;
+
+/// The settings of a scene, and what its ticks cost.
+struct CountedScene {
+    kind: Kind,
+    rule: Rule,
+    ticks: Vec<Tick>,
+}
+
+/// A row over all scenes of the product's rule, one for each kind of terrain among
+/// them, and one over the scenes of the paper's rule.
+pub(crate) fn rows(board: &CountingBoard, scenes: u64) -> Vec<Row> {
+    let counted = count(board, scenes);
+    let target = Target {
+        max: Some(MOST),
+        ..Target::default()
+    };
+    let row = |name: &str, wanted: &dyn Fn(&CountedScene) -> bool| {
+        let own: Vec<&CountedScene> = counted.iter().filter(|scene| wanted(scene)).collect();
+        assert!(own.len() >= OF_EACH, "{name}: {} scenes", own.len());
+        let ticks = own.iter().flat_map(|scene| scene.ticks.iter().copied());
+        let row = Row::new(name, target, ticks.collect());
+        if scenes < ALL { row.of_a_part() } else { row }
+    };
+    let is_swept = |scene: &CountedScene| scene.rule == Rule::Swept;
+    let mut rows = vec![row("soak", &is_swept)];
+    rows.extend(KINDS.iter().map(|kind| {
+        let name = format!("soak, {kind:?}").to_lowercase();
+        row(&name, &|scene| is_swept(scene) && scene.kind == *kind)
+    }));
+    rows.push(row("soak, paper's rule", &|scene| !is_swept(scene)));
+    rows
+}
+
+/// Replays the scenes on all cores.
+fn count(board: &CountingBoard, scenes: u64) -> Vec<CountedScene> {
+    let next = AtomicU64::new(0);
+    let counted = Mutex::new(Vec::new());
+    let work = || loop {
+        let first = next.fetch_add(BATCH, Ordering::Relaxed);
+        if first >= scenes {
+            return;
+        }
+        let batch = count_batch(board, first..scenes.min(first + BATCH));
+        counted.lock().expect("no panic inside").extend(batch);
+    };
+    thread::scope(|scope| {
+        let cores = thread::available_parallelism().map_or(1, usize::from);
+        for _ in 0..cores {
+            scope.spawn(work);
+        }
+    });
+    counted.into_inner().expect("no panic inside")
+}
+
+/// Replays so many scenes in one run of the emulated processor, which must answer
+/// as this one does.
+fn count_batch(board: &CountingBoard, numbers: std::ops::Range<u64>) -> Vec<CountedScene> {
+    let recorded: Vec<_> = numbers.clone().map(|n| Recorded::random(SEED, n)).collect();
+    let replays: Vec<_> = recorded.iter().map(Recorded::replay).collect();
+    let there = board.contact(&replays);
+    let scenes = numbers.zip(&recorded).zip(&there);
+    scenes
+        .map(|((number, recorded), there)| {
+            let (kind, rule) = (recorded.scene.terrain.kind, recorded.scene.rule);
+            let differs = recorded.differs(there);
+            assert_eq!(differs, None, "seed {SEED}, scene {number}, {kind:?}: tick");
+            let ticks = there.iter().enumerate().map(|(index, tick)| Tick {
+                instructions: tick.instructions,
+                units: tick.work,
+                scene: Some(number),
+                index,
+            });
+            let ticks = ticks.collect();
+            CountedScene { kind, rule, ticks }
+        })
+        .collect()
+}

@@ -1,0 +1,115 @@
+//! A scene of the soak as the emulated board can replay it: the tiles and HIPs in
+//! the order they came here, and what the contact answered here.
+//!
+//! The board's window has room for 16 × 16 tiles, as many as this one, so every
+//! scene can be replayed: also those whose tiles are pulled, late and in parts.
+
+use hapterra_core::contact::Execution;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::scene::{Scene as SceneMessage, Source};
+use hapterra_core::terrain::FieldSize;
+
+use super::run::{Player, Scene};
+use super::supply::Buffers;
+use super::terrain::Terrain;
+use crate::counting::{Counted, Event, Replay, Samples, WINDOW};
+use crate::field::point;
+
+/// A scene, felt here in real time.
+pub struct Recorded {
+    /// Its settings.
+    pub scene: Scene,
+    /// As the device is told of it.
+    message: SceneMessage,
+    /// Tiles and HIPs, in the order they came.
+    events: Vec<Event>,
+    /// What each tick answered here, at no cost.
+    answers: Vec<Counted>,
+}
+
+impl Recorded {
+    /// Runs a scene of a seed in real time, as the board does, and notes it down.
+    ///
+    /// # Panics
+    /// When a tick in real time gives no answer.
+    #[must_use]
+    pub fn random(seed: u64, number: u64) -> Self {
+        let scene = Scene {
+            execution: Execution::RealTime,
+            ..Scene::random(seed, number)
+        };
+        let mut buffers = Buffers::new(WINDOW);
+        let mut player = Player::<WINDOW>::new(&scene, &mut buffers, [0; 3], scene.supply);
+        let (mut events, mut answers) = (vec![], vec![]);
+        for hip in &scene.path {
+            events.extend(player.supplied.installed.drain(..).map(Event::Tile));
+            events.push(Event::Hip(point(*hip)));
+            let felt = player.feel(*hip).expect("one tick is one answer");
+            answers.push(Counted {
+                instructions: 0,
+                state: felt.state as u32,
+                converged: felt.converged,
+                work: felt.work,
+                vector: felt.displacement,
+                proxy: felt.proxy,
+            });
+        }
+        let message = SceneMessage {
+            epoch: 1,
+            level: 0,
+            size: FieldSize::new(scene.terrain.size[0], scene.terrain.size[1]),
+            top: scene.terrain.top(),
+            cell_mm: 1.0,
+            home: GridPoint::default(),
+            law: ForceLaw::PREMIUM,
+            rule: scene.rule,
+            source: Source::Points,
+            hold_clock: false,
+        };
+        Self {
+            scene,
+            message,
+            events,
+            answers,
+        }
+    }
+
+    /// As the counting board takes it.
+    #[must_use]
+    pub fn replay(&self) -> Replay<'_> {
+        Replay {
+            scene: &self.message,
+            field: &self.scene.terrain,
+            events: &self.events,
+        }
+    }
+
+    /// The first tick whose answer on the board differs in a bit, or in a unit of
+    /// work, from the one here.
+    #[must_use]
+    pub fn differs(&self, there: &[Counted]) -> Option<usize> {
+        let pairs = self.answers.iter().zip(there);
+        let mut same = pairs.map(|(here, there)| bits(here) == bits(there));
+        same.position(|same| !same)
+    }
+}
+
+impl Samples for Terrain {
+    fn sample(&self, column: i32, row: i32) -> f32 {
+        self.post(column, row)
+    }
+}
+
+type Bits = (u32, bool, u32, [u32; 3], [i32; 3], [u32; 3]);
+
+fn bits(tick: &Counted) -> Bits {
+    (
+        tick.state,
+        tick.converged,
+        tick.work,
+        tick.vector.to_array().map(f32::to_bits),
+        tick.proxy.cell(),
+        tick.proxy.frac().to_array().map(f32::to_bits),
+    )
+}
