@@ -4,6 +4,7 @@ use std::path::Path;
 
 use hapterra::raster::Raster;
 use hapterra::synth::{Kind, Synth};
+use hapterra::terrain::{FeltCells, FeltGrid};
 
 /// Most samples along a side; a larger field is cut to its middle.
 pub const LARGEST_SIDE: u32 = 4097;
@@ -53,7 +54,10 @@ impl Grid {
     /// A terrain file's field at true proportions where it knows them, else
     /// one cell a vertical unit, times `steepness`.
     pub fn from_raster(path: &Path, raster: &Raster, steepness: f64) -> Self {
-        let scale = raster.cells_per_vertical_unit().unwrap_or(1.0) * steepness;
+        let scale = FeltGrid::new(raster, FeltCells::Stored)
+            .cells_per_vertical_unit()
+            .unwrap_or(1.0)
+            * steepness;
         let [width, height] = [raster.columns(), raster.rows()].map(|n| n.min(LARGEST_SIDE));
         let first = [(raster.columns() - width) / 2, (raster.rows() - height) / 2];
         let summary = raster.summary();

@@ -1,6 +1,7 @@
 //! A fixed number of the soak's scenes; `cargo xtask soak MINUTES` for more.
 
-use hapterra_tests::soak::{Broken, Tally, Until, soak};
+use hapterra_tests::scene::supply::Buffers;
+use hapterra_tests::soak::{Broken, Found, Tally, Until, run, soak};
 
 const SEED: u64 = 2026;
 
@@ -39,4 +40,12 @@ fn none<'b>(broken: impl Iterator<Item = &'b Broken>) {
 #[test]
 fn everything_holds_in_a_thousand_random_scenes() {
     none(thousand().broken.iter());
+}
+
+/// A HIP at the foot of a needle of 10⁶: each hop off the needle's side came nearer by
+/// 10⁻⁶ cell, which counted as progress.
+#[test]
+fn a_proxy_does_not_creep_down_a_needle_for_ever() {
+    let found = run(20261201, 15872, &mut Buffers::default());
+    assert!(matches!(found, Found::Held(..)), "{found:?}");
 }

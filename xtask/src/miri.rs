@@ -28,8 +28,6 @@ pub(crate) fn miri() -> Result<()> {
                 // Its square root is inline assembly on x86, which Miri does not know.
                 .args(["--features", "libm/force-soft-floats", "--lib", "--"])
                 .args(LONG.iter().flat_map(|name| ["--skip", name]))
-                // The tests leak their tiles on purpose: a window borrows them for ever.
-                .env("MIRIFLAGS", "-Zmiri-ignore-leaks")
                 .env("CARGO_TARGET_DIR", target_dir().join("miri")),
         )
     })

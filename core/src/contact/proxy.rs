@@ -4,11 +4,11 @@ use glam::Vec3;
 
 use super::boundary_fade::{self, approach};
 use super::budget::{Budget, SHORTCUT};
-use super::closest_point::{Descent, Ended, Leave, count_unless_nearer, position_on};
+use super::closest_point::{Descent, Ended, Leave, Place, position_on};
 use super::output::{ContactOutput, ContactState};
 use super::paper::{self, Candidate, Candidates};
 use super::settings::{ContactSettings, Execution, Rule};
-use super::shortcut::{self, Follow};
+use super::shortcut::{self, Follow, Followed};
 use super::surface::{HipView, SurfacePoint};
 use super::sweep::{Path, Swept};
 use crate::grid::{Cell, GridPoint};
@@ -17,6 +17,9 @@ use crate::terrain::{Ground, TileIndex, Window};
 /// After so many departures for one HIP without getting nearer to it the proxy may
 /// leave the surface no more: it only moves to and fro by rounding.
 const DEPARTURES: u32 = 32;
+/// The same after so many that each come nearer by next to nothing: it creeps along what
+/// is all but vertical, and would for hours.
+const CREEPING: u32 = 2_048;
 
 /// What the proxy does, with what has to be remembered while it does so.
 // The path is most of a contact's state, and there is no heap to put it on.
@@ -64,6 +67,16 @@ struct OnSurface {
     follow: Option<Follow>,
 }
 
+/// What a tick's shortcut comes to.
+enum Shortcut {
+    /// It has the answer.
+    Taken,
+    /// It has none, but knows the closest point of the patch that the proxy is on.
+    Known(Place),
+    /// There is none.
+    None,
+}
+
 /// Whether a tick goes on, or ends with an answer.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
@@ -71,9 +84,18 @@ enum Turn {
     Ends,
 }
 
-/// The nearest place from which the proxy has left the surface for one HIP, and how
-/// often it has left since from where it was no nearer.
-type Departures = Option<(GridPoint, u32)>;
+/// The departures from the surface for one HIP, if there was one.
+type Departures = Option<Departed>;
+
+#[derive(Clone, Copy, Debug)]
+struct Departed {
+    /// The place nearest to the HIP from which the proxy has left.
+    nearest: GridPoint,
+    /// Departures since from where it was no nearer.
+    in_vain: u32,
+    /// Departures in a row from where it was not clearly nearer.
+    creeping: u32,
+}
 
 impl OnSurface {
     const fn at(point: SurfacePoint, fade: f32) -> Self {
@@ -173,45 +195,59 @@ impl Contact {
     ) -> &ContactOutput {
         if self.at_rest && self.hip.is_same(hip) {
             self.output.work = 0;
-        } else if self.takes_shortcut(window, hip) {
-            self.hip = *hip;
-        } else {
-            self.step_in_full(window, *hip);
+            return &self.output;
+        }
+        match self.take_shortcut(window, hip) {
+            Shortcut::Taken => self.hip = *hip,
+            Shortcut::Known(place) => self.step_in_full(window, *hip, Some(place)),
+            Shortcut::None => self.step_in_full(window, *hip, None),
         }
         &self.output
     }
 
     /// Answers as [`Self::step_in_full`] would, or changes nothing.
     #[inline]
-    fn takes_shortcut<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) -> bool {
+    fn take_shortcut<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: &GridPoint,
+    ) -> Shortcut {
         match &mut self.phase {
             Phase::Free if self.at_rest && self.settings.shortcuts => {
                 let is_free = shortcut::is_free(window, &self.hip, hip);
-                if is_free {
-                    self.output.proxy = *hip;
-                    self.output.work = 0;
+                if !is_free {
+                    return Shortcut::None;
                 }
-                is_free
+                self.output.proxy = *hip;
+                self.output.work = 0;
+                Shortcut::Taken
             }
             Phase::OnSurface(OnSurface {
                 follow: Some(follow),
                 ..
-            }) => {
-                let Some((proxy, displacement)) = follow.to(&HipView::new(*hip)) else {
-                    return false;
-                };
-                self.output.proxy = proxy;
-                self.output.displacement = displacement;
-                self.output.work = SHORTCUT;
-                true
-            }
-            _ => false,
+            }) => match follow.to(&HipView::new(*hip)) {
+                Followed::Rests(proxy, displacement) => {
+                    self.output.proxy = proxy;
+                    self.output.displacement = displacement;
+                    self.output.work = SHORTCUT;
+                    Shortcut::Taken
+                }
+                Followed::InPatch(place) => Shortcut::Known(place),
+                Followed::Not => Shortcut::None,
+            },
+            _ => Shortcut::None,
         }
     }
 
-    /// A tick without shortcuts.
+    /// A tick without shortcuts. Of a proxy on the surface the `known` closest point of
+    /// its patch, if there is one, was found by the shortcut that was not taken.
     #[inline(never)]
-    fn step_in_full<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) {
+    fn step_in_full<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        known: Option<Place>,
+    ) {
         let mut budget = Budget::new(self.settings.work_per_tick);
         if self.output.converged || self.settings.execution == Execution::RealTime {
             let ContactOutput {
@@ -224,7 +260,7 @@ impl Contact {
             self.felt = touched.then_some((*proxy, *displacement));
         }
         if !hip.is_same(&self.hip) {
-            self.redirect(window, hip);
+            self.redirect(window, hip, known, &mut budget);
         }
         // Bounded by the budget: of the turns that follow one another without work,
         // none comes back to the one before.
@@ -235,22 +271,30 @@ impl Contact {
     }
 
     /// The HIP has moved: a way under way now leads to its new place.
-    fn redirect<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) {
+    fn redirect<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        known: Option<Place>,
+        budget: &mut Budget,
+    ) {
         match &mut self.phase {
             Phase::Sweeping(sweeping) => {
                 sweeping.path = Path::through_air(sweeping.path.at(), hip);
                 sweeping.departures = None;
             }
             Phase::OnSurface(on) => {
-                let point = match &on.follow {
-                    Some(follow) => Some(follow.point),
-                    None => {
-                        let nearest = on.descent.nearest(window, &HipView::new(self.hip));
-                        nearest.map(|(point, _)| point)
+                match (&on.follow, known) {
+                    (Some(follow), Some(place)) => {
+                        on.descent.restart_knowing(follow.point, place, budget);
                     }
-                };
-                if let Some(point) = point {
-                    on.descent.restart(point);
+                    (Some(follow), None) => on.descent.restart(follow.point),
+                    (None, _) => {
+                        let view = HipView::new(self.hip);
+                        if let Some((point, _)) = on.descent.nearest(window, &view) {
+                            on.descent.restart(point);
+                        }
+                    }
                 }
                 (on.leave, on.departures, on.follow) = (Leave::Anywhere, None, None);
             }
@@ -258,7 +302,8 @@ impl Contact {
         }
     }
 
-    /// One step of what the proxy does.
+    /// One step of what the proxy does. All but the usual ones are calls: the loop around
+    /// would set up 70 registers and addresses for them in every tick.
     fn turn<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -282,6 +327,7 @@ impl Contact {
     }
 
     /// Waiting ends when the HIP is above the patch it is over, or above everything.
+    #[inline(never)]
     fn looks_around<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Turn {
         let view = HipView::new(hip);
         let ground = window.ground(hip.column());
@@ -331,6 +377,7 @@ impl Contact {
     /// In free space the proxy is the HIP, if it still is.
     ///
     /// Most paths end within the tick; those are not worth storing.
+    #[inline(never)]
     fn flies<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -354,6 +401,7 @@ impl Contact {
     }
 
     /// Goes on with a path from an earlier tick, or off the surface.
+    #[inline(never)]
     fn sweeps<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -402,6 +450,7 @@ impl Contact {
     }
 
     /// On the surface: downhill to the closest point.
+    #[inline]
     fn descends<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -430,7 +479,10 @@ impl Contact {
         }
     }
 
-    /// From the surface into the air, straight to the HIP.
+    /// From the surface into the air, straight to the HIP. The path begins at the
+    /// nearest point that is known: that of the patch which was entered, if the proxy
+    /// leaves on the border of it.
+    #[inline(never)]
     fn leaves<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -445,7 +497,7 @@ impl Contact {
         let from = nearest.and_then(|(point, _)| position_on(window, &point));
         let from = from.unwrap_or(self.output.proxy);
         let mut departures = on.departures;
-        count_unless_nearer(&mut departures, from, view);
+        count_departure(&mut departures, from, view);
         self.phase = Phase::Sweeping(Sweeping {
             path: Path::off_surface(from, hip),
             was_late: false,
@@ -472,8 +524,10 @@ impl Contact {
         let Some((point, z)) = on.descent.nearest(window, &view) else {
             return Turn::Ends;
         };
+        let mut may_follow = self.settings.shortcuts && self.settings.rule == Rule::Swept;
         if converged || is_real_time {
             let target = boundary_fade::target(window, &hip, point.cell);
+            may_follow &= target.over_patch;
             if let (Some(tile), false) = (target.missing, is_real_time) {
                 (converged, missing_tile) = (false, Some(tile));
             } else {
@@ -489,18 +543,20 @@ impl Contact {
         // A proxy that has stayed in its patch is likely to stay for another tick.
         let [x, y, _] = self.output.proxy.cell();
         let stayed = point.cell == Cell::new(x, y);
-        let may_follow = self.settings.shortcuts && self.settings.rule == Rule::Swept;
-        if converged && on.fade == 1.0 && stayed && may_follow {
-            on.follow = Follow::from(window, point, hip.column());
+        if converged
+            && on.fade == 1.0
+            && stayed
+            && may_follow
+            && let Some(follow) = Follow::from(window, point, hip.column())
+        {
+            on.follow = Some(follow);
         }
-        self.output = ContactOutput {
-            state: ContactState::Touching,
-            proxy: view.position(&point, z),
-            displacement,
-            converged,
-            missing_tile,
-            work: 0,
-        };
+        // Field by field: a whole answer would be made elsewhere first, and copied.
+        self.output.state = ContactState::Touching;
+        self.output.proxy = view.position(&point, z);
+        self.output.displacement = displacement;
+        self.output.converged = converged;
+        self.output.missing_tile = missing_tile;
         Turn::Ends
     }
 
@@ -542,6 +598,7 @@ impl Contact {
     }
 
     /// By the paper's rule: the first candidate under the segment.
+    #[inline(never)]
     fn seeks<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -590,6 +647,27 @@ impl Contact {
     }
 }
 
+/// Counts a departure, and how it compares with the nearest one before.
+fn count_departure(departures: &mut Departures, from: GridPoint, view: &HipView) {
+    let Some(before) = departures else {
+        *departures = Some(Departed {
+            nearest: from,
+            in_vain: 0,
+            creeping: 0,
+        });
+        return;
+    };
+    before.creeping = match view.is_clearly_nearer(&from, &before.nearest) {
+        true => 0,
+        false => before.creeping + 1,
+    };
+    if view.is_nearer(&from, &before.nearest) {
+        (before.nearest, before.in_vain) = (from, 0);
+    } else {
+        before.in_vain += 1;
+    }
+}
+
 /// Where a proxy that has hit the surface may leave it again.
 fn may_leave<const D: usize>(
     window: &Window<'_, D>,
@@ -601,8 +679,10 @@ fn may_leave<const D: usize>(
         position_on(window, &hit).is_some_and(|position| view.is_nearer(&position, before))
     };
     match departures {
-        Some((_, DEPARTURES..)) => Leave::Nowhere,
-        Some((before, _)) if !is_nearer(before) => Leave::ButAt(hit),
+        Some(before) if before.in_vain >= DEPARTURES || before.creeping >= CREEPING => {
+            Leave::Nowhere
+        }
+        Some(before) if !is_nearer(&before.nearest) => Leave::ButAt(hit),
         _ => Leave::Anywhere,
     }
 }

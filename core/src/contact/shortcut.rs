@@ -8,14 +8,13 @@
 
 use glam::Vec3;
 
-use super::boundary_fade::is_far;
-use super::closest_point::{Convexity, passes_over};
+use super::closest_point::{Convexity, Place, passes_over};
 use super::surface::patch::Patch;
 use super::surface::{HipView, SurfacePoint};
 use super::sweep::lower;
 use super::tolerance::BESIDE_OF_NEAR_HIP;
 use crate::grid::{Cell, GridPoint};
-use crate::terrain::{CellBox, Corners, Ground, Window};
+use crate::terrain::{CellBox, Ground, Window};
 
 /// Whether a free HIP's path is clear, by one comparison or by a look at the nine
 /// samples around it.
@@ -37,57 +36,71 @@ pub(super) struct Follow {
     pub(super) point: SurfacePoint,
     /// A cell known to hold a patch, for the HIP to be over: nothing fades.
     over: Cell,
-    corners: Corners,
+    /// The patch, and the whole height in cells that its heights count from.
     patch: Patch,
+    base: i32,
     convexity: Convexity,
 }
 
 impl Follow {
-    /// Of a proxy that came to rest for a HIP over `over`; `None` where there is
-    /// no shortcut.
+    /// Of a proxy that came to rest for a HIP over the patch of `over`; `None` where
+    /// there is no shortcut.
     pub(super) fn from<const D: usize>(
         window: &Window<'_, D>,
         point: SurfacePoint,
         over: Cell,
     ) -> Option<Self> {
+        if !(is_inside(point.u) && is_inside(point.v)) {
+            return None;
+        }
         let Ground::Patch(corners) = window.ground(point.cell) else {
             return None;
         };
-        let is_patch = |cell| matches!(window.ground(cell), Ground::Patch(_));
-        let nothing_fades = over == point.cell || (!is_far(point.cell, over) && is_patch(over));
         let patch = Patch::new(corners.heights);
         let convexity = Convexity::of(&patch)?;
-        (nothing_fades && is_inside(point.u) && is_inside(point.v)).then_some(Self {
+        Some(Self {
             point,
             over,
-            corners,
+            base: corners.base,
             patch,
             convexity,
         })
     }
 
-    /// Moves the proxy to where it rests now: its position, and the displacement
-    /// from the HIP to it, cells. `None`, and nothing moved, where more has to be
-    /// looked at.
+    /// Moves the proxy to where it rests now, if it goes on resting well inside its
+    /// patch.
     #[inline]
-    pub(super) fn to(&mut self, view: &HipView) -> Option<(GridPoint, Vec3)> {
-        if self.over != view.column() {
-            return None;
-        }
-        let patch = self.patch.seen_from(view.altitude(), self.corners.base);
+    pub(super) fn to(&mut self, view: &HipView) -> Followed {
+        let patch = self.patch.seen_from(view.altitude(), self.base);
         let (p, q) = view.in_patch(self.point.cell);
-        if passes_over(&patch, &self.point, (p - self.point.u, q - self.point.v)) {
-            return None;
+        let (u, v) = (self.point.u, self.point.v);
+        if passes_over(&patch, &self.point, (p - u, q - v)) {
+            return Followed::Not;
         }
-        let height = patch.polynomial(p, q);
-        let place = self.convexity.closest_at_once(&patch, (p, q), height)?;
-        if !(is_inside(place.u) && is_inside(place.v)) {
-            return None;
+        let Some((place, is_exact)) = self.convexity.at_once(&patch, (p, q)) else {
+            return Followed::Not;
+        };
+        let stays = is_exact && is_inside(place.u) && is_inside(place.v);
+        if !(stays && self.convexity.is_closest(&place) && self.over == view.column()) {
+            let begin = (place, is_exact);
+            let place = self.convexity.closest_after(&patch, (p, q), (u, v), begin);
+            return place.map_or(Followed::Not, Followed::InPatch);
         }
         (self.point.u, self.point.v) = (place.u, place.v);
         let displacement = Vec3::new(place.u - p, place.v - q, place.z);
-        Some((view.position(&self.point, place.z), displacement))
+        Followed::Rests(view.position(&self.point, place.z), displacement)
     }
+}
+
+/// What following a proxy within its patch comes to.
+pub(super) enum Followed {
+    /// It rests: its position, and the displacement from the HIP to it, cells.
+    Rests(GridPoint, Vec3),
+    /// More has to be looked at, but the proxy does not leave the surface at once, and
+    /// the patch's closest point is this one.
+    InPatch(Place),
+    /// More has to be looked at.
+    Not,
 }
 
 #[inline]

@@ -12,7 +12,7 @@ use super::{Contact, ContactSettings, ContactState};
 use crate::cases::cases;
 use crate::grid::GridPoint;
 use crate::terrain::FieldSize;
-use crate::terrain::testing::Field;
+use crate::terrain::testing::{Field, buffers};
 
 std::thread_local! {
     /// Patches and evaluations of the searches.
@@ -58,7 +58,8 @@ fn places(step: f64) -> impl Iterator<Item = [f64; 2]> {
 /// Median and 99th percentile of the patches and of the evaluations, over the
 /// ticks of these HIPs that end in a state.
 fn looked_at(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u32; 2]; 2] {
-    let field = Field::<2>::held(FieldSize::new(SIZE, SIZE), height);
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let mut contact = Contact::new(ContactSettings::LOCK_STEP);
     let above = GridPoint::new([30, 30, 9], Vec3::ZERO);
     let mut step = |hip: &GridPoint| *contact.step(&field.window, hip);

@@ -10,7 +10,7 @@ use crate::cases::cases;
 use crate::grid::Cell;
 use crate::grid::GridPoint;
 use crate::terrain::FieldSize;
-use crate::terrain::testing::Field;
+use crate::terrain::testing::{Field, buffers};
 use glam::Vec3;
 
 fn hash(x: i32, y: i32) -> f64 {
@@ -75,7 +75,8 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 /// Runs a trajectory to the end of every tick and checks each answer.
 fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]]) -> [u32; 4] {
-    let field = Field::<2>::held(FieldSize::new(SIZE, SIZE), height);
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let truth = Ground64 { height };
     let mut contact = Contact::new(ContactSettings::LOCK_STEP);
     let mut seen = [0; 4];
@@ -188,7 +189,8 @@ fn dense_crossing(truth: &Ground64, from: [f64; 3], to: [f64; 3]) -> Option<[[f6
 
 /// Random segments that start above everything.
 fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, high: f64) {
-    let field = Field::<2>::held(FieldSize::new(SIZE, SIZE), height);
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let truth = Ground64 { height };
     let mut dice = Dice(7);
     let mut seen = [0, 0];
@@ -267,7 +269,8 @@ fn two_walls(x: i32, _: i32) -> f32 {
 
 #[test]
 fn proxy_does_not_tunnel_through_a_wall() {
-    let field = Field::<2>::held(FieldSize::new(SIZE, SIZE), two_walls);
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), two_walls);
     let (above, beyond) = (point([10.0, 30.2, 5.0]), point([40.0, 30.7, 5.0]));
     let mut swept = Contact::new(ContactSettings::LOCK_STEP);
     swept.step(&field.window, &above);
@@ -284,8 +287,10 @@ fn proxy_does_not_tunnel_through_a_wall() {
 fn shifting_the_scene_changes_no_bit() {
     for shift in [1000, 100_000, 100_000_000] {
         let shift = shift / 32 * 32; // whole tiles, so that one function serves
-        let near = Field::<2>::held(FieldSize::new(SIZE, SIZE), rough);
-        let far = Field::<2>::shifted(SIZE, shift, rough);
+        let mut near_tiles = buffers::<2>();
+        let near = Field::<2>::held(&mut near_tiles, FieldSize::new(SIZE, SIZE), rough);
+        let mut far_tiles = buffers::<2>();
+        let far = Field::<2>::shifted(&mut far_tiles, SIZE, shift, rough);
         let (mut a, mut b) = (
             Contact::new(ContactSettings::LOCK_STEP),
             Contact::new(ContactSettings::LOCK_STEP),
@@ -455,7 +460,8 @@ fn holds_when_the_hip_jumps() {
 /// it the field begins; going on from beyond that, it would come from nowhere.
 #[test]
 fn steep_ways_in_over_the_border_cross_nothing() {
-    let mut field = Field::<8>::new(FieldSize::new(72, 72), |_, _| 0.0);
+    let mut tiles = buffers::<8>();
+    let mut field = Field::<8>::over(&mut tiles, FieldSize::new(72, 72), |_, _| 0.0);
     field.hold_around(Cell::new(36, 36));
     let mut dice = Dice(1);
     for way in 0..cases(1000, 10) {
@@ -495,7 +501,8 @@ fn side_by_side(
     mut look: impl FnMut(&ContactOutput, &ContactOutput, [u32; 2]),
 ) {
     for (height, mid, span) in GROUNDS {
-        let field = Field::<2>::held(FieldSize::new(SIZE, SIZE), height);
+        let mut tiles = buffers::<2>();
+        let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
         let mut contacts = [one, other].map(Contact::new);
         // Most of the time below the surface, once it was seen from above.
         let above = [[30.0, 30.0, 2e4]].into_iter();
@@ -574,7 +581,8 @@ fn on_an_edge_or_vertex_the_steepest_way_down_decides() {
         side(x, 0.1, 0.4) + side(y, 0.15, 0.3)
     };
     for mirrored in [[false, false], [true, false], [false, true], [true, true]] {
-        let field = Field::<2>::held(FieldSize::new(SIZE, SIZE), move |x, y| {
+        let mut tiles = buffers::<2>();
+        let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), move |x, y| {
             let turned = |c: i32, turned: bool| if turned { SIZE - c } else { c };
             tent(turned(x, mirrored[0]), turned(y, mirrored[1]), 30)
         });

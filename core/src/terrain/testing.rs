@@ -16,7 +16,7 @@ pub(crate) fn buffers<const D: usize>() -> Vec<Tile> {
 }
 
 /// A height function and a window over it.
-pub(crate) struct SuppliedField<'t, const D: usize> {
+pub(crate) struct Field<'t, const D: usize> {
     pub(crate) window: Window<'t, D>,
     size: FieldSize,
     base: i32,
@@ -24,42 +24,7 @@ pub(crate) struct SuppliedField<'t, const D: usize> {
     spare: Vec<&'t mut Tile>,
 }
 
-/// The same over buffers that are never given back.
-pub(crate) type Field<const D: usize> = SuppliedField<'static, D>;
-
-impl<const D: usize> Field<D> {
-    /// A field with nothing held yet.
-    pub(crate) fn new(size: FieldSize, height: impl Fn(i32, i32) -> f32 + 'static) -> Self {
-        Self::over(buffers::<D>().leak(), size, height)
-    }
-
-    /// A field with every tile of it held.
-    pub(crate) fn held(size: FieldSize, height: impl Fn(i32, i32) -> f32 + 'static) -> Self {
-        let mut field = Self::new(size, height);
-        let last = size.last_tile();
-        assert!(last.col.max(last.row) < D as i32, "the window is too small");
-        size.tiles().for_each(|tile| field.take(tile));
-        field
-    }
-
-    /// A square field of `size` cells, all held, moved by `shift` cells (whole
-    /// tiles) east, north and up; nothing lies west and south of it.
-    pub(crate) fn shifted(size: i32, shift: i32, height: fn(i32, i32) -> f32) -> Self {
-        let whole = FieldSize::new(size + shift, size + shift);
-        let mut field = Self::new(whole, move |x, y| {
-            if x < shift || y < shift {
-                return f32::NAN;
-            }
-            height(x - shift, y - shift)
-        });
-        field.base = shift;
-        let first = TileIndex::holding(Cell::new(shift, shift)).col;
-        field.hold(first..first + D as i32, first..first + D as i32);
-        field
-    }
-}
-
-impl<'t, const D: usize> SuppliedField<'t, D> {
+impl<'t, const D: usize> Field<'t, D> {
     /// A field in these buffers with nothing held yet.
     pub(crate) fn over(
         buffers: &'t mut [Tile],
@@ -78,6 +43,40 @@ impl<'t, const D: usize> SuppliedField<'t, D> {
             height: Box::new(height),
             spare,
         }
+    }
+
+    /// A field with every tile of it held.
+    pub(crate) fn held(
+        buffers: &'t mut [Tile],
+        size: FieldSize,
+        height: impl Fn(i32, i32) -> f32 + 'static,
+    ) -> Self {
+        let mut field = Self::over(buffers, size, height);
+        let last = size.last_tile();
+        assert!(last.col.max(last.row) < D as i32, "the window is too small");
+        size.tiles().for_each(|tile| field.take(tile));
+        field
+    }
+
+    /// A square field of `size` cells, all held, moved by `shift` cells (whole
+    /// tiles) east, north and up; nothing lies west and south of it.
+    pub(crate) fn shifted(
+        buffers: &'t mut [Tile],
+        size: i32,
+        shift: i32,
+        height: fn(i32, i32) -> f32,
+    ) -> Self {
+        let whole = FieldSize::new(size + shift, size + shift);
+        let mut field = Self::over(buffers, whole, move |x, y| {
+            if x < shift || y < shift {
+                return f32::NAN;
+            }
+            height(x - shift, y - shift)
+        });
+        field.base = shift;
+        let first = TileIndex::holding(Cell::new(shift, shift)).col;
+        field.hold(first..first + D as i32, first..first + D as i32);
+        field
     }
 
     /// Holds the D × D tiles around a cell, as far as they exist.

@@ -89,6 +89,14 @@ impl<const D: usize> TileRequester<D> {
         self.asked.clear();
     }
 
+    /// Lets what was asked be so many ticks older, as where no ticks run while the
+    /// answers are waited for.
+    pub fn age(&mut self, ticks: u32) {
+        for (_, at) in &mut self.asked {
+            *at = at.wrapping_sub(ticks);
+        }
+    }
+
     /// Tiles asked for and not yet received.
     #[must_use]
     pub fn in_flight(&self) -> usize {
@@ -245,6 +253,17 @@ mod tests {
             drain(&mut requester, 7 + RETRY_TICKS, &at(48, 48)),
             [(1, 1)]
         );
+    }
+
+    #[test]
+    fn what_was_made_older_is_overdue_sooner() {
+        let mut requester = requester();
+        assert_eq!(drain(&mut requester, 7, &at(48, 48)), [(1, 1)]);
+        requester.age(RETRY_TICKS / 2);
+        assert_eq!(drain(&mut requester, 7, &at(48, 48)), []);
+        requester.age(RETRY_TICKS / 2);
+        assert_eq!(drain(&mut requester, 7, &at(48, 48)), [(1, 1)]);
+        assert_eq!(drain(&mut requester, 7, &at(48, 48)), []);
     }
 
     #[test]

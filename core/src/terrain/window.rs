@@ -108,6 +108,9 @@ impl<'t, const D: usize> Window<'t, D> {
 
     /// Puts `tile` in its slot and gives back the buffer that was there; gives
     /// back `tile` itself when it is vacant, of another level, or outside.
+    ///
+    /// A buffer that comes back with a key is that of a tile that is not held. The same
+    /// tile once more therefore gives back a vacant buffer.
     #[must_use]
     pub fn install(&mut self, tile: &'t mut Tile) -> &'t mut Tile {
         let Some(key) = tile.key().filter(|key| self.expects(*key)) else {
@@ -116,6 +119,9 @@ impl<'t, const D: usize> Window<'t, D> {
         let top = tile.top();
         let slot = &mut self.slots[wrap::<D>(key.index.row)][wrap::<D>(key.index.col)];
         let spent = core::mem::replace(slot, tile);
+        if spent.key() == Some(key) {
+            spent.vacate();
+        }
         self.renew_maxima(key.index, top);
         spent
     }
@@ -274,7 +280,7 @@ impl<'t, const D: usize> Window<'t, D> {
 mod tests {
     use super::*;
     use crate::cases::cases;
-    use crate::terrain::testing::{SuppliedField, buffers};
+    use crate::terrain::testing::{Field, buffers};
     use std::vec::Vec;
 
     /// A field of 20 × 20 tiles whose height is a hash of the sample.
@@ -286,7 +292,7 @@ mod tests {
     #[test]
     fn every_held_patch_reads_back_its_samples() {
         let mut buffers = buffers::<4>();
-        let mut field = SuppliedField::<4>::over(&mut buffers, FieldSize::new(640, 640), rough);
+        let mut field = Field::<4>::over(&mut buffers, FieldSize::new(640, 640), rough);
         field.hold_around(Cell::new(100, 70));
         for (x, y) in [(100, 70), (95, 63), (96, 64), (127, 95), (64, 32)] {
             let heights = [
@@ -306,7 +312,7 @@ mod tests {
     #[test]
     fn clear_means_clear_whatever_is_held() {
         let mut buffers = buffers::<4>();
-        let mut field = SuppliedField::<4>::over(&mut buffers, FieldSize::new(640, 640), rough);
+        let mut field = Field::<4>::over(&mut buffers, FieldSize::new(640, 640), rough);
         let mut seen = [0, 0];
         const EACH: u32 = cases(1, 8);
         for step in (0..4000_i32).step_by(EACH as usize) {
@@ -336,8 +342,7 @@ mod tests {
     #[test]
     fn a_held_window_answers_for_long_boxes() {
         let mut buffers = buffers::<8>();
-        let mut field =
-            SuppliedField::<8>::over(&mut buffers, FieldSize::new(256, 256), |_, _| 3.0);
+        let mut field = Field::<8>::over(&mut buffers, FieldSize::new(256, 256), |_, _| 3.0);
         field.hold_around(Cell::new(128, 128));
         let whole = CellBox::around(Cell::new(0, 0), Cell::new(255, 255));
         // The field's own bound is higher, so the pyramid has to answer.
@@ -348,7 +353,7 @@ mod tests {
     #[test]
     fn an_installed_tile_gives_its_predecessor_back() {
         let mut buffers = buffers::<4>();
-        let mut field = SuppliedField::<4>::over(&mut buffers, FieldSize::new(640, 640), rough);
+        let mut field = Field::<4>::over(&mut buffers, FieldSize::new(640, 640), rough);
         field.hold_around(Cell::new(20, 20));
         let old = TileKey::holding(0, Cell::new(20, 20));
         let new = TileKey::new(0, 4, old.index.row);
@@ -357,6 +362,8 @@ mod tests {
         assert_eq!(field.window.occupant(old), Some(new));
         let foreign = TileKey { level: 3, ..old };
         assert_eq!(field.install(foreign).key(), Some(foreign), "refused");
+        assert_eq!(field.install(new).key(), None, "held before and after");
+        assert_eq!(field.window.occupant(old), Some(new));
         let outside = TileKey::new(0, 20, old.index.row);
         assert_eq!(field.install(outside).key(), Some(outside), "refused");
         let keys: Vec<_> = [old, new].map(|k| field.window.occupant(k)).to_vec();

@@ -5,7 +5,7 @@
 //! that is the mirrored patch. What a neighbour is said to offer is searched for
 //! before the way goes there.
 
-use super::on_patch::{Nearest, PatchSearch, resolution};
+use super::on_patch::{Nearest, PatchSearch, finest_resolution, resolution, smaller};
 use crate::contact::budget::{Budget, SLOPE};
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
@@ -82,7 +82,7 @@ pub(super) struct Asking {
 }
 
 /// Where the asking begins: the closest point of a patch.
-pub(super) struct From<'d> {
+pub(super) struct Start<'d> {
     pub(super) at: &'d SurfacePoint,
     pub(super) here: &'d Nearest,
 }
@@ -104,46 +104,51 @@ impl Asking {
     }
 
     /// Goes on until it is known where downhill goes on. `search` is where a
-    /// neighbour is searched.
+    /// neighbour is searched; `patch` becomes that of the best offer, if that is made
+    /// now.
     #[inline]
     pub(super) fn advance<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         view: &HipView,
-        from: &From<'_>,
+        start: &Start<'_>,
+        patch: &mut Patch,
         search: &mut PatchSearch,
         budget: &mut Budget,
     ) -> Onward {
         // Up a wall a proxy may stand beside the edge without being on it.
-        let (p, q) = view.in_patch(from.at.cell);
-        let beside = |hip: f32| smaller(BESIDE * resolution(hip), COARSEST_RESOLUTION);
-        let border = from.at.border_within([beside(p), beside(q)]);
+        let (p, q) = view.in_patch(start.at.cell);
+        let beside = |hip: f32| smaller(BESIDE * finest_resolution(hip), COARSEST_RESOLUTION);
+        let border = start.at.border_within([beside(p), beside(q)]);
         if border == Side::NONE {
             return Onward::Nowhere;
         }
-        self.over_border(window, view, from, border, search, budget)
+        self.over_border(window, view, start, border, patch, search, budget)
     }
 
+    // What a descent is made of, each borrowed from another place.
+    #[allow(clippy::too_many_arguments)]
     #[inline(never)]
     fn over_border<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         view: &HipView,
-        from: &From<'_>,
+        start: &Start<'_>,
         border: Side,
+        patch: &mut Patch,
         search: &mut PatchSearch,
         budget: &mut Budget,
     ) -> Onward {
         loop {
             let mut next = Neighbour {
                 side: Side::NONE,
-                entry: *from.at,
-                patch: Patch::new([0.0; 4]),
+                entry: *start.at,
+                patch: *patch,
                 steepness: -1.0,
                 runner_up: -1.0,
                 bit: 0,
             };
-            if let Err(why) = self.steepest(window, view, from, border, budget, &mut next) {
+            if let Err(why) = self.steepest(window, view, start, border, budget, &mut next) {
                 return why;
             }
             if next.steepness < 0.0 {
@@ -162,13 +167,14 @@ impl Asking {
             };
             self.is_searching = false;
             self.asked |= next.bit;
-            if let Some(offer) = offer(&next, hip, from.here, closest)
+            if let Some(offer) = offer(&next, hip, start.here, closest)
                 && self
                     .best
                     .as_ref()
                     .is_none_or(|best| offer.is_better_than(best))
             {
                 self.best = Some(offer);
+                *patch = next.patch;
             }
             if self.has_steeper_than(next.runner_up) {
                 break; // the others need not be looked at again
@@ -192,12 +198,13 @@ impl Asking {
     ///
     /// # Errors
     /// Why it cannot be told now.
-    #[inline]
+    // A call, which fills `next` in place: inlined, its fields are moved to and fro.
+    #[inline(never)]
     fn steepest<const D: usize>(
         &self,
         window: &Window<'_, D>,
         view: &HipView,
-        from: &From<'_>,
+        start: &Start<'_>,
         border: Side,
         budget: &mut Budget,
         next: &mut Neighbour,
@@ -211,14 +218,14 @@ impl Asking {
                 return Err(Onward::Suspended);
             }
             budget.spend(SLOPE);
-            let entry = from.at.across(side);
+            let entry = start.at.across(side);
             let patch = match window.ground(entry.cell) {
                 Ground::Hole => continue,
                 // It might be the better way: the proxy waits to know.
                 Ground::Missing => return Err(Onward::Missing(TileIndex::holding(entry.cell))),
                 Ground::Patch(corners) => view.patch(&corners),
             };
-            let Some(steepness) = fall_into(&patch, view, &entry, side, from.here) else {
+            let Some(steepness) = fall_into(&patch, view, &entry, side, start.here) else {
                 continue;
             };
             if steepness > next.steepness {
@@ -238,10 +245,10 @@ impl Asking {
     }
 }
 
-/// Not `f32::min`, which is a call where the processor has no instruction for it.
+/// Not `f32::max`, for the reason of [`smaller`]; `b` where `a` is not a number.
 #[inline]
-fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 /// How steeply the distance falls from a point of a patch's border into the
@@ -343,41 +350,53 @@ fn gain(here: &Nearest, there: &Nearest, (p, q): (f32, f32), side: Side) -> (f32
     (gain, noise, 2.0 * RESOLUTION * (moved + left))
 }
 
-/// The same point in the patch into which the distance falls most steeply, of
-/// those that meet at it; as it was where it falls into none.
+/// Takes a point on a border of its patch to the one into which the distance falls most
+/// steeply, of those that meet at it; leaves it where it is if there is none.
 ///
 /// # Errors
-/// The tile of one of them that is not here.
-pub(super) fn in_steepest_patch<const D: usize>(
+/// The tile of one of them that is not here; nothing has changed then.
+#[inline(never)]
+pub(super) fn to_steepest_patch<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,
-    at: &SurfacePoint,
-) -> Result<SurfacePoint, TileIndex> {
-    let mut best = (*at, 0.0);
-    let border = at.border();
-    for side in border.itself_and_neighbours() {
-        let point = at.across(side);
-        let patch = match window.ground(point.cell) {
+    border: Side,
+    at: &mut SurfacePoint,
+    patch: &mut Patch,
+) -> Result<(), TileIndex> {
+    let before = (*at, *patch);
+    let mut most = larger(steepness_at(patch, view.in_patch(at.cell), at, border), 0.0);
+    for place in 0..3 {
+        let side = border.neighbour(place);
+        if side == Side::NONE {
+            continue;
+        }
+        let point = before.0.across(side);
+        let its_patch = match window.ground(point.cell) {
             Ground::Hole => continue,
-            Ground::Missing => return Err(TileIndex::holding(point.cell)),
+            Ground::Missing => {
+                (*at, *patch) = before;
+                return Err(TileIndex::holding(point.cell));
+            }
             Ground::Patch(corners) => view.patch(&corners),
         };
-        let steepness = steepness_at(&patch, view.in_patch(point.cell), &point);
-        if steepness > best.1 * (1.0 + EQUALLY_STEEP) {
-            best = (point, steepness);
+        let steepness = {
+            let hip = view.in_patch(point.cell);
+            steepness_at(&its_patch, hip, &point, border.across(side))
+        };
+        if steepness > most * (1.0 + EQUALLY_STEEP) {
+            (*at, *patch, most) = (point, its_patch, steepness);
         }
     }
-    Ok(best.0)
+    Ok(())
 }
 
-/// How steeply the distance to a HIP at `(p, q)` falls from a point of a patch in
-/// the patch's own directions: the squared slope of half the squared distance,
+/// How steeply the distance to a HIP at `(p, q)` falls from a point on a border of a
+/// patch in the patch's own directions: the squared slope of half the squared distance,
 /// cells².
-fn steepness_at(patch: &Patch, (p, q): (f32, f32), at: &SurfacePoint) -> f32 {
+fn steepness_at(patch: &Patch, (p, q): (f32, f32), at: &SurfacePoint, border: Side) -> f32 {
     let z = patch.height(at.u, at.v);
     let east = (at.u - p) + z * patch.slope_u(at.v);
     let north = (at.v - q) + z * patch.slope_v(at.u);
-    let border = at.border();
     // On a border only the way back into the patch counts.
     let falls = |border: i32, slope: f32| {
         let outward = border as f32 * slope < 0.0;

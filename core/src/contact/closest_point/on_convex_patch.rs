@@ -79,22 +79,23 @@ impl Convexity {
         self.twist * (to.z + rise) <= CONVEX
     }
 
-    /// The closest point of the patch, and of what it would be beyond its borders, to
-    /// a shallow HIP at `hip`, in patch coordinates; `height` is that of the patch's
-    /// polynomial over the HIP. `None` where one Hessian is not enough, or the
-    /// distance not convex.
+    /// Where the patch, and what it would be beyond its borders, is closest to a shallow
+    /// HIP at `hip`, in patch coordinates, and whether that is exact; `None` if the HIP
+    /// is not shallow.
     #[inline]
-    pub(in crate::contact) fn closest_at_once(
+    pub(in crate::contact) fn at_once(
         &self,
         patch: &Patch,
         hip: (f32, f32),
-        height: f32,
-    ) -> Option<Place> {
-        if !(height <= self.shallow) {
-            return None;
-        }
-        let (place, is_exact) = self.by_one_hessian(patch, hip, height);
-        (is_exact && place.z >= 0.0 && self.all_over(place.z)).then_some(place)
+    ) -> Option<(Place, bool)> {
+        let height = patch.polynomial(hip.0, hip.1);
+        (height <= self.shallow).then(|| self.by_one_hessian(patch, hip, height))
+    }
+
+    /// Whether an exact place inside the patch is its closest point, all over it.
+    #[inline]
+    pub(in crate::contact) fn is_closest(&self, place: &Place) -> bool {
+        place.z >= 0.0 && self.all_over(place.z)
     }
 
     /// The closest point to a HIP at `hip`, in patch coordinates, for a proxy at
@@ -105,17 +106,23 @@ impl Convexity {
         hip: (f32, f32),
         from: (f32, f32),
     ) -> Option<Place> {
-        let height = patch.polynomial(hip.0, hip.1);
-        let (mut place, mut is_exact) = if height <= self.shallow {
-            self.by_one_hessian(patch, hip, height)
-        } else {
-            let place = Place {
-                u: from.0,
-                v: from.1,
-                z: height,
-            };
-            (place, false)
-        };
+        let begin = self.at_once(patch, hip).unwrap_or_else(|| {
+            let z = patch.polynomial(hip.0, hip.1);
+            let (u, v) = from;
+            (Place { u, v, z }, false)
+        });
+        self.closest_after(patch, hip, from, begin)
+    }
+
+    /// As [`Self::closest`], where it is known what [`Self::at_once`] comes to.
+    #[inline]
+    pub(in crate::contact) fn closest_after(
+        &self,
+        patch: &Patch,
+        hip: (f32, f32),
+        from: (f32, f32),
+        (mut place, mut is_exact): (Place, bool),
+    ) -> Option<Place> {
         loop {
             let side = side_beyond(&place);
             if side != Side::NONE {

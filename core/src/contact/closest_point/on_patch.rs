@@ -17,7 +17,7 @@
 //!
 //! `docs/contact.md` has the error analysis.
 
-use super::on_convex_patch::Convexity;
+use super::on_convex_patch::{Convexity, Place};
 use super::on_ruling::Ruling;
 use super::ruling_search::RulingSearch;
 use crate::contact::budget::{Budget, CONVEX, RULING};
@@ -212,12 +212,7 @@ impl PatchSearch {
 /// The closest point of a patch that is convex enough for Newton's method.
 fn closest_if_convex(patch: &Patch, hip: (f32, f32), from: (f32, f32)) -> Option<Nearest> {
     let place = Convexity::of(patch)?.closest(patch, hip, from)?;
-    Some(Nearest {
-        u: place.u,
-        v: place.v,
-        z: place.z,
-        evaluations: 1,
-    })
+    Some(Nearest::from_convex(place))
 }
 
 const fn exchanged_if(turned: bool, (u, v): (f32, f32)) -> (f32, f32) {
@@ -244,13 +239,19 @@ fn wants_turning(found: &Ruling) -> bool {
 /// Places in a patch closer than this, in cells, cannot be told apart for a HIP at
 /// coordinate `hip`.
 pub(super) fn resolution(hip: f32) -> f32 {
-    // Not `f32::min`, which is a call where the processor has no instruction for it.
-    let resolution = RESOLUTION * (1.0 + 2.0 * hip.abs());
-    if resolution < COARSEST_RESOLUTION {
-        resolution
-    } else {
-        COARSEST_RESOLUTION
-    }
+    smaller(finest_resolution(hip), COARSEST_RESOLUTION)
+}
+
+/// As [`resolution`], without its limit.
+#[inline]
+pub(super) fn finest_resolution(hip: f32) -> f32 {
+    RESOLUTION * (1.0 + 2.0 * hip.abs())
+}
+
+/// Not `f32::min`, which is a call where the processor has no instruction for it.
+#[inline]
+pub(super) fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 /// A coordinate, put on the border where it is as near to it as can be told for
@@ -274,6 +275,18 @@ impl Nearest {
         z: 0.0,
         evaluations: 0,
     };
+
+    /// The closest point of a convex patch.
+    #[inline]
+    pub(super) const fn from_convex(Place { u, v, z }: Place) -> Self {
+        let evaluations = 1;
+        Self {
+            u,
+            v,
+            z,
+            evaluations,
+        }
+    }
 
     /// The point put on the border, where it is as good as on it.
     fn snapped(self, patch: &Patch, (p, q): (f32, f32)) -> Self {

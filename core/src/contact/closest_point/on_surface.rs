@@ -3,9 +3,10 @@
 
 use glam::Vec3;
 
-use super::beyond_border::{Asking, From, Onward, in_steepest_patch};
+use super::beyond_border::{Asking, Onward, Start, to_steepest_patch};
+use super::on_convex_patch::Place;
 use super::on_patch::{Nearest, PatchSearch};
-use crate::contact::budget::{ARRIVAL, Budget, SLOPE};
+use crate::contact::budget::{ARRIVAL, Budget, CONVEX, SLOPE};
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::contact::tolerance::HEIGHT_NOISE;
@@ -46,6 +47,7 @@ pub(in crate::contact) enum Leave {
 }
 
 impl Leave {
+    #[inline]
     fn is_allowed_at(&self, point: &SurfacePoint) -> bool {
         match self {
             Self::Anywhere => true,
@@ -108,6 +110,23 @@ impl Descent {
         self.idle = None;
     }
 
+    /// Another way, from a point inside a patch, if it is known that the proxy does not
+    /// leave the surface there, and where the patch is closest to the other HIP. Counts
+    /// the work as if it were done here: the budget ends where it would without.
+    pub(in crate::contact) fn restart_knowing(
+        &mut self,
+        at: SurfacePoint,
+        closest: Place,
+        budget: &mut Budget,
+    ) {
+        #[cfg(test)]
+        crate::contact::tally::searched(1);
+        budget.spend(ARRIVAL + CONVEX);
+        self.restart(at);
+        self.here = Nearest::from_convex(closest);
+        self.knows_here();
+    }
+
     /// The patch that the proxy is on.
     pub(in crate::contact) const fn cell(&self) -> Cell {
         self.at.cell
@@ -115,20 +134,32 @@ impl Descent {
 
     /// The nearest point found so far and its height above the HIP; `None` where
     /// its patch is not there.
+    #[inline]
     pub(in crate::contact) fn nearest<const D: usize>(
         &self,
         window: &Window<'_, D>,
         view: &HipView,
     ) -> Option<(SurfacePoint, f32)> {
-        let nearest = match self.stage {
-            Stage::Asking | Stage::ArrivedKnowing => self.here,
-            Stage::Arrived => {
-                let patch = patch_at(window, view, &self.at).ok()?;
-                return Some((self.at, patch.height(self.at.u, self.at.v)));
-            }
-            Stage::Searching => self.search.so_far(&patch_at(window, view, &self.at).ok()?),
-        };
-        Some((self.at.moved_to(nearest.u, nearest.v), nearest.z))
+        if matches!(self.stage, Stage::Asking | Stage::ArrivedKnowing) {
+            let at = self.at.moved_to(self.here.u, self.here.v);
+            return Some((at, self.here.z));
+        }
+        self.nearest_so_far(window, view)
+    }
+
+    /// As [`Self::nearest`], in the stages that do not know the patch's closest point.
+    #[inline(never)]
+    fn nearest_so_far<const D: usize>(
+        &self,
+        window: &Window<'_, D>,
+        view: &HipView,
+    ) -> Option<(SurfacePoint, f32)> {
+        let patch = patch_at(window, view, &self.at).ok()?;
+        if matches!(self.stage, Stage::Searching) {
+            let nearest = self.search.so_far(&patch);
+            return Some((self.at.moved_to(nearest.u, nearest.v), nearest.z));
+        }
+        Some((self.at, patch.height(self.at.u, self.at.v)))
     }
 
     /// Goes on until the proxy rests, leaves, or may not go on. A proxy that
@@ -141,19 +172,18 @@ impl Descent {
         waits: bool,
         budget: &mut Budget,
     ) -> Ended {
+        // Not by `patch_at`: a call costs 20 instructions more.
+        let cell = self.at.cell;
+        let mut patch = match window.ground(cell) {
+            Ground::Patch(corners) => view.patch(&corners),
+            Ground::Hole => return Ended::Lost(None),
+            Ground::Missing => return Ended::Lost(Some(TileIndex::holding(cell))),
+        };
         loop {
-            let patch = match patch_at(window, view, &self.at) {
-                Ok(patch) => patch,
-                Err(tile) => return Ended::Lost(tile),
-            };
-            if matches!(self.stage, Stage::Arrived | Stage::ArrivedKnowing) {
-                let cell = self.at.cell;
-                if let Some(ended) = self.arrive(window, view, &patch, leave, waits, budget) {
-                    return ended;
-                }
-                if self.at.cell != cell {
-                    continue;
-                }
+            if matches!(self.stage, Stage::Arrived | Stage::ArrivedKnowing)
+                && let Some(ended) = self.arrive(window, view, &mut patch, leave, waits, budget)
+            {
+                return ended;
             }
             if matches!(self.stage, Stage::Searching) {
                 let hip = view.in_patch(self.at.cell);
@@ -163,17 +193,23 @@ impl Descent {
                 self.here = here;
                 self.knows_here();
             }
-            let from = From {
+            let start = Start {
                 at: &self.at,
                 here: &self.here,
             };
-            match self
-                .asking
-                .advance(window, view, &from, &mut self.search, budget)
-            {
+            let is_resumed = self.asking.best.is_some();
+            let (asking, search) = (&mut self.asking, &mut self.search);
+            match asking.advance(window, view, &start, &mut patch, search, budget) {
                 Onward::Into => {
                     if let Some(ended) = self.enter(window, view) {
                         return ended;
+                    }
+                    if is_resumed {
+                        // The best neighbour may be one of an earlier tick.
+                        patch = match patch_at(window, view, &self.at) {
+                            Ok(patch) => patch,
+                            Err(tile) => return Ended::Lost(tile),
+                        };
                     }
                 }
                 Onward::Missing(tile) => return Ended::Missing(tile),
@@ -189,13 +225,14 @@ impl Descent {
         &mut self,
         window: &Window<'_, D>,
         view: &HipView,
-        patch: &Patch,
+        patch: &mut Patch,
         leave: Leave,
         waits: bool,
         budget: &mut Budget,
     ) -> Option<Ended> {
         let is_known = matches!(self.stage, Stage::ArrivedKnowing);
-        let on_border = !is_known && self.at.border() != Side::NONE;
+        let border = self.at.border();
+        let on_border = !is_known && border != Side::NONE;
         let units = if on_border {
             ARRIVAL + 4 * SLOPE
         } else {
@@ -205,7 +242,7 @@ impl Descent {
             return Some(Ended::Suspended);
         }
         budget.spend(units);
-        if leave.is_allowed_at(&self.at) && leads_off(window, view, &self.at, patch) {
+        if leave.is_allowed_at(&self.at) && leads_off(window, view, &self.at, border, patch) {
             return Some(Ended::Leaves);
         }
         if is_known {
@@ -213,10 +250,11 @@ impl Descent {
             return None;
         }
         if on_border {
-            match in_steepest_patch(window, view, &self.at) {
-                Ok(point) => self.at = point,
-                Err(tile) if waits => return Some(Ended::Missing(tile)),
-                Err(_) => {}
+            let moved = to_steepest_patch(window, view, border, &mut self.at, patch);
+            if let Err(tile) = moved
+                && waits
+            {
+                return Some(Ended::Missing(tile));
             }
         }
         self.search.restart((self.at.u, self.at.v));
@@ -261,7 +299,7 @@ impl Descent {
         let z = self.here.z;
         let leaves = leave.is_allowed_at(&self.at)
             && is_hardly_above(patch, z)
-            && (z < 0.0 || leads_off(window, view, &self.at, patch));
+            && (z < 0.0 || leads_off(window, view, &self.at, self.at.border(), patch));
         if leaves { Ended::Leaves } else { Ended::Rests }
     }
 }
@@ -289,17 +327,18 @@ fn is_hardly_above(patch: &Patch, z: f32) -> bool {
     z <= HEIGHT_NOISE * ((sw + se) + (nw + ne))
 }
 
-/// Whether the straight way from a point to the HIP begins above the surface:
-/// above the one-sided slope of the patch it leads into.
+/// Whether the straight way from a point, on this border of its patch, to the HIP
+/// begins above the surface: above the one-sided slope of the patch it leads into.
+#[inline(always)]
 fn leads_off<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,
     at: &SurfacePoint,
+    border: Side,
     patch: &Patch,
 ) -> bool {
     let (p, q) = view.in_patch(at.cell);
     let (east, north) = (p - at.u, q - at.v);
-    let border = at.border();
     let toward = |border: i32, way: f32| if border as f32 * way > 0.0 { border } else { 0 };
     let side = Side {
         east: toward(border.east, east),
@@ -308,11 +347,21 @@ fn leads_off<const D: usize>(
     if side == Side::NONE {
         return passes_over(patch, at, (east, north));
     }
-    let entered = at.across(side);
-    match patch_at(window, view, &entered) {
-        Ok(patch) => passes_over(&patch, &entered, (east, north)),
+    leads_off_beyond(window, view, &at.across(side), (east, north))
+}
+
+/// The same in the patch that the way leads into, so far east and north.
+#[inline(never)]
+fn leads_off_beyond<const D: usize>(
+    window: &Window<'_, D>,
+    view: &HipView,
+    entered: &SurfacePoint,
+    way: (f32, f32),
+) -> bool {
+    match window.ground(entered.cell) {
+        Ground::Patch(corners) => passes_over(&view.patch(&corners), entered, way),
         // At the border of the data the proxy is held; see `boundary_fade`.
-        Err(_) => false,
+        Ground::Hole | Ground::Missing => false,
     }
 }
 
@@ -366,7 +415,7 @@ pub(in crate::contact) fn position_on<const D: usize>(
 
 /// Counts how often in a row a position is no nearer to the HIP than the nearest
 /// one before, which is kept in `nearest`.
-pub(in crate::contact) fn count_unless_nearer(
+fn count_unless_nearer(
     nearest: &mut Option<(GridPoint, u32)>,
     position: GridPoint,
     view: &HipView,

@@ -31,6 +31,24 @@ impl Side {
         }
     }
 
+    /// Of a point on a border toward this side: the border as the patch beyond `side`
+    /// has it.
+    #[inline]
+    pub(in crate::contact) const fn across(self, side: Self) -> Self {
+        Self {
+            east: if side.east == 0 {
+                self.east
+            } else {
+                -side.east
+            },
+            north: if side.north == 0 {
+                self.north
+            } else {
+                -side.north
+            },
+        }
+    }
+
     /// The patch itself and its neighbours over a border toward this side.
     pub(in crate::contact) fn itself_and_neighbours(self) -> impl Iterator<Item = Self> {
         let neighbours = (0..3).map(move |place| self.neighbour(place));
