@@ -15,11 +15,13 @@ use hapterra_core::terrain::{
 };
 use hapterra_core::wire::frame::{BadFrame, FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice, ToHost};
+use hapterra_core::wire::session::{InSession, SessionNumber};
 
 /// 8,000 × 8,000 cells, of which the window holds 128 × 128.
 const SIZE: FieldSize = FieldSize::new(8_000, 8_000);
 const TOP: i32 = 4;
 const EPOCH: u32 = 1;
+const SESSION: SessionNumber = SessionNumber::new(1);
 /// Ticks from a request to the tile.
 const LATENCY: u32 = 20;
 
@@ -37,7 +39,9 @@ fn travel(frame: &[u8]) -> Result<Vec<u8>, BadFrame> {
 
 /// The host: answers a request for a tile with its heights.
 fn host(request: &[u8]) -> Result<Vec<u8>, BadFrame> {
-    let ToHost::Need { epoch, key } = decode(&travel(request)?)? else {
+    let content = travel(request)?;
+    let InSession { session, message } = decode(&content)?;
+    let ToHost::Need { epoch, key } = message else {
         return Err(BadFrame::Content);
     };
     let first = key.index.first_cell();
@@ -57,13 +61,16 @@ fn host(request: &[u8]) -> Result<Vec<u8>, BadFrame> {
         heights,
     });
     let mut buffer = [0; MAX_FRAME];
-    Ok(encode(&tile, &mut buffer).expect("a tile fits").to_vec())
+    let message = tile;
+    let framed = InSession { session, message };
+    Ok(encode(&framed, &mut buffer).expect("a tile fits").to_vec())
 }
 
 /// The device: takes a tile into a free buffer, and gives its key.
 fn load(frame: &[u8], buffer: &mut Tile) -> Result<TileKey, BadFrame> {
     let content = travel(frame)?;
-    let ToDevice::Tile(TileMessage { key, heights, .. }) = decode(&content)? else {
+    let InSession { message, .. } = decode(&content)?;
+    let ToDevice::Tile(TileMessage { key, heights, .. }) = message else {
         return Err(BadFrame::Content);
     };
     let Heights::Samples { base, bytes } = heights else {
@@ -102,9 +109,11 @@ pub(crate) fn main() -> Result<(), BadFrame> {
             velocity: [0.1, 0.0],
         };
         while let Some(key) = requester.next_request(tick, &demand) {
-            let request = ToHost::Need { epoch: EPOCH, key };
+            let message = ToHost::Need { epoch: EPOCH, key };
+            let session = SESSION;
             let mut buffer = [0; 32];
-            let frame = encode(&request, &mut buffer).expect("a request fits");
+            let frame =
+                encode(&InSession { session, message }, &mut buffer).expect("a request fits");
             link.push_back((tick + LATENCY, host(frame)?));
         }
         while let Some((_, frame)) = link.pop_front_if(|(due, _)| *due <= tick) {

@@ -6,7 +6,10 @@ use std::vec::Vec;
 use glam::Vec3;
 use serde::Serialize;
 
+use super::hello::{HostHello, PROTOCOL};
 use super::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
+use super::request::{Answer, Refusal, Request};
+use super::session::{InSession, SampleCount, SessionNumber};
 use crate::contact::{ContactState, Rule};
 use crate::force::ForceLaw;
 use crate::grid::GridPoint;
@@ -87,21 +90,21 @@ fn a_sample() {
     .concat();
     assert_eq!(bytes(&sample), wanted);
     let answer = ToHost::PointAnswer { seq: 5, sample };
-    assert_eq!(bytes(&answer), [std::vec![5, 5], wanted.clone()].concat());
+    assert_eq!(bytes(&answer), [std::vec![4, 5], wanted.clone()].concat());
     let telemetry = Telemetry {
         first: 6,
         dropped: 7,
         samples: core::iter::once(sample).collect(),
     };
     let telemetry = bytes(&ToHost::Telemetry(telemetry));
-    assert_eq!(telemetry, [std::vec![4, 6, 7, 1], wanted].concat());
+    assert_eq!(telemetry, [std::vec![3, 6, 7, 1], wanted].concat());
 }
 
 #[test]
 fn a_tile_and_the_request_for_it() {
     let key = TileKey::new(1, -2, 100);
     let request = ToHost::Need { epoch: 7, key };
-    assert_eq!(bytes(&request), [3, 7, 1, 3, 0xC8, 0x01]);
+    assert_eq!(bytes(&request), [2, 7, 1, 3, 0xC8, 0x01]);
     let tile = ToDevice::Tile(TileMessage {
         epoch: 7,
         key,
@@ -112,4 +115,41 @@ fn a_tile_and_the_request_for_it() {
     });
     let wanted = [std::vec![2, 7, 1, 3, 0xC8, 0x01, 1, 1], float(0.5)].concat();
     assert_eq!(bytes(&tile), wanted);
+}
+
+#[test]
+fn a_hello_in_its_session() {
+    let hello = InSession {
+        session: SessionNumber::new(300),
+        message: ToDevice::Hello(HostHello {
+            protocol: PROTOCOL,
+            number: 9,
+            silence_s: 180,
+        }),
+    };
+    // The session is 300 | 128; then variant, protocol, number, seconds.
+    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 4, 9, 0xB4, 0x01]);
+}
+
+#[test]
+fn a_request_and_its_answer() {
+    let request = Request::Zero {
+        counts: [1, -1, 64],
+    };
+    let message = ToDevice::Request {
+        number: 200,
+        request,
+    };
+    assert_eq!(bytes(&message), [5, 200, 2, 2, 1, 0x80, 0x01]);
+    let result = Err(Refusal::NotWhileArmed);
+    let answer = ToHost::Answer(Answer {
+        number: 200,
+        result,
+    });
+    assert_eq!(bytes(&answer), [8, 200, 1, 1]);
+    let count = SampleCount {
+        sent: 300,
+        dropped: 2,
+    };
+    assert_eq!(bytes(&ToHost::Goodbye(count)), [10, 0xAC, 0x02, 2]);
 }

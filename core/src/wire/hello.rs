@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::session::LastSession;
+
 /// Version of the table of messages.
-pub const PROTOCOL: u16 = 3;
+pub const PROTOCOL: u16 = 4;
 /// Length limit of names in a hello, bytes.
 pub const NAME: usize = 32;
 
@@ -12,6 +14,11 @@ pub const NAME: usize = 32;
 pub struct HostHello {
     /// The host's [`PROTOCOL`].
     pub protocol: u16,
+    /// Tells hellos of a session apart; the answer repeats it.
+    pub number: u8,
+    /// For how long, in seconds, the host may be silent before the device lets the
+    /// force out and disarms. Brought within [`SILENCE_S`](super::session::SILENCE_S).
+    pub silence_s: u16,
 }
 
 /// The device introduces itself.
@@ -19,6 +26,11 @@ pub struct HostHello {
 pub struct DeviceHello {
     /// The device's [`PROTOCOL`].
     pub protocol: u16,
+    /// The number of the hello that this answers.
+    pub number: u8,
+    /// The number of the hello that opened the session: another than before tells that
+    /// the device was restarted meanwhile.
+    pub opened_by: u8,
     /// Board name.
     pub board: heapless::String<NAME>,
     /// Firmware version.
@@ -31,4 +43,6 @@ pub struct DeviceHello {
     pub clock_hz: u32,
     /// Epoch of the scene that the device still holds, if any.
     pub epoch: Option<u32>,
+    /// The session before this one.
+    pub last: LastSession,
 }

@@ -1,17 +1,15 @@
-//! The table of messages. This file is the specification of the link.
+//! The table of messages. What each end says when is in [`super`].
 //!
-//! Any change to a type here, or to one it holds, is a new [`PROTOCOL`].
-//! [`HostHello`] and [`DeviceHello`] keep their place (variant 0) and begin
-//! with the protocol number in every version, so that versions can tell each
-//! other apart.
-//!
-//! [`PROTOCOL`]: super::hello::PROTOCOL
+//! Each message travels in an [`InSession`](super::session::InSession). Any change to
+//! a type here, or to one it holds, is a new [`PROTOCOL`](super::hello::PROTOCOL).
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::hello::{DeviceHello, HostHello};
-use super::status::{Answer, Status};
+use super::request::{Answer, Request};
+use super::session::SampleCount;
+use super::status::Status;
 use crate::guard::Report;
 use crate::phantom::Calibration;
 use crate::scene::{Point, Sample, Scene};
@@ -19,10 +17,12 @@ use crate::terrain::TileKey;
 
 /// Samples in a telemetry message, at most.
 pub const BATCH: usize = 8;
+
 /// Host to device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ToDevice<'a> {
-    /// Opens a session.
+    /// Opens the session of its frame. Where that is open already it is answered
+    /// again and changes nothing.
     Hello(HostHello),
     /// The scene to be felt. Starts afresh, unless the device already holds
     /// this very scene.
@@ -32,37 +32,25 @@ pub enum ToDevice<'a> {
     Tile(TileMessage<'a>),
     /// A haptic interface point for one tick, in a scene fed by points.
     Point(Point),
+    /// The host is there. Answered by [`ToHost::Alive`].
+    Alive,
+    /// Asks for something to be done, once.
+    Request {
+        /// Tells requests of a session apart: one more than the last, wrapping.
+        number: u8,
+        /// What is to be done.
+        request: Request,
+    },
     /// Asks for a [`ToHost::Status`].
     Status,
-    /// Asks to arm: once nothing blocks it, the dead-man switch has to be
-    /// let go and pressed. Answered when that much is known.
-    Arm,
-    /// Asks to disarm; force goes out gently.
-    Disarm,
-    /// Says what the encoders read in the zero pose of the calibration.
-    Zero {
-        /// Counts of axes 1 to 3.
-        counts: [i32; 3],
-    },
-    /// Puts a calibration in force. Only while disarmed.
-    SetCalibration {
-        /// The record.
-        calibration: Calibration,
-        /// Whether to store it in the device's memory, too; a second answer,
-        /// to [`Request::StoreCalibration`], tells how that went.
-        ///
-        /// [`Request::StoreCalibration`]: super::status::Request::StoreCalibration
-        store: bool,
-    },
     /// Asks for a [`ToHost::Calibration`].
     GetCalibration,
-    /// Clears a latched fault.
-    ClearFault,
-    /// Drops the scene: disarms, and force goes out gently.
-    DropScene,
-    /// Ends the session, and drops the scene likewise. The emulated board ends
-    /// its program, too.
+    /// Ends the session: disarms and drops the scene. Answered by
+    /// [`ToHost::Goodbye`] when the amplifiers are off.
     Bye,
+    /// The host has heard the goodbye and is gone. The emulated board ends its
+    /// program.
+    Close,
 }
 
 /// Device to host.
@@ -70,13 +58,8 @@ pub enum ToDevice<'a> {
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ToHost {
-    /// Answers a hello of the same protocol.
+    /// Answers a hello.
     Hello(DeviceHello),
-    /// Answers a hello of another protocol: this is the device's.
-    Refused {
-        /// The protocol that the device speaks.
-        protocol: u16,
-    },
     /// Answers a scene.
     SceneTaken {
         /// The scene's epoch.
@@ -109,6 +92,19 @@ pub enum ToHost {
     Calibration(Option<Calibration>),
     /// Answers a request.
     Answer(Answer),
+    /// Answers [`ToDevice::Alive`].
+    Alive {
+        /// The samples of this session that were sent before this message.
+        count: SampleCount,
+        /// Epoch of the scene that the device holds, if any.
+        epoch: Option<u32>,
+        /// The state of the guard, so that a lost [`ToHost::Guard`] does not leave
+        /// the host with an old one.
+        report: Report,
+    },
+    /// Answers [`ToDevice::Bye`]: the amplifiers are off, nothing follows, and these
+    /// were the session's samples.
+    Goodbye(SampleCount),
 }
 
 /// A tile's content.
@@ -152,7 +148,8 @@ pub enum Heights<'a> {
 pub struct Telemetry {
     /// Number of the first sample.
     pub first: u32,
-    /// Samples the device itself dropped so far because the link was slow.
+    /// Samples of this session that the device itself dropped so far because the
+    /// link was slow.
     pub dropped: u32,
     /// The samples.
     pub samples: Vec<Sample, BATCH>,

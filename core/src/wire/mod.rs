@@ -1,41 +1,95 @@
 //! What travels between the device and the host: one link, one table of
-//! messages, one framing.
+//! messages, one framing. This page is the specification of the conversation.
 //!
-//! Every message is serialised with postcard, followed by its CRC-32 (ISO-HDLC,
+//! # Frames
+//!
+//! Every frame is serialised with postcard, followed by its CRC-32 (ISO-HDLC,
 //! little-endian), COBS-encoded, and ended by a zero byte. A reader that joins
 //! in the middle, or meets garbage, finds the next frame at the next zero.
 //!
-//! The session: the host says [`message::ToDevice::Hello`]; the device answers
-//! with its own [`message::ToHost::Hello`], or with
-//! [`message::ToHost::Refused`] when the protocol versions differ. The host
-//! then sends a [`Scene`](crate::scene::Scene); from there on the device asks for the
-//! tiles it needs and reports what it feels. Either end may restart at any
-//! time by beginning again with Hello.
+//! A frame holds an [`InSession`](session::InSession): the number of a session and a
+//! message. What belongs to another session is not heard, except
+//! [`ToDevice::Hello`](message::ToDevice::Hello), which opens one. The only other
+//! frames are those with which two versions tell each other apart:
+//! [`version`].
 //!
 //! ```
 //! use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
-//! use hapterra_core::wire::hello::{HostHello, PROTOCOL};
 //! use hapterra_core::wire::message::ToDevice;
+//! use hapterra_core::wire::session::{InSession, SessionNumber};
 //!
-//! let hello = ToDevice::Hello(HostHello { protocol: PROTOCOL });
+//! let session = SessionNumber::new(0x1234_5678);
+//! let alive = InSession { session, message: ToDevice::Alive };
 //! let mut buffer = [0; 32];
-//! let frame = encode(&hello, &mut buffer).expect("it fits");
+//! let frame = encode(&alive, &mut buffer).expect("it fits");
 //!
 //! let mut reader = FrameReader::<MAX_FRAME>::new();
 //! let (taken, content) = reader.push(frame);
 //! let content = content.expect("a whole frame").expect("undamaged");
-//! assert_eq!((taken, decode(content)), (frame.len(), Ok(hello)));
+//! assert_eq!((taken, decode(content)), (frame.len(), Ok(alive)));
 //! ```
 //!
+//! The line may lose, damage, delay, repeat and reorder frames. Whatever is said is
+//! therefore either repeated until it is answered, or makes no difference when it is
+//! lost (telemetry, which is counted) or comes twice.
+//!
+//! # The host
+//!
+//! | state | says | leaves it when | gives up |
+//! | --- | --- | --- | --- |
+//! | closed | nothing | it is told to greet: greeting | |
+//! | greeting | a version check and hello, every 0.4 s | the device's hello comes: scene sent, or open where there is no scene. A refusal that names another protocol: an error | after 4 s, whatever else is heard |
+//! | scene sent | the scene, every 0.4 s; after 0.75 s without an answer hello, too | the scene is taken: open. It is refused: an error | after 4 s, whatever else is heard |
+//! | open | alive, every 0.5 s of its own or of the device's time; its request, its questions, every 0.4 s; tiles and points; after 0.75 s without an answer hello, every 0.4 s | it is told to leave: leaving. A hello of a device that was restarted (another hello opened the session) or holds another scene: scene sent | after 4 s without an answer; after 1.5 s where frames of another session come meanwhile: another host has taken the device |
+//! | leaving | bye, every 0.4 s; answers requests for tiles no more | goodbye comes: close is said once, and it is closed | after 3 s: the user is told that the board may be armed |
+//!
+//! An answer is a frame of this session that answers something the host has said:
+//! hello, scene taken, point answer, answer, status, calibration, alive, goodbye.
+//! Telemetry is none, because it also comes where the device hears nothing.
+//! The times are those for a board in real time.
+//!
+//! One request is under way at a time; the next waits for its answer. A request that
+//! is not answered in 4 s, while other answers come, is given up and told; where it
+//! was to arm, a request to disarm follows, which makes the device ignore the first
+//! should it still arrive.
+//!
+//! A host that goes on over a new line draws a new number, unless the last one was
+//! never answered. The device's hello tells what became of the session before, and
+//! how many samples that had: loss at its end is counted, too.
+//!
+//! # The device
+//!
+//! | state | hears | leaves it when |
+//! | --- | --- | --- |
+//! | closed | hello | hello comes: open |
+//! | open | everything | bye: leaving. `silence_s` without a frame of this session while armed, or being armed: ended, after a command to disarm. Hello of another session: open, replaced |
+//! | leaving | alive, status, calibration, bye | the amplifiers are off and the telemetry has left: it says goodbye and is ended. Hello of another session: open |
+//! | ended | bye: answered by goodbye; close: the emulated board ends its program | hello of another session: open |
+//!
+//! - A hello of the session that is open is answered and changes nothing. A hello of a
+//!   session that is ended, or of the one before the present one, is stale: it is not
+//!   heard.
+//! - A new session keeps the scene and every tile that is held; samples and requests
+//!   are numbered anew. Where the arm was being armed but nothing is driven yet, that
+//!   is ended: the new host has to ask itself.
+//! - Each request is done once. The number of the last one again: it is answered again,
+//!   or is still under way. An older number (by less than 128, wrapping) is not heard.
+//!   To arm is answered when the loop has decided, to store when it is stored.
+//! - While its time stands still (an emulated board in lock-step), what the device has
+//!   requested and not got is requested again after two messages alive.
+//!
 //! Nothing is driven before the host has asked for it
-//! ([`message::ToDevice::Arm`]) and the dead-man switch was pressed after that;
-//! what still blocks it is told in [`message::ToHost::Guard`].
+//! ([`Request::Arm`](request::Request::Arm)) and the dead-man switch was pressed after
+//! that; what still blocks it is told in [`ToHost::Guard`](message::ToHost::Guard).
 
 pub mod frame;
 pub mod hello;
 pub mod message;
 pub mod plant;
+pub mod request;
+pub mod session;
 pub mod status;
+pub mod version;
 
 #[cfg(test)]
 mod bytes_tests;

@@ -5,7 +5,7 @@ use heapless::String;
 use serde::{Deserialize, Serialize};
 
 use super::hello::DeviceHello;
-use crate::guard::{Blockers, Fault};
+use crate::guard::Fault;
 use crate::phantom::{BadCalibration, Model};
 use crate::scene::Health;
 
@@ -39,6 +39,11 @@ pub enum CrashKind {
     HardFault = 2,
     /// An interrupt without a handler; its number is `status`.
     UnhandledInterrupt = 3,
+    /// The stack ran into what guards its end; `pc` is zero where no stack was left to
+    /// keep it.
+    StackOverflow = 4,
+    /// The supply fell below what the chip watches it for.
+    SupplyLow = 5,
 }
 
 /// Bytes of a file's name that a crash keeps: its end.
@@ -70,9 +75,22 @@ pub struct BootReport {
     pub cause: ResetCause,
     /// How the program before had ended, if it crashed.
     pub crash: Option<Crash>,
+    /// Supply below which the chip holds itself in reset, as its option bytes have it,
+    /// millivolts; zero where no chip says so.
+    pub resets_below_mv: u16,
 }
 
+/// The lowest [`BootReport::resets_below_mv`] that a board should have, millivolts: the
+/// highest level of each chip is above it, and all others are below.
+pub const RESETS_BELOW_MV: u16 = 2_600;
+
 impl BootReport {
+    /// Whether the chip would run on at a supply at which it need not work.
+    #[must_use]
+    pub fn lacks_brown_out_reset(&self) -> bool {
+        (1..RESETS_BELOW_MV).contains(&self.resets_below_mv)
+    }
+
     /// The fault to begin with: a board that crashed says so before it drives
     /// anything again.
     #[must_use]
@@ -81,15 +99,18 @@ impl BootReport {
             (Some(crash), _) => Some(match crash.kind {
                 CrashKind::Panic => Fault::Panicked,
                 CrashKind::HardFault | CrashKind::UnhandledInterrupt => Fault::HardFault,
+                CrashKind::StackOverflow => Fault::StackOverflow,
+                CrashKind::SupplyLow => Fault::SupplyLow,
             }),
             (None, ResetCause::Watchdog) => Some(Fault::WatchdogReset),
+            (None, ResetCause::BrownOut) => Some(Fault::SupplyLow),
             (None, _) => None,
         }
     }
 }
 
 /// Where the calibration in force comes from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CalibrationSource {
     /// There is none.
@@ -99,6 +120,8 @@ pub enum CalibrationSource {
     Stored,
     /// This session's host; it is gone when the device restarts.
     Session,
+    /// There is none: the stored record is whole, and cannot be worked with.
+    Refused(BadCalibration),
 }
 
 /// Ticks and what they cost, in counts of the device's clock.
@@ -142,69 +165,15 @@ pub struct Status {
     pub stack: StackFigures,
     /// Frames that were not understood.
     pub bad_frames: u32,
+    /// Frames of a session that is not the open one.
+    pub foreign_frames: u32,
     /// Samples that were dropped.
     pub dropped: u32,
 }
 
-/// What a host asked for that is answered with an [`Answer`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Request {
-    /// To arm.
-    Arm,
-    /// To disarm.
-    Disarm,
-    /// To take the counts of the zero pose.
-    Zero,
-    /// To take a calibration.
-    SetCalibration,
-    /// To store the calibration in force.
-    StoreCalibration,
-    /// To clear a fault.
-    ClearFault,
-    /// To drop the scene.
-    DropScene,
-}
-
-/// Why a request was refused. Nothing was touched.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
-pub enum Refusal {
-    /// The arm cannot be armed.
-    #[error("the arm cannot be armed")]
-    Blocked(Blockers),
-    /// Not while the arm is armed or being armed.
-    #[error("not while the arm is armed or being armed: disarm first")]
-    NotWhileArmed,
-    /// The calibration has a number that cannot be worked with.
-    #[error("the calibration cannot be used: {0}")]
-    Calibration(BadCalibration),
-    /// There is no calibration to do this with.
-    #[error("there is no calibration")]
-    NoCalibration,
-    /// The device has no memory to store a calibration in.
-    #[error("this device has no memory to store a calibration in")]
-    NoMemory,
-    /// The device's memory failed.
-    #[error("the device's memory failed: the calibration is in force but not stored")]
-    MemoryFailed,
-    /// The device still works on the last request of this kind.
-    #[error("the device is still busy with the last request of this kind")]
-    Busy,
-    /// The device's memory has no room left; it makes room when it starts.
-    #[error(
-        "the device's memory is full until it is started again: the calibration is in force but not stored"
-    )]
-    MemoryFull,
-}
-
-/// The answer to a request.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Answer {
-    /// What was asked for.
-    pub request: Request,
-    /// Whether it was done; why not.
-    pub result: Result<(), Refusal>,
-}
+/// For how long a request that is kept for good waits for a press of the dead-man switch,
+/// ms.
+pub const PRESS_MS: u32 = 10_000;
 
 #[cfg(test)]
 mod tests {
@@ -221,13 +190,43 @@ mod tests {
             tick: 9,
             file: String::new(),
         };
-        let boot = |cause, crash| BootReport { cause, crash }.fault();
+        let boot = |cause, crash| {
+            let report = BootReport {
+                cause,
+                crash,
+                ..BootReport::default()
+            };
+            report.fault()
+        };
         let panicked = Some(crash(CrashKind::Panic));
         assert_eq!(boot(ResetCause::Watchdog, panicked), Some(Fault::Panicked));
         let hard = Some(crash(CrashKind::HardFault));
         assert_eq!(boot(ResetCause::Watchdog, hard), Some(Fault::HardFault));
         let starved = boot(ResetCause::Watchdog, None);
         assert_eq!(starved, Some(Fault::WatchdogReset));
+        let browned_out = boot(ResetCause::BrownOut, None);
+        assert_eq!(browned_out, Some(Fault::SupplyLow));
         assert_eq!(boot(ResetCause::PowerOn, None), None);
+        let kept = |kind| boot(ResetCause::Software, Some(crash(kind)));
+        assert_eq!(kept(CrashKind::StackOverflow), Some(Fault::StackOverflow));
+        assert_eq!(kept(CrashKind::SupplyLow), Some(Fault::SupplyLow));
+    }
+
+    #[test]
+    fn a_brown_out_is_a_fault_and_a_chip_that_does_not_see_one_is_told() {
+        let boot = BootReport {
+            cause: ResetCause::BrownOut,
+            ..BootReport::default()
+        };
+        assert_eq!(boot.fault(), Some(Fault::SupplyLow));
+        let lacks = |resets_below_mv| {
+            let boot = BootReport {
+                resets_below_mv,
+                ..BootReport::default()
+            };
+            boot.lacks_brown_out_reset()
+        };
+        assert!(!lacks(0), "no chip says so");
+        assert!(lacks(1_700) && lacks(2_500) && !lacks(2_700) && !lacks(2_800));
     }
 }

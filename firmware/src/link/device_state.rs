@@ -1,24 +1,39 @@
 //! What the link knows of the device (its arm, calibration and last start), and
 //! what of it the host has yet to be told.
 
-use hapterra_core::guard::{Limits, Mode, Report};
+use hapterra_core::guard::{Blockers, Limits, Mode, Report};
 use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::scene::Health;
 use hapterra_core::scene::Scene;
 use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use hapterra_core::wire::message::ToHost;
-use hapterra_core::wire::status::{Answer, BootReport, CalibrationSource, Refusal, Request};
+use hapterra_core::wire::request::Refusal;
+use hapterra_core::wire::session::LastSession;
+use hapterra_core::wire::status::{BootReport, CalibrationSource};
 
+use super::conversation::Conversation;
+use super::requests::LatestRequest;
 use crate::board::TickClock;
+use crate::press::PressWait;
 
 /// Where storing a calibration stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Storing {
     No,
+    /// Somebody has to press the dead-man switch.
+    Waiting(PressWait),
     /// The calibration waits for the board.
     Wanted,
-    /// The board has answered; the host has not been told yet.
-    Done(Result<(), Refusal>),
+}
+
+/// What the board knows of its arm when it starts.
+pub(crate) struct KnownArm {
+    /// The calibration in force.
+    pub(crate) calibration: Option<Calibration>,
+    /// Where it comes from, or why there is none.
+    pub(crate) source: CalibrationSource,
+    /// The current at the ends of the amplifiers' range, A.
+    pub(crate) full_scale_a: f32,
 }
 
 /// What the link knows of the device.
@@ -28,12 +43,20 @@ pub(crate) struct DeviceState {
     pub(super) calibration: Option<Calibration>,
     /// Where the calibration comes from.
     pub(super) source: CalibrationSource,
+    /// No calibration may ask for more, A.
+    full_scale_a: f32,
     /// The loop's latest report.
     pub(super) health: Health,
     /// The guard's report that the host was last told.
     told: Option<Report>,
+    /// The loop was given a command that may lead to driving, and has not reported
+    /// since that it is disarmed.
+    pub(super) may_drive: bool,
     /// While an arm command is open: the guard's count of decisions before it.
     pub(super) arming: Option<u8>,
+    /// What the host last asked for.
+    pub(super) request: LatestRequest,
+    /// The calibration waits for the board to store it.
     storing: Storing,
 }
 
@@ -43,27 +66,30 @@ impl DeviceState {
     pub(crate) fn new<C: TickClock, const D: usize>(
         board: &str,
         boot: BootReport,
-        mechanism: Option<&Mechanism>,
+        arm: KnownArm,
     ) -> Self {
         Self {
             hello: DeviceHello {
                 protocol: PROTOCOL,
+                number: 0,
+                opened_by: 0,
                 board: cut(board),
                 version: cut(env!("CARGO_PKG_VERSION")),
                 window: u8::try_from(D).unwrap_or(u8::MAX),
                 tick_hz: C::RATE.hz(),
                 clock_hz: C::HZ,
                 epoch: None,
+                last: LastSession::default(),
             },
             boot,
-            calibration: mechanism.map(|mechanism| *mechanism.calibration()),
-            source: match mechanism {
-                Some(_) => CalibrationSource::Stored,
-                None => CalibrationSource::None,
-            },
+            calibration: arm.calibration,
+            source: arm.source,
+            full_scale_a: arm.full_scale_a,
             health: Health::default(),
             told: None,
+            may_drive: false,
             arming: None,
+            request: LatestRequest::default(),
             storing: Storing::No,
         }
     }
@@ -72,14 +98,28 @@ impl DeviceState {
     pub(super) fn session_opened(&mut self) {
         self.told = None;
         self.arming = None;
+        self.request = LatestRequest::default();
+        self.forget_press();
     }
 
-    /// Introduces the device to a host that may come back to `scene`.
-    pub(super) fn hello(&self, scene: Option<Scene>) -> DeviceHello {
+    /// Answers the hello of this number, of a host that may come back to `scene`.
+    pub(super) fn hello(
+        &self,
+        number: u8,
+        scene: Option<Scene>,
+        conversation: &Conversation,
+    ) -> DeviceHello {
         DeviceHello {
+            number,
+            opened_by: conversation.opened_by,
             epoch: scene.map(|scene| scene.epoch),
+            last: conversation.last(),
             ..self.hello.clone()
         }
+    }
+
+    pub(super) fn tick_hz(&self) -> u32 {
+        self.hello.tick_hz
     }
 
     pub(super) fn ticks_per_ms(&self) -> u32 {
@@ -91,9 +131,46 @@ impl DeviceState {
         self.health.report.mode.drives()
     }
 
-    /// Whether nothing is driven and no arm command waits for the loop.
+    /// Whether nothing is driven, no arm command waits for the loop and nothing for a
+    /// press.
     pub(super) fn is_at_rest(&self) -> bool {
-        !self.drives() && self.arming.is_none()
+        let is_waiting = matches!(self.storing, Storing::Waiting(_));
+        !self.drives() && self.arming.is_none() && !is_waiting
+    }
+
+    /// Takes a report of the loop, which came in tick `now`.
+    pub(super) fn take_health(&mut self, health: Health, now: u32) {
+        self.health = health;
+        if let Storing::Waiting(wait) = &mut self.storing
+            && let Some(decided) = wait.look(&self.health, now)
+        {
+            match decided {
+                Ok(()) => self.storing = Storing::Wanted,
+                Err(refused) => {
+                    self.storing = Storing::No;
+                    self.request.stored(Err(refused));
+                }
+            }
+        }
+    }
+
+    /// The host that wanted a calibration stored is gone: a press is for something else.
+    pub(super) fn forget_press(&mut self) {
+        if matches!(self.storing, Storing::Waiting(_)) {
+            self.storing = Storing::No;
+        }
+    }
+
+    /// Checks a calibration as a whole, against this board, too.
+    pub(super) fn checked(&self, calibration: &Calibration) -> Result<Mechanism, Refusal> {
+        let fits = calibration.check_board(self.full_scale_a);
+        let mechanism = Mechanism::new(calibration).and_then(|arm| fits.map(|()| arm));
+        mechanism.map_err(Refusal::Calibration)
+    }
+
+    /// Whether an arm command is under way that has not switched anything on.
+    pub(super) fn is_being_armed(&self) -> bool {
+        self.may_drive && !self.drives()
     }
 
     /// Settings change only while the arm is disarmed.
@@ -104,16 +181,36 @@ impl DeviceState {
         }
     }
 
+    /// Outputs are held only while disarmed and without a fault.
+    pub(super) fn may_hold_outputs(&self) -> Result<(), Refusal> {
+        self.may_change_settings()?;
+        match self.health.report.fault {
+            None => Ok(()),
+            Some(_) => Err(Refusal::Blocked(Blockers::FAULT_LATCHED)),
+        }
+    }
+
     pub(super) fn is_storing(&self) -> bool {
         self.storing != Storing::No
     }
 
-    pub(super) fn set_calibration(&mut self, calibration: &Calibration, store: bool) {
+    pub(super) fn set_calibration(&mut self, calibration: &Calibration) {
         self.calibration = Some(*calibration);
         self.source = CalibrationSource::Session;
-        if store {
-            self.storing = Storing::Wanted;
+    }
+
+    /// In tick `now` begins to wait for the press that storing the calibration in force
+    /// takes.
+    pub(super) fn begin_storing(&mut self, now: u32) -> Result<(), Refusal> {
+        self.may_change_settings()?;
+        if self.calibration.is_none() {
+            return Err(Refusal::NoCalibration);
         }
+        if self.is_storing() {
+            return Err(Refusal::Busy);
+        }
+        self.storing = Storing::Waiting(PressWait::new(now, self.ticks_per_ms()));
+        Ok(())
     }
 
     pub(super) fn to_store(&self) -> Option<Calibration> {
@@ -125,43 +222,41 @@ impl DeviceState {
         if result.is_ok() {
             self.source = CalibrationSource::Stored;
         }
-        self.storing = Storing::Done(result);
+        self.storing = Storing::No;
+        self.request.stored(result);
     }
 
     /// What the host should be told next, once.
     pub(super) fn next_message(&mut self) -> Option<ToHost> {
-        self.arm_decided()
-            .or_else(|| self.storing_done())
-            .map(|(request, result)| ToHost::Answer(Answer { request, result }))
-            .or_else(|| self.guard_changed().map(ToHost::Guard))
+        self.look_at_decision();
+        let answer = self.request.take_answer().map(ToHost::Answer);
+        answer.or_else(|| self.guard_changed().map(ToHost::Guard))
     }
 
-    fn arm_decided(&mut self) -> Option<(Request, Result<(), Refusal>)> {
+    /// Whether the loop has decided about the arm command that waits.
+    fn look_at_decision(&mut self) {
         let decision = self.health.report.decision;
-        self.arming.filter(|before| *before != decision.count)?;
+        if self.arming.is_none_or(|before| before == decision.count) {
+            return;
+        }
         self.arming = None;
-        let result = match decision.refused.is_empty() {
+        self.request.arm_decided(match decision.refused.is_empty() {
             true => Ok(()),
             false => Err(Refusal::Blocked(decision.refused)),
-        };
-        Some((Request::Arm, result))
-    }
-
-    fn storing_done(&mut self) -> Option<(Request, Result<(), Refusal>)> {
-        let Storing::Done(result) = self.storing else {
-            return None;
-        };
-        self.storing = Storing::No;
-        Some((Request::StoreCalibration, result))
+        });
     }
 
     /// The guard's report without its limits: they come and go with every touch, and
     /// each sample has them.
-    fn guard_changed(&mut self) -> Option<Report> {
-        let report = Report {
+    pub(super) fn report(&self) -> Report {
+        Report {
             limits: Limits::empty(),
             ..self.health.report
-        };
+        }
+    }
+
+    fn guard_changed(&mut self) -> Option<Report> {
+        let report = self.report();
         (self.told.replace(report) != Some(report)).then_some(report)
     }
 }

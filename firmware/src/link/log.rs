@@ -3,10 +3,26 @@
 #![cfg_attr(not(feature = "defmt"), allow(unused_variables))]
 
 use hapterra_core::wire::frame::BadFrame;
+use hapterra_core::wire::session::{SessionEnd, SessionNumber};
 
-pub(super) fn opened(bad_frames: u32) {
+pub(super) fn opened(session: SessionNumber, last: SessionEnd, bad_frames: u32) {
     #[cfg(feature = "defmt")]
-    defmt::info!("a host opened a session; bad frames so far: {}", bad_frames);
+    defmt::info!(
+        "a host opened session {}; end of the one before: {}; bad frames so far: {}",
+        session.get(),
+        last,
+        bad_frames
+    );
+}
+
+pub(super) fn ended() {
+    #[cfg(feature = "defmt")]
+    defmt::info!("the host said goodbye; disarmed");
+}
+
+pub(super) fn forsaken() {
+    #[cfg(feature = "defmt")]
+    defmt::warn!("the host has been silent for too long: the arm is disarmed");
 }
 
 pub(super) fn refused(protocol: u16) {

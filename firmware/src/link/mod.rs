@@ -11,13 +11,20 @@
 //! - Answers and requests go before telemetry. When the writer is slow,
 //!   telemetry is dropped and counted, nothing else.
 //! - A tile is requested only if there is a buffer to put it in.
-//! - Frames that are damaged, not requested, or of another scene change nothing.
+//! - Frames that are damaged, not requested, of another scene or of another session
+//!   change nothing.
 //! - A hello at any time (after a zero, which ends what an earlier host may
 //!   have left unfinished) opens a new session and keeps the scene and every
 //!   tile that is held, so a host that comes back goes on where it was.
+//! - A host that vanishes leaves the arm rendering what is held, but not for ever:
+//!   after the time that the host named the arm is disarmed.
+//! - Goodbye is answered when the amplifiers are off.
 
+mod conversation;
 mod device_state;
+mod loader;
 mod log;
+mod messages;
 mod poll;
 mod requests;
 pub mod task;
@@ -31,14 +38,17 @@ use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Point, Sample, Scene, Source};
 use hapterra_core::terrain::{Tile, TileDemand, TileRequester};
 use hapterra_core::tick::Command;
-use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode};
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
 use hapterra_core::wire::message::ToHost;
-use hapterra_core::wire::status::{Answer, Refusal, Request};
+use hapterra_core::wire::request::Refusal;
+use hapterra_core::wire::session::SampleCount;
 use heapless::{Deque, Vec};
 
 use crate::led::LedPattern;
 use crate::queues::{LinkEnds, SPARES, TickRecord};
-pub(crate) use device_state::DeviceState;
+use conversation::{Conversation, SessionState};
+pub(crate) use device_state::{DeviceState, KnownArm};
+use loader::LoaderEntry;
 pub use tiles::fill_tile;
 use tx_queue::TxQueue;
 
@@ -65,17 +75,6 @@ impl Buffers {
     }
 }
 
-/// Where the conversation with a host stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum SessionState {
-    /// No host has said hello, or one of another protocol did.
-    Closed,
-    /// A host has said hello.
-    Open,
-    /// The host has said goodbye.
-    Ended,
-}
-
 /// Where the points of a replay stand.
 #[derive(Clone, Copy, Debug, Default)]
 struct ReplayProgress {
@@ -92,9 +91,13 @@ pub struct Link<'t, const D: usize> {
     tx: &'t mut TxQueue,
     samples: &'t mut Deque<Sample, SAMPLES>,
     ends: LinkEnds<'t>,
-    session: SessionState,
+    conversation: Conversation,
+    /// The loop had taken every command when its reports were last read.
+    commands_taken: bool,
     /// What is known of arming, calibration and status.
     device: DeviceState,
+    /// The way into the loader in the chip's ROM.
+    loader: LoaderEntry,
     scene: Option<Scene>,
     requester: TileRequester<D>,
     /// The millisecond in which the tile requester last had nothing to request, while
@@ -106,11 +109,13 @@ pub struct Link<'t, const D: usize> {
     spare: Vec<&'t mut Tile, SPARES>,
     points: Deque<Point, POINTS_AHEAD>,
     replay: ReplayProgress,
-    /// Samples packed into telemetry in this session.
-    packed: u32,
+    /// Samples in the last telemetry message.
+    batch: u32,
     /// Samples dropped here; the monitor counts those that the loop dropped.
     dropped: u32,
     bad_frames: u32,
+    /// Frames of sessions that are not open.
+    foreign_frames: u32,
 }
 
 impl<'t, const D: usize> Link<'t, D> {
@@ -125,8 +130,10 @@ impl<'t, const D: usize> Link<'t, D> {
             tx: &mut buffers.tx,
             samples: &mut buffers.samples,
             ends,
-            session: SessionState::Closed,
+            conversation: Conversation::new(),
+            commands_taken: false,
             device,
+            loader: LoaderEntry::default(),
             scene: None,
             requester: TileRequester::new(),
             nothing_to_request_at: None,
@@ -135,9 +142,10 @@ impl<'t, const D: usize> Link<'t, D> {
             spare: spare.into_iter().collect(),
             points: Deque::new(),
             replay: ReplayProgress::default(),
-            packed: 0,
+            batch: 0,
             dropped: 0,
             bad_frames: 0,
+            foreign_frames: 0,
         }
     }
 
@@ -157,10 +165,9 @@ impl<'t, const D: usize> Link<'t, D> {
             };
             let (n, frame) = reader.push(rest);
             taken += n;
-            match frame.map(|frame| frame.and_then(decode)) {
-                Some(Ok(message)) => self.on_message(message),
-                Some(Err(bad)) => self.on_bad_frame(bad),
-                None => {}
+            let heard = frame.map(|frame| frame.and_then(|content| self.on_content(content)));
+            if let Some(Err(bad)) = heard {
+                self.on_bad_frame(bad);
             }
             self.reader = Some(reader);
         }
@@ -194,8 +201,11 @@ impl<'t, const D: usize> Link<'t, D> {
             Some(scene) if scene.hold_clock && self.requester.in_flight() > 0 => return true,
             Some(_) => false,
         };
-        // What was told to the loop has to reach it, and force has to go out.
+        // What was told to the loop has to reach it, force has to go out, and a host
+        // that leaves has to be told that it has.
+        let leaves = self.conversation.state == SessionState::Leaving;
         waits
+            && !(leaves && self.device.may_drive)
             && self.ends.commands.is_empty()
             && self.ends.settings.is_empty()
             && self.device.is_at_rest()
@@ -233,30 +243,48 @@ impl<'t, const D: usize> Link<'t, D> {
         self.device.stored(result);
     }
 
-    /// Whether the host has said goodbye, everything is sent and no force is left.
+    /// Whether the host has heard that the arm is disarmed, and is gone.
     #[must_use]
     pub fn has_ended(&self) -> bool {
-        let sent = self.samples.is_empty() && self.tx.is_empty();
-        self.session == SessionState::Ended && sent && !self.device.drives()
+        self.conversation.state == SessionState::Gone && self.tx.is_empty()
     }
 
     fn command(&mut self, command: Command<'t>) {
+        // Of these none leads to driving; of others that is not known here.
+        self.device.may_drive |= !matches!(
+            command,
+            Command::Scene(_)
+                | Command::DropScene
+                | Command::Tile(_)
+                | Command::Point(_)
+                | Command::Disarm
+                | Command::Zero(_)
+                | Command::ClearFault
+                | Command::Trip(_)
+        );
+        self.commands_taken = false;
         // Whoever leads here has asked `has_room`.
         let _ = self.ends.commands.enqueue(command);
     }
 
-    fn say(&mut self, message: &ToHost) {
-        // Whoever leads here has asked `has_room`.
-        self.tx.push(message);
+    /// The session's samples that have gone out before what is said next.
+    fn sample_count(&self) -> SampleCount {
+        let waiting = if self.tx.telemetry_waits() {
+            self.batch
+        } else {
+            0
+        };
+        self.conversation.count(waiting, self.samples_dropped())
     }
 
-    fn answer(&mut self, request: Request, result: Result<(), Refusal>) {
-        self.say(&ToHost::Answer(Answer { request, result }));
+    fn say(&mut self, message: &ToHost) {
+        // Whoever leads here has asked `has_room`.
+        self.tx.push(self.conversation.session(), message);
     }
 
     /// Answers a point with what the loop rendered there.
     fn answer_point(&mut self, record: TickRecord) {
-        let is_open = self.session == SessionState::Open;
+        let is_open = self.conversation.is_open();
         if let Some(seq) = record.answers.filter(|_| is_open) {
             let sample = record.sample;
             self.say(&ToHost::PointAnswer { seq, sample });

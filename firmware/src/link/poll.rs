@@ -1,11 +1,14 @@
 //! What the link does when it is polled: it reads what the loop did, hands on what
 //! the loop needs, and fills the queue to the host.
 
+use hapterra_core::guard::Mode;
 use hapterra_core::tick::Command;
-use hapterra_core::wire::message::{BATCH, Telemetry};
+use hapterra_core::wire::message::{BATCH, Telemetry, ToHost};
+use hapterra_core::wire::session::SessionEnd;
 use heapless::Vec;
 
-use super::{Link, SessionState, tiles};
+use super::conversation::SessionState;
+use super::{Link, log, tiles};
 use crate::monitor::Part;
 
 impl<const D: usize> Link<'_, D> {
@@ -16,13 +19,15 @@ impl<const D: usize> Link<'_, D> {
         self.reclaim_buffers();
         self.read_records();
         self.report_state();
+        self.watch_host();
         self.start_next_point();
         self.request_tiles();
         self.pack_telemetry();
+        self.say_goodbye();
     }
 
     /// Reads what the loop recorded since the last poll.
-    fn read_records(&mut self) {
+    pub(super) fn read_records(&mut self) {
         while self.tx.has_room() {
             let Some(record) = self.ends.records.dequeue() else {
                 return;
@@ -36,7 +41,7 @@ impl<const D: usize> Link<'_, D> {
                 self.replay.last = Some(record);
                 self.answer_point(record);
             } else if self.renders_arm()
-                && self.session == SessionState::Open
+                && self.conversation.is_open()
                 && self.samples.push_back(record.sample).is_err()
             {
                 self.dropped = self.dropped.wrapping_add(1);
@@ -46,14 +51,44 @@ impl<const D: usize> Link<'_, D> {
 
     /// Reports where the guard stands and what became of requests.
     fn report_state(&mut self) {
+        // What is reported from now on follows on every command, if the loop had taken
+        // them all before the reports so far were read.
+        let follows = self.commands_taken;
+        self.commands_taken = self.ends.commands.is_empty();
         while let Some(health) = self.ends.health.dequeue() {
-            self.device.health = health;
+            self.device.take_health(health, self.ends.monitor.ticks());
+            self.device.may_drive &= !(follows && health.report.mode == Mode::Disarmed);
         }
-        while self.session == SessionState::Open && self.tx.has_room() {
+        while self.conversation.is_open() && self.tx.has_room() {
             let Some(message) = self.device.next_message() else {
                 return;
             };
             self.say(&message);
+        }
+    }
+
+    /// Disarms where the host has been silent for too long, and ends its session.
+    fn watch_host(&mut self) {
+        let now = self.ends.monitor.ticks();
+        if !self.conversation.is_forsaken(now) || !self.device.may_drive {
+            return;
+        }
+        if self.ends.commands.ready() {
+            log::forsaken();
+            self.command(Command::Disarm);
+            self.forget_conversation();
+            self.conversation.state = SessionState::Ended(SessionEnd::HostSilent);
+        }
+    }
+
+    /// Says goodbye once nothing is driven and everything else was said.
+    fn say_goodbye(&mut self) {
+        let leaves = self.conversation.state == SessionState::Leaving;
+        let said = self.samples.is_empty() && self.tx.wants_telemetry();
+        if leaves && said && !self.device.may_drive && self.tx.has_room() {
+            self.say(&ToHost::Goodbye(self.sample_count()));
+            self.conversation.state = SessionState::Ended(SessionEnd::Goodbye);
+            log::ended();
         }
     }
 
@@ -70,7 +105,8 @@ impl<const D: usize> Link<'_, D> {
 
     /// Packs the next telemetry message, once the last one has left.
     fn pack_telemetry(&mut self) {
-        let enough = self.samples.len() >= BATCH || self.session == SessionState::Ended;
+        let leaves = self.conversation.state == SessionState::Leaving;
+        let enough = self.samples.len() >= BATCH || leaves;
         if !enough || self.samples.is_empty() || !self.tx.wants_telemetry() {
             return;
         }
@@ -81,13 +117,16 @@ impl<const D: usize> Link<'_, D> {
             };
             let _ = samples.push(sample);
         }
-        let first = self.packed;
-        self.packed = self.packed.wrapping_add(samples.len() as u32);
-        self.tx.push_telemetry(Telemetry {
+        let first = self.conversation.packed;
+        self.batch = samples.len() as u32;
+        self.conversation.packed = first.wrapping_add(self.batch);
+        let message = ToHost::Telemetry(Telemetry {
             first,
-            dropped: self.samples_dropped(),
+            dropped: self.sample_count().dropped,
             samples,
         });
+        self.tx
+            .push_telemetry(self.conversation.session(), &message);
     }
 
     /// Moves bytes that are sent next into `into` and returns how many. They count
@@ -99,6 +138,7 @@ impl<const D: usize> Link<'_, D> {
             n += taken;
             if taken == 0 {
                 self.pack_telemetry();
+                self.say_goodbye();
                 if self.tx.is_empty() {
                     break;
                 }

@@ -8,7 +8,7 @@ use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::signal::Signal;
 use embedded_io_async::{Read, Write};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::status::Refusal;
+use hapterra_core::wire::request::Refusal;
 
 use super::Link;
 

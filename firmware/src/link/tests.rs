@@ -3,5 +3,6 @@
 mod buffers;
 mod device_state;
 mod faults;
+mod loader;
 mod rig;
 mod session;

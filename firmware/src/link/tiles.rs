@@ -5,7 +5,7 @@ use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::BadFrame;
 use hapterra_core::wire::message::{Heights, TileMessage, ToHost};
 
-use super::{Link, SessionState};
+use super::Link;
 use crate::queues::TickRecord;
 
 impl<'t, const D: usize> Link<'t, D> {
@@ -49,7 +49,7 @@ impl<'t, const D: usize> Link<'t, D> {
 
     /// Requests tiles, each with a buffer that waits for it.
     pub(super) fn request_tiles(&mut self) {
-        let (SessionState::Open, Some(scene)) = (self.session, self.scene) else {
+        let (true, Some(scene)) = (self.conversation.is_open(), self.scene) else {
             return;
         };
         let focus = self.focus.unwrap_or_else(|| TileDemand {

@@ -1,7 +1,9 @@
 //! Frames that wait to be sent: answers and requests first, telemetry after.
 
 use hapterra_core::wire::frame::encode;
-use hapterra_core::wire::message::{Telemetry, ToHost};
+use hapterra_core::wire::message::ToHost;
+use hapterra_core::wire::session::{InSession, SessionNumber};
+use hapterra_core::wire::version::VersionCheck;
 
 /// Bytes kept for answers and requests.
 const URGENT: usize = 1152;
@@ -34,15 +36,16 @@ impl<const N: usize> Frames<N> {
         N - (self.end - self.sent)
     }
 
-    /// Appends a frame. Returns false if it does not fit.
-    fn push(&mut self, message: &ToHost) -> bool {
+    /// Appends a frame that `write` writes, giving its length. Returns false if it
+    /// does not fit.
+    fn push(&mut self, write: impl FnOnce(&mut [u8]) -> Option<usize>) -> bool {
         self.bytes.copy_within(self.sent..self.end, 0);
         (self.sent, self.end) = (0, self.end - self.sent);
         let free = self.bytes.get_mut(self.end..).unwrap_or(&mut []);
-        let Some(frame) = encode(message, free) else {
+        let Some(length) = write(free) else {
             return false;
         };
-        self.end += frame.len();
+        self.end += length;
         true
     }
 
@@ -55,6 +58,10 @@ impl<const N: usize> Frames<N> {
         self.sent += n;
         n
     }
+}
+
+fn in_session(session: SessionNumber, message: &ToHost, free: &mut [u8]) -> Option<usize> {
+    encode(&InSession { session, message }, free).map(<[u8]>::len)
 }
 
 /// Frames waiting for the writer, in two classes that never mix bytes.
@@ -95,13 +102,27 @@ impl TxQueue {
     }
 
     /// Queues an answer or a request. Returns false if there was no room.
-    pub(super) fn push(&mut self, message: &ToHost) -> bool {
-        self.urgent.push(message)
+    pub(super) fn push(&mut self, session: SessionNumber, message: &ToHost) -> bool {
+        self.urgent.push(|free| in_session(session, message, free))
+    }
+
+    /// Queues a refusal, which belongs to no session.
+    pub(super) fn push_refusal(&mut self, refusal: &VersionCheck) -> bool {
+        self.urgent
+            .push(|free| encode(refusal, free).map(<[u8]>::len))
     }
 
     /// Queues the one telemetry message there is room for.
-    pub(super) fn push_telemetry(&mut self, telemetry: Telemetry) -> bool {
-        self.telemetry.is_empty() && self.telemetry.push(&ToHost::Telemetry(telemetry))
+    pub(super) fn push_telemetry(&mut self, session: SessionNumber, message: &ToHost) -> bool {
+        self.telemetry.is_empty()
+            && self
+                .telemetry
+                .push(|free| in_session(session, message, free))
+    }
+
+    /// Whether telemetry waits that an urgent frame would overtake.
+    pub(super) fn telemetry_waits(&self) -> bool {
+        !self.telemetry.is_empty() && self.telemetry.sent == 0
     }
 
     /// Moves the bytes that are sent next into `into` and returns how many.
@@ -131,10 +152,16 @@ impl TxQueue {
 mod tests {
     use super::*;
     use hapterra_core::wire::frame::{FrameReader, decode};
+    use hapterra_core::wire::message::Telemetry;
     use std::vec::Vec;
 
-    fn refused(protocol: u16) -> ToHost {
-        ToHost::Refused { protocol }
+    const SESSION: SessionNumber = SessionNumber::new(1);
+
+    fn taken(epoch: u32) -> ToHost {
+        ToHost::SceneTaken {
+            epoch,
+            accepted: true,
+        }
     }
 
     /// Takes `n` bytes, or fewer if there are no more.
@@ -155,7 +182,8 @@ mod tests {
         let mut messages = Vec::new();
         while !bytes.is_empty() {
             let (taken, frame) = reader.push(bytes);
-            messages.extend(frame.and_then(|frame| frame.and_then(decode).ok()));
+            let content = frame.and_then(|frame| frame.and_then(decode).ok());
+            messages.extend(content.map(|framed: InSession<ToHost>| framed.message));
             bytes = &bytes[taken..];
         }
         messages
@@ -165,27 +193,27 @@ mod tests {
     fn a_request_goes_before_telemetry_but_never_into_it() {
         let telemetry = || ToHost::Telemetry(Telemetry::default());
         let mut queue = TxQueue::new();
-        queue.push_telemetry(Telemetry::default());
-        queue.push(&refused(1));
+        queue.push_telemetry(SESSION, &telemetry());
+        queue.push(SESSION, &taken(1));
         let all = take(&mut queue, 4096);
-        assert_eq!(understood(&all), [refused(1), telemetry()]);
+        assert_eq!(understood(&all), [taken(1), telemetry()]);
 
-        queue.push_telemetry(Telemetry::default());
+        queue.push_telemetry(SESSION, &telemetry());
         let mut all = take(&mut queue, 2);
-        queue.push(&refused(1));
+        queue.push(SESSION, &taken(1));
         all.extend(take(&mut queue, 4096));
-        assert_eq!(understood(&all), [telemetry(), refused(1)]);
+        assert_eq!(understood(&all), [telemetry(), taken(1)]);
     }
 
     #[test]
     fn what_was_cut_off_does_not_take_the_next_frame_with_it() {
         let mut queue = TxQueue::new();
-        queue.push(&refused(1));
+        queue.push(SESSION, &taken(1));
         let mut all = take(&mut queue, 3);
         queue.clear();
-        queue.push(&refused(2));
+        queue.push(SESSION, &taken(2));
         all.extend(take(&mut queue, 4096));
-        assert_eq!(understood(&all), [refused(2)]);
+        assert_eq!(understood(&all), [taken(2)]);
     }
 
     #[test]
@@ -193,14 +221,14 @@ mod tests {
         let mut queue = TxQueue::new();
         let mut pushed = 0;
         while queue.has_room() {
-            assert!(queue.push(&refused(pushed)));
+            assert!(queue.push(SESSION, &taken(pushed)));
             pushed += 1;
         }
         assert!(pushed > 20);
         let first = take(&mut queue, LONGEST_URGENT);
         assert!(queue.has_room());
         let rest = take(&mut queue, 4096);
-        let all: Vec<_> = (0..pushed).map(refused).collect();
+        let all: Vec<_> = (0..pushed).map(taken).collect();
         assert_eq!(understood(&[first, rest].concat()), all);
     }
 }

@@ -21,6 +21,41 @@ pub fn is_hapterra(vendor: u16, product: u16, name: Option<&str>) -> bool {
     vendor == VENDOR_ID && product == PRODUCT_ID && named
 }
 
+/// Why none of the boards on USB is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NotOne {
+    /// None fits.
+    None,
+    /// Several fit.
+    Several,
+}
+
+/// The board with a serial number among those with `serials`, or the only one: its
+/// position. A choice is never made between two, because an arm is behind each.
+///
+/// # Errors
+/// [`NotOne`].
+pub fn the_one(serials: &[Option<String>], wanted: Option<&str>) -> Result<usize, NotOne> {
+    let fits = |serial: &Option<String>| match (serial, wanted) {
+        (_, None) => true,
+        (Some(serial), Some(wanted)) => serial.eq_ignore_ascii_case(wanted),
+        (None, Some(_)) => false,
+    };
+    let mut fitting = (0..serials.len()).filter(|i| fits(&serials[*i]));
+    match (fitting.next(), fitting.next()) {
+        (Some(only), None) => Ok(only),
+        (None, _) => Err(NotOne::None),
+        (Some(_), Some(_)) => Err(NotOne::Several),
+    }
+}
+
+/// A text of a device's without what a terminal might act on.
+#[must_use]
+pub fn printable(text: &str) -> String {
+    let shown = |c: &char| c.is_ascii_graphic();
+    text.chars().filter(shown).take(64).collect()
+}
+
 /// Where a board's link is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BulkEndpoints {
@@ -104,6 +139,27 @@ mod tests {
         assert!(is_hapterra(VENDOR_ID, PRODUCT_ID, None));
         assert!(!is_hapterra(VENDOR_ID, PRODUCT_ID, Some("blinky")));
         assert!(!is_hapterra(VENDOR_ID, 0x0002, Some(PRODUCT)));
+    }
+
+    #[test]
+    fn of_several_boards_only_the_one_that_is_named_is_taken() {
+        let serials = ["0039001A", "0039001B"].map(|serial| Some(serial.to_owned()));
+        assert_eq!(the_one(&serials, None), Err(NotOne::Several));
+        assert_eq!(the_one(&serials, Some("0039001b")), Ok(1));
+        assert_eq!(the_one(&serials, Some("0039001")), Err(NotOne::None));
+        assert_eq!(the_one(&serials[..1], None), Ok(0));
+        assert_eq!(the_one(&serials[..1], Some("0039001B")), Err(NotOne::None));
+        assert_eq!(the_one(&[None], None), Ok(0));
+        assert_eq!(the_one(&[None], Some("")), Err(NotOne::None));
+        assert_eq!(the_one(&[], None), Err(NotOne::None));
+        let twins = [&serials[0], &serials[0]].map(Clone::clone);
+        assert_eq!(the_one(&twins, Some("0039001A")), Err(NotOne::Several));
+    }
+
+    #[test]
+    fn a_serial_number_reaches_no_terminal_raw() {
+        assert_eq!(printable("00\u{1b}[2J3A\r\n"), "00[2J3A");
+        assert_eq!(printable(&"F".repeat(500)).len(), 64);
     }
 
     #[test]

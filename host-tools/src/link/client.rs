@@ -1,16 +1,22 @@
-//! The host's side of the conversation, without I/O.
+//! The host's side of a session about a terrain, without I/O and without a clock.
+
+use std::time::Duration;
 
 use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Sample, Scene};
+use hapterra_core::scene::{Point, Sample, Scene};
 use hapterra_core::terrain::TileKey;
-use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, encode};
-use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
+use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::message::{TileMessage, ToDevice, ToHost};
-use hapterra_core::wire::status::{Answer, Status};
+use hapterra_core::wire::request::{Refusal, Request};
+use hapterra_core::wire::session::{LastSession, SessionNumber};
+use hapterra_core::wire::status::Status;
 
+use super::conversation::{Ask, Conversation, News, State};
 use super::error::LinkError;
-use super::messages::next_message;
+use super::messages::{FromDevice, from_device, next_frame};
+use super::patience::Patience;
 use super::tally::Tally;
 use crate::terrain::{Terrain, TileBuffer};
 
@@ -34,19 +40,26 @@ pub enum Event<'e> {
         /// HIP, proxy, force and state at the point.
         sample: &'e Sample,
     },
-    /// Where the device's guard stands; told at the beginning of a session and
-    /// whenever it changes.
+    /// Where the device's guard stands; told at the beginning of a session,
+    /// whenever it changes, and twice a second.
     Guard(&'e Report),
     /// The answer to a question for the status.
     Status(&'e Status),
     /// The calibration in force.
     Calibration(Option<&'e Calibration>),
-    /// The answer to a request.
-    Answer(&'e Answer),
+    /// What came of a request.
+    Answered {
+        /// What was asked for.
+        request: &'e Request,
+        /// Whether it was done; why not.
+        result: Result<(), Refusal>,
+    },
+    /// What was asked for was given up: the device does not answer it, or was
+    /// restarted meanwhile. Whether it was done is not known.
+    Unanswered(&'e Ask),
 }
 
-/// How a session arms the device, in the same breath as it puts the scene in
-/// force.
+/// How a session arms the device, as soon as the scene is in force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Arming {
     /// What the encoders read in the zero pose, where the host knows.
@@ -58,49 +71,75 @@ impl Arming {
     pub const VIRTUAL: Self = Self { zero: Some([0; 3]) };
 }
 
-/// What the host waits for at the beginning of a session. An answer that is
-/// not waited for is a duplicate of something earlier and changes nothing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Awaited {
-    /// Nothing: no hello was said yet, or the scene is in force.
-    Nothing,
-    /// The device's hello.
-    Hello,
-    /// That the device takes the scene that it was sent.
-    SceneTaken,
-}
+/// Samples after which the host says that it is there: half a second of a device whose
+/// time runs faster than the host's.
+const SAMPLES_A_SIGN: u32 = 500;
+/// Between two lines of the log about requests for tiles that there are not.
+const LOG_EVERY: Duration = Duration::from_secs(1);
 
 /// Serves one terrain to one device. Bytes from the device go into
 /// [`Client::receive`]; bytes for it come out of there and of
-/// [`Client::greet`].
+/// [`Client::due`], which is to be called now and then. `now` is the time since any
+/// fixed moment.
 pub struct Client<'t> {
     terrain: &'t Terrain<'t>,
     scene: Scene,
     arming: Option<Arming>,
+    talk: Conversation,
     reader: Box<FrameReader<MAX_FRAME>>,
-    frame: Box<[u8; MAX_FRAME]>,
     tile: TileBuffer,
     /// The device of the present session.
     device: Option<DeviceHello>,
-    awaited: Awaited,
+    /// The scene was not taken yet in this session.
+    is_new: bool,
+    /// Tiles that are sent once the device was told its zero: what is done before the
+    /// first tick must not depend on how long a message takes.
+    withheld: Vec<TileKey>,
+    zeroing: bool,
+    /// The point of a replay that is to be felt, and when it was said.
+    point: Option<(Point, Duration)>,
     tally: Tally,
+    samples_since_sign: u32,
+    logged: Option<Duration>,
 }
 
 impl<'t> Client<'t> {
     /// A client that has not said anything yet. It arms the device at the
     /// beginning of each session, if `arming` says how.
     #[must_use]
-    pub fn new(terrain: &'t Terrain<'t>, scene: Scene, arming: Option<Arming>) -> Self {
+    pub fn new(
+        terrain: &'t Terrain<'t>,
+        scene: Scene,
+        arming: Option<Arming>,
+        patience: Patience,
+    ) -> Self {
+        Self::numbered(terrain, scene, arming, patience, fastrand::u64(..))
+    }
+
+    /// The same, with the numbers of its sessions drawn from a seed.
+    #[must_use]
+    pub fn numbered(
+        terrain: &'t Terrain<'t>,
+        scene: Scene,
+        arming: Option<Arming>,
+        patience: Patience,
+        seed: u64,
+    ) -> Self {
         Self {
             terrain,
             scene,
             arming,
+            talk: Conversation::new(Some(scene), patience, fastrand::Rng::with_seed(seed)),
             reader: Box::default(),
-            frame: Box::new([0; MAX_FRAME]),
             tile: TileBuffer::default(),
             device: None,
-            awaited: Awaited::Nothing,
+            is_new: true,
+            withheld: vec![],
+            zeroing: false,
+            point: None,
             tally: Tally::default(),
+            samples_since_sign: 0,
+            logged: None,
         }
     }
 
@@ -116,18 +155,89 @@ impl<'t> Client<'t> {
         &self.tally
     }
 
-    /// Begins a session, the first or another: appends the hello to `out`.
-    pub fn greet(&mut self, out: &mut Vec<u8>) {
-        // A zero first ends whatever may have been under way.
-        out.push(0);
-        self.awaited = Awaited::Hello;
-        let protocol = PROTOCOL;
-        self.say(&ToDevice::Hello(HostHello { protocol }), out);
+    /// Where the conversation stands.
+    #[must_use]
+    pub const fn state(&self) -> State {
+        self.talk.state()
     }
 
-    /// Appends a message to `out`.
-    pub fn say(&mut self, message: &ToDevice<'_>, out: &mut Vec<u8>) {
-        out.extend_from_slice(framed(message, &mut self.frame));
+    /// The session that is spoken in, or will be.
+    #[must_use]
+    pub const fn session(&self) -> SessionNumber {
+        self.talk.session()
+    }
+
+    /// How long it waits for what.
+    #[must_use]
+    pub const fn patience(&self) -> &Patience {
+        self.talk.patience()
+    }
+
+    /// Begins a session, the first or another: appends the hello to `out`.
+    pub fn greet(&mut self, now: Duration, out: &mut Vec<u8>) {
+        *self.reader = FrameReader::new();
+        self.is_new = true;
+        self.withheld.clear();
+        self.zeroing = false;
+        if self.talk.greet(now, out) {
+            self.tally.drawn();
+        }
+    }
+
+    /// Ends the session: appends the goodbye to `out`. The device is known to be
+    /// disarmed when the state is [`State::Closed`].
+    pub fn leave(&mut self, now: Duration, out: &mut Vec<u8>) {
+        self.talk.leave(now, out);
+    }
+
+    /// Asks for something, after what was asked for before.
+    pub fn ask(&mut self, ask: Ask) {
+        self.talk.ask(ask);
+    }
+
+    /// Has a point felt: says it until it is answered.
+    pub fn feel(&mut self, now: Duration, point: Point, out: &mut Vec<u8>) {
+        self.point = Some((point, now));
+        self.talk.say(&ToDevice::Point(point), out);
+    }
+
+    /// Appends what is due to `out`.
+    ///
+    /// # Errors
+    /// When a deadline has passed: [`LinkError::Silent`], [`LinkError::Taken`],
+    /// [`LinkError::NotConfirmed`].
+    pub fn due(
+        &mut self,
+        now: Duration,
+        out: &mut Vec<u8>,
+        on: &mut dyn FnMut(Event<'_>),
+    ) -> Result<(), LinkError> {
+        if self.samples_since_sign >= SAMPLES_A_SIGN {
+            self.samples_since_sign = 0;
+            self.talk.hasten_alive();
+        }
+        let checked = self.talk.due(now, out);
+        self.repeat_point(now, out);
+        for ask in self.talk.take_unanswered() {
+            self.tally.unanswered += 1;
+            if matches!(ask, Ask::Request(Request::Zero { .. })) {
+                self.hand_over_withheld(out);
+            }
+            on(Event::Unanswered(&ask));
+        }
+        checked
+    }
+
+    fn repeat_point(&mut self, now: Duration, out: &mut Vec<u8>) {
+        let again = self.talk.patience().again;
+        let is_open = self.state() == State::Open;
+        if let Some((point, said)) = &mut self.point
+            && is_open
+            && now.saturating_sub(*said) >= again
+        {
+            *said = now;
+            self.talk.say(&ToDevice::Point(*point), out);
+        }
     }
 
     /// Takes bytes from the device, appends the answers to `out` and reports
@@ -137,13 +247,22 @@ impl<'t> Client<'t> {
     /// [`LinkError::Version`] and [`LinkError::SceneRefused`].
     pub fn receive(
         &mut self,
+        now: Duration,
         mut bytes: &[u8],
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
     ) -> Result<(), LinkError> {
-        while let Some(message) = next_message(&mut self.reader, &mut bytes) {
-            match message {
-                Ok(message) => self.on_message(message, out, on)?,
+        while let Some(frame) = next_frame(&mut self.reader, &mut bytes, from_device) {
+            match frame {
+                Ok(FromDevice::Version(check)) => self.talk.on_version_check(check)?,
+                Ok(FromDevice::Message(message)) => {
+                    if message.session != self.talk.session() {
+                        self.tally.foreign_frames += 1;
+                    }
+                    if let Some(news) = self.talk.hear(now, message, out)? {
+                        self.on_news(now, news, out, on);
+                    }
+                }
                 Err(bad) => {
                     self.tally.bad_frames += 1;
                     tracing::debug!(?bad, "a frame was not understood");
@@ -153,139 +272,165 @@ impl<'t> Client<'t> {
         Ok(())
     }
 
-    fn on_message(
+    fn on_news(
         &mut self,
-        message: ToHost,
+        now: Duration,
+        news: News,
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
-    ) -> Result<(), LinkError> {
-        match message {
-            ToHost::Hello(device) if device.protocol != PROTOCOL => {
-                return Err(LinkError::version(device.protocol));
-            }
-            ToHost::Refused { protocol } => return Err(LinkError::version(protocol)),
-            ToHost::Hello(device) if self.awaited == Awaited::Hello => {
-                self.device = Some(device);
-                self.awaited = Awaited::SceneTaken;
-                self.say(&ToDevice::Scene(self.scene), out);
-                if let Some(Arming { zero }) = self.arming {
-                    if let Some(counts) = zero {
-                        self.say(&ToDevice::Zero { counts }, out);
-                    }
-                    self.say(&ToDevice::Arm, out);
-                }
-            }
-            ToHost::SceneTaken { epoch, accepted }
-                if epoch == self.scene.epoch && self.awaited == Awaited::SceneTaken =>
-            {
-                self.awaited = Awaited::Nothing;
-                self.on_scene_taken(accepted, on)?;
-            }
-            ToHost::Need { epoch, key } if epoch == self.scene.epoch => self.on_need(key, out),
-            ToHost::Telemetry(telemetry) => {
-                if self.tally.received(&telemetry) {
-                    telemetry.samples.iter().for_each(|s| on(Event::Sample(s)));
-                }
-            }
-            ToHost::PointAnswer { seq, sample } => on(Event::Felt {
-                seq,
-                sample: &sample,
-            }),
-            ToHost::Guard(report) => on(Event::Guard(&report)),
-            ToHost::Status(status) => on(Event::Status(&status)),
-            ToHost::Calibration(calibration) => on(Event::Calibration(calibration.as_ref())),
-            ToHost::Answer(answer) => on(Event::Answer(&answer)),
-            // Of an earlier session, or said twice.
-            ToHost::Hello(_) | ToHost::SceneTaken { .. } | ToHost::Need { .. } => {}
+    ) {
+        match news {
+            News::Greeted { device, restarted } => self.on_greeted(device, restarted),
+            News::SceneTaken => self.on_scene_taken(now, out, on),
+            News::Answered(ask, message) => self.on_answered(now, ask, &message, out, on),
+            News::Other(message) => self.on_message(now, message, out, on),
         }
-        Ok(())
     }
 
-    fn on_scene_taken(
-        &mut self,
-        accepted: bool,
-        on: &mut dyn FnMut(Event<'_>),
-    ) -> Result<(), LinkError> {
-        if !accepted {
-            return Err(LinkError::SceneRefused);
+    fn on_greeted(&mut self, device: DeviceHello, restarted: bool) {
+        if restarted {
+            self.is_new = true;
+            self.withheld.clear();
+            self.zeroing = false;
+            self.tally.restarted();
+        } else {
+            // Where a restart came between, only the session's last part is known.
+            let LastSession {
+                session,
+                opened_by,
+                count,
+                ..
+            } = device.last;
+            let ours = self.talk.previous();
+            let whole = ours.is_some_and(|ours| (ours.0.get(), ours.1) == (session, opened_by));
+            self.tally.opened(whole.then_some(count));
+        }
+        self.device = Some(device);
+    }
+
+    fn on_scene_taken(&mut self, now: Duration, out: &mut Vec<u8>, on: &mut dyn FnMut(Event<'_>)) {
+        if !std::mem::take(&mut self.is_new) {
+            return;
+        }
+        if let Some(Arming { zero }) = self.arming {
+            if let Some(counts) = zero {
+                self.zeroing = true;
+                self.talk.ask(Ask::Request(Request::Zero { counts }));
+            }
+            self.talk.ask(Ask::Request(Request::Arm));
+            self.talk.say_pending(now, out);
         }
         if let Some(device) = &self.device {
-            self.tally.opened();
             let resumed = device.epoch == Some(self.scene.epoch);
             on(Event::Opened { device, resumed });
         }
-        Ok(())
     }
 
-    fn on_need(&mut self, key: TileKey, out: &mut Vec<u8>) {
+    fn on_answered(
+        &mut self,
+        now: Duration,
+        ask: Ask,
+        message: &ToHost,
+        out: &mut Vec<u8>,
+        on: &mut dyn FnMut(Event<'_>),
+    ) {
+        // The next goes out at once.
+        self.talk.say_pending(now, out);
+        if matches!(ask, Ask::Request(Request::Zero { .. })) {
+            self.hand_over_withheld(out);
+        }
+        match (ask, message) {
+            (Ask::Request(request), ToHost::Answer(answer)) => on(Event::Answered {
+                request: &request,
+                result: answer.result,
+            }),
+            (_, ToHost::Status(status)) => on(Event::Status(status)),
+            (_, ToHost::Calibration(calibration)) => {
+                on(Event::Calibration(calibration.as_ref()));
+            }
+            _ => {}
+        }
+    }
+
+    fn on_message(
+        &mut self,
+        now: Duration,
+        message: ToHost,
+        out: &mut Vec<u8>,
+        on: &mut dyn FnMut(Event<'_>),
+    ) {
+        let is_open = self.state() == State::Open;
+        match message {
+            ToHost::Need { epoch, key } if is_open && epoch == self.scene.epoch => {
+                match self.zeroing {
+                    true if self.withheld.contains(&key) => {}
+                    true => self.withheld.push(key),
+                    false => self.on_need(now, key, out),
+                }
+            }
+            ToHost::Telemetry(telemetry) => {
+                let samples = telemetry.samples.len() as u32;
+                self.samples_since_sign = self.samples_since_sign.saturating_add(samples);
+                // Until the scene is taken they are of another, or of none.
+                if self.tally.received(&telemetry) && !self.is_new {
+                    telemetry.samples.iter().for_each(|s| on(Event::Sample(s)));
+                }
+            }
+            ToHost::PointAnswer { seq, sample } => {
+                self.point.take_if(|(point, _)| point.seq == seq);
+                on(Event::Felt {
+                    seq,
+                    sample: &sample,
+                });
+            }
+            ToHost::Guard(report) => on(Event::Guard(&report)),
+            ToHost::Alive { count, report, .. } => {
+                self.tally.told(count);
+                on(Event::Guard(&report));
+            }
+            ToHost::Goodbye(count) => self.tally.told(count),
+            // Said twice, or of a scene that is not served any more.
+            _ => {}
+        }
+    }
+
+    fn hand_over_withheld(&mut self, out: &mut Vec<u8>) {
+        self.zeroing = false;
+        for key in std::mem::take(&mut self.withheld) {
+            self.on_need(Duration::ZERO, key, out);
+        }
+    }
+
+    fn on_need(&mut self, now: Duration, key: TileKey, out: &mut Vec<u8>) {
         let Some(heights) = self.terrain.tile(key, &mut self.tile) else {
-            tracing::warn!(?key, "the device asked for a tile that there is not");
-            return;
+            return self.on_no_tile(now, key);
         };
-        let message = ToDevice::Tile(TileMessage {
+        let message = TileMessage {
             epoch: self.scene.epoch,
             key,
             heights,
-        });
-        let bytes = framed(&message, &mut self.frame);
-        self.tally.sent_tile(key, bytes.len());
-        tracing::trace!(?key, bytes = bytes.len(), "tile sent");
-        out.extend_from_slice(bytes);
+        };
+        let before = out.len();
+        self.talk.say(&ToDevice::Tile(message), out);
+        self.tally.sent_tile(key, out.len() - before);
     }
-}
 
-fn framed<'b>(message: &ToDevice<'_>, frame: &'b mut [u8; MAX_FRAME]) -> &'b [u8] {
-    // The longest message is a tile, and a frame holds one by definition.
-    encode(message, frame).unwrap_or(&[])
+    /// A device may ask for anything, as often as it likes.
+    fn on_no_tile(&mut self, now: Duration, key: TileKey) {
+        self.tally.no_tiles += 1;
+        let due = |at: Duration| now.saturating_sub(at) >= LOG_EVERY;
+        if self.logged.is_none_or(due) {
+            self.logged = Some(now);
+            let so_far = self.tally.no_tiles;
+            tracing::warn!(
+                ?key,
+                so_far,
+                "the device asked for a tile that there is not"
+            );
+        }
+    }
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
-    use super::*;
-    use crate::raster::Raster;
-    use crate::terrain::Scale;
-    use hapterra_core::contact::Rule;
-    use hapterra_core::force::ForceLaw;
-    use hapterra_core::grid::GridPoint;
-    use hapterra_core::scene::Source;
-
-    /// How a device introduces itself.
-    pub(crate) fn hello() -> DeviceHello {
-        DeviceHello {
-            protocol: PROTOCOL,
-            board: "test".try_into().expect("fits"),
-            version: "1".try_into().expect("fits"),
-            window: 4,
-            tick_hz: 1000,
-            clock_hz: 1_000_000,
-            epoch: None,
-        }
-    }
-
-    #[test]
-    fn what_is_said_twice_opens_once() {
-        let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
-        let scale = Scale::new(1.0, 1.0).expect("scale");
-        let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-        let home = GridPoint::default();
-        let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Points, home);
-        let mut client = Client::new(&terrain, scene, None);
-        let hello = ToHost::Hello(hello());
-        let taken = ToHost::SceneTaken {
-            epoch: scene.epoch,
-            accepted: true,
-        };
-        let (mut out, mut opened) = (Vec::new(), 0);
-        client.greet(&mut out);
-        for message in [&taken, &hello, &hello, &taken, &taken, &hello] {
-            let mut frame = [0; MAX_FRAME];
-            let bytes = encode(message, &mut frame).expect("fits");
-            let mut count =
-                |event: Event<'_>| opened += u32::from(matches!(event, Event::Opened { .. }));
-            client
-                .receive(bytes, &mut out, &mut count)
-                .expect("understood");
-        }
-        assert_eq!((opened, client.tally().sessions), (1, 1));
-    }
-}
+#[path = "client_tests.rs"]
+pub(crate) mod tests;

@@ -12,8 +12,9 @@ use super::usb::Usb;
 /// A device by the name that the command line gives it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceAddress {
-    /// A board on USB.
-    Usb,
+    /// `usb` or `usb:SERIAL`: a board on USB, the only one or that with this serial
+    /// number.
+    Usb(Option<String>),
     /// `tcp:HOST:PORT`: an emulated board, or one behind a network.
     Tcp(String),
     /// The application in this program's memory.
@@ -30,10 +31,22 @@ impl DeviceAddress {
         native: impl FnOnce() -> Native<HostClock>,
     ) -> Result<Box<dyn Transport + 't>, LinkError> {
         Ok(match self {
-            Self::Usb => Box::new(Usb::connect()?),
+            Self::Usb(serial) => Box::new(Usb::connect(serial.as_deref())?),
             Self::Tcp(address) => Box::new(Tcp::connect(address)?),
             Self::Native => Box::new(native()),
         })
+    }
+}
+
+impl DeviceAddress {
+    /// The same device for good: the board that is the only one now, even when another
+    /// one is plugged in later.
+    #[must_use]
+    pub fn pinned(self) -> Self {
+        match self {
+            Self::Usb(None) => Self::Usb(Usb::only_serial()),
+            other => other,
+        }
     }
 }
 
@@ -41,11 +54,14 @@ impl FromStr for DeviceAddress {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match (text, text.strip_prefix("tcp:")) {
-            ("usb", _) => Ok(Self::Usb),
+        match (text, text.split_once(':')) {
+            ("usb", _) => Ok(Self::Usb(None)),
             ("native", _) => Ok(Self::Native),
-            (_, Some(address)) => tcp_address(address).map(Self::Tcp),
-            _ => Err("a device is usb, tcp:HOST:PORT or native".into()),
+            (_, Some(("usb", serial))) if !serial.is_empty() => {
+                Ok(Self::Usb(Some(serial.to_owned())))
+            }
+            (_, Some(("tcp", address))) => tcp_address(address).map(Self::Tcp),
+            _ => Err("a device is usb, usb:SERIAL, tcp:HOST:PORT or native".into()),
         }
     }
 }
@@ -64,7 +80,8 @@ pub(crate) fn tcp_address(text: &str) -> Result<String, String> {
 impl fmt::Display for DeviceAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Usb => f.write_str("usb"),
+            Self::Usb(None) => f.write_str("usb"),
+            Self::Usb(Some(serial)) => write!(f, "usb:{serial}"),
             Self::Tcp(address) => write!(f, "tcp:{address}"),
             Self::Native => f.write_str("native"),
         }
@@ -77,12 +94,16 @@ mod tests {
 
     #[test]
     fn names_of_devices() {
-        assert_eq!("usb".parse(), Ok(DeviceAddress::Usb));
+        assert_eq!("usb".parse(), Ok(DeviceAddress::Usb(None)));
+        let named = "usb:0039001A".parse::<DeviceAddress>();
+        assert_eq!(named, Ok(DeviceAddress::Usb(Some("0039001A".into()))));
+        assert_eq!(named.map(|n| n.to_string()), Ok("usb:0039001A".into()));
         assert_eq!("native".parse(), Ok(DeviceAddress::Native));
         let tcp = "tcp:localhost:4000".parse::<DeviceAddress>();
         assert_eq!(tcp.map(|t| t.to_string()), Ok("tcp:localhost:4000".into()));
         for bad in [
             "",
+            "usb:",
             "tcp:",
             "tcp:localhost",
             "tcp::1",

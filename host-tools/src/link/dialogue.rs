@@ -1,34 +1,45 @@
-//! Questions and requests to a device, without a scene: who it is, how it is,
+//! Questions and requests to a device, without a terrain: who it is, how it is,
 //! its calibration, arming.
 
 use std::time::{Duration, Instant};
 
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
+use hapterra_core::scene::Scene;
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
+use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::message::{ToDevice, ToHost};
-use hapterra_core::wire::status::{Refusal, Request, Status};
+use hapterra_core::wire::request::{Answer, Refusal, Request};
+use hapterra_core::wire::status::Status;
 
+use super::conversation::{Ask, Conversation, News};
 use super::error::LinkError;
-use super::messages::{Inbox, send};
+use super::messages::{FromDevice, from_device, next_frame};
+use super::patience::Patience;
 use super::transport::Transport;
-
-/// Between two tries to be understood.
-const AGAIN: Duration = Duration::from_millis(400);
 
 /// In this time a device tells where it stands at least once.
 const MOMENT: Duration = Duration::from_millis(150);
+/// Between two looks at the clock while an answer is waited for.
+const LOOK: Duration = Duration::from_millis(50);
 
-/// A conversation with a device. The device keeps the scene that it holds.
+/// Is told of a message that comes unasked; what it returns is said to that.
+type OnMessage<'o> = &'o mut dyn FnMut(&ToHost) -> Option<ToDevice<'static>>;
+
+/// A conversation with a device. The device keeps the scene that it holds. It ends
+/// without a word: whoever speaks with the device next begins a session of its own.
 pub struct Dialogue<'t> {
     line: Line<'t>,
     device: DeviceHello,
 }
 
-/// Messages both ways, and how long an answer may take.
+/// Messages both ways.
 struct Line<'t> {
     transport: Box<dyn Transport + 't>,
-    inbox: Inbox,
-    patience: Duration,
+    talk: Conversation,
+    reader: Box<FrameReader<MAX_FRAME>>,
+    began: Instant,
+    out: Vec<u8>,
+    incoming: Box<[u8; 1024]>,
 }
 
 impl<'t> Dialogue<'t> {
@@ -37,21 +48,20 @@ impl<'t> Dialogue<'t> {
     /// # Errors
     /// [`LinkError`]: nobody answers within `patience`, or in another protocol.
     pub fn open(transport: Box<dyn Transport + 't>, patience: Duration) -> Result<Self, LinkError> {
+        let patience = Patience::of_a_dialogue(patience);
         let mut line = Line {
             transport,
-            inbox: Inbox::default(),
-            patience,
+            talk: Conversation::new(None, patience, fastrand::Rng::new()),
+            reader: Box::default(),
+            began: Instant::now(),
+            out: vec![],
+            incoming: Box::new([0; 1024]),
         };
-        // A zero first ends whatever may have been under way.
-        line.transport.send(&[0]).map_err(LinkError::Gone)?;
-        let hello = ToDevice::Hello(HostHello { protocol: PROTOCOL });
-        let device = line.ask(&hello, |message| match message {
-            ToHost::Hello(device) if device.protocol == PROTOCOL => Some(Ok(device)),
-            ToHost::Hello(DeviceHello { protocol, .. }) | ToHost::Refused { protocol } => {
-                Some(Err(LinkError::version(protocol)))
-            }
+        line.talk.greet(line.began.elapsed(), &mut line.out);
+        let device = line.wait_for(|news| match news {
+            News::Greeted { device, .. } => Some(device),
             _ => None,
-        })??;
+        })?;
         Ok(Self { line, device })
     }
 
@@ -61,12 +71,18 @@ impl<'t> Dialogue<'t> {
         &self.device
     }
 
+    /// Ends the conversation and gives the way to the device back.
+    #[must_use]
+    pub fn into_transport(self) -> Box<dyn Transport + 't> {
+        self.line.transport
+    }
+
     /// The state of the device as it answers: guard, calibration, ticks, stack.
     ///
     /// # Errors
     /// [`LinkError`].
     pub fn status(&mut self) -> Result<Status, LinkError> {
-        self.line.ask(&ToDevice::Status, |message| match message {
+        self.line.ask(Ask::Status, |message| match message {
             ToHost::Status(status) => Some(status),
             _ => None,
         })
@@ -78,10 +94,8 @@ impl<'t> Dialogue<'t> {
     /// # Errors
     /// [`LinkError`].
     pub fn fresh_status(&mut self) -> Result<Status, LinkError> {
-        match self.line.wait_for(MOMENT, &mut |_| None::<()>) {
-            Ok(()) | Err(LinkError::Silent(_)) => self.status(),
-            Err(error) => Err(error),
-        }
+        self.line.listen(MOMENT)?;
+        self.status()
     }
 
     /// The calibration in force on the device; none where it has none.
@@ -89,104 +103,191 @@ impl<'t> Dialogue<'t> {
     /// # Errors
     /// [`LinkError`].
     pub fn calibration(&mut self) -> Result<Option<Calibration>, LinkError> {
+        self.line.ask(Ask::Calibration, |message| match message {
+            ToHost::Calibration(calibration) => Some(calibration),
+            _ => None,
+        })
+    }
+
+    /// Asks for something to be done; the device does it, once, or says why not.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    pub fn request(&mut self, request: &Request) -> Result<Result<(), Refusal>, LinkError> {
+        if matches!(request, Request::DropScene | Request::Jog(_)) {
+            self.line.talk.forget_scene();
+        }
         self.line
-            .ask(&ToDevice::GetCalibration, |message| match message {
-                ToHost::Calibration(calibration) => Some(calibration),
+            .ask(Ask::Request(*request), |message| match message {
+                ToHost::Answer(Answer { result, .. }) => Some(result),
                 _ => None,
             })
     }
 
-    /// Asks for something; the device does it or says why not. Asked again where
-    /// the answer does not come: to do any of it twice is to do it once.
+    /// Puts a scene in force.
     ///
     /// # Errors
     /// [`LinkError`].
-    pub fn request(&mut self, message: &ToDevice<'_>) -> Result<Result<(), Refusal>, LinkError> {
-        let wanted = match message {
-            ToDevice::Arm => Request::Arm,
-            ToDevice::Disarm => Request::Disarm,
-            ToDevice::Zero { .. } => Request::Zero,
-            ToDevice::SetCalibration { .. } => Request::SetCalibration,
-            ToDevice::ClearFault => Request::ClearFault,
-            _ => Request::DropScene,
-        };
-        self.line.ask(message, answers(wanted))
+    pub fn put_scene(&mut self, scene: Scene) -> Result<(), LinkError> {
+        let line = &mut self.line;
+        let now = line.began.elapsed();
+        line.talk.listen_from(now);
+        line.talk.put_scene(scene, now, &mut line.out);
+        line.wait_for(|news| matches!(news, News::SceneTaken).then_some(()))
     }
 
-    /// Puts a calibration in force and has it stored.
+    /// Lets `ms` of the device's time pass, tells `on` of what comes unasked, and says
+    /// what `on` says to it. Returns the state of the device at the end.
+    ///
+    /// # Errors
+    /// [`LinkError`]; also where the device's time stands still.
+    pub fn pass(&mut self, ms: u32, on: OnMessage<'_>) -> Result<Status, LinkError> {
+        let line = &mut self.line;
+        let began = line.began.elapsed();
+        line.talk.listen_from(began);
+        let first = line.status(on)?;
+        let ticks = ms * (first.device.tick_hz / 1000).max(1);
+        let patience = line.talk.patience().give_up + Duration::from_millis(u64::from(ms));
+        loop {
+            line.converse(&mut |_| {}, on)?;
+            let status = line.status(on)?;
+            if status.ticks.run.wrapping_sub(first.ticks.run) >= ticks {
+                return Ok(status);
+            }
+            let waited = line.began.elapsed().saturating_sub(began);
+            if waited > patience {
+                return Err(LinkError::Silent(waited));
+            }
+        }
+    }
+
+    /// Puts a calibration in force and has it stored, once somebody has pressed the
+    /// dead-man switch.
     ///
     /// # Errors
     /// [`LinkError`].
     pub fn store(&mut self, calibration: Calibration) -> Result<Result<(), Refusal>, LinkError> {
-        let message = ToDevice::SetCalibration {
-            calibration,
-            store: true,
-        };
-        match self.request(&message)? {
-            Ok(()) => {
-                let patience = self.line.patience;
-                self.line
-                    .wait_for(patience, &mut answers(Request::StoreCalibration))
-            }
+        match self.request(&Request::SetCalibration { calibration })? {
+            Ok(()) => self.request(&Request::StoreCalibration),
             refused => Ok(refused),
         }
     }
 }
 
 impl Line<'_> {
-    /// Says something and waits for the answer.
+    /// Asks for something and waits for the answer.
     fn ask<T>(
         &mut self,
-        message: &ToDevice<'_>,
-        mut answer: impl FnMut(ToHost) -> Option<T>,
+        ask: Ask,
+        mut read: impl FnMut(ToHost) -> Option<T>,
     ) -> Result<T, LinkError> {
-        let began = Instant::now();
+        // Between two questions nobody listens: the user may think for a while.
+        self.talk.listen_from(self.began.elapsed());
+        self.talk.ask(ask);
+        self.wait_for(|news| match news {
+            News::Answered(asked, message) if asked.is_like(&ask) => read(message),
+            _ => None,
+        })
+    }
+
+    /// Asks for the status and converses until it comes.
+    fn status(&mut self, on: OnMessage<'_>) -> Result<Status, LinkError> {
+        self.talk.ask(Ask::Status);
         loop {
-            send(&mut *self.transport, message).map_err(LinkError::Gone)?;
-            match self.wait_for(AGAIN.min(self.patience), &mut answer) {
-                Err(LinkError::Silent(_)) if began.elapsed() < self.patience => {}
-                Err(LinkError::Silent(_)) => return Err(LinkError::Silent(began.elapsed())),
-                other => return other,
+            let mut found = None;
+            let mut answered = |news| {
+                if let News::Answered(Ask::Status, ToHost::Status(status)) = news {
+                    found = Some(status);
+                }
+            };
+            self.converse(&mut answered, on)?;
+            if let Some(status) = found {
+                return Ok(status);
             }
         }
     }
 
-    fn wait_for<T>(
+    /// Takes what has come, and says what `on` says to what comes unasked.
+    fn converse(
         &mut self,
-        patience: Duration,
-        answer: &mut impl FnMut(ToHost) -> Option<T>,
-    ) -> Result<T, LinkError> {
-        let began = Instant::now();
-        let wait = Duration::from_millis(50);
+        answered: &mut dyn FnMut(News),
+        on: OnMessage<'_>,
+    ) -> Result<(), LinkError> {
+        let mut replies = vec![];
+        self.poll(LOOK, &mut |news| match news {
+            News::Other(message) => replies.extend(on(&message)),
+            news => answered(news),
+        })?;
+        for reply in replies {
+            self.talk.say(&reply, &mut self.out);
+        }
+        self.flush()
+    }
+
+    fn wait_for<T>(&mut self, mut read: impl FnMut(News) -> Option<T>) -> Result<T, LinkError> {
         loop {
-            let next = self.inbox.next(&mut *self.transport, wait);
-            match next.map_err(LinkError::Gone)? {
-                Some(message) => {
-                    if let Some(found) = answer(message) {
-                        return Ok(found);
+            let mut found = None;
+            self.poll(LOOK, &mut |news| {
+                found = found.take().or_else(|| read(news));
+            })?;
+            if let Some(found) = found {
+                return Ok(found);
+            }
+        }
+    }
+
+    /// Hears what the device tells for a while.
+    fn listen(&mut self, time: Duration) -> Result<(), LinkError> {
+        self.talk.listen_from(self.began.elapsed());
+        let end = self.began.elapsed() + time;
+        while self.began.elapsed() < end {
+            self.poll(LOOK, &mut |_| {})?;
+        }
+        Ok(())
+    }
+
+    fn poll(&mut self, wait: Duration, on: &mut dyn FnMut(News)) -> Result<(), LinkError> {
+        self.talk.due(self.began.elapsed(), &mut self.out)?;
+        if let Some(ask) = self.talk.take_unanswered().pop() {
+            tracing::debug!(?ask, "given up");
+            return Err(LinkError::Silent(self.talk.patience().give_up));
+        }
+        self.flush()?;
+        let received = self.transport.receive(self.incoming.as_mut_slice(), wait);
+        let received = received.map_err(LinkError::Gone)?;
+        let mut bytes = self.incoming.get(..received).unwrap_or(&[]);
+        let now = self.began.elapsed();
+        while let Some(frame) = next_frame(&mut self.reader, &mut bytes, from_device) {
+            match frame {
+                Ok(FromDevice::Version(check)) => self.talk.on_version_check(check)?,
+                Ok(FromDevice::Message(message)) => {
+                    if let Some(news) = self.talk.hear(now, message, &mut self.out)? {
+                        on(news);
                     }
                 }
-                None if began.elapsed() >= patience => {
-                    return Err(LinkError::Silent(began.elapsed()));
-                }
-                None => {}
+                // The rest of something earlier.
+                Err(_) => {}
             }
         }
+        self.flush()
     }
-}
 
-fn answers(wanted: Request) -> impl FnMut(ToHost) -> Option<Result<(), Refusal>> {
-    move |message| match message {
-        ToHost::Answer(answer) if answer.request == wanted => Some(answer.result),
-        _ => None,
+    fn flush(&mut self) -> Result<(), LinkError> {
+        if self.out.is_empty() {
+            return Ok(());
+        }
+        let sent = self.transport.send(&self.out);
+        self.out.clear();
+        sent.map_err(LinkError::Gone)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::Native;
-    use hapterra_core::wire::frame::{MAX_FRAME, encode};
+    use crate::link::{Meddler, Native};
+    use hapterra_core::wire::frame::encode;
+    use hapterra_core::wire::version::VersionCheck;
     use std::io;
 
     const PATIENCE: Duration = Duration::from_secs(20);
@@ -204,7 +305,8 @@ mod tests {
 
     #[test]
     fn a_calibration_is_taken_stored_and_refused_with_a_reason() {
-        let device = Box::new(Native::for_replay().restless());
+        let press: Meddler = Box::new(|tick, sense, _| sense.dead_man = tick % 1_000 >= 500);
+        let device = Box::new(Native::for_replay().restless().meddled_with(press));
         let mut dialogue = Dialogue::open(device, PATIENCE).expect("it answers");
         let mut calibration = Calibration::OMNI;
         assert_eq!(dialogue.store(calibration).expect("it answers"), Ok(()));
@@ -215,7 +317,7 @@ mod tests {
             matches!(refused, Err(Refusal::Calibration(_))),
             "{refused:?}"
         );
-        let blocked = dialogue.request(&ToDevice::Arm).expect("it answers");
+        let blocked = dialogue.request(&Request::Arm).expect("it answers");
         assert!(matches!(blocked, Err(Refusal::Blocked(_))), "{blocked:?}");
     }
 
@@ -245,7 +347,7 @@ mod tests {
         let nonsense = b"HTTP/1.1 400\0\0".to_vec();
         assert!(matches!(ask(nonsense), Err(LinkError::Silent(_))));
         let mut frame = [0; MAX_FRAME];
-        let refused = ToHost::Refused { protocol: 77 };
+        let refused = VersionCheck::Refused { protocol: 77 };
         let bytes = encode(&refused, &mut frame).expect("fits").to_vec();
         assert!(matches!(
             ask(bytes),

@@ -1,11 +1,16 @@
 //! The emulated board: QEMU as a child of this program.
+//!
+//! The image may be anybody's. QEMU runs without semihosting, through which an image
+//! could read and write every file that its user can: what it has to say goes over
+//! three serial lines, and a reset is its end.
 
 use std::io::{self, Read};
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use super::device_text::shown_lines;
 use super::tcp::Tcp;
 
 /// Environment variable that names the image when no option does.
@@ -18,6 +23,9 @@ pub const QEMU: &str = "qemu-system-arm";
 const START: Duration = Duration::from_secs(60);
 /// How long the board may take to end after a goodbye.
 const END: Duration = Duration::from_secs(10);
+
+/// Bytes of a report that are read, at most.
+const SAID: u64 = 16 << 10;
 
 /// Instructions that the emulated board executes for each count of its clock:
 /// `-icount shift=3` makes an instruction 8 ns, a count of its 25 MHz clock is
@@ -101,17 +109,24 @@ impl Emulator {
     /// it otherwise.
     ///
     /// # Errors
-    /// When the process cannot be waited for.
-    pub fn finish(mut self) -> io::Result<ExitStatus> {
+    /// When it has to be ended, or says that it failed.
+    pub fn finish(mut self) -> io::Result<()> {
         let deadline = Instant::now() + END;
         while Instant::now() < deadline {
             if let Some(status) = self.child.try_wait()? {
-                return Ok(status);
+                // A board that ended well has reported nothing.
+                let report = self.report();
+                return match status.success() && report.is_empty() {
+                    true => Ok(()),
+                    false => Err(io::Error::other(format!(
+                        "{status}; {report} {}",
+                        self.complaint()
+                    ))),
+                };
             }
             std::thread::sleep(Duration::from_millis(5));
         }
-        self.child.kill()?;
-        self.child.wait()
+        Err(io::Error::other(format!("it still ran after {END:?}")))
     }
 
     /// What the board or QEMU said if it has ended by itself; ends it otherwise.
@@ -120,7 +135,7 @@ impl Emulator {
         // The link breaks a moment before the process has ended.
         std::thread::sleep(Duration::from_millis(200));
         let status = self.child.try_wait().ok().flatten()?;
-        Some(format!("{status}; {}", self.said().trim()))
+        Some(format!("{status}; {}", self.said()))
     }
 
     fn accept(&mut self, line: &TcpListener, deadline: Instant) -> Result<Tcp, EmulatorError> {
@@ -142,20 +157,28 @@ impl Emulator {
         }
     }
 
-    /// What QEMU has written on its standard error, read to the end.
+    /// What the board has reported on its third line, which is QEMU's standard output,
+    /// and what QEMU has complained of.
     fn said(&mut self) -> String {
-        let mut said = String::new();
-        if let Some(mut stderr) = self.child.stderr.take() {
-            // What cannot be read is not shown.
-            let _ = stderr.read_to_string(&mut said);
-        }
-        said
+        let report = self.report();
+        let complaint = self.complaint();
+        [report, complaint].join(" ").trim().to_owned()
+    }
+
+    /// The board's report, read to its end: QEMU has ended.
+    fn report(&mut self) -> String {
+        self.child.stdout.take().map_or(String::new(), text)
+    }
+
+    /// What QEMU has written on its standard error, read to its end: QEMU has ended.
+    fn complaint(&mut self) -> String {
+        self.child.stderr.take().map_or(String::new(), text)
     }
 
     fn not_up(&mut self, how: String) -> EmulatorError {
-        let said = match self.said().trim() {
-            "" => how,
-            words => words.to_owned(),
+        let said = match self.said() {
+            nothing if nothing.is_empty() => how,
+            words => words,
         };
         let path = self.path.clone();
         EmulatorError::NotUp { path, said }
@@ -170,6 +193,14 @@ impl Drop for Emulator {
     }
 }
 
+/// What a terminal may show of what is written there: of what is endless the beginning,
+/// and nothing of what cannot be read.
+fn text(from: impl Read) -> String {
+    let mut said = Vec::new();
+    let _ = from.take(SAID).read_to_end(&mut said);
+    shown_lines(String::from_utf8_lossy(&said).trim())
+}
+
 fn listen() -> Result<TcpListener, EmulatorError> {
     let bound = TcpListener::bind((Ipv4Addr::LOCALHOST, 0));
     let listener = bound.and_then(|listener| listener.set_nonblocking(true).map(|()| listener));
@@ -180,17 +211,19 @@ fn command(qemu: &Path, image: &Path, lines: &[TcpListener; 2]) -> Command {
     let mut command = Command::new(qemu);
     command.args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"]);
     command.args(["-icount", "shift=3,sleep=off"]);
-    command.args(["-semihosting-config", "enable=on,target=native"]);
+    // A reset is the end: the board has no other way to end the program.
+    command.arg("-no-reboot");
     for (index, line) in lines.iter().enumerate() {
         let port = line.local_addr().map_or(0, |address| address.port());
         let socket = format!("socket,id=u{index},host=127.0.0.1,port={port},nodelay=on");
         command.args(["-chardev", &socket, "-serial", &format!("chardev:u{index}")]);
     }
+    command.args(["-chardev", "stdio,id=report,signal=off,mux=off"]);
+    command.args(["-serial", "chardev:report"]);
     command.arg("-kernel").arg(image);
-    // Its standard output carries the board's log in a binary format.
     command
         .stdin(Stdio::null())
-        .stdout(Stdio::null())
+        .stdout(Stdio::piped())
         .stderr(Stdio::piped());
     command
 }

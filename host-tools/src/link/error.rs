@@ -16,12 +16,24 @@ pub enum LinkError {
         /// What was found instead.
         why: String,
     },
+    /// Several devices could be meant.
+    #[error("several hapterra boards: {}", .0.join(", "))]
+    Several(Vec<String>),
     /// The transport broke while the device was in use.
     #[error("the device is gone")]
     Gone(#[source] io::Error),
     /// The transport stands, but nobody answers.
     #[error("the device has not answered for {0:.1?}")]
     Silent(Duration),
+    /// The device has another host.
+    #[error("another host has taken the device")]
+    Taken,
+    /// Goodbye was not answered.
+    #[error("the board did not confirm that it is disarmed: switch the amplifiers off")]
+    NotConfirmed,
+    /// The user wants no more.
+    #[error("interrupted")]
+    Interrupted,
     /// The two ends speak different protocols.
     #[error(
         "version mismatch: the device speaks link protocol {theirs}, this command speaks {ours}"

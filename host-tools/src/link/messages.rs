@@ -4,10 +4,19 @@ use std::io;
 use std::time::Duration;
 
 use hapterra_core::wire::frame::{BadFrame, FrameReader, MAX_FRAME, decode, encode};
+use hapterra_core::wire::message::ToHost;
+use hapterra_core::wire::session::InSession;
+use hapterra_core::wire::version::VersionCheck;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::transport::Transport;
+
+/// Appends a frame of at most [`MAX_FRAME`] bytes to `out`; every message is.
+pub(super) fn append(content: &impl Serialize, out: &mut Vec<u8>) {
+    let mut frame = [0; MAX_FRAME];
+    out.extend_from_slice(encode(content, &mut frame).unwrap_or(&[]));
+}
 
 /// Sends a message of at most [`MAX_FRAME`] bytes; every message is.
 pub(super) fn send(transport: &mut dyn Transport, message: &impl Serialize) -> io::Result<()> {
@@ -15,20 +24,40 @@ pub(super) fn send(transport: &mut dyn Transport, message: &impl Serialize) -> i
     transport.send(encode(message, &mut frame).unwrap_or(&[]))
 }
 
-/// Takes the next message out of `bytes`, which keep what comes after it; none
-/// where no message ends in them.
-pub(super) fn next_message<T: DeserializeOwned>(
+/// Takes the next frame's content out of `bytes`, which keep what comes after it, and
+/// has it read; none where no frame ends in them.
+pub(super) fn next_frame<T>(
     reader: &mut FrameReader<MAX_FRAME>,
     bytes: &mut &[u8],
+    read: impl Fn(&[u8]) -> Result<T, BadFrame>,
 ) -> Option<Result<T, BadFrame>> {
     while !bytes.is_empty() {
         let (taken, frame) = reader.push(bytes);
         *bytes = bytes.get(taken..).unwrap_or(&[]);
         if let Some(frame) = frame {
-            return Some(frame.and_then(decode));
+            return Some(frame.and_then(&read));
         }
     }
     None
+}
+
+/// What a device's frame holds.
+#[derive(Debug)]
+// Made, taken apart and dropped.
+#[allow(clippy::large_enum_variant)]
+pub(super) enum FromDevice {
+    /// A message of a session.
+    Message(InSession<ToHost>),
+    /// That it speaks another protocol.
+    Version(VersionCheck),
+}
+
+/// Reads a frame of the link.
+pub(super) fn from_device(content: &[u8]) -> Result<FromDevice, BadFrame> {
+    match VersionCheck::is_in(content) {
+        true => decode(content).map(FromDevice::Version),
+        false => decode(content).map(FromDevice::Message),
+    }
 }
 
 /// Messages as they come from a transport, one at a time.
@@ -56,8 +85,10 @@ impl Inbox {
             self.unread.extend(incoming.iter().take(received));
         }
         let mut bytes = self.unread.as_slice();
-        let found =
-            std::iter::from_fn(|| next_message(&mut self.reader, &mut bytes)).find_map(Result::ok);
+        let found = std::iter::from_fn(|| {
+            next_frame(&mut self.reader, &mut bytes, |content| decode(content))
+        })
+        .find_map(Result::ok);
         let read = self.unread.len() - bytes.len();
         self.unread.drain(..read);
         Ok(found)

@@ -6,25 +6,30 @@
 //!    questions ─── Dialogue ─────┘
 //! ```
 //!
-//! - [`Client`] is the conversation about a terrain without I/O; [`Session`]
-//!   runs it over a [`Transport`]. The device asks and the host answers, so a
+//! - `conversation` is the host's table of states in [`hapterra_core::wire`], without
+//!   I/O and without a clock. [`Client`] holds it and serves a terrain; [`Session`]
+//!   runs that over a [`Transport`]. The device asks and the host answers, so a
 //!   session holds nothing that a new one would need: either end may vanish
 //!   and come back.
 //! - [`Dialogue`] asks and requests without a terrain: status, calibration,
 //!   arming.
 //! - Transports are [`Tcp`], [`Usb`], and [`Native`], a device in this
 //!   program's memory; [`DeviceAddress`] is how a user names one.
+//! - [`shown`] is what of a device's own words a terminal may show.
 //! - [`Emulator`] runs the emulated board; [`serve_plant`] moves the virtual
 //!   Phantom at its second line.
 
 mod bulk;
 mod client;
+mod conversation;
 mod device_address;
+mod device_text;
 mod dialogue;
 mod emulator;
 mod error;
 mod messages;
 mod native;
+mod patience;
 mod plant_line;
 mod session;
 mod tally;
@@ -32,22 +37,25 @@ mod tcp;
 mod transport;
 mod usb;
 
-pub use bulk::{Bulk, BulkEndpoints, Pipes, is_hapterra};
+pub use bulk::{Bulk, BulkEndpoints, NotOne, Pipes, is_hapterra, printable, the_one};
 #[cfg(test)]
 pub(crate) use client::tests::hello;
 pub use client::{Arming, Client, Event};
+pub use conversation::{Ask, State};
 pub use device_address::DeviceAddress;
 pub(crate) use device_address::tcp_address;
+pub use device_text::{shown, shown_lines};
 pub use dialogue::Dialogue;
 pub use emulator::{
     Emulator, EmulatorError, IMAGE_VARIABLE, INSTRUCTIONS_PER_COUNT, Lines, QEMU, QEMU_VARIABLE,
 };
 pub use error::LinkError;
 pub use native::{HostClock, Meddler, Native};
+pub use patience::Patience;
 pub use plant_line::{move_arm_while, serve_plant};
-pub use session::{Patience, Session};
+pub use session::Session;
 pub use tally::Tally;
 pub use tcp::Tcp;
 pub use transport::Transport;
-pub(crate) use usb::usb_devices;
 pub use usb::{SystemPipes, Usb};
+pub(crate) use usb::{is_board, place_on_usb, usb_devices};

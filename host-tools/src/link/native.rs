@@ -62,6 +62,8 @@ pub struct Native<C: TickClock = StoppedClock> {
     drive: Drive,
     meddler: Option<Meddler>,
     restless: bool,
+    /// Ticks run while waiting for the device to say something, at most.
+    ticks_a_call: u32,
     ticks: u64,
     /// What the device said while it was told something.
     pending: VecDeque<u8>,
@@ -108,6 +110,7 @@ impl<C: TickClock> Native<C> {
             drive: Drive::default(),
             meddler: None,
             restless: false,
+            ticks_a_call: TICKS_A_CALL,
             ticks: 0,
             pending: VecDeque::new(),
         };
@@ -128,6 +131,13 @@ impl<C: TickClock> Native<C> {
     #[must_use]
     pub fn restless(mut self) -> Self {
         self.restless = true;
+        self
+    }
+
+    /// The same device, which lets its host look around after so many ticks at least.
+    #[must_use]
+    pub fn in_steps_of(mut self, ticks: u32) -> Self {
+        self.ticks_a_call = ticks;
         self
     }
 
@@ -203,7 +213,7 @@ impl<C: TickClock> Transport for Native<C> {
         if !self.pending.is_empty() {
             return io::Read::read(&mut self.pending, into);
         }
-        for _ in 0..TICKS_A_CALL {
+        for _ in 0..self.ticks_a_call {
             let said = self.device.link.transmit(into);
             if said > 0 || (self.device.link.may_stand_still() && !self.restless) {
                 return Ok(said);

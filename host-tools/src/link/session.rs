@@ -1,48 +1,27 @@
-//! A client over a transport: greets, waits, and greets again after silence.
+//! A client over a transport, and the clock that it is told.
 
 use std::time::{Duration, Instant};
 
-use hapterra_core::scene::Scene;
+use hapterra_core::scene::{Point, Scene};
 use hapterra_core::wire::hello::DeviceHello;
-use hapterra_core::wire::message::ToDevice;
+use hapterra_core::wire::request::Request;
 
 use super::client::{Arming, Client, Event};
+use super::conversation::{Ask, State};
 use super::error::LinkError;
+use super::patience::Patience;
 use super::tally::Tally;
 use super::transport::Transport;
 use crate::terrain::Terrain;
 
-/// How long a device may be quiet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Patience {
-    /// After this much silence the host says hello again: what was lost on the
-    /// way is asked for and answered anew, and nothing else changes.
-    pub greet_again: Duration,
-    /// After this much silence the device counts as gone.
-    pub give_up: Duration,
-}
-
-impl Patience {
-    /// For a device that runs in real time.
-    pub const REAL_TIME: Self = Self {
-        greet_again: Duration::from_millis(750),
-        give_up: Duration::from_secs(4),
-    };
-
-    /// For an emulated board, whose speed is that of a shared machine.
-    pub const EMULATED: Self = Self {
-        greet_again: Duration::from_secs(20),
-        give_up: Duration::from_secs(120),
-    };
-}
+/// Between two looks at the clock while something is waited for.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// A conversation with a device over a transport.
 pub struct Session<'t> {
     client: Client<'t>,
     transport: Box<dyn Transport + 't>,
-    patience: Patience,
-    heard: Instant,
-    greeted: Instant,
+    began: Instant,
     incoming: Box<[u8; 4096]>,
     out: Vec<u8>,
 }
@@ -60,28 +39,30 @@ impl<'t> Session<'t> {
         transport: Box<dyn Transport + 't>,
         patience: Patience,
     ) -> Result<(Self, DeviceHello), LinkError> {
-        let now = Instant::now();
         let mut session = Self {
-            client: Client::new(terrain, scene, arming),
+            client: Client::new(terrain, scene, arming, patience),
             transport,
-            patience,
-            heard: now,
-            greeted: now,
+            began: Instant::now(),
             incoming: Box::new([0; 4096]),
             out: Vec::new(),
         };
-        let device = session.shake_hands()?;
+        let device = session.shake_hands(&|| true, &mut |_| {})?;
         Ok((session, device))
     }
 
-    /// Goes on over a new transport after the old one was lost. Returns the
-    /// device, whose hello tells in `epoch` what it still held.
+    /// Goes on over a new transport after the old one was lost, for as long as `go_on`
+    /// says so. Returns the device, whose hello tells in `epoch` what it still held.
     ///
     /// # Errors
-    /// As [`Session::open`].
-    pub fn resume(&mut self, transport: Box<dyn Transport + 't>) -> Result<DeviceHello, LinkError> {
+    /// As [`Session::open`]; [`LinkError::Interrupted`].
+    pub fn resume(
+        &mut self,
+        transport: Box<dyn Transport + 't>,
+        go_on: &dyn Fn() -> bool,
+        on: &mut dyn FnMut(Event<'_>),
+    ) -> Result<DeviceHello, LinkError> {
         self.transport = transport;
-        self.shake_hands()
+        self.shake_hands(go_on, on)
     }
 
     /// The scene that is served.
@@ -96,75 +77,87 @@ impl<'t> Session<'t> {
         self.client.tally()
     }
 
-    /// Sends a message.
+    /// How long it waits for what.
+    #[must_use]
+    pub const fn patience(&self) -> &Patience {
+        self.client.patience()
+    }
+
+    /// Asks for something; an event tells what came of it. It goes out with the next
+    /// poll, or when what was asked for before is answered.
+    pub fn ask(&mut self, ask: Ask) {
+        self.client.ask(ask);
+    }
+
+    /// Asks for something to be done, as [`Session::ask`].
+    pub fn request(&mut self, request: Request) {
+        self.ask(Ask::Request(request));
+    }
+
+    /// Has a point felt: an [`Event::Felt`] tells what is felt there.
     ///
     /// # Errors
     /// [`LinkError::Gone`].
-    pub fn say(&mut self, message: &ToDevice<'_>) -> Result<(), LinkError> {
-        self.client.say(message, &mut self.out);
+    pub fn feel(&mut self, point: Point) -> Result<(), LinkError> {
+        self.client.feel(self.began.elapsed(), point, &mut self.out);
         self.flush()
     }
 
-    /// Waits for bytes from the device for at most `wait`, answers what it asks
-    /// and reports what it tells.
+    /// Waits for bytes from the device for at most `wait`, answers what it asks,
+    /// says what is due and reports what it tells.
     ///
     /// # Errors
-    /// [`LinkError`], after which the session can be taken up again with
+    /// [`LinkError`]. After one that is passing the session can be taken up again with
     /// [`Session::resume`].
     pub fn poll(&mut self, wait: Duration, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
+        self.client.due(self.began.elapsed(), &mut self.out, on)?;
+        self.flush()?;
         let received = self
             .transport
             .receive(self.incoming.as_mut_slice(), wait)
             .map_err(LinkError::Gone)?;
-        if received == 0 {
-            return self.be_patient();
-        }
-        self.heard = Instant::now();
         let bytes = self.incoming.get(..received).unwrap_or(&[]);
-        self.client.receive(bytes, &mut self.out, on)?;
+        let now = self.began.elapsed();
+        self.client.receive(now, bytes, &mut self.out, on)?;
         self.flush()
     }
 
-    /// Ends the session; an emulated board ends its program.
+    /// Ends the session. The device has let its force out, switched its amplifiers off
+    /// and dropped the scene when this returns; an emulated board ends its program.
     ///
     /// # Errors
-    /// [`LinkError::Gone`].
-    pub fn say_goodbye(&mut self) -> Result<(), LinkError> {
-        self.say(&ToDevice::Bye)
+    /// [`LinkError::NotConfirmed`] where the device does not say so in time.
+    pub fn say_goodbye(&mut self, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
+        self.client.leave(self.began.elapsed(), &mut self.out);
+        while self.client.state() == State::Leaving {
+            self.poll(LOOK, on).map_err(|error| {
+                tracing::debug!(%error, "on the way to goodbye");
+                LinkError::NotConfirmed
+            })?;
+        }
+        Ok(())
     }
 
-    fn shake_hands(&mut self) -> Result<DeviceHello, LinkError> {
-        self.heard = Instant::now();
-        self.greet()?;
+    fn shake_hands(
+        &mut self,
+        go_on: &dyn Fn() -> bool,
+        on: &mut dyn FnMut(Event<'_>),
+    ) -> Result<DeviceHello, LinkError> {
+        self.out.clear();
+        self.client.greet(self.began.elapsed(), &mut self.out);
         let mut opened = None;
-        loop {
-            self.poll(Duration::from_millis(100), &mut |event| {
+        while go_on() {
+            self.poll(LOOK, &mut |event| {
                 if let Event::Opened { device, .. } = event {
                     opened = Some(device.clone());
                 }
+                on(event);
             })?;
             if let Some(device) = opened {
                 return Ok(device);
             }
         }
-    }
-
-    fn greet(&mut self) -> Result<(), LinkError> {
-        self.greeted = Instant::now();
-        self.client.greet(&mut self.out);
-        self.flush()
-    }
-
-    fn be_patient(&mut self) -> Result<(), LinkError> {
-        let quiet = self.heard.elapsed();
-        if quiet >= self.patience.give_up {
-            return Err(LinkError::Silent(quiet));
-        }
-        if quiet.min(self.greeted.elapsed()) >= self.patience.greet_again {
-            tracing::debug!(?quiet, "saying hello again");
-            return self.greet();
-        }
-        Ok(())
+        Err(LinkError::Interrupted)
     }
 
     fn flush(&mut self) -> Result<(), LinkError> {

@@ -1,11 +1,13 @@
-//! What went over the link.
+//! What went over the link, and what of it was lost.
 
 use std::collections::HashSet;
 
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::message::Telemetry;
+use hapterra_core::wire::session::SampleCount;
 
-/// Counts over all sessions with a device.
+/// Counts over all sessions with a device. Of every sample that the device made in a
+/// session of this host, it was received, lost or dropped, and counted once.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Tiles sent.
@@ -17,26 +19,104 @@ pub struct Tally {
     pub tile_bytes: u64,
     /// Telemetry samples received.
     pub samples: u64,
-    /// Samples lost on the link, by the gaps in their numbers.
+    /// Samples lost on the link: by the gaps in their numbers, and by the device's own
+    /// count of what it has sent.
     pub lost: u64,
     /// Samples that the device dropped because the link was slow.
     pub dropped: u64,
+    /// Sessions whose end is not known, because the device was restarted or another
+    /// host came between: more may be lost than was counted.
+    pub uncertain: u64,
     /// Frames that were not understood.
     pub bad_frames: u64,
+    /// Frames of sessions of others, or of one that was over.
+    pub foreign_frames: u64,
+    /// Requests for tiles that there are not.
+    pub no_tiles: u64,
+    /// Requests and questions that were given up without an answer.
+    pub unanswered: u64,
     /// Sessions opened.
     pub sessions: u64,
     sent: HashSet<TileKey>,
+    /// Samples lost before the last one that was received, and in sessions that ended.
+    gaps: u64,
+    now: Numbering,
+    /// The session before, until the device has told how it ended.
+    before: Option<Numbering>,
+}
+
+/// The samples of one session.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Numbering {
     /// Number that the next sample should have.
     expected: u32,
-    /// The device's own count at the last message; it starts with the device.
-    dropped_before: u32,
+    /// What the device says that it has sent and dropped.
+    told: SampleCount,
+}
+
+impl Numbering {
+    /// Samples that were sent and are not here, after the last one that is.
+    fn tail(&self) -> u64 {
+        u64::from(ahead(self.expected, self.told.sent))
+    }
+
+    /// Takes the device's count; returns how many samples it has dropped since the
+    /// last. A count that comes late tells nothing.
+    fn told(&mut self, count: SampleCount) -> u64 {
+        self.told.sent = self
+            .told
+            .sent
+            .wrapping_add(ahead(self.told.sent, count.sent));
+        let newly = ahead(self.told.dropped, count.dropped);
+        self.told.dropped = self.told.dropped.wrapping_add(newly);
+        u64::from(newly)
+    }
+}
+
+/// How far `later` is ahead of `earlier`; zero where it is behind.
+fn ahead(earlier: u32, later: u32) -> u32 {
+    match later.wrapping_sub(earlier) {
+        behind if behind > u32::MAX / 2 => 0,
+        ahead => ahead,
+    }
 }
 
 impl Tally {
-    /// A session begins: samples are numbered from zero again.
-    pub(super) fn opened(&mut self) {
+    /// A new session's number was drawn: its samples are numbered from zero.
+    pub(super) fn drawn(&mut self) {
+        if self.now != Numbering::default() || self.sessions > 0 {
+            self.settle(None);
+            self.before = Some(std::mem::take(&mut self.now));
+        }
+        self.count_lost();
+    }
+
+    /// The session is open. `last`: how many samples the one before had, if the device
+    /// remembers.
+    pub(super) fn opened(&mut self, last: Option<SampleCount>) {
         self.sessions += 1;
-        self.expected = 0;
+        self.settle(last);
+        self.count_lost();
+    }
+
+    /// The device was restarted: samples are numbered from zero again.
+    pub(super) fn restarted(&mut self) {
+        self.sessions += 1;
+        self.before = Some(std::mem::take(&mut self.now));
+        self.settle(None);
+        self.count_lost();
+    }
+
+    /// Closes the account of the session before.
+    fn settle(&mut self, last: Option<SampleCount>) {
+        let Some(mut before) = self.before.take() else {
+            return;
+        };
+        match last {
+            Some(count) => self.dropped += before.told(count),
+            None => self.uncertain += 1,
+        }
+        self.gaps += before.tail();
     }
 
     pub(super) fn sent_tile(&mut self, key: TileKey, bytes: usize) {
@@ -47,24 +127,33 @@ impl Tally {
         }
     }
 
-    /// Takes the count of a message; false if it is one that was seen before.
+    /// Takes the count of a message; false if it is one that was seen before, or that
+    /// was given up as lost.
     pub(super) fn received(&mut self, telemetry: &Telemetry) -> bool {
         let count = telemetry.samples.len() as u32;
-        let gap = telemetry.first.wrapping_sub(self.expected);
+        let gap = telemetry.first.wrapping_sub(self.now.expected);
         if gap > u32::MAX / 2 {
-            return false; // a duplicate of an earlier message
+            return false;
         }
-        self.lost += u64::from(gap);
+        self.gaps += u64::from(gap);
         self.samples += u64::from(count);
-        self.expected = telemetry.first.wrapping_add(count);
-        // A count that went down is that of a device that was restarted.
-        let newly = telemetry
-            .dropped
-            .checked_sub(self.dropped_before)
-            .unwrap_or(telemetry.dropped);
-        self.dropped += u64::from(newly);
-        self.dropped_before = telemetry.dropped;
+        self.now.expected = telemetry.first.wrapping_add(count);
+        self.told(SampleCount {
+            sent: self.now.expected,
+            dropped: telemetry.dropped,
+        });
         true
+    }
+
+    /// Takes the device's own count of this session.
+    pub(super) fn told(&mut self, count: SampleCount) {
+        self.dropped += self.now.told(count);
+        self.count_lost();
+    }
+
+    fn count_lost(&mut self) {
+        let before = self.before.map_or(0, |before| before.tail());
+        self.lost = self.gaps + before + self.now.tail();
     }
 }
 
@@ -81,17 +170,73 @@ mod tests {
         }
     }
 
+    fn counted(tally: &Tally) -> (u64, u64, u64) {
+        (tally.samples, tally.lost, tally.dropped)
+    }
+
+    const fn count(sent: u32, dropped: u32) -> SampleCount {
+        SampleCount { sent, dropped }
+    }
+
     #[test]
     fn gaps_are_loss_and_repeats_are_not_counted_twice() {
         let mut tally = Tally::default();
-        tally.opened();
+        tally.opened(None);
         assert!(tally.received(&batch(0, 0)));
         assert!(!tally.received(&batch(0, 0)));
         assert!(tally.received(&batch(12, 3)));
-        assert_eq!((tally.samples, tally.lost, tally.dropped), (8, 8, 3));
-        tally.opened();
-        assert!(tally.received(&batch(0, 3)));
-        assert!(tally.received(&batch(4, 1)));
-        assert_eq!((tally.samples, tally.lost, tally.dropped), (16, 8, 4));
+        assert_eq!(counted(&tally), (8, 8, 3));
+        // What overtook and comes after all stays counted as lost, once.
+        assert!(!tally.received(&batch(4, 1)));
+        assert_eq!(counted(&tally), (8, 8, 3));
+    }
+
+    #[test]
+    fn loss_at_the_start_and_at_the_end_is_counted() {
+        let mut tally = Tally::default();
+        tally.opened(None);
+        tally.told(count(16, 1));
+        assert_eq!(counted(&tally), (0, 16, 1));
+        assert!(tally.received(&batch(8, 1)));
+        assert_eq!(counted(&tally), (4, 12, 1));
+        tally.told(count(12, 1));
+        tally.told(count(36, 2));
+        tally.told(count(36, 2));
+        assert_eq!(counted(&tally), (4, 32, 2));
+    }
+
+    #[test]
+    fn the_end_of_a_session_is_told_at_the_beginning_of_the_next() {
+        let mut tally = Tally::default();
+        tally.opened(None);
+        assert!(tally.received(&batch(0, 0)));
+        tally.drawn();
+        assert_eq!(counted(&tally), (4, 0, 0));
+        tally.opened(Some(count(20, 7)));
+        assert_eq!(counted(&tally), (4, 16, 7));
+        assert!(tally.received(&batch(0, 0)));
+        assert!(tally.received(&batch(4, 2)));
+        assert_eq!((counted(&tally), tally.uncertain), ((12, 16, 9), 0));
+    }
+
+    #[test]
+    fn a_restart_leaves_a_doubt_that_is_told() {
+        let mut tally = Tally::default();
+        tally.opened(None);
+        assert!(tally.received(&batch(0, 0)));
+        tally.told(count(12, 1));
+        tally.restarted();
+        assert!(tally.received(&batch(0, 1)));
+        assert_eq!((counted(&tally), tally.uncertain), ((8, 8, 2), 1));
+    }
+
+    #[test]
+    fn numbers_wrap_around() {
+        let mut numbering = Numbering {
+            expected: u32::MAX - 3,
+            told: count(u32::MAX - 3, 0),
+        };
+        assert_eq!(numbering.told(count(4, 0)), 0);
+        assert_eq!(numbering.tail(), 8);
     }
 }

@@ -8,7 +8,7 @@ use nusb::MaybeFuture;
 use nusb::io::{EndpointRead, EndpointWrite};
 use nusb::transfer::{self, In, Out};
 
-use super::bulk::{Bulk, BulkEndpoints, Pipes, TRANSFER, is_hapterra};
+use super::bulk::{Bulk, BulkEndpoints, NotOne, Pipes, TRANSFER, is_hapterra, printable, the_one};
 use super::error::LinkError;
 
 /// Transfers under way from the device, so that none of its packets waits.
@@ -26,17 +26,41 @@ pub struct SystemPipes {
 }
 
 impl Usb {
-    /// Opens the first board found.
+    /// Opens the board with a serial number, or the only one.
     ///
     /// # Errors
-    /// [`LinkError::Absent`] says what was looked for and what is there.
-    pub fn connect() -> Result<Self, LinkError> {
-        match Self::list() {
-            (found, _) if !found.is_empty() => Self::open(&found[0]),
-            (_, 0) => Err(absent("no USB devices at all are visible here".into())),
-            (_, n) => Err(absent(format!(
+    /// [`LinkError::Absent`] says what was looked for and what is there;
+    /// [`LinkError::Several`] names the boards that could be meant.
+    pub fn connect(serial: Option<&str>) -> Result<Self, LinkError> {
+        let (found, looked_at) = Self::list();
+        let serials: Vec<_> = found.iter().map(serial_of).collect();
+        match (the_one(&serials, serial), serial, looked_at) {
+            (Ok(i), ..) => Self::open(&found[i]),
+            (Err(NotOne::Several), ..) => {
+                Err(LinkError::Several(found.iter().map(Self::place).collect()))
+            }
+            (Err(NotOne::None), _, 0) => {
+                Err(absent("no USB devices at all are visible here".into()))
+            }
+            (Err(NotOne::None), Some(wanted), _) if !found.is_empty() => {
+                let there: Vec<_> = found.iter().map(Self::place).collect();
+                let wanted = printable(wanted);
+                let there = there.join(", ");
+                Err(absent(format!("none is usb:{wanted}; there is {there}")))
+            }
+            (Err(NotOne::None), _, n) => Err(absent(format!(
                 "{n} USB devices, none of them a hapterra board"
             ))),
+        }
+    }
+
+    /// The serial number of the only board, if there is just one and it has one.
+    #[must_use]
+    pub fn only_serial() -> Option<String> {
+        let (found, _) = Self::list();
+        match &found[..] {
+            [only] => serial_of(only),
+            _ => None,
         }
     }
 
@@ -54,12 +78,12 @@ impl Usb {
         format!("a hapterra board on USB ({VENDOR_ID:04x}:{PRODUCT_ID:04x})")
     }
 
-    /// Where a board is plugged in, and its serial number.
+    /// A board as `--device` takes it, and where it is plugged in.
     #[must_use]
     pub fn place(info: &nusb::DeviceInfo) -> String {
-        let (bus, address) = (info.bus_id(), info.device_address());
-        let serial = info.serial_number().unwrap_or("no serial number");
-        format!("bus {bus} device {address}, {serial}")
+        let serial =
+            serial_of(info).map_or("usb (no serial number)".into(), |s| format!("usb:{s}"));
+        format!("{serial} at {}", place_on_usb(info))
     }
 
     /// Opens a board.
@@ -111,7 +135,17 @@ pub(crate) fn usb_devices() -> Vec<nusb::DeviceInfo> {
     }
 }
 
-fn is_board(info: &nusb::DeviceInfo) -> bool {
+fn serial_of(info: &nusb::DeviceInfo) -> Option<String> {
+    info.serial_number().map(printable)
+}
+
+/// Where a device is plugged in, whatever it is at the moment.
+pub(crate) fn place_on_usb(info: &nusb::DeviceInfo) -> String {
+    let ports: Vec<_> = info.port_chain().iter().map(u8::to_string).collect();
+    format!("bus {} port {}", info.bus_id(), ports.join("."))
+}
+
+pub(crate) fn is_board(info: &nusb::DeviceInfo) -> bool {
     is_hapterra(info.vendor_id(), info.product_id(), info.product_string())
 }
 

@@ -71,6 +71,9 @@ pub fn run(data: &[u8]) {
             dead_man: counts[2] % 2 == 0,
             emergency_stop: counts[1] == 255,
             hardware_failed: counts[1] == 254,
+            outputs_not_as_set: counts[1] == 253,
+            amplifier_not_ready: counts[1] == 252,
+            measured_ma: (counts[2] > 128).then_some([counts[0] as i16, 0, 0]),
         };
         look(&haptics.tick(&sense, true), &law);
     }

@@ -9,13 +9,20 @@ use hapterra_core::scene::{Scene, Source};
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::hello::{HostHello, PROTOCOL};
 use hapterra_core::wire::message::{ToDevice, ToHost};
+use hapterra_core::wire::request::Request;
+use hapterra_core::wire::session::{DEFAULT_SILENCE_S, InSession, SessionNumber};
 use hapterra_core::wire::status::BootReport;
+use hapterra_core::wire::version::VersionCheck;
 use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
 
 use super::bytes::Bytes;
 use hapterra_core::terrain::FieldSize;
+
+/// The session that is played in, and two others.
+const SESSION: SessionNumber = SessionNumber::new(0);
+const OTHERS: [SessionNumber; 2] = [SessionNumber::new(1), SessionNumber::new(2)];
 
 /// A device that lives as long as the thread: its memory cannot be had back.
 pub struct Wire {
@@ -58,7 +65,9 @@ impl Wire {
                 // As it is, on the line.
                 0 => self.hear(chunk),
                 // In a frame whose check sum fits, so that its content is read.
-                1 | 2 => self.hear(&framed(chunk)),
+                1 => self.hear(&framed(chunk)),
+                // And of the session that is open, so that it is acted on.
+                2 => self.hear(&framed(&in_session(chunk))),
                 _ => self.device.link.interrupted(),
             }
             let sense = Sense {
@@ -77,10 +86,22 @@ impl Wire {
     fn begin(&mut self) {
         self.device.link.interrupted();
         self.hear(&[0]);
-        let hello = HostHello { protocol: PROTOCOL };
-        self.hear(&message(&ToDevice::Hello(hello)));
-        self.hear(&message(&ToDevice::Scene(scene())));
-        self.hear(&message(&ToDevice::ClearFault));
+        let hello = HostHello {
+            protocol: PROTOCOL,
+            number: 1,
+            silence_s: DEFAULT_SILENCE_S,
+        };
+        let clear = ToDevice::Request {
+            number: 1,
+            request: Request::ClearFault,
+        };
+        // Two others first, so that the session is none that the device remembers.
+        for session in OTHERS {
+            self.hear(&message_in(session, &ToDevice::Hello(hello)));
+        }
+        for said in [ToDevice::Hello(hello), ToDevice::Scene(scene()), clear] {
+            self.hear(&message(&said));
+        }
         let _ = self.device.tick(Sense::default());
         self.listen();
     }
@@ -113,7 +134,11 @@ impl Wire {
                 said = &said[taken..];
                 if let Some(frame) = frame {
                     let frame = frame.expect("the device sends whole frames");
-                    let _: ToHost = decode(frame).expect("and messages in them");
+                    if VersionCheck::is_in(frame) {
+                        let _: VersionCheck = decode(frame).expect("a refusal");
+                    } else {
+                        let _: InSession<ToHost> = decode(frame).expect("and messages in them");
+                    }
                 }
             }
         }
@@ -128,8 +153,9 @@ fn decoded(mut data: &[u8]) {
         let (taken, frame) = reader.push(data);
         assert!(taken > 0);
         if let Some(Ok(frame)) = frame {
-            let _ = decode::<ToDevice<'_>>(frame);
-            let _ = decode::<ToHost>(frame);
+            let _ = decode::<InSession<ToDevice<'_>>>(frame);
+            let _ = decode::<InSession<ToHost>>(frame);
+            let _ = decode::<VersionCheck>(frame);
         }
         data = &data[taken..];
     }
@@ -154,15 +180,27 @@ fn framed(content: &[u8]) -> Vec<u8> {
         .to_vec()
 }
 
-/// A whole message on the line.
+/// A whole message of the session on the line.
 ///
 /// # Panics
 /// When it does not fit a frame.
 #[must_use]
 pub fn message(message: &ToDevice<'_>) -> Vec<u8> {
-    encode(message, &mut [0; MAX_FRAME])
+    message_in(SESSION, message)
+}
+
+fn message_in(session: SessionNumber, message: &ToDevice<'_>) -> Vec<u8> {
+    let framed = InSession { session, message };
+    encode(&framed, &mut [0; MAX_FRAME])
         .expect("fits a frame")
         .to_vec()
+}
+
+/// A message's bytes with the session's number in front.
+fn in_session(content: &[u8]) -> Vec<u8> {
+    // The least number: as a varint it is two bytes.
+    assert_eq!(SESSION.get(), 128);
+    [&[0x80, 0x01], content].concat()
 }
 
 /// A replay over 64 × 64 patches.

@@ -7,14 +7,14 @@ use hapterra_core::scene::Source;
 use hapterra_core::terrain::{Tile, TileKey};
 use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::{FrameReader, decode};
-use hapterra_core::wire::hello::PROTOCOL;
 use hapterra_core::wire::message::{ToDevice, ToHost};
-use hapterra_core::wire::status::BootReport;
+use hapterra_core::wire::session::InSession;
+use hapterra_core::wire::status::{BootReport, CalibrationSource};
 
-use super::rig::{D, frame, hello, scene, tile};
+use super::rig::{D, HELLO, frame, scene, tile};
 use crate::app::{TileBuffers, WorkingMemory};
-use crate::link::{DeviceState, Link};
-use crate::native::StoppedClock;
+use crate::link::{DeviceState, KnownArm, Link};
+use crate::native::{FULL_SCALE_A, StoppedClock};
 use crate::queues::{LoopEnds, SPARES, TickRecord};
 
 /// A link in a session, and the loop's ends of its queues.
@@ -22,10 +22,18 @@ fn link() -> (Link<'static, D>, LoopEnds<'static>) {
     let tiles = Box::leak(Box::new(TileBuffers::<D>::VACANT));
     let memory = Box::leak(Box::new(WorkingMemory::new()));
     let (loop_ends, link_ends) = memory.queues.split();
-    let device = DeviceState::new::<StoppedClock, D>("test", BootReport::default(), None);
+    let arm = KnownArm {
+        calibration: None,
+        source: CalibrationSource::None,
+        full_scale_a: FULL_SCALE_A,
+    };
+    let device = DeviceState::new::<StoppedClock, D>("test", BootReport::default(), arm);
     let mut link = Link::new(device, tiles.split().1, link_ends, &mut memory.link);
     let scene = scene(Source::Encoders);
-    for message in [hello(PROTOCOL), frame(&ToDevice::Scene(scene))] {
+    for message in [
+        frame(&ToDevice::Hello(HELLO)),
+        frame(&ToDevice::Scene(scene)),
+    ] {
         assert_eq!(link.receive(&message), message.len());
     }
     (link, loop_ends)
@@ -41,7 +49,12 @@ fn asked(link: &mut Link<'static, D>) -> Vec<TileKey> {
     let mut keys = Vec::new();
     while !rest.is_empty() {
         let (taken, frame) = reader.push(rest);
-        if let Some(Ok(ToHost::Need { key, .. })) = frame.map(|f| f.and_then(decode)) {
+        let content = frame.map(|f| f.and_then(decode));
+        if let Some(Ok(InSession {
+            message: ToHost::Need { key, .. },
+            ..
+        })) = content
+        {
             keys.push(key);
         }
         rest = &rest[taken..];

@@ -1,20 +1,25 @@
 //! Arming, calibration and status, as a host sees them.
 
 use hapterra_core::guard::{Blockers, Fault, Mode};
-use hapterra_core::phantom::{Calibration, CalibrationField, Model};
+use hapterra_core::phantom::{BadCalibration, Bound, Calibration, CalibrationField, Model};
 use hapterra_core::scene::Source;
 use hapterra_core::wire::message::{ToDevice, ToHost};
-use hapterra_core::wire::status::{
-    BootReport, CalibrationSource, Crash, CrashKind, Refusal, Request, ResetCause,
-};
+use hapterra_core::wire::request::{Refusal, Request};
+use hapterra_core::wire::session::{SampleCount, SessionEnd};
+use hapterra_core::wire::status::{BootReport, CalibrationSource, Crash, CrashKind, ResetCause};
 
 use super::rig::{Rig, scene};
 use crate::link::tx_queue::{LONGEST_URGENT, TxQueue};
 use crate::store::Stored;
 
-fn set(calibration: Calibration, store: bool) -> ToDevice<'static> {
-    ToDevice::SetCalibration { calibration, store }
+fn set(calibration: Calibration) -> Request {
+    Request::SetCalibration { calibration }
 }
+
+const TO_SET: fn(&Request) -> bool = |r| matches!(r, Request::SetCalibration { .. });
+const TO_STORE: fn(&Request) -> bool = |r| matches!(r, Request::StoreCalibration);
+const TO_ZERO: fn(&Request) -> bool = |r| matches!(r, Request::Zero { .. });
+const TO_ARM: fn(&Request) -> bool = |r| matches!(r, Request::Arm);
 
 #[test]
 fn armed_step_by_step_and_told_of_each() {
@@ -24,8 +29,8 @@ fn armed_step_by_step_and_told_of_each() {
     assert_eq!(report.mode, Mode::Disarmed);
     assert!(report.blockers.contains(Blockers::NOT_ZEROED));
     rig.arm();
-    assert_eq!(rig.answers(Request::Zero), [Ok(())]);
-    assert_eq!(rig.answers(Request::Arm), [Ok(())]);
+    assert_eq!(rig.answers(TO_ZERO), [Ok(())]);
+    assert_eq!(rig.answers(TO_ARM), [Ok(())]);
     let guard = |m: &ToHost| match m {
         ToHost::Guard(report) => Some(report.mode),
         _ => None,
@@ -48,17 +53,17 @@ fn armed_step_by_step_and_told_of_each() {
 fn an_arm_command_that_cannot_be_obeyed_is_refused_by_name() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.run(10);
-    rig.say(&ToDevice::Arm);
+    rig.ask(Request::Arm);
     rig.run(100);
     let refused = Err(Refusal::Blocked(Blockers::NOT_ZEROED));
-    assert_eq!(rig.answers(Request::Arm), [refused]);
-    rig.say(&ToDevice::DropScene);
-    rig.say(&ToDevice::Zero { counts: [0; 3] });
-    rig.say(&ToDevice::Arm);
+    assert_eq!(rig.answers(TO_ARM), [refused]);
+    rig.ask(Request::DropScene);
+    rig.ask(Request::Zero { counts: [0; 3] });
+    rig.ask(Request::Arm);
     rig.run(100);
     let refused = Err(Refusal::Blocked(Blockers::NO_SCENE));
-    assert_eq!(rig.answers(Request::Arm)[1..], [refused]);
-    assert_eq!(rig.answers(Request::DropScene), [Ok(())]);
+    assert_eq!(rig.answers(TO_ARM)[1..], [refused]);
+    assert_eq!(rig.answers(|r| matches!(r, Request::DropScene)), [Ok(())]);
 }
 
 #[test]
@@ -71,10 +76,10 @@ fn a_fault_is_latched_reported_and_cleared_on_request() {
     assert_eq!(rig.report().and_then(|r| r.fault), Some(Fault::EncoderJump));
     assert!(!rig.device.tick(rig.sense).enabled);
     rig.sense.counts = [0; 3];
-    rig.say(&ToDevice::ClearFault);
+    rig.ask(Request::ClearFault);
     rig.run(30);
     assert_eq!(fault(&rig), None);
-    assert_eq!(rig.answers(Request::ClearFault), [Ok(())]);
+    assert_eq!(rig.answers(|r| matches!(r, Request::ClearFault)), [Ok(())]);
     assert!(!rig.device.tick(rig.sense).enabled, "but it stays off");
     rig.arm();
 }
@@ -82,12 +87,14 @@ fn a_fault_is_latched_reported_and_cleared_on_request() {
 #[test]
 fn settings_do_not_change_while_armed() {
     let mut rig = Rig::armed();
-    rig.say(&set(Calibration::PREMIUM_3_0, true));
-    rig.say(&ToDevice::Zero { counts: [5; 3] });
+    rig.ask(set(Calibration::PREMIUM_3_0));
+    rig.ask(Request::StoreCalibration);
+    rig.ask(Request::Zero { counts: [5; 3] });
     rig.run(5);
     let refused = Err(Refusal::NotWhileArmed);
-    assert_eq!(rig.answers(Request::SetCalibration), [refused]);
-    assert_eq!(rig.answers(Request::Zero)[1..], [refused]);
+    assert_eq!(rig.answers(TO_SET), [refused]);
+    assert_eq!(rig.answers(TO_STORE), [refused]);
+    assert_eq!(rig.answers(TO_ZERO)[1..], [refused]);
     assert!(rig.device.tick(rig.sense).enabled);
     assert_eq!(rig.status().model, Some(Model::Premium15));
 }
@@ -101,15 +108,15 @@ fn a_calibration_is_checked_put_in_force_and_stored() {
         l1_mm: -1.0,
         ..Calibration::PREMIUM_3_0
     };
-    rig.say(&set(bad, true));
+    rig.ask(set(bad));
     rig.run(5);
-    let [Err(Refusal::Calibration(why))] = rig.answers(Request::SetCalibration)[..] else {
-        panic!("{:?}", rig.answers(Request::SetCalibration));
+    let [Err(Refusal::Calibration(why))] = rig.answers(TO_SET)[..] else {
+        panic!("{:?}", rig.answers(TO_SET));
     };
     assert_eq!(why.field, CalibrationField::L1);
     assert_eq!(rig.status().model, Some(Model::Premium15), "as before");
 
-    rig.say(&set(Calibration::PREMIUM_3_0, false));
+    rig.ask(set(Calibration::PREMIUM_3_0));
     rig.run(5);
     let status = rig.status();
     assert_eq!(status.calibration, CalibrationSource::Session);
@@ -117,9 +124,9 @@ fn a_calibration_is_checked_put_in_force_and_stored() {
     let stored = Stored::Found(Calibration::PREMIUM_1_5);
     assert_eq!(*rig.device.memory(), stored);
 
-    rig.say(&set(Calibration::PREMIUM_3_0, true));
-    rig.run(5);
-    assert_eq!(rig.answers(Request::StoreCalibration), [Ok(())]);
+    rig.ask(Request::StoreCalibration);
+    rig.press();
+    assert_eq!(rig.answers(TO_STORE), [Ok(())]);
     assert_eq!(rig.status().calibration, CalibrationSource::Stored);
     let stored = Stored::Found(Calibration::PREMIUM_3_0);
     assert_eq!(*rig.device.memory(), stored);
@@ -127,6 +134,111 @@ fn a_calibration_is_checked_put_in_force_and_stored() {
     rig.run(1);
     let got = ToHost::Calibration(Some(Calibration::PREMIUM_3_0));
     assert!(rig.heard.contains(&got));
+}
+
+#[test]
+fn nothing_is_stored_without_a_press_of_the_dead_man_switch() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    let before = Stored::Found(Calibration::PREMIUM_1_5);
+    rig.ask(set(Calibration::PREMIUM_3_0));
+    rig.ask(Request::StoreCalibration);
+    rig.run(9_900);
+    assert_eq!(rig.answers(TO_STORE), [], "it may take its time");
+    rig.run(400);
+    let refused = Err(Refusal::NotPressed);
+    assert_eq!(rig.answers(TO_STORE), [refused]);
+    rig.press();
+    assert_eq!(*rig.device.memory(), before);
+    assert_eq!(rig.status().calibration, CalibrationSource::Session);
+}
+
+#[test]
+fn what_waits_for_a_press_is_the_calibration_that_was_in_force() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    rig.ask(Request::StoreCalibration);
+    rig.ask(set(Calibration::PREMIUM_1_0));
+    rig.run(5);
+    assert_eq!(rig.answers(TO_SET), [Err(Refusal::Busy)]);
+}
+
+#[test]
+fn a_press_for_another_host_or_to_arm_stores_nothing() {
+    let before = Stored::Found(Calibration::PREMIUM_1_5);
+    let others: [fn(&mut Rig); 3] = [
+        Rig::greet_anew,
+        |rig| rig.say(&ToDevice::Bye),
+        |rig| rig.ask(Request::Arm),
+    ];
+    for (index, other) in others.into_iter().enumerate() {
+        let mut rig = Rig::in_scene(scene(Source::Encoders));
+        rig.ask(Request::Zero { counts: [0; 3] });
+        rig.ask(set(Calibration::PREMIUM_3_0));
+        rig.ask(Request::StoreCalibration);
+        rig.run(200);
+        other(&mut rig);
+        rig.run(20);
+        rig.press();
+        assert_eq!(*rig.device.memory(), before, "{index}");
+    }
+}
+
+#[test]
+fn while_something_waits_for_a_press_time_does_not_stand_still() {
+    let mut rig = Rig::new();
+    rig.say(&ToDevice::Hello(super::rig::HELLO));
+    rig.ask(set(Calibration::PREMIUM_3_0));
+    rig.ask(Request::StoreCalibration);
+    rig.run(10);
+    assert!(!rig.device.link.may_stand_still());
+    rig.run(10_200);
+    assert!(rig.device.link.may_stand_still());
+}
+
+/// A record is not its own ceiling: each is refused by name when it is taken, and when
+/// it is found at the start.
+#[test]
+fn a_record_above_a_ceiling_is_refused_by_name_and_does_not_arm() {
+    type Case = (fn(&mut Calibration), CalibrationField);
+    let hostile: [Case; 3] = [
+        (
+            |c| c.continuous_current_a.x = 5.0,
+            CalibrationField::ContinuousCurrent,
+        ),
+        (
+            |c| c.thermal.housing_k_per_w = 0.1,
+            CalibrationField::HousingResistance,
+        ),
+        (|c| c.max_force_n = 40.0, CalibrationField::MaxForce),
+    ];
+    for (raise, field) in hostile {
+        let mut record = Calibration::PREMIUM_1_5;
+        raise(&mut record);
+        let mut rig = Rig::in_scene(scene(Source::Encoders));
+        rig.ask(set(record));
+        rig.ask(Request::StoreCalibration);
+        rig.press();
+        let [Err(Refusal::Calibration(why))] = rig.answers(TO_SET)[..] else {
+            panic!("{:?}", rig.answers(TO_SET));
+        };
+        assert_eq!(why.field, field);
+        assert_eq!(
+            *rig.device.memory(),
+            Stored::Found(Calibration::PREMIUM_1_5)
+        );
+
+        // The same, as an older firmware may have stored it.
+        for stored in [Stored::Found(record), Stored::Refused(why)] {
+            let mut rig = Rig::started(stored, BootReport::default());
+            rig.say(&ToDevice::Hello(super::rig::HELLO));
+            rig.say(&ToDevice::Scene(scene(Source::Encoders)));
+            rig.run(5);
+            let status = rig.status();
+            assert_eq!(status.calibration, CalibrationSource::Refused(why));
+            assert_eq!(status.model, None);
+            let fault = status.health.report.fault;
+            assert_eq!(fault, Some(Fault::CalibrationCorrupt));
+        }
+    }
 }
 
 #[test]
@@ -143,6 +255,7 @@ fn what_was_found_at_boot_is_told_and_blocks() {
     let boot = BootReport {
         cause: ResetCause::Watchdog,
         crash: Some(crash),
+        ..BootReport::default()
     };
     let found = [
         (
@@ -177,31 +290,38 @@ fn what_was_found_at_boot_is_told_and_blocks() {
 }
 
 #[test]
-fn goodbye_lets_the_force_go_out_and_drops_the_scene() {
+fn goodbye_is_answered_when_the_force_is_out_and_the_scene_dropped() {
     let mut rig = Rig::armed();
     rig.say(&ToDevice::Bye);
-    rig.run(1);
-    assert!(!rig.device.link.has_ended(), "force is going out");
-    let mut ticks = 0;
-    while rig.device.tick(rig.sense).enabled {
+    let answered = |rig: &Rig| rig.heard.iter().any(|m| matches!(m, ToHost::Goodbye(_)));
+    let (mut ticks, mut on) = (0, 0);
+    while !answered(&rig) {
+        rig.run(1);
         ticks += 1;
+        on += u32::from(rig.report().is_some_and(|r| r.mode.drives()));
+        assert!(ticks < 400, "for ever");
     }
-    assert!((90..=101).contains(&ticks), "{ticks}");
-    rig.run(20);
+    assert!((90..=102).contains(&on), "{on}");
+    assert!((on..on + 105).contains(&ticks), "{ticks}");
+    assert!(!rig.device.tick(rig.sense).enabled);
+    assert!(!rig.device.link.has_ended(), "the host may have missed it");
+    rig.say(&ToDevice::Close);
+    rig.run(1);
     assert!(rig.device.link.has_ended());
-    rig.say(&ToDevice::Hello(super::rig::HELLO));
     rig.heard.clear();
+    rig.greet_anew();
     rig.run(2);
     let ToHost::Hello(hello) = &rig.heard[0] else {
         panic!("{:?}", rig.heard[0]);
     };
     assert_eq!(hello.epoch, None, "it holds nothing any more");
+    assert_eq!(hello.last.end, SessionEnd::Goodbye);
 }
 
 #[test]
 fn while_force_goes_out_time_does_not_stand_still() {
     let mut rig = Rig::armed();
-    rig.say(&ToDevice::DropScene);
+    rig.ask(Request::DropScene);
     let mut ticks = 0;
     loop {
         rig.run(1);
@@ -238,6 +358,11 @@ fn the_status_at_its_longest_fits_its_place() {
     status.device.version = status.device.board.clone();
     status.device.clock_hz = u32::MAX;
     status.device.epoch = Some(u32::MAX);
+    status.device.last.session = u32::MAX;
+    status.device.last.count = SampleCount {
+        sent: u32::MAX,
+        dropped: u32::MAX,
+    };
     status.boot.crash = Some(Crash {
         kind: CrashKind::HardFault,
         pc: u32::MAX,
@@ -248,6 +373,16 @@ fn the_status_at_its_longest_fits_its_place() {
         file: "x".repeat(24).as_str().try_into().expect("fits"),
     });
     status.health.zero = Some([i32::MIN; 3]);
+    status.calibration = CalibrationSource::Refused(BadCalibration {
+        field: CalibrationField::MaxSpeed,
+        axis: Some(3),
+        value: 1.0,
+        bound: Bound::Model {
+            model: Model::Other,
+            min: 1.0,
+            max: 1.0,
+        },
+    });
     status.health.report.blockers = Blockers::all();
     status.health.report.decision.refused = Blockers::all();
     status.ticks.run = u32::MAX;
@@ -257,13 +392,14 @@ fn the_status_at_its_longest_fits_its_place() {
     status.stack.size = u32::MAX;
     status.stack.high_water = u32::MAX;
     status.bad_frames = u32::MAX;
+    status.foreign_frames = u32::MAX;
     status.dropped = u32::MAX;
     for message in [
         ToHost::Status(status),
         ToHost::Calibration(Some(Calibration::PREMIUM_3_0)),
     ] {
         let mut queue = TxQueue::new();
-        assert!(queue.push(&message));
+        assert!(queue.push(super::rig::FIRST, &message));
         let length = queue.take(&mut [0; 4096]);
         std::eprintln!("{length} bytes");
         assert!(length <= LONGEST_URGENT, "{length}");

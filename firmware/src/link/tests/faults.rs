@@ -4,12 +4,16 @@ use std::collections::HashSet;
 use std::vec;
 use std::vec::Vec;
 
+use hapterra_core::guard::Mode;
 use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_core::terrain::RETRY_TICKS;
-use hapterra_core::wire::hello::PROTOCOL;
+use hapterra_core::wire::hello::{HostHello, PROTOCOL};
 use hapterra_core::wire::message::{BATCH, Heights, TileMessage, ToDevice, ToHost};
+use hapterra_core::wire::request::Request;
+use hapterra_core::wire::session::{SessionEnd, SessionNumber};
+use hapterra_core::wire::version::VersionCheck;
 
-use super::rig::{Rig, frame, hello, point, scene, tile};
+use super::rig::{HELLO, Rig, asked, frame, framed, point, scene, tile};
 
 /// What the points of a descent feel like; nothing about ticks and costs.
 fn forces(felt: &[(u32, Sample)]) -> Vec<(u32, hapterra_core::Vec3)> {
@@ -21,16 +25,265 @@ fn undisturbed() -> Vec<(u32, hapterra_core::Vec3)> {
 }
 
 #[test]
-fn another_protocol_is_refused_and_nothing_after_it_is_heeded() {
+fn another_protocol_is_refused_in_words_that_every_version_knows() {
     let mut rig = Rig::new();
-    rig.send(&hello(PROTOCOL + 1));
-    rig.send(&frame(&ToDevice::Scene(scene(Source::Points))));
+    // A host of protocol 3 says its hello and goes on in its own tongue.
+    rig.send(&asked(3));
+    rig.send(&[1, 7, 0, 0]);
     rig.run(3);
-    let refused = ToHost::Refused { protocol: PROTOCOL };
-    assert_eq!(rig.heard, [refused]);
-    rig.send(&hello(PROTOCOL));
+    assert_eq!(rig.heard, []);
+    let refused = VersionCheck::Refused { protocol: PROTOCOL };
+    assert_eq!(rig.refused, [refused]);
+    // A later one asks, too, whatever its hello is like.
+    rig.send(&asked(PROTOCOL + 1));
+    rig.say(&ToDevice::Hello(HostHello {
+        protocol: PROTOCOL + 1,
+        ..HELLO
+    }));
     rig.run(1);
-    assert!(matches!(rig.heard[1], ToHost::Hello(_)));
+    assert_eq!((rig.refused.len(), rig.heard.len()), (3, 0));
+    rig.send(&asked(PROTOCOL));
+    rig.say(&ToDevice::Hello(HELLO));
+    rig.run(1);
+    assert!(matches!(rig.heard[0], ToHost::Hello(_)));
+    assert_eq!(rig.refused.len(), 3, "the hello is the answer");
+}
+
+#[test]
+fn a_host_of_another_protocol_does_not_end_a_session() {
+    let mut rig = Rig::in_scene(scene(Source::Points));
+    rig.send(&asked(3));
+    assert_eq!(forces(&rig.descend(40)), undisturbed());
+    assert_eq!(rig.refused.len(), 1);
+}
+
+#[test]
+fn what_belongs_to_another_session_is_not_heard() {
+    let mut rig = Rig::armed();
+    let other = SessionNumber::new(rig.session.get() + 1);
+    let drop = ToDevice::Request {
+        number: 9,
+        request: Request::Disarm,
+    };
+    for message in [
+        drop,
+        ToDevice::Bye,
+        ToDevice::Scene(Scene {
+            epoch: 8,
+            ..scene(Source::Encoders)
+        }),
+    ] {
+        rig.send(&framed(other, &message));
+    }
+    rig.run(300);
+    assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
+    assert_eq!(rig.status().foreign_frames, 3);
+}
+
+#[test]
+fn a_hello_that_is_repeated_changes_nothing() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    rig.run(100);
+    for _ in 0..5 {
+        rig.say(&ToDevice::Hello(HELLO));
+        rig.run(33);
+    }
+    rig.ask(Request::Disarm);
+    rig.say(&ToDevice::Hello(HELLO));
+    rig.run(30);
+    let mut next = 0;
+    for telemetry in rig.telemetry() {
+        assert_eq!((telemetry.first, telemetry.dropped), (next, 0));
+        next += telemetry.samples.len() as u32;
+    }
+    assert!(next > 250, "{next}");
+    // The request was done once before the hello and is known after it.
+    rig.number -= 1;
+    rig.ask(Request::Disarm);
+    rig.run(1);
+    assert_eq!(rig.answers(|r| matches!(r, Request::Disarm)), [Ok(()); 2]);
+}
+
+#[test]
+fn a_hello_of_the_session_before_is_stale() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    let first = rig.session;
+    rig.greet_anew();
+    rig.run(20);
+    let heard = rig.heard.len();
+    rig.send(&framed(first, &ToDevice::Hello(HELLO)));
+    rig.run(1);
+    assert_eq!(rig.heard.len(), heard, "not answered");
+    assert_eq!(rig.status().foreign_frames, 1);
+}
+
+#[test]
+fn a_request_is_done_once_however_often_it_comes() {
+    let mut rig = Rig::armed();
+    rig.ask(Request::Disarm);
+    let disarm = rig.number;
+    rig.run(200);
+    rig.arm();
+    // A double of what was asked before arrives late.
+    let request = Request::Disarm;
+    rig.say(&ToDevice::Request {
+        number: disarm,
+        request,
+    });
+    rig.run(200);
+    assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
+    // The last one, whose answer was lost, is answered again and not done again.
+    let arms = |rig: &Rig| rig.answers(|r| matches!(r, Request::Arm)).len();
+    let before = arms(&rig);
+    let (number, request) = (rig.number, Request::Arm);
+    rig.say(&ToDevice::Request { number, request });
+    rig.run(1);
+    assert_eq!(arms(&rig), before + 1);
+}
+
+#[test]
+fn numbers_of_requests_wrap_around() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    for _ in 0..600 {
+        rig.ask(Request::ClearFault);
+        rig.run(1);
+    }
+    let answers = |m: &&ToHost| matches!(m, ToHost::Answer(_));
+    assert_eq!(rig.heard.iter().filter(answers).count(), 600);
+}
+
+#[test]
+fn a_host_that_vanishes_is_let_go_after_the_time_it_named() {
+    let mut rig = Rig::armed();
+    let hello = HostHello {
+        silence_s: 7,
+        ..HELLO
+    };
+    rig.say(&ToDevice::Hello(hello));
+    rig.run(1);
+    for _ in 0..6_900 {
+        assert!(rig.device.tick(rig.sense).enabled, "rendering goes on");
+    }
+    // A frame of this session, and it has its time again.
+    rig.say(&ToDevice::Alive);
+    rig.run(1);
+    let on = (0..20_000).take_while(|_| rig.device.tick(rig.sense).enabled);
+    let on = on.count();
+    assert!(
+        (7_000..7_110).contains(&on),
+        "{on}: seven seconds, and to fade out"
+    );
+    rig.heard.clear();
+    rig.greet_anew();
+    rig.run(5);
+    let ToHost::Hello(device) = &rig.heard[0] else {
+        panic!("{:?}", rig.heard[0]);
+    };
+    assert_eq!(device.last.end, SessionEnd::HostSilent);
+    assert_eq!(device.epoch, Some(7), "and it holds the scene");
+    assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Disarmed));
+}
+
+#[test]
+fn the_time_for_silence_has_bounds() {
+    for (named, least, most) in [(0, 5_000, 5_110), (1, 5_000, 5_110)] {
+        let mut rig = Rig::armed();
+        rig.say(&ToDevice::Hello(HostHello {
+            silence_s: named,
+            ..HELLO
+        }));
+        rig.run(1);
+        let on = (0..20_000).take_while(|_| rig.device.tick(rig.sense).enabled);
+        let on = on.count();
+        assert!((least..most).contains(&on), "{on}");
+    }
+}
+
+#[test]
+fn a_host_that_speaks_is_not_let_go() {
+    let mut rig = Rig::armed();
+    rig.say(&ToDevice::Hello(HostHello {
+        silence_s: 5,
+        ..HELLO
+    }));
+    for _ in 0..40 {
+        rig.say(&ToDevice::Alive);
+        rig.run(500);
+    }
+    assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
+}
+
+#[test]
+fn an_arm_command_that_is_under_way_ends_with_its_session() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    rig.ask(Request::Zero { counts: [0; 3] });
+    rig.ask(Request::Arm);
+    rig.run(10);
+    assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Requested));
+    rig.greet_anew();
+    rig.say(&ToDevice::Scene(scene(Source::Encoders)));
+    rig.run(5);
+    rig.sense.dead_man = true;
+    rig.run(3_000);
+    assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Disarmed));
+}
+
+#[test]
+fn what_is_alive_is_answered_with_what_was_sent_before() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    rig.run(100);
+    for ticks in 1..40 {
+        rig.run(ticks % 7);
+        rig.say(&ToDevice::Alive);
+    }
+    rig.run(20);
+    let (mut sent, mut answers) = (0, 0);
+    for message in &rig.heard {
+        match message {
+            ToHost::Telemetry(telemetry) => sent += telemetry.samples.len() as u32,
+            ToHost::Alive { count, report, .. } => {
+                answers += 1;
+                assert_eq!((count.sent, count.dropped), (sent, 0));
+                assert_eq!(report.mode, Mode::Disarmed);
+            }
+            _ => {}
+        }
+    }
+    assert_eq!(answers, 39);
+}
+
+#[test]
+fn goodbye_is_said_again_to_a_host_that_missed_it() {
+    let mut rig = Rig::armed();
+    for _ in 0..3 {
+        rig.say(&ToDevice::Bye);
+        rig.run(250);
+    }
+    let goodbyes: Vec<_> = rig
+        .heard
+        .iter()
+        .filter(|m| matches!(m, ToHost::Goodbye(_)))
+        .collect();
+    assert_eq!(goodbyes.len(), 3);
+    assert!(goodbyes.windows(2).all(|pair| pair[0] == pair[1]));
+    // After that nothing of the session is heard.
+    rig.ask(Request::Arm);
+    rig.run(100);
+    assert_eq!(rig.answers(|r| matches!(r, Request::Arm)).len(), 1);
+}
+
+#[test]
+fn damage_does_not_make_the_device_ask_again_for_what_is_on_its_way() {
+    let mut rig = Rig::asking(scene(Source::Encoders));
+    rig.run(5);
+    let asked = rig.needs().len();
+    assert!(asked > 0);
+    for _ in 0..50 {
+        rig.send(&[5, 5, 5, 0]);
+        rig.run(1);
+    }
+    assert_eq!(rig.needs().len(), asked);
+    assert_eq!(rig.status().bad_frames, 50);
 }
 
 #[test]
@@ -149,7 +402,7 @@ fn joined_in_the_middle_of_a_frame() {
         let mut rig = Rig::new();
         let key = hapterra_core::terrain::TileKey::new(0, 0, 0);
         rig.send(&tile(7, key)[cut..]);
-        rig.send(&hello(PROTOCOL));
+        rig.say(&ToDevice::Hello(HELLO));
         rig.run(1);
         assert!(matches!(rig.heard[0], ToHost::Hello(_)), "cut {cut}");
     }
@@ -162,7 +415,7 @@ fn a_zero_before_hello_ends_what_the_last_host_left_unfinished() {
     rig.heard.clear();
     rig.send(&point(0, 0.0, 2.0)[..4]);
     rig.send(&[0]);
-    rig.send(&hello(PROTOCOL));
+    rig.greet_anew();
     rig.run(1);
     assert!(matches!(rig.heard[0], ToHost::Hello(_)));
 }
@@ -196,8 +449,8 @@ fn a_host_that_dies_is_felt_on_and_one_that_returns_goes_on() {
     rig.device.link.interrupted();
     rig.writer = usize::MAX;
     rig.heard.clear();
-    rig.send(&hello(PROTOCOL));
-    rig.send(&frame(&ToDevice::Scene(scene(Source::Encoders))));
+    rig.greet_anew();
+    rig.say(&ToDevice::Scene(scene(Source::Encoders)));
     rig.run(300);
     let ToHost::Hello(device) = &rig.heard[0] else {
         panic!("{:?}", rig.heard[0]);
@@ -217,12 +470,12 @@ fn a_host_that_returns_with_another_scene_starts_afresh() {
     let mut rig = Rig::in_scene(scene(Source::Points));
     rig.descend(5);
     rig.heard.clear();
-    rig.send(&hello(PROTOCOL));
+    rig.greet_anew();
     let other = Scene {
         epoch: 8,
         ..scene(Source::Points)
     };
-    rig.send(&frame(&ToDevice::Scene(other)));
+    rig.say(&ToDevice::Scene(other));
     rig.run(5);
     assert!(!rig.needs().is_empty(), "what it held is of another scene");
     assert_eq!(forces(&rig.descend(40)), undisturbed());
@@ -281,17 +534,28 @@ fn a_tile_that_never_comes_is_asked_for_again_and_again() {
 }
 
 #[test]
-fn where_time_stands_still_a_damaged_tile_is_asked_for_at_once() {
+fn where_time_stands_still_a_tile_that_does_not_come_is_asked_for_after_two_alives() {
     let held = Scene {
         hold_clock: true,
         ..scene(Source::Encoders)
     };
     let mut rig = Rig::asking(held);
     assert!(rig.device.link.may_stand_still());
+    let asked = rig.needs().len();
     let mut bytes = tile(7, rig.needs()[0]);
     bytes[9] ^= 1;
     rig.send(&bytes);
+    rig.run(20);
+    assert_eq!(
+        rig.needs().len(),
+        asked,
+        "damage alone is no reason to ask again"
+    );
+    rig.say(&ToDevice::Alive);
+    rig.run(20);
+    assert_eq!(rig.needs().len(), asked, "it may be on its way");
     rig.answers_tiles = true;
+    rig.say(&ToDevice::Alive);
     rig.run(20);
     assert!(!rig.device.link.may_stand_still(), "time goes on");
 }

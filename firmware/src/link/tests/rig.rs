@@ -15,7 +15,10 @@ use hapterra_core::terrain::{FieldSize, TileKey};
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::hello::{HostHello, PROTOCOL};
 use hapterra_core::wire::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
-use hapterra_core::wire::status::{Answer, BootReport, Refusal, Request, Status};
+use hapterra_core::wire::request::{Answer, Refusal, Request};
+use hapterra_core::wire::session::{DEFAULT_SILENCE_S, InSession, SessionNumber};
+use hapterra_core::wire::status::{BootReport, Status};
+use hapterra_core::wire::version::VersionCheck;
 
 use crate::app::{TileBuffers, WorkingMemory};
 use crate::native::{Device, StoppedClock};
@@ -25,7 +28,13 @@ use crate::store::Stored;
 pub(super) const D: usize = 4;
 
 /// What a host of this protocol says first.
-pub(super) const HELLO: HostHello = HostHello { protocol: PROTOCOL };
+pub(super) const HELLO: HostHello = HostHello {
+    protocol: PROTOCOL,
+    number: 1,
+    silence_s: DEFAULT_SILENCE_S,
+};
+/// The rig's first session.
+pub(super) const FIRST: SessionNumber = SessionNumber::new(1 << 8);
 
 /// A device without a host. Its memory is leaked, as a board's is never freed.
 fn device(stored: Stored, boot: BootReport) -> Device<StoppedClock, D> {
@@ -54,31 +63,50 @@ pub(super) fn scene(source: Source) -> Scene {
     }
 }
 
+/// A frame of a session.
+pub(super) fn framed(session: SessionNumber, message: &ToDevice<'_>) -> Vec<u8> {
+    let framed = InSession { session, message };
+    encode(&framed, &mut [0; MAX_FRAME]).unwrap().to_vec()
+}
+
+/// A frame of the first session.
 pub(super) fn frame(message: &ToDevice<'_>) -> Vec<u8> {
-    encode(message, &mut [0; MAX_FRAME]).unwrap().to_vec()
+    framed(FIRST, message)
 }
 
-pub(super) fn hello(protocol: u16) -> Vec<u8> {
-    frame(&ToDevice::Hello(HostHello { protocol }))
+/// What a host says to learn whether the device speaks its protocol.
+pub(super) fn asked(protocol: u16) -> Vec<u8> {
+    let asked = VersionCheck::Asked { protocol };
+    encode(&asked, &mut [0; 16]).unwrap().to_vec()
 }
 
-/// A tile of the plane at height 1.5, with every sample sent.
+/// A tile of the plane at height 1.5, with every sample sent, in the first session.
 pub(super) fn tile(epoch: u32, key: TileKey) -> Vec<u8> {
+    tile_in(FIRST, epoch, key)
+}
+
+fn tile_in(session: SessionNumber, epoch: u32, key: TileKey) -> Vec<u8> {
     let bytes: Vec<u8> = [0.5f32.to_le_bytes(); 33 * 33].concat();
     let heights = Heights::Samples {
         base: 1,
         bytes: &bytes,
     };
-    frame(&ToDevice::Tile(TileMessage {
+    let message = TileMessage {
         epoch,
         key,
         heights,
-    }))
+    };
+    framed(session, &ToDevice::Tile(message))
 }
 
+/// A point in the first session.
 pub(super) fn point(seq: u32, x: f32, z: f32) -> Vec<u8> {
+    point_in(FIRST, seq, x, z)
+}
+
+fn point_in(session: SessionNumber, seq: u32, x: f32, z: f32) -> Vec<u8> {
     let hip = GridPoint::new([100, 100, 0], Vec3::new(x, 0.5, z));
-    frame(&ToDevice::Point(Point { seq, hip }))
+    framed(session, &ToDevice::Point(Point { seq, hip }))
 }
 
 /// A host, its device, and what was said so far.
@@ -90,6 +118,13 @@ pub(super) struct Rig {
     /// Bytes the writer takes a step; `usize::MAX` for a fast one.
     pub(super) writer: usize,
     pub(super) heard: Vec<ToHost>,
+    /// The session that is spoken in, and the number of its last request.
+    pub(super) session: SessionNumber,
+    pub(super) number: u8,
+    /// Requests by the number that they were given.
+    asked: Vec<(u8, Request)>,
+    /// Refusals heard.
+    pub(super) refused: Vec<VersionCheck>,
     /// Whether tiles asked for are answered.
     pub(super) answers_tiles: bool,
     /// What the answer to a tile becomes on the way.
@@ -112,6 +147,10 @@ impl Rig {
             on_the_way: VecDeque::new(),
             writer: usize::MAX,
             heard: Vec::new(),
+            session: FIRST,
+            number: 0,
+            asked: Vec::new(),
+            refused: Vec::new(),
             answers_tiles: true,
             damage: |_| {},
             sense: Sense::default(),
@@ -132,8 +171,8 @@ impl Rig {
     pub(super) fn asking(scene: Scene) -> Self {
         let mut rig = Self::new();
         rig.answers_tiles = false;
-        rig.send(&hello(PROTOCOL));
-        rig.send(&frame(&ToDevice::Scene(scene)));
+        rig.say(&ToDevice::Hello(HELLO));
+        rig.say(&ToDevice::Scene(scene));
         rig.run(1);
         assert!(matches!(rig.heard[0], ToHost::Hello(_)), "{:?}", rig.heard);
         rig
@@ -149,16 +188,39 @@ impl Rig {
     /// Arms as a user does.
     pub(super) fn arm(&mut self) {
         self.sense.dead_man = false;
-        self.say(&ToDevice::Zero { counts: [0; 3] });
-        self.say(&ToDevice::Arm);
+        self.ask(Request::Zero { counts: [0; 3] });
+        self.ask(Request::Arm);
         self.run(10);
         self.sense.dead_man = true;
         self.run(2_300);
         assert_eq!(self.report().map(|r| r.mode), Some(Mode::Armed));
     }
 
+    /// Presses the dead-man switch for a moment, and lets it go.
+    pub(super) fn press(&mut self) {
+        for dead_man in [false, true, false] {
+            self.sense.dead_man = dead_man;
+            self.run(150);
+        }
+    }
+
     pub(super) fn say(&mut self, message: &ToDevice<'_>) {
-        self.send(&frame(message));
+        self.send(&framed(self.session, message));
+    }
+
+    /// Opens another session.
+    pub(super) fn greet_anew(&mut self) {
+        self.session = SessionNumber::new(self.session.get() + (1 << 8));
+        self.number = 0;
+        self.say(&ToDevice::Hello(HELLO));
+    }
+
+    /// Makes a request.
+    pub(super) fn ask(&mut self, request: Request) {
+        self.number = self.number.wrapping_add(1);
+        let number = self.number;
+        self.asked.push((number, request));
+        self.say(&ToDevice::Request { number, request });
     }
 
     pub(super) fn send(&mut self, bytes: &[u8]) {
@@ -180,7 +242,7 @@ impl Rig {
     /// Ends the session and reads on while there is something to read. No more
     /// ticks: the program may be about to end.
     pub(super) fn say_goodbye(&mut self) {
-        self.send(&frame(&ToDevice::Bye));
+        self.say(&ToDevice::Bye);
         self.deliver();
         assert!(!self.device.link.has_ended());
         self.writer = usize::MAX;
@@ -212,12 +274,19 @@ impl Rig {
         while !bytes.is_empty() {
             let (taken, frame) = self.reader.push(bytes);
             bytes = &bytes[taken..];
-            let Some(message) = frame.map(|frame| frame.and_then(decode::<ToHost>)) else {
+            let Some(content) = frame else {
                 continue;
             };
-            let message = message.expect("the device sends whole frames");
+            let content = content.expect("the device sends whole frames");
+            if VersionCheck::is_in(content) {
+                self.refused.push(decode(content).expect("a refusal"));
+                continue;
+            }
+            let framed: InSession<ToHost> = decode(content).expect("a message");
+            assert_eq!(framed.session, self.session, "{:?}", framed.message);
+            let message = framed.message;
             if let (ToHost::Need { epoch, key }, true) = (&message, self.answers_tiles) {
-                let mut answer = tile(*epoch, *key);
+                let mut answer = tile_in(self.session, *epoch, *key);
                 (self.damage)(&mut answer);
                 self.on_the_way.extend(answer);
             }
@@ -259,9 +328,12 @@ impl Rig {
     }
 
     /// The answers so far to a kind of request.
-    pub(super) fn answers(&self, to: Request) -> Vec<Result<(), Refusal>> {
+    pub(super) fn answers(&self, to: fn(&Request) -> bool) -> Vec<Result<(), Refusal>> {
         let answer = |m: &ToHost| match m {
-            ToHost::Answer(Answer { request, result }) if *request == to => Some(*result),
+            ToHost::Answer(Answer { number, result }) => {
+                let asked = self.asked.iter().find(|(asked, _)| asked == number);
+                asked.filter(|(_, request)| to(request)).map(|_| *result)
+            }
             _ => None,
         };
         self.heard.iter().filter_map(answer).collect()
@@ -281,7 +353,8 @@ impl Rig {
     /// Points from above down into the plane, fed one by one, as felt.
     pub(super) fn descend(&mut self, points: u32) -> Vec<(u32, Sample)> {
         for seq in 0..points {
-            self.send(&point(seq, seq as f32 * 0.9, 4.0 - seq as f32 * 0.1));
+            let (x, z) = (seq as f32 * 0.9, 4.0 - seq as f32 * 0.1);
+            self.send(&point_in(self.session, seq, x, z));
             for _ in 0..2000 {
                 self.run(1);
                 if self.felt().last().is_some_and(|(last, _)| *last == seq) {

@@ -5,17 +5,16 @@ use std::vec::Vec;
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::{Fault, Limits};
 use hapterra_core::scene::{Sample, Scene, Source};
-use hapterra_core::wire::hello::PROTOCOL;
 use hapterra_core::wire::message::{Telemetry, ToDevice, ToHost};
 
-use super::rig::{D, Rig, frame, hello, point, scene};
+use super::rig::{D, FIRST, HELLO, Rig, frame, point, scene};
 use crate::link::tx_queue::{LONGEST_URGENT, TxQueue};
 use hapterra_core::terrain::TileIndex;
 
 #[test]
 fn introduces_itself() {
     let mut rig = Rig::new();
-    rig.send(&hello(PROTOCOL));
+    rig.say(&ToDevice::Hello(HELLO));
     rig.run(1);
     let [ToHost::Hello(device), ToHost::Guard(_)] = &rig.heard[..] else {
         panic!("{:?}", rig.heard);
@@ -88,7 +87,7 @@ fn time_may_stand_still_while_a_tile_is_owed_only_if_the_scene_says_so() {
         let mut rig = Rig::new();
         rig.answers_tiles = false;
         assert!(rig.device.link.may_stand_still(), "without a scene");
-        rig.send(&hello(PROTOCOL));
+        rig.say(&ToDevice::Hello(HELLO));
         rig.send(&frame(&ToDevice::Scene(Scene {
             hold_clock,
             ..scene(Source::Encoders)
@@ -114,8 +113,12 @@ fn goodbye_comes_after_everything_was_said() {
     rig.writer = 0;
     rig.run(20);
     rig.say_goodbye();
-    assert!(rig.device.link.has_ended());
+    let Some(ToHost::Goodbye(count)) = rig.heard.last() else {
+        panic!("{:?}", rig.heard.last());
+    };
+    let count = *count;
     let samples: usize = rig.telemetry().iter().map(|t| t.samples.len()).sum();
+    assert_eq!(samples, count.sent as usize);
     assert!(samples >= 40, "the last, short batch came too: {samples}");
 }
 
@@ -136,15 +139,15 @@ fn the_longest_messages_fit_their_places() {
     };
     let mut queue = TxQueue::new();
     let seq = u32::MAX;
-    assert!(queue.push(&ToHost::PointAnswer { seq, sample }));
+    assert!(queue.push(FIRST, &ToHost::PointAnswer { seq, sample }));
     let length = queue.take(&mut [0; 4096]);
     assert!(length <= LONGEST_URGENT, "{length}");
-    let telemetry = Telemetry {
+    let telemetry = ToHost::Telemetry(Telemetry {
         first: u32::MAX,
         dropped: u32::MAX,
         samples: [sample; 8].into_iter().collect(),
-    };
-    assert!(queue.push_telemetry(telemetry));
+    });
+    assert!(queue.push_telemetry(FIRST, &telemetry));
 }
 
 fn far() -> hapterra_core::grid::GridPoint {

@@ -1,0 +1,77 @@
+//! Sessions: which conversation a frame belongs to, how a session ended, and how
+//! many of its samples there were.
+
+use serde::{Deserialize, Serialize};
+
+/// A session's number. The host draws it at random for each session, so that what is
+/// left on the line of one session is not taken for part of another.
+///
+/// No number is below 128: its first byte on the wire has its highest bit set, which
+/// tells a frame of a session from a [`VersionCheck`](super::version::VersionCheck).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct SessionNumber(u32);
+
+impl SessionNumber {
+    /// A number from 32 random bits, of which 31 count.
+    #[must_use]
+    pub const fn new(random: u32) -> Self {
+        Self(random | 0x80)
+    }
+
+    /// The number.
+    #[must_use]
+    pub const fn get(self) -> u32 {
+        self.0
+    }
+}
+
+/// What each frame of the link holds: a message and the session that it belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InSession<M> {
+    /// The session.
+    pub session: SessionNumber,
+    /// The message.
+    pub message: M,
+}
+
+/// How many samples a session had.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SampleCount {
+    /// Samples that were put into messages and given to the line so far.
+    pub sent: u32,
+    /// Samples that the device itself dropped because the line was slow.
+    pub dropped: u32,
+}
+
+/// How a session ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SessionEnd {
+    /// There was no session since the device started.
+    #[default]
+    None,
+    /// The host said goodbye: the arm was disarmed.
+    Goodbye,
+    /// Another session was opened. The device went on with what it held.
+    Replaced,
+    /// The host was silent for too long: the force was let out and the arm disarmed.
+    HostSilent,
+}
+
+/// The session before the present one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LastSession {
+    /// Its number; zero where there was none.
+    pub session: u32,
+    /// The number of the hello that opened it.
+    pub opened_by: u8,
+    /// How it ended.
+    pub end: SessionEnd,
+    /// Its samples.
+    pub count: SampleCount,
+}
+
+/// Bounds of the time for which a host may be silent while the arm is armed, seconds.
+pub const SILENCE_S: (u16, u16) = (5, 3_600);
+/// That time where the user says nothing, seconds.
+pub const DEFAULT_SILENCE_S: u16 = 180;

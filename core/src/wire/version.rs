@@ -1,0 +1,78 @@
+//! How two ends of different protocols tell each other so.
+//!
+//! These frames belong to no session. They are the same in every protocol, the first
+//! included: protocols 1 to 3 had a hello of variant 0 and a refusal of variant 1,
+//! each followed by the protocol's number and nothing more.
+//!
+//! - A host says [`VersionCheck::Asked`] before each hello. A device of protocol 3
+//!   answers it with its refusal; a device of this protocol passes it over, because
+//!   the hello follows.
+//! - A device answers [`VersionCheck::Asked`] of another protocol with
+//!   [`VersionCheck::Refused`]. That changes nothing else: a session that is open
+//!   stays open.
+//! - A host believes a refusal only while it waits for the device's hello, and only
+//!   when it names another protocol than its own.
+//!
+//! The first byte is 0 or 1. In every other frame it is at least 128, see
+//! [`SessionNumber`](super::session::SessionNumber).
+
+use serde::{Deserialize, Serialize};
+
+/// A frame that belongs to no session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum VersionCheck {
+    /// Host to device: the protocol that the host speaks.
+    Asked {
+        /// The host's protocol.
+        protocol: u16,
+    },
+    /// Device to host: the protocol that the device speaks, where the host speaks
+    /// another.
+    Refused {
+        /// The device's protocol.
+        protocol: u16,
+    },
+}
+
+impl VersionCheck {
+    /// Whether a frame's decoded bytes are a version check and no part of a session.
+    #[must_use]
+    pub fn is_in(content: &[u8]) -> bool {
+        content.first().is_some_and(|first| *first < 128)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::session::{InSession, SessionNumber};
+
+    #[test]
+    fn protocol_3_says_the_same_bytes() {
+        let mut buffer = [0; 8];
+        let asked = VersionCheck::Asked { protocol: 3 };
+        assert_eq!(
+            postcard::to_slice(&asked, &mut buffer).ok(),
+            Some(&mut [0, 3][..])
+        );
+        let refused = VersionCheck::Refused { protocol: 3 };
+        assert_eq!(
+            postcard::to_slice(&refused, &mut buffer).ok(),
+            Some(&mut [1, 3][..])
+        );
+    }
+
+    #[test]
+    fn no_session_looks_like_a_version_check() {
+        for random in [0, 1, 0x7F, 0x80, 0x100, 1 << 14, u32::MAX] {
+            let framed = InSession {
+                session: SessionNumber::new(random),
+                message: 0_u8,
+            };
+            let mut buffer = [0; 8];
+            let bytes = postcard::to_slice(&framed, &mut buffer).expect("fits");
+            assert!(!VersionCheck::is_in(bytes), "{random}");
+        }
+        assert!(VersionCheck::is_in(&[0, 3]) && VersionCheck::is_in(&[1, 3]));
+    }
+}

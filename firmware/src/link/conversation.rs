@@ -1,0 +1,148 @@
+//! Which session is heard, since when its host was silent, and what became of the
+//! session before: the device's table of states in [`hapterra_core::wire`].
+
+use hapterra_core::wire::session::{
+    LastSession, SILENCE_S, SampleCount, SessionEnd, SessionNumber,
+};
+
+/// Where the conversation with a host stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SessionState {
+    /// No host has said hello.
+    Closed,
+    /// A host has said hello.
+    Open,
+    /// The host has said goodbye, and has not been answered.
+    Leaving,
+    /// It was answered, or the host was silent for too long.
+    Ended(SessionEnd),
+    /// The host has heard the answer.
+    Gone,
+}
+
+/// What a hello means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Greeting {
+    /// A session begins.
+    Opens,
+    /// The session is open already: the host has missed the answer.
+    Again,
+    /// It comes late, from a session that is over.
+    Stale,
+}
+
+/// The present session.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Conversation {
+    pub(super) state: SessionState,
+    /// The session; any before the first.
+    session: SessionNumber,
+    /// The number of the hello that opened it.
+    pub(super) opened_by: u8,
+    last: LastSession,
+    /// Ticks for which the host may be silent.
+    silence_ticks: u32,
+    /// The tick of the last frame of this session.
+    heard_at: u32,
+    /// Samples put into telemetry.
+    pub(super) packed: u32,
+    /// The device's count of dropped samples when the session was opened.
+    dropped_before: u32,
+}
+
+impl Conversation {
+    pub(super) const fn new() -> Self {
+        Self {
+            state: SessionState::Closed,
+            session: SessionNumber::new(0),
+            opened_by: 0,
+            last: LastSession {
+                session: 0,
+                opened_by: 0,
+                end: SessionEnd::None,
+                count: SampleCount {
+                    sent: 0,
+                    dropped: 0,
+                },
+            },
+            silence_ticks: 0,
+            heard_at: 0,
+            packed: 0,
+            dropped_before: 0,
+        }
+    }
+
+    pub(super) const fn session(&self) -> SessionNumber {
+        self.session
+    }
+
+    /// The session before this one.
+    pub(super) const fn last(&self) -> LastSession {
+        self.last
+    }
+
+    pub(super) fn is_open(&self) -> bool {
+        self.state == SessionState::Open
+    }
+
+    /// Whether there is a session of this number. What belongs to another is not
+    /// heard.
+    pub(super) fn is_of(&self, session: SessionNumber) -> bool {
+        self.state != SessionState::Closed && self.session == session
+    }
+
+    pub(super) fn greeting(&self, session: SessionNumber) -> Greeting {
+        match self.state {
+            SessionState::Open if self.session == session => Greeting::Again,
+            _ if self.is_of(session) || self.last.session == session.get() => Greeting::Stale,
+            _ => Greeting::Opens,
+        }
+    }
+
+    /// Begins a session with the hello of this number. `dropped` samples were dropped since the device started.
+    pub(super) fn open(&mut self, session: SessionNumber, hello: u8, dropped: u32) {
+        let end = match self.state {
+            SessionState::Closed => SessionEnd::None,
+            SessionState::Open | SessionState::Leaving => SessionEnd::Replaced,
+            SessionState::Ended(end) => end,
+            SessionState::Gone => SessionEnd::Goodbye,
+        };
+        if end != SessionEnd::None {
+            self.last = LastSession {
+                session: self.session.get(),
+                opened_by: self.opened_by,
+                end,
+                count: self.count(0, dropped),
+            };
+        }
+        self.state = SessionState::Open;
+        self.session = session;
+        self.opened_by = hello;
+        self.packed = 0;
+        self.dropped_before = dropped;
+    }
+
+    /// The session's samples, of which some are packed and wait for the line.
+    pub(super) const fn count(&self, waiting: u32, dropped: u32) -> SampleCount {
+        SampleCount {
+            sent: self.packed.wrapping_sub(waiting),
+            dropped: dropped.wrapping_sub(self.dropped_before),
+        }
+    }
+
+    /// A frame of this session came at this tick.
+    pub(super) const fn heard(&mut self, tick: u32) {
+        self.heard_at = tick;
+    }
+
+    /// Takes for how long the host may be silent.
+    pub(super) fn set_silence(&mut self, seconds: u16, tick_hz: u32) {
+        let (least, most) = SILENCE_S;
+        self.silence_ticks = u32::from(seconds.clamp(least, most)).saturating_mul(tick_hz);
+    }
+
+    /// Whether the host of the open session has been silent for too long.
+    pub(super) fn is_forsaken(&self, tick: u32) -> bool {
+        self.is_open() && tick.wrapping_sub(self.heard_at) >= self.silence_ticks
+    }
+}

@@ -1,0 +1,54 @@
+//! The way into the loader in the chip's ROM, for an update without a debug probe.
+
+use hapterra_core::wire::request::Refusal;
+
+use super::Link;
+
+/// Where the way into the loader stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum LoaderEntry {
+    /// The board has no loader.
+    #[default]
+    None,
+    /// The board has one.
+    Offered,
+    /// The host has asked for it. There is no way back.
+    Wanted,
+}
+
+impl<const D: usize> Link<'_, D> {
+    /// Says that the board enters a loader when [`Self::enters_loader`] says so.
+    pub fn offer_loader(&mut self) {
+        self.loader = LoaderEntry::Offered;
+    }
+
+    /// Whether the board is to enter its loader: the host has asked for it, has been
+    /// answered, and the amplifiers are off.
+    #[must_use]
+    pub fn enters_loader(&self) -> bool {
+        let is_wanted = self.loader == LoaderEntry::Wanted;
+        is_wanted && self.tx.is_empty() && self.device.may_change_settings().is_ok()
+    }
+
+    /// Whether the board is on its way into its loader, where nothing else is done.
+    pub(super) fn is_leaving(&self) -> bool {
+        self.loader == LoaderEntry::Wanted
+    }
+
+    /// Takes the request for the loader: only while the arm is disarmed and nothing is
+    /// under way that would arm it or is to be stored.
+    pub(super) fn want_loader(&mut self) -> Result<(), Refusal> {
+        if self.loader == LoaderEntry::None {
+            return Err(Refusal::NoLoader);
+        }
+        self.device.may_change_settings()?;
+        if !self.device.is_at_rest() {
+            return Err(Refusal::NotWhileArmed);
+        }
+        if self.device.is_storing() {
+            return Err(Refusal::Busy);
+        }
+        self.loader = LoaderEntry::Wanted;
+        Ok(())
+    }
+}

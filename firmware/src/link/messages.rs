@@ -1,0 +1,246 @@
+//! What the link does with each message of the host.
+
+use hapterra_core::scene::{Point, Scene};
+use hapterra_core::terrain::RETRY_TICKS;
+use hapterra_core::tick::Command;
+use hapterra_core::wire::frame::{BadFrame, decode};
+use hapterra_core::wire::hello::{HostHello, PROTOCOL};
+use hapterra_core::wire::message::{ToDevice, ToHost};
+use hapterra_core::wire::session::{InSession, SessionEnd, SessionNumber};
+use hapterra_core::wire::status::{StackFigures, Status, TickFigures};
+use hapterra_core::wire::version::VersionCheck;
+
+use super::conversation::{Greeting, SessionState};
+use super::{Link, ReplayProgress, log};
+
+impl<const D: usize> Link<'_, D> {
+    /// Acts on a frame's decoded bytes.
+    pub(super) fn on_content(&mut self, content: &[u8]) -> Result<(), BadFrame> {
+        self.nothing_to_request_at = None;
+        if VersionCheck::is_in(content) {
+            self.on_version_check(decode(content)?);
+        } else {
+            let InSession { session, message } = decode(content)?;
+            self.on_message(session, message);
+        }
+        Ok(())
+    }
+
+    /// Answers a host of another protocol. One of this protocol says hello, too.
+    fn on_version_check(&mut self, check: VersionCheck) {
+        if let VersionCheck::Asked { protocol } = check
+            && protocol != PROTOCOL
+        {
+            self.refuse(protocol);
+        }
+    }
+
+    fn refuse(&mut self, theirs: u16) {
+        log::refused(theirs);
+        let protocol = PROTOCOL;
+        self.tx.push_refusal(&VersionCheck::Refused { protocol });
+    }
+
+    fn on_message(&mut self, session: SessionNumber, message: ToDevice<'_>) {
+        if let ToDevice::Hello(hello) = message {
+            return self.on_hello(session, hello);
+        }
+        if !self.conversation.is_of(session) {
+            self.foreign_frames = self.foreign_frames.saturating_add(1);
+            return;
+        }
+        self.conversation.heard(self.ends.monitor.ticks());
+        match (message, self.conversation.state) {
+            (ToDevice::Bye, state) => self.on_bye(state),
+            (ToDevice::Close, SessionState::Ended(SessionEnd::Goodbye)) => {
+                self.conversation.state = SessionState::Gone;
+            }
+            (_, SessionState::Closed | SessionState::Ended(_) | SessionState::Gone) => {}
+            (ToDevice::Alive, _) => self.on_alive(),
+            (ToDevice::Status, _) => self.say(&ToHost::Status(self.status())),
+            (ToDevice::GetCalibration, _) => {
+                self.say(&ToHost::Calibration(self.device.calibration));
+            }
+            (_, SessionState::Leaving) => {}
+            (ToDevice::Scene(scene), _) => self.take_scene(scene),
+            (ToDevice::Tile(tile), _) => self.take_tile(&tile),
+            (ToDevice::Point(point), _) => self.take_point(point),
+            (ToDevice::Request { number, request }, _) => self.take_request(number, &request),
+            (ToDevice::Hello(_) | ToDevice::Close, _) => {}
+        }
+    }
+
+    fn on_hello(&mut self, session: SessionNumber, hello: HostHello) {
+        if hello.protocol != PROTOCOL {
+            return self.refuse(hello.protocol);
+        }
+        match self.conversation.greeting(session) {
+            Greeting::Stale => {
+                self.foreign_frames = self.foreign_frames.saturating_add(1);
+                return;
+            }
+            Greeting::Again => {}
+            Greeting::Opens => self.open(session, hello.number),
+        }
+        self.conversation.heard(self.ends.monitor.ticks());
+        let tick_hz = self.device.tick_hz();
+        self.conversation.set_silence(hello.silence_s, tick_hz);
+        let hello = self
+            .device
+            .hello(hello.number, self.scene, &self.conversation);
+        self.say(&ToHost::Hello(hello));
+    }
+
+    /// Begins a session, which keeps the scene and what is held of it.
+    fn open(&mut self, session: SessionNumber, hello: u8) {
+        self.forget_conversation();
+        let dropped = self.samples_dropped();
+        self.conversation.open(session, hello, dropped);
+        self.device.session_opened();
+        log::opened(session, self.conversation.last().end, self.bad_frames);
+        // What the host before asked for and was not done yet is not done any more.
+        if self.device.is_being_armed() {
+            self.command(Command::Disarm);
+        }
+    }
+
+    fn on_alive(&mut self) {
+        let (count, report) = (self.sample_count(), self.device.report());
+        let epoch = self.scene.map(|scene| scene.epoch);
+        self.say(&ToHost::Alive {
+            count,
+            epoch,
+            report,
+        });
+        // Where time stands still until a tile is there, the time-out for asking
+        // again would never come.
+        if self.may_stand_still() {
+            self.requester.age(RETRY_TICKS / 2);
+        }
+    }
+
+    fn on_bye(&mut self, state: SessionState) {
+        match state {
+            SessionState::Open | SessionState::Ended(SessionEnd::HostSilent) => {
+                self.read_records();
+                self.device.forget_press();
+                self.drop_scene();
+                self.conversation.state = SessionState::Leaving;
+            }
+            // The host has missed the answer.
+            SessionState::Ended(_) | SessionState::Gone => {
+                self.say(&ToHost::Goodbye(self.sample_count()));
+            }
+            SessionState::Closed | SessionState::Leaving => {}
+        }
+    }
+
+    /// Disarms and drops the scene. The loop lets the force out by itself.
+    pub(super) fn drop_scene(&mut self) {
+        let held = self.scene.take().is_some();
+        self.command(if held {
+            Command::DropScene
+        } else {
+            Command::Disarm
+        });
+        self.forget_positions();
+        self.requester.forget_asked();
+    }
+
+    /// Forgets what belongs to the positions of one scene.
+    fn forget_positions(&mut self) {
+        self.focus = None;
+        self.points.clear();
+        self.replay = ReplayProgress::default();
+    }
+
+    pub(super) fn on_bad_frame(&mut self, bad: BadFrame) {
+        log::bad_frame(bad);
+        self.bad_frames = self.bad_frames.saturating_add(1);
+    }
+
+    /// Forgets what was said and requested; keeps the scene and what is held.
+    pub(super) fn forget_conversation(&mut self) {
+        self.nothing_to_request_at = None;
+        self.tx.clear();
+        self.drop_samples();
+        self.points.clear();
+        self.requester.forget_asked();
+    }
+
+    /// Drops the samples that are not packed yet, and counts them.
+    fn drop_samples(&mut self) {
+        self.dropped = self.dropped.wrapping_add(self.samples.len() as u32);
+        self.samples.clear();
+    }
+
+    /// Drops and counts the samples of a scene that another replaces.
+    fn drop_what_was_felt(&mut self) {
+        if self.renders_arm() && self.conversation.is_open() {
+            while self.ends.records.dequeue().is_some() {
+                self.dropped = self.dropped.wrapping_add(1);
+            }
+            self.drop_samples();
+        }
+    }
+
+    fn take_scene(&mut self, scene: Scene) {
+        let accepted = scene.is_valid();
+        // The very scene in force goes on: its host came back.
+        if accepted && self.scene != Some(scene) {
+            self.drop_what_was_felt();
+            self.requester.reset(scene.level, scene.size);
+            self.forget_positions();
+            self.scene = Some(scene);
+            self.command(Command::Scene(scene));
+        }
+        let epoch = scene.epoch;
+        log::scene(epoch, accepted);
+        self.say(&ToHost::SceneTaken { epoch, accepted });
+    }
+
+    /// Takes a point. Each is rendered once; one that was answered is answered
+    /// again.
+    fn take_point(&mut self, point: Point) {
+        if self.renders_arm() || self.scene.is_none() {
+            return;
+        }
+        let is = |seq: u32| seq == point.seq;
+        if let Some(last) = self.replay.last.filter(|r| r.answers.is_some_and(is)) {
+            return self.answer_point(last);
+        }
+        if self.replay.under_way.is_some_and(is) || self.points.iter().any(|p| is(p.seq)) {
+            return;
+        }
+        // A host that does not wait for answers loses points.
+        let _ = self.points.push_back(point);
+    }
+
+    fn status(&self) -> Status {
+        let (device, monitor) = (&self.device, self.ends.monitor);
+        let latest = &self.last_record.sample;
+        let (size, high_water) = monitor.stack();
+        Status {
+            device: device.hello(0, self.scene, &self.conversation),
+            boot: device.boot.clone(),
+            calibration: device.source,
+            model: device.calibration.map(|calibration| calibration.model),
+            health: device.health,
+            ticks: TickFigures {
+                run: monitor.ticks(),
+                cost: latest.cost,
+                worst_cost: latest.worst_cost,
+                late: latest.late,
+            },
+            stack: StackFigures { size, high_water },
+            bad_frames: self.bad_frames,
+            foreign_frames: self.foreign_frames,
+            dropped: self.samples_dropped(),
+        }
+    }
+
+    /// Samples that were dropped here and by the loop.
+    pub(super) fn samples_dropped(&self) -> u32 {
+        self.dropped.wrapping_add(self.ends.monitor.dropped())
+    }
+}

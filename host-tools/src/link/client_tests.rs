@@ -1,0 +1,424 @@
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::scene::Source;
+use hapterra_core::wire::frame::{decode, encode};
+use hapterra_core::wire::hello::PROTOCOL;
+use hapterra_core::wire::session::{InSession, SampleCount};
+use hapterra_core::wire::version::VersionCheck;
+
+use super::*;
+use crate::raster::Raster;
+use crate::terrain::Scale;
+
+/// How a device introduces itself.
+pub(crate) fn hello() -> DeviceHello {
+    DeviceHello {
+        protocol: PROTOCOL,
+        number: 1,
+        opened_by: 1,
+        board: "test".try_into().expect("fits"),
+        version: "1".try_into().expect("fits"),
+        window: 4,
+        tick_hz: 1000,
+        clock_hz: 1_000_000,
+        epoch: None,
+        last: LastSession::default(),
+    }
+}
+
+/// A client, and what a device says to it by hand.
+struct Bench<'t> {
+    client: Client<'t>,
+    now: Duration,
+    out: Vec<u8>,
+    opened: u32,
+    unanswered: Vec<Ask>,
+}
+
+const fn ms(ms: u64) -> Duration {
+    Duration::from_millis(ms)
+}
+
+fn on_bench(arming: Option<Arming>, test: impl FnOnce(&mut Bench<'_>)) {
+    let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    let home = GridPoint::default();
+    let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
+    let mut bench = Bench {
+        client: Client::new(&terrain, scene, arming, Patience::REAL_TIME),
+        now: ms(10_000),
+        out: vec![],
+        opened: 0,
+        unanswered: vec![],
+    };
+    bench.client.greet(bench.now, &mut bench.out);
+    test(&mut bench);
+}
+
+impl Bench<'_> {
+    fn hear_in(&mut self, session: SessionNumber, message: &ToHost) -> Result<(), LinkError> {
+        let mut frame = [0; MAX_FRAME];
+        let bytes = encode(&InSession { session, message }, &mut frame).expect("fits");
+        let opened = &mut self.opened;
+        let mut count =
+            |event: Event<'_>| *opened += u32::from(matches!(event, Event::Opened { .. }));
+        self.client
+            .receive(self.now, bytes, &mut self.out, &mut count)
+    }
+
+    fn hear(&mut self, message: &ToHost) {
+        let session = self.client.session();
+        self.hear_in(session, message).expect("understood");
+    }
+
+    fn taken(&self) -> ToHost {
+        ToHost::SceneTaken {
+            epoch: self.client.scene().epoch,
+            accepted: true,
+        }
+    }
+
+    fn alive(&self) -> ToHost {
+        ToHost::Alive {
+            count: SampleCount::default(),
+            epoch: Some(self.client.scene().epoch),
+            report: Report::default(),
+        }
+    }
+
+    fn open(&mut self) {
+        self.hear(&ToHost::Hello(hello()));
+        self.hear(&self.taken());
+        assert_eq!(self.client.state(), State::Open);
+    }
+
+    /// Lets time pass; what is said meanwhile stays in `out`.
+    fn pass(&mut self, time: Duration) -> Result<(), LinkError> {
+        let end = self.now + time;
+        while self.now < end {
+            self.now += ms(10);
+            let unanswered = &mut self.unanswered;
+            let mut keep = |event: Event<'_>| {
+                if let Event::Unanswered(ask) = event {
+                    unanswered.push(*ask);
+                }
+            };
+            self.client.due(self.now, &mut self.out, &mut keep)?;
+        }
+        Ok(())
+    }
+
+    /// What was said since this was last asked.
+    fn said(&mut self) -> Vec<String> {
+        let mut reader = FrameReader::<MAX_FRAME>::new();
+        let out = std::mem::take(&mut self.out);
+        let (mut bytes, mut said) = (out.as_slice(), vec![]);
+        let read = |content: &[u8]| {
+            if VersionCheck::is_in(content) {
+                return Ok("Version".to_owned());
+            }
+            decode::<InSession<ToDevice<'_>>>(content).map(|framed| {
+                let words = format!("{:?}", framed.message);
+                let name = words.split(['(', ' ']).next().unwrap_or_default();
+                match framed.message {
+                    ToDevice::Request { number, request } => format!("{number} {request:?}"),
+                    _ => name.to_owned(),
+                }
+            })
+        };
+        while let Some(Ok(name)) = next_frame(&mut reader, &mut bytes, read) {
+            said.push(name);
+        }
+        said
+    }
+}
+
+fn count_of(said: &[String], what: &str) -> usize {
+    said.iter().filter(|name| *name == what).count()
+}
+
+#[test]
+fn what_is_said_twice_opens_once() {
+    on_bench(None, |bench| {
+        let hello = ToHost::Hello(hello());
+        let taken = bench.taken();
+        for message in [&taken, &hello, &hello, &taken, &taken, &hello] {
+            bench.hear(message);
+        }
+        assert_eq!((bench.opened, bench.client.tally().sessions), (1, 1));
+        assert_eq!(bench.client.state(), State::Open);
+    });
+}
+
+#[test]
+fn hello_is_repeated_whatever_else_arrives_and_then_given_up() {
+    on_bench(None, |bench| {
+        let foreign = SessionNumber::new(7);
+        let mut noise = 0;
+        let error = loop {
+            let _ = bench.hear_in(foreign, &ToHost::Telemetry(Default::default()));
+            let mut none = |_: Event<'_>| {};
+            let _ = bench
+                .client
+                .receive(bench.now, &[5, 0, 9], &mut bench.out, &mut none);
+            noise += 1;
+            if let Err(error) = bench.pass(ms(50)) {
+                break error;
+            }
+            assert!(noise < 200, "for ever");
+        };
+        assert!(matches!(error, LinkError::Silent(_)), "{error}");
+        let said = bench.said();
+        assert_eq!(
+            (count_of(&said, "Hello"), count_of(&said, "Version")),
+            (10, 10)
+        );
+    });
+}
+
+#[test]
+fn the_scene_is_repeated_whatever_else_arrives_and_then_given_up() {
+    on_bench(None, |bench| {
+        bench.hear(&ToHost::Hello(hello()));
+        let error = loop {
+            bench.hear(&ToHost::Telemetry(Default::default()));
+            if let Err(error) = bench.pass(ms(50)) {
+                break error;
+            }
+        };
+        assert!(matches!(error, LinkError::Silent(_)), "{error}");
+        assert_eq!(count_of(&bench.said(), "Scene"), 10);
+    });
+}
+
+#[test]
+fn telemetry_alone_is_no_answer() {
+    on_bench(None, |bench| {
+        bench.open();
+        bench.said();
+        let error = loop {
+            bench.hear(&ToHost::Telemetry(Default::default()));
+            if let Err(error) = bench.pass(ms(50)) {
+                break error;
+            }
+        };
+        assert!(matches!(error, LinkError::Silent(_)), "{error}");
+        let said = bench.said();
+        assert_eq!(count_of(&said, "Alive"), 8);
+        assert_eq!(count_of(&said, "Hello"), 9, "from 0.75 s on");
+    });
+}
+
+#[test]
+fn an_arm_that_is_lost_is_repeated_and_then_told_and_taken_back() {
+    on_bench(Some(Arming::default()), |bench| {
+        bench.open();
+        for _ in 0..80 {
+            bench.hear(&bench.alive());
+            bench.pass(ms(50)).expect("alive");
+        }
+        let said = bench.said();
+        assert_eq!(count_of(&said, "1 Arm"), 10);
+        assert_eq!(bench.unanswered, [Ask::Request(Request::Arm)]);
+        assert_eq!(bench.client.tally().unanswered, 1);
+        assert_eq!(count_of(&said, "2 Disarm"), 1);
+    });
+}
+
+#[test]
+fn an_answer_ends_the_repeating_and_brings_the_next_request() {
+    on_bench(Some(Arming::VIRTUAL), |bench| {
+        bench.open();
+        assert_eq!(
+            bench.said().last().map(|s| s.starts_with("1 Zero")),
+            Some(true)
+        );
+        for number in [7, 1, 1] {
+            let result = Ok(());
+            bench.hear(&ToHost::Answer(hapterra_core::wire::request::Answer {
+                number,
+                result,
+            }));
+        }
+        assert_eq!(bench.said(), ["2 Arm"]);
+    });
+}
+
+#[test]
+fn tiles_wait_until_the_device_knows_its_zero() {
+    on_bench(Some(Arming::VIRTUAL), |bench| {
+        bench.open();
+        let (epoch, key) = (bench.client.scene().epoch, TileKey::new(0, 0, 0));
+        bench.said();
+        for _ in 0..3 {
+            bench.hear(&ToHost::Need { epoch, key });
+        }
+        assert_eq!(bench.said(), Vec::<String>::new());
+        let (number, result) = (1, Ok(()));
+        bench.hear(&ToHost::Answer(hapterra_core::wire::request::Answer {
+            number,
+            result,
+        }));
+        assert_eq!(bench.said(), ["2 Arm", "Tile"]);
+    });
+}
+
+#[test]
+fn a_refusal_in_mid_session_or_of_the_own_protocol_is_noise() {
+    on_bench(None, |bench| {
+        let refuse = |bench: &mut Bench<'_>, protocol| {
+            let mut frame = [0; 16];
+            let refused = VersionCheck::Refused { protocol };
+            let bytes = encode(&refused, &mut frame).expect("fits");
+            bench
+                .client
+                .receive(bench.now, bytes, &mut bench.out, &mut |_| {})
+        };
+        assert!(refuse(bench, PROTOCOL).is_ok());
+        let refused = refuse(bench, 3);
+        assert!(
+            matches!(refused, Err(LinkError::Version { theirs: 3, .. })),
+            "{refused:?}"
+        );
+        bench.open();
+        assert!(refuse(bench, PROTOCOL).is_ok() && refuse(bench, 3).is_ok());
+        assert_eq!(bench.client.state(), State::Open);
+    });
+}
+
+#[test]
+fn a_device_that_was_restarted_gets_its_scene_again() {
+    on_bench(None, |bench| {
+        bench.open();
+        bench.pass(ms(800)).expect("patient");
+        assert_eq!(
+            count_of(&bench.said(), "Hello"),
+            2,
+            "the first, and after silence"
+        );
+        let again = DeviceHello {
+            number: 2,
+            opened_by: 2,
+            ..hello()
+        };
+        // The answer to the first hello comes late: it tells what was.
+        bench.hear(&ToHost::Hello(hello()));
+        assert_eq!(bench.client.state(), State::Open);
+        bench.hear(&ToHost::Hello(again.clone()));
+        assert_eq!(bench.client.state(), State::SceneSent);
+        bench.hear(&bench.taken());
+        bench.hear(&ToHost::Hello(again));
+        assert_eq!((bench.opened, bench.client.state()), (2, State::Open));
+        assert_eq!(bench.client.tally().uncertain, 1);
+    });
+}
+
+#[test]
+fn another_host_is_noticed() {
+    on_bench(None, |bench| {
+        bench.open();
+        let other = SessionNumber::new(7);
+        let error = loop {
+            bench
+                .hear_in(other, &ToHost::Telemetry(Default::default()))
+                .expect("passed over");
+            if let Err(error) = bench.pass(ms(50)) {
+                break error;
+            }
+        };
+        assert!(matches!(error, LinkError::Taken), "{error}");
+        assert_eq!(bench.client.tally().samples, 0, "none of it is recorded");
+        // While this session is answered, another's frames are but noise.
+    });
+    on_bench(None, |bench| {
+        bench.open();
+        for _ in 0..200 {
+            let other = SessionNumber::new(7);
+            bench
+                .hear_in(other, &ToHost::Telemetry(Default::default()))
+                .expect("passed over");
+            bench.hear(&bench.alive());
+            bench.pass(ms(50)).expect("it is ours");
+        }
+    });
+}
+
+#[test]
+fn goodbye_is_repeated_until_it_is_answered_or_told_that_it_is_not() {
+    on_bench(None, |bench| {
+        bench.open();
+        bench.said();
+        bench.client.leave(bench.now, &mut bench.out);
+        bench.pass(ms(1_000)).expect("patient");
+        assert_eq!(count_of(&bench.said(), "Bye"), 3);
+        let count = SampleCount {
+            sent: 9,
+            dropped: 2,
+        };
+        bench.hear(&ToHost::Goodbye(count));
+        assert_eq!(bench.client.state(), State::Closed);
+        assert_eq!(bench.said(), ["Close"]);
+        let tally = bench.client.tally();
+        assert_eq!((tally.lost, tally.dropped), (9, 2));
+    });
+    on_bench(None, |bench| {
+        bench.open();
+        bench.client.leave(bench.now, &mut bench.out);
+        let error = loop {
+            bench.hear(&bench.alive());
+            if let Err(error) = bench.pass(ms(50)) {
+                break error;
+            }
+        };
+        assert!(matches!(error, LinkError::NotConfirmed), "{error}");
+    });
+}
+
+#[test]
+fn over_a_new_line_a_new_session_is_drawn_unless_the_last_was_never_answered() {
+    on_bench(None, |bench| {
+        let first = bench.client.session();
+        bench.client.greet(bench.now, &mut bench.out);
+        assert_eq!(bench.client.session(), first);
+        bench.hear(&ToHost::Hello(DeviceHello {
+            number: 2,
+            ..hello()
+        }));
+        bench.client.greet(bench.now, &mut bench.out);
+        assert_ne!(bench.client.session(), first);
+        // The device tells how the last one ended.
+        let last = LastSession {
+            session: first.get(),
+            opened_by: 1,
+            count: SampleCount {
+                sent: 5,
+                dropped: 1,
+            },
+            ..LastSession::default()
+        };
+        bench.hear(&ToHost::Hello(DeviceHello {
+            number: 3,
+            last,
+            ..hello()
+        }));
+        let tally = bench.client.tally();
+        assert_eq!((tally.lost, tally.dropped, tally.uncertain), (5, 1, 0));
+    });
+}
+
+#[test]
+fn tiles_that_there_are_not_are_counted_and_seldom_told() {
+    on_bench(None, |bench| {
+        bench.open();
+        let (epoch, key) = (bench.client.scene().epoch, TileKey::new(0, 77, 0));
+        bench.said();
+        for _ in 0..1_000 {
+            bench.hear(&ToHost::Need { epoch, key });
+        }
+        assert_eq!(bench.client.tally().no_tiles, 1_000);
+        assert_eq!(bench.client.logged, Some(bench.now));
+        assert_eq!(bench.said(), Vec::<String>::new());
+    });
+}

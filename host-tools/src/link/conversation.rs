@@ -1,0 +1,536 @@
+//! The host's table of states in [`hapterra_core::wire`], as a state machine without
+//! I/O and without a clock: time is handed in.
+
+use std::collections::VecDeque;
+use std::mem::discriminant;
+use std::time::Duration;
+
+use hapterra_core::scene::Scene;
+use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
+use hapterra_core::wire::message::{ToDevice, ToHost};
+use hapterra_core::wire::request::{Answer, Request};
+use hapterra_core::wire::session::{InSession, SessionNumber};
+use hapterra_core::wire::version::VersionCheck;
+
+use super::error::LinkError;
+use super::messages::append;
+use super::patience::Patience;
+
+/// Where the conversation stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Nothing was said yet, or goodbye was answered.
+    Closed,
+    /// Hello was said.
+    Greeting,
+    /// The scene was said.
+    SceneSent,
+    /// The scene is in force.
+    Open,
+    /// Goodbye was said.
+    Leaving,
+}
+
+/// What a host asks for; repeated until it is answered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ask {
+    /// Something to be done, once.
+    Request(Request),
+    /// The device's status.
+    Status,
+    /// The calibration in force.
+    Calibration,
+}
+
+impl Ask {
+    /// Whether both ask for the same kind of thing. Not whether they are equal: what is
+    /// no number, as a request may hold, equals nothing.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Request(one), Self::Request(two)) => discriminant(one) == discriminant(two),
+            _ => discriminant(self) == discriminant(other),
+        }
+    }
+}
+
+/// What is under way.
+#[derive(Clone, Copy, Debug)]
+struct Pending {
+    ask: Ask,
+    number: u8,
+    since: Duration,
+    said: Duration,
+}
+
+/// What a message of the device means to whoever holds the conversation.
+#[derive(Debug)]
+pub(super) enum News {
+    /// The device has introduced itself: its samples are numbered from zero. `restarted`
+    /// tells that it was in this session before and has lost everything.
+    Greeted {
+        device: DeviceHello,
+        restarted: bool,
+    },
+    /// The scene is in force.
+    SceneTaken,
+    /// What was asked for is answered by this message.
+    Answered(Ask, ToHost),
+    /// A message that answers nothing, or more than the conversation.
+    Other(ToHost),
+}
+
+/// A conversation with a device, perhaps about a scene.
+#[derive(Clone, Debug)]
+pub(super) struct Conversation {
+    numbers: fastrand::Rng,
+    session: SessionNumber,
+    /// The hello that opened it; zero until the device has said which.
+    opened_by: u8,
+    /// The session before, and the hello that opened it; its last frames are no other
+    /// host's.
+    previous: Option<(SessionNumber, u8)>,
+    /// The device has answered in this session.
+    confirmed: bool,
+    scene: Option<Scene>,
+    patience: Patience,
+    state: State,
+    /// When the state began, and when its message was said last.
+    since: Duration,
+    said: Duration,
+    /// When something was answered last.
+    heard: Duration,
+    alive_said: Duration,
+    alive_is_due: bool,
+    /// When a frame of another session came last.
+    foreign: Option<Duration>,
+    /// The last hello's number, and whether it was answered.
+    hello: u8,
+    hello_answered: bool,
+    pending: Option<Pending>,
+    waiting: VecDeque<Ask>,
+    number: u8,
+    unanswered: Vec<Ask>,
+}
+
+impl Conversation {
+    pub(super) fn new(
+        scene: Option<Scene>,
+        patience: Patience,
+        mut numbers: fastrand::Rng,
+    ) -> Self {
+        let session = SessionNumber::new(numbers.u32(..));
+        Self {
+            numbers,
+            session,
+            opened_by: 0,
+            previous: None,
+            confirmed: false,
+            scene,
+            patience,
+            state: State::Closed,
+            since: Duration::ZERO,
+            said: Duration::ZERO,
+            heard: Duration::ZERO,
+            alive_said: Duration::ZERO,
+            alive_is_due: false,
+            foreign: None,
+            hello: 0,
+            hello_answered: true,
+            pending: None,
+            waiting: VecDeque::new(),
+            number: 0,
+            unanswered: vec![],
+        }
+    }
+
+    pub(super) const fn state(&self) -> State {
+        self.state
+    }
+
+    pub(super) const fn session(&self) -> SessionNumber {
+        self.session
+    }
+
+    /// The session before the present one, and the hello that opened it.
+    pub(super) const fn previous(&self) -> Option<(SessionNumber, u8)> {
+        self.previous
+    }
+
+    pub(super) const fn patience(&self) -> &Patience {
+        &self.patience
+    }
+
+    /// Begins, or begins anew over a new line. Returns whether a new session was
+    /// drawn: one that was never answered is tried again, so that no session is opened
+    /// that nobody knows of.
+    pub(super) fn greet(&mut self, now: Duration, out: &mut Vec<u8>) -> bool {
+        let draws = self.confirmed || self.foreign.is_some();
+        if draws {
+            self.previous = Some((self.session, self.opened_by));
+            self.session = SessionNumber::new(self.numbers.u32(..));
+            self.confirmed = false;
+            self.opened_by = 0;
+        }
+        self.foreign = None;
+        self.number = 0;
+        self.give_up_asking();
+        self.enter(State::Greeting, now);
+        self.say_state(now, out);
+        draws
+    }
+
+    /// Ends the conversation.
+    pub(super) fn leave(&mut self, now: Duration, out: &mut Vec<u8>) {
+        if matches!(self.state, State::Closed | State::Leaving) {
+            return;
+        }
+        self.give_up_asking();
+        self.unanswered.clear();
+        self.enter(State::Leaving, now);
+        self.say_state(now, out);
+    }
+
+    /// Puts a scene in force, or another one than before.
+    pub(super) fn put_scene(&mut self, scene: Scene, now: Duration, out: &mut Vec<u8>) {
+        self.scene = Some(scene);
+        self.enter(State::SceneSent, now);
+        self.say_state(now, out);
+    }
+
+    /// No scene is to be in force any more: the host asks for its end.
+    pub(super) const fn forget_scene(&mut self) {
+        self.scene = None;
+    }
+
+    /// Asks for something, after what was asked for before.
+    pub(super) fn ask(&mut self, ask: Ask) {
+        self.waiting.push_back(ask);
+    }
+
+    /// Nobody has listened for a while: silence counts from now.
+    pub(super) fn listen_from(&mut self, now: Duration) {
+        self.heard = now;
+        self.alive_said = now;
+    }
+
+    /// What was given up without an answer since it was last taken.
+    pub(super) fn take_unanswered(&mut self) -> Vec<Ask> {
+        std::mem::take(&mut self.unanswered)
+    }
+
+    /// Says what is due.
+    ///
+    /// # Errors
+    /// When a deadline has passed.
+    pub(super) fn due(&mut self, now: Duration, out: &mut Vec<u8>) -> Result<(), LinkError> {
+        let in_state = now.saturating_sub(self.since);
+        match self.state {
+            State::Closed => return Ok(()),
+            State::Greeting | State::SceneSent if in_state >= self.patience.give_up => {
+                return Err(LinkError::Silent(in_state));
+            }
+            State::Leaving if in_state >= self.patience.goodbye => {
+                return Err(LinkError::NotConfirmed);
+            }
+            State::Open => self.check_silence(now)?,
+            _ => {}
+        }
+        let is_quiet = now.saturating_sub(self.heard) >= self.patience.greet_again;
+        if self.is_due(self.said, now) && (self.state != State::Open || is_quiet) {
+            self.say_state(now, out);
+        }
+        if self.state == State::Open {
+            self.say_alive(now, out);
+            self.say_pending(now, out);
+        }
+        Ok(())
+    }
+
+    fn check_silence(&self, now: Duration) -> Result<(), LinkError> {
+        let quiet = now.saturating_sub(self.heard);
+        // What comes right after the last answer may have been on its way before.
+        let late = self.heard + self.patience.greet_again;
+        let others = self.foreign.is_some_and(|at| at > late);
+        if others && quiet >= 2 * self.patience.greet_again {
+            return Err(LinkError::Taken);
+        }
+        match quiet >= self.patience.give_up {
+            true => Err(LinkError::Silent(quiet)),
+            false => Ok(()),
+        }
+    }
+
+    fn is_due(&self, said: Duration, now: Duration) -> bool {
+        now.saturating_sub(said) >= self.patience.again
+    }
+
+    fn enter(&mut self, state: State, now: Duration) {
+        self.state = state;
+        (self.since, self.said) = (now, now);
+    }
+
+    /// What is asked for, or is to be, is not waited for any more.
+    fn give_up_asking(&mut self) {
+        let under_way = self.pending.take().map(|pending| pending.ask);
+        self.unanswered.extend(under_way);
+        self.unanswered.extend(self.waiting.drain(..));
+    }
+
+    /// Says what the state repeats.
+    fn say_state(&mut self, now: Duration, out: &mut Vec<u8>) {
+        self.said = now;
+        match self.state {
+            State::Closed => {}
+            State::Greeting => {
+                // A zero first ends whatever may have been under way.
+                out.push(0);
+                append(&VersionCheck::Asked { protocol: PROTOCOL }, out);
+                self.say_hello(out);
+            }
+            State::SceneSent => {
+                if let Some(scene) = self.scene {
+                    self.say(&ToDevice::Scene(scene), out);
+                }
+                if now.saturating_sub(self.heard) >= self.patience.greet_again {
+                    self.say_hello(out);
+                }
+            }
+            State::Open => self.say_hello(out),
+            State::Leaving => {
+                // A device that was restarted, or has not heard of this session yet,
+                // has to before it can say goodbye to it.
+                self.say_hello(out);
+                self.say(&ToDevice::Bye, out);
+            }
+        }
+    }
+
+    fn say_hello(&mut self, out: &mut Vec<u8>) {
+        // Zero stands for a hello that was never answered.
+        self.hello = self.hello.checked_add(1).unwrap_or(1);
+        self.hello_answered = false;
+        out.push(0);
+        let hello = HostHello {
+            protocol: PROTOCOL,
+            number: self.hello,
+            silence_s: self.patience.silence_s,
+        };
+        self.say(&ToDevice::Hello(hello), out);
+    }
+
+    /// Says that the host is there.
+    fn say_alive(&mut self, now: Duration, out: &mut Vec<u8>) {
+        if self.alive_is_due || now.saturating_sub(self.alive_said) >= self.patience.alive {
+            (self.alive_is_due, self.alive_said) = (false, now);
+            self.say(&ToDevice::Alive, out);
+        }
+    }
+
+    /// Says at the next chance that the host is there: time has passed on the device.
+    pub(super) const fn hasten_alive(&mut self) {
+        self.alive_is_due = true;
+    }
+
+    /// Says what is under way, again where it is due, and the next where nothing is.
+    pub(super) fn say_pending(&mut self, now: Duration, out: &mut Vec<u8>) {
+        if self.state != State::Open {
+            return;
+        }
+        let patience = self.patience;
+        let given_up = |pending: &mut Pending| {
+            now.saturating_sub(pending.since) >= patience.with(&pending.ask)
+        };
+        if let Some(pending) = self.pending.take_if(given_up) {
+            self.unanswered.push(pending.ask);
+            if matches!(pending.ask, Ask::Request(Request::Arm | Request::Jog(_))) {
+                // Its number makes the device ignore the first, should that still come.
+                self.waiting.push_front(Ask::Request(Request::Disarm));
+            }
+        }
+        match self.pending {
+            Some(pending) if !self.is_due(pending.said, now) => return,
+            Some(_) => {}
+            None => {
+                let Some(ask) = self.waiting.pop_front() else {
+                    return;
+                };
+                // Questions have no number: a hundred of them between two requests
+                // would make the second look older than the first.
+                if matches!(ask, Ask::Request(_)) {
+                    self.number = self.number.wrapping_add(1);
+                }
+                self.pending = Some(Pending {
+                    ask,
+                    number: self.number,
+                    since: now,
+                    said: now,
+                });
+            }
+        }
+        if let Some(pending) = &mut self.pending {
+            pending.said = now;
+            let Pending { ask, number, .. } = *pending;
+            self.say(
+                &match ask {
+                    Ask::Request(request) => ToDevice::Request { number, request },
+                    Ask::Status => ToDevice::Status,
+                    Ask::Calibration => ToDevice::GetCalibration,
+                },
+                out,
+            );
+        }
+    }
+
+    /// Appends a message of this session.
+    pub(super) fn say(&self, message: &ToDevice<'_>, out: &mut Vec<u8>) {
+        let session = self.session;
+        append(&InSession { session, message }, out);
+    }
+
+    /// Takes a refusal. It counts only where it can be meant.
+    pub(super) fn on_version_check(&self, check: VersionCheck) -> Result<(), LinkError> {
+        match check {
+            VersionCheck::Refused { protocol }
+                if self.state == State::Greeting && protocol != PROTOCOL =>
+            {
+                Err(LinkError::version(protocol))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Takes a frame; none where it belongs to another session or is an answer that is
+    /// not waited for.
+    pub(super) fn hear(
+        &mut self,
+        now: Duration,
+        frame: InSession<ToHost>,
+        out: &mut Vec<u8>,
+    ) -> Result<Option<News>, LinkError> {
+        if frame.session != self.session || self.state == State::Closed {
+            let previous = self.previous.map(|(session, _)| session);
+            let is_another = previous != Some(frame.session);
+            self.foreign = is_another.then_some(now).or(self.foreign);
+            return Ok(None);
+        }
+        self.confirmed = true;
+        Ok(match frame.message {
+            ToHost::Hello(device) => self.on_hello(now, device, out)?,
+            ToHost::SceneTaken { epoch, accepted } => self.on_scene_taken(now, epoch, accepted)?,
+            ToHost::Answer(answer) => self.on_answer(now, answer),
+            message @ ToHost::Status(_) => self.on_told(now, Ask::Status, message),
+            message @ ToHost::Calibration(_) => self.on_told(now, Ask::Calibration, message),
+            ToHost::Goodbye(count) => self
+                .on_goodbye(now, out)
+                .then_some(News::Other(ToHost::Goodbye(count))),
+            message @ ToHost::Alive { .. } => {
+                self.on_alive(now, &message, out);
+                Some(News::Other(message))
+            }
+            message @ ToHost::PointAnswer { .. } => {
+                self.heard = now;
+                Some(News::Other(message))
+            }
+            message => Some(News::Other(message)),
+        })
+    }
+
+    fn on_hello(
+        &mut self,
+        now: Duration,
+        device: DeviceHello,
+        out: &mut Vec<u8>,
+    ) -> Result<Option<News>, LinkError> {
+        // An answer to an earlier hello, or this one's double, tells what was.
+        if device.number != self.hello || self.hello_answered {
+            return Ok(None);
+        }
+        self.hello_answered = true;
+        self.heard = now;
+        if device.protocol != PROTOCOL {
+            return Err(LinkError::version(device.protocol));
+        }
+        let is_first = self.opened_by == 0;
+        if self.opened_by == device.opened_by && self.state != State::Greeting {
+            return Ok(None);
+        }
+        self.opened_by = device.opened_by;
+        let restarted = !is_first;
+        if self.state == State::Leaving {
+            return Ok(Some(News::Greeted { device, restarted }));
+        }
+        if restarted {
+            self.give_up_asking();
+        }
+        let next = match self.scene {
+            Some(_) => State::SceneSent,
+            None => State::Open,
+        };
+        if self.state != next {
+            self.enter(next, now);
+        }
+        if next == State::SceneSent {
+            self.say_state(now, out);
+        }
+        Ok(Some(News::Greeted { device, restarted }))
+    }
+
+    /// Whether there is a scene to be felt and this is not its epoch.
+    fn lacks_scene(&self, epoch: Option<u32>) -> bool {
+        self.scene.is_some_and(|scene| epoch != Some(scene.epoch))
+    }
+
+    fn on_scene_taken(
+        &mut self,
+        now: Duration,
+        epoch: u32,
+        accepted: bool,
+    ) -> Result<Option<News>, LinkError> {
+        if self.state != State::SceneSent || self.lacks_scene(Some(epoch)) {
+            return Ok(None);
+        }
+        self.heard = now;
+        if !accepted {
+            return Err(LinkError::SceneRefused);
+        }
+        self.enter(State::Open, now);
+        Ok(Some(News::SceneTaken))
+    }
+
+    fn on_answer(&mut self, now: Duration, answer: Answer) -> Option<News> {
+        let is_it = |pending: &mut Pending| {
+            pending.number == answer.number && matches!(pending.ask, Ask::Request(_))
+        };
+        let pending = self.pending.take_if(is_it)?;
+        self.heard = now;
+        Some(News::Answered(pending.ask, ToHost::Answer(answer)))
+    }
+
+    fn on_told(&mut self, now: Duration, asked: Ask, message: ToHost) -> Option<News> {
+        let pending = self.pending.take_if(|pending| pending.ask == asked)?;
+        self.heard = now;
+        Some(News::Answered(pending.ask, message))
+    }
+
+    fn on_alive(&mut self, now: Duration, message: &ToHost, out: &mut Vec<u8>) {
+        self.heard = now;
+        if let ToHost::Alive { epoch, .. } = message
+            && self.state == State::Open
+            && self.lacks_scene(*epoch)
+        {
+            // The device has taken no scene, or lost it, and its host has missed that.
+            self.enter(State::SceneSent, now);
+            self.say_state(now, out);
+        }
+    }
+
+    fn on_goodbye(&mut self, now: Duration, out: &mut Vec<u8>) -> bool {
+        let leaves = self.state == State::Leaving;
+        if leaves {
+            self.heard = now;
+            self.enter(State::Closed, now);
+            self.say(&ToDevice::Close, out);
+        }
+        leaves
+    }
+}

@@ -1,0 +1,71 @@
+//! How long either end waits for the other.
+
+use std::time::Duration;
+
+use hapterra_core::wire::request::Request;
+use hapterra_core::wire::session::DEFAULT_SILENCE_S;
+use hapterra_core::wire::status::PRESS_MS;
+
+use super::conversation::Ask;
+
+/// The times of the table in [`hapterra_core::wire`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Patience {
+    /// Between two tries to be understood.
+    pub again: Duration,
+    /// Between two signs of life.
+    pub alive: Duration,
+    /// After so long without an answer the host says hello again, which a device that
+    /// was restarted needs, and which changes nothing else.
+    pub greet_again: Duration,
+    /// After so long without an answer the device counts as gone.
+    pub give_up: Duration,
+    /// So long the device may take to disarm and to say so.
+    pub goodbye: Duration,
+    /// For so long, in seconds, the device lets an armed arm be while the host is
+    /// silent.
+    pub silence_s: u16,
+}
+
+impl Patience {
+    /// For a device that runs in real time.
+    pub const REAL_TIME: Self = Self {
+        again: Duration::from_millis(400),
+        alive: Duration::from_millis(500),
+        greet_again: Duration::from_millis(750),
+        give_up: Duration::from_secs(4),
+        goodbye: Duration::from_secs(3),
+        silence_s: DEFAULT_SILENCE_S,
+    };
+
+    /// For an emulated board, whose speed is that of a shared machine.
+    pub const EMULATED: Self = Self {
+        again: Duration::from_secs(5),
+        alive: Duration::from_millis(500),
+        greet_again: Duration::from_secs(20),
+        give_up: Duration::from_secs(120),
+        goodbye: Duration::from_secs(60),
+        silence_s: DEFAULT_SILENCE_S,
+    };
+
+    /// So long an answer may take: somebody has to press a switch before a calibration is
+    /// stored.
+    pub(super) fn with(&self, ask: &Ask) -> Duration {
+        const PRESS: Duration = Duration::from_millis(PRESS_MS as u64);
+        match ask {
+            Ask::Request(Request::StoreCalibration) => self.give_up + PRESS,
+            _ => self.give_up,
+        }
+    }
+
+    /// For a device that is only asked something: all of it within `give_up`.
+    #[must_use]
+    pub fn of_a_dialogue(give_up: Duration) -> Self {
+        Self {
+            again: Self::REAL_TIME.again.min(give_up),
+            greet_again: Self::REAL_TIME.greet_again.min(give_up),
+            give_up,
+            ..Self::REAL_TIME
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! What the device says before any of it is harmed: how many samples each session had.
+
+use std::collections::HashMap;
+
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode};
+use hapterra_core::wire::message::ToHost;
+use hapterra_core::wire::session::{InSession, SampleCount};
+
+/// The samples of every session, by the device's own words.
+#[derive(Default)]
+pub(super) struct Account {
+    reader: Box<FrameReader<MAX_FRAME>>,
+    sessions: HashMap<u32, SampleCount>,
+}
+
+impl Account {
+    /// Hears what the device says.
+    pub(super) fn hear(&mut self, mut bytes: &[u8]) {
+        while !bytes.is_empty() {
+            let (taken, frame) = self.reader.push(bytes);
+            bytes = bytes.get(taken..).unwrap_or(&[]);
+            if let Some(Ok(framed)) = frame.map(|f| f.and_then(decode::<InSession<ToHost>>)) {
+                self.take(framed.session.get(), framed.message);
+            }
+        }
+    }
+
+    fn take(&mut self, session: u32, message: ToHost) {
+        match message {
+            ToHost::Telemetry(telemetry) => {
+                let sent = telemetry.first + telemetry.samples.len() as u32;
+                let dropped = telemetry.dropped;
+                self.raise(session, SampleCount { sent, dropped });
+            }
+            ToHost::Alive { count, .. } | ToHost::Goodbye(count) => self.raise(session, count),
+            ToHost::Hello(device) => self.raise(device.last.session, device.last.count),
+            _ => {}
+        }
+    }
+
+    fn raise(&mut self, session: u32, count: SampleCount) {
+        let known = self.sessions.entry(session).or_default();
+        known.sent = known.sent.max(count.sent);
+        known.dropped = known.dropped.max(count.dropped);
+    }
+
+    /// What the sessions had together: sent, and dropped.
+    pub(super) fn of(&self, sessions: &[u32]) -> (u64, u64) {
+        let counts = sessions
+            .iter()
+            .filter_map(|number| self.sessions.get(number));
+        counts.fold((0, 0), |(sent, dropped), count| {
+            (
+                sent + u64::from(count.sent),
+                dropped + u64::from(count.dropped),
+            )
+        })
+    }
+}

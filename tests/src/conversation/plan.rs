@@ -1,0 +1,51 @@
+//! What goes wrong in a run.
+
+use super::line::{Direction, Harm};
+use crate::chance::Chance;
+
+/// What befalls one of the two ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interruption {
+    /// The host's program is killed and started again.
+    HostKilled,
+    /// The device is reset.
+    DeviceReset,
+    /// For so many ticks nothing gets through one way.
+    Cut(Direction, u64),
+}
+
+/// Everything that goes wrong in a run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan {
+    /// Harm to single frames, by their number in their direction.
+    pub harms: Vec<(Direction, usize, Harm)>,
+    /// What happens at a tick.
+    pub interruptions: Vec<(u64, Interruption)>,
+    /// Harm at random: the seed, and the share of frames in a thousand.
+    pub random: Option<(u64, usize)>,
+}
+
+impl Plan {
+    /// A plan drawn from a seed.
+    #[must_use]
+    pub fn random(seed: u64) -> Self {
+        let mut chance = Chance::new(seed);
+        let share = [5, 20, 80, 200][chance.below(4)];
+        let interruptions = (0..chance.below(4)).map(|_| {
+            let at = chance.below(3_000) as u64;
+            let long = 50 + chance.below(6_000) as u64;
+            let what = match chance.below(4) {
+                0 => Interruption::HostKilled,
+                1 => Interruption::DeviceReset,
+                2 => Interruption::Cut(Direction::ToDevice, long),
+                _ => Interruption::Cut(Direction::ToHost, long),
+            };
+            (at, what)
+        });
+        Self {
+            interruptions: interruptions.collect(),
+            random: Some((chance.bits(), share)),
+            ..Self::default()
+        }
+    }
+}

@@ -1,0 +1,376 @@
+//! One run: a host that opens a session, arms, feels, disarms, arms again and leaves; a
+//! device; a user who presses the dead-man switch whenever that could arm it.
+
+use std::time::Duration;
+
+use hapterra::link::{Arming, Ask, Client, Event, LinkError, Patience, State};
+use hapterra::raster::Raster;
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::guard::{Mode, Sense};
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::{Scene, Source};
+use hapterra_core::wire::request::Request;
+use hapterra_core::wire::status::BootReport;
+use hapterra_firmware::app::{TileBuffers, WorkingMemory};
+use hapterra_firmware::native::{Device, StoppedClock};
+use hapterra_firmware::store::Stored;
+
+use super::account::Account;
+use super::line::{Direction, Line};
+use super::plan::{Interruption, Plan};
+
+/// Ticks after which a run hangs: each step has its deadline, and no plan needs more.
+const LONGEST: u64 = 60_000;
+/// Ticks after the end, in which what was delayed still arrives.
+const AFTER: u64 = 6_500;
+/// Ticks in which the force goes out after a request to disarm was answered.
+const FADE: u64 = 150;
+/// Samples with the amplifiers on after which the host goes on.
+const FELT: u32 = 60;
+/// Times that the host takes up a session that went silent.
+const RESUMPTIONS: u32 = 4;
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The host knows that the device is disarmed.
+    Agreed,
+    /// The host tells its user that it does not know, and why.
+    Told,
+}
+
+/// What must not happen.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Wrong {
+    /// Nothing came to an end in `LONGEST` ticks.
+    Hangs,
+    /// The amplifiers were on at this tick, and no host wished it.
+    Driven(u64),
+    /// The host was told that the device is disarmed, and it is not.
+    NotDisarmed(u64),
+    /// Samples were not counted once: what the host counted as here or lost, and as
+    /// dropped; what the device had.
+    Miscounted((u64, u64), (u64, u64)),
+    /// An error that no harm to frames may lead to.
+    Error(String),
+}
+
+/// What came of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Report {
+    /// How it ended.
+    pub end: End,
+    /// The tick of the end.
+    pub ticks: u64,
+    /// Frames put onto the line, to the device and to the host.
+    pub frames: [usize; 2],
+    /// Whether the arm was ever driven.
+    pub driven: bool,
+    /// Sessions of which the host says that it does not know their end.
+    pub uncertain: u64,
+}
+
+/// What the host is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    /// To open and to be armed.
+    Arming,
+    /// To feel a little.
+    Feeling,
+    /// To be disarmed, since a tick if that was answered.
+    Disarming(Option<u64>),
+    /// To end.
+    Leaving,
+    Over(End),
+}
+
+struct World<'t> {
+    terrain: &'t Terrain<'t>,
+    scene: Scene,
+    client: Client<'t>,
+    device: Device<StoppedClock, 2>,
+    lines: [Line; 2],
+    account: Account,
+    /// Sessions that the present host has spoken in.
+    sessions: Vec<u32>,
+    step: Step,
+    felt: u32,
+    resumptions: u32,
+    seed: u64,
+    now: u64,
+    enabled: bool,
+    driven: bool,
+    /// Since when no host wishes that anything is driven.
+    unwished: Option<u64>,
+}
+
+/// Plays a plan.
+///
+/// # Errors
+/// The first [`Wrong`].
+pub fn check(plan: &Plan) -> Result<Report, Wrong> {
+    let raster = Raster::from_fn(33, 33, |_, _| 0.0).expect("raster");
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    let home = scale.to_grid([16.3, 16.4, 10.0]).expect("addressable");
+    let scene = Scene {
+        hold_clock: false,
+        ..terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home)
+    };
+    World::new(&terrain, scene, plan).play(plan)
+}
+
+/// Frames that an undisturbed run puts onto the line, to the device and to the host.
+///
+/// # Panics
+/// When an undisturbed run goes wrong.
+#[must_use]
+pub fn frames() -> [usize; 2] {
+    check(&Plan::default()).expect("nothing goes wrong").frames
+}
+
+fn device() -> Device<StoppedClock, 2> {
+    // The two halves of the application hand tile buffers to each other by
+    // reference, for as long as the program runs.
+    Device::new(
+        Box::leak(Box::new(TileBuffers::VACANT)),
+        Box::leak(Box::new(WorkingMemory::new())),
+        StoppedClock,
+        Stored::Found(Calibration::PREMIUM_1_5),
+        BootReport::default(),
+    )
+}
+
+impl<'t> World<'t> {
+    fn new(terrain: &'t Terrain<'t>, scene: Scene, plan: &Plan) -> Self {
+        let line = |direction, salt| {
+            let harms = plan.harms.iter().filter(|(way, _, _)| *way == direction);
+            let random = plan.random.map(|(seed, share)| (seed ^ salt, share));
+            Line::new(harms.map(|(_, at, harm)| (*at, *harm)).collect(), random)
+        };
+        Self {
+            terrain,
+            scene,
+            client: host(terrain, scene, 1),
+            device: device(),
+            lines: [line(Direction::ToDevice, 0), line(Direction::ToHost, 1)],
+            account: Account::default(),
+            sessions: vec![],
+            step: Step::Arming,
+            felt: 0,
+            resumptions: 0,
+            seed: 1,
+            now: 0,
+            enabled: false,
+            driven: false,
+            unwished: None,
+        }
+    }
+
+    fn play(mut self, plan: &Plan) -> Result<Report, Wrong> {
+        self.greet();
+        let end = loop {
+            self.interrupt(plan);
+            self.tick()?;
+            if let Step::Over(end) = self.step {
+                break end;
+            }
+            if self.now > LONGEST {
+                return Err(Wrong::Hangs);
+            }
+        };
+        let ticks = self.now;
+        if end == End::Agreed {
+            self.check_count()?;
+            if self.enabled {
+                return Err(Wrong::NotDisarmed(self.now));
+            }
+            self.unwished = Some(0);
+        }
+        for _ in 0..AFTER {
+            self.tick()?;
+        }
+        Ok(Report {
+            end,
+            ticks,
+            frames: [self.lines[0].count(), self.lines[1].count()],
+            driven: self.driven,
+            uncertain: self.client.tally().uncertain,
+        })
+    }
+
+    fn check_count(&self) -> Result<(), Wrong> {
+        let tally = self.client.tally();
+        let counted = (tally.samples + tally.lost, tally.dropped);
+        let made = self.account.of(&self.sessions);
+        match counted == made || tally.uncertain > 0 {
+            true => Ok(()),
+            false => Err(Wrong::Miscounted(counted, made)),
+        }
+    }
+
+    fn interrupt(&mut self, plan: &Plan) {
+        let now = self.now;
+        let here = plan.interruptions.iter().filter(|(at, _)| *at == now);
+        for (_, what) in here {
+            match what {
+                Interruption::HostKilled => {
+                    self.seed += 1;
+                    self.client = host(self.terrain, self.scene, self.seed);
+                    self.lines[0].break_off();
+                    self.sessions.clear();
+                    (self.step, self.felt, self.resumptions) = (Step::Arming, 0, 0);
+                    self.greet();
+                }
+                Interruption::DeviceReset => {
+                    self.device = device();
+                    self.lines[1].break_off();
+                    self.enabled = false;
+                }
+                Interruption::Cut(Direction::ToDevice, long) => self.lines[0].cut(now + long),
+                Interruption::Cut(Direction::ToHost, long) => self.lines[1].cut(now + long),
+            }
+        }
+    }
+
+    fn greet(&mut self) {
+        let mut out = vec![];
+        self.client.greet(time(self.now), &mut out);
+        self.sessions.push(self.client.session().get());
+        self.sessions.dedup();
+        self.unwished = None;
+        self.lines[0].send(&out, self.now);
+    }
+
+    fn tick(&mut self) -> Result<(), Wrong> {
+        self.now += 1;
+        for frame in self.lines[0].arrived(self.now) {
+            let mut rest = frame.as_slice();
+            // What finds no room now finds it after a poll.
+            for _ in 0..100 {
+                let taken = self.device.receive(rest);
+                rest = &rest[taken..];
+                self.listen();
+            }
+        }
+        // Whoever holds the switch presses it until something is driven, and then on.
+        let dead_man = self.enabled || self.now % 300 > 60;
+        let sense = Sense {
+            dead_man,
+            ..Sense::default()
+        };
+        self.enabled = self.device.tick(sense).enabled;
+        self.driven |= self.enabled;
+        if self.enabled && self.unwished.is_some_and(|since| self.now > since) {
+            return Err(Wrong::Driven(self.now));
+        }
+        self.listen();
+        self.host()
+    }
+
+    /// What the device says goes on its way.
+    fn listen(&mut self) {
+        let mut chunk = [0; 2048];
+        loop {
+            let said = self.device.link.transmit(&mut chunk);
+            if said == 0 {
+                return;
+            }
+            self.account.hear(&chunk[..said]);
+            self.lines[1].send(&chunk[..said], self.now);
+        }
+    }
+
+    /// The host's program.
+    fn host(&mut self) -> Result<(), Wrong> {
+        let (mut out, now) = (vec![], time(self.now));
+        let (step, felt) = (&mut self.step, &mut self.felt);
+        let at = self.now;
+        let mut on = |event: Event<'_>| match event {
+            Event::Sample(sample) => *felt += u32::from(sample.mode == Mode::Ramping),
+            Event::Answered {
+                request: Request::Disarm,
+                ..
+            } => {
+                if let Step::Disarming(answered) = step {
+                    answered.get_or_insert(at);
+                }
+            }
+            _ => {}
+        };
+        let mut heard = Ok(());
+        for frame in self.lines[1].arrived(self.now) {
+            heard = heard.and_then(|()| self.client.receive(now, &frame, &mut out, &mut on));
+        }
+        let heard = heard.and_then(|()| self.client.due(now, &mut out, &mut on));
+        self.lines[0].send(&out, self.now);
+        match heard {
+            Ok(()) => self.go_on(),
+            Err(error) => return self.on_error(error),
+        }
+        Ok(())
+    }
+
+    /// The next step, where the last is done.
+    fn go_on(&mut self) {
+        let is_closed = self.client.state() == State::Closed;
+        match self.step {
+            Step::Arming if self.felt > 0 => self.step = Step::Feeling,
+            Step::Feeling if self.felt >= FELT => {
+                self.client.ask(Ask::Request(Request::Disarm));
+                self.step = Step::Disarming(None);
+            }
+            Step::Disarming(Some(answered)) => {
+                self.unwished = Some(answered + FADE);
+                if self.now > answered + 2 * FADE {
+                    self.leave();
+                }
+            }
+            Step::Leaving if is_closed => self.step = Step::Over(End::Agreed),
+            // Somebody who waits for too long gives up, and ends it.
+            _ if self.now.is_multiple_of(40_000) && self.step != Step::Leaving => self.leave(),
+            _ => {}
+        }
+    }
+
+    fn leave(&mut self) {
+        if matches!(self.step, Step::Over(_)) {
+            return;
+        }
+        let mut out = vec![];
+        self.client.leave(time(self.now), &mut out);
+        self.lines[0].send(&out, self.now);
+        self.step = Step::Leaving;
+    }
+
+    fn on_error(&mut self, error: LinkError) -> Result<(), Wrong> {
+        match (error, self.step) {
+            (_, Step::Over(_)) => {}
+            // Frames of a host before that come seconds late look like another host's.
+            (LinkError::NotConfirmed | LinkError::Taken, _) => self.step = Step::Over(End::Told),
+            (LinkError::Silent(_), _) if self.resumptions < RESUMPTIONS => {
+                self.resumptions += 1;
+                if let Step::Disarming(_) = self.step {
+                    self.leave();
+                } else {
+                    self.greet();
+                }
+            }
+            (LinkError::Silent(_), _) => self.leave(),
+            (error, _) => return Err(Wrong::Error(error.to_string())),
+        }
+        Ok(())
+    }
+}
+
+fn host<'t>(terrain: &'t Terrain<'t>, scene: Scene, seed: u64) -> Client<'t> {
+    let (arming, patience) = (Some(Arming::VIRTUAL), Patience::REAL_TIME);
+    Client::numbered(terrain, scene, arming, patience, seed)
+}
+
+/// A tick is a millisecond; the clock began before the program.
+const fn time(now: u64) -> Duration {
+    Duration::from_millis(1_000_000 + now)
+}

@@ -1,0 +1,194 @@
+//! Every frame of a conversation lost, repeated, delayed and overtaken, either end
+//! killed at every moment: the end is agreed or told, nothing is driven that no host
+//! wished, every sample is counted once.
+
+use hapterra_tests::conversation::{
+    Direction, End, Harm, Interruption, Plan, Report, check, frames,
+};
+
+/// What may happen to a frame.
+const HARMS: [Harm; 5] = [
+    Harm::Lose,
+    Harm::Repeat(3),
+    Harm::Repeat(900),
+    Harm::Delay(30),
+    Harm::Delay(900),
+];
+/// Ticks between two moments at which an end is killed.
+const MOMENTS: usize = 23;
+
+/// Plays a plan that leaves the line good enough to agree.
+fn agree(plan: &Plan) -> Report {
+    match check(plan) {
+        Ok(report) if report.end == End::Agreed && report.driven => report,
+        other => panic!("{other:?} in {plan:?}"),
+    }
+}
+
+/// Every harm to every frame of an undisturbed run, first those to the device.
+fn single_harms() -> Vec<(Direction, usize, Harm)> {
+    let [to_device, to_host] = frames();
+    let to_device = (0..to_device).map(|number| (Direction::ToDevice, number));
+    let to_host = (0..to_host).map(|number| (Direction::ToHost, number));
+    let all = to_device.chain(to_host);
+    all.flat_map(|(way, number)| HARMS.map(|harm| (way, number, harm)))
+        .collect()
+}
+
+#[test]
+fn undisturbed_it_ends_at_once_and_nothing_is_uncertain() {
+    let report = agree(&Plan::default());
+    eprintln!("{report:?}");
+    assert!(report.ticks < 2_000 && report.uncertain == 0, "{report:?}");
+}
+
+#[test]
+fn any_one_frame_may_be_lost_repeated_or_late() {
+    let harms = single_harms();
+    eprintln!("{} runs", harms.len());
+    for harm in harms {
+        let harms = vec![harm];
+        let report = agree(&Plan {
+            harms,
+            ..Plan::default()
+        });
+        // Sooner than a session that is given up and taken up again.
+        assert!(report.ticks < 3_000, "{harm:?}: {report:?}");
+        assert_eq!(report.uncertain, 0, "{harm:?}");
+    }
+}
+
+#[test]
+fn any_two_frames_of_the_opening_may_be_lost_repeated_or_late() {
+    // The first frames each way: hello, scene, zero, arm, the tile and their answers.
+    let opening: Vec<_> = single_harms()
+        .into_iter()
+        .filter(|(_, number, harm)| {
+            *number < 9 && matches!(harm, Harm::Lose | Harm::Repeat(900) | Harm::Delay(30))
+        })
+        .collect();
+    for (i, first) in opening.iter().enumerate() {
+        for second in &opening[i + 1..] {
+            let harms = vec![*first, *second];
+            agree(&Plan {
+                harms,
+                ..Plan::default()
+            });
+        }
+    }
+}
+
+#[test]
+fn any_two_frames_of_the_end_may_be_lost_repeated_or_late() {
+    let [to_device, to_host] = frames();
+    let last: Vec<_> = single_harms()
+        .into_iter()
+        .filter(|(way, number, harm)| {
+            let count = match way {
+                Direction::ToDevice => to_device,
+                Direction::ToHost => to_host,
+            };
+            number + 8 > count && matches!(harm, Harm::Lose | Harm::Repeat(900) | Harm::Delay(30))
+        })
+        .collect();
+    for (i, first) in last.iter().enumerate() {
+        for second in &last[i + 1..] {
+            let harms = vec![*first, *second];
+            agree(&Plan {
+                harms,
+                ..Plan::default()
+            });
+        }
+    }
+}
+
+/// Interrupts at every moment of a run, alone and with the next frame each way lost or
+/// repeated.
+fn interrupted(what: Interruption) {
+    let ticks = agree(&Plan::default()).ticks;
+    for at in (0..ticks).step_by(MOMENTS) {
+        let interruptions = vec![(at, what)];
+        let plan = Plan {
+            interruptions,
+            ..Plan::default()
+        };
+        let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+        assert_eq!(report.end, End::Agreed, "{plan:?}");
+        // The frames around that moment, by what an undisturbed run had said.
+        for number in 0..12 {
+            for (way, harm) in [
+                (Direction::ToDevice, Harm::Lose),
+                (Direction::ToHost, Harm::Lose),
+                (Direction::ToHost, Harm::Repeat(900)),
+            ] {
+                let plan = Plan {
+                    harms: vec![(way, number, harm)],
+                    ..plan.clone()
+                };
+                let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+                assert_eq!(report.end, End::Agreed, "{plan:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_host_may_be_killed_at_any_moment() {
+    interrupted(Interruption::HostKilled);
+}
+
+#[test]
+fn the_device_may_be_reset_at_any_moment() {
+    interrupted(Interruption::DeviceReset);
+}
+
+#[test]
+fn the_line_may_be_cut_one_way_at_any_moment() {
+    let ticks = agree(&Plan::default()).ticks;
+    for long in [300, 1_500, 5_000] {
+        for way in [Direction::ToDevice, Direction::ToHost] {
+            for at in (0..ticks).step_by(2 * MOMENTS) {
+                let interruptions = vec![(at, Interruption::Cut(way, long))];
+                let plan = Plan {
+                    interruptions,
+                    ..Plan::default()
+                };
+                let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+                // In a cut that is longer than goodbye may take the user is told.
+                assert!(report.end == End::Agreed || long > 3_000, "{plan:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn whatever_goes_wrong_at_random_the_end_is_agreed_or_told() {
+    let (mut agreed, mut told) = (0, 0);
+    for seed in 0..400 {
+        let plan = Plan::random(seed);
+        match check(&plan) {
+            Ok(report) if report.end == End::Agreed => agreed += 1,
+            Ok(_) => told += 1,
+            Err(wrong) => panic!("{wrong:?} in {plan:?}"),
+        }
+    }
+    eprintln!("{agreed} agreed, {told} told");
+    assert!(agreed > 200, "hardly ever agreed: {agreed}");
+}
+
+#[test]
+fn a_dead_line_ends_in_a_word_and_not_in_a_hang() {
+    for way in [Direction::ToDevice, Direction::ToHost] {
+        for at in [0, 200, 400] {
+            let interruptions = vec![(at, Interruption::Cut(way, u64::MAX / 2))];
+            let plan = Plan {
+                interruptions,
+                ..Plan::default()
+            };
+            let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+            assert_eq!(report.end, End::Told, "{plan:?}");
+            // Four seconds, five times; three for goodbye.
+            assert!(report.ticks < 30_000, "{report:?} in {plan:?}");
+        }
+    }
+}
