@@ -9,7 +9,8 @@ use glam::Vec3;
 
 use crate::contact::{Contact, ContactOutput, ContactSettings, Execution};
 use crate::grid::GridPoint;
-use crate::guard::{Drive, Fault, Guard, Limits, Report, SceneKind, Sense, Surroundings};
+use crate::guard::thermal::Temperatures;
+use crate::guard::{Drive, Fault, Guard, Jog, Limits, Report, SceneKind, Sense, Surroundings};
 use crate::phantom::{Calibration, Mechanism, Pose, to_device_frame, to_terrain_frame};
 use crate::rate::TickRate;
 use crate::scene::{Health, Point, Sample, Scene, Source};
@@ -28,6 +29,9 @@ pub enum Command<'t> {
     Point(Point),
     /// Arm, once nothing blocks it and the dead-man switch is pressed.
     Arm,
+    /// Drop the scene and arm for a jog in its place: a small current in one motor
+    /// for a limited time.
+    Jog(Jog),
     /// Disarm; force goes out gently.
     Disarm,
     /// These are the counts in the zero pose of the calibration record.
@@ -36,6 +40,9 @@ pub enum Command<'t> {
     ClearFault,
     /// Latch a fault found outside the tick.
     Trip(Fault),
+    /// Hold the outputs at these shares of full scale, -1 to 1, with the amplifiers off,
+    /// or no longer ([`Guard::hold`]).
+    HoldOutputs(Option<[f32; 3]>),
 }
 
 /// One tick's result.
@@ -129,6 +136,18 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
     }
 
+    /// Begins with motors as warm as this; [`Haptics::new`] takes them to be as cold as
+    /// the air.
+    pub fn begin_at(&mut self, temperatures: Temperatures) {
+        self.guard.begin_at(temperatures);
+    }
+
+    /// How warm the motors are: what a board keeps over a reset.
+    #[must_use]
+    pub const fn temperatures(&self) -> Temperatures {
+        self.guard.motors().temperatures()
+    }
+
     /// Takes a command between ticks. Gives back a tile buffer that is free
     /// again, where the command brought one.
     #[must_use]
@@ -143,10 +162,15 @@ impl<'t, const D: usize> Haptics<'t, D> {
                 self.point = Some(Point { seq, hip });
             }
             Command::Arm => self.guard.arm(),
+            Command::Jog(jog) => {
+                self.take_scene(None);
+                self.guard.jog(jog);
+            }
             Command::Disarm => self.guard.disarm(),
             Command::Zero(counts) => self.take_zero(counts),
             Command::ClearFault => self.guard.clear(),
             Command::Trip(fault) => self.guard.trip(fault),
+            Command::HoldOutputs(shares) => self.guard.hold(shares),
         }
         None
     }
@@ -252,7 +276,10 @@ impl<'t, const D: usize> Haptics<'t, D> {
     pub fn tick_into(&mut self, sense: &Sense, watchdog_live: bool, outcome: &mut Outcome) {
         self.tick = self.tick.wrapping_add(1);
         match &self.scene {
-            Some(scene) if scene.source == Source::Points => self.tick_point(outcome),
+            Some(scene) if scene.source == Source::Points => {
+                self.follow(sense, watchdog_live);
+                self.tick_point(outcome);
+            }
             _ => self.tick_arm(sense, watchdog_live, outcome),
         }
     }
@@ -293,15 +320,45 @@ impl<'t, const D: usize> Haptics<'t, D> {
         if let Some((mechanism, pose)) = arm {
             force_n = self.guard.limit_force(wanted);
             if self.guard.mode().drives() {
-                let weight = mechanism.gravity_nm(pose) * self.guard.gain();
-                let torques = pose.torques_nm(to_device_frame(force_n)) + weight;
-                outcome.drive = self.guard.limit_currents(mechanism.currents_a(torques));
+                let wanted_a = self.guard.jog_currents_a().unwrap_or_else(|| {
+                    let weight = mechanism.gravity_nm(pose) * self.guard.gain();
+                    let torques = pose.torques_nm(to_device_frame(force_n)) + weight;
+                    mechanism.currents_a(torques)
+                });
+                outcome.drive = self.guard.limit_currents(wanted_a);
             }
             if lost_counts {
                 self.zero = None;
             }
         }
+        if !outcome.drive.enabled {
+            outcome.drive.held = self.guard.held();
+        }
         self.write_state(force_n, &mut outcome.sample);
+    }
+
+    /// Follows the arm while nothing of it is felt, in place of a tick: an arm that
+    /// somebody moves meanwhile keeps its zero, a jump of its encoders is noticed, and
+    /// its motors cool. Nothing is driven.
+    ///
+    /// A board calls it in every tick of a replay in which no point is under way;
+    /// [`Haptics::tick_into`] sees to the others.
+    pub fn follow(&mut self, sense: &Sense, watchdog_live: bool) {
+        let zero = self.zero.unwrap_or_default();
+        let mechanism = self.mechanism.as_ref();
+        let pose = mechanism.map(|mechanism| mechanism.pose(sense.counts, zero));
+        let lost_counts = self.guard.watch(
+            sense,
+            &Surroundings {
+                arm: mechanism.zip(pose.as_ref()),
+                zeroed: self.zero.is_some(),
+                scene: SceneKind::Points,
+                watchdog_live,
+            },
+        );
+        if lost_counts {
+            self.zero = None;
+        }
     }
 
     /// Replay: the host's point in place of the arm, amplifiers off. The tick
@@ -337,7 +394,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             ..
         } = self.guard.report();
         limits.set(Limits::TERRAIN_MISSING, sample.missing_tile.is_some());
-        limits.set(Limits::PRESENCE_FADING, self.contact.boundary_fade() < 1.0);
+        limits.set(Limits::BOUNDARY_FADING, self.contact.boundary_fade() < 1.0);
         sample.tick = self.tick;
         sample.force_n = force_n;
         (sample.mode, sample.limits, sample.fault) = (mode, limits, fault);

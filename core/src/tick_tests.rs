@@ -298,6 +298,98 @@ fn settings_a_new_zero_and_a_replay_switch_off_at_once() {
     assert_eq!(model, Some(crate::phantom::Model::Premium10));
 }
 
+/// In a replay, with an arm that was zeroed before and is at `counts`.
+fn replaying(tiles: &mut [Tile]) -> Device<'_, 4> {
+    let mut device = Device::<4>::armed(tiles, plane);
+    let points = Scene {
+        epoch: 2,
+        ..scene(Source::Points)
+    };
+    device.say(Command::Scene(points));
+    device
+}
+
+/// Moves the arm by 100 counts a tick, with a point under way at every other tick.
+fn wave(device: &mut Device<'_, 4>, ticks: i32) -> [i32; 3] {
+    let mut counts = [0; 3];
+    for n in 0..ticks {
+        counts = [100 * n, -100 * n, 0];
+        if n % 2 == 0 {
+            let hip = GridPoint::new([100, 100, 2], Vec3::splat(0.5));
+            let seq = n.unsigned_abs();
+            device.say(Command::Point(Point { seq, hip }));
+            assert_eq!(device.tick(counts).drive, Drive::default());
+        } else {
+            let sense = Sense {
+                counts,
+                dead_man: true,
+                ..Sense::default()
+            };
+            device.haptics.follow(&sense, true);
+        }
+    }
+    counts
+}
+
+#[test]
+fn an_arm_that_is_moved_during_a_replay_keeps_its_zero() {
+    let mut tiles = buffers::<4>();
+    let mut device = replaying(&mut tiles);
+    let counts = wave(&mut device, 60);
+    device.say(Command::Scene(Scene {
+        epoch: 3,
+        ..scene(Source::Encoders)
+    }));
+    let _ = device.tick(counts);
+    assert_eq!(device.haptics.report().fault, None);
+    assert_eq!(device.haptics.zero, Some([0; 3]));
+}
+
+#[test]
+fn a_jump_during_a_replay_is_noticed() {
+    let mut tiles = buffers::<4>();
+    for with_a_point in [false, true] {
+        let mut device = replaying(&mut tiles);
+        let mut counts = wave(&mut device, 20);
+        assert_eq!(device.haptics.report().fault, None);
+        counts[2] += 129;
+        if with_a_point {
+            let _ = device.tick(counts);
+        } else {
+            device.haptics.follow(
+                &Sense {
+                    counts,
+                    ..Sense::default()
+                },
+                true,
+            );
+        }
+        assert_eq!(device.haptics.report().fault, Some(Fault::EncoderJump));
+        assert_eq!(device.haptics.zero, None);
+    }
+}
+
+#[test]
+fn a_replay_drives_nothing_and_says_why_it_cannot_be_armed() {
+    let mut tiles = buffers::<4>();
+    let mut device = replaying(&mut tiles);
+    device.say(Command::Arm);
+    device.dead_man = false;
+    wave(&mut device, 60);
+    device.dead_man = true;
+    let hip = GridPoint::new([100, 100, 2], Vec3::splat(0.5));
+    device.say(Command::Point(Point { seq: 100, hip }));
+    for _ in 0..200 {
+        assert_eq!(device.tick([5_900, -5_900, 0]).drive, Drive::default());
+    }
+    let report = device.haptics.report();
+    assert_eq!(report.mode, Mode::Disarmed);
+    assert!(
+        report.decision.refused.contains(Blockers::REPLAY),
+        "{report:?}"
+    );
+}
+
 #[test]
 fn without_a_calibration_nothing_is_felt_and_nothing_arms() {
     let mut tiles = buffers::<4>();
@@ -404,7 +496,7 @@ fn pushed_over_the_edge_of_the_data_the_force_fades_and_says_why() {
     for n in 0..2_000 {
         let outcome = device.tick([n, 0, 0]);
         let sample = &outcome.sample;
-        if sample.limits.contains(Limits::PRESENCE_FADING) {
+        if sample.limits.contains(Limits::BOUNDARY_FADING) {
             fading.push(sample.force_n.length());
         }
         assert!((sample.force_n - last).length() < 0.02 || n < 2);
@@ -436,4 +528,22 @@ fn a_point_of_any_bits_is_a_valid_one_before_it_is_felt() {
     assert_eq!(sample.hip.cell(), [-MAX_CELL, 92, MAX_CELL]);
     assert_eq!(sample.hip.frac(), Vec3::new(0.0, 0.5, 0.0));
     assert_eq!(sample.force_n, Vec3::ZERO);
+}
+
+#[test]
+fn held_outputs_reach_the_drive_only_while_the_amplifiers_are_off() {
+    let mut tiles = buffers::<4>();
+    let mut device = Device::<4>::new(&mut tiles, Source::Encoders, plane);
+    let held = Vec3::new(0.5, -0.5, 0.1);
+    device.say(Command::HoldOutputs(Some(held.to_array())));
+    let expected = Drive {
+        held,
+        ..Drive::default()
+    };
+    assert_eq!(device.tick([0; 3]).drive, expected);
+    device.arm([0; 3]);
+    device.say(Command::HoldOutputs(Some(held.to_array())));
+    let drive = device.tick([0; 3]).drive;
+    assert!(drive.enabled);
+    assert_eq!(drive.held, Vec3::ZERO);
 }

@@ -2,14 +2,15 @@
 //! timer interrupt and the link for its task, over memory that stays in its place.
 
 use hapterra_core::guard::Fault;
+use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::phantom::Mechanism;
 use hapterra_core::terrain::Tile;
 use hapterra_core::tick::Haptics;
-use hapterra_core::wire::status::BootReport;
+use hapterra_core::wire::status::{BootReport, CalibrationSource};
 
 use crate::board::{Amplifiers, Encoders, TickClock};
 use crate::haptic_loop::HapticLoop;
-use crate::link::{Buffers, DeviceState, Link};
+use crate::link::{Buffers, DeviceState, KnownArm, Link};
 use crate::monitor::Monitor;
 use crate::queues::{Queues, SPARES};
 use crate::store::Stored;
@@ -66,8 +67,14 @@ pub struct Hardware<E, A, C> {
     pub amplifiers: A,
     /// The tick's timer and the clock.
     pub clock: C,
+    /// The current at the ends of the amplifiers' range, A: no calibration may ask for
+    /// more.
+    pub full_scale_a: f32,
     /// The Phantom's calibration record, as the board's memory has it.
     pub calibration: Stored,
+    /// What the motors are to be taken for: [`crate::motor_memory::begin`] says, and
+    /// [`Temperatures::HOT`] where nothing is known.
+    pub motors: Temperatures,
     /// What the board found when it started.
     pub boot: BootReport,
 }
@@ -80,6 +87,23 @@ pub struct Application<'t, E, A: Amplifiers, C, const D: usize> {
     pub link: Link<'t, D>,
     /// For the task that feeds the watchdog.
     pub monitor: &'t Monitor,
+}
+
+/// The arm of the stored calibration, if this firmware and this board can work with it,
+/// and what the host is told of it.
+fn usable(stored: &Stored, full_scale_a: f32) -> (Option<Mechanism>, CalibrationSource) {
+    let bad = match stored {
+        Stored::Found(calibration) => {
+            let fits = calibration.check_board(full_scale_a);
+            match fits.and_then(|()| Mechanism::new(calibration)) {
+                Ok(mechanism) => return (Some(mechanism), CalibrationSource::Stored),
+                Err(bad) => bad,
+            }
+        }
+        Stored::Refused(bad) => *bad,
+        Stored::Missing | Stored::Damaged => return (None, CalibrationSource::None),
+    };
+    (None, CalibrationSource::Refused(bad))
 }
 
 /// Builds the application in the given memory. `board` is the name by which the
@@ -101,13 +125,11 @@ where
     let (loop_ends, link_ends) = memory.queues.split();
     let monitor = loop_ends.monitor;
     let (window, spare) = tiles.split();
-    let mechanism = match &hardware.calibration {
-        Stored::Found(calibration) => Mechanism::new(calibration).ok(),
-        Stored::Missing | Stored::Damaged => None,
-    };
-    let damaged = hardware.calibration != Stored::Missing && mechanism.is_none();
-    let found = damaged.then_some(Fault::CalibrationCorrupt);
+    let (mechanism, source) = usable(&hardware.calibration, hardware.full_scale_a);
+    let is_unusable = hardware.calibration != Stored::Missing && mechanism.is_none();
+    let found = is_unusable.then_some(Fault::CalibrationCorrupt);
     let mut haptics = Haptics::new(window, C::RATE, hardware.boot.fault().or(found));
+    haptics.begin_at(hardware.motors);
     if let Some(mechanism) = mechanism {
         haptics.configure(mechanism);
     }
@@ -118,7 +140,12 @@ where
         hardware.amplifiers,
         hardware.clock,
     );
-    let device = DeviceState::new::<C, D>(board, hardware.boot, mechanism.as_ref());
+    let arm = KnownArm {
+        calibration: mechanism.map(|mechanism| *mechanism.calibration()),
+        source,
+        full_scale_a: hardware.full_scale_a,
+    };
+    let device = DeviceState::new::<C, D>(board, hardware.boot, arm);
     let link = Link::new(device, spare, link_ends, &mut memory.link);
     Application {
         haptic_loop,

@@ -8,19 +8,27 @@
 pub use hapterra_core::guard::Sense;
 use hapterra_core::rate::TickRate;
 
-/// The encoders and safety inputs.
+/// The encoders, the safety inputs and what the amplifiers say.
 pub trait Encoders {
     /// Reads everything the tick needs, as of now. Bounded, never waits.
     fn sense(&mut self) -> Sense;
 }
 
-/// Amplifiers that are off: there is no way to write a current to them.
+/// Amplifiers that are off: there is no way to make a current flow.
 pub trait Amplifiers: Sized {
     /// The same amplifiers, on.
     type Enabled: EnabledAmplifiers<Disabled = Self>;
 
-    /// Commands zero current, then switches the power stages on.
+    /// Commands zero current, then switches the power stages on. Outputs that can be
+    /// asked and do not read back as they were set leave the power stages off, and
+    /// [`Sense::outputs_not_as_set`] says so in the next tick.
     fn enable(self) -> Self::Enabled;
+
+    /// A tick with the power stages off: puts these shares of full scale, each cut to
+    /// -1..=1, onto the outputs and keeps the outputs ready. The enable line stays low.
+    /// Zero unless somebody measures the outputs
+    /// ([`Guard::hold`](hapterra_core::guard::Guard::hold)).
+    fn rest(&mut self, held: [f32; 3]);
 }
 
 /// Amplifiers that are on.

@@ -18,7 +18,8 @@ pub const CRASH_BYTES: usize = 60;
 /// "HAPX".
 const MAGIC: u32 = 0x4841_5058;
 
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+/// The check sum of what is kept over a reset.
+pub(crate) static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// A crash as plain bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +46,19 @@ impl CrashRecord {
     pub fn unhandled(number: i16, tick: u32) -> Self {
         let number = u32::from(number.cast_unsigned());
         Self::new(CrashKind::UnhandledInterrupt, [0, 0, number, 0, tick], "")
+    }
+
+    /// A stack that ran into its guard, at `pc` and `lr` where they could be kept, with
+    /// the fault `status`.
+    #[must_use]
+    pub fn stack_overflow(pc: u32, lr: u32, status: u32, tick: u32) -> Self {
+        Self::new(CrashKind::StackOverflow, [pc, lr, status, 0, tick], "")
+    }
+
+    /// A supply that fell too low.
+    #[must_use]
+    pub fn supply_low(tick: u32) -> Self {
+        Self::new(CrashKind::SupplyLow, [0, 0, 0, 0, tick], "")
     }
 
     fn new(kind: CrashKind, [pc, lr, status, line, tick]: [u32; 5], path: &str) -> Self {
@@ -121,6 +135,17 @@ mod tests {
             (crash.kind, crash.status),
             (CrashKind::UnhandledInterrupt, 54)
         );
+    }
+
+    #[test]
+    fn a_stack_overflow_and_a_low_supply_come_back() {
+        let record = CrashRecord::stack_overflow(1, 2, 0x82, 3);
+        let crash = CrashRecord::read(record.bytes()).expect("a crash");
+        assert_eq!(crash.kind, CrashKind::StackOverflow);
+        assert_eq!((crash.pc, crash.lr, crash.status), (1, 2, 0x82));
+        let record = CrashRecord::supply_low(9);
+        let crash = CrashRecord::read(record.bytes()).expect("a crash");
+        assert_eq!((crash.kind, crash.tick), (CrashKind::SupplyLow, 9));
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub enum LedPattern {
 /// Length of a fault's flash, ms.
 const FLASH: u32 = 200;
 /// From one flash of a fault to the next, ms.
-const FLASH_AND_GAP: u32 = 500;
+const FLASH_AND_GAP: u32 = 400;
 /// After the last flash of a fault, ms.
 const PAUSE: u32 = 1_500;
 

@@ -37,9 +37,10 @@
 //!
 //! | priority | what | may |
 //! | --- | --- | --- |
-//! | faults, panic | amplifiers off, report, reset or exit | not return |
-//! | 0 | haptic interrupt (TIM7; CMSDK timer 0): [`haptic_loop::HapticLoop::tick`] | use its queues; raise "tick done"; no critical section, no log, no waker |
-//! | — | ceiling of critical sections, `0x10` | |
+//! | faults, panic | amplifiers off, record, reset or exit | not return |
+//! | STM32 0 | the supply's interrupt: amplifiers off, record, reset | not return |
+//! | `0x10` | haptic interrupt (TIM7; CMSDK timer 0): [`haptic_loop::HapticLoop::tick`] | use its queues; raise "tick done"; no critical section, no log, no waker |
+//! | — | ceiling of critical sections, `0x20` | |
 //! | STM32 `0x60`; MPS2 `0x40`-`0x60` | USB or UARTs, the time driver, "tick done" | wake tasks |
 //! | MPS2 `0xC0`; STM32 thread | executor: link, USB stack, supervisor, plant line | log, wait |
 //! | thread | MPS2: sleep | |
@@ -74,7 +75,9 @@ pub mod haptic_loop;
 pub mod led;
 pub mod link;
 pub mod monitor;
+pub mod motor_memory;
 pub mod native;
+mod press;
 mod queues;
 pub mod store;
 pub mod usb;

@@ -5,6 +5,8 @@
 //! real time it calls it a thousand times a second regardless.
 
 use hapterra_core::guard::Drive;
+use hapterra_core::guard::thermal::Temperatures;
+use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::status::BootReport;
 
 use crate::app::{Application, Hardware, TileBuffers, WorkingMemory, assemble};
@@ -12,7 +14,12 @@ use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, Sense, TickClock};
 use crate::haptic_loop::HapticLoop;
 use crate::link::Link;
 use crate::monitor::{Monitor, Part};
+use crate::motor_memory::{self, Copies};
 use crate::store::Stored;
+
+/// Current at the ends of the range of a device without real amplifiers, A: every
+/// board's.
+pub const FULL_SCALE_A: f32 = 5.5;
 
 /// Encoders and switches that read what the caller last set.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,6 +45,8 @@ impl Amplifiers for VirtualAmplifiersOff {
     fn enable(self) -> VirtualAmplifiersOn {
         VirtualAmplifiersOn
     }
+
+    fn rest(&mut self, _held: [f32; 3]) {}
 }
 
 impl EnabledAmplifiers for VirtualAmplifiersOn {
@@ -83,6 +92,8 @@ pub struct Device<C, const D: usize> {
     monitor: &'static Monitor,
     /// What the device remembers without power.
     stored: Stored,
+    /// What the device's RAM keeps over a reset.
+    retained: Copies,
 }
 
 impl<C: TickClock, const D: usize> Device<C, D> {
@@ -95,11 +106,39 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         calibration: Stored,
         boot: BootReport,
     ) -> Self {
+        let cold = (Temperatures::AIR, Copies::default());
+        Self::with_motors(tiles, memory, clock, calibration, boot, cold)
+    }
+
+    /// As [`Device::new`], after a device that left this in its RAM
+    /// ([`Device::retained`]). Motors of which nothing is known are hot.
+    pub fn restarted(
+        tiles: &'static mut TileBuffers<D>,
+        memory: &'static mut WorkingMemory<'static>,
+        clock: C,
+        calibration: Stored,
+        boot: BootReport,
+        retained: &Copies,
+    ) -> Self {
+        let motors = motor_memory::begin(boot.cause, retained);
+        Self::with_motors(tiles, memory, clock, calibration, boot, motors)
+    }
+
+    fn with_motors(
+        tiles: &'static mut TileBuffers<D>,
+        memory: &'static mut WorkingMemory<'static>,
+        clock: C,
+        calibration: Stored,
+        boot: BootReport,
+        (motors, retained): (Temperatures, Copies),
+    ) -> Self {
         let hardware = Hardware {
             encoders: VirtualEncoders::default(),
             amplifiers: VirtualAmplifiersOff,
             clock,
+            full_scale_a: FULL_SCALE_A,
             calibration,
+            motors,
             boot,
         };
         let Application {
@@ -112,6 +151,7 @@ impl<C: TickClock, const D: usize> Device<C, D> {
             link,
             monitor,
             stored: calibration,
+            retained,
         }
     }
 
@@ -119,6 +159,24 @@ impl<C: TickClock, const D: usize> Device<C, D> {
     #[must_use]
     pub const fn memory(&self) -> &Stored {
         &self.stored
+    }
+
+    /// What the device's RAM keeps over a reset: the motors' temperatures, twice.
+    #[must_use]
+    pub const fn retained(&self) -> &Copies {
+        &self.retained
+    }
+
+    /// The calibration in force.
+    #[must_use]
+    pub fn calibration(&self) -> Option<&Calibration> {
+        self.haptic_loop.calibration()
+    }
+
+    /// How warm the device takes its motors to be.
+    #[must_use]
+    pub const fn temperatures(&self) -> Temperatures {
+        self.haptic_loop.temperatures()
     }
 
     /// Takes bytes from the host ([`Link::receive`]) and runs the link's task.
@@ -149,6 +207,12 @@ impl<C: TickClock, const D: usize> Device<C, D> {
     /// Runs one tick alone, as if the link's task hung.
     pub fn tick_alone(&mut self, sense: Sense) -> Drive {
         self.haptic_loop.encoders_mut().0 = sense;
-        self.haptic_loop.tick()
+        let drive = self.haptic_loop.tick();
+        if let Some((copy, words)) = self.haptic_loop.motors_to_keep()
+            && let Some(place) = self.retained.get_mut(copy)
+        {
+            *place = words;
+        }
+        drive
     }
 }

@@ -21,7 +21,7 @@
 //! it says so.
 
 use embedded_storage::nor_flash::NorFlash;
-use hapterra_core::phantom::{Calibration, RECORD_BYTES};
+use hapterra_core::phantom::{BadCalibration, BadRecord, Calibration, RECORD_BYTES};
 
 /// Number and complement.
 const HEAD: usize = 8;
@@ -45,6 +45,10 @@ pub enum Stored {
     Missing,
     /// A record.
     Found(Calibration),
+    /// A whole record that this firmware does not work with, because a number of it makes
+    /// no sense or is above what the model or the board may have. No older record is taken
+    /// instead: somebody wanted this one.
+    Refused(BadCalibration),
     /// Something, but no record that could be read.
     Damaged,
 }
@@ -66,8 +70,8 @@ pub enum StoreError {
 /// What a place holds.
 enum Place {
     Blank,
-    /// A record and its number.
-    Record(u32, Calibration),
+    /// A record and its number; why it cannot be worked with, if so.
+    Record(u32, Result<Calibration, BadCalibration>),
     /// A record that was being written when the power went.
     CutOff,
     /// A record that was whole once.
@@ -78,7 +82,7 @@ enum Place {
 #[derive(Default)]
 struct Contents {
     /// The newest record and its number.
-    newest: Option<(u32, Calibration)>,
+    newest: Option<(u32, Result<Calibration, BadCalibration>)>,
     /// The area that the newest record is in.
     area: usize,
     has_damage: bool,
@@ -106,7 +110,8 @@ impl<F: NorFlash> CalibrationStore<F> {
     pub fn load(&mut self) -> Stored {
         let found = self.scan();
         match found.newest {
-            Some((_, calibration)) => Stored::Found(calibration),
+            Some((_, Ok(calibration))) => Stored::Found(calibration),
+            Some((_, Err(bad))) => Stored::Refused(bad),
             None if found.has_damage => Stored::Damaged,
             None => Stored::Missing,
         }
@@ -226,11 +231,15 @@ impl<F: NorFlash> CalibrationStore<F> {
 }
 
 /// Decodes a place's record and number; nothing unless both are whole.
-fn decoded(written: &[u8]) -> Option<(u32, Calibration)> {
+fn decoded(written: &[u8]) -> Option<(u32, Result<Calibration, BadCalibration>)> {
     let (number, rest) = written.split_first_chunk()?;
     let (check, record) = rest.split_first_chunk()?;
     let [number, check] = [number, check].map(|word| u32::from_le_bytes(*word));
-    let calibration = Calibration::decode(record).ok()?;
+    let calibration = match Calibration::decode(record) {
+        Ok(calibration) => Ok(calibration),
+        Err(BadRecord::Invalid(bad)) => Err(bad),
+        Err(_) => return None,
+    };
     (check == !number).then_some((number, calibration))
 }
 

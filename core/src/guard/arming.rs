@@ -44,7 +44,7 @@ pub(super) struct Arming {
     seen_open: bool,
     /// Share of the force that is let through.
     pub(super) gain: f32,
-    rate: TickRate,
+    pub(super) rate: TickRate,
 }
 
 impl Arming {

@@ -42,11 +42,23 @@ pub enum Fault {
     HardFault = 15,
     /// Found at boot: the stored calibration record is damaged.
     CalibrationCorrupt = 16,
+    /// An amplifier says that it is not ready while it is enabled.
+    AmplifierNotReady = 17,
+    /// A motor's measured current is not the one that was commanded.
+    CurrentMismatch = 18,
+    /// The board's supply fell too low, now or (found at boot) before the reset.
+    SupplyLow = 19,
+    /// A converter's settings do not read back as they were written.
+    OutputsNotAsSet = 20,
+    /// Found at boot: the program had overrun its stack.
+    StackOverflow = 21,
+    /// A joint moved faster or farther than a jog may move it.
+    JogRanAway = 22,
 }
 
 impl Fault {
     /// Every fault, by number.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 22] = [
         Self::NotANumber,
         Self::TickOverrun,
         Self::EncoderJump,
@@ -63,6 +75,12 @@ impl Fault {
         Self::Panicked,
         Self::HardFault,
         Self::CalibrationCorrupt,
+        Self::AmplifierNotReady,
+        Self::CurrentMismatch,
+        Self::SupplyLow,
+        Self::OutputsNotAsSet,
+        Self::StackOverflow,
+        Self::JogRanAway,
     ];
 
     /// The fault's number.
@@ -91,6 +109,14 @@ impl Fault {
             Self::Panicked => "the board's program panicked before it was reset",
             Self::HardFault => "the board's processor met a hard fault before it was reset",
             Self::CalibrationCorrupt => "the calibration record on the board is damaged",
+            Self::AmplifierNotReady => "an amplifier says that it is not ready",
+            Self::CurrentMismatch => "a motor's measured current is not what was commanded",
+            Self::SupplyLow => "the board's supply fell too low",
+            Self::OutputsNotAsSet => {
+                "the converter's settings do not read back as they were written"
+            }
+            Self::StackOverflow => "the board's program overran its stack before it was reset",
+            Self::JogRanAway => "a joint moved faster or farther than a jog may move it",
         }
     }
 
@@ -118,6 +144,16 @@ impl Fault {
                 "please report it with the crash shown by `hapterra status`"
             }
             Self::CalibrationCorrupt => "calibrate again, or store the record from its file",
+            Self::AmplifierNotReady => {
+                "check the amplifiers' supply, their own fault lights and the ready wires"
+            }
+            Self::CurrentMismatch => {
+                "check the motor's cable and the amplifier; run `hapterra bringup` again"
+            }
+            Self::SupplyLow => "check the board's supply and its USB cable",
+            Self::OutputsNotAsSet => "check the supply and the wires of the converter",
+            Self::StackOverflow => "please report it with the crash shown by `hapterra status`",
+            Self::JogRanAway => "check the motor's wiring and the axis; make the current smaller",
         }
     }
 }
@@ -150,6 +186,12 @@ mod tests {
             (Fault::Panicked, 14),
             (Fault::HardFault, 15),
             (Fault::CalibrationCorrupt, 16),
+            (Fault::AmplifierNotReady, 17),
+            (Fault::CurrentMismatch, 18),
+            (Fault::SupplyLow, 19),
+            (Fault::OutputsNotAsSet, 20),
+            (Fault::StackOverflow, 21),
+            (Fault::JogRanAway, 22),
         ];
         for (fault, number) in named {
             assert_eq!(fault.number(), number);

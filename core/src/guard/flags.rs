@@ -35,6 +35,10 @@ bitflags! {
         const DEAD_MAN_RELEASED = 1 << 11;
         /// The force that would be made now is not small yet.
         const FORCE_TOO_LARGE = 1 << 12;
+        /// An amplifier says that it is not ready, or its wire is broken.
+        const AMPLIFIER_NOT_READY = 1 << 13;
+        /// A converter's settings do not read back as they were written.
+        const OUTPUTS_NOT_AS_SET = 1 << 14;
     }
 }
 
@@ -59,7 +63,7 @@ bitflags! {
         /// Terrain that might be felt here is not on the device yet.
         const TERRAIN_MISSING = 1 << 7;
         /// The surface fades out at its border, or comes in after a wait.
-        const PRESENCE_FADING = 1 << 8;
+        const BOUNDARY_FADING = 1 << 8;
     }
 }
 
@@ -95,6 +99,12 @@ impl Blockers {
             Self::DEAD_MAN_STILL_HELD => "the dead-man switch is held: let it go, then press it",
             Self::DEAD_MAN_RELEASED => "the dead-man switch is not held: press it",
             Self::FORCE_TOO_LARGE => "the tip is inside the terrain: lift it off",
+            Self::AMPLIFIER_NOT_READY => {
+                "an amplifier is not ready: check supplies, fault lights and ready wires"
+            }
+            Self::OUTPUTS_NOT_AS_SET => {
+                "the converter does not read back as set: check its supply and its wires"
+            }
             _ => "",
         }
     }
@@ -119,7 +129,7 @@ impl Limits {
             Self::RAMPING => "force is coming in after arming",
             Self::FADING => "force is going out before disarming",
             Self::TERRAIN_MISSING => "terrain that might be felt here is on its way",
-            Self::PRESENCE_FADING => "the surface fades at its border, or comes in after a wait",
+            Self::BOUNDARY_FADING => "the surface fades at its border, or comes in after a wait",
             _ => "",
         }
     }
@@ -134,7 +144,7 @@ mod tests {
         for (name, meaning) in Blockers::all().meanings().chain(Limits::all().meanings()) {
             assert!(!name.is_empty() && !meaning.is_empty(), "{name}");
         }
-        assert_eq!(Blockers::all().meanings().count(), 13);
+        assert_eq!(Blockers::all().meanings().count(), 15);
         assert_eq!(Limits::all().meanings().count(), 9);
         assert_eq!(Blockers::empty().meaning(), "");
     }

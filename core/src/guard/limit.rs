@@ -59,6 +59,19 @@ impl Guard {
         self.force_n += step;
     }
 
+    /// The currents of a tick of the jog that is under way, A; none where there is no
+    /// jog. Ends the jog whose time is over.
+    #[must_use]
+    pub fn jog_currents_a(&mut self) -> Option<Vec3> {
+        let (mode, gain) = (self.mode(), self.arming.gain);
+        let jog = self.jog.as_mut()?;
+        let currents_a = jog.currents_a(self.motors.continuous_a, gain);
+        if mode == Mode::Armed && jog.hold() {
+            self.disarm();
+        }
+        Some(currents_a)
+    }
+
     /// The currents that may reach the amplifiers for the next tick: all
     /// scaled down together so that none exceeds what its motor may have now;
     /// off unless the amplifiers may be on.
@@ -86,6 +99,7 @@ impl Guard {
         Drive {
             currents_a: self.currents_a,
             enabled: true,
+            held: Vec3::ZERO,
         }
     }
 }

@@ -11,7 +11,10 @@
 
 mod arming;
 mod fault;
+mod feedback;
 mod flags;
+mod hold;
+mod jog;
 mod limit;
 mod mode;
 mod speed;
@@ -24,16 +27,22 @@ use serde::{Deserialize, Serialize};
 
 pub use arming::{Decision, SMALL_FORCE_N};
 pub use fault::Fault;
+pub use feedback::CURRENT_TOLERANCE_A;
 pub use flags::{Blockers, Limits};
+pub use hold::HOLD_S;
+pub use jog::{FAR_RAD as JOG_FAR_RAD, FAST_RAD_S as JOG_FAST_RAD_S, JOG_MOST_MS, JOG_SHARE, Jog};
 pub use mode::Mode;
 pub use stall::TRAVEL as TRAVEL_WHILE_ONE_STANDS;
 
 use crate::phantom::{Mechanism, Pose};
 use crate::rate::TickRate;
 use arming::Arming;
+use feedback::Feedback;
+use hold::Hold;
+use jog::JogRun;
 use speed::SpeedMonitor;
 use stall::StallDetector;
-use thermal::Motors;
+use thermal::{Motors, Temperatures};
 
 /// Most that the force may change, newtons a second. A hand at 2 m/s against
 /// 0.5 N/mm makes 1 N/ms; what is faster is no hand.
@@ -50,7 +59,7 @@ pub const MAX_COUNTS_PER_S: u32 = 128_000;
 /// limits are measured by hand.
 pub const LIMIT_MARGIN_RAD: f32 = 0.087;
 
-/// What the encoders and the safety inputs say.
+/// What the encoders, the safety inputs and the amplifiers say.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sense {
     /// Counts of axes 1 to 3 since power-up.
@@ -61,6 +70,13 @@ pub struct Sense {
     pub emergency_stop: bool,
     /// Whether the encoder or amplifier hardware says that it cannot work.
     pub hardware_failed: bool,
+    /// Whether a converter's settings do not read back as they were written.
+    pub outputs_not_as_set: bool,
+    /// Whether an amplifier says that it is not ready, or its wire is broken.
+    pub amplifier_not_ready: bool,
+    /// Currents that flow in motors 1 to 3, mA, as of the tick before; none where the
+    /// amplifiers have no monitors.
+    pub measured_ma: Option<[i16; 3]>,
 }
 
 /// What the guard is told in a tick besides the inputs.
@@ -94,6 +110,9 @@ pub struct Drive {
     pub currents_a: Vec3,
     /// Whether the amplifiers are to be on.
     pub enabled: bool,
+    /// Shares of full scale, -1 to 1, that the outputs are held at while the amplifiers
+    /// are off ([`Guard::hold`]). Zero while they are on.
+    pub held: Vec3,
 }
 
 /// The state of the guard after a tick.
@@ -164,6 +183,10 @@ pub struct Guard {
     speed: SpeedMonitor,
     stall: StallDetector,
     motors: Motors,
+    feedback: Feedback,
+    hold: Hold,
+    /// The jog that is armed for, or under way; none while disarmed.
+    jog: Option<JogRun>,
 }
 
 impl Guard {
@@ -185,6 +208,9 @@ impl Guard {
             speed: SpeedMonitor::new(rate),
             stall: StallDetector::default(),
             motors: Motors::new(rate),
+            feedback: Feedback::new(rate),
+            hold: Hold::new(rate),
+            jog: None,
         }
     }
 
@@ -225,6 +251,12 @@ impl Guard {
         &self.motors
     }
 
+    /// Begins with motors as warm as this; [`Guard::new`] takes them to be as cold as the
+    /// air.
+    pub fn begin_at(&mut self, temperatures: Temperatures) {
+        self.motors.begin_at(temperatures);
+    }
+
     /// Latches a fault and switches off. The first fault stays.
     pub fn trip(&mut self, fault: Fault) {
         self.fault = self.fault.or(Some(fault));
@@ -240,11 +272,20 @@ impl Guard {
 
     /// The host asks to arm.
     pub fn arm(&mut self) {
+        self.hold.end();
         self.arming.request();
+    }
+
+    /// The host asks to arm for a jog. What was driven before is switched off.
+    pub fn jog(&mut self, jog: Jog) {
+        self.stop();
+        self.arming.request();
+        self.jog = Some(JogRun::new(jog, self.arming.rate));
     }
 
     /// Switches off after force has gone out.
     pub fn disarm(&mut self) {
+        self.hold.end();
         let gain = self.arming.gain;
         if self.mode().drives() && self.mode() != Mode::Fading {
             // At the gain that there is, this is the force that there is.
@@ -264,9 +305,11 @@ impl Guard {
 
     fn off(&mut self, why: Blockers) {
         self.arming.stop(why);
+        self.hold.end();
         self.force_n = Vec3::ZERO;
         self.currents_a = Vec3::ZERO;
         self.stall = StallDetector::default();
+        self.jog = None;
     }
 
     /// These counts follow from nothing before.

@@ -17,7 +17,7 @@ pub(super) struct SpeedMonitor {
     every: u32,
     ticks: u32,
     /// Readings a second.
-    hz: f32,
+    pub(super) hz: f32,
     /// Counts of each axis from one reading to the next within which the tip
     /// is below the limit in every pose.
     surely_slow: [u32; 3],

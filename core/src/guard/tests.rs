@@ -1,5 +1,8 @@
 //! The guard tick by tick, with its surroundings played by the test.
 
+mod feedback;
+mod hold;
+
 use std::vec::Vec;
 
 use super::*;
@@ -114,7 +117,7 @@ fn boots_disarmed_and_stays_so_whatever_is_wanted() {
 #[test]
 fn each_blocker_is_named_and_refuses_by_itself() {
     type Case = (fn(&mut Bench), Blockers);
-    let cases: [Case; 9] = [
+    let cases: [Case; 11] = [
         (|b| b.calibrated = false, Blockers::NO_CALIBRATION),
         (|b| b.zeroed = false, Blockers::NOT_ZEROED),
         (|b| b.scene = SceneKind::None, Blockers::NO_SCENE),
@@ -122,6 +125,14 @@ fn each_blocker_is_named_and_refuses_by_itself() {
         (|b| b.guard.trip(Fault::Hardware), Blockers::FAULT_LATCHED),
         (|b| b.sense.emergency_stop = true, Blockers::EMERGENCY_STOP),
         (|b| b.sense.hardware_failed = true, Blockers::HARDWARE),
+        (
+            |b| b.sense.outputs_not_as_set = true,
+            Blockers::OUTPUTS_NOT_AS_SET,
+        ),
+        (
+            |b| b.sense.amplifier_not_ready = true,
+            Blockers::AMPLIFIER_NOT_READY,
+        ),
         (
             |b| b.sense.counts = [0, 40_000, 0],
             Blockers::OUTSIDE_LIMITS,
@@ -293,10 +304,14 @@ fn every_change_of_mode_is_one_that_the_mode_lists() {
 #[test]
 fn each_fault_is_zero_within_its_tick_and_latched_until_cleared() {
     type Case = (fn(&mut Bench), Fault);
-    let cases: [Case; 9] = [
+    let cases: [Case; 10] = [
         (|b| b.sense.dead_man = false, Fault::DeadManReleased),
         (|b| b.sense.emergency_stop = true, Fault::EmergencyStop),
         (|b| b.sense.hardware_failed = true, Fault::Hardware),
+        (
+            |b| b.sense.outputs_not_as_set = true,
+            Fault::OutputsNotAsSet,
+        ),
         (|b| b.watchdog_live = false, Fault::TaskStalled),
         (|b| b.sense.counts[1] += 129, Fault::EncoderJump),
         (|b| b.wanted_n.x = f32::NAN, Fault::NotANumber),

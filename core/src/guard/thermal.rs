@@ -6,6 +6,9 @@
 //! Both change little in a tick, so little at 10 kHz that single precision
 //! would lose it. The heat of each tick is added up and the temperatures follow
 //! every 10 ms.
+//!
+//! A reset does not cool a motor. The model begins with [`Temperatures`] that the
+//! board kept over the reset, or with [`Temperatures::HOT`] where it kept none.
 
 use glam::Vec3;
 
@@ -23,6 +26,68 @@ pub const DERATE_C: f32 = 80.0;
 pub const CONTINUOUS_C: f32 = 100.0;
 /// Here the guard trips, °C. Derating alone never comes this far.
 pub const TRIP_C: f32 = 110.0;
+/// By so much a winding may be warmer than the temperatures that were kept before a
+/// reset, K: 0.2 s of an RE25's peak current, 22 K a second. Temperatures are kept every
+/// 0.1 s, and a watchdog resets within 0.06 s.
+pub const UNSEEN_K: f32 = 5.0;
+/// More than any node can be above the one beside it, K.
+const MOST_K: Vec3 = Vec3::splat(200.0);
+
+/// What the two nodes of each motor are above the air, K: all that the model has to
+/// know of what was before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Temperatures {
+    /// Winding above housing, axes 1 to 3.
+    pub winding_k: Vec3,
+    /// Housing above air, axes 1 to 3.
+    pub housing_k: Vec3,
+}
+
+impl Temperatures {
+    /// Motors as cold as the air.
+    pub const AIR: Self = Self {
+        winding_k: Vec3::ZERO,
+        housing_k: Vec3::ZERO,
+    };
+
+    /// Motors that have worked for hours as hard as derating lets them: the winding at
+    /// [`CONTINUOUS_C`], shared between the nodes as an RE25's 3.1 and 14 K/W share it.
+    /// Derating lets no motor become hotter (`derating_lets_no_motor_become_hotter`), so
+    /// no reset can have hidden more.
+    ///
+    /// A motor that begins here may have its continuous current at once, and its peak
+    /// again after 70 s without load
+    /// (`from_hot_the_continuous_current_is_there_at_once_and_the_peak_after_a_minute`).
+    pub const HOT: Self = Self {
+        winding_k: Vec3::splat((CONTINUOUS_C - AIR_C) * 3.1 / 17.1),
+        housing_k: Vec3::splat((CONTINUOUS_C - AIR_C) * 14.0 / 17.1),
+    };
+
+    /// Temperatures of the windings, °C.
+    #[must_use]
+    pub fn winding_c(&self) -> Vec3 {
+        self.winding_k + self.housing_k + AIR_C
+    }
+
+    /// Takes temperatures that were kept over a reset.
+    ///
+    /// They are up to [`UNSEEN_K`] too low, because the motors had current after they
+    /// were kept. Nothing where a number is none that the model can have: no memory is
+    /// believed against sense.
+    #[must_use]
+    pub fn after_reset(self) -> Option<Self> {
+        let possible = |k: Vec3| k.cmpge(Vec3::ZERO).all() && k.cmple(MOST_K).all();
+        let is_possible = possible(self.winding_k) && possible(self.housing_k);
+        // Not above what derating ends at: a board that resets over and over must not
+        // trip by that alone.
+        let room = Vec3::splat(CONTINUOUS_C - AIR_C) - self.winding_k - self.housing_k;
+        let unseen = room.clamp(Vec3::ZERO, Vec3::splat(UNSEEN_K));
+        is_possible.then_some(Self {
+            winding_k: self.winding_k + unseen,
+            ..self
+        })
+    }
+}
 
 /// Temperatures of the three motors above the air's, and what follows.
 #[derive(Clone, Copy, Debug)]
@@ -34,8 +99,7 @@ pub struct Motors {
     pub(super) peak_a: Vec3,
     /// What each axis may be given for ever, A.
     pub(super) continuous_a: Vec3,
-    winding_k: Vec3,
-    housing_k: Vec3,
+    at: Temperatures,
     /// Σ I² since the last step, A², and of how many ticks.
     squares: Vec3,
     ticks: u32,
@@ -54,8 +118,7 @@ impl Motors {
             thermal: Calibration::PREMIUM_1_5.thermal,
             peak_a: Vec3::ZERO,
             continuous_a: Vec3::ZERO,
-            winding_k: Vec3::ZERO,
-            housing_k: Vec3::ZERO,
+            at: Temperatures::AIR,
             squares: Vec3::ZERO,
             ticks: 0,
             allowed_a: Vec3::ZERO,
@@ -71,10 +134,22 @@ impl Motors {
         self.update_limits();
     }
 
+    /// Begins at these temperatures.
+    pub fn begin_at(&mut self, temperatures: Temperatures) {
+        self.at = temperatures;
+        self.update_limits();
+    }
+
+    /// What a board has to keep over a reset.
+    #[must_use]
+    pub const fn temperatures(&self) -> Temperatures {
+        self.at
+    }
+
     /// Estimated winding temperatures, °C.
     #[must_use]
     pub fn winding_c(&self) -> Vec3 {
-        self.winding_k + self.housing_k + AIR_C
+        self.at.winding_c()
     }
 
     /// Lets `currents_a` flow for a tick.
@@ -95,8 +170,18 @@ impl Motors {
             let end = mean * (thermal.resistance_ohm * k_per_w);
             from + (end - from) * (step_s / time_s)
         };
-        self.winding_k = toward(self.winding_k, thermal.winding_k_per_w, thermal.winding_s);
-        self.housing_k = toward(self.housing_k, thermal.housing_k_per_w, thermal.housing_s);
+        self.at = Temperatures {
+            winding_k: toward(
+                self.at.winding_k,
+                thermal.winding_k_per_w,
+                thermal.winding_s,
+            ),
+            housing_k: toward(
+                self.at.housing_k,
+                thermal.housing_k_per_w,
+                thermal.housing_s,
+            ),
+        };
         self.squares = Vec3::ZERO;
         self.ticks = 0;
         self.update_limits();
@@ -126,6 +211,115 @@ mod tests {
             motors.heat(given);
         }
         (motors, given)
+    }
+
+    /// Seconds without load until a motor may have its peak current again.
+    fn seconds_to_peak(from: Temperatures) -> u32 {
+        let mut motors = Motors::new(khz(1));
+        motors.begin_at(from);
+        motors.configure(&Calibration::PREMIUM_1_5);
+        let cooled = |_: &u32| {
+            for _ in 0..1_000 {
+                motors.heat(Vec3::ZERO);
+            }
+            motors.allowed_a == motors.peak_a
+        };
+        (1..10_000).find(cooled).expect("it cools")
+    }
+
+    #[test]
+    fn from_hot_the_continuous_current_is_there_at_once_and_the_peak_after_a_minute() {
+        let mut motors = Motors::new(khz(1));
+        motors.begin_at(Temperatures::HOT);
+        motors.configure(&Calibration::PREMIUM_1_5);
+        assert!((motors.winding_c().x - CONTINUOUS_C).abs() < 1e-3);
+        assert!((motors.allowed_a.x - 1.24).abs() < 1e-3, "{motors:?}");
+        assert!(!motors.too_hot);
+        for _ in 0..10_000 {
+            motors.heat(Vec3::ZERO);
+        }
+        // While the user is still zeroing the arm.
+        assert!(motors.allowed_a.x > 2.5, "{}", motors.allowed_a);
+        let seconds = seconds_to_peak(Temperatures::HOT);
+        assert!((55..70).contains(&seconds), "{seconds}");
+    }
+
+    #[test]
+    fn begun_hot_and_pressed_at_once_it_derates_and_never_trips() {
+        let mut motors = Motors::new(khz(1));
+        motors.begin_at(Temperatures::HOT);
+        motors.configure(&Calibration::PREMIUM_1_5);
+        for _ in 0..600_000 {
+            motors.heat(Vec3::splat(5.5).min(motors.allowed_a));
+            assert!(!motors.too_hot, "{:?}", motors.winding_c());
+        }
+    }
+
+    /// Whatever a hand does, no node passes the temperatures that are assumed where
+    /// nothing is known.
+    #[test]
+    fn derating_lets_no_motor_become_hotter() {
+        let mut motors = Motors::new(khz(1));
+        motors.configure(&Calibration::PREMIUM_1_5);
+        let hot = Temperatures::HOT;
+        let hottest_c = (hot.winding_k + hot.housing_k).x + AIR_C;
+        // Pressed for ever on axis 1, in bursts on the others.
+        for ms in 0..4_000_000_u32 {
+            let wanted = Vec3::new(
+                5.5,
+                if ms % 9_000 < 4_000 { 5.5 } else { 0.0 },
+                if ms % 100_000 < 60_000 { 5.5 } else { 0.5 },
+            );
+            motors.heat(wanted.min(motors.allowed_a));
+            if ms % 10 == 0 {
+                let housing = motors.at.housing_k.max_element();
+                assert!(housing < hot.housing_k.x + 0.1, "{housing} K");
+                let winding = motors.winding_c().max_element();
+                assert!(winding < hottest_c + 0.1, "{winding} °C");
+            }
+        }
+    }
+
+    #[test]
+    fn what_was_kept_is_gone_on_from_and_a_little_warmer() {
+        let kept = Temperatures {
+            winding_k: Vec3::new(0.0, 10.0, 20.0),
+            housing_k: Vec3::new(0.0, 60.0, 60.0),
+        };
+        let begun = kept.after_reset().expect("possible");
+        let sum = begun.winding_k + begun.housing_k;
+        // Never beyond where derating ends, but never colder either.
+        assert!((sum - Vec3::new(5.0, 75.0, 80.0)).abs().max_element() < 1e-4);
+        assert_eq!(begun.housing_k, kept.housing_k);
+    }
+
+    #[test]
+    fn a_reset_hides_no_more_than_is_added() {
+        let mut motors = Motors::new(khz(1));
+        motors.configure(&Calibration::PREMIUM_1_5);
+        for _ in 0..200 {
+            motors.heat(Vec3::splat(5.5));
+        }
+        assert!(motors.at.winding_k.x < UNSEEN_K, "{}", motors.at.winding_k);
+        assert!(
+            motors.at.winding_k.x > 0.8 * UNSEEN_K,
+            "{}",
+            motors.at.winding_k
+        );
+    }
+
+    #[test]
+    fn numbers_that_no_motor_has_are_not_gone_on_from() {
+        for bad in [f32::NAN, f32::INFINITY, -0.1, 201.0] {
+            for axis in 0..3 {
+                let mut kept = Temperatures::HOT;
+                kept.winding_k[axis] = bad;
+                assert_eq!(kept.after_reset(), None, "{bad}");
+                let mut kept = Temperatures::HOT;
+                kept.housing_k[axis] = bad;
+                assert_eq!(kept.after_reset(), None, "{bad}");
+            }
+        }
     }
 
     fn khz(khz: u32) -> TickRate {

@@ -20,6 +20,13 @@ impl Guard {
         if !around.zeroed || jumped {
             self.counts = None;
         }
+        if self.feedback.disagrees(sense, self.currents_a) {
+            self.trip(Fault::CurrentMismatch);
+        }
+        // A jog does not outlive its arming.
+        if self.mode() == Mode::Disarmed {
+            self.jog = None;
+        }
         if self.motors.too_hot {
             self.trip(Fault::MotorTooHot);
         }
@@ -67,6 +74,12 @@ impl Guard {
         if sense.hardware_failed {
             return Some(Fault::Hardware);
         }
+        if sense.outputs_not_as_set {
+            return Some(Fault::OutputsNotAsSet);
+        }
+        if self.feedback.is_unready(sense) {
+            return Some(Fault::AmplifierNotReady);
+        }
         if !around.watchdog_live {
             return Some(Fault::TaskStalled);
         }
@@ -83,13 +96,19 @@ impl Guard {
             SpeedCheck::Moved(moved) => {
                 let bearable = self.motors.continuous_a;
                 let in_vain = self.stall.check(moved, self.currents_a, bearable);
-                in_vain.then_some(Fault::NoMotion)
+                let (hz, gain) = (self.speed.hz, self.arming.gain);
+                let jogged = self.jog.as_mut();
+                let jogged =
+                    jogged.and_then(|jog| jog.check(moved, hz, mechanism, pose.angles(), gain));
+                in_vain.then_some(Fault::NoMotion).or(jogged)
             }
         }
     }
 
     fn watch_undriven(&mut self, sense: &Sense, around: &Surroundings<'_>) {
         self.motors.heat(Vec3::ZERO);
+        self.feedback.rest();
+        self.hold.pass();
         self.speed.restart(sense.counts);
         let blockers = self.find_blockers(sense, around);
         self.arming.wait(blockers, sense.dead_man);
@@ -105,11 +124,17 @@ impl Guard {
         let bits = [
             (around.arm.is_none(), Blockers::NO_CALIBRATION),
             (!around.zeroed, Blockers::NOT_ZEROED),
-            (around.scene == SceneKind::None, Blockers::NO_SCENE),
+            // A jog takes the place of a scene.
+            (
+                around.scene == SceneKind::None && self.jog.is_none(),
+                Blockers::NO_SCENE,
+            ),
             (around.scene == SceneKind::Points, Blockers::REPLAY),
             (self.fault.is_some(), Blockers::FAULT_LATCHED),
             (sense.emergency_stop, Blockers::EMERGENCY_STOP),
             (sense.hardware_failed, Blockers::HARDWARE),
+            (sense.outputs_not_as_set, Blockers::OUTPUTS_NOT_AS_SET),
+            (sense.amplifier_not_ready, Blockers::AMPLIFIER_NOT_READY),
             (outside, Blockers::OUTSIDE_LIMITS),
             (!around.watchdog_live, Blockers::WATCHDOG_NOT_LIVE),
         ];

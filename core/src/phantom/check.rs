@@ -5,7 +5,7 @@ use core::fmt;
 use glam::{BVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::calibration::Calibration;
+use super::calibration::{Calibration, Model};
 
 /// A number of the record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -129,6 +129,30 @@ pub struct BadCalibration {
     pub axis: Option<u8>,
     /// What it is.
     pub value: f32,
+    /// What it does not keep.
+    pub bound: Bound,
+}
+
+/// The bound that a number does not keep.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Bound {
+    /// [`CalibrationField::range`], or what the record's other numbers leave of it.
+    Range,
+    /// The ceiling of the record's model, which no record can raise.
+    Model {
+        /// The model.
+        model: Model,
+        /// The smallest value that is let through.
+        min: f32,
+        /// The largest.
+        max: f32,
+    },
+    /// The current that the board's outputs can command.
+    Board {
+        /// The largest value, A.
+        max: f32,
+    },
 }
 
 impl fmt::Display for BadCalibration {
@@ -138,19 +162,36 @@ impl fmt::Display for BadCalibration {
         if let Some(axis) = self.axis {
             write!(f, " of axis {axis}")?;
         }
-        let advice = self.field.advice();
-        write!(
-            f,
-            " is {}, expected {min} to {max} {unit}: {advice}",
-            self.value
-        )
+        write!(f, " is {}, ", self.value)?;
+        match self.bound {
+            Bound::Range => {
+                let advice = self.field.advice();
+                write!(f, "expected {min} to {max} {unit}: {advice}")
+            }
+            Bound::Model { model, min, max } if max.is_finite() => write!(
+                f,
+                "but a {model:?} may have {min} to {max} {unit}: a record cannot change that; \
+                 its model's preset in the firmware can"
+            ),
+            Bound::Model { model, min, .. } => write!(
+                f,
+                "but with its ratio a {model:?} has at least {min} {unit}: check the ratio \
+                 and the torque constant"
+            ),
+            Bound::Board { max } => write!(
+                f,
+                "but this board commands at most {max} {unit}: make the record's peak \
+                 current smaller"
+            ),
+        }
     }
 }
 
 impl core::error::Error for BadCalibration {}
 
 impl Calibration {
-    /// Whether every number is one that the loop can work with.
+    /// Whether every number is one that the loop can work with, and within what the
+    /// model may have.
     ///
     /// # Errors
     /// [`BadCalibration`] names the first that is not.
@@ -213,7 +254,8 @@ impl Calibration {
         one(CalibrationField::WindingTime, thermal.winding_s)?;
         one(CalibrationField::HousingTime, thermal.housing_s)?;
         one(CalibrationField::MaxForce, self.max_force_n)?;
-        one(CalibrationField::MaxSpeed, self.max_speed_mm_s)
+        one(CalibrationField::MaxSpeed, self.max_speed_mm_s)?;
+        self.check_ceilings()
     }
 }
 
@@ -225,7 +267,12 @@ fn check(
 ) -> Result<(), BadCalibration> {
     match good {
         true => Ok(()),
-        false => Err(BadCalibration { field, axis, value }),
+        false => Err(BadCalibration {
+            field,
+            axis,
+            value,
+            bound: Bound::Range,
+        }),
     }
 }
 

@@ -2,14 +2,16 @@
 //!
 //! Read `calibration` (what is known of an arm), [`Mechanism`] (what follows
 //! from it, worked out outside the tick), [`Pose`] (tip and torques), and
-//! [`Readings`] (velocity). `presets`, `check` and `record` are about the
-//! calibration itself: records to begin with, checks, and bytes in memory.
+//! [`Readings`] (velocity). `presets`, `check`, `ceiling` and `record` are about
+//! the calibration itself: records to begin with, checks, what no record can raise, and
+//! bytes in memory.
 //!
 //! Two frames. The *device frame* has its origin where the joint axes meet, x
 //! away from the base toward the user, z up. The *terrain frame* is the user's
 //! view: x east (right), y north (away), z up. They differ by a quarter turn.
 
 mod calibration;
+mod ceiling;
 mod check;
 mod inverse;
 mod kinematics;
@@ -20,7 +22,7 @@ mod trig;
 mod velocity;
 
 pub use calibration::{Calibration, JointLimits, Model, Thermal};
-pub use check::{BadCalibration, CalibrationField};
+pub use check::{BadCalibration, Bound, CalibrationField};
 pub use inverse::Unreachable;
 pub(crate) use kinematics::to_device_frame;
 pub use kinematics::{Pose, to_terrain_frame};

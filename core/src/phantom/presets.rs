@@ -49,6 +49,15 @@ impl Model {
 }
 
 impl Calibration {
+    /// Whether the cable ratios are still a preset's for which nobody has published a
+    /// measurement: every model's but the Premium 1.5's. Positions and forces are then
+    /// off by as much as the ratios are, so a calibration measures them.
+    #[must_use]
+    pub fn has_guessed_ratios(&self) -> bool {
+        let is_published = matches!(self.model, Model::Premium15 | Model::Other);
+        !is_published && self.ratio == self.model.preset().ratio
+    }
+
     /// Phantom Premium 1.5. Link lengths, stops and motors from CAD and data
     /// sheet (C2002 has 215 and 170 mm); gravity without stylus from C2002
     /// (−0.0117 and −0.0873 Nm by CAD). Uncertain: the cable ratios; the signs,
@@ -75,6 +84,19 @@ impl Calibration {
 
     /// Phantom Premium 1.0: 8.5 N. Uncertain: link lengths (140 mm), and
     /// everything else, which is a Premium 1.5's. Gravity is left to be fitted.
+    ///
+    /// The ratios contradict the resolution of 0.03 mm that is published for this model.
+    /// No source says which of the two is wrong, so the ruler of the calibration decides.
+    /// What an encoder counts for a millimetre of the tip near the home pose:
+    ///
+    /// | axis | with this preset's 13.3, 11.2, 11.2 | with 7.2, 7.2, 7.2 |
+    /// | --- | --- | --- |
+    /// | 1, tip to the right | 62 counts (16 µm a count) | 34 counts (30 µm) |
+    /// | 2, tip up | 52 counts (19 µm) | 34 counts (30 µm) |
+    /// | 3, tip towards the user | 52 counts (19 µm) | 34 counts (30 µm) |
+    ///
+    /// With the wrong ones, motions are felt 1.6 to 1.8 times too large or too small, and
+    /// so are forces. The ceilings let both through.
     pub const PREMIUM_1_0: Self = Self {
         model: Model::Premium10,
         l1_mm: 140.0,
@@ -125,6 +147,38 @@ impl Calibration {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The tables here and in docs/hardware.md.
+    #[test]
+    fn a_premium_1_0_counts_as_the_tables_say_with_either_ratio() {
+        let counts_a_mm = |ratio: Vec3| {
+            let record = Calibration {
+                ratio,
+                ..Calibration::PREMIUM_1_0
+            };
+            assert_eq!(record.validate(), Ok(()));
+            // In the home pose the levers of the three axes are l1, l1 and l2.
+            let levers_mm = Vec3::new(record.l1_mm, record.l1_mm, record.l2_mm);
+            (record.counts_per_radian() / levers_mm).to_array()
+        };
+        let preset = counts_a_mm(Calibration::PREMIUM_1_0.ratio).map(libm::roundf);
+        assert_eq!(preset, [62.0, 52.0, 52.0]);
+        let other = counts_a_mm(Vec3::splat(7.2));
+        assert_eq!(other.map(libm::roundf), [34.0, 34.0, 34.0]);
+        // 0.03 mm a count.
+        assert!((1.0 / other[0] - 0.03).abs() < 2e-4, "{other:?}");
+    }
+
+    #[test]
+    fn ratios_are_a_guess_until_they_were_measured() {
+        for model in [Model::Premium10, Model::Premium30, Model::Omni] {
+            let mut record = model.preset();
+            assert!(record.has_guessed_ratios(), "{model:?}");
+            record.ratio.x *= 1.01;
+            assert!(!record.has_guessed_ratios(), "{model:?}");
+        }
+        assert!(!Calibration::PREMIUM_1_5.has_guessed_ratios());
+    }
 
     #[test]
     fn every_preset_is_valid_and_names_its_model() {

@@ -2,9 +2,14 @@
 //! 12- and 14-bit relatives (Analog Devices, data sheet rev. G).
 //!
 //! The BIN/2sCOMP pin is tied to ground (two's complement) and LDAC too (each
-//! write takes effect at once); CLR is tied high. A frame has 24 bits: the register in bits 21-19,
-//! the channel in bits 18-16, then the value. Outputs A, B and C command axes 1
-//! to 3; D stays powered down.
+//! write takes effect at once); CLR is tied high. A frame has 24 bits: read or write in bit 23,
+//! the register in bits 21-19, the channel in bits 18-16, then the value. Outputs A, B and C
+//! command axes 1 to 3; D stays powered down.
+//!
+//! What a frame asks to read comes back during the frame after it. Each tick therefore asks
+//! for one register before it writes the three commands, and compares what comes back with
+//! the first of them. A register that does not read back as it was written says that the
+//! converter lost its supply, or that a wire to it is broken.
 
 use super::CurrentOutputs;
 
@@ -12,48 +17,137 @@ use super::CurrentOutputs;
 const DATA: u8 = 0b000 << 3;
 const RANGE: u8 = 0b001 << 3;
 const POWER: u8 = 0b010 << 3;
+/// Asks for a register instead of writing it.
+const READ: u8 = 1 << 7;
 /// The channel that stands for all.
 const ALL: u8 = 0b100;
 /// ±10 V.
 const BIPOLAR_10_V: u16 = 0b100;
 /// Channels A, B and C on, and the reference.
 const POWER_UP: u16 = 0b1_0111;
+/// Bits of a register that are compared: of the range all that it has; of the power
+/// register what was written and the bit that says that the part has shut down, too hot.
+const RANGE_BITS: u16 = 0b111;
+const POWER_BITS: u16 = 0b11_1111;
+/// What is read in turn: the ranges of A, B and C, the power register, the codes.
+const REGISTERS: u8 = 7;
+/// How long the part may take to power its outputs up, µs: twice what the data sheet asks
+/// for before the first code is written.
+const POWER_UP_US: u32 = 20;
 
 /// The way to a converter: it sends frames.
 pub trait FrameBus {
-    /// Sends a frame of three bytes with SYNC low, and lets SYNC rise whatever happened:
-    /// the part ignores a frame that was cut short. The part clocks data in on the
-    /// falling edge (mode 1), at 30 MHz at most.
+    /// Sends a frame of three bytes with SYNC low, lets SYNC rise whatever happened (the
+    /// part ignores a frame that was cut short) and returns what came back meanwhile. SYNC
+    /// is high for at least 200 ns between two frames: the part asks for 100 ns after a
+    /// write and for 200 ns after a read. The part clocks data in on the falling edge
+    /// (mode 1), at 30 MHz at most; what it sends is valid 40 ns after the rising edge,
+    /// so a frame has 10 MHz at most.
     ///
     /// A failure is not told here: the bus reports it through
     /// [`Sense::hardware_failed`](crate::board::Sense), which switches off.
-    fn send(&mut self, frame: [u8; 3]);
+    fn send(&mut self, frame: [u8; 3]) -> [u8; 3];
+
+    /// Waits for so many microseconds at least, a few tens. Only at start-up.
+    fn pause_us(&mut self, us: u32);
+
+    /// Takes whether all registers read back as they were written, for
+    /// [`Sense::outputs_not_as_set`](crate::board::Sense).
+    fn tell(&mut self, as_set: bool);
 }
 
 /// The converter behind a bus of its own.
-pub struct Ad5754<B>(pub B);
-
-impl<B: FrameBus> Ad5754<B> {
-    fn write(&mut self, head: u8, value: u16) {
-        let [high, low] = value.to_be_bytes();
-        self.0.send([head, high, low]);
-    }
+pub struct Ad5754<B> {
+    bus: B,
+    /// Codes as last written.
+    codes: [u16; 3],
+    /// The register that is read next, below [`REGISTERS`].
+    turn: u8,
+    /// How many read back right in a row, up to [`REGISTERS`].
+    right: u8,
 }
 
-impl<B: FrameBus> CurrentOutputs for Ad5754<B> {
-    /// Writes zero to every channel, then the range of ±10 V, then power. A converter
-    /// that is powered with the power stages has forgotten all of it. The outputs may
-    /// take 10 µs to settle afterwards.
-    fn prepare(&mut self) {
+impl<B: FrameBus> Ad5754<B> {
+    /// A converter that has not been set up.
+    pub const fn new(bus: B) -> Self {
+        Self {
+            bus,
+            codes: [0; 3],
+            turn: 0,
+            right: 0,
+        }
+    }
+
+    fn write(&mut self, head: u8, value: u16) -> u16 {
+        let [high, low] = value.to_be_bytes();
+        let [_, high, low] = self.bus.send([head, high, low]);
+        u16::from_be_bytes([high, low])
+    }
+
+    /// Writes the settings: zero to every channel, then the range, then power.
+    fn set_up(&mut self) {
         self.write(DATA | ALL, 0);
+        self.codes = [0; 3];
         self.write(RANGE | ALL, BIPOLAR_10_V);
         self.write(POWER, POWER_UP);
     }
 
-    fn set(&mut self, fractions: [f32; 3]) {
-        for (channel, fraction) in (0..).zip(fractions) {
-            self.write(DATA | channel, bipolar_code(fraction));
+    /// The head that names the register whose turn it is, its bits that are compared, and
+    /// what they should be.
+    fn expected(&self) -> (u8, u16, u16) {
+        let [a, b, c] = self.codes;
+        match self.turn {
+            0 => (RANGE, RANGE_BITS, BIPOLAR_10_V),
+            1 => (RANGE | 1, RANGE_BITS, BIPOLAR_10_V),
+            2 => (RANGE | 2, RANGE_BITS, BIPOLAR_10_V),
+            3 => (POWER, POWER_BITS, POWER_UP),
+            4 => (DATA, u16::MAX, a),
+            5 => (DATA | 1, u16::MAX, b),
+            _ => (DATA | 2, u16::MAX, c),
         }
+    }
+}
+
+impl<B: FrameBus> CurrentOutputs for Ad5754<B> {
+    fn prepare(&mut self) {
+        self.set_up();
+        self.bus.pause_us(POWER_UP_US);
+    }
+
+    /// Sets a converter up that did not read back right. It may be powered with the power
+    /// stages and has then forgotten everything. The next frame goes out in the next tick,
+    /// 100 µs later at least, so there is nothing to wait for.
+    fn maintain(&mut self) {
+        if self.right == 0 {
+            self.set_up();
+        }
+    }
+
+    fn are_as_set(&self) -> bool {
+        self.right == REGISTERS
+    }
+
+    /// Sends four frames: one that asks for a register, and the three commands, the first
+    /// of which brings the answer.
+    fn set(&mut self, fractions: [f32; 3]) {
+        let (head, bits, expected) = self.expected();
+        self.write(READ | head, 0);
+        let [a, b, c] = fractions.map(bipolar_code);
+        let found = self.write(DATA, a);
+        self.write(DATA | 1, b);
+        self.write(DATA | 2, c);
+        self.codes = [a, b, c];
+        self.turn = if self.turn + 1 < REGISTERS {
+            self.turn + 1
+        } else {
+            0
+        };
+        self.right = if found & bits == expected {
+            REGISTERS.min(self.right + 1)
+        } else {
+            0
+        };
+        self.bus.tell(self.right == REGISTERS);
     }
 }
 
@@ -69,84 +163,5 @@ pub fn bipolar_code(fraction: f32) -> u16 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::amplifier::Off;
-    use crate::board::{Amplifiers, EnabledAmplifiers};
-    use core::cell::RefCell;
-    use core::convert::Infallible;
-    use embedded_hal::digital::{self, OutputPin};
-    use std::rc::Rc;
-    use std::vec::Vec;
-
-    /// The frames that were sent.
-    #[derive(Clone, Default)]
-    struct Wires(Rc<RefCell<Vec<[u8; 3]>>>);
-
-    impl FrameBus for Wires {
-        fn send(&mut self, frame: [u8; 3]) {
-            self.0.borrow_mut().push(frame);
-        }
-    }
-
-    /// An enable pin that nobody looks at.
-    struct Enable;
-
-    impl digital::ErrorType for Enable {
-        type Error = Infallible;
-    }
-
-    impl OutputPin for Enable {
-        fn set_low(&mut self) -> Result<(), Infallible> {
-            Ok(())
-        }
-
-        fn set_high(&mut self) -> Result<(), Infallible> {
-            Ok(())
-        }
-    }
-
-    #[test]
-    fn it_is_zero_before_it_has_a_range_and_has_one_before_power() {
-        let wires = Wires::default();
-        let off = Off::new(Ad5754(wires.clone()), Enable, 5.0);
-        let set_up = [[0x04, 0x00, 0x00], [0x0C, 0x00, 0x04], [0x10, 0x00, 0x17]];
-        let zero = [[0, 0, 0], [1, 0, 0], [2, 0, 0]];
-        assert_eq!(wires.0.take(), [set_up, zero].concat());
-        // And again, whenever the power stages come on.
-        let _on = off.enable();
-        assert_eq!(wires.0.take(), [set_up, zero].concat());
-    }
-
-    #[test]
-    fn currents_become_three_frames_one_a_channel() {
-        let wires = Wires::default();
-        let converter = Ad5754(wires.clone());
-        let mut on = Off::new(converter, Enable, 5.0).enable();
-        wires.0.take();
-        on.write([2.5, -2.5, f32::NAN]);
-        let frames = wires.0.take();
-        assert_eq!(
-            frames,
-            [[0x00, 0x40, 0x00], [0x01, 0xC0, 0x00], [0x02, 0x00, 0x00]]
-        );
-        let _off = on.disable();
-        assert_eq!(wires.0.take(), [[0, 0, 0], [1, 0, 0], [2, 0, 0]]);
-    }
-
-    #[test]
-    fn codes_are_nearest_and_saturate() {
-        assert_eq!(bipolar_code(0.0), 0);
-        assert_eq!(bipolar_code(1.0), 0x7FFF);
-        assert_eq!(bipolar_code(-1.0), 0x8000);
-        assert_eq!(bipolar_code(2.0), 0x7FFF);
-        assert_eq!(bipolar_code(f32::NAN), 0);
-        for code in -32_768..=32_767_i32 {
-            for off in [-0.4, 0.0, 0.4] {
-                let fraction = (f64::from(code) + off) / 32_768.0;
-                let nearest = (code as i16).cast_unsigned();
-                assert_eq!(bipolar_code(fraction as f32), nearest, "{code} {off}");
-            }
-        }
-    }
-}
+#[path = "ad5754_tests.rs"]
+mod tests;

@@ -10,12 +10,15 @@ mod timing;
 
 use core::mem;
 
+use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::guard::{Drive, Fault, Sense};
+use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::Source;
 use hapterra_core::tick::{Command, Haptics, Outcome};
 
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, TickClock};
 use crate::monitor::Part;
+use crate::motor_memory::{MotorLog, Words};
 use crate::queues::{LoopEnds, TickRecord};
 use liveness::Liveness;
 use reporter::Reporter;
@@ -57,6 +60,7 @@ pub struct HapticLoop<'t, E, A: Amplifiers, C, const D: usize> {
     outcome: Outcome,
     liveness: Liveness,
     reporter: Reporter,
+    motor_log: MotorLog,
     /// An answer that found the queue full. No other tick runs before it is out.
     unsent: Option<TickRecord>,
 }
@@ -85,6 +89,7 @@ where
             outcome: Outcome::default(),
             liveness: Liveness::new(C::RATE),
             reporter: Reporter::new(C::RATE),
+            motor_log: MotorLog::new(C::RATE),
             unsent: None,
         }
     }
@@ -99,16 +104,39 @@ where
         let began = self.timing.begin(&mut self.clock);
         self.ends.monitor.count_tick();
         self.ends.monitor.check_in(Part::Tick);
-        if let Some(record) = self.unsent.take() {
-            self.answer(record);
-            return Drive::default();
-        }
-        self.take_commands();
-        let drive = self.render();
+        let live = self.liveness.tick(self.ends.monitor.fed());
+        let drive = match self.unsent.take() {
+            Some(record) => {
+                self.answer(record);
+                self.follow_arm(live)
+            }
+            None => {
+                self.take_commands();
+                self.render(live)
+            }
+        };
         if self.timing.end(&self.clock, began) {
             self.give_to_haptics(Command::Trip(Fault::TickOverrun));
         }
         drive
+    }
+
+    /// What the board is to keep over a reset after this tick, if anything: a copy of the
+    /// motors' temperatures, and which of the two it is. Called after each tick.
+    pub fn motors_to_keep(&mut self) -> Option<(usize, Words)> {
+        self.motor_log.tick(&self.haptics.temperatures())
+    }
+
+    /// The calibration in force.
+    #[must_use]
+    pub fn calibration(&self) -> Option<&Calibration> {
+        self.haptics.calibration()
+    }
+
+    /// How warm the motors are by the thermal model.
+    #[must_use]
+    pub const fn temperatures(&self) -> Temperatures {
+        self.haptics.temperatures()
     }
 
     fn take_commands(&mut self) {
@@ -126,7 +154,7 @@ where
                         Source::Points => HipSource::Points { pending: false },
                     };
                 }
-                Command::DropScene => self.hip_source = HipSource::None,
+                Command::DropScene | Command::Jog(_) => self.hip_source = HipSource::None,
                 Command::Point(_) => self.hip_source = HipSource::Points { pending: true },
                 _ => {}
             }
@@ -141,11 +169,11 @@ where
         }
     }
 
-    fn render(&mut self) -> Drive {
-        let live = self.liveness.tick(self.ends.monitor.fed());
+    fn render(&mut self, watchdog_live: bool) -> Drive {
         match self.hip_source {
-            HipSource::Encoders | HipSource::None => self.render_arm(live),
-            HipSource::Points { pending } => self.render_point(pending),
+            HipSource::Encoders | HipSource::None => self.render_arm(watchdog_live),
+            HipSource::Points { pending: true } => self.render_point(watchdog_live),
+            HipSource::Points { pending: false } => self.follow_arm(watchdog_live),
         }
     }
 
@@ -173,14 +201,13 @@ where
         drive
     }
 
-    fn render_point(&mut self, pending: bool) -> Drive {
+    /// Renders the point under way. The encoders are read all the same: the arm may be
+    /// moved meanwhile.
+    fn render_point(&mut self, watchdog_live: bool) -> Drive {
         let drive = Drive::default();
         self.drive(&drive);
-        if !pending {
-            return drive;
-        }
-        let sense = Sense::default();
-        self.run_tick(&sense, false);
+        let sense = self.encoders.sense();
+        self.run_tick(&sense, watchdog_live);
         self.report(&sense, &drive);
         let record = self.record(self.outcome.answers);
         if record.answers.is_some() {
@@ -190,6 +217,16 @@ where
             // It only tells the link what holds the point up; the next one will, too.
             let _ = self.ends.records.enqueue(record);
         }
+        drive
+    }
+
+    /// A tick of a replay without a point: nothing is rendered, and the arm is followed.
+    fn follow_arm(&mut self, watchdog_live: bool) -> Drive {
+        let drive = Drive::default();
+        self.drive(&drive);
+        let sense = self.encoders.sense();
+        self.haptics.follow(&sense, watchdog_live);
+        self.report(&sense, &drive);
         drive
     }
 
@@ -220,7 +257,7 @@ where
     /// Brings the amplifiers to what the tick asks for.
     fn drive(&mut self, drive: &Drive) {
         let power = self.power.take().map(|power| match (power, drive.enabled) {
-            (Power::Off(off), false) => Power::Off(off),
+            (Power::Off(off), false) => Power::Off(rested(off, drive)),
             (Power::On(on), false) => Power::Off(on.disable()),
             (Power::Off(off), true) => Power::On(written(off.enable(), drive)),
             (Power::On(on), true) => Power::On(written(on, drive)),
@@ -233,6 +270,11 @@ where
 
 fn written<A: EnabledAmplifiers>(mut amplifiers: A, drive: &Drive) -> A {
     amplifiers.write(drive.currents_a.to_array());
+    amplifiers
+}
+
+fn rested<A: Amplifiers>(mut amplifiers: A, drive: &Drive) -> A {
+    amplifiers.rest(drive.held.to_array());
     amplifiers
 }
 

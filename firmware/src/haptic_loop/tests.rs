@@ -32,7 +32,13 @@ fn looped(source: Source) -> (Loop, LinkEnds<'static>) {
         VirtualAmplifiersOff,
         StoppedClock,
     );
-    let scene = Scene {
+    let scene = scene(source);
+    assert!(link_ends.commands.enqueue(Command::Scene(scene)).is_ok());
+    (haptic_loop, link_ends)
+}
+
+fn scene(source: Source) -> Scene {
+    Scene {
         epoch: 1,
         level: 0,
         size: FieldSize::new(640, 640),
@@ -43,9 +49,7 @@ fn looped(source: Source) -> (Loop, LinkEnds<'static>) {
         rule: Rule::Swept,
         source,
         hold_clock: false,
-    };
-    assert!(link_ends.commands.enqueue(Command::Scene(scene)).is_ok());
-    (haptic_loop, link_ends)
+    }
 }
 
 fn drain(link_ends: &mut LinkEnds<'_>) -> Vec<TickRecord> {
@@ -61,6 +65,51 @@ fn samples_that_find_no_room_are_counted() {
     let dropped = link_ends.monitor.dropped();
     assert!(dropped > 100);
     assert_eq!(drain(&mut link_ends).len() as u32 + dropped, 200);
+}
+
+/// Moves the arm by 100 counts a tick; returns where it is.
+fn wave(haptic_loop: &mut Loop, from: i32, ticks: i32) -> i32 {
+    for n in 1..=ticks {
+        haptic_loop.encoders_mut().0.counts = [from + 100 * n; 3];
+        assert_eq!(haptic_loop.tick(), Drive::default());
+    }
+    from + 100 * ticks
+}
+
+#[test]
+fn the_arm_is_followed_in_every_tick_of_a_replay() {
+    let (mut haptic_loop, mut link_ends) = looped(Source::Encoders);
+    assert!(link_ends.commands.enqueue(Command::Zero([0; 3])).is_ok());
+    let at = wave(&mut haptic_loop, 0, 2);
+    let points = Command::Scene(scene(Source::Points));
+    assert!(link_ends.commands.enqueue(points).is_ok());
+    // Between two points.
+    let at = wave(&mut haptic_loop, at, 50);
+    // While a point waits for its tile; what it waits for fills the queue.
+    let hip = GridPoint::new([100, 100, 2], Vec3::splat(0.5));
+    let point = Point { seq: 9, hip };
+    assert!(link_ends.commands.enqueue(Command::Point(point)).is_ok());
+    let at = wave(&mut haptic_loop, at, 50);
+    // While its answer finds no room.
+    let tile = Box::leak(Box::new(Tile::VACANT));
+    let key = TileKey::holding(0, Cell::new(100, 100));
+    tile.fill(key, 1, |_, _| 0.5).unwrap();
+    assert!(link_ends.commands.enqueue(Command::Tile(tile)).is_ok());
+    let at = wave(&mut haptic_loop, at, 50);
+    assert!(haptic_loop.unsent.is_some(), "the case that is meant");
+    drain(&mut link_ends);
+    let at = wave(&mut haptic_loop, at, 2);
+    // And then the arm is felt.
+    assert!(link_ends.commands.enqueue(Command::DropScene).is_ok());
+    wave(&mut haptic_loop, at, 2);
+    assert_eq!(haptic_loop.haptics.report().fault, None);
+    let report = || link_ends.health.dequeue();
+    let latest = core::iter::from_fn(report).last().expect("a report");
+    assert_eq!(latest.zero, Some([0; 3]));
+    haptic_loop.encoders_mut().0.counts = [0; 3];
+    haptic_loop.tick();
+    let fault = haptic_loop.haptics.report().fault;
+    assert_eq!(fault, Some(Fault::EncoderJump), "a true one is noticed");
 }
 
 #[test]
@@ -90,4 +139,59 @@ fn an_answer_that_finds_no_room_is_kept_until_it_does() {
         .filter_map(|record| record.answers)
         .collect();
     assert_eq!(late, [9], "once, and only once");
+}
+
+/// Amplifiers that leave what was last done to them in a place that a test sees.
+#[derive(Clone, Default)]
+struct Seen(std::rc::Rc<core::cell::RefCell<(bool, [f32; 3])>>);
+
+impl Amplifiers for Seen {
+    type Enabled = SeenOn;
+
+    fn enable(self) -> SeenOn {
+        *self.0.borrow_mut() = (true, [0.0; 3]);
+        SeenOn(self)
+    }
+
+    fn rest(&mut self, held: [f32; 3]) {
+        *self.0.borrow_mut() = (false, held);
+    }
+}
+
+struct SeenOn(Seen);
+
+impl EnabledAmplifiers for SeenOn {
+    type Disabled = Seen;
+
+    fn write(&mut self, _currents_a: [f32; 3]) {}
+
+    fn disable(self) -> Seen {
+        *self.0.0.borrow_mut() = (false, [0.0; 3]);
+        self.0
+    }
+}
+
+#[test]
+fn held_outputs_reach_the_amplifiers_and_leave_them_off() {
+    let tiles = Box::leak(Box::new(TileBuffers::<4>::VACANT));
+    let memory = Box::leak(Box::new(WorkingMemory::new()));
+    let (loop_ends, mut link_ends) = memory.queues.split();
+    let haptics = Haptics::new(tiles.split().0, TickRate::DEFAULT, None);
+    let seen = Seen::default();
+    let encoders = VirtualEncoders::default();
+    let mut haptic_loop = HapticLoop::new(
+        haptics,
+        loop_ends,
+        encoders,
+        seen.clone(),
+        StoppedClock::<1>,
+    );
+    let held = [0.5, -1.0, 0.25];
+    // Nothing else is needed: no calibration, no scene.
+    for (command, expected) in [(Some(held), held), (None, [0.0; 3])] {
+        let command = Command::HoldOutputs(command);
+        assert!(link_ends.commands.enqueue(command).is_ok());
+        haptic_loop.tick();
+        assert_eq!(*seen.0.borrow(), (false, expected));
+    }
 }

@@ -6,6 +6,8 @@ use embedded_storage::nor_flash::{
 use std::vec;
 use std::vec::Vec;
 
+use hapterra_core::phantom::CalibrationField;
+
 use super::*;
 
 /// A flash in memory: bits only fall when written, a word is written once, and
@@ -142,6 +144,24 @@ fn store<const W: usize, const E: usize>(
         ..flash
     };
     CalibrationStore::new(flash, [0, size as u32], size as u32)
+}
+
+/// An older firmware may have let it through.
+#[test]
+fn a_whole_record_above_a_ceiling_is_refused_by_name_and_no_older_one_is_taken() {
+    let mut store = store(Flash::<8, 2048>::new(4096), 2048);
+    let mut hostile = Calibration::PREMIUM_1_5;
+    hostile.peak_current_a.y = 20.0;
+    store.save(&numbered(1)).expect("stored");
+    store.save(&hostile).expect("stored");
+    let Stored::Refused(bad) = store.load() else {
+        panic!("taken");
+    };
+    let peak = (CalibrationField::PeakCurrent, Some(2));
+    assert_eq!((bad.field, bad.axis), peak);
+    // A good one after it is taken.
+    store.save(&numbered(2)).expect("stored");
+    assert_eq!(store.load(), Stored::Found(numbered(2)));
 }
 
 #[test]

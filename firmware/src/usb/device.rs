@@ -7,7 +7,7 @@ use embassy_usb::msos::{
 use embassy_usb::{Builder, Config, UsbDevice};
 
 use super::bulk_stream::BulkStream;
-use super::endpoint_filter::EndpointFilter;
+use super::endpoint_filter::{EndpointFilter, EndpointHalt};
 use super::{
     INTERFACE_CLASS, INTERFACE_GUIDS, MSOS_VENDOR_CODE, PACKET, PRODUCT, PRODUCT_ID, VENDOR_ID,
 };
@@ -31,24 +31,25 @@ impl DescriptorBuffers {
 }
 
 /// The USB stack, which its task runs for ever, and the two ends of the link.
-pub type UsbParts<'d, D> = (
-    UsbDevice<'d, EndpointFilter<D>>,
+pub type UsbParts<'d, D, H> = (
+    UsbDevice<'d, EndpointFilter<D, H>>,
     BulkStream<<D as Driver<'d>>::EndpointOut>,
     BulkStream<<D as Driver<'d>>::EndpointIn>,
 );
 
-/// Describes the device on `driver` and returns its parts.
-pub fn device<'d, D: Driver<'d>>(
+/// Describes the device on `driver`, whose endpoints' halts end as `H` says, and returns
+/// its parts.
+pub fn device<'d, D: Driver<'d>, H: EndpointHalt + 'd>(
     driver: D,
     serial_number: &'d str,
     buffers: &'d mut DescriptorBuffers,
-) -> UsbParts<'d, D> {
+) -> UsbParts<'d, D, H> {
     let mut config = Config::new(VENDOR_ID, PRODUCT_ID);
     config.manufacturer = Some("hapterra");
     config.product = Some(PRODUCT);
     config.serial_number = Some(serial_number);
     let mut builder = Builder::new(
-        EndpointFilter(driver),
+        EndpointFilter::new(driver),
         config,
         &mut buffers.config,
         &mut buffers.bos,

@@ -1,23 +1,53 @@
-//! Keeps requests about endpoints that do not exist from the USB driver.
+//! Keeps from the USB driver what it cannot take, and gives every endpoint that is
+//! put into use the toggle that the host expects.
 //!
-//! A host may ask to halt any of 32 endpoints. embassy's stack passes the request on
-//! unchecked, and a driver panics at an endpoint number that it does not have.
+//! - A host may ask to halt any of 32 endpoints. embassy's stack passes the request on
+//!   unchecked, and a driver panics at an endpoint number that it does not have.
+//! - A host may end a halt that never was: some do when they open a pipe. embassy-stm32's
+//!   driver of the full-speed peripheral then writes the endpoint's register until it
+//!   reads what is never written (`endpoint_set_stalled` of its `usb/usb.rs`), and the
+//!   executor hangs. So the end of a halt goes to [`EndpointHalt`] instead, which each
+//!   chip's image implements.
+//! - The control endpoint has no halt: the next SETUP ends a refusal there by itself
+//!   (USB 2.0, 8.5.3.4), and its registers belong to a transfer that is under way.
+
+use core::marker::PhantomData;
 
 use embassy_usb::driver::{
     Bus, Driver, EndpointAddress, EndpointAllocError, EndpointType, Event, Unsupported,
 };
 
-/// The highest endpoint number in use.
-const LAST: usize = 1;
+/// The link's endpoint, the only one that can be halted.
+const LINK: usize = 1;
 
-/// A driver that gets requests only about endpoints that it has.
-pub struct EndpointFilter<D>(pub(super) D);
+/// How an endpoint's halt ends on a chip's USB peripheral.
+pub trait EndpointHalt {
+    /// Ends the halt of an endpoint, if it has one, and makes DATA0 the toggle of its
+    /// next packet, halt or not (USB 2.0, 9.4.5). An endpoint that is not in use stays
+    /// so. A packet that waits in the endpoint may be lost.
+    fn end(bus: &mut impl Bus, address: EndpointAddress);
+}
 
-impl<'d, D: Driver<'d>> Driver<'d> for EndpointFilter<D> {
+/// A driver `D` that gets no request that it cannot take; `H` ends halts for it.
+pub struct EndpointFilter<D, H> {
+    driver: D,
+    halt: PhantomData<fn() -> H>,
+}
+
+impl<D, H> EndpointFilter<D, H> {
+    pub(super) const fn new(driver: D) -> Self {
+        Self {
+            driver,
+            halt: PhantomData,
+        }
+    }
+}
+
+impl<'d, D: Driver<'d>, H: EndpointHalt + 'd> Driver<'d> for EndpointFilter<D, H> {
     type EndpointOut = D::EndpointOut;
     type EndpointIn = D::EndpointIn;
     type ControlPipe = D::ControlPipe;
-    type Bus = FilteredBus<D::Bus>;
+    type Bus = FilteredBus<D::Bus, H>;
 
     fn alloc_endpoint_out(
         &mut self,
@@ -26,7 +56,8 @@ impl<'d, D: Driver<'d>> Driver<'d> for EndpointFilter<D> {
         size: u16,
         interval_ms: u8,
     ) -> Result<Self::EndpointOut, EndpointAllocError> {
-        self.0.alloc_endpoint_out(kind, address, size, interval_ms)
+        let driver = &mut self.driver;
+        driver.alloc_endpoint_out(kind, address, size, interval_ms)
     }
 
     fn alloc_endpoint_in(
@@ -36,52 +67,65 @@ impl<'d, D: Driver<'d>> Driver<'d> for EndpointFilter<D> {
         size: u16,
         interval_ms: u8,
     ) -> Result<Self::EndpointIn, EndpointAllocError> {
-        self.0.alloc_endpoint_in(kind, address, size, interval_ms)
+        let driver = &mut self.driver;
+        driver.alloc_endpoint_in(kind, address, size, interval_ms)
     }
 
     fn start(self, control_size: u16) -> (Self::Bus, Self::ControlPipe) {
-        let (bus, pipe) = self.0.start(control_size);
-        (FilteredBus(bus), pipe)
+        let (bus, pipe) = self.driver.start(control_size);
+        let halt = PhantomData;
+        (FilteredBus { bus, halt }, pipe)
     }
 }
 
 /// The bus of an [`EndpointFilter`] driver.
-pub struct FilteredBus<B>(B);
+pub struct FilteredBus<B, H> {
+    bus: B,
+    halt: PhantomData<fn() -> H>,
+}
 
-impl<B: Bus> Bus for FilteredBus<B> {
+impl<B: Bus, H: EndpointHalt> Bus for FilteredBus<B, H> {
     async fn enable(&mut self) {
-        self.0.enable().await;
+        self.bus.enable().await;
     }
 
     async fn disable(&mut self) {
-        self.0.disable().await;
+        self.bus.disable().await;
     }
 
     async fn poll(&mut self) -> Event {
-        self.0.poll().await
+        self.bus.poll().await
     }
 
+    /// A configuration puts every toggle at DATA0 (USB 2.0, 9.1.1.5), also the second
+    /// one without a reset of the bus between, which drivers do not see to.
     fn endpoint_set_enabled(&mut self, address: EndpointAddress, enabled: bool) {
-        if address.index() <= LAST {
-            self.0.endpoint_set_enabled(address, enabled);
+        if address.index() != LINK {
+            return;
+        }
+        self.bus.endpoint_set_enabled(address, enabled);
+        if enabled {
+            H::end(&mut self.bus, address);
         }
     }
 
     fn endpoint_set_stalled(&mut self, address: EndpointAddress, stalled: bool) {
-        if address.index() <= LAST {
-            self.0.endpoint_set_stalled(address, stalled);
+        match (address.index(), stalled) {
+            (LINK, true) => self.bus.endpoint_set_stalled(address, true),
+            (LINK, false) => H::end(&mut self.bus, address),
+            _ => {}
         }
     }
 
     fn endpoint_is_stalled(&mut self, address: EndpointAddress) -> bool {
-        address.index() <= LAST && self.0.endpoint_is_stalled(address)
+        address.index() == LINK && self.bus.endpoint_is_stalled(address)
     }
 
     fn force_reset(&mut self) -> Result<(), Unsupported> {
-        self.0.force_reset()
+        self.bus.force_reset()
     }
 
     async fn remote_wakeup(&mut self) -> Result<(), Unsupported> {
-        self.0.remote_wakeup().await
+        self.bus.remote_wakeup().await
     }
 }

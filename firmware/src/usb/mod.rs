@@ -18,7 +18,7 @@ pub use bulk_stream::BulkStream;
 #[cfg(feature = "usb")]
 pub use device::{DescriptorBuffers, UsbParts, device};
 #[cfg(feature = "usb")]
-pub use endpoint_filter::EndpointFilter;
+pub use endpoint_filter::{EndpointFilter, EndpointHalt};
 
 /// Vendor: pid.codes, shared by open-source projects.
 pub const VENDOR_ID: u16 = 0x1209;

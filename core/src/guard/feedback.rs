@@ -1,0 +1,84 @@
+//! What the amplifiers say about themselves: whether they are ready, and which currents
+//! flow.
+
+use glam::Vec3;
+
+use super::Sense;
+use crate::rate::TickRate;
+
+/// How long after the enable an amplifier need not be ready yet, ms. An ESCON's digital
+/// inputs switch within 8 ms.
+const ENABLE_MS: u32 = 10;
+/// How long an amplifier that was ready may say that it is not, ms: a spike on the wire.
+const SPIKE_MS: u32 = 2;
+/// Time constant of the comparison of currents, ms. Twice what it takes an amplifier that
+/// reads duty cycles at 1 kHz to follow the fastest change of force (5.5 A in 8 ms, each
+/// current 1 ms late) without coming near the tolerance.
+const COMPARE_MS: u32 = 20;
+
+/// How far a measured current may be from its command, A, averaged over the comparison's
+/// 20 ms. A tenth of an amplifier's range: three times what an ESCON's reading of a duty
+/// cycle may be wrong. What is 2 A off is found within 15 ms, an amplifier that pushes at
+/// its peak by itself within 5 ms.
+pub const CURRENT_TOLERANCE_A: f32 = 0.55;
+
+/// Follows the amplifiers' ready lines and current monitors, tick by tick.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Feedback {
+    /// Ticks after the enable in which an amplifier need not be ready.
+    enable_ticks: u32,
+    /// Ticks that one may say that it is not ready.
+    spike_ticks: u32,
+    /// Share of a difference that a tick adds to the average.
+    share: f32,
+    /// Ticks that the amplifiers have been on.
+    on: u32,
+    /// Ticks in a row that one of them was not ready.
+    unready: u32,
+    /// The command of the tick before the last, A: a monitor is converted at the
+    /// beginning of a tick and read in the next.
+    before_a: Vec3,
+    /// Measured less commanded, averaged, A.
+    error_a: Vec3,
+}
+
+impl Feedback {
+    pub(super) fn new(rate: TickRate) -> Self {
+        Self {
+            enable_ticks: rate.ticks(ENABLE_MS),
+            spike_ticks: rate.ticks(SPIKE_MS),
+            share: 1.0 / rate.ticks(COMPARE_MS) as f32,
+            on: 0,
+            unready: 0,
+            before_a: Vec3::ZERO,
+            error_a: Vec3::ZERO,
+        }
+    }
+
+    /// Whether an amplifier that is on says for too long that it is not ready.
+    pub(super) fn is_unready(&mut self, sense: &Sense) -> bool {
+        self.on = self.on.saturating_add(1);
+        let counts = sense.amplifier_not_ready && self.on > self.enable_ticks;
+        self.unready = if counts { self.unready + 1 } else { 0 };
+        self.unready > self.spike_ticks
+    }
+
+    /// The amplifiers are off.
+    pub(super) const fn rest(&mut self) {
+        self.on = 0;
+        self.unready = 0;
+    }
+
+    /// Takes the commands of the last tick, A (zero while the amplifiers are off), and
+    /// returns whether a measured current is not what was commanded. Without monitors
+    /// there is nothing to compare.
+    pub(super) fn disagrees(&mut self, sense: &Sense, commanded_a: Vec3) -> bool {
+        let Some(measured_ma) = sense.measured_ma else {
+            return false;
+        };
+        let before_a = core::mem::replace(&mut self.before_a, commanded_a);
+        let measured_a = Vec3::from(measured_ma.map(f32::from)) * 1e-3;
+        self.error_a += (measured_a - before_a - self.error_a) * self.share;
+        self.error_a.abs().max_element() > CURRENT_TOLERANCE_A
+    }
+}

@@ -1,0 +1,248 @@
+use std::vec::Vec;
+
+use super::*;
+use crate::guard::{Blockers, Drive, Mode, Report, Sense};
+use crate::terrain::FieldStorage;
+use crate::tick::{Command, Haptics};
+
+const RECORD: Calibration = Calibration::PREMIUM_1_5;
+
+/// The loop without a scene, and joints that answer currents as the test says.
+struct Bench<'t> {
+    haptics: Haptics<'t, 1>,
+    sense: Sense,
+    rate: TickRate,
+    drives: Vec<Drive>,
+}
+
+impl<'t> Bench<'t> {
+    fn new(storage: &'t mut FieldStorage<1>, rate: TickRate) -> Self {
+        let mut haptics = Haptics::new(storage.slots(), rate, None);
+        haptics.configure(Mechanism::new(&RECORD).expect("valid"));
+        let mut bench = Self {
+            haptics,
+            sense: Sense::default(),
+            rate,
+            drives: Vec::new(),
+        };
+        bench.say(Command::Zero([0; 3]));
+        bench
+    }
+
+    fn say(&mut self, command: Command<'t>) {
+        assert!(self.haptics.accept(command).is_none());
+    }
+
+    fn report(&self) -> Report {
+        self.haptics.report()
+    }
+
+    /// One tick; once a millisecond the encoders go on as `moves` says of the currents.
+    fn tick(&mut self, moves: impl Fn(Vec3) -> [i32; 3]) -> Drive {
+        let drive = self.haptics.tick(&self.sense, true).drive;
+        self.drives.push(drive);
+        let is_ms = (self.drives.len() as u32).is_multiple_of(self.rate.ticks(1));
+        let moved = moves(drive.currents_a).map(|counts| if is_ms { counts } else { 0 });
+        for (count, moved) in self.sense.counts.iter_mut().zip(moved) {
+            *count += moved;
+        }
+        drive
+    }
+
+    /// Asks for a jog, presses the switch a moment later, and lets `ms` pass.
+    fn jog(&mut self, jog: Jog, ms: u32, moves: impl Fn(Vec3) -> [i32; 3]) {
+        self.say(Command::Jog(jog));
+        for tick in 0..self.rate.ticks(ms) {
+            self.sense.dead_man = tick > self.rate.ticks(20);
+            self.tick(&moves);
+        }
+    }
+}
+
+const JOG: Jog = Jog {
+    axis: 1,
+    current_a: -0.3,
+    hold_ms: 500,
+};
+
+/// A held joint: it gives by some counts when the current has overcome its friction.
+fn held(current: Vec3) -> [i32; 3] {
+    [0, i32::from((0.05..0.052).contains(&-current.y)), 0]
+}
+
+#[test]
+fn one_motor_gets_the_current_for_the_time_and_nothing_else() {
+    for rate in [1_000, 10_000].map(|hz| TickRate::new(hz).expect("in range")) {
+        let (mut storage, ms) = (FieldStorage::<1>::new(), rate.ticks(1) as usize);
+        let mut bench = Bench::new(&mut storage, rate);
+        bench.jog(JOG, 4_000, held);
+        assert_eq!(bench.report().fault, None);
+        assert_eq!(bench.report().mode, Mode::Disarmed);
+        let on = || bench.drives.iter().filter(|drive| drive.enabled);
+        assert!(on().all(|drive| drive.currents_a * Vec3::Y == drive.currents_a));
+        assert!(on().all(|drive| (-0.3..=0.0).contains(&drive.currents_a.y)));
+        // 2 s in, the time asked for, 0.1 s out; from the press on, 0.1 s before.
+        let (driven, full) = (on().count(), on().filter(|d| d.currents_a.y < -0.299));
+        assert!(driven.abs_diff(2_600 * ms) <= 5 * ms, "{driven}");
+        assert!(full.count().abs_diff(508 * ms) <= 5 * ms);
+        let steps = bench.drives.windows(2).map(|pair| {
+            let [a, b] = [pair[0], pair[1]].map(|drive| drive.currents_a.y);
+            (a - b).abs()
+        });
+        // No step beyond what the way out takes, 0.3 A in 100 ms.
+        let most = steps.fold(0.0, f32::max);
+        assert!(most <= 0.3 / (100 * ms) as f32 + 1e-5, "{most}");
+    }
+}
+
+#[test]
+fn it_takes_a_press_and_is_over_when_it_is_over() {
+    let mut storage = FieldStorage::<1>::new();
+    let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
+    // Without a jog, and with nothing to feel, the arm cannot be armed.
+    bench.say(Command::Arm);
+    (0..100).for_each(|_| _ = bench.tick(held));
+    assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
+    // Held from the beginning, the switch does not count.
+    bench.sense.dead_man = true;
+    bench.say(Command::Jog(JOG));
+    for _ in 0..1_000 {
+        assert!(!bench.tick(held).enabled);
+    }
+    bench.jog(JOG, 4_000, held);
+    assert_eq!(bench.report().mode, Mode::Disarmed);
+    assert!(bench.drives.iter().any(|drive| drive.enabled));
+    // To arm once more is not to jog once more.
+    bench.drives.clear();
+    bench.sense.dead_man = false;
+    bench.say(Command::Arm);
+    (0..100).for_each(|_| _ = bench.tick(held));
+    assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
+    assert!(bench.drives.iter().all(|drive| !drive.enabled));
+}
+
+#[test]
+fn whatever_blocks_arming_blocks_a_jog() {
+    let mut storage = FieldStorage::<1>::new();
+    let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
+    bench.sense.emergency_stop = true;
+    bench.jog(JOG, 1_000, held);
+    let refused = bench.report().decision.refused;
+    assert!(refused.contains(Blockers::EMERGENCY_STOP), "{refused:?}");
+    bench.sense.emergency_stop = false;
+    bench.say(Command::Trip(Fault::Hardware));
+    bench.jog(JOG, 1_000, held);
+    let refused = bench.report().decision.refused;
+    assert!(refused.contains(Blockers::FAULT_LATCHED), "{refused:?}");
+    assert!(bench.drives.iter().all(|drive| !drive.enabled));
+}
+
+#[test]
+fn letting_go_ends_a_jog_within_the_tick() {
+    let mut storage = FieldStorage::<1>::new();
+    let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
+    bench.jog(JOG, 1_500, held);
+    assert!(bench.report().mode.drives());
+    bench.sense.dead_man = false;
+    assert_eq!(bench.tick(held), Drive::default());
+    assert_eq!(bench.report().fault, Some(Fault::DeadManReleased));
+}
+
+#[test]
+fn a_joint_that_runs_away_is_a_fault_whichever_it_is() {
+    for axis in 0..3 {
+        for speed in [9, -9, 30, 2] {
+            let mut storage = FieldStorage::<1>::new();
+            let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
+            // Not the motor's own joint, for two of the three.
+            bench.jog(JOG, 4_000, |current| {
+                let mut moved = held(current);
+                moved[axis] += if current.y < -0.1 { speed } else { 0 };
+                moved
+            });
+            let fault = bench.report().fault;
+            assert_eq!(fault, Some(Fault::JogRanAway), "{axis} {speed}");
+            let counts = bench.sense.counts[axis].unsigned_abs() as f32;
+            let way = counts / RECORD.counts_per_radian()[axis];
+            assert!(way < FAR_RAD * 1.1, "{axis} {speed}: {way} rad");
+        }
+    }
+}
+
+#[test]
+fn a_motor_whose_encoder_stands_is_found_at_half_the_current() {
+    for moves in [
+        |_| [0; 3],
+        |current: Vec3| {
+            // One channel dead: a count up and down. Another joint moves.
+            [i32::from(current.y < -0.1 && current.y > -0.11), 0, 0]
+        },
+    ] {
+        let mut storage = FieldStorage::<1>::new();
+        let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
+        bench.jog(JOG, 4_000, moves);
+        assert_eq!(bench.report().fault, Some(Fault::NoMotion));
+        let most = bench.drives.iter().map(|drive| -drive.currents_a.y);
+        assert!(most.fold(0.0, f32::max) < 0.152);
+    }
+}
+
+#[test]
+fn no_host_gets_more_than_a_jog_may_be() {
+    for (axis, current_a, hold_ms) in [
+        (1, 5.0, 500),
+        (1, f32::INFINITY, 500),
+        (3, 0.3, 500),
+        (255, -0.3, 500),
+        (1, 0.3, u16::MAX),
+        (1, f32::NAN, 500),
+    ] {
+        let jog = Jog {
+            axis,
+            current_a,
+            hold_ms,
+        };
+        assert!(!jog.is_valid(&RECORD), "{jog:?}");
+        let mut storage = FieldStorage::<1>::new();
+        let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
+        bench.jog(jog, 10_000, |current| held(-current));
+        let most = bench
+            .drives
+            .iter()
+            .map(|d| d.currents_a.abs().max_element());
+        assert!(most.fold(0.0, f32::max) <= JOG_SHARE * 1.24);
+        let on = bench.drives.iter().filter(|drive| drive.enabled).count();
+        assert!(on <= 2_100 + usize::from(JOG_MOST_MS) + 10, "{on}");
+        let one = |drive: &Drive| drive.currents_a * Vec3::Y == drive.currents_a;
+        assert!(bench.drives.iter().all(one), "{jog:?}");
+    }
+    assert!(JOG.is_valid(&RECORD));
+}
+
+#[test]
+fn a_scene_or_new_settings_end_a_jog() {
+    let ends: [fn(&mut Bench<'_>); 4] = [
+        |bench| bench.say(Command::Disarm),
+        |bench| bench.say(Command::DropScene),
+        |bench| bench.say(Command::Zero([0; 3])),
+        |bench| {
+            bench
+                .haptics
+                .configure(Mechanism::new(&RECORD).expect("valid"));
+        },
+    ];
+    for end in ends {
+        let mut storage = FieldStorage::<1>::new();
+        let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
+        bench.jog(JOG, 1_500, held);
+        assert!(bench.report().mode.drives());
+        end(&mut bench);
+        bench.drives.clear();
+        (0..200).for_each(|_| _ = bench.tick(held));
+        assert_eq!(bench.report().mode, Mode::Disarmed);
+        assert!(bench.drives[101..].iter().all(|drive| !drive.enabled));
+        assert!(bench.haptics.accept(Command::Arm).is_none());
+        (0..100).for_each(|_| _ = bench.tick(held));
+        assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
+    }
+}

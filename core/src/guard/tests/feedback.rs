@@ -1,0 +1,122 @@
+//! Ready lines and current monitors.
+
+use super::*;
+
+/// Ticks until the fault comes with the amplifiers on, at most `at_most` so many.
+fn ticks_until(bench: &mut Bench, fault: Fault, at_most: u32) -> u32 {
+    for ticks in 1..=at_most {
+        bench.tick();
+        if let Some(found) = bench.guard.report().fault {
+            assert_eq!(found, fault);
+            return ticks;
+        }
+    }
+    panic!("no fault within {at_most} ticks");
+}
+
+/// Pushes up with 3 N, each motor's current measured as `measure` makes it of the command
+/// of the tick before the last. Returns the ticks until the fault, if it comes.
+fn compared(measure: impl Fn(Vec3) -> Vec3) -> Option<u32> {
+    let mut bench = Bench::armed();
+    bench.sense.measured_ma = Some([0; 3]);
+    bench.wanted_n = Vec3::new(2.0, 2.0, 3.0);
+    let mut commands = [Vec3::ZERO; 2];
+    for ticks in 1..500 {
+        let measured = measure(commands[0]) * 1e3;
+        bench.sense.measured_ma = Some(measured.to_array().map(|ma| ma as i16));
+        commands = [commands[1], bench.tick().currents_a];
+        if let Some(fault) = bench.guard.report().fault {
+            assert_eq!(fault, Fault::CurrentMismatch);
+            assert_eq!(commands[1], Vec3::ZERO, "in the same tick");
+            return Some(ticks);
+        }
+    }
+    None
+}
+
+#[test]
+fn an_amplifier_that_is_not_ready_is_a_fault_in_the_third_tick() {
+    let mut bench = Bench::armed();
+    bench.sense.amplifier_not_ready = true;
+    assert_eq!(ticks_until(&mut bench, Fault::AmplifierNotReady, 10), 3);
+    // A spike of two ticks is none.
+    let mut bench = Bench::armed();
+    for ticks in 0..300 {
+        bench.sense.amplifier_not_ready = ticks % 3 != 0;
+        bench.tick();
+    }
+    assert_eq!(bench.guard.report().fault, None);
+}
+
+#[test]
+fn an_amplifier_has_ten_milliseconds_to_become_ready_after_the_enable() {
+    for late in [10, 13] {
+        let mut bench = Bench::new();
+        bench.guard.arm();
+        bench.tick();
+        bench.sense.dead_man = true;
+        while bench.guard.mode() != Mode::Ramping {
+            bench.tick();
+        }
+        bench.sense.amplifier_not_ready = true;
+        bench.ticks(late);
+        bench.sense.amplifier_not_ready = false;
+        bench.ticks(20);
+        let fault = bench.guard.report().fault;
+        let expected = (late > 12).then_some(Fault::AmplifierNotReady);
+        assert_eq!(fault, expected, "ready after {late} ms");
+    }
+}
+
+#[test]
+fn currents_that_follow_their_commands_are_no_fault() {
+    assert_eq!(compared(|a| a), None);
+    // A reading that is 3 % and 0.2 A off.
+    assert_eq!(compared(|a| a * 1.03 + 0.2), None);
+}
+
+#[test]
+fn a_current_that_was_not_commanded_is_a_fault() {
+    let open = compared(|a| Vec3::new(0.0, a.y, a.z));
+    assert!(open.is_some_and(|ticks| ticks < 40), "open motor: {open:?}");
+    let full = compared(|a| Vec3::new(a.x, 5.5, a.z));
+    assert!(full.is_some_and(|ticks| ticks < 6), "full on: {full:?}");
+    let swapped = compared(|a| Vec3::new(a.y, a.x, a.z));
+    assert!(swapped.is_some(), "the motors' wires are swapped");
+}
+
+#[test]
+fn a_current_that_flows_with_the_amplifiers_off_is_a_fault() {
+    let mut bench = Bench::new();
+    bench.sense.measured_ma = Some([0, 0, -600]);
+    let took = ticks_until(&mut bench, Fault::CurrentMismatch, 100);
+    assert!(took < 60, "{took}");
+    bench.guard.clear();
+    bench.tick();
+    assert_eq!(bench.guard.report().fault, Some(Fault::CurrentMismatch));
+}
+
+#[test]
+fn the_fastest_change_of_force_is_no_mismatch_for_an_amplifier_a_millisecond_late() {
+    let mut bench = Bench::armed();
+    let mut commands = [Vec3::ZERO; 3];
+    for ticks in 0..2_000 {
+        // 7.65 N to and fro as fast as the slew lets it.
+        let side = if (ticks / 100) % 2 == 0 { 50.0 } else { -50.0 };
+        bench.wanted_n = Vec3::new(side, 0.0, side);
+        let late = commands[0] * 1e3;
+        bench.sense.measured_ma = Some(late.to_array().map(|ma| ma as i16));
+        commands = [commands[1], commands[2], bench.tick().currents_a];
+        assert_eq!(bench.guard.report().fault, None, "tick {ticks}");
+    }
+    assert!(commands[2].abs().max_element() > 2.0, "{commands:?}");
+}
+
+#[test]
+fn without_monitors_nothing_is_compared() {
+    let mut bench = Bench::armed();
+    bench.sense.measured_ma = None;
+    bench.wanted_n = Vec3::Z * 7.0;
+    bench.ticks(1_000);
+    assert_eq!(bench.guard.report().fault, None);
+}

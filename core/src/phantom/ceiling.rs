@@ -1,0 +1,299 @@
+//! What no calibration record can raise: the ceilings of each model, and of the board.
+//!
+//! A record decides what the guard protects. One that is mistyped or hostile could name a
+//! motor that bears 20 A or that never warms, and the protection would be gone. So the
+//! numbers on which a person's hand and the motors depend are held to those of the
+//! model's preset, on the side that is dangerous. A record may be more careful, never
+//! less. Somebody whose motors bear more changes the presets and builds the firmware.
+//!
+//! [`Calibration::validate`] asks for all of it but the board's, so it holds wherever a
+//! record is taken, stored or found.
+
+use glam::Vec3;
+
+use super::calibration::Calibration;
+use super::check::{BadCalibration, Bound, CalibrationField};
+
+/// A record's speed limit may be above the preset's by this: at twice the limit no force
+/// is left, and that has to be below the speed at which counts are taken for a jump.
+const SPEED_SHARE: f32 = 1.25;
+/// Torque of a joint for an ampere, as a share of the preset's, below which a record is
+/// not believed: what the joint then really does would be more than twice what the
+/// force limits count with. Ratios and torque constants of one model differ by less.
+const LEVERAGE_SHARE: f32 = 0.5;
+/// Room for the rounding of numbers that were written down in other units.
+const ROUNDING: f32 = 1e-4;
+
+impl Calibration {
+    /// Whether the record stays within its model's ceilings.
+    pub(super) fn check_ceilings(&self) -> Result<(), BadCalibration> {
+        let preset = self.model.preset();
+        let (mine, theirs) = (&self.thermal, &preset.thermal);
+        let (peak, continuous) = (self.peak_current_a, self.continuous_current_a);
+        self.each_at_most(CalibrationField::PeakCurrent, peak, preset.peak_current_a)?;
+        let most = preset.continuous_current_a;
+        self.each_at_most(CalibrationField::ContinuousCurrent, continuous, most)?;
+        // What warms less than the preset's motor, or later, is dangerous.
+        self.at_least(
+            CalibrationField::Resistance,
+            mine.resistance_ohm,
+            theirs.resistance_ohm,
+        )?;
+        self.at_least(
+            CalibrationField::WindingResistance,
+            mine.winding_k_per_w,
+            theirs.winding_k_per_w,
+        )?;
+        self.at_least(
+            CalibrationField::HousingResistance,
+            mine.housing_k_per_w,
+            theirs.housing_k_per_w,
+        )?;
+        self.at_most(
+            CalibrationField::WindingTime,
+            mine.winding_s,
+            theirs.winding_s,
+        )?;
+        self.at_most(
+            CalibrationField::HousingTime,
+            mine.housing_s,
+            theirs.housing_s,
+        )?;
+        self.at_most(
+            CalibrationField::MaxForce,
+            self.max_force_n,
+            preset.max_force_n,
+        )?;
+        self.at_most(
+            CalibrationField::MaxSpeed,
+            self.max_speed_mm_s,
+            SPEED_SHARE * preset.max_speed_mm_s,
+        )?;
+        let leverage = preset.ratio * preset.torque_constant;
+        let least = LEVERAGE_SHARE * leverage / self.ratio;
+        for axis in 0..3 {
+            let (value, least) = (self.torque_constant[axis], least[axis]);
+            let bound = self.bound(least, f32::INFINITY);
+            let good = value >= least * (1.0 - ROUNDING);
+            bounded(
+                CalibrationField::TorqueConstant,
+                Some(axis),
+                value,
+                bound,
+                good,
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Whether the record asks for no current that the board cannot command.
+    /// `full_scale_a` is the current at the ends of its outputs' range, A.
+    ///
+    /// # Errors
+    /// [`BadCalibration`] names the axis.
+    pub fn check_board(&self, full_scale_a: f32) -> Result<(), BadCalibration> {
+        for axis in 0..3 {
+            let value = self.peak_current_a[axis];
+            let bound = Bound::Board { max: full_scale_a };
+            let good = value <= full_scale_a * (1.0 + ROUNDING);
+            bounded(
+                CalibrationField::PeakCurrent,
+                Some(axis),
+                value,
+                bound,
+                good,
+            )?;
+        }
+        Ok(())
+    }
+
+    const fn bound(&self, min: f32, max: f32) -> Bound {
+        Bound::Model {
+            model: self.model,
+            min,
+            max,
+        }
+    }
+
+    fn each_at_most(
+        &self,
+        field: CalibrationField,
+        values: Vec3,
+        most: Vec3,
+    ) -> Result<(), BadCalibration> {
+        for axis in 0..3 {
+            let (value, most) = (values[axis], most[axis]);
+            let bound = self.bound(field.range().0, most);
+            let good = value <= most * (1.0 + ROUNDING);
+            bounded(field, Some(axis), value, bound, good)?;
+        }
+        Ok(())
+    }
+
+    fn at_most(
+        &self,
+        field: CalibrationField,
+        value: f32,
+        most: f32,
+    ) -> Result<(), BadCalibration> {
+        let bound = self.bound(field.range().0, most);
+        bounded(field, None, value, bound, value <= most * (1.0 + ROUNDING))
+    }
+
+    fn at_least(
+        &self,
+        field: CalibrationField,
+        value: f32,
+        least: f32,
+    ) -> Result<(), BadCalibration> {
+        let bound = self.bound(least, field.range().1);
+        bounded(field, None, value, bound, value >= least * (1.0 - ROUNDING))
+    }
+}
+
+fn bounded(
+    field: CalibrationField,
+    axis: Option<usize>,
+    value: f32,
+    bound: Bound,
+    good: bool,
+) -> Result<(), BadCalibration> {
+    let axis = axis.map(|axis| axis as u8 + 1);
+    match good {
+        true => Ok(()),
+        false => Err(BadCalibration {
+            field,
+            axis,
+            value,
+            bound,
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::phantom::Model;
+    use std::format;
+
+    const MODELS: [Model; 5] = [
+        Model::Premium10,
+        Model::Premium15,
+        Model::Premium30,
+        Model::Omni,
+        Model::Other,
+    ];
+
+    /// A change to the dangerous side, and what is to be named.
+    type Case = (fn(&mut Calibration), CalibrationField, Option<u8>);
+
+    /// Each within the range of its number, so that only the ceiling can refuse it.
+    const RAISED: [Case; 11] = [
+        (
+            |c| c.peak_current_a.x *= 1.01,
+            CalibrationField::PeakCurrent,
+            Some(1),
+        ),
+        (
+            |c| c.continuous_current_a.y *= 1.01,
+            CalibrationField::ContinuousCurrent,
+            Some(2),
+        ),
+        (
+            |c| c.thermal.resistance_ohm *= 0.99,
+            CalibrationField::Resistance,
+            None,
+        ),
+        (
+            |c| c.thermal.winding_k_per_w *= 0.99,
+            CalibrationField::WindingResistance,
+            None,
+        ),
+        (
+            |c| c.thermal.housing_k_per_w = 0.1,
+            CalibrationField::HousingResistance,
+            None,
+        ),
+        (
+            |c| c.thermal.winding_s *= 1.01,
+            CalibrationField::WindingTime,
+            None,
+        ),
+        (
+            |c| c.thermal.housing_s *= 1.01,
+            CalibrationField::HousingTime,
+            None,
+        ),
+        (|c| c.max_force_n *= 1.01, CalibrationField::MaxForce, None),
+        (
+            |c| c.max_speed_mm_s *= 1.26,
+            CalibrationField::MaxSpeed,
+            None,
+        ),
+        (
+            |c| c.torque_constant.z *= 0.49,
+            CalibrationField::TorqueConstant,
+            Some(3),
+        ),
+        (
+            |c| c.ratio.x *= 0.49,
+            CalibrationField::TorqueConstant,
+            Some(1),
+        ),
+    ];
+
+    #[test]
+    fn no_record_raises_a_ceiling_of_its_model() {
+        for model in MODELS {
+            for (raise, field, axis) in RAISED {
+                let mut record = model.preset();
+                raise(&mut record);
+                let bad = record.validate().expect_err("raised");
+                assert_eq!((bad.field, bad.axis), (field, axis), "{model:?}: {bad}");
+                assert!(matches!(bad.bound, Bound::Model { .. }), "{bad}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_record_may_be_more_careful() {
+        for model in MODELS {
+            let mut record = model.preset();
+            record.peak_current_a *= 0.5;
+            record.continuous_current_a *= 0.5;
+            record.thermal.resistance_ohm *= 1.2;
+            record.thermal.winding_s *= 0.5;
+            record.max_force_n *= 0.5;
+            record.max_speed_mm_s *= 0.5;
+            record.torque_constant *= 1.1;
+            assert_eq!(record.validate(), Ok(()), "{model:?}");
+        }
+    }
+
+    #[test]
+    fn a_board_is_not_asked_for_more_than_it_commands() {
+        let record = Calibration::PREMIUM_1_5;
+        assert_eq!(record.check_board(5.5), Ok(()));
+        let bad = record.check_board(4.83).expect_err("too much");
+        assert_eq!(
+            (bad.field, bad.axis),
+            (CalibrationField::PeakCurrent, Some(1))
+        );
+        assert_eq!(
+            format!("{bad}"),
+            "PeakCurrent of axis 1 is 5.5, but this board commands at most 4.83 A: \
+             make the record's peak current smaller"
+        );
+    }
+
+    #[test]
+    fn what_is_said_names_the_model_and_its_ceiling() {
+        let mut record = Calibration::PREMIUM_1_5;
+        record.max_force_n = 20.0;
+        assert_eq!(
+            format!("{}", record.validate().expect_err("raised")),
+            "MaxForce is 20, but a Premium15 may have 0.1 to 8.5 N: a record cannot change \
+             that; its model's preset in the firmware can"
+        );
+    }
+}

@@ -1,0 +1,207 @@
+//! The driver against a converter that answers, forgets and falls silent.
+
+use core::cell::RefCell;
+use std::rc::Rc;
+use std::vec::Vec;
+
+use super::*;
+use crate::amplifier::tests::Pin;
+use crate::amplifier::{Off, On};
+use crate::board::{Amplifiers, EnabledAmplifiers};
+
+/// What is at the other end of the wires.
+#[derive(Default)]
+struct Part {
+    /// The frames that were sent.
+    frames: Vec<[u8; 3]>,
+    range: [u16; 4],
+    power: u16,
+    data: [u16; 4],
+    /// What the last frame asked for.
+    asked: u16,
+    /// Nothing comes back.
+    is_silent: bool,
+    /// What was told last.
+    as_set: bool,
+    paused_us: u32,
+}
+
+#[derive(Clone, Default)]
+struct Wires(Rc<RefCell<Part>>);
+
+impl Wires {
+    fn take_frames(&self) -> Vec<[u8; 3]> {
+        core::mem::take(&mut self.0.borrow_mut().frames)
+    }
+}
+
+impl FrameBus for Wires {
+    fn send(&mut self, frame: [u8; 3]) -> [u8; 3] {
+        let mut part = self.0.borrow_mut();
+        part.frames.push(frame);
+        let [head, high, low] = frame;
+        let value = u16::from_be_bytes([high, low]);
+        let back = core::mem::take(&mut part.asked);
+        let channel = usize::from(head & 7);
+        match (head & READ != 0, head & 0x38) {
+            (true, DATA) => part.asked = part.data[channel],
+            (true, RANGE) => part.asked = part.range[channel],
+            (true, _) => part.asked = part.power,
+            (false, DATA) if channel == 4 => part.data = [value; 4],
+            (false, DATA) => part.data[channel] = value,
+            (false, RANGE) => part.range = [value; 4],
+            (false, _) => part.power = value,
+        }
+        let [high, low] = back.to_be_bytes();
+        if part.is_silent {
+            return [0xFF; 3];
+        }
+        [0, high, low]
+    }
+
+    fn pause_us(&mut self, us: u32) {
+        self.0.borrow_mut().paused_us += us;
+    }
+
+    fn tell(&mut self, as_set: bool) {
+        self.0.borrow_mut().as_set = as_set;
+    }
+}
+
+const SET_UP: [[u8; 3]; 3] = [[0x04, 0x00, 0x00], [0x0C, 0x00, 0x04], [0x10, 0x00, 0x17]];
+const ZERO: [[u8; 3]; 3] = [[0, 0, 0], [1, 0, 0], [2, 0, 0]];
+
+fn off() -> (Off<Ad5754<Wires>, Pin>, Wires, Pin) {
+    let (wires, pin) = (Wires::default(), Pin::default());
+    let off = Off::new(Ad5754::new(wires.clone()), pin.clone(), 5.0);
+    (off, wires, pin)
+}
+
+/// On, after as many ticks at rest as it takes to read everything.
+fn on() -> (On<Ad5754<Wires>, Pin>, Wires, Pin) {
+    let (mut off, wires, pin) = off();
+    (0..7).for_each(|_| off.rest([0.0; 3]));
+    let on = off.enable();
+    assert!(pin.is_high());
+    wires.take_frames();
+    (on, wires, pin)
+}
+
+#[test]
+fn it_is_zero_before_it_has_a_range_and_has_one_before_power_and_time_to_power_up() {
+    let (_off, wires, _) = off();
+    let read_range = [[0x88, 0, 0]];
+    let expected = [&SET_UP[..], &read_range, &ZERO].concat();
+    assert_eq!(wires.take_frames(), expected);
+    assert_eq!(wires.0.borrow().paused_us, 20);
+}
+
+#[test]
+fn currents_become_three_frames_one_a_channel() {
+    let (mut on, wires, _) = on();
+    on.write([2.5, -2.5, f32::NAN]);
+    let frames = wires.take_frames();
+    assert_eq!(
+        frames[1..],
+        [[0x00, 0x40, 0x00], [0x01, 0xC0, 0x00], [0x02, 0x00, 0x00]]
+    );
+    let _off = on.disable();
+    assert_eq!(wires.take_frames()[1..], ZERO);
+}
+
+#[test]
+fn every_register_is_read_in_turn() {
+    let (mut on, wires, _) = on();
+    let mut asked = Vec::new();
+    for _ in 0..7 {
+        on.write([1.0, 2.0, 3.0]);
+        asked.push(wires.take_frames()[0][0]);
+        assert!(wires.0.borrow().as_set);
+    }
+    asked.sort_unstable();
+    assert_eq!(asked, [0x80, 0x81, 0x82, 0x88, 0x89, 0x8A, 0x90]);
+}
+
+#[test]
+fn nothing_is_switched_on_before_all_of_it_read_back() {
+    for ticks in 0..10 {
+        let (mut off, wires, pin) = off();
+        wires.take_frames();
+        (0..ticks).for_each(|_| off.rest([0.0; 3]));
+        let on = off.enable();
+        // Start-up and the enable look at a register, too.
+        assert_eq!(pin.is_high(), ticks >= 5, "after {ticks} ticks");
+        assert_eq!(wires.0.borrow().as_set, pin.is_high());
+        let _off = on.disable();
+        assert!(!pin.is_high());
+    }
+}
+
+#[test]
+fn a_converter_that_lost_its_range_is_told_within_seven_ticks_and_set_up_when_off() {
+    for lose in [
+        |part: &mut Part| part.range[2] = 0,
+        |part: &mut Part| part.power = 0,
+        |part: &mut Part| part.power |= 1 << 5,
+    ] {
+        let (mut on, wires, pin) = on();
+        lose(&mut wires.0.borrow_mut());
+        let told = (1..=7).find(|_| {
+            on.write([1.0, 2.0, 3.0]);
+            !wires.0.borrow().as_set
+        });
+        let mut off = on.disable();
+        assert!(told.is_some());
+        assert!(!pin.is_high());
+        (0..20).for_each(|_| off.rest([0.0; 3]));
+        assert!(wires.0.borrow().as_set, "set up anew");
+        assert_eq!(wires.0.borrow().range, [4; 4]);
+    }
+}
+
+#[test]
+fn a_broken_wire_is_told_at_once_and_keeps_the_amplifiers_off() {
+    let (mut on, wires, pin) = on();
+    wires.0.borrow_mut().is_silent = true;
+    on.write([1.0, 2.0, 3.0]);
+    assert!(!wires.0.borrow().as_set);
+    let mut off = on.disable();
+    (0..50).for_each(|_| off.rest([0.0; 3]));
+    let _on = off.enable();
+    assert!(!pin.is_high());
+}
+
+#[test]
+fn outputs_are_held_with_the_enable_low_and_let_go() {
+    let (mut off, wires, pin) = off();
+    (0..7).for_each(|_| off.rest([0.0; 3]));
+    wires.take_frames();
+    off.rest([0.5, -9.0, f32::NAN]);
+    assert_eq!(
+        wires.take_frames()[1..],
+        [[0x00, 0x40, 0x00], [0x01, 0x80, 0x00], [0x02, 0x00, 0x00]]
+    );
+    off.rest([0.0; 3]);
+    assert_eq!(wires.take_frames()[1..], ZERO);
+    off.rest([1.0; 3]);
+    wires.take_frames();
+    let _on = off.enable();
+    assert!(pin.is_high());
+    assert_eq!(wires.take_frames()[1..], ZERO, "zero before the enable");
+}
+
+#[test]
+fn codes_are_nearest_and_saturate() {
+    assert_eq!(bipolar_code(0.0), 0);
+    assert_eq!(bipolar_code(1.0), 0x7FFF);
+    assert_eq!(bipolar_code(-1.0), 0x8000);
+    assert_eq!(bipolar_code(2.0), 0x7FFF);
+    assert_eq!(bipolar_code(f32::NAN), 0);
+    for code in -32_768..=32_767_i32 {
+        for off in [-0.4, 0.0, 0.4] {
+            let fraction = (f64::from(code) + off) / 32_768.0;
+            let nearest = (code as i16).cast_unsigned();
+            assert_eq!(bipolar_code(fraction as f32), nearest, "{code} {off}");
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Temperatures over a reset, whole and damaged.
+
+use super::*;
+
+const WARM: Temperatures = Temperatures {
+    winding_k: Vec3::new(1.0, 2.0, 3.0),
+    housing_k: Vec3::new(10.0, 20.0, 30.0),
+};
+
+const WARMER: Temperatures = Temperatures {
+    winding_k: Vec3::new(4.0, 5.0, 6.0),
+    housing_k: Vec3::new(11.0, 21.0, 31.0),
+};
+
+/// A RAM after so many ticks of a loop whose motors are at these temperatures.
+fn after(ticks: u32, of: impl Fn(u32) -> Temperatures) -> Copies {
+    let (_, mut copies) = begin(ResetCause::PowerOn, &[[0xA5A5_A5A5; WORDS]; 2]);
+    let mut log = MotorLog::new(TickRate::DEFAULT);
+    for tick in 1..=ticks {
+        if let Some((copy, words)) = log.tick(&of(tick)) {
+            copies[copy] = words;
+        }
+    }
+    copies
+}
+
+fn begun(cause: ResetCause, copies: &Copies) -> Temperatures {
+    begin(cause, copies).0
+}
+
+const RESETS: [ResetCause; 4] = [
+    ResetCause::Pin,
+    ResetCause::Software,
+    ResetCause::Watchdog,
+    ResetCause::BrownOut,
+];
+
+#[test]
+fn a_reset_goes_on_from_the_newest_temperatures() {
+    for ticks in [100, 200, 300, 1_234] {
+        let newest = ticks / 100 * 100;
+        let copies = after(ticks, |tick| if tick < newest { WARM } else { WARMER });
+        for cause in RESETS {
+            assert_eq!(Some(begun(cause, &copies)), WARMER.after_reset(), "{ticks}");
+        }
+    }
+}
+
+#[test]
+fn a_power_up_and_a_start_without_a_cause_assume_hot() {
+    let copies = after(1_000, |_| WARM);
+    for cause in [ResetCause::PowerOn, ResetCause::Unknown] {
+        assert_eq!(begun(cause, &copies), Temperatures::HOT);
+    }
+}
+
+/// A reset in the middle of a write leaves some of its words.
+#[test]
+fn a_copy_that_is_cut_off_leaves_the_one_before() {
+    let (old, new) = (after(100, |_| WARM), after(200, |_| WARMER));
+    for words in 1..WORDS {
+        let mut torn = old;
+        torn[0][..words].copy_from_slice(&new[0][..words]);
+        let begun = begun(ResetCause::Watchdog, &torn);
+        assert_eq!(Some(begun), WARM.after_reset(), "{words}");
+    }
+}
+
+#[test]
+fn no_flipped_bit_is_believed() {
+    let good = after(100, |_| WARM);
+    for bit in 0..WORDS * 32 {
+        let mut bad = good;
+        for copy in &mut bad {
+            copy[bit / 32] ^= 1 << (bit % 32);
+        }
+        assert_eq!(
+            begun(ResetCause::Watchdog, &bad),
+            Temperatures::HOT,
+            "{bit}"
+        );
+    }
+}
+
+#[test]
+fn nothing_that_a_ram_holds_by_itself_is_believed() {
+    for word in [0, u32::MAX, 0xAAAA_AAAA, MAGIC] {
+        let begun = begun(ResetCause::Watchdog, &[[word; WORDS]; 2]);
+        assert_eq!(begun, Temperatures::HOT);
+    }
+    // Whole, but nothing that a motor can be.
+    let nonsense = Temperatures {
+        winding_k: Vec3::NAN,
+        ..WARM
+    };
+    let begun = begun(ResetCause::Watchdog, &[encode(1, &nonsense), [0; WORDS]]);
+    assert_eq!(begun, Temperatures::HOT);
+}
+
+#[test]
+fn what_was_taken_once_is_not_found_again() {
+    let old = after(1_000, |_| WARM);
+    let (hot, copies) = begin(ResetCause::PowerOn, &old);
+    assert_eq!(hot, Temperatures::HOT);
+    // The board is reset before its first tick.
+    assert_eq!(
+        Some(begun(ResetCause::Pin, &copies)),
+        Temperatures::HOT.after_reset()
+    );
+    // And after its second copy, over the old ones.
+    let mut log = MotorLog::new(TickRate::DEFAULT);
+    let mut copies = copies;
+    for _ in 0..200 {
+        if let Some((copy, words)) = log.tick(&WARMER) {
+            copies[copy] = words;
+        }
+    }
+    assert_eq!(Some(begun(ResetCause::Pin, &copies)), WARMER.after_reset());
+}
+
+#[test]
+fn the_newest_is_the_newest_when_the_number_wraps() {
+    let copies = [encode(0, &WARMER), encode(u32::MAX, &WARM)];
+    assert_eq!(newest(&copies), Some(WARMER));
+    let copies = [encode(u32::MAX - 1, &WARM), encode(u32::MAX, &WARMER)];
+    assert_eq!(newest(&copies), Some(WARMER));
+}
+
+#[test]
+fn ten_copies_a_second_at_every_rate() {
+    for khz in [1, 4, 10] {
+        let rate = TickRate::new(1_000 * khz).expect("in range");
+        let mut log = MotorLog::new(rate);
+        let copies = (0..rate.hz()).filter_map(|_| log.tick(&WARM)).count();
+        assert_eq!(copies, 10);
+    }
+}

@@ -1,0 +1,108 @@
+//! A press of the dead-man switch as consent, which no host can give.
+//!
+//! A record that is stored decides what the guard protects from the next start on,
+//! whoever uses the arm then. So somebody at the arm has to agree: the switch has to be
+//! seen open after the request, and then pressed, within [`PRESS_MS`], while the arm is
+//! disarmed.
+
+use hapterra_core::guard::Mode;
+use hapterra_core::scene::Health;
+use hapterra_core::wire::request::Refusal;
+use hapterra_core::wire::status::PRESS_MS;
+
+/// Waits for a press.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PressWait {
+    /// The tick of the request.
+    began: u32,
+    /// Ticks that it may take.
+    patience: u32,
+    seen_open: bool,
+}
+
+impl PressWait {
+    /// Begins to wait in tick `now`.
+    pub(crate) const fn new(now: u32, ticks_per_ms: u32) -> Self {
+        Self {
+            began: now,
+            patience: PRESS_MS * ticks_per_ms,
+            seen_open: false,
+        }
+    }
+
+    /// Takes a report of the loop that came in tick `now`. Returns the decision, once
+    /// there is one.
+    pub(crate) fn look(&mut self, health: &Health, now: u32) -> Option<Result<(), Refusal>> {
+        if health.report.mode != Mode::Disarmed {
+            // That press would be for something else.
+            return Some(Err(Refusal::NotWhileArmed));
+        }
+        if now.wrapping_sub(self.began) > self.patience {
+            return Some(Err(Refusal::NotPressed));
+        }
+        let is_pressed = health.sense.dead_man && self.seen_open;
+        self.seen_open |= !health.sense.dead_man;
+        is_pressed.then_some(Ok(()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn health(dead_man: bool, mode: Mode) -> Health {
+        let mut health = Health::default();
+        health.sense.dead_man = dead_man;
+        health.report.mode = mode;
+        health
+    }
+
+    /// What becomes of a request in tick 1,000 of a board at 1 kHz, with a report of the
+    /// switch every 100 ticks.
+    fn decided(mut switch: impl FnMut(u32) -> bool) -> Option<(u32, Result<(), Refusal>)> {
+        let mut wait = PressWait::new(1_000, 1);
+        (1_000..20_000).step_by(100).find_map(|now| {
+            let health = health(switch(now), Mode::Disarmed);
+            wait.look(&health, now).map(|result| (now, result))
+        })
+    }
+
+    #[test]
+    fn open_and_then_pressed_is_consent() {
+        assert_eq!(decided(|now| now >= 4_000), Some((4_000, Ok(()))));
+    }
+
+    #[test]
+    fn never_pressed_is_refused_after_ten_seconds() {
+        let refused = Some((11_100, Err(Refusal::NotPressed)));
+        assert_eq!(decided(|_| false), refused);
+        // Too late.
+        assert_eq!(decided(|now| now > 11_000), refused);
+    }
+
+    #[test]
+    fn a_switch_that_is_held_all_along_is_no_press() {
+        assert_eq!(decided(|_| true), Some((11_100, Err(Refusal::NotPressed))));
+        let let_go_and_pressed = |now| !(3_000..3_500).contains(&now);
+        assert_eq!(decided(let_go_and_pressed), Some((3_500, Ok(()))));
+    }
+
+    #[test]
+    fn a_press_that_arms_stores_nothing() {
+        let modes = [Mode::Requested, Mode::Confirming, Mode::Armed, Mode::Fading];
+        for mode in modes {
+            let mut wait = PressWait::new(0, 1);
+            assert_eq!(wait.look(&health(false, Mode::Disarmed), 1), None);
+            let refused = wait.look(&health(true, mode), 2);
+            assert_eq!(refused, Some(Err(Refusal::NotWhileArmed)));
+        }
+    }
+
+    #[test]
+    fn ticks_may_wrap_and_be_faster() {
+        let mut wait = PressWait::new(u32::MAX - 50, 10);
+        assert_eq!(wait.look(&health(false, Mode::Disarmed), 99_949), None);
+        let late = wait.look(&health(false, Mode::Disarmed), 99_951);
+        assert_eq!(late, Some(Err(Refusal::NotPressed)));
+    }
+}
