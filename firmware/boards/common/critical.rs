@@ -10,12 +10,13 @@ use core::sync::atomic::{Ordering, compiler_fence};
 
 use cortex_m::register::{basepri, basepri_max};
 
-/// Priority of the haptic interrupt, above everything but faults.
+/// Priority of the haptic interrupt, above everything but faults and, where a board
+/// watches its supply, the interrupt that ends the program.
 #[allow(dead_code)] // Only where priorities are set by number.
-pub(crate) const HAPTIC: u8 = 0x00;
-/// Highest priority that critical sections hold back: level 1 of the sixteen
+pub(crate) const HAPTIC: u8 = 0x10;
+/// Highest priority that critical sections hold back: level 2 of the sixteen
 /// that an STM32 has (and of the 256 of the emulated core).
-pub(crate) const CEILING: u8 = 0x10;
+pub(crate) const CEILING: u8 = 0x20;
 
 struct Ceiling;
 critical_section::set_impl!(Ceiling);

@@ -1,6 +1,7 @@
 //! Counts the instructions of single ticks on the emulated Cortex-M4F.
 //!
-//! Not a product: it calls the same core, compiled in the same way, in a loop over
+//! Not a product, and the only image that needs the host's files; `hapterra` never
+//! starts it. It calls the same core, compiled in the same way, in a loop over
 //! scenes that the host wrote, between two looks at a timer.
 //!
 //! ```text
@@ -25,6 +26,7 @@
 #![no_std]
 #![no_main]
 
+mod ending;
 #[path = "../mps2-an386/failure.rs"]
 mod failure;
 mod files;

@@ -1,4 +1,4 @@
-//! The end of a program that failed: amplifiers off, a report, exit code 1.
+//! The end of a program that failed: amplifiers off, then a report.
 
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -7,30 +7,25 @@ use cortex_m_rt::{ExceptionFrame, exception};
 use hapterra_core::wire::frame::encode;
 use hapterra_core::wire::plant::Currents;
 
-use crate::registers::{Uart, plant_uart};
-
-/// Register reads that a byte may take; then nobody is listening.
-const PATIENCE: u32 = 1_000_000;
+use crate::ending;
+use crate::registers::plant_uart;
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     amplifiers_off();
-    semihosting::eprintln!("{info}");
-    semihosting::process::exit(1)
+    ending::failed(format_args!("{info}"))
 }
 
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     amplifiers_off();
-    semihosting::eprintln!("hard fault: {frame:?}");
-    semihosting::process::exit(1)
+    ending::failed(format_args!("hard fault: {frame:?}"))
 }
 
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
     amplifiers_off();
-    semihosting::eprintln!("interrupt {number} has no handler");
-    semihosting::process::exit(1)
+    ending::failed(format_args!("interrupt {number} has no handler"))
 }
 
 /// Tells the plant that there is no current, past everything that may be broken: without
@@ -50,16 +45,8 @@ fn amplifiers_off() {
     let mut frame = [0; 64];
     let uart = plant_uart();
     // A zero first, to end the frame that may have been under way.
-    send(uart, 0);
+    uart.send(0);
     for byte in encode(&off, &mut frame).unwrap_or(&[]) {
-        send(uart, *byte);
-    }
-}
-
-fn send(uart: &Uart, byte: u8) {
-    for _ in 0..PATIENCE {
-        if uart.state.get() & Uart::TX_FULL == 0 {
-            return uart.data.set(u32::from(byte));
-        }
+        uart.send(*byte);
     }
 }

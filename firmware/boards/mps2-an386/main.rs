@@ -3,16 +3,16 @@
 //!
 //! ```text
 //! qemu-system-arm -M mps2-an386 -nographic -monitor none \
-//!     -icount shift=3,sleep=off -semihosting-config enable=on,target=native \
-//!     -serial LINK -serial PLANT -kernel mps2-an386
+//!     -icount shift=3,sleep=off -no-reboot \
+//!     -serial LINK -serial PLANT -serial REPORT -serial LOG -kernel mps2-an386
 //! ```
 //!
 //! UART0 is the link, UART1 the virtual Phantom's line. Time is emulated time:
-//! see [`time`] for what it is and when it stands still. Ends with exit code 0
-//! when the host says goodbye, 1 on a panic or a fault.
+//! see [`time`] for what it is and when it stands still. Ends with a reset when the host
+//! says goodbye; on a panic or a fault UART2 tells which, first ([`ending`]).
 //!
-//! Log lines (defmt, over semihosting) are written by tasks only, never by the
-//! haptic interrupt; while one is written emulated time does not pass.
+//! Log lines (defmt, on UART3) are written by tasks only, never by the haptic
+//! interrupt.
 #![no_std]
 #![no_main]
 // Interrupt handlers bear the names of the vectors.
@@ -23,7 +23,9 @@ mod application;
 mod chip;
 #[path = "../common/critical.rs"]
 mod critical;
+mod ending;
 mod failure;
+mod log;
 mod plant;
 mod registers;
 mod serial;
@@ -36,15 +38,15 @@ use core::cell::Cell;
 
 use cortex_m::peripheral::NVIC;
 use cortex_m_rt::{entry, interrupt};
-use defmt_semihosting as _;
 use embassy_executor::{InterruptExecutor, Spawner};
+use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::app::Hardware;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::{LinkBoard, run};
 use hapterra_firmware::monitor::{Monitor, Part};
-use hapterra_firmware::native::VirtualAmplifiersOff;
+use hapterra_firmware::native::{FULL_SCALE_A, VirtualAmplifiersOff};
 use hapterra_firmware::store::Stored;
 
 use application::{Loop, TICK_DONE};
@@ -138,7 +140,7 @@ impl LinkBoard for Emulated {
     fn after_poll<const D: usize>(&self, link: &Link<'_, D>) {
         if link.has_ended() {
             defmt::info!("the host said goodbye");
-            semihosting::process::exit(0);
+            ending::done();
         }
         // No watchdog is behind this, but the tick wants to see one fed.
         let _ = self.monitor.may_feed_watchdog(&[Part::Tick, Part::Link]);
@@ -188,13 +190,17 @@ fn main() -> ! {
 /// Sets the board up. Not inlined, so that it gives its stack back when it returns.
 #[inline(never)]
 fn set_up() {
+    log::start();
     let (encoders, port) = plant::open();
     let hardware = Hardware {
         encoders,
         amplifiers: VirtualAmplifiersOff,
         clock: time::start(),
+        full_scale_a: FULL_SCALE_A,
         // There is no memory; the virtual Phantom is a Premium 1.5.
         calibration: Stored::Found(Calibration::PREMIUM_1_5),
+        // They come into being with the board.
+        motors: Temperatures::AIR,
         boot: BootReport::default(),
     };
     let (link, monitor) = application::assemble(hardware, "mps2-an386");

@@ -43,6 +43,24 @@ impl Uart {
     pub(crate) const RX_INTERRUPT: u32 = 1 << 3;
     pub(crate) const SENT: u32 = 1 << 0;
     pub(crate) const RECEIVED: u32 = 1 << 1;
+    /// Register reads that a byte may take; then nobody is listening.
+    const PATIENCE: u32 = 1_000_000;
+
+    /// Turns the port on, with what `control` says of halves and interrupts.
+    pub(crate) fn enable(&self, control: u32) {
+        // The smallest divider the part accepts; QEMU sends at once anyway.
+        self.divider.set(16);
+        self.control.set(control);
+    }
+
+    /// Sends a byte without any interrupt, or gives up where nobody takes it.
+    pub(crate) fn send(&self, byte: u8) {
+        for _ in 0..Self::PATIENCE {
+            if self.state.get() & Self::TX_FULL == 0 {
+                return self.data.set(u32::from(byte));
+            }
+        }
+    }
 }
 
 /// TIMER0: the timer of the haptic tick.
@@ -69,4 +87,16 @@ pub(crate) fn link_uart() -> &'static Uart {
 pub(crate) fn plant_uart() -> &'static Uart {
     // SAFETY: UART1 of the memory map, five words; as for `tick_timer`.
     unsafe { &*(0x4000_5000 as *const Uart) }
+}
+
+/// UART2: why the program ended, where it failed.
+pub(crate) fn report_uart() -> &'static Uart {
+    // SAFETY: UART2 of the memory map, five words; as for `tick_timer`.
+    unsafe { &*(0x4000_6000 as *const Uart) }
+}
+
+/// UART3: log lines.
+pub(crate) fn log_uart() -> &'static Uart {
+    // SAFETY: UART3 of the memory map, five words; as for `tick_timer`.
+    unsafe { &*(0x4000_7000 as *const Uart) }
 }

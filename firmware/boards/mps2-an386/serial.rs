@@ -32,10 +32,7 @@ impl Serial {
     /// Turns the port on and gives its two halves.
     pub(crate) fn open(&'static self) -> (Receiver, Sender) {
         let uart = (self.uart)();
-        // The smallest divider the part accepts; QEMU sends at once anyway.
-        uart.divider.set(16);
-        uart.control
-            .set(Uart::ENABLE | Uart::TX_INTERRUPT | Uart::RX_INTERRUPT);
+        uart.enable(Uart::ENABLE | Uart::TX_INTERRUPT | Uart::RX_INTERRUPT);
         (Receiver(self), Sender(self))
     }
 

@@ -1,21 +1,26 @@
 //! The STM32G474RE: its clocks, pins and what is particular to it.
 
+use core::mem::MaybeUninit;
+
 use cortex_m::Peripherals as Core;
+use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig};
 use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::pac::Interrupt;
+use embassy_stm32::pac::adc::regs::{Smpr, Smpr2};
+use embassy_stm32::pac::gpio::vals::Odr;
 use embassy_stm32::peripherals::{IWDG, TIM2, TIM3, TIM4, USB};
-use embassy_stm32::timer::qei::{self, Qei};
 use embassy_stm32::usb::{Driver, InterruptHandler};
-use embassy_stm32::{Config, Peripherals, bind_interrupts, pac, rcc, time::Hertz};
+use embassy_stm32::{Config, Peripherals, bind_interrupts, interrupt, pac, rcc};
 use hapterra_core::wire::status::ResetCause;
 use hapterra_firmware::amplifier::Off;
 
 use crate::outputs::{self, Outputs};
 use crate::stm32::clock::CycleClock;
-use crate::stm32::encoders::{SafetyInputs, TimerEncoders};
-use crate::stm32::parts;
+use crate::stm32::encoders::{SafetyInputs, TimerEncoders, quadrature};
+use crate::stm32::feedback::{Feedback, Monitors};
 use crate::stm32::priorities::OTHERS;
+use crate::stm32::{failure, parts};
 
 /// Tiles along the side of the window.
 pub(crate) const WINDOW: usize = 4;
@@ -26,12 +31,16 @@ pub(crate) const CALIBRATIONS: [u32; 2] = [0x7_F000, 0x7_F800];
 pub(crate) const CALIBRATIONS_SIZE: u32 = 0x800;
 /// The interrupt of the tick's timer.
 pub(crate) const HAPTIC_INTERRUPT: Interrupt = Interrupt::TIM7_DAC;
+/// The interrupt of the supply's comparator.
+pub(crate) const SUPPLY_INTERRUPT: Interrupt = Interrupt::PVD_PVM;
+/// GPIOB_BSRR and its bit that makes the enable pin low.
+pub(crate) const ENABLE_OFF: (u32, u32) = (0x4800_0418, 1 << 16);
 
 bind_interrupts!(struct Irqs {
     USB_LP => InterruptHandler<USB>;
 });
 
-pub(crate) type Encoders = TimerEncoders<TIM2, TIM3, TIM4>;
+pub(crate) type Encoders = TimerEncoders<TIM2, TIM3, TIM4, Input<'static>>;
 pub(crate) type Amplifiers = Off<Outputs, Output<'static>>;
 /// The core has 170,000,000 cycles a second.
 pub(crate) type Clock = CycleClock<170_000_000, 4>;
@@ -39,19 +48,26 @@ pub(crate) type UsbDriver = Driver<'static, USB>;
 pub(crate) type WatchdogTimer = IWDG;
 pub(crate) type Parts = parts::Parts<Outputs, Encoders, UsbDriver, WatchdogTimer>;
 
+/// Bits that a current monitor's reading has too many: none of 12.
+pub(crate) const MONITOR_SHIFT: u32 = 0;
+
+/// Samples each channel for 247.5 clocks of 42.5 MHz, 6 µs, so that a monitor may have
+/// tens of kilohms. A sequence of three is done 19 µs after its start.
+pub(crate) fn sample_slowly(_channels: [u8; 3]) {
+    pac::ADC1.smpr().write_value(Smpr(0o6_666_666_666));
+    pac::ADC1.smpr2().write_value(Smpr2(0o666_666_666));
+}
+
 /// Sets up what comes before the clocks: nothing on this chip.
 pub(crate) const fn prepare(_core: &mut Core) {}
 
 pub(crate) fn configuration() -> Config {
     let mut config = Config::default();
     config.bdma_interrupt_priority = OTHERS;
-    config.rcc.hse = Some(rcc::Hse {
-        freq: Hertz(24_000_000),
-        mode: rcc::HseMode::Oscillator,
-    });
+    // The chip's own 16 MHz (1 % from 0 to 85 °C): no crystal that can break off.
     config.rcc.pll = Some(rcc::Pll {
-        source: rcc::PllSource::HSE,
-        prediv: rcc::PllPreDiv::DIV6,
+        source: rcc::PllSource::HSI,
+        prediv: rcc::PllPreDiv::DIV4,
         mul: rcc::PllMul::MUL85,
         divp: None,
         divq: None,
@@ -63,6 +79,7 @@ pub(crate) fn configuration() -> Config {
         sync_from_usb: true,
     });
     config.rcc.mux.clk48sel = rcc::mux::Clk48sel::HSI48;
+    config.rcc.mux.adc12sel = rcc::mux::Adcsel::SYS;
     config
 }
 
@@ -70,20 +87,36 @@ pub(crate) fn configuration() -> Config {
 pub(crate) fn take(p: Peripherals) -> Parts {
     // The enable pin first of all.
     let enable = Output::new(p.PB0, Level::Low, Speed::Low);
-    let pulses = qei::Config::default();
+    compare_supply();
     Parts {
         enable,
         outputs: outputs::new(p.DAC1, p.PA4, p.PA5, p.DAC2, p.PA6),
         encoders: TimerEncoders {
             counters: (
-                Qei::new(p.TIM2, p.PA0, p.PA1, pulses),
-                Qei::new(p.TIM3, p.PC6, p.PC7, pulses),
-                Qei::new(p.TIM4, p.PB6, p.PB7, pulses),
+                quadrature(p.TIM2, p.PA0, p.PA1),
+                quadrature(p.TIM3, p.PC6, p.PC7),
+                quadrature(p.TIM4, p.PB6, p.PB7),
             ),
             counts: Default::default(),
             inputs: SafetyInputs {
                 emergency_stop: Input::new(p.PC0, Pull::Up),
                 dead_man: Input::new(p.PC1, Pull::Up),
+            },
+            feedback: Feedback {
+                ready: [
+                    Input::new(p.PC10, Pull::Up),
+                    Input::new(p.PC11, Pull::Up),
+                    Input::new(p.PC12, Pull::Up),
+                ],
+                monitors_fitted: Input::new(p.PC8, Pull::Up),
+                monitors: Monitors::new(
+                    Adc::new(p.ADC1, AdcConfig::default()),
+                    [
+                        p.PC2.degrade_adc(),
+                        p.PC3.degrade_adc(),
+                        p.PB1.degrade_adc(),
+                    ],
+                ),
             },
         },
         flash: Flash::new_blocking(p.FLASH),
@@ -91,16 +124,20 @@ pub(crate) fn take(p: Peripherals) -> Parts {
         usb: Driver::new(p.USB, Irqs, p.PA12, p.PA11),
         watchdog: p.IWDG,
         led: Output::new(p.PA8, Level::Low, Speed::Low),
+        heartbeat: Output::new(p.PD2, Level::Low, Speed::Low),
     }
 }
 
 /// Reads what the chip says about its last reset; then the chip forgets it.
 pub(crate) fn take_reset_cause() -> ResetCause {
+    let ran_before = leave_mark();
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
     match flags {
         _ if flags.iwdgrstf() || flags.wwdgrstf() => ResetCause::Watchdog,
         _ if flags.sftrstf() => ResetCause::Software,
+        // The chip sets one flag for both. After a short dip its RAM still knows.
+        _ if flags.borrstf() && ran_before => ResetCause::BrownOut,
         _ if flags.borrstf() => ResetCause::PowerOn,
         _ if flags.pinrstf() => ResetCause::Pin,
         _ => ResetCause::Unknown,
@@ -111,7 +148,68 @@ pub(crate) fn take_reset_cause() -> ResetCause {
 /// cares for the flash's own.
 pub(crate) const fn write_back(_address: usize, _bytes: usize) {}
 
+/// Marks the RAM as this program's. Returns whether it was so already: a program ran, and
+/// the supply never fell so far that the RAM lost what it holds.
+fn leave_mark() -> bool {
+    /// "HAP4".
+    const OURS: u32 = 0x4841_5034;
+    #[unsafe(link_section = ".uninit.mark")]
+    static mut MARK: MaybeUninit<u32> = MaybeUninit::uninit();
+    let mark = (&raw mut MARK).cast::<u32>();
+    // SAFETY: nothing else touches it, `main` comes here once, and any bits are a number.
+    unsafe {
+        let was_ours = mark.read_volatile() == OURS;
+        mark.write_volatile(OURS);
+        was_ours
+    }
+}
+
+/// Has the supply compared with the highest level there is (2.9 V).
+fn compare_supply() {
+    pac::PWR.cr2().modify(|w| {
+        w.set_pls(6);
+        w.set_pvde(true);
+    });
+}
+
+/// Whether the supply is below that level.
+pub(crate) fn supply_is_low() -> bool {
+    pac::PWR.sr2().read().pvdo()
+}
+
+#[interrupt]
+fn PVD_PVM() {
+    failure::supply_low()
+}
+
+/// Reads the supply below which the chip holds itself in reset, millivolts. The firmware
+/// does not program it: a power cut meanwhile could leave the chip locked.
+pub(crate) fn resets_below_mv() -> u16 {
+    match pac::FLASH.optr().read().bor_lev() {
+        0 => 1_700,
+        1 => 2_000,
+        2 => 2_200,
+        3 => 2_500,
+        _ => 2_800,
+    }
+}
+
+/// Lets the watchdog run on while a debugger halts the core, whatever that asked for.
+pub(crate) fn let_a_halt_stop_the_arm() {
+    pac::DBGMCU.apb1lfzr().modify(|w| w.set_iwdg(false));
+}
+
+/// Changes the heartbeat's level, past any driver.
+pub(crate) fn toggle_heartbeat() {
+    let is_high = pac::GPIOD.odr().read().odr(2) == Odr::HIGH;
+    pac::GPIOD.bsrr().write(|w| match is_high {
+        true => w.set_br(2, true),
+        false => w.set_bs(2, true),
+    });
+}
+
 /// Sets the enable pin low, past any driver, for a program that failed.
+#[inline(always)]
 pub(crate) fn amplifiers_off() {
     pac::GPIOB.bsrr().write(|w| w.set_br(0, true));
 }

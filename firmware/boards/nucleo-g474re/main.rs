@@ -6,12 +6,16 @@
 //! | encoder 1 A, B | PA0, PA1 | TIM2 |
 //! | encoder 2 A, B | PC6, PC7 | TIM3 |
 //! | encoder 3 A, B | PB6, PB7 | TIM4 |
-//! | current command 1, 2, 3 | PA4, PA5, PA6 | DAC1 and DAC2, 12 bits, 0-3.3 V, middle is zero |
+//! | current command 1, 2, 3 | PA4, PA5, PA6 | DAC1 and DAC2, 12 bits, 0.2-3.1 V, middle is zero |
 //! | amplifier enable, high is on, pull it down outside | PB0 | |
 //! | emergency stop, closed to ground | PC0 | |
 //! | dead-man switch, closed to ground while held | PC1 | |
+//! | amplifier ready 1, 2, 3, closed to ground while ready | PC10, PC11, PC12 | |
+//! | current monitors wired, closed to ground | PC8 | |
+//! | current monitor 1, 2, 3 | PC2, PC3, PB1 | ADC1, 1.65 V is zero |
 //! | USB D-, D+ | PA11, PA12 | USB |
 //! | status LED, to ground over a resistor | PA8 | |
+//! | heartbeat, for a one-shot outside | PD2 | |
 //!
 //! PA5 also drives the board's LED LD2: open its solder bridge.
 #![no_std]
@@ -26,6 +30,7 @@ mod flash;
 mod outputs;
 #[path = "../common/stm32/mod.rs"]
 mod stm32;
+mod usb;
 
 use embassy_stm32::interrupt;
 

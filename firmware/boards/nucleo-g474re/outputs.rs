@@ -8,10 +8,9 @@ use hapterra_firmware::amplifier::{CurrentOutputs, offset_code};
 
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-g474re";
-/// The largest code of a converter.
-const DAC_MAX: u16 = 4095;
 
-/// Three converters, each behind an offset stage: the middle of the range is no current.
+/// Three converters, buffered, each behind an offset stage: the middle of the range is no
+/// current.
 pub(crate) struct Outputs {
     /// Keeps the channels as they were set up.
     _channels: [DacChannel<'static, Blocking>; 3],
@@ -35,7 +34,7 @@ impl CurrentOutputs for Outputs {
     /// Writes the registers: embassy's own way asserts the channel's number at each
     /// write, and nothing in a tick may panic.
     fn set(&mut self, fractions: [f32; 3]) {
-        let [first, second, third] = fractions.map(|fraction| offset_code(fraction, DAC_MAX));
+        let [first, second, third] = fractions.map(offset_code);
         pac::DAC1.dhr12r(0).write(|w| w.set_dhr(first));
         pac::DAC1.dhr12r(1).write(|w| w.set_dhr(second));
         pac::DAC2.dhr12r(0).write(|w| w.set_dhr(third));
@@ -44,5 +43,10 @@ impl CurrentOutputs for Outputs {
 
 /// Whether the outputs have failed: a converter on the chip cannot tell.
 pub(crate) const fn failed() -> bool {
+    false
+}
+
+/// Whether the outputs are not as they were set: a converter on the chip cannot tell.
+pub(crate) const fn not_as_set() -> bool {
     false
 }

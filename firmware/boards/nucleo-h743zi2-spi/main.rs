@@ -6,12 +6,16 @@
 //! | encoder 1 A, B | PC6, PC7 | TIM8 |
 //! | encoder 2 A, B | PB4, PB5 | TIM3 |
 //! | encoder 3 A, B | PD12, PD13 | TIM4 |
-//! | converter SCLK, SDIN, SYNC | PE12, PE14, PE11 | SPI4 at 15 MHz, mode 1; SYNC by hand |
+//! | converter SCLK, SDIN, SDO, SYNC | PE12, PE14, PE13, PE11 | SPI4 at 7.5 MHz, mode 1; SYNC by hand |
 //! | amplifier enable, high is on, pull it down outside | PF3 | |
-//! | emergency stop, closed to ground | PF4 | |
+//! | emergency stop, closed to ground | PE15 | |
 //! | dead-man switch, closed to ground while held | PF5 | |
+//! | amplifier ready 1, 2, 3, closed to ground while ready | PF12, PF13, PF14 | |
+//! | current monitors wired, closed to ground | PF15 | |
+//! | current monitor 1, 2, 3 | PA3, PC0, PB1 | ADC1, 1.65 V is zero |
 //! | USB D-, D+ | PA11, PA12 | OTG_FS |
 //! | status LED | PB0 | the board's green LD1 |
+//! | heartbeat, for a one-shot outside | PG1 | |
 #![no_std]
 #![no_main]
 // Interrupt handlers bear the names of the vectors.
@@ -26,6 +30,9 @@ mod flash;
 mod outputs;
 #[path = "../common/stm32/mod.rs"]
 mod stm32;
+mod stop;
+#[path = "../nucleo-h743zi2/usb.rs"]
+mod usb;
 
 use embassy_stm32::interrupt;
 

@@ -2,12 +2,12 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
+use cortex_m::peripheral::DWT;
 use embassy_stm32::Peri;
-use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::pac::SPI4 as REGISTERS;
-use embassy_stm32::pac::spi::vals::Comm;
-use embassy_stm32::peripherals::{PE11, PE12, PE14, SPI4};
+use embassy_stm32::peripherals::{PE11, PE12, PE13, PE14, SPI4};
 use embassy_stm32::spi::mode::Master;
 use embassy_stm32::spi::{Config, MODE_1, Spi};
 use embassy_stm32::time::Hertz;
@@ -15,18 +15,26 @@ use hapterra_firmware::amplifier::{Ad5754, FrameBus};
 
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-h743zi2-spi";
-/// Half of what the converter takes, for wires of a hand's length: a frame is
-/// 1.6 µs long.
-const SPI_HZ: u32 = 15_000_000;
-/// A frame's bytes, which is also what the transmit FIFO surely holds.
+/// At 7.5 MHz half a clock is 67 ns. What the converter sends is valid 40 ns after the
+/// rising edge and is read at the falling one, with wires of a hand's length. A frame is
+/// 3.2 µs long.
+const SPI_HZ: u32 = 7_500_000;
+/// A frame's bytes, which is also what the FIFOs surely hold.
 const FRAME: usize = 3;
 /// Looks at the status until a frame is sent. Each takes four cycles of the
-/// bus' 120 MHz at least, so this is 33 µs, twenty frames.
+/// bus' 120 MHz at least, so this is 33 µs, ten frames.
 const PATIENCE: u32 = 1_000;
+/// Cycles of the core in a microsecond.
+const CYCLES_PER_US: u32 = 480;
+/// Cycles of the core that SYNC stays high at least: 250 ns, of which the pin's own rise
+/// may take some.
+const SYNC_HIGH: u32 = CYCLES_PER_US / 4;
 
 /// Set for good when a frame did not go out: what the converter holds is then unknown,
 /// and the tick switches off.
 static FAILED: AtomicBool = AtomicBool::new(false);
+/// Whether the converter did not read back as it was set.
+static NOT_AS_SET: AtomicBool = AtomicBool::new(true);
 
 pub(crate) type Outputs = Ad5754<Bus>;
 
@@ -34,7 +42,7 @@ pub(crate) type Outputs = Ad5754<Bus>;
 /// would have to take all of them.
 macro_rules! take_outputs {
     ($p:ident) => {
-        crate::outputs::new($p.SPI4, $p.PE12, $p.PE14, $p.PE11)
+        crate::outputs::new($p.SPI4, $p.PE12, $p.PE14, $p.PE13, $p.PE11)
     };
 }
 pub(crate) use take_outputs;
@@ -42,20 +50,22 @@ pub(crate) use take_outputs;
 pub(crate) fn new(
     spi: Peri<'static, SPI4>,
     clock: Peri<'static, PE12>,
-    data: Peri<'static, PE14>,
+    to_converter: Peri<'static, PE14>,
+    from_converter: Peri<'static, PE13>,
     sync: Peri<'static, PE11>,
 ) -> Outputs {
     let mut config = Config::default();
     config.mode = MODE_1;
     config.frequency = Hertz(SPI_HZ);
     config.gpio_speed = Speed::High;
-    let spi = Spi::new_blocking_txonly(spi, clock, data, config);
+    // A wire that is broken reads as ones, which no register of the converter's holds.
+    config.miso_pull = Pull::Up;
+    let spi = Spi::new_blocking(spi, clock, to_converter, from_converter, config);
     REGISTERS.cr1().modify(|w| w.set_spe(false));
-    // Nothing comes back, so nothing can overrun.
-    REGISTERS.cfg2().modify(|w| w.set_comm(Comm::TRANSMITTER));
     REGISTERS.cr2().write(|w| w.set_tsize(FRAME as u16));
-    Ad5754(Bus {
+    Ad5754::new(Bus {
         sync: Output::new(sync, Level::High, Speed::High),
+        rose: DWT::cycle_count(),
         _spi: spi,
     })
 }
@@ -65,6 +75,11 @@ pub(crate) fn failed() -> bool {
     FAILED.load(Ordering::Relaxed)
 }
 
+/// Whether the converter does not read back as it was set.
+pub(crate) fn not_as_set() -> bool {
+    NOT_AS_SET.load(Ordering::Relaxed)
+}
+
 /// SPI4, frame by frame.
 ///
 /// embassy sets the bus up but does not send, because its waiting has no bound. Here a
@@ -72,12 +87,24 @@ pub(crate) fn failed() -> bool {
 /// bytes, and waited for at most [`PATIENCE`] looks.
 pub(crate) struct Bus {
     sync: Output<'static>,
+    /// The cycle in which SYNC rose.
+    rose: u32,
     /// Keeps clock and pins as they were set up.
     _spi: Spi<'static, Blocking, Master>,
 }
 
+/// Waits until so many cycles have passed since `from`, for at most as many looks: a look
+/// takes a cycle at least.
+fn wait(from: u32, cycles: u32) {
+    let _ = (0..cycles).any(|_| DWT::cycle_count().wrapping_sub(from) >= cycles);
+}
+
 impl FrameBus for Bus {
-    fn send(&mut self, frame: [u8; FRAME]) {
+    fn send(&mut self, frame: [u8; FRAME]) -> [u8; FRAME] {
+        if failed() {
+            return [u8::MAX; FRAME];
+        }
+        wait(self.rose, SYNC_HIGH);
         self.sync.set_low();
         REGISTERS.cr1().modify(|w| w.set_spe(true));
         REGISTERS.cr1().modify(|w| w.set_cstart(true));
@@ -85,14 +112,25 @@ impl FrameBus for Bus {
             REGISTERS.txdr8().write_value(byte);
         }
         let sent = (0..PATIENCE).any(|_| REGISTERS.sr().read().eot());
+        let back = frame.map(|_| REGISTERS.rxdr8().read());
         REGISTERS.ifcr().write(|w| {
             w.set_eotc(true);
             w.set_txtfc(true);
         });
         REGISTERS.cr1().modify(|w| w.set_spe(false));
         self.sync.set_high();
+        self.rose = DWT::cycle_count();
         if !sent {
             FAILED.store(true, Ordering::Relaxed);
         }
+        back
+    }
+
+    fn pause_us(&mut self, us: u32) {
+        wait(DWT::cycle_count(), us.saturating_mul(CYCLES_PER_US));
+    }
+
+    fn tell(&mut self, as_set: bool) {
+        NOT_AS_SET.store(!as_set, Ordering::Relaxed);
     }
 }

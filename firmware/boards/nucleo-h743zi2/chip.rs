@@ -2,13 +2,15 @@
 //! outputs are the image's own ([`crate::outputs`]).
 
 use cortex_m::Peripherals as Core;
+use embassy_stm32::adc::{Adc, AdcChannel};
 use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::pac::Interrupt;
+use embassy_stm32::pac::adc::regs::{Pcsel, Smpr};
+use embassy_stm32::pac::gpio::vals::Odr;
 use embassy_stm32::peripherals::{IWDG1, TIM3, TIM4, TIM8, USB_OTG_FS};
-use embassy_stm32::timer::qei::{self, Qei};
 use embassy_stm32::usb::{self, Driver, InterruptHandler};
-use embassy_stm32::{Config, Peripherals, bind_interrupts, pac, rcc, time::Hertz};
+use embassy_stm32::{Config, Peripherals, bind_interrupts, interrupt, pac, rcc};
 use hapterra_core::wire::status::ResetCause;
 use hapterra_firmware::amplifier::Off;
 use static_cell::ConstStaticCell;
@@ -16,9 +18,11 @@ use static_cell::ConstStaticCell;
 use crate::flash;
 use crate::outputs::{Outputs, take_outputs};
 use crate::stm32::clock::CycleClock;
-use crate::stm32::encoders::{SafetyInputs, TimerEncoders};
-use crate::stm32::parts;
+use crate::stm32::encoders::{SafetyInputs, TimerEncoders, quadrature};
+use crate::stm32::feedback::{Feedback, Monitors};
 use crate::stm32::priorities::OTHERS;
+use crate::stm32::{failure, parts};
+use crate::stop::{EmergencyStop, take_stop};
 
 /// Tiles along the side of the window.
 pub(crate) const WINDOW: usize = 8;
@@ -29,12 +33,16 @@ pub(crate) const CALIBRATIONS: [u32; 2] = [0x1C_0000, 0x1E_0000];
 pub(crate) const CALIBRATIONS_SIZE: u32 = 0x2_0000;
 /// The interrupt of the tick's timer.
 pub(crate) const HAPTIC_INTERRUPT: Interrupt = Interrupt::TIM7;
+/// The interrupt of the supply's comparator.
+pub(crate) const SUPPLY_INTERRUPT: Interrupt = Interrupt::PVD_AVD;
+/// GPIOF_BSRR and its bit that makes the enable pin low.
+pub(crate) const ENABLE_OFF: (u32, u32) = (0x5802_1418, 1 << 19);
 
 bind_interrupts!(struct Irqs {
     OTG_FS => InterruptHandler<USB_OTG_FS>;
 });
 
-pub(crate) type Encoders = TimerEncoders<TIM8, TIM3, TIM4>;
+pub(crate) type Encoders = TimerEncoders<TIM8, TIM3, TIM4, EmergencyStop>;
 pub(crate) type Amplifiers = Off<Outputs, Output<'static>>;
 /// The core has 480,000,000 cycles a second.
 pub(crate) type Clock = CycleClock<480_000_000, 8>;
@@ -43,6 +51,19 @@ pub(crate) type WatchdogTimer = IWDG1;
 pub(crate) type Parts = parts::Parts<Outputs, Encoders, UsbDriver, WatchdogTimer>;
 
 static USB_BUFFER: ConstStaticCell<[u8; 256]> = ConstStaticCell::new([0; 256]);
+
+/// Bits that a current monitor's reading has too many: it has 16, and 12 are used.
+pub(crate) const MONITOR_SHIFT: u32 = 4;
+
+/// Connects these channels and samples each for 387.5 clocks of 32 MHz, 12 µs, so that a
+/// monitor may have tens of kilohms. A sequence of three is done 37 µs after its start.
+pub(crate) fn sample_slowly(channels: [u8; 3]) {
+    let selected = channels.iter().fold(0, |all, channel| all | 1 << channel);
+    pac::ADC1.pcsel().write_value(Pcsel(selected));
+    for half in [0, 1] {
+        pac::ADC1.smpr(half).write_value(Smpr(0o6_666_666_666));
+    }
+}
 
 /// Sets up what comes before the clocks: faults and caches. No DMA is used, so the data
 /// cache needs no care.
@@ -57,14 +78,11 @@ pub(crate) fn configuration() -> Config {
     config.bdma_interrupt_priority = OTHERS;
     config.dma_interrupt_priority = OTHERS;
     config.mdma_interrupt_priority = OTHERS;
-    // 8 MHz come from the ST-LINK.
-    config.rcc.hse = Some(rcc::Hse {
-        freq: Hertz(8_000_000),
-        mode: rcc::HseMode::Bypass,
-    });
+    // The chip's own 64 MHz (1 % from 20 to 105 °C). The board's 8 MHz come from the
+    // ST-LINK, which a user may unplug or reset.
     config.rcc.pll1 = Some(rcc::Pll {
-        source: rcc::PllSource::HSE,
-        prediv: rcc::PllPreDiv::DIV4,
+        source: rcc::PllSource::HSI,
+        prediv: rcc::PllPreDiv::DIV32,
         mul: rcc::PllMul::MUL480,
         fracn: None,
         divp: Some(rcc::PllDiv::DIV2),
@@ -82,6 +100,8 @@ pub(crate) fn configuration() -> Config {
         sync_from_usb: true,
     });
     config.rcc.mux.usbsel = rcc::mux::Usbsel::HSI48;
+    // The 64 MHz of the HSI.
+    config.rcc.mux.adcsel = rcc::mux::Adcsel::PER;
     config
 }
 
@@ -89,24 +109,42 @@ pub(crate) fn configuration() -> Config {
 pub(crate) fn take(p: Peripherals) -> Parts {
     // The enable pin first of all.
     let enable = Output::new(p.PF3, Level::Low, Speed::Low);
-    let pulses = qei::Config::default();
+    // Before the stop, which locks the comparator as it is.
+    compare_supply();
     let mut wiring = usb::Config::default();
     // The board's power does not come from this connector.
     wiring.vbus_detection = false;
     let buffer = USB_BUFFER.take();
     Parts {
         enable,
+        // Before the stop, which may act on their timer.
         outputs: take_outputs!(p),
         encoders: TimerEncoders {
             counters: (
-                Qei::new(p.TIM8, p.PC6, p.PC7, pulses),
-                Qei::new(p.TIM3, p.PB4, p.PB5, pulses),
-                Qei::new(p.TIM4, p.PD12, p.PD13, pulses),
+                quadrature(p.TIM8, p.PC6, p.PC7),
+                quadrature(p.TIM3, p.PB4, p.PB5),
+                quadrature(p.TIM4, p.PD12, p.PD13),
             ),
             counts: Default::default(),
             inputs: SafetyInputs {
-                emergency_stop: Input::new(p.PF4, Pull::Up),
+                emergency_stop: take_stop!(p),
                 dead_man: Input::new(p.PF5, Pull::Up),
+            },
+            feedback: Feedback {
+                ready: [
+                    Input::new(p.PF12, Pull::Up),
+                    Input::new(p.PF13, Pull::Up),
+                    Input::new(p.PF14, Pull::Up),
+                ],
+                monitors_fitted: Input::new(p.PF15, Pull::Up),
+                monitors: Monitors::new(
+                    Adc::new(p.ADC1),
+                    [
+                        p.PA3.degrade_adc(),
+                        p.PC0.degrade_adc(),
+                        p.PB1.degrade_adc(),
+                    ],
+                ),
             },
         },
         flash: Flash::new_blocking(p.FLASH),
@@ -114,6 +152,7 @@ pub(crate) fn take(p: Peripherals) -> Parts {
         usb: Driver::new_fs(p.USB_OTG_FS, Irqs, p.PA12, p.PA11, buffer, wiring),
         watchdog: p.IWDG1,
         led: Output::new(p.PB0, Level::Low, Speed::Low),
+        heartbeat: Output::new(p.PG1, Level::Low, Speed::Low),
     }
 }
 
@@ -125,6 +164,7 @@ pub(crate) fn take_reset_cause() -> ResetCause {
         _ if flags.iwdg1rstf() || flags.wwdg1rstf() => ResetCause::Watchdog,
         _ if flags.sftrstf() => ResetCause::Software,
         _ if flags.porrstf() => ResetCause::PowerOn,
+        _ if flags.borrstf() => ResetCause::BrownOut,
         _ if flags.pinrstf() => ResetCause::Pin,
         _ => ResetCause::Unknown,
     }
@@ -138,7 +178,53 @@ pub(crate) fn write_back(address: usize, bytes: usize) {
     core.SCB.clean_invalidate_dcache_by_address(address, bytes);
 }
 
+/// Has the supply compared with the highest level there is (2.85 V).
+fn compare_supply() {
+    pac::PWR.cr1().modify(|w| {
+        w.set_pls(6);
+        w.set_pvde(true);
+    });
+}
+
+/// Whether the supply is below that level.
+pub(crate) fn supply_is_low() -> bool {
+    pac::PWR.csr1().read().pvdo()
+}
+
+#[interrupt]
+fn PVD_AVD() {
+    failure::supply_low()
+}
+
+/// Reads the supply below which the chip holds itself in reset, millivolts. The firmware
+/// does not program it: a power cut meanwhile could leave the chip locked.
+pub(crate) fn resets_below_mv() -> u16 {
+    match pac::FLASH.optsr_cur().read().bor_lev() {
+        0 => 1_670,
+        1 => 2_100,
+        2 => 2_400,
+        _ => 2_700,
+    }
+}
+
+/// Lets the watchdog run on while a debugger halts the core, whatever that asked for, and
+/// lets the halt stop TIM1. Its outputs are then off as by a break (RM0433, 38.3.28).
+pub(crate) fn let_a_halt_stop_the_arm() {
+    pac::DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(false));
+    pac::DBGMCU.apb2fzr1().modify(|w| w.set_tim1(true));
+}
+
+/// Changes the heartbeat's level, past any driver.
+pub(crate) fn toggle_heartbeat() {
+    let is_high = pac::GPIOG.odr().read().odr(1) == Odr::HIGH;
+    pac::GPIOG.bsrr().write(|w| match is_high {
+        true => w.set_br(1, true),
+        false => w.set_bs(1, true),
+    });
+}
+
 /// Sets the enable pin low, past any driver, for a program that failed.
+#[inline(always)]
 pub(crate) fn amplifiers_off() {
     pac::GPIOF.bsrr().write(|w| w.set_br(3, true));
 }

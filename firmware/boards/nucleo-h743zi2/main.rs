@@ -1,5 +1,5 @@
 //! NUCLEO-H743ZI2: Cortex-M7 at 480 MHz, three encoder timers, three PWM
-//! outputs for amplifiers that read 10-90 % (Maxon ESCON), USB full speed.
+//! outputs for amplifiers that read duty cycles (Maxon ESCON), USB full speed.
 //!
 //! | what | pin | part |
 //! | --- | --- | --- |
@@ -8,10 +8,14 @@
 //! | encoder 3 A, B | PD12, PD13 | TIM4 |
 //! | current command 1, 2, 3 | PE9, PE11, PE13 | TIM1, PWM, 50 % is zero |
 //! | amplifier enable, high is on, pull it down outside | PF3 | |
-//! | emergency stop, closed to ground | PF4 | |
+//! | emergency stop, closed to ground | PE15 | TIM1's break |
 //! | dead-man switch, closed to ground while held | PF5 | |
+//! | amplifier ready 1, 2, 3, closed to ground while ready | PF12, PF13, PF14 | |
+//! | current monitors wired, closed to ground | PF15 | |
+//! | current monitor 1, 2, 3 | PA3, PC0, PB1 | ADC1, 1.65 V is zero |
 //! | USB D-, D+ | PA11, PA12 | OTG_FS |
 //! | status LED | PB0 | the board's green LD1 |
+//! | heartbeat, for a one-shot outside | PG1 | |
 #![no_std]
 #![no_main]
 // Interrupt handlers bear the names of the vectors.
@@ -24,6 +28,8 @@ mod flash;
 mod outputs;
 #[path = "../common/stm32/mod.rs"]
 mod stm32;
+mod stop;
+mod usb;
 
 use embassy_stm32::interrupt;
 

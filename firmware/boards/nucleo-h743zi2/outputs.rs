@@ -6,15 +6,12 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm, SimplePwmChannels};
 use embassy_stm32::{Peri, pac};
-use hapterra_firmware::amplifier::{CurrentOutputs, duty_code};
+use hapterra_firmware::amplifier::{CurrentOutputs, DUTY_HZ, duty_code};
 
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-h743zi2";
-/// Frequency of the duty cycles. An ESCON reads 10 Hz to 5 kHz; the faster, the
-/// less a command is delayed, and the coarser it is read.
-const PWM_HZ: u32 = 5_000;
 
-/// Three duty cycles: 10 % and 90 % are the ends of the range, 50 % is no current.
+/// Three duty cycles: 15 % and 85 % are the ends of the range, 50 % is no current.
 pub(crate) struct Outputs {
     /// Keeps the channels as they were set up.
     _channels: SimplePwmChannels<'static, TIM1>,
@@ -43,7 +40,7 @@ pub(crate) fn new(
         Some(PwmPin::new(second, OutputType::PushPull)),
         Some(PwmPin::new(third, OutputType::PushPull)),
         None,
-        Hertz(PWM_HZ),
+        Hertz(DUTY_HZ),
         CountingMode::EdgeAlignedUp,
     )
     .split();
@@ -69,5 +66,10 @@ impl CurrentOutputs for Outputs {
 
 /// Whether the outputs have failed: a timer cannot tell.
 pub(crate) const fn failed() -> bool {
+    false
+}
+
+/// Whether the outputs are not as they were set: a timer cannot tell.
+pub(crate) const fn not_as_set() -> bool {
     false
 }

@@ -1,12 +1,17 @@
 //! The peripherals of a chip, at their addresses.
 
+use std::cell::Cell;
 use std::collections::HashMap;
+use std::rc::Rc;
 
+use crate::adc::Adc;
 use crate::chip::{Chip, Commands, Unreadable, UsbKind};
 use crate::converter::Converter;
 use crate::nvic::{self, Nvic};
-use crate::timer::Timer;
-use crate::usb::{FullSpeed, Otg, Peripheral};
+use crate::shutdown::{self, BreakAt, Sources};
+use crate::supply::{Reset, Supply};
+use crate::timer::{CNT, Timer};
+use crate::usb::{Cable, FullSpeed, Otg, Peripheral};
 use crate::watchdog::Watchdog;
 
 /// Offsets of a GPIO port's registers.
@@ -15,6 +20,7 @@ const PUPDR: u32 = 0x0C;
 const IDR: u32 = 0x10;
 const ODR: u32 = 0x14;
 const BSRR: u32 = 0x18;
+const AFRL: u32 = 0x20;
 const PORTS: u32 = 11;
 /// DWT's cycle counter.
 const CYCCNT: u32 = 0xE000_1004;
@@ -30,6 +36,18 @@ pub enum Effect {
     Command(usize, i32),
     /// The amplifiers' enable pin.
     Enable(bool),
+}
+
+/// Counts the instructions from the first encoder that a tick reads to the last command
+/// that it writes.
+#[derive(Debug, Default)]
+pub struct Stopwatch {
+    /// Instructions executed, counted by whoever runs the core.
+    pub executed: Rc<Cell<u64>>,
+    /// When the first encoder was last read.
+    began: Option<u64>,
+    /// Instructions until the command of axis 3, tick by tick.
+    pub taken: Vec<u64>,
 }
 
 /// Every pin is analogue but the debugger's, on both chips.
@@ -56,30 +74,40 @@ pub struct Bus {
     pub watchdog: Watchdog,
     /// What is on the SPI of a board that has it.
     pub converter: Converter,
-    /// The USB peripheral.
-    pub usb: Box<dyn Peripheral>,
+    /// What reads the current monitors.
+    pub adc: Adc,
+    /// The USB peripheral, plugged in.
+    pub usb: Cable,
     /// Sectors that are being erased: address and bytes.
     pub erased: Vec<(u32, u32)>,
     /// Until when the flash is busy, ns.
     busy_until_ns: u64,
+    /// The supply.
+    pub supply: Supply,
+    /// Whether a debugger has halted the core.
+    pub is_halted: bool,
+    /// Whether the core has locked up.
+    pub is_locked_up: bool,
     /// Time since power-up.
     pub now_ns: u64,
+    /// Runs while a test measures.
+    pub stopwatch: Option<Stopwatch>,
     /// What reached commands and enable pin, in order, since it was last taken.
     pub effects: Vec<Effect>,
 }
 
 impl Bus {
-    /// After a power-up, or a reset by the watchdog.
+    /// After a reset.
     #[must_use]
-    pub fn new(chip: &'static Chip, by_watchdog: bool) -> Self {
+    pub fn new(chip: &'static Chip, cause: Reset) -> Self {
         let usb: Box<dyn Peripheral> = match chip.usb {
             UsbKind::FullSpeedDevice { .. } => Box::new(FullSpeed::default()),
             UsbKind::Otg { .. } => Box::new(Otg::default()),
         };
-        let (flags, power_up, watchdog, _) = chip.reset_flags;
-        let cause = if by_watchdog { watchdog } else { power_up };
         let mut words = ports_after_reset(chip.gpio);
-        words.insert(flags, cause);
+        words.insert(chip.reset_flags.register, chip.reset_flags.after(cause));
+        let (option_bytes, field, highest) = chip.brown_out_level;
+        words.insert(option_bytes, highest << field);
         Self {
             chip,
             words,
@@ -92,10 +120,15 @@ impl Bus {
             nvic: Nvic::default(),
             watchdog: Watchdog::default(),
             converter: Converter::default(),
-            usb,
+            adc: Adc::new(chip.monitors.1),
+            usb: Cable::new(usb),
             erased: vec![],
             busy_until_ns: 0,
+            supply: Supply::default(),
+            is_halted: false,
+            is_locked_up: false,
             now_ns: 0,
+            stopwatch: None,
             effects: vec![],
         }
     }
@@ -103,6 +136,9 @@ impl Bus {
     /// Lets time pass.
     pub fn advance(&mut self, by_ns: u64) {
         self.now_ns += by_ns;
+        if self.is_halted && self.is_frozen(self.chip.freeze.watchdog) {
+            self.watchdog.stand_still(by_ns);
+        }
         for timer in &mut self.timers {
             timer.advance(self.now_ns);
         }
@@ -119,16 +155,81 @@ impl Bus {
         if self.usb.is_asserting() {
             self.nvic.pend(self.chip.usb_interrupt);
         }
+        if self.supply.follow(&self.chip.comparator, &mut self.words) {
+            self.nvic.pend(self.chip.comparator.interrupt);
+        }
+        self.follow_break();
+    }
+
+    fn is_frozen(&self, (register, bit): (u32, u32)) -> bool {
+        self.plain(register) & bit != 0
+    }
+
+    /// What stops the outputs in hardware acts on them.
+    fn follow_break(&mut self) {
+        let Some(at) = self.chip.output_break else {
+            return;
+        };
+        let (port, pin, function) = at.pin;
+        let register = |offset| self.plain(self.chip.gpio + 0x400 * port + offset);
+        let bears = register(MODER) >> (2 * pin) & 3 == 2
+            && register(AFRL + 4 * (pin / 8)) >> (4 * (pin % 8)) & 0xF == function;
+        let level = self.inputs.get(&(port, pin)).copied().unwrap_or(false);
+        let (system, by_supply, by_lockup) = at.system;
+        let through = self.plain(system);
+        let is_low = self.supply.is_low(&self.chip.comparator, &self.words);
+        let sources = Sources {
+            pin: bears.then_some(level),
+            system: through & by_supply != 0 && is_low
+                || through & by_lockup != 0 && self.is_locked_up,
+        };
+        if let Some(timer) = self.timer_named(at.timer) {
+            shutdown::follow(timer, sources);
+        }
+    }
+
+    /// Whether duty cycles leave the chip, on a board that commands by them.
+    #[must_use]
+    pub fn drives_duty_cycles(&mut self) -> Option<bool> {
+        let at = self.chip.output_break?;
+        let stops = self.chip.freeze.outputs;
+        let is_stopped = self.is_halted && stops.is_some_and(|bit| self.is_frozen(bit));
+        let timer = self.timer_named(at.timer)?;
+        Some(!is_stopped && shutdown::drives(timer))
+    }
+
+    fn timer_named(&mut self, name: &str) -> Option<&mut Timer> {
+        let found = self.chip.timers.iter().position(|t| t.name == name);
+        found.and_then(|i| self.timers.get_mut(i))
+    }
+
+    /// Sets the brown-out level of the option bytes.
+    pub fn set_brown_out_level(&mut self, level: u32) {
+        let (option_bytes, field, _) = self.chip.brown_out_level;
+        self.words.insert(option_bytes, level << field);
     }
 
     /// Sets the counters of axes 1 to 3.
     pub fn set_encoders(&mut self, counts: [i32; 3]) {
         for (name, count) in self.chip.encoders.into_iter().zip(counts) {
-            let found = self.chip.timers.iter().position(|t| t.name == name);
-            if let Some(timer) = found.and_then(|i| self.timers.get_mut(i)) {
+            if let Some(timer) = self.timer_named(name) {
                 timer.feed(count as u16);
             }
         }
+    }
+
+    /// Lets an axis's encoder (0 to 2) play its channels for a while, and returns how far
+    /// its timer has counted. `levels` gives channels A and B at a time in ns.
+    pub fn play_encoder(
+        &mut self,
+        axis: usize,
+        ms: u64,
+        levels: impl FnMut(f64) -> [bool; 2],
+    ) -> i32 {
+        let name = self.chip.encoders[axis];
+        let found = self.chip.timers.iter().position(|t| t.name == name);
+        let timer = found.and_then(|i| self.timers.get_mut(i));
+        timer.map_or(0, |timer| timer.play(ms, levels))
     }
 
     /// Sets the level at an input pin.
@@ -168,7 +269,7 @@ impl Bus {
     /// The timer at an address, and the offset into it.
     fn timer(&mut self, address: u32) -> Option<(&mut Timer, u32)> {
         let mut all = self.timers.iter_mut().zip(self.chip.timers);
-        all.find(|(_, at)| (at.base..at.base + 0x60).contains(&address))
+        all.find(|(_, at)| (at.base..at.base + 0x70).contains(&address))
             .map(|(timer, at)| (timer, address - at.base))
     }
 
@@ -180,6 +281,22 @@ impl Bus {
         (base..base + bytes)
             .contains(&address)
             .then(|| address - base)
+    }
+
+    fn adc_offset(&self, address: u32) -> Option<u32> {
+        let (base, ..) = self.chip.monitors;
+        (base..base + 0x100)
+            .contains(&address)
+            .then(|| address - base)
+    }
+
+    /// Sets what the current monitors of axes 1 to 3 show, A, as 12-bit readings.
+    pub fn set_monitors(&mut self, currents_a: [f64; 3]) {
+        let (_, _, channels) = self.chip.monitors;
+        for (channel, current_a) in channels.into_iter().zip(currents_a) {
+            let code = Commands::Converters([0; 3]).code(current_a, 0);
+            self.adc.levels[channel] = (code + 0.5).clamp(0.0, 4095.0) as u16;
+        }
     }
 
     fn port(&self, address: u32) -> Option<(u32, u32)> {
@@ -194,7 +311,9 @@ impl Bus {
     /// A word that the core reads.
     pub fn read(&mut self, address: u32) -> u32 {
         if let Some((timer, offset)) = self.timer(address) {
-            return timer.get(offset);
+            let value = timer.get(offset);
+            self.begin_stopwatch(address);
+            return value;
         }
         if let Some(offset) = self.usb_offset(address) {
             return self.usb.read(offset);
@@ -202,6 +321,9 @@ impl Bus {
         if let Some((port, IDR)) = self.port(address) {
             let level = |pin| self.inputs.get(&(port, pin)).copied().unwrap_or(false);
             return (0..16).map(|pin| u32::from(level(pin)) << pin).sum();
+        }
+        if let Some(offset) = self.adc_offset(address) {
+            return self.adc.read(offset, self.now_ns);
         }
         match address {
             nvic::BASE..=0xE000_EFFF => self.nvic.read(address - nvic::BASE),
@@ -212,6 +334,7 @@ impl Bus {
                 self.watchdog.read(address - self.chip.watchdog)
             }
             _ if self.is_sent(address) => self.converter.status(self.plain(address)),
+            _ if self.is_back(address) => self.converter.give().into(),
             _ => self.ready(address, self.plain(address)),
         }
     }
@@ -219,6 +342,11 @@ impl Bus {
     /// Whether this is the register that says that a frame is out.
     fn is_sent(&self, address: u32) -> bool {
         matches!(self.chip.commands, Commands::Serial { sent, .. } if sent.0 == address)
+    }
+
+    /// Whether this is the register with what came back from the SPI.
+    fn is_back(&self, address: u32) -> bool {
+        matches!(self.chip.commands, Commands::Serial { back, .. } if back == address)
     }
 
     /// What the hardware adds to a register.
@@ -231,6 +359,10 @@ impl Bus {
         let (status, busy) = self.chip.flash.status;
         if address == status && self.now_ns < self.busy_until_ns {
             value |= busy;
+        }
+        let (status, low) = self.chip.comparator.status;
+        if address == status && self.supply.is_low(&self.chip.comparator, &self.words) {
+            value |= low;
         }
         for (_, bits) in self.chip.set.iter().filter(|(at, _)| *at == address) {
             value |= bits;
@@ -249,6 +381,8 @@ impl Bus {
             timer.write(offset, value, mask);
         } else if let Some(offset) = self.usb_offset(address) {
             self.usb.write(offset, value, mask);
+        } else if let Some(offset) = self.adc_offset(address) {
+            self.adc.write(offset, value, mask, self.now_ns);
         } else if let Some((port, BSRR)) = self.port(address) {
             let odr = self.chip.gpio + 0x400 * port + ODR;
             let level = self.plain(odr) & !(value >> 16) | value & 0xFFFF;
@@ -261,10 +395,32 @@ impl Bus {
         } else {
             self.write_plain(address, value, mask);
         }
+        self.follow_break();
         self.command(address, value, mask);
         let now_enabled = self.output(self.chip.enable);
         if now_enabled != enabled {
             self.effects.push(Effect::Enable(now_enabled));
+        }
+    }
+
+    /// Where this is the first encoder's count, the stopwatch begins.
+    fn begin_stopwatch(&mut self, address: u32) {
+        let [first, ..] = self.chip.encoders;
+        let at = self.chip.timers.iter().find(|timer| timer.name == first);
+        if let Some(stopwatch) = &mut self.stopwatch
+            && at.is_some_and(|timer| timer.base + CNT == address)
+        {
+            stopwatch.began = Some(stopwatch.executed.get());
+        }
+    }
+
+    /// An axis has a new command: with the last one the stopwatch ends.
+    fn reach(&mut self, axis: usize, code: i32) {
+        self.effects.push(Effect::Command(axis, code));
+        if let Some(stopwatch) = self.stopwatch.as_mut().filter(|_| axis == 2)
+            && let Some(began) = stopwatch.began.take()
+        {
+            stopwatch.taken.push(stopwatch.executed.get() - began);
         }
     }
 
@@ -273,16 +429,15 @@ impl Bus {
         match self.chip.commands {
             Commands::Converters(at) | Commands::DutyCycles(at, _) => {
                 if let Some(axis) = at.iter().position(|c| *c == address) {
-                    let command = Effect::Command(axis, (value & mask) as i32);
-                    self.effects.push(command);
+                    self.reach(axis, (value & mask) as i32);
                 }
             }
             Commands::Serial { data, sync, .. } => {
                 if address == data {
                     self.converter.take(value as u8);
                 }
-                if let Some((axis, code)) = self.converter.select(!self.output(sync)) {
-                    self.effects.push(Effect::Command(axis, code));
+                if let Some((axis, code)) = self.converter.select(!self.output(sync), self.now_ns) {
+                    self.reach(axis, code);
                 }
             }
         }
@@ -330,13 +485,29 @@ impl Bus {
         true
     }
 
+    /// The bits of a register that PVDL keeps from being written: the comparator's.
+    fn locked(&self, address: u32) -> u32 {
+        let (control, on, level) = self.chip.comparator.control;
+        let locks = |at: &BreakAt| self.plain(at.system.0) & at.system.1 != 0;
+        match address == control && self.chip.output_break.as_ref().is_some_and(locks) {
+            true => on | 7 << level,
+            false => 0,
+        }
+    }
+
     fn write_plain(&mut self, address: u32, value: u32, mask: u32) {
         if self.clear(address, value & mask) {
             return;
         }
-        let (flags, _, _, clear) = self.chip.reset_flags;
+        if address == self.chip.comparator.exti[2] {
+            // What is set is cleared by writing it.
+            *self.words.entry(address).or_default() &= !(value & mask);
+            return;
+        }
+        let flags = self.chip.reset_flags;
+        let mask = mask & !self.locked(address);
         let mut value = self.plain(address) & !mask | value & mask;
-        if address == flags && value & clear != 0 {
+        if address == flags.register && value & flags.clear != 0 {
             value = 0;
         }
         let (control, start) = self.chip.flash.control;

@@ -1,5 +1,8 @@
 //! Where the two chips keep what the images use.
 
+use crate::shutdown::{BreakAt, Freeze};
+use crate::supply::{Comparator, ResetFlags};
+
 /// A timer at an address, with its kernel clock and, if it is used, interrupt.
 #[derive(Clone, Copy, Debug)]
 pub struct TimerAt {
@@ -43,16 +46,19 @@ pub enum UsbKind {
 /// What commands the amplifiers of axes 1 to 3, and the code of a current.
 #[derive(Clone, Copy, Debug)]
 pub enum Commands {
-    /// Converters on the chip: their data registers, 12 bits, the middle is zero.
+    /// Converters on the chip: their data registers, 12 bits, the middle is zero, and
+    /// 256 and 3840 are the ends of the range.
     Converters([u32; 3]),
     /// Compare registers, and the register with the largest count: 50 % is zero,
-    /// 10 % and 90 % are the ends of the range.
+    /// 15 % and 85 % are the ends of the range.
     DutyCycles([u32; 3], u32),
-    /// A quad converter on SPI in two's complement: the transmit register, the
-    /// status register's end-of-transfer bit, and the pin that frames.
+    /// A quad converter on SPI in two's complement: the transmit and receive registers,
+    /// the status register's end-of-transfer bit, and the pin that frames.
     Serial {
         /// Register that bytes are written to.
         data: u32,
+        /// Register that bytes are read from.
+        back: u32,
         /// Status register and the bit that says that a frame is out.
         sent: (u32, u32),
         /// Low during a frame: port and number.
@@ -131,9 +137,19 @@ pub struct Chip {
     pub gpio: u32,
     /// The watchdog.
     pub watchdog: u32,
-    /// Register with the reset flags, the flag of a power-up, the watchdog's,
-    /// and the bit that clears them all.
-    pub reset_flags: (u32, u32, u32, u32),
+    /// The reset flags.
+    pub reset_flags: ResetFlags,
+    /// The comparator that watches the supply.
+    pub comparator: Comparator,
+    /// Register with the brown-out level of the option bytes, the field's first bit, and
+    /// the highest level.
+    pub brown_out_level: (u32, u32, u32),
+    /// Register and bit that switch an external clock on.
+    pub external_clock: (u32, u32),
+    /// What a halted core stops.
+    pub freeze: Freeze,
+    /// The outputs' break.
+    pub output_break: Option<BreakAt>,
     /// Ready bits.
     pub follows: &'static [Follows],
     /// Registers that read these bits as set, whatever was written.
@@ -152,6 +168,15 @@ pub struct Chip {
     pub emergency_stop: (u32, u32),
     /// Closed to ground while held.
     pub dead_man: (u32, u32),
+    /// Changes in each tick that leaves the amplifiers on.
+    pub heartbeat: (u32, u32),
+    /// Low while an amplifier is ready, axes 1 to 3.
+    pub ready: [(u32, u32); 3],
+    /// Closed to ground where the current monitors are wired.
+    pub monitors_fitted: (u32, u32),
+    /// The converter that reads the current monitors: its address, its bits, and the
+    /// channels of axes 1 to 3.
+    pub monitors: (u32, u32, [usize; 3]),
     /// The flash with the calibrations.
     pub flash: Flash,
     /// Where the commands of axes 1 to 3 are.
@@ -170,10 +195,17 @@ const fn follows(address: u32, of: u32, ready: u32) -> Follows {
     Follows { address, of, ready }
 }
 
+/// Each of four causes of a reset, with the pin's flag.
+const fn with_pin([a, b, c, d]: [u32; 4], pin: u32) -> [u32; 4] {
+    [a | pin, b | pin, c | pin, d | pin]
+}
+
 const B: u32 = 1;
 const C: u32 = 2;
+const D: u32 = 3;
 const E: u32 = 4;
 const F: u32 = 5;
+const G: u32 = 6;
 const KIB: u32 = 1024;
 
 /// STM32G474RE on the NUCLEO-G474RE (RM0440).
@@ -200,11 +232,33 @@ pub static G474: Chip = Chip {
     encoders: ["TIM2", "TIM3", "TIM4"],
     gpio: 0x4800_0000,
     watchdog: 0x4000_3000,
-    reset_flags: (0x4002_1094, 1 << 27, 1 << 29, 1 << 23),
+    // RCC_CSR: BORRSTF (a power-up's, too), IWDGRSTF, SFTRSTF; PINRSTF with each; RMVF.
+    reset_flags: ResetFlags {
+        register: 0x4002_1094,
+        of: with_pin([1 << 27, 1 << 29, 1 << 28, 1 << 27], 1 << 26),
+        clear: 1 << 23,
+    },
+    // PWR_CR2.PVDE, PLS; PWR_SR2.PVDO; EXTI_RTSR1, IMR1, PR1.
+    comparator: Comparator {
+        control: (0x4000_7004, 1 << 0, 1),
+        status: (0x4000_7014, 1 << 11),
+        exti: [0x4001_0408, 0x4001_0400, 0x4001_0414],
+        levels_mv: [2_000, 2_200, 2_400, 2_500, 2_600, 2_800, 2_900],
+        interrupt: 1,
+    },
+    // FLASH_OPTR.BOR_LEV.
+    brown_out_level: (0x4002_2020, 8, 4),
+    // RCC_CR.HSEON.
+    external_clock: (0x4002_1000, 1 << 16),
+    // DBGMCU_APB1FZR1.DBG_IWDG_STOP.
+    freeze: Freeze {
+        watchdog: (0xE004_2008, 1 << 12),
+        outputs: None,
+    },
+    output_break: None,
     follows: &[
-        // RCC_CR: HSI, HSE, PLL.
+        // RCC_CR: HSI, PLL. Nothing is on the pins of an external clock.
         follows(0x4002_1000, 1 << 8, 1 << 10),
-        follows(0x4002_1000, 1 << 16, 1 << 17),
         follows(0x4002_1000, 1 << 24, 1 << 25),
         // RCC_CRRCR: HSI48; RCC_CSR: LSI.
         follows(0x4002_1098, 1 << 0, 1 << 1),
@@ -223,6 +277,11 @@ pub static G474: Chip = Chip {
     enable: (B, 0),
     emergency_stop: (C, 0),
     dead_man: (C, 1),
+    heartbeat: (D, 2),
+    ready: [(C, 10), (C, 11), (C, 12)],
+    monitors_fitted: (C, 8),
+    // ADC1: PC2, PC3, PB1.
+    monitors: (0x5000_0000, 12, [8, 9, 12]),
     // FLASH_CR: PNB, BKER, STRT; FLASH_SR.BSY. Pages of 2 KiB.
     flash: Flash {
         control: (0x4002_2014, 1 << 16),
@@ -270,13 +329,40 @@ pub static H743: Chip = Chip {
     encoders: ["TIM8", "TIM3", "TIM4"],
     gpio: 0x5802_0000,
     watchdog: 0x5800_4800,
-    reset_flags: (0x5802_44D0, 1 << 23, 1 << 26, 1 << 16),
+    // RCC_RSR: PORRSTF and BORRSTF, IWDG1RSTF, SFTRSTF, BORRSTF; PINRSTF with each; RMVF.
+    reset_flags: ResetFlags {
+        register: 0x5802_44D0,
+        of: with_pin([1 << 23 | 1 << 21, 1 << 26, 1 << 24, 1 << 21], 1 << 22),
+        clear: 1 << 16,
+    },
+    // PWR_CR1.PVDE, PLS; PWR_CSR1.PVDO; EXTI_RTSR1, CPUIMR1, CPUPR1.
+    comparator: Comparator {
+        control: (0x5802_4800, 1 << 4, 5),
+        status: (0x5802_4804, 1 << 4),
+        exti: [0x5800_0000, 0x5800_0080, 0x5800_0088],
+        levels_mv: [1_950, 2_100, 2_250, 2_400, 2_550, 2_700, 2_850],
+        interrupt: 1,
+    },
+    // FLASH_OPTSR_CUR.BOR_LEV.
+    brown_out_level: (0x5200_201C, 2, 3),
+    // RCC_CR.HSEON.
+    external_clock: (0x5802_4400, 1 << 16),
+    // DBGMCU_APB4FZ1.DBG_IWDG1, APB2FZ1.DBG_TIM1.
+    freeze: Freeze {
+        watchdog: (0x5C00_1054, 1 << 18),
+        outputs: Some((0x5C00_104C, 1 << 0)),
+    },
+    // SYSCFG_CFGR: PVDL, CM7L.
+    output_break: Some(BreakAt {
+        timer: "TIM1",
+        pin: (E, 15, 1),
+        system: (0x5800_0418, 1 << 2, 1 << 6),
+    }),
     follows: &[
-        // RCC_CR: HSI, CSI, HSI48, HSE, the PLLs.
+        // RCC_CR: HSI, CSI, HSI48, the PLLs. Nothing is on the pins of an external clock.
         follows(0x5802_4400, 1 << 0, 1 << 2),
         follows(0x5802_4400, 1 << 7, 1 << 8),
         follows(0x5802_4400, 1 << 12, 1 << 13),
-        follows(0x5802_4400, 1 << 16, 1 << 17),
         follows(0x5802_4400, 1 << 24, 1 << 25),
         follows(0x5802_4400, 1 << 26, 1 << 27),
         follows(0x5802_4400, 1 << 28, 1 << 29),
@@ -299,8 +385,13 @@ pub static H743: Chip = Chip {
     usb_interrupt: 101,
     tick_interrupt: 55,
     enable: (F, 3),
-    emergency_stop: (F, 4),
+    emergency_stop: (E, 15),
     dead_man: (F, 5),
+    heartbeat: (G, 1),
+    ready: [(F, 12), (F, 13), (F, 14)],
+    monitors_fitted: (F, 15),
+    // ADC1: PA3, PC0, PB1.
+    monitors: (0x4002_2000, 16, [15, 10, 5]),
     // FLASH_CR2: SNB, START; FLASH_SR2: BSY, QW. Sectors of 128 KiB.
     flash: Flash {
         control: (0x5200_210C, 1 << 7),
@@ -326,8 +417,10 @@ pub static H743: Chip = Chip {
 pub static H743_SPI: Chip = Chip {
     board: "nucleo-h743zi2-spi",
     variable: "HAPTERRA_H743_SPI_ELF",
+    output_break: None,
     commands: Commands::Serial {
         data: 0x4001_3420,
+        back: 0x4001_3430,
         sent: (0x4001_3414, 1 << 3),
         sync: (E, 11),
     },
@@ -344,8 +437,8 @@ impl Commands {
     pub fn code(&self, current_a: f64, largest: u32) -> f64 {
         let fraction = current_a / FULL_SCALE_A;
         match self {
-            Self::Converters(_) => 2047.5 + 2047.5 * fraction,
-            Self::DutyCycles(..) => f64::from(largest + 1) * (0.5 + 0.4 * fraction),
+            Self::Converters(_) => 2048.0 + 1792.0 * fraction,
+            Self::DutyCycles(..) => f64::from(largest + 1) * (0.5 + 0.35 * fraction),
             Self::Serial { .. } => 32_768.0 * fraction,
         }
     }

@@ -1,9 +1,21 @@
-//! A quad converter on SPI, as the data sheet of the AD5754R describes it.
+//! A quad converter on SPI, as the data sheet of the AD5754R describes it, and the wires
+//! to it.
+//!
+//! Its timing is the data sheet's (rev. G, table 4): SYNC has to be high for 100 ns after a
+//! frame that writes and for 200 ns after one that reads; a frame that comes sooner is
+//! lost. The outputs take 10 µs to power up, and a code that is written meanwhile is lost,
+//! too. What a frame asks to read comes back during the frame after it.
+//!
+//! The emulated core's time moves on every 200 instructions (1.6 µs): two frames with less
+//! between them have nothing between them here. Code that looks at the cycle counter sees
+//! time pass.
 
 /// Registers, as a frame's first byte has them.
 const DATA: u8 = 0b000;
 const RANGE: u8 = 0b001;
 const POWER: u8 = 0b010;
+/// Asks for a register instead of writing it.
+const READ: u8 = 1 << 7;
 /// The channel that stands for all.
 const ALL: u8 = 0b100;
 /// ±10 V.
@@ -12,17 +24,37 @@ const BIPOLAR_10_V: u16 = 0b100;
 const EOT: u32 = 1 << 3;
 /// Bytes of a frame.
 const FRAME: usize = 3;
+/// How long SYNC has to be high after a frame that writes and after one that reads, ns.
+const HIGH_AFTER_WRITE_NS: u64 = 100;
+const HIGH_AFTER_READ_NS: u64 = 200;
+/// How long the outputs take to power up, ns.
+const POWER_UP_NS: u64 = 10_000;
 
 /// The converter, and the wires to it.
 #[derive(Debug, Default)]
 pub struct Converter {
-    codes: [i32; 4],
-    bipolar: bool,
+    codes: [u16; 4],
+    ranges: [u16; 4],
     powered: u16,
+    /// Since when the outputs have power, ns.
+    powered_ns: u64,
     is_selected: bool,
+    /// When SYNC rose, ns, and whether the frame before it asked for a register.
+    rose: Option<(u64, bool)>,
+    /// SYNC fell too soon: the frame is lost.
+    is_lost: bool,
     frame: Vec<u8>,
+    /// What the last frame asked for.
+    asked: u16,
+    /// Bytes that came back and were not read yet.
+    back: Vec<u8>,
     /// Whether the SPI's clock has failed: frames do not go out.
     pub is_cut: bool,
+    /// Whether the wire back is broken: ones are read, by the pull-up.
+    pub is_silent: bool,
+    /// Frames that were lost because SYNC was high for too short a time, or because the
+    /// outputs were not powered up yet.
+    pub lost: u32,
 }
 
 impl Converter {
@@ -30,9 +62,17 @@ impl Converter {
     /// their range.
     #[must_use]
     pub fn codes(&self) -> [i32; 3] {
-        let [a, b, c, _] = self.codes;
-        let on = self.bipolar && self.powered & 0b1_0111 == 0b1_0111;
+        let [a, b, c, _] = self.codes.map(|code| i32::from(code.cast_signed()));
+        let in_range = self.ranges[..3].iter().all(|range| *range == BIPOLAR_10_V);
+        let on = in_range && self.powered & 0b1_0111 == 0b1_0111;
         if on { [a, b, c] } else { [0; 3] }
+    }
+
+    /// The supply goes and comes back: all registers are as after power-up.
+    pub fn forget(&mut self) {
+        self.codes = [0; 4];
+        self.ranges = [0; 4];
+        self.powered = 0;
     }
 
     /// The SPI's status.
@@ -42,40 +82,137 @@ impl Converter {
         others | if sent { EOT } else { 0 }
     }
 
-    /// A byte is clocked out.
+    /// A byte is clocked out, and one comes back.
     pub fn take(&mut self, byte: u8) {
+        let [high, low] = self.asked.to_be_bytes();
+        let back = [0, high, low].get(self.frame.len()).copied();
+        let back = back.filter(|_| !self.is_silent && !self.is_lost);
+        self.back.push(back.unwrap_or(u8::MAX));
         self.frame.push(byte);
+    }
+
+    /// A byte that came back, the first first.
+    pub fn give(&mut self) -> u8 {
+        match self.back.is_empty() {
+            true => 0,
+            false => self.back.remove(0),
+        }
     }
 
     /// The level of SYNC: a frame takes effect when it rises. Gives the channel
     /// (0 to 2) that has a new code.
-    pub fn select(&mut self, is_selected: bool) -> Option<(usize, i32)> {
+    pub fn select(&mut self, is_selected: bool, now_ns: u64) -> Option<(usize, i32)> {
         let falls = is_selected && !self.is_selected;
         let rises = !is_selected && self.is_selected;
         self.is_selected = is_selected;
         if falls {
             self.frame.clear();
+            self.back.clear();
+            self.is_lost = self.rose.is_some_and(|(rose_ns, asked)| {
+                let least = match asked {
+                    true => HIGH_AFTER_READ_NS,
+                    false => HIGH_AFTER_WRITE_NS,
+                };
+                now_ns - rose_ns < least
+            });
+            self.lost += u32::from(self.is_lost);
         }
+        if !rises {
+            return None;
+        }
+        let asks = self.frame.first().is_some_and(|head| head & READ != 0);
+        self.rose = Some((now_ns, asks));
         match self.frame[..] {
-            [head, high, low] if rises && !self.is_cut => {
-                self.execute(head >> 3, head & 7, u16::from_be_bytes([high, low]))
+            [head, high, low] if !self.is_cut && !self.is_lost => {
+                self.asked = 0;
+                self.execute(head, u16::from_be_bytes([high, low]), now_ns)
             }
             _ => None,
         }
     }
 
-    fn execute(&mut self, register: u8, channel: u8, value: u16) -> Option<(usize, i32)> {
-        let code = i32::from(value.cast_signed());
-        match (register, usize::from(channel)) {
-            (DATA, _) if channel == ALL => self.codes = [code; 4],
-            (DATA, channel) => {
-                *self.codes.get_mut(channel)? = code;
-                return (channel < 3).then_some((channel, code));
+    fn execute(&mut self, head: u8, value: u16, now_ns: u64) -> Option<(usize, i32)> {
+        let (register, channel) = (head >> 3 & 7, head & 7);
+        let at = usize::from(channel);
+        match (head & READ != 0, register) {
+            (true, DATA) => self.asked = *self.codes.get(at)?,
+            (true, RANGE) => self.asked = *self.ranges.get(at)?,
+            (true, POWER) if at == 0 => self.asked = self.powered,
+            (false, DATA) if channel == ALL => self.codes = [value; 4],
+            (false, DATA) => return self.output(at, value, now_ns),
+            (false, RANGE) if channel == ALL => self.ranges = [value & 7; 4],
+            (false, RANGE) => *self.ranges.get_mut(at)? = value & 7,
+            (false, POWER) if at == 0 => {
+                if self.powered != value {
+                    self.powered_ns = now_ns;
+                }
+                self.powered = value;
             }
-            (RANGE, _) => self.bipolar = channel == ALL && value == BIPOLAR_10_V,
-            (POWER, 0) => self.powered = value,
-            _ => panic!("no such register: {register} {channel}"),
+            // The control register: no operation.
+            (false, 0b011) => {}
+            _ => panic!("no such register: {head:#x}"),
         }
         None
+    }
+
+    fn output(&mut self, channel: usize, value: u16, now_ns: u64) -> Option<(usize, i32)> {
+        if self.powered != 0 && now_ns - self.powered_ns < POWER_UP_NS {
+            self.lost += 1;
+            return None;
+        }
+        *self.codes.get_mut(channel)? = value;
+        (channel < 3).then_some((channel, i32::from(value.cast_signed())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sends a frame that begins at a time and returns what came back.
+    fn send(converter: &mut Converter, frame: [u8; 3], at_ns: u64) -> u16 {
+        converter.select(true, at_ns);
+        frame.iter().for_each(|byte| converter.take(*byte));
+        converter.select(false, at_ns + 3_200);
+        let [_, high, low] = [(); 3].map(|()| converter.give());
+        u16::from_be_bytes([high, low])
+    }
+
+    fn set_up() -> Converter {
+        let mut converter = Converter::default();
+        send(&mut converter, [0x0C, 0, 4], 0);
+        send(&mut converter, [0x10, 0, 0x17], 10_000);
+        converter
+    }
+
+    #[test]
+    fn a_frame_that_comes_too_soon_is_lost() {
+        let mut converter = set_up();
+        send(&mut converter, [0, 1, 2], 50_000);
+        assert_eq!(converter.codes()[0], 0x0102);
+        send(&mut converter, [0, 3, 4], 53_200 + 99);
+        assert_eq!((converter.codes()[0], converter.lost), (0x0102, 1));
+        send(&mut converter, [0x88, 0, 0], 60_000);
+        send(&mut converter, [0, 5, 6], 63_200 + 199);
+        assert_eq!((converter.codes()[0], converter.lost), (0x0102, 2));
+        send(&mut converter, [0, 7, 8], 66_600 + 100);
+        assert_eq!((converter.codes()[0], converter.lost), (0x0708, 2));
+    }
+
+    #[test]
+    fn a_code_before_the_outputs_have_powered_up_is_lost() {
+        let mut converter = set_up();
+        send(&mut converter, [0, 1, 2], 14_000);
+        assert_eq!((converter.codes()[0], converter.lost), (0, 1));
+        send(&mut converter, [0, 1, 2], 24_000);
+        assert_eq!(converter.codes()[0], 0x0102);
+    }
+
+    #[test]
+    fn what_is_asked_for_comes_with_the_next_frame() {
+        let mut converter = set_up();
+        assert_eq!(send(&mut converter, [0x8A, 0, 0], 50_000), 0);
+        assert_eq!(send(&mut converter, [0x90, 0, 0], 60_000), 4);
+        assert_eq!(send(&mut converter, [0x18, 0, 0], 70_000), 0x17);
     }
 }

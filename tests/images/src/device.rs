@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use hapterra::link::{Bulk, BulkEndpoints, Event, Patience, Session};
+use hapterra::link::{Ask, Bulk, BulkEndpoints, Event, Patience, Session, Transport};
 use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
 use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
@@ -13,8 +13,8 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Mode, Report};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Sample, Scene, Source};
-use hapterra_core::wire::message::ToDevice;
-use hapterra_core::wire::status::{Answer, Status};
+use hapterra_core::wire::request::{Refusal, Request};
+use hapterra_core::wire::status::Status;
 use hapterra_tests::usb::host::{Found, ScriptedPipes, enumerate};
 
 use nusb::descriptors::ConfigurationDescriptor;
@@ -22,6 +22,7 @@ use nusb::descriptors::ConfigurationDescriptor;
 use crate::chip::{CHIPS, Chip};
 use crate::elf::Image;
 use crate::machine::Machine;
+use crate::supply::Reset;
 
 /// Counts that the arm moves in a tick: a third of a metre a second.
 const COUNTS_PER_TICK: i32 = 12;
@@ -74,6 +75,7 @@ pub struct Device<'t> {
     /// The board.
     pub machine: Rc<RefCell<Machine>>,
     session: Session<'t>,
+    endpoints: BulkEndpoints,
     /// Where the encoders are.
     pub counts: [i32; 3],
     /// The latest sample.
@@ -82,8 +84,8 @@ pub struct Device<'t> {
     pub guard: Option<Report>,
     /// The latest status.
     pub status: Option<Status>,
-    /// The latest answer.
-    pub answer: Option<Answer>,
+    /// What came of the latest request that was answered.
+    pub answer: Option<(Request, Result<(), Refusal>)>,
 }
 
 impl<'t> Device<'t> {
@@ -96,7 +98,8 @@ impl<'t> Device<'t> {
     pub fn open(mut machine: Machine, terrain: &'t Terrain<'t>, scene: Scene) -> Self {
         let found = enumerate(&mut machine).expect("enumerated");
         let machine = Rc::new(RefCell::new(machine));
-        let pipes = ScriptedPipes::new(Rc::clone(&machine), endpoints(&found));
+        let endpoints = endpoints(&found);
+        let pipes = ScriptedPipes::new(Rc::clone(&machine), endpoints);
         let link = Box::new(Bulk(pipes));
         // No verdict depends on how fast this machine is.
         let (session, _) =
@@ -104,6 +107,7 @@ impl<'t> Device<'t> {
         let mut device = Self {
             machine,
             session,
+            endpoints,
             counts: [0; 3],
             latest: None,
             guard: None,
@@ -124,13 +128,12 @@ impl<'t> Device<'t> {
     pub fn arm(machine: Machine, terrain: &'t Terrain<'t>, scene: Scene) -> Self {
         let mut device = Self::open(machine, terrain, scene);
         let calibration = Calibration::PREMIUM_1_5;
-        device.say(&ToDevice::SetCalibration {
-            calibration,
-            store: false,
-        });
+        device.request(Request::SetCalibration { calibration });
         device.run_ms(10);
-        device.say(&ToDevice::Zero { counts: [0; 3] });
-        device.say(&ToDevice::Arm);
+        // The board may have found one when it started.
+        device.request(Request::ClearFault);
+        device.request(Request::Zero { counts: [0; 3] });
+        device.request(Request::Arm);
         device.run_ms(30);
         let pin = device.machine.borrow().chip.dead_man;
         device.machine.borrow_mut().set_input(pin, false);
@@ -161,13 +164,22 @@ impl<'t> Device<'t> {
     /// When somebody else holds the machine.
     #[must_use]
     pub fn reset(self) -> Machine {
+        self.reset_by(Reset::Watchdog)
+    }
+
+    /// Pulls the cable and resets the chip. Memory keeps what it holds.
+    ///
+    /// # Panics
+    /// When somebody else holds the machine.
+    #[must_use]
+    pub fn reset_by(self, cause: Reset) -> Machine {
         let Self {
             machine, session, ..
         } = self;
         drop(session);
         let machine = Rc::try_unwrap(machine).ok().expect("nobody else has it");
         let mut machine = machine.into_inner();
-        machine.reset(true);
+        machine.reset(cause);
         machine
     }
 
@@ -177,17 +189,23 @@ impl<'t> Device<'t> {
     /// When there is no answer.
     pub fn ask_status(&mut self) -> Status {
         self.status = None;
-        self.say(&ToDevice::Status);
+        self.session.ask(Ask::Status);
         self.run_ms(150);
         self.status.clone().expect("an answer")
     }
 
-    /// Sends a message.
+    /// Asks for something to be done.
+    pub fn request(&mut self, request: Request) {
+        self.session.request(request);
+    }
+
+    /// Sends bytes that are none of the session's.
     ///
     /// # Panics
-    /// When the link breaks.
-    pub fn say(&mut self, message: &ToDevice<'_>) {
-        self.session.say(message).expect("sent");
+    /// When the board does not take them.
+    pub fn send(&mut self, bytes: &[u8]) {
+        let pipes = ScriptedPipes::new(Rc::clone(&self.machine), self.endpoints);
+        Bulk(pipes).send(bytes).expect("taken");
     }
 
     /// Lets time pass, the host answering.
@@ -201,7 +219,7 @@ impl<'t> Device<'t> {
                 Event::Sample(sample) => self.latest = Some(*sample),
                 Event::Guard(report) => self.guard = Some(*report),
                 Event::Status(status) => self.status = Some(status.clone()),
-                Event::Answer(answer) => self.answer = Some(*answer),
+                Event::Answered { request, result } => self.answer = Some((*request, result)),
                 _ => {}
             };
             self.session

@@ -114,7 +114,7 @@ impl Image {
     /// The function that the link calls for every message it sends.
     #[must_use]
     pub fn message_encoder(&self) -> Function {
-        self.function_like(&["wire", "frame", "encode"])
+        self.function_like(&["link", "tx_queue", "in_session"])
     }
 
     /// A function of core's that panics and takes only a source location.

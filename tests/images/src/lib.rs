@@ -11,12 +11,13 @@
 //! [`machine::Machine`] is the core with its exceptions; [`bus::Bus`] what it
 //! finds at its peripherals' addresses. Only what the images use is modelled,
 //! as the chips' reference manuals (RM0440, RM0433) and the architecture's
-//! (ARM DDI 0403E) describe it. A register that nothing models reads back what
+//! (ARM DDI 0403E) describe it; each module names its registers. A register that nothing models reads back what
 //! was written last.
 //!
 //! What this shows is what the instructions of the image do. What it cannot
 //! show is electrical, or a fault of the silicon or of these models.
 
+pub mod adc;
 pub mod bus;
 pub mod chip;
 pub mod converter;
@@ -24,6 +25,9 @@ pub mod device;
 pub mod elf;
 pub mod machine;
 pub mod nvic;
+pub mod quadrature;
+pub mod shutdown;
+pub mod supply;
 pub mod timer;
 pub mod usb;
 pub mod watchdog;

@@ -9,6 +9,11 @@ const ICER: u32 = 0x180;
 const ISPR: u32 = 0x200;
 const ICPR: u32 = 0x280;
 const IPR: u32 = 0x400;
+/// Application interrupt and reset control: the key in its upper half, and the bit that
+/// resets the chip.
+const AIRCR: u32 = 0xD0C;
+const KEY: u32 = 0x05FA;
+const SYSRESETREQ: u32 = 1 << 2;
 /// Most interrupts there can be.
 const INTERRUPTS: usize = 240;
 
@@ -18,6 +23,8 @@ pub struct Nvic {
     pending: [bool; INTERRUPTS],
     priority: [u8; INTERRUPTS],
     other: HashMap<u32, u32>,
+    /// The program has asked for a reset.
+    pub asks_for_reset: bool,
 }
 
 impl Default for Nvic {
@@ -27,6 +34,7 @@ impl Default for Nvic {
             pending: [false; INTERRUPTS],
             priority: [0; INTERRUPTS],
             other: HashMap::new(),
+            asks_for_reset: false,
         }
     }
 }
@@ -75,6 +83,7 @@ impl Nvic {
                     }
                 }
             }
+            AIRCR => self.asks_for_reset |= value >> 16 == KEY && value & SYSRESETREQ != 0,
             _ => {
                 let word = self.other.entry(offset).or_default();
                 *word = *word & !mask | value & mask;

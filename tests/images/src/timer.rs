@@ -1,14 +1,20 @@
 //! A timer of the chips: counting up, moved by an encoder, or standing still.
 
+use crate::quadrature::{Filter, count};
+
 const CR1: u32 = 0x00;
 const SMCR: u32 = 0x08;
 const DIER: u32 = 0x0C;
 const SR: u32 = 0x10;
 const EGR: u32 = 0x14;
-const CNT: u32 = 0x24;
+const CCMR1: u32 = 0x18;
+/// The counter.
+pub const CNT: u32 = 0x24;
 const PSC: u32 = 0x28;
 /// The auto-reload register: it counts from 0 to this.
 pub const ARR: u32 = 0x2C;
+/// Alternate functions: the break's pin is one of its sources after a reset.
+const AF1: u32 = 0x60;
 /// The first of four compare registers.
 pub const CCR1: u32 = 0x34;
 
@@ -21,7 +27,7 @@ const UIF: u32 = 1 << 0;
 /// One timer.
 pub struct Timer {
     hz: u64,
-    registers: [u32; 24],
+    registers: [u32; 28],
     now_ns: u64,
     /// What is left of the last count, in billionths of a clock.
     carry: u64,
@@ -33,11 +39,12 @@ impl Timer {
     pub fn new(hz: u64) -> Self {
         let mut timer = Self {
             hz,
-            registers: [0; 24],
+            registers: [0; 28],
             now_ns: 0,
             carry: 0,
         };
         timer.set(ARR, 0xFFFF);
+        timer.set(AF1, 1);
         timer
     }
 
@@ -47,7 +54,7 @@ impl Timer {
         self.registers.get((offset / 4) as usize).map_or(0, |r| *r)
     }
 
-    fn set(&mut self, offset: u32, value: u32) {
+    pub(crate) fn set(&mut self, offset: u32, value: u32) {
         if let Some(register) = self.registers.get_mut((offset / 4) as usize) {
             *register = value;
         }
@@ -56,6 +63,22 @@ impl Timer {
     /// Sets the count, as an encoder does.
     pub fn feed(&mut self, count: u16) {
         self.set(CNT, count.into());
+    }
+
+    /// Lets an encoder play its two channels at the inputs, through their filters, and
+    /// returns how far it has counted: nothing where it does not follow an encoder on
+    /// both channels' edges.
+    pub fn play(&mut self, ms: u64, levels: impl FnMut(f64) -> [bool; 2]) -> i32 {
+        if self.get(SMCR) & 7 != 3 || self.get(CR1) & CEN == 0 {
+            return 0;
+        }
+        let (divided, filters) = (self.get(CR1) >> 8 & 3, self.get(CCMR1));
+        let filters = [4, 12].map(|at| Filter::of(filters >> at & 0xF, divided));
+        let counted = count(filters, self.hz, ms, levels);
+        let round = i64::from(self.get(ARR)) + 1;
+        let now = (i64::from(self.get(CNT)) + i64::from(counted)).rem_euclid(round);
+        self.set(CNT, now as u32);
+        counted
     }
 
     /// A write of the core's.

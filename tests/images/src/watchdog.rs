@@ -39,6 +39,11 @@ impl Watchdog {
         }
     }
 
+    /// It does not count for a while.
+    pub fn stand_still(&mut self, ns: u64) {
+        self.fed_ns += ns;
+    }
+
     /// The longest time between two feedings, ns.
     #[must_use]
     pub fn timeout_ns(&self) -> u64 {

@@ -5,14 +5,13 @@ use hapterra::terrain::Terrain;
 use hapterra_core::guard::Fault;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::Scene;
-use hapterra_core::wire::message::ToDevice;
-use hapterra_core::wire::status::{
-    CalibrationSource, CrashKind, Refusal, Request, ResetCause, Status,
-};
+use hapterra_core::wire::request::{Refusal, Request};
+use hapterra_core::wire::status::{CalibrationSource, CrashKind, ResetCause, Status};
 use hapterra_firmware::store::PLACE;
 use hapterra_image_tests::device::{Device, on_each_board, rough_ground};
 use hapterra_image_tests::elf::Function;
 use hapterra_image_tests::machine::{Machine, Stop};
+use hapterra_image_tests::supply::Reset;
 use hapterra_tests::usb::Port;
 
 /// Does something with every board, over rough ground.
@@ -21,22 +20,22 @@ fn on_each(then: impl FnMut(Machine, &Terrain<'_>, Scene)) {
     on_each_board(&raster, home_mm, then);
 }
 
-/// Opens a board, lets something be done to it, and asks it after the reset.
-fn after_reset(mut disturb: impl FnMut(&mut Device<'_>)) -> Vec<(Machine, Status)> {
+/// Opens a board, lets something be done to it, and asks it after a reset of that kind.
+fn after_reset(cause: Reset, mut disturb: impl FnMut(&mut Device<'_>)) -> Vec<(Machine, Status)> {
     let mut all = vec![];
     on_each(|machine, terrain, scene| {
         let mut device = Device::open(machine, terrain, scene);
         disturb(&mut device);
-        let mut again = Device::open(device.reset(), terrain, scene);
+        let mut again = Device::open(device.reset_by(cause), terrain, scene);
         let status = again.ask_status();
         all.push((again.reset(), status));
     });
     all
 }
 
-/// Breaks what the link calls, runs, the host reading, until the watchdog has_expired,
-/// and puts the code back.
-fn run_until_watchdog(device: &Device<'_>, break_it: impl FnOnce(&mut Machine, Function)) {
+/// Breaks what the link calls, runs, the host reading, until that has reset the chip in
+/// the way that is named, and puts the code back.
+fn run_until_reset(device: &Device<'_>, by: Stop, break_it: impl FnOnce(&mut Machine, Function)) {
     let mut machine = device.machine.borrow_mut();
     let at = machine.image.message_encoder();
     break_it(&mut machine, at);
@@ -44,20 +43,20 @@ fn run_until_watchdog(device: &Device<'_>, break_it: impl FnOnce(&mut Machine, F
         let _ = m.take_in(1);
         false
     });
-    assert_eq!(stop, Stop::Watchdog);
+    assert_eq!(stop, by);
     machine.restore(at);
 }
 
 #[test]
 fn a_panic_is_told_after_the_reset_with_its_place() {
-    let told = after_reset(|device| {
-        run_until_watchdog(device, |machine, at| {
+    let told = after_reset(Reset::Software, |device| {
+        run_until_reset(device, Stop::Software, |machine, at| {
             machine.call_instead(at, machine.image.panicking());
         });
     });
     for (machine, status) in told {
         let board = machine.chip.board;
-        assert_eq!(status.boot.cause, ResetCause::Watchdog, "{board}");
+        assert_eq!(status.boot.cause, ResetCause::Software, "{board}");
         let crash = status.boot.crash.expect("a crash");
         assert_eq!(crash.kind, CrashKind::Panic, "{board}");
         assert_eq!((crash.file.as_str(), crash.line), ("made/by/a/test.rs", 7));
@@ -68,8 +67,8 @@ fn a_panic_is_told_after_the_reset_with_its_place() {
 
 #[test]
 fn a_hard_fault_is_told_after_the_reset_with_its_address() {
-    let told = after_reset(|device| {
-        run_until_watchdog(device, |machine, at| {
+    let told = after_reset(Reset::Software, |device| {
+        run_until_reset(device, Stop::Software, |machine, at| {
             machine.patch(at.address, &[0x00, 0xDE]);
         });
     });
@@ -91,8 +90,8 @@ fn a_hard_fault_is_told_after_the_reset_with_its_address() {
 
 #[test]
 fn a_reset_by_the_watchdog_alone_is_told_and_a_crash_only_once() {
-    let told = after_reset(|device| {
-        run_until_watchdog(device, |machine, at| {
+    let told = after_reset(Reset::Watchdog, |device| {
+        run_until_reset(device, Stop::Watchdog, |machine, at| {
             machine.patch(at.address, &[0xFE, 0xE7]);
         });
     });
@@ -107,16 +106,11 @@ fn a_reset_by_the_watchdog_alone_is_told_and_a_crash_only_once() {
 
 #[test]
 fn a_stored_calibration_is_there_after_the_reset() {
-    let told = after_reset(|device| {
+    let told = after_reset(Reset::Watchdog, |device| {
         let before = device.ask_status();
         assert_eq!(before.boot.cause, ResetCause::PowerOn);
         assert_eq!(before.calibration, CalibrationSource::None);
-        let calibration = Calibration::PREMIUM_1_5;
-        device.say(&ToDevice::SetCalibration {
-            calibration,
-            store: true,
-        });
-        device.run_ms(100);
+        assert_eq!(store(device), Ok(()));
     });
     for (machine, status) in told {
         let board = machine.chip.board;
@@ -129,17 +123,20 @@ fn a_stored_calibration_is_there_after_the_reset() {
     }
 }
 
-/// Stores a calibration and gives the answer.
+/// Stores a calibration, with the press of the dead-man switch that it takes, and gives
+/// the answer.
 fn store(device: &mut Device<'_>) -> Result<(), Refusal> {
     let calibration = Calibration::PREMIUM_1_5;
-    device.say(&ToDevice::SetCalibration {
-        calibration,
-        store: true,
-    });
-    device.run_ms(100);
-    let answer = device.answer.take().expect("an answer");
-    assert_eq!(answer.request, Request::StoreCalibration);
-    answer.result
+    device.request(Request::SetCalibration { calibration });
+    device.request(Request::StoreCalibration);
+    let pin = device.machine.borrow().chip.dead_man;
+    for is_open in [true, false, true] {
+        device.machine.borrow_mut().set_input(pin, is_open);
+        device.run_ms(150);
+    }
+    let (request, result) = device.answer.take().expect("an answer");
+    assert_eq!(request, Request::StoreCalibration);
+    result
 }
 
 #[test]
@@ -241,7 +238,7 @@ fn a_word_of_the_program_that_cannot_be_read_stops_it() {
             let _ = m.take_in(1);
             false
         });
-        assert_eq!(stop, Stop::Watchdog, "{board}");
+        assert_eq!(stop, Stop::Software, "{board}");
         let met = |vector| machine.taken.contains(&vector);
         assert!(met(NMI) || met(BUS_FAULT), "{board}: it was not read");
     });

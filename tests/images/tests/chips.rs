@@ -75,21 +75,20 @@ fn every_segment_lies_in_the_chips_memory() {
 }
 
 #[test]
-fn the_stack_lies_in_ram_and_above_what_is_static() {
+fn the_stack_lies_at_the_beginning_of_a_ram_and_nothing_static_below_it() {
     for machine in machines() {
         let (chip, target) = (machine.chip, target(&machine));
         let top = machine.word(chip.memories[0].0);
-        // 8 KiB at least; how much is really used is measured elsewhere.
-        assert!(
-            holds(&ram(&target), top - 8192, 8192),
-            "{}: {top:#x}",
-            chip.board
-        );
+        let end = machine.image.symbol("_stack_end").expect("the stack's end");
+        // How much is really used is measured elsewhere.
+        assert!(end + 8192 <= top, "{}: {end:#x} to {top:#x}", chip.board);
+        assert!(holds(&ram(&target), end, (top - end) as usize));
+        // The words below the stack are no RAM, so an overrun has nothing to write to.
+        assert!(!holds(&ram(&target), end - 4, 4), "{}", chip.board);
         for segment in &machine.image.segments {
-            let end = segment.runs + segment.size;
             assert!(
-                end + 8192 <= top || segment.runs >= top,
-                "{}: {:#x} to {end:#x} leaves no stack under {top:#x}",
+                segment.runs >= top || segment.runs + segment.size <= end,
+                "{}: {:#x} is in the stack",
                 chip.board,
                 segment.runs
             );

@@ -13,6 +13,7 @@ use hapterra_image_tests::chip::Commands;
 use hapterra_image_tests::device::{Device, Plane, machines};
 use hapterra_image_tests::elf::Function;
 use hapterra_image_tests::machine::{Machine, Stop};
+use hapterra_image_tests::supply::Reset;
 
 /// Branches to itself: what a task that hangs does.
 const HANG: [u8; 2] = [0xFE, 0xE7];
@@ -220,7 +221,7 @@ fn assert_in_time(machine: &mut Machine, ms: u64) {
     );
     assert!(ms <= WATCHDOG_MS + CHECK_MS, "reset after {ms} ms");
     // The reset lets go of every pin, and the pull-down outside acts.
-    machine.reset(true);
+    machine.reset(Reset::Watchdog);
     assert!(!machine.is_enabled());
 }
 
@@ -279,7 +280,8 @@ fn a_tick_that_hangs_ends_in_the_watchdogs_reset() {
     });
 }
 
-/// Runs until the amplifiers are off: at once, and nothing is done after it.
+/// Runs until the amplifiers are off: at once, and nothing is done after it but the
+/// program's reset.
 fn assert_off_at_once_and_for_good(machine: &mut Machine) {
     // The link sends what the host reads.
     let stop = machine.run_until(50, |m| {
@@ -288,7 +290,7 @@ fn assert_off_at_once_and_for_good(machine: &mut Machine) {
     });
     assert_eq!(stop, Stop::Asked, "{}", machine.chip.board);
     assert_eq!(machine.take_effects().last(), Some(&Effect::Enable(false)));
-    assert_eq!(machine.run_ms(200), Stop::Watchdog);
+    assert_eq!(machine.run_ms(200), Stop::Software);
     assert_eq!(machine.take_effects(), [], "nothing after it");
 }
 

@@ -8,7 +8,7 @@ use core::cell::RefCell;
 use embassy_stm32::flash::{Blocking, Error, Flash};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::status::Refusal;
+use hapterra_core::wire::request::Refusal;
 use hapterra_firmware::store::{CalibrationStore, StoreError, Stored};
 
 use crate::chip::{CALIBRATIONS, CALIBRATIONS_SIZE, write_back};

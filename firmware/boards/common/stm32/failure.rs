@@ -1,21 +1,30 @@
 //! The end of a program that failed: amplifiers off, a record that survives the
-//! reset, a report to whoever listens, then the reset that the starved watchdog
-//! brings.
+//! reset, then a reset.
+//!
+//! Nothing here writes to the log: a program that failed inside a log line would panic
+//! again. The next start logs what it finds.
 
+use core::arch::naked_asm;
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 use core::ptr;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::SCB;
-use cortex_m_rt::{ExceptionFrame, exception};
+use cortex_m_rt::exception;
 use hapterra_core::wire::status::Crash;
 use hapterra_firmware::crash::{CRASH_BYTES, CrashRecord};
 
-use crate::chip::{amplifiers_off, write_back};
+use super::stack_guard;
+use crate::chip::{ENABLE_OFF, amplifiers_off, write_back};
 
 /// Ticks since the start, counted by the interrupt below the haptic one.
 static TICKS: AtomicU32 = AtomicU32::new(0);
+/// Whether a record of this program's end is written or being written. The first one
+/// tells the cause; what fails after it follows from that.
+static HAS_ENDED: AtomicBool = AtomicBool::new(false);
+/// CFSR: MMFAR holds the address of a forbidden access.
+const MMARVALID: u32 = 1 << 7;
 
 type Bytes = [u8; CRASH_BYTES];
 
@@ -27,24 +36,66 @@ static mut RECORD: MaybeUninit<Bytes> = MaybeUninit::uninit();
 fn panic(info: &PanicInfo<'_>) -> ! {
     stop();
     let (file, line) = info.location().map_or(("", 0), |at| (at.file(), at.line()));
-    keep(CrashRecord::panic(file, line, ticks()));
-    defmt::error!("panic at {}:{}", file, line);
-    rest()
+    end(|| CrashRecord::panic(file, line, ticks()))
 }
 
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    stop();
-    // SAFETY: a read of a status register, which has no side effect.
-    let status = unsafe { (*SCB::PTR).cfsr.read() };
-    keep(CrashRecord::hard_fault(
-        frame.pc(),
-        frame.lr(),
-        status,
-        ticks(),
-    ));
-    defmt::error!("hard fault at {:#x}, status {:#x}", frame.pc(), status);
-    rest()
+/// Switches off without a stack, because the fault may be that there is none left. ARM's
+/// manual (DDI 0337, 5.12.1) has the handler run even where its frame could not be
+/// written. Then it goes on on a fresh stack, which is the old one's memory: what the
+/// frame says is read before. The floating-point unit is told to forget the registers
+/// that it still owes that frame.
+#[unsafe(naked)]
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".HardFault.hapterra")]
+unsafe extern "C" fn HardFault() -> ! {
+    naked_asm!(
+        "cpsid i",
+        "movw r3, #{off_low}",
+        "movt r3, #{off_high}",
+        "mov.w r2, #{off_bit}",
+        "str r2, [r3]", // The enable pin is low.
+        "mov r2, sp",
+        "movs r0, #0",
+        "movs r1, #0",
+        "movw r3, #0xEF34", // FPCCR: nothing is owed.
+        "movt r3, #0xE000",
+        "str r0, [r3]",
+        "movw r3, #:lower16:_stack_end",
+        "movt r3, #:upper16:_stack_end",
+        "cmp r2, r3",
+        "blo 2f",
+        "movw r3, #:lower16:_stack_start",
+        "movt r3, #:upper16:_stack_start",
+        "subs r3, #32",
+        "cmp r2, r3",
+        "bhi 2f",
+        "ldr r0, [r2, #24]",
+        "ldr r1, [r2, #20]",
+        "2:",
+        "movw r3, #:lower16:_stack_start",
+        "movt r3, #:upper16:_stack_start",
+        "mov sp, r3",
+        "b {after}",
+        off_low = const ENABLE_OFF.0 & 0xFFFF,
+        off_high = const ENABLE_OFF.0 >> 16,
+        off_bit = const ENABLE_OFF.1,
+        after = sym after_hard_fault,
+    )
+}
+
+/// Goes on after a hard fault at `pc`, called from about `lr` (both zero where no frame
+/// was left), with the stack pointer at `sp`.
+extern "C" fn after_hard_fault(pc: u32, lr: u32, sp: u32) -> ! {
+    // SAFETY: reads of status registers, which have no side effect.
+    let (status, address) = unsafe { ((*SCB::PTR).cfsr.read(), (*SCB::PTR).mmfar.read()) };
+    let at_guard = status & MMARVALID != 0 && stack_guard::has(address);
+    end(|| {
+        if at_guard || stack_guard::has(sp) {
+            CrashRecord::stack_overflow(pc, lr, status, ticks())
+        } else {
+            CrashRecord::hard_fault(pc, lr, status, ticks())
+        }
+    })
 }
 
 #[exception]
@@ -61,16 +112,31 @@ pub(crate) fn count_tick() {
 #[inline(never)]
 pub(crate) fn unhandled(number: i16) -> ! {
     stop();
-    keep(CrashRecord::unhandled(number, ticks()));
-    defmt::error!("interrupt {} has no handler", number);
-    rest()
+    end(|| CrashRecord::unhandled(number, ticks()))
+}
+
+/// The end of a program whose supply fell too low.
+pub(crate) fn supply_low() -> ! {
+    stop();
+    end(|| CrashRecord::supply_low(ticks()))
 }
 
 /// Amplifiers off before anything else, and no interrupt that could turn them
 /// on again.
 fn stop() {
-    cortex_m::interrupt::disable();
     amplifiers_off();
+    cortex_m::interrupt::disable();
+    // Once more: the tick may have come in between.
+    amplifiers_off();
+}
+
+/// Keeps the record, unless there is one of this program already, and resets the chip:
+/// before the watchdog runs nobody else would.
+fn end(record: impl FnOnce() -> CrashRecord) -> ! {
+    if !HAS_ENDED.swap(true, Ordering::Relaxed) {
+        keep(record());
+    }
+    SCB::sys_reset()
 }
 
 fn ticks() -> u32 {
@@ -95,8 +161,17 @@ pub(crate) fn take_record() -> Option<Crash> {
     CrashRecord::read(&bytes)
 }
 
-fn rest() -> ! {
-    loop {
-        cortex_m::asm::nop();
+/// Writes to the log how the program before this one ended.
+pub(crate) fn log(crash: Option<&Crash>) {
+    if let Some(crash) = crash {
+        defmt::error!(
+            "the program before ended with {}: line {} of {=str}, pc {:#x}, lr {:#x}, status {:#x}",
+            crash.kind,
+            crash.line,
+            crash.file.as_str(),
+            crash.pc,
+            crash.lr,
+            crash.status
+        );
     }
 }

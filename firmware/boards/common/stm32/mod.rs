@@ -9,9 +9,15 @@ pub(crate) mod clock;
 mod critical;
 pub(crate) mod encoders;
 pub(crate) mod failure;
+pub(crate) mod feedback;
+pub(crate) mod heartbeat;
+pub(crate) mod loader;
+pub(crate) mod motor_memory;
 pub(crate) mod parts;
 pub(crate) mod priorities;
 #[path = "../stack.rs"]
 pub(crate) mod stack;
+pub(crate) mod stack_guard;
 pub(crate) mod start;
+pub(crate) mod supply;
 pub(crate) mod tasks;

@@ -18,4 +18,6 @@ pub(crate) struct Parts<O, E, U, W: PeripheralType + 'static> {
     pub(crate) usb: U,
     pub(crate) watchdog: Peri<'static, W>,
     pub(crate) led: Output<'static>,
+    /// Changes its level in each tick that leaves the amplifiers on.
+    pub(crate) heartbeat: Output<'static>,
 }

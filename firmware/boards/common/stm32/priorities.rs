@@ -11,6 +11,12 @@ use super::clock;
 /// back.
 pub(crate) const OTHERS: Priority = Priority::P6;
 
+/// The priority of the supply's interrupt, which ends the program: above the tick,
+/// which could switch the amplifiers on again.
+const SUPPLY: Priority = Priority::P0;
+/// The priority of the haptic interrupt, above the ceiling of critical sections.
+const HAPTIC: Priority = Priority::P1;
+
 /// Puts every interrupt below the ceiling of critical sections, before any is enabled.
 /// [`start_tick`] lifts the haptic one above it afterwards.
 pub(crate) fn lower_all(core: &mut Peripherals) {
@@ -22,10 +28,17 @@ pub(crate) fn lower_all(core: &mut Peripherals) {
     }
 }
 
+/// Enables the interrupt that ends the program when the supply falls, above everything.
+pub(crate) fn start_supply_watch(supply: Interrupt) {
+    supply.set_priority(SUPPLY);
+    // SAFETY: its handler enters no critical section and does not return.
+    unsafe { supply.enable() };
+}
+
 /// Enables the haptic interrupt, above the ceiling of critical sections, and `done`,
 /// which the haptic one raises, below. Then starts the timer.
 pub(crate) fn start_tick(haptic: Interrupt, done: Interrupt) {
-    haptic.set_priority(Priority::P0);
+    haptic.set_priority(HAPTIC);
     haptic.pend();
     for interrupt in [done, haptic] {
         // SAFETY: their handlers are ready, and the haptic one, which critical

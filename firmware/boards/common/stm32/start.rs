@@ -13,13 +13,13 @@ use hapterra_firmware::usb::{DescriptorBuffers, device};
 use static_cell::ConstStaticCell;
 
 use super::calibration_memory::CalibrationMemory;
-use super::{failure, priorities, tasks};
+use super::{failure, heartbeat, motor_memory, priorities, stack_guard, supply, tasks};
 use crate::application::{self, Loop, TICK_DONE};
 use crate::chip::{self, Clock};
 use crate::outputs::BOARD;
 
 /// Current in amperes that the ends of an output's range stand for.
-const FULL_SCALE_A: f32 = 5.5;
+pub(super) const FULL_SCALE_A: f32 = 5.5;
 /// Time after which the watchdog resets the chip, microseconds.
 const WATCHDOG_US: u32 = 50_000;
 
@@ -28,7 +28,11 @@ static DESCRIPTORS: ConstStaticCell<DescriptorBuffers> =
 
 /// What the haptic interrupt does; `slot` is its own variable.
 pub(crate) fn on_haptic_interrupt(slot: &mut Option<&'static mut Loop>) {
-    if application::tick(slot).is_some() {
+    if let Some((haptic_loop, drive)) = application::tick(slot) {
+        heartbeat::beat(&drive);
+        if let Some(copy) = haptic_loop.motors_to_keep() {
+            motor_memory::keep(copy);
+        }
         // Waking a task takes a critical section: an interrupt below does it.
         cortex_m::peripheral::NVIC::pend(Interrupt::TIM6_DAC);
     }
@@ -44,22 +48,32 @@ fn TIM6_DAC() {
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     let mut core = cortex_m::Peripherals::take().expect("taken once");
+    stack_guard::set_up(&core.MPU);
     priorities::lower_all(&mut core);
     chip::prepare(&mut core);
     let parts = chip::take(embassy_stm32::init(chip::configuration()));
     let boot = BootReport {
         cause: chip::take_reset_cause(),
         crash: failure::take_record(),
+        resets_below_mv: chip::resets_below_mv(),
     };
+    failure::log(boot.crash.as_ref());
+    supply::wait_and_watch();
+    heartbeat::set_up(parts.heartbeat);
     let (memory, calibration) = CalibrationMemory::open(parts.flash);
+    // The cycle counter runs from here on: outputs may wait for it.
+    let clock = Clock::new(parts.timer, &mut core);
     let hardware = Hardware {
         encoders: parts.encoders,
         amplifiers: Off::new(parts.outputs, parts.enable, FULL_SCALE_A),
-        clock: Clock::new(parts.timer, &mut core),
+        clock,
+        full_scale_a: FULL_SCALE_A,
         calibration,
+        motors: motor_memory::begin(boot.cause),
         boot,
     };
-    let (link, monitor) = application::assemble(hardware, BOARD);
+    let (mut link, monitor) = application::assemble(hardware, BOARD);
+    link.offer_loader();
 
     let serial_number = embassy_stm32::uid::uid_hex();
     let (usb, rx, tx) = device(parts.usb, serial_number, DESCRIPTORS.take());

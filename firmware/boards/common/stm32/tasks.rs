@@ -6,11 +6,11 @@ use embassy_futures::join::join;
 use embassy_stm32::gpio::Output;
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
-use embassy_time::{Duration, Ticker};
+use embassy_time::{Duration, Instant, Ticker};
 use embassy_usb::UsbDevice;
 use embassy_usb::driver::Driver;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::status::Refusal;
+use hapterra_core::wire::request::Refusal;
 use hapterra_firmware::led::LedPattern;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::{LinkBoard, run};
@@ -18,14 +18,18 @@ use hapterra_firmware::monitor::{Monitor, Part};
 use hapterra_firmware::usb::{BulkStream, EndpointFilter};
 
 use super::calibration_memory::CalibrationMemory;
-use super::stack;
+use super::{loader, stack};
 use crate::application::TICK_DONE;
-use crate::chip::{UsbDriver, WINDOW, WatchdogTimer};
+use crate::chip::{self, UsbDriver, WINDOW, WatchdogTimer};
+use crate::usb::EndpointHalts;
 
 /// How often parts check in and the supervisor looks, milliseconds.
 const CHECK_MS: u32 = 10;
 /// How often the stack is measured, milliseconds.
 const STACK_MS: u32 = 1_000;
+
+/// How long the host has to fetch the answer before the board enters its loader.
+const FAREWELL: Duration = Duration::from_millis(50);
 
 /// What the LED shows: the link sets it, the supervisor shows it.
 static LED: CriticalSectionMutex<Cell<LedPattern>> =
@@ -33,7 +37,11 @@ static LED: CriticalSectionMutex<Cell<LedPattern>> =
 
 /// What the link's task needs from the board. A real board goes on ticking whatever
 /// the link does.
-struct Board(CalibrationMemory);
+struct Board {
+    memory: CalibrationMemory,
+    /// Since when the board is to enter its loader.
+    leaving: Cell<Option<Instant>>,
+}
 
 impl LinkBoard for Board {
     async fn tick_done(&self) {
@@ -42,10 +50,17 @@ impl LinkBoard for Board {
 
     fn after_poll<const D: usize>(&self, link: &Link<'_, D>) {
         LED.lock(|led| led.set(link.led_pattern()));
+        if link.enters_loader() {
+            let since = self.leaving.get().unwrap_or_else(Instant::now);
+            self.leaving.set(Some(since));
+            if since.elapsed() >= FAREWELL {
+                loader::enter();
+            }
+        }
     }
 
     async fn store(&self, calibration: &Calibration) -> Result<(), Refusal> {
-        self.0.save(calibration)
+        self.memory.save(calibration)
     }
 }
 
@@ -57,13 +72,17 @@ pub(crate) async fn serve_link(
     tx: BulkStream<<UsbDriver as Driver<'static>>::EndpointIn>,
     memory: CalibrationMemory,
 ) {
-    run(&mut link, rx, tx, &Board(memory)).await;
+    let board = Board {
+        memory,
+        leaving: Cell::new(None),
+    };
+    run(&mut link, rx, tx, &board).await;
 }
 
 /// Runs the USB stack for ever and checks in for it.
 #[embassy_executor::task]
 pub(crate) async fn serve_usb(
-    mut device: UsbDevice<'static, EndpointFilter<UsbDriver>>,
+    mut device: UsbDevice<'static, EndpointFilter<UsbDriver, EndpointHalts>>,
     monitor: &'static Monitor,
 ) {
     let checking_in = async {
@@ -77,7 +96,7 @@ pub(crate) async fn serve_usb(
 }
 
 /// Feeds the watchdog while all parts run, measures the stack, and shows the LED's
-/// pattern, for ever.
+/// pattern, for ever. Takes back what a debugger may have said about a halted core.
 #[embassy_executor::task]
 pub(crate) async fn supervise(
     monitor: &'static Monitor,
@@ -88,6 +107,7 @@ pub(crate) async fn supervise(
     let mut ms = 0_u32;
     loop {
         ticker.next().await;
+        chip::let_a_halt_stop_the_arm();
         if monitor.may_feed_watchdog(&[Part::Tick, Part::Link, Part::Usb]) {
             watchdog.pet();
         }

@@ -70,9 +70,7 @@ impl Machine {
             .flat_map(|r| (self.register(*r) as u32).to_le_bytes())
             .collect();
         let stack = (self.register(RegisterARM::SP) - 26 * 4) & !7;
-        self.core
-            .mem_write(stack, &frame)
-            .expect("the stack is in a memory");
+        self.stack_frame(stack as u32, &frame);
         let table = {
             let set = self.bus().read(0xE000_ED08);
             if set == 0 {
@@ -114,9 +112,14 @@ impl Machine {
 
     pub(super) fn fault(&mut self, why: &str) -> Option<Stop> {
         if self.active.iter().any(|a| a.vector == HARD_FAULT) {
+            let mut bus = self.bus();
+            bus.is_locked_up = true;
+            bus.raise_interrupts();
+            drop(bus);
             return Some(Stop::Lockup(format!("{why} at {}", self.place())));
         }
         self.hard_faults += 1;
+        self.report_forbidden();
         self.enter(HARD_FAULT, -1);
         None
     }

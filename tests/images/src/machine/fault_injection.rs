@@ -6,6 +6,7 @@ use std::rc::Rc;
 use unicorn_engine::{HookType, MemType, UcHookId, Unicorn};
 
 use super::Machine;
+use crate::bus::Stopwatch;
 use crate::elf::Function;
 
 /// Whether the core loads a word of flash that cannot be read.
@@ -57,6 +58,21 @@ impl Machine {
             .ctl_flush_tb()
             .expect("translated code is dropped");
         counted
+    }
+
+    /// Counts every instruction from now on, for the bus' stopwatch. Slow.
+    pub fn start_stopwatch(&mut self) {
+        let stopwatch = Stopwatch::default();
+        let executed = Rc::clone(&stopwatch.executed);
+        let (flash, bytes) = self.chip.memories[0];
+        let count = move |_: &mut Unicorn<'_, ()>, _: u64, _: u32| executed.set(executed.get() + 1);
+        let to = u64::from(flash) + u64::from(bytes) - 1;
+        let hook = self.core.add_code_hook(flash.into(), to, count);
+        hook.expect("a hook");
+        self.core
+            .ctl_flush_tb()
+            .expect("translated code is dropped");
+        self.bus().stopwatch = Some(stopwatch);
     }
 
     /// From now on the flash's word at `address` cannot be read, until it is

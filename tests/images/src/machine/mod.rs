@@ -2,6 +2,8 @@
 
 mod exceptions;
 mod fault_injection;
+mod halting;
+mod protection;
 mod running;
 
 use std::cell::{Cell, RefCell};
@@ -13,8 +15,10 @@ use unicorn_engine::{Arch, ArmCpuModel, Mode, Prot, RegisterARM, Unicorn};
 use crate::bus::{Bus, Effect};
 use crate::chip::Chip;
 use crate::elf::Image;
+use crate::supply::Reset;
 use exceptions::Active;
 use fault_injection::{Load, UnreadableWord};
+use protection::Protection;
 use running::SLICE;
 
 /// The Thumb bit of the program status.
@@ -27,6 +31,8 @@ pub enum Stop {
     Time,
     /// The watchdog has reset the chip.
     Watchdog,
+    /// The program has reset the chip.
+    Software,
     /// A condition of the caller's.
     Asked,
     /// A fault in the handler of a hard fault, and where.
@@ -45,6 +51,8 @@ pub struct Machine {
     unreadable: Vec<UnreadableWord>,
     /// A load of a word that cannot be read.
     load: Rc<Cell<Load>>,
+    /// What the memory protection unit forbids.
+    protection: Protection,
     /// Vectors taken since it was last cleared.
     pub taken: Vec<u32>,
     /// How often a hard fault was taken.
@@ -67,7 +75,8 @@ pub struct Machine {
 
 impl Machine {
     /// A powered-up chip with `image` in its flash, the switches as they are
-    /// when nobody is near: emergency stop not pressed, dead-man not held.
+    /// when nobody is near: emergency stop not pressed, dead-man not held; amplifiers that are
+    /// ready and have no current monitors.
     #[must_use]
     pub fn new(chip: &'static Chip, image: Image) -> Self {
         let model = if chip.is_m7 {
@@ -81,7 +90,7 @@ impl Machine {
             core.mem_map((*address).into(), (*bytes).into(), Prot::ALL)
                 .expect("memory");
         }
-        let bus = Rc::new(RefCell::new(Bus::new(chip, false)));
+        let bus = Rc::new(RefCell::new(Bus::new(chip, Reset::PowerUp)));
         for (address, bytes) in [(0x4000_0000, 0x2000_0000), (0xE000_0000, 0x10_0000)] {
             map_peripherals(&mut core, &bus, address, bytes);
         }
@@ -93,6 +102,7 @@ impl Machine {
             active: vec![],
             unreadable: vec![],
             load: Rc::default(),
+            protection: Protection::default(),
             taken: vec![],
             hard_faults: 0,
             slice: SLICE,
@@ -102,8 +112,9 @@ impl Machine {
             delayed: 0,
             masked: 0,
         };
+        machine.watch_forbidden();
         machine.load();
-        machine.reset(false);
+        machine.reset(Reset::PowerUp);
         machine
     }
 
@@ -121,11 +132,13 @@ impl Machine {
     }
 
     /// Resets the chip. Memory keeps what it holds.
-    pub fn reset(&mut self, by_watchdog: bool) {
+    pub fn reset(&mut self, cause: Reset) {
         let inputs = self.chip;
-        *self.bus.borrow_mut() = Bus::new(self.chip, by_watchdog);
+        *self.bus.borrow_mut() = Bus::new(self.chip, cause);
+        self.protect();
         self.set_input(inputs.emergency_stop, false);
         self.set_input(inputs.dead_man, true);
+        self.set_input(inputs.monitors_fitted, true);
         self.active.clear();
         let flash = self.chip.memories[0].0;
         let (stack, entry) = (self.word(flash), self.word(flash + 4));
@@ -151,7 +164,16 @@ impl Machine {
 
     /// Sets the level at an input pin.
     pub fn set_input(&mut self, pin: (u32, u32), high: bool) {
-        self.bus().set_input(pin, high);
+        let mut bus = self.bus();
+        bus.set_input(pin, high);
+        bus.raise_interrupts();
+    }
+
+    /// Sets the supply's voltage, millivolts.
+    pub fn set_supply_mv(&mut self, mv: u32) {
+        let mut bus = self.bus();
+        bus.supply.mv = mv;
+        bus.raise_interrupts();
     }
 
     /// Whether the amplifiers are switched on.

@@ -34,10 +34,14 @@ impl Machine {
             if is_met(self) {
                 return Stop::Asked;
             }
-            let (now_ns, has_expired) = {
+            let (now_ns, has_expired, asks) = {
                 let bus = self.bus();
-                (bus.now_ns, bus.watchdog.has_expired(bus.now_ns))
+                let has_expired = bus.watchdog.has_expired(bus.now_ns);
+                (bus.now_ns, has_expired, bus.nvic.asks_for_reset)
             };
+            if asks {
+                return Stop::Software;
+            }
             if has_expired {
                 return Stop::Watchdog;
             }
@@ -67,6 +71,7 @@ impl Machine {
     fn step(&mut self) -> Option<Stop> {
         self.bus().raise_interrupts();
         self.erase();
+        self.protect();
         self.raise_tick();
         self.take_interrupt();
         self.watch_masks();
@@ -104,7 +109,9 @@ impl Machine {
         }
     }
 
-    fn is_ticking(&self) -> bool {
+    /// Whether the haptic interrupt is being handled.
+    #[must_use]
+    pub fn is_ticking(&self) -> bool {
         let vector = self.chip.tick_interrupt as u32 + 16;
         self.active.iter().any(|a| a.vector == vector)
     }

@@ -13,11 +13,14 @@ const MEMORY: u32 = 0x400;
 
 /// Bits of an endpoint's register.
 const CTR_RX: u16 = 1 << 15;
+const DTOG_RX: u16 = 1 << 14;
 const STAT_RX: u16 = 0b11 << 12;
 const SETUP: u16 = 1 << 11;
 const CTR_TX: u16 = 1 << 7;
+const DTOG_TX: u16 = 1 << 6;
 const STAT_TX: u16 = 0b11 << 4;
-const TOGGLED: u16 = STAT_RX | STAT_TX | 1 << 14 | 1 << 6;
+/// A one that is written inverts these.
+const TOGGLED: u16 = DTOG_RX | STAT_RX | DTOG_TX | STAT_TX;
 const PLAIN: u16 = 0b111 << 8 | 0xF;
 /// Values of both STAT fields.
 const STALL: u16 = 1;
@@ -65,6 +68,8 @@ impl FullSpeed {
         }
     }
 
+    /// What a write does to an endpoint's register: some bits are written, some are
+    /// inverted by a one, some are cleared by a zero, and SETUP is the peripheral's.
     fn write_endpoint(&mut self, index: usize, value: u16) {
         let old = self.endpoints[index];
         self.endpoints[index] =
@@ -170,36 +175,41 @@ impl Peripheral for FullSpeed {
         }
         self.set_stat(0, STAT_RX, NAK);
         self.set_stat(0, STAT_TX, NAK);
-        self.endpoints[0] |= CTR_RX | SETUP;
+        // The SETUP itself is DATA0; what follows it is DATA1, in both directions.
+        self.endpoints[0] |= CTR_RX | SETUP | DTOG_RX | DTOG_TX;
         Handshake::Ack
     }
 
-    fn out(&mut self, endpoint: usize, packet: &[u8]) -> Handshake {
+    fn out(&mut self, endpoint: usize, packet: &[u8], toggle: bool) -> Handshake {
         let Some(index) = self.of(endpoint) else {
             return Handshake::Nak;
         };
+        let expected = self.endpoints[index] & DTOG_RX != 0;
         match (self.endpoints[index] & STAT_RX) >> 12 {
+            // Taken for the last packet, sent again: nothing is stored or told.
+            VALID if toggle != expected => return Handshake::Ack,
             VALID if self.store(index, packet) => {}
             STALL => return Handshake::Stall,
             _ => return Handshake::Nak,
         }
         self.set_stat(index, STAT_RX, NAK);
-        self.endpoints[index] = self.endpoints[index] & !SETUP | CTR_RX;
+        self.endpoints[index] = (self.endpoints[index] & !SETUP | CTR_RX) ^ DTOG_RX;
         Handshake::Ack
     }
 
-    fn take_in(&mut self, endpoint: usize) -> Answer {
+    fn take_in(&mut self, endpoint: usize) -> (Answer, bool) {
         let Some(index) = self.of(endpoint) else {
-            return Answer::Nak;
+            return (Answer::Nak, false);
         };
+        let toggle = self.endpoints[index] & DTOG_TX != 0;
         match (self.endpoints[index] & STAT_TX) >> 4 {
             VALID => {}
-            STALL => return Answer::Stall,
-            _ => return Answer::Nak,
+            STALL => return (Answer::Stall, toggle),
+            _ => return (Answer::Nak, toggle),
         }
         let (at, count) = (self.half(8 * index), self.half(8 * index + 2) & 0x3FF);
         self.set_stat(index, STAT_TX, NAK);
-        self.endpoints[index] |= CTR_TX;
-        Answer::Data(self.memory[at..at + count].to_vec())
+        self.endpoints[index] = (self.endpoints[index] | CTR_TX) ^ DTOG_TX;
+        (Answer::Data(self.memory[at..at + count].to_vec()), toggle)
     }
 }

@@ -1,9 +1,10 @@
 //! The chips' two USB peripherals, for the scripted host of `hapterra-tests`.
 
+mod cable;
 mod full_speed;
-
 mod otg;
 
+pub use cable::Cable;
 pub use full_speed::FullSpeed;
 pub use otg::Otg;
 
@@ -25,8 +26,8 @@ pub trait Peripheral {
     fn suspend(&mut self);
     /// The host begins a control transfer.
     fn setup(&mut self, request: [u8; 8]) -> Handshake;
-    /// The host sends a packet.
-    fn out(&mut self, endpoint: usize, packet: &[u8]) -> Handshake;
-    /// The host asks for a packet.
-    fn take_in(&mut self, endpoint: usize) -> Answer;
+    /// The host sends a packet with this toggle: whether it is DATA1.
+    fn out(&mut self, endpoint: usize, packet: &[u8], toggle: bool) -> Handshake;
+    /// The host asks for a packet, and gets its toggle with it.
+    fn take_in(&mut self, endpoint: usize) -> (Answer, bool);
 }

@@ -46,8 +46,11 @@ const OEPINT: u32 = 1 << 19;
 const ACTIVE: u32 = 1 << 15;
 const NAK: u32 = 1 << 17;
 const STALL: u32 = 1 << 21;
+const DPID: u32 = 1 << 16;
 const CNAK: u32 = 1 << 26;
 const SNAK: u32 = 1 << 27;
+const SD0PID: u32 = 1 << 28;
+const SD1PID: u32 = 1 << 29;
 const DISABLE: u32 = 1 << 30;
 const ENABLE: u32 = 1 << 31;
 /// Bits of an endpoint's interrupts.
@@ -143,8 +146,15 @@ impl Otg {
 
     fn write_control(&mut self, offset: u32, value: u32) {
         let old = self.get(offset);
-        let mut new = value & !(CNAK | SNAK | DISABLE | ENABLE | NAK);
-        new |= old & (NAK | ENABLE) | value & ENABLE;
+        let commands = CNAK | SNAK | SD0PID | SD1PID | DISABLE | ENABLE;
+        let mut new = value & !(commands | NAK | DPID);
+        new |= old & (NAK | ENABLE | DPID) | value & ENABLE;
+        if value & SD0PID != 0 {
+            new &= !DPID;
+        }
+        if value & SD1PID != 0 {
+            new |= DPID;
+        }
         if value & CNAK != 0 {
             new &= !NAK;
         }
@@ -239,13 +249,14 @@ impl Peripheral for Otg {
 
     fn setup(&mut self, request: [u8; 8]) -> Handshake {
         for block in [IN, OUT] {
-            self.set(block, self.get(block) & !STALL | NAK);
+            // What follows a SETUP is DATA1.
+            self.set(block, self.get(block) & !STALL | NAK | DPID);
         }
         self.receive(SETUP_DATA, 0, &request);
         Handshake::Ack
     }
 
-    fn out(&mut self, endpoint: usize, packet: &[u8]) -> Handshake {
+    fn out(&mut self, endpoint: usize, packet: &[u8], toggle: bool) -> Handshake {
         let control = OUT + 0x20 * endpoint as u32;
         let value = self.get(control);
         if value & STALL != 0 {
@@ -263,27 +274,31 @@ impl Peripheral for Otg {
         if packet.len() > largest {
             return Handshake::Nak; // a babble: never acknowledged
         }
-        self.set(control, value | NAK);
+        if toggle != (value & DPID != 0) {
+            return Handshake::Ack; // taken for the last one, sent again
+        }
+        self.set(control, (value | NAK) ^ DPID);
         self.receive(OUT_DATA, endpoint as u32, packet);
         Handshake::Ack
     }
 
-    fn take_in(&mut self, endpoint: usize) -> Answer {
+    fn take_in(&mut self, endpoint: usize) -> (Answer, bool) {
         let block = IN + 0x20 * endpoint as u32;
         let control = self.get(block);
+        let toggle = control & DPID != 0;
         if control & STALL != 0 {
-            return Answer::Stall;
+            return (Answer::Stall, toggle);
         }
         let bytes = (self.get(block + SIZE) & 0x7FFFF) as usize;
         let ready = control & ENABLE != 0 && control & NAK == 0;
         if !ready || self.sending[endpoint].len() < bytes {
-            return Answer::Nak;
+            return (Answer::Nak, toggle);
         }
         let mut packet = std::mem::take(&mut self.sending[endpoint]);
         packet.truncate(bytes);
-        self.set(block, control & !ENABLE);
+        self.set(block, control & !ENABLE ^ DPID);
         self.set(block + SIZE, 0);
         self.raise(IN, endpoint as u32, DONE);
-        Answer::Data(packet)
+        (Answer::Data(packet), toggle)
     }
 }

@@ -1,0 +1,86 @@
+//! What the amplifiers say: a ready line of each, and a current monitor of each where
+//! they have one.
+
+use embassy_stm32::adc::{Adc, AnyAdcChannel};
+use embassy_stm32::gpio::Input;
+use embassy_stm32::pac::ADC1 as REGISTERS;
+use embassy_stm32::peripherals::ADC1;
+use hapterra_firmware::amplifier::monitor_ma;
+
+use super::start::FULL_SCALE_A;
+use crate::chip::{MONITOR_SHIFT, sample_slowly};
+
+/// The amplifiers' ready lines and current monitors, axes 1 to 3.
+pub(crate) struct Feedback {
+    /// Pulled down by an amplifier that is ready: high when one is not, and when its
+    /// wire is broken.
+    pub(crate) ready: [Input<'static>; 3],
+    /// Closed to ground where the monitors are wired.
+    pub(crate) monitors_fitted: Input<'static>,
+    pub(crate) monitors: Monitors,
+}
+
+impl Feedback {
+    /// Whether an amplifier is not ready.
+    pub(crate) fn is_unready(&self) -> bool {
+        self.ready.iter().any(Input::is_high)
+    }
+
+    /// Currents in mA as of the tick before, where there are monitors; an error where the
+    /// conversions have not been made. Starts the next ones.
+    pub(crate) fn measure_ma(&self) -> Result<Option<[i16; 3]>, NotConverted> {
+        let codes = self.monitors.read();
+        if self.monitors_fitted.is_high() {
+            return Ok(None);
+        }
+        let of = |code| monitor_ma(code, FULL_SCALE_A);
+        codes.map(|codes| Some(codes.map(of))).ok_or(NotConverted)
+    }
+}
+
+/// The converter has not done what it was told a tick before.
+pub(crate) struct NotConverted;
+
+/// The three monitors on ADC1, as one injected sequence that each tick starts and the
+/// next tick reads. embassy sets the converter up; it has no injected sequences for both
+/// chips, and in a tick nothing may wait for a conversion.
+pub(crate) struct Monitors {
+    /// Keeps the converter as it was set up.
+    _adc: Adc<'static, ADC1>,
+}
+
+impl Monitors {
+    /// Takes the converter and the channels of axes 1 to 3. Starts the first sequence.
+    pub(crate) fn new(
+        adc: Adc<'static, ADC1>,
+        channels: [AnyAdcChannel<'static, ADC1>; 3],
+    ) -> Self {
+        let [a, b, c] = channels.map(|channel| channel.get_hw_channel());
+        sample_slowly([a, b, c]);
+        // A sequence that the program starts, and no queue of them.
+        REGISTERS.cfgr().modify(|w| w.set_jqdis(true));
+        REGISTERS.jsqr().write(|w| {
+            w.set_jl(2);
+            w.set_jsq(0, a);
+            w.set_jsq(1, b);
+            w.set_jsq(2, c);
+        });
+        start();
+        Self { _adc: adc }
+    }
+
+    /// What was converted since the last call, if all of it was; starts anew.
+    fn read(&self) -> Option<[u16; 3]> {
+        let is_done = REGISTERS.isr().read().jeos();
+        // What is written as set is cleared.
+        REGISTERS.isr().write(|w| w.set_jeos(true));
+        let code = |n| (REGISTERS.jdr(n).read().0 >> MONITOR_SHIFT) as u16;
+        let codes = [code(0), code(1), code(2)];
+        start();
+        is_done.then_some(codes)
+    }
+}
+
+fn start() {
+    REGISTERS.cr().modify(|w| w.set_jadstart(true));
+}

@@ -1,0 +1,9 @@
+//! The end of the program, told to the host through semihosting.
+
+use core::fmt;
+
+/// Ends the program and tells why.
+pub(crate) fn failed(why: fmt::Arguments<'_>) -> ! {
+    semihosting::eprintln!("{why}");
+    semihosting::process::exit(1)
+}

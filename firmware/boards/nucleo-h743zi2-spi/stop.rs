@@ -1,0 +1,19 @@
+//! The emergency stop, an input: the converter has none that would stop it.
+
+use embassy_stm32::Peri;
+use embassy_stm32::gpio::{Input, Pull};
+use embassy_stm32::peripherals::PE15;
+
+pub(crate) type EmergencyStop = Input<'static>;
+
+/// Takes the pin out of the chip's peripherals, as `take_outputs` does.
+macro_rules! take_stop {
+    ($p:ident) => {
+        crate::stop::new($p.PE15)
+    };
+}
+pub(crate) use take_stop;
+
+pub(crate) fn new(pin: Peri<'static, PE15>) -> EmergencyStop {
+    Input::new(pin, Pull::Up)
+}

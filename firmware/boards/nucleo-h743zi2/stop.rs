@@ -1,0 +1,71 @@
+//! The emergency stop, which is also the break of TIM1: pressing it ends the duty cycles
+//! in hardware.
+//!
+//! A lockup of the core and a falling supply are breaks, too. A break clears
+//! TIM1_BDTR.MOE, and the outputs go to their idle level, which is low (RM0433, 38.3.16).
+//! An amplifier that reads a duty cycle of 0 % as a broken wire is off then, whatever the
+//! program does.
+
+use embassy_stm32::Peri;
+use embassy_stm32::gpio::{AfType, Flex, Pull};
+use embassy_stm32::pac::timer::vals::{Bkp, FilterValue, Ossi};
+use embassy_stm32::pac::{SYSCFG, TIM1};
+use embassy_stm32::peripherals::PE15;
+use embassy_stm32::timer::{BkIn1, BreakInputPin};
+
+use crate::stm32::encoders::Stop;
+
+/// The pin, normally closed to ground, pulled up: high when pressed, and when the wire is
+/// broken.
+pub(crate) struct EmergencyStop(Flex<'static>);
+
+/// Core cycles for the pull-up and the filter: 10 µs.
+const SETTLE_CYCLES: u32 = 4_800;
+/// SYSCFG_CFGR (RM0433, 12.3.3), counted in words, which metapac does not know.
+const SYSCFG_CFGR: usize = 0x18 / 4;
+/// Its bits PVDL and CM7L: the supply's comparator, which is locked as it is set up, and
+/// the core's lockup are breaks.
+const SUPPLY_AND_LOCKUP: u32 = 1 << 2 | 1 << 6;
+
+/// Takes the pin out of the chip's peripherals, as `take_outputs` does.
+macro_rules! take_stop {
+    ($p:ident) => {
+        crate::stop::new($p.PE15)
+    };
+}
+pub(crate) use take_stop;
+
+/// Makes the pin the break of TIM1, which has to be set up already.
+pub(crate) fn new(pin: Peri<'static, PE15>) -> EmergencyStop {
+    let function = BreakInputPin::<embassy_stm32::peripherals::TIM1, BkIn1>::af_num(&*pin);
+    let mut stop = EmergencyStop(Flex::new(pin));
+    stop.0
+        .set_as_af_unchecked(function, AfType::input(Pull::Up));
+    let cfgr = SYSCFG.as_ptr().cast::<u32>().wrapping_add(SYSCFG_CFGR);
+    // SAFETY: a register of SYSCFG, whose clock is on. Its bits can only be set.
+    unsafe { cfgr.write_volatile(SUPPLY_AND_LOCKUP) };
+    TIM1.bdtr().modify(|w| {
+        w.set_ossi(Ossi::IDLE_LEVEL);
+        // Eight equal samples of the stop at 7.5 MHz: a microsecond.
+        w.set_bkf(0, FilterValue::FDTS_DIV32_N8);
+        w.set_bkp(0, Bkp::ACTIVE_HIGH);
+        w.set_bke(0, true);
+    });
+    cortex_m::asm::delay(SETTLE_CYCLES);
+    // What came while the pin was being set up was no stop.
+    TIM1.bdtr().modify(|w| w.set_moe(true));
+    stop
+}
+
+impl Stop for EmergencyStop {
+    /// Tells a stop that was too short for the tick to see, too. The outputs come back
+    /// when the stop has been told and is released; the amplifiers are off by then.
+    fn is_pressed(&mut self) -> bool {
+        let is_pressed = self.0.is_high();
+        let is_broken_off = !TIM1.bdtr().read().moe();
+        if is_broken_off && !is_pressed {
+            TIM1.bdtr().modify(|w| w.set_moe(true));
+        }
+        is_pressed || is_broken_off
+    }
+}

@@ -1,0 +1,107 @@
+//! The memory protection unit (ARM DDI 0403E, B3.5) as far as an image uses it: region 0
+//! with no access at all, over the default map. And exception entry where the stack cannot
+//! be written: the handler runs all the same (ARM DDI 0337, 5.12.1), and its frame holds
+//! what was there.
+
+use std::cell::Cell;
+use std::ops::Range;
+use std::rc::Rc;
+
+use unicorn_engine::{HookType, MemType, Prot, Unicorn};
+
+use super::Machine;
+
+const MPU_CTRL: u32 = 0xE000_ED94;
+const MPU_RBAR: u32 = 0xE000_ED9C;
+const MPU_RASR: u32 = 0xE000_EDA0;
+/// The fault status and the address of a forbidden access.
+const CFSR: u32 = 0xE000_ED28;
+const MMFAR: u32 = 0xE000_ED34;
+/// Of CFSR: a data access was forbidden, to MMFAR; the stacking was; a bus fault of the
+/// stacking.
+const DACCVIOL: u32 = 1 << 1;
+const MSTKERR: u32 = 1 << 4;
+const MMARVALID: u32 = 1 << 7;
+const STKERR: u32 = 1 << 12;
+
+/// What is forbidden, and the last access to it.
+#[derive(Default)]
+pub(super) struct Protection {
+    region: Range<u32>,
+    met: Rc<Cell<Option<u32>>>,
+}
+
+impl Machine {
+    /// Notes the address of each forbidden access.
+    pub(super) fn watch_forbidden(&mut self) {
+        let met = Rc::clone(&self.protection.met);
+        let note = move |_: &mut Unicorn<'_, ()>, _: MemType, at: u64, _: usize, _: i64| {
+            met.set(Some(at as u32));
+            false
+        };
+        let all = HookType::MEM_READ_PROT | HookType::MEM_WRITE_PROT;
+        self.core.add_mem_hook(all, 1, 0, note).expect("a hook");
+    }
+
+    /// Forbids what the registers say now.
+    pub(super) fn protect(&mut self) {
+        let region = self.forbidden();
+        let before = std::mem::replace(&mut self.protection.region, region.clone());
+        if region == before {
+            return;
+        }
+        self.allow(before, Prot::ALL);
+        self.allow(region, Prot::NONE);
+        self.core.ctl_flush_tlb().expect("what it knows is dropped");
+    }
+
+    /// Where there is memory: elsewhere an access fails anyway.
+    fn allow(&mut self, region: Range<u32>, access: Prot) {
+        for (start, bytes) in self.chip.memories {
+            let from = region.start.max(*start);
+            let to = region.end.min(start + bytes);
+            if from < to {
+                let changed = self
+                    .core
+                    .mem_protect(from.into(), (to - from).into(), access);
+                changed.expect("whole pages");
+            }
+        }
+    }
+
+    fn forbidden(&self) -> Range<u32> {
+        let mut bus = self.bus();
+        let (control, base) = (bus.read(MPU_CTRL), bus.read(MPU_RBAR) & !0x1F);
+        let attributes = bus.read(MPU_RASR);
+        let is_on = control & 1 != 0 && attributes & 1 != 0;
+        let has_access = attributes >> 24 & 7 != 0;
+        if !is_on || has_access {
+            return 0..0;
+        }
+        base..base + (2 << (attributes >> 1 & 0x1F))
+    }
+
+    /// Tells the program of the access that failed.
+    pub(super) fn report_forbidden(&mut self) {
+        if let Some(address) = self.protection.met.take() {
+            self.raise_status(DACCVIOL | MMARVALID);
+            self.bus().write(MMFAR, address, u32::MAX);
+        }
+    }
+
+    /// Writes an exception's frame, where that can be.
+    pub(super) fn stack_frame(&mut self, stack: u32, frame: &[u8]) {
+        let forbidden = &self.protection.region;
+        if forbidden.contains(&stack) || forbidden.contains(&(stack + frame.len() as u32 - 1)) {
+            self.raise_status(MSTKERR);
+        } else if self.core.mem_write(stack.into(), frame).is_err() {
+            self.raise_status(STKERR);
+        }
+    }
+
+    fn raise_status(&mut self, bits: u32) {
+        let mut bus = self.bus();
+        let status = bus.read(CFSR) | bits;
+        bus.write(CFSR, status, u32::MAX);
+    }
+}

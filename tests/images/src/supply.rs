@@ -1,0 +1,110 @@
+//! The comparator that watches a chip's supply (PVD), on its line of EXTI, and why a chip
+//! was reset.
+//!
+//! Modelled as RM0440 (6.2.3, 15.5) and RM0433 (6.5.3, 20.6) have it: PVDE, PLS and PVDO of
+//! PWR, and of EXTI the rising edge's choice, the mask and the pending bit of line 16. The
+//! hysteresis (100 mV) is not modelled.
+
+use std::collections::HashMap;
+
+/// What a board's regulator gives, millivolts.
+pub const NOMINAL_MV: u32 = 3_300;
+/// EXTI's line of the comparator.
+const LINE: u32 = 1 << 16;
+
+/// Where a chip keeps its comparator.
+#[derive(Clone, Copy, Debug)]
+pub struct Comparator {
+    /// Control register, the bit that switches it on, and the first of the level's
+    /// three bits.
+    pub control: (u32, u32, u32),
+    /// Status register, and the bit that says that the supply is low.
+    pub status: (u32, u32),
+    /// EXTI's rising edge, mask and pending registers.
+    pub exti: [u32; 3],
+    /// The levels, millivolts.
+    pub levels_mv: [u32; 7],
+    /// Its interrupt.
+    pub interrupt: usize,
+}
+
+/// The supply of a chip, as its comparator sees it.
+pub struct Supply {
+    /// Its voltage, millivolts.
+    pub mv: u32,
+    was_low: bool,
+}
+
+impl Default for Supply {
+    fn default() -> Self {
+        Self {
+            mv: NOMINAL_MV,
+            was_low: false,
+        }
+    }
+}
+
+impl Supply {
+    /// Whether the comparator is on and says that the supply is low.
+    #[must_use]
+    pub fn is_low(&self, at: &Comparator, words: &HashMap<u32, u32>) -> bool {
+        let (control, on, level) = at.control;
+        let control = words.get(&control).copied().unwrap_or(0);
+        let level = at.levels_mv.get((control >> level & 7) as usize);
+        control & on != 0 && level.is_some_and(|level| self.mv < *level)
+    }
+
+    /// Takes a look. Returns whether the interrupt is asserted.
+    pub fn follow(&mut self, at: &Comparator, words: &mut HashMap<u32, u32>) -> bool {
+        let is_low = self.is_low(at, words);
+        let rose = is_low && !self.was_low;
+        self.was_low = is_low;
+        let [rising, mask, pending] = at.exti;
+        let has = |words: &HashMap<u32, u32>, register| {
+            words.get(&register).copied().unwrap_or(0) & LINE != 0
+        };
+        if rose && has(words, rising) {
+            *words.entry(pending).or_default() |= LINE;
+        }
+        has(words, pending) && has(words, mask)
+    }
+}
+
+/// Why a chip was reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reset {
+    /// Power came up: memory holds nothing.
+    PowerUp,
+    /// The watchdog was not fed.
+    Watchdog,
+    /// The program asked for it.
+    Software,
+    /// The supply was below the brown-out level, and memory kept what it held.
+    BrownOut,
+}
+
+/// The register with the flags of resets.
+#[derive(Clone, Copy, Debug)]
+pub struct ResetFlags {
+    /// Its address.
+    pub register: u32,
+    /// The flags of a power-up, a watchdog's, a program's and a brown-out's reset. Each
+    /// reset also pulls the pin.
+    pub of: [u32; 4],
+    /// The bit that clears them all.
+    pub clear: u32,
+}
+
+impl ResetFlags {
+    /// What the register reads after a reset.
+    #[must_use]
+    pub const fn after(&self, cause: Reset) -> u32 {
+        let [power_up, watchdog, software, brown_out] = self.of;
+        match cause {
+            Reset::PowerUp => power_up,
+            Reset::Watchdog => watchdog,
+            Reset::Software => software,
+            Reset::BrownOut => brown_out,
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! The cable between a chip and the scripted host, with what a host's controller keeps
+//! of every endpoint: its toggle.
+
+use hapterra_tests::usb::{Answer, Handshake};
+
+use super::Peripheral;
+
+/// Endpoint numbers in each direction.
+const ENDPOINTS: usize = 16;
+/// Standard requests after which toggles start anew: SET_CONFIGURATION and, for an
+/// endpoint's halt, CLEAR_FEATURE.
+const SET_CONFIGURATION: [u8; 2] = [0x00, 9];
+const CLEAR_HALT: [u8; 4] = [0x02, 1, 0, 0];
+
+/// A peripheral at the end of a cable.
+///
+/// A packet whose toggle is not the expected one is taken for one that was sent again:
+/// it is acknowledged and thrown away (USB 2.0, 8.6), so what it held is lost.
+pub struct Cable {
+    peripheral: Box<dyn Peripheral>,
+    to_device: [bool; ENDPOINTS],
+    to_host: [bool; ENDPOINTS],
+    /// A control transfer without data, which has its effect when it is done.
+    under_way: Option<[u8; 8]>,
+    /// Packets of the device's that were thrown away.
+    pub thrown_away: u32,
+}
+
+impl Cable {
+    /// Plugs a peripheral in.
+    #[must_use]
+    pub fn new(peripheral: Box<dyn Peripheral>) -> Self {
+        Self {
+            peripheral,
+            to_device: [false; ENDPOINTS],
+            to_host: [false; ENDPOINTS],
+            under_way: None,
+            thrown_away: 0,
+        }
+    }
+
+    /// A word that the core reads.
+    pub fn read(&mut self, offset: u32) -> u32 {
+        self.peripheral.read(offset)
+    }
+
+    /// A word that the core writes, in the bytes of `mask`.
+    pub fn write(&mut self, offset: u32, value: u32, mask: u32) {
+        self.peripheral.write(offset, value, mask);
+    }
+
+    /// Whether the interrupt is asserted.
+    #[must_use]
+    pub fn is_asserting(&self) -> bool {
+        self.peripheral.is_asserting()
+    }
+
+    /// Whether the device shows itself to a host.
+    #[must_use]
+    pub fn is_attached(&self) -> bool {
+        self.peripheral.is_attached()
+    }
+
+    /// The host resets the bus.
+    pub fn bus_reset(&mut self) {
+        self.to_device = [false; ENDPOINTS];
+        self.to_host = [false; ENDPOINTS];
+        self.under_way = None;
+        self.peripheral.bus_reset();
+    }
+
+    /// The bus has been idle for 3 ms, as after an unplugging.
+    pub fn suspend(&mut self) {
+        self.peripheral.suspend();
+    }
+
+    /// The host begins a control transfer; what follows the SETUP is DATA1.
+    pub fn setup(&mut self, request: [u8; 8]) -> Handshake {
+        let hand = self.peripheral.setup(request);
+        if hand == Handshake::Ack {
+            (self.to_device[0], self.to_host[0]) = (true, true);
+            self.under_way = (request[6..] == [0, 0]).then_some(request);
+        }
+        hand
+    }
+
+    /// The host sends a packet.
+    pub fn out(&mut self, endpoint: usize, packet: &[u8]) -> Handshake {
+        let toggle = &mut self.to_device[endpoint];
+        let hand = self.peripheral.out(endpoint, packet, *toggle);
+        *toggle ^= hand == Handshake::Ack;
+        hand
+    }
+
+    /// The host asks for a packet.
+    pub fn take_in(&mut self, endpoint: usize) -> Answer {
+        let (answer, toggle) = self.peripheral.take_in(endpoint);
+        let expected = &mut self.to_host[endpoint];
+        match answer {
+            Answer::Data(_) if toggle != *expected => {
+                self.thrown_away += 1;
+                return Answer::Nak;
+            }
+            Answer::Data(_) => *expected ^= true,
+            _ => return answer,
+        }
+        if endpoint == 0
+            && let Some(request) = self.under_way.take()
+        {
+            self.take_effect(request);
+        }
+        answer
+    }
+
+    /// Does what a control transfer that has ended means for the toggles.
+    fn take_effect(&mut self, request: [u8; 8]) {
+        let [kind, number, value, high, index, ..] = request;
+        if [kind, number] == SET_CONFIGURATION {
+            self.to_device[1..].fill(false);
+            self.to_host[1..].fill(false);
+        }
+        if [kind, number, value, high] == CLEAR_HALT {
+            let endpoint = usize::from(index & 0xF);
+            let toggle = match index & 0x80 {
+                0 => &mut self.to_device[endpoint],
+                _ => &mut self.to_host[endpoint],
+            };
+            *toggle = false;
+        }
+    }
+}

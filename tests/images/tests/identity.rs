@@ -1,0 +1,32 @@
+//! How the boards' own images tell one board from another: by the chip's identifier.
+
+use hapterra_firmware::usb::{PRODUCT, PRODUCT_ID, VENDOR_ID};
+use hapterra_image_tests::device::machines;
+use hapterra_tests::usb::host::{enumerate, string};
+use nusb::descriptors::DeviceDescriptor;
+
+#[test]
+fn the_serial_number_on_usb_is_the_chips_identifier() {
+    for mut machine in machines() {
+        let board = machine.chip.board;
+        // RM0440, 48.1; RM0433, 61.1.
+        let identifier = if machine.chip.is_m7 {
+            0x1FF1_E800
+        } else {
+            0x1FFF_7590
+        };
+        let bytes: Vec<u8> = (0..12).map(|i| 0x1F + 0x11 * i).collect();
+        machine.patch(identifier, &bytes);
+        let found = enumerate(&mut machine).expect("enumerated");
+        let device = DeviceDescriptor::new(&found.device).expect("well formed");
+        let numbers = (device.vendor_id(), device.product_id());
+        assert_eq!(numbers, (VENDOR_ID, PRODUCT_ID), "{board}");
+        let mut named = |index: Option<std::num::NonZeroU8>| {
+            string(&mut machine, index.expect("has one").get()).expect("read")
+        };
+        assert_eq!(named(device.product_string_index()), PRODUCT, "{board}");
+        let serial = named(device.serial_number_string_index());
+        let expected: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
+        assert_eq!(serial, expected, "{board}");
+    }
+}

@@ -1,0 +1,148 @@
+//! How warm a board takes its motors to be after a start: what it kept in its RAM goes on
+//! after a reset, and everything else is hot.
+
+use hapterra::phantom::{PhantomModel, Placement};
+use hapterra::raster::Raster;
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::Vec3;
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::guard::Sense;
+use hapterra_core::guard::thermal::{CONTINUOUS_C, UNSEEN_K};
+use hapterra_core::scene::{Scene, Source};
+use hapterra_core::wire::status::{BootReport, ResetCause, Status};
+use hapterra_firmware::app::{TileBuffers, WorkingMemory};
+use hapterra_firmware::motor_memory::Copies;
+use hapterra_firmware::native::{Device as NativeDevice, StoppedClock};
+use hapterra_firmware::store::Stored;
+use hapterra_image_tests::device::{Device, Plane, machines};
+use hapterra_image_tests::machine::{Machine, Stop};
+use hapterra_image_tests::supply::Reset;
+
+/// What a board's RAM holds whose motors were never used.
+fn cold() -> Copies {
+    let tiles = Box::leak(Box::new(TileBuffers::<4>::VACANT));
+    let memory = Box::leak(Box::new(WorkingMemory::new()));
+    let (clock, boot) = (StoppedClock::<1>, BootReport::default());
+    let mut device = NativeDevice::new(tiles, memory, clock, Stored::Missing, boot);
+    for _ in 0..200 {
+        device.tick(Sense::default());
+    }
+    *device.retained()
+}
+
+fn plane() -> (Plane, Raster, Scale) {
+    let plane = Plane {
+        model: PhantomModel::premium_1_5(),
+        place: Placement {
+            home_mm: [100.0, 100.0, 30.0],
+        },
+        slope: [0.0; 2],
+        height_mm: 20.0,
+        law: ForceLaw::PREMIUM,
+    };
+    let raster = Raster::from_fn(201, 201, |_, _| 20.0).expect("raster");
+    (plane, raster, Scale::new(1.0, 1.0).expect("scale"))
+}
+
+fn on_each(mut then: impl FnMut(Machine, &Plane, &Terrain<'_>, Scene)) {
+    let (plane, raster, scale) = plane();
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    let home = scale.to_grid(plane.place.home_mm).expect("addressable");
+    let scene = terrain.scene(plane.law, Rule::Swept, Source::Encoders, home);
+    for machine in machines() {
+        then(machine, &plane, &terrain, scene);
+    }
+}
+
+/// Where the image keeps the copies.
+fn place(machine: &Machine) -> u32 {
+    let symbol = machine.image.symbol_like(&["motor_memory", "COPIES"]);
+    symbol.expect("the copies").address
+}
+
+/// Puts copies into the RAM and resets the chip.
+fn reset_with(machine: &mut Machine, copies: &Copies, cause: Reset) {
+    let words = copies.as_flattened().iter();
+    let bytes: Vec<u8> = words.flat_map(|word| word.to_le_bytes()).collect();
+    machine.patch(place(machine), &bytes);
+    machine.reset(cause);
+}
+
+fn assert_hot(status: &Status, board: &str) {
+    let winding_c = status.health.winding_c;
+    let hot = winding_c
+        .to_array()
+        .map(|c| CONTINUOUS_C - 3.0 < c && c <= CONTINUOUS_C + 0.1);
+    assert_eq!(hot, [true; 3], "{board}: {winding_c}");
+}
+
+#[test]
+fn a_power_up_takes_the_motors_to_be_hot_whatever_the_ram_holds() {
+    on_each(|mut machine, _, terrain, scene| {
+        let board = machine.chip.board;
+        reset_with(&mut machine, &cold(), Reset::PowerUp);
+        let status = Device::open(machine, terrain, scene).ask_status();
+        assert_eq!(status.boot.cause, ResetCause::PowerOn, "{board}");
+        assert_hot(&status, board);
+    });
+}
+
+#[test]
+fn a_damaged_ram_takes_the_motors_to_be_hot() {
+    on_each(|mut machine, _, terrain, scene| {
+        let board = machine.chip.board;
+        let mut copies = cold();
+        for copy in &mut copies {
+            copy[3] ^= 1 << 20;
+        }
+        reset_with(&mut machine, &copies, Reset::Watchdog);
+        let status = Device::open(machine, terrain, scene).ask_status();
+        assert_eq!(status.boot.cause, ResetCause::Watchdog, "{board}");
+        assert_hot(&status, board);
+    });
+}
+
+#[test]
+fn a_reset_under_load_keeps_the_motors_temperatures() {
+    on_each(|mut machine, plane, terrain, scene| {
+        let board = machine.chip.board;
+        // It has been up for long, and its motors are cold.
+        reset_with(&mut machine, &cold(), Reset::Watchdog);
+        let mut device = Device::arm(machine, terrain, scene);
+        let begun = device.ask_status().health.winding_c;
+        assert!(
+            begun.max_element() < 25.0 + UNSEEN_K + 0.1,
+            "{board}: {begun}"
+        );
+        device.move_to(plane.counts_at([100.0, 100.0], -3.0));
+        device.wait_for_full_force();
+        device.move_to(plane.counts_at([100.0, 100.0], 6.0));
+        device.run_ms(1_500);
+        let before = device.ask_status().health.winding_c;
+        {
+            // The tick hangs with the force on, and the watchdog resets the chip.
+            let mut machine = device.machine.borrow_mut();
+            assert!(machine.is_enabled(), "{board}: under load");
+            let tick = machine.image.function_like(&["HapticLoop", "run_tick"]);
+            machine.patch(tick.address, &[0xFE, 0xE7]);
+            assert_eq!(machine.run_ms(200), Stop::Watchdog, "{board}");
+            machine.restore(tick);
+        }
+        let mut again = Device::open(device.reset(), terrain, scene);
+        let after = again.ask_status().health.winding_c;
+        println!("{board}: {before} °C before the reset, {after} after it");
+        let kept = after - before;
+        // The start takes a moment, in which the windings cool a little.
+        assert!(
+            kept.cmpgt(Vec3::splat(0.0)).all(),
+            "{board}: {before} {after}"
+        );
+        assert!(
+            kept.cmplt(Vec3::splat(UNSEEN_K + 1.0)).all(),
+            "{board}: {before} {after}"
+        );
+        // Each axis has its own: the one that pushed is the warmest.
+        assert!(after.y > after.x + 1.0, "{board}: {after}");
+    });
+}

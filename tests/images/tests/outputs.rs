@@ -1,0 +1,271 @@
+//! What leaves the boards' own images for the amplifiers, and what the amplifiers say
+//! back.
+
+use hapterra::phantom::{PhantomModel, Placement};
+use hapterra::raster::Raster;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::guard::{Blockers, Fault};
+use hapterra_core::wire::request::Request;
+use hapterra_image_tests::bus::Effect;
+use hapterra_image_tests::chip::Commands;
+use hapterra_image_tests::device::{Device, Plane, machines, on_each_board};
+use hapterra_image_tests::machine::{Machine, Stop};
+
+const HOME_MM: [f64; 3] = [100.0, 100.0, 30.0];
+
+fn ground() -> Raster {
+    Raster::from_fn(201, 201, |_, _| 20.0).expect("raster")
+}
+
+fn plane() -> Plane {
+    Plane {
+        model: PhantomModel::premium_1_5(),
+        place: Placement { home_mm: HOME_MM },
+        slope: [0.0; 2],
+        height_mm: 20.0,
+        law: ForceLaw::PREMIUM,
+    }
+}
+
+/// Changes the machine before it starts, then arms it in its home pose.
+fn on_each_armed(before: impl Fn(&mut Machine), mut then: impl FnMut(&mut Device<'_>)) {
+    on_each_board(&ground(), HOME_MM, |mut machine, terrain, scene| {
+        before(&mut machine);
+        let mut device = Device::arm(machine, terrain, scene);
+        device.run_ms(60);
+        let mut machine = device.machine.borrow_mut();
+        assert_eq!(machine.run_ticks(1), Stop::Asked);
+        let _ = machine.take_effects();
+        drop(machine);
+        then(&mut device);
+    });
+}
+
+fn has_converter(machine: &Machine) -> bool {
+    matches!(machine.chip.commands, Commands::Serial { .. })
+}
+
+/// Whole ticks that pass until the amplifiers are off, and what the host is told then.
+fn ends(device: &mut Device<'_>, at_most: usize) -> (usize, Option<Fault>) {
+    let mut machine = device.machine.borrow_mut();
+    let board = machine.chip.board;
+    let took = (1..=at_most).find(|_| {
+        assert_eq!(machine.run_ticks(1), Stop::Asked);
+        !machine.is_enabled()
+    });
+    drop(machine);
+    device.run_ms(40);
+    let told = device.latest.and_then(|sample| sample.fault);
+    let took = took.unwrap_or_else(|| panic!("{board}: on after {at_most} ticks, {told:?}"));
+    (took, told)
+}
+
+#[test]
+fn no_frame_to_the_converter_comes_too_soon() {
+    on_each_armed(
+        |_| (),
+        |device| {
+            if !has_converter(&device.machine.borrow()) {
+                return;
+            }
+            device.wait_for_full_force();
+            device.move_to(plane().counts_at([100.0, 100.0], 3.0));
+            device.run_ms(40);
+            assert!(device.commands().iter().any(|code| *code != 0));
+            assert_eq!(device.machine.borrow().bus().converter.lost, 0);
+        },
+    );
+}
+
+#[test]
+fn a_converter_that_does_not_read_back_keeps_the_amplifiers_off() {
+    on_each_board(&ground(), HOME_MM, |machine, terrain, scene| {
+        if !has_converter(&machine) {
+            return;
+        }
+        let mut device = Device::open(machine, terrain, scene);
+        let blocked = |device: &mut Device<'_>| {
+            device.run_ms(150);
+            let report = device.guard.expect("told");
+            report.blockers.contains(Blockers::OUTPUTS_NOT_AS_SET)
+        };
+        assert!(!blocked(&mut device));
+        device.machine.borrow().bus().converter.is_silent = true;
+        assert!(blocked(&mut device));
+        device.machine.borrow().bus().converter.is_silent = false;
+        assert!(!blocked(&mut device), "set up anew");
+        // It was without its supply for a moment.
+        device.machine.borrow().bus().converter.forget();
+        assert!(!blocked(&mut device), "set up anew");
+        assert_eq!(device.commands(), [0; 3]);
+    });
+}
+
+#[test]
+fn a_converter_that_forgets_takes_eight_ticks() {
+    on_each_armed(
+        |_| (),
+        |device| {
+            if !has_converter(&device.machine.borrow()) {
+                return;
+            }
+            device.machine.borrow().bus().converter.forget();
+            let (took, told) = ends(device, 9);
+            assert!(took <= 8, "{took}");
+            assert_eq!(told, Some(Fault::OutputsNotAsSet));
+        },
+    );
+}
+
+#[test]
+fn a_broken_wire_from_the_converter_takes_two_ticks() {
+    on_each_armed(
+        |_| (),
+        |device| {
+            if !has_converter(&device.machine.borrow()) {
+                return;
+            }
+            device.machine.borrow().bus().converter.is_silent = true;
+            assert_eq!(ends(device, 9), (2, Some(Fault::OutputsNotAsSet)));
+        },
+    );
+}
+
+#[test]
+fn an_amplifier_that_is_not_ready_takes_three_ticks() {
+    for axis in 0..3 {
+        on_each_armed(
+            |_| (),
+            |device| {
+                let pin = device.machine.borrow().chip.ready[axis];
+                device.machine.borrow_mut().set_input(pin, true);
+                assert_eq!(ends(device, 9), (3, Some(Fault::AmplifierNotReady)));
+                device.run_ms(150);
+                let report = device.guard.expect("told");
+                assert!(report.blockers.contains(Blockers::AMPLIFIER_NOT_READY));
+            },
+        );
+    }
+}
+
+#[test]
+fn a_current_that_was_not_commanded_is_found_where_there_are_monitors() {
+    for axis in 0..3 {
+        let mut wrong = [0.0; 3];
+        wrong[axis] = -2.0;
+        let fit = |machine: &mut Machine| {
+            let pin = machine.chip.monitors_fitted;
+            machine.set_input(pin, false);
+        };
+        on_each_armed(fit, |device| {
+            device.machine.borrow().bus().set_monitors(wrong);
+            let (took, told) = ends(device, 40);
+            assert!((4..=15).contains(&took), "{took}");
+            assert_eq!(told, Some(Fault::CurrentMismatch));
+        });
+    }
+}
+
+#[test]
+fn without_monitors_what_is_at_their_pins_does_not_matter() {
+    on_each_armed(
+        |machine| machine.bus().set_monitors([5.0, -5.0, 3.0]),
+        |device| {
+            device.run_ms(300);
+            assert!(device.machine.borrow().is_enabled(), "{:?}", device.guard);
+            let status = device.ask_status();
+            assert_eq!(status.health.sense.measured_ma, None);
+        },
+    );
+}
+
+#[test]
+fn measured_currents_are_told_in_milliamperes() {
+    for machine in machines() {
+        let pin = machine.chip.monitors_fitted;
+        let terrain = ground();
+        let board = machine.chip.board;
+        on_each_board(&terrain, HOME_MM, |mut machine, terrain, scene| {
+            if machine.chip.board != board {
+                return;
+            }
+            machine.set_input(pin, false);
+            machine.bus().set_monitors([0.1, -0.2, 0.4]);
+            let mut device = Device::open(machine, terrain, scene);
+            let measured = device.ask_status().health.sense.measured_ma;
+            let measured = measured.expect("there are monitors");
+            for (got, expected) in measured.into_iter().zip([100, -200, 400]) {
+                assert!((got - expected).abs() <= 3, "{board}: {measured:?}");
+            }
+        });
+    }
+}
+
+/// Codes that full scale may have, and that a converter's or an amplifier's range allows.
+fn range(machine: &Machine) -> std::ops::RangeInclusive<i32> {
+    match machine.chip.commands {
+        // 0.2 V and 3.1 V of 3.3 V.
+        Commands::Converters(_) => 249..=3847,
+        Commands::DutyCycles(_, largest) => {
+            let period = machine.bus().read(largest) as i32 + 1;
+            period * 15 / 100..=period * 85 / 100
+        }
+        Commands::Serial { .. } => -32_768..=32_767,
+    }
+}
+
+#[test]
+fn the_largest_currents_stay_where_outputs_and_amplifiers_are_specified() {
+    on_each_armed(
+        |_| (),
+        |device| {
+            device.wait_for_full_force();
+            device.move_to(plane().counts_at([100.0, 100.0], 30.0));
+            device.run_ms(40);
+            // More than warm motors may have: the ends of the range themselves.
+            device.request(Request::Disarm);
+            device.run_ms(300);
+            device.request(Request::HoldOutputs(Some([1.0, -1.0, 1.0])));
+            device.run_ms(20);
+            let mut machine = device.machine.borrow_mut();
+            let (range, idle) = (range(&machine), machine.bus().code(0.0));
+            let full = (machine.bus().code(5.5) - idle).abs();
+            let mut largest = 0.0f64;
+            for effect in machine.take_effects() {
+                if let Effect::Command(axis, code) = effect {
+                    assert!(range.contains(&code), "axis {axis}: {code} of {range:?}");
+                    largest = largest.max((f64::from(code) - idle).abs());
+                }
+            }
+            assert!(largest > 0.99 * full, "{largest} of {full}");
+        },
+    );
+}
+
+#[test]
+fn duty_cycles_are_as_fast_as_an_escon_reads_well() {
+    for mut machine in machines() {
+        let Commands::DutyCycles(_, largest) = machine.chip.commands else {
+            continue;
+        };
+        assert_eq!(machine.run_ms(10), Stop::Time);
+        let mut bus = machine.bus();
+        let counts = u64::from(bus.read(largest)) + 1;
+        let divider = u64::from(bus.read(largest - 4)) + 1;
+        assert_eq!(machine.chip.timer_hz, 2_000 * counts * divider);
+    }
+}
+
+#[test]
+fn converters_on_the_chip_are_buffered() {
+    for mut machine in machines() {
+        if !matches!(machine.chip.commands, Commands::Converters(_)) {
+            continue;
+        }
+        assert_eq!(machine.run_ms(10), Stop::Time);
+        for mode in [0x5000_083C, 0x5000_0C3C] {
+            // DAC_MCR: MODE1, MODE2: to the pin, with the buffer.
+            assert_eq!(machine.bus().read(mode) & 0x0007_0007, 0);
+        }
+    }
+}

@@ -1,0 +1,344 @@
+//! What switches the arm off when the program cannot, and what the chip itself does when
+//! its supply, its stack or its core fails.
+
+use std::cell::Cell;
+
+use hapterra::terrain::Terrain;
+use hapterra_core::guard::Fault;
+use hapterra_core::scene::Scene;
+use hapterra_core::wire::frame::encode;
+use hapterra_core::wire::status::{CrashKind, ResetCause, Status};
+use hapterra_core::wire::version::VersionCheck;
+use hapterra_image_tests::device::{Device, machines, on_each_board, rough_ground};
+use hapterra_image_tests::machine::{Machine, Stop};
+use hapterra_image_tests::supply::{NOMINAL_MV, Reset};
+use hapterra_tests::usb::Port;
+
+/// Below every chip's highest level.
+const TOO_LOW_MV: u32 = 2_800;
+/// Branches to itself.
+const HANG: [u8; 2] = [0xFE, 0xE7];
+/// No instruction: a hard fault.
+const UNDEFINED: [u8; 2] = [0x00, 0xDE];
+
+/// Does something with every board, over rough ground.
+fn on_each(then: impl FnMut(Machine, &Terrain<'_>, Scene)) {
+    let (raster, home_mm) = rough_ground();
+    on_each_board(&raster, home_mm, then);
+}
+
+/// Arms every board, does something to it, resets it in a way, and gives what it tells
+/// after that.
+fn after(
+    cause: Reset,
+    mut disturb: impl FnMut(&mut Device<'_>, Scene),
+    mut asked: impl FnMut(&str, &Status),
+) {
+    on_each(|machine, terrain, scene| {
+        let mut device = Device::arm(machine, terrain, scene);
+        let _ = device.machine.borrow_mut().take_effects();
+        disturb(&mut device, scene);
+        let mut again = Device::open(device.reset_by(cause), terrain, scene);
+        let status = again.ask_status();
+        let board = again.machine.borrow().chip.board;
+        asked(board, &status);
+    });
+}
+
+/// Runs, the host reading, until the amplifiers are off.
+fn run_until_off(machine: &mut Machine, ms: u64) -> Stop {
+    machine.run_until(ms, |m| {
+        let _ = m.take_in(1);
+        !m.is_enabled()
+    })
+}
+
+#[test]
+fn a_supply_that_falls_in_a_tick_switches_off_before_the_tick_goes_on() {
+    let fall = |device: &mut Device<'_>, _: Scene| {
+        let mut machine = device.machine.borrow_mut();
+        machine.slice = 1;
+        assert_eq!(machine.run_until(5, |m| m.is_ticking()), Stop::Asked);
+        machine.run_until(1, |m| !m.place().contains("TIM7"));
+        assert!(machine.is_ticking() && machine.is_enabled());
+        machine.set_supply_mv(TOO_LOW_MV);
+        let before_ns = machine.bus().now_ns;
+        assert_eq!(run_until_off(&mut machine, 1), Stop::Asked, "off");
+        assert!(machine.is_ticking(), "the tick has not gone on");
+        // A few instructions, and what an exception costs.
+        let after_ns = machine.bus().now_ns - before_ns;
+        assert!(after_ns < 500, "off after {after_ns} ns");
+        let _ = machine.take_effects();
+        machine.slice = 200;
+        assert_eq!(machine.run_ms(20), Stop::Software);
+        assert_eq!(machine.take_effects(), [], "nothing after it");
+    };
+    after(Reset::Software, fall, |board, status| {
+        let crash = status.boot.crash.clone().expect("a record");
+        assert_eq!(crash.kind, CrashKind::SupplyLow, "{board}");
+        let fault = status.health.report.fault;
+        assert_eq!(fault, Some(Fault::SupplyLow), "{board}");
+    });
+}
+
+#[test]
+fn on_a_supply_that_is_too_low_no_program_starts() {
+    for mut machine in machines() {
+        let board = machine.chip.board;
+        machine.set_supply_mv(TOO_LOW_MV);
+        machine.run_ms(50);
+        assert!(!machine.is_attached(), "{board}");
+        machine.set_supply_mv(NOMINAL_MV);
+        machine.run_ms(50);
+        assert!(machine.is_attached(), "{board}");
+    }
+}
+
+#[test]
+fn a_brown_out_is_told_after_the_reset() {
+    after(
+        Reset::BrownOut,
+        |_, _| {},
+        |board, status| {
+            assert_eq!(status.boot.cause, ResetCause::BrownOut, "{board}");
+            let fault = status.health.report.fault;
+            assert_eq!(fault, Some(Fault::SupplyLow), "{board}");
+        },
+    );
+}
+
+#[test]
+fn option_bytes_without_a_brown_out_level_are_told() {
+    on_each(|machine, terrain, scene| {
+        let board = machine.chip.board;
+        let mut device = Device::open(machine, terrain, scene);
+        let set = device.ask_status().boot;
+        assert!(!set.lacks_brown_out_reset(), "{board}: {set:?}");
+        assert!(set.resets_below_mv >= 2_700, "{board}: {set:?}");
+        let machine = device.reset();
+        machine.bus().set_brown_out_level(0);
+        let mut device = Device::open(machine, terrain, scene);
+        let as_sold = device.ask_status().boot;
+        assert!(as_sold.lacks_brown_out_reset(), "{board}: {as_sold:?}");
+    });
+}
+
+#[test]
+fn a_core_that_a_debugger_halts_is_stopped_by_the_chip() {
+    on_each(|machine, terrain, scene| {
+        let board = machine.chip.board;
+        let device = Device::arm(machine, terrain, scene);
+        let mut machine = device.machine.borrow_mut();
+        machine.attach_debugger();
+        // One look of the supervisor.
+        assert_eq!(machine.run_ms(15), Stop::Time, "{board}");
+        assert!(
+            machine.is_enabled(),
+            "{board}: attaching alone does nothing"
+        );
+        assert_eq!(machine.halt_ms(0), Stop::Time);
+        let driven = machine.bus().drives_duty_cycles();
+        assert_ne!(driven, Some(true), "{board}: halted, and still pulses");
+        let before_ns = machine.bus().now_ns;
+        assert_eq!(machine.halt_ms(200), Stop::Watchdog, "{board}");
+        let ms = (machine.bus().now_ns - before_ns) / 1_000_000;
+        assert!(ms <= 52, "{board}: reset after {ms} ms");
+    });
+}
+
+#[test]
+fn a_core_that_locks_up_stops_the_duty_cycles_and_the_watchdog_does_the_rest() {
+    on_each(|machine, terrain, scene| {
+        let board = machine.chip.board;
+        let device = Device::arm(machine, terrain, scene);
+        let mut machine = device.machine.borrow_mut();
+        let handler = machine.image.function_like(&["HardFault"]);
+        let encoder = machine.image.message_encoder();
+        machine.patch(handler.address, &UNDEFINED);
+        machine.patch(encoder.address, &UNDEFINED);
+        let stop = run_until_off(&mut machine, 50);
+        assert!(matches!(stop, Stop::Lockup(_)), "{board}: {stop:?}");
+        let driven = machine.bus().drives_duty_cycles();
+        assert_ne!(driven, Some(true), "{board}: locked up, and still pulses");
+        assert_eq!(machine.halt_ms(200), Stop::Watchdog, "{board}");
+    });
+}
+
+#[test]
+fn the_stop_ends_the_duty_cycles_without_the_program() {
+    on_each(|machine, terrain, scene| {
+        let device = Device::arm(machine, terrain, scene);
+        let mut machine = device.machine.borrow_mut();
+        if machine.bus().drives_duty_cycles().is_none() {
+            return;
+        }
+        let tick = machine.image.function_like(&["HapticLoop", "run_tick"]);
+        machine.patch(tick.address, &HANG);
+        machine.run_ms(3);
+        assert!(machine.is_enabled(), "nothing else switches off");
+        assert_eq!(machine.bus().drives_duty_cycles(), Some(true));
+        let pin = machine.chip.emergency_stop;
+        machine.set_input(pin, true);
+        assert_eq!(machine.bus().drives_duty_cycles(), Some(false));
+        // Not even when it is released.
+        machine.set_input(pin, false);
+        machine.run_ms(3);
+        assert_eq!(machine.bus().drives_duty_cycles(), Some(false));
+    });
+}
+
+#[test]
+fn a_stop_too_short_for_a_tick_to_see_is_a_stop() {
+    on_each(|machine, terrain, scene| {
+        let mut device = Device::arm(machine, terrain, scene);
+        let mut machine = device.machine.borrow_mut();
+        if machine.bus().drives_duty_cycles().is_none() {
+            return;
+        }
+        machine.run_ticks(1);
+        let pin = machine.chip.emergency_stop;
+        machine.set_input(pin, true);
+        machine.set_input(pin, false);
+        machine.run_ticks(1);
+        assert!(!machine.is_enabled());
+        machine.run_ticks(1);
+        let driven = machine.bus().drives_duty_cycles();
+        assert_eq!(driven, Some(true), "ready for the next time");
+        drop(machine);
+        device.run_ms(40);
+        let told = device.latest.and_then(|sample| sample.fault);
+        assert_eq!(told, Some(Fault::EmergencyStop));
+    });
+}
+
+#[test]
+fn a_stack_that_overruns_switches_off_and_overwrites_nothing() {
+    // push {r0-r7, lr}; and again.
+    const RECURSE: [u8; 4] = [0xFF, 0xB5, 0xFD, 0xE7];
+    let overrun = |device: &mut Device<'_>, _: Scene| {
+        let mut machine = device.machine.borrow_mut();
+        let board = machine.chip.board;
+        let encoder = machine.image.message_encoder();
+        machine.patch(encoder.address, &RECURSE);
+        let stop = run_until_off(&mut machine, 50);
+        assert_eq!(stop, Stop::Asked, "{board}: off");
+        assert_eq!(machine.hard_faults, 1, "{board}");
+        assert_eq!(machine.run_ms(200), Stop::Software, "{board}");
+        machine.restore(encoder);
+    };
+    after(Reset::Software, overrun, |board, status| {
+        let crash = status.boot.crash.clone().expect("a record");
+        assert_eq!(crash.kind, CrashKind::StackOverflow, "{board}: {crash:?}");
+        let fault = status.health.report.fault;
+        assert_eq!(fault, Some(Fault::StackOverflow), "{board}");
+    });
+}
+
+#[test]
+fn a_fault_inside_a_log_line_is_told_as_what_it_was() {
+    let at = Cell::new(0);
+    let break_log = |device: &mut Device<'_>, _: Scene| {
+        let release = {
+            let mut machine = device.machine.borrow_mut();
+            let release = machine.image.function_like(&["_defmt_release"]);
+            machine.patch(release.address, &UNDEFINED);
+            release
+        };
+        at.set(release.address);
+        // A host of another protocol is logged.
+        let hello = VersionCheck::Asked { protocol: 3 };
+        device.send(encode(&hello, &mut [0; 32]).expect("it fits"));
+        let mut machine = device.machine.borrow_mut();
+        let stop = machine.run_until(200, |m| {
+            let _ = m.take_in(1);
+            false
+        });
+        assert_eq!(stop, Stop::Software);
+        machine.restore(release);
+    };
+    after(Reset::Software, break_log, |board, status| {
+        let crash = status.boot.crash.clone().expect("a record");
+        assert_eq!(crash.kind, CrashKind::HardFault, "{board}: {crash:?}");
+        assert_eq!(crash.pc, at.get(), "{board}");
+    });
+}
+
+#[test]
+fn a_panic_before_the_watchdog_runs_resets_the_chip() {
+    on_each(|mut machine, terrain, scene| {
+        let board = machine.chip.board;
+        let scan = machine.image.function_like(&["CalibrationStore", "scan"]);
+        let panic = machine.image.panicking();
+        machine.call_instead(scan, panic);
+        assert_eq!(machine.run_ms(100), Stop::Software, "{board}");
+        assert!(!machine.is_attached(), "{board}: it came before the link");
+        machine.restore(scan);
+        machine.reset(Reset::Software);
+        let mut device = Device::open(machine, terrain, scene);
+        let status = device.ask_status();
+        let fault = status.health.report.fault;
+        assert_eq!(fault, Some(Fault::Panicked), "{board}");
+    });
+}
+
+/// Level changes of the heartbeat in so many ticks.
+fn beats(machine: &mut Machine, ticks: usize) -> usize {
+    let pin = machine.chip.heartbeat;
+    let mut level = machine.bus().output(pin);
+    let mut changes = 0;
+    for _ in 0..ticks {
+        machine.run_ticks(1);
+        let now = machine.bus().output(pin);
+        changes += usize::from(now != level);
+        level = now;
+    }
+    changes
+}
+
+#[test]
+fn the_heartbeat_changes_in_each_tick_that_leaves_the_amplifiers_on() {
+    on_each(|machine, terrain, scene| {
+        let board = machine.chip.board;
+        let device = Device::arm(machine, terrain, scene);
+        let mut machine = device.machine.borrow_mut();
+        assert_eq!(beats(&mut machine, 20), 20, "{board}: armed");
+        let pin = machine.chip.dead_man;
+        machine.set_input(pin, true);
+        machine.run_ticks(2);
+        assert!(!machine.is_enabled(), "{board}");
+        assert_eq!(beats(&mut machine, 20), 0, "{board}: off");
+    });
+}
+
+#[test]
+fn a_tick_that_hangs_has_no_heartbeat() {
+    on_each(|machine, terrain, scene| {
+        let board = machine.chip.board;
+        let device = Device::arm(machine, terrain, scene);
+        let mut machine = device.machine.borrow_mut();
+        assert_eq!(beats(&mut machine, 4), 4, "{board}: it had one");
+        let tick = machine.image.function_like(&["HapticLoop", "run_tick"]);
+        machine.patch(tick.address, &HANG);
+        machine.run_ms(2);
+        let pin = machine.chip.heartbeat;
+        let level = machine.bus().output(pin);
+        let changed = machine.run_until(30, |m| m.bus().output(pin) != level);
+        assert_eq!(changed, Stop::Time, "{board}");
+        assert!(
+            machine.is_enabled(),
+            "{board}: only a one-shot would see it"
+        );
+    });
+}
+
+#[test]
+fn no_clock_comes_from_outside_of_the_chip() {
+    for mut machine in machines() {
+        let board = machine.chip.board;
+        // The model has nothing on the pins of an external clock.
+        assert_eq!(machine.run_ms(20), Stop::Time, "{board}");
+        assert!(machine.is_attached(), "{board}: it waits for a clock");
+        let (control, on) = machine.chip.external_clock;
+        assert_eq!(machine.bus().read(control) & on, 0, "{board}: it is on");
+    }
+}
