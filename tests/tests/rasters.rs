@@ -6,6 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use hapterra::raster::{BadRaster, CellUnit, OpenOptions, PngChannel, Raster};
+use hapterra::terrain::{FeltCells, FeltGrid};
 use hapterra_tests::shared;
 
 const COLUMNS: usize = 512;
@@ -182,9 +183,10 @@ fn cells_and_units_come_from_the_file() {
         return;
     };
     let raster = open(&folder.join("i16_scale_offset_ft.tif"));
-    assert_eq!(raster.metres_per_cell(), Some(30.0));
+    let felt = FeltGrid::new(&raster, FeltCells::Stored);
+    assert_eq!((felt.side_m(), felt.is_resampled()), (Some(30.0), false));
     assert_eq!(raster.metres_per_vertical_unit(), 0.3048);
-    assert_eq!(raster.cells_per_vertical_unit(), Some(0.3048 / 30.0));
+    assert_eq!(felt.cells_per_vertical_unit(), Some(0.3048 / 30.0));
 
     let rotated = open(&folder.join("rotated_geotransform.tif"));
     let metres = rotated.cell().expect("a grid").metres();
@@ -192,8 +194,11 @@ fn cells_and_units_come_from_the_file() {
     assert!(rotated.remarks()[0].contains("rotated by 11.3°"));
 
     let picture = open(&folder.join("png_gray16.png"));
-    assert_eq!(picture.metres_per_cell(), None);
-    assert_eq!(picture.cells_per_vertical_unit(), None);
+    let felt = FeltGrid::new(&picture, FeltCells::Stored);
+    assert_eq!(
+        (felt.side_m(), felt.cells_per_vertical_unit()),
+        (None, None)
+    );
 }
 
 /// Columns, rows, holes and height range of the real files, as the sources and
@@ -255,7 +260,9 @@ fn every_real_file_opens() {
             summary.highest
         );
         assert!(
-            raster.cells_per_vertical_unit().is_some(),
+            FeltGrid::new(&raster, FeltCells::Stored)
+                .cells_per_vertical_unit()
+                .is_some(),
             "{name}: true proportions"
         );
     }

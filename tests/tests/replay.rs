@@ -4,7 +4,7 @@
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};
-use hapterra::terrain::{Scale, Terrain};
+use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
 use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::Sample;
@@ -146,7 +146,8 @@ fn on_real_terrains_too_whatever_their_holes() {
     ] {
         let Some(path) = shared(file) else { return };
         let raster = Raster::open(path, &OpenOptions::default()).expect("opens");
-        let scale = Scale::true_to(&raster, cell_mm).expect("scale");
+        let grid = FeltGrid::new(&raster, FeltCells::Stored);
+        let scale = Scale::true_to(&grid, cell_mm).expect("scale");
         eprint!("{file}: ");
         let touched = judge(&raster, scale, Rule::Swept, 5, 2000);
         assert!(touched > 100, "{file}: the walk hardly touches");

@@ -2,6 +2,7 @@
 //! (`hapterra_tests::minima`), and by looking densely at the HIP paths.
 
 use hapterra::raster::{OpenOptions, Raster};
+use hapterra::terrain::{FeltCells, FeltGrid};
 use hapterra_core::contact::{ContactState, Execution, Rule};
 use hapterra_tests::chance::Chance;
 use hapterra_tests::invariants::judge::Judge;
@@ -210,7 +211,10 @@ fn on_real_terrain_every_proxy_rests_at_a_closest_point() {
 /// At most 200 × 200 patches of its middle, lowest sample near zero.
 fn cut(raster: &Raster, steepness: f64) -> Terrain {
     const MOST: u32 = 200;
-    let scale = raster.cells_per_vertical_unit().unwrap_or(1.0) * steepness;
+    let scale = FeltGrid::new(raster, FeltCells::Stored)
+        .cells_per_vertical_unit()
+        .unwrap_or(1.0)
+        * steepness;
     let lowest = raster.summary().lowest;
     let [width, height] = [raster.columns(), raster.rows()].map(|n| n.min(MOST + 1));
     let first = [(raster.columns() - width) / 2, (raster.rows() - height) / 2];

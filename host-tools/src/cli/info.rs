@@ -8,7 +8,8 @@ use hapterra_core::terrain::{POSTS, TILE_CELLS};
 
 use super::failure::Failure;
 use super::options::terrain_file::TerrainFile;
-use crate::raster::{CellSize, CellUnit, Certainty, Raster};
+use crate::raster::{CellSize, CellUnit, Certainty};
+use crate::terrain::{FeltCells, FeltGrid};
 
 /// Arguments of `hapterra info`.
 #[derive(Debug, clap::Args)]
@@ -16,6 +17,10 @@ pub struct Args {
     /// The terrain file.
     #[command(flatten)]
     pub terrain: TerrainFile,
+
+    /// Which cells of the file are felt
+    #[arg(long, value_enum, default_value_t)]
+    pub cells: FeltCells,
 
     /// Print one JSON object
     #[arg(long)]
@@ -28,7 +33,8 @@ pub struct Args {
 /// When the file cannot be opened as a height field.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let raster = args.terrain.open()?;
-    let report = FileReport::new(&args.terrain, &raster);
+    let grid = FeltGrid::new(&raster, args.cells);
+    let report = FileReport::new(&args.terrain, &grid);
     if args.json {
         let json = serde_json::to_string_pretty(&report).map_err(Failure::new)?;
         println!("{json}");
@@ -47,6 +53,9 @@ struct FileReport {
     columns: u32,
     /// Samples from south to north.
     rows: u32,
+    /// The horizontal reference system, as `EPSG:26911`, where the file states it.
+    crs: Option<String>,
+    crs_name: Option<String>,
     cell: Option<Cell>,
     /// Metres per vertical unit, where the file says so.
     metres_per_vertical_unit: Option<f64>,
@@ -67,11 +76,16 @@ struct Cell {
     unit: &'static str,
     /// Whether the file states the unit; metres or degrees are assumed if not.
     unit_stated: bool,
+    /// Where the unit comes from: the `file`, the `code` of its reference system, or
+    /// it is `assumed`.
+    unit_from: &'static str,
     /// Ground length of both sides in metres.
     east_m: f64,
     north_m: f64,
     /// Side of the square cell that is felt, m on the ground.
     felt_m: f64,
+    /// Whether heights are interpolated for that, as the stored cells are not square.
+    resampled: bool,
 }
 
 /// One level of detail: the field with every 2^level-th sample.
@@ -86,20 +100,24 @@ struct Level {
 }
 
 impl FileReport {
-    fn new(input: &TerrainFile, raster: &Raster) -> Self {
+    fn new(input: &TerrainFile, grid: &FeltGrid<'_>) -> Self {
+        let raster = grid.raster();
         let summary = raster.summary();
+        let (crs, crs_name) = raster.reference_system().unzip();
         Self {
             file: input.file.display().to_string(),
             format: raster.format().to_owned(),
             columns: raster.columns(),
             rows: raster.rows(),
-            cell: raster.cell().map(Cell::new),
+            crs: crs.map(|code| format!("EPSG:{code}")),
+            crs_name,
+            cell: raster.cell().map(|cell| Cell::new(cell, grid)),
             metres_per_vertical_unit: raster.stated_metres_per_vertical_unit(),
             lowest: summary.lowest,
             highest: summary.highest,
             no_data: summary.holes,
             bytes: raster.samples().bytes(),
-            levels: levels(raster.columns(), raster.rows()),
+            levels: levels(grid.columns(), grid.rows()),
             remarks: raster.remarks().to_vec(),
         }
     }
@@ -114,6 +132,9 @@ impl FileReport {
         line("file", self.file.clone());
         line("format", self.format.clone());
         line("size", format!("{} × {} samples", self.columns, self.rows));
+        if let (Some(code), Some(name)) = (&self.crs, &self.crs_name) {
+            line("crs", format!("{code} {name}"));
+        }
         let cell = self.cell.as_ref();
         line("cell", cell.map_or("unknown".into(), Cell::text));
         line("heights", self.heights());
@@ -143,7 +164,7 @@ impl FileReport {
 }
 
 impl Cell {
-    fn new(cell: CellSize) -> Self {
+    fn new(cell: CellSize, grid: &FeltGrid<'_>) -> Self {
         let (east_m, north_m) = cell.metres();
         Self {
             east: cell.east,
@@ -154,26 +175,36 @@ impl Cell {
                 CellUnit::Length { .. } => "unit of length",
             },
             unit_stated: cell.certainty == Certainty::Stated,
+            unit_from: match cell.certainty {
+                Certainty::Stated => "file",
+                Certainty::FromCode => "code",
+                Certainty::UnitAssumed => "assumed",
+            },
             east_m,
             north_m,
-            felt_m: cell.square_metres(),
+            felt_m: grid.side_m().unwrap_or_default(),
+            resampled: grid.is_resampled(),
         }
     }
 
     fn text(&self) -> String {
-        let assumed = if self.unit_stated {
-            ""
-        } else {
-            " (unit assumed)"
+        let assumed = match self.unit_from {
+            "file" => "",
+            "code" => " (unit by the code of its reference system)",
+            _ => " (unit assumed)",
         };
         let (east_m, north_m, felt_m) = (self.east_m, self.north_m, self.felt_m);
         let stored = format!("{} × {} {}{assumed}", self.east, self.north, self.unit);
-        let square = (east_m - north_m).abs() <= 1e-6 * north_m;
+        let square = (east_m - north_m).abs() <= 1e-3 * east_m.min(north_m);
+        let hint = match self.resampled {
+            true => "",
+            false => " of the same area (--cells square: in their true shape)",
+        };
         match (square, self.unit) {
-            (true, "metre") => stored,
-            (true, _) => format!("{stored}, {felt_m:.3} m on the ground"),
-            (false, _) => format!(
-                "{stored}, {east_m:.3} × {north_m:.3} m on the ground, felt as {felt_m:.3} m squares"
+            (true, "metre") if !self.resampled => stored,
+            (true, _) if !self.resampled => format!("{stored}, {felt_m:.3} m on the ground"),
+            _ => format!(
+                "{stored}, {east_m:.3} × {north_m:.3} m on the ground, felt as {felt_m:.3} m squares{hint}"
             ),
         }
     }

@@ -6,7 +6,7 @@ use clap::ValueHint;
 
 use super::failure::Failure;
 use super::options::terrain_file::parse_size;
-use super::terminal::{interrupt, progress};
+use super::terminal::{interrupt, left_behind, progress};
 use crate::synth::{Grid, Kind, Synth, write};
 
 /// Arguments of `hapterra synth`.
@@ -32,7 +32,9 @@ pub struct Args {
     #[arg(long, value_name = "METRES", default_value_t = 10.0, value_parser = parse_length)]
     pub cell_m: f64,
 
-    /// Height of the terrain in metres [default: what suits the kind, some tens of cells]
+    /// Height of the terrain in metres, from its lowest to its highest place at most
+    /// [default: what suits the kind, some tens of cells; a plane rises by a fifth of a
+    /// cell per cell to the east]
     #[arg(long, value_name = "METRES", value_parser = parse_length)]
     pub amplitude: Option<f64>,
 }
@@ -48,12 +50,18 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::new(error).hint("a surface needs at least --size 2x2"));
     }
     let usual = args.kind.usual_amplitude_cells() * args.cell_m;
-    let synth = Synth::new(args.kind, args.seed, args.amplitude.unwrap_or(usual));
+    let stated = args.amplitude.map(|height| match args.kind {
+        // Its own amplitude is a slope.
+        Kind::Plane => height / Synth::new(Kind::Plane, 0, 1.0).rise(columns, rows),
+        _ => height,
+    });
+    let synth = Synth::new(args.kind, args.seed, stated.unwrap_or(usual));
     let grid = Grid {
         columns,
         rows,
         cell_m: args.cell_m,
     };
+    left_behind::tell([args.output.as_path()]);
     let progress = progress::bar(Some(rows.into()), "{bar:30} {pos}/{len} rows, {eta} left");
     interrupt::listen();
     let written = write(&args.output, &synth, &grid, &mut || {

@@ -1,7 +1,6 @@
 //! A scale at which a terrain feels good, for when the user states none.
 
-use crate::raster::Raster;
-use crate::terrain::{BadScale, Scale};
+use crate::terrain::{BadScale, FeltGrid, Scale};
 
 /// What the hand ranges over without moving the elbow, east and north, mm.
 const HAND_MM: [f64; 2] = [140.0, 70.0];
@@ -28,7 +27,7 @@ pub struct SuggestedScale {
     pub exaggeration: f64,
 }
 
-/// A scale for a raster: the cell as stated, else 1 mm, more for a terrain
+/// A scale for a terrain: the cell as stated, else 1 mm, more for a terrain
 /// smaller than a hand's reach; heights at their true proportions (1 mm a unit
 /// where the file does not know them) where that is neither flat nor a tower
 /// under the hand, else exaggerated by a round number, but not so much that the
@@ -36,17 +35,20 @@ pub struct SuggestedScale {
 ///
 /// # Errors
 /// A stated cell that no terrain can be scaled with.
-pub fn suggest_scale(raster: &Raster, cell_mm: Option<f64>) -> Result<SuggestedScale, BadScale> {
-    let longest = raster.columns().max(raster.rows()) - 1;
+pub fn suggest_scale(
+    grid: &FeltGrid<'_>,
+    cell_mm: Option<f64>,
+) -> Result<SuggestedScale, BadScale> {
+    let longest = grid.columns().max(grid.rows()) - 1;
     let fitting = (LENGTH_MM / f64::from(longest)).clamp(CELL_MM.0, CELL_MM.1);
     let cell_mm = cell_mm.unwrap_or((fitting * 2.0).round() / 2.0);
-    let plain = Scale::true_to(raster, cell_mm)?;
-    let relief_mm = usual_relief(raster, cell_mm) * plain.height_mm_per_unit();
+    let plain = Scale::true_to(grid, cell_mm)?;
+    let relief_mm = usual_relief(grid, cell_mm) * plain.height_mm_per_unit();
     let good = (GOOD_MM.0..=GOOD_MM.1).contains(&relief_mm) || relief_mm <= 0.0;
     let exaggeration = match good {
         true => 1.0,
         false => {
-            let bearable = STEEP / plain.height_cells(great_slope(raster));
+            let bearable = STEEP / plain.height_cells(great_slope(grid));
             // Slopes that are steep by themselves are the terrain's own.
             round(f64::min(AIM_MM / relief_mm, bearable.max(1.0)))
         }
@@ -77,23 +79,23 @@ fn quantile(mut values: Vec<f64>, tenths: usize) -> f64 {
 
 /// The median relief, in vertical units, of places as large as a hand's reach
 /// that have any.
-fn usual_relief(raster: &Raster, cell_mm: f64) -> f64 {
-    let last = [raster.columns() - 1, raster.rows() - 1];
+fn usual_relief(grid: &FeltGrid<'_>, cell_mm: f64) -> f64 {
+    let last = [grid.columns() - 1, grid.rows() - 1];
     let size = [0, 1].map(|axis| {
         let cells = (HAND_MM[axis] / cell_mm).ceil();
         cells.min(f64::from(last[axis])).max(1.0) as u32
     });
     let corner =
         |place: [u32; 2]| [0, 1].map(|axis| spread(place[axis], PLACES, last[axis] - size[axis]));
-    let reliefs = square(PLACES).filter_map(|place| relief(raster, corner(place), size));
+    let reliefs = square(PLACES).filter_map(|place| relief(grid, corner(place), size));
     quantile(reliefs.collect(), 5)
 }
 
 /// Relief of a place, if most of it is known and it is not flat.
-fn relief(raster: &Raster, corner: [u32; 2], size: [u32; 2]) -> Option<f64> {
+fn relief(grid: &FeltGrid<'_>, corner: [u32; 2], size: [u32; 2]) -> Option<f64> {
     let known: Vec<f64> = square(SAMPLES)
         .map(|at| [0, 1].map(|axis| corner[axis] + spread(at[axis], SAMPLES, size[axis])))
-        .map(|[x, y]| raster.height(x, y))
+        .map(|[x, y]| grid.height(x, y))
         .filter(|height| !height.is_nan())
         .collect();
     let low = known.iter().copied().fold(f64::MAX, f64::min);
@@ -103,12 +105,12 @@ fn relief(raster: &Raster, corner: [u32; 2], size: [u32; 2]) -> Option<f64> {
 
 /// The slope, in vertical units a cell, that one in ten of those that are not
 /// flat exceeds.
-fn great_slope(raster: &Raster) -> f64 {
+fn great_slope(grid: &FeltGrid<'_>) -> f64 {
     const ALONG: u32 = 200;
     let slopes = square(ALONG).map(|[i, j]| {
-        let x = spread(i, ALONG, raster.columns() - 2);
-        let y = spread(j, ALONG, raster.rows() - 2);
-        (raster.height(x + 1, y) - raster.height(x, y)).abs()
+        let x = spread(i, ALONG, grid.columns() - 2);
+        let y = spread(j, ALONG, grid.rows() - 2);
+        (grid.height(x + 1, y) - grid.height(x, y)).abs()
     });
     quantile(slopes.filter(|slope| *slope > 0.0).collect(), 9)
 }
@@ -127,6 +129,12 @@ fn round(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::raster::Raster;
+    use crate::terrain::FeltCells;
+
+    fn grid(raster: &Raster) -> FeltGrid<'_> {
+        FeltGrid::new(raster, FeltCells::Square)
+    }
 
     #[test]
     fn round_numbers() {
@@ -149,8 +157,8 @@ mod tests {
                 height * ((x as f32 * 0.05).sin() + (y as f32 * 0.07).cos())
             });
             let raster = raster.expect("raster");
-            let suggestion = suggest_scale(&raster, None).expect("valid");
-            let relief = usual_relief(&raster, 1.0) * suggestion.scale.height_mm_per_unit();
+            let suggestion = suggest_scale(&grid(&raster), None).expect("valid");
+            let relief = usual_relief(&grid(&raster), 1.0) * suggestion.scale.height_mm_per_unit();
             assert!((8.0..=50.0).contains(&relief), "{height}: {relief} mm");
             assert_eq!(suggestion.scale.cell_mm(), 1.0);
         }
@@ -159,12 +167,13 @@ mod tests {
     #[test]
     fn small_and_flat_and_mostly_unknown_terrains_have_a_scale() {
         let flat = Raster::from_fn(2, 2, |_, _| 3.0).expect("raster");
-        let suggestion = suggest_scale(&flat, None).expect("valid");
+        let suggestion = suggest_scale(&grid(&flat), None).expect("valid");
         assert_eq!(
             (suggestion.scale.cell_mm(), suggestion.exaggeration),
             (5.0, 1.0)
         );
         let holes = Raster::from_fn(50, 50, |x, y| if x + y > 8 { f32::NAN } else { x as f32 });
-        assert!(suggest_scale(&holes.expect("raster"), Some(2.0)).is_ok());
+        let holes = holes.expect("raster");
+        assert!(suggest_scale(&grid(&holes), Some(2.0)).is_ok());
     }
 }

@@ -32,6 +32,8 @@ pub(super) struct Decoded {
     pub(super) scale: f64,
     /// See `scale`.
     pub(super) offset: f64,
+    /// EPSG code of the reference system, where the file states it.
+    pub(super) epsg: Option<u16>,
     /// Size of a cell, where the file knows it.
     pub(super) cell: Option<CellSize>,
     /// Metres per vertical unit, where the file says so.
@@ -65,10 +67,22 @@ impl Decoded {
             mask: None,
             scale: 1.0,
             offset: 0.0,
+            epsg: None,
             cell: None,
             metres_per_vertical_unit: None,
             remarks: Vec::new(),
         }
+    }
+}
+
+impl Decoded {
+    /// Turns numbers that grow downwards into heights, and says so.
+    pub(super) fn turn_depths_into_heights(&mut self, why: &str) {
+        self.scale = -self.scale;
+        self.offset = -self.offset;
+        self.remarks.push(format!(
+            "depths ({why}): they are felt as heights below zero"
+        ));
     }
 }
 

@@ -17,6 +17,8 @@ pub enum CellUnit {
 pub enum Certainty {
     /// The file states size and unit.
     Stated,
+    /// The file states the size; the unit follows from a code of its reference system.
+    FromCode,
     /// The file states the size; the unit is taken to be the usual one.
     UnitAssumed,
 }
@@ -28,8 +30,14 @@ pub struct CellSize {
     pub east: f64,
     /// Along a column, south to north, in `unit`s; positive.
     pub north: f64,
+    /// Cosine of the angle between a row and a column: zero where they are
+    /// perpendicular, positive where columns lean to the east.
+    pub lean: f64,
     /// Unit of both.
     pub unit: CellUnit,
+    /// Ground metres in a metre of the map along rows and columns, in the middle of
+    /// the field: a projected system is true to scale in few places.
+    pub map_scale: (f64, f64),
     /// Latitude of the middle of the field in degrees, where known.
     pub latitude: Option<f64>,
     /// Whether the unit is stated or assumed.
@@ -43,7 +51,9 @@ impl CellSize {
         Self {
             east,
             north,
+            lean: 0.0,
             unit,
+            map_scale: (1.0, 1.0),
             latitude,
             certainty: Certainty::Stated,
         }
@@ -73,11 +83,17 @@ impl CellSize {
         }
     }
 
+    /// The cell's sides (east, north) on the ground, m: [`CellSize::metres`] of the map,
+    /// at the scale that the map has in the middle of the field.
+    pub fn ground_metres(&self) -> (f64, f64) {
+        let (east, north) = self.metres();
+        (east * self.map_scale.0, north * self.map_scale.1)
+    }
+
     /// The side in metres of the square cell that stands for this one.
     ///
-    /// Felt cells are square. One that is not square on the ground (10 m
-    /// by 30 m, or an arc second away from the equator) is felt as the square of
-    /// the same area, so that its mean slope is kept.
+    /// It has the same area, so that the mean slope of cells that are felt as they
+    /// are stored is kept.
     pub fn square_metres(&self) -> f64 {
         let (east, north) = self.metres();
         (east * north).sqrt()
@@ -117,7 +133,7 @@ impl CellSize {
     pub(super) fn is_valid(&self) -> bool {
         let (east, north) = self.metres();
         let usable = |side: f64| side.is_finite() && side > 1e-12 && side < 1e12;
-        usable(east) && usable(north)
+        usable(east) && usable(north) && self.lean.abs() < 0.999
     }
 }
 

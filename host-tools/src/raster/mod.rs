@@ -20,6 +20,7 @@
 //! infinite sample is an error: it is neither a height nor a declared hole.
 
 mod archive;
+mod crs;
 mod decoded;
 mod error;
 mod format;
@@ -87,6 +88,13 @@ impl Raster {
         let metre = CellUnit::Length { metres: 1.0 };
         decoded.cell = Some(CellSize::stated((1.0, 1.0), metre, None));
         Self::checked(decoded, None)
+    }
+
+    /// The same samples in cells of another size.
+    #[must_use]
+    pub fn with_cell(mut self, cell: CellSize) -> Self {
+        self.source.cell = Some(cell).filter(CellSize::is_valid);
+        self
     }
 
     fn checked(mut source: Decoded, no_data: Option<f64>) -> Result<Self, BadRaster> {
@@ -160,15 +168,16 @@ impl Raster {
         &self.source.format
     }
 
+    /// EPSG code and name of the horizontal reference system, where the file states a
+    /// code that is known.
+    pub fn reference_system(&self) -> Option<(u16, String)> {
+        let code = self.source.epsg?;
+        Some((code, crs::name(code)?))
+    }
+
     /// Size of a cell, where the file knows it.
     pub fn cell(&self) -> Option<CellSize> {
         self.source.cell
-    }
-
-    /// Side in metres of the square cell that stands for the file's cells (see
-    /// [`CellSize::square_metres`]), where the file knows it.
-    pub fn metres_per_cell(&self) -> Option<f64> {
-        self.cell().map(|cell| cell.square_metres())
     }
 
     /// Metres per vertical unit, where the file says so; most say nothing and
@@ -180,14 +189,6 @@ impl Raster {
     /// Metres per vertical unit; one where the file does not say.
     pub fn metres_per_vertical_unit(&self) -> f64 {
         self.stated_metres_per_vertical_unit().unwrap_or(1.0)
-    }
-
-    /// How many cells high one vertical unit is at true proportions, where the
-    /// file knows its cell size: with `cell_mm` hand millimetres a cell, the true
-    /// height of a unit is `cell_mm` times this.
-    pub fn cells_per_vertical_unit(&self) -> Option<f64> {
-        self.metres_per_cell()
-            .map(|metres| self.metres_per_vertical_unit() / metres)
     }
 
     /// What the user should know about how the file was read, one sentence each.

@@ -67,6 +67,11 @@ impl Synth {
         (height * self.amplitude) as f32
     }
 
+    /// How much a plane of so many samples rises from its lowest corner to its highest.
+    pub fn rise(&self, columns: u32, rows: u32) -> f64 {
+        f64::from(self.height(columns - 1, rows - 1)) - f64::from(self.height(0, 0))
+    }
+
     /// A field of this terrain in memory, with cells of 1 m and heights in metres.
     ///
     /// # Errors

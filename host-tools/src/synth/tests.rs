@@ -67,3 +67,11 @@ fn a_plane_rises_east_and_north() {
         assert_eq!(plane.height(column, row), expected);
     }
 }
+
+#[test]
+fn a_plane_is_as_high_as_its_height_is_stated() {
+    let rise = Synth::new(Kind::Plane, 1, 1.0).rise(301, 201);
+    let plane = Synth::new(Kind::Plane, 1, 100.0 / rise).raster(301, 201);
+    let heights = plane.expect("raster").summary();
+    assert!((heights.highest - heights.lowest - 100.0).abs() < 1e-4);
+}

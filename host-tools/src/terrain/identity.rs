@@ -4,7 +4,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use hapterra_core::scene::Scene;
 
-use super::Scale;
+use super::{FeltGrid, Scale};
 use crate::raster::Raster;
 
 /// Hash of all heights: two files with the same content are the same terrain,
@@ -25,9 +25,10 @@ pub(super) fn fingerprint(raster: &Raster) -> u64 {
 }
 
 /// The epoch of a scene over a terrain; the scene's own epoch does not count.
-pub(super) fn epoch(fingerprint: u64, scale: &Scale, scene: &Scene) -> u32 {
+pub(super) fn epoch(fingerprint: u64, grid: &FeltGrid<'_>, scale: &Scale, scene: &Scene) -> u32 {
     let mut hasher = DefaultHasher::new();
     fingerprint.hash(&mut hasher);
+    grid.hash_shape(&mut hasher);
     let numbers = [scale.cell_mm(), scale.height_mm_per_unit()];
     numbers.map(f64::to_bits).hash(&mut hasher);
     // Everything else that the scene states.

@@ -1,13 +1,15 @@
 //! A raster as the device sees it: at a scale, counted in cells, cut
 //! into tiles.
 //!
-//! [`Scale`] turns the file's units into millimetres of the arm and into cells; [`Terrain`]
+//! [`FeltGrid`] lays square cells over the raster; [`Scale`] turns the file's units into millimetres of the arm and into cells; [`Terrain`]
 //! is a raster at that scale and one level of detail, with its tiles made one
 //! by one when they are asked for: nothing of the raster is copied or kept.
 
+mod felt_grid;
 mod identity;
 mod scale;
 mod tiler;
 
+pub use felt_grid::{FeltCells, FeltGrid};
 pub use scale::{BadScale, Scale};
 pub use tiler::{Terrain, TerrainError, TileBuffer};

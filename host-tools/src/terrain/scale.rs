@@ -3,7 +3,7 @@
 use hapterra_core::Vec3;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 
-use crate::raster::Raster;
+use super::FeltGrid;
 
 /// How large the terrain is in the hand.
 ///
@@ -53,8 +53,8 @@ impl Scale {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn true_to(raster: &Raster, cell_mm: f64) -> Result<Self, BadScale> {
-        let cells = raster.cells_per_vertical_unit();
+    pub fn true_to(grid: &FeltGrid<'_>, cell_mm: f64) -> Result<Self, BadScale> {
+        let cells = grid.cells_per_vertical_unit();
         Self::new(cell_mm, cells.map_or(1.0, |cells| cells * cell_mm))
     }
 

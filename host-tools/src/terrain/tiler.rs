@@ -9,7 +9,7 @@ use hapterra_core::scene::{Scene, Source};
 use hapterra_core::terrain::{FieldSize, POSTS, TILE_CELLS, TileKey};
 use hapterra_core::wire::message::Heights;
 
-use super::{BadScale, Scale, identity};
+use super::{BadScale, FeltCells, FeltGrid, Scale, identity};
 use crate::raster::Raster;
 
 /// Bytes of a tile's samples.
@@ -17,7 +17,7 @@ const TILE_BYTES: usize = 4 * POSTS * POSTS;
 
 /// A raster at a scale and a level of detail.
 pub struct Terrain<'r> {
-    raster: &'r Raster,
+    grid: FeltGrid<'r>,
     /// Of the level's cells.
     scale: Scale,
     level: u8,
@@ -52,9 +52,9 @@ pub enum TerrainError {
     NoSuchLevel {
         /// The level asked for.
         level: u8,
-        /// Samples of the raster, west to east.
+        /// Samples of the grid, west to east.
         columns: u32,
-        /// Samples of the raster, south to north.
+        /// Samples of the grid, south to north.
         rows: u32,
     },
 }
@@ -81,7 +81,15 @@ impl<'r> Terrain<'r> {
     /// [`TerrainError`] when its heights or its size leave what a position can
     /// say, or the level leaves no patch.
     pub fn new(raster: &'r Raster, scale: Scale, level: u8) -> Result<Self, TerrainError> {
-        let (columns, rows) = (raster.columns(), raster.rows());
+        Self::over(FeltGrid::new(raster, FeltCells::default()), scale, level)
+    }
+
+    /// As [`Self::new`], over cells of the user's choice.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn over(grid: FeltGrid<'r>, scale: Scale, level: u8) -> Result<Self, TerrainError> {
+        let (columns, rows) = (grid.columns(), grid.rows());
         let larger = columns.max(rows);
         if i64::from(larger) > i64::from(MAX_CELL) {
             return Err(TerrainError::TooLarge(larger));
@@ -97,11 +105,11 @@ impl<'r> Terrain<'r> {
         }
         let scale = scale.at_level(level);
         Ok(Self {
-            raster,
+            grid,
             scale,
             level,
             size,
-            top: top(raster, &scale)?,
+            top: top(grid.raster(), &scale)?,
             fingerprint: OnceCell::new(),
         })
     }
@@ -109,7 +117,19 @@ impl<'r> Terrain<'r> {
     /// The raster.
     #[must_use]
     pub const fn raster(&self) -> &'r Raster {
-        self.raster
+        self.grid.raster()
+    }
+
+    /// The grid of its level 0.
+    #[must_use]
+    pub const fn grid(&self) -> &FeltGrid<'r> {
+        &self.grid
+    }
+
+    /// Its level of detail: every `2^level`-th sample of the grid.
+    #[must_use]
+    pub const fn level(&self) -> u8 {
+        self.level
     }
 
     /// The scale of this level: its cells are `2^level` times the file's.
@@ -154,8 +174,8 @@ impl<'r> Terrain<'r> {
         };
         let fingerprint = *self
             .fingerprint
-            .get_or_init(|| identity::fingerprint(self.raster));
-        scene.epoch = identity::epoch(fingerprint, &self.scale, &scene);
+            .get_or_init(|| identity::fingerprint(self.raster()));
+        scene.epoch = identity::epoch(fingerprint, &self.grid, &self.scale, &scene);
         scene
     }
 
@@ -167,7 +187,7 @@ impl<'r> Terrain<'r> {
         let (row, v) = place(north_mm / self.scale.cell_mm(), self.size[1])?;
         let at = |dx: u32, dy: u32| {
             let (x, y) = ((column + dx) << self.level, (row + dy) << self.level);
-            self.raster.height(x, y) * self.scale.height_mm_per_unit()
+            self.grid.height(x, y) * self.scale.height_mm_per_unit()
         };
         let (south, north) = ([at(0, 0), at(1, 0)], [at(0, 1), at(1, 1)]);
         let mix = |[a, b]: [f64; 2], t: f64| a * (1.0 - t) + b * t;
@@ -218,7 +238,7 @@ impl<'r> Terrain<'r> {
         let first = |index: i32| index as u32 * TILE_CELLS as u32;
         let (west, south) = (first(key.index.col), first(key.index.row));
         for (row, line) in (south..).zip(heights.chunks_exact_mut(POSTS)) {
-            self.raster.copy_row(self.level, row, west, line);
+            self.grid.copy_row(self.level, row, west, line);
             for height in line {
                 *height = self.scale.height_cells(*height);
             }

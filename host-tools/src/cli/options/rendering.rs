@@ -5,7 +5,7 @@ use hapterra_core::force::ForceLaw;
 
 use crate::cli::failure::{Failure, OrHint};
 use crate::raster::Raster;
-use crate::terrain::{Scale, Terrain};
+use crate::terrain::{FeltCells, FeltGrid, Scale, Terrain};
 
 /// How the terrain feels.
 #[derive(Clone, Debug, clap::Args)]
@@ -19,6 +19,10 @@ pub struct Rendering {
     /// proportions where it knows its cell size, else 1]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub height_mm_per_unit: Option<f64>,
+
+    /// Which cells of the file are felt
+    #[arg(long, value_enum, default_value_t)]
+    pub cells: FeltCells,
 
     /// Level of detail: every 2^LEVEL-th sample is felt
     #[arg(long, default_value_t = 0)]
@@ -52,21 +56,27 @@ impl Rendering {
     ///
     /// # Errors
     /// Numbers that no terrain can be scaled with.
-    pub fn scale(&self, raster: &Raster) -> Result<Scale, Failure> {
+    pub fn scale(&self, grid: &FeltGrid<'_>) -> Result<Scale, Failure> {
         let cell_mm = self.cell_mm.unwrap_or(1.0);
         let scale = match self.height_mm_per_unit {
             Some(height) => Scale::new(cell_mm, height),
-            None => Scale::true_to(raster, cell_mm),
+            None => Scale::true_to(grid, cell_mm),
         };
         scale.or_hint("choose another --cell-mm or --height-mm-per-unit")
+    }
+
+    /// The grid that is felt of a raster.
+    #[must_use]
+    pub fn grid<'r>(&self, raster: &'r Raster) -> FeltGrid<'r> {
+        FeltGrid::new(raster, self.cells)
     }
 
     /// The terrain at a scale.
     ///
     /// # Errors
     /// Heights or a size that positions cannot say, or a level too high.
-    pub fn terrain<'r>(&self, raster: &'r Raster, scale: Scale) -> Result<Terrain<'r>, Failure> {
-        Ok(Terrain::new(raster, scale, self.level)?)
+    pub fn terrain<'r>(&self, grid: FeltGrid<'r>, scale: Scale) -> Result<Terrain<'r>, Failure> {
+        Ok(Terrain::over(grid, scale, self.level)?)
     }
 
     /// The force law.

@@ -1,5 +1,6 @@
 //! Cell size and orientation of a grid, from its coordinate variables.
 
+use netcdf_reader::cf::{CfAxisType, identify_axis};
 use netcdf_reader::{NcFile, NcVariable};
 
 use super::attributes::text;
@@ -7,26 +8,48 @@ use crate::raster::decoded::Decoded;
 use crate::raster::geometry::metres_in;
 use crate::raster::{BadRaster, CellSize, CellUnit};
 
-/// Cell size and orientation from the coordinate variables.
-pub(super) fn place(
-    file: &NcFile,
-    heights: &NcVariable,
-    decoded: &mut Decoded,
-) -> Result<(), BadRaster> {
-    // A GMT grid with pixels for samples runs from north to south all the same:
-    // only the coordinates tell the order of rows.
-    let [y, x] = heights
+/// The dimensions of a grid.
+pub(super) struct Names {
+    x: String,
+    y: String,
+    /// The variable is stored column by column: (lon, lat).
+    pub(super) x_first: bool,
+}
+
+/// Which dimension is which: the last two, y first, unless their coordinates say that
+/// it is the other way round (CF conventions §4).
+pub(super) fn names(file: &NcFile, heights: &NcVariable) -> Result<Names, BadRaster> {
+    let [first, second] = heights
         .dimensions()
         .last_chunk()
         .ok_or_else(|| BadRaster::NotAHeightField("it has no two dimensions".into()))?;
+    let role = |name: &str| file.variable(name).map(identify_axis).ok();
+    let x_first =
+        role(&first.name) == Some(CfAxisType::X) && role(&second.name) == Some(CfAxisType::Y);
+    let (y, x) = if x_first {
+        (second, first)
+    } else {
+        (first, second)
+    };
+    Ok(Names {
+        x: x.name.clone(),
+        y: y.name.clone(),
+        x_first,
+    })
+}
+
+/// Cell size and orientation from the coordinate variables.
+pub(super) fn place(file: &NcFile, names: &Names, decoded: &mut Decoded) {
+    // A GMT grid with pixels for samples runs from north to south all the same:
+    // only the coordinates tell the order of rows.
     let (Some(north), Some(east)) = (
-        axis(file, &y.name, decoded.rows),
-        axis(file, &x.name, decoded.columns),
+        axis(file, &names.y, decoded.rows),
+        axis(file, &names.x, decoded.columns),
     ) else {
         decoded
             .remarks
             .push("no coordinates: its first row is taken to be the northernmost".into());
-        return Ok(());
+        return;
     };
     decoded.south_up = north.step > 0.0;
     decoded.east_first = east.step < 0.0;
@@ -54,7 +77,6 @@ pub(super) fn place(
             CellSize::guessed(steps, Some((east.low, north.low)), extent)
         }
     });
-    Ok(())
 }
 
 struct Axis {

@@ -6,6 +6,8 @@ mod axes;
 
 use std::sync::Arc;
 
+use netcdf_reader::masked::MaskParams;
+use netcdf_reader::unpack::SignParams;
 use netcdf_reader::{
     BytesStorage, DynStorage, FileStorage, NcFile, NcReadable, NcType, NcVariable,
 };
@@ -39,13 +41,21 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let file = NcFile::from_storage(storage(input)?).map_err(|error| fault(&error))?;
     let variables = file.variables().map_err(|error| fault(&error))?;
     let heights = choose(variables)?;
-    let size = size(heights)?;
+    let mut size = size(heights)?;
     let sample = sample_type(heights)
         .ok_or_else(|| BadRaster::NotAHeightField(format!("{} is no number", heights.name())))?;
     input.check_holds(size.0, size.1, sample.bytes())?;
-    let samples: Samples = with_samples!(sample.none(), none => {
+    let mut samples: Samples = with_samples!(sample.none(), none => {
         read_values(none, &file, heights)?.into()
     });
+    if SignParams::from_variable(heights).is_some() {
+        samples = of_the_other_sign(samples);
+    }
+    let axes = axes::names(&file, heights)?;
+    if axes.x_first {
+        samples = with_samples!(&samples, values => transposed(values, size.0).into());
+        size = (size.1, size.0);
+    }
     let format = format!(
         "NetCDF, variable {}, {}",
         heights.name(),
@@ -56,7 +66,10 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     decoded.scale = number(heights, "scale_factor").unwrap_or(1.0);
     decoded.offset = number(heights, "add_offset").unwrap_or(0.0);
     decoded.metres_per_vertical_unit = text(heights, "units").and_then(|unit| metres_in(&unit));
-    axes::place(&file, heights, &mut decoded)?;
+    if text(heights, "positive").is_some_and(|way| way.eq_ignore_ascii_case("down")) {
+        decoded.turn_depths_into_heights("positive = down");
+    }
+    axes::place(&file, &axes, &mut decoded);
     Ok(decoded)
 }
 
@@ -128,32 +141,67 @@ fn read_values<T: NcReadable>(
     }
 }
 
-/// `_FillValue`, else `missing_value`, else what the format writes where nothing
-/// was written; both where they differ.
+/// Integers whose `_Unsigned` attribute says the other sign than their stored type.
+fn of_the_other_sign(samples: Samples) -> Samples {
+    fn all<T, U>(values: Vec<T>, convert: impl Fn(T) -> U) -> Samples
+    where
+        Samples: From<Vec<U>>,
+    {
+        values.into_iter().map(convert).collect::<Vec<U>>().into()
+    }
+    match samples {
+        Samples::I8(values) => all(values, |value| value as u8),
+        Samples::U8(values) => all(values, |value| value as i8),
+        Samples::I16(values) => all(values, |value| value as u16),
+        Samples::U16(values) => all(values, |value| value as i16),
+        Samples::I32(values) => all(values, |value| value as u32),
+        Samples::U32(values) => all(values, |value| value as i32),
+        others => others,
+    }
+}
+
+/// Rows for columns: `along` values a stored row.
+fn transposed<T: Copy>(values: &[T], along: u32) -> Vec<T> {
+    let along = along as usize;
+    let column = |first: usize| values.iter().skip(first).step_by(along);
+    (0..along).flat_map(column).copied().collect()
+}
+
+/// `_FillValue`, else `missing_value`, else what the format writes where nothing was
+/// written, is no data; so is every other missing value, and what is out of the valid
+/// range.
 fn mark_missing(decoded: &mut Decoded, variable: &NcVariable) {
-    let fill = number(variable, "_FillValue");
-    let missing = number(variable, "missing_value");
     let default = match decoded.samples {
         Samples::I16(_) => Some(-32767.0),
         Samples::I32(_) => Some(-2_147_483_647.0),
         Samples::F32(_) | Samples::F64(_) => Some(9.969_209_968_386_869e36),
         _ => None,
     };
-    decoded.no_data = fill.or(missing).or(default);
-    let second = missing.and_then(|value| decoded.samples.comparable_no_data(value));
-    if let Some(second) = second.filter(|_| fill.is_some() && fill != missing) {
-        let mut mask = HoleMask::with_capacity(decoded.samples.len());
-        with_samples!(&decoded.samples, values => {
-            for (index, value) in values.iter().enumerate() {
-                if value.widen() == second {
-                    mask.insert(index);
-                }
+    let Some(stated) = MaskParams::from_variable(variable) else {
+        decoded.no_data = default;
+        return;
+    };
+    let missing = stated.missing_values.first().copied();
+    decoded.no_data = stated.fill_value.or(missing).or(default);
+    let others = stated.missing_values.iter();
+    let others = others.filter_map(|value| decoded.samples.comparable_no_data(*value));
+    let others: Vec<f64> = others.collect();
+    let valid = stated.valid_min.unwrap_or(f64::MIN)..=stated.valid_max.unwrap_or(f64::MAX);
+    let mut mask = HoleMask::with_capacity(decoded.samples.len());
+    with_samples!(&decoded.samples, values => {
+        for (index, value) in values.iter().enumerate() {
+            let value = value.widen();
+            if others.contains(&value) || !(value.is_nan() || valid.contains(&value)) {
+                mask.insert(index);
             }
-        });
-        decoded.mask = Some(mask);
-    }
+        }
+    });
+    decoded.mask = Some(mask).filter(|mask| !mask.is_clear());
 }
 
 fn fault(error: &netcdf_reader::Error) -> BadRaster {
     BadRaster::Damaged(format!("NetCDF: {error}"))
 }
+
+#[cfg(test)]
+mod tests;

@@ -25,7 +25,8 @@ const CHUNK_BYTES: usize = 64 << 20;
 /// Reads one channel of a picture as heights.
 ///
 /// - Grey: the grey is the height. With alpha, a sample of alpha 0 is a hole and
-///   any other alpha means nothing.
+///   any other alpha means nothing. A grey that is called transparent (`tRNS`) is no
+///   data.
 /// - Colour with alpha: the alpha is the height, as in the paper's data, 0 being
 ///   a height like any other. An alpha that is opaque everywhere marks a
 ///   photograph, not a height field.
@@ -52,6 +53,7 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Bad
     };
     let pixel_bytes = sample_bytes * color.samples();
     input.check_holds(size.0, size.1, pixel_bytes as u64)?;
+    let transparent = transparent_grey(info);
     let chosen = Choice::new(color, channel)?;
     let count = size.0 as usize * size.1 as usize;
     let mut pixels = Pixels {
@@ -73,7 +75,17 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Bad
     let format = format!("PNG, {}-bit {what}", 8 * sample_bytes);
     let mut decoded = Decoded::new(format, size, pixels.samples);
     decoded.mask = pixels.mask;
+    decoded.no_data = transparent;
     Ok(decoded)
+}
+
+/// The grey of a `tRNS` chunk, which holds 16 bits whatever the picture's depth.
+fn transparent_grey(info: &::png::Info<'_>) -> Option<f64> {
+    let grey = match info.trns.as_deref() {
+        Some(&[high, low]) if info.color_type == ColorType::Grayscale => [high, low],
+        _ => return None,
+    };
+    Some(u16::from_be_bytes(grey).into())
 }
 
 /// Which channel is the height, and which marks holes.

@@ -73,3 +73,19 @@ fn transparent_grey_is_a_hole() {
     assert_eq!([found[0], found[2], found[3]], [10.0, 30.0, 0.0]);
     assert!(found[1].is_nan());
 }
+
+#[test]
+fn a_grey_that_is_called_transparent_is_a_hole() {
+    let mut file = Vec::new();
+    let mut encoder = ::png::Encoder::new(&mut file, 2, 2);
+    encoder.set_color(::png::ColorType::Grayscale);
+    encoder.set_depth(::png::BitDepth::Sixteen);
+    encoder.set_trns(vec![0x01, 0x02]);
+    let mut writer = encoder.write_header().expect("a header");
+    let samples = [0, 5, 1, 2, 0, 6, 0, 7];
+    writer.write_image_data(&samples).expect("the samples");
+    writer.finish().expect("the end");
+    let [a, b, c, d] = open(&FileBytes::unpacked("test.png", file), None).expect("heights");
+    assert!(b.is_nan(), "0x0102 is no data");
+    assert_eq!([a, c, d], [5.0, 6.0, 7.0]);
+}

@@ -2,13 +2,13 @@
 
 use geotiff_core::geokeys::{
     GEODETIC_CRS_TYPE, GEOG_ANGULAR_UNITS, GT_MODEL_TYPE, GeoKeyDirectory, PROJ_LINEAR_UNITS,
-    PROJECTED_CRS_TYPE, VERTICAL_UNITS,
+    PROJECTED_CRS_TYPE, VERTICAL_CS_TYPE, VERTICAL_UNITS,
 };
 use geotiff_core::transform::GeoTransform;
 use tiff_reader::Ifd;
 
 use crate::raster::decoded::Decoded;
-use crate::raster::{CellSize, CellUnit};
+use crate::raster::{CellSize, CellUnit, Certainty, crs};
 
 const MODEL_PIXEL_SCALE: u16 = 33550;
 const MODEL_TIEPOINT: u16 = 33922;
@@ -22,7 +22,8 @@ const STRAIGHT: f64 = 1e-6;
 /// Sets cell size, units and orientation as far as the file states them.
 pub(super) fn apply(image: &Ifd, decoded: &mut Decoded) {
     let keys = GeoKeys::read(image);
-    decoded.metres_per_vertical_unit = keys.code(VERTICAL_UNITS).and_then(metres_of_code);
+    apply_vertical(&keys, decoded);
+    decoded.epsg = keys.projected().or_else(|| keys.known(GEODETIC_CRS_TYPE));
     let Some(grid) = GroundMap::read(image) else {
         return;
     };
@@ -39,7 +40,23 @@ pub(super) fn apply(image: &Ifd, decoded: &mut Decoded) {
             map.skew_y.atan2(map.pixel_width).to_degrees()
         ));
     }
-    decoded.cell = Some(grid.cell(&keys, decoded.columns, decoded.rows));
+    let mut cell = grid.cell(&keys, decoded.columns, decoded.rows);
+    cell.lean = grid.lean(decoded.south_up);
+    if let Some(scale) = grid.map_scale(&keys, &cell, (decoded.columns, decoded.rows)) {
+        cell.map_scale = scale;
+    }
+    decoded.cell = Some(cell);
+}
+
+/// The vertical unit, by its own code or by that of the vertical reference system;
+/// depths become heights.
+fn apply_vertical(keys: &GeoKeys, decoded: &mut Decoded) {
+    let system = keys.code(VERTICAL_CS_TYPE).and_then(crs::vertical);
+    let stated = keys.code(VERTICAL_UNITS).and_then(metres_of_code);
+    decoded.metres_per_vertical_unit = stated.or(system.as_ref().map(|system| system.metres));
+    if let Some(system) = system.filter(|system| system.is_depth) {
+        decoded.turn_depths_into_heights(&system.name);
+    }
 }
 
 /// The map from column and row to ground coordinates.
@@ -85,13 +102,44 @@ impl GroundMap {
         self.0.skew_y.abs() <= STRAIGHT * east && self.0.skew_x.abs() <= STRAIGHT * south
     }
 
+    /// Cosine of the angle between a row and a column northwards; `south_up` as the
+    /// rows are stored.
+    fn lean(&self, south_up: bool) -> f64 {
+        let (map, (east, south)) = (&self.0, self.steps());
+        let along = map.pixel_width * map.skew_x + map.skew_y * map.pixel_height;
+        match self.is_straight() {
+            true => 0.0,
+            false if south_up => along / (east * south),
+            false => -along / (east * south),
+        }
+    }
+
+    /// Ground metres in a metre of the map along rows and columns, where the
+    /// projection is known by a code.
+    fn map_scale(&self, keys: &GeoKeys, cell: &CellSize, size: (u32, u32)) -> Option<(f64, f64)> {
+        let CellUnit::Length { metres } = cell.unit else {
+            return None;
+        };
+        let middle = (f64::from(size.0) / 2.0, f64::from(size.1) / 2.0);
+        let place = self.0.pixel_to_geo(middle.0, middle.1);
+        let (x, y) = crs::local_metres(keys.projected()?, place)?;
+        // Along a row and a column, which need not be along x and y.
+        let along = |dx: f64, dy: f64| (x * dx).hypot(y * dy) / dx.hypot(dy) / metres;
+        let map = &self.0;
+        Some((
+            along(map.pixel_width, map.skew_y),
+            along(map.skew_x, map.pixel_height),
+        ))
+    }
+
     fn cell(&self, keys: &GeoKeys, columns: u32, rows: u32) -> CellSize {
         let (east, north) = self.steps();
         let (columns, rows) = (f64::from(columns), f64::from(rows));
         match keys.unit() {
-            Some((unit @ CellUnit::Length { .. }, _)) => {
-                CellSize::stated((east, north), unit, None)
-            }
+            Some((unit @ CellUnit::Length { .. }, _)) => CellSize {
+                certainty: keys.certainty(),
+                ..CellSize::stated((east, north), unit, None)
+            },
             Some((CellUnit::Degree, degrees)) => {
                 let (_, latitude) = self.0.pixel_to_geo(columns / 2.0, rows / 2.0);
                 let sides = (east * degrees, north * degrees);
@@ -154,6 +202,33 @@ impl GeoKeys {
         self.0.as_ref()?.get_double(key)?.first().copied()
     }
 
+    /// EPSG code of the projected reference system.
+    fn projected(&self) -> Option<u16> {
+        self.known(PROJECTED_CRS_TYPE)
+    }
+
+    /// A code that is one of EPSG's.
+    fn known(&self, key: u16) -> Option<u16> {
+        const USER_DEFINED: u16 = 32767;
+        self.code(key).filter(|code| *code != USER_DEFINED)
+    }
+
+    /// Metres in the linear unit, where the file states it.
+    fn stated_metres(&self) -> Option<f64> {
+        let named = self.code(PROJ_LINEAR_UNITS).and_then(metres_of_code);
+        let metres = named.or(self.number(LINEAR_UNIT_SIZE));
+        metres.filter(|metres| metres.is_finite() && *metres > 0.0)
+    }
+
+    /// Where the linear unit comes from.
+    fn certainty(&self) -> Certainty {
+        match self.projected().and_then(crs::metres_per_unit) {
+            _ if self.stated_metres().is_some() => Certainty::Stated,
+            Some(_) => Certainty::FromCode,
+            None => Certainty::UnitAssumed,
+        }
+    }
+
     /// The unit of the ground coordinates; of an angle, also its size in degrees.
     fn unit(&self) -> Option<(CellUnit, f64)> {
         let projected = match self.code(GT_MODEL_TYPE) {
@@ -164,10 +239,8 @@ impl GeoKeys {
             _ => return None,
         };
         if projected {
-            let named = self.code(PROJ_LINEAR_UNITS).and_then(metres_of_code);
-            let metres = named.or(self.number(LINEAR_UNIT_SIZE));
-            let metres = metres.filter(|metres| metres.is_finite() && *metres > 0.0);
-            let metres = metres.unwrap_or(1.0);
+            let of_system = || self.projected().and_then(crs::metres_per_unit);
+            let metres = self.stated_metres().or_else(of_system).unwrap_or(1.0);
             return Some((CellUnit::Length { metres }, 1.0));
         }
         let degrees = match self.code(GEOG_ANGULAR_UNITS) {

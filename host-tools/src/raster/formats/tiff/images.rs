@@ -24,6 +24,12 @@ pub(super) fn mask_of<'f>(file: &'f TiffFile, image: &Ifd) -> Option<&'f Ifd> {
     others.find(|other| kind(other) == MASK && size(other) == size(image))
 }
 
+/// The first image that is as large as another.
+pub(super) fn of_same_size<'f>(file: &'f TiffFile, image: &Ifd) -> Option<&'f Ifd> {
+    let size = |image: &Ifd| (image.width(), image.height());
+    file.ifds().iter().find(|other| size(other) == size(image))
+}
+
 /// Whether an image is reduced or a mask, as a set of bits.
 fn kind(image: &Ifd) -> u32 {
     let bits = image.tag(NEW_SUBFILE_TYPE);

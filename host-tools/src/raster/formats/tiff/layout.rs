@@ -13,6 +13,8 @@ pub(super) struct Layout {
     /// Type of a sample.
     pub(super) stored: (SampleFormat, u16),
     pub(super) bands: u16,
+    /// The band that says what is transparent, if one does.
+    pub(super) alpha: Option<usize>,
     /// Name, and how many bytes one stored byte may hold.
     pub(super) compression: (&'static str, u64),
     /// Each band has its own chunks.
@@ -78,6 +80,7 @@ impl Layout {
             rows,
             stored: stored_type(image)?,
             bands,
+            alpha: alpha(image, bands),
             compression: compression(image.compression())?,
             planar: image.planar_configuration() == 2,
             tiled,
@@ -125,6 +128,16 @@ impl Layout {
         };
         format!("TIFF, {sample}{bits}, {compression}, {chunks}{order}")
     }
+}
+
+/// The band that its tag calls alpha, associated or not.
+fn alpha(image: &Ifd, bands: u16) -> Option<usize> {
+    const EXTRA_SAMPLES: u16 = 338;
+    let extra = image.tag(EXTRA_SAMPLES)?.value.as_u16_slice()?;
+    let first = usize::from(bands).checked_sub(extra.len())?;
+    let alpha = extra.iter().position(|kind| matches!(kind, 1 | 2))?;
+    // The first band is the height, whatever it is called.
+    Some(first + alpha).filter(|band| *band > 0)
 }
 
 /// Colours are no heights, however many bands they have.

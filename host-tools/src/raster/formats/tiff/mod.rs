@@ -39,11 +39,13 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let image = images::full(&file)?;
     let layout = Layout::read(image)?;
     budget::check(&layout, input.len())?;
-    let samples = samples::read(&file, image, &layout)?;
+    let samples = samples::read(&file, image, &layout, 0)?;
     let format = layout.described(file.byte_order());
     let mut decoded = Decoded::new(format, (layout.columns, layout.rows), samples);
-    decoded.mask = samples::holes(&file, image, &layout)?;
-    if layout.bands > 1 {
+    let beside = mask_beside(input)?;
+    decoded.mask = samples::holes(&file, image, &layout, beside.as_ref())?;
+    let meant = 1 + u16::from(layout.alpha.is_some());
+    if layout.bands > meant {
         decoded.remarks.push(format!(
             "it has {} bands: the first is taken for the height",
             layout.bands
@@ -58,6 +60,20 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
         .metres_per_vertical_unit
         .or(decoded.metres_per_vertical_unit);
     Ok(decoded)
+}
+
+/// The mask that GDAL keeps in a file of its own, `NAME.tif.msk`.
+fn mask_beside(input: &FileBytes) -> Result<Option<TiffFile>, BadRaster> {
+    let Data::File(_, path) = input.data() else {
+        return Ok(None);
+    };
+    let mut mask = path.as_os_str().to_owned();
+    mask.push(".msk");
+    let mask = std::path::Path::new(&mask);
+    match mask.is_file() {
+        true => open(&FileBytes::open(mask)?).map(Some),
+        false => Ok(None),
+    }
 }
 
 /// Opens the file. No list in its directories may be longer than the file is.

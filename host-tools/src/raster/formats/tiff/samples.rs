@@ -1,18 +1,27 @@
-//! The first band's samples, and which of them are holes that no value marks.
+//! The samples of a band, and which of the first band's are holes that no value marks:
+//! left out of a sparse file, masked, transparent.
 
 use half::f16;
 use tiff_reader::{Ifd, TiffFile, TiffSample};
 
 use super::fault::fault;
-use super::images::mask_of;
+use super::images::{mask_of, of_same_size};
 use super::layout::{Layout, SampleFormat};
-use crate::raster::samples::HoleMask;
+use crate::raster::samples::{HoleMask, SampleValue, with_samples};
 use crate::raster::{BadRaster, Samples};
 
-/// Reads the first band.
-pub(super) fn read(file: &TiffFile, image: &Ifd, layout: &Layout) -> Result<Samples, BadRaster> {
+/// Reads a band, the first being 0.
+pub(super) fn read(
+    file: &TiffFile,
+    image: &Ifd,
+    layout: &Layout,
+    band: usize,
+) -> Result<Samples, BadRaster> {
     use SampleFormat::{Float, Signed, Unsigned};
-    let band = Band::new(file, image, layout);
+    let band = Band {
+        band,
+        ..Band::first(file, image, layout)
+    };
     Ok(match layout.stored {
         (Unsigned, 8) => band.read(|value: u8| value)?.into(),
         (Signed, 8) => band.read(|value: i8| value)?.into(),
@@ -28,10 +37,11 @@ pub(super) fn read(file: &TiffFile, image: &Ifd, layout: &Layout) -> Result<Samp
     })
 }
 
-/// The first band of an image.
+/// A band of an image.
 struct Band<'f> {
     file: &'f TiffFile,
     image: &'f Ifd,
+    band: usize,
     /// Columns and rows.
     size: (usize, usize),
     /// Rows of a strip or tile.
@@ -40,11 +50,12 @@ struct Band<'f> {
 
 impl<'f> Band<'f> {
     /// `layout` is that of the full image, which has the same size.
-    fn new(file: &'f TiffFile, image: &'f Ifd, layout: &Layout) -> Self {
+    fn first(file: &'f TiffFile, image: &'f Ifd, layout: &Layout) -> Self {
         let height = image.tile_height().unwrap_or(image.rows_per_strip());
         Self {
             file,
             image,
+            band: 0,
             size: (layout.columns as usize, layout.rows as usize),
             rows_at_once: height.clamp(1, layout.rows) as usize,
         }
@@ -65,7 +76,7 @@ impl<'f> Band<'f> {
             let count = self.rows_at_once.min(rows - first);
             let window = self
                 .file
-                .read_band_window_from_ifd::<T>(self.image, 0, first, 0, count, columns)
+                .read_band_window_from_ifd::<T>(self.image, self.band, first, 0, count, columns)
                 .map_err(fault)?;
             let (window, _) = window.into_raw_vec_and_offset();
             values.extend(window.into_iter().map(&convert));
@@ -74,12 +85,13 @@ impl<'f> Band<'f> {
     }
 }
 
-/// The samples in chunks that a sparse file leaves out, and those that the mask
-/// beside the image calls no data.
+/// The samples in chunks that a sparse file leaves out, those that a mask in the file
+/// or `beside` it calls no data, and those whose alpha is zero.
 pub(super) fn holes(
     file: &TiffFile,
     image: &Ifd,
     layout: &Layout,
+    beside: Option<&TiffFile>,
 ) -> Result<Option<HoleMask>, BadRaster> {
     let (columns, rows) = (layout.columns as usize, layout.rows as usize);
     let mut holes = None;
@@ -96,10 +108,18 @@ pub(super) fn holes(
             (west..(west + width).min(columns)).for_each(|column| set(row * columns + column));
         }
     }
-    if let Some(mask) = mask_of(file, image) {
-        let has_data = Band::new(file, mask, layout).read(|value: u8| value != 0)?;
+    let inside = mask_of(file, image).map(|mask| (file, mask));
+    let outside = beside.and_then(|beside| Some((beside, of_same_size(beside, image)?)));
+    for (file, mask) in inside.into_iter().chain(outside) {
+        let has_data = Band::first(file, mask, layout).read(|value: u8| value != 0)?;
         let missing = has_data.iter().enumerate().filter(|(_, has)| !**has);
         missing.for_each(|(index, _)| set(index));
+    }
+    if let Some(band) = layout.alpha {
+        with_samples!(read(file, image, layout, band)?, alpha => {
+            let clear = alpha.iter().enumerate().filter(|(_, alpha)| alpha.widen() == 0.0);
+            clear.for_each(|(index, _)| set(index));
+        });
     }
     Ok(holes)
 }

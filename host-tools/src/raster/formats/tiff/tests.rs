@@ -101,3 +101,128 @@ fn a_size_that_the_file_cannot_hold_is_refused_before_room_is_made() {
     let fault = open(outside).expect_err("refused");
     assert!(matches!(fault, BadRaster::Truncated(_)), "{fault}");
 }
+
+/// A little-endian file of one strip from tags with their type, count and bytes.
+fn by_hand(tags: &[(u16, u16, u32, Vec<u8>)], samples: &[u8]) -> Vec<u8> {
+    let mut bytes = b"II*\0".to_vec();
+    bytes.extend((8 + samples.len() as u32).to_le_bytes());
+    bytes.extend(samples);
+    bytes.extend((tags.len() as u16).to_le_bytes());
+    let mut far: Vec<u8> = Vec::new();
+    let after = bytes.len() + 12 * tags.len() + 4;
+    for (tag, kind, count, value) in tags {
+        bytes.extend(tag.to_le_bytes());
+        bytes.extend(kind.to_le_bytes());
+        bytes.extend(count.to_le_bytes());
+        if value.len() > 4 {
+            bytes.extend(((after + far.len()) as u32).to_le_bytes());
+            far.extend(value);
+        } else {
+            bytes.extend(value.iter().chain(&[0; 4]).take(4));
+        }
+    }
+    bytes.extend([0; 4]);
+    bytes.extend(far);
+    bytes
+}
+
+fn shorts(tag: u16, values: &[u16]) -> (u16, u16, u32, Vec<u8>) {
+    let bytes = values.iter().flat_map(|value| value.to_le_bytes());
+    (tag, 3, values.len() as u32, bytes.collect())
+}
+
+fn doubles(tag: u16, values: &[f64]) -> (u16, u16, u32, Vec<u8>) {
+    let bytes = values.iter().flat_map(|value| value.to_le_bytes());
+    (tag, 12, values.len() as u32, bytes.collect())
+}
+
+/// Tags of an uncompressed strip of bytes.
+fn grey(size: [u16; 2], bands: u16) -> Vec<(u16, u16, u32, Vec<u8>)> {
+    vec![
+        shorts(256, &[size[0]]),
+        shorts(257, &[size[1]]),
+        shorts(258, &vec![8; bands.into()]),
+        shorts(259, &[1]),
+        shorts(262, &[1]),
+        shorts(273, &[8]),
+        shorts(277, &[bands]),
+        shorts(278, &[size[1]]),
+        shorts(279, &[size[0] * size[1] * bands]),
+    ]
+}
+
+#[test]
+fn what_its_alpha_calls_transparent_is_a_hole() {
+    let samples = [1, 255, 2, 0, 3, 7, 4, 255];
+    for (kind, holes) in [(1, 1), (2, 1), (0, 0)] {
+        let mut tags = grey([2, 2], 2);
+        tags.push(shorts(338, &[kind]));
+        let raster = open(by_hand(&tags, &samples)).expect("a band and its alpha");
+        assert_eq!(
+            raster.summary().holes,
+            holes,
+            "extra samples of kind {kind}"
+        );
+        assert_eq!(raster.height(1, 1).is_nan(), holes == 1);
+        assert_eq!(raster.height(0, 0), 3.0);
+    }
+}
+
+/// A mask in `NAME.tif.msk`, as GDAL writes it.
+#[test]
+fn a_mask_in_a_file_beside_makes_holes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("terrain.tif");
+    std::fs::write(&path, file(&[FULL])).expect("written");
+    let mask = Part {
+        kind: 4,
+        samples: &[255, 0, 255, 255, 255, 0],
+        ..FULL
+    };
+    std::fs::write(folder.path().join("terrain.tif.msk"), file(&[mask])).expect("written");
+    let raster = Raster::open(&path, &crate::raster::OpenOptions::default()).expect("opens");
+    assert_eq!(raster.summary().holes, 2);
+    assert!(raster.height(1, 1).is_nan() && raster.height(2, 0).is_nan());
+}
+
+/// A projected grid of 10 units with these GeoKeys besides model type and raster type.
+fn projected(keys: &[(u16, u16)], origin: [f64; 2]) -> Raster {
+    let mut directory = vec![1, 1, 0, 2 + keys.len() as u16, 1024, 0, 1, 1, 1025, 0, 1, 1];
+    for (key, value) in keys {
+        directory.extend([*key, 0, 1, *value]);
+    }
+    let mut tags = grey([3, 2], 1);
+    tags.push(doubles(33550, &[10.0, 10.0, 0.0]));
+    tags.push(doubles(33922, &[0.0, 0.0, 0.0, origin[0], origin[1], 0.0]));
+    tags.push(shorts(34735, &directory));
+    open(by_hand(&tags, &[1, 2, 3, 4, 5, 6])).expect("a grid")
+}
+
+#[test]
+fn units_follow_from_the_codes_of_the_reference_systems() {
+    let (projected_system, vertical_system) = (3072, 4096);
+    // NAD83 / UTM 11N with NAVD88 heights in feet.
+    let feet_up = projected(
+        &[(projected_system, 26911), (vertical_system, 8228)],
+        [386_000.0, 3_790_000.0],
+    );
+    assert_eq!(feet_up.stated_metres_per_vertical_unit(), Some(0.3048));
+    let (east, _) = feet_up.cell().expect("a cell").ground_metres();
+    assert!((east - 10.0024).abs() < 1e-3, "{east}: UTM's scale there");
+    let system = feet_up.reference_system().expect("known");
+    assert_eq!(system, (26911, "NAD83 / UTM zone 11N".to_owned()));
+    // California zone 5 in US survey feet, without a unit of its own.
+    let feet = projected(&[(projected_system, 2229)], [6_490_000.0, 1_870_000.0]);
+    let (east, _) = feet.cell().expect("a cell").ground_metres();
+    assert!((east - 3.0481).abs() < 1e-3, "{east}");
+    // Pseudo-Mercator at 60° N is half as large on the ground as on the map.
+    let mercator = projected(&[(projected_system, 3857)], [0.0, 8_399_737.9]);
+    let (east, north) = mercator.cell().expect("a cell").ground_metres();
+    assert!((east - 5.0126).abs() < 1e-3 && (north - 5.0042).abs() < 1e-3);
+    // A depth.
+    let depth = projected(
+        &[(projected_system, 26911), (vertical_system, 6357)],
+        [386_000.0, 3_790_000.0],
+    );
+    assert_eq!(depth.summary().lowest, -6.0);
+}

@@ -1,0 +1,345 @@
+//! The grid that is felt: square cells over the samples of a raster.
+//!
+//! A patch is a square. Where a file's cells are not (an arc second away from the
+//! equator, 10 m by 30 m, a skewed transform) the finer of its two axes keeps its
+//! samples and the other is interpolated, sample by sample, when a tile is made.
+
+use std::hash::{Hash, Hasher};
+
+use crate::raster::{CellSize, Raster};
+
+/// Cells whose sides differ by less than this share count as square, and keep
+/// their exact samples.
+const SQUARE: f64 = 1e-3;
+/// A place this close to a sample is on it, in samples.
+const ON_SAMPLE: f64 = 1e-9;
+
+/// Which cells of a file are felt.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum FeltCells {
+    /// As the file stores them, felt as squares whatever their shape
+    #[default]
+    Stored,
+    /// Square on the ground: true to scale in every direction
+    Square,
+}
+
+/// Samples of square cells over a raster. Column 0 is the westernmost, row 0 the
+/// southernmost.
+#[derive(Clone, Copy, Debug)]
+pub struct FeltGrid<'r> {
+    raster: &'r Raster,
+    columns: u32,
+    rows: u32,
+    /// Side of a felt cell on the ground, metres, where the file knows it.
+    side_m: Option<f64>,
+    /// Where the samples lie in the file; `None` where they are the file's own.
+    resampling: Option<Resampling>,
+}
+
+/// Place of felt sample (u, v) in the file: column `first + u · column_step + v · lean`,
+/// row `v · row_step`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Resampling {
+    first: f64,
+    column_step: f64,
+    lean: f64,
+    row_step: f64,
+}
+
+impl<'r> FeltGrid<'r> {
+    /// The grid in which a raster is felt.
+    #[must_use]
+    pub fn new(raster: &'r Raster, cells: FeltCells) -> Self {
+        let stored = Self {
+            raster,
+            columns: raster.columns(),
+            rows: raster.rows(),
+            side_m: raster.cell().map(|cell| cell.square_metres()),
+            resampling: None,
+        };
+        match (cells, raster.cell()) {
+            (FeltCells::Square, Some(cell)) if is_square(&cell) => {
+                let (east, north) = cell.ground_metres();
+                Self {
+                    side_m: Some((east * north).sqrt()),
+                    ..stored
+                }
+            }
+            (FeltCells::Square, Some(cell)) => stored.squared(&cell).unwrap_or(stored),
+            _ => stored,
+        }
+    }
+
+    /// Lays square cells, as large as the smaller side of the file's, over the
+    /// field; `None` where they are too many to be counted.
+    ///
+    /// With columns `e` apart and rows `n` apart that lean by the cosine `c` of the
+    /// angle between them (`k` its sine), felt sample (u, v) of side `s` is on row
+    /// `s v / (n k)` and column `(s u + west − s v c / k) / e`.
+    fn squared(self, cell: &CellSize) -> Option<Self> {
+        let ((east, north), cosine) = (cell.ground_metres(), cell.lean);
+        let sine = (1.0 - cosine * cosine).sqrt();
+        let side = east.min(north);
+        let last = |samples: u32| f64::from(samples - 1);
+        let leaning = cosine * north * last(self.rows);
+        let size = [
+            east * last(self.columns) + leaning.abs(),
+            north * sine * last(self.rows),
+        ];
+        let samples = |length: f64| {
+            let cells = (length / side + ON_SAMPLE).floor();
+            (cells >= 1.0 && cells < f64::from(u32::MAX)).then_some(cells as u32 + 1)
+        };
+        Some(Self {
+            columns: samples(size[0])?,
+            rows: samples(size[1])?,
+            side_m: Some(side),
+            resampling: Some(Resampling {
+                first: leaning.min(0.0) / east,
+                column_step: side / east,
+                lean: -side * cosine / (sine * east),
+                row_step: side / (north * sine),
+            }),
+            ..self
+        })
+    }
+
+    /// The raster under the grid.
+    #[must_use]
+    pub const fn raster(&self) -> &'r Raster {
+        self.raster
+    }
+
+    /// Felt samples from west to east.
+    #[must_use]
+    pub const fn columns(&self) -> u32 {
+        self.columns
+    }
+
+    /// Felt samples from south to north.
+    #[must_use]
+    pub const fn rows(&self) -> u32 {
+        self.rows
+    }
+
+    /// Whether heights are interpolated because the file's cells are not square.
+    #[must_use]
+    pub const fn is_resampled(&self) -> bool {
+        self.resampling.is_some()
+    }
+
+    /// Side of a felt cell on the ground in metres, where the file knows it. Cells
+    /// felt as they are stored count as squares of the same area.
+    #[must_use]
+    pub const fn side_m(&self) -> Option<f64> {
+        self.side_m
+    }
+
+    /// How many cells high one vertical unit is at true proportions, where the file
+    /// knows its cell size: with `cell_mm` hand millimetres a cell, the true height
+    /// of a unit is `cell_mm` times this.
+    #[must_use]
+    pub fn cells_per_vertical_unit(&self) -> Option<f64> {
+        let metres = self.raster.metres_per_vertical_unit();
+        self.side_m.map(|side| metres / side)
+    }
+
+    /// The height at a felt sample in the file's vertical unit; NaN in a hole and
+    /// outside the field.
+    #[must_use]
+    pub fn height(&self, column: u32, row: u32) -> f64 {
+        match &self.resampling {
+            None => self.raster.height(column, row),
+            Some(_) if column >= self.columns || row >= self.rows => f64::NAN,
+            Some(resampling) => resampling.height(self.raster, column, row),
+        }
+    }
+
+    /// Copies heights of a row from `first_column` eastwards, one for each place in
+    /// `heights`: the same values as [`FeltGrid::height`].
+    ///
+    /// Level *L* is the grid with every 2ᴸ-th sample; row and column count in it.
+    pub fn copy_row(&self, level: u8, row: u32, first_column: u32, heights: &mut [f64]) {
+        if self.resampling.is_none() {
+            return self.raster.copy_row(level, row, first_column, heights);
+        }
+        let whole = |index: u32| {
+            let index = u64::from(index).checked_shl(level.into());
+            index.and_then(|index| u32::try_from(index).ok())
+        };
+        for (column, height) in (first_column..).zip(heights) {
+            *height = match (whole(column), whole(row)) {
+                (Some(column), Some(row)) => self.height(column, row),
+                _ => f64::NAN,
+            };
+        }
+    }
+}
+
+impl FeltGrid<'_> {
+    /// What the grid is besides the samples of its raster.
+    pub(super) fn hash_shape<H: Hasher>(&self, hasher: &mut H) {
+        (self.columns, self.rows).hash(hasher);
+        if let Some(places) = &self.resampling {
+            let numbers = [
+                places.first,
+                places.column_step,
+                places.lean,
+                places.row_step,
+            ];
+            numbers.map(f64::to_bits).hash(hasher);
+        }
+    }
+}
+
+impl Resampling {
+    /// The file's bilinear surface at a felt sample; a hole where a corner that
+    /// counts is one.
+    fn height(&self, raster: &Raster, column: u32, row: u32) -> f64 {
+        let (u, v) = (f64::from(column), f64::from(row));
+        let along = self.first + u * self.column_step + v * self.lean;
+        let Some((column, east)) = split(along) else {
+            return f64::NAN;
+        };
+        let Some((row, north)) = split(v * self.row_step) else {
+            return f64::NAN;
+        };
+        let across = |row: u32| {
+            mix(east, raster.height(column, row), || {
+                raster.height(column + 1, row)
+            })
+        };
+        mix(north, across(row), || across(row + 1))
+    }
+}
+
+/// A place in samples as a sample and the share of the way to the next.
+fn split(place: f64) -> Option<(u32, f64)> {
+    let nearest = place.round();
+    let (sample, share) = if (place - nearest).abs() <= ON_SAMPLE * nearest.abs().max(1.0) {
+        (nearest, 0.0)
+    } else {
+        (place.floor(), place - place.floor())
+    };
+    (sample >= 0.0 && sample < f64::from(u32::MAX)).then_some((sample as u32, share))
+}
+
+/// `share` of the way from one height to the next, which is not asked for where it
+/// does not count.
+fn mix(share: f64, from: f64, to: impl Fn() -> f64) -> f64 {
+    match share {
+        0.0 => from,
+        _ => from * (1.0 - share) + to() * share,
+    }
+}
+
+fn is_square(cell: &CellSize) -> bool {
+    let (east, north) = cell.ground_metres();
+    (east - north).abs() <= SQUARE * east.min(north) && cell.lean.abs() <= SQUARE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::{CellUnit, Certainty};
+
+    fn cell(east: f64, north: f64, lean: f64) -> CellSize {
+        CellSize {
+            east,
+            north,
+            lean,
+            map_scale: (1.0, 1.0),
+            unit: CellUnit::Length { metres: 1.0 },
+            latitude: None,
+            certainty: Certainty::Stated,
+        }
+    }
+
+    /// A field whose height is known everywhere on the ground: a plane.
+    fn plane(cell: CellSize, [east, north]: [f64; 2]) -> Raster {
+        let sine = (1.0 - cell.lean * cell.lean).sqrt();
+        let raster = Raster::from_fn(41, 31, |column, row| {
+            let (column, row) = (f64::from(column) * cell.east, f64::from(row) * cell.north);
+            (east * (column + row * cell.lean) + north * row * sine) as f32
+        });
+        raster.expect("raster").with_cell(cell)
+    }
+
+    #[test]
+    fn a_plane_is_true_in_every_direction_whatever_the_cells() {
+        for (across, along, lean) in [
+            (10.0, 30.0, 0.0),
+            (30.0, 10.0, 0.0),
+            (5.0, 10.0, 0.2),
+            (10.0, 10.0, -0.3),
+            (10.0, 7.3, 0.0),
+        ] {
+            let raster = plane(cell(across, along, lean), [1.0, 0.5]);
+            let grid = FeltGrid::new(&raster, FeltCells::Square);
+            let side = grid.side_m().expect("known");
+            assert_eq!(side, f64::min(across, along));
+            let mut steps = 0;
+            for row in 0..grid.rows() - 1 {
+                for column in 0..grid.columns() - 1 {
+                    let at = grid.height(column, row);
+                    let (east, north) =
+                        (grid.height(column + 1, row), grid.height(column, row + 1));
+                    if !(at.is_nan() || east.is_nan() || north.is_nan()) {
+                        let slopes = [(east - at) / side, (north - at) / side];
+                        assert!((slopes[0] - 1.0).abs() < 1e-4, "{slopes:?} east");
+                        assert!((slopes[1] - 0.5).abs() < 1e-4, "{slopes:?} north");
+                        steps += 1;
+                    }
+                }
+            }
+            let ground = 40.0 * across * 30.0 * along * (1.0 - lean * lean).sqrt();
+            let felt = f64::from(steps) * side * side;
+            assert!(felt > 0.8 * ground, "{felt} of {ground} m²");
+        }
+    }
+
+    #[test]
+    fn square_cells_keep_their_exact_samples_and_so_do_stored_ones() {
+        for (cells, east) in [(FeltCells::Square, 10.009), (FeltCells::Stored, 30.0)] {
+            let raster = plane(cell(east, 10.0, 0.0), [0.3, 0.7]);
+            let grid = FeltGrid::new(&raster, cells);
+            assert!(!grid.is_resampled());
+            assert_eq!((grid.columns(), grid.rows()), (41, 31));
+            assert_eq!(grid.height(17, 23), raster.height(17, 23));
+        }
+    }
+
+    #[test]
+    fn the_finer_axis_keeps_its_samples_and_rows_read_as_single_samples_do() {
+        let raster = plane(cell(10.0, 25.0, 0.0), [0.3, 0.7]);
+        let grid = FeltGrid::new(&raster, FeltCells::Square);
+        assert_eq!((grid.columns(), grid.rows()), (41, 76));
+        // Row 5 of 10 m is the file's row 2 of 25 m.
+        assert_eq!(grid.height(7, 5), raster.height(7, 2));
+        let mut heights = [0.0; 12];
+        grid.copy_row(2, 3, 1, &mut heights);
+        for (column, height) in (1..).zip(heights) {
+            let single = grid.height(4 * column, 12);
+            assert!(height == single || (height.is_nan() && single.is_nan()));
+        }
+        assert!(heights[10].is_nan(), "east of the field");
+        grid.copy_row(40, 1, 0, &mut heights);
+        assert!(heights.iter().all(|height| height.is_nan()));
+    }
+
+    #[test]
+    fn a_hole_is_as_large_as_the_patches_that_it_belongs_to() {
+        let raster = Raster::from_fn(9, 9, |column, row| match (column, row) {
+            (4, 4) => f32::NAN,
+            _ => 1.0,
+        });
+        let raster = raster.expect("raster").with_cell(cell(10.0, 20.0, 0.0));
+        let grid = FeltGrid::new(&raster, FeltCells::Square);
+        let holes: Vec<_> = (0..grid.rows())
+            .flat_map(|row| (0..grid.columns()).map(move |column| (column, row)))
+            .filter(|&(column, row)| grid.height(column, row).is_nan())
+            .collect();
+        assert_eq!(holes, [(4, 7), (4, 8), (4, 9)]);
+    }
+}

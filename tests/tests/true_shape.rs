@@ -1,0 +1,89 @@
+//! A terrain is felt in its true shape: planes of known slope on the ellipsoid, as a
+//! file of degrees stores them.
+
+use std::path::PathBuf;
+
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::replay::on_native;
+use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::force::ForceLaw;
+
+/// Samples along a side, and degrees between them.
+const SIDE: u32 = 80;
+const STEP_DEG: f64 = 0.001;
+
+/// Metres in a degree of longitude and of latitude at a latitude, from the radii of
+/// curvature of WGS 84.
+fn degree_m(latitude_deg: f64) -> [f64; 2] {
+    let (a, e2) = (6_378_137.0_f64, 0.006_694_379_990_14);
+    let (sin, cos) = latitude_deg.to_radians().sin_cos();
+    let w = 1.0 - e2 * sin * sin;
+    [a * cos / w.sqrt(), a * (1.0 - e2) / (w * w.sqrt())].map(f64::to_radians)
+}
+
+/// A grid of degrees at a latitude whose heights rise by `slope` metres a metre east
+/// and north.
+fn plane(latitude_deg: f64, slope: [f64; 2]) -> PathBuf {
+    let middle = latitude_deg + f64::from(SIDE) * STEP_DEG / 2.0;
+    let [east, north] = degree_m(middle).map(|metres| metres * STEP_DEG);
+    let mut text = format!(
+        "ncols {SIDE}\nnrows {SIDE}\nxllcorner 10\nyllcorner {latitude_deg}\ncellsize {STEP_DEG}\n"
+    );
+    for row in (0..SIDE).rev() {
+        let heights = (0..SIDE).map(|column| {
+            let (column, row) = (f64::from(column), f64::from(row));
+            format!("{:.6}", column * east * slope[0] + row * north * slope[1])
+        });
+        text += &(heights.collect::<Vec<_>>().join(" ") + "\n");
+    }
+    let name = format!("plane_{latitude_deg}_{}_{}.asc", slope[0], slope[1]);
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::write(&path, text).expect("writable");
+    path
+}
+
+/// The force over the middle of a terrain, a cell deep.
+fn force(terrain: &Terrain<'_>) -> [f64; 3] {
+    let mut replayer = on_native(terrain, ForceLaw::PREMIUM, Rule::Swept).expect("opened");
+    let [east, north] = terrain.size_mm().map(|size| size / 2.0);
+    let ground = terrain.height_mm(east, north).expect("known");
+    for depth in [-2.0, 1.0] {
+        let hip = terrain.scale().to_grid([east, north, ground - depth]);
+        let sample = replayer.feel(hip.expect("addressable")).expect("felt");
+        if depth > 0.0 {
+            assert_eq!(sample.state, ContactState::Touching);
+            return sample.force_n.to_array().map(f64::from);
+        }
+    }
+    unreachable!("the second point is below ground")
+}
+
+#[test]
+fn a_slope_of_degrees_feels_as_steep_as_it_is_in_every_direction() {
+    for latitude in [0.0, 35.0, 60.0, -72.0] {
+        for slope in [[1.0, 0.0], [0.0, 1.0], [0.5, -0.5]] {
+            let raster = Raster::open(plane(latitude, slope), &OpenOptions::default());
+            let raster = raster.expect("opens");
+            let grid = FeltGrid::new(&raster, FeltCells::Square);
+            let scale = Scale::true_to(&grid, 1.0).expect("scale");
+            let terrain = Terrain::over(grid, scale, 0).expect("terrain");
+            let [x, y, z] = force(&terrain);
+            let felt = [-x / z, -y / z];
+            for axis in 0..2 {
+                let off = (felt[axis] - slope[axis]).abs();
+                assert!(off < 1e-3, "at {latitude}°: {felt:?} for {slope:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn stored_cells_are_felt_as_squares_of_the_same_area() {
+    let raster = Raster::open(plane(60.0, [1.0, 0.0]), &OpenOptions::default()).expect("opens");
+    let grid = FeltGrid::new(&raster, FeltCells::Stored);
+    assert_eq!((grid.columns(), grid.rows()), (SIDE, SIDE));
+    let terrain = Terrain::over(grid, Scale::true_to(&grid, 1.0).expect("scale"), 0);
+    let [x, _, z] = force(&terrain.expect("terrain"));
+    assert!((x / z).abs() < 0.75, "a cell is half as wide as it is long");
+}
