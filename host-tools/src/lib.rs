@@ -14,12 +14,14 @@
 //! - [`picture`]: what was felt, as PNG files;
 //! - [`board`]: boards, probes, and images onto chips;
 //! - [`calibrate`]: from ruler and scale to a calibration record;
+//! - [`bringup`]: the first power-up of a board and its arm, step by step;
 //! - [`output`]: files that appear only when they are complete;
 //! - [`cli`]: the `hapterra` command, one file a subcommand.
 
 #![forbid(unsafe_code)]
 
 pub mod board;
+pub mod bringup;
 pub mod calibrate;
 pub mod cli;
 pub mod link;

@@ -1,6 +1,12 @@
-//! Files that appear only when they are complete.
+//! Files that appear only when they are complete, and what killed processes left of
+//! them.
+//!
+//! A file `OUT` grows as `OUT.XXXXXX.partial` beside its place, with a lock that the
+//! system lets go when the process ends, however it ends. A partial file without a
+//! lock is therefore one that nobody will complete.
 
-use std::fs::File;
+use std::ffi::OsStr;
+use std::fs::{File, TryLockError};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -99,15 +105,75 @@ pub fn folder_of(path: &Path) -> &Path {
     }
 }
 
+/// What a process that was killed had written of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LeftBehind {
+    /// Where it is.
+    pub path: PathBuf,
+    /// How long it is, bytes.
+    pub bytes: u64,
+}
+
+/// What killed processes left of the file at `path`, by name. Nothing here touches
+/// it.
+#[must_use]
+pub fn left_behind(path: &Path) -> Vec<LeftBehind> {
+    let beginning = beginning_of_partial(path);
+    let beside = folder_of(path).read_dir().into_iter().flatten().flatten();
+    let partial = beside.filter(|entry| is_partial(&beginning, &entry.file_name()));
+    let mut found: Vec<_> = partial
+        .map(|entry| entry.path())
+        .filter(|path| is_nobodys(path))
+        .filter_map(|path| {
+            let bytes = path.metadata().ok()?.len();
+            Some(LeftBehind { path, bytes })
+        })
+        .collect();
+    found.sort_by(|a, b| a.path.cmp(&b.path));
+    found
+}
+
+/// Letters and digits between a file's name and the suffix.
+const RANDOM: usize = 6;
+const SUFFIX: &str = ".partial";
+
+/// Bytes of a file's own name that its partial file bears, at most: file systems end
+/// names at 255.
+const OWN_NAME: usize = 200;
+
+/// What the name of a partial file of `path` begins with.
+fn beginning_of_partial(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let cut = name.floor_char_boundary(OWN_NAME);
+    format!("{}.", name.get(..cut).unwrap_or_default())
+}
+
+/// Whether a name that begins so is that of a partial file.
+fn is_partial(beginning: &str, name: &OsStr) -> bool {
+    let random = name
+        .to_str()
+        .and_then(|name| name.strip_prefix(beginning)?.strip_suffix(SUFFIX));
+    random.is_some_and(|r| r.len() == RANDOM && r.bytes().all(|b| b.is_ascii_alphanumeric()))
+}
+
+/// Whether no process is writing a partial file.
+fn is_nobodys(path: &Path) -> bool {
+    let file = File::open(path);
+    file.is_ok_and(|file| !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+}
+
 fn temporary(path: &Path) -> io::Result<(File, TempPath)> {
+    let prefix = beginning_of_partial(path);
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".hapterra-").suffix(".partial");
+    builder.prefix(&prefix).suffix(SUFFIX).rand_bytes(RANDOM);
     // Readable by whom the user's mask says, as any other file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder
-        .tempfile_in(folder_of(path))
-        .map(tempfile::NamedTempFile::into_parts)
+    let (file, place) = builder.tempfile_in(folder_of(path))?.into_parts();
+    // A file system without locks has files that look as if nobody wrote them: they are
+    // named to the user, and nothing more.
+    let _ = file.try_lock();
+    Ok((file, place))
 }
 
 #[cfg(test)]
@@ -129,6 +195,34 @@ mod tests {
         output.finish().expect("finished");
         assert_eq!(std::fs::read(&path).expect("there"), b"all");
         assert_eq!(entries(), 1);
+    }
+
+    #[test]
+    fn what_nobody_writes_any_more_is_found_and_what_somebody_writes_is_not() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("out.csv");
+        let mut alive = Output::create(&path).expect("created");
+        alive.write_all(b"half").expect("written");
+        alive.flush().expect("written");
+        assert_eq!(left_behind(&path), []);
+        let dead = folder.path().join("out.csv.a1B2c3.partial");
+        std::fs::write(&dead, "t_s,x_mm").expect("written");
+        // Of other files, or of another name.
+        for other in [
+            "out.csv.b.csv.a1B2c3.partial",
+            "out.csv.partial",
+            "other.csv.a1B2c3.partial",
+            "out.csv",
+        ] {
+            std::fs::write(folder.path().join(other), "x").expect("written");
+        }
+        let found = LeftBehind {
+            path: dead.clone(),
+            bytes: 8,
+        };
+        assert_eq!(left_behind(&path), [found]);
+        alive.finish().expect("finished");
+        assert_eq!(std::fs::read(&dead).expect("kept"), b"t_s,x_mm");
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! The boards that there is firmware for.
 
+use super::memories::Memories;
+
 /// A board that there is firmware for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Board {
@@ -7,33 +9,53 @@ pub struct Board {
     pub name: &'static str,
     /// What probe-rs calls its chip; none for a board that is only emulated.
     pub chip: Option<&'static str>,
+    /// The memories of that chip.
+    pub memories: Option<Memories>,
     /// What it is.
     pub what: &'static str,
 }
 
 /// Every board.
 pub const BOARDS: [Board; 4] = [
-    Board::new("mps2-an386", None, "Cortex-M4F at 25 MHz, emulated by QEMU"),
+    Board::emulated("mps2-an386", "Cortex-M4F at 25 MHz, emulated by QEMU"),
     Board::new(
         "nucleo-g474re",
-        Some("STM32G474RETx"),
+        ("STM32G474RETx", Memories::G474),
         "Cortex-M4F at 170 MHz, three on-chip converters for amplifiers",
     ),
     Board::new(
         "nucleo-h743zi2",
-        Some("STM32H743ZITx"),
+        ("STM32H743ZITx", Memories::H743),
         "Cortex-M7 at 480 MHz, three duty cycles for amplifiers",
     ),
     Board::new(
         "nucleo-h743zi2-spi",
-        Some("STM32H743ZITx"),
+        ("STM32H743ZITx", Memories::H743),
         "the same with a quad ±10 V converter on SPI (AD5754R)",
     ),
 ];
 
 impl Board {
-    const fn new(name: &'static str, chip: Option<&'static str>, what: &'static str) -> Self {
-        Self { name, chip, what }
+    const fn emulated(name: &'static str, what: &'static str) -> Self {
+        Self {
+            name,
+            chip: None,
+            memories: None,
+            what,
+        }
+    }
+
+    const fn new(
+        name: &'static str,
+        (chip, memories): (&'static str, Memories),
+        what: &'static str,
+    ) -> Self {
+        Self {
+            name,
+            chip: Some(chip),
+            memories: Some(memories),
+            what,
+        }
     }
 
     /// The board called `name`.

@@ -1,10 +1,12 @@
 //! An image onto a chip, through a debug probe.
 
 use probe_rs::Permissions;
+use probe_rs::config::{Registry, RegistryError};
 use probe_rs::flashing::{DownloadOptions, FlashError as WriteError, FlashProgress, ProgressEvent};
 use probe_rs::probe::list::{Accessibility, Lister};
 use probe_rs::probe::{DebugProbeError, DebugProbeInfo, DebugProbeSelector};
 
+use super::boards::Board;
 use super::image::Image;
 
 /// An image was written.
@@ -28,6 +30,12 @@ pub struct Progress {
 /// Why an image could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum FlashError {
+    /// probe-rs does not know the chip.
+    #[error("the chip {0} is not known")]
+    UnknownChip(&'static str, #[source] RegistryError),
+    /// The board has no chip.
+    #[error("{0} is emulated: there is no chip to write to")]
+    Emulated(&'static str),
     /// No probe at all.
     #[error("no debug probe: looked for ST-LINK, CMSIS-DAP, J-Link and other probes on USB")]
     NoProbe,
@@ -85,10 +93,14 @@ pub enum FlashError {
 /// # Errors
 /// [`FlashError`].
 pub fn flash(
+    board: &Board,
     image: &Image,
     probe: Option<&str>,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Flashed, FlashError> {
+    let chip = board.chip.ok_or(FlashError::Emulated(board.name))?;
+    let target = Registry::from_builtin_families().get_target_by_name(chip);
+    let target = target.map_err(|error| FlashError::UnknownChip(chip, error))?;
     let lister = Lister::new();
     let info = choose(&lister, probe)?;
     let name = name(&info);
@@ -96,20 +108,20 @@ pub fn flash(
         name: name.clone(),
         source,
     })?;
-    let chip = image.target.name.clone();
+    let chip = target.name.clone();
     let unanswered = |source: probe_rs::Error| FlashError::Chip {
         name: name.clone(),
         chip: chip.clone(),
         source: Box::new(source),
     };
     let mut session = opened
-        .attach_under_reset(image.target.clone(), Permissions::default())
+        .attach_under_reset(target.clone(), Permissions::default())
         .map_err(unanswered)?;
     let refused = |source: WriteError| FlashError::Write {
         chip: chip.clone(),
         source: Box::new(source),
     };
-    let mut loader = image.target.flash_loader();
+    let mut loader = target.flash_loader();
     for part in &image.parts {
         loader
             .add_data(part.address, &part.bytes)

@@ -8,15 +8,14 @@ use std::path::{Path, PathBuf};
 use object::LittleEndian;
 use object::elf::{EM_ARM, FileHeader32, PT_LOAD, SHT_SYMTAB};
 use object::read::elf::{FileHeader, ProgramHeader, Sym};
-use probe_rs::Target;
-use probe_rs::config::{MemoryRegion, Registry};
 
 use super::boards::Board;
+use super::memories::Memories;
 
 /// An image that fits its chip.
 #[derive(Debug)]
 pub struct Image {
-    pub(super) target: Target,
+    pub(super) memories: Memories,
     /// What goes into the chip's flash.
     pub(super) parts: Vec<Part>,
     /// Where it goes, for people.
@@ -95,22 +94,23 @@ pub enum ImageError {
         /// The board it names.
         found: Option<String>,
     },
-    /// probe-rs does not know the chip.
-    #[error("the chip {0} is not known")]
-    UnknownChip(&'static str, #[source] probe_rs::config::RegistryError),
 }
 
 impl Image {
-    /// Reads an ELF and holds it against the memories of the board's chip, as
-    /// probe-rs' registry knows them.
+    /// The memories of the chip that it is for.
+    #[must_use]
+    pub const fn memories(&self) -> &Memories {
+        &self.memories
+    }
+
+    /// Reads an ELF and holds it against the memories of the board's chip.
     ///
     /// # Errors
     /// [`ImageError`]: what does not fit.
     pub fn read(board: &Board, path: &Path) -> Result<Self, ImageError> {
-        let chip = board.chip.ok_or(ImageError::Emulated(board.name))?;
-        let target = Registry::from_builtin_families()
-            .get_target_by_name(chip)
-            .map_err(|error| ImageError::UnknownChip(chip, error))?;
+        let (Some(chip), Some(memories)) = (board.chip, board.memories) else {
+            return Err(ImageError::Emulated(board.name));
+        };
         let elf = std::fs::read(path).map_err(|source| ImageError::Unreadable {
             path: path.to_owned(),
             source,
@@ -119,7 +119,7 @@ impl Image {
             path: path.to_owned(),
             why,
         })?;
-        let image = place(target, segments).map_err(|stray| ImageError::OutOfMemory {
+        let image = place(memories, segments).map_err(|stray| ImageError::OutOfMemory {
             path: path.to_owned(),
             chip: chip.to_owned(),
             address: stray.address,
@@ -213,7 +213,7 @@ struct Stray {
     in_flash: bool,
 }
 
-fn place(target: Target, segments: Vec<Segment>) -> Result<Image, Stray> {
+fn place(memories: Memories, segments: Vec<Segment>) -> Result<Image, Stray> {
     let mut placed: Vec<Placed> = Vec::new();
     let mut take = |address: u64, bytes: u64, in_flash: bool| {
         if bytes == 0 {
@@ -224,7 +224,7 @@ fn place(target: Target, segments: Vec<Segment>) -> Result<Image, Stray> {
             bytes,
             in_flash,
         };
-        let memory = memory(&target, address, bytes, in_flash).ok_or(stray)?;
+        let memory = memories.holding(address, bytes, in_flash).ok_or(stray)?;
         match placed.iter_mut().find(|place| place.memory == memory) {
             Some(place) => place.bytes += bytes,
             None => placed.push(Placed {
@@ -250,45 +250,14 @@ fn place(target: Target, segments: Vec<Segment>) -> Result<Image, Stray> {
                 bytes: s.bytes,
             })
             .collect(),
-        target,
+        memories,
         placed,
     })
-}
-
-/// The memory of the chip that holds all of a range, if one does. Neighbours are
-/// one memory: an image may lie across them.
-fn memory(target: &Target, address: u64, bytes: u64, in_flash: bool) -> Option<Range<u64>> {
-    let mut ranges: Vec<Range<u64>> = target
-        .memory_map
-        .iter()
-        .filter_map(|region| match region {
-            MemoryRegion::Nvm(flash) if in_flash => Some(flash.range.clone()),
-            MemoryRegion::Ram(ram) if !in_flash => Some(ram.range.clone()),
-            _ => None,
-        })
-        .collect();
-    ranges.sort_by_key(|range| range.start);
-    let mut joined: Vec<Range<u64>> = Vec::new();
-    for range in ranges {
-        match joined.last_mut() {
-            Some(last) if last.end >= range.start => last.end = last.end.max(range.end),
-            _ => joined.push(range),
-        }
-    }
-    joined
-        .into_iter()
-        .find(|range| range.start <= address && address + bytes <= range.end)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn g474() -> Target {
-        Registry::from_builtin_families()
-            .get_target_by_name("STM32G474RETx")
-            .expect("known")
-    }
 
     fn segment(runs: u64, loaded: u64, bytes: usize, in_memory: u64) -> Segment {
         Segment {
@@ -306,7 +275,7 @@ mod tests {
     fn code_and_data_find_their_memories() {
         let code = segment(FLASH, FLASH, 1000, 1000);
         let data = segment(RAM, FLASH + 1000, 40, 240);
-        let image = place(g474(), vec![code, data]).ok().expect("fits");
+        let image = place(Memories::G474, vec![code, data]).ok().expect("fits");
         let taken: Vec<_> = image.placed.iter().map(|p| (p.is_flash, p.bytes)).collect();
         assert_eq!(taken, [(true, 1040), (false, 240)]);
         assert_eq!(image.parts.len(), 2);
@@ -316,9 +285,9 @@ mod tests {
     fn data_may_lie_across_the_chips_blocks_of_ram() {
         // SRAM1, SRAM2 and CCM of the G474, 128 KiB end to end.
         let data = segment(RAM + 0x1000, FLASH, 8, 0x1_F000);
-        assert!(place(g474(), vec![data]).is_ok());
+        assert!(place(Memories::G474, vec![data]).is_ok());
         let too_much = segment(RAM + 0x1000, FLASH, 8, 0x1_F001);
-        assert!(place(g474(), vec![too_much]).is_err());
+        assert!(place(Memories::G474, vec![too_much]).is_err());
     }
 
     #[test]
@@ -329,7 +298,7 @@ mod tests {
             segment(FLASH, FLASH + 0x8_0000 - 4, 8, 8),
             segment(0, 0, 64, 64),
         ] {
-            assert!(place(g474(), vec![stray]).is_err());
+            assert!(place(Memories::G474, vec![stray]).is_err());
         }
     }
 
@@ -345,16 +314,5 @@ mod tests {
         let emulated = Board::named("mps2-an386").expect("known");
         let error = Image::read(emulated, &path).expect_err("no chip");
         assert!(matches!(error, ImageError::Emulated(_)));
-    }
-
-    #[test]
-    fn every_board_with_a_chip_is_known_to_probe_rs() {
-        let registry = Registry::from_builtin_families();
-        for chip in super::super::boards::BOARDS
-            .iter()
-            .filter_map(|board| board.chip)
-        {
-            registry.get_target_by_name(chip).expect(chip);
-        }
     }
 }

@@ -9,6 +9,7 @@ use super::gravity::N_PER_GRAM;
 use super::ratios::Direction;
 use super::review::Review;
 use super::walk::{Attendant, Stopped};
+use crate::link::Meddler;
 use crate::phantom::{HandModel, PhantomModel, Plant, kinematics};
 
 /// How long a pose is held until everything is still, s.
@@ -64,6 +65,18 @@ impl VirtualUser {
     #[must_use]
     pub fn counts(&self) -> Rc<Cell<[i32; 3]>> {
         Rc::clone(&self.counts)
+    }
+
+    /// What the user's hands do to the encoders and switches of a device: the encoders
+    /// follow the arm, and the dead-man switch is pressed for half of every second, so
+    /// that whatever waits for a press gets one.
+    #[must_use]
+    pub fn hands(&self) -> Meddler {
+        let counts = self.counts();
+        Box::new(move |tick, sense, _| {
+            sense.counts = counts.get();
+            sense.dead_man = tick % 1_000 >= 500;
+        })
     }
 
     /// The arm with its true ratios, signs and weights.

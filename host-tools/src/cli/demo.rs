@@ -11,7 +11,7 @@ use super::options::emulated_board::{EmulatedBoard, RunsOn};
 use super::options::rendering::Rendering;
 use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::session_summary::{self, SessionSummary};
-use super::terminal::{interrupt, progress};
+use super::terminal::{interrupt, left_behind, progress};
 use crate::link::{
     Arming, Event, HostClock, LinkError, Native, Patience, Session, Transport, move_arm_while,
 };
@@ -22,7 +22,7 @@ use crate::raster::Raster;
 use crate::replay::{Record, Recording, state_name};
 use crate::synth::{Kind, Synth};
 use crate::telemetry::SampleLog;
-use crate::terrain::Scale;
+use crate::terrain::{FeltGrid, Scale};
 
 /// Samples along the side of the terrain that the demo makes itself.
 const OWN_SIZE: u32 = 1024;
@@ -69,11 +69,12 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (raster, name) = terrain_of(args)?;
     let (law, rule) = (args.rendering.law()?, args.rendering.rule());
-    let mut scale = scale_of(args, &raster)?;
+    let grid = args.rendering.grid(&raster);
+    let mut scale = scale_of(args, &grid)?;
     // Heights that nobody asked for may as well be lower.
     let may_lower = args.rendering.height_mm_per_unit.is_none();
     for _ in 0..HALVINGS {
-        let terrain = args.rendering.terrain(&raster, scale)?;
+        let terrain = args.rendering.terrain(grid, scale)?;
         match PlacedTerrain::new(&terrain, law, rule) {
             Ok(placed) => return show(args, &placed, &name),
             Err(PlacingError::OutOfReach(_)) if may_lower => {
@@ -101,11 +102,11 @@ fn terrain_of(args: &Args) -> Result<(Raster, String), Failure> {
 }
 
 /// The scale as stated, or one that suits the hand.
-fn scale_of(args: &Args, raster: &Raster) -> Result<Scale, Failure> {
+fn scale_of(args: &Args, grid: &FeltGrid<'_>) -> Result<Scale, Failure> {
     if args.rendering.height_mm_per_unit.is_some() {
-        return args.rendering.scale(raster);
+        return args.rendering.scale(grid);
     }
-    let suggested = suggest_scale(raster, args.rendering.cell_mm);
+    let suggested = suggest_scale(grid, args.rendering.cell_mm);
     Ok(suggested.or_hint("choose another --cell-mm")?.scale)
 }
 
@@ -122,6 +123,12 @@ fn show(args: &Args, placed: &PlacedTerrain<'_>, name: &str) -> Result<(), Failu
         "terrain        {name}: {}",
         session_summary::in_words(terrain)
     );
+    let stem = Path::new(name)
+        .file_stem()
+        .map_or(name.into(), |s| s.to_string_lossy());
+    let recording = args.out.join(format!("{stem}.csv"));
+    let picture = args.out.join(format!("{stem}.png"));
+    left_behind::tell([recording.as_path(), &picture]);
     let arm = placed.held_phantom();
     let stop_s = args.seconds.unwrap_or(f64::MAX).min(placed.duration_s());
     interrupt::listen();
@@ -132,11 +139,6 @@ fn show(args: &Args, placed: &PlacedTerrain<'_>, name: &str) -> Result<(), Failu
         }
         RunsOn::Emulated => tour_emulated(args, placed, arm, stop_s)?,
     };
-    let stem = Path::new(name)
-        .file_stem()
-        .map_or(name.into(), |s| s.to_string_lossy());
-    let recording = args.out.join(format!("{stem}.csv"));
-    let picture = args.out.join(format!("{stem}.png"));
     write(&toured.rows, &recording).or_hint(OTHER_FOLDER)?;
     let summary = &toured.summary;
     print!("{}", summary.text());
@@ -174,10 +176,9 @@ fn tour_emulated(
         match tour(placed, Box::new(lines.link), Patience::EMULATED, stop_s) {
             Ok(toured) => {
                 // The arm is still there while the board lets its force go out.
-                let status = emulator.finish().map_err(Failure::new)?;
-                let ended_well = status.success().then_some(toured);
-                ended_well
-                    .ok_or_else(|| format!("the emulated board ended with {status}"))
+                let ended = emulator.finish().map(|()| toured);
+                ended
+                    .map_err(|why| format!("the emulated board did not end well: {why}"))
                     .or_hint(report)
             }
             // A link that broke because the board ended is the board's failure.
@@ -203,24 +204,28 @@ fn tour(
     let template = "feeling {bar:30} {human_pos} of {human_len} ticks, {elapsed}";
     let progress = progress::bar(Some(stop_tick), template);
     let (mut log, mut rows) = (SampleLog::new(terrain, &device), Vec::new());
-    while log.ticks() < stop_tick && !interrupt::requested() {
-        session.poll(Duration::from_millis(100), &mut |event| {
+    let mut toured = Ok(());
+    while toured.is_ok() && log.ticks() < stop_tick && !interrupt::requested() {
+        toured = session.poll(Duration::from_millis(100), &mut |event| {
             if let Event::Sample(sample) = event {
                 rows.push((log.take(sample), state_name(sample.state)));
             }
-        })?;
+        });
         progress.set_position(log.ticks());
     }
     progress.finish_and_clear();
+    let figures = log.figures();
+    let ticks = log.ticks();
+    // However the tour ended, the board is told; what it felt after the tour's end
+    // is not shown.
+    let left = session.say_goodbye(&mut |_| {});
+    toured.and(left)?;
     let summary = SessionSummary {
-        ticks: log.ticks(),
+        ticks,
         device,
-        figures: log.figures(),
+        figures,
         tally: session.tally().clone(),
     };
-    session.say_goodbye()?;
-    // Lets a device in memory or behind a slow line hear it.
-    let _ = session.poll(Duration::from_millis(10), &mut |_| {});
     Ok(Toured { rows, summary })
 }
 

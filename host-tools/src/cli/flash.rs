@@ -1,11 +1,17 @@
-//! `hapterra flash`: an image onto a board, through its debug probe.
+//! `hapterra flash`: an image onto a board, through its debug probe or, with `--dfu`,
+//! through the USB loader in its chip's ROM.
 
 use std::path::PathBuf;
 
 use clap::ValueHint;
 
-use super::failure::Failure;
-use crate::board::{BOARDS, Board};
+use super::failure::{Failure, OrHint};
+use crate::board::{BOARDS, Board, Checkout, Image};
+use crate::link::DeviceAddress;
+
+mod over_usb;
+#[cfg(feature = "probe")]
+mod through_a_probe;
 
 /// Arguments of `hapterra flash`.
 #[derive(Debug, clap::Args)]
@@ -18,13 +24,30 @@ pub struct Args {
     #[arg(long, value_name = "ELF", value_hint = ValueHint::FilePath)]
     pub image: Option<PathBuf>,
 
+    /// Without a debug probe: over USB, by the loader in the chip's ROM. The board has
+    /// to be disarmed
+    #[arg(long, conflicts_with = "probe")]
+    pub dfu: bool,
+
+    /// With --dfu: which board, where there are several: usb:SERIAL (`hapterra list`
+    /// shows it)
+    #[arg(long, default_value = "usb", requires = "dfu", value_parser = parse_usb)]
+    pub device: DeviceAddress,
+
     /// The debug probe, where there are several (`hapterra list` names them)
     #[arg(long, value_name = "VID:PID[:SERIAL]")]
     pub probe: Option<String>,
 
-    /// Only hold the image against the chip's memories; needs no probe
+    /// Only hold the image against the chip's memories; needs no board
     #[arg(long)]
     pub check: bool,
+}
+
+fn parse_usb(text: &str) -> Result<DeviceAddress, String> {
+    match text.parse() {
+        Ok(DeviceAddress::Usb(serial)) => Ok(DeviceAddress::Usb(serial)),
+        _ => Err("a board to flash is usb or usb:SERIAL".into()),
+    }
 }
 
 fn parse_board(text: &str) -> Result<&'static Board, String> {
@@ -43,81 +66,60 @@ fn parse_board(text: &str) -> Result<&'static Board, String> {
 /// Writes the image.
 ///
 /// # Errors
-/// No image, one for another chip, no probe, or a chip that does not answer.
-#[cfg(feature = "probe")]
+/// No image, one for another chip or board, no way to the board, or a chip that does not
+/// take it.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    through_a_probe::run(args)
+    #[cfg(not(feature = "probe"))]
+    if !args.dfu && !args.check {
+        return Err(without_probes(args));
+    }
+    let path = image(args)?;
+    let image = Image::read(args.board, &path)?;
+    println!("image          {}", path.display());
+    for place in &image.placed {
+        let (start, bytes) = (place.memory.start, place.bytes);
+        let all = place.memory.end - start;
+        let kind = if place.is_flash { "flash" } else { "RAM" };
+        println!("{kind:<14} {bytes} of {all} bytes at {start:#010x}");
+    }
+    match (args.check, args.dfu) {
+        (true, _) => Ok(()),
+        (_, true) => over_usb::run(args, &image),
+        #[cfg(feature = "probe")]
+        _ => through_a_probe::run(args, &image),
+        #[cfg(not(feature = "probe"))]
+        _ => Err(without_probes(args)),
+    }
+}
+
+fn image(args: &Args) -> Result<PathBuf, Failure> {
+    if let Some(path) = &args.image {
+        return Ok(path.clone());
+    }
+    let here = std::env::current_dir().map_err(Failure::new)?;
+    let checkout = Checkout::around(&here)
+        .ok_or_else(|| {
+            let (board, here) = (args.board.name, here.display());
+            format!("no image of {board}: looked for the project's source around {here}")
+        })
+        .or_hint("name one with --image ELF, or run this inside a checkout")?;
+    let built = checkout.build(args.board);
+    built.or_hint("what cargo said above tells why")
 }
 
 /// This command was built without the part that talks to probes.
-///
-/// # Errors
-/// Always, with how to get it.
 #[cfg(not(feature = "probe"))]
-pub fn run(args: &Args) -> Result<(), Failure> {
-    Err(Failure::new(format!(
-        "cannot flash {}: this hapterra was built without debug probes",
+fn without_probes(args: &Args) -> Failure {
+    Failure::new(format!(
+        "cannot flash {} through a debug probe: this hapterra was built without them",
         args.board.name
     ))
-    .hint(WITHOUT))
+    .hint(WITHOUT)
 }
 
 /// How to get what was left out.
 #[cfg(not(feature = "probe"))]
-pub(super) const WITHOUT: &str = "in a checkout type: cargo install --path host-tools --features probe; or, with probe-rs' own command (cargo install probe-rs-tools --locked): cargo xtask flash BOARD";
-
-#[cfg(feature = "probe")]
-mod through_a_probe {
-    use std::path::PathBuf;
-
-    use super::super::failure::{Failure, OrHint};
-    use super::super::terminal::progress;
-    use super::Args;
-    use crate::board::{Checkout, Image, flash};
-
-    pub(super) fn run(args: &Args) -> Result<(), Failure> {
-        let path = image(args)?;
-        let image = Image::read(args.board, &path)?;
-        println!("image          {}", path.display());
-        for place in &image.placed {
-            let (start, bytes) = (place.memory.start, place.bytes);
-            let all = place.memory.end - start;
-            let kind = if place.is_flash { "flash" } else { "RAM" };
-            println!("{kind:<14} {bytes} of {all} bytes at {start:#010x}");
-        }
-        if args.check {
-            return Ok(());
-        }
-        let bar = progress::bar(Some(0), "{bar:30} {bytes} of {total_bytes}");
-        let flashed = flash(&image, args.probe.as_deref(), &mut |progress| {
-            bar.set_length(progress.of);
-            bar.set_position(progress.done);
-        });
-        bar.finish_and_clear();
-        let flashed = flashed?;
-        println!("probe          {}", flashed.probe);
-        println!(
-            "written        {} bytes to {}, read back and equal; it was started",
-            flashed.bytes, args.board.name
-        );
-        Ok(())
-    }
-
-    fn image(args: &Args) -> Result<PathBuf, Failure> {
-        if let Some(path) = &args.image {
-            return Ok(path.clone());
-        }
-        let here = std::env::current_dir().map_err(Failure::new)?;
-        let checkout = Checkout::around(&here)
-            .ok_or_else(|| {
-                let (board, here) = (args.board.name, here.display());
-                format!("no image of {board}: looked for the project's source around {here}")
-            })
-            .or_hint("name one with --image ELF, or run this inside a checkout")?;
-        let built = checkout.build(args.board);
-        built.or_hint("what cargo said above tells why")
-    }
-}
+pub(super) const WITHOUT: &str = "add --dfu for an update over USB; or, in a checkout, type: cargo install --path host-tools --features probe; or, with probe-rs' own command (cargo install probe-rs-tools --locked): cargo xtask flash BOARD";
 
 #[cfg(test)]
 mod tests {
@@ -129,5 +131,12 @@ mod tests {
         let refused = |name| parse_board(name).expect_err("refused");
         assert!(refused("mps2-an386").contains("emulated"));
         assert!(refused("uno").contains("nucleo-h743zi2"));
+    }
+
+    #[test]
+    fn only_a_board_on_usb_can_be_updated_over_usb() {
+        let named = DeviceAddress::Usb(Some("0039001A".into()));
+        assert_eq!(parse_usb("usb:0039001A"), Ok(named));
+        assert!(parse_usb("native").is_err() && parse_usb("tcp:a:1").is_err());
     }
 }

@@ -3,6 +3,8 @@
 //! A hint that depends on the command's own options stands in that command.
 
 use super::failure::Hint;
+use crate::board::ImageError;
+use crate::board::update::{UpdateError, UpdateFailure};
 use crate::calibrate::{FitError, WalkError};
 use crate::link::{EmulatorError, LinkError};
 use crate::place::PlacingError;
@@ -118,6 +120,7 @@ impl Hint for LinkError {
                 "plug the board in, check its cable and that you may open it (on Linux the udev rule host-tools/udev/70-hapterra.rules); or try --device native"
             }
             Self::Absent { .. } => "start the emulated board there, or try --device native",
+            Self::Several(_) => "name one: --device usb:SERIAL",
             Self::Gone(_) | Self::Silent(_) | Self::Restarted => {
                 "check the device and its cable, then start again"
             }
@@ -125,6 +128,11 @@ impl Hint for LinkError {
                 "flash the firmware that belongs to this command"
             }
             Self::Version { .. } => "install the hapterra command that belongs to the firmware",
+            Self::Taken => {
+                "end the other host, then start again; where there is none, switch the amplifiers off: the board may be armed"
+            }
+            Self::NotConfirmed => "then see hapterra status",
+            Self::Interrupted => "start again",
             Self::SceneRefused | Self::Stuck(_) => REPORT,
         };
         hint.into()
@@ -170,37 +178,75 @@ impl Hint for WalkError<LinkError> {
     }
 }
 
+impl Hint for ImageError {
+    fn hint(&self) -> String {
+        let hint = match self {
+            Self::Emulated(_) => "`hapterra demo` runs it",
+            Self::Unreadable { .. } => "check the path given with --image",
+            Self::NoImage { .. } => {
+                "name the ELF that `cargo xtask image BOARD` prints with --image"
+            }
+            Self::OutOfMemory { .. } => {
+                "it was built for another board: name the right one with --board"
+            }
+            Self::OtherBoard { found: Some(_), .. } => {
+                "name the board that it was built for with --board, or another image"
+            }
+            Self::OtherBoard { found: None, .. } => {
+                "images built from this source name theirs, unless they were stripped: `cargo xtask image BOARD` builds one"
+            }
+        };
+        hint.into()
+    }
+}
+
+impl Hint for UpdateError {
+    fn hint(&self) -> String {
+        let hint = match self {
+            Self::Nothing { .. } => {
+                "plug the board's own USB in; `hapterra list` shows what is seen; a board without working firmware shows its loader when BOOT0 is high at a reset"
+            }
+            Self::Several(_) => {
+                "name one: --device usb:SERIAL; two that cannot be told apart are unplugged but for one"
+            }
+            Self::OtherBoard { .. } => {
+                "nothing was touched: name the image of that board, or plug in the other one"
+            }
+            Self::NoLoader => {
+                "press the board's reset button: nothing was erased, and it runs as before; on Windows the loader needs the WinUSB driver once (https://zadig.akeo.ie), on Linux the udev rule host-tools/udev/70-hapterra.rules"
+            }
+            Self::Layout(_) | Self::OtherChip { .. } | Self::Cannot(_) => {
+                "nothing was touched: check that --board is the board that is plugged in; a press of its reset button ends the loader"
+            }
+            Self::Calibrations { .. } | Self::NoVectors(_) => {
+                "nothing was touched: `cargo xtask image BOARD` builds an image that fits"
+            }
+            Self::Gone { .. } | Self::Refused { .. } | Self::Endless(_) | Self::Differs(_) => {
+                "press the board's reset button and try again"
+            }
+        };
+        hint.into()
+    }
+}
+
+impl Hint for UpdateFailure {
+    fn hint(&self) -> String {
+        if !self.erased {
+            return format!("{}; nothing was erased", self.error.hint());
+        }
+        "the board has no whole program now, and its calibration is as it was; leave the power stages off and type the same command again, the loader is still there; if it is not: unplug everything, set BOOT0 high (NUCLEO-G474RE: CN7 pin 7 to pin 5; NUCLEO-H743ZI2: CN11 pin 7 to pin 5), plug in, and type it again; or use the debug probe: hapterra flash without --dfu".into()
+    }
+}
+
 #[cfg(feature = "probe")]
 mod of_the_probe {
     use super::Hint;
-    use crate::board::{FlashError, ImageError};
-
-    impl Hint for ImageError {
-        fn hint(&self) -> String {
-            let hint = match self {
-                Self::Emulated(_) => "`hapterra demo` runs it",
-                Self::Unreadable { .. } => "check the path given with --image",
-                Self::NoImage { .. } => {
-                    "name the ELF that `cargo xtask image BOARD` prints with --image"
-                }
-                Self::OutOfMemory { .. } => {
-                    "it was built for another board: name the right one with --board"
-                }
-                Self::OtherBoard { found: Some(_), .. } => {
-                    "name the board that it was built for with --board, or another image"
-                }
-                Self::OtherBoard { found: None, .. } => {
-                    "images built from this source name theirs, unless they were stripped: `cargo xtask image BOARD` builds one"
-                }
-                Self::UnknownChip(..) => "this should not happen: please report it",
-            };
-            hint.into()
-        }
-    }
+    use crate::board::FlashError;
 
     impl Hint for FlashError {
         fn hint(&self) -> String {
             let hint = match self {
+                Self::UnknownChip(..) | Self::Emulated(_) => super::REPORT,
                 Self::NoProbe => {
                     "plug the Nucleo's ST-LINK connector in with a data cable; `hapterra list` shows what is seen"
                 }

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use super::failure::{Failure, Hint};
 use super::session_summary;
+use crate::board::update::plugged;
 use crate::board::{BOARDS, probes};
-use crate::link::{Dialogue, LinkError, Tcp, Transport, Usb, tcp_address};
+use crate::link::{Dialogue, LinkError, Tcp, Transport, Usb, shown, tcp_address};
 
 /// Arguments of `hapterra list`.
 #[derive(Debug, clap::Args)]
@@ -51,9 +52,14 @@ fn list_usb() {
         println!("  that the cable carries data, and that the board runs hapterra's firmware");
     }
     for info in found {
-        let place = Usb::place(&info);
+        let place = shown(&Usb::place(&info));
         let known = Usb::open(&info).and_then(|link| who(Box::new(link)));
         println!("  {place}: {}", known.unwrap_or_else(|error| told(&error)));
+    }
+    for loader in plugged().iter().filter(|device| device.is_loader) {
+        let serial = loader.serial.as_deref().unwrap_or("(no serial number)");
+        println!("  usb:{serial} at {}: an STM32 in its loader", loader.place);
+        println!("  `hapterra flash --dfu` writes firmware to it; its reset button ends it");
     }
 }
 
@@ -65,8 +71,8 @@ fn list_probes() {
         println!("  check the cable to the board's ST-LINK connector");
     }
     for probe in &found {
-        let name = probe.name.as_deref().unwrap_or("no name");
-        println!("  {} {} ({name})", probe.kind, probe.selector);
+        let name = shown(probe.name.as_deref().unwrap_or("no name"));
+        println!("  {} {} ({name})", probe.kind, shown(&probe.selector));
     }
     #[cfg(not(feature = "probe"))]
     if !found.is_empty() {

@@ -3,9 +3,12 @@
 //!
 //! - [`options`]: what several subcommands let their user say;
 //! - `terminal`: progress, Ctrl-C, and prompts while a command runs;
-//! - [`failure`] and `hints`: what an error looks like, and what to do about it.
+//! - [`failure`] and `hints`: what an error looks like, and what to do about it;
+//! - `log` and `sparing`: diagnostics, and lines that a device can cause kept to so many
+//!   a second.
 
 pub mod bench;
+pub mod bringup;
 pub mod calibrate;
 pub mod demo;
 pub mod failure;
@@ -13,10 +16,12 @@ pub mod flash;
 mod hints;
 pub mod info;
 pub mod list;
+mod log;
 pub mod options;
 pub mod replay;
 pub mod run;
 mod session_summary;
+mod sparing;
 pub mod status;
 pub mod synth;
 mod terminal;
@@ -24,7 +29,6 @@ mod terminal;
 use std::process::ExitCode;
 
 use clap::{ArgAction, Parser, Subcommand};
-use tracing_subscriber::EnvFilter;
 
 pub use failure::Failure;
 
@@ -58,9 +62,11 @@ pub enum Command {
     List(list::Args),
     /// Show how a device is: calibration, what keeps it from arming, faults, figures
     Status(status::Args),
+    /// Bring a board and its arm up for the first time, step by step, with a log
+    Bringup(bringup::Args),
     /// Calibrate an arm: zero pose, ratios against a ruler, gravity
     Calibrate(calibrate::Args),
-    /// Write an image to a board through its debug probe
+    /// Write an image to a board, through its debug probe or over USB
     Flash(flash::Args),
     /// Measure run time against error, beside other ways to render a height field
     Bench(bench::Args),
@@ -70,19 +76,21 @@ pub enum Command {
 /// 2 on wrong usage.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
-    log_to_stderr(cli.verbose);
+    let log = log::to_stderr(cli.verbose);
     let outcome = match cli.command {
         Command::Info(args) => info::run(&args),
         Command::Synth(args) => synth::run(&args),
-        Command::Run(args) => run::run(&args),
+        Command::Run(args) => run::run(&args.pinned()),
         Command::Demo(args) => demo::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::List(args) => list::run(&args),
         Command::Status(args) => status::run(&args),
+        Command::Bringup(args) => bringup::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Flash(args) => flash::run(&args),
         Command::Bench(args) => bench::run(&args),
     };
+    log.end();
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -90,22 +98,4 @@ pub fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
-}
-
-/// Diagnostics go to standard error; `RUST_LOG` overrides the `-v` count.
-fn log_to_stderr(verbose: u8) {
-    let level = match verbose {
-        // A probe library warns of each kind of probe that it cannot look for;
-        // what comes of it is said by the error.
-        0 => "warn,probe_rs=error",
-        1 => "info",
-        2 => "debug",
-        _ => "trace",
-    };
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .without_time()
-        .init();
 }

@@ -9,7 +9,7 @@ use super::failure::Failure;
 use super::options::emulated_board::{EmulatedBoard, RunsOn};
 use super::options::rendering::Rendering;
 use super::options::terrain_file::TerrainFile;
-use super::terminal::{interrupt, progress};
+use super::terminal::{interrupt, left_behind, progress};
 use crate::link::{Patience, Transport};
 use crate::replay::{Replayer, Summary, on_native, replay_file};
 use crate::terrain::Terrain;
@@ -51,9 +51,11 @@ pub struct Args {
 /// # Errors
 /// What is wrong with the terrain, the trajectory, the device or the output.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    left_behind::tell([args.output.as_path()]);
     let raster = args.terrain.open()?;
-    let scale = args.rendering.scale(&raster)?;
-    let terrain = args.rendering.terrain(&raster, scale)?;
+    let grid = args.rendering.grid(&raster);
+    let scale = args.rendering.scale(&grid)?;
+    let terrain = args.rendering.terrain(grid, scale)?;
     let began = Instant::now();
     let summary = match args.on {
         RunsOn::Native => native(args, &terrain),
@@ -84,8 +86,9 @@ fn emulated(args: &Args, terrain: &Terrain<'_>) -> Result<Summary, Failure> {
     let mut replayer = Replayer::open(terrain, law, rule, link, Patience::EMULATED)?;
     let summary = replay(args, &mut replayer)?;
     replayer.say_goodbye()?;
-    let status = emulator.finish().map_err(Failure::new)?;
-    tracing::info!("the emulated board ended: {status}");
+    if let Err(why) = emulator.finish() {
+        tracing::info!("the emulated board did not end well: {why}");
+    }
     Ok(summary)
 }
 

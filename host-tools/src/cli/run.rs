@@ -8,14 +8,16 @@ use std::time::{Duration, Instant};
 use clap::ValueHint;
 use hapterra_core::scene::Sample;
 use hapterra_core::wire::hello::DeviceHello;
+use hapterra_core::wire::session::{DEFAULT_SILENCE_S, SILENCE_S, SessionEnd};
 use indicatif::ProgressBar;
 
+use super::bringup::required::brought_up;
 use super::failure::{Failure, OrHint};
 use super::options::rendering::Rendering;
 use super::options::terrain_file::TerrainFile;
 use super::session_summary::{self, SessionSummary};
 use super::terminal::arming_prompts::ArmingPrompts;
-use super::terminal::interrupt;
+use super::terminal::{interrupt, left_behind};
 use crate::link::{
     Arming, DeviceAddress, Event, HostClock, LinkError, Native, Patience, Session, Tcp, Transport,
     serve_plant,
@@ -30,6 +32,8 @@ use crate::telemetry::SampleLog;
 const RETRY: Duration = Duration::from_millis(500);
 /// For how long the virtual arm stays after the session has ended.
 const LINGER: Duration = Duration::from_secs(2);
+/// Between two looks at the clock while nothing comes.
+const POLL: Duration = Duration::from_millis(50);
 /// Between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(2);
 
@@ -40,8 +44,8 @@ pub struct Args {
     #[command(flatten)]
     pub terrain: TerrainFile,
 
-    /// Device: usb, tcp:HOST:PORT, or native (the application in this program,
-    /// with a virtual Phantom in a scripted hand)
+    /// Device: usb, usb:SERIAL (`hapterra list` shows it), tcp:HOST:PORT, or native (the
+    /// application in this program, with a virtual Phantom in a scripted hand)
     #[arg(long, default_value = "usb")]
     pub device: DeviceAddress,
 
@@ -58,9 +62,29 @@ pub struct Args {
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
 
+    /// For how many seconds the device lets an armed arm be while it hears nothing from
+    /// here; then it lets the force out and disarms
+    #[arg(long, value_name = "S", default_value_t = DEFAULT_SILENCE_S,
+          value_parser = clap::value_parser!(u16).range(i64::from(SILENCE_S.0)..=i64::from(SILENCE_S.1)))]
+    pub silence_s: u16,
+
+    /// Serve a real board although its log of `hapterra bringup` is not complete
+    #[arg(long)]
+    pub unchecked: bool,
+
     /// How the terrain feels.
     #[command(flatten)]
     pub rendering: Rendering,
+}
+
+impl Args {
+    /// The same, and the board that is the only one now for good: one that is plugged in
+    /// later is not taken for it.
+    #[must_use]
+    pub fn pinned(mut self) -> Self {
+        self.device = self.device.pinned();
+        self
+    }
 }
 
 fn parse_plant(text: &str) -> Result<String, String> {
@@ -76,9 +100,11 @@ fn parse_plant(text: &str) -> Result<String, String> {
 /// What is wrong with the file, or no device there at the beginning. A device
 /// that goes later is waited for.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    left_behind::tell(args.record.as_deref());
     let raster = args.terrain.open()?;
-    let scale = args.rendering.scale(&raster)?;
-    let terrain = args.rendering.terrain(&raster, scale)?;
+    let grid = args.rendering.grid(&raster);
+    let scale = args.rendering.scale(&grid)?;
+    let terrain = args.rendering.terrain(grid, scale)?;
     let placed = PlacedTerrain::new(&terrain, args.rendering.law()?, args.rendering.rule())?;
     interrupt::listen();
     let Some(address) = &args.plant else {
@@ -115,41 +141,34 @@ fn is_scripted(args: &Args) -> bool {
 }
 
 fn serve(args: &Args, placed: &PlacedTerrain<'_>) -> Result<(), Failure> {
-    let transport = connect(args, placed)?;
+    // What cannot be recorded is known before anything is armed.
+    let recording = recording(args)?;
+    let mut transport = connect(args, placed)?;
     let scripted = is_scripted(args);
+    if !scripted && !args.unchecked {
+        transport = brought_up(transport)?;
+    }
     // A virtual arm was switched on in its zero pose; where a real one was,
     // its user has to say.
     let arming = match scripted {
         true => Arming::VIRTUAL,
         false => Arming::default(),
     };
+    let patience = Patience {
+        silence_s: args.silence_s,
+        ..Patience::REAL_TIME
+    };
     let (terrain, scene) = (placed.terrain(), placed.scene());
-    let (mut session, device) =
-        Session::open(terrain, scene, Some(arming), transport, Patience::REAL_TIME)?;
+    interrupt::board_may_be_armed(true);
+    let (mut session, device) = Session::open(terrain, scene, Some(arming), transport, patience)?;
     let how = session_summary::in_words(terrain);
     println!("terrain        {}: {how}", args.terrain.name());
     println!("device         {}", session_summary::device(&device));
-    let mut watch = Watch::new(args, placed, &device)?;
-    let mut prompts = ArmingPrompts::at_the_terminal();
-    while !watch.is_over() {
-        let polled = session.poll(Duration::from_millis(50), &mut |event| {
-            prompts.on_event(&event);
-            watch.take(event);
-        });
-        // A scripted hand needs no telling.
-        for line in prompts.lines().iter().filter(|_| !scripted) {
-            watch.status.suspend(|| eprintln!("{line}"));
-        }
-        let polled = polled.and_then(|()| {
-            let mut messages = prompts.messages().into_iter();
-            messages.try_for_each(|message| session.say(&message))
-        });
-        watch.show(&session);
-        match polled {
-            Err(error) if error.is_passing() => wait_for(args, placed, &mut session, error)?,
-            other => other?,
-        }
-    }
+    tell_last_end(&device);
+    let mut watch = Watch::new(args, placed, &device, recording);
+    let served = watch.serve(args, placed, &mut session);
+    let ended = leave(&mut session, &mut watch, served);
+    interrupt::board_may_be_armed(false);
     watch.status.finish_and_clear();
     let summary = SessionSummary {
         ticks: watch.log.ticks(),
@@ -157,18 +176,55 @@ fn serve(args: &Args, placed: &PlacedTerrain<'_>) -> Result<(), Failure> {
         figures: watch.log.figures(),
         tally: session.tally().clone(),
     };
-    // It goes on rendering what it holds; telling it is a courtesy.
-    let _ = session.say_goodbye();
     print!("{}", summary.text());
-    watch.finish(args)
+    // What was recorded is kept, however it ended.
+    let kept = watch.finish(args);
+    ended.and(kept)
+}
+
+/// Ends the session, whatever ended the serving: the board is known to be disarmed, or
+/// the user is told that it may not be.
+fn leave(
+    session: &mut Session<'_>,
+    watch: &mut Watch<'_>,
+    served: Result<(), LinkError>,
+) -> Result<(), Failure> {
+    // Another host has the arm now; it is not this one's to disarm.
+    if let Err(LinkError::Taken) = served {
+        return Ok(served?);
+    }
+    let left = session.say_goodbye(&mut |event| watch.take(event));
+    match (served, left) {
+        (Err(error), Err(not_confirmed)) => {
+            watch.status.suspend(|| eprintln!("{not_confirmed}"));
+            Err(error.into())
+        }
+        (served, left) => Ok(served.and(left)?),
+    }
+}
+
+/// Says what became of the arm where its host before was silent for too long.
+fn tell_last_end(device: &DeviceHello) {
+    if device.last.end == SessionEnd::HostSilent {
+        eprintln!(
+            "before this the device had heard nothing from its host for too long: it let the force out and disarmed the arm"
+        );
+    }
+}
+
+fn recording(args: &Args) -> Result<Option<Recording>, Failure> {
+    let columns = ["state", "tick", "work", "cost", "late"];
+    let output = args.record.as_deref().map(Output::create).transpose();
+    let output = output.or_hint(OTHER_FILE)?;
+    Ok(output.map(|output| Recording::new(output, &columns)))
 }
 
 fn connect<'t>(
     args: &Args,
     placed: &PlacedTerrain<'t>,
-) -> Result<Box<dyn Transport + 't>, Failure> {
+) -> Result<Box<dyn Transport + 't>, LinkError> {
     let native = || Native::new(HostClock::default(), Some(Box::new(placed.held_phantom())));
-    Ok(args.device.connect(native)?)
+    args.device.connect(native)
 }
 
 /// The device is gone: says so, waits for it and resumes.
@@ -176,24 +232,29 @@ fn wait_for<'t>(
     args: &Args,
     placed: &PlacedTerrain<'t>,
     session: &mut Session<'t>,
+    on: &mut dyn FnMut(Event<'_>),
     why: LinkError,
-) -> Result<(), Failure> {
+) -> Result<(), LinkError> {
     let (why, device) = (described(&why), &args.device);
     eprintln!("{why}; waiting for {device} (Ctrl-C ends)");
     let began = Instant::now();
-    while !interrupt::requested() {
-        match connect(args, placed).map(|transport| session.resume(transport)) {
-            Ok(Ok(device)) => {
+    let go_on = || !interrupt::requested();
+    while go_on() {
+        let connected = connect(args, placed);
+        match connected.and_then(|transport| session.resume(transport, &go_on, on)) {
+            Ok(device) => {
                 let again = match device.epoch == Some(session.scene().epoch) {
                     true => "goes on where it was",
                     false => "was restarted and begins anew",
                 };
                 let after = began.elapsed();
                 eprintln!("the device is back after {after:.1?}: it {again}");
+                tell_last_end(&device);
                 return Ok(());
             }
-            Ok(Err(error)) if !error.is_passing() => return Err(error.into()),
-            _ => std::thread::sleep(RETRY),
+            Err(LinkError::Interrupted) => return Ok(()),
+            Err(error) if !error.is_passing() => return Err(error),
+            Err(_) => std::thread::sleep(RETRY),
         }
     }
     Ok(())
@@ -214,6 +275,7 @@ struct Watch<'t> {
     latest: Option<(Sample, Record)>,
     recording: Option<Recording>,
     failed: Option<OutputError>,
+    prompts: ArmingPrompts,
     status: ProgressBar,
     line_due: Instant,
 }
@@ -222,24 +284,54 @@ struct Watch<'t> {
 const OTHER_FILE: &str = "name another file with --record";
 
 impl<'t> Watch<'t> {
-    fn new(args: &Args, placed: &PlacedTerrain<'t>, device: &DeviceHello) -> Result<Self, Failure> {
-        let columns = ["state", "tick", "work", "cost", "late"];
-        let output = args.record.as_deref().map(Output::create).transpose();
-        let script_s = match is_scripted(args) {
-            true => placed.duration_s(),
-            false => f64::MAX,
+    fn new(
+        args: &Args,
+        placed: &PlacedTerrain<'t>,
+        device: &DeviceHello,
+        recording: Option<Recording>,
+    ) -> Self {
+        let (script_s, prompts) = match is_scripted(args) {
+            true => (placed.duration_s(), ArmingPrompts::for_a_script()),
+            false => (f64::MAX, ArmingPrompts::at_the_terminal()),
         };
-        Ok(Self {
+        Self {
             log: SampleLog::new(placed.terrain(), device),
             stop_s: args.seconds.unwrap_or(f64::MAX).min(script_s),
             latest: None,
-            recording: output
-                .or_hint(OTHER_FILE)?
-                .map(|output| Recording::new(output, &columns)),
+            recording,
             failed: None,
+            prompts,
             status: ProgressBar::new_spinner(),
             line_due: Instant::now() + LINE_EVERY,
-        })
+        }
+    }
+
+    /// Serves until the end of the time or of the script, an end that was asked for, or
+    /// an error that waiting does not mend.
+    fn serve(
+        &mut self,
+        args: &Args,
+        placed: &PlacedTerrain<'t>,
+        session: &mut Session<'t>,
+    ) -> Result<(), LinkError> {
+        while !self.is_over() {
+            let polled = session.poll(POLL, &mut |event| self.take(event));
+            for line in self.prompts.lines() {
+                self.status.suspend(|| eprintln!("{line}"));
+            }
+            for ask in self.prompts.messages() {
+                session.ask(ask);
+            }
+            self.show(session);
+            match polled {
+                Err(error) if error.is_passing() => {
+                    let on = &mut |event: Event<'_>| self.take(event);
+                    wait_for(args, placed, session, on, error)?;
+                }
+                other => other?,
+            }
+        }
+        Ok(())
     }
 
     fn is_over(&self) -> bool {
@@ -247,6 +339,7 @@ impl<'t> Watch<'t> {
     }
 
     fn take(&mut self, event: Event<'_>) {
+        self.prompts.on_event(&event);
         let Event::Sample(sample) = event else {
             return;
         };

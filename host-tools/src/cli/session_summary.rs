@@ -5,7 +5,7 @@ use std::path::Path;
 use hapterra_core::wire::hello::DeviceHello;
 
 use super::failure::{Failure, OrHint};
-use crate::link::{INSTRUCTIONS_PER_COUNT, Tally};
+use crate::link::{INSTRUCTIONS_PER_COUNT, Tally, shown};
 use crate::picture::{SessionPicture, Surface};
 use crate::replay::Record;
 use crate::telemetry::Figures;
@@ -63,6 +63,18 @@ impl SessionSummary {
         if bad > 0 || sessions > 1 {
             text += &format!("link           {bad} frames not understood, {sessions} sessions\n");
         }
+        let told = [
+            (
+                tally.uncertain,
+                "sessions whose end is not known: more may be lost",
+            ),
+            (tally.foreign_frames, "frames of other sessions, not heeded"),
+            (tally.no_tiles, "requests for tiles that there are not"),
+            (tally.unanswered, "requests and questions without an answer"),
+        ];
+        for (count, what) in told.iter().filter(|(count, _)| *count > 0) {
+            text += &format!("link           {count} {what}\n");
+        }
         text
     }
 
@@ -119,20 +131,31 @@ impl SessionSummary {
 
 /// A terrain and its scale, in words.
 pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
-    let (raster, scale) = (terrain.raster(), terrain.scale());
-    let proportions = match raster.cells_per_vertical_unit() {
-        Some(true_cells) => match scale.height_cells(1.0) / true_cells {
+    let (raster, grid, scale) = (terrain.raster(), terrain.grid(), terrain.scale());
+    // A cell of level L is 2ᴸ cells of the grid.
+    let step = f64::from(terrain.level()).exp2();
+    let proportions = match grid.cells_per_vertical_unit() {
+        Some(true_cells) => match scale.height_cells(1.0) * step / true_cells {
             times if (times - 1.0).abs() < 1e-9 => "heights true to scale".to_owned(),
             times => format!("heights × {}", (times * 1e6).round() / 1e6),
         },
         None => format!("{} mm a vertical unit", scale.height_mm_per_unit()),
     };
     let (columns, rows, cell_mm) = (raster.columns(), raster.rows(), scale.cell_mm());
-    format!("{columns} × {rows} samples, {cell_mm} mm a cell, {proportions}")
+    let felt = match grid.side_m() {
+        Some(side) if grid.is_resampled() => format!(
+            " felt as {} × {} squares of {side:.3} m,",
+            grid.columns() - 1,
+            grid.rows() - 1
+        ),
+        _ => String::new(),
+    };
+    format!("{columns} × {rows} samples,{felt} {cell_mm} mm a cell, {proportions}")
 }
 
 /// A device in words.
 pub(super) fn device(hello: &DeviceHello) -> String {
-    let (board, version, w, hz) = (&hello.board, &hello.version, hello.window, hello.tick_hz);
+    let [board, version] = [&hello.board, &hello.version].map(|text| shown(text));
+    let (w, hz) = (hello.window, hello.tick_hz);
     format!("{board} {version}, window of {w} × {w} tiles, {hz} ticks a second")
 }

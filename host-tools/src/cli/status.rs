@@ -1,7 +1,7 @@
 //! `hapterra status`: how a device is, and what to do about it.
 
 use hapterra_core::wire::hello::PROTOCOL;
-use hapterra_core::wire::message::ToDevice;
+use hapterra_core::wire::request::Request;
 use hapterra_core::wire::status::{
     BootReport, CalibrationSource, Crash, CrashKind, ResetCause, Status,
 };
@@ -9,6 +9,7 @@ use hapterra_core::wire::status::{
 use super::failure::Failure;
 use super::options::device::Device;
 use super::session_summary;
+use crate::link::shown;
 
 /// Arguments of `hapterra status`.
 #[derive(Debug, clap::Args)]
@@ -33,11 +34,11 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     args.device.talk(|dialogue| {
         if args.disarm {
-            dialogue.request(&ToDevice::Disarm)?.map_err(Failure::new)?;
+            dialogue.request(&Request::Disarm)?.map_err(Failure::new)?;
         }
         print!("{}", text(&dialogue.fresh_status()?));
         if args.clear {
-            let answer = dialogue.request(&ToDevice::ClearFault)?;
+            let answer = dialogue.request(&Request::ClearFault)?;
             answer.map_err(Failure::new)?;
             let cleared = match dialogue.fresh_status()?.health.report.fault {
                 None => "no fault is latched any more".to_owned(),
@@ -61,11 +62,12 @@ fn text(status: &Status) -> String {
     };
     format!(
         "device         {device}\n\
-         link           protocol {} on the device, {PROTOCOL} here; {} frames not understood, {} samples dropped\n\
+         link           protocol {} on the device, {PROTOCOL} here; {} frames not understood, {} of other sessions, {} samples dropped\n\
          calibration    {}\n\
          {}{arm}",
         status.device.protocol,
         status.bad_frames,
+        status.foreign_frames,
         status.dropped,
         calibration(status),
         boot(&status.boot),
@@ -76,6 +78,9 @@ fn calibration(status: &Status) -> String {
     let model = status.model.map_or(String::new(), |m| format!("{m:?}, "));
     match status.calibration {
         CalibrationSource::None => "none: type hapterra calibrate".into(),
+        CalibrationSource::Refused(bad) => {
+            format!("none: the stored record is refused ({bad}); type hapterra calibrate")
+        }
         CalibrationSource::Stored => format!("{model}stored on the device"),
         CalibrationSource::Session => {
             format!("{model}from a host; gone when the device restarts")
@@ -93,15 +98,29 @@ fn boot(boot: &BootReport) -> String {
         ResetCause::BrownOut => "after its supply was too low for a moment: check it",
     };
     let crash = boot.crash.as_ref().map_or(String::new(), crashed);
-    format!("started        {cause}\n{crash}")
+    let brown_out = if boot.lacks_brown_out_reset() {
+        format!(
+            "supply guard   the chip runs down to {} mV: set its brown-out level (docs/hardware.md, Flashing)\n",
+            boot.resets_below_mv
+        )
+    } else {
+        String::new()
+    };
+    format!("started        {cause}\n{crash}{brown_out}")
 }
 
 fn crashed(crash: &Crash) -> String {
     let (pc, lr, status, tick) = (crash.pc, crash.lr, crash.status, crash.tick);
     let what = match crash.kind {
-        CrashKind::Panic => format!("a panic at line {} of …{}", crash.line, crash.file),
+        CrashKind::Panic => {
+            format!("a panic at line {} of …{}", crash.line, shown(&crash.file))
+        }
         CrashKind::HardFault => format!("a hard fault, status {status:#010x}"),
         CrashKind::UnhandledInterrupt => format!("interrupt {status} without a handler"),
+        CrashKind::StackOverflow => format!("a stack overflow, status {status:#010x}"),
+        CrashKind::SupplyLow => {
+            return format!("ended before   its supply fell too low at tick {tick}: check it\n");
+        }
     };
     format!("crashed before {what}; pc {pc:#010x}, lr {lr:#010x}, tick {tick}: please report it\n")
 }
@@ -140,6 +159,10 @@ fn measured(status: &Status) -> String {
     let three = |[a, b, c]: [f32; 3]| format!("{a:.2} {b:.2} {c:.2}");
     let not = |is| if is { "" } else { "not " };
     let us = |counts: u32| 1e6 * f64::from(counts) / f64::from(status.device.clock_hz.max(1));
+    let flowing = match health.sense.measured_ma {
+        Some(ma) => format!(", {} A measured", three(ma.map(|ma| f32::from(ma) * 1e-3))),
+        None => String::new(),
+    };
     let stack = match status.stack.size {
         0 => "not measured".to_owned(),
         size => format!("{} of {size} bytes used at most", status.stack.high_water),
@@ -148,13 +171,16 @@ fn measured(status: &Status) -> String {
         "encoders       {a} {b} {c} counts, {zeroed}\n\
          joints         {}°\n\
          switches       dead-man {}held, emergency stop {}pressed\n\
-         currents       {} A\n\
+         amplifiers     {}ready, outputs {}as set\n\
+         currents       {} A{flowing}\n\
          motors         {} °C by the thermal model\n\
          ticks          {} run, {} late; the last cost {:.1} µs, the costliest {:.1} µs\n\
          stack          {stack}\n",
         three(health.angles_rad.to_array().map(f32::to_degrees)),
         not(health.sense.dead_man),
         not(health.sense.emergency_stop),
+        not(!health.sense.amplifier_not_ready),
+        not(!health.sense.outputs_not_as_set),
         three(health.currents_a.to_array()),
         three(health.winding_c.to_array()),
         ticks.run,
@@ -185,6 +211,7 @@ mod tests {
             },
             stack: StackFigures::default(),
             bad_frames: 0,
+            foreign_frames: 0,
             dropped: 0,
         }
     }
@@ -218,6 +245,29 @@ mod tests {
     }
 
     #[test]
+    fn a_hostile_device_cannot_write_past_its_line() {
+        let mut status = status();
+        status.device.board = "\x1b[2J\x1b[H".try_into().expect("fits");
+        status.device.version = "1\r\nfault none".try_into().expect("fits");
+        status.boot.crash = Some(Crash {
+            kind: CrashKind::Panic,
+            pc: 0,
+            lr: 0,
+            status: 0,
+            line: 1,
+            tick: 1,
+            file: "\u{9b}31m\x07\u{202e}".try_into().expect("fits"),
+        });
+        let text = text(&status);
+        let controls = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
+        assert!(!text.contains(controls), "{text:?}");
+        assert!(
+            text.contains("\\u{1b}[2J\\u{1b}[H 1\\r\\nfault none"),
+            "{text}"
+        );
+    }
+
+    #[test]
     fn a_crash_before_is_shown() {
         let mut status = status();
         status.boot = BootReport {
@@ -231,11 +281,13 @@ mod tests {
                 tick: 5,
                 file: "src/tick.rs".try_into().expect("fits"),
             }),
+            resets_below_mv: 1_700,
         };
         let text = text(&status);
         assert!(
             text.contains("by the watchdog") && text.contains("line 77 of …src/tick.rs"),
             "{text}"
         );
+        assert!(text.contains("runs down to 1700 mV"), "{text}");
     }
 }

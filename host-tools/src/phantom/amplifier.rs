@@ -1,14 +1,24 @@
 //! From a current command to joint torque: the amplifier's limit, the current
-//! loop's lag, the motor and the cable ratio.
+//! loop's lag, the motor and the cable ratio; and what the amplifier says about itself.
 
 use libm::exp;
 
 use super::model::AxisDrive;
 
+/// What is wrong with an amplifier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AmplifierFault {
+    /// It is not there, or has no supply: it is not ready, and no current flows.
+    Missing,
+    /// The motor's wire is broken: the amplifier is ready, and no current flows.
+    MotorOpen,
+}
+
 /// One joint's amplifier and motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Amplifier {
     axis: AxisDrive,
+    fault: Option<AmplifierFault>,
     command_a: f64,
     current_a: f64,
 }
@@ -19,6 +29,7 @@ impl Amplifier {
     pub fn new(axis: AxisDrive) -> Self {
         Self {
             axis,
+            fault: None,
             command_a: 0.0,
             current_a: 0.0,
         }
@@ -35,10 +46,32 @@ impl Amplifier {
         };
     }
 
+    /// Breaks the amplifier, or mends it.
+    pub fn set_fault(&mut self, fault: Option<AmplifierFault>) {
+        self.fault = fault;
+    }
+
+    /// Whether its ready line says that it is ready.
+    #[must_use]
+    pub fn is_ready(&self) -> bool {
+        self.fault != Some(AmplifierFault::Missing)
+    }
+
+    /// What its current monitor reads, mA, to the next lower one.
+    #[must_use]
+    pub fn monitor_ma(&self) -> i16 {
+        // The cast saturates.
+        (1e3 * self.current_a) as i16
+    }
+
     /// Lets the current follow the command for `h_s` seconds.
     pub fn advance(&mut self, h_s: f64) {
+        let aim_a = match self.fault {
+            None => self.command_a,
+            Some(AmplifierFault::Missing | AmplifierFault::MotorOpen) => 0.0,
+        };
         let keep = exp(-h_s / self.axis.motor.current_lag_s);
-        self.current_a = self.command_a + (self.current_a - self.command_a) * keep;
+        self.current_a = aim_a + (self.current_a - aim_a) * keep;
     }
 
     /// The current that flows, A.
@@ -91,6 +124,20 @@ mod tests {
         assert_eq!(settled(axis, 99.0).current_a(), 5.5);
         assert_eq!(settled(axis, f64::NEG_INFINITY).current_a(), -5.5);
         assert_eq!(settled(axis, f64::NAN).current_a(), 0.0);
+    }
+
+    #[test]
+    fn a_broken_amplifier_says_what_it_does() {
+        let axis = PhantomModel::premium_1_5().drive[0];
+        let broken = |fault| {
+            let mut amplifier = settled(axis, -2.0);
+            amplifier.set_fault(fault);
+            amplifier.advance(1.0);
+            (amplifier.is_ready(), amplifier.monitor_ma())
+        };
+        assert_eq!(broken(None), (true, -2000));
+        assert_eq!(broken(Some(AmplifierFault::Missing)), (false, 0));
+        assert_eq!(broken(Some(AmplifierFault::MotorOpen)), (true, 0));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 
 use hapterra_core::guard::Sense;
 
+use super::amplifier::AmplifierFault;
 use super::hand::HandModel;
 use super::model::PhantomModel;
 use super::placement::{OutOfReach, Placement};
@@ -21,6 +22,9 @@ pub struct HeldPhantom {
     /// When the script begins, s.
     begin_s: f64,
     t_s: f64,
+    /// What the current monitors read a step ago: a board reads what was converted in
+    /// the tick before.
+    measured_ma: [i16; 3],
 }
 
 impl HeldPhantom {
@@ -44,6 +48,7 @@ impl HeldPhantom {
             script,
             begin_s: 0.0,
             t_s: 0.0,
+            measured_ma: [0; 3],
         })
     }
 
@@ -60,7 +65,7 @@ impl HeldPhantom {
     /// device has confirmed and force has come in.
     pub const ARMED_S: f64 = 3.0;
 
-    /// What encoders and switches say now.
+    /// What encoders, switches and amplifiers say now.
     #[must_use]
     pub fn sense(&self) -> Sense {
         Sense {
@@ -68,6 +73,9 @@ impl HeldPhantom {
             dead_man: self.begin_s > 0.0 && self.t_s >= PRESS_S,
             emergency_stop: false,
             hardware_failed: false,
+            outputs_not_as_set: false,
+            amplifier_not_ready: !self.plant.amplifiers_are_ready(),
+            measured_ma: Some(self.measured_ma),
         }
     }
 
@@ -81,7 +89,13 @@ impl HeldPhantom {
         let speed_m_s = Placement::turn_to_device(target.speed_mm_s).map(|v| v * 1e-3);
         self.plant.aim(at_m, speed_m_s);
         self.t_s += dt_s;
+        self.measured_ma = self.plant.monitors_ma();
         self.plant.step(currents_a, dt_s)
+    }
+
+    /// Breaks the amplifier of an axis (0 to 2), or mends it.
+    pub fn set_amplifier_fault(&mut self, axis: usize, fault: Option<AmplifierFault>) {
+        self.plant.set_amplifier_fault(axis, fault);
     }
 
     /// The arm and its hand.

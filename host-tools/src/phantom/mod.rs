@@ -38,8 +38,9 @@ mod plant;
 mod script;
 mod touch;
 mod tour;
+mod wiring;
 
-pub use amplifier::Amplifier;
+pub use amplifier::{Amplifier, AmplifierFault};
 pub use dynamics::Dynamics;
 pub use encoder::Encoder;
 pub use hand::{Hand, HandModel};
@@ -51,3 +52,4 @@ pub use plant::{MAX_SUBSTEP_S, Plant};
 pub use script::{Script, Target};
 pub use touch::{Surface, Touch};
 pub use tour::{Tour, TourPlan};
+pub use wiring::Wiring;

@@ -8,7 +8,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::amplifier::Amplifier;
+use super::amplifier::{Amplifier, AmplifierFault};
 use super::dynamics::Dynamics;
 use super::encoder::Encoder;
 use super::friction;
@@ -56,6 +56,13 @@ impl Plant {
     #[must_use]
     pub fn held_by(mut self, hand: HandModel) -> Self {
         self.hand = Some(Hand::new(hand, self.tip_m()));
+        self
+    }
+
+    /// The same arm with nobody's hand on it.
+    #[must_use]
+    pub fn let_go(mut self) -> Self {
+        self.hand = None;
         self
     }
 
@@ -111,6 +118,25 @@ impl Plant {
         std::array::from_fn(|i| self.encoders[i].counts(angles[i]))
     }
 
+    /// Breaks the amplifier of an axis (0 to 2), or mends it. Of another axis, nothing.
+    pub fn set_amplifier_fault(&mut self, axis: usize, fault: Option<AmplifierFault>) {
+        if let Some(amplifier) = self.amplifiers.get_mut(axis) {
+            amplifier.set_fault(fault);
+        }
+    }
+
+    /// Whether all amplifiers say that they are ready.
+    #[must_use]
+    pub fn amplifiers_are_ready(&self) -> bool {
+        self.amplifiers.iter().all(Amplifier::is_ready)
+    }
+
+    /// What the amplifiers' current monitors read, mA.
+    #[must_use]
+    pub fn monitors_ma(&self) -> [i16; 3] {
+        self.amplifiers.map(|amplifier| amplifier.monitor_ma())
+    }
+
     /// The model in use.
     #[must_use]
     pub fn model(&self) -> &PhantomModel {
@@ -121,6 +147,12 @@ impl Plant {
     #[must_use]
     pub fn q_rad(&self) -> [f64; 3] {
         self.q.to_array()
+    }
+
+    /// True joint rates, rad/s. Exactly zero while friction holds a joint.
+    #[must_use]
+    pub fn rate_rad_s(&self) -> [f64; 3] {
+        self.rate.to_array()
     }
 
     /// True tip position, m, device frame.

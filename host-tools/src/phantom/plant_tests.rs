@@ -10,11 +10,6 @@ impl Plant {
         self
     }
 
-    /// True joint rates, rad/s. Exactly zero while friction holds a joint.
-    pub(in crate::phantom) fn rate_rad_s(&self) -> [f64; 3] {
-        self.rate.to_array()
-    }
-
     /// Force that the motors make at the tip at rest, N, device frame: the
     /// solution of `τ = Jᵀ·F`. Not finite in a singular pose.
     pub(in crate::phantom) fn motor_force_n(&self) -> [f64; 3] {

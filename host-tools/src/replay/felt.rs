@@ -1,19 +1,19 @@
 //! Points to a device and back, one at a time.
 
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Point, Sample, Source};
 use hapterra_core::wire::hello::DeviceHello;
-use hapterra_core::wire::message::ToDevice;
 
 use crate::link::{Event, LinkError, Patience, Session, Tally, Transport};
 use crate::terrain::Terrain;
 
-/// Times a point is sent again before the device counts as stuck.
-const ATTEMPTS: u32 = 8;
+/// A point may take so many times what an answer may take before the device counts as
+/// stuck.
+const ANSWERS_A_POINT: u32 = 8;
 
 /// Feels points on a device, in a scene of its own.
 pub struct Replayer<'t> {
@@ -73,8 +73,9 @@ impl<'t> Replayer<'t> {
     pub fn feel(&mut self, hip: GridPoint) -> Result<Sample, LinkError> {
         let seq = self.seq;
         self.seq = seq.wrapping_add(1);
-        for _ in 0..ATTEMPTS {
-            self.session.say(&ToDevice::Point(Point { seq, hip }))?;
+        self.session.feel(Point { seq, hip })?;
+        let deadline = Instant::now() + ANSWERS_A_POINT * self.session.patience().give_up;
+        while Instant::now() < deadline {
             if let Some(sample) = self.answer(seq)? {
                 return Ok(sample);
             }
@@ -82,32 +83,27 @@ impl<'t> Replayer<'t> {
         Err(LinkError::Stuck(seq))
     }
 
-    /// The answer to a point; `None` if the point may have been lost.
+    /// The answer to a point, if it comes soon.
     fn answer(&mut self, expected: u32) -> Result<Option<Sample>, LinkError> {
-        let mut answer = None;
-        let mut opened_again = None;
-        while answer.is_none() {
-            self.session
-                .poll(Duration::from_millis(100), &mut |event| match event {
-                    Event::Felt { seq, sample } if seq == expected => answer = Some(*sample),
-                    Event::Opened { resumed, .. } => opened_again = Some(resumed),
-                    _ => {}
-                })?;
-            match opened_again {
-                Some(false) => return Err(LinkError::Restarted),
-                Some(true) => break,
-                None => {}
-            }
+        let (mut answer, mut restarted) = (None, false);
+        let wait = Duration::from_millis(100);
+        self.session.poll(wait, &mut |event| match event {
+            Event::Felt { seq, sample } if seq == expected => answer = Some(*sample),
+            Event::Opened { resumed, .. } => restarted = !resumed,
+            _ => {}
+        })?;
+        match restarted {
+            true => Err(LinkError::Restarted),
+            false => Ok(answer),
         }
-        Ok(answer)
     }
 
     /// Ends the session; an emulated board ends its program.
     ///
     /// # Errors
-    /// [`LinkError::Gone`].
+    /// [`LinkError::NotConfirmed`].
     pub fn say_goodbye(&mut self) -> Result<(), LinkError> {
-        self.session.say_goodbye()
+        self.session.say_goodbye(&mut |_| {})
     }
 }
 

@@ -10,10 +10,12 @@ use std::time::Duration;
 use clap::ValueHint;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hapterra_core::phantom::{Calibration, Model, RECORD_BYTES};
-use hapterra_core::wire::message::ToDevice;
+use hapterra_core::wire::request::Request;
+use hapterra_core::wire::status::PRESS_MS;
 
 use super::failure::{Failure, OrHint};
 use super::options::device::{Device, DeviceChoice};
+use super::terminal::left_behind;
 use crate::calibrate::{Attendant, Plan, VirtualUser, walk};
 use crate::link::{DeviceAddress, Dialogue, HostClock, Native};
 use crate::output::{Output, OutputError};
@@ -49,6 +51,10 @@ pub struct Args {
     /// Do not measure the ratios
     #[arg(long)]
     pub skip_ratios: bool,
+
+    /// Take a preset's guessed ratios as they are (Premium 1.0, 3.0, Omni)
+    #[arg(long)]
+    pub unmeasured_ratios: bool,
 
     /// Do not measure gravity
     #[arg(long)]
@@ -89,6 +95,7 @@ fn models() -> impl TypedValueParser<Value = Model> {
 /// No device, measurements that do not fit together, a record that the device
 /// refuses.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    left_behind::tell(args.output.as_deref());
     if args.device.device != DeviceChoice::There(DeviceAddress::Native) {
         let mut user = UserAtTerminal::new(args.yes);
         return args
@@ -98,9 +105,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     // In memory: a virtual user shows how it goes.
     let mut user = VirtualUser::with_a_stylus();
     user.says = |line| println!("{line}");
-    let counts = user.counts();
     let device = Native::new(HostClock::default(), None)
-        .meddled_with(Box::new(move |_, sense, _| sense.counts = counts.get()))
+        .meddled_with(user.hands())
         .restless();
     if !args.no_walk {
         println!("a virtual user calibrates a virtual Phantom that differs from its preset");
@@ -116,6 +122,11 @@ fn calibrate(
 ) -> Result<(), Failure> {
     let (begin, whence) = begin(args, dialogue)?;
     println!("begins with    {whence}");
+    if (args.no_walk || args.skip_ratios) && !args.unmeasured_ratios && begin.has_guessed_ratios() {
+        return Err("the cable ratios of this model are a guess, and were never measured").or_hint(
+            "measure them: no --no-walk, no --skip-ratios; or agree with --unmeasured-ratios",
+        );
+    }
     if dialogue.status()?.health.report.mode.drives() {
         return Err("the amplifiers are on").or_hint("disarm first: hapterra status --disarm");
     }
@@ -135,7 +146,7 @@ fn calibrate(
     }
     hand_over(args, dialogue, record)?;
     if let Some(counts) = zero {
-        let zeroed = dialogue.request(&ToDevice::Zero { counts })?;
+        let zeroed = dialogue.request(&Request::Zero { counts })?;
         zeroed.map_err(Failure::new)?;
         println!("zeroed         the arm, until the device is switched off");
     }
@@ -173,13 +184,16 @@ fn hand_over(
 ) -> Result<(), Failure> {
     let (answer, until) = match args.no_store {
         true => {
-            let message = ToDevice::SetCalibration {
-                calibration,
-                store: false,
-            };
-            (dialogue.request(&message)?, "until it is switched off")
+            let request = Request::SetCalibration { calibration };
+            (dialogue.request(&request)?, "until it is switched off")
         }
-        false => (dialogue.store(calibration)?, "and stored there"),
+        false => {
+            println!(
+                "to store it    press the dead-man switch within {} s",
+                PRESS_MS / 1_000
+            );
+            (dialogue.store(calibration)?, "and stored there")
+        }
     };
     answer.or_hint("see hapterra status; the record can be kept in a file with --output FILE")?;
     println!("in force       on the device, {until}");

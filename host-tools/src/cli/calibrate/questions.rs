@@ -1,9 +1,8 @@
 //! The questions of a calibration at a terminal, or at a pipe, whose lines are
 //! the answers.
 
-use std::io::{self, BufRead, Write};
-
 use crate::calibrate::{Attendant, Direction, N_PER_GRAM, Review, Stopped};
+use crate::cli::terminal::questions::{ask, number};
 
 /// A user at a terminal.
 pub(super) struct UserAtTerminal {
@@ -14,35 +13,6 @@ impl UserAtTerminal {
     /// A user who may have agreed beforehand.
     pub(super) fn new(yes: bool) -> Self {
         Self { yes }
-    }
-
-    /// Asks, and gives the answer without the space around it. The end of the
-    /// input, and `q`, stop.
-    fn ask(&self, question: &str) -> Result<String, Stopped> {
-        print!("{question} ");
-        // What cannot be shown cannot be answered either: the read decides.
-        let _ = io::stdout().flush();
-        let mut line = String::new();
-        match io::stdin().lock().read_line(&mut line) {
-            Ok(0) | Err(_) => {
-                println!();
-                Err(Stopped)
-            }
-            Ok(_) if line.trim() == "q" => Err(Stopped),
-            Ok(_) => Ok(line.trim().to_owned()),
-        }
-    }
-
-    /// Asks until the answer is a number, or nothing.
-    fn number(&self, question: &str) -> Result<Option<f64>, Stopped> {
-        loop {
-            let answer = self.ask(question)?.replace(',', ".");
-            match answer.parse::<f64>() {
-                _ if answer.is_empty() => return Ok(None),
-                Ok(number) if number.is_finite() => return Ok(Some(number)),
-                _ => println!("  {answer} is no number (q stops)"),
-            }
-        }
     }
 }
 
@@ -55,8 +25,9 @@ impl Attendant for UserAtTerminal {
         println!(
             "put the arm into its zero pose and hold it: upper link level and pointing at you, fore link hanging straight down"
         );
-        self.ask("  press Enter when it is there (q stops)")
+        ask("  press Enter when it is there (q stops)")
             .map(drop)
+            .ok_or(Stopped)
     }
 
     fn move_along(&mut self, direction: Direction, about_mm: f64) -> Result<f64, Stopped> {
@@ -64,22 +35,22 @@ impl Attendant for UserAtTerminal {
             "lay a ruler at the tip, {}; move the tip along it by about {about_mm} mm and hold it",
             direction.words()
         );
-        let moved = self.number(&format!("  how far did it go, in mm? [{about_mm}]"))?;
+        let moved = number(&format!("  how far did it go, in mm? [{about_mm}]")).ok_or(Stopped)?;
         Ok(moved.unwrap_or(about_mm))
     }
 
-    fn hold_still(&mut self, number: usize) -> Result<Option<[f64; 2]>, Stopped> {
-        if number == 1 {
+    fn hold_still(&mut self, pose: usize) -> Result<Option<[f64; 2]>, Stopped> {
+        if pose == 1 {
             println!(
                 "gravity: hold the tip by a thread on a spring or kitchen scale, everything still, in poses that differ;\n  \
                  tell what the scale reads upwards and towards you (negative: down, away from you)"
             );
         }
-        let Some(up) = self.number(&format!("  pose {number}: grams upwards? [no more poses]"))?
-        else {
+        let grams = |question: String| number(&question).ok_or(Stopped);
+        let Some(up) = grams(format!("  pose {pose}: grams upwards? [no more poses]"))? else {
             return Ok(None);
         };
-        let towards = self.number(&format!("  pose {number}: grams towards you? [0]"))?;
+        let towards = grams(format!("  pose {pose}: grams towards you? [0]"))?;
         Ok(Some(
             [up, towards.unwrap_or(0.0)].map(|grams| grams * N_PER_GRAM),
         ))
@@ -90,7 +61,7 @@ impl Attendant for UserAtTerminal {
         if self.yes {
             return Ok(true);
         }
-        let answer = self.ask("take this record? [y/N]")?;
+        let answer = ask("take this record? [y/N]").ok_or(Stopped)?;
         Ok(matches!(answer.as_str(), "y" | "Y" | "yes"))
     }
 }

@@ -29,10 +29,9 @@ impl FromStr for DeviceChoice {
     fn from_str(text: &str) -> Result<Self, String> {
         match text {
             "emulated" => Ok(Self::Emulated),
-            _ => text
-                .parse()
-                .map(Self::There)
-                .map_err(|_| "a device is usb, tcp:HOST:PORT, native or emulated".into()),
+            _ => text.parse().map(Self::There).map_err(|_| {
+                "a device is usb, usb:SERIAL, tcp:HOST:PORT, native or emulated".into()
+            }),
         }
     }
 }
@@ -40,7 +39,8 @@ impl FromStr for DeviceChoice {
 /// The device, and how to emulate it.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Device {
-    /// Device: usb, tcp:HOST:PORT, native (the application in this program), or
+    /// Device: usb, usb:SERIAL (`hapterra list` shows it), tcp:HOST:PORT, native (the
+    /// application in this program), or
     /// emulated (the Cortex-M4F board, in QEMU)
     #[arg(long, default_value = "usb")]
     pub device: DeviceChoice,
@@ -94,7 +94,10 @@ mod tests {
     #[test]
     fn devices_by_name() {
         assert_eq!("emulated".parse(), Ok(DeviceChoice::Emulated));
-        assert_eq!("usb".parse(), Ok(DeviceChoice::There(DeviceAddress::Usb)));
+        assert_eq!(
+            "usb".parse(),
+            Ok(DeviceChoice::There(DeviceAddress::Usb(None)))
+        );
         assert!("serial".parse::<DeviceChoice>().is_err());
     }
 

@@ -3,12 +3,16 @@
 
 use std::io::{BufRead, IsTerminal};
 use std::sync::mpsc::{Receiver, channel};
+use std::time::Instant;
 
 use hapterra_core::guard::{Blockers, Mode, Report};
-use hapterra_core::wire::message::ToDevice;
-use hapterra_core::wire::status::{Refusal, Request};
+use hapterra_core::wire::request::{Refusal, Request};
 
-use crate::link::Event;
+use crate::cli::sparing::Sparing;
+use crate::link::{Ask, Event};
+
+/// More than an arm that is armed, faulted and armed again in a second needs.
+const LINES_A_SECOND: u32 = 24;
 
 /// Leads the user from disarmed to armed.
 pub(in crate::cli) struct ArmingPrompts {
@@ -16,12 +20,24 @@ pub(in crate::cli) struct ArmingPrompts {
     report: Option<Report>,
     /// Enter was pressed with the arm in its zero pose: its counts are asked for.
     zeroing: bool,
-    say: Vec<ToDevice<'static>>,
+    say: Vec<Ask>,
+    /// Whether there is a user who arms; a virtual hand follows its script.
+    leads: bool,
     /// Lines for the user, in order.
     lines: Vec<String>,
+    sparing: Sparing,
 }
 
 impl ArmingPrompts {
+    /// For a virtual hand: only what is wrong is told.
+    pub(in crate::cli) fn for_a_script() -> Self {
+        let (_, nobody) = channel();
+        Self {
+            leads: false,
+            ..Self::listening(nobody)
+        }
+    }
+
     /// Listens to the terminal, if there is one.
     pub(in crate::cli) fn at_the_terminal() -> Self {
         let (pressed, enter) = channel();
@@ -43,7 +59,9 @@ impl ArmingPrompts {
             report: None,
             zeroing: false,
             say: vec![],
+            leads: true,
             lines: vec![],
+            sparing: Sparing::new(LINES_A_SECOND),
         }
     }
 
@@ -51,19 +69,27 @@ impl ArmingPrompts {
     pub(in crate::cli) fn on_event(&mut self, event: &Event<'_>) {
         match event {
             Event::Guard(report) => self.on_guard_report(report),
-            Event::Answer(answer) => match (answer.request, &answer.result) {
+            Event::Answered { request, result } => match (request, result) {
                 (Request::Arm, Err(Refusal::Blocked(why))) => {
                     self.lines.push("not armed:".into());
                     self.name(*why);
                     self.ask_for_enter(*why);
                 }
+                // It is armed already, in the pose that it has.
+                (Request::Zero { .. }, Err(Refusal::NotWhileArmed)) => {}
                 (request, Err(refused)) => self.lines.push(format!("{request:?}: {refused}")),
                 (_, Ok(())) => {}
             },
+            Event::Unanswered(ask) => {
+                self.zeroing &= **ask != Ask::Status;
+                self.lines
+                    .push(format!("the device does not answer: {ask:?} was given up"));
+            }
             Event::Status(status) if self.zeroing => {
                 self.zeroing = false;
                 let counts = status.health.sense.counts;
-                self.say.extend([ToDevice::Zero { counts }, ToDevice::Arm]);
+                let requests = [Request::Zero { counts }, Request::Arm];
+                self.say.extend(requests.map(Ask::Request));
                 let [a, b, c] = counts;
                 self.lines.push(format!("zeroed at {a} {b} {c} counts"));
             }
@@ -87,6 +113,7 @@ impl ArmingPrompts {
             return self.ask_for_enter(report.blockers);
         }
         match report.mode {
+            _ if !self.leads => {}
             // What is in the way besides is refused, or gone, in a moment.
             Mode::Requested if Blockers::BY_HAND.contains(report.blockers) => {
                 self.lines.push("ready to arm; waits for your hand:".into());
@@ -113,6 +140,9 @@ impl ArmingPrompts {
     }
 
     fn ask_for_enter(&mut self, why: Blockers) {
+        if !self.leads {
+            return;
+        }
         self.lines.push(match why.contains(Blockers::NOT_ZEROED) {
             true => "put the arm into its zero pose, hold it there and press Enter".into(),
             false => "when that is seen to, press Enter to clear it and arm".into(),
@@ -120,25 +150,35 @@ impl ArmingPrompts {
     }
 
     /// What is to be said to the device now.
-    pub(in crate::cli) fn messages(&mut self) -> Vec<ToDevice<'static>> {
+    pub(in crate::cli) fn messages(&mut self) -> Vec<Ask> {
         // Where there is no terminal nobody presses anything.
         if self.enter.try_recv().is_ok() {
             let report = self.report.unwrap_or_default();
             if report.fault.is_some() {
-                self.say.push(ToDevice::ClearFault);
+                self.say.push(Ask::Request(Request::ClearFault));
             }
             self.zeroing = report.blockers.contains(Blockers::NOT_ZEROED);
             self.say.push(match self.zeroing {
-                true => ToDevice::Status,
-                false => ToDevice::Arm,
+                true => Ask::Status,
+                false => Ask::Request(Request::Arm),
             });
         }
         std::mem::take(&mut self.say)
     }
 
-    /// What is to be said to the user now.
+    /// What is to be said to the user now: a device whose state flickers gets so many
+    /// lines a second, and the others are counted.
     pub(in crate::cli) fn lines(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.lines)
+        let now = Instant::now();
+        let mut said = vec![];
+        for line in self.lines.drain(..) {
+            match self.sparing.admit(now) {
+                Some(0) => said.push(line),
+                Some(left_out) => said.extend([format!("({left_out} lines left out)"), line]),
+                None => {}
+            }
+        }
+        said
     }
 }
 
@@ -146,13 +186,22 @@ impl ArmingPrompts {
 mod tests {
     use super::*;
     use hapterra_core::guard::Fault;
-    use hapterra_core::wire::status::Answer;
 
-    fn refused(why: Blockers) -> Answer {
-        Answer {
-            request: Request::Arm,
-            result: Err(Refusal::Blocked(why)),
+    #[test]
+    fn a_device_whose_state_flickers_does_not_flood_the_terminal() {
+        let (_press, enter) = channel();
+        let mut prompts = ArmingPrompts::listening(enter);
+        let mut said = 0;
+        for flicker in 0..10_000 {
+            let report = Report {
+                fault: (flicker % 2 == 0).then_some(Fault::EncoderJump),
+                ..Report::default()
+            };
+            prompts.on_event(&Event::Guard(&report));
+            said += prompts.lines().len();
         }
+        // However long this took, it was not ten thousand seconds.
+        assert!((24..5_000).contains(&said), "{said} lines");
     }
 
     #[test]
@@ -164,7 +213,10 @@ mod tests {
             ..Report::default()
         };
         prompts.on_event(&Event::Guard(&report));
-        prompts.on_event(&Event::Answer(&refused(Blockers::NOT_ZEROED)));
+        prompts.on_event(&Event::Answered {
+            request: &Request::Arm,
+            result: Err(Refusal::Blocked(Blockers::NOT_ZEROED)),
+        });
         let told = prompts.lines().join("\n");
         assert!(
             told.contains("NOT_ZEROED") && told.contains("press Enter"),
@@ -172,7 +224,33 @@ mod tests {
         );
         assert_eq!(prompts.messages(), []);
         press.send(()).expect("listening");
-        assert_eq!(prompts.messages(), [ToDevice::Status]);
+        assert_eq!(prompts.messages(), [Ask::Status]);
+    }
+
+    #[test]
+    fn with_a_script_what_is_wrong_is_told_and_nothing_else() {
+        let mut prompts = ArmingPrompts::for_a_script();
+        for mode in [Mode::Disarmed, Mode::Requested, Mode::Ramping, Mode::Armed] {
+            let report = Report {
+                mode,
+                ..Report::default()
+            };
+            prompts.on_event(&Event::Guard(&report));
+        }
+        assert!(prompts.lines().is_empty());
+        // A fault that was latched before this session.
+        let report = Report {
+            fault: Some(Fault::EncoderJump),
+            ..Report::default()
+        };
+        prompts.on_event(&Event::Guard(&report));
+        prompts.on_event(&Event::Unanswered(&Ask::Request(Request::Arm)));
+        let told = prompts.lines().join("\n");
+        assert!(
+            told.contains("FAULT 3 EncoderJump") && told.contains("does not answer"),
+            "{told}"
+        );
+        assert!(!told.contains("Enter"), "{told}");
     }
 
     #[test]
@@ -212,6 +290,7 @@ mod tests {
         prompts.on_event(&Event::Guard(&report));
         assert!(prompts.lines().is_empty());
         press.send(()).expect("listening");
-        assert_eq!(prompts.messages(), [ToDevice::ClearFault, ToDevice::Arm]);
+        let wanted = [Request::ClearFault, Request::Arm].map(Ask::Request);
+        assert_eq!(prompts.messages(), wanted);
     }
 }

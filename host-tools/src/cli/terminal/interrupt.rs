@@ -1,10 +1,18 @@
-//! Ctrl-C: the first asks for a clean end, the second ends at once.
+//! Ctrl-C, and the signals that ask a program to end or tell that its terminal is
+//! gone: the first asks for a clean end, the second ends at once.
 
+use std::io::Write as _;
 use std::process::exit;
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
+/// Whether a board may be armed by this program.
+static MAY_BE_ARMED: AtomicBool = AtomicBool::new(false);
+
+/// What is said where a program ends that may leave an armed board.
+const NOT_CONFIRMED: &str =
+    "ended at once: the board did not confirm that it is disarmed: switch the amplifiers off";
 
 /// Exit code of a program that was interrupted twice, as shells have it.
 const INTERRUPTED: i32 = 130;
@@ -15,6 +23,9 @@ pub(in crate::cli) fn listen() {
     ONCE.call_once(|| {
         let listening = ctrlc::set_handler(|| {
             if REQUESTED.swap(true, Ordering::Relaxed) {
+                if MAY_BE_ARMED.load(Ordering::Relaxed) {
+                    let _ = writeln!(std::io::stderr(), "{NOT_CONFIRMED}");
+                }
                 exit(INTERRUPTED);
             }
         });
@@ -23,6 +34,12 @@ pub(in crate::cli) fn listen() {
             tracing::debug!("cannot listen to Ctrl-C: {error}");
         }
     });
+}
+
+/// Says whether a board may be armed by this program from now on: who ends it at once
+/// is then told to switch the amplifiers off.
+pub(in crate::cli) fn board_may_be_armed(may: bool) {
+    MAY_BE_ARMED.store(may, Ordering::Relaxed);
 }
 
 /// Whether an end was asked for.

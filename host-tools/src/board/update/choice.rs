@@ -1,0 +1,114 @@
+//! Which of the devices on USB is updated.
+
+use super::error::UpdateError;
+
+/// A device that could be updated.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Plugged {
+    /// Where it is plugged in: the same place before and after it changes into its
+    /// loader.
+    pub place: String,
+    /// Its serial number. A loader's is another than that of the board's firmware.
+    pub serial: Option<String>,
+    /// Whether it is a loader already, and not a board that runs its firmware.
+    pub is_loader: bool,
+}
+
+/// The device to update.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Choice<'p> {
+    /// A board that runs its firmware and has to enter its loader first.
+    Board(&'p Plugged),
+    /// A loader, as after an update that failed.
+    Loader(&'p Plugged),
+}
+
+/// Picks the device with a serial number, or the only one that there is. A choice is
+/// never made between two: the image might go onto somebody's other board.
+///
+/// # Errors
+/// [`UpdateError::Nothing`] and [`UpdateError::Several`], which names them.
+pub fn choose<'p>(plugged: &'p [Plugged], serial: Option<&str>) -> Result<Choice<'p>, UpdateError> {
+    let fits = |device: &&Plugged| {
+        serial.is_none_or(|wanted| {
+            let serial = device.serial.as_deref();
+            serial.is_some_and(|serial| serial.eq_ignore_ascii_case(wanted))
+        })
+    };
+    let mut fitting = plugged.iter().filter(fits);
+    match (fitting.next(), fitting.next()) {
+        (Some(device), None) if device.is_loader => Ok(Choice::Loader(device)),
+        (Some(device), None) => Ok(Choice::Board(device)),
+        (None, _) => Err(UpdateError::Nothing {
+            looked_for: match serial {
+                Some(serial) => format!("the serial number {serial:?}"),
+                None => "a hapterra board, or an STM32 in its loader".into(),
+            },
+        }),
+        (Some(_), Some(_)) => Err(UpdateError::Several(plugged.iter().map(name).collect())),
+    }
+}
+
+fn name(device: &Plugged) -> String {
+    let kind = if device.is_loader {
+        "a loader"
+    } else {
+        "a board"
+    };
+    let serial = device.serial.as_deref();
+    let serial = serial.map_or("without a serial number".into(), |s| format!("usb:{s}"));
+    format!("{kind} {serial} at {}", device.place)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn device(serial: &str, is_loader: bool) -> Plugged {
+        Plugged {
+            place: format!("bus 1 port {}", serial.len()),
+            serial: Some(serial.into()),
+            is_loader,
+        }
+    }
+
+    #[test]
+    fn one_device_is_taken_and_of_several_only_the_one_that_is_named() {
+        let [a, b, c] = [
+            device("AB12", false),
+            device("CD345", false),
+            device("0F", true),
+        ];
+        let one = std::slice::from_ref(&a);
+        assert_eq!(choose(one, None).ok(), Some(Choice::Board(&a)));
+        assert_eq!(choose(one, Some("ab12")).ok(), Some(Choice::Board(&a)));
+        let three = [a.clone(), b.clone(), c.clone()];
+        assert_eq!(choose(&three, Some("0F")).ok(), Some(Choice::Loader(&c)));
+        let Err(UpdateError::Several(named)) = choose(&three, None) else {
+            panic!("refused");
+        };
+        for device in [&a, &b, &c] {
+            let serial = device.serial.as_deref().expect("has one");
+            assert!(named.iter().any(|name| name.contains(serial)), "{named:?}");
+        }
+        let twins = [a.clone(), a];
+        assert!(matches!(
+            choose(&twins, Some("AB12")),
+            Err(UpdateError::Several(_))
+        ));
+    }
+
+    #[test]
+    fn none_is_told() {
+        assert!(matches!(
+            choose(&[], None),
+            Err(UpdateError::Nothing { .. })
+        ));
+        let one = [device("AB12", false)];
+        let other = choose(&one, Some("AB"));
+        assert!(
+            matches!(other, Err(UpdateError::Nothing { .. })),
+            "{other:?}"
+        );
+    }
+}

@@ -1,0 +1,100 @@
+//! Why an update failed, and whether the board still has its program.
+
+use std::error::Error;
+use std::{fmt, io};
+
+/// Why an image could not be brought onto a board through its loader.
+#[derive(Debug, thiserror::Error)]
+pub enum UpdateError {
+    /// Nothing to update is plugged in.
+    #[error("no board to update: looked for {looked_for} on USB")]
+    Nothing {
+        /// What was looked for.
+        looked_for: String,
+    },
+    /// Several could be meant.
+    #[error("several boards could be updated: {}", .0.join(", "))]
+    Several(Vec<String>),
+    /// The image is for another board than the one that is plugged in.
+    #[error("the image is for {image}, and the board on USB runs {running}")]
+    OtherBoard {
+        /// The board that the image is for.
+        image: &'static str,
+        /// The board that the running firmware names.
+        running: String,
+    },
+    /// The loader did not show up.
+    #[error("the board has left its program, and no loader has appeared on USB")]
+    NoLoader,
+    /// What the loader says of its flash is not understood.
+    #[error("the loader describes its flash in a way that is not understood: {0:?}")]
+    Layout(String),
+    /// The loader's flash is not that of the board's chip.
+    #[error("the loader is not that of {board}: it says its flash is {said:?}")]
+    OtherChip {
+        /// The board that the image is for.
+        board: &'static str,
+        /// What the loader says.
+        said: String,
+    },
+    /// The loader cannot write, or not read back.
+    #[error("the loader cannot {0}")]
+    Cannot(&'static str),
+    /// The image would take the place of the calibrations.
+    #[error("the image reaches to {end:#010x}, into the flash that keeps the calibrations")]
+    Calibrations {
+        /// The address past its last byte.
+        end: u64,
+    },
+    /// The image has nothing where the chip looks for its vectors.
+    #[error("the image has no vectors at {0:#010x}")]
+    NoVectors(u64),
+    /// The loader went away or does not answer.
+    #[error("the loader is gone, while it was to {doing}")]
+    Gone {
+        /// What was under way.
+        doing: &'static str,
+        /// Why.
+        #[source]
+        source: io::Error,
+    },
+    /// The loader refused something.
+    #[error("the loader refused to {doing}: {why} (status {status}, state {state})")]
+    Refused {
+        /// What was under way.
+        doing: &'static str,
+        /// What its status means.
+        why: &'static str,
+        /// The status it gave.
+        status: u8,
+        /// The state it is in.
+        state: u8,
+    },
+    /// The loader never comes to an end.
+    #[error("the loader does not come to an end with: {0}")]
+    Endless(&'static str),
+    /// What is read back is not what was written.
+    #[error("flash at {0:#010x} does not read back as it was written")]
+    Differs(u64),
+}
+
+/// A failed update.
+#[derive(Debug)]
+pub struct UpdateFailure {
+    /// Why.
+    pub error: UpdateError,
+    /// Whether anything was erased: the board has then no whole program.
+    pub erased: bool,
+}
+
+impl fmt::Display for UpdateFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.error.fmt(f)
+    }
+}
+
+impl Error for UpdateFailure {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        self.error.source()
+    }
+}

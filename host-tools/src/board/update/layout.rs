@@ -1,0 +1,119 @@
+//! What a loader says of its flash: `@Internal Flash  /0x08000000/256*02Kg`, which is a
+//! name, the first address, and runs of pages (UM0424, 4.3.2).
+
+use super::error::UpdateError;
+
+/// Most pages that are believed: the largest STM32 has fewer.
+const MOST_PAGES: u64 = 4096;
+
+/// The flash of a loader: pages of one size, one after the other.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// The loader's own words, for people; other than printable ASCII is left out.
+    pub said: String,
+    /// First address.
+    pub start: u64,
+    /// Bytes of a page.
+    pub page_bytes: u64,
+    /// How many pages.
+    pub pages: u64,
+}
+
+impl Layout {
+    /// Reads a loader's words.
+    ///
+    /// # Errors
+    /// [`UpdateError::Layout`] where they are anything else than one block of pages of one
+    /// size that can be read, erased and written.
+    pub fn read(words: &str) -> Result<Self, UpdateError> {
+        let printable = |c: &char| c.is_ascii_graphic() || *c == ' ';
+        let said: String = words.chars().filter(printable).take(100).collect();
+        Self::parse(&said).ok_or(UpdateError::Layout(said))
+    }
+
+    fn parse(said: &str) -> Option<Self> {
+        let mut fields = said.strip_prefix('@')?.split('/');
+        let (_name, address, runs) = (fields.next()?, fields.next()?, fields.next()?);
+        if fields.next().is_some() {
+            return None;
+        }
+        let start = u64::from_str_radix(address.trim().strip_prefix("0x")?, 16).ok()?;
+        let runs: Option<Vec<_>> = runs.split(',').map(run).collect();
+        let runs = runs?;
+        let (_, page_bytes) = *runs.first()?;
+        let pages = runs.iter().map(|(pages, _)| pages).sum();
+        let even = runs.iter().all(|(_, bytes)| *bytes == page_bytes);
+        let believed = even && page_bytes > 0 && (1..=MOST_PAGES).contains(&pages);
+        believed.then(|| Self {
+            said: said.to_owned(),
+            start,
+            page_bytes,
+            pages,
+        })
+    }
+}
+
+/// A run of pages, as `256*02Kg`: how many, and bytes of each.
+fn run(text: &str) -> Option<(u64, u64)> {
+    let (pages, size) = text.trim().split_once('*')?;
+    let digits = size.len() - size.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+    let (number, unit) = size.split_at_checked(digits)?;
+    // The last letter counts what may be done: bit 0 to read, 1 to erase, 2 to write.
+    let scale = match unit {
+        "Kg" => 1024,
+        "Mg" => 1024 * 1024,
+        " g" | "Bg" => 1,
+        _ => return None,
+    };
+    let pages: u64 = pages.trim().parse().ok().filter(|n| *n <= MOST_PAGES)?;
+    let bytes: u64 = number.parse().ok().filter(|n| *n <= 1024 * 1024)?;
+    Some((pages, bytes * scale))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_two_chips_loaders_are_understood() {
+        let read = |words| {
+            Layout::read(words)
+                .map(|l| (l.start, l.page_bytes, l.pages))
+                .ok()
+        };
+        let g474 = "@Internal Flash   /0x08000000/256*02Kg";
+        assert_eq!(read(g474), Some((0x0800_0000, 2048, 256)));
+        let h743 = "@Internal Flash   /0x08000000/8*128Kg,8*128Kg";
+        assert_eq!(read(h743), Some((0x0800_0000, 131_072, 16)));
+    }
+
+    #[test]
+    fn what_is_not_flash_is_refused_and_nothing_panics() {
+        for words in [
+            "",
+            "@",
+            "@Option Bytes   /0x1FF22000/01*048 e",
+            "@OTP Memory /0x1FFF7000/01*0001Ke",
+            "@Internal Flash /0x08000000",
+            "@Internal Flash /0x08000000/",
+            "@Internal Flash /0x08000000/*",
+            "@Internal Flash /0x08000000/4*016Kg,1*064Kg",
+            "@Internal Flash /0x08000000/99999999999999999999*02Kg",
+            "@Internal Flash /0x08000000/4294967295*4294967295Mg",
+            "@Internal Flash /08000000/256*02Kg",
+            "@Internal Flash /0x08000000/256*02Kg/0x1FFF0000/1*2Kg",
+            "@Internal Flash /0x08000000/256*0\u{e9}g",
+            "@Internal Flash /0x08000000/256*02Ka",
+        ] {
+            assert!(Layout::read(words).is_err(), "{words:?}");
+        }
+    }
+
+    #[test]
+    fn what_a_loader_says_reaches_no_terminal_raw() {
+        let Err(UpdateError::Layout(said)) = Layout::read("@\u{1b}[2J\r\nFlash\u{202e}") else {
+            panic!("refused");
+        };
+        assert_eq!(said, "@[2JFlash");
+    }
+}

@@ -1,0 +1,297 @@
+//! The USB loader in the chip's ROM: DFU 1.1 with ST's extensions (AN3156, UM0424).
+//!
+//! A download is a control transfer whose block number says what it is: 0 is a command,
+//! from 2 on it is data, `(block − 2) × transfer size` bytes behind the address pointer.
+//! The loader does it when its status is asked for, says for how long it wants to be left
+//! alone, and has done it when the state is `dfuDNLOAD-IDLE` afterwards.
+
+use std::io;
+use std::time::Duration;
+
+use super::error::UpdateError;
+use super::layout::Layout;
+
+/// Requests of the class.
+pub mod request {
+    /// Gives the loader a block.
+    pub const DNLOAD: u8 = 1;
+    /// Takes a block from it.
+    pub const UPLOAD: u8 = 2;
+    /// Asks for status and state.
+    pub const GETSTATUS: u8 = 3;
+    /// Ends an error.
+    pub const CLRSTATUS: u8 = 4;
+    /// Back to idle.
+    pub const ABORT: u8 = 6;
+}
+
+/// States.
+const IDLE: u8 = 2;
+const DNLOAD_SYNC: u8 = 3;
+const DNBUSY: u8 = 4;
+const DNLOAD_IDLE: u8 = 5;
+const MANIFEST_SYNC: u8 = 6;
+const MANIFEST: u8 = 7;
+const ERROR: u8 = 10;
+
+/// Commands of block 0.
+const SET_ADDRESS: u8 = 0x21;
+const ERASE: u8 = 0x41;
+/// The block with a page's first bytes.
+const FIRST_BLOCK: u16 = 2;
+
+/// Bits of the functional descriptor's attributes.
+const CAN_DOWNLOAD: u8 = 1 << 0;
+const CAN_UPLOAD: u8 = 1 << 1;
+/// The descriptor's type.
+const FUNCTIONAL: u8 = 0x21;
+/// Longest transfer that is used; an STM32's loaders say 1,024 or 2,048.
+const MOST_TRANSFERRED: u16 = 4096;
+
+/// Longest that one thing may take: an H743's sector takes 4 s at most (its data sheet).
+const PATIENCE: Duration = Duration::from_secs(30);
+/// Tries to bring a loader to rest.
+const TRIES: usize = 8;
+
+/// Control transfers to the loader's interface.
+pub trait ControlPipe {
+    /// A request of the class that reads at most `length` bytes.
+    ///
+    /// # Errors
+    /// The device is gone, refuses or does not answer.
+    fn read(&mut self, request: u8, value: u16, length: u16) -> io::Result<Vec<u8>>;
+
+    /// A request of the class that writes.
+    ///
+    /// # Errors
+    /// As for [`Self::read`].
+    fn write(&mut self, request: u8, value: u16, bytes: &[u8]) -> io::Result<()>;
+
+    /// Leaves the device alone for a while.
+    fn wait(&mut self, time: Duration);
+}
+
+/// What a loader answers when it is asked for its status.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Status {
+    status: u8,
+    wait: Duration,
+    state: u8,
+}
+
+/// A loader at the end of a pipe.
+pub struct Loader<P> {
+    pipe: P,
+    /// What it says of its flash.
+    layout: Layout,
+    /// Bytes of a transfer.
+    transfer: u16,
+}
+
+impl<P: ControlPipe> Loader<P> {
+    /// Takes a loader that says these words of its flash and has this functional
+    /// descriptor, and brings it to rest.
+    ///
+    /// # Errors
+    /// [`UpdateError`]: it is no such loader, or does not answer.
+    pub fn open(pipe: P, words: &str, functional: &[u8]) -> Result<Self, UpdateError> {
+        let layout = Layout::read(words)?;
+        let (attributes, transfer) = match functional {
+            [_, FUNCTIONAL, attributes, _, _, low, high, ..] => {
+                (*attributes, u16::from_le_bytes([*low, *high]))
+            }
+            _ => return Err(UpdateError::Cannot("say what it can")),
+        };
+        if attributes & CAN_DOWNLOAD == 0 {
+            return Err(UpdateError::Cannot("write"));
+        }
+        if attributes & CAN_UPLOAD == 0 {
+            return Err(UpdateError::Cannot("read back what was written"));
+        }
+        // Whole words of flash.
+        let transfer = transfer.min(MOST_TRANSFERRED) / 32 * 32;
+        if transfer == 0 {
+            return Err(UpdateError::Cannot("take whole words of flash"));
+        }
+        let mut loader = Self {
+            pipe,
+            layout,
+            transfer,
+        };
+        loader.rest("begin")?;
+        Ok(loader)
+    }
+
+    /// What the loader says of its flash.
+    #[must_use]
+    pub const fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Gives the pipe back.
+    pub fn into_pipe(self) -> P {
+        self.pipe
+    }
+
+    /// Erases the page that begins at an address.
+    ///
+    /// # Errors
+    /// [`UpdateError`].
+    pub fn erase(&mut self, address: u64) -> Result<(), UpdateError> {
+        self.command(ERASE, address, "erase a page")
+    }
+
+    /// Writes erased flash from an address on.
+    ///
+    /// # Errors
+    /// [`UpdateError`].
+    pub fn write(&mut self, address: u64, bytes: &[u8]) -> Result<(), UpdateError> {
+        const DOING: &str = "write";
+        self.command(SET_ADDRESS, address, DOING)?;
+        for (block, chunk) in (FIRST_BLOCK..).zip(bytes.chunks(self.transfer.into())) {
+            self.give(block, chunk, DOING)?;
+        }
+        Ok(())
+    }
+
+    /// Reads flash from an address on.
+    ///
+    /// # Errors
+    /// [`UpdateError`].
+    pub fn read(&mut self, address: u64, bytes: usize) -> Result<Vec<u8>, UpdateError> {
+        const DOING: &str = "read back";
+        self.command(SET_ADDRESS, address, DOING)?;
+        // Only an idle loader, or one that reads already, gives blocks.
+        self.rest(DOING)?;
+        let mut all = Vec::with_capacity(bytes);
+        let mut block = FIRST_BLOCK;
+        while all.len() < bytes {
+            let length = (bytes - all.len()).min(self.transfer.into()) as u16;
+            let got = self.pipe.read(request::UPLOAD, block, length);
+            let got = got.map_err(|source| self.failed(DOING, source))?;
+            if got.len() != usize::from(length) {
+                return Err(UpdateError::Cannot("read back what was written"));
+            }
+            all.extend(got);
+            block = block.wrapping_add(1);
+        }
+        self.rest(DOING)?;
+        Ok(all)
+    }
+
+    /// Leaves the loader for the program at an address.
+    ///
+    /// # Errors
+    /// [`UpdateError`].
+    pub fn leave(&mut self, address: u64) -> Result<(), UpdateError> {
+        const DOING: &str = "start the program";
+        self.command(SET_ADDRESS, address, DOING)?;
+        let given = self.pipe.write(request::DNLOAD, 0, &[]);
+        given.map_err(|source| UpdateError::Gone {
+            doing: DOING,
+            source,
+        })?;
+        // It leaves when its status is asked for, and may be gone before it answers.
+        match self.status(DOING) {
+            Ok(status) if matches!(status.state, MANIFEST | MANIFEST_SYNC) => Ok(()),
+            Ok(status) => Err(refused(DOING, status)),
+            Err(_) => Ok(()),
+        }
+    }
+
+    fn command(
+        &mut self,
+        command: u8,
+        address: u64,
+        doing: &'static str,
+    ) -> Result<(), UpdateError> {
+        let [a, b, c, d, ..] = address.to_le_bytes();
+        self.give(0, &[command, a, b, c, d], doing)
+    }
+
+    /// Gives the loader a block and waits until it is done with it.
+    fn give(&mut self, block: u16, bytes: &[u8], doing: &'static str) -> Result<(), UpdateError> {
+        let given = self.pipe.write(request::DNLOAD, block, bytes);
+        given.map_err(|source| self.failed(doing, source))?;
+        let mut waited = Duration::ZERO;
+        while waited < PATIENCE {
+            let status = self.status(doing)?;
+            match status.state {
+                DNLOAD_IDLE if status.status == 0 => return Ok(()),
+                DNBUSY | DNLOAD_SYNC if status.status == 0 => {
+                    // No loader may hold its host up for ever, or spin it.
+                    let wait = status.wait.clamp(Duration::from_millis(1), PATIENCE);
+                    self.pipe.wait(wait);
+                    waited += wait;
+                }
+                _ => return Err(refused(doing, status)),
+            }
+        }
+        Err(UpdateError::Endless(doing))
+    }
+
+    /// A transfer failed: what the loader says of it, if it still answers.
+    fn failed(&mut self, doing: &'static str, source: io::Error) -> UpdateError {
+        match self.status(doing) {
+            Ok(status) if status.state == ERROR => refused(doing, status),
+            _ => UpdateError::Gone { doing, source },
+        }
+    }
+
+    /// Brings the loader to `dfuIDLE`, whatever was before.
+    fn rest(&mut self, doing: &'static str) -> Result<(), UpdateError> {
+        for _ in 0..TRIES {
+            let status = self.status(doing)?;
+            let number = match status.state {
+                IDLE => return Ok(()),
+                ERROR => request::CLRSTATUS,
+                DNBUSY => {
+                    self.pipe.wait(status.wait.min(PATIENCE));
+                    continue;
+                }
+                _ => request::ABORT,
+            };
+            let done = self.pipe.write(number, 0, &[]);
+            done.map_err(|source| UpdateError::Gone { doing, source })?;
+        }
+        Err(UpdateError::Endless(doing))
+    }
+
+    fn status(&mut self, doing: &'static str) -> Result<Status, UpdateError> {
+        let answer = self.pipe.read(request::GETSTATUS, 0, 6);
+        let answer = answer.map_err(|source| UpdateError::Gone { doing, source })?;
+        let [status, low, middle, high, state, _] = answer[..] else {
+            return Err(UpdateError::Cannot("say how it is"));
+        };
+        let ms = u32::from_le_bytes([low, middle, high, 0]);
+        Ok(Status {
+            status,
+            wait: Duration::from_millis(ms.into()),
+            state,
+        })
+    }
+}
+
+fn refused(doing: &'static str, Status { status, state, .. }: Status) -> UpdateError {
+    UpdateError::Refused {
+        doing,
+        why: meaning(status),
+        status,
+        state,
+    }
+}
+
+/// What a status means (DFU 1.1, 6.1.2; ST gives some of them a meaning of its own).
+const fn meaning(status: u8) -> &'static str {
+    match status {
+        0x00 => "it is in another state than it should be",
+        0x01 => "the address is not one that it can write",
+        0x02 => "the bytes are not for this device",
+        0x03 => "its flash cannot be written",
+        0x04 => "its flash cannot be erased",
+        0x08 => "the address is out of its range",
+        0x0B => "its flash is protected against reading",
+        0x0F => "it did not expect that request",
+        _ => "it does not know why",
+    }
+}

@@ -1,0 +1,174 @@
+//! Which pages of flash an update erases, and what they hold afterwards.
+
+use std::collections::BTreeMap;
+
+use super::error::UpdateError;
+use super::layout::Layout;
+use crate::board::boards::Board;
+use crate::board::image::Image;
+use crate::board::memories::Memories;
+
+/// What an erased byte reads.
+const ERASED: u8 = 0xFF;
+/// Whole words of flash, and what they will hold.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stretch {
+    /// The first address.
+    pub address: u64,
+    /// What will be there.
+    pub bytes: Vec<u8>,
+}
+
+/// What an update erases and writes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// First addresses of the pages to erase; first that with the vectors.
+    pub erased: Vec<u64>,
+    /// The word with the first two vectors, stack and start: written last.
+    pub vectors: Stretch,
+    /// Everything else, in order. What is not written of an erased page stays erased.
+    pub others: Vec<Stretch>,
+}
+
+impl Plan {
+    /// Plans an update of `board` with `image` through a loader with the flash `layout`.
+    ///
+    /// # Errors
+    /// [`UpdateError`]: the flash is another chip's, or the image reaches into the
+    /// calibrations or has no vectors.
+    pub fn new(board: &Board, image: &Image, layout: &Layout) -> Result<Self, UpdateError> {
+        let memories = image.memories;
+        let expected = (memories.flash, memories.page_bytes, memories.flash_bytes);
+        let said = (
+            layout.start,
+            layout.page_bytes,
+            layout.page_bytes * layout.pages,
+        );
+        if said != expected {
+            return Err(UpdateError::OtherChip {
+                board: board.name,
+                said: layout.said.clone(),
+            });
+        }
+        let mut pages = pages(image, &memories)?;
+        let erased = pages.keys().copied().collect();
+        let start = memories.flash;
+        let vectors = pages.get_mut(&start).ok_or(UpdateError::NoVectors(start))?;
+        let behind = vectors.split_off(memories.word_bytes as usize);
+        let word = std::mem::replace(vectors, behind);
+        let others = pages.into_iter().map(|(address, bytes)| match address {
+            _ if address == start => Stretch {
+                address: start + memories.word_bytes,
+                bytes,
+            },
+            _ => Stretch { address, bytes },
+        });
+        Ok(Self {
+            erased,
+            vectors: Stretch {
+                address: start,
+                bytes: word,
+            },
+            others: others.filter(|stretch| !stretch.bytes.is_empty()).collect(),
+        })
+    }
+
+    /// Bytes that are written.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let others: usize = self.others.iter().map(|stretch| stretch.bytes.len()).sum();
+        self.vectors.bytes.len() + others
+    }
+}
+
+/// The image's bytes, page by page.
+fn pages(image: &Image, memories: &Memories) -> Result<BTreeMap<u64, Vec<u8>>, UpdateError> {
+    let allowed = memories.for_image();
+    let mut pages: BTreeMap<u64, Vec<u8>> = BTreeMap::new();
+    for part in &image.parts {
+        let end = part.address + part.bytes.len() as u64;
+        if part.address < allowed.start || end > allowed.end {
+            return Err(UpdateError::Calibrations { end });
+        }
+        for (address, byte) in (part.address..).zip(&part.bytes) {
+            let offset = ((address - memories.flash) % memories.page_bytes) as usize;
+            let page = pages.entry(address - offset as u64).or_default();
+            let words = (offset + 1).next_multiple_of(memories.word_bytes as usize);
+            page.resize(page.len().max(words), ERASED);
+            page[offset] = *byte;
+        }
+    }
+    Ok(pages)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::image::Part;
+
+    const FLASH: u64 = 0x0800_0000;
+
+    fn image(parts: &[(u64, usize)]) -> Image {
+        let part = |(address, bytes): &(u64, usize)| Part {
+            address: *address,
+            bytes: vec![0x5A; *bytes],
+        };
+        Image {
+            memories: Memories::G474,
+            parts: parts.iter().map(part).collect(),
+            placed: vec![],
+        }
+    }
+
+    fn plan(parts: &[(u64, usize)], words: &str) -> Result<Plan, UpdateError> {
+        let board = Board::named("nucleo-g474re").expect("known");
+        let layout = Layout::read(words).expect("understood");
+        Plan::new(board, &image(parts), &layout)
+    }
+
+    const G474: &str = "@Internal Flash   /0x08000000/256*02Kg";
+
+    #[test]
+    fn an_image_takes_the_pages_that_it_lies_in_and_no_other_and_its_first_word_apart() {
+        let plan = plan(&[(FLASH, 2049), (FLASH + 0x3010, 3)], G474).expect("fits");
+        assert_eq!(plan.erased, [FLASH, FLASH + 0x800, FLASH + 0x3000]);
+        assert_eq!((plan.vectors.address, plan.vectors.bytes.len()), (FLASH, 8));
+        let others = plan.others.iter();
+        let others: Vec<_> = others.map(|s| (s.address - FLASH, s.bytes.len())).collect();
+        assert_eq!(others, [(8, 2040), (0x800, 8), (0x3000, 24)]);
+        let last = &plan.others[2].bytes;
+        assert_eq!(last[..16], [ERASED; 16]);
+        assert_eq!(last[16..20], [0x5A, 0x5A, 0x5A, ERASED]);
+    }
+
+    #[test]
+    fn the_calibrations_are_out_of_reach() {
+        let calibrations = FLASH + 508 * 1024;
+        assert!(plan(&[(FLASH, 8), (calibrations - 8, 8)], G474).is_ok());
+        for part in [(calibrations - 8, 9), (calibrations, 1), (FLASH - 4, 8)] {
+            let refused = plan(&[(FLASH, 8), part], G474);
+            assert!(
+                matches!(refused, Err(UpdateError::Calibrations { .. })),
+                "{part:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn another_chips_loader_is_refused() {
+        for words in [
+            "@Internal Flash /0x08000000/16*128Kg",
+            "@Internal Flash /0x08000000/128*02Kg",
+            "@Internal Flash /0x08000000/128*04Kg",
+            "@Internal Flash /0x90000000/256*02Kg",
+        ] {
+            let refused = plan(&[(FLASH, 8)], words);
+            assert!(
+                matches!(refused, Err(UpdateError::OtherChip { .. })),
+                "{words}"
+            );
+        }
+        let refused = plan(&[(FLASH + 0x800, 8)], G474);
+        assert!(matches!(refused, Err(UpdateError::NoVectors(FLASH))));
+    }
+}

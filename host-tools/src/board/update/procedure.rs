@@ -1,0 +1,84 @@
+//! An update from the first erase to the start of the program.
+
+use super::error::{UpdateError, UpdateFailure};
+use super::loader::{ControlPipe, Loader};
+use super::plan::{Plan, Stretch};
+use crate::board::boards::Board;
+use crate::board::image::Image;
+
+/// How far an update is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// So many pages of so many are erased.
+    Erased(usize, usize),
+    /// So many bytes of so many are written.
+    Written(usize, usize),
+    /// So many bytes of so many were read back and are as they should be.
+    Compared(usize, usize),
+}
+
+/// Brings an image onto the board behind a loader, compares what is in flash then, and
+/// starts it. Returns how many bytes it wrote.
+///
+/// The page with the vectors is erased before any other, and its first word is written
+/// when everything else was read back: until then a chip that is reset finds no program
+/// at all, and none that is half old and half new.
+///
+/// # Errors
+/// [`UpdateFailure`], which says whether anything was erased.
+pub fn update<P: ControlPipe>(
+    loader: &mut Loader<P>,
+    board: &Board,
+    image: &Image,
+    progress: &mut dyn FnMut(Step),
+) -> Result<usize, UpdateFailure> {
+    let plan = Plan::new(board, image, loader.layout());
+    let plan = plan.map_err(|error| UpdateFailure {
+        error,
+        erased: false,
+    })?;
+    let done = carry_out(loader, &plan, progress);
+    done.map_err(|error| UpdateFailure {
+        error,
+        erased: true,
+    })?;
+    Ok(plan.bytes())
+}
+
+fn carry_out<P: ControlPipe>(
+    loader: &mut Loader<P>,
+    plan: &Plan,
+    progress: &mut dyn FnMut(Step),
+) -> Result<(), UpdateError> {
+    let (pages, bytes) = (plan.erased.len(), plan.bytes());
+    for (done, page) in (1..).zip(&plan.erased) {
+        loader.erase(*page)?;
+        progress(Step::Erased(done, pages));
+    }
+    let mut written = 0;
+    for stretch in &plan.others {
+        loader.write(stretch.address, &stretch.bytes)?;
+        written += stretch.bytes.len();
+        progress(Step::Written(written, bytes));
+    }
+    let mut compared = 0;
+    for stretch in &plan.others {
+        compare(loader, stretch)?;
+        compared += stretch.bytes.len();
+        progress(Step::Compared(compared, bytes));
+    }
+    loader.write(plan.vectors.address, &plan.vectors.bytes)?;
+    progress(Step::Written(bytes, bytes));
+    compare(loader, &plan.vectors)?;
+    progress(Step::Compared(bytes, bytes));
+    loader.leave(plan.vectors.address)
+}
+
+fn compare<P: ControlPipe>(loader: &mut Loader<P>, stretch: &Stretch) -> Result<(), UpdateError> {
+    let found = loader.read(stretch.address, stretch.bytes.len())?;
+    let mut pairs = found.iter().zip(&stretch.bytes);
+    match pairs.position(|(is, was)| is != was) {
+        None => Ok(()),
+        Some(at) => Err(UpdateError::Differs(stretch.address + at as u64)),
+    }
+}

@@ -1,0 +1,251 @@
+//! A chip's ROM loader that follows AN3156 and UM0424 to the letter, and what can go
+//! wrong with it. It forgives nothing: a request in a state that does not take it, or
+//! before the time that it asked to be left alone for, is an error.
+
+use std::io;
+use std::time::Duration;
+
+use super::loader::{ControlPipe, request};
+
+const FLASH: u64 = 0x0800_0000;
+const FLASH_BYTES: usize = 512 * 1024;
+const PAGE: usize = 2048;
+pub(super) const TRANSFER: usize = 1024;
+/// Times that it asks for, ms.
+const ERASE_MS: u64 = 25;
+const WRITE_MS: u64 = 5;
+
+/// States by their numbers (DFU 1.1, A.1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(super) enum State {
+    Idle = 2,
+    DownloadSync = 3,
+    Busy = 4,
+    DownloadIdle = 5,
+    ManifestSync = 6,
+    Manifest = 7,
+    UploadIdle = 9,
+    Error = 10,
+}
+
+/// What it was told to do with its flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Deed {
+    Erased(u64),
+    Wrote(u64, usize),
+    Started(u64),
+}
+
+/// What goes wrong with it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Faults {
+    /// It is gone after so many requests.
+    pub(super) gone_after: Option<usize>,
+    /// A cell of its flash that reads a bit that was not written.
+    pub(super) bad_cell: Option<u64>,
+    /// A page that cannot be erased.
+    pub(super) stuck_page: Option<u64>,
+    /// It is protected against reading.
+    pub(super) protected: bool,
+    /// It never has done what it was told.
+    pub(super) never_done: bool,
+}
+
+/// The loader.
+pub(super) struct Scripted {
+    pub(super) flash: Vec<u8>,
+    pub(super) state: State,
+    status: u8,
+    pointer: u64,
+    /// The block that was given last.
+    block: (u16, Vec<u8>),
+    now: Duration,
+    busy_until: Duration,
+    requests: usize,
+    pub(super) deeds: Vec<Deed>,
+    pub(super) faults: Faults,
+}
+
+impl Scripted {
+    /// A chip whose flash is full of another program.
+    pub(super) fn new(faults: Faults) -> Self {
+        Self {
+            flash: vec![0xA5; FLASH_BYTES],
+            state: State::Idle,
+            status: 0,
+            pointer: FLASH,
+            block: (0, vec![]),
+            now: Duration::ZERO,
+            busy_until: Duration::ZERO,
+            requests: 0,
+            deeds: vec![],
+            faults,
+        }
+    }
+
+    /// The same chip, reset into its loader again, with nothing wrong.
+    pub(super) fn again(self) -> Self {
+        Self {
+            flash: self.flash,
+            ..Self::new(Faults::default())
+        }
+    }
+
+    pub(super) fn requests(&self) -> usize {
+        self.requests
+    }
+
+    fn count(&mut self) -> io::Result<()> {
+        let has_gone = matches!(self.deeds.last(), Some(Deed::Started(_)));
+        if has_gone || self.faults.gone_after.is_some_and(|n| self.requests >= n) {
+            return Err(io::Error::new(io::ErrorKind::NotConnected, "unplugged"));
+        }
+        self.requests += 1;
+        if self.state == State::Busy && self.now < self.busy_until {
+            // Whoever does not wait as asked gets no answer.
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        Ok(())
+    }
+
+    fn stall<T>(&mut self, status: u8) -> io::Result<T> {
+        self.state = State::Error;
+        self.status = status;
+        Err(io::Error::new(io::ErrorKind::BrokenPipe, "stalled"))
+    }
+
+    fn place(&self, address: u64, bytes: usize) -> Option<usize> {
+        let at = usize::try_from(address.checked_sub(FLASH)?).ok()?;
+        (at + bytes <= FLASH_BYTES).then_some(at)
+    }
+
+    /// Does what the last block said; the status that follows.
+    fn carry_out(&mut self) -> u8 {
+        let (block, bytes) = std::mem::take(&mut self.block);
+        if block >= 2 {
+            return self.program(block, &bytes);
+        }
+        let [command, rest @ ..] = &bytes[..] else {
+            return 0x0F;
+        };
+        let Ok(address) = <[u8; 4]>::try_from(rest) else {
+            // An erase without an address erases everything.
+            return 0x0F;
+        };
+        let address = u64::from(u32::from_le_bytes(address));
+        let Some(at) = self.place(address, 1) else {
+            return 0x01;
+        };
+        match command {
+            0x21 => self.pointer = address,
+            0x41 if self.faults.stuck_page == Some(address) => return 0x04,
+            0x41 => {
+                let page = at / PAGE * PAGE;
+                self.flash[page..page + PAGE].fill(0xFF);
+                self.deeds.push(Deed::Erased(address));
+            }
+            _ => return 0x0F,
+        }
+        0
+    }
+
+    fn program(&mut self, block: u16, bytes: &[u8]) -> u8 {
+        let address = self.pointer + u64::from(block - 2) * TRANSFER as u64;
+        let Some(at) = self.place(address, bytes.len()) else {
+            return 0x08;
+        };
+        let cells = &mut self.flash[at..at + bytes.len()];
+        if !bytes.len().is_multiple_of(8) || cells.iter().any(|cell| *cell != 0xFF) {
+            return 0x03;
+        }
+        cells.copy_from_slice(bytes);
+        self.deeds.push(Deed::Wrote(address, bytes.len()));
+        0
+    }
+
+    fn get_status(&mut self) -> [u8; 6] {
+        let mut wait = 0;
+        match self.state {
+            State::DownloadSync => {
+                let erases = self.block.0 == 0 && self.block.1.first() == Some(&0x41);
+                wait = if erases { ERASE_MS } else { WRITE_MS };
+                self.busy_until = self.now + Duration::from_millis(wait);
+                self.state = State::Busy;
+            }
+            State::Busy if self.faults.never_done => {}
+            State::Busy => {
+                self.status = self.carry_out();
+                self.state = match self.status {
+                    0 => State::DownloadIdle,
+                    _ => State::Error,
+                };
+            }
+            State::ManifestSync => {
+                self.state = State::Manifest;
+                self.deeds.push(Deed::Started(self.pointer));
+            }
+            _ => {}
+        }
+        let [a, b, c, ..] = wait.to_le_bytes();
+        [self.status, a, b, c, self.state as u8, 0]
+    }
+}
+
+impl ControlPipe for Scripted {
+    fn read(&mut self, number: u8, value: u16, length: u16) -> io::Result<Vec<u8>> {
+        self.count()?;
+        match number {
+            request::GETSTATUS => Ok(self.get_status().to_vec()),
+            request::UPLOAD if self.faults.protected => self.stall(0x0B),
+            request::UPLOAD
+                if matches!(self.state, State::Idle | State::UploadIdle) && value >= 2 =>
+            {
+                let address = self.pointer + u64::from(value - 2) * TRANSFER as u64;
+                let length = usize::from(length);
+                let Some(at) = self.place(address, length).filter(|_| length <= TRANSFER) else {
+                    return self.stall(0x08);
+                };
+                self.state = match length == TRANSFER {
+                    true => State::UploadIdle,
+                    false => State::Idle,
+                };
+                let mut bytes = self.flash[at..at + length].to_vec();
+                let bad = self
+                    .faults
+                    .bad_cell
+                    .and_then(|cell| cell.checked_sub(address));
+                if let Some(byte) = bad.and_then(|at| bytes.get_mut(at as usize)) {
+                    *byte ^= 0x10;
+                }
+                Ok(bytes)
+            }
+            _ => self.stall(0x0F),
+        }
+    }
+
+    fn write(&mut self, number: u8, value: u16, bytes: &[u8]) -> io::Result<()> {
+        self.count()?;
+        let idle = matches!(self.state, State::Idle | State::DownloadIdle);
+        match number {
+            request::DNLOAD if idle && bytes.is_empty() => self.state = State::ManifestSync,
+            request::DNLOAD if idle && bytes.len() <= TRANSFER && value != 1 => {
+                self.block = (value, bytes.to_vec());
+                self.state = State::DownloadSync;
+            }
+            request::CLRSTATUS if self.state == State::Error => {
+                self.state = State::Idle;
+                self.status = 0;
+            }
+            request::ABORT if !matches!(self.state, State::Error | State::Busy) => {
+                self.state = State::Idle;
+            }
+            _ => return self.stall(0x0F),
+        }
+        Ok(())
+    }
+
+    fn wait(&mut self, time: Duration) {
+        self.now += time;
+    }
+}

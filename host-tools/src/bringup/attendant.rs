@@ -1,0 +1,202 @@
+//! What the user is asked to do, to read and to say.
+
+use std::fmt;
+
+use crate::calibrate::Direction;
+
+/// Who connects, turns, presses, measures and looks.
+pub trait Attendant {
+    /// Is told something.
+    fn hear(&mut self, line: &str);
+
+    /// Is asked to do something that the board sees by itself.
+    fn begin(&mut self, task: Task);
+
+    /// Does something and says when it is done.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    fn finish(&mut self, task: Task) -> Result<(), Stopped>;
+
+    /// Reads something off a meter, a ruler or a scale.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    fn read(&mut self, reading: Reading) -> Result<f64, Stopped>;
+
+    /// Says whether something is so.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    fn confirms(&mut self, question: Question) -> Result<bool, Stopped>;
+}
+
+/// The attendant does not want to go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("stopped: the steps that are passed are kept in the log")]
+pub struct Stopped;
+
+/// Something to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Task {
+    /// Wire the board as a step wants it.
+    Wire(&'static str),
+    /// Press the emergency stop.
+    PressStop,
+    /// Release it.
+    ReleaseStop,
+    /// Pull one of its wires, the switch released.
+    PullStopWire,
+    /// Connect the wire again.
+    ConnectStopWire,
+    /// Press the dead-man switch and hold it.
+    PressDeadMan,
+    /// Let it go.
+    ReleaseDeadMan,
+    /// Put the arm into its zero pose and hold it.
+    ZeroPose,
+    /// Move the tip along a ruler from where it is, by this many millimetres.
+    MoveAlong(Direction, u16),
+    /// Hold the tip loosely in the zero pose.
+    HoldLoosely,
+    /// Hold the tip in the zero pose with a spring scale that pulls against the push
+    /// of an axis (0 to 2).
+    HoldWithScale(usize),
+    /// Read the scale now, for a question that comes after.
+    LookAtScale,
+    /// Let the tip go, a hand near it.
+    LetGoOfTip,
+    /// Hold the tip again.
+    HoldTip,
+    /// Lower the tip slowly through the plane.
+    LowerTip,
+    /// Lift the tip off it.
+    LiftTip,
+}
+
+impl fmt::Display for Task {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Wire(how) => f.write_str(how),
+            Self::PressStop => f.write_str("press the emergency stop"),
+            Self::ReleaseStop => f.write_str("release the emergency stop"),
+            Self::PullStopWire => f.write_str("pull one wire of the emergency stop off the board"),
+            Self::ConnectStopWire => f.write_str("connect the wire again"),
+            Self::PressDeadMan => f.write_str("press the dead-man switch and hold it"),
+            Self::ReleaseDeadMan => f.write_str("let the dead-man switch go"),
+            Self::ZeroPose => f.write_str(
+                "put the arm into its zero pose and hold it: upper link level and pointing at you, fore link hanging straight down",
+            ),
+            Self::MoveAlong(direction, mm) => write!(
+                f,
+                "lay a ruler at the tip; move the tip {} by about {mm} mm and hold it",
+                direction.words()
+            ),
+            Self::HoldLoosely => f.write_str(
+                "hold the tip loosely with two fingers in the zero pose, your face away from the arm",
+            ),
+            Self::HoldWithScale(axis) => write!(
+                f,
+                "hook a spring scale to the tip and hold the tip with it in the zero pose, the scale pulling {}",
+                against(*axis)
+            ),
+            Self::LookAtScale => f.write_str("read the scale now"),
+            Self::LetGoOfTip => f.write_str("let the tip go, a hand near it; keep the switch pressed"),
+            Self::HoldTip => f.write_str("hold the tip again"),
+            Self::LowerTip => f.write_str(
+                "lower the tip slowly: a soft floor begins some 20 mm below; push 10 mm into it",
+            ),
+            Self::LiftTip => f.write_str("lift the tip again"),
+        }
+    }
+}
+
+/// Where a scale pulls against the push of an axis.
+const fn against(axis: usize) -> &'static str {
+    match axis {
+        0 => "to your left",
+        1 => "straight down",
+        _ => "away from you",
+    }
+}
+
+/// Something to read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reading {
+    /// The enable line at the amplifiers' end, V.
+    EnableVolts(BoardIs),
+    /// A command output (0 to 2) while the board holds it at a fraction of full scale.
+    Output {
+        /// Which.
+        axis: usize,
+        /// The fraction, −1 to 1.
+        fraction: f64,
+        /// In which unit it is read.
+        unit: &'static str,
+    },
+    /// How far the tip went along the ruler, mm.
+    MovedMm(Direction, u16),
+    /// What the scale reads, grams; at rest, or at the moment that was called out.
+    ScaleGrams {
+        /// Whether the motor pushed.
+        pushed: bool,
+    },
+}
+
+/// What becomes of the board while the enable line is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BoardIs {
+    /// It runs, disarmed.
+    Running,
+    /// Its reset button is held down.
+    InReset,
+    /// It is without power.
+    Unplugged,
+}
+
+impl fmt::Display for Reading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::EnableVolts(when) => {
+                let when = match when {
+                    BoardIs::Running => "the board running",
+                    BoardIs::InReset => "the board's reset button held down",
+                    BoardIs::Unplugged => "the board unplugged",
+                };
+                write!(f, "volts on the enable line at the amplifiers, {when}?")
+            }
+            Self::Output {
+                axis,
+                fraction,
+                unit,
+            } => write!(
+                f,
+                "{unit} at output {}, held at {:+.0} % of full scale?",
+                axis + 1,
+                100.0 * fraction
+            ),
+            Self::MovedMm(direction, _) => {
+                write!(f, "how many mm did the tip go {}?", direction.words())
+            }
+            Self::ScaleGrams { pushed: false } => f.write_str("grams on the scale, at rest?"),
+            Self::ScaleGrams { pushed: true } => {
+                f.write_str("grams on the scale, while the motor pushed?")
+            }
+        }
+    }
+}
+
+/// Something to say yes or no to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Question {
+    /// Whether the floor pushed the tip back up.
+    PushedBack,
+}
+
+impl fmt::Display for Question {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::PushedBack => f.write_str("did the floor push the tip up, and only up?"),
+        }
+    }
+}

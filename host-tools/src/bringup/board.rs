@@ -1,0 +1,181 @@
+//! The board as the steps use it: looked at, asked for things, given a plane.
+
+use hapterra_core::guard::{Fault, Mode};
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::{Sample, Scene};
+use hapterra_core::wire::hello::DeviceHello;
+use hapterra_core::wire::message::{Heights, TileMessage, ToDevice, ToHost};
+use hapterra_core::wire::request::{Refusal, Request};
+use hapterra_core::wire::status::Status;
+
+use super::attendant::{Attendant, Task};
+use super::finding::Finding;
+use super::halt::Halt;
+use crate::link::Dialogue;
+
+/// Between two looks, ms of the board's time.
+const LOOK_MS: u32 = 100;
+/// How long the board looks out for what the user was asked to do, in looks.
+const LOOKS: usize = 600;
+/// Encoders that move by more than this between two looks are not still.
+const STILL_COUNTS: u32 = 3;
+
+/// A board on the link.
+pub(super) struct Board<'d, 't> {
+    dialogue: &'d mut Dialogue<'t>,
+}
+
+impl<'d, 't> Board<'d, 't> {
+    /// The board at the other end of a dialogue.
+    pub(super) fn new(dialogue: &'d mut Dialogue<'t>) -> Self {
+        Self { dialogue }
+    }
+
+    /// How it introduced itself.
+    #[must_use]
+    pub(super) fn device(&self) -> &DeviceHello {
+        self.dialogue.device()
+    }
+
+    /// The record in force.
+    ///
+    /// # Errors
+    /// [`Halt::Link`].
+    pub(super) fn calibration(&mut self) -> Result<Option<Calibration>, Halt> {
+        Ok(self.dialogue.calibration()?)
+    }
+
+    /// Looks at it after a moment; tells `on` of each sample, and sends the flat tiles
+    /// that it asks for.
+    ///
+    /// # Errors
+    /// [`Halt::Link`].
+    pub(super) fn look_with(&mut self, on: &mut dyn FnMut(&Sample)) -> Result<Status, Halt> {
+        let passed = self.dialogue.pass(LOOK_MS, &mut |message| match message {
+            ToHost::Need { epoch, key } => Some(ToDevice::Tile(TileMessage {
+                epoch: *epoch,
+                key: *key,
+                heights: Heights::Flat {
+                    base: 0,
+                    height: 0.0,
+                },
+            })),
+            ToHost::Telemetry(telemetry) => {
+                telemetry.samples.iter().for_each(&mut *on);
+                None
+            }
+            _ => None,
+        });
+        Ok(passed?)
+    }
+
+    /// Looks at it after a moment.
+    ///
+    /// # Errors
+    /// [`Halt::Link`].
+    pub(super) fn look(&mut self) -> Result<Status, Halt> {
+        self.look_with(&mut |_| {})
+    }
+
+    /// Asks the attendant to do something and looks until the board sees it.
+    ///
+    /// # Errors
+    /// [`Finding::NotSeen`], [`Halt::Link`].
+    pub(super) fn see(
+        &mut self,
+        attendant: &mut dyn Attendant,
+        task: Task,
+        seen: impl Fn(&Status) -> bool,
+    ) -> Result<Status, Halt> {
+        attendant.begin(task);
+        for _ in 0..LOOKS {
+            let status = self.look()?;
+            if seen(&status) {
+                return Ok(status);
+            }
+        }
+        Err(Finding::NotSeen(task).into())
+    }
+
+    /// Looks until the encoders stand still; returns their counts.
+    ///
+    /// # Errors
+    /// [`Halt::Link`].
+    pub(super) fn still(&mut self, attendant: &mut dyn Attendant) -> Result<[i32; 3], Halt> {
+        let mut before = self.look()?.health.sense.counts;
+        for look in 0.. {
+            let now = self.look()?.health.sense.counts;
+            if (0..3).all(|i| now[i].abs_diff(before[i]) <= STILL_COUNTS) {
+                return Ok(now);
+            }
+            before = now;
+            if look == LOOKS / 10 {
+                attendant.hear("the arm moves: hold it still");
+            }
+        }
+        Ok(before)
+    }
+
+    /// Asks for something to be done.
+    ///
+    /// # Errors
+    /// [`Finding::NotReady`], [`Finding::Refused`], [`Halt::Link`].
+    pub(super) fn ask(&mut self, request: &Request) -> Result<(), Halt> {
+        match self.dialogue.request(request)? {
+            Ok(()) => Ok(()),
+            Err(Refusal::Blocked(why)) => Err(Finding::NotReady(why).into()),
+            Err(refusal) => Err(Finding::Refused(refusal).into()),
+        }
+    }
+
+    /// Puts a scene in force.
+    ///
+    /// # Errors
+    /// [`Halt::Link`].
+    pub(super) fn put(&mut self, scene: Scene) -> Result<(), Halt> {
+        Ok(self.dialogue.put_scene(scene)?)
+    }
+
+    /// Arms for the scene in force, with the attendant's press.
+    ///
+    /// # Errors
+    /// What blocks it, or a fault.
+    pub(super) fn arm(&mut self, attendant: &mut dyn Attendant) -> Result<(), Halt> {
+        self.ask(&Request::Arm)?;
+        let ends = |status: &Status| {
+            let report = &status.health.report;
+            report.mode == Mode::Armed || report.fault.is_some()
+        };
+        let status = self.see(attendant, Task::PressDeadMan, ends)?;
+        match status.health.report.fault {
+            Some(fault) => Err(Finding::Fault(fault).into()),
+            None => Ok(()),
+        }
+    }
+
+    /// Has the attendant do something that is to end in a fault, and clears the fault.
+    ///
+    /// # Errors
+    /// [`Finding::NotSeen`]; another fault.
+    pub(super) fn trips(
+        &mut self,
+        attendant: &mut dyn Attendant,
+        task: Task,
+        fault: Fault,
+    ) -> Result<(), Halt> {
+        let status = self.see(attendant, task, |s| s.health.report.fault.is_some())?;
+        match status.health.report.fault {
+            Some(found) if found != fault => Err(Finding::Fault(found).into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// Disarms, clears what the step has latched and drops its scene, whatever the
+    /// board says to that.
+    pub(super) fn leave(&mut self) {
+        for request in [Request::Disarm, Request::DropScene, Request::ClearFault] {
+            // The board may be gone; then nothing is left to be done.
+            let _ = self.dialogue.request(&request);
+        }
+    }
+}

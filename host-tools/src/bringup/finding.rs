@@ -1,0 +1,181 @@
+//! What a step finds wrong, by name, with what to do about it.
+
+use hapterra_core::guard::{Blockers, Fault};
+use hapterra_core::wire::request::Refusal;
+
+use super::attendant::Task;
+use crate::calibrate::FitError;
+
+/// Why a step is not passed. Axes and joints are counted from 1.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Finding {
+    /// The board has a fault.
+    #[error("the board has fault {} {:?}: {}", .0.number(), .0, .0.meaning())]
+    Fault(Fault),
+    /// The board finds something wrong with itself.
+    #[error("the board is not ready: {}", .0.meaning())]
+    NotReady(Blockers),
+    /// The board does not do what it is asked for.
+    #[error("the board refuses: {0}")]
+    Refused(Refusal),
+    /// What the user was to do was not seen.
+    #[error("the board did not see it: {0}")]
+    NotSeen(Task),
+    /// The enable line is not low.
+    #[error("the enable line is at {0:.2} V where it has to be low")]
+    EnableHigh(f64),
+    /// An output is not where it is held.
+    #[error("output {axis} is at {found} {unit} where {expected} {unit} is expected")]
+    Output {
+        /// Which.
+        axis: usize,
+        /// What was measured.
+        found: f64,
+        /// What it should be.
+        expected: f64,
+        /// In which unit.
+        unit: &'static str,
+    },
+    /// No encoder counted where a joint was turned.
+    #[error("the encoder of joint {joint} is dead: it went {counts} counts while the joint turned")]
+    DeadEncoder {
+        /// The joint.
+        joint: usize,
+        /// What it counted.
+        counts: i32,
+    },
+    /// Another encoder counted.
+    #[error("encoders are swapped: joint {joint} turned and encoder {encoder} counted")]
+    SwappedEncoders {
+        /// The joint that was turned.
+        joint: usize,
+        /// The encoder that counted.
+        encoder: usize,
+    },
+    /// An encoder did not come back to where it was.
+    #[error("the encoder of joint {joint} loses counts: {there} there, {back} back")]
+    CountsLost {
+        /// The joint.
+        joint: usize,
+        /// Counts on the way there.
+        there: i32,
+        /// Counts on the way back.
+        back: i32,
+    },
+    /// There is no record on the board.
+    #[error("the board holds no stored calibration")]
+    NoCalibration,
+    /// The ruler's moves fit no record.
+    #[error(transparent)]
+    Ruler(#[from] FitError),
+    /// An encoder's direction is not the record's.
+    #[error(
+        "the encoder sign of joint {joint} is inverted: the record says {record:+}, the ruler the opposite"
+    )]
+    InvertedEncoder {
+        /// The joint.
+        joint: usize,
+        /// The record's sign.
+        record: i8,
+    },
+    /// A cable ratio is not the record's.
+    #[error(
+        "the ratio of joint {joint} is wrong: {record:.2} in the record, {found:.2} by the ruler"
+    )]
+    WrongRatio {
+        /// The joint.
+        joint: usize,
+        /// The record's.
+        record: f64,
+        /// What the ruler says.
+        found: f64,
+    },
+    /// A motor turned another joint than its own.
+    #[error("motors are swapped: command {motor} turns joint {joint}")]
+    SwappedMotors {
+        /// The command.
+        motor: usize,
+        /// The joint that moved.
+        joint: usize,
+    },
+    /// A motor turned its joint the other way.
+    #[error(
+        "the sign of motor {motor} is inverted: it turns its joint the other way than the record says"
+    )]
+    InvertedMotor {
+        /// The motor.
+        motor: usize,
+        /// The sign that is right.
+        right: i8,
+    },
+    /// A motor does not push.
+    #[error("motor {motor} does not push: no joint moved at {current_a:.2} A")]
+    NoPush {
+        /// The motor.
+        motor: usize,
+        /// The current, A.
+        current_a: f32,
+    },
+    /// It cannot be told from the hand's own motion which way a motor turns.
+    #[error("it cannot be told which way motor {motor} turns: the hand moved more than the motor")]
+    Unclear {
+        /// The motor.
+        motor: usize,
+    },
+    /// A motor's torque is far from the record's.
+    #[error("motor {motor} makes {found:.4} Nm for an ampere where the record says {record:.4}")]
+    WrongTorque {
+        /// The motor.
+        motor: usize,
+        /// By the scale, Nm/A of the motor.
+        found: f64,
+        /// The record's.
+        record: f64,
+    },
+    /// The arm does not stay where it is left.
+    #[error("the arm drifts: {mm:.0} mm within {seconds:.1} s after it was let go")]
+    Drifts {
+        /// How far, mm.
+        mm: f64,
+        /// In which time, s.
+        seconds: f64,
+    },
+    /// The floor does not push, or not up.
+    #[error("the floor does not push the tip back")]
+    NoFloor,
+}
+
+impl Finding {
+    /// What to do, in the imperative.
+    #[must_use]
+    pub fn what_to_do(&self) -> String {
+        match self {
+            Self::Fault(fault) => return fault.what_to_do().into(),
+            Self::InvertedMotor { motor, right } => {
+                return format!(
+                    "exchange the motor's two wires, or type: hapterra calibrate --no-walk --set motor-sign-{motor}={right}"
+                );
+            }
+            Self::WrongTorque { .. } => {
+                "check the amplifier's full scale against the board's page, then the torque constant of the motor's data sheet"
+            }
+            Self::NotReady(_) | Self::Refused(_) => "look at hapterra status",
+            Self::NotSeen(_) => "check the switch's wires against the board's page",
+            Self::EnableHigh(_) => "add the pull-down at the amplifiers; go no further before it is low",
+            Self::Output { .. } => "check the output's wire and its offset stage; no amplifier is switched on before it is right",
+            Self::DeadEncoder { .. } => "check the encoder's supply, both its channels, and its plug",
+            Self::SwappedEncoders { .. } => "exchange the two encoders' wires",
+            Self::CountsLost { .. } => "check the encoder's level shifter, its shield and its ground",
+            Self::NoCalibration | Self::InvertedEncoder { .. } | Self::WrongRatio { .. } => {
+                "calibrate the arm: hapterra calibrate"
+            }
+            Self::Ruler(_) => "measure again, along the ruler; if it stays so, calibrate: hapterra calibrate",
+            Self::SwappedMotors { .. } => "exchange the two motors' plugs, or the two commands",
+            Self::NoPush { .. } => "check that the amplifier is there, has power and its enable, then fuse and motor cable",
+            Self::Unclear { .. } => "hold the tip more loosely and as still as you can, and try again",
+            Self::Drifts { .. } => "measure the arm's weight again: hapterra calibrate --skip-ratios",
+            Self::NoFloor => "report it with the log; do not go on to terrain",
+        }
+        .into()
+    }
+}

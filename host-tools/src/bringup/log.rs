@@ -1,0 +1,272 @@
+//! The log of a first power-up: what was passed on which board, with which record.
+//! It is kept as TOML, and what is in it no longer counts where the board, its firmware
+//! or its calibration is another one.
+
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use etcetera::{AppStrategy, AppStrategyArgs, choose_app_strategy};
+use hapterra_core::phantom::{Calibration, RECORD_BYTES};
+use hapterra_core::wire::hello::DeviceHello;
+use serde::{Deserialize, Serialize};
+
+use super::step::Step;
+use crate::output::{Output, OutputError};
+
+/// Which board, and which record in it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
+    /// The board's name.
+    pub board: String,
+    /// Its firmware's version.
+    pub firmware: String,
+    /// Ticks a second of its image.
+    pub tick_hz: u32,
+    /// CRC-32 of the calibration record in force, in hexadecimal digits; empty where
+    /// there is none.
+    pub calibration: String,
+}
+
+impl Identity {
+    /// Of a device and the record in force on it.
+    #[must_use]
+    pub fn of(device: &DeviceHello, record: Option<&Calibration>) -> Self {
+        Self {
+            board: device.board.to_string(),
+            firmware: device.version.to_string(),
+            tick_hz: device.tick_hz,
+            calibration: record.map_or(String::new(), fingerprint),
+        }
+    }
+}
+
+/// The check sum that a record ends with.
+fn fingerprint(record: &Calibration) -> String {
+    let mut buffer = [0; RECORD_BYTES];
+    let sum = record.encode(&mut buffer).last_chunk::<4>();
+    let sum = u32::from_le_bytes(*sum.unwrap_or(&[0; 4]));
+    format!("{sum:08x}")
+}
+
+/// What became of a step.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Entry {
+    /// Which step.
+    pub step: Step,
+    /// Whether it was passed.
+    pub passed: bool,
+    /// When, UTC.
+    pub at: String,
+    /// What was measured, or what was wrong.
+    pub result: String,
+}
+
+/// The log of one board.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Log {
+    /// The board and record that it is about.
+    #[serde(flatten)]
+    pub identity: Identity,
+    /// The steps so far, in order, each once.
+    #[serde(default, rename = "entry")]
+    pub entries: Vec<Entry>,
+}
+
+/// Why a log cannot be kept.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// There is no home folder to keep it in.
+    #[error("there is no folder to keep the log in: {0}")]
+    NoHome(#[from] etcetera::HomeDirError),
+    /// It cannot be read.
+    #[error("cannot read the log {path}: {source}")]
+    Unreadable {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// It is no log.
+    #[error("{path} is no log of a first power-up: {source}")]
+    NoLog {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: Box<toml::de::Error>,
+    },
+    /// It cannot be put into words.
+    #[error("the log cannot be written: {0}")]
+    Unwritable(#[from] toml::ser::Error),
+    /// It cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+impl Log {
+    /// Where the log of a board is kept, in the user's data folder.
+    ///
+    /// # Errors
+    /// [`LogError::NoHome`].
+    pub fn place(board: &str) -> Result<PathBuf, LogError> {
+        let strategy = choose_app_strategy(AppStrategyArgs {
+            app_name: "hapterra".into(),
+            ..AppStrategyArgs::default()
+        })?;
+        // A board's name comes over the link: it names no other folder.
+        let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
+        let name: String = board.chars().map(plain).collect();
+        Ok(strategy.in_data_dir(format!("bringup/{name}.toml")))
+    }
+
+    /// Reads a log; an empty one where there is none yet.
+    ///
+    /// # Errors
+    /// [`LogError::Unreadable`], [`LogError::NoLog`].
+    pub fn read(path: &Path) -> Result<Self, LogError> {
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
+            Err(source) => {
+                let path = path.to_owned();
+                return Err(LogError::Unreadable { path, source });
+            }
+        };
+        toml::from_str(&text).map_err(|source| LogError::NoLog {
+            path: path.to_owned(),
+            source: Box::new(source),
+        })
+    }
+
+    /// Writes the log as a whole: it is the old one or the new one.
+    ///
+    /// # Errors
+    /// [`LogError::Unwritable`], [`LogError::Output`].
+    pub fn write(&self, path: &Path) -> Result<(), LogError> {
+        let text = toml::to_string(self)?;
+        let failed = |source| OutputError {
+            path: path.to_owned(),
+            source,
+        };
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder).map_err(failed)?;
+        }
+        let mut output = Output::create(path)?;
+        output.write_all(text.as_bytes()).map_err(failed)?;
+        Ok(output.finish()?)
+    }
+
+    /// Takes the board and record as they are now, and forgets what was found of others:
+    /// everything of another board or firmware, and what depends on the calibration of
+    /// another record. Returns why something was forgotten.
+    pub fn meet(&mut self, now: Identity) -> Option<&'static str> {
+        let was = std::mem::replace(&mut self.identity, now);
+        let before = self.entries.len();
+        let now = &self.identity;
+        let why = if (&was.board, &was.firmware, was.tick_hz)
+            != (&now.board, &now.firmware, now.tick_hz)
+        {
+            self.entries.clear();
+            "the board or its firmware is another one"
+        } else if was.calibration != now.calibration {
+            self.entries
+                .retain(|entry| !entry.step.depends_on_calibration());
+            "the calibration is another one"
+        } else {
+            return None;
+        };
+        (self.entries.len() < before).then_some(why)
+    }
+
+    /// The first step that is not passed; none where the log is complete.
+    #[must_use]
+    pub fn next(&self) -> Option<Step> {
+        let passed = |step: &Step| self.entries.iter().any(|e| e.step == *step && e.passed);
+        Step::ALL.into_iter().find(|step| !passed(step))
+    }
+
+    /// Takes what became of a step. What comes after it is forgotten: it was not found
+    /// on what this step found.
+    pub fn take(&mut self, step: Step, passed: bool, result: String) {
+        self.entries.retain(|entry| entry.step < step);
+        self.entries.push(Entry {
+            step,
+            passed,
+            at: jiff::Timestamp::now()
+                .strftime("%Y-%m-%dT%H:%M:%SZ")
+                .to_string(),
+            result,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn identity(calibration: &str) -> Identity {
+        Identity {
+            board: "nucleo-g474re".into(),
+            firmware: "0.1.0".into(),
+            tick_hz: 1000,
+            calibration: calibration.into(),
+        }
+    }
+
+    fn complete() -> Log {
+        let mut log = Log {
+            identity: identity("0badcafe"),
+            entries: vec![],
+        };
+        for step in Step::ALL {
+            assert_eq!(log.next(), Some(step));
+            log.take(step, true, format!("{step:?}: \"fine\""));
+        }
+        assert_eq!(log.next(), None);
+        log
+    }
+
+    #[test]
+    fn it_comes_back_from_its_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("new").join("board.toml");
+        assert_eq!(Log::read(&path).expect("none yet"), Log::default());
+        let log = complete();
+        log.write(&path).expect("written");
+        assert_eq!(Log::read(&path).expect("a log"), log);
+        std::fs::write(&path, "entry = 7").expect("written");
+        assert!(matches!(Log::read(&path), Err(LogError::NoLog { .. })));
+    }
+
+    #[test]
+    fn another_record_voids_what_depends_on_it_and_another_board_all() {
+        let mut log = complete();
+        assert_eq!(log.meet(identity("0badcafe")), None);
+        assert_eq!(log.next(), None);
+        assert!(log.meet(identity("deadbeef")).is_some());
+        assert_eq!(log.next(), Some(Step::Calibration));
+        let mut flashed = identity("deadbeef");
+        flashed.firmware = "0.2.0".into();
+        assert!(log.meet(flashed).is_some());
+        assert_eq!(log.next(), Some(Step::Board));
+    }
+
+    #[test]
+    fn a_step_gone_through_again_voids_what_came_after_it() {
+        let mut log = complete();
+        log.take(Step::Encoders, false, "dead".into());
+        assert_eq!(log.next(), Some(Step::Encoders));
+        log.take(Step::Encoders, true, "alive".into());
+        assert_eq!(log.next(), Some(Step::Calibration));
+    }
+
+    #[test]
+    fn records_have_fingerprints() {
+        let one = fingerprint(&Calibration::PREMIUM_1_5);
+        let mut other = Calibration::PREMIUM_1_5;
+        other.motor_sign.y = -1.0;
+        assert_eq!(one.len(), 8);
+        assert_ne!(one, fingerprint(&other));
+        let place = Log::place("../evil/board").expect("a home");
+        assert!(place.ends_with("bringup/---evil-board.toml"), "{place:?}");
+    }
+}

@@ -1,0 +1,34 @@
+//! The first power-up of a board and its arm, step by step, none of them skipped.
+//!
+//! ```text
+//! Step (in order) ─▶ steps/ ─ asks ─▶ Attendant (a terminal, or a VirtualUser)
+//!                       │     looks, asks ─▶ Board (over the link)
+//!                       ▼
+//!           result, or a Finding that names what is wrong ─▶ Log (TOML)
+//! ```
+//!
+//! The motors are first driven by a *jog*: one at a time, with a quarter of the current
+//! that it can bear for ever, while no joint may move faster than
+//! [`JOG_FAST_RAD_S`](hapterra_core::guard::JOG_FAST_RAD_S) or farther than
+//! [`JOG_FAR_RAD`](hapterra_core::guard::JOG_FAR_RAD). There is nothing to feel before
+//! each motor's joint, sign and torque are known.
+
+mod attendant;
+mod board;
+mod finding;
+mod halt;
+mod log;
+mod step;
+mod steps;
+mod virtual_bench;
+mod virtual_user;
+mod walk;
+
+pub use attendant::{Attendant, BoardIs, Question, Reading, Stopped, Task};
+pub use finding::Finding;
+pub use halt::Halt;
+pub use log::{Entry, Identity, Log, LogError};
+pub use step::Step;
+pub use virtual_bench::VirtualBench;
+pub use virtual_user::VirtualUser;
+pub use walk::{BringupError, Walked, walk};

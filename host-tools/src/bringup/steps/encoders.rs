@@ -1,0 +1,92 @@
+//! The encoders: each joint is moved by hand, there and back.
+
+use super::{Board, Halt};
+use crate::bringup::attendant::{Attendant, Task};
+use crate::bringup::finding::Finding;
+use crate::calibrate::Direction;
+
+/// How far the tip is to be moved, mm.
+const ABOUT_MM: u16 = 80;
+/// An encoder whose joint was moved that far has counted more than this.
+const ALIVE_COUNTS: u32 = 400;
+/// There and back may differ by this share: a hand does not find the zero pose again
+/// any better.
+const LOST_SHARE: f64 = 0.1;
+
+/// Has the tip moved right, up and towards the user, and back.
+pub(super) fn by_hand(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+) -> Result<String, Halt> {
+    attendant.finish(Task::ZeroPose)?;
+    let mut from = board.still(attendant)?;
+    let mut told = Vec::new();
+    for (joint, direction) in Direction::ALL.into_iter().enumerate() {
+        attendant.finish(Task::MoveAlong(direction, ABOUT_MM))?;
+        let to = board.still(attendant)?;
+        attendant.finish(Task::ZeroPose)?;
+        let again = board.still(attendant)?;
+        let (there, back) = (moved(from, to), moved(to, again));
+        judge(joint, there, back)?;
+        told.push(format!("joint {}: {:+} counts", joint + 1, there[joint]));
+        from = again;
+    }
+    Ok(told.join(", "))
+}
+
+fn moved(from: [i32; 3], to: [i32; 3]) -> [i32; 3] {
+    std::array::from_fn(|i| to[i].wrapping_sub(from[i]))
+}
+
+/// What is wrong with the encoder of the joint (0 to 2) that was moved.
+fn judge(joint: usize, there: [i32; 3], back: [i32; 3]) -> Result<(), Finding> {
+    let most = (0..3).max_by_key(|i| there[*i].unsigned_abs());
+    let most = most.unwrap_or(joint);
+    let counts = there[joint];
+    let alive = counts.unsigned_abs() > ALIVE_COUNTS / 10;
+    if most != joint && alive && there[most].unsigned_abs() > ALIVE_COUNTS {
+        return Err(Finding::SwappedEncoders {
+            joint: joint + 1,
+            encoder: most + 1,
+        });
+    }
+    // One that stands still is dead, whatever else moves along.
+    if counts.unsigned_abs() <= ALIVE_COUNTS {
+        return Err(Finding::DeadEncoder {
+            joint: joint + 1,
+            counts,
+        });
+    }
+    let off = f64::from(counts + back[joint]).abs();
+    if off > LOST_SHARE * f64::from(counts).abs() {
+        return Err(Finding::CountsLost {
+            joint: joint + 1,
+            there: counts,
+            back: back[joint],
+        });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_mistake_has_its_name() {
+        let back = |there: [i32; 3]| there.map(|counts| -counts);
+        let judge_one = |there| judge(1, there, back(there));
+        assert_eq!(judge_one([40, 2_800, 700]), Ok(()));
+        assert_eq!(judge_one([40, -2_800, 700]), Ok(()));
+        let dead = |counts| Err(Finding::DeadEncoder { joint: 2, counts });
+        assert_eq!(judge_one([0, 0, 0]), dead(0));
+        assert_eq!(judge_one([40, 1, 700]), dead(1));
+        let swapped = Finding::SwappedEncoders {
+            joint: 2,
+            encoder: 3,
+        };
+        assert_eq!(judge_one([40, 700, 2_800]), Err(swapped));
+        let lost = judge(1, [40, 2_800, 700], [-40, -2_000, -700]);
+        assert!(matches!(lost, Err(Finding::CountsLost { joint: 2, .. })));
+    }
+}

@@ -1,0 +1,94 @@
+//! The steps, one file for what is done alike.
+
+mod encoders;
+mod gravity;
+mod motors;
+mod outputs;
+mod plane;
+mod ruler;
+mod switches;
+mod touch;
+
+use hapterra_core::guard::{Blockers, Mode};
+use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::request::Request;
+use hapterra_core::wire::status::CalibrationSource;
+
+use super::attendant::{Attendant, Task};
+use super::board::Board;
+use super::finding::Finding;
+use super::halt::Halt;
+use super::step::Step;
+
+/// Goes through one step. Returns what the log keeps of it.
+///
+/// # Errors
+/// [`Halt`].
+pub(super) fn go(
+    step: Step,
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+) -> Result<String, Halt> {
+    if let Some(how) = step.wiring() {
+        attendant.finish(Task::Wire(how))?;
+    }
+    match step {
+        Step::Board => answers(board),
+        Step::Switches => switches::both_positions(board, attendant),
+        Step::EnableLine => outputs::enable_line(attendant),
+        Step::Outputs => outputs::held(board, attendant),
+        Step::Encoders => encoders::by_hand(board, attendant),
+        Step::Calibration => ruler::check(board, attendant),
+        Step::Motor1 => motors::jogged(board, attendant, 0),
+        Step::Motor2 => motors::jogged(board, attendant, 1),
+        Step::Motor3 => motors::jogged(board, attendant, 2),
+        Step::Gravity => gravity::carried(board, attendant),
+        Step::FirstTouch => touch::soft_plane(board, attendant),
+    }
+}
+
+/// The board answers, is disarmed, and finds nothing wrong with itself.
+fn answers(board: &mut Board<'_, '_>) -> Result<String, Halt> {
+    let status = board.look()?;
+    let report = status.health.report;
+    if let Some(fault) = report.fault {
+        return Err(Finding::Fault(fault).into());
+    }
+    let own = Blockers::HARDWARE | Blockers::WATCHDOG_NOT_LIVE;
+    let wrong = report.blockers & own;
+    if !wrong.is_empty() || report.mode != Mode::Disarmed {
+        return Err(Finding::NotReady(wrong).into());
+    }
+    let device = &status.device;
+    Ok(format!(
+        "{} with firmware {}, {} ticks a second, disarmed",
+        device.board, device.version, device.tick_hz
+    ))
+}
+
+/// The record that the board holds in its memory.
+fn stored_record(board: &mut Board<'_, '_>) -> Result<Calibration, Halt> {
+    let source = board.look()?.calibration;
+    match board.calibration()? {
+        Some(record) if source == CalibrationSource::Stored => Ok(record),
+        _ => Err(Finding::NoCalibration.into()),
+    }
+}
+
+/// The record, with the arm zeroed; where it is not, the attendant puts it into its zero
+/// pose.
+fn zeroed(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<Calibration, Halt> {
+    let record = stored_record(board)?;
+    if board.look()?.health.zero.is_none() {
+        zero(board, attendant)?;
+    }
+    Ok(record)
+}
+
+/// Has the arm put into its zero pose and tells the board. Returns the counts there.
+fn zero(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<[i32; 3], Halt> {
+    attendant.finish(Task::ZeroPose)?;
+    let counts = board.still(attendant)?;
+    board.ask(&Request::Zero { counts })?;
+    Ok(counts)
+}

@@ -1,0 +1,231 @@
+//! One motor at a time, jogged: which joint it turns, which way, and how strongly.
+
+use glam::{DVec3, Vec3};
+use hapterra_core::guard::{Fault, JOG_SHARE, Jog};
+use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::request::Request;
+use hapterra_core::wire::status::Status;
+
+use super::{Board, Halt};
+use crate::bringup::attendant::{Attendant, Reading, Task};
+use crate::bringup::finding::Finding;
+use crate::calibrate::N_PER_GRAM;
+
+/// How long the current stays, ms, to see which way the joint gives.
+const GIVE_MS: u16 = 500;
+/// How long it stays to be read off a scale, ms.
+const SCALE_MS: u16 = 3_000;
+/// A joint has moved by this much under a jog, rad: 0.3 mm at the tip of a Premium 1.5,
+/// a third of what a relaxed hand gives under it.
+const MOVED_RAD: f64 = 0.001_5;
+/// So often it is tried to tell the motor's motion from the hand's.
+const TRIES: usize = 3;
+/// By this factor the torque may differ from the record's either way. The scale is read
+/// against the joint's friction, about an eighth of a jog's torque on a Premium 1.5, and
+/// no scale is hooked on quite straight: this is the order of magnitude and no more.
+const TORQUE_FACTOR: f64 = 1.6;
+
+/// Finds joint, sign and torque constant of a motor (0 to 2).
+pub(super) fn jogged(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+    axis: usize,
+) -> Result<String, Halt> {
+    let record = super::zeroed(board, attendant)?;
+    let sign = find_sign(board, attendant, &record, axis)?;
+    let found = find_torque(board, attendant, &record, axis)?;
+    let said = f64::from(record.torque_constant[axis]);
+    Ok(format!(
+        "turns joint {} the right way ({sign:+} in the record); {found:.4} Nm/A by the scale, {said:.4} in the record",
+        axis + 1
+    ))
+}
+
+/// The current of a jog, A.
+fn current_a(record: &Calibration, axis: usize) -> f32 {
+    JOG_SHARE * record.continuous_current_a[axis]
+}
+
+/// Jogs both ways while the tip is held loosely.
+fn find_sign(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+    record: &Calibration,
+    axis: usize,
+) -> Result<i8, Halt> {
+    let current_a = current_a(record, axis);
+    let mut judged = Err(Finding::Unclear { motor: axis + 1 });
+    for _ in 0..TRIES {
+        attendant.finish(Task::HoldLoosely)?;
+        board.still(attendant)?;
+        // What a fault tells here is told by where the joints went.
+        let mut gave = |current_a| jog(board, attendant, (axis, current_a, GIVE_MS), false);
+        let (plus, minus) = (gave(current_a)?.0, gave(-current_a)?.0);
+        judged = judge_sign(record, axis, plus, minus);
+        if !matches!(judged, Err(Finding::Unclear { .. })) {
+            break;
+        }
+    }
+    Ok(judged?)
+}
+
+/// Has the attendant press the switch for a jog, and follows it to its end. Returns how
+/// far the joints gave, rad, and the jog's own fault that ended it.
+fn jog(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+    (axis, current_a, hold_ms): (usize, f32, u16),
+    on_scale: bool,
+) -> Result<(DVec3, Option<Fault>), Halt> {
+    let axis = axis as u8; // 0 to 2
+    board.ask(&Request::Jog(Jog {
+        axis,
+        current_a,
+        hold_ms,
+    }))?;
+    let angles = |status: &Status| status.health.angles_rad.as_dvec3();
+    let began = |status: &Status| {
+        let report = &status.health.report;
+        report.mode.drives() || report.fault.is_some()
+    };
+    let first = board.see(attendant, Task::PressDeadMan, began)?;
+    let (from, mut driven, mut now, mut told) = (angles(&first), first.clone(), first, false);
+    while now.health.report.mode.drives() {
+        let full = now.health.currents_a.abs().max_element() > 0.99 * current_a.abs();
+        if on_scale && full && !told {
+            attendant.begin(Task::LookAtScale);
+            told = true;
+        }
+        driven = now;
+        now = board.look()?;
+    }
+    board.see(attendant, Task::ReleaseDeadMan, |s| {
+        !s.health.sense.dead_man
+    })?;
+    let fault = now.health.report.fault;
+    if let Some(fault) = fault {
+        let (number, meaning) = (fault.number(), fault.meaning());
+        attendant.hear(&format!("  the jog ended with fault {number}: {meaning}"));
+    }
+    // A joint that was held springs back when the current is gone; one that ran away
+    // does not.
+    let at = match fault {
+        None | Some(Fault::NoMotion) => driven,
+        Some(Fault::JogRanAway) => now,
+        Some(fault) => return Err(Finding::Fault(fault).into()),
+    };
+    if fault.is_some() {
+        board.ask(&Request::ClearFault)?;
+    }
+    Ok((angles(&at) - from, fault))
+}
+
+/// Which way the motor turns, given how far the joints gave under a positive and a
+/// negative current, rad.
+fn judge_sign(record: &Calibration, axis: usize, plus: DVec3, minus: DVec3) -> Result<i8, Finding> {
+    let (by_motor, by_hand) = (0.5 * (plus - minus), 0.5 * (plus + minus));
+    let joint = by_motor.abs().max_position();
+    let motor = axis + 1;
+    if by_motor[joint].abs() < MOVED_RAD {
+        return match by_hand.abs().max_element() < 10.0 * MOVED_RAD {
+            true => Err(Finding::NoPush {
+                motor,
+                current_a: current_a(record, axis),
+            }),
+            false => Err(Finding::Unclear { motor }),
+        };
+    }
+    if by_hand[joint].abs() > by_motor[joint].abs() {
+        return Err(Finding::Unclear { motor });
+    }
+    if joint != axis {
+        return Err(Finding::SwappedMotors {
+            motor,
+            joint: joint + 1,
+        });
+    }
+    let right = by_motor[joint].signum();
+    match right == f64::from(record.motor_sign[axis]) {
+        true => Ok(right as i8),
+        false => Err(Finding::InvertedMotor {
+            motor,
+            right: right as i8,
+        }),
+    }
+}
+
+/// Jogs towards larger angles while a spring scale holds the tip. Returns the motor's
+/// torque constant by the scale, Nm/A.
+fn find_torque(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+    record: &Calibration,
+    axis: usize,
+) -> Result<f64, Halt> {
+    let current_a = current_a(record, axis) * record.motor_sign[axis];
+    attendant.finish(Task::HoldWithScale(axis))?;
+    board.still(attendant)?;
+    let rest = attendant.read(Reading::ScaleGrams { pushed: false })?;
+    if let (_, Some(fault)) = jog(board, attendant, (axis, current_a, SCALE_MS), true)? {
+        return Err(Finding::Fault(fault).into());
+    }
+    let pushed = attendant.read(Reading::ScaleGrams { pushed: true })?;
+    let torque_nm = (pushed - rest) * N_PER_GRAM * 1e-3 * lever_mm(record, axis);
+    let found = torque_nm / f64::from(current_a.abs() * record.ratio[axis]);
+    let said = f64::from(record.torque_constant[axis]);
+    match (said / TORQUE_FACTOR..said * TORQUE_FACTOR).contains(&found) {
+        true => Ok(found),
+        false => Err(Finding::WrongTorque {
+            motor: axis + 1,
+            found,
+            record: said,
+        }
+        .into()),
+    }
+}
+
+/// How far the tip is from a joint's axis in the zero pose, mm.
+fn lever_mm(record: &Calibration, axis: usize) -> f64 {
+    let arm = crate::calibrate::Arm::of(record);
+    let tip = |q: DVec3| arm.tip_mm(q);
+    let turn = Vec3::AXES[axis].as_dvec3() * 1e-6;
+    (tip(arm.zero_rad + turn) - tip(arm.zero_rad)).length() / 1e-6
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RECORD: Calibration = Calibration::PREMIUM_1_5;
+
+    fn judge(plus: [f64; 3], minus: [f64; 3]) -> Result<i8, Finding> {
+        judge_sign(&RECORD, 1, DVec3::from(plus), DVec3::from(minus))
+    }
+
+    #[test]
+    fn each_mistake_has_its_name() {
+        assert_eq!(judge([0.0, 0.006, 0.001], [0.0, -0.005, -0.001]), Ok(1));
+        let right = -1;
+        let inverted = Err(Finding::InvertedMotor { motor: 2, right });
+        assert_eq!(judge([0.0, -0.006, 0.0], [0.0, 0.006, 0.0]), inverted);
+        let swapped = Err(Finding::SwappedMotors { motor: 2, joint: 3 });
+        assert_eq!(judge([0.0, 0.001, -0.007], [0.0, 0.0, 0.007]), swapped);
+        let none = judge([0.0, 0.000_1, 0.0], [0.000_1, 0.0, 0.0]);
+        assert!(matches!(none, Err(Finding::NoPush { motor: 2, .. })));
+    }
+
+    #[test]
+    fn a_hand_that_moves_more_than_the_motor_is_not_taken_for_it() {
+        let unclear = Err(Finding::Unclear { motor: 2 });
+        assert_eq!(judge([0.0, 0.03, 0.0], [0.0, 0.02, 0.0]), unclear);
+        assert_eq!(judge([0.02, 0.0, 0.0], [0.02, 0.0, 0.0]), unclear);
+    }
+
+    #[test]
+    fn levers_of_the_zero_pose() {
+        let levers = [0, 1, 2].map(|axis| lever_mm(&RECORD, axis));
+        for (lever, link) in levers.into_iter().zip([209.55, 209.55, 169.545]) {
+            assert!((lever - link).abs() < 1e-3, "{lever} {link}");
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! A flat plane under the arm, without a terrain file.
+
+use glam::{DVec3, Vec3};
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::phantom::{Calibration, to_terrain_frame};
+use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::terrain::FieldSize;
+use hapterra_core::wire::status::Status;
+
+use crate::calibrate::Arm;
+
+/// Size of a cell, mm.
+const CELL_MM: f32 = 8.0;
+/// Cells along a side: half a metre, with the arm's zero pose over its middle.
+const CELLS: i32 = 64;
+
+/// Softest stiffness that can be felt, N/mm, and the most that the plane may push, N.
+pub(super) const SOFT: ForceLaw = ForceLaw {
+    stiffness_n_per_mm: 0.05,
+    max_force_n: 0.5,
+};
+
+/// A plane that lies `below_mm` under the tip as it is now.
+pub(super) fn below_tip(record: &Calibration, status: &Status, below_mm: f32) -> Scene {
+    let tip_mm = tip_mm(record, status) - Arm::of(record).tip_mm(DVec3::ZERO);
+    let up_mm = to_terrain_frame(tip_mm.as_vec3()).z;
+    let middle = CELLS / 2;
+    Scene {
+        // Another one than the last, whatever that was.
+        epoch: status.ticks.run | 1,
+        level: 0,
+        size: FieldSize::new(CELLS, CELLS),
+        top: 1,
+        cell_mm: CELL_MM,
+        home: GridPoint::new(
+            [middle, middle, 0],
+            Vec3::Z * ((below_mm - up_mm) / CELL_MM),
+        ),
+        law: SOFT,
+        rule: Rule::default(),
+        source: Source::Encoders,
+        hold_clock: false,
+    }
+}
+
+/// The tip by the encoders, mm, device frame.
+pub(super) fn tip_mm(record: &Calibration, status: &Status) -> DVec3 {
+    Arm::of(record).tip_mm(status.health.angles_rad.as_dvec3())
+}
+
+/// How deep the HIP is below the proxy, mm.
+pub(super) fn depth_mm(sample: &Sample) -> f32 {
+    let up = |point: GridPoint| point.cell()[2] as f32 + point.frac().z;
+    (up(sample.proxy) - up(sample.hip)) * CELL_MM
+}

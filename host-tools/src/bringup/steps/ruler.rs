@@ -1,0 +1,68 @@
+//! The record against a ruler: zero pose, ratios and signs.
+
+use hapterra_core::phantom::Calibration;
+
+use super::{Board, Halt};
+use crate::bringup::attendant::{Attendant, Reading, Task};
+use crate::bringup::finding::Finding;
+use crate::calibrate::{Check, Direction, RatioFit, fit_ratios};
+
+/// How far the tip is to be moved, mm.
+const ABOUT_MM: u16 = 80;
+/// By this share a ratio may differ from the ruler's: one read to a millimetre gives it
+/// to two per cent.
+const RATIO_SHARE: f64 = 0.05;
+
+/// Zeroes the arm and holds the record against a ruler.
+pub(super) fn check(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+) -> Result<String, Halt> {
+    let record = super::stored_record(board)?;
+    let zero = super::zero(board, attendant)?;
+    let since_zero = |counts: [i32; 3]| std::array::from_fn(|i| counts[i].wrapping_sub(zero[i]));
+    let mut checks = Vec::new();
+    for direction in Direction::ALL {
+        let from = since_zero(board.still(attendant)?);
+        attendant.finish(Task::MoveAlong(direction, ABOUT_MM))?;
+        let to = since_zero(board.still(attendant)?);
+        let mm = attendant.read(Reading::MovedMm(direction, ABOUT_MM))?;
+        checks.push(Check {
+            from,
+            to,
+            direction,
+            mm,
+        });
+        attendant.finish(Task::ZeroPose)?;
+    }
+    board.still(attendant)?;
+    let fit = fit_ratios(&record, &checks).map_err(Finding::Ruler)?;
+    judge(&record, &fit)?;
+    let found = fit.ratio;
+    Ok(format!(
+        "ratios {:.2} {:.2} {:.2} by the ruler, {:.2} {:.2} {:.2} in the record",
+        found.x, found.y, found.z, record.ratio.x, record.ratio.y, record.ratio.z
+    ))
+}
+
+/// What of the record is not as the ruler says.
+fn judge(record: &Calibration, fit: &RatioFit) -> Result<(), Finding> {
+    for joint in 0..3 {
+        let sign = record.encoder_sign[joint];
+        if f64::from(sign) != fit.sign[joint] {
+            return Err(Finding::InvertedEncoder {
+                joint: joint + 1,
+                record: sign as i8,
+            });
+        }
+        let (record, found) = (f64::from(record.ratio[joint]), fit.ratio[joint]);
+        if (found / record - 1.0).abs() > RATIO_SHARE {
+            return Err(Finding::WrongRatio {
+                joint: joint + 1,
+                record,
+                found,
+            });
+        }
+    }
+    Ok(())
+}

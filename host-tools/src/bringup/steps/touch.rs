@@ -1,0 +1,107 @@
+//! The first touch: a soft plane that pushes with half a newton at most.
+
+use hapterra_core::guard::Fault;
+use hapterra_core::scene::Sample;
+use hapterra_core::wire::request::Request;
+
+use super::{Board, Halt, plane};
+use crate::bringup::attendant::{Attendant, Question, Task};
+use crate::bringup::finding::Finding;
+
+/// So far below the tip the plane lies, mm.
+const BELOW_MM: f32 = 20.0;
+/// So deep the tip is to be pushed into it, mm.
+const DEEP_MM: f32 = 5.0;
+/// The tip rests while it comes less than this deeper in a look, mm.
+const STILL_MM: f32 = 0.1;
+/// So many looks (a tenth of a second each) that may take.
+const LOOKS: usize = 600;
+
+/// What was felt of the plane.
+#[derive(Default)]
+struct Felt {
+    /// Deepest HIP below the proxy, mm, and the force up there, N.
+    deepest: (f32, f32),
+    /// The largest force, N.
+    most_n: f32,
+    /// The latest force, N.
+    now_n: f32,
+    /// The deepest so far when the tip was looked at last, mm.
+    looked_mm: f32,
+}
+
+impl Felt {
+    fn take(&mut self, sample: &Sample) {
+        self.now_n = sample.force_n.length();
+        self.most_n = self.most_n.max(self.now_n);
+        let depth_mm = plane::depth_mm(sample);
+        if depth_mm > self.deepest.0 {
+            self.deepest = (depth_mm, sample.force_n.z);
+        }
+    }
+}
+
+/// Has the tip lowered into the plane and lifted again; then has the stop pressed.
+pub(super) fn soft_plane(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+) -> Result<String, Halt> {
+    let record = super::zeroed(board, attendant)?;
+    attendant.finish(Task::HoldLoosely)?;
+    board.still(attendant)?;
+    let status = board.look()?;
+    board.put(plane::below_tip(&record, &status, BELOW_MM))?;
+    board.arm(attendant)?;
+    let felt = touched(board, attendant)?;
+    let (deep_mm, up_n) = felt.deepest;
+    let law = plane::SOFT;
+    let expected_n = (law.stiffness_n_per_mm * deep_mm).min(law.max_force_n);
+    let pushed = (0.5 * expected_n..=1.1 * expected_n).contains(&up_n);
+    if !pushed || felt.most_n > 1.01 * law.max_force_n {
+        return Err(Finding::NoFloor.into());
+    }
+    if !attendant.confirms(Question::PushedBack)? {
+        return Err(Finding::NoFloor.into());
+    }
+    board.trips(attendant, Task::PressStop, Fault::EmergencyStop)?;
+    let released = |s: &hapterra_core::wire::status::Status| !s.health.sense.dead_man;
+    board.see(attendant, Task::ReleaseDeadMan, released)?;
+    board.see(attendant, Task::ReleaseStop, |s| {
+        !s.health.sense.emergency_stop
+    })?;
+    board.leave();
+    Ok(format!(
+        "{deep_mm:.1} mm deep the floor pushed up with {up_n:.2} N; the emergency stop gave fault 5"
+    ))
+}
+
+/// Whether a move has come to its end.
+type IsDone = fn(&Felt) -> bool;
+
+/// Lets the tip be lowered until it is deep enough, and lifted until nothing is felt.
+fn touched(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<Felt, Halt> {
+    let mut felt = Felt::default();
+    // Deep enough, and not on its way any more.
+    let deep =
+        |felt: &Felt| felt.deepest.0 >= DEEP_MM && felt.deepest.0 - felt.looked_mm < STILL_MM;
+    let free = |felt: &Felt| felt.now_n == 0.0;
+    let moves = [Task::LowerTip, Task::LiftTip];
+    for (task, done) in moves.into_iter().zip([deep as IsDone, free]) {
+        attendant.begin(task);
+        for look in 0.. {
+            let status = board.look_with(&mut |sample| felt.take(sample))?;
+            if let Some(fault) = status.health.report.fault {
+                return Err(Finding::Fault(fault).into());
+            }
+            if done(&felt) {
+                break;
+            }
+            felt.looked_mm = felt.deepest.0;
+            if look > LOOKS {
+                board.ask(&Request::Disarm)?;
+                return Err(Finding::NotSeen(task).into());
+            }
+        }
+    }
+    Ok(felt)
+}

@@ -1,0 +1,167 @@
+//! A user made of formulas, at a virtual bench.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use glam::DVec3;
+
+use super::attendant::{Attendant, BoardIs, Question, Reading, Stopped, Task};
+use super::virtual_bench::{Grip, VirtualBench};
+use crate::calibrate::Direction;
+use crate::link::Native;
+use crate::phantom::{PhantomModel, Wiring};
+use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::status::BootReport;
+use hapterra_firmware::native::StoppedClock;
+use hapterra_firmware::store::Stored;
+
+/// How far below the tip a hand aims that pushes into the soft plane, m.
+const PUSH_M: f64 = 0.035;
+/// The virtual user feels an upward push from this force on, N.
+const FELT_N: f64 = 0.1;
+/// So often the virtual device lets its host look around, ms.
+const LOOK_MS: u32 = 25;
+
+/// Does as it is told at a virtual bench, and reads off the truth.
+pub struct VirtualUser {
+    bench: Rc<RefCell<VirtualBench>>,
+    /// Where the tip was before it was last moved along the ruler, m.
+    before_m: DVec3,
+    /// The direction of the scale, and what it read when it was called out, grams.
+    scale: (DVec3, f64),
+    /// The largest push up while the tip was lowered, N.
+    felt_n: f64,
+    /// Takes what is said, a line at a time.
+    pub says: fn(&str),
+}
+
+impl VirtualUser {
+    /// A user of a Premium 1.5, wired like this.
+    #[must_use]
+    pub fn new(wiring: Wiring) -> Self {
+        Self::at(VirtualBench::new(PhantomModel::premium_1_5(), wiring))
+    }
+
+    /// A user at this bench.
+    #[must_use]
+    pub fn at(bench: VirtualBench) -> Self {
+        Self {
+            before_m: bench.tip_m(),
+            bench: Rc::new(RefCell::new(bench)),
+            scale: (DVec3::ZERO, 0.0),
+            felt_n: 0.0,
+            says: |line| tracing::info!("{line}"),
+        }
+    }
+
+    /// The bench.
+    #[must_use]
+    pub fn bench(&self) -> Rc<RefCell<VirtualBench>> {
+        Rc::clone(&self.bench)
+    }
+
+    /// A device in memory, just switched on, that is wired to the bench and holds this
+    /// record.
+    #[must_use]
+    pub fn device(&self, record: Calibration) -> Native<StoppedClock> {
+        let bench = self.bench();
+        let stored = Stored::Found(record);
+        Native::started(StoppedClock, None, stored, BootReport::default())
+            .meddled_with(Box::new(move |_, sense, drive| {
+                *sense = bench.borrow_mut().tick(drive);
+            }))
+            .restless()
+            .in_steps_of(LOOK_MS)
+    }
+
+    fn act(&mut self, task: Task) {
+        let mut bench = self.bench.borrow_mut();
+        let home_m = bench.home_m();
+        match task {
+            Task::Wire(_) => {}
+            Task::PressStop | Task::PullStopWire => bench.stop = true,
+            Task::ReleaseStop | Task::ConnectStopWire => bench.stop = false,
+            Task::PressDeadMan => bench.dead_man = true,
+            Task::ReleaseDeadMan => bench.dead_man = false,
+            Task::ZeroPose => {
+                bench.hold(Grip::Firm);
+                bench.lead(home_m);
+            }
+            Task::MoveAlong(direction, mm) => {
+                self.before_m = bench.tip_m();
+                bench.lead(self.before_m + 1e-3 * f64::from(mm) * direction.unit());
+            }
+            Task::HoldLoosely | Task::HoldTip => bench.hold(Grip::Loose),
+            Task::HoldWithScale(axis) => {
+                bench.hold(Grip::Scale);
+                self.scale.0 = pushed_along(axis);
+            }
+            Task::LookAtScale => self.scale.1 = bench.scale_grams(self.scale.0),
+            Task::LetGoOfTip => bench.let_go(),
+            Task::LowerTip => {
+                let tip_m = bench.tip_m();
+                self.before_m = tip_m;
+                bench.feel(tip_m - PUSH_M * DVec3::Z);
+            }
+            Task::LiftTip => {
+                // Against the push of the hand, the floor's is what is left over.
+                self.felt_n = bench.scale_grams(DVec3::Z) * crate::calibrate::N_PER_GRAM;
+                bench.feel(self.before_m);
+            }
+        }
+    }
+
+    fn reads(&self, reading: Reading) -> f64 {
+        let bench = self.bench.borrow();
+        match reading {
+            Reading::EnableVolts(BoardIs::Running) => bench.enable_v(),
+            Reading::EnableVolts(_) => 0.0,
+            Reading::Output { axis, .. } => bench.output_v(axis),
+            Reading::MovedMm(direction, _) => {
+                1e3 * direction.unit().dot(bench.tip_m() - self.before_m)
+            }
+            Reading::ScaleGrams { pushed: false } => bench.scale_grams(self.scale.0),
+            Reading::ScaleGrams { pushed: true } => self.scale.1,
+        }
+    }
+}
+
+/// Where an axis pushes the tip in the zero pose as its angle grows.
+fn pushed_along(axis: usize) -> DVec3 {
+    let direction = Direction::ALL.get(axis).copied();
+    direction.unwrap_or(Direction::Up).unit()
+}
+
+impl Attendant for VirtualUser {
+    fn hear(&mut self, line: &str) {
+        (self.says)(line);
+    }
+
+    fn begin(&mut self, task: Task) {
+        (self.says)(&format!("  > {task}"));
+        self.act(task);
+    }
+
+    fn finish(&mut self, task: Task) -> Result<(), Stopped> {
+        self.begin(task);
+        Ok(())
+    }
+
+    fn read(&mut self, reading: Reading) -> Result<f64, Stopped> {
+        // No meter shows more, and none shows a negative zero.
+        let value = (self.reads(reading) * 10.0).round() / 10.0 + 0.0;
+        (self.says)(&format!("  ? {reading} {value:.1}"));
+        Ok(value)
+    }
+
+    fn confirms(&mut self, question: Question) -> Result<bool, Stopped> {
+        let yes = match question {
+            Question::PushedBack => self.felt_n > FELT_N,
+        };
+        (self.says)(&format!(
+            "  ? {question} {}",
+            if yes { "yes" } else { "no" }
+        ));
+        Ok(yes)
+    }
+}

@@ -1,0 +1,128 @@
+//! `hapterra bringup`: the first power-up, step by step, with a log.
+
+pub(super) mod required;
+mod terminal;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::ValueHint;
+use hapterra_core::phantom::Calibration;
+
+use super::failure::{Failure, Hint};
+use super::terminal::interrupt;
+use crate::bringup::{
+    Attendant, BringupError, Halt, Log, LogError, Step, VirtualUser, Walked, walk,
+};
+use crate::link::{DeviceAddress, Dialogue, HostClock, Native, Transport};
+use crate::phantom::Wiring;
+use terminal::UserAtTerminal;
+
+/// How long a device may take to answer.
+const PATIENCE: Duration = Duration::from_secs(4);
+/// How long a device in this program may take to answer.
+const VIRTUAL_PATIENCE: Duration = Duration::from_secs(20);
+
+/// Arguments of `hapterra bringup`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Device: usb, tcp:HOST:PORT, or native (the application in this program, with a
+    /// virtual arm and a virtual user who shows how it goes)
+    #[arg(long, default_value = "usb")]
+    pub device: DeviceAddress,
+
+    /// Keep the log in this file [default: a file for the board in your data folder;
+    /// none for native]
+    #[arg(long, value_name = "FILE.toml", value_hint = ValueHint::FilePath)]
+    pub log: Option<PathBuf>,
+
+    /// Begin again with this step, as motor-2
+    #[arg(long, value_name = "STEP", value_enum)]
+    pub again_from: Option<Step>,
+}
+
+/// Walks through the steps that the log does not have yet.
+///
+/// # Errors
+/// No device; what a step finds; a log that cannot be kept.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    interrupt::listen();
+    if args.device == DeviceAddress::Native {
+        println!("a virtual user brings a virtual Phantom up");
+        let mut user = VirtualUser::new(Wiring::RIGHT);
+        user.says = |line| println!("{line}");
+        return bring_up(args, &mut user, VIRTUAL_PATIENCE, |user| {
+            Ok(Box::new(user.device(Calibration::PREMIUM_1_5)))
+        });
+    }
+    // There is none in memory.
+    let native = || Native::new(HostClock::default(), None);
+    bring_up(args, &mut UserAtTerminal, PATIENCE, |_| {
+        Ok(args.device.connect(native)?)
+    })
+}
+
+/// Walks until the log is complete, and greets the board again where it was off.
+fn bring_up<A: Attendant>(
+    args: &Args,
+    user: &mut A,
+    patience: Duration,
+    connect: impl Fn(&A) -> Result<Box<dyn Transport>, Failure>,
+) -> Result<(), Failure> {
+    let mut again_from = args.again_from;
+    // A virtual arm's log is of no use to anybody who does not ask for it.
+    let mut kept = None;
+    loop {
+        let mut dialogue = Dialogue::open(connect(user)?, patience)?;
+        let path = place(args, &dialogue)?;
+        let mut log = match (&path, kept.take()) {
+            (Some(path), _) => Log::read(path)?,
+            (None, kept) => kept.unwrap_or_default(),
+        };
+        if let Some(step) = again_from.take() {
+            log.entries.retain(|entry| entry.step < step);
+        }
+        let mut keep = |log: &Log| path.as_ref().map_or(Ok(()), |path| log.write(path));
+        let walked = walk(&mut dialogue, user, &mut log, &mut keep);
+        if let Some(path) = &path {
+            println!("log            {}", path.display());
+        }
+        match walked? {
+            Walked::BoardWasOff => kept = Some(log),
+            Walked::ToTheEnd => break,
+        }
+    }
+    println!("complete       every step is passed: set the amplifiers' limits to the motors' peak");
+    Ok(())
+}
+
+/// Where the log is kept.
+fn place(args: &Args, dialogue: &Dialogue<'_>) -> Result<Option<PathBuf>, Failure> {
+    Ok(match (&args.log, &args.device) {
+        (Some(path), _) => Some(path.clone()),
+        (None, DeviceAddress::Native) => None,
+        (None, _) => Some(Log::place(&dialogue.device().board)?),
+    })
+}
+
+impl Hint for BringupError {
+    fn hint(&self) -> String {
+        match self {
+            Self::Found { finding, .. } => {
+                format!("{}; then go on with hapterra bringup", finding.what_to_do())
+            }
+            Self::Halt(Halt::Link(error)) => error.hint(),
+            Self::Halt(_) => "go on with hapterra bringup when you are ready".into(),
+            Self::Log(error) => error.hint(),
+        }
+    }
+}
+
+impl Hint for LogError {
+    fn hint(&self) -> String {
+        match self {
+            Self::NoLog { .. } => "name another file with --log, or move this one away".into(),
+            _ => "name a file in a folder that you may write to with --log".into(),
+        }
+    }
+}

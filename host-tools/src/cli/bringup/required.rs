@@ -1,0 +1,95 @@
+//! Whether a board was brought up before it serves terrain.
+
+use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::hello::DeviceHello;
+
+use super::PATIENCE;
+use crate::board::BOARDS;
+use crate::bringup::{Identity, Log, Step};
+use crate::cli::failure::Failure;
+use crate::link::{Dialogue, Transport};
+
+/// Asks the device who it is, and refuses a real board whose log is not complete. Gives
+/// the way to the device back.
+///
+/// # Errors
+/// The board was not brought up; no answer.
+pub(in crate::cli) fn brought_up<'t>(
+    transport: Box<dyn Transport + 't>,
+) -> Result<Box<dyn Transport + 't>, Failure> {
+    let mut dialogue = Dialogue::open(transport, PATIENCE)?;
+    if is_real(&dialogue.device().board) {
+        let record = dialogue.calibration()?;
+        let device = dialogue.device();
+        let log = Log::read(&Log::place(&device.board)?)?;
+        if let Some(step) = missing(device, record.as_ref(), log) {
+            let (board, number, title) = (&device.board, step.number(), step.title());
+            return Err(Failure::new(format!(
+                "{board} was not brought up with this firmware and calibration: step {number} ({title}) is not passed"
+            ))
+            .hint("type hapterra bringup; or, if you know what you do, say --unchecked"));
+        }
+    }
+    Ok(dialogue.into_transport())
+}
+
+/// Whether a board of this name drives a real arm: it has a chip, and is not emulated.
+fn is_real(board: &str) -> bool {
+    let has_chip = |known: &&crate::board::Board| known.name == board && known.chip.is_some();
+    BOARDS.iter().find(has_chip).is_some()
+}
+
+/// The first step that its log does not have, for the device and record as they are now.
+fn missing(device: &DeviceHello, record: Option<&Calibration>, mut log: Log) -> Option<Step> {
+    log.meet(Identity::of(device, record));
+    log.next()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::Native;
+
+    fn device() -> DeviceHello {
+        let native = Box::new(Native::for_replay().restless());
+        let dialogue = Dialogue::open(native, PATIENCE).expect("it answers");
+        DeviceHello {
+            board: "nucleo-g474re".try_into().expect("fits"),
+            ..dialogue.device().clone()
+        }
+    }
+
+    #[test]
+    fn only_a_complete_log_of_this_board_and_record_will_do() {
+        let (device, record) = (device(), Calibration::PREMIUM_1_5);
+        let mut log = Log::default();
+        assert_eq!(
+            missing(&device, Some(&record), log.clone()),
+            Some(Step::Board)
+        );
+        log.meet(Identity::of(&device, Some(&record)));
+        for step in Step::ALL {
+            assert_eq!(missing(&device, Some(&record), log.clone()), Some(step));
+            log.take(step, true, String::new());
+        }
+        assert_eq!(missing(&device, Some(&record), log.clone()), None);
+        let other = Calibration::PREMIUM_3_0;
+        let again = missing(&device, Some(&other), log);
+        assert_eq!(again, Some(Step::Calibration));
+    }
+
+    #[test]
+    fn what_is_not_real_is_never_refused() {
+        for (board, real) in [
+            ("nucleo-g474re", true),
+            ("nucleo-h743zi2", true),
+            ("nucleo-h743zi2-spi", true),
+            ("mps2-an386", false),
+            ("native", false),
+        ] {
+            assert_eq!(is_real(board), real, "{board}");
+        }
+        let native = Box::new(Native::for_replay().restless());
+        assert!(brought_up(native).is_ok());
+    }
+}

@@ -1,0 +1,129 @@
+//! Over USB, by the loader in the chip's ROM.
+
+use std::time::{Duration, Instant};
+
+use hapterra_core::wire::request::Request;
+
+use super::Args;
+use crate::board::Image;
+use crate::board::update::{
+    Choice, Loader, Plan, Plugged, Step, SystemPipe, UpdateError, choose, open_loader, plugged,
+    update,
+};
+use crate::cli::failure::{Failure, OrHint};
+use crate::cli::session_summary;
+use crate::cli::terminal::progress;
+use crate::link::{DeviceAddress, Dialogue, Usb};
+
+/// How long the board may take to answer.
+const PATIENCE: Duration = Duration::from_secs(4);
+/// How long a device may take to show up again as another: on Windows, a driver's first
+/// start takes seconds.
+const REAPPEARS: Duration = Duration::from_secs(15);
+/// Between two looks at what is plugged in.
+const LOOK: Duration = Duration::from_millis(200);
+
+pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
+    let serial = match &args.device {
+        DeviceAddress::Usb(serial) => serial.as_deref(),
+        _ => None,
+    };
+    let plugged = plugged();
+    let place = match choose(&plugged, serial)? {
+        Choice::Loader(device) => {
+            println!("loader         {}, as it was found", device.place);
+            &device.place
+        }
+        Choice::Board(device) => {
+            enter_loader(args, device)?;
+            &device.place
+        }
+    };
+    let mut loader = wait_for(|| open_loader(place))?.ok_or(UpdateError::NoLoader)?;
+    // The same is done again before the first erase; here, a refusal can still let the
+    // board go.
+    if let Err(error) = Plan::new(args.board, image, loader.layout()) {
+        let _ = loader.leave(image.memories().flash);
+        return Err(error.into());
+    }
+    let bytes = write(args, image, &mut loader)?;
+    println!(
+        "written        {bytes} bytes to {}, read back and equal",
+        args.board.name
+    );
+    drop(loader);
+    greet(place)
+}
+
+/// Has a board that runs its firmware enter its loader, if it is the right one.
+fn enter_loader(args: &Args, device: &Plugged) -> Result<(), Failure> {
+    let transport = Box::new(Usb::connect(device.serial.as_deref())?);
+    let mut dialogue = Dialogue::open(transport, PATIENCE)?;
+    let running = dialogue.device().board.as_str();
+    if running != args.board.name {
+        return Err(UpdateError::OtherBoard {
+            image: args.board.name,
+            running: running.to_owned(),
+        }
+        .into());
+    }
+    println!(
+        "board          {}",
+        session_summary::device(dialogue.device())
+    );
+    dialogue
+        .request(&Request::EnterLoader)?
+        .or_hint("disarm it (`hapterra status --disarm`) and try again; firmware without this request is flashed through the debug probe once")
+}
+
+/// Looks until something is there, for as long as a device may take to reappear.
+fn wait_for<T>(
+    mut look: impl FnMut() -> Result<Option<T>, UpdateError>,
+) -> Result<Option<T>, UpdateError> {
+    let began = Instant::now();
+    loop {
+        match look() {
+            Ok(None) | Err(UpdateError::Gone { .. }) if began.elapsed() < REAPPEARS => {
+                std::thread::sleep(LOOK);
+            }
+            other => return other,
+        }
+    }
+}
+
+fn write(args: &Args, image: &Image, loader: &mut Loader<SystemPipe>) -> Result<usize, Failure> {
+    let bar = progress::bar(Some(0), "{msg:10} {bar:30} {pos} of {len}");
+    let written = update(loader, args.board, image, &mut |step| {
+        let (what, done, of) = match step {
+            Step::Erased(done, of) => ("erased", done, of),
+            Step::Written(done, of) => ("written", done, of),
+            Step::Compared(done, of) => ("compared", done, of),
+        };
+        bar.set_message(what);
+        bar.set_length(of as u64);
+        bar.set_position(done as u64);
+    });
+    bar.finish_and_clear();
+    Ok(written?)
+}
+
+/// Waits for the new firmware to introduce itself.
+fn greet(place: &str) -> Result<(), Failure> {
+    let back = wait_for(|| {
+        let mut devices = plugged().into_iter();
+        Ok(devices.find(|device| !device.is_loader && device.place == place))
+    })?;
+    let Some(device) = back else {
+        return Err(
+            Failure::new("the board was updated, and does not come back on USB")
+                .hint("press its reset button; `hapterra status` shows how it is then"),
+        );
+    };
+    let transport = Box::new(Usb::connect(device.serial.as_deref())?);
+    let dialogue = Dialogue::open(transport, PATIENCE)?;
+    println!(
+        "started        {}",
+        session_summary::device(dialogue.device())
+    );
+    Ok(())
+}

@@ -1,0 +1,204 @@
+//! Diagnostics on standard error. A device can cause some of them, as often as it
+//! likes and with words of its own: every line goes through [`shown`], and of each kind
+//! of line about the link one a second is written, with the count of those left out.
+
+use std::collections::HashMap;
+use std::io::{self, Write};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use tracing::Metadata;
+use tracing::callsite::Identifier;
+use tracing_subscriber::EnvFilter;
+use tracing_subscriber::fmt::MakeWriter;
+
+use super::sparing::Sparing;
+use crate::link::shown;
+
+/// Where the lines come from that a device can cause.
+const BY_DEVICE: &str = "hapterra::link";
+
+/// Starts the log. `RUST_LOG` overrides the `-v` count.
+pub(super) fn to_stderr(verbose: u8) -> Log<io::Stderr> {
+    let level = match verbose {
+        // A probe library warns of each kind of probe that it cannot look for;
+        // what comes of it is said by the error.
+        0 => "warn,probe_rs=error",
+        1 => "info",
+        2 => "debug",
+        _ => "trace",
+    };
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    let log = Log::to(io::stderr);
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(log.clone())
+        // A colour is a control sequence, and of those no line has any.
+        .with_ansi(false)
+        .without_time()
+        .init();
+    log
+}
+
+/// The log, over what `open` gives.
+pub(super) struct Log<W> {
+    open: Arc<dyn Fn() -> W + Send + Sync>,
+    /// Of each kind of line that a device can cause.
+    kinds: Arc<Mutex<HashMap<Identifier, Sparing>>>,
+}
+
+impl<W> Clone for Log<W> {
+    fn clone(&self) -> Self {
+        Self {
+            open: Arc::clone(&self.open),
+            kinds: Arc::clone(&self.kinds),
+        }
+    }
+}
+
+impl<W: Write> Log<W> {
+    fn to(open: impl Fn() -> W + Send + Sync + 'static) -> Self {
+        Self {
+            open: Arc::new(open),
+            kinds: Arc::default(),
+        }
+    }
+
+    /// How many lines of this kind were left out before the one at `now`; none where this
+    /// one is left out, too.
+    fn admit(&self, about: &Metadata<'_>, now: Instant) -> Option<u64> {
+        if !about.target().starts_with(BY_DEVICE) {
+            return Some(0);
+        }
+        let mut kinds = self.kinds.lock().unwrap_or_else(PoisonError::into_inner);
+        let kind = kinds.entry(about.callsite()).or_insert(Sparing::new(1));
+        kind.admit(now)
+    }
+
+    /// Says how many lines were left out since the last of their kind.
+    pub(super) fn end(&self) {
+        let kinds = self.kinds.lock().unwrap_or_else(PoisonError::into_inner);
+        let left_out: u64 = kinds.values().map(Sparing::left_out).sum();
+        if left_out > 0 {
+            // There is nobody to tell that nobody can be told.
+            let _ = writeln!((self.open)(), "{}", left_out_text(left_out));
+        }
+    }
+}
+
+fn left_out_text(count: u64) -> String {
+    format!("({count} lines about the device were left out)")
+}
+
+impl<W: Write> MakeWriter<'_> for Log<W> {
+    type Writer = Line<W>;
+
+    fn make_writer(&self) -> Line<W> {
+        Line(Some((self.open)()), 0)
+    }
+
+    fn make_writer_for(&self, about: &Metadata<'_>) -> Line<W> {
+        match self.admit(about, Instant::now()) {
+            Some(left_out) => Line(Some((self.open)()), left_out),
+            None => Line(None, 0),
+        }
+    }
+}
+
+/// Takes one line; none where it is left out. With the count of lines left out before.
+pub(super) struct Line<W>(Option<W>, u64);
+
+impl<W: Write> Write for Line<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if let Line(Some(out), left_out) = self {
+            let text = String::from_utf8_lossy(bytes);
+            let mut line = shown(text.trim_end_matches('\n'));
+            let left_out = std::mem::take(left_out);
+            if left_out > 0 {
+                line += " ";
+                line += &left_out_text(left_out);
+            }
+            line.push('\n');
+            out.write_all(line.as_bytes())?;
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.as_mut().map_or(Ok(()), Write::flush)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is written, for whoever holds a copy.
+    #[derive(Clone, Default)]
+    struct Page(Arc<Mutex<Vec<u8>>>);
+
+    impl Page {
+        fn text(&self) -> String {
+            String::from_utf8(self.0.lock().expect("one thread").clone()).expect("text")
+        }
+    }
+
+    impl Write for Page {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().expect("one thread").write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// What is written while `say` speaks, and after the end.
+    fn written(say: impl FnOnce()) -> String {
+        let page = Page::default();
+        let copy = page.clone();
+        let log = Log::to(move || copy.clone());
+        let subscriber = tracing_subscriber::fmt()
+            .with_writer(log.clone())
+            .with_ansi(false)
+            .without_time()
+            .finish();
+        tracing::subscriber::with_default(subscriber, say);
+        log.end();
+        page.text()
+    }
+
+    #[test]
+    fn a_device_that_floods_the_log_gets_a_line_a_second_and_the_rest_is_counted() {
+        let text = written(|| {
+            for tile in 0..100_000 {
+                tracing::warn!(target: "hapterra::link::client", tile, "no such tile");
+            }
+        });
+        let said = text.lines().filter(|line| line.contains("no such tile"));
+        // One for each second that this took, and the last count.
+        let (said, lines) = (said.count(), text.lines().count());
+        assert!((1..60).contains(&said) && lines == said + 1, "{text}");
+        let left_out = text.lines().filter_map(|line| {
+            let (_, rest) = line.split_once('(')?;
+            rest.split(' ').next()?.parse::<usize>().ok()
+        });
+        assert_eq!(said + left_out.sum::<usize>(), 100_000, "{text}");
+    }
+
+    #[test]
+    fn what_no_device_causes_is_not_left_out_and_no_line_controls_the_terminal() {
+        let text = written(|| {
+            for row in 0..10 {
+                tracing::warn!(target: "hapterra::replay", row, "odd");
+            }
+            tracing::warn!(target: "hapterra::link", name = "\x1b[2J\r\n\u{202e}", "\x1b]0;owned\x07");
+        });
+        assert_eq!(text.lines().count(), 11, "{text}");
+        let controls = |c: char| c.is_control() && c != '\n';
+        assert!(
+            !text.contains(controls) && !text.contains('\u{202e}'),
+            "{text:?}"
+        );
+    }
+}

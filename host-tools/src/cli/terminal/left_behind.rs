@@ -1,0 +1,46 @@
+//! What killed commands left of a file that is about to be written.
+
+use std::path::Path;
+
+use crate::output::left_behind;
+
+/// Says on standard error what killed commands left of these files, and how to keep it.
+/// Nothing else in this program touches what is left.
+pub(in crate::cli) fn tell<'p>(files: impl IntoIterator<Item = &'p Path>) {
+    for line in files.into_iter().flat_map(lines) {
+        eprintln!("{line}");
+    }
+}
+
+/// Two lines for each partial file of `file`.
+fn lines(file: &Path) -> Vec<String> {
+    let found = left_behind(file).into_iter().flat_map(|left| {
+        let (path, bytes) = (left.path.display(), left.bytes);
+        [
+            format!(
+                "note: {path} ({bytes} bytes) is what a command that was killed had written of {}",
+                file.display()
+            ),
+            "  to keep it, give it another name (its last line may be cut); it stays until you delete it"
+                .to_owned(),
+        ]
+    });
+    found.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_file_its_size_and_what_to_do_are_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let partial = folder.path().join("out.csv.a1B2c3.partial");
+        std::fs::write(&partial, "t_s,x_mm").expect("written");
+        let text = lines(&folder.path().join("out.csv")).join("\n");
+        for part in [&*partial.to_string_lossy(), "(8 bytes)", "another name"] {
+            assert!(text.contains(part), "{part} in {text}");
+        }
+        assert_eq!(lines(&folder.path().join("new.csv")), [""; 0]);
+    }
+}

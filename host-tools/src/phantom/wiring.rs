@@ -1,0 +1,86 @@
+//! How a board is wired to an arm, with the mistakes that people make.
+
+/// Which motor each command reaches, and which encoder each counter reads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wiring {
+    /// The motor (0 to 2) that each of the three commands reaches.
+    pub motor: [usize; 3],
+    /// What each command is multiplied by on its way: −1 where a motor's two wires
+    /// are crossed, 0 where its amplifier or its cable is missing, 2 where an
+    /// amplifier's full scale is twice what the board believes.
+    pub gain: [f64; 3],
+    /// Whether each encoder's counter stands still.
+    pub dead_encoder: [bool; 3],
+}
+
+impl Wiring {
+    /// As the wiring pages say.
+    pub const RIGHT: Self = Self {
+        motor: [0, 1, 2],
+        gain: [1.0; 3],
+        dead_encoder: [false; 3],
+    };
+
+    /// The commands of two axes exchanged.
+    #[must_use]
+    pub fn swapped(self, one: usize, other: usize) -> Self {
+        let mut wiring = self;
+        wiring.motor.swap(one, other);
+        wiring
+    }
+
+    /// One command multiplied by `gain`.
+    #[must_use]
+    pub fn with_gain(self, axis: usize, gain: f64) -> Self {
+        let mut wiring = self;
+        wiring.gain[axis] *= gain;
+        wiring
+    }
+
+    /// One encoder that does not count.
+    #[must_use]
+    pub fn with_dead_encoder(self, axis: usize) -> Self {
+        let mut wiring = self;
+        wiring.dead_encoder[axis] = true;
+        wiring
+    }
+
+    /// The motors' currents, A, for the board's commands.
+    #[must_use]
+    pub fn currents_a(&self, commands_a: [f64; 3]) -> [f64; 3] {
+        let mut currents_a = [0.0; 3];
+        for (axis, motor) in self.motor.into_iter().enumerate() {
+            currents_a[motor] += self.gain[axis] * commands_a[axis];
+        }
+        currents_a
+    }
+
+    /// What the board's counters read where the encoders have turned to `counts`.
+    #[must_use]
+    pub fn counts(&self, counts: [i32; 3]) -> [i32; 3] {
+        std::array::from_fn(|axis| match self.dead_encoder[axis] {
+            true => 0,
+            false => counts[axis],
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_mistake_is_where_it_was_made() {
+        let commands = [1.0, 2.0, 3.0];
+        assert_eq!(Wiring::RIGHT.currents_a(commands), commands);
+        let swapped = Wiring::RIGHT.swapped(1, 2);
+        assert_eq!(swapped.currents_a(commands), [1.0, 3.0, 2.0]);
+        // What becomes of a command belongs to the command, wherever it goes.
+        let swapped = swapped.with_gain(1, -1.0);
+        assert_eq!(swapped.currents_a(commands), [1.0, 3.0, -2.0]);
+        let missing = Wiring::RIGHT.with_gain(0, 0.0);
+        assert_eq!(missing.currents_a(commands), [0.0, 2.0, 3.0]);
+        let dead = Wiring::RIGHT.with_dead_encoder(2);
+        assert_eq!(dead.counts([7, 8, 9]), [7, 8, 0]);
+    }
+}
