@@ -21,8 +21,9 @@ pub(crate) fn named(variable: &str) -> Option<PathBuf> {
     value.map(PathBuf::from)
 }
 
-/// QEMU, or `None` with a visible line.
-pub(crate) fn qemu() -> Option<PathBuf> {
+/// QEMU, or `None` with a visible line: the caller then returns.
+#[must_use]
+pub fn qemu() -> Option<PathBuf> {
     let qemu = named("HAPTERRA_QEMU").unwrap_or_else(|| "qemu-system-arm".into());
     if runs(&qemu) {
         return Some(qemu);

@@ -5,6 +5,7 @@
 
 pub mod campaign;
 pub mod chance;
+pub mod conversation;
 pub mod counting;
 pub mod emulation;
 pub mod faulty;
@@ -12,6 +13,7 @@ pub mod field;
 pub mod figures;
 pub mod fuzzing;
 pub mod invariants;
+pub mod link_campaign;
 pub mod minima;
 pub mod oracle;
 pub mod scene;

@@ -12,9 +12,8 @@ use hapterra_core::phantom::Calibration;
 const FRICTION_NM: f64 = 0.01;
 
 fn calibrated(user: &mut VirtualUser) -> Review {
-    let counts = user.counts();
     let device = Native::new(HostClock::default(), None)
-        .meddled_with(Box::new(move |_, sense, _| sense.counts = counts.get()))
+        .meddled_with(user.hands())
         .restless();
     let opened = Dialogue::open(Box::new(device), Duration::from_secs(20));
     let mut dialogue = opened.expect("it answers");

@@ -7,7 +7,9 @@ use hapterra_core::guard::{Drive, Fault, Mode, Sense};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::Sample;
 use hapterra_tests::campaign::extremes::OFF_COUNTS;
+use hapterra_tests::campaign::hostile;
 use hapterra_tests::campaign::watch::{Truth, Watch};
+use hapterra_tests::chance::Chance;
 
 const ZERO: [i32; 3] = [100, -200, 300];
 /// A pose in the middle of the workspace, rad.
@@ -30,6 +32,7 @@ impl Tick {
             drive: Drive {
                 currents_a: currents(&model, force_n),
                 enabled: true,
+                held: Vec3::ZERO,
             },
             sense: Sense {
                 counts: std::array::from_fn(|i| counts[i] + ZERO[i]),
@@ -102,16 +105,38 @@ fn each_wrong_current_is_told() {
 
 #[test]
 fn amplifiers_on_against_an_input_are_told() {
-    let forge: [fn(&mut Sense); 3] = [
+    let forge: [fn(&mut Sense); 4] = [
         |sense| sense.dead_man = false,
         |sense| sense.emergency_stop = true,
         |sense| sense.hardware_failed = true,
+        |sense| sense.outputs_not_as_set = true,
     ];
     for forge in forge {
         let mut tick = Tick::pushing(up(1.0));
         forge(&mut tick.sense);
         assert!(tick.verdict().contains("amplifiers on with"));
     }
+}
+
+#[test]
+fn outputs_are_held_only_when_asked_for_and_with_the_amplifiers_off() {
+    let held = |enabled, held, may_hold| {
+        let mut tick = Tick::pushing(up(0.0));
+        tick.drive = Drive {
+            currents_a: Vec3::ZERO,
+            enabled,
+            held,
+        };
+        let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
+        watch.may_hold = may_hold;
+        watch.drive(&tick.drive, &tick.sense, ZERO, &tick.truth)
+    };
+    let half = Vec3::splat(0.5);
+    assert_eq!(held(false, half, true), Ok(()));
+    assert!(held(false, half, false).is_err());
+    assert!(held(true, half, true).is_err());
+    assert!(held(false, 3.0 * half, true).is_err());
+    assert!(held(false, Vec3::splat(f32::NAN), true).is_err());
 }
 
 #[test]
@@ -157,6 +182,57 @@ fn a_singular_pose_is_counted_not_judged() {
     let (watch, said) = tick.judged();
     assert_eq!(said, Ok(()));
     assert_eq!(watch.extremes.singular_ticks, 1);
+}
+
+/// Nobody reads switches or encoders while the core stands still; outputs and truth
+/// count all the same.
+#[test]
+fn a_command_that_is_held_is_judged_by_what_is_true() {
+    let held = |tick: &Tick| {
+        let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
+        watch.held(&tick.drive, &tick.truth)
+    };
+    let mut tick = Tick::pushing(up(7.6));
+    tick.sense.dead_man = false;
+    assert_eq!(held(&tick), Ok(()));
+    tick.truth.q_rad = [0.0, 0.9, 0.3];
+    assert!(held(&tick).expect_err("much").contains("at the tip"));
+    let mut tick = Tick::pushing(up(1.0));
+    tick.drive.currents_a.z = 5.51;
+    assert!(held(&tick).expect_err("much").contains("peak current"));
+    let mut tick = Tick::pushing(up(1.0));
+    tick.truth.winding_c[0] = 112.1;
+    assert!(held(&tick).expect_err("hot").contains("112.1 °C"));
+}
+
+#[test]
+fn motors_taken_for_colder_than_they_are_are_told() {
+    let watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
+    let mut tick = Tick::pushing(up(1.0));
+    let told =
+        |believed_c: f32, tick: &Tick| watch.warmth(Vec3::new(90.0, 90.0, believed_c), &tick.truth);
+    tick.truth.winding_c = [90.0, 30.0, 80.0];
+    assert_eq!(told(100.0, &tick), Ok(()));
+    assert_eq!(told(79.5, &tick), Ok(()));
+    // Forgotten at a reset.
+    assert!(told(25.0, &tick).expect_err("cold").contains("winding 3"));
+    assert!(told(f32::NAN, &tick).is_err());
+}
+
+#[test]
+fn every_hostile_calibration_is_refused_and_would_be_told() {
+    assert_eq!(hostile::harmless().validate(), Ok(()));
+    assert_eq!(hostile::keeps_ceilings(&hostile::harmless()), Ok(()));
+    assert_eq!(hostile::keeps_ceilings(&Calibration::PREMIUM_1_5), Ok(()));
+    let mut chance = Chance::new(7);
+    let mut above = 0;
+    for _ in 0..2_000 {
+        let record = hostile::calibration(&mut chance);
+        assert!(record.validate().is_err(), "{record:?}");
+        above += u32::from(hostile::keeps_ceilings(&record).is_err());
+    }
+    // The others are told apart by the device alone: a length that is none.
+    assert!(above > 1_600, "{above}");
 }
 
 fn sample(tick: u32, force_n: Vec3) -> Sample {

@@ -87,12 +87,50 @@ fn a_record_goes_to_a_file_and_comes_back() {
     fails(&read, 1, &["damaged", "hint:"]);
 }
 
+/// Nobody has published a Premium 1.0's ratios: a record that never measured them is not
+/// taken by oversight.
+#[test]
+fn guessed_ratios_are_not_taken_unmeasured_unless_told() {
+    let base = ["calibrate", "--device", "native", "--no-store", "--yes"];
+    for model in ["premium-1.0", "premium-3.0", "omni"] {
+        for skip in ["--no-walk", "--skip-ratios"] {
+            let words = [&base[..], &["--model", model, skip]].concat();
+            fails(&words, 1, &["a guess", "--unmeasured-ratios"]);
+        }
+    }
+    let agreed = ["--model", "premium-1.0", "--no-walk", "--unmeasured-ratios"];
+    let known = ["--model", "premium-1.5", "--no-walk"];
+    let measured = [
+        "--model",
+        "premium-1.0",
+        "--no-walk",
+        "--set",
+        "ratio-1=7.2",
+    ];
+    for words in [&agreed[..], &known[..], &measured[..]] {
+        let output = hapterra(&[&base[..], words].concat());
+        assert!(output.status.success(), "{}", told(&output));
+    }
+}
+
+#[test]
+fn a_record_above_a_ceiling_is_refused_before_it_is_sent() {
+    let base = ["calibrate", "--device", "native", "--no-walk", "--set"];
+    for (setting, part) in [
+        ("peak-a-1=20", "5.5 A"),
+        ("max-force-n=20", "8.5 N"),
+        ("torque-constant-2=0.005", "check the ratio"),
+    ] {
+        fails(&[&base[..], &[setting]].concat(), 1, &[part, "hint:"]);
+    }
+}
+
 #[test]
 fn wrong_words_are_answered_with_what_to_do() {
     fails(
         &["status", "--device", "serial"],
         2,
-        &["usb, tcp:HOST:PORT, native or emulated"],
+        &["usb, usb:SERIAL, tcp:HOST:PORT, native or emulated"],
     );
     fails(
         &["status", "--device", "tcp:127.0.0.1:1"],

@@ -11,6 +11,7 @@ use hapterra_core::scene::{Point, Source};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::tick::Outcome;
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
+use hapterra_core::wire::request::Request;
 use hapterra_tests::chance::Chance;
 use hapterra_tests::fuzzing::{tick, wire};
 
@@ -115,7 +116,10 @@ fn sensible_talk(chance: &mut Chance) -> Vec<u8> {
                 source: Source::Encoders,
                 ..wire::scene()
             }),
-            2 => ToDevice::ClearFault,
+            2 => ToDevice::Request {
+                number: seq as u8 + 2,
+                request: Request::ClearFault,
+            },
             _ => ToDevice::Point(Point { seq, hip }),
         };
         line.extend(wire::message(&said));

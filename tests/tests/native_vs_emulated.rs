@@ -91,8 +91,7 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
             .count();
         assert!(touched > 50, "{name}: the walk hardly touches");
         board.say_goodbye().expect("said");
-        let status = emulator.finish().expect("ended");
-        assert!(status.success(), "the board ended with {status}");
+        emulator.finish().expect("the board ended well");
     }
 }
 

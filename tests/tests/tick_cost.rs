@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use hapterra::link::{
-    Arming, Emulator, Event, INSTRUCTIONS_PER_COUNT, Patience, Session, serve_plant,
+    Arming, Ask, Emulator, Event, INSTRUCTIONS_PER_COUNT, Patience, Session, serve_plant,
 };
 use hapterra::place::PlacedTerrain;
 use hapterra::synth::{Kind, Synth};
@@ -14,7 +14,6 @@ use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Mode;
 use hapterra_core::scene::Sample;
-use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::status::Status;
 use hapterra_tests::emulation::emulated_board;
 
@@ -52,13 +51,12 @@ fn felt() -> Option<(Vec<Sample>, Status)> {
                 })
                 .expect("goes on");
             if !asked && samples.last().is_some_and(|last| last.tick >= ticks) {
-                session.say(&ToDevice::Status).expect("said");
+                session.ask(Ask::Status);
                 asked = true;
             }
         }
-        session.say_goodbye().expect("said");
-        let ended = emulator.finish().expect("ended");
-        assert!(ended.success(), "the board ended with {ended}");
+        session.say_goodbye(&mut |_| {}).expect("confirmed");
+        emulator.finish().expect("the board ended well");
         (samples, status.expect("told"))
     });
     Some(felt)

@@ -12,8 +12,9 @@ use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::Source;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
-use hapterra_core::wire::hello::{HostHello, PROTOCOL};
+use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
 use hapterra_core::wire::message::{ToDevice, ToHost};
+use hapterra_core::wire::session::{DEFAULT_SILENCE_S, InSession, SessionNumber};
 use hapterra_firmware::usb::{INTERFACE_GUIDS, MSOS_VENDOR_CODE, PRODUCT, PRODUCT_ID, VENDOR_ID};
 use hapterra_tests::usb::board::{Board, SERIAL};
 use hapterra_tests::usb::host::{
@@ -131,9 +132,13 @@ fn halting_an_endpoint_that_is_not_there_harms_nothing() {
 }
 
 fn hello() -> Vec<u8> {
-    let protocol = PROTOCOL;
-    let message = ToDevice::Hello(HostHello { protocol });
-    encode(&message, &mut [0; MAX_FRAME])
+    let message = ToDevice::Hello(HostHello {
+        protocol: PROTOCOL,
+        number: 1,
+        silence_s: DEFAULT_SILENCE_S,
+    });
+    let session = SessionNumber::new(7);
+    encode(&InSession { session, message }, &mut [0; MAX_FRAME])
         .expect("fits")
         .to_vec()
 }
@@ -148,7 +153,8 @@ fn answers(board: &mut Board) -> bool {
         let mut bytes = packet.as_slice();
         while !bytes.is_empty() {
             let (taken, frame) = reader.push(bytes);
-            if let Some(Ok(ToHost::Hello(_))) = frame.map(|f| f.and_then(decode)) {
+            let framed = frame.map(|f| f.and_then(decode::<InSession<ToHost>>));
+            if framed.is_some_and(|f| f.is_ok_and(|f| matches!(f.message, ToHost::Hello(_)))) {
                 return true;
             }
             bytes = &bytes[taken..];
@@ -240,6 +246,13 @@ fn visit(then: impl FnOnce(&mut Session<'_>, &Rc<RefCell<Board>>)) {
     then(&mut session, &board);
 }
 
+/// Goes on over a new line.
+fn resume(session: &mut Session<'_>, link: Box<Bulk<ScriptedPipes<Board>>>) -> DeviceHello {
+    session
+        .resume(link, &|| true, &mut |_| {})
+        .expect("resumed")
+}
+
 /// Ticks of the samples that came in so many polls of a millisecond.
 fn ticks(session: &mut Session<'_>, polls: usize) -> Vec<u32> {
     let mut ticks = vec![];
@@ -284,7 +297,7 @@ fn a_reset_of_the_bus_in_a_transfer_costs_a_handshake_and_no_terrain() {
         let tiles = session.tally().tiles;
         half_a_transfer(board);
         let found = enumerate(&mut *board.borrow_mut()).expect("again");
-        let device = session.resume(link(board, &found)).expect("resumed");
+        let device = resume(session, link(board, &found));
         assert_eq!(device.epoch, Some(session.scene().epoch), "still held");
         let after = ticks(session, 200);
         assert!(
@@ -315,7 +328,7 @@ fn an_unplugged_board_goes_on_feeling_and_is_there_again() {
         }
         drop(unplugged);
         let found = enumerate(&mut *board.borrow_mut()).expect("again");
-        let device = session.resume(link(board, &found)).expect("resumed");
+        let device = resume(session, link(board, &found));
         assert_eq!(device.epoch, Some(session.scene().epoch), "still held");
         let after = *ticks(session, 200).first().expect("samples");
         assert!(after > before + 2000, "{before}, then {after}");

@@ -63,11 +63,18 @@ fn the_wiring_tables_have_the_pins_that_the_images_take() {
     let g474 = taken(&["nucleo-g474re/chip.rs", "nucleo-g474re/outputs.rs"]);
     assert!(g474.len() > 12, "{g474:?}");
     assert_eq!(wired(&page("nucleo-g474re"), "# nucleo-g474re\n"), g474);
-    let h743 = taken(&["nucleo-h743zi2/chip.rs", "nucleo-h743zi2/outputs.rs"]);
+    let h743 = taken(&[
+        "nucleo-h743zi2/chip.rs",
+        "nucleo-h743zi2/outputs.rs",
+        "nucleo-h743zi2/stop.rs",
+    ]);
     let page = page("nucleo-h743zi2");
     assert_eq!(wired(&page, "## Duty cycles"), h743);
     // This table has only what is other than there.
-    let spi = taken(&["nucleo-h743zi2-spi/outputs.rs"]);
-    assert_eq!(spi.len(), 3);
+    let spi = taken(&[
+        "nucleo-h743zi2-spi/outputs.rs",
+        "nucleo-h743zi2-spi/stop.rs",
+    ]);
+    assert_eq!(spi.len(), 5);
     assert_eq!(wired(&page, "## A converter on SPI"), spi);
 }

@@ -11,8 +11,9 @@ use hapterra_tests::campaign::levers::{force, is_near_singular};
 
 /// What an encoder is off by, counts.
 const OFF: i32 = OFF_COUNTS as i32;
-/// The coarsest converter of the boards.
-const DAC_MAX: u16 = 4_095;
+/// No current and full scale of the coarsest converter of the boards, codes.
+const MIDDLE: f64 = 2_048.0;
+const SPAN: f64 = 1_792.0;
 const FULL_SCALE_A: f32 = 5.5;
 
 /// Poses between the stops, six degrees apart. Turning joint 1 turns all of it.
@@ -35,9 +36,8 @@ fn directions() -> impl Iterator<Item = Vec3> {
 
 /// What a converter makes of a current.
 fn converted(current_a: f32) -> f64 {
-    let code = f64::from(offset_code(current_a / FULL_SCALE_A, DAC_MAX));
-    let middle = f64::from(DAC_MAX) / 2.0;
-    (code - middle) / middle * f64::from(FULL_SCALE_A)
+    let code = f64::from(offset_code(current_a / FULL_SCALE_A));
+    (code - MIDDLE) / SPAN * f64::from(FULL_SCALE_A)
 }
 
 #[test]

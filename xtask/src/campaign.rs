@@ -1,4 +1,5 @@
-//! `cargo xtask campaign`: the closed-loop campaign at full speed.
+//! `cargo xtask campaign`: the closed-loop campaign, or that of link faults, at full
+//! speed.
 
 use std::ffi::OsString;
 use std::process::Command;
@@ -8,9 +9,13 @@ use anyhow::Result;
 use crate::run::{cargo, output, root, run, timed};
 
 /// Runs the campaign with the user's words; without a segment the report goes to
-/// `docs/campaign.md`.
+/// `docs/campaign.md`, or to `docs/link-campaign.md` with `--link`.
 pub(crate) fn campaign(words: impl Iterator<Item = OsString>) -> Result<()> {
     let words: Vec<_> = words.collect();
+    let page = match words.iter().any(|word| word == "--link") {
+        true => "docs/link-campaign.md",
+        false => "docs/campaign.md",
+    };
     let whole = !words.iter().any(|word| word == "--segment");
     timed("the campaign", || {
         let mut command = cargo();
@@ -19,7 +24,7 @@ pub(crate) fn campaign(words: impl Iterator<Item = OsString>) -> Result<()> {
             .args(["--bin", "hapterra-campaign", "--"])
             .args(&words);
         if whole {
-            command.arg("--report").arg(root().join("docs/campaign.md"));
+            command.arg("--report").arg(root().join(page));
             if let Some(commit) = commit() {
                 command.arg("--commit").arg(commit);
             }

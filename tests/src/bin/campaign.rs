@@ -1,18 +1,22 @@
 //! Runs the closed-loop campaign: `hapterra-campaign --seconds N --seed S`, or
-//! one segment of it with `--segment K`. `cargo xtask campaign` builds it with
-//! full optimisation and puts the report into `docs/campaign.md`.
+//! one segment of it with `--segment K`; with `--link` the campaign of link faults.
+//! `cargo xtask campaign` builds it with full optimisation and puts the report into
+//! `docs/campaign.md` or `docs/link-campaign.md`.
 
 #![forbid(unsafe_code)]
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use hapterra_tests::campaign::{self, SEED, Tally, Violation, report, segment};
+use hapterra_tests::campaign::{self, Violation};
+use hapterra_tests::link_campaign;
 
 /// What the user asked for.
 struct Request {
-    seconds: u64,
-    seed: u64,
+    /// The campaign of link faults, not that of the closed loop.
+    link: bool,
+    seconds: Option<u64>,
+    seed: Option<u64>,
     segment: Option<u64>,
     report: Option<PathBuf>,
     /// Of the source that is run, for the report.
@@ -25,38 +29,53 @@ fn main() -> ExitCode {
         Err(wrong) => {
             eprintln!("error: {wrong}");
             eprintln!(
-                "hint: hapterra-campaign [--seconds N] [--seed S] [--segment K] [--report FILE] [--commit C]"
+                "hint: hapterra-campaign [--link] [--seconds N] [--seed S] [--segment K] [--report FILE] [--commit C]"
             );
             return ExitCode::from(2);
         }
     };
-    match run(&request) {
-        Ok(tally) => finish(&request, &tally),
+    let ran = match request.link {
+        true => run_link(&request),
+        false => run(&request),
+    };
+    match ran {
+        Ok(page) => finish(&request, &page),
         Err(violation) => {
-            let Violation {
-                segment,
-                tick,
-                what,
-            } = violation;
-            eprintln!("error: segment {segment}, tick {tick}: {what}");
-            eprintln!(
-                "hint: repeat it with: cargo xtask campaign --seed {} --segment {segment}",
-                request.seed
-            );
+            tell(&request, &violation);
             ExitCode::FAILURE
         }
     }
 }
 
+/// Says what must not happen and did, and how to repeat it.
+fn tell(request: &Request, violation: &Violation) {
+    let Violation {
+        segment,
+        tick,
+        what,
+    } = violation;
+    let (link, seed) = match request.link {
+        true => ("--link ", request.seed.unwrap_or(link_campaign::SEED)),
+        false => ("", request.seed.unwrap_or(campaign::SEED)),
+    };
+    eprintln!("error: segment {segment}, tick {tick}: {what}");
+    eprintln!("hint: repeat it with: cargo xtask campaign {link}--seed {seed} --segment {segment}");
+}
+
 fn request(mut words: impl Iterator<Item = String>) -> Result<Request, String> {
     let mut request = Request {
-        seconds: 10_000,
-        seed: SEED,
+        link: false,
+        seconds: None,
+        seed: None,
         segment: None,
         report: None,
         commit: None,
     };
     while let Some(word) = words.next() {
+        if word == "--link" {
+            request.link = true;
+            continue;
+        }
         let value = words.next().ok_or(format!("{word} wants a value"))?;
         let number = || {
             value
@@ -64,8 +83,8 @@ fn request(mut words: impl Iterator<Item = String>) -> Result<Request, String> {
                 .map_err(|_| format!("{word} {value}: not a whole number"))
         };
         match word.as_str() {
-            "--seconds" => request.seconds = number()?,
-            "--seed" => request.seed = number()?,
+            "--seconds" => request.seconds = Some(number()?),
+            "--seed" => request.seed = Some(number()?),
             "--segment" => request.segment = Some(number()?),
             "--report" => request.report = Some(value.into()),
             "--commit" => request.commit = Some(value),
@@ -75,34 +94,61 @@ fn request(mut words: impl Iterator<Item = String>) -> Result<Request, String> {
     Ok(request)
 }
 
-fn run(request: &Request) -> Result<Tally, Violation> {
+/// Runs the closed loop; gives the report, none for a single segment.
+fn run(request: &Request) -> Result<Option<String>, Violation> {
+    let seed = request.seed.unwrap_or(campaign::SEED);
     if let Some(number) = request.segment {
-        let mut tally = Tally::default();
-        segment::run(request.seed, number, &mut tally)?;
-        return Ok(tally);
+        let mut tally = campaign::Tally::default();
+        campaign::segment::run(seed, number, &mut tally)?;
+        print!("{}", tally.table());
+        println!("{:#?}", tally.extremes);
+        return Ok(None);
     }
-    campaign::run(request.seed, request.seconds, &mut |segment, tally| {
+    let seconds = request.seconds.unwrap_or(10_000);
+    let tally = campaign::run(seed, seconds, &mut |segment, tally| {
         eprintln!(
             "segment {segment}: {} mishaps, amplifiers on for {} s of {} s",
             tally.injected(),
             tally.armed / 1_000,
             tally.ticks / 1_000
         );
-    })
-}
-
-fn finish(request: &Request, tally: &Tally) -> ExitCode {
+    })?;
     print!("{}", tally.table());
     println!("{:#?}", tally.extremes);
-    let Some(path) = &request.report else {
+    let commit = request.commit.as_deref();
+    Ok(Some(campaign::report::page(commit, seed, seconds, &tally)))
+}
+
+/// Runs the campaign of link faults; gives the report, none for a single segment.
+fn run_link(request: &Request) -> Result<Option<String>, Violation> {
+    let seed = request.seed.unwrap_or(link_campaign::SEED);
+    if let Some(number) = request.segment {
+        let mut tally = link_campaign::Tally::default();
+        link_campaign::segment(seed, number, &mut tally)?;
+        print!("{}", tally.table());
+        return Ok(None);
+    }
+    let seconds = request.seconds.unwrap_or(3_600);
+    let tally = link_campaign::run(seed, seconds, &mut |segment, tally| {
+        eprintln!(
+            "segment {segment}: {} runs, amplifiers on for {} s of {} s",
+            tally.runs(),
+            tally.ticks[1] / 1_000,
+            tally.ticks[0] / 1_000
+        );
+    })?;
+    print!("{}", tally.table());
+    let commit = request.commit.as_deref();
+    Ok(Some(link_campaign::report::page(
+        commit, seed, seconds, &tally,
+    )))
+}
+
+/// Leaves the report where it is wanted.
+fn finish(request: &Request, page: &Option<String>) -> ExitCode {
+    let (Some(path), Some(page)) = (&request.report, page) else {
         return ExitCode::SUCCESS;
     };
-    let page = report::page(
-        request.commit.as_deref(),
-        request.seed,
-        request.seconds,
-        tally,
-    );
     match std::fs::write(path, page) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

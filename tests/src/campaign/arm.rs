@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use hapterra::phantom::{HandModel, PhantomModel, Placement, Plant, kinematics};
+use hapterra::phantom::{AmplifierFault, HandModel, PhantomModel, Placement, Plant, kinematics};
 use hapterra::terrain::Terrain;
 
 use crate::chance::Chance;
@@ -86,6 +86,14 @@ impl<'t> Arm<'t> {
     #[must_use]
     pub fn counts(&self) -> [i32; 3] {
         self.plant.counts()
+    }
+
+    /// Breaks the amplifier of an axis; all others are whole.
+    pub fn break_amplifier(&mut self, broken: Option<(usize, AmplifierFault)>) {
+        for axis in 0..3 {
+            let fault = broken.filter(|(at, _)| *at == axis).map(|(_, fault)| fault);
+            self.plant.set_amplifier_fault(axis, fault);
+        }
     }
 
     /// The plant.

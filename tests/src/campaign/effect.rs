@@ -1,18 +1,34 @@
 //! What a kind of mishap does to a tick.
 
+use hapterra::phantom::AmplifierFault;
 use hapterra_core::contact::Rule;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Sense;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::Point;
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
+use hapterra_core::wire::request::Request;
+use hapterra_core::wire::status::ResetCause;
 
 use super::arm::Mood;
 use super::clock::Reading;
 use super::host::Tiles;
-use super::kind::Kind;
+use super::kind::{Kind, LOADED_TICKS};
 use super::pipe::Unkind;
 use crate::chance::Chance;
+
+/// What the core of the device does in a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Core {
+    /// It runs.
+    Runs,
+    /// It stands still, and its outputs stay as they are.
+    Halted,
+    /// It has no supply.
+    Down,
+    /// It comes out of a reset.
+    Resets(ResetCause),
+}
 
 /// The contact rule of all scenes.
 pub const RULE: Rule = Rule::Swept;
@@ -28,7 +44,7 @@ pub struct Mishap {
     sign: i32,
     size: f64,
     by_mm: [f64; 3],
-    /// What a stuck encoder reads.
+    /// What a stuck encoder reads, and one that runs away read last.
     held: Option<i32>,
 }
 
@@ -76,14 +92,40 @@ impl Mishap {
             Kind::EncoderStuck => {
                 counts[self.axis] = *self.held.get_or_insert(counts[self.axis]);
             }
-            // Within what a tick may move, above what a tip may do.
-            Kind::EncoderRunaway => counts[self.axis] += self.sign * 110 * since,
+            // Within what a tick may move, whatever the hand adds, and above what a tip may do.
+            Kind::EncoderRunaway => {
+                let count = &mut counts[self.axis];
+                let away = *count + self.sign * 110 * since;
+                *count = match self.held {
+                    Some(last) => last + (away - last).clamp(-127, 127),
+                    None => *count + self.sign * 60,
+                };
+                self.held = Some(*count);
+            }
             Kind::EncoderBeyondLimits => counts[self.axis] += self.sign * 12 * since,
             Kind::EmergencyStop => sense.emergency_stop = true,
             Kind::DeadManReleased | Kind::DeadManBounce => sense.dead_man = false,
             Kind::HardwareFailed => sense.hardware_failed = true,
+            Kind::OutputsNotAsSet => sense.outputs_not_as_set = true,
+            Kind::CurrentMismatch => {
+                let more_ma = self.sign as i16 * (1_500 + (4_000.0 * self.size) as i16);
+                if let Some(of_axis) = sense.measured_ma.as_mut().map(|all| &mut all[self.axis]) {
+                    *of_axis = of_axis.saturating_add(more_ma);
+                }
+            }
             _ => {}
         }
+    }
+
+    /// What it does to an amplifier, and to which.
+    #[must_use]
+    pub fn amplifier(&self) -> Option<(usize, AmplifierFault)> {
+        let fault = match self.kind {
+            Kind::AmplifierNotReady => AmplifierFault::Missing,
+            Kind::MotorOpen => AmplifierFault::MotorOpen,
+            _ => return None,
+        };
+        Some((self.axis, fault))
     }
 
     /// What it does to the link.
@@ -152,11 +194,33 @@ impl Mishap {
         self.kind == Kind::LinkSilence && self.sign > 0 && now == self.ticks.start
     }
 
+    /// Whether an endpoint is halted and cleared at `now`: what was under way on it is
+    /// lost.
+    #[must_use]
+    pub fn halts_endpoint(&self, chance: &mut Chance) -> bool {
+        self.kind == Kind::EndpointHalt && chance.below(20) == 0
+    }
+
+    /// What it does to the core at `now`.
+    #[must_use]
+    pub fn core(&self, now: u64) -> Core {
+        let is_last = now + 1 == self.ticks.end;
+        match self.kind {
+            Kind::HaltedCore if is_last => Core::Resets(ResetCause::Watchdog),
+            Kind::HaltedCore => Core::Halted,
+            Kind::BrownOut if is_last => Core::Resets(ResetCause::BrownOut),
+            Kind::BrownOut if now >= self.ticks.start + u64::from(LOADED_TICKS) => Core::Down,
+            Kind::ResetUnderLoad if is_last && self.sign > 0 => Core::Resets(ResetCause::Pin),
+            Kind::ResetUnderLoad if is_last => Core::Resets(ResetCause::Software),
+            _ => Core::Runs,
+        }
+    }
+
     /// What it does to the hand.
     #[must_use]
     pub fn mood(&self) -> Mood {
         match self.kind {
-            Kind::HotMotors => Mood::Presses,
+            Kind::HotMotors | Kind::ResetUnderLoad | Kind::BrownOut => Mood::Presses,
             Kind::Yank => Mood::Yanked(self.by_mm),
             _ => Mood::Wanders,
         }
@@ -171,14 +235,17 @@ impl Mishap {
         let mut calibration = Calibration::PREMIUM_1_5;
         calibration.l1_mm *= 0.5;
         calibration.motor_sign = -calibration.motor_sign;
+        // Any number: some are new, some were given before.
+        let number = chance.bits() as u8;
+        let request = |request| ToDevice::Request { number, request };
         Some(match chance.below(6) {
-            0 => ToDevice::SetCalibration {
-                calibration,
-                store: chance.below(2) == 0,
-            },
-            1 => ToDevice::Zero {
+            0 => request(match chance.below(2) {
+                0 => Request::StoreCalibration,
+                _ => Request::SetCalibration { calibration },
+            }),
+            1 => request(Request::Zero {
                 counts: [1_000, -2_000, 3_000],
-            },
+            }),
             2 => ToDevice::Point(Point {
                 seq: 1,
                 hip: GridPoint::default(),

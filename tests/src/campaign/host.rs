@@ -1,18 +1,20 @@
 //! The host's end of the link, tick by tick, over two pipes.
 
-use hapterra::link::{Client, Event, LinkError};
+use std::time::Duration;
+
+use hapterra::link::{Ask, Client, Event, LinkError, Patience, State};
 use hapterra::terrain::Terrain;
 use hapterra_core::scene::{Sample, Scene};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice, ToHost};
+use hapterra_core::wire::request::Request;
+use hapterra_core::wire::session::{InSession, SessionNumber};
 use hapterra_core::wire::status::Status;
 
 use super::pipe::{Pipe, Unkind};
 use crate::chance::Chance;
 
-/// After this many silent ticks the host says hello again, as a session does.
-const GREET_AGAIN: u64 = 750;
 /// Bytes of a tile's samples.
 const TILE_BYTES: usize = 33 * 33 * 4;
 
@@ -35,14 +37,10 @@ pub struct Host<'t> {
     reader: Box<FrameReader<MAX_FRAME>>,
     to_device: Pipe,
     to_host: Pipe,
-    heard: u64,
-    greeted: u64,
     /// Samples that came since they were last taken.
     pub samples: Vec<Sample>,
     /// The last answer to a question for the status.
     pub status: Option<Status>,
-    /// Whether the scene is in force.
-    pub opened: bool,
     /// A link error that no fault of a link may cause.
     pub failed: Option<LinkError>,
 }
@@ -50,25 +48,24 @@ pub struct Host<'t> {
 impl<'t> Host<'t> {
     /// A host that has not said anything yet.
     #[must_use]
-    pub fn new(terrain: &'t Terrain<'t>, scene: Scene) -> Self {
+    pub fn new(terrain: &'t Terrain<'t>, scene: Scene, seed: u64) -> Self {
         Self {
             terrain,
-            client: Client::new(terrain, scene, None),
+            client: Client::numbered(terrain, scene, None, Patience::REAL_TIME, seed),
             reader: Box::default(),
             to_device: Pipe::default(),
             to_host: Pipe::default(),
-            heard: 0,
-            greeted: 0,
             samples: Vec::new(),
             status: None,
-            opened: false,
             failed: None,
         }
     }
 
     /// Forgets everything and begins anew with another scene.
     pub fn restart(&mut self, scene: Scene, now: u64, chance: &mut Chance) {
-        self.client = Client::new(self.terrain, scene, None);
+        let seed = chance.bits();
+        let patience = Patience::REAL_TIME;
+        self.client = Client::numbered(self.terrain, scene, None, patience, seed);
         *self.reader = FrameReader::new();
         self.greet(now, chance);
     }
@@ -76,17 +73,38 @@ impl<'t> Host<'t> {
     /// Says hello; the scene follows.
     pub fn greet(&mut self, now: u64, chance: &mut Chance) {
         let mut out = Vec::new();
-        self.client.greet(&mut out);
-        self.opened = false;
-        self.greeted = now;
+        self.client.greet(time(now), &mut out);
         self.to_device.send(&out, now, &Unkind::default(), chance);
     }
 
-    /// Sends a message.
+    /// Says hello where there is no session.
+    pub fn greet_if_closed(&mut self, now: u64, chance: &mut Chance) {
+        if self.client.state() == State::Closed {
+            self.greet(now, chance);
+        }
+    }
+
+    /// Says goodbye.
+    pub fn leave(&mut self, now: u64, chance: &mut Chance) {
+        let mut out = Vec::new();
+        self.client.leave(time(now), &mut out);
+        self.to_device.send(&out, now, &Unkind::default(), chance);
+    }
+
+    /// Asks for the status.
+    pub fn ask_status(&mut self) {
+        self.client.ask(Ask::Status);
+    }
+
+    /// Asks for something to be done.
+    pub fn request(&mut self, request: Request) {
+        self.client.ask(Ask::Request(request));
+    }
+
+    /// Sends a message that the client would not send.
     pub fn say(&mut self, message: &ToDevice<'_>, now: u64, unkind: &Unkind, chance: &mut Chance) {
-        let mut frame = [0; MAX_FRAME];
-        let bytes = encode(message, &mut frame).unwrap_or(&[]);
-        self.to_device.send(bytes, now, unkind, chance);
+        let bytes = framed(self.client.session(), message);
+        self.to_device.send(&bytes, now, unkind, chance);
     }
 
     /// What arrives at the device in this tick; `take` tells how many bytes it
@@ -111,61 +129,87 @@ impl<'t> Host<'t> {
         chance: &mut Chance,
     ) {
         self.to_host.send(said, now, unkind, chance);
+        let mut out = Vec::new();
         while let Some(piece) = self.to_host.receive(now) {
-            self.heard = now;
-            let out = match tiles {
-                Tiles::Sent => self.understand(&piece),
-                other => self.mistreat(&piece, other == Tiles::Poisoned, chance),
-            };
-            self.to_device.send(&out, now, unkind, chance);
+            match tiles {
+                Tiles::Sent => self.understand(&piece, now, &mut out),
+                other => self.mistreat(&piece, other == Tiles::Poisoned, now, &mut out, chance),
+            }
         }
-        let quiet_since = self.heard.max(self.greeted);
-        if now.saturating_sub(quiet_since) >= GREET_AGAIN && !unkind.cut {
-            self.greet(now, chance);
+        self.do_what_is_due(now, &mut out);
+        self.to_device.send(&out, now, unkind, chance);
+    }
+
+    /// Repeats what is not answered; a device that is gone is greeted anew.
+    fn do_what_is_due(&mut self, now: u64, out: &mut Vec<u8>) {
+        match self.client.due(time(now), out, &mut |_| {}) {
+            Ok(()) => {}
+            Err(LinkError::Silent(_) | LinkError::NotConfirmed) => {
+                self.client.greet(time(now), out);
+            }
+            Err(error) => self.failed = Some(error),
         }
     }
 
-    fn understand(&mut self, bytes: &[u8]) -> Vec<u8> {
-        let mut out = Vec::new();
+    fn understand(&mut self, bytes: &[u8], now: u64, out: &mut Vec<u8>) {
         let Self {
             client,
             samples,
             status,
-            opened,
             ..
         } = self;
         let mut on = |event: Event<'_>| match event {
-            Event::Opened { .. } => *opened = true,
             Event::Sample(sample) => samples.push(*sample),
             Event::Status(told) => *status = Some(told.clone()),
             _ => {}
         };
-        if let Err(error) = client.receive(bytes, &mut out, &mut on) {
+        if let Err(error) = client.receive(time(now), bytes, out, &mut on) {
             self.failed = Some(error);
         }
-        out
     }
 
-    /// Hears samples, and withholds tiles or sends poison.
-    fn mistreat(&mut self, mut bytes: &[u8], poison: bool, chance: &mut Chance) -> Vec<u8> {
-        let mut out = Vec::new();
+    /// Withholds tiles or sends poison, and is a host else.
+    fn mistreat(
+        &mut self,
+        mut bytes: &[u8],
+        poison: bool,
+        now: u64,
+        out: &mut Vec<u8>,
+        chance: &mut Chance,
+    ) {
         while !bytes.is_empty() {
             let (taken, frame) = self.reader.push(bytes);
             bytes = bytes.get(taken..).unwrap_or(&[]);
-            match frame.map(|frame| frame.and_then(decode::<ToHost>)) {
-                Some(Ok(ToHost::Telemetry(telemetry))) => self.samples.extend(telemetry.samples),
-                Some(Ok(ToHost::Need { epoch, key })) if poison => {
-                    out.extend(poisoned(epoch, key, chance));
+            let Some(Ok(framed)) = frame.map(|frame| frame.and_then(decode::<InSession<ToHost>>))
+            else {
+                continue;
+            };
+            if let ToHost::Need { epoch, key } = framed.message {
+                if poison {
+                    out.extend(poisoned(self.client.session(), epoch, key, chance));
                 }
-                _ => {}
+            } else {
+                let mut frame = [0; MAX_FRAME];
+                let frame = encode(&framed, &mut frame).unwrap_or(&[]).to_vec();
+                self.understand(&frame, now, out);
             }
         }
-        out
     }
 }
 
+/// A tick is a millisecond.
+const fn time(now: u64) -> Duration {
+    Duration::from_millis(now)
+}
+
+fn framed(session: SessionNumber, message: &ToDevice<'_>) -> Vec<u8> {
+    let mut frame = [0; MAX_FRAME];
+    let framed = InSession { session, message };
+    encode(&framed, &mut frame).unwrap_or(&[]).to_vec()
+}
+
 /// A well-formed tile of heights that no terrain has.
-fn poisoned(epoch: u32, key: TileKey, chance: &mut Chance) -> Vec<u8> {
+fn poisoned(session: SessionNumber, epoch: u32, key: TileKey, chance: &mut Chance) -> Vec<u8> {
     const WORDS: [f32; 6] = [
         f32::INFINITY,
         f32::NEG_INFINITY,
@@ -199,6 +243,5 @@ fn poisoned(epoch: u32, key: TileKey, chance: &mut Chance) -> Vec<u8> {
         key,
         heights,
     });
-    let mut frame = [0; MAX_FRAME];
-    encode(&message, &mut frame).unwrap_or(&[]).to_vec()
+    framed(session, &message)
 }

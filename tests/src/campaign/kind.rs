@@ -25,6 +25,14 @@ pub enum Kind {
     DeadManBounce,
     /// The encoder or amplifier hardware says that it cannot work.
     HardwareFailed,
+    /// A converter's settings do not read back as they were written.
+    OutputsNotAsSet,
+    /// An amplifier loses its supply: it is not ready, and its motor has no current.
+    AmplifierNotReady,
+    /// A motor's measured current is another than the one that was commanded.
+    CurrentMismatch,
+    /// The wire of a motor breaks.
+    MotorOpen,
     /// Bytes are lost, both ways.
     LinkLoss,
     /// Bytes come late, both ways.
@@ -56,6 +64,19 @@ pub enum Kind {
     HotMotors,
     /// The hand is yanked away.
     Yank,
+    /// The supply breaks down under load and comes back; the RAM may be damaged.
+    BrownOut,
+    /// The chip is reset under load.
+    ResetUnderLoad,
+    /// The core stands still with its command on, until the watchdog resets it.
+    HaltedCore,
+    /// The host replays points while the arm is moved, and then runs a terrain.
+    ReplayThenRun,
+    /// The host sends calibrations above every ceiling, or of garbage, or wants one
+    /// stored that nobody agreed to.
+    HostileCalibration,
+    /// Endpoints of the USB are halted and cleared in the middle of what is sent.
+    EndpointHalt,
 }
 
 /// What may become of it. What is not in here is a violation.
@@ -93,7 +114,7 @@ const fn latch(may_latch: &'static [Fault], within: u32) -> Expectation {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 35] = [
         Self::EncoderJump,
         Self::EncoderGlitch,
         Self::EncoderNoise,
@@ -104,6 +125,10 @@ impl Kind {
         Self::DeadManReleased,
         Self::DeadManBounce,
         Self::HardwareFailed,
+        Self::OutputsNotAsSet,
+        Self::AmplifierNotReady,
+        Self::CurrentMismatch,
+        Self::MotorOpen,
         Self::LinkLoss,
         Self::LinkDelay,
         Self::LinkDuplicates,
@@ -119,6 +144,12 @@ impl Kind {
         Self::TilesPoisoned,
         Self::HotMotors,
         Self::Yank,
+        Self::BrownOut,
+        Self::ResetUnderLoad,
+        Self::HaltedCore,
+        Self::ReplayThenRun,
+        Self::HostileCalibration,
+        Self::EndpointHalt,
     ];
 
     /// What is expected.
@@ -129,6 +160,15 @@ impl Kind {
             Self::EmergencyStop => latch(&[Fault::EmergencyStop], 0),
             Self::DeadManReleased | Self::DeadManBounce => latch(&[Fault::DeadManReleased], 0),
             Self::HardwareFailed => latch(&[Fault::Hardware], 0),
+            Self::OutputsNotAsSet => latch(&[Fault::OutputsNotAsSet], 0),
+            // Two ticks may be a spike on the wire.
+            Self::AmplifierNotReady => latch(&[Fault::AmplifierNotReady], 2),
+            Self::CurrentMismatch => latch(&[Fault::CurrentMismatch], MISMATCH_TICKS),
+            // Where nothing is commanded nothing is missing.
+            Self::MotorOpen => Expectation {
+                may_latch: &[Fault::CurrentMismatch],
+                ..RIDE
+            },
             // Found when the tick that ran over has driven already.
             Self::TickOverrun => latch(&[Fault::TickOverrun], 1),
             Self::TaskStalled => latch(&[Fault::TaskStalled], STALL_TICKS),
@@ -150,7 +190,18 @@ impl Kind {
                 may_latch: &[Fault::TooFast, Fault::EncoderJump],
                 ..RIDE
             },
-            Self::HostRestarted | Self::Goodbye => Expectation {
+            // No later than the watchdog's reset.
+            Self::HaltedCore => latch(&[Fault::WatchdogReset], WATCHDOG_TICKS),
+            Self::BrownOut => Expectation {
+                may_ride: false,
+                may_latch: &[Fault::SupplyLow],
+                ..RIDE
+            },
+            Self::HostRestarted
+            | Self::Goodbye
+            | Self::ResetUnderLoad
+            | Self::ReplayThenRun
+            | Self::HostileCalibration => Expectation {
                 may_ride: false,
                 may_disarm: true,
                 ..RIDE
@@ -163,6 +214,7 @@ impl Kind {
             | Self::LinkSilence
             | Self::Misplaced
             | Self::LateTicks
+            | Self::EndpointHalt
             | Self::TilesMissing
             | Self::TilesPoisoned => RIDE,
         }
@@ -175,6 +227,10 @@ impl Kind {
             Self::EncoderGlitch | Self::DeadManBounce | Self::TickOverrun => (1, 1),
             Self::EncoderJump | Self::Goodbye | Self::HostRestarted => (1, 1),
             Self::EmergencyStop | Self::DeadManReleased | Self::HardwareFailed => (1, 150),
+            Self::OutputsNotAsSet => (1, 150),
+            Self::AmplifierNotReady => (3, 300),
+            Self::CurrentMismatch => (MISMATCH_TICKS, 150),
+            Self::MotorOpen => (100, 800),
             Self::EncoderStuck => (50, 1_500),
             Self::EncoderRunaway => (400, 400),
             Self::EncoderBeyondLimits => (3_000, 3_000),
@@ -184,15 +240,28 @@ impl Kind {
             Self::Yank => (40, 120),
             Self::TaskStalled => (STALL_TICKS + 20, STALL_TICKS + 200),
             Self::LateTicks => (1, 50),
+            Self::BrownOut => (LOADED_TICKS + 50, LOADED_TICKS + 2_000),
+            Self::ResetUnderLoad => (3_000, 12_000),
+            Self::HaltedCore => (WATCHDOG_TICKS, WATCHDOG_TICKS),
+            Self::ReplayThenRun => (300, 3_000),
+            Self::HostileCalibration => (500, 2_500),
             Self::EncoderNoise
             | Self::LinkLoss
             | Self::LinkDelay
             | Self::LinkDuplicates
             | Self::LinkCorruption
+            | Self::EndpointHalt
             | Self::Misplaced => (50, 800),
         }
     }
 }
 
+/// Within this many ticks a current that was not commanded has to be noticed.
+pub const MISMATCH_TICKS: u32 = 25;
+
 /// Within this many ticks a task that hangs has to be noticed.
 pub const STALL_TICKS: u32 = 41;
+/// Within this many ticks the watchdog resets a chip whose core stands still.
+pub const WATCHDOG_TICKS: u32 = 60;
+/// For so many ticks the hand presses before the supply breaks down.
+pub const LOADED_TICKS: u32 = 1_500;

@@ -12,10 +12,12 @@
 //! and its own number alone, so a violation is repeated by itself.
 
 pub mod arm;
+pub mod board;
 pub mod clock;
 pub mod effect;
 pub mod extremes;
 pub mod host;
+pub mod hostile;
 pub mod kind;
 pub mod levers;
 pub mod pipe;

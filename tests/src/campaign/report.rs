@@ -29,7 +29,10 @@ Held in every tick, by `tests/src/campaign/watch.rs`:
   within the same clamp, whatever is wrong with the encoders;
 - the force that they make at the true tip, with the arm's true levers, within the record's 8.5 N while no encoder is off by
   more than {OFF_COUNTS} counts, as much as two jumps may add before they are found;
-- the virtual motors' windings below 112 °C.
+- the virtual motors' windings below 112 °C, and no winding more than 1 K warmer than the device takes it to be, whatever reset
+  came between;
+- no calibration in force above the ceilings of a Premium 1.5, and none stored that nobody agreed to;
+- while the core stands still with its command on, all of this but what needs an encoder that is read.
 
 Both forces are the least that explain the currents with any share of the arm's weight held. They are not worked out within
 30° of the links in line or 80 mm of the base's axis.

@@ -5,28 +5,28 @@ use hapterra::phantom::PhantomModel;
 use hapterra::raster::Raster;
 use hapterra::synth::{Kind as Look, Synth};
 use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::Vec3;
 use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Drive, Mode, Sense};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Scene, Source};
+use hapterra_core::scene::{Point, Scene, Source};
 use hapterra_core::wire::message::ToDevice;
-use hapterra_core::wire::status::{BootReport, Status};
-use hapterra_firmware::app::{TileBuffers, WorkingMemory};
-use hapterra_firmware::native::Device;
-use hapterra_firmware::store::Stored;
+use hapterra_core::wire::request::Request;
+use hapterra_core::wire::status::{ResetCause, Status};
 
 use super::arm::{Arm, Mood};
+use super::board::{self, Board};
 use super::clock::{Reading, SetClock};
-use super::effect::{Mishap, RULE};
+use super::effect::{Core, Mishap, RULE};
 use super::host::{Host, Tiles};
+use super::hostile;
 use super::kind::Kind;
 use super::pipe::Unkind;
 use super::tally::{Outcome, Tally};
 use super::watch::{Truth, Watch};
 use crate::chance::Chance;
 
-/// Tiles along the side of the window, as on the smallest board.
-const WINDOW: usize = 4;
 /// Samples along the side of the terrain, and the side of a cell, mm.
 const SAMPLES: u32 = 512;
 const CELL_MM: f64 = 0.5;
@@ -94,7 +94,7 @@ struct Stretch<'t> {
     terrain: &'t Terrain<'t>,
     chance: Chance,
     clock: SetClock,
-    device: Device<SetClock, WINDOW>,
+    device: Board,
     host: Host<'t>,
     scene: Scene,
     arm: Arm<'t>,
@@ -104,6 +104,8 @@ struct Stretch<'t> {
     /// What the device was told that they read in its zero pose.
     zero: [i32; 3],
     dead_man: bool,
+    /// What the current monitors read a tick ago, mA.
+    measured_ma: [i16; 3],
     drive: Drive,
     now: u64,
     /// Ticks with the amplifiers on.
@@ -113,27 +115,24 @@ struct Stretch<'t> {
 impl<'t> Stretch<'t> {
     fn new(terrain: &'t Terrain<'t>, mut chance: Chance) -> Self {
         let record = Calibration::PREMIUM_1_5;
-        // The two halves of the application hand tile buffers to each other by
-        // reference, for as long as the program runs.
-        let tiles = Box::leak(Box::new(TileBuffers::VACANT));
-        let memory = Box::leak(Box::new(WorkingMemory::new()));
         let clock = SetClock::default();
-        let stored = Stored::Found(record);
-        let device = Device::new(tiles, memory, clock.clone(), stored, BootReport::default());
+        let device = board::new(clock.clone());
         let arm = Arm::new(terrain, &mut chance);
         let scene = scene(terrain, &arm, &mut chance);
+        let host = Host::new(terrain, scene, chance.bits());
         Self {
             terrain,
             chance,
             clock,
             device,
-            host: Host::new(terrain, scene),
+            host,
             scene,
             arm,
             watch: Watch::new(record, PhantomModel::premium_1_5()),
             lost: [0; 3],
             zero: [0; 3],
             dead_man: false,
+            measured_ma: [0; 3],
             drive: Drive::default(),
             now: 0,
             armed: 0,
@@ -172,24 +171,32 @@ impl<'t> Stretch<'t> {
         let began = self.now;
         let mut off = None;
         match kind {
-            Kind::Goodbye => self.say(&ToDevice::Bye),
+            Kind::Goodbye => self.host.leave(self.now, &mut self.chance),
             Kind::HostRestarted => {
                 self.scene = scene(self.terrain, &self.arm, &mut self.chance);
-                self.host.restart(self.scene, self.now, &mut self.chance);
-                self.watch.forget();
+                self.bring(self.scene);
             }
+            Kind::ReplayThenRun => self.bring(Scene {
+                source: Source::Points,
+                epoch: self.scene.epoch.wrapping_add(1),
+                ..self.scene
+            }),
+            Kind::HostileCalibration => self.host.request(Request::Disarm),
             _ => {}
         }
         let end = mishap.ticks.end + SETTLE;
         while self.now < end {
             let at = self.now - began;
             let under_way = mishap.ticks.contains(&self.now);
+            self.act(kind, at, mishap.ticks.end.saturating_sub(self.now));
             self.tick(under_way.then_some(&mut mishap))?;
             if !self.drive.enabled {
                 off.get_or_insert(at);
             }
         }
-        let report = self.status()?.health.report;
+        let status = self.status()?;
+        self.judge(kind, &status)?;
+        let report = status.health.report;
         let outcome = match (report.fault, report.mode) {
             (Some(fault), _) => Outcome::Latched(fault),
             (None, Mode::Armed) if off.is_none() => Outcome::Ridden,
@@ -198,14 +205,82 @@ impl<'t> Stretch<'t> {
         Ok((outcome, off))
     }
 
+    /// What host and user do in a mishap that takes more than a tick, `at` ticks after its
+    /// first one and with so many left.
+    fn act(&mut self, kind: Kind, at: u64, left: u64) {
+        match kind {
+            Kind::ReplayThenRun if left == 1 => {
+                self.scene.epoch = self.scene.epoch.wrapping_add(2);
+                self.bring(self.scene);
+            }
+            Kind::ReplayThenRun if left > 1 && at.is_multiple_of(3) => {
+                let hip = GridPoint::new(self.scene.home.cell(), Vec3::splat(0.5));
+                let seq = at as u32;
+                self.say(&ToDevice::Point(Point { seq, hip }));
+            }
+            // The force has gone out.
+            Kind::HostileCalibration if at == 150 => self.dead_man = false,
+            Kind::HostileCalibration if at > 150 && left > 0 && at.is_multiple_of(20) => {
+                let store = self.chance.below(2) == 0;
+                let calibration = match self.chance.below(5) {
+                    0 => hostile::harmless(),
+                    _ => hostile::calibration(&mut self.chance),
+                };
+                self.ask_past_the_client(Request::SetCalibration { calibration });
+                if store {
+                    self.ask_past_the_client(Request::StoreCalibration);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Makes a request under any number, as no honest host would.
+    fn ask_past_the_client(&mut self, request: Request) {
+        let number = self.chance.bits() as u8;
+        self.say(&ToDevice::Request { number, request });
+    }
+
+    /// Sends a message that the client would not send.
+    fn say(&mut self, message: &ToDevice<'_>) {
+        let (now, kind) = (self.now, Unkind::default());
+        self.host.say(message, now, &kind, &mut self.chance);
+    }
+
+    /// What has to hold after a mishap besides what [`Kind::expectation`] says.
+    fn judge(&self, kind: Kind, status: &Status) -> Result<(), String> {
+        let zero = status.health.zero;
+        if kind == Kind::ReplayThenRun && zero != Some(self.zero) {
+            return Err(format!("a replay lost the zero: {zero:?}"));
+        }
+        if *self.device.memory() != board::STORED {
+            return Err("a calibration was stored that nobody agreed to".into());
+        }
+        Ok(())
+    }
+
+    /// The host comes with a scene, as if it were started anew.
+    fn bring(&mut self, scene: Scene) {
+        self.host.restart(scene, self.now, &mut self.chance);
+        self.watch.forget();
+    }
+
+    /// The device comes out of a reset. Its encoders count from where the arm is now.
+    fn reset(&mut self, cause: ResetCause) {
+        let clock = self.clock.clone();
+        self.device = board::reset(&self.device, clock, cause, &mut self.chance);
+        self.lost = self.arm.counts().map(i32::wrapping_neg);
+        self.watch.forget();
+    }
+
     /// Asks for the status until there is an answer.
     fn status(&mut self) -> Result<Status, String> {
         self.host.status = None;
         let began = self.now;
         while self.now < began + ANSWER {
             if (self.now - began).is_multiple_of(100) {
-                self.greet_if_closed();
-                self.say(&ToDevice::Status);
+                self.host.greet_if_closed(self.now, &mut self.chance);
+                self.host.ask_status();
             }
             self.tick(None)?;
             if let Some(status) = self.host.status.take() {
@@ -213,12 +288,6 @@ impl<'t> Stretch<'t> {
             }
         }
         Err("the device does not tell its status".into())
-    }
-
-    fn greet_if_closed(&mut self) {
-        if !self.host.opened {
-            self.host.greet(self.now, &mut self.chance);
-        }
     }
 
     /// Clears, zeroes and arms as a user would, until the force is in.
@@ -238,10 +307,10 @@ impl<'t> Stretch<'t> {
         while self.now < began + TRY {
             let at = self.now - began;
             match at {
-                30 => self.say(&ToDevice::Disarm),
-                40 => self.say(&ToDevice::ClearFault),
+                30 => self.host.request(Request::Disarm),
+                40 => self.host.request(Request::ClearFault),
                 50 => self.say_zero(),
-                ASK => self.say(&ToDevice::Arm),
+                ASK => self.host.request(Request::Arm),
                 PRESS => self.dead_man = true,
                 _ => {}
             }
@@ -262,12 +331,7 @@ impl<'t> Stretch<'t> {
     /// With the arm in its zero pose its encoders would read what they are off by.
     fn say_zero(&mut self) {
         self.zero = self.lost;
-        self.say(&ToDevice::Zero { counts: self.zero });
-    }
-
-    fn say(&mut self, message: &ToDevice<'_>) {
-        let kind = Unkind::default();
-        self.host.say(message, self.now, &kind, &mut self.chance);
+        self.host.request(Request::Zero { counts: self.zero });
     }
 
     fn tick(&mut self, mishap: Option<&mut Mishap>) -> Result<(), String> {
@@ -279,22 +343,30 @@ impl<'t> Stretch<'t> {
 
     /// One tick of everything.
     fn tick_in(&mut self, mood: Mood, mishap: Option<&mut Mishap>) -> Result<(), String> {
+        self.arm
+            .break_amplifier(mishap.as_ref().and_then(|mishap| mishap.amplifier()));
         let mut sense = Sense {
             counts: self.arm.counts(),
             dead_man: self.dead_man,
             emergency_stop: false,
             hardware_failed: false,
+            outputs_not_as_set: false,
+            amplifier_not_ready: !self.arm.plant().amplifiers_are_ready(),
+            measured_ma: Some(self.measured_ma),
         };
+        self.measured_ma = self.arm.plant().monitors_ma();
         for (count, lost) in sense.counts.iter_mut().zip(self.lost) {
             *count += lost;
         }
         let (mut unkind, mut tiles) = (Unkind::default(), Tiles::Sent);
         let (mut reading, mut stalls) = (Reading::default(), false);
+        let mut core = Core::Runs;
         if let Some(mishap) = mishap {
             mishap.meddle(&mut sense, &mut self.lost, self.now, &mut self.chance);
             (unkind, tiles) = (mishap.unkind(), mishap.tiles());
             (reading, stalls) = (mishap.reading(), mishap.stalls());
-            if mishap.unplugs(self.now) {
+            core = mishap.core(self.now);
+            if mishap.unplugs(self.now) || mishap.halts_endpoint(&mut self.chance) {
                 self.device.link.interrupted();
             }
             if let Some(message) = mishap.misplaced(&mut self.chance, self.scene.epoch) {
@@ -302,24 +374,12 @@ impl<'t> Stretch<'t> {
             }
         }
         self.clock.set(reading);
-        let device = &mut self.device;
-        self.drive = if stalls {
-            device.tick_alone(sense)
-        } else {
-            self.host
-                .deliver(self.now, &mut |bytes| device.receive(bytes));
-            device.tick(sense)
-        };
         let mut said = [0; 1024];
-        let length = if stalls {
-            0
-        } else {
-            self.device.link.transmit(&mut said)
-        };
+        let length = self.run_core(core, sense, stalls, &mut said);
         let said = &said[..length];
         self.host
             .hear(said, self.now, &unkind, tiles, &mut self.chance);
-        self.look(&sense)?;
+        self.look(core, &sense)?;
         let currents = self.drive.currents_a.to_array().map(f64::from);
         self.arm.step(currents, mood);
         self.armed += u64::from(self.drive.enabled);
@@ -327,7 +387,29 @@ impl<'t> Stretch<'t> {
         Ok(())
     }
 
-    fn look(&mut self, sense: &Sense) -> Result<(), String> {
+    /// Lets the core do what it does in a tick; returns the length of what it said.
+    fn run_core(&mut self, core: Core, sense: Sense, stalls: bool, said: &mut [u8]) -> usize {
+        match core {
+            Core::Runs if stalls => self.drive = self.device.tick_alone(sense),
+            Core::Runs => {
+                let device = &mut self.device;
+                self.host
+                    .deliver(self.now, &mut |bytes| device.receive(bytes));
+                self.drive = device.tick(sense);
+                return device.link.transmit(said);
+            }
+            // The last command stays.
+            Core::Halted => {}
+            Core::Down => self.drive = Drive::default(),
+            Core::Resets(cause) => {
+                self.reset(cause);
+                self.drive = Drive::default();
+            }
+        }
+        0
+    }
+
+    fn look(&mut self, core: Core, sense: &Sense) -> Result<(), String> {
         if let Some(error) = self.host.failed.take() {
             return Err(format!("the link broke: {error}"));
         }
@@ -337,7 +419,18 @@ impl<'t> Stretch<'t> {
             counts: plant.counts(),
             winding_c: plant.winding_c(),
         };
-        self.watch.drive(&self.drive, sense, self.zero, &truth)?;
+        if core == Core::Halted {
+            self.watch.held(&self.drive, &truth)?;
+        } else {
+            self.watch.drive(&self.drive, sense, self.zero, &truth)?;
+        }
+        if core == Core::Runs {
+            let believed_c = self.device.temperatures().winding_c();
+            self.watch.warmth(believed_c, &truth)?;
+            self.device
+                .calibration()
+                .map_or(Ok(()), hostile::keeps_ceilings)?;
+        }
         for sample in std::mem::take(&mut self.host.samples) {
             self.watch.sample(&sample, self.scene.law.max_force_n)?;
         }

@@ -8,6 +8,7 @@
 //! - while one is, no program can know the true levers: that force is told.
 
 use hapterra::phantom::{Encoder, PhantomModel};
+use hapterra_core::Vec3;
 use hapterra_core::guard::{Drive, Mode, Sense, WORKING_SHARE};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::Sample;
@@ -20,6 +21,9 @@ const SLEW_N: f32 = 1.0;
 /// The winding of a virtual motor may get this hot, °C. The guard trips at
 /// 110 °C by its own, more careful model.
 const HOTTEST_C: f64 = 112.0;
+/// A winding may be warmer than the device takes it to be by this, K: the arm's motors
+/// and the device's model are not the same formula.
+const COLDER_K: f64 = 1.0;
 /// Room for rounding in comparisons of f32.
 const ROUNDING: f32 = 1e-4;
 
@@ -39,6 +43,8 @@ pub struct Watch {
     record: Calibration,
     model: PhantomModel,
     last: Option<Sample>,
+    /// Whether the host has asked to hold outputs with the amplifiers off.
+    pub may_hold: bool,
     /// The largest so far.
     pub extremes: Extremes,
 }
@@ -51,6 +57,7 @@ impl Watch {
             record,
             model,
             last: None,
+            may_hold: false,
             extremes: Extremes::default(),
         }
     }
@@ -67,6 +74,53 @@ impl Watch {
         zero: [i32; 3],
         truth: &Truth,
     ) -> Result<(), String> {
+        self.outputs(drive, truth)?;
+        let told_unfit = sense.hardware_failed || sense.outputs_not_as_set;
+        let unsafe_input = !sense.dead_man || sense.emergency_stop || told_unfit;
+        if drive.enabled && unsafe_input {
+            return Err(format!("amplifiers on with {sense:?}"));
+        }
+        if drive.enabled {
+            let told = std::array::from_fn(|i| sense.counts[i].wrapping_sub(zero[i]));
+            let currents = drive.currents_a.to_array().map(f64::from);
+            let torque = torques_nm(&self.model, currents);
+            self.force_as_read(torque, told)?;
+            self.force_at_the_tip(torque, told, truth)?;
+        }
+        Ok(())
+    }
+
+    /// Looks at a command that a core holds which stands still: nobody reads the
+    /// encoders, so only what is true counts.
+    ///
+    /// # Errors
+    /// What must not be.
+    pub fn held(&mut self, drive: &Drive, truth: &Truth) -> Result<(), String> {
+        self.outputs(drive, truth)?;
+        let currents = drive.currents_a.to_array().map(f64::from);
+        let torque = torques_nm(&self.model, currents);
+        self.force_at_the_tip(torque, truth.counts, truth)
+    }
+
+    /// Looks at what the device takes its motors to be: never colder than they are.
+    ///
+    /// # Errors
+    /// Where it does.
+    pub fn warmth(&self, believed_c: Vec3, truth: &Truth) -> Result<(), String> {
+        for (axis, is_c) in truth.winding_c.into_iter().enumerate() {
+            let believed_c = f64::from(believed_c[axis]);
+            if believed_c.is_nan() || believed_c < is_c - COLDER_K {
+                return Err(format!(
+                    "winding {} is at {is_c:.1} °C, and the device takes it to be at {believed_c:.1} °C",
+                    axis + 1
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// What holds of the outputs whatever the inputs say.
+    fn outputs(&mut self, drive: &Drive, truth: &Truth) -> Result<(), String> {
         let currents = drive.currents_a;
         let largest = currents.abs().max_element();
         if !currents.is_finite() {
@@ -75,24 +129,24 @@ impl Watch {
         if !drive.enabled && largest != 0.0 {
             return Err(format!("{largest} A commanded with the amplifiers off"));
         }
+        if drive.enabled && drive.held != Vec3::ZERO {
+            return Err(format!("{} held with the amplifiers on", drive.held));
+        }
+        // Nobody asks to hold outputs while a terrain is served.
+        if drive.held != Vec3::ZERO && !self.may_hold {
+            return Err(format!("{} held although nobody asked", drive.held));
+        }
+        if drive.held.is_nan() || drive.held.abs().cmpgt(Vec3::ONE).any() {
+            return Err(format!("{} held is beyond full scale", drive.held));
+        }
         if currents.abs().cmpgt(self.record.peak_current_a).any() {
             return Err(format!("{currents} A is above the peak current"));
-        }
-        let unsafe_input = !sense.dead_man || sense.emergency_stop || sense.hardware_failed;
-        if drive.enabled && unsafe_input {
-            return Err(format!("amplifiers on with {sense:?}"));
         }
         self.extremes.current_a = self.extremes.current_a.max(f64::from(largest));
         let hottest = truth.winding_c.into_iter().fold(0.0, f64::max);
         self.extremes.winding_c = self.extremes.winding_c.max(hottest);
         if hottest > HOTTEST_C {
             return Err(format!("a winding of the arm is at {hottest:.1} °C"));
-        }
-        if drive.enabled {
-            let told = std::array::from_fn(|i| sense.counts[i].wrapping_sub(zero[i]));
-            let torque = torques_nm(&self.model, currents.to_array().map(f64::from));
-            self.force_as_read(torque, told)?;
-            self.force_at_the_tip(torque, told, truth)?;
         }
         Ok(())
     }

@@ -10,7 +10,8 @@ use std::task::{Context, Waker};
 use embassy_futures::join::join;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_usb_driver::Event;
+use embassy_usb_driver::{Bus, EndpointAddress, Event};
+use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::app::{Application, Hardware, TileBuffers, WorkingMemory, assemble};
@@ -19,9 +20,11 @@ use hapterra_firmware::haptic_loop::HapticLoop;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::{LinkBoard, run};
 use hapterra_firmware::monitor::{Monitor, Part};
-use hapterra_firmware::native::{StoppedClock, VirtualAmplifiersOff, VirtualEncoders};
+use hapterra_firmware::native::{
+    FULL_SCALE_A, StoppedClock, VirtualAmplifiersOff, VirtualEncoders,
+};
 use hapterra_firmware::store::Stored;
-use hapterra_firmware::usb::{DescriptorBuffers, device};
+use hapterra_firmware::usb::{DescriptorBuffers, EndpointHalt, device};
 
 use super::driver::{ScriptedDriver, Wire};
 use super::{Answer, Handshake, MOMENTS_A_MS, Port};
@@ -45,6 +48,15 @@ impl LinkBoard for TickDone {
     fn after_poll<const D: usize>(&self, _link: &Link<'_, D>) {}
 }
 
+/// Whole packets have no toggles.
+struct EndpointHalts;
+
+impl EndpointHalt for EndpointHalts {
+    fn end(bus: &mut impl Bus, address: EndpointAddress) {
+        bus.endpoint_set_stalled(address, false);
+    }
+}
+
 /// A board without a chip.
 pub struct Board {
     wire: Rc<RefCell<Wire>>,
@@ -64,7 +76,9 @@ impl Board {
             encoders: VirtualEncoders::default(),
             amplifiers: VirtualAmplifiersOff,
             clock: StoppedClock,
+            full_scale_a: FULL_SCALE_A,
             calibration: Stored::Found(Calibration::PREMIUM_1_5),
+            motors: Temperatures::AIR,
             boot: BootReport::default(),
         };
         let tiles = Box::leak(Box::new(TileBuffers::VACANT));
@@ -78,7 +92,7 @@ impl Board {
         wire.borrow_mut().report(Event::PowerDetected);
         let driver = ScriptedDriver(Rc::clone(&wire), [0; 2]);
         let buffers = Box::leak(Box::new(DescriptorBuffers::EMPTY));
-        let (mut stack, rx, tx) = device(driver, SERIAL, buffers);
+        let (mut stack, rx, tx) = device::<_, EndpointHalts>(driver, SERIAL, buffers);
         let done = TickDone(Rc::new(Signal::new()));
         let host = done.clone();
         let tasks = Box::pin(async move {

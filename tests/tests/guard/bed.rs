@@ -13,8 +13,8 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Drive, Report, Sense, WORKING_SHARE};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Sample, Scene, Source};
-use hapterra_core::wire::message::ToDevice;
-use hapterra_core::wire::status::{Answer, BootReport};
+use hapterra_core::wire::request::{Refusal, Request};
+use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::native::StoppedClock;
 use hapterra_firmware::store::Stored;
 use hapterra_tests::faulty::Shared;
@@ -40,7 +40,7 @@ pub(crate) struct Bed<'t> {
     pub(crate) log: Log,
     pub(crate) samples: Vec<Sample>,
     pub(crate) reports: Vec<Report>,
-    pub(crate) answers: Vec<Answer>,
+    pub(crate) answers: Vec<(Request, Result<(), Refusal>)>,
 }
 
 impl<'t> Bed<'t> {
@@ -110,15 +110,14 @@ impl<'t> Bed<'t> {
         let polled = session.poll(Duration::ZERO, &mut |event| match event {
             Event::Sample(sample) => samples.push(*sample),
             Event::Guard(report) => reports.push(*report),
-            Event::Answer(answer) => answers.push(*answer),
+            Event::Answered { request, result } => answers.push((*request, result)),
             _ => {}
         });
         polled.expect("goes on");
     }
 
-    pub(crate) fn say(&mut self, message: &ToDevice<'_>) {
-        let session = self.session.as_mut().expect("open");
-        session.say(message).expect("said");
+    pub(crate) fn ask(&mut self, request: Request) {
+        self.session.as_mut().expect("open").request(request);
     }
 
     pub(crate) fn sample(&self, tick: u64) -> &Sample {

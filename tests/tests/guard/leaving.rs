@@ -5,7 +5,6 @@ use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::{Drive, Limits, Mode, Sense};
-use hapterra_core::wire::message::ToDevice;
 
 use crate::bed::{Bed, MIDDLE_MM, NOTHING, PLANE_MM, PRESSED, on_plane, plane, press};
 
@@ -79,7 +78,9 @@ fn goodbye_lets_the_force_out_gently_and_switches_off() {
     let raster = plane();
     let terrain = on_plane(&raster);
     let mut bed = Bed::new(&terrain, press(2.0).finish(), NOTHING).run(PRESSED);
-    bed.say(&ToDevice::Bye);
+    let session = bed.session.as_mut().expect("open");
+    session.say_goodbye(&mut |_| {}).expect("confirmed");
+    assert!(!bed.device.borrow().drive().enabled, "as it says");
     bed.device.borrow_mut().pass(300);
     let log = bed.log.borrow();
     let off = bed.off_at() as usize;

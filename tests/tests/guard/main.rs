@@ -10,8 +10,8 @@ use hapterra::phantom::Script;
 use hapterra_core::guard::{Blockers, Fault, Limits, Mode};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::Sample;
-use hapterra_core::wire::message::ToDevice;
-use hapterra_core::wire::status::{Answer, BootReport, Refusal, Request, ResetCause};
+use hapterra_core::wire::request::{Refusal, Request};
+use hapterra_core::wire::status::{BootReport, ResetCause};
 use hapterra_firmware::store::Stored;
 use std::cell::RefCell;
 
@@ -36,10 +36,7 @@ fn armed_only_after_the_switch_was_pressed_and_force_comes_in_over_two_seconds()
     assert!(ramping.limits.contains(Limits::RAMPING));
     let modes: Vec<Mode> = bed.reports.iter().map(|report| report.mode).collect();
     assert_eq!(modes.last(), Some(&Mode::Armed), "{modes:?}");
-    let granted = Answer {
-        request: Request::Arm,
-        result: Ok(()),
-    };
+    let granted = (Request::Arm, Ok(()));
     assert!(bed.answers.contains(&granted), "{:?}", bed.answers);
     assert!((bed.sample(PRESSED + 400).force_n.z - 1.0).abs() < 0.1);
 }
@@ -116,12 +113,12 @@ fn after_a_fault_it_takes_a_clearing_a_command_and_a_new_press() {
     };
     let script = press(0.1).finish().wait(30.0);
     let mut bed = Bed::new(&terrain, script, wrong).run(PRESSED + 700);
-    bed.say(&ToDevice::Arm);
+    bed.ask(Request::Arm);
     bed = bed.run(PRESSED + 900);
     let refused = Err(Refusal::Blocked(Blockers::FAULT_LATCHED));
-    assert_eq!(bed.answers.last().map(|a| a.result), Some(refused));
-    bed.say(&ToDevice::ClearFault);
-    bed.say(&ToDevice::Arm);
+    assert_eq!(bed.answers.last().map(|(_, result)| *result), Some(refused));
+    bed.ask(Request::ClearFault);
+    bed.ask(Request::Arm);
     bed = bed.run(5_890);
     let report = bed.reports.last().expect("told");
     assert_eq!(report.blockers, Blockers::DEAD_MAN_STILL_HELD);
@@ -246,36 +243,40 @@ fn what_was_found_at_boot_has_to_be_cleared_first() {
     let terrain = on_plane(&raster);
     let starved = BootReport {
         cause: ResetCause::Watchdog,
-        crash: None,
+        ..BootReport::default()
     };
     let good = Stored::Found(Calibration::PREMIUM_1_5);
     let script = || press(0.1).finish().wait(30.0);
     let held_late: Wrong = |tick, sense| sense.dead_man &= tick > 1_000;
     let mut bed = Bed::started(&terrain, script(), held_late, (good, starved)).run(500);
     let refused = Err(Refusal::Blocked(Blockers::FAULT_LATCHED));
-    assert_eq!(bed.answers.last().map(|a| a.result), Some(refused));
+    assert_eq!(bed.answers.last().map(|(_, result)| *result), Some(refused));
     let fault = bed.reports.last().and_then(|r| r.fault);
     assert_eq!(fault, Some(Fault::WatchdogReset));
-    bed.say(&ToDevice::ClearFault);
-    bed.say(&ToDevice::Arm);
+    bed.ask(Request::ClearFault);
+    bed.ask(Request::Arm);
     bed = bed.run(3_300);
     assert_eq!(bed.samples.last().map(|s| s.mode), Some(Mode::Armed));
 
     let damaged = (Stored::Damaged, BootReport::default());
-    let mut bed = Bed::started(&terrain, script(), held_late, damaged).run(500);
+    // Pressed once to store the calibration, and then again to arm.
+    let pressed_twice: Wrong =
+        |tick, sense| sense.dead_man &= (1_000..1_300).contains(&tick) || tick > 1_800;
+    let mut bed = Bed::started(&terrain, script(), pressed_twice, damaged).run(500);
     let fault = bed.reports.last().and_then(|r| r.fault);
     assert_eq!(fault, Some(Fault::CalibrationCorrupt));
-    bed.say(&ToDevice::ClearFault);
-    bed.say(&ToDevice::Arm);
+    bed.ask(Request::ClearFault);
+    bed.ask(Request::Arm);
     bed = bed.run(700);
     let refused = Err(Refusal::Blocked(Blockers::NO_CALIBRATION));
-    assert_eq!(bed.answers.last().map(|a| a.result), Some(refused));
-    bed.say(&ToDevice::SetCalibration {
+    assert_eq!(bed.answers.last().map(|(_, result)| *result), Some(refused));
+    bed.ask(Request::SetCalibration {
         calibration: Calibration::PREMIUM_1_5,
-        store: true,
     });
-    bed.say(&ToDevice::Arm);
-    bed = bed.run(3_400);
+    bed.ask(Request::StoreCalibration);
+    bed = bed.run(1_500);
+    bed.ask(Request::Arm);
+    bed = bed.run(4_200);
     assert_eq!(bed.samples.last().map(|s| s.mode), Some(Mode::Armed));
     assert_eq!(*bed.device.borrow().memory(), good);
 }

@@ -1,0 +1,63 @@
+//! The device of a segment, and what a reset leaves of it.
+
+use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::status::{BootReport, ResetCause};
+use hapterra_firmware::app::{TileBuffers, WorkingMemory};
+use hapterra_firmware::motor_memory::Copies;
+use hapterra_firmware::native::Device;
+use hapterra_firmware::store::Stored;
+
+use super::clock::SetClock;
+use crate::chance::Chance;
+
+/// Tiles along the side of the window, as on the smallest board.
+const WINDOW: usize = 4;
+
+/// The device.
+pub type Board = Device<SetClock, WINDOW>;
+
+/// What every board of the campaign has stored.
+pub const STORED: Stored = Stored::Found(Calibration::PREMIUM_1_5);
+
+/// The two halves of the application hand tile buffers to each other by reference, for
+/// as long as the program runs.
+fn memory() -> (
+    &'static mut TileBuffers<WINDOW>,
+    &'static mut WorkingMemory<'static>,
+) {
+    let tiles = Box::leak(Box::new(TileBuffers::VACANT));
+    (tiles, Box::leak(Box::new(WorkingMemory::new())))
+}
+
+/// A device with cold motors.
+#[must_use]
+pub fn new(clock: SetClock) -> Board {
+    let (tiles, memory) = memory();
+    Device::new(tiles, memory, clock, STORED, BootReport::default())
+}
+
+/// The device after a reset: flash and RAM as the one before has left them, the RAM
+/// damaged by chance where the supply was low.
+#[must_use]
+pub fn reset(before: &Board, clock: SetClock, cause: ResetCause, chance: &mut Chance) -> Board {
+    let mut ram = *before.retained();
+    if cause == ResetCause::BrownOut {
+        damage(&mut ram, chance);
+    }
+    let (tiles, memory) = memory();
+    let boot = BootReport {
+        cause,
+        ..BootReport::default()
+    };
+    Device::restarted(tiles, memory, clock, *before.memory(), boot, &ram)
+}
+
+/// Flips a bit of no copy, of one, or of both.
+fn damage(ram: &mut Copies, chance: &mut Chance) {
+    for copy in ram {
+        if chance.below(2) == 0 {
+            let at = chance.below(copy.len());
+            copy[at] ^= 1 << chance.below(32);
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! The two directions between host and device, and what may be done to each.
+
+use std::collections::VecDeque;
+
+use crate::chance::Chance;
+
+/// Bytes that a direction holds at most: a device that finds no room waits, as one does
+/// whose host does not read.
+const CAPACITY: usize = 8 << 10;
+/// Bytes that a device may send in a tick: a full-speed USB's, about.
+pub const A_TICK: usize = 1_024;
+
+/// What is done to one direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Harm {
+    /// Share of bytes in which a bit flips.
+    pub flipped: f64,
+    /// Share of transfers that lose a run of bytes.
+    pub dropped: f64,
+    /// Share of transfers that come twice.
+    pub twice: f64,
+    /// Milliseconds that a transfer is late, at most.
+    pub late: u32,
+    /// What is on its way stays there, and so does what is sent.
+    pub stalled: bool,
+    /// Nothing gets in, and what was on its way is gone.
+    pub cut: bool,
+}
+
+impl Harm {
+    /// None.
+    pub const NONE: Self = Self {
+        flipped: 0.0,
+        dropped: 0.0,
+        twice: 0.0,
+        late: 0,
+        stalled: false,
+        cut: false,
+    };
+}
+
+/// One direction.
+#[derive(Default)]
+pub struct Way {
+    transfers: VecDeque<(u64, Vec<u8>)>,
+    held: usize,
+    harm: Harm,
+}
+
+impl Way {
+    /// What is done to it from now on.
+    pub fn harm(&mut self, harm: Harm) {
+        self.harm = harm;
+        if harm.cut {
+            self.transfers.clear();
+            self.held = 0;
+        }
+    }
+
+    /// Bytes that there is room for.
+    #[must_use]
+    pub fn room(&self) -> usize {
+        CAPACITY.saturating_sub(self.held)
+    }
+
+    /// Puts a transfer in at `now`, ms.
+    pub fn send(&mut self, bytes: &[u8], now: u64, chance: &mut Chance) {
+        if bytes.is_empty() || self.harm.cut {
+            return;
+        }
+        let mut transfer = bytes.to_vec();
+        flip(&mut transfer, self.harm.flipped, chance);
+        if happens(self.harm.dropped, chance) {
+            let from = chance.below(transfer.len());
+            let to = (from + 1 + chance.below(80)).min(transfer.len());
+            transfer.drain(from..to);
+        }
+        let late = chance.below(self.harm.late as usize + 1) as u64;
+        // Bytes do not overtake each other.
+        let due = self.transfers.back().map_or(0, |(due, _)| *due);
+        let due = due.max(now + late);
+        let times = 1 + usize::from(happens(self.harm.twice, chance));
+        for _ in 0..times {
+            self.held += transfer.len();
+            self.transfers.push_back((due, transfer.clone()));
+        }
+    }
+
+    /// The next transfer that has arrived.
+    pub fn receive(&mut self, now: u64) -> Option<Vec<u8>> {
+        let (due, _) = self.transfers.front()?;
+        if self.harm.stalled || *due > now {
+            return None;
+        }
+        let (_, transfer) = self.transfers.pop_front()?;
+        self.held -= transfer.len();
+        Some(transfer)
+    }
+
+    /// Puts back what was not taken.
+    pub fn put_back(&mut self, rest: &[u8], now: u64) {
+        if !rest.is_empty() {
+            self.held += rest.len();
+            self.transfers.push_front((now, rest.to_vec()));
+        }
+    }
+}
+
+fn happens(share: f64, chance: &mut Chance) -> bool {
+    share > 0.0 && chance.between(0.0, 1.0) < share
+}
+
+/// Flips a bit in so many of the bytes.
+fn flip(bytes: &mut [u8], share: f64, chance: &mut Chance) {
+    if share <= 0.0 {
+        return;
+    }
+    // From one flip to the next it is so many bytes.
+    let stride = |chance: &mut Chance| {
+        let u = chance.between(f64::MIN_POSITIVE, 1.0);
+        (libm::log(u) / libm::log1p(-share)) as usize
+    };
+    let mut at = stride(chance);
+    while let Some(byte) = bytes.get_mut(at) {
+        *byte ^= 1 << chance.below(8);
+        at += 1 + stride(chance);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn as_many_bits_flip_as_are_asked_for() {
+        let mut chance = Chance::new(1);
+        let mut flipped = 0;
+        for _ in 0..1_000 {
+            let mut bytes = [0; 1_000];
+            flip(&mut bytes, 1e-3, &mut chance);
+            flipped += bytes.iter().filter(|byte| **byte != 0).count();
+        }
+        assert!((900..1_100).contains(&flipped), "{flipped}");
+    }
+
+    #[test]
+    fn what_stalls_comes_later_and_what_is_cut_never() {
+        let mut chance = Chance::new(2);
+        let mut way = Way::default();
+        let stalled = Harm {
+            stalled: true,
+            ..Harm::NONE
+        };
+        way.harm(stalled);
+        way.send(b"held", 1, &mut chance);
+        assert_eq!((way.receive(9), way.room()), (None, CAPACITY - 4));
+        way.harm(Harm::NONE);
+        assert_eq!(way.receive(9), Some(b"held".to_vec()));
+        let cut = Harm {
+            cut: true,
+            ..Harm::NONE
+        };
+        way.send(b"gone", 10, &mut chance);
+        way.harm(cut);
+        way.send(b"gone", 11, &mut chance);
+        way.harm(Harm::NONE);
+        assert_eq!((way.receive(99), way.room()), (None, CAPACITY));
+    }
+}

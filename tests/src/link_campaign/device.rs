@@ -1,0 +1,124 @@
+//! The device: the boards' application compiled for this machine, with a virtual arm in a
+//! hand, tick by tick.
+
+use hapterra::phantom::PhantomModel;
+use hapterra::terrain::Terrain;
+use hapterra_core::guard::{Drive, Sense};
+use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::status::BootReport;
+use hapterra_firmware::app::{TileBuffers, WorkingMemory};
+use hapterra_firmware::native::{Device, StoppedClock};
+use hapterra_firmware::store::Stored;
+
+use super::cable::A_TICK;
+use crate::campaign::arm::{Arm, Mood};
+use crate::campaign::watch::{Truth, Watch};
+use crate::chance::Chance;
+
+/// Tiles along the side of the window, as on the smallest board.
+const WINDOW: usize = 4;
+
+/// The device and its arm.
+pub struct Board<'t> {
+    device: Device<StoppedClock, WINDOW>,
+    arm: Arm<'t>,
+    /// Holds every tick to its bounds.
+    pub watch: Watch,
+    /// Whether the hand holds the dead-man switch.
+    pub dead_man: bool,
+    /// What the hand is up to.
+    pub mood: Mood,
+    /// What the amplifiers got in the last tick.
+    pub drive: Drive,
+    /// Whether the device's time stands still while it waits for the host.
+    pub lock_step: bool,
+    /// Ticks so far, and those with the amplifiers on.
+    pub ticks: [u64; 2],
+}
+
+impl<'t> Board<'t> {
+    /// A board that was just switched on, its arm over the middle of a terrain.
+    pub fn new(terrain: &'t Terrain<'t>, chance: &mut Chance) -> Self {
+        let record = Calibration::PREMIUM_1_5;
+        Self {
+            device: start(),
+            arm: Arm::new(terrain, chance),
+            watch: Watch::new(record, PhantomModel::premium_1_5()),
+            dead_man: false,
+            mood: Mood::Lifted,
+            drive: Drive::default(),
+            lock_step: false,
+            ticks: [0; 2],
+        }
+    }
+
+    /// The terrain point at the home pose, mm.
+    #[must_use]
+    pub fn home_mm(&self) -> [f64; 3] {
+        self.arm.home_mm()
+    }
+
+    /// Restarts the device; the arm stays where it is.
+    pub fn restart(&mut self) {
+        self.device = start();
+        self.drive = Drive::default();
+        self.watch.forget();
+    }
+
+    /// The transport says that it was interrupted.
+    pub fn interrupt(&mut self) {
+        self.device.link.interrupted();
+    }
+
+    /// Takes bytes from the host; gives how many it took.
+    pub fn receive(&mut self, bytes: &[u8]) -> usize {
+        self.device.receive(bytes)
+    }
+
+    /// What the device says, as far as there is room for it.
+    pub fn say<'b>(&mut self, into: &'b mut [u8; A_TICK], room: usize) -> &'b [u8] {
+        let room = room.min(A_TICK);
+        let said = self.device.link.transmit(&mut into[..room]);
+        &into[..said]
+    }
+
+    /// Runs one tick of device and arm.
+    ///
+    /// # Errors
+    /// What must not be, by the watch.
+    pub fn tick(&mut self) -> Result<(), String> {
+        if self.lock_step && self.device.link.may_stand_still() {
+            // The link's task runs all the same.
+            self.device.receive(&[]);
+            return Ok(());
+        }
+        let sense = Sense {
+            counts: self.arm.counts(),
+            dead_man: self.dead_man,
+            emergency_stop: false,
+            ..Sense::default()
+        };
+        self.drive = self.device.tick(sense);
+        let plant = self.arm.plant();
+        let truth = Truth {
+            q_rad: plant.q_rad(),
+            counts: plant.counts(),
+            winding_c: plant.winding_c(),
+        };
+        self.watch.drive(&self.drive, &sense, [0; 3], &truth)?;
+        let currents = self.drive.currents_a.to_array().map(f64::from);
+        self.arm.step(currents, self.mood);
+        self.ticks[0] += 1;
+        self.ticks[1] += u64::from(self.drive.enabled);
+        Ok(())
+    }
+}
+
+fn start() -> Device<StoppedClock, WINDOW> {
+    // The two halves of the application hand tile buffers to each other by reference, for
+    // as long as the program runs.
+    let tiles = Box::leak(Box::new(TileBuffers::VACANT));
+    let memory = Box::leak(Box::new(WorkingMemory::new()));
+    let stored = Stored::Found(Calibration::PREMIUM_1_5);
+    Device::new(tiles, memory, StoppedClock, stored, BootReport::default())
+}

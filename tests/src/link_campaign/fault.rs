@@ -1,0 +1,135 @@
+//! What goes wrong on the link, and for how long.
+
+use super::cable::Harm;
+use crate::chance::Chance;
+
+/// Something that goes wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Bits flip, in one byte of a million to one of a hundred.
+    Flips,
+    /// Transfers lose a run of bytes.
+    Drops,
+    /// Transfers come twice.
+    Duplicates,
+    /// Transfers come late.
+    Delays,
+    /// Both directions stand still, then everything comes at once.
+    Stall,
+    /// Nothing reaches the host.
+    DeafHost,
+    /// Nothing reaches the device.
+    DeafDevice,
+    /// Nothing reaches either.
+    Cut,
+    /// The host is killed and another is started.
+    HostKilled,
+    /// The host is killed, and for a long time there is no other.
+    HostVanishes,
+    /// The device is restarted.
+    DeviceRestarted,
+    /// Another program talks to the device: noise, floods, messages that make no sense.
+    HostileHost,
+    /// Something else answers the host.
+    HostileDevice,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 13] = [
+        Self::Flips,
+        Self::Drops,
+        Self::Duplicates,
+        Self::Delays,
+        Self::Stall,
+        Self::DeafHost,
+        Self::DeafDevice,
+        Self::Cut,
+        Self::HostKilled,
+        Self::HostVanishes,
+        Self::DeviceRestarted,
+        Self::HostileHost,
+        Self::HostileDevice,
+    ];
+
+    /// For how many milliseconds it lasts, shortest and longest.
+    #[must_use]
+    pub const fn duration(self) -> (usize, usize) {
+        match self {
+            Self::Flips | Self::Drops | Self::Duplicates | Self::Delays => (200, 6_000),
+            Self::Stall | Self::DeafHost | Self::DeafDevice | Self::Cut => (20, 6_000),
+            Self::HostileHost => (50, 2_000),
+            Self::HostKilled | Self::HostVanishes | Self::DeviceRestarted | Self::HostileDevice => {
+                (1, 1)
+            }
+        }
+    }
+}
+
+/// One fault of a kind that lasts.
+#[derive(Clone, Copy, Debug)]
+pub struct Fault {
+    /// What it is.
+    pub kind: Kind,
+    /// When it ends, ms.
+    pub end: u64,
+    share: f64,
+    /// Which directions a fault of the bytes harms: to the device, to the host.
+    ways: [bool; 2],
+}
+
+impl Fault {
+    /// One that begins at `now`, ms.
+    #[must_use]
+    pub fn of(kind: Kind, now: u64, chance: &mut Chance) -> Self {
+        let (shortest, longest) = kind.duration();
+        // As many short ones as long ones.
+        let stretch = chance.between(0.0, 1.0);
+        let length = (longest - shortest) as f64 * stretch * stretch;
+        Self {
+            kind,
+            end: now + shortest as u64 + length as u64,
+            share: chance.between(0.0, 1.0),
+            ways: [[true, true], [true, false], [false, true]][chance.below(3)],
+        }
+    }
+
+    /// What it does to the direction to the device and to that to the host.
+    #[must_use]
+    pub fn harms(&self) -> [Harm; 2] {
+        let harm = match self.kind {
+            Kind::Flips => Harm {
+                flipped: libm::pow(10.0, -6.0 + 4.0 * self.share),
+                ..Harm::NONE
+            },
+            Kind::Drops => Harm {
+                dropped: 0.001 + 0.4 * self.share * self.share,
+                ..Harm::NONE
+            },
+            Kind::Duplicates => Harm {
+                twice: 0.02 + 0.98 * self.share,
+                ..Harm::NONE
+            },
+            Kind::Delays => Harm {
+                late: 5 + (400.0 * self.share) as u32,
+                ..Harm::NONE
+            },
+            Kind::Stall => Harm {
+                stalled: true,
+                ..Harm::NONE
+            },
+            Kind::DeafHost | Kind::DeafDevice | Kind::Cut => Harm {
+                cut: true,
+                ..Harm::NONE
+            },
+            _ => Harm::NONE,
+        };
+        let ways = match self.kind {
+            Kind::DeafHost => [false, true],
+            Kind::DeafDevice => [true, false],
+            Kind::Stall | Kind::Cut => [true, true],
+            _ => self.ways,
+        };
+        ways.map(|harmed| if harmed { harm } else { Harm::NONE })
+    }
+}

@@ -1,0 +1,235 @@
+//! Programs that mean no good: one that talks to the device, one that answers a host.
+
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::guard::Report;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::{Point, Sample, Scene, Source};
+use hapterra_core::terrain::{FieldSize, TileKey};
+use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
+use hapterra_core::wire::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
+use hapterra_core::wire::request::Request;
+use hapterra_core::wire::session::{LastSession, SampleCount, SessionNumber};
+use hapterra_core::wire::version::VersionCheck;
+
+use super::wire;
+use crate::chance::Chance;
+
+/// Bytes that a hostile program says in a millisecond, at most.
+const A_MILLISECOND: usize = 2_048;
+
+/// What a hostile host says in a millisecond.
+pub fn host(chance: &mut Chance) -> Vec<u8> {
+    match chance.below(6) {
+        0 => noise(chance, A_MILLISECOND),
+        1 => vec![0; chance.below(A_MILLISECOND)],
+        // The beginning of a frame without its end, or an end without a beginning.
+        2 => {
+            let frame = host_frame(chance);
+            let cut = chance.below(frame.len().max(1));
+            let part = if chance.below(2) == 0 {
+                &frame[..cut]
+            } else {
+                &frame[cut..]
+            };
+            part.to_vec()
+        }
+        _ => {
+            let mut said = Vec::new();
+            for _ in 0..1 + chance.below(8) {
+                said.extend(host_frame(chance));
+            }
+            said.truncate(A_MILLISECOND);
+            said
+        }
+    }
+}
+
+fn noise(chance: &mut Chance, most: usize) -> Vec<u8> {
+    let length = chance.below(most);
+    (0..length).map(|_| chance.bits() as u8).collect()
+}
+
+/// A well-formed frame of one of a few sessions.
+fn host_frame(chance: &mut Chance) -> Vec<u8> {
+    if chance.below(12) == 0 {
+        let protocol = chance.bits() as u16;
+        return wire::version_check(VersionCheck::Asked { protocol });
+    }
+    let session = SessionNumber::new(1_000 * chance.below(3) as u32);
+    wire::from_host(session, &host_message(chance))
+}
+
+/// A well-formed message with content that is not. Calibrations that the device may take
+/// are not among them: a device that is disarmed takes those from anybody.
+fn host_message<'b>(chance: &mut Chance) -> ToDevice<'b> {
+    let words = [i32::MIN, -1, 0, 1, 1_000_000, i32::MAX];
+    let word = |chance: &mut Chance| words[chance.below(words.len())];
+    let epoch = chance.bits() as u32;
+    match chance.below(12) {
+        0 | 1 => ToDevice::Hello(HostHello {
+            protocol: [PROTOCOL, chance.bits() as u16][chance.below(2)],
+            number: chance.bits() as u8,
+            silence_s: chance.bits() as u16,
+        }),
+        2 => ToDevice::Scene(Scene {
+            epoch,
+            level: chance.bits() as u8,
+            size: FieldSize::new(word(chance), word(chance)),
+            top: word(chance),
+            cell_mm: [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-30, 0.5][chance.below(6)],
+            home: GridPoint::default(),
+            law: ForceLaw {
+                stiffness_n_per_mm: [f32::NAN, -1.0, 1e30, 0.5][chance.below(4)],
+                max_force_n: [f32::INFINITY, -8.0, 8.5][chance.below(3)],
+            },
+            rule: Rule::Swept,
+            source: [Source::Encoders, Source::Points][chance.below(2)],
+            hold_clock: chance.below(2) == 0,
+        }),
+        3 | 4 => ToDevice::Tile(TileMessage {
+            epoch,
+            key: TileKey::new(chance.bits() as u8, word(chance), word(chance)),
+            heights: Heights::Flat {
+                base: word(chance),
+                height: f32::NAN,
+            },
+        }),
+        5 => ToDevice::Point(Point {
+            seq: chance.bits() as u32,
+            hip: GridPoint::default(),
+        }),
+        6 => ToDevice::Status,
+        7 => ToDevice::Alive,
+        8 => [ToDevice::GetCalibration, ToDevice::Bye, ToDevice::Close][chance.below(3)].clone(),
+        _ => ToDevice::Request {
+            number: chance.bits() as u8,
+            request: host_request(chance),
+        },
+    }
+}
+
+fn host_request(chance: &mut Chance) -> Request {
+    let mut calibration = Calibration::PREMIUM_1_5;
+    calibration.l1_mm = -1.0;
+    [
+        Request::Arm,
+        Request::Disarm,
+        Request::SetCalibration { calibration },
+        Request::StoreCalibration,
+        Request::DropScene,
+        Request::ClearFault,
+    ][chance.below(6)]
+}
+
+/// How something that is no device behaves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Behaviour {
+    /// It says nothing.
+    Mute,
+    /// It says noise without end.
+    Noise,
+    /// It says one byte each half second.
+    Drips,
+    /// It greets each hello, and nothing follows.
+    GreetsOnly,
+    /// It takes every scene, and then asks for tiles that there are not, as fast as it
+    /// can.
+    AsksForEverything,
+    /// It takes every scene and then refuses the protocol that both speak, and others.
+    RefusesLate,
+    /// It takes every scene and sends samples with numbers at random.
+    CountsWildly,
+    /// It refuses the scene.
+    RefusesScenes,
+}
+
+impl Behaviour {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::Mute,
+        Self::Noise,
+        Self::Drips,
+        Self::GreetsOnly,
+        Self::AsksForEverything,
+        Self::RefusesLate,
+        Self::CountsWildly,
+        Self::RefusesScenes,
+    ];
+
+    /// What it says in the millisecond `now` to a host that serves a scene and has said
+    /// hello with this number.
+    pub fn say(
+        self,
+        now: u64,
+        scene: &Scene,
+        (session, number): (SessionNumber, u8),
+        chance: &mut Chance,
+    ) -> Vec<u8> {
+        let often = now.is_multiple_of(10);
+        let mut said = Vec::new();
+        let mut tell = |message: ToHost| said.extend(wire::from_device(session, &message));
+        let greets = !matches!(self, Self::Mute | Self::Noise | Self::Drips);
+        if greets && often {
+            tell(ToHost::Hello(hello(number)));
+        }
+        let epoch = scene.epoch;
+        if greets && often && self != Self::GreetsOnly {
+            let accepted = self != Self::RefusesScenes;
+            tell(ToHost::SceneTaken { epoch, accepted });
+        }
+        match self {
+            Self::Noise => return noise(chance, A_MILLISECOND),
+            Self::Drips if now.is_multiple_of(500) => return vec![chance.bits() as u8],
+            Self::AsksForEverything => {
+                for _ in 0..20 {
+                    let (level, row) = (chance.bits() as u8, chance.bits() as i32);
+                    let key = TileKey::new(level, i32::MAX, row);
+                    tell(ToHost::Need { epoch, key });
+                }
+            }
+            Self::RefusesLate if now.is_multiple_of(100) => {
+                let protocol = [PROTOCOL, PROTOCOL + 1][chance.below(2)];
+                said.extend(wire::version_check(VersionCheck::Refused { protocol }));
+            }
+            Self::CountsWildly => {
+                tell(ToHost::Telemetry(Telemetry {
+                    first: chance.bits() as u32,
+                    dropped: chance.bits() as u32,
+                    samples: [Sample::default(); 8].into_iter().collect(),
+                }));
+                tell(ToHost::Alive {
+                    epoch: Some(epoch),
+                    count: count(chance),
+                    report: Report::default(),
+                });
+            }
+            _ => {}
+        }
+        said
+    }
+}
+
+fn count(chance: &mut Chance) -> SampleCount {
+    SampleCount {
+        sent: chance.bits() as u32,
+        dropped: chance.bits() as u32,
+    }
+}
+
+/// A greeting whose words a terminal would obey.
+fn hello(number: u8) -> DeviceHello {
+    DeviceHello {
+        protocol: PROTOCOL,
+        number,
+        board: "\x1b[2J\x1b]0;x\x07".try_into().unwrap_or_default(),
+        version: "\r\n\u{202e}".try_into().unwrap_or_default(),
+        window: 0,
+        tick_hz: 0,
+        clock_hz: 0,
+        epoch: None,
+        opened_by: number,
+        last: LastSession::default(),
+    }
+}

@@ -1,0 +1,325 @@
+//! A stretch of the campaign: one device with its arm, the line, and whoever is at the
+//! other end, millisecond by millisecond.
+
+use hapterra::terrain::Terrain;
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::scene::{Scene, Source};
+use hapterra_core::wire::session::SessionEnd;
+
+use super::cable::{A_TICK, Way};
+use super::device::Board;
+use super::fault::{Fault, Kind};
+use super::host::Host;
+use super::hostile;
+use super::surface;
+use super::tap::{Moment, Tap};
+use crate::chance::Chance;
+
+/// How long what the user sees may differ from what is, on a line that works, ms.
+const STALE: u64 = 1_500;
+/// The same where another program has taken the device: until the host gives up, which
+/// its user is told.
+const TAKEN: u64 = 4_500;
+/// How long after the line stood still the device may still say what it had to say then,
+/// ms.
+const DRAINS: u64 = 50;
+/// How long an arm that was asked for may still come after its host is gone, ms: the
+/// switch was pressed just before.
+const LATE_ARM: u64 = 500;
+
+/// One device and what is around it.
+pub struct Stretch<'t> {
+    /// The terrain that honest hosts serve.
+    pub terrain: &'t Terrain<'t>,
+    /// The scene that they put in force.
+    pub scene: Scene,
+    /// Decides everything.
+    pub chance: Chance,
+    /// The device and its arm.
+    pub board: Board<'t>,
+    /// The direction to the device.
+    pub to_device: Way,
+    /// The direction to the host.
+    pub to_host: Way,
+    /// What leaves the device, as the judge reads it.
+    pub tap: Tap,
+    /// The honest host, if one runs.
+    pub host: Option<Host<'t>>,
+    /// What goes wrong with the line now.
+    pub fault: Option<Fault>,
+    /// Milliseconds so far.
+    pub now: u64,
+    /// When the line or one of its ends was last not as it should be.
+    troubled: u64,
+    /// Until when the amplifiers may go on.
+    wished: u64,
+    was_on: bool,
+    /// Another program has talked to the device while the present host lived.
+    contested: bool,
+    /// When the direction to the host had no room last.
+    full: u64,
+    /// The device has let an arm go whose host was silent, and nobody has talked to it
+    /// since.
+    pub let_go: bool,
+    /// The present host has to be told so.
+    owed: bool,
+    /// Since when the user has seen something else than what is.
+    stale: Option<u64>,
+    /// The largest distance of a proxy from the surface, cells.
+    pub off_surface: f64,
+    /// Samples that were judged while they touched.
+    pub touching: u64,
+}
+
+impl<'t> Stretch<'t> {
+    /// A device that was just switched on, and nobody at the other end.
+    #[must_use]
+    pub fn new(terrain: &'t Terrain<'t>, mut chance: Chance) -> Self {
+        let mut board = Board::new(terrain, &mut chance);
+        board.lock_step = chance.below(4) == 0;
+        let scene = scene(terrain, &board, &mut chance);
+        Self {
+            terrain,
+            scene,
+            chance,
+            board,
+            to_device: Way::default(),
+            to_host: Way::default(),
+            tap: Tap::default(),
+            host: None,
+            fault: None,
+            now: 0,
+            troubled: 0,
+            wished: 0,
+            was_on: false,
+            contested: false,
+            full: 0,
+            let_go: false,
+            owed: false,
+            stale: None,
+            off_surface: 0.0,
+            touching: 0,
+        }
+    }
+
+    /// Starts an honest host, with another scene or the one that was in force last.
+    pub fn start_host(&mut self, other_scene: bool) {
+        if other_scene {
+            self.scene = scene(self.terrain, &self.board, &mut self.chance);
+        }
+        self.board.watch.forget();
+        self.owed = std::mem::take(&mut self.let_go);
+        self.contested = false;
+        let mut out = Vec::new();
+        let chance = &mut self.chance;
+        let host = Host::start(self.terrain, self.scene, self.now, chance, &mut out);
+        self.tap.begin(Some(host.session()));
+        self.host = Some(host);
+        self.send(&out);
+    }
+
+    /// Kills the honest host: it says nothing more.
+    pub fn kill_host(&mut self) {
+        self.host = None;
+        self.troubled = self.now;
+    }
+
+    /// Restarts the device.
+    pub fn restart_device(&mut self) {
+        self.board.restart();
+        self.tap.begin(None);
+        (self.let_go, self.owed) = (false, false);
+        self.troubled = self.now;
+        self.was_on = false;
+    }
+
+    /// Lets something go wrong with the line.
+    pub fn begin(&mut self, fault: Fault) {
+        if fault.kind == Kind::HostileHost {
+            (self.let_go, self.owed) = (false, false);
+            self.contested = true;
+        }
+        let [to_device, to_host] = fault.harms();
+        self.to_device.harm(to_device);
+        self.to_host.harm(to_host);
+        self.fault = Some(fault);
+    }
+
+    /// Lets the honest host do something; what it says goes on its way.
+    pub fn with_host(&mut self, act: impl FnOnce(&mut Host<'t>, u64, &mut Vec<u8>)) {
+        let mut out = Vec::new();
+        if let Some(host) = &mut self.host {
+            act(host, self.now, &mut out);
+        }
+        self.send(&out);
+    }
+
+    /// Puts bytes on their way to the device.
+    pub fn send(&mut self, bytes: &[u8]) {
+        self.to_device.send(bytes, self.now, &mut self.chance);
+    }
+
+    /// How long the line and its ends have been as they should be, ms.
+    #[must_use]
+    pub fn calm(&self) -> u64 {
+        self.now - self.troubled
+    }
+
+    /// One millisecond of everything.
+    ///
+    /// # Errors
+    /// What must not be.
+    pub fn step(&mut self) -> Result<(), String> {
+        self.end_fault();
+        self.speak_hostile();
+        self.deliver();
+        self.board.tick()?;
+        let mut buffer = [0; A_TICK];
+        let said = self.board.say(&mut buffer, self.to_host.room());
+        if self.to_host.room() < A_TICK {
+            self.full = self.now;
+        }
+        let when = Moment {
+            now: self.now,
+            ticks: self.board.ticks[0],
+            flows: self.now > self.full + DRAINS,
+        };
+        self.tap.hear(said, &when);
+        self.to_host.send(said, self.now, &mut self.chance);
+        let mut heard = Vec::new();
+        while let Some(transfer) = self.to_host.receive(self.now) {
+            heard.extend(transfer);
+        }
+        self.with_host(|host, now, out| host.step(now, &heard, out));
+        self.judge()?;
+        self.now += 1;
+        Ok(())
+    }
+
+    fn end_fault(&mut self) {
+        if self.fault.is_none() {
+            return;
+        }
+        self.troubled = self.now;
+        self.fault = self.fault.filter(|fault| self.now < fault.end);
+        if self.fault.is_none() {
+            self.to_device.harm(Default::default());
+            self.to_host.harm(Default::default());
+        }
+    }
+
+    /// Another program talks to the device, if that is what goes wrong.
+    fn speak_hostile(&mut self) {
+        let hostile = self
+            .fault
+            .is_some_and(|fault| fault.kind == Kind::HostileHost);
+        if hostile && self.to_device.room() > 0 {
+            let said = hostile::host(&mut self.chance);
+            self.send(&said);
+        }
+    }
+
+    fn deliver(&mut self) {
+        while let Some(transfer) = self.to_device.receive(self.now) {
+            let taken = self.board.receive(&transfer);
+            let rest = transfer.get(taken..).unwrap_or(&[]);
+            if !rest.is_empty() {
+                return self.to_device.put_back(rest, self.now);
+            }
+        }
+    }
+
+    fn judge(&mut self) -> Result<(), String> {
+        self.judge_samples()?;
+        self.judge_wish()?;
+        self.judge_view()?;
+        self.judge_last_end()
+    }
+
+    /// The first host after one that vanished is told why the arm is disarmed.
+    fn judge_last_end(&mut self) -> Result<(), String> {
+        let greeted = self.host.as_ref().and_then(|host| host.last_end);
+        match greeted.filter(|_| self.owed) {
+            None => Ok(()),
+            Some(SessionEnd::HostSilent) => {
+                self.owed = false;
+                Ok(())
+            }
+            Some(other) => Err(format!(
+                "the host before vanished, and the next is told {other:?}"
+            )),
+        }
+    }
+
+    fn judge_samples(&mut self) -> Result<(), String> {
+        let Some(host) = &mut self.host else {
+            return Ok(());
+        };
+        for sample in std::mem::take(&mut host.samples) {
+            self.board
+                .watch
+                .sample(&sample, self.scene.law.max_force_n)?;
+            let off = surface::judge(self.terrain, &sample)?;
+            self.off_surface = self.off_surface.max(off);
+            self.touching += u64::from(off > 0.0);
+        }
+        Ok(())
+    }
+
+    /// Amplifiers go on only where a host that lives has asked for it.
+    fn judge_wish(&mut self) -> Result<(), String> {
+        let wishes = |host: &Host<'_>| host.asked && host.end.is_none();
+        if self.host.as_ref().is_some_and(wishes) {
+            self.wished = self.now + LATE_ARM;
+        }
+        let (was, is) = (self.was_on, self.board.drive.enabled);
+        self.was_on = is;
+        match is && !was && self.now >= self.wished {
+            true => Err("the amplifiers went on and no host had asked for it".into()),
+            false => Ok(()),
+        }
+    }
+
+    /// What the user sees is what is, a moment after the line works again.
+    fn judge_view(&mut self) -> Result<(), String> {
+        let is_on = self.board.drive.enabled;
+        let sees = |host: &Host<'_>| {
+            let live = host.opened && host.end.is_none();
+            let view = host.view.map(|view| view.mode.drives());
+            live.then_some(view)
+        };
+        let wrong = match self.host.as_ref().and_then(sees) {
+            Some(seen) => seen != Some(is_on),
+            None => false,
+        };
+        if !wrong || self.calm() < STALE {
+            self.stale = None;
+            return Ok(());
+        }
+        let since = *self.stale.get_or_insert(self.now);
+        let most = if self.contested { TAKEN } else { STALE };
+        match self.now - since < most {
+            true => Ok(()),
+            false => Err(format!(
+                "the user has seen {:?} for {} ms with the amplifiers {}",
+                self.host.as_ref().and_then(|host| host.view),
+                self.now - since,
+                if is_on { "on" } else { "off" }
+            )),
+        }
+    }
+}
+
+/// A scene like no other before.
+fn scene(terrain: &Terrain<'_>, board: &Board<'_>, chance: &mut Chance) -> Scene {
+    let law = ForceLaw {
+        stiffness_n_per_mm: chance.between(0.3, 0.8) as f32,
+        max_force_n: 8.5,
+    };
+    let home = terrain.scale().to_grid(board.home_mm()).expect("in range");
+    Scene {
+        hold_clock: board.lock_step,
+        ..terrain.scene(law, Rule::Swept, Source::Encoders, home)
+    }
+}

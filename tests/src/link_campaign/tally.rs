@@ -1,0 +1,124 @@
+//! What became of the runs, as a table.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use super::fault::Kind;
+use crate::campaign::extremes::Extremes;
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Host and device agreed on the end.
+    Agreed,
+    /// The user was told what is wrong.
+    Told(String),
+    /// The host was killed, and no other came in this run.
+    Killed,
+}
+
+/// What became of the runs with one kind of fault.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+struct Row {
+    runs: u32,
+    agreed: u32,
+    killed: u32,
+    /// By the error's words, without numbers.
+    told: BTreeMap<String, u32>,
+}
+
+/// All of a campaign.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tally {
+    rows: Vec<(Kind, Row)>,
+    /// Ticks of devices run, and those with the amplifiers on.
+    pub ticks: [u64; 2],
+    /// Samples in contact whose proxy was held against the surface.
+    pub touching: u64,
+    /// The largest distance of a proxy from the surface, cells.
+    pub off_surface: f64,
+    /// The largest of what the watch saw.
+    pub extremes: Extremes,
+}
+
+impl Tally {
+    /// Counts a run.
+    pub fn count(&mut self, kind: Kind, outcome: Outcome) {
+        let row = self.row(kind);
+        row.runs += 1;
+        match outcome {
+            Outcome::Agreed => row.agreed += 1,
+            Outcome::Killed => row.killed += 1,
+            Outcome::Told(error) => {
+                let words = error.split([':', '0', '1', '2', '3', '4', '5', '6', '7', '8', '9']);
+                let begin = words.into_iter().next().unwrap_or_default();
+                *row.told.entry(begin.trim().to_owned()).or_default() += 1;
+            }
+        }
+    }
+
+    fn row(&mut self, kind: Kind) -> &mut Row {
+        let at = self.rows.iter().position(|(known, _)| *known == kind);
+        let at = at.unwrap_or_else(|| {
+            self.rows.push((kind, Row::default()));
+            self.rows.len() - 1
+        });
+        &mut self.rows[at].1
+    }
+
+    /// Adds what was seen in a stretch.
+    pub fn add(&mut self, ticks: [u64; 2], touching: u64, off_surface: f64, extremes: &Extremes) {
+        self.ticks = [0, 1].map(|i| self.ticks[i] + ticks[i]);
+        self.touching += touching;
+        self.off_surface = self.off_surface.max(off_surface);
+        self.extremes = self.extremes.or(*extremes);
+    }
+
+    /// Runs with this kind of fault.
+    #[must_use]
+    pub fn runs_with(&self, kind: Kind) -> u32 {
+        let row = self.rows.iter().find(|(known, _)| *known == kind);
+        row.map_or(0, |(_, row)| row.runs)
+    }
+
+    /// Runs in all.
+    #[must_use]
+    pub fn runs(&self) -> u32 {
+        self.rows.iter().map(|(_, row)| row.runs).sum()
+    }
+
+    /// Runs whose end host and device agreed on.
+    #[must_use]
+    pub fn agreed(&self) -> u32 {
+        self.rows.iter().map(|(_, row)| row.agreed).sum()
+    }
+
+    /// The table, in Markdown.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let mut text = String::from(
+            "| went wrong | runs | end agreed on | killed, no host after it | user told |\n\
+             | --- | ---: | ---: | ---: | --- |\n",
+        );
+        for kind in Kind::ALL {
+            let Some((_, row)) = self.rows.iter().find(|(known, _)| *known == kind) else {
+                continue;
+            };
+            let told: Vec<_> = row
+                .told
+                .iter()
+                .map(|(words, count)| format!("{count} {words}"))
+                .collect();
+            // Writing to a String cannot fail.
+            let _ = writeln!(
+                text,
+                "| {kind:?} | {} | {} | {} | {} |",
+                row.runs,
+                row.agreed,
+                row.killed,
+                told.join("; "),
+            );
+        }
+        text
+    }
+}

@@ -1,0 +1,53 @@
+//! Frames as the judge and hostile programs make and read them. All that they know of the
+//! link's format is here.
+
+use hapterra_core::wire::frame::{MAX_FRAME, decode, encode};
+use hapterra_core::wire::message::{ToDevice, ToHost};
+use hapterra_core::wire::session::{InSession, SessionNumber};
+use hapterra_core::wire::version::VersionCheck;
+
+/// A message of a host, as it travels.
+#[must_use]
+pub fn from_host(session: SessionNumber, message: &ToDevice<'_>) -> Vec<u8> {
+    let mut frame = [0; MAX_FRAME];
+    let framed = InSession { session, message };
+    encode(&framed, &mut frame).unwrap_or(&[]).to_vec()
+}
+
+/// A message of a device, as it travels.
+#[must_use]
+pub fn from_device(session: SessionNumber, message: &ToHost) -> Vec<u8> {
+    let mut frame = [0; MAX_FRAME];
+    let framed = InSession { session, message };
+    encode(&framed, &mut frame).unwrap_or(&[]).to_vec()
+}
+
+/// A frame of no session, as it travels.
+#[must_use]
+pub fn version_check(check: VersionCheck) -> Vec<u8> {
+    let mut frame = [0; MAX_FRAME];
+    encode(&check, &mut frame).unwrap_or(&[]).to_vec()
+}
+
+/// What a device said in a frame, and in which session.
+#[must_use]
+pub fn said_by_device(frame: &[u8]) -> Option<InSession<ToHost>> {
+    decode(frame).ok()
+}
+
+/// What a host said in a frame, and in which session.
+#[must_use]
+pub fn said_by_host(frame: &[u8]) -> Option<InSession<ToDevice<'_>>> {
+    decode(frame).ok()
+}
+
+/// What a device said in a frame, changed by `change`, as it travels.
+#[must_use]
+pub fn changed(frame: &[u8], change: impl FnOnce(&mut ToHost)) -> Option<Vec<u8>> {
+    let InSession {
+        session,
+        mut message,
+    } = said_by_device(frame)?;
+    change(&mut message);
+    Some(from_device(session, &message))
+}

@@ -1,0 +1,342 @@
+//! `hapterra bringup` against a virtual arm: as it should be, and with the mistakes that
+//! people make with wires, plugs and numbers. Each is named, and no joint moves faster
+//! than is stated.
+
+use std::cell::RefCell;
+use std::path::Path;
+use std::time::Duration;
+
+use hapterra::bringup::{
+    Attendant, BringupError, Finding, Identity, Log, Question, Reading, Step, Stopped, Task,
+    VirtualBench, VirtualUser, Walked, walk,
+};
+use hapterra::link::{Dialogue, Native};
+use hapterra::phantom::{PhantomModel, Wiring};
+use hapterra_core::guard::{Blockers, JOG_FAST_RAD_S, Jog};
+use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::request::{Refusal, Request};
+use hapterra_firmware::native::StoppedClock;
+
+const RECORD: Calibration = Calibration::PREMIUM_1_5;
+/// What the guard may be late or wrong by: two counts in a millisecond, and what a
+/// motor's torque adds until its current is gone.
+const LATE_RAD_S: f64 = 0.3;
+
+thread_local! {
+    /// What was said, a line each.
+    static SAID: RefCell<String> = const { RefCell::new(String::new()) };
+}
+
+fn say(line: &str) {
+    println!("{line}");
+    SAID.with_borrow_mut(|said| *said += &format!("{line}\n"));
+}
+
+/// Walks with a user, and looks at how fast the joints were.
+fn walked(user: &mut VirtualUser, record: Calibration, log: &mut Log) -> Result<(), BringupError> {
+    let ended = walked_at_any_speed(user, record, log);
+    let fastest = user.bench().borrow().fastest_rad_s();
+    println!("fastest {fastest:?} rad/s");
+    let most = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;
+    assert!(fastest.iter().all(|speed| *speed < most), "{fastest:?}");
+    ended
+}
+
+/// Walks with a user from where a log ends; the board is switched off and on where the
+/// steps say so.
+fn walked_at_any_speed(
+    user: &mut VirtualUser,
+    record: Calibration,
+    log: &mut Log,
+) -> Result<(), BringupError> {
+    SAID.take();
+    loop {
+        let device = user.device(record);
+        match walked_once(user, device, log) {
+            Ok(Walked::BoardWasOff) => {}
+            Ok(Walked::ToTheEnd) => return Ok(()),
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+fn walked_once(
+    user: &mut dyn Attendant,
+    device: Native<StoppedClock>,
+    log: &mut Log,
+) -> Result<Walked, BringupError> {
+    let opened = Dialogue::open(Box::new(device), Duration::from_secs(20));
+    walk(&mut opened.expect("it answers"), user, log, &mut |_| Ok(()))
+}
+
+/// The block of the page under this heading.
+fn on_the_page(heading: &str) -> String {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/bringup.md");
+    let page = std::fs::read_to_string(page).expect("a page");
+    let (_, after) = page.split_once(heading).expect("a heading");
+    let (_, block) = after.split_once("```text\n").expect("a block");
+    let (block, _) = block.split_once("```").expect("its end");
+    block.to_owned()
+}
+
+/// The step and the finding at which a walk with this bench and record ends.
+fn found(bench: VirtualBench, record: Calibration) -> (Step, Finding) {
+    found_from(Step::Board, bench, record)
+}
+
+/// The same, where all steps before this one were passed before.
+fn found_from(from: Step, bench: VirtualBench, record: Calibration) -> (Step, Finding) {
+    found_by(walked, from, bench, record)
+}
+
+/// The same of an arm that may be faster than a jog.
+fn found_at_any_speed(from: Step, bench: VirtualBench, record: Calibration) -> (Step, Finding) {
+    found_by(walked_at_any_speed, from, bench, record)
+}
+
+/// How a walk is gone.
+type Walk = fn(&mut VirtualUser, Calibration, &mut Log) -> Result<(), BringupError>;
+
+fn found_by(walk: Walk, from: Step, bench: VirtualBench, record: Calibration) -> (Step, Finding) {
+    let mut user = VirtualUser::at(bench);
+    user.says = say;
+    let mut log = Log::default();
+    let opened = Dialogue::open(Box::new(user.device(record)), Duration::from_secs(20));
+    let opened = opened.expect("it answers");
+    _ = log.meet(Identity::of(opened.device(), Some(&record)));
+    for step in Step::ALL.into_iter().filter(|step| *step < from) {
+        log.take(step, true, String::new());
+    }
+    let ended = walk(&mut user, record, &mut log);
+    let Err(BringupError::Found { step, finding }) = ended else {
+        panic!("{ended:?}");
+    };
+    // It says so in the log, and goes on nowhere else.
+    assert_eq!(log.next(), Some(step));
+    let last = log.entries.last().expect("an entry");
+    assert_eq!((last.step, last.passed), (step, false));
+    assert_eq!(last.result, finding.to_string());
+    assert!(!finding.what_to_do().is_empty());
+    (step, finding)
+}
+
+fn wired(wiring: Wiring) -> VirtualBench {
+    VirtualBench::new(PhantomModel::premium_1_5(), wiring)
+}
+
+#[test]
+fn an_arm_without_mistakes_comes_to_the_end() {
+    let mut user = VirtualUser::new(Wiring::RIGHT);
+    user.says = say;
+    let mut log = Log::default();
+    walked(&mut user, RECORD, &mut log).expect("to the end");
+    assert_eq!(log.next(), None);
+    assert_eq!(log.entries.len(), Step::ALL.len());
+    // What the page shows is what the command says.
+    assert_eq!(SAID.take(), on_the_page("## Transcript"));
+}
+
+#[test]
+fn it_goes_on_where_it_was_and_again_where_the_record_is_another() {
+    let mut user = VirtualUser::new(Wiring::RIGHT.with_gain(1, -1.0));
+    user.says = say;
+    let mut log = Log::default();
+    walked(&mut user, RECORD, &mut log).expect_err("the sign is inverted");
+    assert_eq!(log.next(), Some(Step::Motor2));
+    let error = SAID.take() + "error: " + &log.entries.last().expect("one").result + "\n";
+    assert!(error.contains("step 8 of 11: motor 2"));
+    // The next start is at the very step, with an arm that has to be zeroed anew.
+    let ended = walked(&mut user, RECORD, &mut log);
+    assert!(ended.is_err());
+    let said = SAID.take();
+    assert!(
+        said.starts_with("step 8 of 11") && said.contains("zero pose"),
+        "{said}"
+    );
+    // With the sign that it named, the record is another one: it is measured again.
+    let mut record = RECORD;
+    record.motor_sign.y = -1.0;
+    walked(&mut user, record, &mut log).expect("to the end");
+    let said = SAID.take();
+    assert!(said.starts_with("the calibration is another one"), "{said}");
+    assert!(said.contains("step 6 of 11") && !said.contains("step 5 of 11"));
+}
+
+/// Never holds the tip while a motor is jogged for the first time.
+struct Careless(VirtualUser);
+
+impl Attendant for Careless {
+    fn hear(&mut self, line: &str) {
+        self.0.hear(line);
+    }
+
+    fn begin(&mut self, task: Task) {
+        self.0.begin(task);
+    }
+
+    fn finish(&mut self, task: Task) -> Result<(), Stopped> {
+        self.0.finish(match task {
+            Task::HoldLoosely => Task::LetGoOfTip,
+            task => task,
+        })
+    }
+
+    fn read(&mut self, reading: Reading) -> Result<f64, Stopped> {
+        self.0.read(reading)
+    }
+
+    fn confirms(&mut self, question: Question) -> Result<bool, Stopped> {
+        self.0.confirms(question)
+    }
+}
+
+#[test]
+fn an_arm_that_nobody_holds_is_stopped_before_it_is_fast() {
+    // Of an arm without weight, the other joints stay where they are.
+    let mut model = PhantomModel::premium_1_5();
+    model.gravity_m_s2 = 0.0;
+    for gain in [1.0, -1.0] {
+        let wiring = Wiring::RIGHT.with_gain(0, gain);
+        let mut user = Careless(VirtualUser::at(VirtualBench::new(model, wiring)));
+        user.0.says = say;
+        SAID.take();
+        let mut log = Log::default();
+        let mut ended = Ok(Walked::BoardWasOff);
+        while let Ok(Walked::BoardWasOff) = ended {
+            let device = user.0.device(RECORD);
+            ended = walked_once(&mut user, device, &mut log);
+        }
+        let said = SAID.take();
+        assert!(said.contains("the jog ended with fault 22"), "{said}");
+        let fastest = user.0.bench().borrow().fastest_rad_s();
+        println!("fastest {fastest:?} rad/s");
+        let most = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;
+        assert!(fastest[0] < most, "{fastest:?}");
+        // Which way it went is told all the same.
+        let inverted = log
+            .entries
+            .iter()
+            .any(|entry| entry.result.contains("inverted"));
+        assert_eq!(inverted, gain < 0.0, "{log:?}");
+    }
+}
+
+#[test]
+fn an_amplifier_of_another_scale_is_named() {
+    for (gain, axis, step) in [(0.4, 0, Step::Motor1), (2.0, 1, Step::Motor2)] {
+        let wiring = Wiring::RIGHT.with_gain(axis, gain);
+        let (_, finding) = found_from(step, wired(wiring), RECORD);
+        let Finding::WrongTorque {
+            motor,
+            found,
+            record,
+        } = finding
+        else {
+            panic!("{finding}");
+        };
+        assert_eq!(motor, axis + 1);
+        let factor = found / record;
+        assert!((factor / gain - 1.0).abs() < 0.3, "{gain}: {factor}");
+    }
+}
+
+#[test]
+fn a_weight_that_the_record_does_not_know_is_named() {
+    let mut record = RECORD;
+    record.gravity_2_nm = 0.03;
+    // It sinks as fast as it would without motors: a hand is near it.
+    let (step, finding) = found_at_any_speed(Step::Gravity, wired(Wiring::RIGHT), record);
+    assert_eq!(step, Step::Gravity);
+    let sinks = matches!(finding, Finding::Drifts { .. } | Finding::Fault(_));
+    assert!(sinks, "{finding}");
+}
+
+#[test]
+fn swapped_motors_are_named() {
+    let (step, finding) = found_from(Step::Motor1, wired(Wiring::RIGHT.swapped(1, 2)), RECORD);
+    assert_eq!(step, Step::Motor2);
+    assert_eq!(finding, Finding::SwappedMotors { motor: 2, joint: 3 });
+}
+
+#[test]
+fn an_inverted_sign_is_named() {
+    for (axis, step) in [Step::Motor1, Step::Motor2, Step::Motor3]
+        .into_iter()
+        .enumerate()
+    {
+        let wiring = Wiring::RIGHT.with_gain(axis, -1.0);
+        let (at, finding) = found_from(step, wired(wiring), RECORD);
+        assert_eq!(at, step);
+        let motor = axis + 1;
+        assert_eq!(finding, Finding::InvertedMotor { motor, right: -1 });
+        let hint = format!("--set motor-sign-{motor}=-1");
+        assert!(finding.what_to_do().contains(&hint));
+    }
+}
+
+#[test]
+fn a_dead_encoder_is_named() {
+    for axis in 0..3 {
+        let (step, finding) = found(wired(Wiring::RIGHT.with_dead_encoder(axis)), RECORD);
+        assert_eq!(step, Step::Encoders);
+        let (joint, counts) = (axis + 1, 0);
+        assert_eq!(finding, Finding::DeadEncoder { joint, counts });
+    }
+}
+
+#[test]
+fn a_wrong_ratio_is_named() {
+    let mut model = PhantomModel::premium_1_5();
+    model.drive[1].ratio *= 0.8;
+    let (step, finding) = found(VirtualBench::new(model, Wiring::RIGHT), RECORD);
+    assert_eq!(step, Step::Calibration);
+    let Finding::WrongRatio {
+        joint: 2,
+        record,
+        found,
+    } = finding
+    else {
+        panic!("{finding}");
+    };
+    assert!((record - 11.2).abs() < 1e-4 && (found - 8.96).abs() < 0.1);
+}
+
+#[test]
+fn a_missing_amplifier_is_named() {
+    for (axis, step) in [Step::Motor1, Step::Motor2, Step::Motor3]
+        .into_iter()
+        .enumerate()
+    {
+        let wiring = Wiring::RIGHT.with_gain(axis, 0.0);
+        let (at, finding) = found_from(step, wired(wiring), RECORD);
+        assert_eq!(at, step);
+        let named = matches!(finding, Finding::NoPush { motor, .. } if motor == axis + 1);
+        assert!(named, "{finding}");
+    }
+}
+
+#[test]
+fn a_jog_beyond_its_bounds_is_refused() {
+    let user = VirtualUser::new(Wiring::RIGHT);
+    let opened = Dialogue::open(Box::new(user.device(RECORD)), Duration::from_secs(20));
+    let mut dialogue = opened.expect("it answers");
+    let mut ask = |request| dialogue.request(&request).expect("it answers");
+    let jog = |axis, current_a, hold_ms| {
+        Request::Jog(Jog {
+            axis,
+            current_a,
+            hold_ms,
+        })
+    };
+    for beyond in [
+        jog(0, 0.32, 500),
+        jog(3, 0.1, 500),
+        jog(0, 0.1, 5_001),
+        jog(1, f32::NAN, 1),
+    ] {
+        assert_eq!(ask(beyond), Err(Refusal::NoSuchJog), "{beyond:?}");
+    }
+    // What blocks arming blocks a jog: this arm is not zeroed.
+    let blocked = ask(jog(0, 0.3, 500));
+    assert_eq!(blocked, Err(Refusal::Blocked(Blockers::NOT_ZEROED)));
+}

@@ -1,0 +1,107 @@
+//! What a command that was killed had recorded is found, named and left alone.
+#![cfg(unix)]
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+
+use hapterra_tests::hapterra_binary;
+
+/// Points that fill the recording's buffer more than once.
+const POINTS: usize = 4_000;
+
+fn terrain(folder: &Path) -> PathBuf {
+    let path = folder.join("terrain.tif");
+    let made = Command::new(hapterra_binary())
+        .args(["synth", "fractal", "--size", "64x64", "--output"])
+        .arg(&path)
+        .output()
+        .expect("started");
+    assert!(made.status.success(), "{}", said(&made));
+    path
+}
+
+fn said(run: &Output) -> String {
+    String::from_utf8_lossy(&run.stderr).into_owned()
+}
+
+fn replay(folder: &Path, terrain: &Path) -> Command {
+    let mut command = Command::new(hapterra_binary());
+    command.arg("replay").arg(terrain).arg("/dev/stdin");
+    command.arg("--output").arg(folder.join("out.csv"));
+    command.stdin(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+fn say_points(process: &mut Child) {
+    let mut points = String::from("t_s,x_mm,y_mm,z_mm\n");
+    for point in 0..POINTS {
+        points += &format!("{},10,10,5\n", point as f64 * 1e-3);
+    }
+    let stdin = process.stdin.as_mut().expect("piped");
+    stdin.write_all(points.as_bytes()).expect("written");
+}
+
+/// The partial files in a folder.
+fn partial(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).expect("listed");
+    let mut paths: Vec<_> = entries.map(|entry| entry.expect("entry").path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|kind| kind == "partial"));
+    paths
+}
+
+/// A replay that is killed while it waits for more points; gives what it left.
+fn killed(folder: &Path, terrain: &Path) -> PathBuf {
+    let mut process = replay(folder, terrain).spawn().expect("started");
+    // Its input stays open, so it cannot come to its end.
+    say_points(&mut process);
+    let left = loop {
+        let is_written = |path: &PathBuf| path.metadata().is_ok_and(|meta| meta.len() > 0);
+        if let Some(path) = partial(folder).into_iter().find(is_written) {
+            break path;
+        }
+        assert_eq!(process.try_wait().expect("waited for"), None, "it ended");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    };
+    process.kill().expect("killed");
+    process.wait().expect("waited for");
+    left
+}
+
+/// Fails unless a command named the partial file and its size, and left it alone.
+fn names_it(run: &Output, left: &Path, content: &[u8]) {
+    let said = said(run);
+    assert!(run.status.success(), "{said}");
+    let size = format!("({} bytes)", content.len());
+    for part in [&*left.to_string_lossy(), &size, "to keep it"] {
+        assert!(said.contains(part), "{part} in {said}");
+    }
+    assert_eq!(fs::read(left).expect("still there"), content);
+}
+
+#[test]
+fn a_killed_commands_recording_is_named_at_the_next_start_and_kept() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let terrain = terrain(folder);
+    let left = killed(folder, &terrain);
+    let content = fs::read(&left).expect("left behind");
+    assert!(content.starts_with(b"t_s,x_mm"), "it is the recording");
+
+    let mut again = replay(folder, &terrain).spawn().expect("started");
+    say_points(&mut again);
+    drop(again.stdin.take());
+    names_it(&again.wait_with_output().expect("ended"), &left, &content);
+    assert!(folder.join("out.csv").exists());
+    assert_eq!(partial(folder), [left.as_path()]);
+
+    let run = Command::new(hapterra_binary())
+        .arg("run")
+        .arg(&terrain)
+        .args(["--device", "native", "--seconds", "0.05", "--record"])
+        .arg(folder.join("out.csv"))
+        .output()
+        .expect("started");
+    names_it(&run, &left, &content);
+}

@@ -1,0 +1,30 @@
+//! A minute of the campaign of link faults, and whether the report that is kept is whole.
+
+use hapterra_tests::link_campaign::fault::Kind;
+use hapterra_tests::link_campaign::{SEED, report, run};
+use hapterra_tests::repository;
+
+#[test]
+fn no_fault_of_the_link_is_felt_hangs_or_goes_untold() {
+    let tally = run(SEED, 60, &mut |_, _| {}).expect("no violation");
+    for kind in Kind::ALL {
+        assert!(tally.runs_with(kind) > 0, "{kind:?} was not tried");
+    }
+    // Otherwise the bounds were never put to the test.
+    assert!(tally.extremes.force_n > 2.0, "{:?}", tally.extremes);
+    assert!(tally.touching > 5_000, "{tally:?}");
+    assert!(tally.agreed() > 3, "{tally:?}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_campaign() {
+    let once = || run(SEED + 1, 1, &mut |_, _| {}).expect("no violation");
+    assert_eq!(once(), once());
+}
+
+#[test]
+fn the_report_that_is_kept_has_every_kind() {
+    let path = repository().join("docs/link-campaign.md");
+    let page = std::fs::read_to_string(path).expect("the report is kept");
+    assert_eq!(report::missing(&page), []);
+}
