@@ -275,35 +275,47 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// As [`Haptics::tick`], into a place that stays: nothing is copied.
     pub fn tick_into(&mut self, sense: &Sense, watchdog_live: bool, outcome: &mut Outcome) {
         self.tick = self.tick.wrapping_add(1);
+        let pose = self.watch(sense, watchdog_live);
         match &self.scene {
-            Some(scene) if scene.source == Source::Points => {
-                self.follow(sense, watchdog_live);
-                self.tick_point(outcome);
-            }
-            _ => self.tick_arm(sense, watchdog_live, outcome),
+            Some(scene) if scene.source == Source::Points => self.tick_point(outcome),
+            _ => self.tick_arm(pose.as_ref(), outcome),
         }
     }
 
-    /// The full path: counts, pose, haptic interface point, proxy, force,
-    /// torques, currents.
-    fn tick_arm(&mut self, sense: &Sense, watchdog_live: bool, outcome: &mut Outcome) {
+    /// Follows the arm while nothing of it is felt, in place of a tick: an arm that
+    /// somebody moves meanwhile keeps its zero, a jump of its encoders is noticed, and
+    /// its motors cool. Nothing is driven.
+    ///
+    /// A board calls it in every tick of a replay in which no point is under way;
+    /// [`Haptics::tick_into`] sees to the others.
+    pub fn follow(&mut self, sense: &Sense, watchdog_live: bool) {
+        self.watch(sense, watchdog_live);
+    }
+
+    /// Where the arm is, and what the guard makes of it.
+    fn watch(&mut self, sense: &Sense, watchdog_live: bool) -> Option<Pose> {
         let zero = self.zero.unwrap_or_default();
         let mechanism = self.mechanism.as_ref();
         let pose = mechanism.map(|mechanism| mechanism.pose(sense.counts, zero));
-        let arm = mechanism.zip(pose.as_ref());
-        let lost_counts = self.guard.watch(
-            sense,
-            &Surroundings {
-                arm,
-                zeroed: self.zero.is_some(),
-                scene: match self.scene {
-                    Some(_) => SceneKind::Arm,
-                    None => SceneKind::None,
-                },
-                watchdog_live,
+        let around = Surroundings {
+            arm: mechanism.zip(pose.as_ref()),
+            zeroed: self.zero.is_some(),
+            scene: match &self.scene {
+                Some(scene) if scene.source == Source::Points => SceneKind::Points,
+                Some(_) => SceneKind::Arm,
+                None => SceneKind::None,
             },
-        );
-        outcome.drive = Drive::default();
+            watchdog_live,
+        };
+        if self.guard.watch(sense, &around) {
+            self.zero = None;
+        }
+        pose
+    }
+
+    /// The full path: pose, haptic interface point, proxy, force, torques, currents.
+    fn tick_arm(&mut self, pose: Option<&Pose>, outcome: &mut Outcome) {
+        let arm = self.mechanism.as_ref().zip(pose);
         outcome.answers = None;
         let sample = &mut outcome.sample;
         let mut wanted = Vec3::ZERO;
@@ -316,49 +328,25 @@ impl<'t, const D: usize> Haptics<'t, D> {
         } else {
             write_output(GridPoint::default(), &ContactOutput::default(), sample);
         }
-        let mut force_n = Vec3::ZERO;
-        if let Some((mechanism, pose)) = arm {
-            force_n = self.guard.limit_force(wanted);
-            if self.guard.mode().drives() {
+        let force_n = match arm {
+            Some(_) => self.guard.limit_force(wanted),
+            None => Vec3::ZERO,
+        };
+        outcome.drive = match arm {
+            Some((mechanism, pose)) if self.guard.mode().drives() => {
                 let wanted_a = self.guard.jog_currents_a().unwrap_or_else(|| {
                     let weight = mechanism.gravity_nm(pose) * self.guard.gain();
                     let torques = pose.torques_nm(to_device_frame(force_n)) + weight;
                     mechanism.currents_a(torques)
                 });
-                outcome.drive = self.guard.limit_currents(wanted_a);
+                self.guard.limit_currents(wanted_a)
             }
-            if lost_counts {
-                self.zero = None;
-            }
-        }
+            _ => Drive::default(),
+        };
         if !outcome.drive.enabled {
             outcome.drive.held = self.guard.held();
         }
         self.write_state(force_n, &mut outcome.sample);
-    }
-
-    /// Follows the arm while nothing of it is felt, in place of a tick: an arm that
-    /// somebody moves meanwhile keeps its zero, a jump of its encoders is noticed, and
-    /// its motors cool. Nothing is driven.
-    ///
-    /// A board calls it in every tick of a replay in which no point is under way;
-    /// [`Haptics::tick_into`] sees to the others.
-    pub fn follow(&mut self, sense: &Sense, watchdog_live: bool) {
-        let zero = self.zero.unwrap_or_default();
-        let mechanism = self.mechanism.as_ref();
-        let pose = mechanism.map(|mechanism| mechanism.pose(sense.counts, zero));
-        let lost_counts = self.guard.watch(
-            sense,
-            &Surroundings {
-                arm: mechanism.zip(pose.as_ref()),
-                zeroed: self.zero.is_some(),
-                scene: SceneKind::Points,
-                watchdog_live,
-            },
-        );
-        if lost_counts {
-            self.zero = None;
-        }
     }
 
     /// Replay: the host's point in place of the arm, amplifiers off. The tick

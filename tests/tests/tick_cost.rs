@@ -18,10 +18,8 @@ use hapterra_core::wire::status::Status;
 use hapterra_tests::emulation::emulated_board;
 
 /// Most that a tick in contact may cost on average: kinematics, contact,
-/// guard, torques, and all the loop does around them. It was 2,500 before the guard
-/// compared commands with current monitors, judged ready lines, and knew jogs, held
-/// outputs and temperatures that outlive a reset: 2,710 are counted with all of it.
-const IN_CONTACT: f64 = 2_750.0;
+/// guard, torques, and all the loop does around them.
+const IN_CONTACT: f64 = 2_500.0;
 
 /// The demonstration's samples on the emulated board, and how it is afterwards.
 fn felt() -> Option<(Vec<Sample>, Status)> {

@@ -73,12 +73,14 @@ impl Feedback {
     /// returns whether a measured current is not what was commanded. Without monitors
     /// there is nothing to compare.
     pub(super) fn disagrees(&mut self, sense: &Sense, commanded_a: Vec3) -> bool {
-        let Some(measured_ma) = sense.measured_ma else {
+        let Some([a, b, c]) = sense.measured_ma else {
             return false;
         };
         let before_a = core::mem::replace(&mut self.before_a, commanded_a);
-        let measured_a = Vec3::from(measured_ma.map(f32::from)) * 1e-3;
+        let measured_a = Vec3::new(f32::from(a), f32::from(b), f32::from(c)) * 1e-3;
         self.error_a += (measured_a - before_a - self.error_a) * self.share;
-        self.error_a.abs().max_element() > CURRENT_TOLERANCE_A
+        let tolerance_a = Vec3::splat(CURRENT_TOLERANCE_A);
+        // Written so that what is not a number disagrees.
+        !self.error_a.abs().cmple(tolerance_a).all()
     }
 }
