@@ -330,9 +330,9 @@ impl Contact {
     #[inline(never)]
     fn looks_around<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Turn {
         let view = HipView::new(hip);
-        let ground = window.ground(hip.column());
+        let (cell, ground) = view.ground(window);
         let is_above = view.altitude().cell() >= window.top()
-            || matches!(&ground, Ground::Patch(corners) if view.is_above(corners));
+            || matches!(&ground, Ground::Patch(corners) if view.is_above(cell, corners));
         if is_above {
             return self.becomes_free(hip);
         }
@@ -341,7 +341,7 @@ impl Contact {
         self.answers(ContactOutput {
             proxy: hip,
             converged: !is_missing,
-            missing_tile: is_missing.then(|| TileIndex::holding(hip.column())),
+            missing_tile: is_missing.then(|| TileIndex::holding(cell)),
             ..ContactOutput::default()
         })
     }

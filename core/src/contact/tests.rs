@@ -479,6 +479,76 @@ fn steep_ways_in_over_the_border_cross_nothing() {
     }
 }
 
+/// A field of 16 × 16 cells with a hole in the middle, flat at height 1.
+fn with_a_hole(x: i32, y: i32) -> f32 {
+    match (6..=10).contains(&x) && (6..=10).contains(&y) {
+        true => f32::NAN,
+        false => 1.0,
+    }
+}
+
+/// A patch has all four borders: straight down onto the last sample in the east or
+/// north, or onto one beside a hole, is onto the surface.
+#[test]
+fn straight_down_onto_any_sample_meets_the_surface() {
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(16, 16), with_a_hole);
+    for (x, y) in (0..=16).flat_map(|y| (0..=16).map(move |x| (x, y))) {
+        for fast in [0.1, 1.5, 500.0] {
+            let at = |z: f32| GridPoint::new([x, y, 0], Vec3::Z * z);
+            let mut contact = Contact::new(ContactSettings::REAL_TIME);
+            let above = contact.step(&field.window, &at(1.0 + fast)).state;
+            let felt = contact.step(&field.window, &at(0.75));
+            let expected = match with_a_hole(x, y).is_nan() {
+                true => (above, Vec3::ZERO),
+                false => (ContactState::Touching, Vec3::Z * 0.25),
+            };
+            let felt = (felt.state, felt.displacement);
+            assert_eq!(felt, expected, "({x}, {y}) {fast}");
+        }
+    }
+}
+
+/// What is felt on a way that often lies on grid lines is felt on the mirrored way over
+/// the mirrored field.
+#[test]
+fn a_mirrored_way_along_grid_lines_is_felt_mirrored() {
+    let mut tiles = [buffers::<2>(), buffers::<2>()];
+    let [plain, mirrored] = &mut tiles;
+    let lopsided = |x: i32, y: i32| with_a_hole(x - 2, y + 1) + 0.125 * x as f32;
+    let size = FieldSize::new(16, 16);
+    let plain = Field::<2>::held(plain, size, lopsided);
+    let mirrored = Field::<2>::held(mirrored, size, move |x, y| lopsided(16 - x, 16 - y));
+    let mut dice = Dice(5);
+    let mut touched = 0;
+    for _ in 0..cases(400, 10) {
+        let mut contacts = [(); 2].map(|()| Contact::new(ContactSettings::REAL_TIME));
+        let mut at = [8.0, 8.0, 4.0_f32];
+        for tick in 0..60 {
+            let axis = (dice.between(0.0, 3.0) as usize).min(2);
+            let way = 0.25 * dice.between(-8.0, 9.0).floor() as f32;
+            let most = if axis == 2 { 4.0 } else { 17.0 };
+            at[axis] = (at[axis] + way).clamp(-1.0, most);
+            let [x, y, z] = at;
+            let ways = [[x, y, z], [16.0 - x, 16.0 - y, z]];
+            let mut felt = [ContactOutput::default(); 2];
+            for (index, field) in [&plain, &mirrored].into_iter().enumerate() {
+                let hip = GridPoint::new([0; 3], Vec3::from(ways[index]));
+                felt[index] = *contacts[index].step(&field.window, &hip);
+            }
+            let [one, other] = felt;
+            let back = Vec3::new(-1.0, -1.0, 1.0) * other.displacement;
+            assert_eq!(one.state, other.state, "{tick}: {at:?}");
+            assert!(
+                (one.displacement - back).length() < 1e-5,
+                "{tick}: {at:?} {one:?} {back}"
+            );
+            touched += u32::from(one.state == ContactState::Touching);
+        }
+    }
+    assert!(touched > cases(4000, 20), "{touched}");
+}
+
 /// A ground, the height around which it is felt, and how far up and down from there.
 type FeltGround = (fn(i32, i32) -> f32, f64, f64);
 

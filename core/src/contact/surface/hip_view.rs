@@ -3,10 +3,10 @@
 use glam::Vec3;
 
 use super::patch::Patch;
-use super::point::SurfacePoint;
+use super::point::{Side, SurfacePoint};
 use crate::contact::tolerance::RESOLUTION;
 use crate::grid::{Altitude, Cell, GridPoint};
-use crate::terrain::Corners;
+use crate::terrain::{Corners, Ground, Window};
 
 /// A point to see patches from, with its place in their coordinates and their
 /// heights counted from its own: the HIP, or where a path of the HIP begins.
@@ -50,10 +50,25 @@ impl HipView {
         corners.heights.iter().any(|height| up(height) > 0.0)
     }
 
+    /// The cell that the HIP is over and what lies there: of cells that share the place,
+    /// one that is no hole.
+    pub(in crate::contact) fn ground<const D: usize>(
+        &self,
+        window: &Window<'_, D>,
+    ) -> (Cell, Ground) {
+        let (place, column) = (self.hip.frac(), self.column());
+        let sides = Side::sharing(place.x, place.y).itself_and_neighbours();
+        sides
+            .map(|side| column.offset(side.east, side.north))
+            .map(|cell| (cell, window.ground(cell)))
+            .find(|(_, ground)| *ground != Ground::Hole)
+            .unwrap_or((column, Ground::Hole))
+    }
+
     /// Whether the HIP is above the patch of these corners, which it is over.
-    pub(in crate::contact) fn is_above(&self, corners: &Corners) -> bool {
-        let place = self.hip.frac();
-        self.patch(corners).height(place.x, place.y) < 0.0
+    pub(in crate::contact) fn is_above(&self, cell: Cell, corners: &Corners) -> bool {
+        let (u, v) = self.in_patch(cell);
+        self.patch(corners).height(u, v) < 0.0
     }
 
     /// The position of a point of the surface, `z` cells above the HIP.

@@ -18,6 +18,16 @@ impl Side {
     /// Neither east nor north: inside the patch.
     pub const NONE: Self = Self { east: 0, north: 0 };
 
+    /// Toward the cells to the west and south that have a place of a cell on their own
+    /// border.
+    #[inline]
+    pub(in crate::contact) fn sharing(u: f32, v: f32) -> Self {
+        Self {
+            east: -i32::from(u == 0.0),
+            north: -i32::from(v == 0.0),
+        }
+    }
+
     /// The neighbours over a border toward this side: one over an edge, three around
     /// a vertex. [`Self::NONE`] where a place is empty.
     #[inline]

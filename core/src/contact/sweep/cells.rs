@@ -1,7 +1,7 @@
 //! The cells under a straight path, one after the other.
 
-use crate::contact::surface::SurfacePoint;
 use crate::contact::surface::patch::Patch;
+use crate::contact::surface::{Side, SurfacePoint};
 use crate::contact::tolerance::{RUNS_ALONG, TINY_STEP};
 use crate::grid::{Cell, GridPoint};
 
@@ -51,6 +51,38 @@ impl Step {
             patch.blossom(self.from, self.to) - 0.5 * (self.z_from + self.z_to),
             patch.height(self.to.0, self.to.1) - self.z_to,
         ]
+    }
+
+    /// What of this part lies on the border of the cells to the west and south, as they
+    /// have it: a patch has its east and its north border, too.
+    pub(super) fn beside(&self) -> impl Iterator<Item = Self> {
+        let side = Side::sharing(self.to.0, self.to.1);
+        side.itself_and_neighbours()
+            .filter(|side| *side != Side::NONE)
+            .map(|side| self.on_border_of(side))
+    }
+
+    /// All of the part, or only where it ends.
+    fn on_border_of(&self, side: Side) -> Self {
+        let runs_along =
+            (side.east == 0 || self.from.0 == 0.0) && (side.north == 0 || self.from.1 == 0.0);
+        let (from, z_from) = match runs_along {
+            true => (self.from, self.z_from),
+            false => (self.to, self.z_to),
+        };
+        let seen = |(u, v): (f32, f32)| (u - side.east as f32, v - side.north as f32);
+        Self {
+            cell: self.cell.offset(side.east, side.north),
+            from: seen(from),
+            to: seen(self.to),
+            z_from,
+            z_to: self.z_to,
+        }
+    }
+
+    /// Whether it is no more than a point.
+    pub(super) fn is_point(&self) -> bool {
+        self.from == self.to && self.z_from == self.z_to
     }
 
     /// The point of the surface under a fraction of this part.

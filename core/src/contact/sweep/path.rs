@@ -10,7 +10,7 @@
 
 use heapless::Vec;
 
-use super::cells::Steps;
+use super::cells::{Step, Steps};
 use super::intersect::{first_crossing, next_crossing};
 use super::look_ahead::look_along;
 use crate::contact::budget::{BOX, Budget, HALF, INTERSECTION};
@@ -112,7 +112,7 @@ impl Path {
             }
             budget.spend(BOX);
             let Some(&end) = self.ends.last() else { break };
-            let span = CellBox::around(self.at.column(), end.column());
+            let span = span(&self.at, &end);
             let low = lower(&self.at, &end);
             if window.is_clear(span, low) || window.is_clear_nearby(span, low) {
                 // Above all that is around, so only the field's border matters.
@@ -122,7 +122,7 @@ impl Path {
                 if let Some(ended) = self.walk(window, end, budget) {
                     return ended;
                 }
-            } else if longer_side(span) > LOOK_CELLS {
+            } else if longer_side(span) > LOOK_CELLS || self.may_touch_border(window, &end) {
                 // Not full: such a piece is walked.
                 let _ = self.ends.push(self.at.midpoint(&end));
                 continue;
@@ -173,6 +173,13 @@ impl Path {
         (longer_side(span) <= WALK_CELLS && is_low) || self.ends.is_full()
     }
 
+    /// Whether a piece may touch the border of a patch from over a hole, which a look
+    /// along it does not see.
+    fn may_touch_border<const D: usize>(&self, window: &Window<'_, D>, end: &GridPoint) -> bool {
+        is_on_grid_line(end)
+            && (is_on_grid_line(&self.at) || window.ground(end.column()) == Ground::Hole)
+    }
+
     /// The path is clear from one place to another.
     fn passes<const D: usize>(&mut self, window: &Window<'_, D>, from: GridPoint, to: GridPoint) {
         // On a border, what was passed is the cell before it.
@@ -196,7 +203,7 @@ impl Path {
         let mut over_hole = self.over_hole;
         let mut on_surface = self.on_surface;
         let mut steps = Steps::between(&self.at, &end);
-        while let Some(step) = steps.next() {
+        while let Some(mut step) = steps.next() {
             if !budget.has(INTERSECTION) {
                 return Some(Swept::Suspended);
             }
@@ -206,7 +213,12 @@ impl Path {
                 // A corner of a cell, or of a hole, touched on leaving an edge.
                 continue;
             }
-            let patch = match window.ground(step.cell) {
+            let mut ground = window.ground(step.cell);
+            if ground == Ground::Hole {
+                (step, ground) = beside(window, step);
+                over_hole |= step.is_point();
+            }
+            let patch = match ground {
                 Ground::Patch(corners) => view.patch(&corners),
                 Ground::Missing => return Some(Swept::Missing(TileIndex::holding(step.cell))),
                 Ground::Hole => {
@@ -232,6 +244,34 @@ impl Path {
         (self.over_hole, self.on_surface) = (over_hole, false);
         None
     }
+}
+
+/// What a step over a hole meets: a patch on whose border it is, or the hole.
+#[inline(never)]
+fn beside<const D: usize>(window: &Window<'_, D>, step: Step) -> (Step, Ground) {
+    for other in step.beside() {
+        let ground = window.ground(other.cell);
+        if ground != Ground::Hole {
+            return (other, ground);
+        }
+    }
+    (step, Ground::Hole)
+}
+
+/// The cells under a piece of a path, and those on whose border it ends.
+fn span(at: &GridPoint, end: &GridPoint) -> CellBox {
+    let mut span = CellBox::around(at.column(), end.column());
+    if is_on_grid_line(end) {
+        // A cell more than need be does no harm.
+        span.from = span.from.offset(-1, -1);
+    }
+    span
+}
+
+#[inline]
+fn is_on_grid_line(point: &GridPoint) -> bool {
+    let place = point.frac();
+    place.x == 0.0 || place.y == 0.0
 }
 
 /// The lower end of a path.
