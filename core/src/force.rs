@@ -73,6 +73,13 @@ pub fn clamp_length(v: Vec3, limit: f32) -> Vec3 {
     if largest <= part { v } else { unit * part }
 }
 
+/// Whether all of it is a number and finite: nothing else times zero is zero. A third of
+/// the instructions of `Vec3::is_finite`, in every tick.
+#[inline]
+pub(crate) fn is_finite(v: Vec3) -> bool {
+    (v * 0.0).element_sum() == 0.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -119,6 +126,29 @@ mod tests {
         }
         let f = ForceLaw::PREMIUM.force_n(Vec3::new(300.0, -400.0, 0.0));
         assert!((f - Vec3::new(5.1, -6.8, 0.0)).length() < 1e-5);
+    }
+
+    #[test]
+    fn what_is_finite_is_told_from_what_is_not() {
+        let finite = [
+            0.0,
+            -0.0,
+            f32::MIN_POSITIVE,
+            1e-45,
+            -3.0,
+            f32::MAX,
+            f32::MIN,
+        ];
+        let not = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+        for axis in 0..3 {
+            for (numbers, expected) in [(&finite[..], true), (&not[..], false)] {
+                for number in numbers {
+                    let mut v = Vec3::splat(f32::MAX);
+                    v[axis] = *number;
+                    assert_eq!(is_finite(v), expected, "{v}");
+                }
+            }
+        }
     }
 
     #[test]

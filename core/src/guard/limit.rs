@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{Blockers, Drive, Fault, Guard, Limits, Mode, SMALL_FORCE_N};
-use crate::force::clamp_length;
+use crate::force::{clamp_length, is_finite};
 
 impl Guard {
     /// The force that may be asked of the motors: no longer than the device
@@ -11,7 +11,7 @@ impl Guard {
     /// gently, slew-limited; zero unless the amplifiers are on.
     #[must_use]
     pub fn limit_force(&mut self, wanted_n: Vec3) -> Vec3 {
-        if !wanted_n.is_finite() {
+        if !is_finite(wanted_n) {
             self.trip(Fault::NotANumber);
         }
         match self.mode() {
@@ -53,10 +53,13 @@ impl Guard {
         }
         let change = aim - self.force_n;
         let step = clamp_length(change, self.max_slew_n);
-        if step != change {
+        self.force_n = if step == change {
+            // To the bit, so that a replay gives the force that was felt.
+            aim
+        } else {
             self.limits |= Limits::SLEW_LIMITED;
-        }
-        self.force_n += step;
+            self.force_n + step
+        };
     }
 
     /// The currents of a tick of the jog that is under way, A; none where there is no
@@ -77,7 +80,7 @@ impl Guard {
     /// off unless the amplifiers may be on.
     #[must_use]
     pub fn limit_currents(&mut self, wanted_a: Vec3) -> Drive {
-        if !wanted_a.is_finite() {
+        if !is_finite(wanted_a) {
             self.trip(Fault::NotANumber);
         }
         if !self.mode().drives() {

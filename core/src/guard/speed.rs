@@ -75,6 +75,8 @@ impl SpeedMonitor {
     }
 
     /// Takes a tick's counts.
+    // It has one caller, and would be a call with copies of its arguments in every tick.
+    #[inline(always)]
     pub(super) fn check(
         &mut self,
         counts: [i32; 3],

@@ -34,6 +34,8 @@ pub(super) struct StallDetector {
 impl StallDetector {
     /// Takes how far the encoders moved in a millisecond under these currents.
     /// True if a motor pushes and nothing comes of it.
+    // It has one caller, and would be a call with copies of its arguments in every tick.
+    #[inline(always)]
     pub(super) fn check(&mut self, moved: [i32; 3], currents_a: Vec3, continuous_a: Vec3) -> bool {
         let load = currents_a.abs();
         if load.cmple(0.5 * continuous_a).all() {

@@ -119,6 +119,7 @@ impl JointLimits {
 
     /// Whether each joint by itself lies inside, give or take `margin_rad`.
     #[must_use]
+    #[inline]
     pub fn each_allows(&self, q: Vec3, margin_rad: f32) -> bool {
         let margin = Vec3::splat(margin_rad);
         q.cmpge(self.min_rad - margin).all() && q.cmple(self.max_rad + margin).all()
