@@ -128,7 +128,13 @@ fn a_hello_in_its_session() {
         }),
     };
     // The session is 300 | 128; then variant, protocol, number, seconds.
-    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 4, 9, 0xB4, 0x01]);
+    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 5, 9, 0xB4, 0x01]);
+}
+
+#[test]
+fn a_detach_and_its_answer() {
+    assert_eq!(bytes(&ToDevice::Detach), [10]);
+    assert_eq!(bytes(&ToHost::Detached), [11]);
 }
 
 #[test]

@@ -51,6 +51,9 @@ pub enum ToDevice<'a> {
     /// The host has heard the goodbye and is gone. The emulated board ends its
     /// program.
     Close,
+    /// Ends the session and leaves the arm and the scene as they are: the host has only
+    /// looked. Answered by [`ToHost::Detached`].
+    Detach,
 }
 
 /// Device to host.
@@ -105,6 +108,8 @@ pub enum ToHost {
     /// Answers [`ToDevice::Bye`]: the amplifiers are off, nothing follows, and these
     /// were the session's samples.
     Goodbye(SampleCount),
+    /// Answers [`ToDevice::Detach`]: the session is over.
+    Detached,
 }
 
 /// A tile's content.

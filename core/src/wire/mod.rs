@@ -41,10 +41,15 @@
 //! | greeting | a version check and hello, every 0.4 s | the device's hello comes: scene sent, or open where there is no scene. A refusal that names another protocol: an error | after 4 s, whatever else is heard |
 //! | scene sent | the scene, every 0.4 s; after 0.75 s without an answer hello, too | the scene is taken: open. It is refused: an error | after 4 s, whatever else is heard |
 //! | open | alive, every 0.5 s of its own or of the device's time; its request, its questions, every 0.4 s; tiles and points; after 0.75 s without an answer hello, every 0.4 s | it is told to leave: leaving. A hello of a device that was restarted (another hello opened the session) or holds another scene: scene sent | after 4 s without an answer; after 1.5 s where frames of another session come meanwhile: another host has taken the device |
-//! | leaving | bye, every 0.4 s; answers requests for tiles no more | goodbye comes: close is said once, and it is closed | after 3 s: the user is told that the board may be armed |
+//! | leaving | hello and bye, every 0.4 s; answers requests for tiles no more | goodbye comes: close is said once, and it is closed | after 3 s: the user is told that the board may be armed |
+//! | detaching | hello and detach, every 0.4 s | detached comes: closed | after 3 s |
+//!
+//! A host that has put no scene in force and asked for nothing that drives leaves by
+//! detaching: what another host left is none of its business.
 //!
 //! An answer is a frame of this session that answers something the host has said:
-//! hello, scene taken, point answer, answer, status, calibration, alive, goodbye.
+//! hello, scene taken, point answer, answer, status, calibration, alive, goodbye,
+//! detached.
 //! Telemetry is none, because it also comes where the device hears nothing.
 //! The times are those for a board in real time.
 //!
@@ -62,16 +67,19 @@
 //! | state | hears | leaves it when |
 //! | --- | --- | --- |
 //! | closed | hello | hello comes: open |
-//! | open | everything | bye: leaving. `silence_s` without a frame of this session while armed, or being armed: ended, after a command to disarm. Hello of another session: open, replaced |
+//! | open | everything | bye: leaving. Detach: detached, and it says so. `silence_s` without a frame of this session while armed, or being armed: ended, after a command to disarm. Hello of another session: open, replaced |
 //! | leaving | alive, status, calibration, bye | the amplifiers are off and the telemetry has left: it says goodbye and is ended. Hello of another session: open |
-//! | ended | bye: answered by goodbye; close: the emulated board ends its program | hello of another session: open |
+//! | detached | detach: answered by detached; bye | bye: leaving. `silence_s` while armed, as when open: ended, after a command to disarm. Hello of another session: open |
+//! | ended | bye: answered by goodbye; detach: answered by detached; close: the emulated board ends its program | hello of another session: open |
 //!
 //! - A hello of the session that is open is answered and changes nothing. A hello of a
 //!   session that is ended, or of the one before the present one, is stale: it is not
 //!   heard.
+//! - The session before, of which a hello tells, is the last one that was not detached.
+//!   Who looks does not hide what became of it.
 //! - A new session keeps the scene and every tile that is held; samples and requests
 //!   are numbered anew. Where the arm was being armed but nothing is driven yet, that
-//!   is ended: the new host has to ask itself.
+//!   is ended: the new host has to ask itself. So it is where its host detaches.
 //! - Each request is done once. The number of the last one again: it is answered again,
 //!   or is still under way. An older number (by less than 128, wrapping) is not heard.
 //!   To arm is answered when the loop has decided, to store when it is stored.

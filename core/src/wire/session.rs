@@ -58,7 +58,9 @@ pub enum SessionEnd {
     HostSilent,
 }
 
-/// The session before the present one.
+/// The session before the present one, not counting those that were detached
+/// ([`ToDevice::Detach`](super::message::ToDevice::Detach)): a host that only looked does
+/// not hide what became of the session before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LastSession {
     /// Its number; zero where there was none.

@@ -16,6 +16,8 @@ pub(super) enum SessionState {
     Leaving,
     /// It was answered, or the host was silent for too long.
     Ended(SessionEnd),
+    /// The host has looked and is gone; the arm is as it was.
+    Detached,
     /// The host has heard the answer.
     Gone,
 }
@@ -40,6 +42,9 @@ pub(super) struct Conversation {
     /// The number of the hello that opened it.
     pub(super) opened_by: u8,
     last: LastSession,
+    /// The number of the session before, whether it was detached or not; zero where there
+    /// was none.
+    previous: u32,
     /// Ticks for which the host may be silent.
     silence_ticks: u32,
     /// The tick of the last frame of this session.
@@ -65,6 +70,7 @@ impl Conversation {
                     dropped: 0,
                 },
             },
+            previous: 0,
             silence_ticks: 0,
             heard_at: 0,
             packed: 0,
@@ -76,7 +82,7 @@ impl Conversation {
         self.session
     }
 
-    /// The session before this one.
+    /// The session before this one that was not detached.
     pub(super) const fn last(&self) -> LastSession {
         self.last
     }
@@ -94,7 +100,7 @@ impl Conversation {
     pub(super) fn greeting(&self, session: SessionNumber) -> Greeting {
         match self.state {
             SessionState::Open if self.session == session => Greeting::Again,
-            _ if self.is_of(session) || self.last.session == session.get() => Greeting::Stale,
+            _ if self.is_of(session) || self.previous == session.get() => Greeting::Stale,
             _ => Greeting::Opens,
         }
     }
@@ -102,7 +108,8 @@ impl Conversation {
     /// Begins a session with the hello of this number. `dropped` samples were dropped since the device started.
     pub(super) fn open(&mut self, session: SessionNumber, hello: u8, dropped: u32) {
         let end = match self.state {
-            SessionState::Closed => SessionEnd::None,
+            // Who has only looked leaves no trace.
+            SessionState::Closed | SessionState::Detached => SessionEnd::None,
             SessionState::Open | SessionState::Leaving => SessionEnd::Replaced,
             SessionState::Ended(end) => end,
             SessionState::Gone => SessionEnd::Goodbye,
@@ -114,6 +121,9 @@ impl Conversation {
                 end,
                 count: self.count(0, dropped),
             };
+        }
+        if self.state != SessionState::Closed {
+            self.previous = self.session.get();
         }
         self.state = SessionState::Open;
         self.session = session;
@@ -141,8 +151,10 @@ impl Conversation {
         self.silence_ticks = u32::from(seconds.clamp(least, most)).saturating_mul(tick_hz);
     }
 
-    /// Whether the host of the open session has been silent for too long.
+    /// Whether the host of the session that is open, or was detached, has been silent for
+    /// too long.
     pub(super) fn is_forsaken(&self, tick: u32) -> bool {
-        self.is_open() && tick.wrapping_sub(self.heard_at) >= self.silence_ticks
+        let has_begun = matches!(self.state, SessionState::Open | SessionState::Detached);
+        has_begun && tick.wrapping_sub(self.heard_at) >= self.silence_ticks
     }
 }

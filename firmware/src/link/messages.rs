@@ -52,10 +52,17 @@ impl<const D: usize> Link<'_, D> {
         self.conversation.heard(self.ends.monitor.ticks());
         match (message, self.conversation.state) {
             (ToDevice::Bye, state) => self.on_bye(state),
+            (ToDevice::Detach, state) => self.on_detach(state),
             (ToDevice::Close, SessionState::Ended(SessionEnd::Goodbye)) => {
                 self.conversation.state = SessionState::Gone;
             }
-            (_, SessionState::Closed | SessionState::Ended(_) | SessionState::Gone) => {}
+            (
+                _,
+                SessionState::Closed
+                | SessionState::Ended(_)
+                | SessionState::Detached
+                | SessionState::Gone,
+            ) => {}
             (ToDevice::Alive, _) => self.on_alive(),
             (ToDevice::Status, _) => self.say(&ToHost::Status(self.status())),
             (ToDevice::GetCalibration, _) => {
@@ -121,7 +128,9 @@ impl<const D: usize> Link<'_, D> {
 
     fn on_bye(&mut self, state: SessionState) {
         match state {
-            SessionState::Open | SessionState::Ended(SessionEnd::HostSilent) => {
+            SessionState::Open
+            | SessionState::Detached
+            | SessionState::Ended(SessionEnd::HostSilent) => {
                 self.read_records();
                 self.device.forget_press();
                 self.drop_scene();
@@ -133,6 +142,25 @@ impl<const D: usize> Link<'_, D> {
             }
             SessionState::Closed | SessionState::Leaving => {}
         }
+    }
+
+    /// The host has looked and goes: what drives goes on, and what only waits to drive, or
+    /// to be stored, does not.
+    fn on_detach(&mut self, state: SessionState) {
+        match state {
+            SessionState::Closed | SessionState::Leaving => return,
+            SessionState::Open => {
+                self.device.forget_press();
+                self.drop_samples();
+                if self.device.is_being_armed() {
+                    self.command(Command::Disarm);
+                }
+                self.conversation.state = SessionState::Detached;
+            }
+            // The host has missed the answer.
+            SessionState::Detached | SessionState::Ended(_) | SessionState::Gone => {}
+        }
+        self.say(&ToHost::Detached);
     }
 
     /// Disarms and drops the scene. The loop lets the force out by itself.

@@ -146,7 +146,7 @@ fn serve(args: &Args, placed: &PlacedTerrain<'_>) -> Result<(), Failure> {
     let mut transport = connect(args, placed)?;
     let scripted = is_scripted(args);
     if !scripted && !args.unchecked {
-        transport = brought_up(transport)?;
+        brought_up(&mut *transport)?;
     }
     // A virtual arm was switched on in its zero pose; where a real one was,
     // its user has to say.

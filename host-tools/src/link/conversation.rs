@@ -19,7 +19,7 @@ use super::patience::Patience;
 /// Where the conversation stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
-    /// Nothing was said yet, or goodbye was answered.
+    /// Nothing was said yet, or goodbye or detach was answered.
     Closed,
     /// Hello was said.
     Greeting,
@@ -29,6 +29,8 @@ pub enum State {
     Open,
     /// Goodbye was said.
     Leaving,
+    /// Detach was said: the arm stays as it is.
+    Detaching,
 }
 
 /// What a host asks for; repeated until it is answered.
@@ -179,15 +181,29 @@ impl Conversation {
         draws
     }
 
-    /// Ends the conversation.
+    /// Ends the conversation, and has the device disarm.
     pub(super) fn leave(&mut self, now: Duration, out: &mut Vec<u8>) {
-        if matches!(self.state, State::Closed | State::Leaving) {
+        self.end_by(State::Leaving, now, out);
+    }
+
+    /// Ends the conversation, and leaves the arm and the scene as they are.
+    pub(super) fn detach(&mut self, now: Duration, out: &mut Vec<u8>) {
+        self.end_by(State::Detaching, now, out);
+    }
+
+    fn end_by(&mut self, state: State, now: Duration, out: &mut Vec<u8>) {
+        if self.state == State::Closed || self.is_ending() {
             return;
         }
         self.give_up_asking();
         self.unanswered.clear();
-        self.enter(State::Leaving, now);
+        self.enter(state, now);
         self.say_state(now, out);
+    }
+
+    /// Whether its end was said and is not answered.
+    pub(super) const fn is_ending(&self) -> bool {
+        matches!(self.state, State::Leaving | State::Detaching)
     }
 
     /// Puts a scene in force, or another one than before.
@@ -231,6 +247,9 @@ impl Conversation {
             }
             State::Leaving if in_state >= self.patience.goodbye => {
                 return Err(LinkError::NotConfirmed);
+            }
+            State::Detaching if in_state >= self.patience.goodbye => {
+                return Err(LinkError::Silent(in_state));
             }
             State::Open => self.check_silence(now)?,
             _ => {}
@@ -301,6 +320,10 @@ impl Conversation {
                 // has to before it can say goodbye to it.
                 self.say_hello(out);
                 self.say(&ToDevice::Bye, out);
+            }
+            State::Detaching => {
+                self.say_hello(out);
+                self.say(&ToDevice::Detach, out);
             }
         }
     }
@@ -423,6 +446,10 @@ impl Conversation {
             ToHost::Goodbye(count) => self
                 .on_goodbye(now, out)
                 .then_some(News::Other(ToHost::Goodbye(count))),
+            ToHost::Detached => {
+                self.on_detached(now);
+                None
+            }
             message @ ToHost::Alive { .. } => {
                 self.on_alive(now, &message, out);
                 Some(News::Other(message))
@@ -456,7 +483,7 @@ impl Conversation {
         }
         self.opened_by = device.opened_by;
         let restarted = !is_first;
-        if self.state == State::Leaving {
+        if self.is_ending() {
             return Ok(Some(News::Greeted { device, restarted }));
         }
         if restarted {
@@ -521,6 +548,13 @@ impl Conversation {
             // The device has taken no scene, or lost it, and its host has missed that.
             self.enter(State::SceneSent, now);
             self.say_state(now, out);
+        }
+    }
+
+    fn on_detached(&mut self, now: Duration) {
+        if self.state == State::Detaching {
+            self.heard = now;
+            self.enter(State::Closed, now);
         }
     }
 

@@ -1,7 +1,7 @@
 //! Questions and requests to a device, without a terrain: who it is, how it is,
 //! its calibration, arming.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::Scene;
@@ -11,35 +11,39 @@ use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::request::{Answer, Refusal, Request};
 use hapterra_core::wire::status::Status;
 
-use super::conversation::{Ask, Conversation, News};
+use super::conversation::{Ask, Conversation, News, State};
 use super::error::LinkError;
+use super::line::{LOOK, Line};
 use super::messages::{FromDevice, from_device, next_frame};
 use super::patience::Patience;
 use super::transport::Transport;
 
 /// In this time a device tells where it stands at least once.
 const MOMENT: Duration = Duration::from_millis(150);
-/// Between two looks at the clock while an answer is waited for.
-const LOOK: Duration = Duration::from_millis(50);
 
 /// Is told of a message that comes unasked; what it returns is said to that.
 type OnMessage<'o> = &'o mut dyn FnMut(&ToHost) -> Option<ToDevice<'static>>;
 
-/// A conversation with a device. The device keeps the scene that it holds. It ends
-/// without a word: whoever speaks with the device next begins a session of its own.
+/// A conversation with a device. However it ends, the device is told: one that has put
+/// a scene in force or asked for what drives says goodbye, so that the arm is disarmed;
+/// one that has only looked, or changed settings, detaches and leaves arm and scene as
+/// they are. [`Dialogue::end`] waits for the answer and returns what came of it. A
+/// dialogue that is dropped waits, too, for as long as a goodbye may take
+/// ([`Patience::goodbye`]), and logs where the arm may still be armed.
 pub struct Dialogue<'t> {
-    line: Line<'t>,
+    exchange: Exchange<'t>,
     device: DeviceHello,
 }
 
-/// Messages both ways.
-struct Line<'t> {
-    transport: Box<dyn Transport + 't>,
+/// Messages both ways, and their end.
+struct Exchange<'t> {
+    line: Line<'t>,
     talk: Conversation,
     reader: Box<FrameReader<MAX_FRAME>>,
-    began: Instant,
-    out: Vec<u8>,
-    incoming: Box<[u8; 1024]>,
+    /// It has put a scene in force, or asked for something that drives.
+    drives: bool,
+    /// Its end was said, or there is nobody any more to say it to.
+    is_over: bool,
 }
 
 impl<'t> Dialogue<'t> {
@@ -49,20 +53,20 @@ impl<'t> Dialogue<'t> {
     /// [`LinkError`]: nobody answers within `patience`, or in another protocol.
     pub fn open(transport: Box<dyn Transport + 't>, patience: Duration) -> Result<Self, LinkError> {
         let patience = Patience::of_a_dialogue(patience);
-        let mut line = Line {
-            transport,
+        let mut exchange = Exchange {
+            line: Line::new(transport),
             talk: Conversation::new(None, patience, fastrand::Rng::new()),
             reader: Box::default(),
-            began: Instant::now(),
-            out: vec![],
-            incoming: Box::new([0; 1024]),
+            drives: false,
+            is_over: false,
         };
-        line.talk.greet(line.began.elapsed(), &mut line.out);
-        let device = line.wait_for(|news| match news {
+        let line = &mut exchange.line;
+        exchange.talk.greet(line.now(), &mut line.out);
+        let device = exchange.wait_for(|news| match news {
             News::Greeted { device, .. } => Some(device),
             _ => None,
         })?;
-        Ok(Self { line, device })
+        Ok(Self { exchange, device })
     }
 
     /// How the device introduced itself.
@@ -71,10 +75,12 @@ impl<'t> Dialogue<'t> {
         &self.device
     }
 
-    /// Ends the conversation and gives the way to the device back.
-    #[must_use]
-    pub fn into_transport(self) -> Box<dyn Transport + 't> {
-        self.line.transport
+    /// Ends the conversation, and returns when the device has said so.
+    ///
+    /// # Errors
+    /// [`LinkError::NotConfirmed`] where the arm may be armed; else [`LinkError`].
+    pub fn end(mut self) -> Result<(), LinkError> {
+        self.exchange.end()
     }
 
     /// The state of the device as it answers: guard, calibration, ticks, stack.
@@ -82,7 +88,7 @@ impl<'t> Dialogue<'t> {
     /// # Errors
     /// [`LinkError`].
     pub fn status(&mut self) -> Result<Status, LinkError> {
-        self.line.ask(Ask::Status, |message| match message {
+        self.exchange.ask(Ask::Status, |message| match message {
             ToHost::Status(status) => Some(status),
             _ => None,
         })
@@ -94,7 +100,7 @@ impl<'t> Dialogue<'t> {
     /// # Errors
     /// [`LinkError`].
     pub fn fresh_status(&mut self) -> Result<Status, LinkError> {
-        self.line.listen(MOMENT)?;
+        self.exchange.listen(MOMENT)?;
         self.status()
     }
 
@@ -103,10 +109,11 @@ impl<'t> Dialogue<'t> {
     /// # Errors
     /// [`LinkError`].
     pub fn calibration(&mut self) -> Result<Option<Calibration>, LinkError> {
-        self.line.ask(Ask::Calibration, |message| match message {
-            ToHost::Calibration(calibration) => Some(calibration),
-            _ => None,
-        })
+        self.exchange
+            .ask(Ask::Calibration, |message| match message {
+                ToHost::Calibration(calibration) => Some(calibration),
+                _ => None,
+            })
     }
 
     /// Asks for something to be done; the device does it, once, or says why not.
@@ -115,12 +122,17 @@ impl<'t> Dialogue<'t> {
     /// [`LinkError`].
     pub fn request(&mut self, request: &Request) -> Result<Result<(), Refusal>, LinkError> {
         if matches!(request, Request::DropScene | Request::Jog(_)) {
-            self.line.talk.forget_scene();
+            self.exchange.talk.forget_scene();
         }
-        self.line
+        self.exchange.drives |= drives(request);
+        self.exchange
             .ask(Ask::Request(*request), |message| match message {
                 ToHost::Answer(Answer { result, .. }) => Some(result),
                 _ => None,
+            })
+            .inspect(|result| {
+                // The device that enters its loader hears nothing more.
+                self.exchange.is_over |= *request == Request::EnterLoader && result.is_ok();
             })
     }
 
@@ -129,11 +141,13 @@ impl<'t> Dialogue<'t> {
     /// # Errors
     /// [`LinkError`].
     pub fn put_scene(&mut self, scene: Scene) -> Result<(), LinkError> {
-        let line = &mut self.line;
-        let now = line.began.elapsed();
-        line.talk.listen_from(now);
-        line.talk.put_scene(scene, now, &mut line.out);
-        line.wait_for(|news| matches!(news, News::SceneTaken).then_some(()))
+        let exchange = &mut self.exchange;
+        exchange.drives = true;
+        let now = exchange.line.now();
+        exchange.talk.listen_from(now);
+        let out = &mut exchange.line.out;
+        exchange.talk.put_scene(scene, now, out);
+        exchange.wait_for(|news| matches!(news, News::SceneTaken).then_some(()))
     }
 
     /// Lets `ms` of the device's time pass, tells `on` of what comes unasked, and says
@@ -142,19 +156,19 @@ impl<'t> Dialogue<'t> {
     /// # Errors
     /// [`LinkError`]; also where the device's time stands still.
     pub fn pass(&mut self, ms: u32, on: OnMessage<'_>) -> Result<Status, LinkError> {
-        let line = &mut self.line;
-        let began = line.began.elapsed();
-        line.talk.listen_from(began);
-        let first = line.status(on)?;
+        let exchange = &mut self.exchange;
+        let began = exchange.line.now();
+        exchange.talk.listen_from(began);
+        let first = exchange.status(on)?;
         let ticks = ms * (first.device.tick_hz / 1000).max(1);
-        let patience = line.talk.patience().give_up + Duration::from_millis(u64::from(ms));
+        let patience = exchange.talk.patience().give_up + Duration::from_millis(u64::from(ms));
         loop {
-            line.converse(&mut |_| {}, on)?;
-            let status = line.status(on)?;
+            exchange.converse(&mut |_| {}, on)?;
+            let status = exchange.status(on)?;
             if status.ticks.run.wrapping_sub(first.ticks.run) >= ticks {
                 return Ok(status);
             }
-            let waited = line.began.elapsed().saturating_sub(began);
+            let waited = exchange.line.now().saturating_sub(began);
             if waited > patience {
                 return Err(LinkError::Silent(waited));
             }
@@ -174,7 +188,7 @@ impl<'t> Dialogue<'t> {
     }
 }
 
-impl Line<'_> {
+impl Exchange<'_> {
     /// Asks for something and waits for the answer.
     fn ask<T>(
         &mut self,
@@ -182,7 +196,7 @@ impl Line<'_> {
         mut read: impl FnMut(ToHost) -> Option<T>,
     ) -> Result<T, LinkError> {
         // Between two questions nobody listens: the user may think for a while.
-        self.talk.listen_from(self.began.elapsed());
+        self.talk.listen_from(self.line.now());
         self.talk.ask(ask);
         self.wait_for(|news| match news {
             News::Answered(asked, message) if asked.is_like(&ask) => read(message),
@@ -219,9 +233,9 @@ impl Line<'_> {
             news => answered(news),
         })?;
         for reply in replies {
-            self.talk.say(&reply, &mut self.out);
+            self.talk.say(&reply, &mut self.line.out);
         }
-        self.flush()
+        self.line.flush()
     }
 
     fn wait_for<T>(&mut self, mut read: impl FnMut(News) -> Option<T>) -> Result<T, LinkError> {
@@ -238,30 +252,35 @@ impl Line<'_> {
 
     /// Hears what the device tells for a while.
     fn listen(&mut self, time: Duration) -> Result<(), LinkError> {
-        self.talk.listen_from(self.began.elapsed());
-        let end = self.began.elapsed() + time;
-        while self.began.elapsed() < end {
+        self.talk.listen_from(self.line.now());
+        let end = self.line.now() + time;
+        while self.line.now() < end {
             self.poll(LOOK, &mut |_| {})?;
         }
         Ok(())
     }
 
     fn poll(&mut self, wait: Duration, on: &mut dyn FnMut(News)) -> Result<(), LinkError> {
-        self.talk.due(self.began.elapsed(), &mut self.out)?;
+        let polled = self.try_poll(wait, on);
+        // Another host has the device: it is not this one's to say an end to.
+        self.is_over |= matches!(polled, Err(LinkError::Taken));
+        polled
+    }
+
+    fn try_poll(&mut self, wait: Duration, on: &mut dyn FnMut(News)) -> Result<(), LinkError> {
+        let line = &mut self.line;
+        self.talk.due(line.now(), &mut line.out)?;
         if let Some(ask) = self.talk.take_unanswered().pop() {
             tracing::debug!(?ask, "given up");
             return Err(LinkError::Silent(self.talk.patience().give_up));
         }
-        self.flush()?;
-        let received = self.transport.receive(self.incoming.as_mut_slice(), wait);
-        let received = received.map_err(LinkError::Gone)?;
-        let mut bytes = self.incoming.get(..received).unwrap_or(&[]);
-        let now = self.began.elapsed();
+        line.flush()?;
+        let (now, mut bytes, out) = line.receive(wait)?;
         while let Some(frame) = next_frame(&mut self.reader, &mut bytes, from_device) {
             match frame {
                 Ok(FromDevice::Version(check)) => self.talk.on_version_check(check)?,
                 Ok(FromDevice::Message(message)) => {
-                    if let Some(news) = self.talk.hear(now, message, &mut self.out)? {
+                    if let Some(news) = self.talk.hear(now, message, out)? {
                         on(news);
                     }
                 }
@@ -269,16 +288,51 @@ impl Line<'_> {
                 Err(_) => {}
             }
         }
-        self.flush()
+        line.flush()
     }
 
-    fn flush(&mut self) -> Result<(), LinkError> {
-        if self.out.is_empty() {
+    /// Says the end that fits what was asked for, and waits for the answer, once.
+    fn end(&mut self) -> Result<(), LinkError> {
+        if std::mem::replace(&mut self.is_over, true) {
             return Ok(());
         }
-        let sent = self.transport.send(&self.out);
-        self.out.clear();
-        sent.map_err(LinkError::Gone)
+        let has_opened = self.talk.state() != State::Greeting;
+        let line = &mut self.line;
+        match self.drives {
+            true => self.talk.leave(line.now(), &mut line.out),
+            false => self.talk.detach(line.now(), &mut line.out),
+        }
+        if !has_opened {
+            // Whether it was heard is not known, and not worth another wait.
+            return line.flush();
+        }
+        while self.talk.state() != State::Closed {
+            let polled = self.poll(LOOK, &mut |_| {});
+            polled.map_err(|error| {
+                tracing::debug!(%error, "on the way to the end");
+                match self.drives {
+                    true => LinkError::NotConfirmed,
+                    false => error,
+                }
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// Whether a request may lead to something being driven.
+const fn drives(request: &Request) -> bool {
+    matches!(
+        request,
+        Request::Arm | Request::Jog(_) | Request::HoldOutputs(Some(_))
+    )
+}
+
+impl Drop for Exchange<'_> {
+    fn drop(&mut self) {
+        if let Err(not_confirmed @ LinkError::NotConfirmed) = self.end() {
+            tracing::error!("{not_confirmed}");
+        }
     }
 }
 
@@ -286,9 +340,18 @@ impl Line<'_> {
 mod tests {
     use super::*;
     use crate::link::{Meddler, Native};
+    use crate::raster::Raster;
+    use crate::terrain::{Scale, Terrain};
+    use hapterra_core::contact::Rule;
+    use hapterra_core::force::ForceLaw;
+    use hapterra_core::grid::GridPoint;
+    use hapterra_core::scene::Source;
     use hapterra_core::wire::frame::encode;
+    use hapterra_core::wire::session::SessionEnd;
     use hapterra_core::wire::version::VersionCheck;
+    use hapterra_firmware::native::StoppedClock;
     use std::io;
+    use std::time::Instant;
 
     const PATIENCE: Duration = Duration::from_secs(20);
 
@@ -319,6 +382,100 @@ mod tests {
         );
         let blocked = dialogue.request(&Request::Arm).expect("it answers");
         assert!(matches!(blocked, Err(Refusal::Blocked(_))), "{blocked:?}");
+    }
+
+    /// A scene for the arm.
+    fn scene() -> Scene {
+        let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
+        let scale = Scale::new(1.0, 1.0).expect("scale");
+        let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+        let home = GridPoint::default();
+        terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home)
+    }
+
+    fn open<'t>(device: &'t mut Native<StoppedClock>) -> Dialogue<'t> {
+        Dialogue::open(Box::new(device), PATIENCE).expect("it answers")
+    }
+
+    #[test]
+    fn one_that_drove_says_goodbye_and_one_that_looked_does_not_hide_it() {
+        let mut device = Native::for_replay().restless();
+        open(&mut device).put_scene(scene()).expect("taken");
+        for _ in 0..3 {
+            let mut looking = open(&mut device);
+            let (last, epoch) = (looking.device().last, looking.device().epoch);
+            assert_eq!((last.end, epoch), (SessionEnd::Goodbye, None));
+            assert!(looking.status().is_ok());
+        }
+        // Asked to arm, even in vain, it says goodbye: a session of its own.
+        let before = open(&mut device).device().last.session;
+        let mut arming = open(&mut device);
+        let blocked = arming.request(&Request::Arm).expect("it answers");
+        assert!(blocked.is_err());
+        arming.end().expect("confirmed");
+        let last = open(&mut device).device().last;
+        assert_eq!(last.end, SessionEnd::Goodbye);
+        assert_ne!(last.session, before);
+    }
+
+    #[test]
+    fn one_that_looked_keeps_what_the_device_holds() {
+        let mut device = Native::for_replay().restless();
+        let held = scene();
+        let mut vanishes = open(&mut device);
+        vanishes.put_scene(held).expect("taken");
+        // As where its program is killed.
+        vanishes.exchange.is_over = true;
+        drop(vanishes);
+        for _ in 0..3 {
+            let looking = open(&mut device);
+            let (last, epoch) = (looking.device().last, looking.device().epoch);
+            let kept = (SessionEnd::Replaced, Some(held.epoch));
+            assert_eq!((last.end, epoch), kept);
+            looking.end().expect("confirmed");
+        }
+    }
+
+    /// A device that hears nothing any more after so many sends.
+    struct Deaf(Native<StoppedClock>, usize);
+
+    impl Transport for Deaf {
+        fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+            self.1 = self.1.saturating_sub(1);
+            match self.1 {
+                0 => Ok(()),
+                _ => self.0.send(bytes),
+            }
+        }
+
+        fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
+            std::thread::sleep(wait / 10);
+            self.0.receive(into, wait)
+        }
+    }
+
+    #[test]
+    fn an_end_that_is_not_heard_is_told_within_its_time() {
+        let patience = Duration::from_millis(300);
+        let open = || {
+            let deaf = Deaf(Native::for_replay().restless(), 3);
+            Dialogue::open(Box::new(deaf), patience).expect("it answers")
+        };
+        let within = |began: Instant| {
+            let took = began.elapsed();
+            assert!(took >= patience && took < 10 * patience, "{took:?}");
+        };
+        let mut dialogue = open();
+        assert!(dialogue.request(&Request::Arm).is_ok(), "the second send");
+        let began = Instant::now();
+        let end = dialogue.end();
+        assert!(matches!(end, Err(LinkError::NotConfirmed)), "{end:?}");
+        within(began);
+        let mut dialogue = open();
+        assert!(dialogue.status().is_ok());
+        let began = Instant::now();
+        drop(dialogue);
+        within(began);
     }
 
     /// Something that listens and says one thing.

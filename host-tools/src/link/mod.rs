@@ -27,6 +27,7 @@ mod device_text;
 mod dialogue;
 mod emulator;
 mod error;
+mod line;
 mod messages;
 mod native;
 mod patience;

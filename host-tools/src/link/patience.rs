@@ -65,6 +65,7 @@ impl Patience {
             again: Self::REAL_TIME.again.min(give_up),
             greet_again: Self::REAL_TIME.greet_again.min(give_up),
             give_up,
+            goodbye: Self::REAL_TIME.goodbye.min(give_up),
             ..Self::REAL_TIME
         }
     }

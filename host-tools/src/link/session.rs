@@ -1,6 +1,6 @@
 //! A client over a transport, and the clock that it is told.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use hapterra_core::scene::{Point, Scene};
 use hapterra_core::wire::hello::DeviceHello;
@@ -9,21 +9,16 @@ use hapterra_core::wire::request::Request;
 use super::client::{Arming, Client, Event};
 use super::conversation::{Ask, State};
 use super::error::LinkError;
+use super::line::{LOOK, Line};
 use super::patience::Patience;
 use super::tally::Tally;
 use super::transport::Transport;
 use crate::terrain::Terrain;
 
-/// Between two looks at the clock while something is waited for.
-const LOOK: Duration = Duration::from_millis(50);
-
 /// A conversation with a device over a transport.
 pub struct Session<'t> {
     client: Client<'t>,
-    transport: Box<dyn Transport + 't>,
-    began: Instant,
-    incoming: Box<[u8; 4096]>,
-    out: Vec<u8>,
+    line: Line<'t>,
 }
 
 impl<'t> Session<'t> {
@@ -41,10 +36,7 @@ impl<'t> Session<'t> {
     ) -> Result<(Self, DeviceHello), LinkError> {
         let mut session = Self {
             client: Client::new(terrain, scene, arming, patience),
-            transport,
-            began: Instant::now(),
-            incoming: Box::new([0; 4096]),
-            out: Vec::new(),
+            line: Line::new(transport),
         };
         let device = session.shake_hands(&|| true, &mut |_| {})?;
         Ok((session, device))
@@ -61,7 +53,7 @@ impl<'t> Session<'t> {
         go_on: &dyn Fn() -> bool,
         on: &mut dyn FnMut(Event<'_>),
     ) -> Result<DeviceHello, LinkError> {
-        self.transport = transport;
+        self.line.replace(transport);
         self.shake_hands(go_on, on)
     }
 
@@ -99,8 +91,9 @@ impl<'t> Session<'t> {
     /// # Errors
     /// [`LinkError::Gone`].
     pub fn feel(&mut self, point: Point) -> Result<(), LinkError> {
-        self.client.feel(self.began.elapsed(), point, &mut self.out);
-        self.flush()
+        let line = &mut self.line;
+        self.client.feel(line.now(), point, &mut line.out);
+        line.flush()
     }
 
     /// Waits for bytes from the device for at most `wait`, answers what it asks,
@@ -110,16 +103,12 @@ impl<'t> Session<'t> {
     /// [`LinkError`]. After one that is passing the session can be taken up again with
     /// [`Session::resume`].
     pub fn poll(&mut self, wait: Duration, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
-        self.client.due(self.began.elapsed(), &mut self.out, on)?;
-        self.flush()?;
-        let received = self
-            .transport
-            .receive(self.incoming.as_mut_slice(), wait)
-            .map_err(LinkError::Gone)?;
-        let bytes = self.incoming.get(..received).unwrap_or(&[]);
-        let now = self.began.elapsed();
-        self.client.receive(now, bytes, &mut self.out, on)?;
-        self.flush()
+        let line = &mut self.line;
+        self.client.due(line.now(), &mut line.out, on)?;
+        line.flush()?;
+        let (now, bytes, out) = line.receive(wait)?;
+        self.client.receive(now, bytes, out, on)?;
+        line.flush()
     }
 
     /// Ends the session. The device has let its force out, switched its amplifiers off
@@ -128,8 +117,8 @@ impl<'t> Session<'t> {
     /// # Errors
     /// [`LinkError::NotConfirmed`] where the device does not say so in time.
     pub fn say_goodbye(&mut self, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
-        self.client.leave(self.began.elapsed(), &mut self.out);
-        while self.client.state() == State::Leaving {
+        self.client.leave(self.line.now(), &mut self.line.out);
+        while self.client.state() != State::Closed {
             self.poll(LOOK, on).map_err(|error| {
                 tracing::debug!(%error, "on the way to goodbye");
                 LinkError::NotConfirmed
@@ -143,8 +132,7 @@ impl<'t> Session<'t> {
         go_on: &dyn Fn() -> bool,
         on: &mut dyn FnMut(Event<'_>),
     ) -> Result<DeviceHello, LinkError> {
-        self.out.clear();
-        self.client.greet(self.began.elapsed(), &mut self.out);
+        self.client.greet(self.line.now(), &mut self.line.out);
         let mut opened = None;
         while go_on() {
             self.poll(LOOK, &mut |event| {
@@ -158,14 +146,5 @@ impl<'t> Session<'t> {
             }
         }
         Err(LinkError::Interrupted)
-    }
-
-    fn flush(&mut self) -> Result<(), LinkError> {
-        if self.out.is_empty() {
-            return Ok(());
-        }
-        let sent = self.transport.send(&self.out);
-        self.out.clear();
-        sent.map_err(LinkError::Gone)
     }
 }

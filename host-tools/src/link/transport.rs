@@ -19,6 +19,16 @@ pub trait Transport {
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize>;
 }
 
+impl<T: Transport + ?Sized> Transport for &mut T {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        (**self).send(bytes)
+    }
+
+    fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
+        (**self).receive(into, wait)
+    }
+}
+
 /// Whether a read ended because nothing came in time.
 pub(super) fn is_time_out(error: &io::Error) -> bool {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};

@@ -7,7 +7,7 @@ use std::vec::Vec;
 use hapterra_core::guard::Mode;
 use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_core::terrain::RETRY_TICKS;
-use hapterra_core::wire::hello::{HostHello, PROTOCOL};
+use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
 use hapterra_core::wire::message::{BATCH, Heights, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{SessionEnd, SessionNumber};
@@ -211,6 +211,87 @@ fn a_host_that_speaks_is_not_let_go() {
         rig.run(500);
     }
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
+}
+
+/// The hello that a new host hears.
+fn greeted(rig: &mut Rig) -> DeviceHello {
+    rig.heard.clear();
+    rig.greet_anew();
+    rig.run(5);
+    match &rig.heard[0] {
+        ToHost::Hello(device) => device.clone(),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A host that looks and detaches.
+fn look(rig: &mut Rig, silence_s: u16) {
+    rig.greet_anew();
+    rig.say(&ToDevice::Hello(HostHello { silence_s, ..HELLO }));
+    rig.run(1);
+    for _ in 0..2 {
+        rig.heard.clear();
+        rig.say(&ToDevice::Detach);
+        rig.run(1);
+        assert!(rig.heard.contains(&ToHost::Detached), "{:?}", rig.heard);
+    }
+}
+
+#[test]
+fn a_host_that_detaches_leaves_the_arm_as_it_was_and_hides_nothing() {
+    let mut rig = Rig::armed();
+    let first = rig.session;
+    look(&mut rig, 60);
+    let second = rig.session;
+    look(&mut rig, 60);
+    rig.run(500);
+    assert!(rig.device.tick(rig.sense).enabled, "rendering goes on");
+    // Its own late hello does not open it again, and neither does the one before's.
+    rig.heard.clear();
+    for session in [second, rig.session] {
+        rig.send(&framed(session, &ToDevice::Hello(HELLO)));
+    }
+    rig.run(5);
+    assert_eq!(rig.heard, []);
+    let device = greeted(&mut rig);
+    let (session, end) = (device.last.session, device.last.end);
+    assert_eq!((session, end), (first.get(), SessionEnd::Replaced));
+    assert!(device.last.count.sent > 2_000, "{:?}", device.last);
+    assert_eq!(device.epoch, Some(7), "and it holds the scene");
+    assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
+}
+
+#[test]
+fn an_arm_that_was_only_looked_at_is_let_go_after_the_time_too() {
+    let mut rig = Rig::armed();
+    look(&mut rig, 7);
+    let on = (0..20_000).take_while(|_| rig.device.tick(rig.sense).enabled);
+    let on = on.count();
+    assert!((6_990..7_110).contains(&on), "{on}");
+    assert_eq!(greeted(&mut rig).last.end, SessionEnd::HostSilent);
+    assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Disarmed));
+}
+
+#[test]
+fn a_host_that_detaches_arms_nothing_and_one_that_says_goodbye_after_it_disarms() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    rig.ask(Request::Zero { counts: [0; 3] });
+    rig.ask(Request::Arm);
+    rig.run(10);
+    rig.say(&ToDevice::Detach);
+    rig.run(10);
+    rig.sense.dead_man = true;
+    for _ in 0..3_000 {
+        assert!(!rig.device.tick(rig.sense).enabled);
+    }
+    let mut rig = Rig::armed();
+    rig.say(&ToDevice::Detach);
+    rig.run(10);
+    rig.say(&ToDevice::Bye);
+    rig.run(250);
+    assert!(matches!(rig.heard.last(), Some(ToHost::Goodbye(_))));
+    assert!(!rig.device.tick(rig.sense).enabled);
+    assert_eq!(greeted(&mut rig).last.end, SessionEnd::Goodbye);
 }
 
 #[test]

@@ -14,7 +14,7 @@ use super::terminal::interrupt;
 use crate::bringup::{
     Attendant, BringupError, Halt, Log, LogError, Step, VirtualUser, Walked, walk,
 };
-use crate::link::{DeviceAddress, Dialogue, HostClock, Native, Transport};
+use crate::link::{DeviceAddress, Dialogue, HostClock, LinkError, Native, Transport};
 use crate::phantom::Wiring;
 use terminal::UserAtTerminal;
 
@@ -87,9 +87,19 @@ fn bring_up<A: Attendant>(
         if let Some(path) = &path {
             println!("log            {}", path.display());
         }
-        match walked? {
-            Walked::BoardWasOff => kept = Some(log),
-            Walked::ToTheEnd => break,
+        match (walked, dialogue) {
+            // The session went with the board's power: there is nobody to say an end to.
+            (Ok(Walked::BoardWasOff), _) => kept = Some(log),
+            (Ok(Walked::ToTheEnd), dialogue) => {
+                dialogue.end()?;
+                break;
+            }
+            (Err(error), dialogue) => {
+                if let Err(not_confirmed @ LinkError::NotConfirmed) = dialogue.end() {
+                    eprintln!("{not_confirmed}");
+                }
+                return Err(error.into());
+            }
         }
     }
     println!("complete       every step is passed: set the amplifiers' limits to the motors' peak");

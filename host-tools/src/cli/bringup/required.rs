@@ -9,15 +9,13 @@ use crate::bringup::{Identity, Log, Step};
 use crate::cli::failure::Failure;
 use crate::link::{Dialogue, Transport};
 
-/// Asks the device who it is, and refuses a real board whose log is not complete. Gives
-/// the way to the device back.
+/// Asks the device who it is, and refuses a real board whose log is not complete. The
+/// device keeps what it holds.
 ///
 /// # Errors
 /// The board was not brought up; no answer.
-pub(in crate::cli) fn brought_up<'t>(
-    transport: Box<dyn Transport + 't>,
-) -> Result<Box<dyn Transport + 't>, Failure> {
-    let mut dialogue = Dialogue::open(transport, PATIENCE)?;
+pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Failure> {
+    let mut dialogue = Dialogue::open(Box::new(transport), PATIENCE)?;
     if is_real(&dialogue.device().board) {
         let record = dialogue.calibration()?;
         let device = dialogue.device();
@@ -30,7 +28,7 @@ pub(in crate::cli) fn brought_up<'t>(
             .hint("type hapterra bringup; or, if you know what you do, say --unchecked"));
         }
     }
-    Ok(dialogue.into_transport())
+    Ok(dialogue.end()?)
 }
 
 /// Whether a board of this name drives a real arm: it has a chip, and is not emulated.
@@ -89,7 +87,7 @@ mod tests {
         ] {
             assert_eq!(is_real(board), real, "{board}");
         }
-        let native = Box::new(Native::for_replay().restless());
-        assert!(brought_up(native).is_ok());
+        let mut native = Native::for_replay().restless();
+        assert!(brought_up(&mut native).is_ok());
     }
 }

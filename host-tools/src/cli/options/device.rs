@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::emulated_board::EmulatedBoard;
 use crate::cli::failure::Failure;
-use crate::link::{DeviceAddress, Dialogue, HostClock, Native, move_arm_while};
+use crate::link::{DeviceAddress, Dialogue, HostClock, Native, Transport, move_arm_while};
 use crate::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script};
 
 /// How long a real device may take to answer.
@@ -63,19 +63,28 @@ impl Device {
         match &self.device {
             DeviceChoice::There(address) => {
                 let native = || Native::new(HostClock::default(), Some(Box::new(arm))).restless();
-                talk(&mut Dialogue::open(address.connect(native)?, PATIENCE)?)
+                converse(address.connect(native)?, PATIENCE, talk)
             }
             DeviceChoice::Emulated => {
                 let (_emulator, mut lines) = self.board.start()?;
                 move_arm_while(&mut lines.plant, &mut arm, || {
-                    talk(&mut Dialogue::open(
-                        Box::new(lines.link),
-                        EMULATED_PATIENCE,
-                    )?)
+                    converse(Box::new(lines.link), EMULATED_PATIENCE, talk)
                 })
             }
         }
     }
+}
+
+/// Talks over a transport, and ends the conversation.
+fn converse<T>(
+    transport: Box<dyn Transport + '_>,
+    patience: Duration,
+    talk: impl FnOnce(&mut Dialogue<'_>) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    let mut dialogue = Dialogue::open(transport, patience)?;
+    let said = talk(&mut dialogue)?;
+    dialogue.end()?;
+    Ok(said)
 }
 
 /// A virtual Phantom at rest in its zero pose.
