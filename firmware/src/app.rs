@@ -6,6 +6,7 @@ use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::phantom::Mechanism;
 use hapterra_core::terrain::Tile;
 use hapterra_core::tick::Haptics;
+use hapterra_core::wire::hello::SerialNumber;
 use hapterra_core::wire::status::{BootReport, CalibrationSource};
 
 use crate::board::{Amplifiers, Encoders, TickClock};
@@ -75,6 +76,8 @@ pub struct Hardware<E, A, C> {
     /// What the motors are to be taken for: [`crate::motor_memory::begin`] says, and
     /// [`Temperatures::HOT`] where nothing is known.
     pub motors: Temperatures,
+    /// What tells the board from others of its kind.
+    pub serial: SerialNumber,
     /// What the board found when it started.
     pub boot: BootReport,
 }
@@ -145,7 +148,7 @@ where
         source,
         full_scale_a: hardware.full_scale_a,
     };
-    let device = DeviceState::new::<C, D>(board, hardware.boot, arm);
+    let device = DeviceState::new::<C, D>((board, hardware.serial), hardware.boot, arm);
     let link = Link::new(device, spare, link_ends, &mut memory.link);
     Application {
         haptic_loop,

@@ -7,6 +7,7 @@
 use hapterra_core::guard::Drive;
 use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::hello::SerialNumber;
 use hapterra_core::wire::status::BootReport;
 
 use crate::app::{Application, Hardware, TileBuffers, WorkingMemory, assemble};
@@ -139,6 +140,7 @@ impl<C: TickClock, const D: usize> Device<C, D> {
             full_scale_a: FULL_SCALE_A,
             calibration,
             motors,
+            serial: SerialNumber::NONE,
             boot,
         };
         let Application {

@@ -6,10 +6,10 @@ use std::vec::Vec;
 use glam::Vec3;
 use serde::Serialize;
 
-use super::hello::{HostHello, PROTOCOL};
+use super::hello::{DeviceHello, HostHello, PROTOCOL, SerialNumber};
 use super::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
 use super::request::{Answer, Refusal, Request};
-use super::session::{InSession, SampleCount, SessionNumber};
+use super::session::{InSession, LastSession, SampleCount, SessionEnd, SessionNumber};
 use crate::contact::{ContactState, Rule};
 use crate::force::ForceLaw;
 use crate::grid::GridPoint;
@@ -129,6 +129,42 @@ fn a_hello_in_its_session() {
     };
     // The session is 300 | 128; then variant, protocol, number, seconds.
     assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 5, 9, 0xB4, 0x01]);
+}
+
+#[test]
+fn a_device_that_introduces_itself() {
+    let serial: [u8; 12] = core::array::from_fn(|i| 0xA0 + i as u8);
+    let hello = ToHost::Hello(DeviceHello {
+        protocol: PROTOCOL,
+        number: 9,
+        opened_by: 8,
+        board: "b".try_into().expect("fits"),
+        serial: SerialNumber::new(serial),
+        version: "v1".try_into().expect("fits"),
+        window: 4,
+        tick_hz: 1000,
+        clock_hz: 300,
+        epoch: Some(7),
+        last: LastSession {
+            session: 300,
+            opened_by: 6,
+            end: SessionEnd::HostSilent,
+            count: SampleCount {
+                sent: 5,
+                dropped: 1,
+            },
+        },
+    });
+    let wanted = [
+        std::vec![0, 5, 9, 8, 1, b'b'],
+        serial.to_vec(),
+        std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xAC, 0x02, 1, 7],
+        std::vec![0xAC, 0x02, 6, 3, 5, 1],
+    ];
+    assert_eq!(bytes(&hello), wanted.concat());
+    let shown = std::format!("{}", SerialNumber::new(serial));
+    assert_eq!(shown, "A0A1A2A3A4A5A6A7A8A9AAAB");
+    assert!(SerialNumber::NONE.is_none() && !SerialNumber::new(serial).is_none());
 }
 
 #[test]

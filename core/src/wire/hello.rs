@@ -1,5 +1,7 @@
 //! How host and device introduce themselves to each other.
 
+use core::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use super::session::LastSession;
@@ -21,6 +23,34 @@ pub struct HostHello {
     pub silence_s: u16,
 }
 
+/// What tells two boards of a kind apart: the identifier that the chip's maker gave it,
+/// 96 bits. Shown in upper-case hexadecimal digits, as the board's USB descriptor has it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SerialNumber([u8; 12]);
+
+impl SerialNumber {
+    /// The number of a device that has no chip: an emulated board, or one in memory.
+    pub const NONE: Self = Self([0; 12]);
+
+    /// From a chip's identifier, in the order of its addresses.
+    #[must_use]
+    pub const fn new(identifier: [u8; 12]) -> Self {
+        Self(identifier)
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::NONE
+    }
+}
+
+impl fmt::Display for SerialNumber {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02X}"))
+    }
+}
+
 /// The device introduces itself.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DeviceHello {
@@ -33,6 +63,8 @@ pub struct DeviceHello {
     pub opened_by: u8,
     /// Board name.
     pub board: heapless::String<NAME>,
+    /// The board's serial number; [`SerialNumber::NONE`] where it has none.
+    pub serial: SerialNumber,
     /// Firmware version.
     pub version: heapless::String<NAME>,
     /// Tiles along the side of the device's window.

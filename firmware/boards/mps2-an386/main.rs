@@ -41,6 +41,7 @@ use cortex_m_rt::{entry, interrupt};
 use embassy_executor::{InterruptExecutor, Spawner};
 use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::hello::SerialNumber;
 use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::app::Hardware;
 use hapterra_firmware::link::Link;
@@ -201,6 +202,7 @@ fn set_up() {
         calibration: Stored::Found(Calibration::PREMIUM_1_5),
         // They come into being with the board.
         motors: Temperatures::AIR,
+        serial: SerialNumber::NONE,
         boot: BootReport::default(),
     };
     let (link, monitor) = application::assemble(hardware, "mps2-an386");

@@ -5,7 +5,7 @@ use hapterra_core::guard::{Blockers, Limits, Mode, Report};
 use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::scene::Health;
 use hapterra_core::scene::Scene;
-use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
+use hapterra_core::wire::hello::{DeviceHello, PROTOCOL, SerialNumber};
 use hapterra_core::wire::message::ToHost;
 use hapterra_core::wire::request::Refusal;
 use hapterra_core::wire::session::LastSession;
@@ -61,10 +61,10 @@ pub(crate) struct DeviceState {
 }
 
 impl DeviceState {
-    /// Takes the board's name, cut to what the message holds, how the board
-    /// started, and the arm that it knows. The window has `D × D` tiles.
+    /// Takes the board's name, cut to what the message holds, its serial number, how the
+    /// board started, and the arm that it knows. The window has `D × D` tiles.
     pub(crate) fn new<C: TickClock, const D: usize>(
-        board: &str,
+        (board, serial): (&str, SerialNumber),
         boot: BootReport,
         arm: KnownArm,
     ) -> Self {
@@ -74,6 +74,7 @@ impl DeviceState {
                 number: 0,
                 opened_by: 0,
                 board: cut(board),
+                serial,
                 version: cut(env!("CARGO_PKG_VERSION")),
                 window: u8::try_from(D).unwrap_or(u8::MAX),
                 tick_hz: C::RATE.hz(),

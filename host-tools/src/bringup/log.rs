@@ -18,6 +18,9 @@ use crate::output::{Output, OutputError};
 pub struct Identity {
     /// The board's name.
     pub board: String,
+    /// The board's serial number; empty where it has none.
+    #[serde(default)]
+    pub serial: String,
     /// Its firmware's version.
     pub firmware: String,
     /// Ticks a second of its image.
@@ -33,10 +36,19 @@ impl Identity {
     pub fn of(device: &DeviceHello, record: Option<&Calibration>) -> Self {
         Self {
             board: device.board.to_string(),
+            serial: serial(device),
             firmware: device.version.to_string(),
             tick_hz: device.tick_hz,
             calibration: record.map_or(String::new(), fingerprint),
         }
+    }
+}
+
+/// The board's serial number; empty where it has none.
+fn serial(device: &DeviceHello) -> String {
+    match device.serial.is_none() {
+        true => String::new(),
+        false => device.serial.to_string(),
     }
 }
 
@@ -103,18 +115,23 @@ pub enum LogError {
 }
 
 impl Log {
-    /// Where the log of a board is kept, in the user's data folder.
+    /// Where the log of a board is kept, in the user's data folder: a file for each board,
+    /// by its name and serial number.
     ///
     /// # Errors
     /// [`LogError::NoHome`].
-    pub fn place(board: &str) -> Result<PathBuf, LogError> {
+    pub fn place(device: &DeviceHello) -> Result<PathBuf, LogError> {
         let strategy = choose_app_strategy(AppStrategyArgs {
             app_name: "hapterra".into(),
             ..AppStrategyArgs::default()
         })?;
         // A board's name comes over the link: it names no other folder.
         let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
-        let name: String = board.chars().map(plain).collect();
+        let mut name: String = device.board.chars().map(plain).collect();
+        let serial = serial(device);
+        if !serial.is_empty() {
+            name = format!("{name}-{serial}");
+        }
         Ok(strategy.in_data_dir(format!("bringup/{name}.toml")))
     }
 
@@ -142,7 +159,7 @@ impl Log {
     /// # Errors
     /// [`LogError::Unwritable`], [`LogError::Output`].
     pub fn write(&self, path: &Path) -> Result<(), LogError> {
-        let text = toml::to_string(self)?;
+        let text = self.text()?;
         let failed = |source| OutputError {
             path: path.to_owned(),
             source,
@@ -155,6 +172,10 @@ impl Log {
         Ok(output.finish()?)
     }
 
+    fn text(&self) -> Result<String, LogError> {
+        Ok(toml::to_string(self)?)
+    }
+
     /// Takes the board and record as they are now, and forgets what was found of others:
     /// everything of another board or firmware, and what depends on the calibration of
     /// another record. Returns why something was forgotten.
@@ -162,9 +183,8 @@ impl Log {
         let was = std::mem::replace(&mut self.identity, now);
         let before = self.entries.len();
         let now = &self.identity;
-        let why = if (&was.board, &was.firmware, was.tick_hz)
-            != (&now.board, &now.firmware, now.tick_hz)
-        {
+        let of = |it: &Identity| (it.board.clone(), it.serial.clone(), it.firmware.clone());
+        let why = if (of(&was), was.tick_hz) != (of(now), now.tick_hz) {
             self.entries.clear();
             "the board or its firmware is another one"
         } else if was.calibration != now.calibration {
@@ -202,10 +222,12 @@ impl Log {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hapterra_core::wire::hello::SerialNumber;
 
     fn identity(calibration: &str) -> Identity {
         Identity {
             board: "nucleo-g474re".into(),
+            serial: "0000000000000000000000AA".into(),
             firmware: "0.1.0".into(),
             tick_hz: 1000,
             calibration: calibration.into(),
@@ -266,7 +288,42 @@ mod tests {
         other.motor_sign.y = -1.0;
         assert_eq!(one.len(), 8);
         assert_ne!(one, fingerprint(&other));
-        let place = Log::place("../evil/board").expect("a home");
-        assert!(place.ends_with("bringup/---evil-board.toml"), "{place:?}");
+    }
+
+    #[test]
+    fn two_boards_of_a_kind_have_a_log_each() {
+        let mut device = crate::link::hello();
+        device.board = "../evil/board".try_into().expect("fits");
+        let place = |device: &DeviceHello| Log::place(device).expect("a home");
+        let without = place(&device);
+        assert!(
+            without.ends_with("bringup/---evil-board.toml"),
+            "{without:?}"
+        );
+        device.serial = SerialNumber::new([0x2A; 12]);
+        let one = place(&device);
+        let name = "bringup/---evil-board-2A2A2A2A2A2A2A2A2A2A2A2A.toml";
+        assert!(one.ends_with(name), "{one:?}");
+        let mut other = device.clone();
+        other.serial = SerialNumber::new([0x2B; 12]);
+        assert_ne!(one, place(&other));
+        // One's log under the other's name tells nothing of the other.
+        let mut log = complete();
+        log.identity = Identity::of(&device, None);
+        assert_eq!(log.meet(Identity::of(&device, None)), None);
+        assert!(log.meet(Identity::of(&other, None)).is_some());
+        assert_eq!(log.next(), Some(Step::Board));
+    }
+
+    #[test]
+    fn a_log_that_names_no_board_counts_for_none_with_a_number() {
+        let text = complete().text().expect("in words");
+        let old: String = text
+            .lines()
+            .filter(|line| !line.starts_with("serial"))
+            .fold(String::new(), |text, line| text + line + "\n");
+        let mut log: Log = toml::from_str(&old).expect("a log");
+        assert!(log.meet(identity("0badcafe")).is_some());
+        assert_eq!(log.next(), Some(Step::Board));
     }
 }

@@ -116,7 +116,11 @@ impl SessionSummary {
         let height_mm = |east: f64, north: f64| terrain.height_mm(east, north);
         let picture = SessionPicture {
             title,
-            subtitle: &format!("{}; felt by {}", in_words(terrain), device(&self.device)),
+            subtitle: &format!(
+                "{}; felt by {}",
+                in_words(terrain),
+                kind_of_device(&self.device)
+            ),
             surface: Surface {
                 height_mm: &height_mm,
                 size_mm: terrain.size_mm(),
@@ -155,6 +159,14 @@ pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
 
 /// A device in words.
 pub(super) fn device(hello: &DeviceHello) -> String {
+    match hello.serial.is_none() {
+        true => kind_of_device(hello),
+        false => format!("{}, serial number {}", kind_of_device(hello), hello.serial),
+    }
+}
+
+/// A device in words that are also those of others of its kind.
+fn kind_of_device(hello: &DeviceHello) -> String {
     let [board, version] = [&hello.board, &hello.version].map(|text| shown(text));
     let (w, hz) = (hello.window, hello.tick_hz);
     format!("{board} {version}, window of {w} × {w} tiles, {hz} ticks a second")

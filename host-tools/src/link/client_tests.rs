@@ -3,7 +3,7 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
 use hapterra_core::wire::frame::{decode, encode};
-use hapterra_core::wire::hello::PROTOCOL;
+use hapterra_core::wire::hello::{PROTOCOL, SerialNumber};
 use hapterra_core::wire::session::{InSession, SampleCount};
 use hapterra_core::wire::version::VersionCheck;
 
@@ -18,6 +18,7 @@ pub(crate) fn hello() -> DeviceHello {
         number: 1,
         opened_by: 1,
         board: "test".try_into().expect("fits"),
+        serial: SerialNumber::NONE,
         version: "1".try_into().expect("fits"),
         window: 4,
         tick_hz: 1000,

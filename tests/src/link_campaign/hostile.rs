@@ -7,7 +7,7 @@ use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Point, Sample, Scene, Source};
 use hapterra_core::terrain::{FieldSize, TileKey};
-use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
+use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL, SerialNumber};
 use hapterra_core::wire::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{LastSession, SampleCount, SessionNumber};
@@ -224,6 +224,7 @@ fn hello(number: u8) -> DeviceHello {
         protocol: PROTOCOL,
         number,
         board: "\x1b[2J\x1b]0;x\x07".try_into().unwrap_or_default(),
+        serial: SerialNumber::new([0x1B; 12]),
         version: "\r\n\u{202e}".try_into().unwrap_or_default(),
         window: 0,
         tick_hz: 0,

@@ -13,6 +13,7 @@ use embassy_sync::signal::Signal;
 use embassy_usb_driver::{Bus, EndpointAddress, Event};
 use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::hello::SerialNumber;
 use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::app::{Application, Hardware, TileBuffers, WorkingMemory, assemble};
 use hapterra_firmware::board::Sense;
@@ -79,6 +80,7 @@ impl Board {
             full_scale_a: FULL_SCALE_A,
             calibration: Stored::Found(Calibration::PREMIUM_1_5),
             motors: Temperatures::AIR,
+            serial: SerialNumber::NONE,
             boot: BootReport::default(),
         };
         let tiles = Box::leak(Box::new(TileBuffers::VACANT));

@@ -6,6 +6,7 @@ use embassy_executor::Spawner;
 use embassy_stm32::interrupt;
 use embassy_stm32::pac::Interrupt;
 use embassy_stm32::wdg::IndependentWatchdog;
+use hapterra_core::wire::hello::SerialNumber;
 use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::amplifier::Off;
 use hapterra_firmware::app::Hardware;
@@ -70,11 +71,13 @@ async fn main(spawner: Spawner) {
         full_scale_a: FULL_SCALE_A,
         calibration,
         motors: motor_memory::begin(boot.cause),
+        serial: SerialNumber::new(embassy_stm32::uid::uid()),
         boot,
     };
     let (mut link, monitor) = application::assemble(hardware, BOARD);
     link.offer_loader();
 
+    // The same that the link tells.
     let serial_number = embassy_stm32::uid::uid_hex();
     let (usb, rx, tx) = device(parts.usb, serial_number, DESCRIPTORS.take());
     spawner.spawn(tasks::serve_usb(usb, monitor).expect("started once"));

@@ -7,6 +7,7 @@ use hapterra_core::scene::Source;
 use hapterra_core::terrain::{Tile, TileKey};
 use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::{FrameReader, decode};
+use hapterra_core::wire::hello::SerialNumber;
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::session::InSession;
 use hapterra_core::wire::status::{BootReport, CalibrationSource};
@@ -27,7 +28,11 @@ fn link() -> (Link<'static, D>, LoopEnds<'static>) {
         source: CalibrationSource::None,
         full_scale_a: FULL_SCALE_A,
     };
-    let device = DeviceState::new::<StoppedClock, D>("test", BootReport::default(), arm);
+    let device = DeviceState::new::<StoppedClock, D>(
+        ("test", SerialNumber::NONE),
+        BootReport::default(),
+        arm,
+    );
     let mut link = Link::new(device, tiles.split().1, link_ends, &mut memory.link);
     let scene = scene(Source::Encoders);
     for message in [

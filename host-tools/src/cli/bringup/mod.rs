@@ -111,7 +111,7 @@ fn place(args: &Args, dialogue: &Dialogue<'_>) -> Result<Option<PathBuf>, Failur
     Ok(match (&args.log, &args.device) {
         (Some(path), _) => Some(path.clone()),
         (None, DeviceAddress::Native) => None,
-        (None, _) => Some(Log::place(&dialogue.device().board)?),
+        (None, _) => Some(Log::place(dialogue.device())?),
     })
 }
 

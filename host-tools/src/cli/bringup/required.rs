@@ -19,11 +19,12 @@ pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Fa
     if is_real(&dialogue.device().board) {
         let record = dialogue.calibration()?;
         let device = dialogue.device();
-        let log = Log::read(&Log::place(&device.board)?)?;
+        let log = Log::read(&Log::place(device)?)?;
         if let Some(step) = missing(device, record.as_ref(), log) {
             let (board, number, title) = (&device.board, step.number(), step.title());
+            let serial = device.serial;
             return Err(Failure::new(format!(
-                "{board} was not brought up with this firmware and calibration: step {number} ({title}) is not passed"
+                "{board} {serial} was not brought up with this firmware and calibration: step {number} ({title}) is not passed"
             ))
             .hint("type hapterra bringup; or, if you know what you do, say --unchecked"));
         }
@@ -47,12 +48,14 @@ fn missing(device: &DeviceHello, record: Option<&Calibration>, mut log: Log) -> 
 mod tests {
     use super::*;
     use crate::link::Native;
+    use hapterra_core::wire::hello::SerialNumber;
 
     fn device() -> DeviceHello {
         let native = Box::new(Native::for_replay().restless());
         let dialogue = Dialogue::open(native, PATIENCE).expect("it answers");
         DeviceHello {
             board: "nucleo-g474re".try_into().expect("fits"),
+            serial: SerialNumber::new([0x2A; 12]),
             ..dialogue.device().clone()
         }
     }
@@ -71,6 +74,12 @@ mod tests {
             log.take(step, true, String::new());
         }
         assert_eq!(missing(&device, Some(&record), log.clone()), None);
+        let twin = DeviceHello {
+            serial: SerialNumber::new([0x2B; 12]),
+            ..device.clone()
+        };
+        let never = missing(&twin, Some(&record), log.clone());
+        assert_eq!(never, Some(Step::Board), "another board's log");
         let other = Calibration::PREMIUM_3_0;
         let again = missing(&device, Some(&other), log);
         assert_eq!(again, Some(Step::Calibration));
