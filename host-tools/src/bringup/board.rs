@@ -1,5 +1,7 @@
 //! The board as the steps use it: looked at, asked for things, given a plane.
 
+use std::cell::Cell;
+
 use hapterra_core::guard::{Fault, Mode};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Sample, Scene};
@@ -45,28 +47,48 @@ impl<'d, 't> Board<'d, 't> {
         Ok(self.dialogue.calibration()?)
     }
 
-    /// Looks at it after a moment; tells `on` of each sample, and sends the flat tiles
-    /// that it asks for.
+    /// Looks at it after a moment, or as soon as `on` says of a sample that it is enough;
+    /// sends the flat tiles that it asks for.
+    ///
+    /// # Errors
+    /// [`Halt::Link`].
+    pub(super) fn look_until(
+        &mut self,
+        on: &mut dyn FnMut(&Sample) -> bool,
+    ) -> Result<Status, Halt> {
+        let is_enough = Cell::new(false);
+        let enough = || is_enough.get();
+        let passed = self
+            .dialogue
+            .pass(LOOK_MS, &enough, &mut |message| match message {
+                ToHost::Need { epoch, key } => Some(ToDevice::Tile(TileMessage {
+                    epoch: *epoch,
+                    key: *key,
+                    heights: Heights::Flat {
+                        base: 0,
+                        height: 0.0,
+                    },
+                })),
+                ToHost::Telemetry(telemetry) => {
+                    for sample in &telemetry.samples {
+                        is_enough.set(is_enough.get() | on(sample));
+                    }
+                    None
+                }
+                _ => None,
+            });
+        Ok(passed?)
+    }
+
+    /// Looks at it after a moment; tells `on` of each sample.
     ///
     /// # Errors
     /// [`Halt::Link`].
     pub(super) fn look_with(&mut self, on: &mut dyn FnMut(&Sample)) -> Result<Status, Halt> {
-        let passed = self.dialogue.pass(LOOK_MS, &mut |message| match message {
-            ToHost::Need { epoch, key } => Some(ToDevice::Tile(TileMessage {
-                epoch: *epoch,
-                key: *key,
-                heights: Heights::Flat {
-                    base: 0,
-                    height: 0.0,
-                },
-            })),
-            ToHost::Telemetry(telemetry) => {
-                telemetry.samples.iter().for_each(&mut *on);
-                None
-            }
-            _ => None,
-        });
-        Ok(passed?)
+        self.look_until(&mut |sample| {
+            on(sample);
+            false
+        })
     }
 
     /// Looks at it after a moment.

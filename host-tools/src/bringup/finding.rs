@@ -140,6 +140,12 @@ pub enum Finding {
         /// In which time, s.
         seconds: f64,
     },
+    /// The arm moves when it is left to itself.
+    #[error("the arm moves by itself: its tip had {mm_s:.0} mm/s when it was let go")]
+    MovesByItself {
+        /// How fast, mm/s.
+        mm_s: f64,
+    },
     /// The floor does not push, or not up.
     #[error("the floor does not push the tip back")]
     NoFloor,
@@ -173,7 +179,7 @@ impl Finding {
             Self::SwappedMotors { .. } => "exchange the two motors' plugs, or the two commands",
             Self::NoPush { .. } => "check that the amplifier is there, has power and its enable, then fuse and motor cable",
             Self::Unclear { .. } => "hold the tip more loosely and as still as you can, and try again",
-            Self::Drifts { .. } => "measure the arm's weight again: hapterra calibrate --skip-ratios",
+            Self::Drifts { .. } | Self::MovesByItself { .. } => "measure the arm's weight again: hapterra calibrate --skip-ratios",
             Self::NoFloor => "report it with the log; do not go on to terrain",
         }
         .into()

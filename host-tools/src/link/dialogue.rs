@@ -150,12 +150,18 @@ impl<'t> Dialogue<'t> {
         exchange.wait_for(|news| matches!(news, News::SceneTaken).then_some(()))
     }
 
-    /// Lets `ms` of the device's time pass, tells `on` of what comes unasked, and says
-    /// what `on` says to it. Returns the state of the device at the end.
+    /// Lets `ms` of the device's time pass, or less where it is `enough`; tells `on` of what
+    /// comes unasked, and says what `on` says to it. Returns the state of the device at the
+    /// end.
     ///
     /// # Errors
     /// [`LinkError`]; also where the device's time stands still.
-    pub fn pass(&mut self, ms: u32, on: OnMessage<'_>) -> Result<Status, LinkError> {
+    pub fn pass(
+        &mut self,
+        ms: u32,
+        enough: &dyn Fn() -> bool,
+        on: OnMessage<'_>,
+    ) -> Result<Status, LinkError> {
         let exchange = &mut self.exchange;
         let began = exchange.line.now();
         exchange.talk.listen_from(began);
@@ -165,7 +171,7 @@ impl<'t> Dialogue<'t> {
         loop {
             exchange.converse(&mut |_| {}, on)?;
             let status = exchange.status(on)?;
-            if status.ticks.run.wrapping_sub(first.ticks.run) >= ticks {
+            if enough() || status.ticks.run.wrapping_sub(first.ticks.run) >= ticks {
                 return Ok(status);
             }
             let waited = exchange.line.now().saturating_sub(began);

@@ -1,6 +1,10 @@
 //! The motors carry the arm's weight, with nothing to touch in its reach.
 
+use std::collections::VecDeque;
+
+use glam::DVec3;
 use hapterra_core::guard::Fault;
+use hapterra_core::scene::Sample;
 use hapterra_core::wire::request::Request;
 
 use super::{Board, Halt, plane};
@@ -14,35 +18,79 @@ const LOOKS: usize = 30;
 /// So far the tip may drift meanwhile, mm.
 const DRIFT_MM: f64 = 20.0;
 
+/// How fast the tip may move while it is left to itself, mm/s: half of what a jog may move
+/// it.
+const FAST_MM_S: f64 = 100.0;
+/// Over so many milliseconds its speed is taken.
+const OVER_MS: u32 = 10;
+
+/// The motion of the tip, sample by sample.
+struct TipMotion {
+    ticks_per_ms: u32,
+    /// The latest samples: their ticks, and where the tip was, mm.
+    latest: VecDeque<(u32, DVec3)>,
+    /// The fastest so far, mm/s.
+    fastest_mm_s: f64,
+}
+
+impl TipMotion {
+    fn new(tick_hz: u32) -> Self {
+        Self {
+            ticks_per_ms: (tick_hz / 1000).max(1),
+            latest: VecDeque::new(),
+            fastest_mm_s: 0.0,
+        }
+    }
+
+    /// Takes the next sample. Returns whether the tip is too fast.
+    fn take(&mut self, sample: &Sample) -> bool {
+        let now = (sample.tick, plane::hip_mm(sample));
+        let since = |then: &(u32, DVec3)| now.0.wrapping_sub(then.0) / self.ticks_per_ms;
+        // The oldest that is old enough; what comes before it is not needed any more.
+        while self
+            .latest
+            .get(1)
+            .is_some_and(|then| since(then) >= OVER_MS)
+        {
+            self.latest.pop_front();
+        }
+        let then = self.latest.front().filter(|then| since(then) >= OVER_MS);
+        if let Some(then) = then {
+            let mm_s = 1e3 * now.1.distance(then.1) / f64::from(since(then));
+            self.fastest_mm_s = self.fastest_mm_s.max(mm_s);
+        }
+        self.latest.push_back(now);
+        self.fastest_mm_s > FAST_MM_S
+    }
+}
+
 /// Has the tip let go and watches that it stays; then has the switch let go.
 pub(super) fn carried(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
 ) -> Result<String, Halt> {
-    let record = super::zeroed(board, attendant)?;
-    attendant.finish(Task::HoldLoosely)?;
-    board.still(attendant)?;
-    let status = board.look()?;
-    board.put(plane::below_tip(&record, &status, OUT_OF_REACH_MM))?;
-    board.arm(attendant)?;
+    let record = super::armed_over_plane(board, attendant, OUT_OF_REACH_MM)?;
     let from = plane::tip_mm(&record, &board.look()?);
     attendant.begin(Task::LetGoOfTip);
+    let mut motion = TipMotion::new(board.device().tick_hz);
     let mut drift_mm = 0.0_f64;
     for look in 1..=LOOKS {
-        let status = board.look()?;
+        let status = board.look_until(&mut |sample| motion.take(sample))?;
         if let Some(fault) = status.health.report.fault {
             return Err(Finding::Fault(fault).into());
         }
         drift_mm = drift_mm.max(from.distance(plane::tip_mm(&record, &status)));
-        if drift_mm > DRIFT_MM {
-            board.ask(&Request::Disarm)?;
-            attendant.begin(Task::HoldTip);
-            return Err(Finding::Drifts {
+        let finding = match motion.fastest_mm_s {
+            mm_s if mm_s > FAST_MM_S => Finding::MovesByItself { mm_s },
+            _ if drift_mm > DRIFT_MM => Finding::Drifts {
                 mm: drift_mm,
                 seconds: 0.1 * look as f64,
-            }
-            .into());
-        }
+            },
+            _ => continue,
+        };
+        board.ask(&Request::Disarm)?;
+        attendant.begin(Task::HoldTip);
+        return Err(finding.into());
     }
     attendant.begin(Task::HoldTip);
     board.trips(attendant, Task::ReleaseDeadMan, Fault::DeadManReleased)?;

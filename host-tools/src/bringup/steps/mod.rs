@@ -92,3 +92,19 @@ fn zero(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<[i32
     board.ask(&Request::Zero { counts })?;
     Ok(counts)
 }
+
+/// The arm zeroed, held loosely and still: puts a plane so far below the tip, mm, in
+/// force, and has the attendant arm for it. Returns the record.
+fn armed_over_plane(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+    below_mm: f32,
+) -> Result<Calibration, Halt> {
+    let record = zeroed(board, attendant)?;
+    attendant.finish(Task::HoldLoosely)?;
+    board.still(attendant)?;
+    let status = board.look()?;
+    board.put(plane::below_tip(&record, &status, below_mm))?;
+    board.arm(attendant)?;
+    Ok(record)
+}

@@ -46,12 +46,7 @@ pub(super) fn soft_plane(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
 ) -> Result<String, Halt> {
-    let record = super::zeroed(board, attendant)?;
-    attendant.finish(Task::HoldLoosely)?;
-    board.still(attendant)?;
-    let status = board.look()?;
-    board.put(plane::below_tip(&record, &status, BELOW_MM))?;
-    board.arm(attendant)?;
+    super::armed_over_plane(board, attendant, BELOW_MM)?;
     let felt = touched(board, attendant)?;
     let (deep_mm, up_n) = felt.deepest;
     let law = plane::SOFT;
