@@ -142,6 +142,90 @@ fn the_device_may_be_reset_at_any_moment() {
     interrupted(Interruption::DeviceReset);
 }
 
+/// What happened before a moment, with everything that may come again after it.
+fn histories() -> Vec<Vec<(u64, Interruption)>> {
+    let ticks = agree(&Plan::default()).ticks;
+    // While it opens, while it feels, and when everything but the end of the end was said.
+    let killed = [60, ticks / 2, ticks - 2].map(|at| vec![(at, Interruption::HostKilled)]);
+    [vec![]].into_iter().chain(killed).collect()
+}
+
+/// Plays each history with something more at every moment after it. It ends as it would
+/// without, as soon, in as many sessions, and nothing more is uncertain.
+fn at_every_moment_after(histories: &[Vec<(u64, Interruption)>], what: Interruption) {
+    for history in histories {
+        let plan = |interruptions| Plan {
+            interruptions,
+            ..Plan::default()
+        };
+        let alone = agree(&plan(history.clone()));
+        let begin = history.last().map_or(0, |(at, _)| at + 1);
+        for at in (begin..alone.ticks).step_by(MOMENTS) {
+            let plan = plan([history.as_slice(), &[(at, what)]].concat());
+            let report = agree(&plan);
+            let (ends, sessions) = (report.uncertain, report.resumptions);
+            assert_eq!((ends, sessions), (alone.uncertain, 0), "{plan:?}");
+            assert!(report.ticks < alone.ticks + 900, "{report:?} in {plan:?}");
+        }
+    }
+}
+
+#[test]
+fn all_that_was_said_may_come_again_at_any_moment() {
+    for way in [Direction::ToDevice, Direction::ToHost] {
+        at_every_moment_after(&histories(), Interruption::Echo(way));
+    }
+}
+
+#[test]
+fn what_a_device_said_before_its_reset_may_come_again_at_any_moment() {
+    let ticks = agree(&Plan::default()).ticks;
+    let reset = [60, ticks / 2].map(|at| vec![(at, Interruption::DeviceReset)]);
+    at_every_moment_after(&reset, Interruption::Echo(Direction::ToHost));
+}
+
+#[test]
+fn a_host_of_another_version_may_speak_at_any_moment() {
+    at_every_moment_after(&histories(), Interruption::OtherHost);
+}
+
+#[test]
+fn a_device_of_another_version_is_told_and_never_driven() {
+    let ticks = agree(&Plan::default()).ticks;
+    let other = (0, Interruption::OtherDevice);
+    let report = check(&Plan {
+        interruptions: vec![other],
+        ..Plan::default()
+    });
+    let report = report.expect("nothing wrong");
+    assert!(report.end == End::Told && !report.driven && report.ticks < 100);
+    // One that was given other firmware meanwhile says so after its reset.
+    for at in (0..ticks).step_by(MOMENTS) {
+        let other = Interruption::OtherDevice;
+        let interruptions = vec![(at, Interruption::DeviceReset), (at, other)];
+        let plan = Plan {
+            interruptions,
+            ..Plan::default()
+        };
+        let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+        let is_late = at + 100 > ticks;
+        assert!(report.end == End::Told || is_late, "{report:?} in {plan:?}");
+        assert!(report.ticks < at + 3_000, "{report:?} in {plan:?}");
+    }
+}
+
+#[test]
+fn a_host_that_is_gone_leaves_an_arm_that_is_let_go_in_time() {
+    let ticks = agree(&Plan::default()).ticks;
+    for at in (0..ticks).step_by(MOMENTS) {
+        let plan = Plan {
+            interruptions: vec![(at, Interruption::HostGone)],
+            ..Plan::default()
+        };
+        check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+    }
+}
+
 #[test]
 fn the_line_may_be_cut_one_way_at_any_moment() {
     let ticks = agree(&Plan::default()).ticks;

@@ -1,9 +1,12 @@
-//! What the device says before any of it is harmed: how many samples each session had.
+//! What both sides say before any of it is harmed: how the device introduced itself, how
+//! many samples each session had, and whether a host has asked to arm.
 
 use std::collections::HashMap;
 
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode};
-use hapterra_core::wire::message::ToHost;
+use hapterra_core::wire::hello::DeviceHello;
+use hapterra_core::wire::message::{ToDevice, ToHost};
+use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{InSession, SampleCount};
 
 /// The samples of every session, by the device's own words.
@@ -11,6 +14,27 @@ use hapterra_core::wire::session::{InSession, SampleCount};
 pub(super) struct Account {
     reader: Box<FrameReader<MAX_FRAME>>,
     sessions: HashMap<u32, SampleCount>,
+    /// Each greeting of the device, and its session.
+    greetings: Vec<(u32, DeviceHello)>,
+}
+
+/// Whether a host asks to arm in any of these frames.
+pub(super) fn asks_to_arm(mut bytes: &[u8]) -> bool {
+    let mut reader = Box::new(FrameReader::<MAX_FRAME>::new());
+    while !bytes.is_empty() {
+        let (taken, frame) = reader.push(bytes);
+        bytes = bytes.get(taken..).unwrap_or(&[]);
+        let Some(Ok(content)) = frame else {
+            continue;
+        };
+        let framed = decode::<InSession<ToDevice<'_>>>(content);
+        let message = framed.map(|framed| framed.message);
+        let arm = Request::Arm;
+        if matches!(message, Ok(ToDevice::Request { request, .. }) if request == arm) {
+            return true;
+        }
+    }
+    false
 }
 
 impl Account {
@@ -33,9 +57,18 @@ impl Account {
                 self.raise(session, SampleCount { sent, dropped });
             }
             ToHost::Alive { count, .. } | ToHost::Goodbye(count) => self.raise(session, count),
-            ToHost::Hello(device) => self.raise(device.last.session, device.last.count),
+            ToHost::Hello(device) => {
+                self.raise(device.last.session, device.last.count);
+                self.greetings.push((session, device));
+            }
             _ => {}
         }
+    }
+
+    /// Greetings in this session so far.
+    pub(super) fn greetings(&self, session: u32) -> impl Iterator<Item = &DeviceHello> {
+        let of_it = self.greetings.iter().filter(move |(of, _)| *of == session);
+        of_it.map(|(_, device)| device)
     }
 
     fn raise(&mut self, session: u32, count: SampleCount) {

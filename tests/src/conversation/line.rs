@@ -29,7 +29,7 @@ pub(super) struct Line {
     /// Bytes of a frame that has not ended.
     begun: Vec<u8>,
     /// Frames that were put in so far.
-    count: usize,
+    past: Vec<Vec<u8>>,
     harms: Vec<(usize, Harm)>,
     random: Option<(Chance, usize)>,
     /// Until when nothing gets in.
@@ -41,15 +41,27 @@ impl Line {
         Self {
             frames: vec![],
             begun: vec![],
-            count: 0,
+            past: vec![],
             harms,
             random: random.map(|(seed, share)| (Chance::new(seed), share)),
             cut_until: 0,
         }
     }
 
-    pub(super) const fn count(&self) -> usize {
-        self.count
+    pub(super) fn count(&self) -> usize {
+        self.past.len()
+    }
+
+    /// All that was ever put in comes again, in its order, as of something that stores and
+    /// forwards.
+    pub(super) fn echo(&mut self, now: u64) {
+        let again = self.past.iter().map(|frame| (now + 1, frame.clone()));
+        self.frames.extend(again);
+    }
+
+    /// A frame of somebody else arrives.
+    pub(super) fn slip_in(&mut self, frame: Vec<u8>, now: u64) {
+        self.frames.push((now + 1, frame));
     }
 
     pub(super) fn cut(&mut self, until: u64) {
@@ -76,8 +88,8 @@ impl Line {
     }
 
     fn put(&mut self, frame: Vec<u8>, now: u64) {
-        let number = self.count;
-        self.count += 1;
+        let number = self.past.len();
+        self.past.push(frame.clone());
         if now < self.cut_until {
             return;
         }

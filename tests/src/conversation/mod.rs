@@ -5,13 +5,17 @@
 //! ```text
 //! Client ──▶ Line ──▶ Device        World: one run
 //!        ◀── Line ◀──               Plan: what goes wrong in it
+//!                                   Judge: what must not come of it
 //! ```
 
 mod account;
+mod forged;
+mod judge;
 mod line;
 mod plan;
 mod world;
 
+pub use judge::Wrong;
 pub use line::{Direction, Harm};
 pub use plan::{Interruption, Plan};
-pub use world::{End, Report, Wrong, check, frames};
+pub use world::{End, Report, check, frames};

@@ -12,6 +12,14 @@ pub enum Interruption {
     DeviceReset,
     /// For so many ticks nothing gets through one way.
     Cut(Direction, u64),
+    /// All that was said one way so far comes again: of this session, and of those before.
+    Echo(Direction),
+    /// A host of another version says hello on the same line.
+    OtherHost,
+    /// From now on the device says that it is of another version.
+    OtherDevice,
+    /// The host's program is killed, and no other is started.
+    HostGone,
 }
 
 /// Everything that goes wrong in a run.

@@ -17,7 +17,8 @@ use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
 
-use super::account::Account;
+use super::forged;
+use super::judge::{FADE, Judge, SILENCE_S, Wrong};
 use super::line::{Direction, Line};
 use super::plan::{Interruption, Plan};
 
@@ -25,8 +26,6 @@ use super::plan::{Interruption, Plan};
 const LONGEST: u64 = 60_000;
 /// Ticks after the end, in which what was delayed still arrives.
 const AFTER: u64 = 6_500;
-/// Ticks in which the force goes out after a request to disarm was answered.
-const FADE: u64 = 150;
 /// Samples with the amplifiers on after which the host goes on.
 const FELT: u32 = 60;
 /// Times that the host takes up a session that went silent.
@@ -39,22 +38,6 @@ pub enum End {
     Agreed,
     /// The host tells its user that it does not know, and why.
     Told,
-}
-
-/// What must not happen.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Wrong {
-    /// Nothing came to an end in `LONGEST` ticks.
-    Hangs,
-    /// The amplifiers were on at this tick, and no host wished it.
-    Driven(u64),
-    /// The host was told that the device is disarmed, and it is not.
-    NotDisarmed(u64),
-    /// Samples were not counted once: what the host counted as here or lost, and as
-    /// dropped; what the device had.
-    Miscounted((u64, u64), (u64, u64)),
-    /// An error that no harm to frames may lead to.
-    Error(String),
 }
 
 /// What came of a run.
@@ -70,6 +53,8 @@ pub struct Report {
     pub driven: bool,
     /// Sessions of which the host says that it does not know their end.
     pub uncertain: u64,
+    /// Times that the host gave a session up and began another.
+    pub resumptions: u32,
 }
 
 /// What the host is about.
@@ -92,7 +77,7 @@ struct World<'t> {
     client: Client<'t>,
     device: Device<StoppedClock, 2>,
     lines: [Line; 2],
-    account: Account,
+    judge: Judge,
     /// Sessions that the present host has spoken in.
     sessions: Vec<u32>,
     step: Step,
@@ -102,8 +87,10 @@ struct World<'t> {
     now: u64,
     enabled: bool,
     driven: bool,
-    /// Since when no host wishes that anything is driven.
-    unwished: Option<u64>,
+    /// The device says that it is of another version.
+    other_device: bool,
+    /// There is no host any more.
+    host_gone: bool,
 }
 
 /// Plays a plan.
@@ -156,7 +143,7 @@ impl<'t> World<'t> {
             client: host(terrain, scene, 1),
             device: device(),
             lines: [line(Direction::ToDevice, 0), line(Direction::ToHost, 1)],
-            account: Account::default(),
+            judge: Judge::default(),
             sessions: vec![],
             step: Step::Arming,
             felt: 0,
@@ -165,7 +152,8 @@ impl<'t> World<'t> {
             now: 0,
             enabled: false,
             driven: false,
-            unwished: None,
+            other_device: false,
+            host_gone: false,
         }
     }
 
@@ -177,17 +165,18 @@ impl<'t> World<'t> {
             if let Step::Over(end) = self.step {
                 break end;
             }
+            // It tells nobody, and what counts is the device.
+            if self.host_gone && !self.enabled {
+                break End::Told;
+            }
             if self.now > LONGEST {
                 return Err(Wrong::Hangs);
             }
         };
         let ticks = self.now;
         if end == End::Agreed {
-            self.check_count()?;
-            if self.enabled {
-                return Err(Wrong::NotDisarmed(self.now));
-            }
-            self.unwished = Some(0);
+            self.judge.count(self.client.tally(), &self.sessions)?;
+            self.judge.agreed(self.now, self.enabled)?;
         }
         for _ in 0..AFTER {
             self.tick()?;
@@ -198,17 +187,8 @@ impl<'t> World<'t> {
             frames: [self.lines[0].count(), self.lines[1].count()],
             driven: self.driven,
             uncertain: self.client.tally().uncertain,
+            resumptions: self.resumptions,
         })
-    }
-
-    fn check_count(&self) -> Result<(), Wrong> {
-        let tally = self.client.tally();
-        let counted = (tally.samples + tally.lost, tally.dropped);
-        let made = self.account.of(&self.sessions);
-        match counted == made || tally.uncertain > 0 {
-            true => Ok(()),
-            false => Err(Wrong::Miscounted(counted, made)),
-        }
     }
 
     fn interrupt(&mut self, plan: &Plan) {
@@ -222,7 +202,12 @@ impl<'t> World<'t> {
                     self.lines[0].break_off();
                     self.sessions.clear();
                     (self.step, self.felt, self.resumptions) = (Step::Arming, 0, 0);
+                    self.judge.another_host();
                     self.greet();
+                }
+                Interruption::HostGone => {
+                    self.lines[0].break_off();
+                    self.host_gone = true;
                 }
                 Interruption::DeviceReset => {
                     self.device = device();
@@ -231,6 +216,14 @@ impl<'t> World<'t> {
                 }
                 Interruption::Cut(Direction::ToDevice, long) => self.lines[0].cut(now + long),
                 Interruption::Cut(Direction::ToHost, long) => self.lines[1].cut(now + long),
+                Interruption::Echo(Direction::ToDevice) => self.lines[0].echo(now),
+                Interruption::Echo(Direction::ToHost) => self.lines[1].echo(now),
+                Interruption::OtherHost => {
+                    for frame in forged::greeting() {
+                        self.lines[0].slip_in(frame, now);
+                    }
+                }
+                Interruption::OtherDevice => self.other_device = true,
             }
         }
     }
@@ -240,13 +233,20 @@ impl<'t> World<'t> {
         self.client.greet(time(self.now), &mut out);
         self.sessions.push(self.client.session().get());
         self.sessions.dedup();
-        self.unwished = None;
-        self.lines[0].send(&out, self.now);
+        self.judge.wished();
+        self.say(&out);
+    }
+
+    /// What the host says goes on its way.
+    fn say(&mut self, out: &[u8]) {
+        self.judge.host_says(out);
+        self.lines[0].send(out, self.now);
     }
 
     fn tick(&mut self) -> Result<(), Wrong> {
         self.now += 1;
         for frame in self.lines[0].arrived(self.now) {
+            self.judge.frame_came(self.now);
             let mut rest = frame.as_slice();
             // What finds no room now finds it after a poll.
             for _ in 0..100 {
@@ -263,11 +263,13 @@ impl<'t> World<'t> {
         };
         self.enabled = self.device.tick(sense).enabled;
         self.driven |= self.enabled;
-        if self.enabled && self.unwished.is_some_and(|since| self.now > since) {
-            return Err(Wrong::Driven(self.now));
-        }
+        let session = self.client.session().get();
+        self.judge.look(self.now, self.enabled, session)?;
         self.listen();
-        self.host()
+        match self.host_gone {
+            true => Ok(()),
+            false => self.host(),
+        }
     }
 
     /// What the device says goes on its way.
@@ -278,7 +280,7 @@ impl<'t> World<'t> {
             if said == 0 {
                 return;
             }
-            self.account.hear(&chunk[..said]);
+            self.judge.device_says(&chunk[..said]);
             self.lines[1].send(&chunk[..said], self.now);
         }
     }
@@ -288,7 +290,9 @@ impl<'t> World<'t> {
         let (mut out, now) = (vec![], time(self.now));
         let (step, felt) = (&mut self.step, &mut self.felt);
         let at = self.now;
+        let mut opened = None;
         let mut on = |event: Event<'_>| match event {
+            Event::Opened { device, .. } => opened = Some(device.clone()),
             Event::Sample(sample) => *felt += u32::from(sample.mode == Mode::Ramping),
             Event::Answered {
                 request: Request::Disarm,
@@ -301,11 +305,18 @@ impl<'t> World<'t> {
             _ => {}
         };
         let mut heard = Ok(());
-        for frame in self.lines[1].arrived(self.now) {
+        for mut frame in self.lines[1].arrived(self.now) {
+            if self.other_device {
+                frame = forged::of_another_version(frame);
+            }
             heard = heard.and_then(|()| self.client.receive(now, &frame, &mut out, &mut on));
         }
         let heard = heard.and_then(|()| self.client.due(now, &mut out, &mut on));
-        self.lines[0].send(&out, self.now);
+        self.say(&out);
+        if let Some(device) = opened {
+            let session = self.client.session().get();
+            self.judge.opened(session, device)?;
+        }
         match heard {
             Ok(()) => self.go_on(),
             Err(error) => return self.on_error(error),
@@ -323,7 +334,7 @@ impl<'t> World<'t> {
                 self.step = Step::Disarming(None);
             }
             Step::Disarming(Some(answered)) => {
-                self.unwished = Some(answered + FADE);
+                self.judge.unwished_from(answered + FADE);
                 if self.now > answered + 2 * FADE {
                     self.leave();
                 }
@@ -341,7 +352,7 @@ impl<'t> World<'t> {
         }
         let mut out = vec![];
         self.client.leave(time(self.now), &mut out);
-        self.lines[0].send(&out, self.now);
+        self.say(&out);
         self.step = Step::Leaving;
     }
 
@@ -350,6 +361,9 @@ impl<'t> World<'t> {
             (_, Step::Over(_)) => {}
             // Frames of a host before that come seconds late look like another host's.
             (LinkError::NotConfirmed | LinkError::Taken, _) => self.step = Step::Over(End::Told),
+            (LinkError::Version { .. }, _) if self.other_device => {
+                self.step = Step::Over(End::Told);
+            }
             (LinkError::Silent(_), _) if self.resumptions < RESUMPTIONS => {
                 self.resumptions += 1;
                 if let Step::Disarming(_) = self.step {
@@ -366,7 +380,11 @@ impl<'t> World<'t> {
 }
 
 fn host<'t>(terrain: &'t Terrain<'t>, scene: Scene, seed: u64) -> Client<'t> {
-    let (arming, patience) = (Some(Arming::VIRTUAL), Patience::REAL_TIME);
+    let patience = Patience {
+        silence_s: SILENCE_S,
+        ..Patience::REAL_TIME
+    };
+    let arming = Some(Arming::VIRTUAL);
     Client::numbered(terrain, scene, arming, patience, seed)
 }
 

@@ -1,0 +1,131 @@
+//! Looks at every tick of a run, and at what the host is told.
+
+use hapterra::link::Tally;
+use hapterra_core::wire::hello::DeviceHello;
+
+use super::account::{Account, asks_to_arm};
+
+/// Ticks in which the force goes out after a request to disarm was answered.
+pub(super) const FADE: u64 = 150;
+/// For so long the device lets a silent host's arm be, seconds, and ticks with the force
+/// going out.
+pub(super) const SILENCE_S: u16 = 5;
+const SILENCE: u64 = SILENCE_S as u64 * 1_000 + FADE;
+
+/// What must not happen.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Wrong {
+    /// Nothing came to an end in `LONGEST` ticks.
+    Hangs,
+    /// The amplifiers were on at this tick, and no host wished it.
+    Driven(u64),
+    /// The amplifiers went on at this tick in a session whose host had not asked for it.
+    Unasked(u64),
+    /// The amplifiers were on at this tick, and nothing had come for longer than the host
+    /// had said.
+    Forsaken(u64),
+    /// The host took this for the device's greeting, and the device had not said so in
+    /// its session.
+    Misled(Box<DeviceHello>),
+    /// The host was told that the device is disarmed, and it is not.
+    NotDisarmed(u64),
+    /// Samples were not counted once: what the host counted as here or lost, and as
+    /// dropped; what the device had.
+    Miscounted((u64, u64), (u64, u64)),
+    /// An error that no harm to frames may lead to.
+    Error(String),
+}
+
+/// What is known of a run, and what is wrong with it.
+#[derive(Default)]
+pub(super) struct Judge {
+    account: Account,
+    /// Since when no host wishes that anything is driven.
+    unwished: Option<u64>,
+    /// The present host has asked to arm.
+    asked: bool,
+    /// The session that the device is in, and whether the amplifiers were on when it began
+    /// and ever since.
+    inherited: (u32, bool),
+    /// The tick of the last frame to the device.
+    heard_at: u64,
+}
+
+impl Judge {
+    pub(super) fn device_says(&mut self, bytes: &[u8]) {
+        self.account.hear(bytes);
+    }
+
+    pub(super) fn host_says(&mut self, bytes: &[u8]) {
+        self.asked |= asks_to_arm(bytes);
+    }
+
+    /// A frame has come to the device.
+    pub(super) const fn frame_came(&mut self, now: u64) {
+        self.heard_at = now;
+    }
+
+    /// A host was started in the place of one that was killed.
+    pub(super) const fn another_host(&mut self) {
+        self.asked = false;
+    }
+
+    /// A host is there that wishes that something is driven.
+    pub(super) const fn wished(&mut self) {
+        self.unwished = None;
+    }
+
+    /// From this tick on no host wishes it any more.
+    pub(super) const fn unwished_from(&mut self, tick: u64) {
+        self.unwished = Some(tick);
+    }
+
+    /// After a tick in which the amplifiers were on or off, while the host is in this
+    /// session.
+    pub(super) fn look(&mut self, now: u64, enabled: bool, session: u32) -> Result<(), Wrong> {
+        let is_greeted = self.account.greetings(session).next().is_some();
+        if self.inherited.0 != session && is_greeted {
+            self.inherited = (session, enabled);
+        }
+        self.inherited.1 &= enabled;
+        let unasked = is_greeted && !self.inherited.1 && !self.asked;
+        if enabled && self.unwished.is_some_and(|since| now > since) {
+            return Err(Wrong::Driven(now));
+        }
+        if enabled && unasked {
+            return Err(Wrong::Unasked(now));
+        }
+        if enabled && now > self.heard_at + SILENCE {
+            return Err(Wrong::Forsaken(now));
+        }
+        Ok(())
+    }
+
+    /// The host believes that its session is open with this device.
+    pub(super) fn opened(&self, session: u32, device: DeviceHello) -> Result<(), Wrong> {
+        let has_said = self.account.greetings(session).any(|said| *said == device);
+        match has_said {
+            true => Ok(()),
+            false => Err(Wrong::Misled(Box::new(device))),
+        }
+    }
+
+    /// The host believes that the device is disarmed, and so it has to stay.
+    pub(super) const fn agreed(&mut self, now: u64, enabled: bool) -> Result<(), Wrong> {
+        self.unwished = Some(0);
+        match enabled {
+            true => Err(Wrong::NotDisarmed(now)),
+            false => Ok(()),
+        }
+    }
+
+    /// The host's account of its sessions against the device's.
+    pub(super) fn count(&self, tally: &Tally, sessions: &[u32]) -> Result<(), Wrong> {
+        let counted = (tally.samples + tally.lost, tally.dropped);
+        let made = self.account.of(sessions);
+        match counted == made || tally.uncertain > 0 {
+            true => Ok(()),
+            false => Err(Wrong::Miscounted(counted, made)),
+        }
+    }
+}
