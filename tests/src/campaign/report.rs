@@ -3,6 +3,7 @@
 use super::Tally;
 use super::extremes::OFF_COUNTS;
 use super::kind::{Kind, STALL_TICKS};
+use crate::rows;
 
 /// The page of a campaign that ran with the source at `commit`.
 #[must_use]
@@ -76,14 +77,5 @@ pose were {:.1} s.
 /// Kinds that a page does not have, or not with a count.
 #[must_use]
 pub fn missing(page: &str) -> Vec<Kind> {
-    let has = |kind: &Kind| {
-        page.lines().any(|line| {
-            let mut cells = line.split('|').map(str::trim).skip(1);
-            cells.next() == Some(&format!("{kind:?}"))
-                && cells
-                    .next()
-                    .is_some_and(|count| count.parse().is_ok_and(|n: u32| n > 0))
-        })
-    };
-    Kind::ALL.into_iter().filter(|kind| !has(kind)).collect()
+    rows::missing(page, &Kind::ALL)
 }

@@ -1,12 +1,12 @@
 //! What became of everything that went wrong, as a table.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
 use hapterra_core::guard::Fault;
 
 use super::extremes::Extremes;
 use super::kind::Kind;
+use crate::rows::Rows;
 
 /// What became of a mishap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +35,7 @@ struct Row {
 /// All of a campaign.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tally {
-    rows: Vec<(Kind, Row)>,
+    rows: Rows<Kind, Row>,
     /// Ticks run.
     pub ticks: u64,
     /// Ticks with the amplifiers on.
@@ -55,7 +55,7 @@ impl Tally {
         outcome: Outcome,
         reaction: Option<u64>,
     ) -> Result<(), String> {
-        let row = self.row(kind);
+        let row = self.rows.of(kind);
         row.injected += 1;
         let expected = kind.expectation();
         let fits = match outcome {
@@ -87,15 +87,6 @@ impl Tally {
         }
     }
 
-    fn row(&mut self, kind: Kind) -> &mut Row {
-        let at = self.rows.iter().position(|(known, _)| *known == kind);
-        let at = at.unwrap_or_else(|| {
-            self.rows.push((kind, Row::default()));
-            self.rows.len() - 1
-        });
-        &mut self.rows[at].1
-    }
-
     /// Adds a segment's time and extremes.
     pub fn add(&mut self, ticks: u64, armed: u64, extremes: &Extremes) {
         self.ticks += ticks;
@@ -106,43 +97,29 @@ impl Tally {
     /// Mishaps in all.
     #[must_use]
     pub fn injected(&self) -> u32 {
-        self.rows.iter().map(|(_, row)| row.injected).sum()
+        self.rows.sum(|row| row.injected)
     }
 
     /// How often a kind was injected.
     #[must_use]
     pub fn injected_of(&self, kind: Kind) -> u32 {
-        let row = self.rows.iter().find(|(known, _)| *known == kind);
-        row.map_or(0, |(_, row)| row.injected)
+        self.rows.get(kind).map_or(0, |row| row.injected)
     }
 
     /// The table, in Markdown.
     #[must_use]
     pub fn table(&self) -> String {
-        let mut text = String::from(
-            "| went wrong | injected | ridden through | disarmed | latched | amplifiers on for at most, ticks |\n\
-             | --- | ---: | ---: | ---: | --- | ---: |\n",
-        );
-        for kind in Kind::ALL {
-            let Some((_, row)) = self.rows.iter().find(|(known, _)| *known == kind) else {
-                continue;
-            };
-            let latched: Vec<_> = row
-                .latched
-                .values()
+        let heading = "| went wrong | injected | ridden through | disarmed | latched | amplifiers on for at most, ticks |\n\
+             | --- | ---: | ---: | ---: | --- | ---: |\n";
+        self.rows.table(heading, &Kind::ALL, |row| {
+            let latched = row.latched.values();
+            let latched: Vec<_> = latched
                 .map(|(fault, count)| format!("{count} {fault:?}"))
                 .collect();
             let worst = row.worst.map_or("always".into(), |ticks| ticks.to_string());
-            // Writing to a String cannot fail.
-            let _ = writeln!(
-                text,
-                "| {kind:?} | {} | {} | {} | {} | {worst} |",
-                row.injected,
-                row.ridden,
-                row.disarmed,
-                latched.join(", "),
-            );
-        }
-        text
+            let (injected, ridden, disarmed) = (row.injected, row.ridden, row.disarmed);
+            let latched = latched.join(", ");
+            format!("{injected} | {ridden} | {disarmed} | {latched} | {worst}")
+        })
     }
 }

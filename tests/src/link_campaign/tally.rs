@@ -1,10 +1,10 @@
 //! What became of the runs, as a table.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
 use super::fault::Kind;
 use crate::campaign::extremes::Extremes;
+use crate::rows::Rows;
 
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,7 +30,7 @@ struct Row {
 /// All of a campaign.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tally {
-    rows: Vec<(Kind, Row)>,
+    rows: Rows<Kind, Row>,
     /// Ticks of devices run, and those with the amplifiers on.
     pub ticks: [u64; 2],
     /// Samples in contact whose proxy was held against the surface.
@@ -44,7 +44,7 @@ pub struct Tally {
 impl Tally {
     /// Counts a run.
     pub fn count(&mut self, kind: Kind, outcome: Outcome) {
-        let row = self.row(kind);
+        let row = self.rows.of(kind);
         row.runs += 1;
         match outcome {
             Outcome::Agreed => row.agreed += 1,
@@ -55,15 +55,6 @@ impl Tally {
                 *row.told.entry(begin.trim().to_owned()).or_default() += 1;
             }
         }
-    }
-
-    fn row(&mut self, kind: Kind) -> &mut Row {
-        let at = self.rows.iter().position(|(known, _)| *known == kind);
-        let at = at.unwrap_or_else(|| {
-            self.rows.push((kind, Row::default()));
-            self.rows.len() - 1
-        });
-        &mut self.rows[at].1
     }
 
     /// Adds what was seen in a stretch.
@@ -77,48 +68,33 @@ impl Tally {
     /// Runs with this kind of fault.
     #[must_use]
     pub fn runs_with(&self, kind: Kind) -> u32 {
-        let row = self.rows.iter().find(|(known, _)| *known == kind);
-        row.map_or(0, |(_, row)| row.runs)
+        self.rows.get(kind).map_or(0, |row| row.runs)
     }
 
     /// Runs in all.
     #[must_use]
     pub fn runs(&self) -> u32 {
-        self.rows.iter().map(|(_, row)| row.runs).sum()
+        self.rows.sum(|row| row.runs)
     }
 
     /// Runs whose end host and device agreed on.
     #[must_use]
     pub fn agreed(&self) -> u32 {
-        self.rows.iter().map(|(_, row)| row.agreed).sum()
+        self.rows.sum(|row| row.agreed)
     }
 
     /// The table, in Markdown.
     #[must_use]
     pub fn table(&self) -> String {
-        let mut text = String::from(
-            "| went wrong | runs | end agreed on | killed, no host after it | user told |\n\
-             | --- | ---: | ---: | ---: | --- |\n",
-        );
-        for kind in Kind::ALL {
-            let Some((_, row)) = self.rows.iter().find(|(known, _)| *known == kind) else {
-                continue;
-            };
-            let told: Vec<_> = row
-                .told
-                .iter()
+        let heading = "| went wrong | runs | end agreed on | killed, no host after it | user told |\n\
+             | --- | ---: | ---: | ---: | --- |\n";
+        self.rows.table(heading, &Kind::ALL, |row| {
+            let told = row.told.iter();
+            let told: Vec<_> = told
                 .map(|(words, count)| format!("{count} {words}"))
                 .collect();
-            // Writing to a String cannot fail.
-            let _ = writeln!(
-                text,
-                "| {kind:?} | {} | {} | {} | {} |",
-                row.runs,
-                row.agreed,
-                row.killed,
-                told.join("; "),
-            );
-        }
-        text
+            let (runs, agreed, killed) = (row.runs, row.agreed, row.killed);
+            format!("{runs} | {agreed} | {killed} | {}", told.join("; "))
+        })
     }
 }
