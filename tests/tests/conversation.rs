@@ -142,6 +142,44 @@ fn the_device_may_be_reset_at_any_moment() {
     interrupted(Interruption::DeviceReset);
 }
 
+#[test]
+fn a_host_that_leaves_an_armed_arm_hears_goodbye_when_it_is_off() {
+    let abrupt = || Plan {
+        abrupt: true,
+        ..Plan::default()
+    };
+    let (ticks, frames) = (agree(&abrupt()).ticks, agree(&abrupt()).frames);
+    for harm in HARMS {
+        // The last frames each way: bye, goodbye and what is around them.
+        for (way, count) in [Direction::ToDevice, Direction::ToHost]
+            .into_iter()
+            .zip(frames)
+        {
+            for number in count.saturating_sub(12)..count {
+                agree(&Plan {
+                    harms: vec![(way, number, harm)],
+                    ..abrupt()
+                });
+            }
+        }
+    }
+    // A host before had heard its goodbye, and all of that comes again.
+    let killed = (ticks - 2, Interruption::HostKilled);
+    let again = Plan {
+        interruptions: vec![killed],
+        ..abrupt()
+    };
+    let leaves = agree(&again).ticks - 150;
+    for at in leaves..leaves + 150 {
+        for way in [Direction::ToDevice, Direction::ToHost] {
+            agree(&Plan {
+                interruptions: vec![killed, (at, Interruption::Echo(way))],
+                ..abrupt()
+            });
+        }
+    }
+}
+
 /// What happened before a moment, with everything that may come again after it.
 fn histories() -> Vec<Vec<(u64, Interruption)>> {
     let ticks = agree(&Plan::default()).ticks;
@@ -150,7 +188,7 @@ fn histories() -> Vec<Vec<(u64, Interruption)>> {
     [vec![]].into_iter().chain(killed).collect()
 }
 
-/// Plays each history with something more at every moment after it. It ends as it would
+/// Plays each history with something more at its end and every moment after it. It ends as it would
 /// without, as soon, in as many sessions, and nothing more is uncertain.
 fn at_every_moment_after(histories: &[Vec<(u64, Interruption)>], what: Interruption) {
     for history in histories {
@@ -159,7 +197,7 @@ fn at_every_moment_after(histories: &[Vec<(u64, Interruption)>], what: Interrupt
             ..Plan::default()
         };
         let alone = agree(&plan(history.clone()));
-        let begin = history.last().map_or(0, |(at, _)| at + 1);
+        let begin = history.last().map_or(0, |(at, _)| *at);
         for at in (begin..alone.ticks).step_by(MOMENTS) {
             let plan = plan([history.as_slice(), &[(at, what)]].concat());
             let report = agree(&plan);

@@ -1,12 +1,17 @@
 //! How the boards' own images tell one board from another: by the chip's identifier.
 
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::Duration;
+
+use hapterra::link::{Bulk, BulkEndpoints, Dialogue};
 use hapterra_firmware::usb::{PRODUCT, PRODUCT_ID, VENDOR_ID};
 use hapterra_image_tests::device::machines;
-use hapterra_tests::usb::host::{enumerate, string};
-use nusb::descriptors::DeviceDescriptor;
+use hapterra_tests::usb::host::{ScriptedPipes, enumerate, string};
+use nusb::descriptors::{ConfigurationDescriptor, DeviceDescriptor};
 
 #[test]
-fn the_serial_number_on_usb_is_the_chips_identifier() {
+fn the_serial_number_on_usb_and_on_the_link_is_the_chips_identifier() {
     for mut machine in machines() {
         let board = machine.chip.board;
         // RM0440, 48.1; RM0433, 61.1.
@@ -28,5 +33,12 @@ fn the_serial_number_on_usb_is_the_chips_identifier() {
         let serial = named(device.serial_number_string_index());
         let expected: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
         assert_eq!(serial, expected, "{board}");
+        // The greeting on the link has the same.
+        let configuration = ConfigurationDescriptor::new(&found.configuration);
+        let endpoints = BulkEndpoints::find(&configuration.expect("well formed"));
+        let pipes = ScriptedPipes::new(Rc::new(RefCell::new(machine)), endpoints.expect("two"));
+        let opened = Dialogue::open(Box::new(Bulk(pipes)), Duration::from_secs(60));
+        let told = opened.expect("it answers").device().serial.to_string();
+        assert_eq!(told, expected, "{board}");
     }
 }

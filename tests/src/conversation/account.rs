@@ -1,7 +1,7 @@
 //! What both sides say before any of it is harmed: how the device introduced itself, how
 //! many samples each session had, and whether a host has asked to arm.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode};
 use hapterra_core::wire::hello::DeviceHello;
@@ -14,6 +14,8 @@ use hapterra_core::wire::session::{InSession, SampleCount};
 pub(super) struct Account {
     reader: Box<FrameReader<MAX_FRAME>>,
     sessions: HashMap<u32, SampleCount>,
+    /// The ticks of the samples that were told in each session.
+    ticks: HashMap<u32, HashSet<u32>>,
     /// Each greeting of the device, and its session.
     greetings: Vec<(u32, DeviceHello)>,
 }
@@ -55,6 +57,8 @@ impl Account {
                 let sent = telemetry.first + telemetry.samples.len() as u32;
                 let dropped = telemetry.dropped;
                 self.raise(session, SampleCount { sent, dropped });
+                let ticks = telemetry.samples.iter().map(|sample| sample.tick);
+                self.ticks.entry(session).or_default().extend(ticks);
             }
             ToHost::Alive { count, .. } | ToHost::Goodbye(count) => self.raise(session, count),
             ToHost::Hello(device) => {
@@ -69,6 +73,12 @@ impl Account {
     pub(super) fn greetings(&self, session: u32) -> impl Iterator<Item = &DeviceHello> {
         let of_it = self.greetings.iter().filter(move |(of, _)| *of == session);
         of_it.map(|(_, device)| device)
+    }
+
+    /// Whether the sample of this tick was told in this session.
+    pub(super) fn has_told(&self, session: u32, tick: u32) -> bool {
+        let ticks = self.ticks.get(&session);
+        ticks.is_some_and(|ticks| ticks.contains(&tick))
     }
 
     fn raise(&mut self, session: u32, count: SampleCount) {

@@ -24,9 +24,9 @@ pub enum Wrong {
     /// The amplifiers were on at this tick, and nothing had come for longer than the host
     /// had said.
     Forsaken(u64),
-    /// The host took this for the device's greeting, and the device had not said so in
-    /// its session.
-    Misled(Box<DeviceHello>),
+    /// The host took this for the device's words, and the device had not said so in its
+    /// session.
+    Misled(String),
     /// The host was told that the device is disarmed, and it is not.
     NotDisarmed(u64),
     /// Samples were not counted once: what the host counted as here or lost, and as
@@ -101,12 +101,22 @@ impl Judge {
         Ok(())
     }
 
-    /// The host believes that its session is open with this device.
-    pub(super) fn opened(&self, session: u32, device: DeviceHello) -> Result<(), Wrong> {
-        let has_said = self.account.greetings(session).any(|said| *said == device);
-        match has_said {
-            true => Ok(()),
-            false => Err(Wrong::Misled(Box::new(device))),
+    /// The host believes that its session is open with this device, and that these were
+    /// samples of it, by their ticks.
+    pub(super) fn told(
+        &self,
+        session: u32,
+        opened: Option<&DeviceHello>,
+        samples: &[u32],
+    ) -> Result<(), Wrong> {
+        let mut greetings = self.account.greetings(session);
+        if let Some(device) = opened.filter(|device| !greetings.any(|said| said == *device)) {
+            return Err(Wrong::Misled(format!("{device:?}")));
+        }
+        let has_told = |tick: &&u32| self.account.has_told(session, **tick);
+        match samples.iter().find(|tick| !has_told(tick)) {
+            Some(tick) => Err(Wrong::Misled(format!("the sample of tick {tick}"))),
+            None => Ok(()),
         }
     }
 

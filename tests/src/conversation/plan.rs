@@ -29,6 +29,8 @@ pub struct Plan {
     pub harms: Vec<(Direction, usize, Harm)>,
     /// What happens at a tick.
     pub interruptions: Vec<(u64, Interruption)>,
+    /// The host leaves while the arm is armed, without a request to disarm before.
+    pub abrupt: bool,
     /// Harm at random: the seed, and the share of frames in a thousand.
     pub random: Option<(u64, usize)>,
 }

@@ -87,6 +87,8 @@ struct World<'t> {
     now: u64,
     enabled: bool,
     driven: bool,
+    /// The host leaves without a request to disarm.
+    abrupt: bool,
     /// The device says that it is of another version.
     other_device: bool,
     /// There is no host any more.
@@ -152,6 +154,7 @@ impl<'t> World<'t> {
             now: 0,
             enabled: false,
             driven: false,
+            abrupt: plan.abrupt,
             other_device: false,
             host_gone: false,
         }
@@ -290,10 +293,13 @@ impl<'t> World<'t> {
         let (mut out, now) = (vec![], time(self.now));
         let (step, felt) = (&mut self.step, &mut self.felt);
         let at = self.now;
-        let mut opened = None;
+        let (mut opened, mut samples) = (None, vec![]);
         let mut on = |event: Event<'_>| match event {
             Event::Opened { device, .. } => opened = Some(device.clone()),
-            Event::Sample(sample) => *felt += u32::from(sample.mode == Mode::Ramping),
+            Event::Sample(sample) => {
+                *felt += u32::from(sample.mode == Mode::Ramping);
+                samples.push(sample.tick);
+            }
             Event::Answered {
                 request: Request::Disarm,
                 ..
@@ -313,10 +319,8 @@ impl<'t> World<'t> {
         }
         let heard = heard.and_then(|()| self.client.due(now, &mut out, &mut on));
         self.say(&out);
-        if let Some(device) = opened {
-            let session = self.client.session().get();
-            self.judge.opened(session, device)?;
-        }
+        let session = self.client.session().get();
+        self.judge.told(session, opened.as_ref(), &samples)?;
         match heard {
             Ok(()) => self.go_on(),
             Err(error) => return self.on_error(error),
@@ -329,6 +333,7 @@ impl<'t> World<'t> {
         let is_closed = self.client.state() == State::Closed;
         match self.step {
             Step::Arming if self.felt > 0 => self.step = Step::Feeling,
+            Step::Feeling if self.felt >= FELT && self.abrupt => self.leave(),
             Step::Feeling if self.felt >= FELT => {
                 self.client.ask(Ask::Request(Request::Disarm));
                 self.step = Step::Disarming(None);
