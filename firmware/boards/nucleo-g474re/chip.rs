@@ -20,6 +20,7 @@ use crate::stm32::clock::CycleClock;
 use crate::stm32::encoders::{SafetyInputs, TimerEncoders, quadrature};
 use crate::stm32::feedback::{Feedback, Monitors};
 use crate::stm32::priorities::OTHERS;
+use crate::stm32::start::FULL_SCALE_A;
 use crate::stm32::{failure, parts};
 
 /// Tiles along the side of the window.
@@ -89,8 +90,9 @@ pub(crate) fn take(p: Peripherals) -> Parts {
     let enable = Output::new(p.PB0, Level::Low, Speed::Low);
     compare_supply();
     Parts {
-        enable,
-        outputs: outputs::new(p.DAC1, p.PA4, p.PA5, p.DAC2, p.PA6),
+        amplifiers,
+    let outputs = outputs::new(p.DAC1, p.PA4, p.PA5, p.DAC2, p.PA6);
+    let amplifiers = Off::new(outputs, enable, FULL_SCALE_A);
         encoders: TimerEncoders {
             counters: (
                 quadrature(p.TIM2, p.PA0, p.PA1),

@@ -1,9 +1,9 @@
 //! Commands as voltages of the chip's own converters.
 
-use embassy_stm32::dac::{Ch1, Dac, DacChannel};
-use embassy_stm32::mode::Blocking;
+use embassy_stm32::pac::dac::Dac;
+use embassy_stm32::pac::dac::vals::Mode;
 use embassy_stm32::peripherals::{DAC1, DAC2, PA4, PA5, PA6};
-use embassy_stm32::{Peri, pac};
+use embassy_stm32::{Peri, pac, rcc};
 use hapterra_firmware::amplifier::{CurrentOutputs, offset_code};
 
 /// The image's name.
@@ -11,23 +11,43 @@ pub(crate) const BOARD: &str = "nucleo-g474re";
 
 /// Three converters, buffered, each behind an offset stage: the middle of the range is no
 /// current.
-pub(crate) struct Outputs {
-    /// Keeps the channels as they were set up.
-    _channels: [DacChannel<'static, Blocking>; 3],
+pub(crate) struct Outputs(());
+
+/// MCR.HFSEL: how long a channel waits for a bus faster than 160 MHz.
+const FASTEST_BUS: u8 = 0b10;
+
+/// Takes the converters and their pins, which are analogue since the reset. A channel is
+/// switched on only when it holds the code for no current: it would begin with 0 V, which is
+/// beyond full scale. embassy's own way switches a channel on before it takes a code.
+pub(crate) fn new(
+    _: Peri<'static, DAC1>,
+    _: Peri<'static, PA4>,
+    _: Peri<'static, PA5>,
+    _: Peri<'static, DAC2>,
+    _: Peri<'static, PA6>,
+) -> Outputs {
+    rcc::enable_and_reset::<DAC1>();
+    rcc::enable_and_reset::<DAC2>();
+    let mut outputs = Outputs(());
+    outputs.set([0.0; 3]);
+    switch_on(pac::DAC1, &[0, 1]);
+    switch_on(pac::DAC2, &[0]);
+    outputs
 }
 
-pub(crate) fn new(
-    dac1: Peri<'static, DAC1>,
-    first: Peri<'static, PA4>,
-    second: Peri<'static, PA5>,
-    dac2: Peri<'static, DAC2>,
-    third: Peri<'static, PA6>,
-) -> Outputs {
-    let (first, second) = Dac::new_blocking(dac1, first, second).split();
-    let third = DacChannel::new_blocking::<_, Ch1>(dac2, third);
-    Outputs {
-        _channels: [first, second, third],
-    }
+/// Gives channels of a converter to their pins, buffered.
+fn switch_on(converter: Dac, channels: &[usize]) {
+    converter.mcr().write(|w| {
+        w.set_hfsel(FASTEST_BUS);
+        for channel in channels {
+            w.set_mode(*channel, Mode::NORMAL_EXT_BUFEN);
+        }
+    });
+    converter.cr().write(|w| {
+        for channel in channels {
+            w.set_en(*channel, true);
+        }
+    });
 }
 
 impl CurrentOutputs for Outputs {

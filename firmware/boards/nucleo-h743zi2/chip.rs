@@ -22,6 +22,7 @@ use crate::stm32::encoders::{SafetyInputs, TimerEncoders, quadrature};
 use crate::stm32::feedback::{Feedback, Monitors};
 use crate::stm32::priorities::OTHERS;
 use crate::stm32::{failure, parts};
+use crate::stm32::start::FULL_SCALE_A;
 use crate::stop::{EmergencyStop, take_stop};
 
 /// Tiles along the side of the window.
@@ -109,16 +110,16 @@ pub(crate) fn configuration() -> Config {
 pub(crate) fn take(p: Peripherals) -> Parts {
     // The enable pin first of all.
     let enable = Output::new(p.PF3, Level::Low, Speed::Low);
-    // Before the stop, which locks the comparator as it is.
+    // Before the stop, which may act on the outputs' timer.
+    let amplifiers = Off::new(take_outputs!(p), enable, FULL_SCALE_A);
+    // Before the stop, too, which locks the comparator as it is.
     compare_supply();
     let mut wiring = usb::Config::default();
     // The board's power does not come from this connector.
     wiring.vbus_detection = false;
     let buffer = USB_BUFFER.take();
     Parts {
-        enable,
-        // Before the stop, which may act on their timer.
-        outputs: take_outputs!(p),
+        amplifiers,
         encoders: TimerEncoders {
             counters: (
                 quadrature(p.TIM8, p.PC6, p.PC7),

@@ -269,3 +269,33 @@ fn converters_on_the_chip_are_buffered() {
         }
     }
 }
+/// Control registers of the converters on the chip: DAC1's with its channels 1 and 2, and
+/// DAC2's with its channel 1.
+const CONVERTERS: [(u32, u32); 3] = [
+    (0x5000_0800, 1 << 0),
+    (0x5000_0800, 1 << 16),
+    (0x5000_0C00, 1 << 0),
+];
+
+#[test]
+fn no_converter_on_the_chip_is_switched_on_before_it_holds_no_current() {
+    for mut machine in machines() {
+        if !matches!(machine.chip.commands, Commands::Converters(_)) {
+            continue;
+        }
+        machine.slice = 1;
+        let mut were_on = [false; 3];
+        let all_on = machine.run_until(20, |m| {
+            let mut bus = m.bus();
+            let commands = bus.commands();
+            for (axis, (control, enable)) in CONVERTERS.into_iter().enumerate() {
+                let is_on = bus.read(control) & enable != 0;
+                assert!(!is_on || commands[axis] == 2048, "axis {axis}: {commands:?}");
+                were_on[axis] |= is_on;
+            }
+            were_on == [true; 3]
+        });
+        assert_eq!(all_on, Stop::Asked);
+    }
+}
+

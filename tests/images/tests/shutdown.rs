@@ -88,6 +88,8 @@ fn on_a_supply_that_is_too_low_no_program_starts() {
         machine.set_supply_mv(TOO_LOW_MV);
         machine.run_ms(50);
         assert!(!machine.is_attached(), "{board}");
+        let idle = (machine.bus().code(0.0) + 0.5) as i32;
+        assert_eq!(machine.bus().commands(), [idle; 3], "{board}: meanwhile");
         machine.set_supply_mv(NOMINAL_MV);
         machine.run_ms(50);
         assert!(machine.is_attached(), "{board}");

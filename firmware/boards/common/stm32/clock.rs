@@ -37,11 +37,8 @@ impl<const HZ: u32, const PER_COUNT: u32> CycleClock<HZ, PER_COUNT> {
         (counts_a_second / TICK_HZ - 1) as u16
     };
 
-    /// Sets the timer up, which [`start`] starts, and starts the cycle counter.
-    pub(crate) fn new(timer: Peri<'static, TickTimer>, core: &mut Peripherals) -> Self {
-        core.DCB.enable_trace();
-        DWT::unlock();
-        core.DWT.enable_cycle_counter();
+    /// Sets the timer up, which [`start`] starts.
+    pub(crate) fn new(timer: Peri<'static, TickTimer>) -> Self {
         let timer = Timer::new(timer);
         let registers = timer.regs_core();
         registers.psc().write_value(DIVIDER - 1);
@@ -51,6 +48,13 @@ impl<const HZ: u32, const PER_COUNT: u32> CycleClock<HZ, PER_COUNT> {
         timer.enable_update_interrupt(true);
         Self { timer }
     }
+}
+
+/// Starts the cycle counter.
+pub(crate) fn count_cycles(core: &mut Peripherals) {
+    core.DCB.enable_trace();
+    DWT::unlock();
+    core.DWT.enable_cycle_counter();
 }
 
 /// Starts the timer. Its owner, the loop, is already with the interrupt.

@@ -3,15 +3,16 @@
 use embassy_stm32::flash::{Blocking, Flash};
 use embassy_stm32::gpio::Output;
 use embassy_stm32::{Peri, PeripheralType};
+use hapterra_firmware::amplifier::Off;
 
 use super::clock::TickTimer;
 
 /// The parts of a chip with outputs `O`, encoders `E`, a USB driver `U` and a watchdog
 /// `W`.
 pub(crate) struct Parts<O, E, U, W: PeripheralType + 'static> {
-    /// The amplifiers' enable pin, low.
-    pub(crate) enable: Output<'static>,
-    pub(crate) outputs: O,
+    /// Off, and no current is commanded: the first thing that a start does, because after a
+    /// reset the power stages may still be on for the time that their enable input takes.
+    pub(crate) amplifiers: Off<O, Output<'static>>,
     pub(crate) encoders: E,
     pub(crate) flash: Flash<'static, Blocking>,
     pub(crate) timer: Peri<'static, TickTimer>,

@@ -8,19 +8,18 @@ use embassy_stm32::pac::Interrupt;
 use embassy_stm32::wdg::IndependentWatchdog;
 use hapterra_core::wire::hello::SerialNumber;
 use hapterra_core::wire::status::BootReport;
-use hapterra_firmware::amplifier::Off;
 use hapterra_firmware::app::Hardware;
 use hapterra_firmware::usb::{DescriptorBuffers, device};
 use static_cell::ConstStaticCell;
 
 use super::calibration_memory::CalibrationMemory;
-use super::{failure, heartbeat, motor_memory, priorities, stack_guard, supply, tasks};
+use super::{clock, failure, heartbeat, motor_memory, priorities, stack_guard, supply, tasks};
 use crate::application::{self, Loop, TICK_DONE};
 use crate::chip::{self, Clock};
 use crate::outputs::BOARD;
 
 /// Current in amperes that the ends of an output's range stand for.
-pub(super) const FULL_SCALE_A: f32 = 5.5;
+pub(crate) const FULL_SCALE_A: f32 = 5.5;
 /// Time after which the watchdog resets the chip, microseconds.
 const WATCHDOG_US: u32 = 50_000;
 
@@ -52,6 +51,9 @@ async fn main(spawner: Spawner) {
     stack_guard::set_up(&core.MPU);
     priorities::lower_all(&mut core);
     chip::prepare(&mut core);
+    // Outputs may wait for it.
+    clock::count_cycles(&mut core);
+    // Commands no current, before anything that may take long.
     let parts = chip::take(embassy_stm32::init(chip::configuration()));
     let boot = BootReport {
         cause: chip::take_reset_cause(),
@@ -62,12 +64,10 @@ async fn main(spawner: Spawner) {
     supply::wait_and_watch();
     heartbeat::set_up(parts.heartbeat);
     let (memory, calibration) = CalibrationMemory::open(parts.flash);
-    // The cycle counter runs from here on: outputs may wait for it.
-    let clock = Clock::new(parts.timer, &mut core);
     let hardware = Hardware {
         encoders: parts.encoders,
-        amplifiers: Off::new(parts.outputs, parts.enable, FULL_SCALE_A),
-        clock,
+        amplifiers: parts.amplifiers,
+        clock: Clock::new(parts.timer),
         full_scale_a: FULL_SCALE_A,
         calibration,
         motors: motor_memory::begin(boot.cause),
