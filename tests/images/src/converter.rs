@@ -78,6 +78,18 @@ impl Converter {
     /// The SPI's status.
     #[must_use]
     pub fn status(&self, others: u32) -> u32 {
+    /// The chip was reset, and the converter was not: it keeps its registers, and with them
+    /// its outputs. Nothing ties CLR to the chip's reset here. Time begins anew.
+    #[must_use]
+    pub fn after_reset(self) -> Self {
+        Self {
+            codes: self.codes,
+            ranges: self.ranges,
+            powered: self.powered,
+            ..Self::default()
+        }
+    }
+
         let sent = self.frame.len() >= FRAME && !self.is_cut;
         others | if sent { EOT } else { 0 }
     }

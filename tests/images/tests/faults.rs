@@ -316,3 +316,28 @@ fn a_panic_switches_the_amplifiers_off_before_anything_else() {
         assert_eq!(machine.hard_faults, 0);
     });
 }
+
+/// A reset lets go of the enable line, and an amplifier takes its time to follow: so what it
+/// is commanded matters. A start may also take long.
+#[test]
+fn a_start_after_a_crash_commands_no_current_before_it_does_anything_that_takes_long() {
+    Bench::new().on_each(|device| {
+        let mut machine = device.machine.borrow_mut();
+        let board = machine.chip.board;
+        let (commands, idle) = (machine.bus().commands(), idle(&machine));
+        assert_ne!(commands, [idle; 3], "{board}: it presses");
+        // What was cut off has to be erased at the next start.
+        let (areas, _) = machine.chip.flash.calibrations;
+        machine.patch(areas[0], &[0x5A]);
+        let at = machine.image.message_encoder();
+        machine.patch(at.address, &UNDEFINED);
+        assert_off_at_once_and_for_good(&mut machine);
+        machine.restore(at);
+        machine.reset(Reset::Software);
+        assert_eq!(machine.run_ms(1), Stop::Time, "{board}");
+        assert_eq!(machine.bus().commands(), [idle; 3], "{board}");
+        assert_eq!(machine.run_ms(20), Stop::Time, "{board}");
+        let erases = !machine.bus().usb.is_attached();
+        assert!(erases, "{board}: nothing took long");
+    });
+}

@@ -131,10 +131,14 @@ impl Machine {
         }
     }
 
-    /// Resets the chip. Memory keeps what it holds.
+    /// Resets the chip. Memory keeps what it holds, and what is outside of the chip knows of
+    /// no reset but a power-up.
     pub fn reset(&mut self, cause: Reset) {
         let inputs = self.chip;
-        *self.bus.borrow_mut() = Bus::new(self.chip, cause);
+        let before = self.bus.replace(Bus::new(self.chip, cause));
+        if cause != Reset::PowerUp {
+            self.bus().converter = before.converter.after_reset();
+        }
         self.protect();
         self.set_input(inputs.emergency_stop, false);
         self.set_input(inputs.dead_man, true);
