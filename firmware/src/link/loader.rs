@@ -1,5 +1,6 @@
 //! The way into the loader in the chip's ROM, for an update without a debug probe.
 
+use hapterra_core::tick::Command;
 use hapterra_core::wire::request::Refusal;
 
 use super::Link;
@@ -23,11 +24,14 @@ impl<const D: usize> Link<'_, D> {
     }
 
     /// Whether the board is to enter its loader: the host has asked for it, has been
-    /// answered, and the amplifiers are off.
+    /// answered, the amplifiers are off, and the loop holds no output any more.
     #[must_use]
     pub fn enters_loader(&self) -> bool {
         let is_wanted = self.loader == LoaderEntry::Wanted;
-        is_wanted && self.tx.is_empty() && self.device.may_change_settings().is_ok()
+        is_wanted
+            && self.tx.is_empty()
+            && self.ends.commands.is_empty()
+            && self.device.may_change_settings().is_ok()
     }
 
     /// Whether the board is on its way into its loader, where nothing else is done.
@@ -48,6 +52,9 @@ impl<const D: usize> Link<'_, D> {
         if self.device.is_storing() {
             return Err(Refusal::Busy);
         }
+        // It ends outputs that are held, too: a converter outside of the chip would keep them
+        // through the whole update.
+        self.command(Command::Disarm);
         self.loader = LoaderEntry::Wanted;
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! The way into the loader in the chip's ROM.
 
+use hapterra_core::Vec3;
 use hapterra_core::guard::Mode;
 use hapterra_core::scene::Source;
 use hapterra_core::wire::request::{Refusal, Request};
@@ -85,4 +86,17 @@ fn a_device_goes_only_when_its_answer_has_left_it() {
     rig.run(1);
     assert_eq!(rig.answers(TO_ENTER), [Ok(())]);
     assert!(enters(&rig));
+}
+
+#[test]
+fn outputs_that_are_held_are_let_go_before_the_loader_is_entered() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    rig.device.link.offer_loader();
+    rig.ask(Request::HoldOutputs(Some([1.0; 3])));
+    rig.run(5);
+    assert_ne!(rig.device.tick(rig.sense).held, Vec3::ZERO, "held");
+    rig.ask(Request::EnterLoader);
+    rig.run(5);
+    assert!(enters(&rig));
+    assert_eq!(rig.device.tick(rig.sense).held, Vec3::ZERO);
 }
