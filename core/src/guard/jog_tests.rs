@@ -121,6 +121,31 @@ fn it_takes_a_press_and_is_over_when_it_is_over() {
     assert!(bench.drives.iter().all(|drive| !drive.enabled));
 }
 
+/// Also where no tick came in between, and in the tick after its force has gone out.
+#[test]
+fn a_plain_arm_does_not_arm_for_a_jog_of_before() {
+    let mut storage = FieldStorage::<1>::new();
+    let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
+    for between in [Some(Command::Disarm), None] {
+        bench.say(Command::Jog(JOG));
+        between.into_iter().for_each(|command| bench.say(command));
+        bench.say(Command::Arm);
+        (0..100).for_each(|_| _ = bench.tick(held));
+        let refused = bench.report().decision.refused;
+        assert!(refused.contains(Blockers::NO_SCENE), "{refused:?}");
+    }
+    bench.jog(JOG, 1_500, held);
+    assert!(bench.report().mode.drives());
+    bench.say(Command::Disarm);
+    while bench.report().mode.drives() {
+        bench.tick(held);
+    }
+    bench.say(Command::Arm);
+    bench.sense.dead_man = false;
+    (0..100).for_each(|_| _ = bench.tick(held));
+    assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
+}
+
 #[test]
 fn whatever_blocks_arming_blocks_a_jog() {
     let mut storage = FieldStorage::<1>::new();

@@ -270,9 +270,13 @@ impl Guard {
         self.stop();
     }
 
-    /// The host asks to arm.
+    /// The host asks to arm. A jog that was asked for before, and has driven nothing, is
+    /// forgotten; one under way goes on.
     pub fn arm(&mut self) {
         self.hold.end();
+        if !self.mode().drives() {
+            self.jog = None;
+        }
         self.arming.request();
     }
 
