@@ -9,7 +9,8 @@
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, Flex, Pull};
 use embassy_stm32::pac::timer::vals::{Bkp, FilterValue, Ossi};
-use embassy_stm32::pac::{SYSCFG, TIM1};
+use embassy_stm32::pac::gpio::vals::Odr;
+use embassy_stm32::pac::{GPIOF, SYSCFG, TIM1};
 use embassy_stm32::peripherals::PE15;
 use embassy_stm32::timer::{BkIn1, BreakInputPin};
 
@@ -26,6 +27,11 @@ const SYSCFG_CFGR: usize = 0x18 / 4;
 /// Its bits PVDL and CM7L: the supply's comparator, which is locked as it is set up, and
 /// the core's lockup are breaks.
 const SUPPLY_AND_LOCKUP: u32 = 1 << 2 | 1 << 6;
+
+/// Whether the enable pin is high.
+fn amplifiers_are_on() -> bool {
+    GPIOF.odr().read().odr(3) == Odr::HIGH
+}
 
 /// Takes the pin out of the chip's peripherals, as `take_outputs` does.
 macro_rules! take_stop {
@@ -59,11 +65,12 @@ pub(crate) fn new(pin: Peri<'static, PE15>) -> EmergencyStop {
 
 impl Stop for EmergencyStop {
     /// Tells a stop that was too short for the tick to see, too. The outputs come back
-    /// when the stop has been told and is released; the amplifiers are off by then.
+    /// when the stop is released and the amplifiers are off, which is a tick after it was
+    /// told at the earliest: the compare registers still hold the last command until then.
     fn is_pressed(&mut self) -> bool {
         let is_pressed = self.0.is_high();
         let is_broken_off = !TIM1.bdtr().read().moe();
-        if is_broken_off && !is_pressed {
+        if is_broken_off && !is_pressed && !amplifiers_are_on() {
             TIM1.bdtr().modify(|w| w.set_moe(true));
         }
         is_pressed || is_broken_off
