@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::Sense;
+use super::{Fault, Sense};
 use crate::rate::TickRate;
 
 /// How long after the enable an amplifier need not be ready yet, ms. An ESCON's digital
@@ -38,6 +38,8 @@ pub(super) struct Feedback {
     /// The command of the tick before the last, A: a monitor is converted at the
     /// beginning of a tick and read in the next.
     before_a: Vec3,
+    /// Whether currents were measured in the last tick with the amplifiers off, or since.
+    is_measured: bool,
     /// Measured less commanded, averaged, A.
     error_a: Vec3,
 }
@@ -51,6 +53,7 @@ impl Feedback {
             on: 0,
             unready: 0,
             before_a: Vec3::ZERO,
+            is_measured: false,
             error_a: Vec3::ZERO,
         }
     }
@@ -64,23 +67,27 @@ impl Feedback {
     }
 
     /// The amplifiers are off.
-    pub(super) const fn rest(&mut self) {
+    pub(super) const fn rest(&mut self, sense: &Sense) {
+        self.is_measured = sense.measured_ma.is_some();
         self.on = 0;
         self.unready = 0;
     }
 
     /// Takes the commands of the last tick, A (zero while the amplifiers are off), and
-    /// returns whether a measured current is not what was commanded. Without monitors
-    /// there is nothing to compare.
-    pub(super) fn disagrees(&mut self, sense: &Sense, commanded_a: Vec3) -> bool {
+    /// returns the fault that a measured current is not what was commanded. Without monitors
+    /// there is nothing to compare; monitors that are there no more, while the amplifiers are
+    /// `on`, are a fault of the board's wiring.
+    pub(super) fn check(&mut self, sense: &Sense, commanded_a: Vec3, on: bool) -> Option<Fault> {
         let Some([a, b, c]) = sense.measured_ma else {
-            return false;
+            return (on && self.is_measured).then_some(Fault::Hardware);
         };
+        self.is_measured = true;
         let before_a = core::mem::replace(&mut self.before_a, commanded_a);
         let measured_a = Vec3::new(f32::from(a), f32::from(b), f32::from(c)) * 1e-3;
         self.error_a += (measured_a - before_a - self.error_a) * self.share;
         let tolerance_a = Vec3::splat(CURRENT_TOLERANCE_A);
         // Written so that what is not a number disagrees.
-        !self.error_a.abs().cmple(tolerance_a).all()
+        let agrees = self.error_a.abs().cmple(tolerance_a).all();
+        (!agrees).then_some(Fault::CurrentMismatch)
     }
 }

@@ -20,8 +20,9 @@ impl Guard {
         if !around.zeroed || jumped {
             self.counts = None;
         }
-        if self.feedback.disagrees(sense, self.currents_a) {
-            self.trip(Fault::CurrentMismatch);
+        let is_on = self.mode().drives();
+        if let Some(fault) = self.feedback.check(sense, self.currents_a, is_on) {
+            self.trip(fault);
         }
         // A jog does not outlive its arming.
         if self.mode() == Mode::Disarmed {
@@ -107,7 +108,7 @@ impl Guard {
 
     fn watch_undriven(&mut self, sense: &Sense, around: &Surroundings<'_>) {
         self.motors.heat(Vec3::ZERO);
-        self.feedback.rest();
+        self.feedback.rest(sense);
         self.hold.pass();
         self.speed.restart(sense.counts);
         let blockers = self.find_blockers(sense, around);

@@ -120,3 +120,21 @@ fn without_monitors_nothing_is_compared() {
     bench.ticks(1_000);
     assert_eq!(bench.guard.report().fault, None);
 }
+
+#[test]
+fn monitors_that_are_gone_while_armed_are_a_fault_and_none_at_all_are_not() {
+    let mut bench = Bench::armed();
+    (0..300).for_each(|_| _ = bench.tick());
+    assert_eq!(bench.guard.report().fault, None, "there never were any");
+    bench.sense.measured_ma = Some([0; 3]);
+    bench.tick();
+    bench.sense.measured_ma = None;
+    assert_eq!(ticks_until(&mut bench, Fault::Hardware, 2), 1);
+    // Off, they may come and go.
+    bench.guard.clear();
+    for measured in [Some([0; 3]), None, Some([0; 3]), None] {
+        bench.sense.measured_ma = measured;
+        (0..3).for_each(|_| _ = bench.tick());
+    }
+    assert_eq!(bench.guard.report().fault, None);
+}
