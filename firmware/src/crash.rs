@@ -17,9 +17,20 @@ pub const CRASH_BYTES: usize = 60;
 
 /// "HAPX".
 const MAGIC: u32 = 0x4841_5058;
+/// "HAPB": of a bare record.
+const BARE: u32 = 0x4841_5042;
 
 /// The check sum of what is kept over a reset.
 pub(crate) static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// All kinds of ends.
+const KINDS: [CrashKind; 5] = [
+    CrashKind::Panic,
+    CrashKind::HardFault,
+    CrashKind::UnhandledInterrupt,
+    CrashKind::StackOverflow,
+    CrashKind::SupplyLow,
+];
 
 /// A crash as plain bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +39,20 @@ pub struct CrashRecord([u8; CRASH_BYTES]);
 impl CrashRecord {
     /// What the memory holds when there is nothing to tell.
     pub const NONE: Self = Self([0; CRASH_BYTES]);
+
+    /// What is written first: the kind of end alone, made without a serialiser, a check sum
+    /// or a call. It stays where making the whole record fails.
+    #[must_use]
+    pub const fn bare(kind: CrashKind) -> Self {
+        let words = [BARE, !BARE, kind as u32, !(kind as u32)];
+        let mut bytes = [0; CRASH_BYTES];
+        let mut at = 0;
+        while at < 4 * words.len() {
+            bytes[at] = words[at / 4].to_le_bytes()[at % 4];
+            at += 1;
+        }
+        Self(bytes)
+    }
 
     /// A panic in `line` of `file`, `tick` ticks after the start.
     #[must_use]
@@ -93,6 +118,17 @@ impl CrashRecord {
     /// Reads what the memory holds; nothing if that is no crash.
     #[must_use]
     pub fn read(bytes: &[u8; CRASH_BYTES]) -> Option<Crash> {
+        if let Some(kind) = KINDS.into_iter().find(|kind| Self::bare(*kind).0 == *bytes) {
+            return Some(Crash {
+                kind,
+                pc: 0,
+                lr: 0,
+                status: 0,
+                line: 0,
+                tick: 0,
+                file: String::new(),
+            });
+        }
         let read = postcard::take_from_bytes_crc32(bytes, CRC.digest());
         let ((magic, crash), rest): ((u32, Crash), _) = read.ok()?;
         (magic == MAGIC && rest.iter().all(|byte| *byte == 0)).then_some(crash)
@@ -146,6 +182,20 @@ mod tests {
         let record = CrashRecord::supply_low(9);
         let crash = CrashRecord::read(record.bytes()).expect("a crash");
         assert_eq!((crash.kind, crash.tick), (CrashKind::SupplyLow, 9));
+    }
+
+    #[test]
+    fn a_bare_record_tells_its_kind_and_no_flipped_bit_of_it_does() {
+        for kind in KINDS {
+            let bare = *CrashRecord::bare(kind).bytes();
+            let crash = CrashRecord::read(&bare).expect("a crash");
+            assert_eq!((crash.kind, crash.pc, crash.tick), (kind, 0, 0));
+            for bit in 0..8 * CRASH_BYTES {
+                let mut bad = bare;
+                bad[bit / 8] ^= 1 << (bit % 8);
+                assert_eq!(CrashRecord::read(&bad), None, "bit {bit}");
+            }
+        }
     }
 
     #[test]

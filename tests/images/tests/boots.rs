@@ -89,6 +89,30 @@ fn a_hard_fault_is_told_after_the_reset_with_its_address() {
 }
 
 #[test]
+fn a_panic_is_told_even_where_its_record_cannot_be_made() {
+    let told = after_reset(Reset::Software, |device| {
+        let record = {
+            let mut machine = device.machine.borrow_mut();
+            let record = machine.image.function_like(&["CrashRecord", "new"]);
+            machine.patch(record.address, &[0x00, 0xDE]);
+            record
+        };
+        run_until_reset(device, Stop::Software, |machine, at| {
+            machine.call_instead(at, machine.image.panicking());
+        });
+        let mut machine = device.machine.borrow_mut();
+        assert_eq!(machine.hard_faults, 1, "making the record failed");
+        machine.restore(record);
+    });
+    for (machine, status) in told {
+        let board = machine.chip.board;
+        let crash = status.boot.crash.expect("a crash");
+        assert_eq!((crash.kind, crash.tick), (CrashKind::Panic, 0), "{board}");
+        assert_eq!(status.health.report.fault, Some(Fault::Panicked), "{board}");
+    }
+}
+
+#[test]
 fn a_reset_by_the_watchdog_alone_is_told_and_a_crash_only_once() {
     let told = after_reset(Reset::Watchdog, |device| {
         run_until_reset(device, Stop::Watchdog, |machine, at| {

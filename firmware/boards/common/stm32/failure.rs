@@ -12,7 +12,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
-use hapterra_core::wire::status::Crash;
+use hapterra_core::wire::status::{Crash, CrashKind};
 use hapterra_firmware::crash::{CRASH_BYTES, CrashRecord};
 
 use super::stack_guard;
@@ -36,7 +36,9 @@ static mut RECORD: MaybeUninit<Bytes> = MaybeUninit::uninit();
 fn panic(info: &PanicInfo<'_>) -> ! {
     stop();
     let (file, line) = info.location().map_or(("", 0), |at| (at.file(), at.line()));
-    end(|| CrashRecord::panic(file, line, ticks()))
+    end(CrashKind::Panic, || {
+        CrashRecord::panic(file, line, ticks())
+    })
 }
 
 /// Switches off without a stack, because the fault may be that there is none left. ARM's
@@ -89,13 +91,15 @@ extern "C" fn after_hard_fault(pc: u32, lr: u32, sp: u32) -> ! {
     // SAFETY: reads of status registers, which have no side effect.
     let (status, address) = unsafe { ((*SCB::PTR).cfsr.read(), (*SCB::PTR).mmfar.read()) };
     let at_guard = status & MMARVALID != 0 && stack_guard::has(address);
-    end(|| {
-        if at_guard || stack_guard::has(sp) {
+    if at_guard || stack_guard::has(sp) {
+        end(CrashKind::StackOverflow, || {
             CrashRecord::stack_overflow(pc, lr, status, ticks())
-        } else {
+        })
+    } else {
+        end(CrashKind::HardFault, || {
             CrashRecord::hard_fault(pc, lr, status, ticks())
-        }
-    })
+        })
+    }
 }
 
 #[exception]
@@ -112,13 +116,15 @@ pub(crate) fn count_tick() {
 #[inline(never)]
 pub(crate) fn unhandled(number: i16) -> ! {
     stop();
-    end(|| CrashRecord::unhandled(number, ticks()))
+    end(CrashKind::UnhandledInterrupt, || {
+        CrashRecord::unhandled(number, ticks())
+    })
 }
 
 /// The end of a program whose supply fell too low.
 pub(crate) fn supply_low() -> ! {
     stop();
-    end(|| CrashRecord::supply_low(ticks()))
+    end(CrashKind::SupplyLow, || CrashRecord::supply_low(ticks()))
 }
 
 /// Amplifiers off before anything else, and no interrupt that could turn them
@@ -131,9 +137,11 @@ fn stop() {
 }
 
 /// Keeps the record, unless there is one of this program already, and resets the chip:
-/// before the watchdog runs nobody else would.
-fn end(record: impl FnOnce() -> CrashRecord) -> ! {
+/// before the watchdog runs nobody else would. A bare record comes first: to make the whole
+/// one takes code that may be what failed.
+fn end(kind: CrashKind, record: impl FnOnce() -> CrashRecord) -> ! {
     if !HAS_ENDED.swap(true, Ordering::Relaxed) {
+        keep(CrashRecord::bare(kind));
         keep(record());
     }
     SCB::sys_reset()
