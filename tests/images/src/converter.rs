@@ -6,9 +6,9 @@
 //! lost. The outputs take 10 µs to power up, and a code that is written meanwhile is lost,
 //! too. What a frame asks to read comes back during the frame after it.
 //!
-//! The emulated core's time moves on every 200 instructions (1.6 µs): two frames with less
-//! between them have nothing between them here. Code that looks at the cycle counter sees
-//! time pass.
+//! The emulated core's time moves on every 200 instructions (1.6 µs), unless a test asks for
+//! less: two frames with less between them have nothing between them here, so a test of
+//! these times looks after every instruction.
 
 /// Registers, as a frame's first byte has them.
 const DATA: u8 = 0b000;
@@ -52,6 +52,9 @@ pub struct Converter {
     pub is_cut: bool,
     /// Whether the wire back is broken: ones are read, by the pull-up.
     pub is_silent: bool,
+    /// How long SYNC was high at least, after a frame that writes and after one that asks
+    /// for a register, ns; zero before there were any.
+    pub shortest_high_ns: (u64, u64),
     /// Frames that were lost because SYNC was high for too short a time, or because the
     /// outputs were not powered up yet.
     pub lost: u32,
@@ -75,9 +78,6 @@ impl Converter {
         self.powered = 0;
     }
 
-    /// The SPI's status.
-    #[must_use]
-    pub fn status(&self, others: u32) -> u32 {
     /// The chip was reset, and the converter was not: it keeps its registers, and with them
     /// its outputs. Nothing ties CLR to the chip's reset here. Time begins anew.
     #[must_use]
@@ -90,6 +90,9 @@ impl Converter {
         }
     }
 
+    /// The SPI's status.
+    #[must_use]
+    pub fn status(&self, others: u32) -> u32 {
         let sent = self.frame.len() >= FRAME && !self.is_cut;
         others | if sent { EOT } else { 0 }
     }
@@ -121,11 +124,14 @@ impl Converter {
             self.frame.clear();
             self.back.clear();
             self.is_lost = self.rose.is_some_and(|(rose_ns, asked)| {
-                let least = match asked {
-                    true => HIGH_AFTER_READ_NS,
-                    false => HIGH_AFTER_WRITE_NS,
+                let (writes, reads) = &mut self.shortest_high_ns;
+                let (least, shortest) = match asked {
+                    true => (HIGH_AFTER_READ_NS, reads),
+                    false => (HIGH_AFTER_WRITE_NS, writes),
                 };
-                now_ns - rose_ns < least
+                let high_ns = now_ns - rose_ns;
+                *shortest = if *shortest == 0 { high_ns } else { high_ns.min(*shortest) };
+                high_ns < least
             });
             self.lost += u32::from(self.is_lost);
         }

@@ -72,7 +72,20 @@ fn no_frame_to_the_converter_comes_too_soon() {
             device.move_to(plane().counts_at([100.0, 100.0], 3.0));
             device.run_ms(40);
             assert!(device.commands().iter().any(|code| *code != 0));
-            assert_eq!(device.machine.borrow().bus().converter.lost, 0);
+            // Time goes on with each instruction: what lies between two frames counts.
+            let mut machine = device.machine.borrow_mut();
+            machine.slice = 1;
+            let _ = machine.take_effects();
+            assert_eq!(machine.run_ticks(3), Stop::Asked);
+            let sent = machine.take_effects().len();
+            assert!(sent >= 9, "{sent} commands");
+            let bus = machine.bus();
+            assert_eq!(bus.converter.lost, 0);
+            // And the test sees what it is for: the data sheet's least, and no more than a
+            // frame's length above it.
+            let (after_write_ns, after_read_ns) = bus.converter.shortest_high_ns;
+            assert!((100..1_000).contains(&after_write_ns), "{after_write_ns}");
+            assert!((200..1_000).contains(&after_read_ns), "{after_read_ns}");
         },
     );
 }
@@ -256,19 +269,6 @@ fn duty_cycles_are_as_fast_as_an_escon_reads_well() {
     }
 }
 
-#[test]
-fn converters_on_the_chip_are_buffered() {
-    for mut machine in machines() {
-        if !matches!(machine.chip.commands, Commands::Converters(_)) {
-            continue;
-        }
-        assert_eq!(machine.run_ms(10), Stop::Time);
-        for mode in [0x5000_083C, 0x5000_0C3C] {
-            // DAC_MCR: MODE1, MODE2: to the pin, with the buffer.
-            assert_eq!(machine.bus().read(mode) & 0x0007_0007, 0);
-        }
-    }
-}
 /// Control registers of the converters on the chip: DAC1's with its channels 1 and 2, and
 /// DAC2's with its channel 1.
 const CONVERTERS: [(u32, u32); 3] = [
@@ -299,3 +299,16 @@ fn no_converter_on_the_chip_is_switched_on_before_it_holds_no_current() {
     }
 }
 
+#[test]
+fn converters_on_the_chip_are_buffered() {
+    for mut machine in machines() {
+        if !matches!(machine.chip.commands, Commands::Converters(_)) {
+            continue;
+        }
+        assert_eq!(machine.run_ms(10), Stop::Time);
+        for mode in [0x5000_083C, 0x5000_0C3C] {
+            // DAC_MCR: MODE1, MODE2: to the pin, with the buffer.
+            assert_eq!(machine.bus().read(mode) & 0x0007_0007, 0);
+        }
+    }
+}
