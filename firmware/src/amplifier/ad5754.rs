@@ -26,9 +26,10 @@ const BIPOLAR_10_V: u16 = 0b100;
 /// Channels A, B and C on, and the reference.
 const POWER_UP: u16 = 0b1_0111;
 /// Bits of a register that are compared: of the range all that it has; of the power
-/// register what was written and the bit that says that the part has shut down, too hot.
+/// register what was written, bit 5 that says that the part has shut down, too hot, and bits
+/// 10 to 7 that say of channels D to A that their output is overloaded. Bit 6 has no meaning.
 const RANGE_BITS: u16 = 0b111;
-const POWER_BITS: u16 = 0b11_1111;
+const POWER_BITS: u16 = 0b111_1011_1111;
 /// What is read in turn: the ranges of A, B and C, the power register, the codes.
 const REGISTERS: u8 = 7;
 /// How long the part may take to power its outputs up, µs: twice what the data sheet asks

@@ -138,11 +138,13 @@ fn nothing_is_switched_on_before_all_of_it_read_back() {
 }
 
 #[test]
-fn a_converter_that_lost_its_range_is_told_within_seven_ticks_and_set_up_when_off() {
+fn a_converter_that_lost_its_range_or_is_overloaded_is_told_within_seven_ticks() {
     for lose in [
         |part: &mut Part| part.range[2] = 0,
         |part: &mut Part| part.power = 0,
         |part: &mut Part| part.power |= 1 << 5,
+        |part: &mut Part| part.power |= 1 << 7,
+        |part: &mut Part| part.power |= 1 << 10,
     ] {
         let (mut on, wires, pin) = on();
         lose(&mut wires.0.borrow_mut());
