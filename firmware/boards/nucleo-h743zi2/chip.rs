@@ -7,6 +7,7 @@ use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::pac::Interrupt;
 use embassy_stm32::pac::adc::regs::{Pcsel, Smpr};
+use embassy_stm32::pac::crs::vals::Syncsrc;
 use embassy_stm32::pac::gpio::vals::Odr;
 use embassy_stm32::peripherals::{IWDG1, TIM3, TIM4, TIM8, USB_OTG_FS};
 use embassy_stm32::usb::{self, Driver, InterruptHandler};
@@ -119,6 +120,7 @@ pub(crate) fn take(p: Peripherals) -> Parts {
     wiring.vbus_detection = false;
     let buffer = USB_BUFFER.take();
     Parts {
+    trim_usb_oscillator();
         amplifiers,
         encoders: TimerEncoders {
             counters: (
@@ -184,6 +186,17 @@ fn compare_supply() {
     pac::PWR.cr1().modify(|w| {
         w.set_pls(6);
         w.set_pvde(true);
+/// Has USB's oscillator follow the start-of-frames of OTG_FS. embassy chooses source 2, which
+/// are those of the other peripheral, OTG_HS: RM0433 and ST's HAL name them USB1 (2) and
+/// USB2 (3). The source can be written only while the recovery is off.
+fn trim_usb_oscillator() {
+    pac::CRS.cr().modify(|w| w.set_cen(false));
+    pac::CRS
+        .cfgr()
+        .modify(|w| w.set_syncsrc(Syncsrc::from_bits(3)));
+    pac::CRS.cr().modify(|w| w.set_cen(true));
+}
+
     });
 }
 

@@ -22,6 +22,8 @@ const ODR: u32 = 0x14;
 const BSRR: u32 = 0x18;
 const AFRL: u32 = 0x20;
 const PORTS: u32 = 11;
+/// CRS_CR: the clock recovery runs.
+const CRS_CEN: u32 = 1 << 5;
 /// DWT's cycle counter.
 const CYCCNT: u32 = 0xE000_1004;
 
@@ -502,6 +504,11 @@ impl Bus {
         if address == self.chip.comparator.exti[2] {
             // What is set is cleared by writing it.
             *self.words.entry(address).or_default() &= !(value & mask);
+            return;
+        }
+        // The clock recovery's settings are locked while it runs.
+        let (recovery, _) = self.chip.recovery;
+        if address == recovery + 4 && self.plain(recovery) & CRS_CEN != 0 {
             return;
         }
         let flags = self.chip.reset_flags;

@@ -148,6 +148,9 @@ pub struct Chip {
     pub external_clock: (u32, u32),
     /// What a halted core stops.
     pub freeze: Freeze,
+    /// The clock recovery of USB's oscillator, and the synchronisation source that is the
+    /// start-of-frame of the USB that is used.
+    pub recovery: (u32, u32),
     /// The outputs' break.
     pub output_break: Option<BreakAt>,
     /// Ready bits.
@@ -253,6 +256,7 @@ pub static G474: Chip = Chip {
     // DBGMCU_APB1FZR1.DBG_IWDG_STOP.
     freeze: Freeze {
         watchdog: (0xE004_2008, 1 << 12),
+    recovery: (0x4000_2000, 0b10),
         outputs: None,
     },
     output_break: None,
@@ -351,6 +355,8 @@ pub static H743: Chip = Chip {
     freeze: Freeze {
         watchdog: (0x5C00_1054, 1 << 18),
         outputs: Some((0x5C00_104C, 1 << 0)),
+    // 0b10 is OTG_HS (USB1), 0b11 is OTG_FS (USB2).
+    recovery: (0x4000_8400, 0b11),
     },
     // SYSCFG_CFGR: PVDL, CM7L.
     output_break: Some(BreakAt {

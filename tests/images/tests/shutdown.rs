@@ -352,3 +352,51 @@ fn no_clock_comes_from_outside_of_the_chip() {
         assert_eq!(machine.bus().read(control) & on, 0, "{board}: it is on");
     }
 }
+
+/// The clock of the core, as the registers of its PLL have it, from the chip's own
+/// oscillator.
+fn core_hz(machine: &Machine) -> u64 {
+    let field = |address, from: u32, bits: u32| {
+        u64::from(machine.bus().read(address) >> from & ((1 << bits) - 1))
+    };
+    match machine.chip.is_m7 {
+        // RCC_PLLCKSELR: DIVM1; RCC_PLL1DIVR: DIVN1, DIVP1.
+        true => {
+            64_000_000 / field(0x5802_4428, 4, 6) * (field(0x5802_4430, 0, 9) + 1)
+                / (field(0x5802_4430, 9, 7) + 1)
+        }
+        // RCC_PLLCFGR: PLLM, PLLN, PLLR.
+        false => {
+            16_000_000 / (field(0x4002_100C, 4, 4) + 1) * field(0x4002_100C, 8, 7)
+                / (2 * field(0x4002_100C, 25, 2) + 2)
+        }
+    }
+}
+
+#[test]
+fn no_core_is_faster_than_it_may_be_with_an_oscillator_that_is_a_hundredth_fast() {
+    for mut machine in machines() {
+        let (board, chip) = (machine.chip.board, machine.chip);
+        assert_eq!(machine.run_ms(20), Stop::Time, "{board}");
+        let hz = core_hz(&machine);
+        assert_eq!(hz, chip.core_hz, "{board}");
+        let fastest_hz = hz + hz / 100;
+        assert!(fastest_hz <= chip.core_at_most_hz, "{board}: {fastest_hz}");
+    }
+}
+
+#[test]
+fn usbs_oscillator_follows_the_usb_that_is_used() {
+    for mut machine in machines() {
+        let board = machine.chip.board;
+        assert_eq!(machine.run_ms(20), Stop::Time, "{board}");
+        let (recovery, source) = machine.chip.recovery;
+        let (control, settings) = (
+            machine.bus().read(recovery),
+            machine.bus().read(recovery + 4),
+        );
+        assert_eq!(settings >> 28 & 3, source, "{board}");
+        // CRS_CR: AUTOTRIMEN, CEN.
+        assert_eq!(control >> 5 & 3, 0b11, "{board}: {control:#x}");
+    }
+}
