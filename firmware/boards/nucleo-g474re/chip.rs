@@ -52,8 +52,11 @@ pub(crate) type Parts = parts::Parts<Outputs, Encoders, UsbDriver, WatchdogTimer
 /// Bits that a current monitor's reading has too many: none of 12.
 pub(crate) const MONITOR_SHIFT: u32 = 0;
 
-/// Samples each channel for 247.5 clocks of 42.5 MHz, 6 µs, so that a monitor may have
-/// tens of kilohms. A sequence of three is done 19 µs after its start.
+/// Time that a sequence of three conversions takes, µs.
+pub(crate) const SEQUENCE_US: u32 = 19;
+
+/// Samples each channel for 247.5 clocks of 42 MHz, 6 µs, so that a monitor may have
+/// tens of kilohms.
 pub(crate) fn sample_slowly(_channels: [u8; 3]) {
     pac::ADC1.smpr().write_value(Smpr(0o6_666_666_666));
     pac::ADC1.smpr2().write_value(Smpr2(0o666_666_666));

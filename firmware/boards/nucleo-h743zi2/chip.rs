@@ -57,8 +57,12 @@ static USB_BUFFER: ConstStaticCell<[u8; 256]> = ConstStaticCell::new([0; 256]);
 /// Bits that a current monitor's reading has too many: it has 16, and 12 are used.
 pub(crate) const MONITOR_SHIFT: u32 = 4;
 
-/// Connects these channels and samples each for 387.5 clocks of 32 MHz, 12 µs, so that a
-/// monitor may have tens of kilohms. A sequence of three is done 37 µs after its start.
+/// Time that a sequence of three conversions takes, µs, on the slower of the chip's revisions.
+pub(crate) const SEQUENCE_US: u32 = 75;
+
+/// Connects these channels and samples each for 387.5 clocks, so that a monitor may have
+/// tens of kilohms: 12 µs at 32 MHz up to revision Y of the chip, 24 µs at 16 MHz from
+/// revision V on, where a fixed divider of two follows the prescaler.
 pub(crate) fn sample_slowly(channels: [u8; 3]) {
     let selected = channels.iter().fold(0, |all, channel| all | 1 << channel);
     pac::ADC1.pcsel().write_value(Pcsel(selected));

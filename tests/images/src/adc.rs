@@ -17,8 +17,9 @@ const JADSTART: u32 = 1 << 3;
 const ADCAL: u32 = 1 << 31;
 /// Bit of CFGR: no queue of injected sequences. With a queue the program cannot start one.
 const JQDIS: u32 = 1 << 31;
-/// How long a sequence takes, ns: three conversions of the slower chip.
-const SEQUENCE_NS: u64 = 38_000;
+/// How long a sequence takes, ns: three conversions of the slower chip in its slower revision,
+/// an H743 of revision V, whose converter halves its clock once more.
+const SEQUENCE_NS: u64 = 75_000;
 
 /// The converter, and the voltages at its channels.
 pub struct Adc {

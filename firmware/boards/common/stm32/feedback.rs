@@ -7,8 +7,12 @@ use embassy_stm32::pac::ADC1 as REGISTERS;
 use embassy_stm32::peripherals::ADC1;
 use hapterra_firmware::amplifier::monitor_ma;
 
+use super::clock::TICK_HZ;
 use super::start::FULL_SCALE_A;
-use crate::chip::{MONITOR_SHIFT, sample_slowly};
+use crate::chip::{MONITOR_SHIFT, SEQUENCE_US, sample_slowly};
+
+// What a tick starts is there in the next one, with a tenth of the period to spare.
+const _: () = assert!(SEQUENCE_US * TICK_HZ <= 900_000);
 
 /// The amplifiers' ready lines and current monitors, axes 1 to 3.
 pub(crate) struct Feedback {
