@@ -17,9 +17,9 @@ struct Board(&'static str, &'static str, Option<u32>);
 
 const BOARDS: [Board; 4] = [
     Board("mps2-an386", "mps2-an386", None),
-    Board("nucleo-g474re", "nucleo-g474re", Some(42_500_000)),
-    Board("nucleo-h743zi2", "nucleo-h743zi2", Some(60_000_000)),
-    Board("nucleo-h743zi2-spi", "nucleo-h743zi2", Some(60_000_000)),
+    Board("nucleo-g474re", "nucleo-g474re", Some(42_000_000)),
+    Board("nucleo-h743zi2", "nucleo-h743zi2", Some(57_000_000)),
+    Board("nucleo-h743zi2-spi", "nucleo-h743zi2", Some(57_000_000)),
 ];
 
 fn main() {

@@ -37,8 +37,8 @@ mod tests {
     use hapterra_core::rate::TickRate;
 
     /// The tick timers of the two chips.
-    const G474: u32 = 42_500_000;
-    const H743: u32 = 60_000_000;
+    const G474: u32 = 42_000_000;
+    const H743: u32 = 57_000_000;
 
     #[test]
     fn one_kilohertz_where_nothing_is_said() {
@@ -48,7 +48,12 @@ mod tests {
     #[test]
     fn what_divides_the_timers_clock_is_taken_and_core_takes_it_too() {
         for (clock, rates) in [
-            (G474, &[1_000, 2_000, 4_000, 5_000, 10_000][..]),
+            (
+                G474,
+                &[
+                    1_000, 2_000, 3_000, 4_000, 5_000, 6_000, 7_000, 8_000, 10_000,
+                ][..],
+            ),
             (
                 H743,
                 &[1_000, 2_000, 3_000, 4_000, 5_000, 6_000, 8_000, 10_000],
@@ -67,14 +72,14 @@ mod tests {
     #[test]
     fn anything_else_is_named_with_what_there_is_instead() {
         for text in [
-            "0", "999", "10001", "3000", "1500", "-1000", "1e3", "fast", "",
+            "0", "999", "10001", "9000", "1500", "-1000", "1e3", "fast", "",
         ] {
             let why = tick_hz(Some(text), "nucleo-g474re", G474).expect_err(text);
             assert_eq!(
                 why,
                 format!(
-                    "HAPTERRA_TICK_HZ is {text:?}; nucleo-g474re can tick 1000, 2000, 4000, \
-                     5000, 10000 times a second"
+                    "HAPTERRA_TICK_HZ is {text:?}; nucleo-g474re can tick 1000, 2000, 3000, \
+                     4000, 5000, 6000, 7000, 8000, 10000 times a second"
                 )
             );
         }

@@ -25,7 +25,7 @@ const BATCH: u64 = 20;
 /// Scenes of every kind of terrain, and of the paper's rule, at least.
 const OF_EACH: usize = 30;
 /// Most instructions that a tick of the contact may take on any scene: with the
-/// chain around it a tick at 10 kHz then fits a processor of 170 MHz.
+/// chain around it a tick at 10 kHz then fits a processor of 168 MHz.
 const MOST: u32 = 12_000;
 
 /// The settings of a scene, and what its ticks cost.

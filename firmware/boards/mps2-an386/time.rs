@@ -1,7 +1,7 @@
 //! The emulated board's time, and when it stands still.
 //!
 //! QEMU runs with `-icount shift=3,sleep=off`: an instruction takes 8 ns of
-//! emulated time (125 million a second, what a 170 MHz Cortex-M4F does at 1.36
+//! emulated time (125 million a second, what a 168 MHz Cortex-M4F does at 1.34
 //! cycles an instruction), and sleeping costs no real time. The board's two timers are
 //! all that it knows of time, so stopping both stops its time. That is how lock-step
 //! works: while the host or the virtual Phantom has to answer first, there is a reason

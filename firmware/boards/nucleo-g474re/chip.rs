@@ -43,8 +43,8 @@ bind_interrupts!(struct Irqs {
 
 pub(crate) type Encoders = TimerEncoders<TIM2, TIM3, TIM4, Input<'static>>;
 pub(crate) type Amplifiers = Off<Outputs, Output<'static>>;
-/// The core has 170,000,000 cycles a second.
-pub(crate) type Clock = CycleClock<170_000_000, 4>;
+/// The core has 168,000,000 cycles a second.
+pub(crate) type Clock = CycleClock<168_000_000, 4>;
 pub(crate) type UsbDriver = Driver<'static, USB>;
 pub(crate) type WatchdogTimer = IWDG;
 pub(crate) type Parts = parts::Parts<Outputs, Encoders, UsbDriver, WatchdogTimer>;
@@ -68,11 +68,12 @@ pub(crate) const fn prepare(_core: &mut Core) {}
 pub(crate) fn configuration() -> Config {
     let mut config = Config::default();
     config.bdma_interrupt_priority = OTHERS;
-    // The chip's own 16 MHz (1 % from 0 to 85 °C): no crystal that can break off.
+    // The chip's own 16 MHz (1 % from 0 to 85 °C): no crystal that can break off. The core
+    // may have 170 MHz and no more, so 168 are meant.
     config.rcc.pll = Some(rcc::Pll {
         source: rcc::PllSource::HSI,
         prediv: rcc::PllPreDiv::DIV4,
-        mul: rcc::PllMul::MUL85,
+        mul: rcc::PllMul::MUL84,
         divp: None,
         divq: None,
         divr: Some(rcc::PllRDiv::DIV2),
@@ -91,11 +92,11 @@ pub(crate) fn configuration() -> Config {
 pub(crate) fn take(p: Peripherals) -> Parts {
     // The enable pin first of all.
     let enable = Output::new(p.PB0, Level::Low, Speed::Low);
+    let outputs = outputs::new(p.DAC1, p.PA4, p.PA5, p.DAC2, p.PA6);
+    let amplifiers = Off::new(outputs, enable, FULL_SCALE_A);
     compare_supply();
     Parts {
         amplifiers,
-    let outputs = outputs::new(p.DAC1, p.PA4, p.PA5, p.DAC2, p.PA6);
-    let amplifiers = Off::new(outputs, enable, FULL_SCALE_A);
         encoders: TimerEncoders {
             counters: (
                 quadrature(p.TIM2, p.PA0, p.PA1),

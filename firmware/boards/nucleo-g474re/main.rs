@@ -1,4 +1,4 @@
-//! NUCLEO-G474RE: Cortex-M4F at 170 MHz, three encoder timers, three DAC
+//! NUCLEO-G474RE: Cortex-M4F at 168 MHz, three encoder timers, three DAC
 //! outputs, USB full speed.
 //!
 //! | what | pin | part |

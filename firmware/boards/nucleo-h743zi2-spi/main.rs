@@ -6,7 +6,7 @@
 //! | encoder 1 A, B | PC6, PC7 | TIM8 |
 //! | encoder 2 A, B | PB4, PB5 | TIM3 |
 //! | encoder 3 A, B | PD12, PD13 | TIM4 |
-//! | converter SCLK, SDIN, SDO, SYNC | PE12, PE14, PE13, PE11 | SPI4 at 7.5 MHz, mode 1; SYNC by hand |
+//! | converter SCLK, SDIN, SDO, SYNC | PE12, PE14, PE13, PE11 | SPI4 at 7.1 MHz, mode 1; SYNC by hand |
 //! | amplifier enable, high is on, pull it down outside | PF3 | |
 //! | emergency stop, closed to ground | PE15 | |
 //! | dead-man switch, closed to ground while held | PF5 | |

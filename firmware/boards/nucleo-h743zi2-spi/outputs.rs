@@ -15,17 +15,17 @@ use hapterra_firmware::amplifier::{Ad5754, FrameBus};
 
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-h743zi2-spi";
-/// At 7.5 MHz half a clock is 67 ns. What the converter sends is valid 40 ns after the
+/// The bus's 114 MHz make 7.1 MHz of it, of which half a clock is 70 ns. What the converter sends is valid 40 ns after the
 /// rising edge and is read at the falling one, with wires of a hand's length. A frame is
-/// 3.2 µs long.
+/// 3.4 µs long.
 const SPI_HZ: u32 = 7_500_000;
 /// A frame's bytes, which is also what the FIFOs surely hold.
 const FRAME: usize = 3;
 /// Looks at the status until a frame is sent. Each takes four cycles of the
-/// bus' 120 MHz at least, so this is 33 µs, ten frames.
+/// bus' 114 MHz at least, so this is 35 µs, ten frames.
 const PATIENCE: u32 = 1_000;
 /// Cycles of the core in a microsecond.
-const CYCLES_PER_US: u32 = 480;
+const CYCLES_PER_US: u32 = 456;
 /// Cycles of the core that SYNC stays high at least: 250 ns, of which the pin's own rise
 /// may take some.
 const SYNC_HIGH: u32 = CYCLES_PER_US / 4;

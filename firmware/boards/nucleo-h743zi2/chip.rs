@@ -22,8 +22,8 @@ use crate::stm32::clock::CycleClock;
 use crate::stm32::encoders::{SafetyInputs, TimerEncoders, quadrature};
 use crate::stm32::feedback::{Feedback, Monitors};
 use crate::stm32::priorities::OTHERS;
-use crate::stm32::{failure, parts};
 use crate::stm32::start::FULL_SCALE_A;
+use crate::stm32::{failure, parts};
 use crate::stop::{EmergencyStop, take_stop};
 
 /// Tiles along the side of the window.
@@ -46,8 +46,8 @@ bind_interrupts!(struct Irqs {
 
 pub(crate) type Encoders = TimerEncoders<TIM8, TIM3, TIM4, EmergencyStop>;
 pub(crate) type Amplifiers = Off<Outputs, Output<'static>>;
-/// The core has 480,000,000 cycles a second.
-pub(crate) type Clock = CycleClock<480_000_000, 8>;
+/// The core has 456,000,000 cycles a second.
+pub(crate) type Clock = CycleClock<456_000_000, 8>;
 pub(crate) type UsbDriver = Driver<'static, USB_OTG_FS>;
 pub(crate) type WatchdogTimer = IWDG1;
 pub(crate) type Parts = parts::Parts<Outputs, Encoders, UsbDriver, WatchdogTimer>;
@@ -85,11 +85,12 @@ pub(crate) fn configuration() -> Config {
     config.dma_interrupt_priority = OTHERS;
     config.mdma_interrupt_priority = OTHERS;
     // The chip's own 64 MHz (1 % from 20 to 105 °C). The board's 8 MHz come from the
-    // ST-LINK, which a user may unplug or reset.
+    // ST-LINK, which a user may unplug or reset. The core may have 480 MHz and no more, so
+    // 456 is meant: the next lower clock that divides into every tick rate.
     config.rcc.pll1 = Some(rcc::Pll {
         source: rcc::PllSource::HSI,
         prediv: rcc::PllPreDiv::DIV32,
-        mul: rcc::PllMul::MUL480,
+        mul: rcc::PllMul::MUL456,
         fracn: None,
         divp: Some(rcc::PllDiv::DIV2),
         divq: None,
@@ -119,12 +120,12 @@ pub(crate) fn take(p: Peripherals) -> Parts {
     let amplifiers = Off::new(take_outputs!(p), enable, FULL_SCALE_A);
     // Before the stop, too, which locks the comparator as it is.
     compare_supply();
+    trim_usb_oscillator();
     let mut wiring = usb::Config::default();
     // The board's power does not come from this connector.
     wiring.vbus_detection = false;
     let buffer = USB_BUFFER.take();
     Parts {
-    trim_usb_oscillator();
         amplifiers,
         encoders: TimerEncoders {
             counters: (
@@ -185,11 +186,6 @@ pub(crate) fn write_back(address: usize, bytes: usize) {
     core.SCB.clean_invalidate_dcache_by_address(address, bytes);
 }
 
-/// Has the supply compared with the highest level there is (2.85 V).
-fn compare_supply() {
-    pac::PWR.cr1().modify(|w| {
-        w.set_pls(6);
-        w.set_pvde(true);
 /// Has USB's oscillator follow the start-of-frames of OTG_FS. embassy chooses source 2, which
 /// are those of the other peripheral, OTG_HS: RM0433 and ST's HAL name them USB1 (2) and
 /// USB2 (3). The source can be written only while the recovery is off.
@@ -201,6 +197,11 @@ fn trim_usb_oscillator() {
     pac::CRS.cr().modify(|w| w.set_cen(true));
 }
 
+/// Has the supply compared with the highest level there is (2.85 V).
+fn compare_supply() {
+    pac::PWR.cr1().modify(|w| {
+        w.set_pls(6);
+        w.set_pvde(true);
     });
 }
 

@@ -1,4 +1,4 @@
-//! NUCLEO-H743ZI2: Cortex-M7 at 480 MHz, three encoder timers, three PWM
+//! NUCLEO-H743ZI2: Cortex-M7 at 456 MHz, three encoder timers, three PWM
 //! outputs for amplifiers that read duty cycles (Maxon ESCON), USB full speed.
 //!
 //! | what | pin | part |

@@ -52,7 +52,7 @@ pub(crate) fn new(pin: Peri<'static, PE15>) -> EmergencyStop {
     unsafe { cfgr.write_volatile(SUPPLY_AND_LOCKUP) };
     TIM1.bdtr().modify(|w| {
         w.set_ossi(Ossi::IDLE_LEVEL);
-        // Eight equal samples of the stop at 7.5 MHz: a microsecond.
+        // Eight equal samples of the stop at 7.1 MHz: a microsecond.
         w.set_bkf(0, FilterValue::FDTS_DIV32_N8);
         w.set_bkp(0, Bkp::ACTIVE_HIGH);
         w.set_bke(0, true);

@@ -38,7 +38,7 @@ mod tests {
 
     #[test]
     fn full_scale_keeps_away_from_what_an_escon_reads_as_a_broken_wire() {
-        // The timer's counts at 240 MHz, and some that are few.
+        // The timer's counts at 228 MHz, and some that are few.
         for max in [60_000, 1_000, 200] {
             for (fraction, end) in [(-1.0, 0.1), (1.0, 0.9)] {
                 let duty = f64::from(duty_code(fraction, max)) / f64::from(max);

@@ -21,12 +21,12 @@ pub const BOARDS: [Board; 4] = [
     Board::new(
         "nucleo-g474re",
         ("STM32G474RETx", Memories::G474),
-        "Cortex-M4F at 170 MHz, three on-chip converters for amplifiers",
+        "Cortex-M4F at 168 MHz, three on-chip converters for amplifiers",
     ),
     Board::new(
         "nucleo-h743zi2",
         ("STM32H743ZITx", Memories::H743),
-        "Cortex-M7 at 480 MHz, three duty cycles for amplifiers",
+        "Cortex-M7 at 456 MHz, three duty cycles for amplifiers",
     ),
     Board::new(
         "nucleo-h743zi2-spi",

@@ -125,6 +125,8 @@ pub struct Chip {
     pub is_m7: bool,
     /// Core clock.
     pub core_hz: u64,
+    /// The fastest core clock of the data sheet.
+    pub core_at_most_hz: u64,
     /// Clock of the timers.
     pub timer_hz: u64,
     /// Memories that code and data may be in: address and bytes.
@@ -146,11 +148,11 @@ pub struct Chip {
     pub brown_out_level: (u32, u32, u32),
     /// Register and bit that switch an external clock on.
     pub external_clock: (u32, u32),
-    /// What a halted core stops.
-    pub freeze: Freeze,
     /// The clock recovery of USB's oscillator, and the synchronisation source that is the
     /// start-of-frame of the USB that is used.
     pub recovery: (u32, u32),
+    /// What a halted core stops.
+    pub freeze: Freeze,
     /// The outputs' break.
     pub output_break: Option<BreakAt>,
     /// Ready bits.
@@ -217,8 +219,9 @@ pub static G474: Chip = Chip {
     chip: "STM32G474RETx",
     variable: "HAPTERRA_G474_ELF",
     is_m7: false,
-    core_hz: 170_000_000,
-    timer_hz: 170_000_000,
+    core_hz: 168_000_000,
+    core_at_most_hz: 170_000_000,
+    timer_hz: 168_000_000,
     memories: &[
         (0x0800_0000, 512 * KIB),
         (0x2000_0000, 128 * KIB),
@@ -253,10 +256,10 @@ pub static G474: Chip = Chip {
     brown_out_level: (0x4002_2020, 8, 4),
     // RCC_CR.HSEON.
     external_clock: (0x4002_1000, 1 << 16),
+    recovery: (0x4000_2000, 0b10),
     // DBGMCU_APB1FZR1.DBG_IWDG_STOP.
     freeze: Freeze {
         watchdog: (0xE004_2008, 1 << 12),
-    recovery: (0x4000_2000, 0b10),
         outputs: None,
     },
     output_break: None,
@@ -314,8 +317,9 @@ pub static H743: Chip = Chip {
     chip: "STM32H743ZITx",
     variable: "HAPTERRA_H743_ELF",
     is_m7: true,
-    core_hz: 480_000_000,
-    timer_hz: 240_000_000,
+    core_hz: 456_000_000,
+    core_at_most_hz: 480_000_000,
+    timer_hz: 228_000_000,
     memories: &[
         (0x0800_0000, 2048 * KIB),
         (0x2000_0000, 128 * KIB),
@@ -351,12 +355,12 @@ pub static H743: Chip = Chip {
     brown_out_level: (0x5200_201C, 2, 3),
     // RCC_CR.HSEON.
     external_clock: (0x5802_4400, 1 << 16),
+    // 0b10 is OTG_HS (USB1), 0b11 is OTG_FS (USB2).
+    recovery: (0x4000_8400, 0b11),
     // DBGMCU_APB4FZ1.DBG_IWDG1, APB2FZ1.DBG_TIM1.
     freeze: Freeze {
         watchdog: (0x5C00_1054, 1 << 18),
         outputs: Some((0x5C00_104C, 1 << 0)),
-    // 0b10 is OTG_HS (USB1), 0b11 is OTG_FS (USB2).
-    recovery: (0x4000_8400, 0b11),
     },
     // SYSCFG_CFGR: PVDL, CM7L.
     output_break: Some(BreakAt {

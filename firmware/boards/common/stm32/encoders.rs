@@ -7,12 +7,12 @@
 //! fault, 128,000 counts a second, a channel keeps its level for 15.6 µs, and the other
 //! channel's edge follows after 7.8 µs.
 //!
-//! | | G474, 170 MHz | H743, 240 MHz |
+//! | | G474, 168 MHz | H743, 228 MHz |
 //! | --- | --- | --- |
-//! | between samples | 0.38 µs | 0.27 µs |
-//! | a pulse up to this is never counted (7 samples) | 2.6 µs | 1.8 µs |
-//! | a level of this is always counted (8 samples) | 3.1 µs | 2.2 µs |
-//! | counts a second beyond which counts are lost | 650,000 | 900,000 |
+//! | between samples | 0.38 µs | 0.28 µs |
+//! | a pulse up to this is never counted (7 samples) | 2.6 µs | 1.9 µs |
+//! | a level of this is always counted (8 samples) | 3.1 µs | 2.3 µs |
+//! | counts a second beyond which counts are lost | 650,000 | 850,000 |
 //!
 //! So the filter takes the longest disturbance that leaves the fastest motion a margin
 //! of five: a speed that is a fault is still counted right, and is told as that fault.

@@ -13,7 +13,7 @@ use crate::stm32::priorities;
 
 /// EXTI's line of the comparator: it rises as the supply falls.
 const LINE: usize = 16;
-/// Core cycles that the comparator gets to settle: 0.2 ms at 480 MHz, 0.6 ms at 170 MHz.
+/// Core cycles that the comparator gets to settle: 0.2 ms at 456 MHz, 0.6 ms at 168 MHz.
 const SETTLE_CYCLES: u32 = 100_000;
 
 /// Waits until the supply is high enough, as the comparator that is on already has it, and watches
