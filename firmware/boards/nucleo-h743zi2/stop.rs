@@ -8,8 +8,8 @@
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, Flex, Pull};
-use embassy_stm32::pac::timer::vals::{Bkp, FilterValue, Ossi};
 use embassy_stm32::pac::gpio::vals::Odr;
+use embassy_stm32::pac::timer::vals::{Bkp, FilterValue, Ossi};
 use embassy_stm32::pac::{GPIOF, SYSCFG, TIM1};
 use embassy_stm32::peripherals::PE15;
 use embassy_stm32::timer::{BkIn1, BreakInputPin};

@@ -130,7 +130,11 @@ impl Converter {
                     false => (HIGH_AFTER_WRITE_NS, writes),
                 };
                 let high_ns = now_ns - rose_ns;
-                *shortest = if *shortest == 0 { high_ns } else { high_ns.min(*shortest) };
+                *shortest = if *shortest == 0 {
+                    high_ns
+                } else {
+                    high_ns.min(*shortest)
+                };
                 high_ns < least
             });
             self.lost += u32::from(self.is_lost);

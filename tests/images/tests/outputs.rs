@@ -290,7 +290,10 @@ fn no_converter_on_the_chip_is_switched_on_before_it_holds_no_current() {
             let commands = bus.commands();
             for (axis, (control, enable)) in CONVERTERS.into_iter().enumerate() {
                 let is_on = bus.read(control) & enable != 0;
-                assert!(!is_on || commands[axis] == 2048, "axis {axis}: {commands:?}");
+                assert!(
+                    !is_on || commands[axis] == 2048,
+                    "axis {axis}: {commands:?}"
+                );
                 were_on[axis] |= is_on;
             }
             were_on == [true; 3]

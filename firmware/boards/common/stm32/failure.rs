@@ -36,9 +36,7 @@ static mut RECORD: MaybeUninit<Bytes> = MaybeUninit::uninit();
 fn panic(info: &PanicInfo<'_>) -> ! {
     stop();
     let (file, line) = info.location().map_or(("", 0), |at| (at.file(), at.line()));
-    end(CrashKind::Panic, || {
-        CrashRecord::panic(file, line, ticks())
-    })
+    end(CrashKind::Panic, || CrashRecord::panic(file, line, ticks()))
 }
 
 /// Switches off without a stack, because the fault may be that there is none left. ARM's
