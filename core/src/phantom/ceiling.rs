@@ -21,6 +21,16 @@ const SPEED_SHARE: f32 = 1.25;
 /// not believed: what the joint then really does would be more than twice what the
 /// force limits count with. Ratios and torque constants of one model differ by less.
 const LEVERAGE_SHARE: f32 = 0.5;
+/// Links may be longer than the preset's by this: a longer link of the record's is a smaller
+/// force for a torque, so the true force would be larger than the one that is clamped.
+const LINK_SHARE: f32 = 1.15;
+/// What the counts of a radian may be of the preset's. More of them under-read every angle
+/// and speed by as much; half of them is what another encoder has.
+const COUNTS_SHARE: (f32, f32) = (0.5, 1.25);
+/// The same where the preset's ratios are a guess.
+const COUNTS_SHARE_OF_A_GUESS: (f32, f32) = (0.5, 2.0);
+/// Stops may be measured wider than the preset's by this: 5°.
+const STOPS_RAD: f32 = 5.0 * (core::f32::consts::PI / 180.0);
 /// Room for the rounding of numbers that were written down in other units.
 const ROUNDING: f32 = 1e-4;
 
@@ -69,6 +79,7 @@ impl Calibration {
             self.max_speed_mm_s,
             SPEED_SHARE * preset.max_speed_mm_s,
         )?;
+        self.check_geometry(&preset)?;
         let leverage = preset.ratio * preset.torque_constant;
         let least = LEVERAGE_SHARE * leverage / self.ratio;
         for axis in 0..3 {
@@ -80,6 +91,62 @@ impl Calibration {
                 Some(axis),
                 value,
                 bound,
+                good,
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Whether the arm is about as large, as finely counted and as free to turn as the model.
+    fn check_geometry(&self, preset: &Self) -> Result<(), BadCalibration> {
+        self.at_most(CalibrationField::L1, self.l1_mm, LINK_SHARE * preset.l1_mm)?;
+        self.at_most(CalibrationField::L2, self.l2_mm, LINK_SHARE * preset.l2_mm)?;
+        self.check_counts(preset)?;
+        let (mine, theirs) = (&self.limits, &preset.limits);
+        let widest = theirs.max_rad + Vec3::splat(STOPS_RAD);
+        self.each_at_most(CalibrationField::MaxAngle, mine.max_rad, widest)?;
+        for axis in 0..3 {
+            let (value, least) = (mine.min_rad[axis], theirs.min_rad[axis] - STOPS_RAD);
+            let bound = self.bound(least, CalibrationField::MinAngle.range().1);
+            let good = value >= least - ROUNDING;
+            bounded(CalibrationField::MinAngle, Some(axis), value, bound, good)?;
+        }
+        self.at_most(
+            CalibrationField::Q2MinusQ3,
+            mine.q2_minus_q3_max_rad,
+            theirs.q2_minus_q3_max_rad + STOPS_RAD,
+        )?;
+        self.at_most(
+            CalibrationField::Q3MinusQ2,
+            mine.q3_minus_q2_max_rad,
+            theirs.q3_minus_q2_max_rad + STOPS_RAD,
+        )
+    }
+
+    /// Whether a radian of each joint has about as many counts as the model's. Where it has
+    /// not, the number that is farther from the preset's is named.
+    fn check_counts(&self, preset: &Self) -> Result<(), BadCalibration> {
+        let (least, most) = match preset.has_guessed_ratios() {
+            true => COUNTS_SHARE_OF_A_GUESS,
+            false => COUNTS_SHARE,
+        };
+        let within =
+            |share: f32| share >= least * (1.0 - ROUNDING) && share <= most * (1.0 + ROUNDING);
+        let of_encoder = self.counts_per_turn / preset.counts_per_turn;
+        for axis in 0..3 {
+            let of_ratio = self.ratio[axis] / preset.ratio[axis];
+            let good = within(of_encoder * of_ratio);
+            let (field, at, value) = match within(of_encoder) {
+                true => (CalibrationField::Ratio, Some(axis), self.ratio[axis]),
+                false => (CalibrationField::CountsPerTurn, None, self.counts_per_turn),
+            };
+            // What this number would be at the preset's counts, beside the other number.
+            let unit = value / (of_encoder * of_ratio);
+            bounded(
+                field,
+                at,
+                value,
+                self.bound(least * unit, most * unit),
                 good,
             )?;
         }
@@ -188,7 +255,7 @@ mod tests {
     type Case = (fn(&mut Calibration), CalibrationField, Option<u8>);
 
     /// Each within the range of its number, so that only the ceiling can refuse it.
-    const RAISED: [Case; 11] = [
+    const RAISED: [Case; 19] = [
         (
             |c| c.peak_current_a.x *= 1.01,
             CalibrationField::PeakCurrent,
@@ -236,9 +303,43 @@ mod tests {
             Some(3),
         ),
         (
-            |c| c.ratio.x *= 0.49,
+            |c| {
+                c.ratio.x *= 0.6;
+                c.torque_constant.x *= 0.8;
+            },
             CalibrationField::TorqueConstant,
             Some(1),
+        ),
+        (|c| c.l1_mm *= 1.2, CalibrationField::L1, None),
+        (|c| c.l2_mm *= 2.0, CalibrationField::L2, None),
+        (
+            |c| {
+                c.ratio.y *= 2.5;
+                c.torque_constant.y /= 2.5;
+            },
+            CalibrationField::Ratio,
+            Some(2),
+        ),
+        (|c| c.ratio.x *= 0.49, CalibrationField::Ratio, Some(1)),
+        (
+            |c| c.counts_per_turn *= 10.0,
+            CalibrationField::CountsPerTurn,
+            None,
+        ),
+        (
+            |c| c.limits.max_rad.z += 0.1,
+            CalibrationField::MaxAngle,
+            Some(3),
+        ),
+        (
+            |c| c.limits.min_rad.y -= 0.1,
+            CalibrationField::MinAngle,
+            Some(2),
+        ),
+        (
+            |c| c.limits.q2_minus_q3_max_rad += 0.1,
+            CalibrationField::Q2MinusQ3,
+            None,
         ),
     ];
 
