@@ -125,7 +125,7 @@ pub(crate) fn take(p: Peripherals) -> Parts {
                 ),
             },
         },
-        flash: Flash::new_blocking(p.FLASH),
+        flash: has_two_banks().then(|| Flash::new_blocking(p.FLASH)),
         timer: p.TIM7,
         usb: Driver::new(p.USB, Irqs, p.PA12, p.PA11),
         watchdog: p.IWDG,
@@ -168,6 +168,12 @@ fn leave_mark() -> bool {
         mark.write_volatile(OURS);
         was_ours
     }
+}
+
+/// Whether the flash has two banks, as the chip is sold. With one, its pages are others than
+/// those that the calibrations are kept in.
+fn has_two_banks() -> bool {
+    pac::FLASH.optr().read().dbank()
 }
 
 /// Has the supply compared with the highest level there is (2.9 V).

@@ -155,7 +155,7 @@ pub(crate) fn take(p: Peripherals) -> Parts {
                 ),
             },
         },
-        flash: Flash::new_blocking(p.FLASH),
+        flash: Some(Flash::new_blocking(p.FLASH)),
         timer: p.TIM7,
         usb: Driver::new_fs(p.USB_OTG_FS, Irqs, p.PA12, p.PA11, buffer, wiring),
         watchdog: p.IWDG1,

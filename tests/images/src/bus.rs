@@ -86,6 +86,8 @@ pub struct Bus {
     busy_until_ns: u64,
     /// The supply.
     pub supply: Supply,
+    /// Bits that option bytes have cleared, of those that the chip is sold with.
+    pub cleared_options: Option<(u32, u32)>,
     /// Whether a debugger has halted the core.
     pub is_halted: bool,
     /// Whether the core has locked up.
@@ -127,6 +129,7 @@ impl Bus {
             erased: vec![],
             busy_until_ns: 0,
             supply: Supply::default(),
+            cleared_options: None,
             is_halted: false,
             is_locked_up: false,
             now_ns: 0,
@@ -368,6 +371,9 @@ impl Bus {
         }
         for (_, bits) in self.chip.set.iter().filter(|(at, _)| *at == address) {
             value |= bits;
+        }
+        if let Some((_, bits)) = self.cleared_options.filter(|(at, _)| *at == address) {
+            value &= !bits;
         }
         for &(_, from, to, width) in self.chip.copies.iter().filter(|c| c.0 == address) {
             let mask = (1 << width) - 1;

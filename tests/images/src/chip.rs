@@ -175,6 +175,8 @@ pub struct Chip {
     pub dead_man: (u32, u32),
     /// Changes in each tick that leaves the amplifiers on.
     pub heartbeat: (u32, u32),
+    /// The status LED.
+    pub led: (u32, u32),
     /// Low while an amplifier is ready, axes 1 to 3.
     pub ready: [(u32, u32); 3],
     /// Closed to ground where the current monitors are wired.
@@ -205,6 +207,7 @@ const fn with_pin([a, b, c, d]: [u32; 4], pin: u32) -> [u32; 4] {
     [a | pin, b | pin, c | pin, d | pin]
 }
 
+const A: u32 = 0;
 const B: u32 = 1;
 const C: u32 = 2;
 const D: u32 = 3;
@@ -285,6 +288,7 @@ pub static G474: Chip = Chip {
     emergency_stop: (C, 0),
     dead_man: (C, 1),
     heartbeat: (D, 2),
+    led: (A, 8),
     ready: [(C, 10), (C, 11), (C, 12)],
     monitors_fitted: (C, 8),
     // ADC1: PC2, PC3, PB1.
@@ -398,6 +402,7 @@ pub static H743: Chip = Chip {
     emergency_stop: (E, 15),
     dead_man: (F, 5),
     heartbeat: (G, 1),
+    led: (B, 0),
     ready: [(F, 12), (F, 13), (F, 14)],
     monitors_fitted: (F, 15),
     // ADC1: PA3, PC0, PB1.

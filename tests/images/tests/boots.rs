@@ -285,3 +285,17 @@ fn a_third_of_the_stack_is_never_used() {
         assert!(3 * stack.high_water <= 2 * stack.size, "{board}: {stack:?}");
     });
 }
+
+#[test]
+fn a_g474_whose_flash_is_one_bank_starts_and_says_that_it_stores_nothing() {
+    on_each(|machine, terrain, scene| {
+        if machine.chip.is_m7 {
+            return;
+        }
+        // FLASH_OPTR.DBANK.
+        machine.bus().cleared_options = Some((0x4002_2020, 1 << 22));
+        let mut device = Device::open(machine, terrain, scene);
+        assert_eq!(device.ask_status().health.report.fault, None);
+        assert_eq!(store(&mut device), Err(Refusal::NoMemory));
+    });
+}

@@ -86,7 +86,17 @@ fn on_a_supply_that_is_too_low_no_program_starts() {
     for mut machine in machines() {
         let board = machine.chip.board;
         machine.set_supply_mv(TOO_LOW_MV);
-        machine.run_ms(50);
+        let led = machine.chip.led;
+        let mut levels = [false; 2];
+        let stop = machine.run_until(120, |m| {
+            levels[usize::from(m.bus().output(led))] = true;
+            false
+        });
+        assert_eq!(
+            (stop, levels),
+            (Stop::Time, [true; 2]),
+            "{board}: it flickers"
+        );
         assert!(!machine.is_attached(), "{board}");
         let idle = (machine.bus().code(0.0) + 0.5) as i32;
         assert_eq!(machine.bus().commands(), [idle; 3], "{board}: meanwhile");

@@ -58,24 +58,29 @@ impl NorFlash for Uncached {
     }
 }
 
-/// The board's memory for calibrations.
-pub(crate) struct CalibrationMemory(RefCell<CalibrationStore<Uncached>>);
+/// The board's memory for calibrations, where it has one.
+pub(crate) struct CalibrationMemory(RefCell<Option<CalibrationStore<Uncached>>>);
 
 impl CalibrationMemory {
     /// Opens the memory and returns what is stored. Makes room for the next record,
-    /// because erasing takes long, and now nothing waits.
-    pub(crate) fn open(flash: Flash<'static, Blocking>) -> (Self, Stored) {
+    /// because erasing takes long, and now nothing waits. Without a flash nothing is stored.
+    pub(crate) fn open(flash: Option<Flash<'static, Blocking>>) -> (Self, Stored) {
+        let Some(flash) = flash else {
+            defmt::warn!("no memory for calibrations: the option bytes give the flash one bank");
+            return (Self(RefCell::new(None)), Stored::Missing);
+        };
         let mut store = CalibrationStore::new(Uncached(flash), CALIBRATIONS, CALIBRATIONS_SIZE);
         let stored = store.load();
         if store.prepare().is_err() {
             defmt::warn!("the memory for calibrations cannot be erased");
         }
-        (Self(RefCell::new(store)), stored)
+        (Self(RefCell::new(Some(store))), stored)
     }
 
     /// Stores a record.
     pub(crate) fn save(&self, calibration: &Calibration) -> Result<(), Refusal> {
-        let saved = self.0.borrow_mut().save(calibration);
+        let mut store = self.0.borrow_mut();
+        let saved = store.as_mut().ok_or(Refusal::NoMemory)?.save(calibration);
         saved.map_err(|why| match why {
             StoreError::Full => Refusal::MemoryFull,
             StoreError::Erase | StoreError::Write => Refusal::MemoryFailed,

@@ -14,7 +14,8 @@ pub(crate) struct Parts<O, E, U, W: PeripheralType + 'static> {
     /// reset the power stages may still be on for the time that their enable input takes.
     pub(crate) amplifiers: Off<O, Output<'static>>,
     pub(crate) encoders: E,
-    pub(crate) flash: Flash<'static, Blocking>,
+    /// None where the flash is not set up as the memory map has it.
+    pub(crate) flash: Option<Flash<'static, Blocking>>,
     pub(crate) timer: Peri<'static, TickTimer>,
     pub(crate) usb: U,
     pub(crate) watchdog: Peri<'static, W>,

@@ -61,7 +61,8 @@ async fn main(spawner: Spawner) {
         resets_below_mv: chip::resets_below_mv(),
     };
     failure::log(boot.crash.as_ref());
-    supply::wait_and_watch();
+    let mut led = parts.led;
+    supply::wait_and_watch(&mut led);
     heartbeat::set_up(parts.heartbeat);
     let (memory, calibration) = CalibrationMemory::open(parts.flash);
     let hardware = Hardware {
@@ -86,6 +87,6 @@ async fn main(spawner: Spawner) {
     priorities::start_tick(chip::HAPTIC_INTERRUPT, Interrupt::TIM6_DAC);
     let mut watchdog = IndependentWatchdog::new(parts.watchdog, WATCHDOG_US);
     watchdog.unleash();
-    spawner.spawn(tasks::supervise(monitor, watchdog, parts.led).expect("started once"));
+    spawner.spawn(tasks::supervise(monitor, watchdog, led).expect("started once"));
     defmt::info!("{} is up", BOARD);
 }
