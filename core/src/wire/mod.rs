@@ -73,10 +73,13 @@
 //! | ended | bye: answered by goodbye; detach: answered by detached; close: the emulated board ends its program | hello of another session: open |
 //!
 //! - A hello of the session that is open is answered and changes nothing. A hello of a
-//!   session that is ended, or of the one before the present one, is stale: it is not
+//!   session that is ended, or of the eight before the present one, is stale: it is not
 //!   heard.
 //! - The session before, of which a hello tells, is the last one that was not detached.
 //!   Who looks does not hide what became of it.
+//! - What waits for a press of the dead-man switch (an arm command before anything is
+//!   driven, a calibration to be stored) ends after 2 s without a frame of the session:
+//!   its host is not there to see what the press does.
 //! - A new session keeps the scene and every tile that is held; samples and requests
 //!   are numbered anew. Where the arm was being armed but nothing is driven yet, that
 //!   is ended: the new host has to ask itself. So it is where its host detaches.

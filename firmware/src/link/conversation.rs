@@ -4,6 +4,15 @@
 use hapterra_core::wire::session::{
     LastSession, SILENCE_S, SampleCount, SessionEnd, SessionNumber,
 };
+use heapless::HistoryBuf;
+
+/// Sessions that are over and are known: a hello of one of them, which some buffer has kept,
+/// opens none.
+const KNOWN: usize = 8;
+
+/// A host that waits for a press says something every half second. One that has said nothing
+/// for so long, ms, is not there to see what the press does.
+const ABSENT_MS: u32 = 2_000;
 
 /// Where the conversation with a host stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +43,7 @@ pub(super) enum Greeting {
 }
 
 /// The present session.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Conversation {
     pub(super) state: SessionState,
     /// The session; any before the first.
@@ -42,13 +51,14 @@ pub(super) struct Conversation {
     /// The number of the hello that opened it.
     pub(super) opened_by: u8,
     last: LastSession,
-    /// The number of the session before, whether it was detached or not; zero where there
-    /// was none.
-    previous: u32,
+    /// The last sessions that are over, the oldest first.
+    over: HistoryBuf<SessionNumber, KNOWN>,
     /// Ticks for which the host may be silent.
     silence_ticks: u32,
     /// The tick of the last frame of this session.
     heard_at: u32,
+    /// It was said that the host has not been heard since.
+    told_absent: bool,
     /// Samples put into telemetry.
     pub(super) packed: u32,
     /// The device's count of dropped samples when the session was opened.
@@ -70,9 +80,10 @@ impl Conversation {
                     dropped: 0,
                 },
             },
-            previous: 0,
+            over: HistoryBuf::new(),
             silence_ticks: 0,
             heard_at: 0,
+            told_absent: false,
             packed: 0,
             dropped_before: 0,
         }
@@ -100,12 +111,13 @@ impl Conversation {
     pub(super) fn greeting(&self, session: SessionNumber) -> Greeting {
         match self.state {
             SessionState::Open if self.session == session => Greeting::Again,
-            _ if self.is_of(session) || self.previous == session.get() => Greeting::Stale,
+            _ if self.is_of(session) || self.over.as_slice().contains(&session) => Greeting::Stale,
             _ => Greeting::Opens,
         }
     }
 
-    /// Begins a session with the hello of this number. `dropped` samples were dropped since the device started.
+    /// Begins a session with the hello of this number. `dropped` samples were dropped since
+    /// the device started.
     pub(super) fn open(&mut self, session: SessionNumber, hello: u8, dropped: u32) {
         let end = match self.state {
             // Who has only looked leaves no trace.
@@ -123,7 +135,7 @@ impl Conversation {
             };
         }
         if self.state != SessionState::Closed {
-            self.previous = self.session.get();
+            self.over.write(self.session);
         }
         self.state = SessionState::Open;
         self.session = session;
@@ -143,12 +155,21 @@ impl Conversation {
     /// A frame of this session came at this tick.
     pub(super) const fn heard(&mut self, tick: u32) {
         self.heard_at = tick;
+        self.told_absent = false;
     }
 
     /// Takes for how long the host may be silent.
     pub(super) fn set_silence(&mut self, seconds: u16, tick_hz: u32) {
         let (least, most) = SILENCE_S;
         self.silence_ticks = u32::from(seconds.clamp(least, most)).saturating_mul(tick_hz);
+    }
+
+    /// Whether the host of the open session has not been heard for [`ABSENT_MS`]; said once
+    /// until it is heard again.
+    pub(super) fn is_absent(&mut self, tick: u32, ticks_per_ms: u32) -> bool {
+        let silent = tick.wrapping_sub(self.heard_at);
+        let is_absent = self.is_open() && silent >= ABSENT_MS.saturating_mul(ticks_per_ms);
+        is_absent && !core::mem::replace(&mut self.told_absent, true)
     }
 
     /// Whether the host of the session that is open, or was detached, has been silent for

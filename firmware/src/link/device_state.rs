@@ -135,8 +135,12 @@ impl DeviceState {
     /// Whether nothing is driven, no arm command waits for the loop and nothing for a
     /// press.
     pub(super) fn is_at_rest(&self) -> bool {
-        let is_waiting = matches!(self.storing, Storing::Waiting(_));
-        !self.drives() && self.arming.is_none() && !is_waiting
+        !self.drives() && self.arming.is_none() && !self.waits_for_press()
+    }
+
+    /// Whether a calibration is stored when somebody presses the dead-man switch.
+    pub(super) const fn waits_for_press(&self) -> bool {
+        matches!(self.storing, Storing::Waiting(_))
     }
 
     /// Takes a report of the loop, which came in tick `now`.
@@ -159,6 +163,15 @@ impl DeviceState {
     pub(super) fn forget_press(&mut self) {
         if matches!(self.storing, Storing::Waiting(_)) {
             self.storing = Storing::No;
+        }
+    }
+
+    /// The host that wanted a calibration stored says nothing any more. It is answered, should
+    /// it come back.
+    pub(super) fn give_up_press(&mut self) {
+        if self.waits_for_press() {
+            self.storing = Storing::No;
+            self.request.stored(Err(Refusal::NotPressed));
         }
     }
 

@@ -67,9 +67,19 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    /// Disarms where the host has been silent for too long, and ends its session.
+    /// Disarms where the host has been silent for too long, and ends its session. What waits
+    /// for a press of the dead-man switch waits no longer than the host is there.
     fn watch_host(&mut self) {
         let now = self.ends.monitor.ticks();
+        let waits = self.device.is_being_armed() || self.device.waits_for_press();
+        if waits
+            && self.ends.commands.ready()
+            && self.conversation.is_absent(now, self.device.ticks_per_ms())
+        {
+            log::forsaken();
+            self.device.give_up_press();
+            self.command(Command::Disarm);
+        }
         if !self.conversation.is_forsaken(now) || !self.device.may_drive {
             return;
         }

@@ -87,6 +87,7 @@ pub async fn run<const D: usize>(
                     loop {
                         board.tick_done().await;
                         link.borrow_mut().poll();
+                        board.after_poll(&**link.borrow());
                         room.signal(());
                     }
                 };

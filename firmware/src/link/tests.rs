@@ -6,3 +6,4 @@ mod faults;
 mod loader;
 mod rig;
 mod session;
+mod task;

@@ -129,7 +129,7 @@ impl<const WRITE: usize, const ERASE: usize> NorFlash for Flash<WRITE, ERASE> {
 
 fn numbered(n: usize) -> Calibration {
     Calibration {
-        l1_mm: 200.0 + n as f32,
+        l1_mm: 100.0 + 0.5 * n as f32,
         ..Calibration::PREMIUM_1_5
     }
 }

@@ -20,9 +20,9 @@ use hapterra_firmware::store::Stored;
 use super::bytes::Bytes;
 use hapterra_core::terrain::FieldSize;
 
-/// The session that is played in, and two others.
+/// The session that is played in, and how many others are opened before it.
 const SESSION: SessionNumber = SessionNumber::new(0);
-const OTHERS: [SessionNumber; 2] = [SessionNumber::new(1), SessionNumber::new(2)];
+const OTHERS: u32 = 16;
 
 /// A device that lives as long as the thread: its memory cannot be had back.
 pub struct Wire {
@@ -95,8 +95,8 @@ impl Wire {
             number: 1,
             request: Request::ClearFault,
         };
-        // Two others first, so that the session is none that the device remembers.
-        for session in OTHERS {
+        // Others first, so that the session is none that the device remembers.
+        for session in (1..=OTHERS).map(SessionNumber::new) {
             self.hear(&message_in(session, &ToDevice::Hello(hello)));
         }
         for said in [ToDevice::Hello(hello), ToDevice::Scene(scene()), clear] {

@@ -142,7 +142,10 @@ fn nothing_is_stored_without_a_press_of_the_dead_man_switch() {
     let before = Stored::Found(Calibration::PREMIUM_1_5);
     rig.ask(set(Calibration::PREMIUM_3_0));
     rig.ask(Request::StoreCalibration);
-    rig.run(9_900);
+    for _ in 0..9 {
+        rig.run(1_100);
+        rig.say(&ToDevice::Alive);
+    }
     assert_eq!(rig.answers(TO_STORE), [], "it may take its time");
     rig.run(400);
     let refused = Err(Refusal::NotPressed);

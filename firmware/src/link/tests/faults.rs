@@ -9,7 +9,7 @@ use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_core::terrain::RETRY_TICKS;
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
 use hapterra_core::wire::message::{BATCH, Heights, TileMessage, ToDevice, ToHost};
-use hapterra_core::wire::request::Request;
+use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_core::wire::session::{SessionEnd, SessionNumber};
 use hapterra_core::wire::version::VersionCheck;
 
@@ -655,4 +655,76 @@ fn a_host_that_floods_is_held_back_not_obeyed() {
     assert!(rig.on_the_way.is_empty());
     let taken = |m: &&ToHost| matches!(m, ToHost::SceneTaken { accepted: true, .. });
     assert_eq!(rig.heard.iter().filter(taken).count(), 501);
+}
+
+#[test]
+fn a_host_that_is_gone_has_no_arm_armed_and_no_record_stored() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    rig.ask(Request::Zero { counts: [0; 3] });
+    rig.ask(Request::Arm);
+    rig.run(3_000);
+    rig.sense.dead_man = true;
+    for _ in 0..3_000 {
+        assert!(!rig.device.tick(rig.sense).enabled);
+    }
+    rig.sense.dead_man = false;
+    rig.ask(Request::StoreCalibration);
+    rig.run(3_000);
+    rig.press();
+    assert_eq!(rig.device.link.to_store(), None);
+    // A host that is there may take its time.
+    rig.ask(Request::Arm);
+    for _ in 0..10 {
+        rig.run(1_000);
+        rig.say(&ToDevice::Alive);
+    }
+    rig.sense.dead_man = true;
+    rig.run(300);
+    assert!(rig.device.tick(rig.sense).enabled);
+}
+
+#[test]
+fn no_hello_of_the_last_sessions_opens_one_again() {
+    let mut rig = Rig::new();
+    rig.say(&ToDevice::Hello(HELLO));
+    rig.run(1);
+    let sessions: Vec<_> = (0..8)
+        .map(|_| {
+            let of = rig.session;
+            rig.greet_anew();
+            rig.run(1);
+            of
+        })
+        .collect();
+    let foreign = rig.status().foreign_frames;
+    for session in sessions {
+        rig.send(&framed(session, &ToDevice::Hello(HELLO)));
+        rig.run(1);
+    }
+    assert_eq!(rig.status().foreign_frames, foreign + 8);
+}
+
+#[test]
+fn nothing_is_armed_while_a_record_is_being_stored() {
+    let mut rig = Rig::in_scene(scene(Source::Encoders));
+    rig.ask(Request::Zero { counts: [0; 3] });
+    rig.ask(Request::StoreCalibration);
+    rig.run(150);
+    rig.sense.dead_man = true;
+    // The loop tells of the press, and the board has not come to store it.
+    (0..100).for_each(|_| _ = rig.device.tick_alone(rig.sense));
+    rig.device.link.poll();
+    assert!(rig.device.link.to_store().is_some());
+    rig.number += 1;
+    let (number, request) = (rig.number, Request::Arm);
+    rig.device
+        .link
+        .receive(&frame(&ToDevice::Request { number, request }));
+    rig.device.link.stored(Ok(()));
+    rig.run(10);
+    let last = rig.heard.iter().rev().find_map(|message| match message {
+        ToHost::Answer(answer) if answer.number == number => Some(answer.result),
+        _ => None,
+    });
+    assert_eq!(last, Some(Err(Refusal::Busy)));
 }

@@ -37,7 +37,7 @@ pub(super) const HELLO: HostHello = HostHello {
 pub(super) const FIRST: SessionNumber = SessionNumber::new(1 << 8);
 
 /// A device without a host. Its memory is leaked, as a board's is never freed.
-fn device(stored: Stored, boot: BootReport) -> Device<StoppedClock, D> {
+pub(super) fn device(stored: Stored, boot: BootReport) -> Device<StoppedClock, D> {
     Device::new(
         Box::leak(Box::new(TileBuffers::VACANT)),
         Box::leak(Box::new(WorkingMemory::new())),
