@@ -324,7 +324,8 @@ fn a_start_after_a_crash_commands_no_current_before_it_does_anything_that_takes_
     Bench::new().on_each(|device| {
         let mut machine = device.machine.borrow_mut();
         let board = machine.chip.board;
-        let (commands, idle) = (machine.bus().commands(), idle(&machine));
+        let commands = machine.bus().commands();
+        let idle = idle(&machine);
         assert_ne!(commands, [idle; 3], "{board}: it presses");
         // What was cut off has to be erased at the next start.
         let (areas, _) = machine.chip.flash.calibrations;

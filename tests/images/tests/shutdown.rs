@@ -401,10 +401,8 @@ fn usbs_oscillator_follows_the_usb_that_is_used() {
         let board = machine.chip.board;
         assert_eq!(machine.run_ms(20), Stop::Time, "{board}");
         let (recovery, source) = machine.chip.recovery;
-        let (control, settings) = (
-            machine.bus().read(recovery),
-            machine.bus().read(recovery + 4),
-        );
+        let control = machine.bus().read(recovery);
+        let settings = machine.bus().read(recovery + 4);
         assert_eq!(settings >> 28 & 3, source, "{board}");
         // CRS_CR: AUTOTRIMEN, CEN.
         assert_eq!(control >> 5 & 3, 0b11, "{board}: {control:#x}");
