@@ -22,6 +22,10 @@ const ODR: u32 = 0x14;
 const BSRR: u32 = 0x18;
 const AFRL: u32 = 0x20;
 const PORTS: u32 = 11;
+/// RCC_CR of an H743 and its bit for PLL1, and RCC_PLLCKSELR's offset.
+const H743_RCC: u32 = 0x5802_4400;
+const PLL1ON: u32 = 1 << 24;
+const PLLCKSELR: u32 = 0x28;
 /// CRS_CR: the clock recovery runs.
 const CRS_CEN: u32 = 1 << 5;
 /// DWT's cycle counter.
@@ -493,8 +497,13 @@ impl Bus {
         true
     }
 
-    /// The bits of a register that PVDL keeps from being written: the comparator's.
+    /// The bits of a register that cannot be written: the comparator's, once PVDL is set, and
+    /// the source and the prescaler of an H743's PLL1 while that is on.
     fn locked(&self, address: u32) -> u32 {
+        let pll_is_on = self.plain(H743_RCC) & PLL1ON != 0;
+        if self.chip.is_m7 && address == H743_RCC + PLLCKSELR && pll_is_on {
+            return 0x3F3;
+        }
         let (control, on, level) = self.chip.comparator.control;
         let locks = |at: &BreakAt| self.plain(at.system.0) & at.system.1 != 0;
         match address == control && self.chip.output_break.as_ref().is_some_and(locks) {
