@@ -36,8 +36,8 @@ pub enum Command<'t> {
     Disarm,
     /// These are the counts in the zero pose of the calibration record.
     Zero([i32; 3]),
-    /// Clear a latched fault.
-    ClearFault,
+    /// Clear the latched fault, if it is this one.
+    ClearFault(Option<Fault>),
     /// Latch a fault found outside the tick.
     Trip(Fault),
     /// Hold the outputs at these shares of full scale, -1 to 1, with the amplifiers off,
@@ -168,7 +168,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             }
             Command::Disarm => self.guard.disarm(),
             Command::Zero(counts) => self.take_zero(counts),
-            Command::ClearFault => self.guard.clear(),
+            Command::ClearFault(seen) => self.guard.clear_seen(seen),
             Command::Trip(fault) => self.guard.trip(fault),
             Command::HoldOutputs(shares) => self.guard.hold(shares),
         }

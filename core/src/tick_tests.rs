@@ -234,7 +234,13 @@ fn a_fault_is_latched_until_cleared_and_counts_lost_have_to_be_zeroed() {
     for _ in 0..3 {
         assert_eq!(device.tick([5000, 0, 0]).drive, Drive::default());
     }
-    device.say(Command::ClearFault);
+    // Only the one that was seen.
+    device.say(Command::ClearFault(Some(Fault::Hardware)));
+    assert_eq!(
+        device.tick([5000, 0, 0]).sample.fault,
+        Some(Fault::EncoderJump)
+    );
+    device.say(Command::ClearFault(Some(Fault::EncoderJump)));
     let outcome = device.tick([0; 3]);
     assert_eq!((outcome.sample.fault, outcome.drive.enabled), (None, false));
     let blockers = device.haptics.report().blockers;

@@ -118,7 +118,7 @@ fn sensible_talk(chance: &mut Chance) -> Vec<u8> {
             }),
             2 => ToDevice::Request {
                 number: seq as u8 + 2,
-                request: Request::ClearFault,
+                request: Request::ClearFault { seen: None },
             },
             _ => ToDevice::Point(Point { seq, hip }),
         };

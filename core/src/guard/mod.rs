@@ -270,6 +270,13 @@ impl Guard {
         self.stop();
     }
 
+    /// Clears the fault as [`Self::clear`] does if it is the one that somebody has seen.
+    pub fn clear_seen(&mut self, seen: Option<Fault>) {
+        if self.fault.is_none() || self.fault == seen {
+            self.clear();
+        }
+    }
+
     /// The host asks to arm. A jog that was asked for before, and has driven nothing, is
     /// forgotten; one under way goes on.
     pub fn arm(&mut self) {

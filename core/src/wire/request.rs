@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::guard::{Blockers, Jog};
+use crate::guard::{Blockers, Fault, Jog};
 use crate::phantom::{BadCalibration, Calibration};
 
 /// What a host asks a device to do. New kinds go to the end.
@@ -34,8 +34,13 @@ pub enum Request {
     /// pressed the dead-man switch, which no host can. Only while disarmed. Answered when
     /// it is stored.
     StoreCalibration,
-    /// To clear a latched fault.
-    ClearFault,
+    /// To clear a latched fault: the one that the user has seen. Another one, which came
+    /// after what the user was shown, stays ([`Refusal::Blocked`]). Its field is none where
+    /// no fault was shown; it then clears none.
+    ClearFault {
+        /// The fault that was shown.
+        seen: Option<Fault>,
+    },
     /// To drop the scene: disarms, and force goes out gently.
     DropScene,
     /// To enter the loader in the chip's ROM, for an update. Only while disarmed.

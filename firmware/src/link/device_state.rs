@@ -1,7 +1,7 @@
 //! What the link knows of the device (its arm, calibration and last start), and
 //! what of it the host has yet to be told.
 
-use hapterra_core::guard::{Blockers, Limits, Mode, Report};
+use hapterra_core::guard::{Blockers, Fault, Limits, Mode, Report};
 use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::scene::Health;
 use hapterra_core::scene::Scene;
@@ -192,6 +192,14 @@ impl DeviceState {
         match self.health.report.mode {
             Mode::Disarmed => Ok(()),
             _ => Err(Refusal::NotWhileArmed),
+        }
+    }
+
+    /// Only the fault that was seen is cleared.
+    pub(super) fn may_clear(&self, seen: Option<Fault>) -> Result<(), Refusal> {
+        match self.health.report.fault {
+            Some(fault) if Some(fault) != seen => Err(Refusal::Blocked(Blockers::FAULT_LATCHED)),
+            _ => Ok(()),
         }
     }
 

@@ -259,7 +259,7 @@ impl<'t, const D: usize> Link<'t, D> {
                 | Command::Point(_)
                 | Command::Disarm
                 | Command::Zero(_)
-                | Command::ClearFault
+                | Command::ClearFault(_)
                 | Command::Trip(_)
         );
         self.commands_taken = false;

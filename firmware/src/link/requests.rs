@@ -114,7 +114,10 @@ impl<const D: usize> Link<'_, D> {
                 refused => refused,
             },
             Request::Disarm => self.obey(Command::Disarm),
-            Request::ClearFault => self.obey(Command::ClearFault),
+            Request::ClearFault { seen } => self
+                .device
+                .may_clear(seen)
+                .and_then(|()| self.obey(Command::ClearFault(seen))),
             Request::Zero { counts } => self
                 .device
                 .may_change_settings()

@@ -195,7 +195,10 @@ impl<'d, 't> Board<'d, 't> {
     /// Disarms, clears what the step has latched and drops its scene, whatever the
     /// board says to that.
     pub(super) fn leave(&mut self) {
-        for request in [Request::Disarm, Request::DropScene, Request::ClearFault] {
+        let latched = self.dialogue.fresh_status().ok();
+        let seen = latched.and_then(|status| status.health.report.fault);
+        let clear = Request::ClearFault { seen };
+        for request in [Request::Disarm, Request::DropScene, clear] {
             // The board may be gone; then nothing is left to be done.
             let _ = self.dialogue.request(&request);
         }

@@ -36,9 +36,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         if args.disarm {
             dialogue.request(&Request::Disarm)?.map_err(Failure::new)?;
         }
-        print!("{}", text(&dialogue.fresh_status()?));
+        let status = dialogue.fresh_status()?;
+        print!("{}", text(&status));
         if args.clear {
-            let answer = dialogue.request(&Request::ClearFault)?;
+            let seen = status.health.report.fault;
+            let answer = dialogue.request(&Request::ClearFault { seen })?;
             answer.map_err(Failure::new)?;
             let cleared = match dialogue.fresh_status()?.health.report.fault {
                 None => "no fault is latched any more".to_owned(),

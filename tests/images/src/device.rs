@@ -131,7 +131,8 @@ impl<'t> Device<'t> {
         device.request(Request::SetCalibration { calibration });
         device.run_ms(10);
         // The board may have found one when it started.
-        device.request(Request::ClearFault);
+        let seen = device.guard.and_then(|report| report.fault);
+        device.request(Request::ClearFault { seen });
         device.request(Request::Zero { counts: [0; 3] });
         device.request(Request::Arm);
         device.run_ms(30);

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use hapterra::link::{Ask, Client, Event, LinkError, Patience, State};
 use hapterra::terrain::Terrain;
+use hapterra_core::guard::Fault;
 use hapterra_core::scene::{Sample, Scene};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
@@ -41,6 +42,8 @@ pub struct Host<'t> {
     pub samples: Vec<Sample>,
     /// The last answer to a question for the status.
     pub status: Option<Status>,
+    /// The fault that was last told.
+    pub fault: Option<Fault>,
     /// A link error that no fault of a link may cause.
     pub failed: Option<LinkError>,
 }
@@ -57,6 +60,7 @@ impl<'t> Host<'t> {
             to_host: Pipe::default(),
             samples: Vec::new(),
             status: None,
+            fault: None,
             failed: None,
         }
     }
@@ -156,11 +160,13 @@ impl<'t> Host<'t> {
             client,
             samples,
             status,
+            fault,
             ..
         } = self;
         let mut on = |event: Event<'_>| match event {
             Event::Sample(sample) => samples.push(*sample),
             Event::Status(told) => *status = Some(told.clone()),
+            Event::Guard(report) => *fault = report.fault,
             _ => {}
         };
         if let Err(error) = client.receive(time(now), bytes, out, &mut on) {

@@ -308,7 +308,10 @@ impl<'t> Stretch<'t> {
             let at = self.now - began;
             match at {
                 30 => self.host.request(Request::Disarm),
-                40 => self.host.request(Request::ClearFault),
+                40 => {
+                    let seen = self.host.fault;
+                    self.host.request(Request::ClearFault { seen });
+                }
                 50 => self.say_zero(),
                 ASK => self.host.request(Request::Arm),
                 PRESS => self.dead_man = true,

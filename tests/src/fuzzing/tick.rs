@@ -45,7 +45,8 @@ pub fn run(data: &[u8]) {
                 spare = haptics.accept(Command::Tile(tile));
             }
             3 => {
-                let _ = haptics.accept(Command::ClearFault);
+                let seen = haptics.report().fault;
+                let _ = haptics.accept(Command::ClearFault(seen));
             }
             4 => {
                 let _ = haptics.accept(Command::Trip(Fault::Hardware));

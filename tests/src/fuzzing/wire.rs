@@ -3,7 +3,7 @@
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::guard::Sense;
+use hapterra_core::guard::{Fault, Sense};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
@@ -91,16 +91,19 @@ impl Wire {
             number: 1,
             silence_s: DEFAULT_SILENCE_S,
         };
-        let clear = ToDevice::Request {
-            number: 1,
-            request: Request::ClearFault,
-        };
         // Others first, so that the session is none that the device remembers.
         for session in (1..=OTHERS).map(SessionNumber::new) {
             self.hear(&message_in(session, &ToDevice::Hello(hello)));
         }
-        for said in [ToDevice::Hello(hello), ToDevice::Scene(scene()), clear] {
+        for said in [ToDevice::Hello(hello), ToDevice::Scene(scene())] {
             self.hear(&message(&said));
+        }
+        // Whichever is latched. The last of these requests has the number 1.
+        let first = 2_u8.wrapping_sub(Fault::ALL.len() as u8);
+        for (fault, number) in Fault::ALL.into_iter().zip(0..) {
+            let number = first.wrapping_add(number);
+            let request = Request::ClearFault { seen: Some(fault) };
+            self.hear(&message(&ToDevice::Request { number, request }));
         }
         let _ = self.device.tick(Sense::default());
         self.listen();

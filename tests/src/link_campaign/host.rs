@@ -101,7 +101,9 @@ impl<'t> Host<'t> {
     pub fn arm(&mut self) {
         self.asked = true;
         let zero = Request::Zero { counts: [0; 3] };
-        for request in [Request::ClearFault, zero, Request::Arm] {
+        let seen = self.view.and_then(|view| view.fault);
+        let clear = Request::ClearFault { seen };
+        for request in [clear, zero, Request::Arm] {
             self.client.ask(Ask::Request(request));
         }
     }

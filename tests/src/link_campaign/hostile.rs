@@ -119,7 +119,7 @@ fn host_request(chance: &mut Chance) -> Request {
         Request::SetCalibration { calibration },
         Request::StoreCalibration,
         Request::DropScene,
-        Request::ClearFault,
+        Request::ClearFault { seen: None },
     ][chance.below(6)]
 }
 

@@ -117,7 +117,8 @@ fn after_a_fault_it_takes_a_clearing_a_command_and_a_new_press() {
     bed = bed.run(PRESSED + 900);
     let refused = Err(Refusal::Blocked(Blockers::FAULT_LATCHED));
     assert_eq!(bed.answers.last().map(|(_, result)| *result), Some(refused));
-    bed.ask(Request::ClearFault);
+    let seen = Some(Fault::DeadManReleased);
+    bed.ask(Request::ClearFault { seen });
     bed.ask(Request::Arm);
     bed = bed.run(5_890);
     let report = bed.reports.last().expect("told");
@@ -253,7 +254,8 @@ fn what_was_found_at_boot_has_to_be_cleared_first() {
     assert_eq!(bed.answers.last().map(|(_, result)| *result), Some(refused));
     let fault = bed.reports.last().and_then(|r| r.fault);
     assert_eq!(fault, Some(Fault::WatchdogReset));
-    bed.ask(Request::ClearFault);
+    let seen = Some(Fault::WatchdogReset);
+    bed.ask(Request::ClearFault { seen });
     bed.ask(Request::Arm);
     bed = bed.run(3_300);
     assert_eq!(bed.samples.last().map(|s| s.mode), Some(Mode::Armed));
@@ -265,7 +267,8 @@ fn what_was_found_at_boot_has_to_be_cleared_first() {
     let mut bed = Bed::started(&terrain, script(), pressed_twice, damaged).run(500);
     let fault = bed.reports.last().and_then(|r| r.fault);
     assert_eq!(fault, Some(Fault::CalibrationCorrupt));
-    bed.ask(Request::ClearFault);
+    let seen = Some(Fault::CalibrationCorrupt);
+    bed.ask(Request::ClearFault { seen });
     bed.ask(Request::Arm);
     bed = bed.run(700);
     let refused = Err(Refusal::Blocked(Blockers::NO_CALIBRATION));

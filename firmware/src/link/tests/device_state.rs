@@ -76,10 +76,19 @@ fn a_fault_is_latched_reported_and_cleared_on_request() {
     assert_eq!(rig.report().and_then(|r| r.fault), Some(Fault::EncoderJump));
     assert!(!rig.device.tick(rig.sense).enabled);
     rig.sense.counts = [0; 3];
-    rig.ask(Request::ClearFault);
+    // Another one, or none, was seen: it stays.
+    for seen in [None, Some(Fault::Hardware)] {
+        rig.ask(Request::ClearFault { seen });
+        rig.run(30);
+        assert_eq!(fault(&rig), Some(Fault::EncoderJump));
+    }
+    let seen = Some(Fault::EncoderJump);
+    rig.ask(Request::ClearFault { seen });
     rig.run(30);
     assert_eq!(fault(&rig), None);
-    assert_eq!(rig.answers(|r| matches!(r, Request::ClearFault)), [Ok(())]);
+    let refused = Err(Refusal::Blocked(Blockers::FAULT_LATCHED));
+    let answers = rig.answers(|r| matches!(r, Request::ClearFault { .. }));
+    assert_eq!(answers, [refused, refused, Ok(())]);
     assert!(!rig.device.tick(rig.sense).enabled, "but it stays off");
     rig.arm();
 }

@@ -145,7 +145,7 @@ fn a_request_is_done_once_however_often_it_comes() {
 fn numbers_of_requests_wrap_around() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     for _ in 0..600 {
-        rig.ask(Request::ClearFault);
+        rig.ask(Request::ClearFault { seen: None });
         rig.run(1);
     }
     let answers = |m: &&ToHost| matches!(m, ToHost::Answer(_));

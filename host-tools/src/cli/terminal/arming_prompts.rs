@@ -155,7 +155,8 @@ impl ArmingPrompts {
         if self.enter.try_recv().is_ok() {
             let report = self.report.unwrap_or_default();
             if report.fault.is_some() {
-                self.say.push(Ask::Request(Request::ClearFault));
+                let seen = report.fault;
+                self.say.push(Ask::Request(Request::ClearFault { seen }));
             }
             self.zeroing = report.blockers.contains(Blockers::NOT_ZEROED);
             self.say.push(match self.zeroing {
@@ -290,7 +291,8 @@ mod tests {
         prompts.on_event(&Event::Guard(&report));
         assert!(prompts.lines().is_empty());
         press.send(()).expect("listening");
-        let wanted = [Request::ClearFault, Request::Arm].map(Ask::Request);
+        let seen = report.fault;
+        let wanted = [Request::ClearFault { seen }, Request::Arm].map(Ask::Request);
         assert_eq!(prompts.messages(), wanted);
     }
 }
