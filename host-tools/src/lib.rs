@@ -7,6 +7,7 @@
 //! - [`synth`]: terrains made by formula, for trying and testing;
 //! - [`terrain`]: a raster at a scale, cut into tiles;
 //! - [`link`]: the terrain served to a device, tile by tile;
+//! - [`serving`]: that session from its first line to an end that is known;
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
 //! - [`replay`]: a trajectory felt in lock-step, and recordings;
 //! - [`place`]: where a terrain lies in front of the arm, and how large;
@@ -31,6 +32,7 @@ pub mod picture;
 pub mod place;
 pub mod raster;
 pub mod replay;
+pub mod serving;
 pub mod synth;
 pub mod telemetry;
 pub mod terrain;

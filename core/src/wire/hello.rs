@@ -19,7 +19,8 @@ pub struct HostHello {
     /// Tells hellos of a session apart; the answer repeats it.
     pub number: u8,
     /// For how long, in seconds, the host may be silent before the device lets the
-    /// force out and disarms. Brought within [`SILENCE_S`](super::session::SILENCE_S).
+    /// force out and disarms. Brought within [`SILENCE_S`](super::session::SILENCE_S);
+    /// [`ONLY_LOOKS`](super::session::ONLY_LOOKS) opens no session.
     pub silence_s: u16,
 }
 

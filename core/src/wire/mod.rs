@@ -75,6 +75,10 @@
 //! - A hello of the session that is open is answered and changes nothing. A hello of a
 //!   session that is ended, or of the eight before the present one, is stale: it is not
 //!   heard.
+//! - A hello that names no time for silence, of a session that is not open, opens none:
+//!   its host only looks. It is answered, and so are its questions for status and
+//!   calibration, in its own session's number; the last such host is known. Whoever looks
+//!   takes no arm from its host, and keeps none armed whose host is gone.
 //! - The session before, of which a hello tells, is the last one that was not detached.
 //!   Who looks does not hide what became of it.
 //! - What waits for a press of the dead-man switch (an arm command before anything is

@@ -75,5 +75,8 @@ pub struct LastSession {
 
 /// Bounds of the time for which a host may be silent while the arm is armed, seconds.
 pub const SILENCE_S: (u16, u16) = (5, 3_600);
+/// What a host names as that time that only looks: it opens no session, and is no host
+/// whose silence ends anything.
+pub const ONLY_LOOKS: u16 = 0;
 /// That time where the user says nothing, seconds.
 pub const DEFAULT_SILENCE_S: u16 = 180;

@@ -6,7 +6,7 @@ use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::{BadFrame, decode};
 use hapterra_core::wire::hello::{HostHello, PROTOCOL};
 use hapterra_core::wire::message::{ToDevice, ToHost};
-use hapterra_core::wire::session::{InSession, SessionEnd, SessionNumber};
+use hapterra_core::wire::session::{InSession, ONLY_LOOKS, SessionEnd, SessionNumber};
 use hapterra_core::wire::status::{StackFigures, Status, TickFigures};
 use hapterra_core::wire::version::VersionCheck;
 
@@ -45,6 +45,9 @@ impl<const D: usize> Link<'_, D> {
         if let ToDevice::Hello(hello) = message {
             return self.on_hello(session, hello);
         }
+        if !self.conversation.is_of(session) && self.looker == Some(session) {
+            return self.on_look(session, &message);
+        }
         if !self.conversation.is_of(session) {
             self.foreign_frames = self.foreign_frames.saturating_add(1);
             return;
@@ -81,6 +84,13 @@ impl<const D: usize> Link<'_, D> {
         if hello.protocol != PROTOCOL {
             return self.refuse(hello.protocol);
         }
+        if hello.silence_s == ONLY_LOOKS && !self.conversation.is_of(session) {
+            self.looker = Some(session);
+            let hello = self
+                .device
+                .hello(hello.number, self.scene, &self.conversation);
+            return self.say_in(session, &ToHost::Hello(hello));
+        }
         match self.conversation.greeting(session) {
             Greeting::Stale => {
                 self.foreign_frames = self.foreign_frames.saturating_add(1);
@@ -96,6 +106,17 @@ impl<const D: usize> Link<'_, D> {
             .device
             .hello(hello.number, self.scene, &self.conversation);
         self.say(&ToHost::Hello(hello));
+    }
+
+    /// Answers a host that only looks: whose the arm is stays as it is, and for how long.
+    fn on_look(&mut self, session: SessionNumber, message: &ToDevice<'_>) {
+        match message {
+            ToDevice::Status => self.say_in(session, &ToHost::Status(self.status())),
+            ToDevice::GetCalibration => {
+                self.say_in(session, &ToHost::Calibration(self.device.calibration));
+            }
+            _ => {}
+        }
     }
 
     /// Begins a session, which keeps the scene and what is held of it.

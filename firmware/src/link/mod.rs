@@ -41,7 +41,7 @@ use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
 use hapterra_core::wire::message::ToHost;
 use hapterra_core::wire::request::Refusal;
-use hapterra_core::wire::session::SampleCount;
+use hapterra_core::wire::session::{SampleCount, SessionNumber};
 use heapless::{Deque, Vec};
 
 use crate::led::LedPattern;
@@ -92,6 +92,8 @@ pub struct Link<'t, const D: usize> {
     samples: &'t mut Deque<Sample, SAMPLES>,
     ends: LinkEnds<'t>,
     conversation: Conversation,
+    /// The session of the last host that only looks.
+    looker: Option<SessionNumber>,
     /// The loop had taken every command when its reports were last read.
     commands_taken: bool,
     /// What is known of arming, calibration and status.
@@ -131,6 +133,7 @@ impl<'t, const D: usize> Link<'t, D> {
             samples: &mut buffers.samples,
             ends,
             conversation: Conversation::new(),
+            looker: None,
             commands_taken: false,
             device,
             loader: LoaderEntry::default(),
@@ -278,8 +281,12 @@ impl<'t, const D: usize> Link<'t, D> {
     }
 
     fn say(&mut self, message: &ToHost) {
+        self.say_in(self.conversation.session(), message);
+    }
+
+    fn say_in(&mut self, session: SessionNumber, message: &ToHost) {
         // Whoever leads here has asked `has_room`.
-        self.tx.push(self.conversation.session(), message);
+        self.tx.push(session, message);
     }
 
     /// Answers a point with what the loop rendered there.

@@ -29,6 +29,14 @@ pub trait Attendant {
     /// # Errors
     /// [`Stopped`].
     fn confirms(&mut self, question: Question) -> Result<bool, Stopped>;
+
+    /// Tells whether the attendant wants to stop; asked before each look at the board.
+    fn stops(&self) -> fn() -> bool {
+        || false
+    }
+
+    /// Is told that the arm may be armed from now on, or is known to be disarmed.
+    fn may_be_armed(&mut self, _may: bool) {}
 }
 
 /// The attendant does not want to go on.

@@ -10,27 +10,39 @@ use hapterra_core::wire::message::{Heights, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_core::wire::status::Status;
 
-use super::attendant::{Attendant, Task};
+use super::attendant::{Attendant, Stopped, Task};
 use super::finding::Finding;
 use super::halt::Halt;
-use crate::link::Dialogue;
+use crate::link::{Dialogue, LinkError};
 
 /// Between two looks, ms of the board's time.
 const LOOK_MS: u32 = 100;
 /// How long the board looks out for what the user was asked to do, in looks.
 const LOOKS: usize = 600;
+/// Looks within which a board that was told to disarm has let the force out.
+const LOOKS_TO_DISARM: usize = 20;
 /// Encoders that move by more than this between two looks are not still.
 const STILL_COUNTS: u32 = 3;
 
 /// A board on the link.
 pub(super) struct Board<'d, 't> {
     dialogue: &'d mut Dialogue<'t>,
+    /// Whether the attendant wants to stop.
+    stops: fn() -> bool,
+    /// It was asked for something that drives, and has not confirmed that it is disarmed
+    /// since.
+    may_be_armed: bool,
 }
 
 impl<'d, 't> Board<'d, 't> {
-    /// The board at the other end of a dialogue.
-    pub(super) fn new(dialogue: &'d mut Dialogue<'t>) -> Self {
-        Self { dialogue }
+    /// The board at the other end of a dialogue, for an attendant who wants to stop when
+    /// `stops` says so.
+    pub(super) fn new(dialogue: &'d mut Dialogue<'t>, stops: fn() -> bool) -> Self {
+        Self {
+            dialogue,
+            stops,
+            may_be_armed: false,
+        }
     }
 
     /// How it introduced itself.
@@ -56,6 +68,9 @@ impl<'d, 't> Board<'d, 't> {
         &mut self,
         on: &mut dyn FnMut(&Sample) -> bool,
     ) -> Result<Status, Halt> {
+        if (self.stops)() {
+            return Err(Stopped.into());
+        }
         let is_enough = Cell::new(false);
         let enough = || is_enough.get();
         let passed = self
@@ -83,7 +98,7 @@ impl<'d, 't> Board<'d, 't> {
     /// Looks at it after a moment; tells `on` of each sample.
     ///
     /// # Errors
-    /// [`Halt::Link`].
+    /// [`Halt::Stopped`], [`Halt::Link`].
     pub(super) fn look_with(&mut self, on: &mut dyn FnMut(&Sample)) -> Result<Status, Halt> {
         self.look_until(&mut |sample| {
             on(sample);
@@ -150,6 +165,20 @@ impl<'d, 't> Board<'d, 't> {
         }
     }
 
+    /// Asks for something that drives the arm, once somebody presses the switch.
+    ///
+    /// # Errors
+    /// As [`Board::ask`].
+    pub(super) fn drive(
+        &mut self,
+        attendant: &mut dyn Attendant,
+        request: &Request,
+    ) -> Result<(), Halt> {
+        self.may_be_armed = true;
+        attendant.may_be_armed(true);
+        self.ask(request)
+    }
+
     /// Puts a scene in force.
     ///
     /// # Errors
@@ -163,7 +192,7 @@ impl<'d, 't> Board<'d, 't> {
     /// # Errors
     /// What blocks it, or a fault.
     pub(super) fn arm(&mut self, attendant: &mut dyn Attendant) -> Result<(), Halt> {
-        self.ask(&Request::Arm)?;
+        self.drive(attendant, &Request::Arm)?;
         let ends = |status: &Status| {
             let report = &status.health.report;
             report.mode == Mode::Armed || report.fault.is_some()
@@ -192,15 +221,36 @@ impl<'d, 't> Board<'d, 't> {
         }
     }
 
-    /// Disarms, clears what the step has latched and drops its scene, whatever the
-    /// board says to that.
-    pub(super) fn leave(&mut self) {
+    /// Disarms, clears what the step has latched and drops its scene.
+    ///
+    /// # Errors
+    /// [`LinkError::NotConfirmed`] where the board was asked to drive the arm and does not
+    /// say that it is disarmed.
+    pub(super) fn leave(&mut self) -> Result<(), LinkError> {
+        match self.disarm() {
+            Ok(true) => self.may_be_armed = false,
+            _ if self.may_be_armed => return Err(LinkError::NotConfirmed),
+            // The board may be gone; then nothing is left to be done.
+            _ => return Ok(()),
+        }
         let latched = self.dialogue.fresh_status().ok();
         let seen = latched.and_then(|status| status.health.report.fault);
-        let clear = Request::ClearFault { seen };
-        for request in [Request::Disarm, Request::DropScene, clear] {
-            // The board may be gone; then nothing is left to be done.
+        for request in [Request::DropScene, Request::ClearFault { seen }] {
+            // Whether it does depends on what it still sees.
             let _ = self.dialogue.request(&request);
         }
+        Ok(())
+    }
+
+    /// Whether the board says that it is disarmed, once it was told to.
+    fn disarm(&mut self) -> Result<bool, LinkError> {
+        let answer = self.dialogue.request(&Request::Disarm)?;
+        for _ in 0..LOOKS_TO_DISARM {
+            let status = self.dialogue.pass(LOOK_MS, &|| false, &mut |_| None)?;
+            if status.health.report.mode == Mode::Disarmed {
+                return Ok(answer.is_ok());
+            }
+        }
+        Ok(false)
     }
 }

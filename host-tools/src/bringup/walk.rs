@@ -48,7 +48,7 @@ pub fn walk(
     log: &mut Log,
     keep: &mut dyn FnMut(&Log) -> Result<(), LogError>,
 ) -> Result<Walked, BringupError> {
-    let mut board = Board::new(dialogue);
+    let mut board = Board::new(dialogue, attendant.stops());
     let record = board.calibration().map_err(BringupError::Halt)?;
     if let Some(why) = log.meet(Identity::of(board.device(), record.as_ref())) {
         attendant.hear(&format!("{why}: what was found of it no longer counts"));
@@ -62,11 +62,12 @@ pub fn walk(
                 attendant.hear(&format!("passed: {told}"));
                 log.take(step, true, told.clone());
             }
-            Err(Halt::Found(finding)) => {
-                board.leave();
-                log.take(step, false, finding.to_string());
-            }
-            Err(_) => board.leave(),
+            Err(Halt::Found(finding)) => log.take(step, false, finding.to_string()),
+            Err(_) => {}
+        }
+        match &result {
+            Ok(_) => attendant.may_be_armed(false),
+            Err(_) => leave(&mut board, attendant),
         }
         keep(log)?;
         match result {
@@ -77,4 +78,13 @@ pub fn walk(
         }
     }
     Ok(Walked::ToTheEnd)
+}
+
+/// Has the board disarm after a step that was not passed; tells the attendant where it
+/// does not confirm that.
+fn leave(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) {
+    match board.leave() {
+        Ok(()) => attendant.may_be_armed(false),
+        Err(not_confirmed) => attendant.hear(&not_confirmed.to_string()),
+    }
 }

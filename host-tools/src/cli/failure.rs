@@ -3,6 +3,8 @@
 use std::error::Error;
 use std::fmt::Write as _;
 
+use super::terminal::voice;
+
 /// Any error, as the standard library boxes it.
 type AnyError = Box<dyn Error + Send + Sync>;
 
@@ -70,8 +72,9 @@ impl Failure {
         text
     }
 
-    /// Prints the failure on standard error.
+    /// Prints the failure on standard error, after everything that was said before.
     pub fn report(&self) {
-        eprintln!("{}", self.text());
+        voice::finish();
+        voice::put(std::io::stderr(), &format!("{}\n", self.text()));
     }
 }

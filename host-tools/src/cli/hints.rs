@@ -129,7 +129,7 @@ impl Hint for LinkError {
             }
             Self::Version { .. } => "install the hapterra command that belongs to the firmware",
             Self::Taken => {
-                "end the other host, then start again; where there is none, switch the amplifiers off: the board may be armed"
+                "switch the amplifiers off where nobody has the arm in hand; end the other host, then start again"
             }
             Self::NotConfirmed => "then see hapterra status",
             Self::Interrupted => "start again",

@@ -107,7 +107,7 @@ fn list_emulated(args: &Args) {
 
 /// The device behind a link, in words.
 fn who(link: Box<dyn Transport>) -> Result<String, LinkError> {
-    let dialogue = Dialogue::open(link, PATIENCE)?;
+    let dialogue = Dialogue::look(link, PATIENCE)?;
     Ok(session_summary::device(dialogue.device()))
 }
 

@@ -90,6 +90,7 @@ pub fn main() -> ExitCode {
         Command::Flash(args) => flash::run(&args),
         Command::Bench(args) => bench::run(&args),
     };
+    terminal::voice::finish();
     log.end();
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,41 +1,37 @@
 //! `hapterra run`: serves a terrain to a device for as long as it is touched.
 
-use std::io::IsTerminal;
+mod watch;
+
 use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use clap::ValueHint;
-use hapterra_core::scene::Sample;
-use hapterra_core::wire::hello::DeviceHello;
-use hapterra_core::wire::session::{DEFAULT_SILENCE_S, SILENCE_S, SessionEnd};
-use indicatif::ProgressBar;
+use hapterra_core::wire::session::{DEFAULT_SILENCE_S, SILENCE_S};
 
 use super::bringup::required::brought_up;
 use super::failure::{Failure, OrHint};
 use super::options::rendering::Rendering;
 use super::options::terrain_file::TerrainFile;
 use super::session_summary::{self, SessionSummary};
-use super::terminal::arming_prompts::ArmingPrompts;
+use super::terminal::voice::{say, show, tell};
 use super::terminal::{interrupt, left_behind};
 use crate::link::{
-    Arming, DeviceAddress, Event, HostClock, LinkError, Native, Patience, Session, Tcp, Transport,
-    serve_plant,
+    Arming, DeviceAddress, HostClock, LinkError, Native, Patience, Tcp, Transport, serve_plant,
 };
-use crate::output::{Output, OutputError};
+use crate::output::Output;
 use crate::phantom::HeldPhantom;
 use crate::place::PlacedTerrain;
-use crate::replay::{Record, Recording, state_name};
-use crate::telemetry::SampleLog;
+use crate::replay::Recording;
+use crate::serving::{Service, told_of_last_end};
+use watch::Watch;
 
 /// Between two tries to find a device that is gone.
 const RETRY: Duration = Duration::from_millis(500);
 /// For how long the virtual arm stays after the session has ended.
 const LINGER: Duration = Duration::from_secs(2);
-/// Between two looks at the clock while nothing comes.
-const POLL: Duration = Duration::from_millis(50);
-/// Between two lines where there is no terminal.
-const LINE_EVERY: Duration = Duration::from_secs(2);
+/// What to do where the recording cannot be written.
+const OTHER_FILE: &str = "name another file with --record";
 
 /// Arguments of `hapterra run`.
 #[derive(Debug, clap::Args)]
@@ -129,7 +125,7 @@ fn move_arm(address: &str, mut arm: HeldPhantom, done: &OnceLock<Instant>) {
         let ended = Tcp::connect(address)
             .and_then(|mut line| serve_plant(&mut line, &mut arm, &stop).map_err(LinkError::Gone));
         if let Err(why) = ended {
-            tracing::info!("the plant's line at {address}: {}", described(&why));
+            tracing::info!("the plant's line at {address}: {why:?}");
             std::thread::sleep(RETRY);
         }
     }
@@ -143,72 +139,75 @@ fn is_scripted(args: &Args) -> bool {
 fn serve(args: &Args, placed: &PlacedTerrain<'_>) -> Result<(), Failure> {
     // What cannot be recorded is known before anything is armed.
     let recording = recording(args)?;
-    let mut transport = connect(args, placed)?;
     let scripted = is_scripted(args);
-    if !scripted && !args.unchecked {
-        brought_up(&mut *transport)?;
-    }
-    // A virtual arm was switched on in its zero pose; where a real one was,
-    // its user has to say.
-    let arming = match scripted {
-        true => Arming::VIRTUAL,
-        false => Arming::default(),
-    };
-    let patience = Patience {
-        silence_s: args.silence_s,
-        ..Patience::REAL_TIME
-    };
-    let (terrain, scene) = (placed.terrain(), placed.scene());
+    let service = service(args, placed);
     interrupt::board_may_be_armed(true);
-    let (mut session, device) = Session::open(terrain, scene, Some(arming), transport, patience)?;
-    let how = session_summary::in_words(terrain);
-    println!("terrain        {}: {how}", args.terrain.name());
-    println!("device         {}", session_summary::device(&device));
-    tell_last_end(&device);
+    let opened = service.open(|line| match scripted || args.unchecked {
+        true => Ok(()),
+        false => brought_up(line),
+    });
+    // Where it could not be opened, what has to be told is told.
+    let (served, device) = opened.inspect_err(|_| interrupt::board_may_be_armed(false))?;
+    let how = session_summary::in_words(placed.terrain());
+    say(format!("terrain        {}: {how}", args.terrain.name()));
+    say(format!(
+        "device         {}",
+        session_summary::device(&device)
+    ));
+    if let Some(line) = told_of_last_end(&device) {
+        tell(line);
+    }
     let mut watch = Watch::new(args, placed, &device, recording);
-    let served = watch.serve(args, placed, &mut session);
-    let ended = leave(&mut session, &mut watch, served);
+    let end = served.serve(&mut watch);
+    // What was recorded is kept, however it ended, and before anything else is done.
+    let log = watch.finish();
+    let kept = log.kept.or_hint(OTHER_FILE);
+    let ended = told(end.why, end.disarmed);
     interrupt::board_may_be_armed(false);
-    watch.status.finish_and_clear();
     let summary = SessionSummary {
-        ticks: watch.log.ticks(),
+        ticks: log.ticks,
         device,
-        figures: watch.log.figures(),
-        tally: session.tally().clone(),
+        figures: log.figures,
+        tally: end.tally,
     };
-    print!("{}", summary.text());
-    // What was recorded is kept, however it ended.
-    let kept = watch.finish(args);
+    show(summary.text());
+    if let (Ok(()), Some(path)) = (&kept, &args.record) {
+        say(format!("recording      {}", path.display()));
+    }
     ended.and(kept)
 }
 
-/// Ends the session, whatever ended the serving: the board is known to be disarmed, or
-/// the user is told that it may not be.
-fn leave(
-    session: &mut Session<'_>,
-    watch: &mut Watch<'_>,
-    served: Result<(), LinkError>,
-) -> Result<(), Failure> {
-    // Another host has the arm now; it is not this one's to disarm.
-    if let Err(LinkError::Taken) = served {
-        return Ok(served?);
-    }
-    let left = session.say_goodbye(&mut |event| watch.take(event));
-    match (served, left) {
-        (Err(error), Err(not_confirmed)) => {
-            watch.status.suspend(|| eprintln!("{not_confirmed}"));
-            Err(error.into())
-        }
-        (served, left) => Ok(served.and(left)?),
+/// What is served, and to which device.
+fn service<'s, 't: 's>(args: &'s Args, placed: &'s PlacedTerrain<'t>) -> Service<'s, 't> {
+    Service {
+        terrain: placed.terrain(),
+        scene: placed.scene(),
+        // A virtual arm was switched on in its zero pose; where a real one was,
+        // its user has to say.
+        arming: match is_scripted(args) {
+            true => Arming::VIRTUAL,
+            false => Arming::default(),
+        },
+        patience: Patience {
+            silence_s: args.silence_s,
+            ..Patience::REAL_TIME
+        },
+        connect: Box::new(move || connect(args, placed)),
+        device: args.device.to_string(),
+        retry: RETRY,
+        goes_on: &|| !interrupt::requested(),
+        tell: &|line| tell(line),
     }
 }
 
-/// Says what became of the arm where its host before was silent for too long.
-fn tell_last_end(device: &DeviceHello) {
-    if device.last.end == SessionEnd::HostSilent {
-        eprintln!(
-            "before this the device had heard nothing from its host for too long: it let the force out and disarmed the arm"
-        );
+/// How it ended, as a failure; where two things went wrong, the first is told here.
+fn told(why: Result<(), LinkError>, disarmed: Result<(), LinkError>) -> Result<(), Failure> {
+    match (why, disarmed) {
+        (Err(error), Err(not_confirmed)) => {
+            tell(not_confirmed);
+            Err(error.into())
+        }
+        (why, disarmed) => Ok(why.and(disarmed)?),
     }
 }
 
@@ -225,171 +224,4 @@ fn connect<'t>(
 ) -> Result<Box<dyn Transport + 't>, LinkError> {
     let native = || Native::new(HostClock::default(), Some(Box::new(placed.held_phantom())));
     args.device.connect(native)
-}
-
-/// The device is gone: says so, waits for it and resumes.
-fn wait_for<'t>(
-    args: &Args,
-    placed: &PlacedTerrain<'t>,
-    session: &mut Session<'t>,
-    on: &mut dyn FnMut(Event<'_>),
-    why: LinkError,
-) -> Result<(), LinkError> {
-    let (why, device) = (described(&why), &args.device);
-    eprintln!("{why}; waiting for {device} (Ctrl-C ends)");
-    let began = Instant::now();
-    let go_on = || !interrupt::requested();
-    while go_on() {
-        let connected = connect(args, placed);
-        match connected.and_then(|transport| session.resume(transport, &go_on, on)) {
-            Ok(device) => {
-                let again = match device.epoch == Some(session.scene().epoch) {
-                    true => "goes on where it was",
-                    false => "was restarted and begins anew",
-                };
-                let after = began.elapsed();
-                eprintln!("the device is back after {after:.1?}: it {again}");
-                tell_last_end(&device);
-                return Ok(());
-            }
-            Err(LinkError::Interrupted) => return Ok(()),
-            Err(error) if !error.is_passing() => return Err(error),
-            Err(_) => std::thread::sleep(RETRY),
-        }
-    }
-    Ok(())
-}
-
-fn described(error: &LinkError) -> String {
-    match error {
-        LinkError::Gone(why) => format!("{error}: {why}"),
-        _ => error.to_string(),
-    }
-}
-
-/// What is seen and recorded of a session while it goes on.
-struct Watch<'t> {
-    log: SampleLog<'t>,
-    stop_s: f64,
-    /// The latest sample and its row.
-    latest: Option<(Sample, Record)>,
-    recording: Option<Recording>,
-    failed: Option<OutputError>,
-    prompts: ArmingPrompts,
-    status: ProgressBar,
-    line_due: Instant,
-}
-
-/// What to do where the recording cannot be written.
-const OTHER_FILE: &str = "name another file with --record";
-
-impl<'t> Watch<'t> {
-    fn new(
-        args: &Args,
-        placed: &PlacedTerrain<'t>,
-        device: &DeviceHello,
-        recording: Option<Recording>,
-    ) -> Self {
-        let (script_s, prompts) = match is_scripted(args) {
-            true => (placed.duration_s(), ArmingPrompts::for_a_script()),
-            false => (f64::MAX, ArmingPrompts::at_the_terminal()),
-        };
-        Self {
-            log: SampleLog::new(placed.terrain(), device),
-            stop_s: args.seconds.unwrap_or(f64::MAX).min(script_s),
-            latest: None,
-            recording,
-            failed: None,
-            prompts,
-            status: ProgressBar::new_spinner(),
-            line_due: Instant::now() + LINE_EVERY,
-        }
-    }
-
-    /// Serves until the end of the time or of the script, an end that was asked for, or
-    /// an error that waiting does not mend.
-    fn serve(
-        &mut self,
-        args: &Args,
-        placed: &PlacedTerrain<'t>,
-        session: &mut Session<'t>,
-    ) -> Result<(), LinkError> {
-        while !self.is_over() {
-            let polled = session.poll(POLL, &mut |event| self.take(event));
-            for line in self.prompts.lines() {
-                self.status.suspend(|| eprintln!("{line}"));
-            }
-            for ask in self.prompts.messages() {
-                session.ask(ask);
-            }
-            self.show(session);
-            match polled {
-                Err(error) if error.is_passing() => {
-                    let on = &mut |event: Event<'_>| self.take(event);
-                    wait_for(args, placed, session, on, error)?;
-                }
-                other => other?,
-            }
-        }
-        Ok(())
-    }
-
-    fn is_over(&self) -> bool {
-        interrupt::requested() || self.failed.is_some() || self.log.t_s() >= self.stop_s
-    }
-
-    fn take(&mut self, event: Event<'_>) {
-        self.prompts.on_event(&event);
-        let Event::Sample(sample) = event else {
-            return;
-        };
-        let record = self.log.take(sample);
-        if let Some(recording) = &mut self.recording {
-            let state = state_name(sample.state);
-            let more: [&dyn std::fmt::Display; 5] = [
-                &state,
-                &sample.tick,
-                &sample.work,
-                &sample.cost,
-                &sample.late,
-            ];
-            self.failed = self.failed.take().or(recording.write(&record, &more).err());
-        }
-        self.latest = Some((*sample, record));
-    }
-
-    /// One line that is written over, or a line now and then.
-    fn show(&mut self, session: &Session<'_>) {
-        let Some((sample, record)) = &self.latest else {
-            return;
-        };
-        let force = glam::DVec3::from(record.force_n).length();
-        let ([x, y, z], t_s, state) = (record.hip_mm, record.t_s, state_name(sample.state));
-        let (tally, fault) = (session.tally(), sample.fault);
-        let (tiles, lost) = (tally.tiles, tally.lost + tally.dropped);
-        let fault = fault.map_or(String::new(), |f| format!(", FAULT {f:?}"));
-        let line = format!(
-            "{t_s:8.3} s  {state:8}  HIP {x:.1} {y:.1} {z:.1} mm  {force:.2} N  {tiles} tiles  {lost} lost{fault}"
-        );
-        if std::io::stderr().is_terminal() {
-            self.status.set_message(line);
-            self.status.tick();
-        } else if Instant::now() >= self.line_due {
-            self.line_due = Instant::now() + LINE_EVERY;
-            eprintln!("{line}");
-        }
-    }
-
-    fn finish(self, args: &Args) -> Result<(), Failure> {
-        let ended = match (self.failed, self.recording) {
-            (Some(error), _) => Err(error),
-            (None, Some(recording)) => recording.finish(),
-            (None, None) => Ok(()),
-        };
-        ended.or_hint(OTHER_FILE)?;
-        if let Some(path) = &args.record {
-            println!("recording      {}", path.display());
-        }
-        Ok(())
-    }
 }

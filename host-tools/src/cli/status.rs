@@ -32,6 +32,12 @@ pub struct Args {
 /// # Errors
 /// No device, or one that does not answer.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    if !args.disarm && !args.clear {
+        return args.device.look(|dialogue| {
+            print!("{}", text(&dialogue.fresh_status()?));
+            Ok(())
+        });
+    }
     args.device.talk(|dialogue| {
         if args.disarm {
             dialogue.request(&Request::Disarm)?.map_err(Failure::new)?;

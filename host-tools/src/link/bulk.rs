@@ -121,6 +121,11 @@ impl<P: Pipes> Transport for Bulk<P> {
             .try_for_each(|transfer| self.0.send(transfer))
     }
 
+    fn send_some(&mut self, bytes: &[u8], _: Duration) -> io::Result<usize> {
+        let transfer = bytes.get(..TRANSFER).unwrap_or(bytes);
+        self.0.send(transfer).map(|()| transfer.len())
+    }
+
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
         match self.0.receive(into, wait) {
             Err(error) if is_time_out(&error) => Ok(0),

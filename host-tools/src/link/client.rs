@@ -59,7 +59,8 @@ pub enum Event<'e> {
     Unanswered(&'e Ask),
 }
 
-/// How a session arms the device, as soon as the scene is in force.
+/// How a session arms the device, as soon as the scene is in force. A device that comes
+/// back after it was lost is armed again by itself only where the arm is virtual.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Arming {
     /// What the encoders read in the zero pose, where the host knows.
@@ -74,6 +75,12 @@ impl Arming {
 /// Samples after which the host says that it is there: half a second of a device whose
 /// time runs faster than the host's.
 const SAMPLES_A_SIGN: u32 = 500;
+/// Bytes that are said to one reception at most, but for the tile that reaches beyond
+/// them: a device has four requests under way, of 4.5 KiB each. What is left out is asked
+/// for again.
+const SAID_AT_ONCE: usize = 32 * 1024;
+/// Tiles that are held back, or sent to one reception, at most.
+const WITHHELD: usize = 16;
 /// Between two lines of the log about requests for tiles that there are not.
 const LOG_EVERY: Duration = Duration::from_secs(1);
 
@@ -92,9 +99,13 @@ pub struct Client<'t> {
     device: Option<DeviceHello>,
     /// The scene was not taken yet in this session.
     is_new: bool,
+    /// The scene was taken in some session, and the device asked to arm.
+    has_armed: bool,
     /// Tiles that are sent once the device was told its zero: what is done before the
     /// first tick must not depend on how long a message takes.
     withheld: Vec<TileKey>,
+    /// Tiles that the present reception was answered with.
+    sent: Vec<TileKey>,
     zeroing: bool,
     /// The point of a replay that is to be felt, and when it was said.
     point: Option<(Point, Duration)>,
@@ -134,7 +145,9 @@ impl<'t> Client<'t> {
             tile: TileBuffer::default(),
             device: None,
             is_new: true,
+            has_armed: false,
             withheld: vec![],
+            sent: vec![],
             zeroing: false,
             point: None,
             tally: Tally::default(),
@@ -252,6 +265,7 @@ impl<'t> Client<'t> {
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
     ) -> Result<(), LinkError> {
+        self.sent.clear();
         while let Some(frame) = next_frame(&mut self.reader, &mut bytes, from_device) {
             match frame {
                 Ok(FromDevice::Version(check)) => self.talk.on_version_check(check)?,
@@ -312,7 +326,10 @@ impl<'t> Client<'t> {
         if !std::mem::take(&mut self.is_new) {
             return;
         }
-        if let Some(Arming { zero }) = self.arming {
+        let again = std::mem::replace(&mut self.has_armed, true);
+        // A real arm that has come back is as it is: armed, or its user says when it is
+        // to be.
+        if let Some(Arming { zero }) = self.arming.filter(|a| !again || a.zero.is_some()) {
             if let Some(counts) = zero {
                 self.zeroing = true;
                 self.talk.ask(Ask::Request(Request::Zero { counts }));
@@ -362,10 +379,17 @@ impl<'t> Client<'t> {
         let is_open = self.state() == State::Open;
         match message {
             ToHost::Need { epoch, key } if is_open && epoch == self.scene.epoch => {
-                match self.zeroing {
-                    true if self.withheld.contains(&key) => {}
-                    true => self.withheld.push(key),
-                    false => self.on_need(now, key, out),
+                // A device that asks more often than it reads is not answered more often.
+                let known = match self.zeroing {
+                    true => &mut self.withheld,
+                    false => &mut self.sent,
+                };
+                let has_room = out.len() < SAID_AT_ONCE && known.len() < WITHHELD;
+                if has_room && !known.contains(&key) {
+                    known.push(key);
+                    if !self.zeroing {
+                        self.on_need(now, key, out);
+                    }
                 }
             }
             ToHost::Telemetry(telemetry) => {

@@ -423,3 +423,60 @@ fn tiles_that_there_are_not_are_counted_and_seldom_told() {
         assert_eq!(bench.said(), Vec::<String>::new());
     });
 }
+
+#[test]
+fn a_real_arm_that_comes_back_is_not_armed_by_itself() {
+    for (arming, again) in [(Arming::default(), 0), (Arming::VIRTUAL, 1)] {
+        on_bench(Some(arming), |bench| {
+            let arms = |bench: &mut Bench<'_>| {
+                let said = bench.said();
+                let arm = |said: &&String| said.contains("Zero") || said.ends_with("Arm");
+                usize::from(said.iter().any(|s| arm(&s)))
+            };
+            bench.open();
+            assert_eq!(arms(bench), 1);
+            // Its host was silent, and it was disarmed.
+            bench.client.greet(bench.now, &mut bench.out);
+            bench.hear(&ToHost::Hello(DeviceHello {
+                number: 2,
+                ..hello()
+            }));
+            let taken = bench.taken();
+            bench.hear(&taken);
+            assert_eq!(bench.opened, 2);
+            assert_eq!(arms(bench), again, "{arming:?}");
+            bench.client.ask(Ask::Request(Request::Arm));
+            bench.pass(ms(50)).expect("answered");
+            assert_eq!(arms(bench), 1 - again, "{arming:?}");
+        });
+    }
+}
+
+#[test]
+fn a_device_that_asks_for_much_at_once_gets_each_tile_once_and_so_many() {
+    on_bench(None, |bench| {
+        bench.open();
+        bench.said();
+        let session = bench.client.session();
+        let epoch = bench.client.scene().epoch;
+        let mut bytes = vec![];
+        let mut frame = [0; MAX_FRAME];
+        for _ in 0..200 {
+            let key = TileKey::new(0, 0, 0);
+            let message = ToHost::Need { epoch, key };
+            let framed = InSession { session, message };
+            bytes.extend(encode(&framed, &mut frame).expect("fits"));
+        }
+        let heard = bench
+            .client
+            .receive(bench.now, &bytes, &mut bench.out, &mut |_| {});
+        heard.expect("understood");
+        assert_eq!(count_of(&bench.said(), "Tile"), 1);
+        // The next reception may ask for it again.
+        let heard = bench
+            .client
+            .receive(bench.now, &bytes, &mut bench.out, &mut |_| {});
+        heard.expect("understood");
+        assert_eq!(count_of(&bench.said(), "Tile"), 1);
+    });
+}

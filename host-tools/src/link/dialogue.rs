@@ -9,6 +9,7 @@ use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::request::{Answer, Refusal, Request};
+use hapterra_core::wire::session::ONLY_LOOKS;
 use hapterra_core::wire::status::Status;
 
 use super::conversation::{Ask, Conversation, News, State};
@@ -52,13 +53,27 @@ impl<'t> Dialogue<'t> {
     /// # Errors
     /// [`LinkError`]: nobody answers within `patience`, or in another protocol.
     pub fn open(transport: Box<dyn Transport + 't>, patience: Duration) -> Result<Self, LinkError> {
-        let patience = Patience::of_a_dialogue(patience);
+        Self::with(transport, Patience::of_a_dialogue(patience))
+    }
+
+    /// Only looks: the device answers questions for its status and its calibration, hears
+    /// no request, and keeps the host that it has.
+    ///
+    /// # Errors
+    /// As [`Dialogue::open`].
+    pub fn look(transport: Box<dyn Transport + 't>, patience: Duration) -> Result<Self, LinkError> {
+        Self::with(transport, Patience::of_a_look(patience))
+    }
+
+    fn with(transport: Box<dyn Transport + 't>, patience: Patience) -> Result<Self, LinkError> {
+        // Where no session is opened there is none to end.
+        let is_over = patience.silence_s == ONLY_LOOKS;
         let mut exchange = Exchange {
             line: Line::new(transport),
             talk: Conversation::new(None, patience, fastrand::Rng::new()),
             reader: Box::default(),
             drives: false,
-            is_over: false,
+            is_over,
         };
         let line = &mut exchange.line;
         exchange.talk.greet(line.now(), &mut line.out);
@@ -370,6 +385,20 @@ mod tests {
         assert!(!status.health.report.blockers.is_empty());
         let known = dialogue.calibration().expect("it answers");
         assert_eq!(known, Some(Calibration::PREMIUM_1_5));
+    }
+
+    #[test]
+    fn whoever_looks_takes_no_device_from_its_host() {
+        let mut device = Native::for_replay().restless();
+        let mut looks = Dialogue::look(Box::new(&mut device), PATIENCE).expect("it answers");
+        let known = looks.calibration().expect("it answers");
+        assert_eq!(known, Some(Calibration::PREMIUM_1_5));
+        let status = looks.fresh_status().expect("it answers");
+        assert!(!status.health.report.blockers.is_empty());
+        drop(looks);
+        let host = Dialogue::open(Box::new(&mut device), PATIENCE).expect("it answers");
+        let before = host.device().last.end;
+        assert_eq!(before, SessionEnd::None, "nobody was its host before");
     }
 
     #[test]

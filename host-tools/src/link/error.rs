@@ -26,7 +26,7 @@ pub enum LinkError {
     #[error("the device has not answered for {0:.1?}")]
     Silent(Duration),
     /// The device has another host.
-    #[error("another host has taken the device")]
+    #[error("another host has taken the device: the arm may be armed")]
     Taken,
     /// Goodbye was not answered.
     #[error("the board did not confirm that it is disarmed: switch the amplifiers off")]

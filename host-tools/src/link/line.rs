@@ -1,17 +1,21 @@
 //! A transport, the clock that a conversation over it is told, and bytes on their way.
 
+use std::io;
 use std::time::{Duration, Instant};
 
 use super::error::LinkError;
-use super::transport::Transport;
+use super::transport::{NoLine, Transport};
 
 /// Between two looks at the clock while something is waited for.
 pub(super) const LOOK: Duration = Duration::from_millis(50);
+/// How long a device may take over what is said at once before it counts as gone.
+const TAKES: Duration = Duration::from_secs(5);
 
 /// What [`Session`](super::Session) and [`Dialogue`](super::Dialogue) hold their
 /// conversation over.
 pub(super) struct Line<'t> {
     transport: Box<dyn Transport + 't>,
+    is_open: bool,
     began: Instant,
     incoming: Box<[u8; 4096]>,
     /// What is to be said with the next [`Line::flush`].
@@ -22,6 +26,7 @@ impl<'t> Line<'t> {
     pub(super) fn new(transport: Box<dyn Transport + 't>) -> Self {
         Self {
             transport,
+            is_open: true,
             began: Instant::now(),
             incoming: Box::new([0; 4096]),
             out: vec![],
@@ -31,6 +36,7 @@ impl<'t> Line<'t> {
     /// Goes on over another transport; what was not said yet is forgotten.
     pub(super) fn replace(&mut self, transport: Box<dyn Transport + 't>) {
         self.transport = transport;
+        self.is_open = true;
         self.out.clear();
     }
 
@@ -39,14 +45,50 @@ impl<'t> Line<'t> {
         self.began.elapsed()
     }
 
+    /// Closes the line. Some devices can be opened once only: another line to them comes
+    /// after this one is closed.
+    pub(super) fn hang_up(&mut self) {
+        self.replace(Box::new(NoLine));
+        self.is_open = false;
+    }
+
+    /// Whether there is a line.
+    pub(super) const fn is_open(&self) -> bool {
+        self.is_open
+    }
+
     /// Says what is to be said.
     pub(super) fn flush(&mut self) -> Result<(), LinkError> {
-        if self.out.is_empty() {
-            return Ok(());
+        self.flush_while(None, &|| true)
+    }
+
+    /// Says what is to be said. A device that takes none of it for a while, or has not
+    /// taken it by `until`, is gone; where no more is wanted, the rest is not said.
+    pub(super) fn flush_while(
+        &mut self,
+        until: Option<Instant>,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<(), LinkError> {
+        let until = until.unwrap_or_else(|| Instant::now() + TAKES);
+        let mut sent = 0;
+        while let Some(rest) = self.out.get(sent..).filter(|rest| !rest.is_empty()) {
+            let taken = match Instant::now() < until {
+                true => self.transport.send_some(rest, LOOK),
+                false => Err(io::ErrorKind::TimedOut.into()),
+            };
+            match taken {
+                Ok(taken) => sent += taken,
+                Err(error) => {
+                    self.out.clear();
+                    return Err(LinkError::Gone(error));
+                }
+            }
+            if !goes_on() {
+                break;
+            }
         }
-        let sent = self.transport.send(&self.out);
         self.out.clear();
-        sent.map_err(LinkError::Gone)
+        Ok(())
     }
 
     /// What comes within `wait`: when, the bytes, and where the answers go.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use hapterra_core::wire::request::Request;
-use hapterra_core::wire::session::DEFAULT_SILENCE_S;
+use hapterra_core::wire::session::{DEFAULT_SILENCE_S, ONLY_LOOKS};
 use hapterra_core::wire::status::PRESS_MS;
 
 use super::conversation::Ask;
@@ -55,6 +55,15 @@ impl Patience {
         match ask {
             Ask::Request(Request::StoreCalibration) => self.give_up + PRESS,
             _ => self.give_up,
+        }
+    }
+
+    /// For a device that is only looked at, whatever its host: all of it within `give_up`.
+    #[must_use]
+    pub fn of_a_look(give_up: Duration) -> Self {
+        Self {
+            silence_s: ONLY_LOOKS,
+            ..Self::of_a_dialogue(give_up)
         }
     }
 

@@ -1,6 +1,6 @@
 //! A client over a transport, and the clock that it is told.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use hapterra_core::scene::{Point, Scene};
 use hapterra_core::wire::hello::DeviceHello;
@@ -19,9 +19,38 @@ use crate::terrain::Terrain;
 pub struct Session<'t> {
     client: Client<'t>,
     line: Line<'t>,
+    /// Whether it is to go on; what a device does not read is not waited for else.
+    goes_on: &'t dyn Fn() -> bool,
+    /// Until then goodbye is to be said and answered.
+    leaves_by: Option<Instant>,
 }
 
 impl<'t> Session<'t> {
+    /// A session that has said nothing yet.
+    #[must_use]
+    pub fn new(
+        terrain: &'t Terrain<'t>,
+        scene: Scene,
+        arming: Option<Arming>,
+        transport: Box<dyn Transport + 't>,
+        patience: Patience,
+    ) -> Self {
+        Self {
+            client: Client::new(terrain, scene, arming, patience),
+            line: Line::new(transport),
+            goes_on: &|| true,
+            leaves_by: None,
+        }
+    }
+
+    /// The same session, which ends its beginning, and what a device is slow to read, when
+    /// `goes_on` says no.
+    #[must_use]
+    pub fn heeding(mut self, goes_on: &'t dyn Fn() -> bool) -> Self {
+        self.goes_on = goes_on;
+        self
+    }
+
     /// Shakes hands, puts the scene in force and asks the device to arm, if
     /// `arming` says how.
     ///
@@ -34,12 +63,18 @@ impl<'t> Session<'t> {
         transport: Box<dyn Transport + 't>,
         patience: Patience,
     ) -> Result<(Self, DeviceHello), LinkError> {
-        let mut session = Self {
-            client: Client::new(terrain, scene, arming, patience),
-            line: Line::new(transport),
-        };
-        let device = session.shake_hands(&|| true, &mut |_| {})?;
+        let mut session = Self::new(terrain, scene, arming, transport, patience);
+        let device = session.begin(&mut |_| {})?;
         Ok((session, device))
+    }
+
+    /// Shakes hands over the line that it has. The session can be said goodbye to where
+    /// that fails, too.
+    ///
+    /// # Errors
+    /// As [`Session::open`]; [`LinkError::Interrupted`].
+    pub fn begin(&mut self, on: &mut dyn FnMut(Event<'_>)) -> Result<DeviceHello, LinkError> {
+        self.shake_hands(self.goes_on, on)
     }
 
     /// Goes on over a new transport after the old one was lost, for as long as `go_on`
@@ -53,8 +88,25 @@ impl<'t> Session<'t> {
         go_on: &dyn Fn() -> bool,
         on: &mut dyn FnMut(Event<'_>),
     ) -> Result<DeviceHello, LinkError> {
-        self.line.replace(transport);
+        self.go_over(transport);
         self.shake_hands(go_on, on)
+    }
+
+    /// Goes over to another line, in the session that it is in.
+    pub fn go_over(&mut self, transport: Box<dyn Transport + 't>) {
+        self.line.replace(transport);
+    }
+
+    /// Closes the line. Some devices can be opened once only: another line to them comes
+    /// after this one is closed.
+    pub fn hang_up(&mut self) {
+        self.line.hang_up();
+    }
+
+    /// Whether it has a line.
+    #[must_use]
+    pub const fn has_line(&self) -> bool {
+        self.line.is_open()
     }
 
     /// The scene that is served.
@@ -91,9 +143,8 @@ impl<'t> Session<'t> {
     /// # Errors
     /// [`LinkError::Gone`].
     pub fn feel(&mut self, point: Point) -> Result<(), LinkError> {
-        let line = &mut self.line;
-        self.client.feel(line.now(), point, &mut line.out);
-        line.flush()
+        self.client.feel(self.line.now(), point, &mut self.line.out);
+        self.flush()
     }
 
     /// Waits for bytes from the device for at most `wait`, answers what it asks,
@@ -105,10 +156,10 @@ impl<'t> Session<'t> {
     pub fn poll(&mut self, wait: Duration, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
         let line = &mut self.line;
         self.client.due(line.now(), &mut line.out, on)?;
-        line.flush()?;
-        let (now, bytes, out) = line.receive(wait)?;
+        self.flush()?;
+        let (now, bytes, out) = self.line.receive(wait)?;
         self.client.receive(now, bytes, out, on)?;
-        line.flush()
+        self.flush()
     }
 
     /// Ends the session. The device has let its force out, switched its amplifiers off
@@ -118,6 +169,9 @@ impl<'t> Session<'t> {
     /// [`LinkError::NotConfirmed`] where the device does not say so in time.
     pub fn say_goodbye(&mut self, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
         self.client.leave(self.line.now(), &mut self.line.out);
+        // The user wants the end, and the end is to be heard.
+        self.goes_on = &|| true;
+        self.leaves_by = Some(Instant::now() + self.client.patience().goodbye);
         while self.client.state() != State::Closed {
             self.poll(LOOK, on).map_err(|error| {
                 tracing::debug!(%error, "on the way to goodbye");
@@ -125,6 +179,19 @@ impl<'t> Session<'t> {
             })?;
         }
         Ok(())
+    }
+
+    /// As [`Session::say_goodbye`], to a device that was not greeted yet: what another
+    /// host has left armed is disarmed.
+    ///
+    /// # Errors
+    /// As [`Session::say_goodbye`].
+    pub fn say_hello_and_goodbye(
+        &mut self,
+        on: &mut dyn FnMut(Event<'_>),
+    ) -> Result<(), LinkError> {
+        self.client.greet(self.line.now(), &mut self.line.out);
+        self.say_goodbye(on)
     }
 
     fn shake_hands(
@@ -146,5 +213,9 @@ impl<'t> Session<'t> {
             }
         }
         Err(LinkError::Interrupted)
+    }
+
+    fn flush(&mut self) -> Result<(), LinkError> {
+        self.line.flush_while(self.leaves_by, self.goes_on)
     }
 }

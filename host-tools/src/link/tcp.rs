@@ -2,7 +2,7 @@
 
 use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::error::LinkError;
 use super::transport::{Transport, is_time_out};
@@ -11,12 +11,16 @@ use super::transport::{Transport, is_time_out};
 #[derive(Debug)]
 pub struct Tcp {
     stream: TcpStream,
+    /// For how long reads and writes wait now.
     wait: Duration,
+    write_wait: Duration,
 }
 
-/// How long a connection may take, and how long the device may leave bytes
-/// unread before it counts as gone.
+/// How long a connection may take, and how long the device may take over what is sent at
+/// once before it counts as gone.
 const TIMEOUT: Duration = Duration::from_secs(5);
+/// The shortest wait: none at all would be for ever.
+const AT_LEAST: Duration = Duration::from_micros(1);
 
 impl Tcp {
     /// Connects to `HOST:PORT`.
@@ -48,17 +52,43 @@ impl Tcp {
         stream.set_write_timeout(Some(TIMEOUT))?;
         let wait = TIMEOUT;
         stream.set_read_timeout(Some(wait))?;
-        Ok(Self { stream, wait })
+        Ok(Self {
+            stream,
+            wait,
+            write_wait: wait,
+        })
     }
 }
 
 impl Transport for Tcp {
-    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.stream.write_all(bytes)
+    fn send(&mut self, mut bytes: &[u8]) -> io::Result<()> {
+        let began = Instant::now();
+        // A device that reads a byte now and then is not waited for, either.
+        while !bytes.is_empty() {
+            let left = TIMEOUT.saturating_sub(began.elapsed());
+            if left.is_zero() {
+                return Err(io::ErrorKind::TimedOut.into());
+            }
+            let sent = self.send_some(bytes, left)?;
+            bytes = bytes.get(sent..).unwrap_or(&[]);
+        }
+        Ok(())
+    }
+
+    fn send_some(&mut self, bytes: &[u8], wait: Duration) -> io::Result<usize> {
+        let wait = wait.max(AT_LEAST);
+        if wait != self.write_wait {
+            self.stream.set_write_timeout(Some(wait))?;
+            self.write_wait = wait;
+        }
+        match self.stream.write(bytes) {
+            Err(error) if is_time_out(&error) => Ok(0),
+            other => other,
+        }
     }
 
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
-        let wait = wait.max(Duration::from_micros(1)); // zero would be for ever
+        let wait = wait.max(AT_LEAST);
         if wait != self.wait {
             self.stream.set_read_timeout(Some(wait))?;
             self.wait = wait;

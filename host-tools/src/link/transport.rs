@@ -17,6 +17,16 @@ pub trait Transport {
     /// # Errors
     /// When the device is gone.
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize>;
+
+    /// Sends as much of `bytes` as the device takes within about `wait`; returns how many
+    /// bytes that were. A transport that never waits for its device sends all of them.
+    ///
+    /// # Errors
+    /// When the device is gone.
+    fn send_some(&mut self, bytes: &[u8], wait: Duration) -> io::Result<usize> {
+        let _ = wait;
+        self.send(bytes).map(|()| bytes.len())
+    }
 }
 
 impl<T: Transport + ?Sized> Transport for &mut T {
@@ -26,6 +36,23 @@ impl<T: Transport + ?Sized> Transport for &mut T {
 
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
         (**self).receive(into, wait)
+    }
+
+    fn send_some(&mut self, bytes: &[u8], wait: Duration) -> io::Result<usize> {
+        (**self).send_some(bytes, wait)
+    }
+}
+
+/// The line of somebody who has hung up.
+pub(super) struct NoLine;
+
+impl Transport for NoLine {
+    fn send(&mut self, _: &[u8]) -> io::Result<()> {
+        Err(io::ErrorKind::NotConnected.into())
+    }
+
+    fn receive(&mut self, _: &mut [u8], _: Duration) -> io::Result<usize> {
+        Err(io::ErrorKind::NotConnected.into())
     }
 }
 

@@ -13,8 +13,9 @@ use super::error::LinkError;
 
 /// Transfers under way from the device, so that none of its packets waits.
 const TRANSFERS: usize = 4;
-/// How long the board may leave a transfer unread before it counts as gone.
-const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
+/// How long the board may leave a transfer unread before it counts as gone. A board reads
+/// within milliseconds, and an end that is asked for waits for this.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A hapterra board on USB.
 pub type Usb = Bulk<SystemPipes>;

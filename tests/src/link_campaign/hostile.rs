@@ -219,7 +219,8 @@ fn count(chance: &mut Chance) -> SampleCount {
 }
 
 /// A greeting whose words a terminal would obey.
-fn hello(number: u8) -> DeviceHello {
+#[must_use]
+pub fn hello(number: u8) -> DeviceHello {
     DeviceHello {
         protocol: PROTOCOL,
         number,

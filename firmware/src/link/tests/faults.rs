@@ -10,10 +10,10 @@ use hapterra_core::terrain::RETRY_TICKS;
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
 use hapterra_core::wire::message::{BATCH, Heights, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::request::{Refusal, Request};
-use hapterra_core::wire::session::{SessionEnd, SessionNumber};
+use hapterra_core::wire::session::{ONLY_LOOKS, SessionEnd, SessionNumber};
 use hapterra_core::wire::version::VersionCheck;
 
-use super::rig::{HELLO, Rig, asked, frame, framed, point, scene, tile};
+use super::rig::{FIRST, HELLO, Rig, asked, frame, framed, point, scene, tile};
 
 /// What the points of a descent feel like; nothing about ticks and costs.
 fn forces(felt: &[(u32, Sample)]) -> Vec<(u32, hapterra_core::Vec3)> {
@@ -182,6 +182,48 @@ fn a_host_that_vanishes_is_let_go_after_the_time_it_named() {
     assert_eq!(device.last.end, SessionEnd::HostSilent);
     assert_eq!(device.epoch, Some(7), "and it holds the scene");
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Disarmed));
+}
+
+#[test]
+fn who_only_looks_takes_no_arm_and_keeps_none_armed() {
+    let mut rig = Rig::armed();
+    rig.say(&ToDevice::Hello(HostHello {
+        silence_s: 5,
+        ..HELLO
+    }));
+    rig.run(1);
+    let looker = SessionNumber::new(99 << 8);
+    (rig.looker, rig.answers_tiles) = (Some(looker), false);
+    let looks = HostHello {
+        silence_s: ONLY_LOOKS,
+        ..HELLO
+    };
+    for second in 0..6 {
+        rig.send(&framed(looker, &ToDevice::Hello(looks)));
+        for message in [ToDevice::Status, ToDevice::GetCalibration, ToDevice::Alive] {
+            rig.send(&framed(looker, &message));
+        }
+        rig.run(999);
+        let on = rig.device.tick(rig.sense).enabled;
+        assert_eq!(on, second < 5, "second {second}");
+    }
+    let answers = rig.looked_at.iter().map(|message| match message {
+        ToHost::Hello(_) => 'h',
+        ToHost::Status(_) => 's',
+        ToHost::Calibration(_) => 'c',
+        _ => '?',
+    });
+    assert_eq!(answers.collect::<std::string::String>(), "hsc".repeat(6));
+    // It asks for nothing, and the session before is the one that was left.
+    rig.send(&framed(looker, &ToDevice::Bye));
+    rig.heard.clear();
+    rig.greet_anew();
+    rig.run(5);
+    let ToHost::Hello(device) = &rig.heard[0] else {
+        panic!("{:?}", rig.heard[0]);
+    };
+    assert_eq!(device.last.session, FIRST.get());
+    assert_eq!(device.last.end, SessionEnd::HostSilent);
 }
 
 #[test]

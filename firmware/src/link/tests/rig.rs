@@ -118,6 +118,9 @@ pub(super) struct Rig {
     /// Bytes the writer takes a step; `usize::MAX` for a fast one.
     pub(super) writer: usize,
     pub(super) heard: Vec<ToHost>,
+    /// The session of a host that only looks, and what that has heard.
+    pub(super) looker: Option<SessionNumber>,
+    pub(super) looked_at: Vec<ToHost>,
     /// The session that is spoken in, and the number of its last request.
     pub(super) session: SessionNumber,
     pub(super) number: u8,
@@ -147,6 +150,8 @@ impl Rig {
             on_the_way: VecDeque::new(),
             writer: usize::MAX,
             heard: Vec::new(),
+            looker: None,
+            looked_at: Vec::new(),
             session: FIRST,
             number: 0,
             asked: Vec::new(),
@@ -283,6 +288,10 @@ impl Rig {
                 continue;
             }
             let framed: InSession<ToHost> = decode(content).expect("a message");
+            if self.looker == Some(framed.session) {
+                self.looked_at.push(framed.message);
+                continue;
+            }
             assert_eq!(framed.session, self.session, "{:?}", framed.message);
             let message = framed.message;
             if let (ToHost::Need { epoch, key }, true) = (&message, self.answers_tiles) {

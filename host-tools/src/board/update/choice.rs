@@ -19,8 +19,11 @@ pub struct Plugged {
 pub enum Choice<'p> {
     /// A board that runs its firmware and has to enter its loader first.
     Board(&'p Plugged),
-    /// A loader, as after an update that failed.
+    /// The loader that was named.
     Loader(&'p Plugged),
+    /// A loader that nobody named. Any STM32 may be one: a board after an update that
+    /// failed, or somebody's other machine. Its user has to say that it is meant.
+    UnnamedLoader(&'p Plugged),
 }
 
 /// Picks the device with a serial number, or the only one that there is. A choice is
@@ -37,7 +40,10 @@ pub fn choose<'p>(plugged: &'p [Plugged], serial: Option<&str>) -> Result<Choice
     };
     let mut fitting = plugged.iter().filter(fits);
     match (fitting.next(), fitting.next()) {
-        (Some(device), None) if device.is_loader => Ok(Choice::Loader(device)),
+        (Some(device), None) if device.is_loader => Ok(match serial {
+            Some(_) => Choice::Loader(device),
+            None => Choice::UnnamedLoader(device),
+        }),
         (Some(device), None) => Ok(Choice::Board(device)),
         (None, _) => Err(UpdateError::Nothing {
             looked_for: match serial {
@@ -84,6 +90,9 @@ mod tests {
         assert_eq!(choose(one, Some("ab12")).ok(), Some(Choice::Board(&a)));
         let three = [a.clone(), b.clone(), c.clone()];
         assert_eq!(choose(&three, Some("0F")).ok(), Some(Choice::Loader(&c)));
+        let only = std::slice::from_ref(&c);
+        assert_eq!(choose(only, None).ok(), Some(Choice::UnnamedLoader(&c)));
+        assert_eq!(choose(only, Some("0f")).ok(), Some(Choice::Loader(&c)));
         let Err(UpdateError::Several(named)) = choose(&three, None) else {
             panic!("refused");
         };

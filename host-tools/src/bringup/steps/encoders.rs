@@ -57,7 +57,7 @@ fn judge(joint: usize, there: [i32; 3], back: [i32; 3]) -> Result<(), Finding> {
             counts,
         });
     }
-    let off = f64::from(counts + back[joint]).abs();
+    let off = (f64::from(counts) + f64::from(back[joint])).abs();
     if off > LOST_SHARE * f64::from(counts).abs() {
         return Err(Finding::CountsLost {
             joint: joint + 1,
@@ -86,6 +86,9 @@ mod tests {
             encoder: 3,
         };
         assert_eq!(judge_one([40, 700, 2_800]), Err(swapped));
+        // A board may say anything.
+        let most = judge(1, [0, i32::MAX, 0], [0, i32::MAX, 0]);
+        assert!(matches!(most, Err(Finding::CountsLost { joint: 2, .. })));
         let lost = judge(1, [40, 2_800, 700], [-40, -2_000, -700]);
         assert!(matches!(lost, Err(Finding::CountsLost { joint: 2, .. })));
     }

@@ -94,7 +94,7 @@ pub(super) fn carried(
     }
     attendant.begin(Task::HoldTip);
     board.trips(attendant, Task::ReleaseDeadMan, Fault::DeadManReleased)?;
-    board.leave();
+    board.leave()?;
     Ok(format!(
         "the tip stayed within {drift_mm:.1} mm for 3 s; letting the switch go gave fault 6"
     ))

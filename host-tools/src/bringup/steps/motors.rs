@@ -78,11 +78,12 @@ fn jog(
     on_scale: bool,
 ) -> Result<(DVec3, Option<Fault>), Halt> {
     let axis = axis as u8; // 0 to 2
-    board.ask(&Request::Jog(Jog {
+    let jog = Jog {
         axis,
         current_a,
         hold_ms,
-    }))?;
+    };
+    board.drive(attendant, &Request::Jog(jog))?;
     let angles = |status: &Status| status.health.angles_rad.as_dvec3();
     let began = |status: &Status| {
         let report = &status.health.report;

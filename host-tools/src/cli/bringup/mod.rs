@@ -11,6 +11,7 @@ use hapterra_core::phantom::Calibration;
 
 use super::failure::{Failure, Hint};
 use super::terminal::interrupt;
+use super::terminal::voice::{say, tell};
 use crate::bringup::{
     Attendant, BringupError, Halt, Log, LogError, Step, VirtualUser, Walked, walk,
 };
@@ -48,9 +49,9 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     interrupt::listen();
     if args.device == DeviceAddress::Native {
-        println!("a virtual user brings a virtual Phantom up");
+        say("a virtual user brings a virtual Phantom up");
         let mut user = VirtualUser::new(Wiring::RIGHT);
-        user.says = |line| println!("{line}");
+        user.says = |line| say(line);
         return bring_up(args, &mut user, VIRTUAL_PATIENCE, |user| {
             Ok(Box::new(user.device(Calibration::PREMIUM_1_5)))
         });
@@ -85,7 +86,7 @@ fn bring_up<A: Attendant>(
         let mut keep = |log: &Log| path.as_ref().map_or(Ok(()), |path| log.write(path));
         let walked = walk(&mut dialogue, user, &mut log, &mut keep);
         if let Some(path) = &path {
-            println!("log            {}", path.display());
+            say(format!("log            {}", path.display()));
         }
         match (walked, dialogue) {
             // The session went with the board's power: there is nobody to say an end to.
@@ -96,13 +97,13 @@ fn bring_up<A: Attendant>(
             }
             (Err(error), dialogue) => {
                 if let Err(not_confirmed @ LinkError::NotConfirmed) = dialogue.end() {
-                    eprintln!("{not_confirmed}");
+                    tell(not_confirmed);
                 }
                 return Err(error.into());
             }
         }
     }
-    println!("complete       every step is passed: set the amplifiers' limits to the motors' peak");
+    say("complete       every step is passed: set the amplifiers' limits to the motors' peak");
     Ok(())
 }
 

@@ -15,7 +15,7 @@ use crate::link::{Dialogue, Transport};
 /// # Errors
 /// The board was not brought up; no answer.
 pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Failure> {
-    let mut dialogue = Dialogue::open(Box::new(transport), PATIENCE)?;
+    let mut dialogue = Dialogue::look(Box::new(transport), PATIENCE)?;
     if is_real(&dialogue.device().board) {
         let record = dialogue.calibration()?;
         let device = dialogue.device();

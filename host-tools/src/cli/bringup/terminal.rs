@@ -1,22 +1,24 @@
 //! The first power-up's tasks and questions at a terminal.
 
 use crate::bringup::{Attendant, Question, Reading, Stopped, Task};
+use crate::cli::terminal::interrupt;
 use crate::cli::terminal::questions::{ask, number};
+use crate::cli::terminal::voice::say;
 
 /// A user at a terminal.
 pub(super) struct UserAtTerminal;
 
 impl Attendant for UserAtTerminal {
     fn hear(&mut self, line: &str) {
-        println!("{line}");
+        say(line);
     }
 
     fn begin(&mut self, task: Task) {
-        println!("  > {task}");
+        say(format!("  > {task}"));
     }
 
     fn finish(&mut self, task: Task) -> Result<(), Stopped> {
-        println!("  > {task}");
+        say(format!("  > {task}"));
         ask("    press Enter when that is done (q stops)")
             .map(drop)
             .ok_or(Stopped)
@@ -33,5 +35,13 @@ impl Attendant for UserAtTerminal {
     fn confirms(&mut self, question: Question) -> Result<bool, Stopped> {
         let answer = ask(&format!("  ? {question} [y/N]")).ok_or(Stopped)?;
         Ok(matches!(answer.as_str(), "y" | "Y" | "yes"))
+    }
+
+    fn stops(&self) -> fn() -> bool {
+        interrupt::requested
+    }
+
+    fn may_be_armed(&mut self, may: bool) {
+        interrupt::board_may_be_armed(may);
     }
 }

@@ -16,6 +16,7 @@ use hapterra_core::wire::status::PRESS_MS;
 use super::failure::{Failure, OrHint};
 use super::options::device::{Device, DeviceChoice};
 use super::terminal::left_behind;
+use super::terminal::voice::say;
 use crate::calibrate::{Attendant, Plan, VirtualUser, walk};
 use crate::link::{DeviceAddress, Dialogue, HostClock, Native};
 use crate::output::{Output, OutputError};
@@ -104,12 +105,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     // In memory: a virtual user shows how it goes.
     let mut user = VirtualUser::with_a_stylus();
-    user.says = |line| println!("{line}");
+    user.says = |line| say(line);
     let device = Native::new(HostClock::default(), None)
         .meddled_with(user.hands())
         .restless();
     if !args.no_walk {
-        println!("a virtual user calibrates a virtual Phantom that differs from its preset");
+        say("a virtual user calibrates a virtual Phantom that differs from its preset");
     }
     let mut dialogue = Dialogue::open(Box::new(device), PATIENCE)?;
     calibrate(args, &mut dialogue, &mut user)
@@ -121,7 +122,7 @@ fn calibrate(
     attendant: &mut dyn Attendant,
 ) -> Result<(), Failure> {
     let (begin, whence) = begin(args, dialogue)?;
-    println!("begins with    {whence}");
+    say(format!("begins with    {whence}"));
     if (args.no_walk || args.skip_ratios) && !args.unmeasured_ratios && begin.has_guessed_ratios() {
         return Err("the cable ratios of this model are a guess, and were never measured").or_hint(
             "measure them: no --no-walk, no --skip-ratios; or agree with --unmeasured-ratios",
@@ -142,13 +143,13 @@ fn calibrate(
     }
     if let Some(path) = &args.output {
         write(path, &record).or_hint("name another file with --output")?;
-        println!("written        {}", path.display());
+        say(format!("written        {}", path.display()));
     }
     hand_over(args, dialogue, record)?;
     if let Some(counts) = zero {
         let zeroed = dialogue.request(&Request::Zero { counts })?;
         zeroed.map_err(Failure::new)?;
-        println!("zeroed         the arm, until the device is switched off");
+        say("zeroed         the arm, until the device is switched off");
     }
     Ok(())
 }
@@ -188,15 +189,15 @@ fn hand_over(
             (dialogue.request(&request)?, "until it is switched off")
         }
         false => {
-            println!(
+            say(format!(
                 "to store it    press the dead-man switch within {} s",
                 PRESS_MS / 1_000
-            );
+            ));
             (dialogue.store(calibration)?, "and stored there")
         }
     };
     answer.or_hint("see hapterra status; the record can be kept in a file with --output FILE")?;
-    println!("in force       on the device, {until}");
+    say(format!("in force       on the device, {until}"));
     Ok(())
 }
 

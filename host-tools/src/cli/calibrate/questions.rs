@@ -3,6 +3,7 @@
 
 use crate::calibrate::{Attendant, Direction, N_PER_GRAM, Review, Stopped};
 use crate::cli::terminal::questions::{ask, number};
+use crate::cli::terminal::voice::{say, show};
 
 /// A user at a terminal.
 pub(super) struct UserAtTerminal {
@@ -18,33 +19,33 @@ impl UserAtTerminal {
 
 impl Attendant for UserAtTerminal {
     fn hear(&mut self, line: &str) {
-        println!("  {line}");
+        say(format!("  {line}"));
     }
 
     fn zero_pose(&mut self) -> Result<(), Stopped> {
-        println!(
+        say(format!(
             "put the arm into its zero pose and hold it: upper link level and pointing at you, fore link hanging straight down"
-        );
+        ));
         ask("  press Enter when it is there (q stops)")
             .map(drop)
             .ok_or(Stopped)
     }
 
     fn move_along(&mut self, direction: Direction, about_mm: f64) -> Result<f64, Stopped> {
-        println!(
+        say(format!(
             "lay a ruler at the tip, {}; move the tip along it by about {about_mm} mm and hold it",
             direction.words()
-        );
+        ));
         let moved = number(&format!("  how far did it go, in mm? [{about_mm}]")).ok_or(Stopped)?;
         Ok(moved.unwrap_or(about_mm))
     }
 
     fn hold_still(&mut self, pose: usize) -> Result<Option<[f64; 2]>, Stopped> {
         if pose == 1 {
-            println!(
+            say(format!(
                 "gravity: hold the tip by a thread on a spring or kitchen scale, everything still, in poses that differ;\n  \
                  tell what the scale reads upwards and towards you (negative: down, away from you)"
-            );
+            ));
         }
         let grams = |question: String| number(&question).ok_or(Stopped);
         let Some(up) = grams(format!("  pose {pose}: grams upwards? [no more poses]"))? else {
@@ -57,7 +58,7 @@ impl Attendant for UserAtTerminal {
     }
 
     fn agrees(&mut self, review: &Review) -> Result<bool, Stopped> {
-        print!("{review}");
+        show(review);
         if self.yes {
             return Ok(true);
         }

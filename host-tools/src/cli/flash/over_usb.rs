@@ -13,6 +13,8 @@ use crate::board::update::{
 use crate::cli::failure::{Failure, OrHint};
 use crate::cli::session_summary;
 use crate::cli::terminal::progress;
+use crate::cli::terminal::questions::ask;
+use crate::cli::terminal::voice::{self, say};
 use crate::link::{DeviceAddress, Dialogue, Usb};
 
 /// How long the board may take to answer.
@@ -31,7 +33,11 @@ pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
     let plugged = plugged();
     let place = match choose(&plugged, serial)? {
         Choice::Loader(device) => {
-            println!("loader         {}, as it was found", device.place);
+            say(format!("loader         {}", device.place));
+            &device.place
+        }
+        Choice::UnnamedLoader(device) => {
+            agree(args, device)?;
             &device.place
         }
         Choice::Board(device) => {
@@ -47,12 +53,32 @@ pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
         return Err(error.into());
     }
     let bytes = write(args, image, &mut loader)?;
-    println!(
+    say(format!(
         "written        {bytes} bytes to {}, read back and equal",
         args.board.name
-    );
+    ));
     drop(loader);
     greet(place)
+}
+
+/// Asks whether a loader that nobody named is the board that is meant: a loader does not
+/// tell what it is wired to.
+fn agree(args: &Args, device: &Plugged) -> Result<(), Failure> {
+    let serial = device.serial.as_deref().unwrap_or("without a number");
+    let (place, board) = (&device.place, args.board.name);
+    say(format!(
+        "loader         {serial} at {place}, as it was found"
+    ));
+    let question = format!("is that the {board} that is to be written? [y/N]");
+    match ask(&question).as_deref() {
+        Some("y" | "Y" | "yes") => Ok(()),
+        _ => Err(Failure::new(format!(
+            "nobody said that the loader {serial} at {place} is the board that is meant"
+        ))
+        .hint(format!(
+            "nothing was touched; name it: --device usb:{serial}"
+        ))),
+    }
 }
 
 /// Has a board that runs its firmware enter its loader, if it is the right one.
@@ -67,10 +93,10 @@ fn enter_loader(args: &Args, device: &Plugged) -> Result<(), Failure> {
         }
         .into());
     }
-    println!(
+    say(format!(
         "board          {}",
         session_summary::device(dialogue.device())
-    );
+    ));
     dialogue
         .request(&Request::EnterLoader)?
         .or_hint("disarm it (`hapterra status --disarm`) and try again; firmware without this request is flashed through the debug probe once")
@@ -92,6 +118,7 @@ fn wait_for<T>(
 }
 
 fn write(args: &Args, image: &Image, loader: &mut Loader<SystemPipe>) -> Result<usize, Failure> {
+    voice::finish();
     let bar = progress::bar(Some(0), "{msg:10} {bar:30} {pos} of {len}");
     let written = update(loader, args.board, image, &mut |step| {
         let (what, done, of) = match step {
@@ -121,9 +148,9 @@ fn greet(place: &str) -> Result<(), Failure> {
     };
     let transport = Box::new(Usb::connect(device.serial.as_deref())?);
     let dialogue = Dialogue::open(transport, PATIENCE)?;
-    println!(
+    say(format!(
         "started        {}",
         session_summary::device(dialogue.device())
-    );
+    ));
     Ok(())
 }

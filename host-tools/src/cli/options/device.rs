@@ -6,7 +6,9 @@ use std::time::Duration;
 
 use super::emulated_board::EmulatedBoard;
 use crate::cli::failure::Failure;
-use crate::link::{DeviceAddress, Dialogue, HostClock, Native, Transport, move_arm_while};
+use crate::link::{
+    DeviceAddress, Dialogue, HostClock, LinkError, Native, Transport, move_arm_while,
+};
 use crate::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script};
 
 /// How long a real device may take to answer.
@@ -59,32 +61,63 @@ impl Device {
         &self,
         talk: impl FnOnce(&mut Dialogue<'_>) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
+        self.speak(opened, talk)
+    }
+
+    /// Looks at the device, and leaves it to the host that it has.
+    ///
+    /// # Errors
+    /// As [`Device::talk`].
+    pub fn look<T>(
+        &self,
+        talk: impl FnOnce(&mut Dialogue<'_>) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
+        self.speak(looked_at, talk)
+    }
+
+    fn speak<T>(
+        &self,
+        open: for<'t> fn(Box<dyn Transport + 't>, Duration) -> Result<Dialogue<'t>, LinkError>,
+        talk: impl FnOnce(&mut Dialogue<'_>) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
         let mut arm = resting()?;
         match &self.device {
             DeviceChoice::There(address) => {
                 let native = || Native::new(HostClock::default(), Some(Box::new(arm))).restless();
-                converse(address.connect(native)?, PATIENCE, talk)
+                converse(open(address.connect(native)?, PATIENCE)?, talk)
             }
             DeviceChoice::Emulated => {
                 let (_emulator, mut lines) = self.board.start()?;
                 move_arm_while(&mut lines.plant, &mut arm, || {
-                    converse(Box::new(lines.link), EMULATED_PATIENCE, talk)
+                    converse(open(Box::new(lines.link), EMULATED_PATIENCE)?, talk)
                 })
             }
         }
     }
 }
 
-/// Talks over a transport, and ends the conversation.
+/// Talks, and ends the conversation.
 fn converse<T>(
-    transport: Box<dyn Transport + '_>,
-    patience: Duration,
+    mut dialogue: Dialogue<'_>,
     talk: impl FnOnce(&mut Dialogue<'_>) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
-    let mut dialogue = Dialogue::open(transport, patience)?;
     let said = talk(&mut dialogue)?;
     dialogue.end()?;
     Ok(said)
+}
+
+fn opened<'t>(
+    line: Box<dyn Transport + 't>,
+    patience: Duration,
+) -> Result<Dialogue<'t>, LinkError> {
+    Dialogue::open(line, patience)
+}
+
+fn looked_at<'t>(
+    line: Box<dyn Transport + 't>,
+    patience: Duration,
+) -> Result<Dialogue<'t>, LinkError> {
+    Dialogue::look(line, patience)
 }
 
 /// A virtual Phantom at rest in its zero pose.

@@ -1,62 +1,113 @@
 //! Arming while a terrain is served: says what keeps the arm from it, and takes
 //! Enter for "go on": clear the fault, zero the arm, ask to arm.
+//!
+//! Enter answers the question that was shown last, and nothing else: what was typed before
+//! it is forgotten, and a fault that came after it is shown first.
 
-use std::io::{BufRead, IsTerminal};
-use std::sync::mpsc::{Receiver, channel};
+use std::io::{self, IsTerminal};
 use std::time::Instant;
 
-use hapterra_core::guard::{Blockers, Mode, Report};
+use hapterra_core::guard::{Blockers, Fault, Mode, Report};
 use hapterra_core::wire::request::{Refusal, Request};
 
+use super::keyboard::keyboard;
 use crate::cli::sparing::Sparing;
 use crate::link::{Ask, Event};
 
 /// More than an arm that is armed, faulted and armed again in a second needs.
 const LINES_A_SECOND: u32 = 24;
 
+/// What Enter means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Question {
+    /// The fault that was shown and is cleared.
+    fault: Option<Fault>,
+    /// The arm is in its zero pose.
+    zeroes: bool,
+}
+
+/// Something to tell the user.
+#[derive(Debug)]
+struct Line {
+    text: String,
+    /// What Enter means from now on.
+    asks: Option<Question>,
+}
+
+/// Where Enter comes from.
+trait Enter {
+    /// Forgets what was pressed so far.
+    fn forget(&mut self);
+
+    /// Whether Enter was pressed since the last look.
+    fn was_pressed(&mut self) -> bool;
+}
+
+/// The user at the terminal.
+struct AtTheTerminal;
+
+impl Enter for AtTheTerminal {
+    fn forget(&mut self) {
+        keyboard().forget_typed();
+    }
+
+    fn was_pressed(&mut self) -> bool {
+        keyboard().was_pressed()
+    }
+}
+
+/// Where nobody presses anything.
+struct Nobody;
+
+impl Enter for Nobody {
+    fn forget(&mut self) {}
+
+    fn was_pressed(&mut self) -> bool {
+        false
+    }
+}
+
 /// Leads the user from disarmed to armed.
 pub(in crate::cli) struct ArmingPrompts {
-    enter: Receiver<()>,
+    enter: Box<dyn Enter>,
+    /// What was asked last and not answered yet.
+    question: Option<Question>,
     report: Option<Report>,
+    /// The device has come back: its first report tells whether the arm is armed.
+    is_back: bool,
     /// Enter was pressed with the arm in its zero pose: its counts are asked for.
     zeroing: bool,
     say: Vec<Ask>,
     /// Whether there is a user who arms; a virtual hand follows its script.
     leads: bool,
     /// Lines for the user, in order.
-    lines: Vec<String>,
+    lines: Vec<Line>,
     sparing: Sparing,
 }
 
 impl ArmingPrompts {
     /// For a virtual hand: only what is wrong is told.
     pub(in crate::cli) fn for_a_script() -> Self {
-        let (_, nobody) = channel();
         Self {
             leads: false,
-            ..Self::listening(nobody)
+            ..Self::listening(Nobody)
         }
     }
 
     /// Listens to the terminal, if there is one.
     pub(in crate::cli) fn at_the_terminal() -> Self {
-        let (pressed, enter) = channel();
-        if std::io::stdin().is_terminal() {
-            std::thread::spawn(move || {
-                for line in std::io::stdin().lock().lines() {
-                    if line.is_err() || pressed.send(()).is_err() {
-                        return;
-                    }
-                }
-            });
+        match io::stdin().is_terminal() {
+            true => Self::listening(AtTheTerminal),
+            false => Self::listening(Nobody),
         }
-        Self::listening(enter)
     }
 
-    fn listening(enter: Receiver<()>) -> Self {
+    fn listening(enter: impl Enter + 'static) -> Self {
         Self {
-            enter,
+            enter: Box::new(enter),
+            question: None,
             report: None,
+            is_back: false,
             zeroing: false,
             say: vec![],
             leads: true,
@@ -69,21 +120,21 @@ impl ArmingPrompts {
     pub(in crate::cli) fn on_event(&mut self, event: &Event<'_>) {
         match event {
             Event::Guard(report) => self.on_guard_report(report),
+            Event::Opened { .. } => self.is_back = self.leads,
             Event::Answered { request, result } => match (request, result) {
                 (Request::Arm, Err(Refusal::Blocked(why))) => {
-                    self.lines.push("not armed:".into());
+                    self.tell("not armed:");
                     self.name(*why);
                     self.ask_for_enter(*why);
                 }
                 // It is armed already, in the pose that it has.
                 (Request::Zero { .. }, Err(Refusal::NotWhileArmed)) => {}
-                (request, Err(refused)) => self.lines.push(format!("{request:?}: {refused}")),
+                (request, Err(refused)) => self.tell(format!("{request:?}: {refused}")),
                 (_, Ok(())) => {}
             },
             Event::Unanswered(ask) => {
                 self.zeroing &= **ask != Ask::Status;
-                self.lines
-                    .push(format!("the device does not answer: {ask:?} was given up"));
+                self.tell(format!("the device does not answer: {ask:?} was given up"));
             }
             Event::Status(status) if self.zeroing => {
                 self.zeroing = false;
@@ -91,7 +142,7 @@ impl ArmingPrompts {
                 let requests = [Request::Zero { counts }, Request::Arm];
                 self.say.extend(requests.map(Ask::Request));
                 let [a, b, c] = counts;
-                self.lines.push(format!("zeroed at {a} {b} {c} counts"));
+                self.tell(format!("zeroed at {a} {b} {c} counts"));
             }
             _ => {}
         }
@@ -100,6 +151,14 @@ impl ArmingPrompts {
     /// Says how the guard stands, where that is news.
     fn on_guard_report(&mut self, report: &Report) {
         let before = self.report.replace(*report);
+        let is_settled = report.mode == Mode::Disarmed || report.mode.drives();
+        if self.is_back && is_settled {
+            self.is_back = false;
+            if report.mode == Mode::Disarmed && report.fault.is_none() {
+                self.tell("the arm is not armed any more");
+                return self.ask_for_enter(report.blockers);
+            }
+        }
         let news = |r: &Report| (r.mode, r.fault, r.blockers);
         if before.as_ref().map(news) == Some(news(report)) {
             return;
@@ -107,77 +166,105 @@ impl ArmingPrompts {
         let was = before.and_then(|before| before.fault);
         if let Some(fault) = report.fault.filter(|_| was != report.fault) {
             let (number, meaning) = (fault.number(), fault.meaning());
-            self.lines
-                .push(format!("FAULT {number} {fault:?}: {meaning}"));
-            self.lines.push(format!("  {}", fault.what_to_do()));
+            self.tell(format!("FAULT {number} {fault:?}: {meaning}"));
+            self.tell(format!("  {}", fault.what_to_do()));
             return self.ask_for_enter(report.blockers);
         }
         match report.mode {
             _ if !self.leads => {}
             // What is in the way besides is refused, or gone, in a moment.
             Mode::Requested if Blockers::BY_HAND.contains(report.blockers) => {
-                self.lines.push("ready to arm; waits for your hand:".into());
+                self.tell("ready to arm; waits for your hand:");
                 self.name(report.blockers);
             }
             Mode::Confirming if report.blockers.contains(Blockers::FORCE_TOO_LARGE) => {
                 let what = Blockers::FORCE_TOO_LARGE.meaning();
-                self.lines.push(format!("held back: {what}"));
+                self.tell(format!("held back: {what}"));
             }
-            Mode::Ramping => self.lines.push("amplifiers on; force comes in".into()),
-            Mode::Armed => self.lines.push("armed".into()),
+            Mode::Ramping => self.tell("amplifiers on; force comes in"),
+            Mode::Armed => self.tell("armed"),
             Mode::Disarmed if before.is_some_and(|before| before.mode.drives()) => {
-                self.lines.push("disarmed; amplifiers off".into());
+                self.tell("disarmed; amplifiers off");
             }
             _ => {}
         }
     }
 
+    fn tell(&mut self, text: impl Into<String>) {
+        let text = text.into();
+        self.lines.push(Line { text, asks: None });
+    }
+
     /// Names what is in the way of arming, with what to do, a line each.
     fn name(&mut self, blockers: Blockers) {
-        let lines = blockers.meanings();
-        self.lines
-            .extend(lines.map(|(name, meaning)| format!("  {name}: {meaning}")));
+        for (name, meaning) in blockers.meanings() {
+            self.tell(format!("  {name}: {meaning}"));
+        }
     }
 
     fn ask_for_enter(&mut self, why: Blockers) {
         if !self.leads {
             return;
         }
-        self.lines.push(match why.contains(Blockers::NOT_ZEROED) {
-            true => "put the arm into its zero pose, hold it there and press Enter".into(),
-            false => "when that is seen to, press Enter to clear it and arm".into(),
+        let fault = self.report.and_then(|report| report.fault);
+        let zeroes = why.contains(Blockers::NOT_ZEROED);
+        let text = match (zeroes, fault.is_some()) {
+            (true, _) => "put the arm into its zero pose, hold it there and press Enter",
+            (false, true) => "when that is seen to, press Enter to clear it and arm",
+            (false, false) => "when you are ready, press Enter to arm",
+        };
+        self.lines.push(Line {
+            text: text.into(),
+            asks: Some(Question { fault, zeroes }),
         });
     }
 
     /// What is to be said to the device now.
     pub(in crate::cli) fn messages(&mut self) -> Vec<Ask> {
-        // Where there is no terminal nobody presses anything.
-        if self.enter.try_recv().is_ok() {
-            let report = self.report.unwrap_or_default();
-            if report.fault.is_some() {
-                let seen = report.fault;
-                self.say.push(Ask::Request(Request::ClearFault { seen }));
-            }
-            self.zeroing = report.blockers.contains(Blockers::NOT_ZEROED);
-            self.say.push(match self.zeroing {
-                true => Ask::Status,
-                false => Ask::Request(Request::Arm),
-            });
+        if self.enter.was_pressed()
+            && let Some(question) = self.question.take()
+        {
+            self.on_enter(question);
         }
         std::mem::take(&mut self.say)
     }
 
+    fn on_enter(&mut self, question: Question) {
+        let fault = self.report.and_then(|report| report.fault);
+        // Nobody has read of a fault that came after the question.
+        if fault.is_some() && fault != question.fault {
+            let blockers = self.report.unwrap_or_default().blockers;
+            return self.ask_for_enter(blockers);
+        }
+        if fault.is_some() {
+            self.say
+                .push(Ask::Request(Request::ClearFault { seen: fault }));
+        }
+        self.zeroing = question.zeroes;
+        self.say.push(match question.zeroes {
+            true => Ask::Status,
+            false => Ask::Request(Request::Arm),
+        });
+    }
+
     /// What is to be said to the user now: a device whose state flickers gets so many
-    /// lines a second, and the others are counted.
+    /// lines a second, and the others are counted. A question that is left out was not
+    /// asked.
     pub(in crate::cli) fn lines(&mut self) -> Vec<String> {
         let now = Instant::now();
         let mut said = vec![];
         for line in self.lines.drain(..) {
-            match self.sparing.admit(now) {
-                Some(0) => said.push(line),
-                Some(left_out) => said.extend([format!("({left_out} lines left out)"), line]),
-                None => {}
+            let Some(left_out) = self.sparing.admit(now) else {
+                continue;
+            };
+            if left_out > 0 {
+                said.push(format!("({left_out} lines left out)"));
             }
+            if line.asks.is_some() {
+                self.question = line.asks;
+                self.enter.forget();
+            }
+            said.push(line.text);
         }
         said
     }
@@ -186,12 +273,100 @@ impl ArmingPrompts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hapterra_core::guard::Fault;
+    use std::sync::mpsc::{Receiver, Sender, channel};
+
+    impl Enter for Receiver<()> {
+        fn forget(&mut self) {
+            self.was_pressed();
+        }
+
+        fn was_pressed(&mut self) -> bool {
+            self.try_iter().count() > 0
+        }
+    }
+
+    fn with_a_user() -> (Sender<()>, ArmingPrompts) {
+        let (press, enter) = channel();
+        (press, ArmingPrompts::listening(enter))
+    }
+
+    fn not_zeroed() -> Report {
+        Report {
+            blockers: Blockers::NOT_ZEROED,
+            ..Report::default()
+        }
+    }
+
+    const REFUSED: Event<'static> = Event::Answered {
+        request: &Request::Arm,
+        result: Err(Refusal::Blocked(Blockers::NOT_ZEROED)),
+    };
+
+    #[test]
+    fn an_enter_from_before_the_question_is_no_answer() {
+        let (press, mut prompts) = with_a_user();
+        press.send(()).expect("listening");
+        prompts.on_event(&Event::Guard(&not_zeroed()));
+        prompts.on_event(&REFUSED);
+        assert_eq!(prompts.messages(), []);
+        // Nor is one that comes while the question is on its way to the terminal.
+        press.send(()).expect("listening");
+        assert!(prompts.lines().join("\n").contains("press Enter"));
+        assert_eq!(prompts.messages(), []);
+        press.send(()).expect("listening");
+        assert_eq!(prompts.messages(), [Ask::Status]);
+        // It is answered once.
+        press.send(()).expect("listening");
+        assert_eq!(prompts.messages(), []);
+    }
+
+    #[test]
+    fn a_fault_that_nobody_has_read_of_is_not_cleared() {
+        let (press, mut prompts) = with_a_user();
+        prompts.on_event(&Event::Guard(&not_zeroed()));
+        prompts.on_event(&REFUSED);
+        prompts.lines();
+        press.send(()).expect("listening");
+        let report = Report {
+            fault: Some(Fault::EncoderJump),
+            blockers: Blockers::FAULT_LATCHED,
+            ..Report::default()
+        };
+        prompts.on_event(&Event::Guard(&report));
+        assert_eq!(prompts.messages(), []);
+        assert!(prompts.lines().join("\n").contains("EncoderJump"));
+        press.send(()).expect("listening");
+        let seen = report.fault;
+        let wanted = [Request::ClearFault { seen }, Request::Arm].map(Ask::Request);
+        assert_eq!(prompts.messages(), wanted);
+    }
+
+    #[test]
+    fn an_arm_that_comes_back_disarmed_is_armed_by_enter() {
+        let (press, mut prompts) = with_a_user();
+        let device = crate::link::hello();
+        let resumed = true;
+        let opened = Event::Opened {
+            device: &device,
+            resumed,
+        };
+        for (mode, asks) in [(Mode::Armed, false), (Mode::Disarmed, true)] {
+            prompts.on_event(&opened);
+            let report = Report {
+                mode,
+                ..Report::default()
+            };
+            prompts.on_event(&Event::Guard(&report));
+            let told = prompts.lines().join("\n");
+            assert_eq!(told.contains("press Enter to arm"), asks, "{told}");
+        }
+        press.send(()).expect("listening");
+        assert_eq!(prompts.messages(), [Ask::Request(Request::Arm)]);
+    }
 
     #[test]
     fn a_device_whose_state_flickers_does_not_flood_the_terminal() {
-        let (_press, enter) = channel();
-        let mut prompts = ArmingPrompts::listening(enter);
+        let (_press, mut prompts) = with_a_user();
         let mut said = 0;
         for flicker in 0..10_000 {
             let report = Report {
@@ -207,17 +382,9 @@ mod tests {
 
     #[test]
     fn an_arm_that_is_not_zeroed_is_told_and_enter_asks_for_its_counts() {
-        let (press, enter) = channel();
-        let mut prompts = ArmingPrompts::listening(enter);
-        let report = Report {
-            blockers: Blockers::NOT_ZEROED,
-            ..Report::default()
-        };
-        prompts.on_event(&Event::Guard(&report));
-        prompts.on_event(&Event::Answered {
-            request: &Request::Arm,
-            result: Err(Refusal::Blocked(Blockers::NOT_ZEROED)),
-        });
+        let (press, mut prompts) = with_a_user();
+        prompts.on_event(&Event::Guard(&not_zeroed()));
+        prompts.on_event(&REFUSED);
         let told = prompts.lines().join("\n");
         assert!(
             told.contains("NOT_ZEROED") && told.contains("press Enter"),
@@ -256,8 +423,7 @@ mod tests {
 
     #[test]
     fn that_it_waits_for_the_hand_is_told_once() {
-        let (_press, enter) = channel();
-        let mut prompts = ArmingPrompts::listening(enter);
+        let (_press, mut prompts) = with_a_user();
         let waits = |more| Report {
             mode: Mode::Requested,
             blockers: Blockers::DEAD_MAN_RELEASED | more,
@@ -274,8 +440,7 @@ mod tests {
 
     #[test]
     fn a_fault_is_told_once_and_enter_clears_it_and_arms() {
-        let (press, enter) = channel();
-        let mut prompts = ArmingPrompts::listening(enter);
+        let (press, mut prompts) = with_a_user();
         let report = Report {
             fault: Some(Fault::DeadManReleased),
             blockers: Blockers::FAULT_LATCHED,

@@ -1,8 +1,10 @@
-//! What happens at the terminal while a command runs: progress, Ctrl-C, what killed
-//! commands left, and the prompts that lead to an armed arm.
+//! What happens at the terminal while a command runs: what is written and typed there,
+//! progress, Ctrl-C, what killed commands left, and the prompts that lead to an armed arm.
 
 pub(super) mod arming_prompts;
 pub(super) mod interrupt;
+pub(super) mod keyboard;
 pub(super) mod left_behind;
 pub(super) mod progress;
 pub(super) mod questions;
+pub(super) mod voice;

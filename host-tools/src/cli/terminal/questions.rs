@@ -1,21 +1,21 @@
 //! Questions at a terminal, or at a pipe, whose lines are the answers.
 
-use std::io::{self, BufRead, Write};
+use super::keyboard::keyboard;
+use super::voice::{say, show};
 
-/// Asks, and gives the answer without the space around it; none where the input ends or
-/// the answer is `q`.
+/// Asks, and gives the answer without the space around it; none where the input ends, an
+/// end is asked for, or the answer is `q`. What was typed before is no answer.
 pub(in crate::cli) fn ask(question: &str) -> Option<String> {
-    print!("{question} ");
-    // What cannot be shown cannot be answered either: the read decides.
-    let _ = io::stdout().flush();
-    let mut line = String::new();
-    match io::stdin().lock().read_line(&mut line) {
-        Ok(0) | Err(_) => {
-            println!();
+    let keyboard = keyboard();
+    keyboard.forget_typed();
+    show(format!("{question} "));
+    match keyboard.line() {
+        None => {
+            say("");
             None
         }
-        Ok(_) if line.trim() == "q" => None,
-        Ok(_) => Some(line.trim().to_owned()),
+        Some(line) if line.trim() == "q" => None,
+        Some(line) => Some(line.trim().to_owned()),
     }
 }
 
@@ -26,7 +26,7 @@ pub(in crate::cli) fn number(question: &str) -> Option<Option<f64>> {
         match answer.parse::<f64>() {
             _ if answer.is_empty() => return Some(None),
             Ok(number) if number.is_finite() => return Some(Some(number)),
-            _ => println!("  {answer} is no number (q stops)"),
+            _ => say(format!("  {answer} is no number (q stops)")),
         }
     }
 }

@@ -1,0 +1,145 @@
+//! What is seen, shown and recorded of a session while it goes on.
+
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+use hapterra_core::scene::Sample;
+use hapterra_core::wire::hello::DeviceHello;
+
+use super::{Args, is_scripted};
+use crate::cli::terminal::arming_prompts::ArmingPrompts;
+use crate::cli::terminal::voice::{status, tell};
+use crate::link::{Ask, Event, Tally};
+use crate::output::OutputError;
+use crate::place::PlacedTerrain;
+use crate::replay::{Record, Recording, state_name};
+use crate::serving::Onlooker;
+use crate::telemetry::{Figures, SampleLog};
+
+/// Between two lines where there is no terminal.
+const LINE_EVERY: Duration = Duration::from_secs(2);
+
+/// What is seen and recorded of a session while it goes on.
+pub(super) struct Watch<'t> {
+    log: SampleLog<'t>,
+    stop_s: f64,
+    /// The latest sample and its row.
+    latest: Option<(Sample, Record)>,
+    recording: Option<Recording>,
+    failed: Option<OutputError>,
+    prompts: ArmingPrompts,
+    line_due: Instant,
+}
+
+/// What was seen in all.
+pub(super) struct Seen {
+    /// Ticks run since the scene was taken.
+    pub(super) ticks: u64,
+    pub(super) figures: Figures,
+    /// Whether the recording, where there is one, is complete and in its place.
+    pub(super) kept: Result<(), OutputError>,
+}
+
+impl<'t> Watch<'t> {
+    pub(super) fn new(
+        args: &Args,
+        placed: &PlacedTerrain<'t>,
+        device: &DeviceHello,
+        recording: Option<Recording>,
+    ) -> Self {
+        let (script_s, prompts) = match is_scripted(args) {
+            true => (placed.duration_s(), ArmingPrompts::for_a_script()),
+            false => (f64::MAX, ArmingPrompts::at_the_terminal()),
+        };
+        Self {
+            log: SampleLog::new(placed.terrain(), device),
+            stop_s: args.seconds.unwrap_or(f64::MAX).min(script_s),
+            latest: None,
+            recording,
+            failed: None,
+            prompts,
+            line_due: Instant::now() + LINE_EVERY,
+        }
+    }
+
+    /// Ends the recording, and takes the line at the bottom of the terminal away.
+    pub(super) fn finish(self) -> Seen {
+        status(None);
+        let (ticks, figures) = (self.log.ticks(), self.log.figures());
+        let kept = match (self.failed, self.recording) {
+            (Some(error), _) => Err(error),
+            (None, Some(recording)) => recording.finish(),
+            (None, None) => Ok(()),
+        };
+        Seen {
+            ticks,
+            figures,
+            kept,
+        }
+    }
+
+    fn record(&mut self, sample: &Sample) -> Record {
+        let record = self.log.take(sample);
+        if let Some(recording) = &mut self.recording {
+            let state = state_name(sample.state);
+            let more: [&dyn std::fmt::Display; 5] = [
+                &state,
+                &sample.tick,
+                &sample.work,
+                &sample.cost,
+                &sample.late,
+            ];
+            self.failed = self.failed.take().or(recording.write(&record, &more).err());
+        }
+        record
+    }
+}
+
+impl Onlooker for Watch<'_> {
+    fn take(&mut self, event: Event<'_>) {
+        self.prompts.on_event(&event);
+        if let Event::Sample(sample) = event {
+            self.latest = Some((*sample, self.record(sample)));
+        }
+    }
+
+    fn hear(&mut self, line: &str) {
+        tell(line);
+    }
+
+    fn asks(&mut self) -> Vec<Ask> {
+        for line in self.prompts.lines() {
+            tell(line);
+        }
+        self.prompts.messages()
+    }
+
+    /// One line that is written over, or a line now and then.
+    fn show(&mut self, tally: &Tally) {
+        let Some((sample, record)) = &self.latest else {
+            return;
+        };
+        let line = in_words(sample, record, tally);
+        if std::io::stderr().is_terminal() {
+            status(Some(line));
+        } else if Instant::now() >= self.line_due {
+            self.line_due = Instant::now() + LINE_EVERY;
+            tell(line);
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.failed.is_some() || self.log.t_s() >= self.stop_s
+    }
+}
+
+fn in_words(sample: &Sample, record: &Record, tally: &Tally) -> String {
+    let force = glam::DVec3::from(record.force_n).length();
+    let ([x, y, z], t_s, state) = (record.hip_mm, record.t_s, state_name(sample.state));
+    let (tiles, lost) = (tally.tiles, tally.lost + tally.dropped);
+    let fault = sample.fault;
+    let fault = fault.map_or(String::new(), |f| format!(", FAULT {f:?}"));
+    format!(
+        "{t_s:8.3} s  {state:8}  HIP {x:.1} {y:.1} {z:.1} mm  {force:.2} N  {tiles} tiles  {lost} lost{fault}"
+    )
+}

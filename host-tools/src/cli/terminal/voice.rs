@@ -1,0 +1,116 @@
+//! What is written to the terminal while a board may be armed.
+//!
+//! One thread writes, and whoever speaks does not wait for it. A window that was closed,
+//! a reader that is gone and a disk that is full therefore end nothing. A terminal that
+//! was stopped (Ctrl-S), or a reader that does not read, holds nothing up: the lines that
+//! do not fit any more are left out.
+
+use std::fmt::Display;
+use std::io::{self, Write};
+use std::sync::OnceLock;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::Builder;
+
+use indicatif::ProgressBar;
+
+/// Lines that wait to be written; beyond them, lines are left out.
+const WAITING: usize = 512;
+
+/// What is to be written.
+enum Said {
+    /// To standard output, as it is.
+    Out(String),
+    /// A line to standard error.
+    Err(String),
+    /// The line at the bottom of the terminal.
+    Status(Option<String>),
+    /// Nothing: everything before is written.
+    Flush(SyncSender<()>),
+}
+
+/// The way to the thread that writes; none where there can be no such thread.
+static VOICE: OnceLock<Option<SyncSender<Said>>> = OnceLock::new();
+
+/// Writes a line to standard output.
+pub(in crate::cli) fn say(line: impl Display) {
+    speak(Said::Out(format!("{line}\n")));
+}
+
+/// Writes to standard output, without an end of the line.
+pub(in crate::cli) fn show(text: impl Display) {
+    speak(Said::Out(text.to_string()));
+}
+
+/// Writes a line to standard error.
+pub(in crate::cli) fn tell(line: impl Display) {
+    speak(Said::Err(format!("{line}\n")));
+}
+
+/// Replaces the line at the bottom of the terminal, or takes it away.
+pub(in crate::cli) fn status(line: Option<String>) {
+    speak(Said::Status(line));
+}
+
+/// Waits until everything is written that was said.
+pub(in crate::cli) fn finish() {
+    if let Some(Some(voice)) = VOICE.get() {
+        let (done, is_done) = sync_channel(1);
+        // Where the thread is gone there is nothing to wait for.
+        if voice.send(Said::Flush(done)).is_ok() {
+            let _ = is_done.recv();
+        }
+    }
+}
+
+fn speak(said: Said) {
+    let voice = VOICE.get_or_init(|| {
+        let (voice, said) = sync_channel(WAITING);
+        let thread = Builder::new().name("voice".into());
+        thread.spawn(move || write_all(said)).ok().map(|_| voice)
+    });
+    match voice {
+        // Where nobody takes it, nobody can be told that either.
+        Some(voice) => drop(voice.try_send(said)),
+        None => write(said, &mut None),
+    }
+}
+
+fn write_all(said: Receiver<Said>) {
+    let mut bottom = None;
+    for said in said {
+        write(said, &mut bottom);
+    }
+}
+
+/// Writes around the line at the bottom.
+fn write(said: Said, bottom: &mut Option<ProgressBar>) {
+    match said {
+        Said::Out(text) => above(bottom, || put(io::stdout(), &text)),
+        Said::Err(line) => above(bottom, || put(io::stderr(), &line)),
+        Said::Status(Some(line)) => {
+            let bar = bottom.get_or_insert_with(ProgressBar::new_spinner);
+            bar.set_message(line);
+            bar.tick();
+        }
+        Said::Status(None) => {
+            if let Some(bar) = bottom.take() {
+                bar.finish_and_clear();
+            }
+        }
+        Said::Flush(done) => {
+            let _ = done.send(());
+        }
+    }
+}
+
+fn above(bottom: &Option<ProgressBar>, put: impl FnOnce()) {
+    match bottom {
+        Some(bar) => bar.suspend(put),
+        None => put(),
+    }
+}
+
+/// Writes, where that can be written.
+pub(in crate::cli) fn put(mut to: impl Write, text: &str) {
+    let _ = to.write_all(text.as_bytes()).and_then(|()| to.flush());
+}

@@ -1,0 +1,229 @@
+//! Opens a session, serves, goes on over another line where one is lost, and ends.
+
+use std::time::{Duration, Instant};
+
+use hapterra_core::scene::Scene;
+use hapterra_core::wire::hello::DeviceHello;
+use hapterra_core::wire::session::SessionEnd;
+
+use super::onlooker::Onlooker;
+use crate::link::{Arming, Event, LinkError, Patience, Session, Tally, Transport};
+use crate::terrain::Terrain;
+
+/// Between two looks at the clock while nothing comes.
+const POLL: Duration = Duration::from_millis(50);
+
+/// What a device says that was without its host for too long.
+const WAS_SILENT: &str = "before this the device had heard nothing from its host for too long: it let the force out and disarmed the arm";
+
+/// Makes a line to the device.
+pub type Connect<'s, 't> = Box<dyn FnMut() -> Result<Box<dyn Transport + 't>, LinkError> + 's>;
+
+/// What is served, to which device, and for how long.
+pub struct Service<'s, 't> {
+    /// The terrain.
+    pub terrain: &'t Terrain<'t>,
+    /// How it lies under the arm and feels.
+    pub scene: Scene,
+    /// How the arm is armed.
+    pub arming: Arming,
+    /// How long is waited for what.
+    pub patience: Patience,
+    /// Makes a line to the device. There is one line at a time: the one before is closed
+    /// when this is called.
+    pub connect: Connect<'s, 't>,
+    /// The device as the user names it.
+    pub device: String,
+    /// Between two tries to find a device that is gone.
+    pub retry: Duration,
+    /// Whether the user wants it to go on.
+    pub goes_on: &'t dyn Fn() -> bool,
+    /// Tells the user what has to be told whatever else happens.
+    pub tell: &'s dyn Fn(&str),
+}
+
+/// A session under way. Whoever drops it, also in a panic, says goodbye.
+pub struct Served<'s, 't> {
+    session: Session<'t>,
+    connect: Connect<'s, 't>,
+    device: String,
+    retry: Duration,
+    goes_on: &'t dyn Fn() -> bool,
+    tell: &'s dyn Fn(&str),
+    /// Hello was said, or may have been.
+    has_greeted: bool,
+    is_left: bool,
+}
+
+/// How serving has ended.
+#[derive(Debug)]
+pub struct End {
+    /// The error that ended it, where one did.
+    pub why: Result<(), LinkError>,
+    /// Whether the device has confirmed that it is disarmed:
+    /// [`LinkError::NotConfirmed`] where not. Another host's arm is not this one's to
+    /// disarm; then this is no error and [`End::why`] is [`LinkError::Taken`].
+    pub disarmed: Result<(), LinkError>,
+    /// Counts of what went over the link.
+    pub tally: Tally,
+}
+
+impl<'s, 't> Service<'s, 't> {
+    /// Makes a line, has `check` look at the device that is there, and opens a session.
+    ///
+    /// # Errors
+    /// No line; what `check` finds; [`LinkError`]. Once the line stands, the device is
+    /// disarmed before the error is returned, or the user is told that it may not be.
+    pub fn open<E: From<LinkError>>(
+        mut self,
+        check: impl FnOnce(&mut dyn Transport) -> Result<(), E>,
+    ) -> Result<(Served<'s, 't>, DeviceHello), E> {
+        let mut line = (self.connect)()?;
+        let checked = check(&mut *line);
+        let (scene, arming) = (self.scene, Some(self.arming));
+        let session = Session::new(self.terrain, scene, arming, line, self.patience);
+        let mut served = Served {
+            session: session.heeding(self.goes_on),
+            connect: self.connect,
+            device: self.device,
+            retry: self.retry,
+            goes_on: self.goes_on,
+            tell: self.tell,
+            has_greeted: false,
+            is_left: false,
+        };
+        if let Err(error) = checked {
+            served.leave_and_tell(None);
+            return Err(error);
+        }
+        served.has_greeted = true;
+        match served.session.begin(&mut |_| {}) {
+            Ok(device) => Ok((served, device)),
+            Err(error) => {
+                served.leave_and_tell(Some(&error));
+                Err(error.into())
+            }
+        }
+    }
+}
+
+impl Served<'_, '_> {
+    /// Serves until the onlooker has seen enough, an end is asked for, or an error that
+    /// waiting does not mend; then says goodbye.
+    pub fn serve(mut self, onlooker: &mut dyn Onlooker) -> End {
+        let why = self.until_over(onlooker);
+        let disarmed = self.leave(why.as_ref().err(), &mut |event| onlooker.take(event));
+        let tally = self.session.tally().clone();
+        End {
+            why,
+            disarmed,
+            tally,
+        }
+    }
+
+    fn until_over(&mut self, onlooker: &mut dyn Onlooker) -> Result<(), LinkError> {
+        while (self.goes_on)() && !onlooker.is_over() {
+            let polled = self.session.poll(POLL, &mut |event| onlooker.take(event));
+            for ask in onlooker.asks() {
+                self.session.ask(ask);
+            }
+            onlooker.show(self.session.tally());
+            match polled {
+                Err(error) if error.is_passing() => self.wait_for_device(onlooker, &error)?,
+                other => other?,
+            }
+        }
+        Ok(())
+    }
+
+    /// The device is gone: says so, waits for it and resumes.
+    fn wait_for_device(
+        &mut self,
+        onlooker: &mut dyn Onlooker,
+        why: &LinkError,
+    ) -> Result<(), LinkError> {
+        let (why, device) = (described(why), &self.device);
+        onlooker.hear(&format!("{why}; waiting for {device} (Ctrl-C ends)"));
+        let began = Instant::now();
+        while (self.goes_on)() {
+            // A device that is silent may still be claimed by the line to it.
+            self.session.hang_up();
+            match self.resume(onlooker) {
+                Ok(device) => {
+                    let again = match device.epoch == Some(self.session.scene().epoch) {
+                        true => "goes on where it was",
+                        false => "was restarted and begins anew",
+                    };
+                    let after = began.elapsed();
+                    onlooker.hear(&format!("the device is back after {after:.1?}: it {again}"));
+                    if let Some(line) = told_of_last_end(&device) {
+                        onlooker.hear(line);
+                    }
+                    return Ok(());
+                }
+                Err(LinkError::Interrupted) => return Ok(()),
+                Err(error) if !error.is_passing() => return Err(error),
+                Err(_) => std::thread::sleep(self.retry),
+            }
+        }
+        Ok(())
+    }
+
+    fn resume(&mut self, onlooker: &mut dyn Onlooker) -> Result<DeviceHello, LinkError> {
+        let line = (self.connect)()?;
+        let on = &mut |event: Event<'_>| onlooker.take(event);
+        self.session.resume(line, self.goes_on, on)
+    }
+
+    /// Ends the session, whatever has ended the serving.
+    fn leave(
+        &mut self,
+        why: Option<&LinkError>,
+        on: &mut dyn FnMut(Event<'_>),
+    ) -> Result<(), LinkError> {
+        self.is_left = true;
+        match why {
+            // Another host has the arm; it is not this one's to disarm, and says so itself.
+            Some(LinkError::Taken) => return Ok(()),
+            // Nothing that this host says is understood.
+            Some(LinkError::Version { .. }) => return Err(LinkError::NotConfirmed),
+            _ => {}
+        }
+        if !self.session.has_line()
+            && let Ok(line) = (self.connect)()
+        {
+            self.session.go_over(line);
+        }
+        match self.has_greeted {
+            true => self.session.say_goodbye(on),
+            false => self.session.say_hello_and_goodbye(on),
+        }
+    }
+
+    fn leave_and_tell(&mut self, why: Option<&LinkError>) {
+        if let Err(not_confirmed) = self.leave(why, &mut |_| {}) {
+            (self.tell)(&not_confirmed.to_string());
+        }
+    }
+}
+
+impl Drop for Served<'_, '_> {
+    fn drop(&mut self) {
+        if !self.is_left {
+            self.leave_and_tell(None);
+        }
+    }
+}
+
+/// What became of the arm where its host before was silent for too long.
+#[must_use]
+pub fn told_of_last_end(device: &DeviceHello) -> Option<&'static str> {
+    (device.last.end == SessionEnd::HostSilent).then_some(WAS_SILENT)
+}
+
+fn described(error: &LinkError) -> String {
+    match error {
+        LinkError::Gone(why) => format!("{error}: {why}"),
+        _ => error.to_string(),
+    }
+}

@@ -1,0 +1,351 @@
+//! Every end of serving, against a device in memory.
+
+use std::cell::{Cell, RefCell};
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::rc::Rc;
+use std::time::Duration;
+
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::scene::Source;
+use hapterra_core::wire::session::{DEFAULT_SILENCE_S, SessionEnd};
+
+use super::{End, Onlooker, Served, Service};
+use crate::link::{Arming, Ask, Dialogue, Event, LinkError, Native, Patience, Tally, Transport};
+use crate::raster::Raster;
+use crate::terrain::{Scale, Terrain};
+
+const fn ms(ms: u64) -> Duration {
+    Duration::from_millis(ms)
+}
+
+/// The device answers at once.
+const PATIENCE: Patience = Patience {
+    again: ms(10),
+    alive: ms(20),
+    greet_again: ms(40),
+    give_up: ms(400),
+    goodbye: ms(200),
+    silence_s: DEFAULT_SILENCE_S,
+};
+
+/// A device, and what is wrong with the lines to it.
+#[derive(Clone)]
+struct Bench {
+    device: Rc<RefCell<Native>>,
+    /// Lines that stand.
+    lines: Rc<Cell<u32>>,
+    /// Nothing reaches the device.
+    deaf: Rc<Cell<bool>>,
+    /// Nothing comes from the device over the lines up to this one, either.
+    dead_up_to: Rc<Cell<u32>>,
+    /// Lines made so far.
+    made: Rc<Cell<u32>>,
+    told: Rc<RefCell<Vec<String>>>,
+}
+
+/// A line to the device.
+struct Line {
+    bench: Bench,
+    number: u32,
+}
+
+impl Transport for Line {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        let Bench { device, deaf, .. } = &self.bench;
+        match deaf.get() || self.is_dead() {
+            true => Ok(()),
+            false => device.borrow_mut().send(bytes),
+        }
+    }
+
+    fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
+        if self.is_dead() {
+            std::thread::sleep(wait.min(ms(1)));
+            return Ok(0);
+        }
+        self.bench.device.borrow_mut().receive(into, wait)
+    }
+}
+
+impl Line {
+    fn is_dead(&self) -> bool {
+        self.number <= self.bench.dead_up_to.get()
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        let lines = &self.bench.lines;
+        lines.set(lines.get() - 1);
+    }
+}
+
+impl Bench {
+    fn new() -> Self {
+        let device = Native::for_replay().restless().in_steps_of(20);
+        Self {
+            device: Rc::new(RefCell::new(device)),
+            lines: Rc::default(),
+            deaf: Rc::default(),
+            dead_up_to: Rc::default(),
+            made: Rc::default(),
+            told: Rc::default(),
+        }
+    }
+
+    fn line(&self) -> Line {
+        self.made.set(self.made.get() + 1);
+        self.lines.set(self.lines.get() + 1);
+        Line {
+            bench: self.clone(),
+            number: self.made.get(),
+        }
+    }
+
+    /// As USB makes one: none while another stands.
+    fn only_line(&self) -> Result<Box<dyn Transport>, LinkError> {
+        match self.lines.get() {
+            0 => Ok(Box::new(self.line())),
+            _ => Err(absent()),
+        }
+    }
+
+    /// How the last session ended, as the next host hears it.
+    fn last_end(&self) -> SessionEnd {
+        self.deaf.set(false);
+        let line = Box::new(self.line());
+        let dialogue = Dialogue::open(line, Duration::from_secs(20)).expect("it answers");
+        dialogue.device().last.end
+    }
+
+    fn was_told(&self) -> bool {
+        let told = self.told.borrow();
+        told.iter()
+            .any(|line| line.contains("switch the amplifiers off"))
+    }
+}
+
+fn absent() -> LinkError {
+    LinkError::Absent {
+        looked_for: "a line".into(),
+        why: "it is in use".into(),
+    }
+}
+
+/// An onlooker that has seen enough after so many looks, and does something at the last
+/// one.
+struct Looks<'l> {
+    left: u32,
+    last: Box<dyn FnMut() + 'l>,
+    heard: Vec<String>,
+}
+
+impl<'l> Looks<'l> {
+    fn times(left: u32, last: impl FnMut() + 'l) -> Self {
+        Self {
+            left,
+            last: Box::new(last),
+            heard: vec![],
+        }
+    }
+}
+
+impl Onlooker for Looks<'_> {
+    fn take(&mut self, _: Event<'_>) {}
+
+    fn hear(&mut self, line: &str) {
+        self.heard.push(line.to_owned());
+    }
+
+    fn asks(&mut self) -> Vec<Ask> {
+        vec![]
+    }
+
+    fn show(&mut self, _: &Tally) {
+        self.left -= 1;
+        if self.left == 0 {
+            (self.last)();
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.left == 0
+    }
+}
+
+/// Plays with a service to the bench's device over lines that `connect` makes.
+fn played<T>(
+    bench: &Bench,
+    goes_on: &dyn Fn() -> bool,
+    connect: &mut dyn FnMut() -> Result<Box<dyn Transport>, LinkError>,
+    play: impl FnOnce(Service<'_, '_>) -> T,
+) -> T {
+    let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    let home = GridPoint::default();
+    play(Service {
+        terrain: &terrain,
+        scene: terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home),
+        arming: Arming::default(),
+        patience: PATIENCE,
+        connect: Box::new(|| connect().map(|line| line as Box<dyn Transport>)),
+        device: "the bench".into(),
+        retry: ms(1),
+        goes_on,
+        tell: &|line| bench.told.borrow_mut().push(line.to_owned()),
+    })
+}
+
+fn open<'s, 't>(service: Service<'s, 't>) -> Result<Served<'s, 't>, LinkError> {
+    service.open(|_| Ok(())).map(|(served, _)| served)
+}
+
+/// Serves for so many looks; `last` happens at the last.
+fn served(bench: &Bench, looks: u32, last: &mut dyn FnMut()) -> (End, Vec<String>) {
+    let mut onlooker = Looks::times(looks, last);
+    let end = played(bench, &|| true, &mut || bench.only_line(), |service| {
+        let served = open(service).expect("it answers");
+        served.serve(&mut onlooker)
+    });
+    (end, onlooker.heard)
+}
+
+#[test]
+fn who_has_seen_enough_says_goodbye_and_who_is_not_heard_is_told() {
+    let bench = Bench::new();
+    let (end, _) = served(&bench, 5, &mut || {});
+    assert!(end.why.is_ok() && end.disarmed.is_ok(), "{end:?}");
+    assert_eq!(bench.last_end(), SessionEnd::Goodbye);
+    let (end, _) = served(&bench, 5, &mut || bench.deaf.set(true));
+    assert!(end.why.is_ok(), "{end:?}");
+    assert!(matches!(end.disarmed, Err(LinkError::NotConfirmed)));
+    assert_eq!(bench.last_end(), SessionEnd::Replaced);
+}
+
+#[test]
+fn a_panic_says_goodbye_and_where_that_is_not_heard_the_user_is_told() {
+    for deaf in [false, true] {
+        let bench = Bench::new();
+        let mut last = || {
+            bench.deaf.set(deaf);
+            panic!("nobody reads what is written");
+        };
+        let panicked = catch_unwind(AssertUnwindSafe(|| served(&bench, 5, &mut last)));
+        assert!(panicked.is_err());
+        assert_eq!(bench.was_told(), deaf);
+        let end = [SessionEnd::Goodbye, SessionEnd::Replaced][usize::from(deaf)];
+        assert_eq!(bench.last_end(), end);
+    }
+}
+
+#[test]
+fn what_cannot_begin_says_goodbye_and_where_that_is_not_heard_the_user_is_told() {
+    for deaf in [false, true] {
+        let bench = Bench::new();
+        // The host before was killed.
+        let line = Box::new(bench.line());
+        let killed = Dialogue::open(line, Duration::from_secs(20)).expect("it answers");
+        bench.deaf.set(deaf);
+        drop(killed);
+        let began = played(&bench, &|| true, &mut || bench.only_line(), |service| {
+            service.open(|_| Err(absent())).map(|_| ())
+        });
+        assert!(matches!(began, Err(LinkError::Absent { .. })), "{began:?}");
+        assert_eq!(bench.was_told(), deaf);
+        let end = [SessionEnd::Goodbye, SessionEnd::Replaced][usize::from(deaf)];
+        assert_eq!(bench.last_end(), end);
+    }
+    let bench = Bench::new();
+    bench.deaf.set(true);
+    let began = played(&bench, &|| true, &mut || bench.only_line(), |service| {
+        open(service).map(|_| ())
+    });
+    assert!(matches!(began, Err(LinkError::Silent(_))), "{began:?}");
+    assert!(bench.was_told());
+}
+
+#[test]
+fn an_end_that_is_asked_for_while_it_greets_is_heeded() {
+    let bench = Bench::new();
+    let began = played(&bench, &|| false, &mut || bench.only_line(), |service| {
+        open(service).map(|_| ())
+    });
+    assert!(matches!(began, Err(LinkError::Interrupted)), "{began:?}");
+    assert_eq!(bench.last_end(), SessionEnd::Goodbye);
+}
+
+#[test]
+fn a_device_that_was_silent_is_taken_up_over_another_line_once_the_first_is_closed() {
+    let bench = Bench::new();
+    let mut onlooker = Looks::times(2_000, || {});
+    let mut connect = || {
+        // Nobody waits for ever for a test that fails.
+        let waits = bench.lines.get() > 0 && bench.made.get() > 0;
+        assert!(!waits, "the line before is not closed");
+        bench.only_line()
+    };
+    let end = played(&bench, &|| true, &mut connect, |service| {
+        let served = open(service).expect("it answers");
+        bench.dead_up_to.set(1);
+        served.serve(&mut onlooker)
+    });
+    assert!(end.why.is_ok() && end.disarmed.is_ok(), "{end:?}");
+    let heard = onlooker.heard.join("\n");
+    assert!(heard.contains("goes on where it was"), "{heard}");
+    assert_eq!(bench.last_end(), SessionEnd::Goodbye);
+}
+
+#[test]
+fn an_end_that_is_asked_for_while_the_device_is_away_is_said_once_it_is_back() {
+    for back in [true, false] {
+        let bench = Bench::new();
+        let goes_on = Cell::new(true);
+        let mut made = 0;
+        let mut connect = || {
+            made += 1;
+            match made {
+                1 => bench.only_line(),
+                2 => {
+                    goes_on.set(false);
+                    Err(absent())
+                }
+                _ if back => bench.only_line(),
+                _ => Err(absent()),
+            }
+        };
+        let mut onlooker = Looks::times(u32::MAX, || {});
+        let end = played(&bench, &|| goes_on.get(), &mut connect, |service| {
+            let served = open(service).expect("it answers");
+            bench.dead_up_to.set(1);
+            served.serve(&mut onlooker)
+        });
+        assert!(end.why.is_ok(), "{end:?}");
+        assert_eq!(end.disarmed.is_ok(), back, "{end:?}");
+        let last = [SessionEnd::Replaced, SessionEnd::Goodbye][usize::from(back)];
+        assert_eq!(bench.last_end(), last);
+    }
+}
+
+#[test]
+fn whoever_loses_the_device_to_another_host_is_told_that_the_arm_may_be_armed() {
+    let bench = Bench::new();
+    let mut another = None;
+    let mut onlooker = Looks::times(u32::MAX, || {});
+    let end = played(&bench, &|| true, &mut || bench.only_line(), |service| {
+        let served = open(service).expect("it answers");
+        let line = Box::new(bench.line());
+        another = Some(Dialogue::open(line, Duration::from_secs(20)).expect("it answers"));
+        served.serve(&mut onlooker)
+    });
+    let Err(taken @ LinkError::Taken) = end.why else {
+        panic!("{end:?}");
+    };
+    assert!(taken.to_string().contains("may be armed"), "{taken}");
+    assert!(end.disarmed.is_ok());
+    drop(another);
+    assert_eq!(bench.last_end(), SessionEnd::Replaced);
+}

@@ -1,0 +1,141 @@
+//! `hapterra bringup` that is interrupted while the arm is driven.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Sender, channel};
+use std::time::{Duration, Instant};
+
+use hapterra::bringup::{Attendant, Identity, Log, Step, Task, VirtualUser};
+use hapterra::link::{Dialogue, Tcp};
+use hapterra::phantom::Wiring;
+use hapterra_core::guard::Mode;
+use hapterra_core::phantom::Calibration;
+use hapterra_tests::hapterra_binary;
+
+use super::served::{Served, ended_within, signal, told};
+
+const RECORD: Calibration = Calibration::PREMIUM_1_5;
+/// What the terminal shows of a task, and the tasks after which Enter is pressed.
+const CONFIRMED: [Task; 2] = [Task::ZeroPose, Task::HoldLoosely];
+const SEEN: [Task; 1] = [Task::PressDeadMan];
+
+/// A device at a virtual bench, whose user does the tasks that are sent.
+fn at_a_bench() -> (Served, Sender<Task>) {
+    let (send, tasks) = channel();
+    let served = Served::with(move || {
+        let mut user = VirtualUser::new(Wiring::RIGHT);
+        let device = user.device(RECORD);
+        (device, move || {
+            tasks.try_iter().for_each(|task| user.begin(task))
+        })
+    });
+    (served, send)
+}
+
+/// A log in which the last step alone is missing.
+fn log(served: &Served, file: &Path) {
+    let link = Tcp::connect(&served.address.to_string()).expect("there");
+    let dialogue = Dialogue::open(Box::new(link), Duration::from_secs(20)).expect("answers");
+    let mut log = Log::default();
+    _ = log.meet(Identity::of(dialogue.device(), Some(&RECORD)));
+    for step in Step::ALL.into_iter().filter(|s| *s != Step::FirstTouch) {
+        log.take(step, true, String::new());
+    }
+    log.write(file).expect("written");
+}
+
+/// Brings up until the arm is armed over the soft plane.
+fn armed(served: &Served, bench: &Sender<Task>, folder: &Path) -> Child {
+    let file = folder.join("log.toml");
+    log(served, &file);
+    let mut child = Command::new(hapterra_binary())
+        .args(["bringup", "--device", &format!("tcp:{}", served.address)])
+        .arg("--log")
+        .arg(file)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it runs");
+    let mut keys = child.stdin.take().expect("piped");
+    let mut lines = BufReader::new(child.stdout.take().expect("piped"));
+    while !lead(&mut lines, &mut keys, bench) {}
+    child.stdout = Some(lines.into_inner());
+    child.stdin = Some(keys);
+    child
+}
+
+/// Does what the next line asks for. Whether the arm is armed and is to be moved now.
+fn lead(lines: &mut impl BufRead, keys: &mut ChildStdin, bench: &Sender<Task>) -> bool {
+    let mut line = String::new();
+    assert!(lines.read_line(&mut line).expect("text") > 0, "it ended");
+    for task in CONFIRMED.into_iter().chain(SEEN) {
+        if line.contains(&format!("> {task}")) {
+            bench.send(task).expect("a bench");
+            // The tip is led there.
+            std::thread::sleep(Duration::from_millis(500));
+            if CONFIRMED.contains(&task) {
+                keys.write_all(b"\n").expect("written");
+            }
+        }
+    }
+    line.contains(&format!("> {}", Task::LowerTip))
+}
+
+#[test]
+fn one_signal_disarms_and_ends_a_bring_up() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (served, bench) = at_a_bench();
+    let child = armed(&served, &bench, folder.path());
+    signal(&child, "INT");
+    let output = ended_within(child, Duration::from_secs(5)).expect("it ends");
+    let told = told(&output);
+    assert!(told.contains("stopped"), "{told}");
+    assert!(!told.contains("did not confirm"), "{told}");
+    assert_eq!(served.status().health.report.mode, Mode::Disarmed, "{told}");
+}
+
+#[test]
+fn where_a_board_does_not_confirm_the_end_of_a_bring_up_the_user_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (served, bench) = at_a_bench();
+    let child = armed(&served, &bench, folder.path());
+    served.deaf.store(true, Ordering::Relaxed);
+    signal(&child, "INT");
+    let output = ended_within(child, Duration::from_secs(15)).expect("it ends");
+    let told = told(&output);
+    assert!(told.contains("switch the amplifiers off"), "{told}");
+}
+
+#[test]
+fn the_second_signal_ends_a_bring_up_at_once_and_tells_that_the_arm_may_be_armed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (served, bench) = at_a_bench();
+    let child = armed(&served, &bench, folder.path());
+    served.deaf.store(true, Ordering::Relaxed);
+    signal(&child, "INT");
+    std::thread::sleep(Duration::from_millis(300));
+    let began = Instant::now();
+    signal(&child, "INT");
+    let output = ended_within(child, Duration::from_secs(5)).expect("it ends");
+    assert!(began.elapsed() < Duration::from_secs(1));
+    let told = told(&output);
+    assert!(told.contains("switch the amplifiers off"), "{told}");
+}
+
+#[test]
+fn a_pipe_whose_reader_is_gone_ends_no_bring_up_with_an_armed_arm() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (served, bench) = at_a_bench();
+    let mut child = armed(&served, &bench, folder.path());
+    drop((child.stdout.take(), child.stderr.take()));
+    // The next line is written when the tip is down.
+    bench.send(Task::LowerTip).expect("a bench");
+    std::thread::sleep(Duration::from_secs(4));
+    signal(&child, "INT");
+    let output = ended_within(child, Duration::from_secs(5)).expect("it ends");
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(served.status().health.report.mode, Mode::Disarmed);
+}

@@ -1,0 +1,124 @@
+//! Every way in which `hapterra run` and `hapterra bringup` end: the board is known to be
+//! disarmed, or the user is told that it may not be; what was recorded is kept.
+#![cfg(unix)]
+
+mod bringup;
+mod hostile;
+mod served;
+mod terminal;
+
+use std::process::Command;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use hapterra_core::wire::session::SessionEnd;
+use hapterra_tests::hapterra_binary;
+use served::{Served, command, signal, start, told};
+
+#[test]
+fn a_signal_ends_it_with_a_goodbye_that_the_board_confirms() {
+    for name in ["INT", "TERM", "HUP"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let served = Served::start();
+        let child = start(&served, folder.path(), &[]);
+        signal(&child, name);
+        let output = child.wait_with_output().expect("it ends");
+        let told = told(&output);
+        assert!(output.status.success(), "{name}: {told}");
+        assert!(!told.contains("did not confirm"), "{name}: {told}");
+        assert!(folder.path().join("felt.csv").exists(), "{name}: {told}");
+        assert_eq!(served.last_end(), SessionEnd::Goodbye, "{name}");
+    }
+}
+
+#[test]
+fn the_end_of_the_time_is_a_goodbye_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let served = Served::start();
+    let child = start(&served, folder.path(), &["--seconds", "0.5"]);
+    let output = child.wait_with_output().expect("it ends");
+    assert!(output.status.success(), "{}", told(&output));
+    // Who looks does not hide it from who looks next.
+    for _ in 0..2 {
+        assert_eq!(served.last_end(), SessionEnd::Goodbye);
+    }
+}
+
+#[test]
+fn where_the_board_does_not_confirm_the_user_is_told_and_it_fails() {
+    for name in ["INT", "TERM", "HUP"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let served = Served::start();
+        let child = start(&served, folder.path(), &[]);
+        // Telemetry goes on coming, and nothing gets to the board any more.
+        served.deaf.store(true, Ordering::Relaxed);
+        signal(&child, name);
+        let output = child.wait_with_output().expect("it ends");
+        let told = told(&output);
+        assert_eq!(output.status.code(), Some(1), "{name}: {told}");
+        let says = "did not confirm that it is disarmed: switch the amplifiers off";
+        assert!(told.contains(says), "{name}: {told}");
+        assert!(folder.path().join("felt.csv").exists(), "{name}: {told}");
+        assert_eq!(served.last_end(), SessionEnd::Replaced, "{name}");
+    }
+}
+
+#[test]
+fn the_second_signal_ends_it_at_once_with_the_same_word() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let served = Served::start();
+    let child = start(&served, folder.path(), &[]);
+    served.deaf.store(true, Ordering::Relaxed);
+    signal(&child, "INT");
+    std::thread::sleep(Duration::from_millis(300));
+    signal(&child, "INT");
+    let output = child.wait_with_output().expect("it ends");
+    let told = told(&output);
+    assert_eq!(output.status.code(), Some(130), "{told}");
+    assert!(told.contains("switch the amplifiers off"), "{told}");
+}
+
+#[test]
+fn a_silence_that_no_device_keeps_to_is_refused() {
+    for seconds in ["4", "3601", "soon"] {
+        let output = Command::new(hapterra_binary())
+            .args(["run", "x.tif", "--silence-s", seconds])
+            .output()
+            .expect("it runs");
+        assert_eq!(output.status.code(), Some(2), "{}", told(&output));
+    }
+}
+
+#[test]
+fn one_that_cannot_begin_tells_that_the_arm_may_be_armed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let served = Served::start();
+    let killed = start(&served, folder.path(), &[]);
+    signal(&killed, "KILL");
+    killed.wait_with_output().expect("it ends");
+    // What the one before has left armed cannot be disarmed by the next one.
+    served.deaf.store(true, Ordering::Relaxed);
+    let next = command(served.address, folder.path()).output();
+    let told = told(&next.expect("it ends"));
+    assert!(told.contains("switch the amplifiers off"), "{told}");
+}
+
+#[test]
+fn a_signal_before_it_has_begun_is_heeded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let served = Served::start();
+    served.deaf.store(true, Ordering::Relaxed);
+    let child = command(served.address, folder.path())
+        .arg("--unchecked")
+        .spawn();
+    let child = child.expect("it runs");
+    std::thread::sleep(Duration::from_millis(1_000));
+    // It greets a device that does not answer; that is heard, and said goodbye to.
+    signal(&child, "INT");
+    std::thread::sleep(Duration::from_millis(500));
+    served.deaf.store(false, Ordering::Relaxed);
+    let output = child.wait_with_output().expect("it ends");
+    let told = told(&output);
+    assert!(told.contains("interrupted"), "{told}");
+    assert_eq!(served.last_end(), SessionEnd::Goodbye, "{told}");
+}
