@@ -21,6 +21,10 @@
 
 #![forbid(unsafe_code)]
 
+// Before all others: its macros hold from here on.
+#[macro_use]
+mod say;
+
 pub mod board;
 pub mod bringup;
 pub mod calibrate;

@@ -10,6 +10,7 @@ use std::fs::{File, TryLockError};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use same_file::is_same_file;
 use tempfile::TempPath;
 
 /// An output file cannot be written.
@@ -29,12 +30,13 @@ pub struct Output {
     path: PathBuf,
     writer: BufWriter<File>,
     /// Where it is written, beside the file that it will replace; none for a
-    /// pipe or device, where there is nothing to replace.
+    /// pipe, a device and standard output, where there is nothing to replace.
     beside: Option<TempPath>,
 }
 
 impl Output {
-    /// Begins a file.
+    /// Begins a file. `-` names none: it stands for standard output, which most commands
+    /// write to themselves.
     ///
     /// # Errors
     /// When its folder cannot be written to.
@@ -44,6 +46,9 @@ impl Output {
             source,
         };
         let opened = match std::fs::metadata(path) {
+            _ if is_standard_output(path) => Err(io::Error::other(
+                "it stands for standard output, where this command says how it goes",
+            )),
             Ok(there) if there.is_dir() => Err(io::Error::other("it is a folder")),
             Ok(there) if !there.is_file() => {
                 let file = File::options().write(true).open(path);
@@ -56,6 +61,25 @@ impl Output {
             path: path.to_owned(),
             writer: BufWriter::with_capacity(1 << 16, file),
             beside,
+        })
+    }
+
+    /// Begins a file; where the path is `-`, writes to standard output.
+    ///
+    /// # Errors
+    /// As [`Output::create`].
+    pub fn create_or_standard_output(path: &Path) -> Result<Self, OutputError> {
+        if !is_standard_output(path) {
+            return Self::create(path);
+        }
+        let file = standard_output().map_err(|source| OutputError {
+            path: path.to_owned(),
+            source,
+        })?;
+        Ok(Self {
+            path: path.to_owned(),
+            writer: BufWriter::with_capacity(1 << 16, file),
+            beside: None,
         })
     }
 
@@ -93,6 +117,76 @@ impl Write for Output {
 impl Seek for Output {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.writer.seek(to)
+    }
+}
+
+/// Whether a path is `-`.
+fn is_standard_output(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// Standard output as a file, without the line buffer of the standard library's handle.
+#[cfg(unix)]
+fn standard_output() -> io::Result<File> {
+    use std::os::fd::AsFd;
+    Ok(File::from(io::stdout().as_fd().try_clone_to_owned()?))
+}
+
+/// Standard output as a file, without the line buffer of the standard library's handle.
+#[cfg(windows)]
+fn standard_output() -> io::Result<File> {
+    use std::os::windows::io::AsHandle;
+    Ok(File::from(io::stdout().as_handle().try_clone_to_owned()?))
+}
+
+/// Checks that no output is one of the inputs: by the same name or another, through links
+/// of either kind. To be called before anything is written.
+///
+/// # Errors
+/// [`OutputError`] names the output and the input.
+pub fn keep_apart(outputs: &[&Path], inputs: &[&Path]) -> Result<(), OutputError> {
+    for output in outputs {
+        // What is not there cannot be the same.
+        let same = |input: &&&Path| is_same_file(output, input).unwrap_or(false);
+        if let Some(input) = inputs.iter().find(same) {
+            let input = input.display();
+            return Err(OutputError {
+                path: output.to_path_buf(),
+                source: io::Error::other(format!("it is the input {input}")),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// A folder that is made for outputs, and is gone again where nothing came to lie in it.
+#[derive(Debug)]
+pub struct OutputFolder {
+    /// The folder, where it was not there before.
+    made: Option<PathBuf>,
+}
+
+impl OutputFolder {
+    /// Makes the folder, and those that it lies in.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub fn create(path: &Path) -> Result<Self, OutputError> {
+        let was_there = path.exists();
+        std::fs::create_dir_all(path).map_err(|source| OutputError {
+            path: path.to_owned(),
+            source,
+        })?;
+        Ok(Self {
+            made: (!was_there).then(|| path.to_owned()),
+        })
+    }
+}
+
+impl Drop for OutputFolder {
+    fn drop(&mut self) {
+        // A folder with anything in it cannot be removed, and is not to be.
+        let _ = self.made.as_ref().map(std::fs::remove_dir);
     }
 }
 
@@ -226,9 +320,49 @@ mod tests {
     }
 
     #[test]
+    fn an_input_is_known_by_every_name() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("terrain.tif"), "heights").expect("written");
+        std::fs::write(at("other.tif"), "heights").expect("written");
+        std::fs::hard_link(at("terrain.tif"), at("hard.csv")).expect("linked");
+        let mut names = vec![at("terrain.tif"), at("./terrain.tif"), at("hard.csv")];
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink("terrain.tif", at("soft.csv")).expect("linked");
+            std::os::unix::fs::symlink(".", at("here")).expect("linked");
+            names.extend([at("soft.csv"), at("here/terrain.tif")]);
+        }
+        let (new, other, terrain) = (at("new.csv"), at("other.tif"), at("terrain.tif"));
+        for name in names {
+            let wrong = keep_apart(&[&new, &name], &[&terrain]).expect_err("the input");
+            let cause = std::error::Error::source(&wrong).map(ToString::to_string);
+            assert!(cause.is_some_and(|cause| cause.contains("terrain.tif")));
+            assert_eq!(wrong.path, name);
+        }
+        assert!(keep_apart(&[&new, &other], &[&terrain]).is_ok());
+    }
+
+    #[test]
+    fn a_folder_in_which_nothing_came_to_lie_is_gone_again() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("out");
+        drop(OutputFolder::create(&path).expect("made"));
+        assert!(!path.exists());
+        let made = OutputFolder::create(&path).expect("made");
+        std::fs::write(path.join("kept"), "").expect("written");
+        drop(made);
+        assert!(path.join("kept").exists());
+        std::fs::remove_file(path.join("kept")).expect("removed");
+        drop(OutputFolder::create(&path).expect("there"));
+        assert!(path.exists(), "it was there before");
+    }
+
+    #[test]
     fn an_impossible_place_is_an_error_at_once() {
         let folder = tempfile::tempdir().expect("a folder");
         assert!(Output::create(&folder.path().join("no/such/out.csv")).is_err());
+        assert!(Output::create(Path::new("-")).is_err());
         let error = Output::create(folder.path()).err().expect("a folder");
         assert!(error.to_string().contains("cannot write"));
     }

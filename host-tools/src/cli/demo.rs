@@ -8,6 +8,7 @@ use clap::ValueHint;
 
 use super::failure::{Failure, OrHint};
 use super::options::emulated_board::{EmulatedBoard, RunsOn};
+use super::options::exaggeration::Exaggeration;
 use super::options::rendering::Rendering;
 use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::session_summary::{self, SessionSummary};
@@ -15,17 +16,20 @@ use super::terminal::{interrupt, left_behind, progress};
 use crate::link::{
     Arming, Event, HostClock, LinkError, Native, Patience, Session, Transport, move_arm_while,
 };
-use crate::output::{Output, OutputError};
+use crate::output::{Output, OutputError, OutputFolder, keep_apart};
 use crate::phantom::HeldPhantom;
-use crate::place::{PlacedTerrain, PlacingError, suggest_scale};
+use crate::place::{PlacedTerrain, PlacingError};
 use crate::raster::Raster;
-use crate::replay::{Record, Recording, state_name};
+use crate::replay::settings::Device;
+use crate::replay::{LoopColumns, Record, Recording, Settings};
 use crate::synth::{Kind, Synth};
 use crate::telemetry::SampleLog;
-use crate::terrain::{FeltGrid, Scale};
+use crate::terrain::Scale;
 
 /// Samples along the side of the terrain that the demo makes itself.
 const OWN_SIZE: u32 = 1024;
+/// What that terrain is called in a recording: how to make it as a file.
+const OWN_TERRAIN: &str = "hapterra synth fractal --size 1024 --seed 1";
 /// Times that heights are halved until the arm reaches the terrain.
 const HALVINGS: u32 = 12;
 
@@ -40,9 +44,10 @@ pub struct Args {
     #[command(flatten)]
     pub reading: ReadingOptions,
 
-    /// Where the loop runs
-    #[arg(long, value_enum, default_value = "emulated")]
-    pub device: RunsOn,
+    /// Where the loop runs [default: emulated where an image of the board is named, else
+    /// native]
+    #[arg(long, value_enum)]
+    pub device: Option<RunsOn>,
 
     /// Folder for the picture and the recording
     #[arg(long, value_name = "DIR", default_value = "demo", value_hint = ValueHint::DirPath)]
@@ -52,8 +57,7 @@ pub struct Args {
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
 
-    /// How it feels. Without a stated height the demo chooses one that suits
-    /// the hand, and says which.
+    /// How it feels.
     #[command(flatten)]
     pub rendering: Rendering,
 
@@ -68,15 +72,17 @@ pub struct Args {
 /// What is wrong with the file, the device or the output folder.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (raster, name) = terrain_of(args)?;
+    let outputs = Outputs::new(&args.out, &name);
+    outputs.keep_apart(args.file.as_deref())?;
     let (law, rule) = (args.rendering.law()?, args.rendering.rule());
     let grid = args.rendering.grid(&raster);
-    let mut scale = scale_of(args, &grid)?;
-    // Heights that nobody asked for may as well be lower.
-    let may_lower = args.rendering.height_mm_per_unit.is_none();
+    let mut scale = args.rendering.scale(&grid)?;
+    // Heights that the demo was to choose may as well be lower.
+    let may_lower = args.rendering.exaggeration == Some(Exaggeration::Auto);
     for _ in 0..HALVINGS {
         let terrain = args.rendering.terrain(grid, scale)?;
         match PlacedTerrain::new(&terrain, law, rule) {
-            Ok(placed) => return show(args, &placed, &name),
+            Ok(placed) => return show(args, &placed, &name, &outputs),
             Err(PlacingError::OutOfReach(_)) if may_lower => {
                 let lower = 0.5 * scale.height_mm_per_unit();
                 scale = Scale::new(scale.cell_mm(), lower).map_err(Failure::new)?;
@@ -85,7 +91,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         }
     }
     Err("the terrain is too tall for the arm")
-        .or_hint("choose a smaller --height-mm-per-unit or --cell-mm")
+        .or_hint("choose a smaller --cell-mm")
 }
 
 fn terrain_of(args: &Args) -> Result<(Raster, String), Failure> {
@@ -101,51 +107,70 @@ fn terrain_of(args: &Args) -> Result<(Raster, String), Failure> {
     Ok((raster.map_err(Failure::new)?, "fractal".into()))
 }
 
-/// The scale as stated, or one that suits the hand.
-fn scale_of(args: &Args, grid: &FeltGrid<'_>) -> Result<Scale, Failure> {
-    if args.rendering.height_mm_per_unit.is_some() {
-        return args.rendering.scale(grid);
-    }
-    let suggested = suggest_scale(grid, args.rendering.cell_mm);
-    Ok(suggested.or_hint("choose another --cell-mm")?.scale)
-}
-
 /// What to do where a file of the demo cannot be written.
 const OTHER_FOLDER: &str = "name another folder with --out";
 
+/// The files that the demo writes.
+struct Outputs {
+    folder: PathBuf,
+    recording: PathBuf,
+    picture: PathBuf,
+}
+
+impl Outputs {
+    /// In a folder, with the name of the terrain.
+    fn new(folder: &Path, name: &str) -> Self {
+        let stem = Path::new(name).file_stem();
+        let stem = stem.map_or(name.into(), |stem| stem.to_string_lossy());
+        Self {
+            folder: folder.to_owned(),
+            recording: folder.join(format!("{stem}.csv")),
+            picture: folder.join(format!("{stem}.png")),
+        }
+    }
+
+    fn keep_apart(&self, input: Option<&Path>) -> Result<(), Failure> {
+        let inputs = Vec::from_iter(input);
+        keep_apart(&[&self.recording, &self.picture], &inputs).or_hint(OTHER_FOLDER)
+    }
+}
+
 /// Runs the tour and shows what was felt.
-fn show(args: &Args, placed: &PlacedTerrain<'_>, name: &str) -> Result<(), Failure> {
-    std::fs::create_dir_all(&args.out)
-        .map_err(|error| format!("cannot make {}: {error}", args.out.display()))
-        .or_hint(OTHER_FOLDER)?;
+fn show(
+    args: &Args,
+    placed: &PlacedTerrain<'_>,
+    name: &str,
+    outputs: &Outputs,
+) -> Result<(), Failure> {
+    // Gone again where nothing comes to lie in it.
+    let _folder = OutputFolder::create(&outputs.folder).or_hint(OTHER_FOLDER)?;
     let terrain = placed.terrain();
     println!(
         "terrain        {name}: {}",
         session_summary::in_words(terrain)
     );
-    let stem = Path::new(name)
-        .file_stem()
-        .map_or(name.into(), |s| s.to_string_lossy());
-    let recording = args.out.join(format!("{stem}.csv"));
-    let picture = args.out.join(format!("{stem}.png"));
-    left_behind::tell([recording.as_path(), &picture]);
+    left_behind::tell([outputs.recording.as_path(), &outputs.picture]);
     let arm = placed.held_phantom();
     let stop_s = args.seconds.unwrap_or(f64::MAX).min(placed.duration_s());
     interrupt::listen();
-    let toured = match args.device {
+    let toured = match device(args) {
         RunsOn::Native => {
             let device = Native::new(HostClock::default(), Some(Box::new(arm)));
             tour(placed, Box::new(device), Patience::REAL_TIME, stop_s)?
         }
         RunsOn::Emulated => tour_emulated(args, placed, arm, stop_s)?,
     };
-    write(&toured.rows, &recording).or_hint(OTHER_FOLDER)?;
+    let file = args.file.as_ref();
+    let file = file.map_or(OWN_TERRAIN.into(), |file| file.display().to_string());
+    let device = Device::of(&toured.summary.device);
+    let settings = Settings::new(&file, terrain, placed.law(), Some(placed.home_mm()), device);
+    write(&toured.rows, &settings, &outputs.recording).or_hint(OTHER_FOLDER)?;
     let summary = &toured.summary;
     print!("{}", summary.text());
     let records: Vec<Record> = toured.rows.iter().map(|(record, _)| *record).collect();
-    summary.draw(&picture, terrain, name, &records)?;
-    println!("recording      {}", recording.display());
-    println!("picture        {}", picture.display());
+    summary.draw(&outputs.picture, terrain, name, &records)?;
+    println!("recording      {}", outputs.recording.display());
+    println!("picture        {}", outputs.picture.display());
     match summary.figures.fault {
         None => Ok(()),
         Some(fault) => Err(format!(
@@ -156,10 +181,24 @@ fn show(args: &Args, placed: &PlacedTerrain<'_>, name: &str) -> Result<(), Failu
     }
 }
 
+/// Where the loop runs: as stated, else on the emulated board where there is one.
+fn device(args: &Args) -> RunsOn {
+    match args.device {
+        Some(device) => device,
+        None if args.board.is_named() => RunsOn::Emulated,
+        None => {
+            eprintln!(
+                "note: no image of the emulated board is named (--image ELF), so the same application runs in this program (--device native)"
+            );
+            RunsOn::Native
+        }
+    }
+}
+
 /// All that was felt on a tour.
 struct Toured {
-    /// The rows of the recording, with the state of the contact.
-    rows: Vec<(Record, &'static str)>,
+    /// The rows of the recording, with what the loop did.
+    rows: Vec<(Record, LoopColumns)>,
     summary: SessionSummary,
 }
 
@@ -181,6 +220,8 @@ fn tour_emulated(
                     .map_err(|why| format!("the emulated board did not end well: {why}"))
                     .or_hint(report)
             }
+            // The user ended it, and the board may not have been able to answer.
+            Err(_) if interrupt::requested() => Err("interrupted").or_hint("nothing was written"),
             // A link that broke because the board ended is the board's failure.
             Err(error) => match emulator.failure() {
                 Some(said) => Err(format!("the emulated board failed: {said}")).or_hint(report),
@@ -208,7 +249,7 @@ fn tour(
     while toured.is_ok() && log.ticks() < stop_tick && !interrupt::requested() {
         toured = session.poll(Duration::from_millis(100), &mut |event| {
             if let Event::Sample(sample) = event {
-                rows.push((log.take(sample), state_name(sample.state)));
+                rows.push((log.take(sample), LoopColumns::of(sample)));
             }
         });
         progress.set_position(log.ticks());
@@ -229,10 +270,15 @@ fn tour(
     Ok(Toured { rows, summary })
 }
 
-fn write(rows: &[(Record, &'static str)], path: &Path) -> Result<(), OutputError> {
-    let mut recording = Recording::new(Output::create(path)?, &["state"]);
-    for (record, state) in rows {
-        recording.write(record, &[state])?;
+fn write(
+    rows: &[(Record, LoopColumns)],
+    settings: &Settings,
+    path: &Path,
+) -> Result<(), OutputError> {
+    let mut recording = Recording::new(Output::create(path)?, &LoopColumns::COLUMNS)?;
+    recording.describe(settings);
+    for (record, columns) in rows {
+        recording.write(record, &columns.values())?;
     }
     recording.finish()
 }

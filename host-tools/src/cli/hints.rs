@@ -10,6 +10,7 @@ use crate::link::{EmulatorError, LinkError};
 use crate::place::PlacingError;
 use crate::raster::{BadRaster, Error};
 use crate::replay::ReplayError;
+use crate::replay::settings::OtherTerrain;
 use crate::synth::{WriteError, WriteFault};
 use crate::terrain::TerrainError;
 
@@ -70,7 +71,7 @@ impl Hint for TerrainError {
             Self::NoSuchLevel { .. } => "choose a lower --level",
             Self::TooLarge(_) => "cut a smaller part out of the file",
             Self::TooTall { .. } | Self::Scale(_) => {
-                "choose a smaller --height-mm-per-unit, a larger --cell-mm, or name the file's no-data value with --no-data"
+                "choose a smaller --exaggeration or --height-mm-per-unit, a larger --cell-mm, or name the file's no-data value with --no-data"
             }
         };
         hint.into()
@@ -79,7 +80,7 @@ impl Hint for TerrainError {
 
 impl Hint for PlacingError {
     fn hint(&self) -> String {
-        "choose a smaller --height-mm-per-unit or --cell-mm".into()
+        "let the heights be chosen for the hand with --exaggeration auto, or choose a smaller --exaggeration, --height-mm-per-unit or --cell-mm".into()
     }
 }
 
@@ -103,6 +104,9 @@ impl Hint for ReplayError {
     fn hint(&self) -> String {
         let hint = match self {
             Self::Link(error) => return error.hint(),
+            Self::Trajectory(error) if error.is_about_settings() => {
+                "replay it with the version of hapterra that recorded it, or take its path alone with --ignore-settings"
+            }
             Self::Trajectory(_) => {
                 "a trajectory is CSV: the header t_s,x_mm,y_mm,z_mm, then four numbers a line"
             }
@@ -110,6 +114,12 @@ impl Hint for ReplayError {
             Self::Interrupted => "nothing was written",
         };
         hint.into()
+    }
+}
+
+impl Hint for OtherTerrain {
+    fn hint(&self) -> String {
+        "name the file that was recorded on, and read it with the same options; or take the recording's path alone, on this terrain, with --ignore-settings".into()
     }
 }
 

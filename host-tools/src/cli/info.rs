@@ -86,6 +86,8 @@ struct Cell {
     felt_m: f64,
     /// Whether heights are interpolated for that, as the stored cells are not square.
     resampled: bool,
+    /// Whether stored cells that are not square are felt as squares.
+    distorted: bool,
 }
 
 /// One level of detail: the field with every 2^level-th sample.
@@ -184,6 +186,7 @@ impl Cell {
             north_m,
             felt_m: grid.side_m().unwrap_or_default(),
             resampled: grid.is_resampled(),
+            distorted: grid.is_distorted(),
         }
     }
 
@@ -195,14 +198,13 @@ impl Cell {
         };
         let (east_m, north_m, felt_m) = (self.east_m, self.north_m, self.felt_m);
         let stored = format!("{} × {} {}{assumed}", self.east, self.north, self.unit);
-        let square = (east_m - north_m).abs() <= 1e-3 * east_m.min(north_m);
-        let hint = match self.resampled {
-            true => "",
-            false => " of the same area (--cells square: in their true shape)",
+        let hint = match self.distorted {
+            false => "",
+            true => " of the same area, not in their true shape (--cells square)",
         };
-        match (square, self.unit) {
-            (true, "metre") if !self.resampled => stored,
-            (true, _) if !self.resampled => format!("{stored}, {felt_m:.3} m on the ground"),
+        match (self.resampled || self.distorted, self.unit) {
+            (false, "metre") => stored,
+            (false, _) => format!("{stored}, {felt_m:.3} m on the ground"),
             _ => format!(
                 "{stored}, {east_m:.3} × {north_m:.3} m on the ground, felt as {felt_m:.3} m squares{hint}"
             ),

@@ -36,6 +36,8 @@ pub(super) fn to_stderr(verbose: u8) -> Log<io::Stderr> {
         // A colour is a control sequence, and of those no line has any.
         .with_ansi(false)
         .without_time()
+        // Where standard error is closed there is nobody to tell.
+        .log_internal_errors(false)
         .init();
     log
 }

@@ -4,14 +4,20 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::ValueHint;
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
 
-use super::failure::Failure;
+use super::failure::{Failure, OrHint};
 use super::options::emulated_board::{EmulatedBoard, RunsOn};
 use super::options::rendering::Rendering;
 use super::options::terrain_file::TerrainFile;
 use super::terminal::{interrupt, left_behind, progress};
 use crate::link::{Patience, Transport};
-use crate::replay::{Replayer, Summary, on_native, replay_file};
+use crate::output::{Output, keep_apart};
+use crate::replay::settings::Device;
+use crate::replay::{
+    ReplayError, Replayer, Settings, Summary, Trajectory, on_native, replay_trajectory,
+};
 use crate::terrain::Terrain;
 
 /// Arguments of `hapterra replay`.
@@ -21,15 +27,23 @@ pub struct Args {
     #[command(flatten)]
     pub terrain: TerrainFile,
 
-    /// Trajectory of the HIP: CSV with the header t_s,x_mm,y_mm,z_mm
+    /// Trajectory of the HIP: CSV with the header t_s,x_mm,y_mm,z_mm, or a recording
     ///
     /// Millimetres as the hand feels them; x east, y north, z up, origin at
-    /// the south-west sample at height zero. Further columns are ignored, so a
-    /// recording can be replayed.
+    /// the south-west sample at height zero: at 1 mm a cell they count felt
+    /// cells, which are squares on the ground. Further columns are ignored.
+    /// A recording, CSV or Parquet, is felt with the settings that it was
+    /// recorded with, on the terrain that it was recorded on; options given
+    /// here win.
     #[arg(value_hint = ValueHint::FilePath)]
     pub trajectory: PathBuf,
 
-    /// File to write what was felt to
+    /// Take a recording's path alone: not its settings, and on any terrain
+    #[arg(long)]
+    pub ignore_settings: bool,
+
+    /// File to write what was felt to: CSV, or Parquet where its name ends in .parquet;
+    /// `-` for standard output
     #[arg(short, long, value_hint = ValueHint::FilePath)]
     pub output: PathBuf,
 
@@ -51,17 +65,37 @@ pub struct Args {
 /// # Errors
 /// What is wrong with the terrain, the trajectory, the device or the output.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    let inputs = [args.terrain.file.as_path(), &args.trajectory];
+    keep_apart(&[&args.output], &inputs).or_hint("name another file with --output")?;
     left_behind::tell([args.output.as_path()]);
+    let mut trajectory = Trajectory::open(&args.trajectory).map_err(ReplayError::from)?;
+    let recorded = trajectory.settings().filter(|_| !args.ignore_settings).cloned();
+    let rendering = rendering(args, recorded.as_ref());
     let raster = args.terrain.open()?;
-    let grid = args.rendering.grid(&raster);
-    let scale = args.rendering.scale(&grid)?;
-    let terrain = args.rendering.terrain(grid, scale)?;
+    let grid = rendering.grid(&raster);
+    let scale = rendering.scale(&grid)?;
+    let terrain = rendering.terrain(grid, scale)?;
+    let file = args.terrain.file.display().to_string();
+    if let Some(recorded) = &recorded {
+        recorded.check_terrain(&file, &terrain)?;
+    }
+    let felt = Felt {
+        terrain: &terrain,
+        law: (rendering.law()?, rendering.rule()),
+        file,
+    };
     let began = Instant::now();
     let summary = match args.on {
-        RunsOn::Native => native(args, &terrain),
-        RunsOn::Emulated => emulated(args, &terrain),
+        RunsOn::Native => native(args, &felt, &mut trajectory),
+        RunsOn::Emulated => emulated(args, &felt, &mut trajectory),
     }?;
     let seconds = began.elapsed().as_secs_f64();
+    if summary.below_ground > 0 {
+        eprintln!(
+            "{} rows are below ground and not felt: the HIP had not been above the surface before them",
+            summary.below_ground
+        );
+    }
     eprintln!(
         "{} rows, {} in contact, {:.0} rows a second: {}",
         summary.rows,
@@ -72,19 +106,48 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-fn native(args: &Args, terrain: &Terrain<'_>) -> Result<Summary, Failure> {
-    let mut replayer = on_native(terrain, args.rendering.law()?, args.rendering.rule())?;
-    replay(args, &mut replayer)
+/// What is felt, and how.
+struct Felt<'t> {
+    terrain: &'t Terrain<'t>,
+    law: (ForceLaw, Rule),
+    /// The terrain file, as it was named.
+    file: String,
 }
 
-fn emulated(args: &Args, terrain: &Terrain<'_>) -> Result<Summary, Failure> {
-    let (law, rule) = (args.rendering.law()?, args.rendering.rule());
+/// How it feels: as stated, else as recorded, else as usual.
+fn rendering(args: &Args, recorded: Option<&Settings>) -> Rendering {
+    let Some(recorded) = recorded else {
+        return args.rendering.clone();
+    };
+    let (rendering, told) = args.rendering.or_recorded(recorded);
+    for line in told {
+        eprintln!("note: {line}");
+    }
+    rendering
+}
+
+fn native(
+    args: &Args,
+    felt: &Felt<'_>,
+    trajectory: &mut Trajectory,
+) -> Result<Summary, Failure> {
+    let (law, rule) = felt.law;
+    let mut replayer = on_native(felt.terrain, law, rule)?;
+    replay(args, felt, trajectory, &mut replayer)
+}
+
+fn emulated(
+    args: &Args,
+    felt: &Felt<'_>,
+    trajectory: &mut Trajectory,
+) -> Result<Summary, Failure> {
+    let (law, rule) = felt.law;
     let (emulator, lines) = args.board.start()?;
     // The other line stays open and silent: points take the arm's place.
     let _plant = lines.plant;
     let link: Box<dyn Transport> = Box::new(lines.link);
-    let mut replayer = Replayer::open(terrain, law, rule, link, Patience::EMULATED)?;
-    let summary = replay(args, &mut replayer)?;
+    let mut replayer = Replayer::open(felt.terrain, law, rule, link, Patience::EMULATED)?;
+    let summary = replay(args, felt, trajectory, &mut replayer)?;
     replayer.say_goodbye()?;
     if let Err(why) = emulator.finish() {
         tracing::info!("the emulated board did not end well: {why}");
@@ -92,10 +155,18 @@ fn emulated(args: &Args, terrain: &Terrain<'_>) -> Result<Summary, Failure> {
     Ok(summary)
 }
 
-fn replay(args: &Args, replayer: &mut Replayer<'_>) -> Result<Summary, Failure> {
+fn replay(
+    args: &Args,
+    felt: &Felt<'_>,
+    trajectory: &mut Trajectory,
+    replayer: &mut Replayer<'_>,
+) -> Result<Summary, Failure> {
     let progress = progress::bar(None, "{spinner} {human_pos} rows, {per_sec}");
     interrupt::listen();
-    let summary = replay_file(replayer, &args.trajectory, &args.output, &mut |rows| {
+    let device = Device::of(replayer.device());
+    let settings = Settings::new(&felt.file, felt.terrain, felt.law, None, device);
+    let output = Output::create_or_standard_output(&args.output).map_err(ReplayError::from)?;
+    let summary = replay_trajectory(replayer, trajectory, &settings, output, &mut |rows| {
         progress.set_position(rows);
         !interrupt::requested()
     });

@@ -50,8 +50,9 @@ pub struct Args {
     #[arg(long, value_name = "tcp:HOST:PORT", value_parser = parse_plant)]
     pub plant: Option<String>,
 
-    /// Write what was felt to a file, tick by tick, as replay does
-    #[arg(long, value_name = "OUT.csv", value_hint = ValueHint::FilePath)]
+    /// Write what was felt to a file, tick by tick, as replay does: CSV, or Parquet where
+    /// its name ends in .parquet
+    #[arg(long, value_name = "OUT", value_hint = ValueHint::FilePath)]
     pub record: Option<PathBuf>,
 
     /// End after this many seconds of the device's time
@@ -96,6 +97,8 @@ fn parse_plant(text: &str) -> Result<String, String> {
 /// What is wrong with the file, or no device there at the beginning. A device
 /// that goes later is waited for.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    let outputs = Vec::from_iter(args.record.as_deref());
+    keep_apart(&outputs, &[&args.terrain.file]).or_hint(OTHER_FILE)?;
     left_behind::tell(args.record.as_deref());
     let raster = args.terrain.open()?;
     let grid = args.rendering.grid(&raster);
@@ -212,10 +215,30 @@ fn told(why: Result<(), LinkError>, disarmed: Result<(), LinkError>) -> Result<(
 }
 
 fn recording(args: &Args) -> Result<Option<Recording>, Failure> {
-    let columns = ["state", "tick", "work", "cost", "late"];
-    let output = args.record.as_deref().map(Output::create).transpose();
-    let output = output.or_hint(OTHER_FILE)?;
-    Ok(output.map(|output| Recording::new(output, &columns)))
+    let [state, mode, limits] = LoopColumns::COLUMNS;
+    let [tick, work, cost, late] = ["tick", "work", "cost", "late"].map(Column::Count);
+    let columns = [state, tick, work, cost, late, mode, limits];
+    let recording = args.record.as_deref().map(|path| {
+        let output = Output::create(path)?;
+        Recording::new(output, &columns)
+    });
+    recording.transpose().or_hint(OTHER_FILE)
+}
+
+/// The recording, with the settings in which the device feels the terrain.
+fn described(
+    mut recording: Option<Recording>,
+    args: &Args,
+    placed: &PlacedTerrain<'_>,
+    device: &DeviceHello,
+) -> Option<Recording> {
+    if let Some(recording) = &mut recording {
+        let (file, device) = (args.terrain.file.display(), Device::of(device));
+        let (terrain, home_mm) = (placed.terrain(), placed.home_mm());
+        let file = file.to_string();
+        recording.describe(&Settings::new(&file, terrain, placed.law(), Some(home_mm), device));
+    }
+    recording
 }
 
 fn connect<'t>(

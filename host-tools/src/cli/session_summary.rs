@@ -136,13 +136,9 @@ impl SessionSummary {
 /// A terrain and its scale, in words.
 pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
     let (raster, grid, scale) = (terrain.raster(), terrain.grid(), terrain.scale());
-    // A cell of level L is 2ᴸ cells of the grid.
-    let step = f64::from(terrain.level()).exp2();
-    let proportions = match grid.cells_per_vertical_unit() {
-        Some(true_cells) => match scale.height_cells(1.0) * step / true_cells {
-            times if (times - 1.0).abs() < 1e-9 => "heights true to scale".to_owned(),
-            times => format!("heights × {}", (times * 1e6).round() / 1e6),
-        },
+    let proportions = match terrain.scale_of_level_0().exaggeration(grid) {
+        Some(1.0) => "heights true to scale".to_owned(),
+        Some(times) => format!("heights × {}", (times * 1e6).round() / 1e6),
         None => format!("{} mm a vertical unit", scale.height_mm_per_unit()),
     };
     let (columns, rows, cell_mm) = (raster.columns(), raster.rows(), scale.cell_mm());
@@ -152,6 +148,9 @@ pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
             grid.columns() - 1,
             grid.rows() - 1
         ),
+        Some(side) if grid.is_distorted() => {
+            format!(" its stored cells felt as squares of {side:.3} m, not in their true shape,")
+        }
         _ => String::new(),
     };
     format!("{columns} × {rows} samples,{felt} {cell_mm} mm a cell, {proportions}")

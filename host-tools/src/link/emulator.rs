@@ -221,6 +221,9 @@ fn command(qemu: &Path, image: &Path, lines: &[TcpListener; 2]) -> Command {
     command.args(["-chardev", "stdio,id=report,signal=off,mux=off"]);
     command.args(["-serial", "chardev:report"]);
     command.arg("-kernel").arg(image);
+    // A Ctrl-C at the terminal is this program's: it ends the session, and then the board.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command
         .stdin(Stdio::null())
         .stdout(Stdio::piped())

@@ -16,6 +16,7 @@ const REST_S: f64 = 0.25;
 pub struct PlacedTerrain<'t> {
     terrain: &'t Terrain<'t>,
     scene: Scene,
+    home_mm: [f64; 3],
     arm: HeldPhantom,
     duration_s: f64,
 }
@@ -56,6 +57,7 @@ impl<'t> PlacedTerrain<'t> {
         Ok(Self {
             terrain,
             scene: terrain.scene(law, rule, Source::Encoders, home),
+            home_mm,
             arm: HeldPhantom::new(model, hand, tour.placement, tour.script)?.arming(),
             duration_s,
         })
@@ -71,6 +73,19 @@ impl<'t> PlacedTerrain<'t> {
     #[must_use]
     pub const fn scene(&self) -> Scene {
         self.scene
+    }
+
+    /// The force law and the contact rule.
+    #[must_use]
+    pub const fn law(&self) -> (ForceLaw, Rule) {
+        (self.scene.law, self.scene.rule)
+    }
+
+    /// The point of the terrain that is at the tip in the arm's home pose, hand
+    /// millimetres.
+    #[must_use]
+    pub const fn home_mm(&self) -> [f64; 3] {
+        self.home_mm
     }
 
     /// The virtual Phantom, held at the beginning of the tour by a hand that

@@ -7,17 +7,20 @@
 //! the result depends on nothing but the terrain, the law and the trajectory.
 
 mod felt;
+mod loop_columns;
 mod recording;
+pub mod settings;
 mod trajectory;
 
 pub use felt::Replayer;
-pub use recording::{Record, Recording};
+pub use loop_columns::LoopColumns;
+pub use recording::{Column, Record, Recording, Value};
+pub use settings::Settings;
 pub use trajectory::{Row, Trajectory, TrajectoryError};
 
-use std::path::Path;
-
-use hapterra_core::contact::Rule;
+use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
+use hapterra_core::scene::Sample;
 
 use crate::link::{LinkError, Native, Patience, Transport};
 use crate::output::{Output, OutputError};
@@ -47,38 +50,56 @@ pub struct Summary {
     pub rows: u64,
     /// Of those, rows in contact.
     pub in_contact: u64,
+    /// Of those, rows below the ground that were not felt, because the HIP had not been
+    /// above it.
+    pub below_ground: u64,
 }
 
-/// Runs a trajectory file through a device and writes what was felt to another
-/// file, which appears only when it is complete.
+/// The column that a replay's recording has after the usual ones.
+const STATE: Column = Column::Text("state");
+
+/// Runs a trajectory through a device and writes what was felt to an output, which
+/// appears only when it is complete.
 ///
 /// `go_on` is asked now and then, with the number of rows so far, whether to.
 ///
 /// # Errors
 /// [`ReplayError`] says what was wrong, with file, line and column.
-pub fn replay_file(
+pub fn replay_trajectory(
     replayer: &mut Replayer<'_>,
-    trajectory: &Path,
-    output: &Path,
+    trajectory: &mut Trajectory,
+    settings: &Settings,
+    output: Output,
     go_on: &mut dyn FnMut(u64) -> bool,
 ) -> Result<Summary, ReplayError> {
     const ASK_EVERY: u64 = 512;
-    let scale = *replayer.terrain().scale();
-    let mut rows = Trajectory::open(trajectory, scale)?;
-    let mut recording = Recording::new(Output::create(output)?, &["state"]);
+    let terrain = replayer.terrain();
+    let scale = *terrain.scale();
+    let mut recording = Recording::new(output, &[STATE])?;
+    recording.describe(settings);
     let mut summary = Summary::default();
-    while let Some(row) = rows.next_row()? {
+    while let Some(row) = trajectory.next_row(&scale)? {
         let sample = replayer.feel(row.hip)?;
         let record = Record::new(row.t_s, row.hip_mm, &sample, &scale);
-        recording.write(&record, &[&state_name(sample.state)])?;
+        recording.write(&record, &[Value::Text(state_name(sample.state))])?;
         summary.rows += 1;
         summary.in_contact += u64::from(record.contact);
+        summary.below_ground += u64::from(is_below_ground(&sample, &record, terrain));
         if summary.rows % ASK_EVERY == 0 && !go_on(summary.rows) {
             return Err(ReplayError::Interrupted);
         }
     }
     recording.finish()?;
     Ok(summary)
+}
+
+/// Whether nothing is felt because the HIP is below ground and came there from below, from
+/// a hole or from outside.
+#[must_use]
+pub fn is_below_ground(sample: &Sample, record: &Record, terrain: &Terrain<'_>) -> bool {
+    let [x, y, z] = record.hip_mm;
+    let waits = sample.state == ContactState::Waiting && sample.missing_tile.is_none();
+    waits && terrain.height_mm(x, y).is_some_and(|ground| z < ground)
 }
 
 /// A replayer on the application in this program's memory.
@@ -96,8 +117,7 @@ pub fn on_native<'t>(
 
 /// A state's name in a recording.
 #[must_use]
-pub fn state_name(state: hapterra_core::contact::ContactState) -> &'static str {
-    use hapterra_core::contact::ContactState;
+pub fn state_name(state: ContactState) -> &'static str {
     match state {
         ContactState::Waiting => "waiting",
         ContactState::Free => "free",

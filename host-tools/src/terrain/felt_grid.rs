@@ -15,12 +15,15 @@ const SQUARE: f64 = 1e-3;
 const ON_SAMPLE: f64 = 1e-9;
 
 /// Which cells of a file are felt.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "lowercase")]
 pub enum FeltCells {
     /// As the file stores them, felt as squares whatever their shape
-    #[default]
     Stored,
     /// Square on the ground: true to scale in every direction
+    #[default]
     Square,
 }
 
@@ -29,6 +32,7 @@ pub enum FeltCells {
 #[derive(Clone, Copy, Debug)]
 pub struct FeltGrid<'r> {
     raster: &'r Raster,
+    cells: FeltCells,
     columns: u32,
     rows: u32,
     /// Side of a felt cell on the ground, metres, where the file knows it.
@@ -53,6 +57,7 @@ impl<'r> FeltGrid<'r> {
     pub fn new(raster: &'r Raster, cells: FeltCells) -> Self {
         let stored = Self {
             raster,
+            cells,
             columns: raster.columns(),
             rows: raster.rows(),
             side_m: raster.cell().map(|cell| cell.square_metres()),
@@ -109,6 +114,20 @@ impl<'r> FeltGrid<'r> {
     #[must_use]
     pub const fn raster(&self) -> &'r Raster {
         self.raster
+    }
+
+    /// Which cells of the file were asked for.
+    #[must_use]
+    pub const fn cells(&self) -> FeltCells {
+        self.cells
+    }
+
+    /// Whether cells that are not square on the ground are felt as squares, which is not
+    /// their true shape.
+    #[must_use]
+    pub fn is_distorted(&self) -> bool {
+        let cell = self.raster.cell();
+        !self.is_resampled() && cell.is_some_and(|cell| !is_square(&cell))
     }
 
     /// Felt samples from west to east.
@@ -305,6 +324,7 @@ mod tests {
             let raster = plane(cell(east, 10.0, 0.0), [0.3, 0.7]);
             let grid = FeltGrid::new(&raster, cells);
             assert!(!grid.is_resampled());
+            assert_eq!(grid.is_distorted(), cells == FeltCells::Stored);
             assert_eq!((grid.columns(), grid.rows()), (41, 31));
             assert_eq!(grid.height(17, 23), raster.height(17, 23));
         }

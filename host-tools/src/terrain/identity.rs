@@ -1,22 +1,32 @@
 //! A number that names a scene: what is felt, how large, and by which law.
 
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::hash::{Hash, Hasher};
 
 use hapterra_core::scene::Scene;
+use twox_hash::XxHash64;
 
 use super::{FeltGrid, Scale};
 use crate::raster::Raster;
 
-/// Hash of all heights: two files with the same content are the same terrain,
-/// and a file that was changed in place is not.
+/// Hash of all heights from south-west to north-east, after the numbers of columns and
+/// rows: two files with the same content are the same terrain, and a file that was
+/// changed in place is not.
+///
+/// XXH64 with seed 0 over little-endian bytes. Recordings keep it, so it has to be the
+/// same on every machine and in every later version; the standard library's hasher is not.
+/// It is taken of the samples in memory: the file is not read again.
 pub(super) fn fingerprint(raster: &Raster) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    (raster.columns(), raster.rows()).hash(&mut hasher);
+    let mut hasher = XxHash64::with_seed(0);
+    for count in [raster.columns(), raster.rows()] {
+        hasher.write(&count.to_le_bytes());
+    }
     let mut heights = vec![0.0; raster.columns() as usize];
     let mut bytes = vec![0; 8 * heights.len()];
     for row in 0..raster.rows() {
         raster.copy_row(0, row, 0, &mut heights);
         for (to, height) in bytes.chunks_exact_mut(8).zip(&heights) {
+            // One bit pattern for all holes.
+            let height = if height.is_nan() { f64::NAN } else { *height };
             to.copy_from_slice(&height.to_le_bytes());
         }
         hasher.write(&bytes);
@@ -26,7 +36,7 @@ pub(super) fn fingerprint(raster: &Raster) -> u64 {
 
 /// The epoch of a scene over a terrain; the scene's own epoch does not count.
 pub(super) fn epoch(fingerprint: u64, grid: &FeltGrid<'_>, scale: &Scale, scene: &Scene) -> u32 {
-    let mut hasher = DefaultHasher::new();
+    let mut hasher = XxHash64::with_seed(0);
     fingerprint.hash(&mut hasher);
     grid.hash_shape(&mut hasher);
     let numbers = [scale.cell_mm(), scale.height_mm_per_unit()];
@@ -34,4 +44,27 @@ pub(super) fn epoch(fingerprint: u64, grid: &FeltGrid<'_>, scale: &Scale, scene:
     // Everything else that the scene states.
     format!("{:?}", Scene { epoch: 0, ..*scene }).hash(&mut hasher);
     hasher.finish() as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Recordings name terrains by this number, so it may never change: XXH64 by an
+    /// implementation of its own.
+    const FOR_EVER: u64 = 0x7046_36b8_d443_a868;
+
+    #[test]
+    fn the_fingerprint_is_the_same_for_ever() {
+        let heights = |hole: f32| {
+            Raster::from_fn(3, 2, move |x, y| match (x, y) {
+                (2, 1) => hole,
+                _ => (x + 10 * y) as f32,
+            })
+        };
+        let print = |hole| fingerprint(&heights(hole).expect("raster"));
+        assert_eq!(print(f32::NAN), FOR_EVER);
+        assert_eq!(print(-f32::NAN), FOR_EVER);
+        assert_ne!(print(12.0), FOR_EVER);
+    }
 }

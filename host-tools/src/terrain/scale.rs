@@ -80,6 +80,16 @@ impl Scale {
         }
     }
 
+    /// The scale of which this is [`Self::at_level`].
+    #[must_use]
+    pub fn of_level_0(&self, level: u8) -> Self {
+        Self {
+            // A power of two: exact both ways.
+            cell_mm: self.cell_mm / f64::from(level).exp2(),
+            ..*self
+        }
+    }
+
     /// A height of the file in cells.
     #[must_use]
     pub fn height_cells(&self, height: f64) -> f64 {
@@ -89,10 +99,14 @@ impl Scale {
     /// A place in hand millimetres on the grid; `None` when it is not a number
     /// or farther than [`MAX_CELL`] cells from the origin.
     ///
-    /// Worked out in `f64`; the fraction is rounded once, to `f32`.
+    /// Worked out in `f64`; the fraction is rounded once, to `f32`. A place that
+    /// [`Self::to_mm`] gives for a whole number of cells comes back as that number.
     #[must_use]
     pub fn to_grid(&self, mm: [f64; 3]) -> Option<GridPoint> {
-        let cells = mm.map(|mm| mm / self.cell_mm);
+        let cells = mm.map(|mm| {
+            let (cells, whole) = (mm / self.cell_mm, (mm / self.cell_mm).round());
+            if whole * self.cell_mm == mm { whole } else { cells }
+        });
         let max = f64::from(MAX_CELL);
         if !cells.iter().all(|c| c.abs() <= max) {
             return None;
@@ -128,6 +142,13 @@ mod tests {
                 assert!((back - mm).abs() <= 0.25 * 2f64.powi(-24), "{back} {mm}");
             }
         }
+        // Whole cells of lengths that no binary fraction is.
+        let scale = Scale::new(0.7, 1.0).expect("valid");
+        for cell in 0..2000 {
+            let point = GridPoint::new([cell, -cell, 3], Vec3::ZERO);
+            assert_eq!(scale.to_grid(scale.to_mm(&point)), Some(point));
+        }
+        let scale = Scale::new(0.25, 1.0).expect("valid");
         // Just below a whole cell rounds up into the next.
         let below = scale.to_grid([-1e-12, 0.0, 0.0]).expect("addressable");
         assert_eq!((below.cell()[0], below.frac().x), (0, 0.0));
@@ -148,7 +169,9 @@ mod tests {
             assert!(Scale::new(cell, 1.0).is_err(), "{cell}");
         }
         assert!(Scale::new(1.0, f64::NAN).is_err());
-        let scale = Scale::new(2.0, 3.0).expect("valid").at_level(3);
+        let plain = Scale::new(2.0, 3.0).expect("valid");
+        let scale = plain.at_level(3);
+        assert_eq!(scale.of_level_0(3), plain);
         assert_eq!((scale.cell_mm(), scale.height_cells(16.0)), (16.0, 3.0));
     }
 }

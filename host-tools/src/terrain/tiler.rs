@@ -138,6 +138,20 @@ impl<'r> Terrain<'r> {
         &self.scale
     }
 
+    /// The scale of the finest level: of the grid's own cells.
+    #[must_use]
+    pub fn scale_of_level_0(&self) -> Scale {
+        self.scale.of_level_0(self.level)
+    }
+
+    /// Hash of all heights of the raster: the same terrain has the same, and a file that
+    /// was changed has another. Worked out once, from the samples in memory.
+    #[must_use]
+    pub fn fingerprint(&self) -> u64 {
+        let print = || identity::fingerprint(self.raster());
+        *self.fingerprint.get_or_init(print)
+    }
+
     /// Size in patches of this level, east and north.
     #[must_use]
     pub const fn size(&self) -> [i32; 2] {
@@ -172,10 +186,7 @@ impl<'r> Terrain<'r> {
             source,
             hold_clock: true,
         };
-        let fingerprint = *self
-            .fingerprint
-            .get_or_init(|| identity::fingerprint(self.raster()));
-        scene.epoch = identity::epoch(fingerprint, &self.grid, &self.scale, &scene);
+        scene.epoch = identity::epoch(self.fingerprint(), &self.grid, &self.scale, &scene);
         scene
     }
 

@@ -30,6 +30,12 @@ pub struct EmulatedBoard {
 }
 
 impl EmulatedBoard {
+    /// Whether an image is named, here or by the environment.
+    #[must_use]
+    pub fn is_named(&self) -> bool {
+        self.image.is_some() || path_in(IMAGE_VARIABLE).is_some()
+    }
+
     /// Starts the board and connects its two lines.
     ///
     /// # Errors

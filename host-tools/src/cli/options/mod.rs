@@ -3,5 +3,7 @@
 
 pub mod device;
 pub mod emulated_board;
+pub mod exaggeration;
+pub mod recorded;
 pub mod rendering;
 pub mod terrain_file;

@@ -3,12 +3,14 @@
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 
+use super::exaggeration::Exaggeration;
 use crate::cli::failure::{Failure, OrHint};
+use crate::place::suggest_scale;
 use crate::raster::Raster;
 use crate::terrain::{FeltCells, FeltGrid, Scale, Terrain};
 
 /// How the terrain feels.
-#[derive(Clone, Debug, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Feel")]
 pub struct Rendering {
     /// Hand millimetres a cell [default: 1]
@@ -17,35 +19,43 @@ pub struct Rendering {
 
     /// Hand millimetres a vertical unit of the file [default: its true
     /// proportions where it knows its cell size, else 1]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, conflicts_with = "exaggeration")]
     pub height_mm_per_unit: Option<f64>,
 
-    /// Which cells of the file are felt
-    #[arg(long, value_enum, default_value_t)]
-    pub cells: FeltCells,
+    /// Times that heights are felt higher than true to scale; `auto` chooses what suits
+    /// the hand [default: 1]
+    #[arg(long, value_name = "TIMES|auto", allow_negative_numbers = true)]
+    pub exaggeration: Option<Exaggeration>,
 
-    /// Level of detail: every 2^LEVEL-th sample is felt
-    #[arg(long, default_value_t = 0)]
-    pub level: u8,
+    /// Which cells of the file are felt [default: square]
+    #[arg(long, value_enum)]
+    pub cells: Option<FeltCells>,
 
-    /// Stiffness of the surface
-    #[arg(long, value_name = "N/MM", default_value_t = 0.5)]
-    pub stiffness_n_per_mm: f32,
+    /// Level of detail: every 2^LEVEL-th sample is felt [default: 0]
+    #[arg(long)]
+    pub level: Option<u8>,
 
-    /// Largest force
-    #[arg(long, value_name = "N", default_value_t = 8.5)]
-    pub max_force_n: f32,
+    /// Stiffness of the surface [default: 0.5]
+    #[arg(long, value_name = "N/MM")]
+    pub stiffness_n_per_mm: Option<f32>,
 
-    /// Contact rule
-    #[arg(long, value_enum, default_value_t)]
-    pub contact: ContactRule,
+    /// Largest force [default: 8.5]
+    #[arg(long, value_name = "N")]
+    pub max_force_n: Option<f32>,
+
+    /// Contact rule [default: swept]
+    #[arg(long, value_enum)]
+    pub contact: Option<ContactRule>,
 }
 
+/// Above this a word is said, N/mm: people hold 0.4 to 0.8 N/mm on a Premium 1.5
+/// (`docs/hardware.md`).
+const STIFFEST_N_PER_MM: f32 = 1.0;
+
 /// Contact rule.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum ContactRule {
     /// Continuous: nothing passes through the surface
-    #[default]
     Swept,
     /// As published in the paper, for comparison
     Paper,
@@ -58,17 +68,19 @@ impl Rendering {
     /// Numbers that no terrain can be scaled with.
     pub fn scale(&self, grid: &FeltGrid<'_>) -> Result<Scale, Failure> {
         let cell_mm = self.cell_mm.unwrap_or(1.0);
-        let scale = match self.height_mm_per_unit {
-            Some(height) => Scale::new(cell_mm, height),
-            None => Scale::true_to(grid, cell_mm),
+        let scale = match (self.height_mm_per_unit, self.exaggeration.unwrap_or_default()) {
+            (Some(height), _) => Scale::new(cell_mm, height),
+            (None, Exaggeration::Auto) => suggest_scale(grid, self.cell_mm).map(|s| s.scale),
+            (None, Exaggeration::Times(times)) => Scale::true_to(grid, cell_mm)
+                .and_then(|plain| Scale::new(cell_mm, plain.height_mm_per_unit() * times)),
         };
-        scale.or_hint("choose another --cell-mm or --height-mm-per-unit")
+        scale.or_hint("choose another --cell-mm, --exaggeration or --height-mm-per-unit")
     }
 
     /// The grid that is felt of a raster.
     #[must_use]
     pub fn grid<'r>(&self, raster: &'r Raster) -> FeltGrid<'r> {
-        FeltGrid::new(raster, self.cells)
+        FeltGrid::new(raster, self.cells.unwrap_or_default())
     }
 
     /// The terrain at a scale.
@@ -76,7 +88,7 @@ impl Rendering {
     /// # Errors
     /// Heights or a size that positions cannot say, or a level too high.
     pub fn terrain<'r>(&self, grid: FeltGrid<'r>, scale: Scale) -> Result<Terrain<'r>, Failure> {
-        Ok(Terrain::over(grid, scale, self.level)?)
+        Ok(Terrain::over(grid, scale, self.level.unwrap_or(0))?)
     }
 
     /// The force law.
@@ -84,14 +96,20 @@ impl Rendering {
     /// # Errors
     /// A stiffness or limit that is negative or not finite.
     pub fn law(&self) -> Result<ForceLaw, Failure> {
+        let usual = ForceLaw::PREMIUM;
         let law = ForceLaw {
-            stiffness_n_per_mm: self.stiffness_n_per_mm,
-            max_force_n: self.max_force_n,
+            stiffness_n_per_mm: self.stiffness_n_per_mm.unwrap_or(usual.stiffness_n_per_mm),
+            max_force_n: self.max_force_n.unwrap_or(usual.max_force_n),
         };
         let ForceLaw {
             stiffness_n_per_mm: k,
             max_force_n: limit,
         } = law;
+        if k.is_finite() && k > STIFFEST_N_PER_MM {
+            tracing::warn!(
+                "a stiffness of {k} N/mm: people hold 0.4 to 0.8 N/mm on a Phantom Premium 1.5; above {STIFFEST_N_PER_MM} N/mm an arm most likely buzzes or kicks"
+            );
+        }
         law.is_valid()
             .then_some(law)
             .ok_or_else(|| {
@@ -104,8 +122,8 @@ impl Rendering {
     #[must_use]
     pub const fn rule(&self) -> Rule {
         match self.contact {
-            ContactRule::Swept => Rule::Swept,
-            ContactRule::Paper => Rule::Paper,
+            None | Some(ContactRule::Swept) => Rule::Swept,
+            Some(ContactRule::Paper) => Rule::Paper,
         }
     }
 }

@@ -1,0 +1,163 @@
+//! Settings of a recording in place of options that were not given.
+
+use std::fmt::Debug;
+
+use hapterra_core::contact::Rule;
+
+use super::exaggeration::Exaggeration;
+use super::rendering::{ContactRule, Rendering};
+use crate::replay::Settings;
+
+impl Rendering {
+    /// These options, and where one is missing what a recording says. Options win; the
+    /// lines say which did against the recording.
+    ///
+    /// A size in the hand of one's own keeps the recorded proportions, unless those are
+    /// stated, too.
+    #[must_use]
+    pub fn or_recorded(&self, settings: &Settings) -> (Self, Vec<String>) {
+        let (felt, force) = (&settings.felt, &settings.force);
+        let mut told = Vec::new();
+        let cells = merged("cells", self.cells, felt.cells, &mut told);
+        let cell_mm = merged("cell-mm", self.cell_mm, felt.cell_mm, &mut told);
+        let mut rendering = Self {
+            cell_mm: Some(cell_mm),
+            cells: Some(cells),
+            level: Some(merged("level", self.level, felt.level, &mut told)),
+            stiffness_n_per_mm: Some(merged(
+                "stiffness-n-per-mm",
+                self.stiffness_n_per_mm,
+                force.stiffness_n_per_mm,
+                &mut told,
+            )),
+            max_force_n: Some(merged(
+                "max-force-n",
+                self.max_force_n,
+                force.max_force_n,
+                &mut told,
+            )),
+            contact: Some(merged("contact", self.contact, rule(force.rule), &mut told)),
+            ..self.clone()
+        };
+        match (self.height_mm_per_unit, self.exaggeration) {
+            (Some(height), _) if height != felt.height_mm_per_unit => {
+                told.push(line("height-mm-per-unit", &height, &felt.height_mm_per_unit));
+            }
+            (None, Some(exaggeration)) => told.extend(differs(exaggeration, felt.exaggeration)),
+            (Some(_), _) => {}
+            // Other cells have another size on the ground: the proportions are kept by
+            // the factor.
+            (None, None) if cells != felt.cells && felt.exaggeration.is_some() => {
+                rendering.exaggeration = felt.exaggeration.map(Exaggeration::Times);
+            }
+            (None, None) => rendering.height_mm_per_unit = Some(felt.height_at_cell_mm(cell_mm)),
+        }
+        (rendering, told)
+    }
+}
+
+fn merged<T: PartialEq + Debug + Copy>(
+    name: &str,
+    given: Option<T>,
+    recorded: T,
+    told: &mut Vec<String>,
+) -> T {
+    if let Some(given) = given.filter(|given| *given != recorded) {
+        told.push(line(name, &given, &recorded));
+    }
+    given.unwrap_or(recorded)
+}
+
+fn differs(given: Exaggeration, recorded: Option<f64>) -> Option<String> {
+    let recorded = recorded.map_or("an unknown one".into(), |times| times.to_string());
+    match given {
+        Exaggeration::Times(times) if times.to_string() == recorded => None,
+        Exaggeration::Times(times) => Some(told("exaggeration", &times.to_string(), &recorded)),
+        Exaggeration::Auto => Some(told("exaggeration", "auto", &recorded)),
+    }
+}
+
+fn line(name: &str, given: &impl Debug, recorded: &impl Debug) -> String {
+    let [given, recorded] = [format!("{given:?}"), format!("{recorded:?}")];
+    told(name, &given.to_lowercase(), &recorded.to_lowercase())
+}
+
+fn told(name: &str, given: &str, recorded: &str) -> String {
+    format!("--{name} {given}, where the recording has {recorded}")
+}
+
+const fn rule(rule: Rule) -> ContactRule {
+    match rule {
+        Rule::Swept => ContactRule::Swept,
+        Rule::Paper => ContactRule::Paper,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hapterra_core::force::ForceLaw;
+
+    use super::*;
+    use crate::raster::Raster;
+    use crate::replay::settings::Device;
+    use crate::terrain::{FeltCells, Scale, Terrain};
+
+    fn recorded() -> Settings {
+        let raster = Raster::from_fn(9, 9, |x, _| x as f32).expect("raster");
+        let scale = Scale::new(2.0, 6.0).expect("valid");
+        let terrain = Terrain::new(&raster, scale, 1).expect("terrain");
+        let law = ForceLaw {
+            stiffness_n_per_mm: 0.3,
+            max_force_n: 4.0,
+        };
+        let device = Device {
+            board: "native".into(),
+            firmware: String::new(),
+            tick_hz: 1000,
+        };
+        Settings::new("t.tif", &terrain, (law, Rule::Paper), None, device)
+    }
+
+    #[test]
+    fn what_is_not_stated_is_as_recorded() {
+        let (rendering, told) = Rendering::default().or_recorded(&recorded());
+        assert_eq!(told, [""; 0]);
+        assert_eq!((rendering.cell_mm, rendering.height_mm_per_unit), (Some(2.0), Some(6.0)));
+        assert_eq!((rendering.level, rendering.max_force_n), (Some(1), Some(4.0)));
+        assert_eq!(rendering.rule(), Rule::Paper);
+    }
+
+    #[test]
+    fn what_is_stated_wins_and_is_told_where_it_differs() {
+        let stated = Rendering {
+            cell_mm: Some(1.0),
+            level: Some(1),
+            stiffness_n_per_mm: Some(0.5),
+            ..Rendering::default()
+        };
+        let (rendering, told) = stated.or_recorded(&recorded());
+        assert_eq!(told.len(), 2, "{told:?}");
+        assert_eq!(told[0], "--cell-mm 1.0, where the recording has 2.0");
+        assert!(told[1].starts_with("--stiffness-n-per-mm 0.5"), "{told:?}");
+        // Half as large, and half as high.
+        assert_eq!(rendering.height_mm_per_unit, Some(3.0));
+    }
+
+    #[test]
+    fn other_cells_keep_the_exaggeration_and_a_stated_one_wins() {
+        let stated = Rendering {
+            cells: Some(FeltCells::Stored),
+            ..Rendering::default()
+        };
+        let (rendering, told) = stated.or_recorded(&recorded());
+        assert_eq!(told, ["--cells stored, where the recording has square"]);
+        assert_eq!(rendering.exaggeration, Some(Exaggeration::Times(3.0)));
+        let stated = Rendering {
+            exaggeration: Some(Exaggeration::Times(2.0)),
+            ..Rendering::default()
+        };
+        let (rendering, told) = stated.or_recorded(&recorded());
+        assert_eq!(rendering.height_mm_per_unit, None);
+        assert_eq!(told, ["--exaggeration 2, where the recording has 3"]);
+    }
+}

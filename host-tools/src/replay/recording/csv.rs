@@ -1,0 +1,68 @@
+//! Recordings as CSV: the settings behind `# `, a header, a line a row.
+
+use std::io::Write;
+
+use super::{BEFORE_CONTACT, CONTACT, Column, NUMBERS, Record, Value};
+use crate::output::{Output, OutputError};
+use crate::replay::settings::Settings;
+
+/// A CSV recording being written.
+pub(super) struct Csv {
+    output: Output,
+    /// What is not written yet: a row, or the settings and the header before the first.
+    text: Vec<u8>,
+}
+
+impl Csv {
+    /// Begins with the header.
+    pub(super) fn new(output: Output, more: &[Column]) -> Self {
+        let (before, after) = NUMBERS.split_at(BEFORE_CONTACT);
+        let names = before.iter().chain([&CONTACT]).chain(after).copied();
+        let names = names.chain(more.iter().map(Column::name));
+        let mut text = names.collect::<Vec<_>>().join(",").into_bytes();
+        text.push(b'\n');
+        Self { output, text }
+    }
+
+    /// Puts the settings before what is not written yet: the header.
+    pub(super) fn describe(&mut self, settings: &Settings) {
+        let header = std::mem::take(&mut self.text);
+        for line in settings.to_toml().lines() {
+            let space = if line.is_empty() { "" } else { " " };
+            self.text.extend(format!("#{space}{line}\n").bytes());
+        }
+        self.text.extend(header);
+    }
+
+    pub(super) fn write(&mut self, record: &Record, more: &[Value<'_>]) -> Result<(), OutputError> {
+        self.flush()?;
+        let contact = f64::from(u8::from(record.contact));
+        let numbers = record.numbers();
+        let (before, after) = numbers.split_at(BEFORE_CONTACT);
+        for number in before.iter().chain([&contact]).chain(after) {
+            // The shortest digits that read back to the same value. Writing to
+            // a vector cannot fail.
+            let _ = write!(self.text, "{number},");
+        }
+        for value in more {
+            let _ = write!(self.text, "{value},");
+        }
+        self.text.pop();
+        self.text.push(b'\n');
+        Ok(())
+    }
+
+    pub(super) fn finish(mut self) -> Result<(), OutputError> {
+        self.flush()?;
+        self.output.finish()
+    }
+
+    fn flush(&mut self) -> Result<(), OutputError> {
+        let written = self.output.write_all(&self.text);
+        self.text.clear();
+        written.map_err(|source| OutputError {
+            path: self.output.path().to_owned(),
+            source,
+        })
+    }
+}

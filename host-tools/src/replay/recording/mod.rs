@@ -1,0 +1,181 @@
+//! Recordings: one row a tick, with what was felt, and the settings with which it was.
+//!
+//! CSV, or Parquet where the file's name ends in `.parquet`. Both have the same columns
+//! and the same settings.
+
+mod csv;
+mod parquet;
+
+use std::fmt;
+use std::path::Path;
+
+use hapterra_core::contact::ContactState;
+use hapterra_core::scene::Sample;
+
+use super::settings::Settings;
+use crate::output::{Output, OutputError};
+use crate::terrain::Scale;
+
+/// The columns of every recording that are numbers with a fraction, in their order.
+const NUMBERS: [&str; 10] = [
+    "t_s",
+    "x_mm",
+    "y_mm",
+    "z_mm",
+    "proxy_x_mm",
+    "proxy_y_mm",
+    "proxy_z_mm",
+    "force_x_n",
+    "force_y_n",
+    "force_z_n",
+];
+/// The column of every recording that says whether the surface was touched, 0 or 1.
+const CONTACT: &str = "contact";
+/// How many of [`NUMBERS`] stand before [`CONTACT`].
+const BEFORE_CONTACT: usize = 4;
+/// What the name of a Parquet recording ends in.
+const PARQUET: &str = "parquet";
+
+/// One row of a recording.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Record {
+    /// Time, s.
+    pub t_s: f64,
+    /// Where the HIP was, mm; terrain frame.
+    pub hip_mm: [f64; 3],
+    /// Whether the surface was touched.
+    pub contact: bool,
+    /// Where the proxy was, mm: at the HIP unless touching.
+    pub proxy_mm: [f64; 3],
+    /// Force on the hand, N.
+    pub force_n: [f64; 3],
+}
+
+impl Record {
+    /// What was felt in a tick of a device with `tick_hz` ticks a second.
+    #[must_use]
+    pub fn of_tick(sample: &Sample, tick_hz: u32, scale: &Scale) -> Self {
+        let t_s = f64::from(sample.tick) / f64::from(tick_hz.max(1));
+        Self::new(t_s, scale.to_mm(&sample.hip), sample, scale)
+    }
+
+    /// What was felt at a time, s, with the HIP at a place, mm.
+    #[must_use]
+    pub fn new(t_s: f64, hip_mm: [f64; 3], sample: &Sample, scale: &Scale) -> Self {
+        let contact = sample.state == ContactState::Touching;
+        Self {
+            t_s,
+            hip_mm,
+            contact,
+            proxy_mm: if contact {
+                scale.to_mm(&sample.proxy)
+            } else {
+                hip_mm
+            },
+            force_n: sample.force_n.to_array().map(f64::from),
+        }
+    }
+
+    /// The values of [`NUMBERS`].
+    fn numbers(&self) -> [f64; NUMBERS.len()] {
+        let ([x, y, z], [px, py, pz], [fx, fy, fz]) = (self.hip_mm, self.proxy_mm, self.force_n);
+        [self.t_s, x, y, z, px, py, pz, fx, fy, fz]
+    }
+}
+
+/// A column after those that every recording has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Column {
+    /// Words.
+    Text(&'static str),
+    /// Whole numbers.
+    Count(&'static str),
+}
+
+impl Column {
+    /// The name in the header.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Text(name) | Self::Count(name) => name,
+        }
+    }
+}
+
+/// A value of a [`Column`], of its kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Value<'v> {
+    /// Words, without comma, quote and line end.
+    Text(&'v str),
+    /// A whole number.
+    Count(u32),
+}
+
+impl fmt::Display for Value<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Text(text) => f.write_str(text),
+            Self::Count(count) => write!(f, "{count}"),
+        }
+    }
+}
+
+/// A recording being written. Dropped before [`Recording::finish`], it leaves nothing
+/// behind.
+pub struct Recording(Form);
+
+/// The two forms.
+enum Form {
+    Csv(csv::Csv),
+    Parquet(Box<parquet::Parquet>),
+}
+
+impl Recording {
+    /// Begins a recording with `more` columns after the usual ones; in Parquet where the
+    /// output's name ends so.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn new(output: Output, more: &[Column]) -> Result<Self, OutputError> {
+        let form = match is_parquet(output.path()) {
+            true => Form::Parquet(Box::new(parquet::Parquet::new(output, more)?)),
+            false => Form::Csv(csv::Csv::new(output, more)),
+        };
+        Ok(Self(form))
+    }
+
+    /// Says with which settings the rows were felt: before the first row.
+    pub fn describe(&mut self, settings: &Settings) {
+        match &mut self.0 {
+            Form::Csv(csv) => csv.describe(settings),
+            Form::Parquet(parquet) => parquet.describe(settings),
+        }
+    }
+
+    /// Appends a row; `more` are the values of the further columns, in their order.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write(&mut self, record: &Record, more: &[Value<'_>]) -> Result<(), OutputError> {
+        match &mut self.0 {
+            Form::Csv(csv) => csv.write(record, more),
+            Form::Parquet(parquet) => parquet.write(record, more),
+        }
+    }
+
+    /// Puts the complete file in its place.
+    ///
+    /// # Errors
+    /// When it cannot be written to the end.
+    pub fn finish(self) -> Result<(), OutputError> {
+        match self.0 {
+            Form::Csv(csv) => csv.finish(),
+            Form::Parquet(parquet) => parquet.finish(),
+        }
+    }
+}
+
+fn is_parquet(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    extension.eq_ignore_ascii_case(PARQUET)
+}

@@ -1,0 +1,387 @@
+//! What a recording says of itself: on which terrain, at which place and scale, under
+//! which law and by which device it was felt.
+//!
+//! The text is TOML. In a CSV recording each of its lines stands behind `# ` before the
+//! header; in a Parquet recording it is the value of [`KEY`] among the file's metadata.
+
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
+use serde::{Deserialize, Serialize};
+
+use crate::link::shown;
+use crate::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+
+/// What the first line of the settings begins with; its value is [`FORMAT`].
+pub const KEY: &str = "hapterra-recording";
+/// Version of the settings' format that this program writes and reads.
+pub const FORMAT: u32 = 1;
+/// Lengths and cell sizes that differ by less than this share count as the same: two
+/// machines may round the size of a degree differently.
+const SAME: f64 = 1e-9;
+
+/// The settings with which something was felt.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Version of this format.
+    #[serde(rename = "hapterra-recording")]
+    format: u32,
+    /// Version of the program that recorded.
+    pub program: String,
+    /// Version of the protocol between program and device.
+    pub protocol: u16,
+    /// The terrain file.
+    pub terrain: TerrainFile,
+    /// What of it was felt, where and how large.
+    pub felt: Felt,
+    /// The force law and the contact rule.
+    pub force: Force,
+    /// The device.
+    pub device: Device,
+}
+
+/// The terrain of a recording.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TerrainFile {
+    /// The file as it was named, or what was made on the spot.
+    pub file: String,
+    /// Hash of all heights: [`Terrain::fingerprint`] in hexadecimal digits.
+    pub fingerprint: String,
+    /// Samples of the file, west to east and south to north.
+    pub samples: [u32; 2],
+    /// EPSG code of its horizontal reference system, as `EPSG:2056`, where known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub crs: Option<String>,
+}
+
+/// What was felt of a terrain.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Felt {
+    /// Which cells of the file.
+    pub cells: FeltCells,
+    /// Felt samples of level 0, west to east and south to north.
+    pub samples: [u32; 2],
+    /// Side of a felt cell of level 0 on the ground, m, where the file knows it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cell_m: Option<f64>,
+    /// Level of detail: every 2^level-th sample.
+    pub level: u8,
+    /// Hand millimetres a felt cell of level 0.
+    pub cell_mm: f64,
+    /// Hand millimetres a vertical unit of the file.
+    pub height_mm_per_unit: f64,
+    /// Times that heights are higher than true to scale, where the file knows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exaggeration: Option<f64>,
+    /// The point of the terrain that was at the tip in the arm's home pose, hand
+    /// millimetres; none where no arm felt it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub home_mm: Option<[f64; 3]>,
+}
+
+/// How force was made.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Force {
+    /// Newtons for a millimetre between the HIP and the proxy.
+    pub stiffness_n_per_mm: f32,
+    /// Largest force, N.
+    pub max_force_n: f32,
+    /// The contact rule.
+    #[serde(with = "rule_name")]
+    pub rule: Rule,
+}
+
+/// The device that felt it, as it described itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Device {
+    /// Its board.
+    pub board: String,
+    /// Version of its firmware.
+    pub firmware: String,
+    /// Ticks a second.
+    pub tick_hz: u32,
+}
+
+/// Settings that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum BadSettings {
+    /// Written by a later version of the program.
+    #[error("its settings are of format {found}, and this program reads format {FORMAT}")]
+    Later {
+        /// The format found.
+        found: u32,
+    },
+    /// No TOML, or numbers are missing.
+    #[error("its settings cannot be read: {0}")]
+    Unreadable(String),
+}
+
+/// A terrain that is not the one of a recording.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{found} is not the terrain of this recording, which is {recorded}: {difference}")]
+pub struct OtherTerrain {
+    /// The terrain of the recording.
+    recorded: String,
+    /// The one that was named now.
+    found: String,
+    /// In what they differ.
+    difference: String,
+}
+
+impl Settings {
+    /// What is felt of a terrain under a law and a rule; `file` names the terrain.
+    /// `home_mm` is the place in the arm's home pose, where there is an arm.
+    #[must_use]
+    pub fn new(
+        file: &str,
+        terrain: &Terrain<'_>,
+        (law, rule): (ForceLaw, Rule),
+        home_mm: Option<[f64; 3]>,
+        device: Device,
+    ) -> Self {
+        let (raster, grid) = (terrain.raster(), terrain.grid());
+        let scale = terrain.scale_of_level_0();
+        Self {
+            format: FORMAT,
+            program: env!("CARGO_PKG_VERSION").to_owned(),
+            protocol: PROTOCOL,
+            terrain: TerrainFile {
+                file: file.to_owned(),
+                fingerprint: digits(terrain),
+                samples: [raster.columns(), raster.rows()],
+                crs: raster
+                    .reference_system()
+                    .map(|(code, _)| format!("EPSG:{code}")),
+            },
+            felt: Felt {
+                cells: grid.cells(),
+                samples: [grid.columns(), grid.rows()],
+                cell_m: grid.side_m(),
+                level: terrain.level(),
+                cell_mm: scale.cell_mm(),
+                height_mm_per_unit: scale.height_mm_per_unit(),
+                exaggeration: scale.exaggeration(grid),
+                home_mm,
+            },
+            force: Force {
+                stiffness_n_per_mm: law.stiffness_n_per_mm,
+                max_force_n: law.max_force_n,
+                rule,
+            },
+            device,
+        }
+    }
+
+    /// The settings as TOML, [`KEY`] first.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        // Structures of numbers and text always have a form in TOML.
+        toml::to_string(self).unwrap_or_default()
+    }
+
+    /// Reads settings; none where the text is anything else.
+    ///
+    /// # Errors
+    /// [`BadSettings`] where the text begins as settings do and cannot be used.
+    pub fn from_toml(text: &str) -> Result<Option<Self>, BadSettings> {
+        /// The format alone: all else may be another way in another one.
+        #[derive(Deserialize)]
+        struct Format {
+            #[serde(rename = "hapterra-recording")]
+            format: u32,
+        }
+        if !text.trim_start().starts_with(KEY) {
+            return Ok(None);
+        }
+        let unreadable = |error: toml::de::Error| BadSettings::Unreadable(error.to_string());
+        let Format { format } = toml::from_str(text).map_err(unreadable)?;
+        if format != FORMAT {
+            return Err(BadSettings::Later { found: format });
+        }
+        toml::from_str(text).map(Some).map_err(unreadable)
+    }
+
+    /// The force law.
+    #[must_use]
+    pub const fn law(&self) -> ForceLaw {
+        ForceLaw {
+            stiffness_n_per_mm: self.force.stiffness_n_per_mm,
+            max_force_n: self.force.max_force_n,
+        }
+    }
+
+    /// Checks that a terrain is the one that was felt; `file` names it.
+    ///
+    /// Its heights have to be the same, and where the same cells of it are felt, those
+    /// have to be as large on the ground.
+    ///
+    /// # Errors
+    /// [`OtherTerrain`] says in what it differs.
+    pub fn check_terrain(&self, file: &str, terrain: &Terrain<'_>) -> Result<(), OtherTerrain> {
+        let difference = if self.terrain.fingerprint != digits(terrain) {
+            let (recorded, raster) = (self.terrain.samples, terrain.raster());
+            match recorded == [raster.columns(), raster.rows()] {
+                true => "its heights are others".to_owned(),
+                false => format!(
+                    "{} × {} samples, not {} × {}",
+                    raster.columns(),
+                    raster.rows(),
+                    recorded[0],
+                    recorded[1]
+                ),
+            }
+        } else if let Some(difference) = self.felt.difference(terrain.grid()) {
+            difference
+        } else {
+            return Ok(());
+        };
+        Err(OtherTerrain {
+            recorded: self.terrain.file.clone(),
+            found: file.to_owned(),
+            difference,
+        })
+    }
+}
+
+impl Device {
+    /// The device behind a hello.
+    #[must_use]
+    pub fn of(hello: &DeviceHello) -> Self {
+        Self {
+            board: shown(&hello.board),
+            firmware: shown(&hello.version),
+            tick_hz: hello.tick_hz,
+        }
+    }
+}
+
+impl Felt {
+    /// In what the cells of the same heights differ, where the same kind is felt.
+    fn difference(&self, grid: &FeltGrid<'_>) -> Option<String> {
+        if grid.cells() != self.cells {
+            return None;
+        }
+        let same_size = match (self.cell_m, grid.side_m()) {
+            (Some(recorded), Some(now)) => (recorded - now).abs() <= SAME * recorded.abs(),
+            (recorded, now) => recorded == now,
+        };
+        let metres = |side: Option<f64>| side.map_or("unknown".into(), |m| format!("{m} m"));
+        let same = same_size && self.samples == [grid.columns(), grid.rows()];
+        (!same).then(|| {
+            format!(
+                "the same heights in cells of another size on the ground, {} and not {}",
+                metres(grid.side_m()),
+                metres(self.cell_m)
+            )
+        })
+    }
+
+    /// Hand millimetres a vertical unit at another size in the hand and the recorded
+    /// proportions.
+    #[must_use]
+    pub fn height_at_cell_mm(&self, cell_mm: f64) -> f64 {
+        match cell_mm == self.cell_mm {
+            true => self.height_mm_per_unit,
+            false => self.height_mm_per_unit * (cell_mm / self.cell_mm),
+        }
+    }
+}
+
+impl Scale {
+    /// Times that heights are higher than true to scale, to nine digits; none where the
+    /// file does not know the size of its cells.
+    #[must_use]
+    pub fn exaggeration(&self, grid: &FeltGrid<'_>) -> Option<f64> {
+        let true_cells = grid.cells_per_vertical_unit()?;
+        let times = self.height_cells(1.0) / true_cells;
+        let rounded = (times * 1e9).round() / 1e9;
+        times.is_finite().then_some(rounded)
+    }
+}
+
+fn digits(terrain: &Terrain<'_>) -> String {
+    format!("{:016x}", terrain.fingerprint())
+}
+
+/// A contact rule by the name that the command line gives it.
+mod rule_name {
+    use hapterra_core::contact::Rule;
+    use serde::{Deserialize as _, Deserializer, Serializer, de::Error as _};
+
+    pub(super) fn serialize<S: Serializer>(rule: &Rule, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(match rule {
+            Rule::Swept => "swept",
+            Rule::Paper => "paper",
+        })
+    }
+
+    pub(super) fn deserialize<'d, D: Deserializer<'d>>(from: D) -> Result<Rule, D::Error> {
+        match String::deserialize(from)?.as_str() {
+            "swept" => Ok(Rule::Swept),
+            "paper" => Ok(Rule::Paper),
+            other => Err(D::Error::custom(format!("no contact rule is called {other}"))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::Raster;
+
+    fn raster(height: f32) -> Raster {
+        Raster::from_fn(9, 7, |x, y| height + (x * y) as f32).expect("raster")
+    }
+
+    fn terrain(raster: &Raster) -> Terrain<'_> {
+        Terrain::new(raster, Scale::new(2.0, 0.1).expect("valid"), 1).expect("terrain")
+    }
+
+    fn settings(terrain: &Terrain<'_>) -> Settings {
+        let law = (ForceLaw::PREMIUM, Rule::Paper);
+        let device = Device {
+            board: "native".into(),
+            firmware: "0.1.0".into(),
+            tick_hz: 1000,
+        };
+        Settings::new("a \"b\"\nc.tif", terrain, law, Some([1.5, -2.0, 0.1]), device)
+    }
+
+    #[test]
+    fn they_come_back_from_their_text() {
+        let raster = raster(0.0);
+        let settings = settings(&terrain(&raster));
+        let text = settings.to_toml();
+        assert!(text.starts_with("hapterra-recording = 1\n"), "{text}");
+        assert_eq!(Settings::from_toml(&text).expect("read"), Some(settings));
+        assert!(text.contains("rule = \"paper\"") && text.contains("level = 1"));
+        assert!(text.contains("cell_mm = 2.0"), "of level 0: {text}");
+    }
+
+    #[test]
+    fn anything_else_is_no_settings_and_what_is_broken_or_later_is_told() {
+        assert_eq!(Settings::from_toml(" a remark\n").expect("none"), None);
+        let later = Settings::from_toml("hapterra-recording = 2\nall = \"else\"");
+        assert!(matches!(later, Err(BadSettings::Later { found: 2 })));
+        for broken in ["hapterra-recording = 1", "hapterra-recording 1"] {
+            let read = Settings::from_toml(broken);
+            assert!(matches!(read, Err(BadSettings::Unreadable(_))), "{broken}");
+        }
+    }
+
+    #[test]
+    fn another_terrain_is_told_apart_by_its_heights_and_its_cells() {
+        let (one, other) = (raster(0.0), raster(0.5));
+        let settings = settings(&terrain(&one));
+        assert_eq!(settings.check_terrain("same", &terrain(&one)), Ok(()));
+        let wrong = settings.check_terrain("x.tif", &terrain(&other));
+        let wrong = wrong.expect_err("other heights").to_string();
+        assert!(wrong.contains("x.tif") && wrong.contains("c.tif"), "{wrong}");
+        let mut cell = one.cell().expect("metres");
+        (cell.east, cell.north) = (2.0, 2.0);
+        let wider = one.clone().with_cell(cell);
+        let wrong = settings.check_terrain("x.tif", &terrain(&wider));
+        let wrong = wrong.expect_err("other cells").to_string();
+        assert!(wrong.contains("2 m and not 1 m"), "{wrong}");
+    }
+}

@@ -1,0 +1,103 @@
+//! The lines that begin with `#` before a CSV header, and a stream read again from its
+//! beginning.
+
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
+
+/// Bytes of comments that are looked at, at most: settings take less than two thousand.
+const LONGEST: usize = 1 << 16;
+/// A mark that some editors put before the first byte.
+const MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// A stream whose first bytes were read already, and are read again. Positions count from
+/// its beginning.
+pub(super) struct Again<R> {
+    head: Cursor<Vec<u8>>,
+    rest: BufReader<R>,
+}
+
+/// Reads the comments before the first line that is none. Returns them without their `#`
+/// and a space after it, and the stream as if nothing had been read.
+pub(super) fn split<R: Read>(stream: R) -> io::Result<(String, Again<R>)> {
+    let mut rest = BufReader::with_capacity(1 << 16, stream);
+    let (mut head, mut comments) = (Vec::new(), String::new());
+    while head.len() < LONGEST {
+        let from = head.len();
+        rest.by_ref()
+            .take((LONGEST - from) as u64)
+            .read_until(b'\n', &mut head)?;
+        let line = head.get(from..).unwrap_or_default();
+        let line = line.strip_prefix(MARK).unwrap_or(line);
+        let Some(comment) = line.strip_prefix(b"#") else {
+            break;
+        };
+        let comment = comment.strip_prefix(b" ").unwrap_or(comment);
+        comments += &String::from_utf8_lossy(comment);
+    }
+    let head = Cursor::new(head);
+    Ok((comments, Again { head, rest }))
+}
+
+impl<R: Read> Read for Again<R> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        match self.head.read(into)? {
+            0 => self.rest.read(into),
+            read => Ok(read),
+        }
+    }
+}
+
+impl<R: Seek> Seek for Again<R> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        // What is in front is in the stream, too.
+        self.head.set_position(self.head.get_ref().len() as u64);
+        self.rest.seek(to)
+    }
+}
+
+/// How many lines from here on are empty or comments: a row begins after them.
+pub(super) fn lines_before_a_row(stream: impl Read) -> u64 {
+    let (mut reader, mut line, mut count) = (BufReader::new(stream), Vec::new(), 0);
+    loop {
+        line.clear();
+        let read = reader.read_until(b'\n', &mut line);
+        let passed_over = line.starts_with(b"#") || line.trim_ascii().is_empty();
+        if !passed_over || line.is_empty() || read.is_err() {
+            return count;
+        }
+        count += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parts(text: &[u8]) -> (String, Vec<u8>) {
+        let (comments, mut again) = split(text).expect("in memory");
+        let mut whole = Vec::new();
+        again.read_to_end(&mut whole).expect("in memory");
+        (comments, whole)
+    }
+
+    #[test]
+    fn comments_are_told_apart_and_nothing_is_lost() {
+        for (text, expected) in [
+            (&b"# a = 1\n#\n#b\r\nt_s\n0\n# later\n"[..], "a = 1\n\nb\r\n"),
+            (b"\xef\xbb\xbf# a\nt_s", "a\n"),
+            (b"t_s\n1\n", ""),
+            (b"# a", "a"),
+            (b"", ""),
+        ] {
+            assert_eq!(parts(text), (expected.to_owned(), text.to_vec()));
+        }
+        let endless = [b'#'; 3 * LONGEST];
+        assert_eq!(parts(&endless).1.len(), endless.len());
+    }
+
+    #[test]
+    fn lines_that_are_no_rows_are_counted() {
+        for (text, count) in [("1,2\n", 0), ("\n# a\n \r\n1,2\n", 3), ("", 0), ("#", 1)] {
+            assert_eq!(lines_before_a_row(text.as_bytes()), count, "{text:?}");
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Rows of a CSV file, after its comments.
+
+use std::io::{self, Read, Seek, SeekFrom};
+
+use csv::{ByteRecord, ReaderBuilder, Trim};
+
+use super::comments::{self, Again};
+use super::{COLUMNS, Numbers, TrajectoryFault};
+
+/// Rows of a CSV file that are read one by one.
+pub(super) struct Rows<R> {
+    reader: csv::Reader<Again<R>>,
+    record: ByteRecord,
+    columns: usize,
+}
+
+impl<R: Read + Seek> Rows<R> {
+    /// Reads a stream up to the first row. Returns the comments before the header, too.
+    pub(super) fn open(stream: R) -> Result<(Self, String), TrajectoryFault> {
+        let (text, stream) = comments::split(stream).map_err(TrajectoryFault::Unreadable)?;
+        let reader = ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .comment(Some(b'#'))
+            .trim(Trim::All)
+            .buffer_capacity(1 << 16)
+            .from_reader(stream);
+        let mut rows = Self {
+            reader,
+            record: ByteRecord::new(),
+            columns: 0,
+        };
+        rows.read_header()?;
+        Ok((rows, text))
+    }
+
+    fn read_header(&mut self) -> Result<(), TrajectoryFault> {
+        self.read_record()?;
+        let names: Vec<_> = self.record.iter().map(String::from_utf8_lossy).collect();
+        let fits = names.len() >= COLUMNS.len() && names.iter().zip(COLUMNS).all(|(a, b)| a == b);
+        self.columns = names.len();
+        if !fits {
+            let found = shown(&names.join(","));
+            let at = self.place();
+            return Err(TrajectoryFault::Header { at, found });
+        }
+        Ok(())
+    }
+
+    /// The next row; `None` after the last.
+    pub(super) fn next(&mut self) -> Result<Option<Numbers>, TrajectoryFault> {
+        if !self.read_record()? {
+            return Ok(None);
+        }
+        if self.record.len() != self.columns {
+            return Err(TrajectoryFault::Columns {
+                at: self.place(),
+                found: self.record.len(),
+                expected: self.columns,
+            });
+        }
+        let mut numbers = Numbers::default();
+        for (column, number) in numbers.iter_mut().enumerate() {
+            *number = self.number(column)?;
+        }
+        Ok(Some(numbers))
+    }
+
+    fn read_record(&mut self) -> Result<bool, TrajectoryFault> {
+        let read = self.reader.read_byte_record(&mut self.record);
+        read.map_err(|error| TrajectoryFault::Unreadable(io::Error::other(error)))
+    }
+
+    /// The line of the present row, for a message: no row can be read afterwards.
+    pub(super) fn place(&mut self) -> String {
+        let Some(position) = self.record.position() else {
+            return "line 1".into();
+        };
+        // A record counts from where the last one ended: before the empty lines and
+        // comments in between, and before the second half of a CR LF.
+        let stream = self.reader.get_mut();
+        let mut line = position.line();
+        if stream.seek(SeekFrom::Start(position.byte())).is_ok() {
+            line += comments::lines_before_a_row(stream);
+        }
+        format!("line {line}")
+    }
+
+    fn number(&mut self, column: usize) -> Result<f64, TrajectoryFault> {
+        let field = self.record.get(column).unwrap_or(&[]);
+        let text = std::str::from_utf8(field).ok();
+        let number = text.and_then(|text| text.parse().ok());
+        if let Some(number) = number.filter(|x: &f64| x.is_finite()) {
+            return Ok(number);
+        }
+        let found = shown(&String::from_utf8_lossy(field));
+        Err(TrajectoryFault::Field {
+            at: self.place(),
+            column: COLUMNS[column],
+            what: format!("`{found}` is not a finite number"),
+        })
+    }
+}
+
+/// The beginning of a text that may be anything.
+fn shown(text: &str) -> String {
+    const LONGEST: usize = 60;
+    let mut short: String = text.chars().take(LONGEST).collect();
+    if short.len() < text.len() {
+        short.push('…');
+    }
+    short
+}

@@ -1,0 +1,116 @@
+//! Rows of a Parquet recording.
+
+use std::fs::File;
+use std::io;
+
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::DoubleType;
+use parquet::errors::ParquetError;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+
+use super::{COLUMNS, Numbers, TrajectoryFault};
+use crate::replay::settings::KEY;
+
+/// Rows that are read at a time.
+const AT_A_TIME: usize = 4096;
+
+/// Rows of a Parquet file, read some at a time.
+pub(super) struct Rows {
+    reader: SerializedFileReader<File>,
+    /// The next group of rows to be read.
+    next_group: usize,
+    /// What reads the columns of the present group.
+    columns: Vec<ColumnReaderImpl<DoubleType>>,
+    /// Rows that were read, and are not told yet from `next` on.
+    read: [Vec<f64>; COLUMNS.len()],
+    next: usize,
+    /// Rows told so far.
+    told: u64,
+}
+
+impl Rows {
+    /// Opens a file and checks its columns. Returns its settings as text, too.
+    pub(super) fn open(file: File) -> Result<(Self, String), TrajectoryFault> {
+        let reader = SerializedFileReader::new(file).map_err(unreadable)?;
+        let about = reader.metadata().file_metadata();
+        let entries = about.key_value_metadata().into_iter().flatten();
+        let settings = entries.filter(|entry| entry.key == KEY);
+        let text = settings.filter_map(|entry| entry.value.clone()).collect();
+        let schema = about.schema_descr().columns();
+        let names: Vec<_> = schema.iter().map(|column| column.name()).collect();
+        if !names.starts_with(&COLUMNS) {
+            let first: Vec<_> = names.into_iter().take(COLUMNS.len()).collect();
+            return Err(TrajectoryFault::Schema(first.join(", ")));
+        }
+        let rows = Self {
+            reader,
+            next_group: 0,
+            columns: Vec::new(),
+            read: Default::default(),
+            next: 0,
+            told: 0,
+        };
+        Ok((rows, text))
+    }
+
+    /// The next row; `None` after the last.
+    pub(super) fn next(&mut self) -> Result<Option<Numbers>, TrajectoryFault> {
+        while self.next >= self.read[0].len() {
+            if !self.read_more()? {
+                return Ok(None);
+            }
+        }
+        let mut numbers = Numbers::default();
+        for (column, number) in numbers.iter_mut().enumerate() {
+            let value = self.read[column].get(self.next).copied();
+            *number = value.filter(|x| x.is_finite()).ok_or_else(|| {
+                TrajectoryFault::Field {
+                    at: format!("row {}", self.told + 1),
+                    column: COLUMNS[column],
+                    what: "no finite number".into(),
+                }
+            })?;
+        }
+        self.next += 1;
+        self.told += 1;
+        Ok(Some(numbers))
+    }
+
+    /// The present row, for a message.
+    pub(super) fn place(&self) -> String {
+        format!("row {}", self.told)
+    }
+
+    /// Reads some rows of the present group, or begins the next; whether there is one.
+    fn read_more(&mut self) -> Result<bool, TrajectoryFault> {
+        self.next = 0;
+        for values in &mut self.read {
+            values.clear();
+        }
+        for (column, values) in self.columns.iter_mut().zip(&mut self.read) {
+            let read = column.read_records(AT_A_TIME, None, None, values);
+            read.map_err(unreadable)?;
+        }
+        if !self.read[0].is_empty() {
+            return Ok(true);
+        }
+        if self.next_group >= self.reader.num_row_groups() {
+            return Ok(false);
+        }
+        let group = self.reader.get_row_group(self.next_group).map_err(unreadable)?;
+        self.next_group += 1;
+        self.columns.clear();
+        for (index, name) in COLUMNS.iter().enumerate() {
+            let column = group.get_column_reader(index).map_err(unreadable)?;
+            let ColumnReader::DoubleColumnReader(column) = column else {
+                return Err(TrajectoryFault::Schema(format!("{name}, another type")));
+            };
+            self.columns.push(column);
+        }
+        Ok(true)
+    }
+}
+
+fn unreadable(error: ParquetError) -> TrajectoryFault {
+    TrajectoryFault::Unreadable(io::Error::other(error))
+}

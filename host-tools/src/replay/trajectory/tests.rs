@@ -1,0 +1,92 @@
+//! Trajectories as they are written by hand, by programs, and by this one.
+
+use super::*;
+
+fn rows(text: &str) -> Result<Vec<Row>, TrajectoryError> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("t.csv");
+    std::fs::write(&path, text).expect("written");
+    rows_of(&path)
+}
+
+fn rows_of(path: &Path) -> Result<Vec<Row>, TrajectoryError> {
+    let scale = Scale::new(1.0, 1.0).expect("valid");
+    let mut trajectory = Trajectory::open(path)?;
+    let mut rows = Vec::new();
+    while let Some(row) = trajectory.next_row(&scale)? {
+        rows.push(row);
+    }
+    Ok(rows)
+}
+
+fn message(text: &str) -> String {
+    rows(text).expect_err("is wrong").to_string()
+}
+
+#[test]
+fn forgiving_about_white_space_line_ends_and_marks() {
+    let plain = rows("t_s,x_mm,y_mm,z_mm\n0,1,2.5,-3e1\n0.001,4,5,6\n").expect("plain");
+    assert_eq!(plain.len(), 2);
+    assert_eq!(plain[0].hip_mm, [1.0, 2.5, -30.0]);
+    for same in [
+        "t_s,x_mm,y_mm,z_mm\r\n0,1,2.5,-3e1\r\n0.001,4,5,6",
+        "\u{feff}t_s,x_mm,y_mm,z_mm\n0,1,2.5,-3e1\n\n0.001,4,5,6\n",
+        " t_s , x_mm,y_mm ,z_mm\n 0, 1,\t2.5 ,-3e1 \n0.001,4,5,6\n",
+        "t_s,x_mm,y_mm,z_mm,note\n0,1,2.5,-3e1,a\n0.001,4,5,6,\n",
+        "# a remark\n#\nt_s,x_mm,y_mm,z_mm\n0,1,2.5,-3e1\n# another\n0.001,4,5,6\n",
+        "\"t_s\",\"x_mm\",\"y_mm\",\"z_mm\"\n\"0\",1,2.5,-3e1\n0.001,4,5,6\n",
+    ] {
+        assert_eq!(rows(same).expect(same), plain, "{same:?}");
+    }
+    assert_eq!(rows("t_s,x_mm,y_mm,z_mm").expect("header only"), []);
+}
+
+#[test]
+fn says_what_is_wrong_and_where() {
+    let cases = [
+        ("", "line 1 is not the header"),
+        ("0,1,2,3\n", "line 1 is not the header"),
+        ("t_s,x_mm,z_mm,y_mm\n", "line 1 is not the header"),
+        ("0,1,2\n", "line 2 has 3 columns where the header has 4"),
+        ("0,1,2,3\n0,1,2,3,4\n", "line 3 has 5 columns"),
+        ("0,1,2,3\n\n0,one,2,3\n", "line 4, column x_mm: `one`"),
+        ("0,1,2,3\r\n0,1,2,x\r\n", "line 3, column z_mm: `x`"),
+        ("0,1,nan,3\n", "line 2, column y_mm: `nan`"),
+        ("# a\n0,1,2,3\n# b\n\n0,1,nan,3\n", "line 6, column y_mm: `nan`"),
+        ("inf,1,2,3\n", "line 2, column t_s: `inf`"),
+        ("0,1,2,\n", "line 2, column z_mm: ``"),
+        (
+            "0,1,-6e8,3\n",
+            "line 2, column y_mm: -600000000 mm is farther",
+        ),
+        ("0,1,2,1e300\n", "line 2, column z_mm"),
+    ];
+    for (text, expected) in cases {
+        let whole = match expected.contains("header") && !expected.contains("has") {
+            true => text.to_owned(),
+            false => format!("t_s,x_mm,y_mm,z_mm\n{text}"),
+        };
+        let message = message(&whole);
+        assert!(message.contains("t.csv: "), "{message}");
+        assert!(message.contains(expected), "{message}");
+    }
+}
+
+#[test]
+fn a_header_after_comments_is_named_with_its_line() {
+    let wrong = message("# one\n# two\ntime,x,y,z\n");
+    assert!(wrong.contains("line 3 is not the header"), "{wrong}");
+}
+
+#[test]
+fn settings_that_cannot_be_used_are_told_and_remarks_are_no_settings() {
+    let later = message("# hapterra-recording = 9\nt_s,x_mm,y_mm,z_mm\n");
+    assert!(later.contains("format 9"), "{later}");
+    assert_eq!(rows("# anything = ]\nt_s,x_mm,y_mm,z_mm\n").expect("none"), []);
+}
+
+#[test]
+fn bytes_that_only_begin_as_parquet_does_are_told() {
+    let wrong = message("PAR1 and so on");
+    assert!(wrong.contains("cannot read the trajectory"), "{wrong}");
+}

@@ -1,0 +1,32 @@
+//! `print!`, `println!`, `eprint!` and `eprintln!` of this crate, under the names of the
+//! standard library's. Those panic where nobody reads any more: `hapterra info FILE | head
+//! -1` would end in a crash, and `hapterra run FILE | head -1` without letting go of the
+//! arm. These go on in silence.
+//!
+//! What a command was asked to write (files, `replay -o -`) is not said by them: there, an
+//! error is an error.
+
+/// Says something on standard output.
+macro_rules! print {
+    ($($what:tt)*) => {{
+        use std::io::Write as _;
+        // Whoever closed it does not want to know.
+        let _ = write!(std::io::stdout().lock(), $($what)*);
+    }};
+}
+
+/// Says a line on standard output.
+macro_rules! println {
+    ($($what:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout().lock(), $($what)*);
+    }};
+}
+
+/// Says a line on standard error.
+macro_rules! eprintln {
+    ($($what:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr().lock(), $($what)*);
+    }};
+}
