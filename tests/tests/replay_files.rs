@@ -47,7 +47,7 @@ impl Folder {
         let run = self.replay(more);
         assert!(run.status.success(), "{}", said(&run));
         let text = std::fs::read_to_string(self.path("out.csv")).expect("there");
-        let mut lines = text.lines();
+        let mut lines = text.lines().skip_while(|line| line.starts_with('#'));
         let header = lines.next().expect("a header");
         assert!(header == HEADER || header.starts_with(&format!("{HEADER},")));
         lines

@@ -78,6 +78,47 @@ fn a_slope_of_degrees_feels_as_steep_as_it_is_in_every_direction() {
     }
 }
 
+/// The same through the command: at 1 mm a cell, a millimetre of the trajectory is a felt
+/// cell, so one place east and one north of it are equally far on the ground.
+#[test]
+fn a_plane_at_60_degrees_feels_the_same_both_ways_through_replay() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [path, out] = ["path.csv", "felt.csv"].map(|name| folder.path().join(name));
+    for (slope, axis) in [([1.0, 0.0], 0), ([0.0, 1.0], 1)] {
+        // From high above to ten millimetres below the plane at (30, 30) mm.
+        std::fs::write(&path, "t_s,x_mm,y_mm,z_mm\n0,30,30,90\n1,30,30,20\n").expect("written");
+        let run = std::process::Command::new(hapterra_tests::hapterra_binary())
+            .arg("replay")
+            .args([&plane(60.0, slope), &path])
+            .args(["--cell-mm", "1", "-o"])
+            .arg(&out)
+            .output()
+            .expect("started");
+        let told = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.success(), "{told}");
+        let text = std::fs::read_to_string(&out).expect("there");
+        let last = text.lines().last().expect("a row").split(',');
+        let felt: Vec<f64> = last
+            .take(11)
+            .map(|x| x.parse().expect("a number"))
+            .collect();
+        let [proxy, force] = [&felt[5..8], &felt[8..11]];
+        assert_eq!(felt[4], 1.0, "{felt:?}");
+        assert!(
+            (-force[axis] / force[2] - 1.0).abs() < 1e-3,
+            "{slope:?}: {felt:?}"
+        );
+        assert!(
+            force[1 - axis].abs() < 1e-3 * force[2],
+            "{slope:?}: {felt:?}"
+        );
+        // 45°: as high as it is far, in millimetres, and in the middle between below the
+        // plane and beside it.
+        assert!((proxy[axis] - 25.0).abs() < 0.05, "{slope:?}: {felt:?}");
+        assert!((proxy[2] - 25.0).abs() < 0.05, "{slope:?}: {felt:?}");
+    }
+}
+
 #[test]
 fn stored_cells_are_felt_as_squares_of_the_same_area() {
     let raster = Raster::open(plane(60.0, [1.0, 0.0]), &OpenOptions::default()).expect("opens");

@@ -99,6 +99,11 @@ impl Request {
     fn words(&self, emulation: Option<&Emulation>) -> Vec<OsString> {
         let mut words: Vec<OsString> = vec!["demo".into()];
         words.extend(self.file.clone());
+        // Any file has to come out well without a question: relief that suits the hand.
+        let stated = ["--exaggeration", "--height-mm-per-unit"];
+        if stated.iter().all(|option| self.value(option).is_none()) {
+            words.extend(["--exaggeration", "auto"].map(OsString::from));
+        }
         match emulation {
             Some(Emulation { image, qemu }) => {
                 let pairs = ["--image".into(), image.into(), "--qemu".into(), qemu.into()];
@@ -140,20 +145,20 @@ mod tests {
         let line = line(Some("a b.tif"), &["--out=x", "--seconds", "3"], true);
         assert_eq!(
             line,
-            "demo a b.tif --image ELF --qemu QEMU --out=x --seconds 3"
+            "demo a b.tif --exaggeration auto --image ELF --qemu QEMU --out=x --seconds 3"
         );
     }
 
     #[test]
     fn without_emulation_the_device_is_native() {
         let line = line(None, &["--out", "x"], false);
-        assert_eq!(line, "demo --device native --out x");
+        assert_eq!(line, "demo --exaggeration auto --device native --out x");
     }
 
     #[test]
     fn a_device_of_the_users_is_not_overruled() {
         let line = line(None, &["--device", "usb", "--out", "x"], false);
-        assert_eq!(line, "demo --device usb --out x");
+        assert_eq!(line, "demo --exaggeration auto --device usb --out x");
     }
 
     #[test]
@@ -166,6 +171,14 @@ mod tests {
         assert_eq!(request.device().as_deref(), Some("emulated"));
         assert_eq!(request.value("--out").as_deref(), Some("y"));
         assert_eq!(request.value("--seconds"), None);
+    }
+
+    #[test]
+    fn relief_that_is_stated_is_not_overruled() {
+        for stated in ["--exaggeration=1", "--height-mm-per-unit=2"] {
+            let line = line(None, &[stated, "--out", "x"], false);
+            assert!(!line.contains("auto"), "{line}");
+        }
     }
 
     #[test]

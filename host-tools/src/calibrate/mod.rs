@@ -13,6 +13,7 @@
 //! [`Attendant`]: a terminal, or a [`VirtualUser`].
 
 mod arm;
+pub mod file;
 mod fit_error;
 mod gravity;
 mod ratios;

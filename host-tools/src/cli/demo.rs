@@ -90,8 +90,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             Err(error) => return Err(error.into()),
         }
     }
-    Err("the terrain is too tall for the arm")
-        .or_hint("choose a smaller --cell-mm")
+    Err("the terrain is too tall for the arm").or_hint("choose a smaller --cell-mm")
 }
 
 fn terrain_of(args: &Args) -> Result<(Raster, String), Failure> {

@@ -5,6 +5,7 @@
 use super::failure::Hint;
 use crate::board::ImageError;
 use crate::board::update::{UpdateError, UpdateFailure};
+use crate::calibrate::file::BadFile;
 use crate::calibrate::{FitError, WalkError};
 use crate::link::{EmulatorError, LinkError};
 use crate::place::PlacingError;
@@ -185,6 +186,12 @@ impl Hint for WalkError<LinkError> {
             }
         };
         hint.into()
+    }
+}
+
+impl Hint for BadFile {
+    fn hint(&self) -> String {
+        "name a file that hapterra calibrate --output has written".into()
     }
 }
 

@@ -69,7 +69,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     keep_apart(&[&args.output], &inputs).or_hint("name another file with --output")?;
     left_behind::tell([args.output.as_path()]);
     let mut trajectory = Trajectory::open(&args.trajectory).map_err(ReplayError::from)?;
-    let recorded = trajectory.settings().filter(|_| !args.ignore_settings).cloned();
+    let recorded = trajectory
+        .settings()
+        .filter(|_| !args.ignore_settings)
+        .cloned();
     let rendering = rendering(args, recorded.as_ref());
     let raster = args.terrain.open()?;
     let grid = rendering.grid(&raster);
@@ -126,21 +129,13 @@ fn rendering(args: &Args, recorded: Option<&Settings>) -> Rendering {
     rendering
 }
 
-fn native(
-    args: &Args,
-    felt: &Felt<'_>,
-    trajectory: &mut Trajectory,
-) -> Result<Summary, Failure> {
+fn native(args: &Args, felt: &Felt<'_>, trajectory: &mut Trajectory) -> Result<Summary, Failure> {
     let (law, rule) = felt.law;
     let mut replayer = on_native(felt.terrain, law, rule)?;
     replay(args, felt, trajectory, &mut replayer)
 }
 
-fn emulated(
-    args: &Args,
-    felt: &Felt<'_>,
-    trajectory: &mut Trajectory,
-) -> Result<Summary, Failure> {
+fn emulated(args: &Args, felt: &Felt<'_>, trajectory: &mut Trajectory) -> Result<Summary, Failure> {
     let (law, rule) = felt.law;
     let (emulator, lines) = args.board.start()?;
     // The other line stays open and silent: points take the arm's place.

@@ -236,7 +236,13 @@ fn described(
         let (file, device) = (args.terrain.file.display(), Device::of(device));
         let (terrain, home_mm) = (placed.terrain(), placed.home_mm());
         let file = file.to_string();
-        recording.describe(&Settings::new(&file, terrain, placed.law(), Some(home_mm), device));
+        recording.describe(&Settings::new(
+            &file,
+            terrain,
+            placed.law(),
+            Some(home_mm),
+            device,
+        ));
     }
     recording
 }

@@ -319,7 +319,9 @@ mod rule_name {
         match String::deserialize(from)?.as_str() {
             "swept" => Ok(Rule::Swept),
             "paper" => Ok(Rule::Paper),
-            other => Err(D::Error::custom(format!("no contact rule is called {other}"))),
+            other => Err(D::Error::custom(format!(
+                "no contact rule is called {other}"
+            ))),
         }
     }
 }
@@ -344,7 +346,13 @@ mod tests {
             firmware: "0.1.0".into(),
             tick_hz: 1000,
         };
-        Settings::new("a \"b\"\nc.tif", terrain, law, Some([1.5, -2.0, 0.1]), device)
+        Settings::new(
+            "a \"b\"\nc.tif",
+            terrain,
+            law,
+            Some([1.5, -2.0, 0.1]),
+            device,
+        )
     }
 
     #[test]
@@ -376,7 +384,10 @@ mod tests {
         assert_eq!(settings.check_terrain("same", &terrain(&one)), Ok(()));
         let wrong = settings.check_terrain("x.tif", &terrain(&other));
         let wrong = wrong.expect_err("other heights").to_string();
-        assert!(wrong.contains("x.tif") && wrong.contains("c.tif"), "{wrong}");
+        assert!(
+            wrong.contains("x.tif") && wrong.contains("c.tif"),
+            "{wrong}"
+        );
         let mut cell = one.cell().expect("metres");
         (cell.east, cell.north) = (2.0, 2.0);
         let wider = one.clone().with_cell(cell);

@@ -105,7 +105,11 @@ impl Scale {
     pub fn to_grid(&self, mm: [f64; 3]) -> Option<GridPoint> {
         let cells = mm.map(|mm| {
             let (cells, whole) = (mm / self.cell_mm, (mm / self.cell_mm).round());
-            if whole * self.cell_mm == mm { whole } else { cells }
+            if whole * self.cell_mm == mm {
+                whole
+            } else {
+                cells
+            }
         });
         let max = f64::from(MAX_CELL);
         if !cells.iter().all(|c| c.abs() <= max) {

@@ -3,13 +3,12 @@
 mod questions;
 mod set;
 
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::ValueHint;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use hapterra_core::phantom::{Calibration, Model, RECORD_BYTES};
+use hapterra_core::phantom::{Calibration, Model};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::status::PRESS_MS;
 
@@ -19,10 +18,12 @@ use super::terminal::left_behind;
 use super::terminal::voice::say;
 use crate::calibrate::{Attendant, Plan, VirtualUser, walk};
 use crate::link::{DeviceAddress, Dialogue, HostClock, Native};
-use crate::output::{Output, OutputError};
+use crate::output::keep_apart;
 use questions::UserAtTerminal;
 use set::Setting;
 
+/// What to do where the record cannot be written.
+const OTHER_FILE: &str = "name another file with --output";
 /// How long a device in this program may take to answer.
 const PATIENCE: Duration = Duration::from_secs(20);
 
@@ -37,7 +38,12 @@ pub struct Args {
     #[arg(long, value_name = "MODEL", value_parser = models())]
     pub model: Option<Model>,
 
-    /// Begin with the record in this file
+    /// Print a record as the text of a file and do nothing else: the one in FILE, else
+    /// what the device holds
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, num_args = 0..=1)]
+    pub show: Option<Option<PathBuf>>,
+
+    /// Begin with the record in this file (TOML, or a binary one of an earlier version)
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, conflicts_with = "model")]
     pub from: Option<PathBuf>,
 
@@ -61,7 +67,7 @@ pub struct Args {
     #[arg(long)]
     pub skip_gravity: bool,
 
-    /// Write the record to this file, too
+    /// Write the record to this file, too, as TOML
     #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub output: Option<PathBuf>,
 
@@ -96,6 +102,15 @@ fn models() -> impl TypedValueParser<Value = Model> {
 /// No device, measurements that do not fit together, a record that the device
 /// refuses.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    let (outputs, inputs) = (
+        Vec::from_iter(args.output.as_deref()),
+        Vec::from_iter(args.from.as_deref()),
+    );
+    keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
+    if let Some(Some(path)) = &args.show {
+        print!("{}", file::to_toml(&file::read(path)?));
+        return Ok(());
+    }
     left_behind::tell(args.output.as_deref());
     if args.device.device != DeviceChoice::There(DeviceAddress::Native) {
         let mut user = UserAtTerminal::new(args.yes);
@@ -121,6 +136,13 @@ fn calibrate(
     dialogue: &mut Dialogue<'_>,
     attendant: &mut dyn Attendant,
 ) -> Result<(), Failure> {
+    if args.show.is_some() {
+        let held = dialogue
+            .calibration()?
+            .ok_or("the device holds no calibration");
+        print!("{}", file::to_toml(&held.or_hint("see hapterra status")?));
+        return Ok(());
+    }
     let (begin, whence) = begin(args, dialogue)?;
     say(format!("begins with    {whence}"));
     if (args.no_walk || args.skip_ratios) && !args.unmeasured_ratios && begin.has_guessed_ratios() {
@@ -158,7 +180,7 @@ fn calibrate(
 fn begin(args: &Args, dialogue: &mut Dialogue<'_>) -> Result<(Calibration, String), Failure> {
     let held = dialogue.calibration()?;
     let (mut record, whence) = match (&args.from, args.model, held) {
-        (Some(path), _, _) => (read(path)?, path.display().to_string()),
+        (Some(path), _, _) => (file::read(path)?, path.display().to_string()),
         (None, Some(model), _) => (model.preset(), format!("the preset of {model:?}")),
         (None, None, Some(held)) => (held, format!("what the device holds ({:?})", held.model)),
         (None, None, None) => (
@@ -199,23 +221,4 @@ fn hand_over(
     answer.or_hint("see hapterra status; the record can be kept in a file with --output FILE")?;
     say(format!("in force       on the device, {until}"));
     Ok(())
-}
-
-fn read(path: &Path) -> Result<Calibration, Failure> {
-    let bytes = std::fs::read(path)
-        .map_err(|error| format!("cannot read {}: {error}", path.display()))
-        .or_hint("check the path given with --from")?;
-    Calibration::decode(&bytes)
-        .map_err(|bad| format!("{}: {bad}", path.display()))
-        .or_hint("name a file that hapterra calibrate --output has written")
-}
-
-fn write(path: &Path, record: &Calibration) -> Result<(), OutputError> {
-    let mut output = Output::create(path)?;
-    let written = output.write_all(record.encode(&mut [0; RECORD_BYTES]));
-    written.map_err(|source| OutputError {
-        path: path.to_owned(),
-        source,
-    })?;
-    output.finish()
 }

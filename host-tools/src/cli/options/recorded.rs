@@ -41,7 +41,11 @@ impl Rendering {
         };
         match (self.height_mm_per_unit, self.exaggeration) {
             (Some(height), _) if height != felt.height_mm_per_unit => {
-                told.push(line("height-mm-per-unit", &height, &felt.height_mm_per_unit));
+                told.push(line(
+                    "height-mm-per-unit",
+                    &height,
+                    &felt.height_mm_per_unit,
+                ));
             }
             (None, Some(exaggeration)) => told.extend(differs(exaggeration, felt.exaggeration)),
             (Some(_), _) => {}
@@ -122,8 +126,14 @@ mod tests {
     fn what_is_not_stated_is_as_recorded() {
         let (rendering, told) = Rendering::default().or_recorded(&recorded());
         assert_eq!(told, [""; 0]);
-        assert_eq!((rendering.cell_mm, rendering.height_mm_per_unit), (Some(2.0), Some(6.0)));
-        assert_eq!((rendering.level, rendering.max_force_n), (Some(1), Some(4.0)));
+        assert_eq!(
+            (rendering.cell_mm, rendering.height_mm_per_unit),
+            (Some(2.0), Some(6.0))
+        );
+        assert_eq!(
+            (rendering.level, rendering.max_force_n),
+            (Some(1), Some(4.0))
+        );
         assert_eq!(rendering.rule(), Rule::Paper);
     }
 

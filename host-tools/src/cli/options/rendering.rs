@@ -19,7 +19,12 @@ pub struct Rendering {
 
     /// Hand millimetres a vertical unit of the file [default: its true
     /// proportions where it knows its cell size, else 1]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, conflicts_with = "exaggeration")]
+    #[arg(
+        long,
+        value_name = "MM",
+        allow_negative_numbers = true,
+        conflicts_with = "exaggeration"
+    )]
     pub height_mm_per_unit: Option<f64>,
 
     /// Times that heights are felt higher than true to scale; `auto` chooses what suits
@@ -68,7 +73,10 @@ impl Rendering {
     /// Numbers that no terrain can be scaled with.
     pub fn scale(&self, grid: &FeltGrid<'_>) -> Result<Scale, Failure> {
         let cell_mm = self.cell_mm.unwrap_or(1.0);
-        let scale = match (self.height_mm_per_unit, self.exaggeration.unwrap_or_default()) {
+        let scale = match (
+            self.height_mm_per_unit,
+            self.exaggeration.unwrap_or_default(),
+        ) {
             (Some(height), _) => Scale::new(cell_mm, height),
             (None, Exaggeration::Auto) => suggest_scale(grid, self.cell_mm).map(|s| s.scale),
             (None, Exaggeration::Times(times)) => Scale::true_to(grid, cell_mm)

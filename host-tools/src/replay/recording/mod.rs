@@ -179,3 +179,6 @@ fn is_parquet(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
     extension.eq_ignore_ascii_case(PARQUET)
 }
+
+#[cfg(test)]
+mod tests;

@@ -102,7 +102,10 @@ impl Parquet {
 
 impl Values {
     /// Writes the values as the group's next column, and is empty again.
-    fn write(&mut self, group: &mut SerializedRowGroupWriter<'_, Output>) -> Result<(), ParquetError> {
+    fn write(
+        &mut self,
+        group: &mut SerializedRowGroupWriter<'_, Output>,
+    ) -> Result<(), ParquetError> {
         match self {
             Self::Numbers(values) => write::<DoubleType>(values, group),
             Self::Flags(values) => write::<Int32Type>(values, group),
@@ -170,7 +173,9 @@ fn schema(more: &[Column]) -> Result<Type, ParquetError> {
         };
         fields.push(field(column.name(), physical)?);
     }
-    Type::group_type_builder("recording").with_fields(fields).build()
+    Type::group_type_builder("recording")
+        .with_fields(fields)
+        .build()
 }
 
 fn field(name: &str, physical: Physical) -> Result<Arc<Type>, ParquetError> {

@@ -82,7 +82,10 @@ mod tests {
     #[test]
     fn comments_are_told_apart_and_nothing_is_lost() {
         for (text, expected) in [
-            (&b"# a = 1\n#\n#b\r\nt_s\n0\n# later\n"[..], "a = 1\n\nb\r\n"),
+            (
+                &b"# a = 1\n#\n#b\r\nt_s\n0\n# later\n"[..],
+                "a = 1\n\nb\r\n",
+            ),
             (b"\xef\xbb\xbf# a\nt_s", "a\n"),
             (b"t_s\n1\n", ""),
             (b"# a", "a"),

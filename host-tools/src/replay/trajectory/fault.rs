@@ -35,7 +35,9 @@ pub(super) enum TrajectoryFault {
         "{at} is not the header of a trajectory: `{found}` where `t_s,x_mm,y_mm,z_mm` is expected"
     )]
     Header { at: String, found: String },
-    #[error("the first columns are {0} where t_s, x_mm, y_mm, z_mm are expected, double-precision numbers all")]
+    #[error(
+        "the first columns are {0} where t_s, x_mm, y_mm, z_mm are expected, double-precision numbers all"
+    )]
     Schema(String),
     #[error("{at} has {found} columns where the header has {expected}")]
     Columns {

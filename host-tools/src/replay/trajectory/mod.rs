@@ -144,8 +144,7 @@ fn far(hip_mm: [f64; 3], scale: &Scale) -> (&'static str, String) {
     let far = |mm: &f64| (mm / cell_mm).abs() > f64::from(MAX_CELL);
     let axis = hip_mm.iter().position(far).unwrap_or(0);
     let mm = hip_mm.get(axis).copied().unwrap_or_default();
-    let what =
-        format!("{mm} mm is farther than {MAX_CELL} cells of {cell_mm} mm from the origin");
+    let what = format!("{mm} mm is farther than {MAX_CELL} cells of {cell_mm} mm from the origin");
     (COLUMNS[1 + axis], what)
 }
 

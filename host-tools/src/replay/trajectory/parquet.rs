@@ -63,13 +63,13 @@ impl Rows {
         let mut numbers = Numbers::default();
         for (column, number) in numbers.iter_mut().enumerate() {
             let value = self.read[column].get(self.next).copied();
-            *number = value.filter(|x| x.is_finite()).ok_or_else(|| {
-                TrajectoryFault::Field {
+            *number = value
+                .filter(|x| x.is_finite())
+                .ok_or_else(|| TrajectoryFault::Field {
                     at: format!("row {}", self.told + 1),
                     column: COLUMNS[column],
                     what: "no finite number".into(),
-                }
-            })?;
+                })?;
         }
         self.next += 1;
         self.told += 1;
@@ -97,7 +97,10 @@ impl Rows {
         if self.next_group >= self.reader.num_row_groups() {
             return Ok(false);
         }
-        let group = self.reader.get_row_group(self.next_group).map_err(unreadable)?;
+        let group = self
+            .reader
+            .get_row_group(self.next_group)
+            .map_err(unreadable)?;
         self.next_group += 1;
         self.columns.clear();
         for (index, name) in COLUMNS.iter().enumerate() {

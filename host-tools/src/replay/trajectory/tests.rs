@@ -52,7 +52,10 @@ fn says_what_is_wrong_and_where() {
         ("0,1,2,3\n\n0,one,2,3\n", "line 4, column x_mm: `one`"),
         ("0,1,2,3\r\n0,1,2,x\r\n", "line 3, column z_mm: `x`"),
         ("0,1,nan,3\n", "line 2, column y_mm: `nan`"),
-        ("# a\n0,1,2,3\n# b\n\n0,1,nan,3\n", "line 6, column y_mm: `nan`"),
+        (
+            "# a\n0,1,2,3\n# b\n\n0,1,nan,3\n",
+            "line 6, column y_mm: `nan`",
+        ),
         ("inf,1,2,3\n", "line 2, column t_s: `inf`"),
         ("0,1,2,\n", "line 2, column z_mm: ``"),
         (
@@ -82,7 +85,10 @@ fn a_header_after_comments_is_named_with_its_line() {
 fn settings_that_cannot_be_used_are_told_and_remarks_are_no_settings() {
     let later = message("# hapterra-recording = 9\nt_s,x_mm,y_mm,z_mm\n");
     assert!(later.contains("format 9"), "{later}");
-    assert_eq!(rows("# anything = ]\nt_s,x_mm,y_mm,z_mm\n").expect("none"), []);
+    assert_eq!(
+        rows("# anything = ]\nt_s,x_mm,y_mm,z_mm\n").expect("none"),
+        []
+    );
 }
 
 #[test]

@@ -1,0 +1,498 @@
+//! Recordings describe themselves: what `run`, `demo` and `replay` write, `replay` feels
+//! again as it was.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use hapterra_tests::hapterra_binary;
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    /// With a terrain of hills.
+    fn new() -> Self {
+        let folder = Self(tempfile::tempdir().expect("a folder"));
+        let file = folder.text("hills.tif");
+        folder.runs(&["synth", "fractal", "-o", &file, "--size", "256"]);
+        folder
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn text(&self, name: &str) -> String {
+        self.path(name).to_str().expect("a plain path").to_owned()
+    }
+
+    fn run(&self, words: &[&str]) -> Output {
+        let mut command = Command::new(hapterra_binary());
+        let command = command.args(words).env_remove("HAPTERRA_MPS2_ELF");
+        command.output().expect("started")
+    }
+
+    /// Runs a command that succeeds; what it says on standard error.
+    fn runs(&self, words: &[&str]) -> String {
+        let run = self.run(words);
+        assert!(run.status.success(), "{words:?}: {}", said(&run));
+        said(&run)
+    }
+
+    /// Runs a command that fails; what it says.
+    fn fails(&self, words: &[&str]) -> String {
+        let run = self.run(words);
+        assert_eq!(run.status.code(), Some(1), "{words:?}: {}", said(&run));
+        said(&run)
+    }
+
+    /// Replays `from` into `to`; what it says.
+    fn replays(&self, from: &str, to: &str, more: &[&str]) -> String {
+        let [terrain, from, to] = ["hills.tif", from, to].map(|name| self.text(name));
+        let words = ["replay", &terrain, &from, "-o", &to];
+        self.runs(&[&words[..], more].concat())
+    }
+
+    fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).expect("there")
+    }
+
+    /// Makes a trajectory that goes up and down over the hills.
+    fn write_trajectory(&self, name: &str) {
+        let mut text = "t_s,x_mm,y_mm,z_mm\n".to_owned();
+        for tick in 0..400 {
+            let t = f64::from(tick) / 400.0;
+            let (x, z) = (60.0 + 30.0 * t, 40.0 * (12.0 * t).cos() + 20.0);
+            text += &format!("{t},{x},{},{z}\n", 70.0 - 10.0 * t);
+        }
+        std::fs::write(self.path(name), text).expect("written");
+    }
+}
+
+fn said(run: &Output) -> String {
+    String::from_utf8_lossy(&run.stderr).into_owned()
+}
+
+/// The rows of a recording by the names of its columns.
+fn rows(text: &str) -> Vec<std::collections::HashMap<&str, &str>> {
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<_> = lines.next().expect("a header").split(',').collect();
+    lines
+        .map(|line| header.iter().copied().zip(line.split(',')).collect())
+        .collect()
+}
+
+const SETTINGS: [&str; 6] = [
+    "--cell-mm=0.7",
+    "--height-mm-per-unit=0.9",
+    "--level=1",
+    "--stiffness-n-per-mm=0.3",
+    "--max-force-n=4",
+    "--contact=paper",
+];
+
+#[test]
+fn a_recording_is_replayed_with_its_own_settings() {
+    let folder = Folder::new();
+    folder.write_trajectory("in.csv");
+    let (terrain, input) = (folder.text("hills.tif"), folder.text("in.csv"));
+    let felt = folder.text("felt.csv");
+    let words = ["replay", &terrain, &input, "-o", &felt];
+    folder.runs(&[&words[..], &SETTINGS].concat());
+    let text = folder.read("felt.csv");
+    assert!(rows(&text).iter().any(|row| row["contact"] == "1"));
+    for part in [
+        "# hapterra-recording = 1",
+        "hills.tif",
+        "fingerprint",
+        "\"square\"",
+        "paper",
+    ] {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+    folder.replays("felt.csv", "again.csv", &[]);
+    assert!(folder.read("again.csv") == text, "not the same again");
+    // Without its settings it is felt as anything else would be.
+    folder.replays("felt.csv", "plain.csv", &["--ignore-settings"]);
+    let plain = folder.read("plain.csv");
+    assert!(
+        rows(&plain)
+            .iter()
+            .zip(rows(&text))
+            .any(|(a, b)| a["force_z_n"] != b["force_z_n"])
+    );
+    // An option of one's own wins, and that is said.
+    let told = folder.replays("felt.csv", "stiff.csv", &["--stiffness-n-per-mm=0.6"]);
+    assert!(
+        told.contains("--stiffness-n-per-mm 0.6, where the recording has 0.3"),
+        "{told}"
+    );
+    assert!(
+        folder
+            .read("stiff.csv")
+            .contains("# stiffness_n_per_mm = 0.6")
+    );
+}
+
+#[test]
+fn a_recording_of_another_terrain_is_refused() {
+    let folder = Folder::new();
+    folder.write_trajectory("in.csv");
+    folder.replays("in.csv", "felt.csv", &[]);
+    let other = folder.text("other.tif");
+    folder.runs(&[
+        "synth", "fractal", "-o", &other, "--size", "256", "--seed", "7",
+    ]);
+    let (felt, out) = (folder.text("felt.csv"), folder.text("out.csv"));
+    let told = folder.fails(&["replay", &other, &felt, "-o", &out]);
+    for part in [
+        "other.tif",
+        "hills.tif",
+        "its heights are others",
+        "--ignore-settings",
+    ] {
+        assert!(told.contains(part), "{part} in {told}");
+    }
+    assert!(!folder.path("out.csv").exists());
+    folder.runs(&["replay", &other, &felt, "-o", &out, "--ignore-settings"]);
+    // The same heights under another name are the same terrain.
+    std::fs::copy(folder.path("hills.tif"), folder.path("copy.tif")).expect("copied");
+    folder.runs(&["replay", &folder.text("copy.tif"), &felt, "-o", &out]);
+    let later = folder
+        .read("felt.csv")
+        .replacen("recording = 1", "recording = 2", 1);
+    std::fs::write(folder.path("later.csv"), later).expect("written");
+    let told = folder.fails(&["replay", &other, &folder.text("later.csv"), "-o", &out]);
+    assert!(
+        told.contains("format 2") && told.contains("hint: "),
+        "{told}"
+    );
+}
+
+/// Bits of a row that the terrain and the path decide alone.
+const FELT: [&str; 9] = [
+    "t_s",
+    "x_mm",
+    "y_mm",
+    "z_mm",
+    "contact",
+    "proxy_x_mm",
+    "proxy_y_mm",
+    "proxy_z_mm",
+    "state",
+];
+
+/// Replays a recording and compares: every tick feels the same, and where the guard let
+/// the force be what the law makes of it, that is the same, too.
+fn is_reproduced(folder: &Folder, recording: &str) {
+    folder.replays(recording, "again.csv", &[]);
+    let (live, again) = (folder.read(recording), folder.read("again.csv"));
+    let (live, again) = (rows(&live), rows(&again));
+    assert_eq!(live.len(), again.len());
+    let mut compared = 0;
+    for (live, again) in live.iter().zip(&again) {
+        for column in FELT {
+            assert_eq!(live[column], again[column], "{column} at {} s", live["t_s"]);
+        }
+        if live["mode"] == "armed" && live["limits"].is_empty() && live["contact"] == "1" {
+            compared += 1;
+            for column in ["force_x_n", "force_y_n", "force_z_n"] {
+                assert_eq!(live[column], again[column], "{column} at {} s", live["t_s"]);
+            }
+        }
+    }
+    assert!(compared > 300, "only {compared} forces to compare");
+}
+
+#[test]
+fn what_run_recorded_is_felt_again_bit_by_bit() {
+    let folder = Folder::new();
+    let (terrain, record) = (folder.text("hills.tif"), folder.text("run.csv"));
+    let words = ["run", &terrain, "--device", "native", "--record", &record];
+    folder.runs(&[&words[..], &["--seconds", "6", "--cell-mm", "0.9"]].concat());
+    is_reproduced(&folder, "run.csv");
+}
+
+#[test]
+fn what_demo_recorded_is_felt_again_bit_by_bit() {
+    let folder = Folder::new();
+    let (terrain, out) = (folder.text("hills.tif"), folder.text("demo"));
+    // No image is named, and no device: it runs in the program itself, and says so.
+    let told = folder.runs(&["demo", &terrain, "--out", &out, "--seconds", "6"]);
+    assert!(told.contains("--device native"), "{told}");
+    is_reproduced(&folder, "demo/hills.csv");
+}
+
+/// A Python that can read Parquet, and what it reads it with.
+fn python() -> Option<(String, &'static str)> {
+    let program = std::env::var("HAPTERRA_PYTHON").unwrap_or("python3".into());
+    let imports = ["polars", "pandas, pyarrow"];
+    let works = |import: &&str| {
+        let run = Command::new(&program)
+            .args(["-c", &format!("import {import}")])
+            .output();
+        run.is_ok_and(|run| run.status.success())
+    };
+    let found = imports.into_iter().find(works);
+    if found.is_none() {
+        eprintln!("skipped: {program} has neither polars nor pandas with pyarrow");
+    }
+    found.map(|import| (program, import))
+}
+
+#[test]
+fn a_parquet_recording_is_opened_by_polars_or_pandas() {
+    let folder = Folder::new();
+    folder.write_trajectory("in.csv");
+    folder.replays("in.csv", "felt.csv", &[]);
+    folder.replays("in.csv", "felt.parquet", &[]);
+    // It is a trajectory with settings, too.
+    folder.replays("felt.parquet", "again.csv", &[]);
+    assert!(folder.read("again.csv") == folder.read("felt.csv"));
+    let Some((program, import)) = python() else {
+        return;
+    };
+    let script = match import {
+        "polars" => {
+            "import polars as p, sys\n\
+             a = p.read_csv(sys.argv[1], comment_prefix='#')\n\
+             b = p.read_parquet(sys.argv[2])\n\
+             assert a.columns == b.columns, (a.columns, b.columns)\n\
+             assert a.equals(b.cast({'contact': p.Int64})), (a, b)\n\
+             print(len(b))"
+        }
+        _ => {
+            "import pandas as p, sys\n\
+             a = p.read_csv(sys.argv[1], comment='#', float_precision='round_trip')\n\
+             b = p.read_parquet(sys.argv[2])\n\
+             assert list(a.columns) == list(b.columns)\n\
+             assert (a == b).all().all()\n\
+             print(len(b))"
+        }
+    };
+    let run = Command::new(program)
+        .args(["-c", script])
+        .args([folder.path("felt.csv"), folder.path("felt.parquet")])
+        .output()
+        .expect("started");
+    assert!(run.status.success(), "{}", said(&run));
+    assert_eq!(String::from_utf8_lossy(&run.stdout).trim(), "400");
+}
+
+fn exists_as_before(path: &Path, bytes: &[u8]) {
+    assert!(
+        std::fs::read(path).expect("there") == bytes,
+        "{}",
+        path.display()
+    );
+}
+
+#[test]
+fn no_command_writes_over_its_own_input() {
+    let folder = Folder::new();
+    folder.write_trajectory("in.csv");
+    let terrain = std::fs::read(folder.path("hills.tif")).expect("there");
+    let trajectory = std::fs::read(folder.path("in.csv")).expect("there");
+    std::fs::hard_link(folder.path("hills.tif"), folder.path("hard.csv")).expect("linked");
+    let [hills, input, hard] = ["hills.tif", "in.csv", "hard.csv"].map(|name| folder.text(name));
+    let mut outputs = vec![hills.clone(), hard];
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("hills.tif", folder.path("soft.csv")).expect("linked");
+        outputs.push(folder.text("soft.csv"));
+    }
+    for output in &outputs {
+        let told = folder.fails(&["replay", &hills, &input, "-o", output]);
+        assert!(
+            told.contains("it is the input") && told.contains("hint: "),
+            "{told}"
+        );
+        folder.fails(&[
+            "run",
+            &hills,
+            "--device",
+            "native",
+            "--seconds",
+            "1",
+            "--record",
+            output,
+        ]);
+    }
+    folder.fails(&["replay", &hills, &input, "-o", &input]);
+    // The picture of dem.png would be dem.png.
+    let (png, here) = (folder.text("dem.png"), folder.text("."));
+    folder.runs(&["synth", "fractal", "-o", &png, "--size", "64"]);
+    let picture = std::fs::read(&png).expect("there");
+    let told = folder.fails(&["demo", &png, "--device", "native", "--out", &here]);
+    assert!(told.contains("--out"), "{told}");
+    let arm = folder.text("arm.toml");
+    let native = ["calibrate", "--device", "native", "--no-walk", "--no-store"];
+    folder.runs(&[&native[..], &["-o", &arm]].concat());
+    let record = std::fs::read(&arm).expect("there");
+    folder.fails(&[&native[..], &["--from", &arm, "-o", &arm]].concat());
+    exists_as_before(&folder.path("hills.tif"), &terrain);
+    exists_as_before(&folder.path("in.csv"), &trajectory);
+    exists_as_before(&folder.path("dem.png"), &picture);
+    exists_as_before(&folder.path("arm.toml"), &record);
+}
+
+#[test]
+fn a_calibration_file_is_text_and_show_prints_it() {
+    let folder = Folder::new();
+    let arm = folder.text("arm.toml");
+    let native = ["calibrate", "--device", "native", "--no-walk", "--no-store"];
+    let set = ["--set", "l1-mm=215", "-o", &arm];
+    folder.runs(&[&native[..], &set].concat());
+    let text = folder.read("arm.toml");
+    assert!(text.contains("l1_mm = 215.0"), "{text}");
+    let shown = folder.run(&["calibrate", "--show", &arm]);
+    assert_eq!(String::from_utf8_lossy(&shown.stdout), text);
+    let held = folder.run(&["calibrate", "--device", "native", "--show"]);
+    let held = String::from_utf8_lossy(&held.stdout).into_owned();
+    assert!(
+        held.contains("l1_mm = 209.55") && held.starts_with("# Calibration"),
+        "{held}"
+    );
+    std::fs::write(&arm, text.replace("l1_mm", "l1_inch")).expect("written");
+    let told = folder.fails(&["calibrate", "--show", &arm]);
+    assert!(
+        told.contains("arm.toml") && told.contains("l1_inch"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_reader_who_goes_away_is_no_crash() {
+    let folder = Folder::new();
+    folder.write_trajectory("in.csv");
+    let [hills, input, out, demo] =
+        ["hills.tif", "in.csv", "out.csv", "demo"].map(|name| folder.text(name));
+    let commands: [&[&str]; 8] = [
+        &["info", &hills],
+        &["info", "--json", &hills],
+        &["list"],
+        &["status", "--device", "native"],
+        &["calibrate", "--device", "native", "--yes"],
+        &["run", &hills, "--device", "native", "--seconds", "3"],
+        &[
+            "demo",
+            &hills,
+            "--device",
+            "native",
+            "--seconds",
+            "3",
+            "--out",
+            &demo,
+        ],
+        &["replay", &hills, &input, "-o", &out, "-vvv"],
+    ];
+    for words in commands {
+        for closed in ["stdout", "both"] {
+            let (reader, writer) = std::io::pipe().expect("a pipe");
+            drop(reader);
+            let mut command = Command::new(hapterra_binary());
+            command.args(words).stdin(std::process::Stdio::null());
+            if closed == "both" {
+                command.stderr(writer.try_clone().expect("cloned"));
+            } else {
+                command.stderr(std::process::Stdio::piped());
+            }
+            let run = command.stdout(writer).spawn().expect("started");
+            let run = run.wait_with_output().expect("it ends");
+            let told = said(&run);
+            assert!(!told.contains("panicked"), "{words:?}, {closed}: {told}");
+            // A crash is 101; no hardware to be listed is 1.
+            assert!(
+                matches!(run.status.code(), Some(0 | 1)),
+                "{words:?}, {closed}: {told}"
+            );
+        }
+    }
+}
+
+#[test]
+fn odd_outputs_and_options_are_told() {
+    let folder = Folder::new();
+    folder.write_trajectory("in.csv");
+    let [hills, input] = ["hills.tif", "in.csv"].map(|name| folder.text(name));
+    // `-` is standard output, and no file.
+    folder.replays("in.csv", "felt.csv", &[]);
+    let run = folder.run(&["replay", &hills, &input, "-o", "-"]);
+    assert!(run.status.success(), "{}", said(&run));
+    assert_eq!(
+        String::from_utf8_lossy(&run.stdout),
+        folder.read("felt.csv")
+    );
+    let told = folder.fails(&["run", &hills, "--device", "native", "--record", "-"]);
+    assert!(told.contains("standard output"), "{told}");
+    let told = folder.replays("in.csv", "stiff.csv", &["--stiffness-n-per-mm=1e9"]);
+    assert!(told.contains("1000000000 N/mm"), "{told}");
+    // Nothing is left of a demo that fails.
+    let demo = folder.text("demo");
+    let words = [
+        "demo", &hills, "--device", "emulated", "--image", "none.elf",
+    ];
+    let told = folder.fails(&[&words[..], &["--out", &demo]].concat());
+    assert!(
+        told.contains("none.elf") && !folder.path("demo").exists(),
+        "{told}"
+    );
+    // Who begins below ground is told why nothing is felt.
+    std::fs::write(
+        folder.path("in.csv"),
+        "t_s,x_mm,y_mm,z_mm\n0,60,60,-900\n1,60,60,-901\n",
+    )
+    .expect("written");
+    let told = folder.replays("in.csv", "felt.csv", &[]);
+    assert!(told.contains("2 rows are below ground"), "{told}");
+    // Time that runs backwards is told once.
+    std::fs::write(
+        folder.path("in.csv"),
+        "t_s,x_mm,y_mm,z_mm\n5,1,1,900\n4,1,1,900\n3,1,1,900\n2,1,1,900\n",
+    )
+    .expect("written");
+    let told = folder.replays("in.csv", "felt.csv", &[]);
+    assert_eq!(told.matches("time runs backwards").count(), 1, "{told}");
+    assert!(!told.contains('\u{1b}') && told.ends_with('\n'), "{told:?}");
+}
+
+#[test]
+fn every_command_takes_one_exaggeration_and_feels_true_to_scale_without() {
+    let folder = Folder::new();
+    let hills = folder.text("hills.tif");
+    for (more, expected) in [
+        (&[][..], "heights true to scale"),
+        (&["--exaggeration", "0.5"], "heights × 0.5"),
+    ] {
+        let demo = folder.text("demo");
+        let commands: [&[&str]; 2] = [
+            &[
+                "demo",
+                &hills,
+                "--device",
+                "native",
+                "--seconds",
+                "0.1",
+                "--out",
+                &demo,
+            ],
+            &["run", &hills, "--device", "native", "--seconds", "0.1"],
+        ];
+        for words in commands {
+            let run = folder.run(&[words, more].concat());
+            let told = String::from_utf8_lossy(&run.stdout).into_owned();
+            assert!(
+                run.status.success() && told.contains(expected),
+                "{told}{}",
+                said(&run)
+            );
+        }
+    }
+    folder.write_trajectory("in.csv");
+    folder.replays("in.csv", "felt.csv", &["--exaggeration=3"]);
+    assert!(folder.read("felt.csv").contains("# exaggeration = 3.0"));
+    let input = folder.text("in.csv");
+    let both = ["--exaggeration=2", "--height-mm-per-unit=1"];
+    let out = folder.text("o.csv");
+    let run = folder.run(&[&["replay", &hills, &input, "-o", &out][..], &both].concat());
+    assert_eq!(run.status.code(), Some(2), "{}", said(&run));
+}
