@@ -53,8 +53,9 @@ enum Fault {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
+    /// Known before all else is read.
     #[serde(rename = "hapterra-calibration")]
-    format: u32,
+    _format: u32,
     model: String,
     encoders: Encoders,
     links: Links,

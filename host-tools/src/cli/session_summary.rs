@@ -12,7 +12,7 @@ use crate::telemetry::Figures;
 use crate::terrain::Terrain;
 
 /// The board whose clock counts instructions.
-const EMULATED: &str = "mps2-an386";
+pub(super) const EMULATED: &str = "mps2-an386";
 
 /// Figures of a session and of its link.
 #[derive(Clone, Debug)]

@@ -89,6 +89,9 @@ fn calibration(status: &Status) -> String {
         CalibrationSource::Refused(bad) => {
             format!("none: the stored record is refused ({bad}); type hapterra calibrate")
         }
+        CalibrationSource::Stored if status.device.board == session_summary::EMULATED => {
+            format!("{model}built into the emulated board, which has no memory to store another in")
+        }
         CalibrationSource::Stored => format!("{model}stored on the device"),
         CalibrationSource::Session => {
             format!("{model}from a host; gone when the device restarts")
