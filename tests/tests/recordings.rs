@@ -83,7 +83,7 @@ fn rows(text: &str) -> Vec<std::collections::HashMap<&str, &str>> {
 
 const SETTINGS: [&str; 6] = [
     "--cell-mm=0.7",
-    "--height-mm-per-unit=0.9",
+    "--height-mm-per-unit=0.1",
     "--level=1",
     "--stiffness-n-per-mm=0.3",
     "--max-force-n=4",
@@ -168,7 +168,7 @@ fn a_recording_of_another_terrain_is_refused() {
     );
 }
 
-/// Bits of a row that the terrain and the path decide alone.
+/// What the terrain and the path decide alone; the path comes first.
 const FELT: [&str; 9] = [
     "t_s",
     "x_mm",
@@ -181,8 +181,12 @@ const FELT: [&str; 9] = [
     "state",
 ];
 
-/// Replays a recording and compares: every tick feels the same, and where the guard let
-/// the force be what the law makes of it, that is the same, too.
+/// The guard comes to a force by steps in single precision: it is off the law's force by
+/// the rounding of one, N.
+const ROUNDING_N: f64 = 1e-6;
+
+/// Replays a recording and compares: every tick that had its terrain feels the same to the
+/// bit, and where the guard limited nothing, the force is the same but for its rounding.
 fn is_reproduced(folder: &Folder, recording: &str) {
     folder.replays(recording, "again.csv", &[]);
     let (live, again) = (folder.read(recording), folder.read("again.csv"));
@@ -190,13 +194,21 @@ fn is_reproduced(folder: &Folder, recording: &str) {
     assert_eq!(live.len(), again.len());
     let mut compared = 0;
     for (live, again) in live.iter().zip(&again) {
-        for column in FELT {
+        let (path, felt) = FELT.split_at(4);
+        let felt = match live["limits"].contains("TERRAIN_MISSING") {
+            true => &[][..],
+            false => felt,
+        };
+        for column in path.iter().chain(felt).copied() {
             assert_eq!(live[column], again[column], "{column} at {} s", live["t_s"]);
         }
         if live["mode"] == "armed" && live["limits"].is_empty() && live["contact"] == "1" {
             compared += 1;
             for column in ["force_x_n", "force_y_n", "force_z_n"] {
-                assert_eq!(live[column], again[column], "{column} at {} s", live["t_s"]);
+                let [live, again] = [live, again].map(|row| row[column]);
+                let number = |text: &str| text.parse::<f64>().expect("a number");
+                let off = (number(live) - number(again)).abs();
+                assert!(off < ROUNDING_N, "{column}: {live} and {again}");
             }
         }
     }
@@ -245,6 +257,11 @@ fn a_parquet_recording_is_opened_by_polars_or_pandas() {
     folder.write_trajectory("in.csv");
     folder.replays("in.csv", "felt.csv", &[]);
     folder.replays("in.csv", "felt.parquet", &[]);
+    assert!(
+        rows(&folder.read("felt.csv"))
+            .iter()
+            .any(|row| row["contact"] == "1")
+    );
     // It is a trajectory with settings, too.
     folder.replays("felt.parquet", "again.csv", &[]);
     assert!(folder.read("again.csv") == folder.read("felt.csv"));
@@ -371,8 +388,8 @@ fn a_reader_who_goes_away_is_no_crash() {
         &["info", "--json", &hills],
         &["list"],
         &["status", "--device", "native"],
-        &["calibrate", "--device", "native", "--yes"],
-        &["run", &hills, "--device", "native", "--seconds", "3"],
+        &["calibrate", "--device", "native", "--no-walk", "--no-store"],
+        &["run", &hills, "--device", "native", "--seconds", "0.3"],
         &[
             "demo",
             &hills,
