@@ -87,7 +87,9 @@ fn a_killed_commands_recording_is_named_at_the_next_start_and_kept() {
     let terrain = terrain(folder);
     let left = killed(folder, &terrain);
     let content = fs::read(&left).expect("left behind");
-    assert!(content.starts_with(b"t_s,x_mm"), "it is the recording");
+    let text = String::from_utf8_lossy(&content);
+    let is_recording = text.starts_with("# hapterra-recording") && text.contains("\nt_s,x_mm");
+    assert!(is_recording, "it is the recording, with its settings");
 
     let mut again = replay(folder, &terrain).spawn().expect("started");
     say_points(&mut again);

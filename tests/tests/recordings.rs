@@ -396,7 +396,7 @@ fn a_reader_who_goes_away_is_no_crash() {
             "--device",
             "native",
             "--seconds",
-            "3",
+            "0.3",
             "--out",
             &demo,
         ],

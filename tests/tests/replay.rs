@@ -36,10 +36,11 @@ fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Heights of a terrain in cells, from the raster itself.
+/// Heights of a terrain in cells, from the grid that is felt (`true_shape.rs` holds that
+/// against the ground).
 fn heights<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
     move |x, y| {
-        let height = terrain.raster().height(x as u32, y as u32);
+        let height = terrain.grid().height(x as u32, y as u32);
         height * terrain.scale().height_mm_per_unit() / terrain.scale().cell_mm()
     }
 }
@@ -146,7 +147,7 @@ fn on_real_terrains_too_whatever_their_holes() {
     ] {
         let Some(path) = shared(file) else { return };
         let raster = Raster::open(path, &OpenOptions::default()).expect("opens");
-        let grid = FeltGrid::new(&raster, FeltCells::Stored);
+        let grid = FeltGrid::new(&raster, FeltCells::default());
         let scale = Scale::true_to(&grid, cell_mm).expect("scale");
         eprint!("{file}: ");
         let touched = judge(&raster, scale, Rule::Swept, 5, 2000);
