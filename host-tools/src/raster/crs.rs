@@ -4,6 +4,8 @@
 //! `epsg-utils` knows the codes, `proj4rs` the projections; both are named in this
 //! file only.
 
+use std::f64::consts::{PI, TAU};
+
 use epsg_utils::Crs;
 use epsg_utils::crs::{CoordinateSystem, Unit};
 use proj4rs::Proj;
@@ -14,6 +16,10 @@ const WGS_84: (f64, f64) = (6_378_137.0, 0.006_694_379_990_141_3);
 /// Where a map's units are shorter or longer than this on the ground, the place is
 /// outside of what the projection is for.
 const SENSIBLE: std::ops::RangeInclusive<f64> = 1e-4..=1e4;
+
+/// A place that a projection gives back this much off is not one of its own, radians:
+/// 60 m on the ground.
+const SAME_RADIANS: f64 = 1e-5;
 
 /// A vertical unit that follows from a code.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,12 +70,8 @@ pub(super) fn metres_per_unit(code: u16) -> Option<f64> {
 pub(super) fn local_metres(code: u16, (x, y): (f64, f64)) -> Option<(f64, f64)> {
     const STEP: f64 = 1.0;
     let map = Proj::from_epsg_code(code).ok()?;
-    let globe = Proj::from_proj_string("+proj=longlat +datum=WGS84 +no_defs").ok()?;
-    let radians = |x: f64, y: f64| {
-        let mut place = (x, y, 0.0);
-        transform(&map, &globe, &mut place).ok()?;
-        Some((place.0, place.1))
-    };
+    let globe = globe()?;
+    let radians = |x: f64, y: f64| between(&map, &globe, [x, y]).map(|[x, y]| (x, y));
     let here = radians(x, y)?;
     let length = |there: (f64, f64)| {
         let [east, north] = metres_per_radian(here.1);
@@ -89,6 +91,58 @@ fn metres_per_radian(latitude: f64) -> [f64; 2] {
     let (sin, cos) = latitude.sin_cos();
     let w = (1.0 - e2 * sin * sin).sqrt();
     [a * cos / w, a * (1.0 - e2) / (w * w * w)]
+}
+
+/// Longitude and latitude (WGS 84, degrees) of a place on the map with an EPSG code.
+pub(super) fn to_lonlat(code: u16, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+    between(&Proj::from_epsg_code(code).ok()?, &globe()?, [x, y])
+        .map(|radians| radians.map(f64::to_degrees))
+}
+
+/// The place on the map with an EPSG code at a longitude and latitude (WGS 84, degrees).
+pub(super) fn of_lonlat(code: u16, lonlat: [f64; 2]) -> Option<[f64; 2]> {
+    let radians = lonlat.map(f64::to_radians);
+    let map = Proj::from_epsg_code(code).ok()?;
+    let place = between(&globe()?, &map, radians)?;
+    // Far outside of what a projection is for its formulas give numbers all the same.
+    let back = between(&map, &globe()?, place)?;
+    let off = [0, 1].map(|axis| (back[axis] - radians[axis] + PI).rem_euclid(TAU) - PI);
+    let is_there = off.iter().all(|angle| angle.abs() < SAME_RADIANS);
+    is_there.then_some(place)
+}
+
+/// Longitude and latitude (WGS 84, degrees) of those of the geographic system with an
+/// EPSG code.
+pub(super) fn geographic_to_lonlat(code: u16, own: [f64; 2]) -> Option<[f64; 2]> {
+    let own = own.map(f64::to_radians);
+    between(&geographic(code)?, &globe()?, own).map(|radians| radians.map(f64::to_degrees))
+}
+
+/// Longitude and latitude (degrees) in the geographic system with an EPSG code of those
+/// of WGS 84.
+pub(super) fn geographic_of_lonlat(code: u16, lonlat: [f64; 2]) -> Option<[f64; 2]> {
+    let lonlat = lonlat.map(f64::to_radians);
+    between(&globe()?, &geographic(code)?, lonlat).map(|radians| radians.map(f64::to_degrees))
+}
+
+fn geographic(code: u16) -> Option<Proj> {
+    let system = Proj::from_epsg_code(code).ok()?;
+    system.is_latlong().then_some(system)
+}
+
+fn globe() -> Option<Proj> {
+    Proj::from_proj_string("+proj=longlat +datum=WGS84 +no_defs").ok()
+}
+
+/// A place of one system in another; angles in radians.
+fn between(from: &Proj, to: &Proj, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+    let mut place = (x, y, 0.0);
+    transform(from, to, &mut place).ok()?;
+    let found = [place.0, place.1];
+    found
+        .iter()
+        .all(|number| number.is_finite())
+        .then_some(found)
 }
 
 fn crs(code: u16) -> Option<Crs> {

@@ -2,6 +2,7 @@
 
 use super::BadRaster;
 use super::geometry::CellSize;
+use super::georeference::GroundTransform;
 use super::samples::{HoleMask, SampleValue, Samples, with_samples};
 
 /// No height is larger than this (in the file's vertical unit), whatever the
@@ -34,6 +35,9 @@ pub(super) struct Decoded {
     pub(super) offset: f64,
     /// EPSG code of the reference system, where the file states it.
     pub(super) epsg: Option<u16>,
+    /// From a sample's column and row, as the file stores them, to the coordinates of its
+    /// centre, where the file knows them.
+    pub(super) ground: Option<GroundTransform>,
     /// Size of a cell, where the file knows it.
     pub(super) cell: Option<CellSize>,
     /// Metres per vertical unit, where the file says so.
@@ -68,6 +72,7 @@ impl Decoded {
             scale: 1.0,
             offset: 0.0,
             epsg: None,
+            ground: None,
             cell: None,
             metres_per_vertical_unit: None,
             remarks: Vec::new(),

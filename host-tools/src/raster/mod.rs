@@ -26,6 +26,7 @@ mod error;
 mod format;
 mod formats;
 mod geometry;
+mod georeference;
 mod guard;
 mod input;
 mod open;
@@ -38,6 +39,7 @@ use std::path::Path;
 pub use decoded::{HeightSummary, LARGEST_HEIGHT};
 pub use error::{BadRaster, Error};
 pub use geometry::{CellSize, CellUnit, Certainty};
+pub use georeference::{Bounds, Georeference, GroundTransform, System};
 pub use options::{OpenOptions, PngChannel, RawLayout};
 pub use samples::{Endian, SampleType, Samples};
 
@@ -173,6 +175,32 @@ impl Raster {
     pub fn reference_system(&self) -> Option<(u16, String)> {
         let code = self.source.epsg?;
         Some((code, crs::name(code)?))
+    }
+
+    /// Where the samples lie in the coordinates of the file's reference system.
+    pub fn georeference(&self) -> Georeference {
+        let source = &self.source;
+        let last = [source.columns, source.rows].map(|count| f64::from(count) - 1.0);
+        let ground = source.ground.map(|map| {
+            let map = match source.east_first {
+                true => map.with_columns_from(last[0]),
+                false => map,
+            };
+            match source.south_up {
+                true => map,
+                false => map.with_rows_from(last[1]),
+            }
+        });
+        Georeference::new(ground, source.epsg, source.cell, last)
+    }
+
+    /// The same samples at a place: the south-west one at `origin`, and the steps to the
+    /// next column and row, in coordinates of the reference system with an EPSG code.
+    #[must_use]
+    pub fn with_ground(mut self, ground: GroundTransform, epsg: Option<u16>) -> Self {
+        self.source.ground = Some(ground);
+        self.source.epsg = epsg;
+        self
     }
 
     /// Size of a cell, where the file knows it.

@@ -5,7 +5,7 @@ use crate::raster::decoded::Decoded;
 use crate::raster::format::{Claim, Format};
 use crate::raster::input::FileBytes;
 use crate::raster::read::read_samples;
-use crate::raster::{BadRaster, CellSize, CellUnit, Endian, SampleType};
+use crate::raster::{BadRaster, CellSize, CellUnit, Endian, GroundTransform, SampleType};
 
 /// SRTM tiles: nothing but their name tells them.
 pub(super) const FORMAT: Format = Format {
@@ -28,7 +28,8 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let mut decoded = Decoded::new(format, (columns, rows), samples);
     decoded.no_data = Some(VOID);
     decoded.metres_per_vertical_unit = Some(1.0);
-    let latitude = south_latitude(input.name()).map(|south| south + 0.5);
+    let corner = south_west(input.name());
+    let latitude = corner.map(|[_, south]| south + 0.5);
     if latitude.is_none() {
         decoded.remarks.push(
             "the name does not say where the tile is (as N44W072.hgt does): \
@@ -39,6 +40,9 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let cells = [columns, rows].map(|samples| f64::from(samples.max(2) - 1));
     let degrees = (1.0 / cells[0], 1.0 / cells[1]);
     decoded.cell = Some(CellSize::stated(degrees, CellUnit::Degree, latitude));
+    decoded.ground = corner.and_then(|[west, south]| {
+        GroundTransform::new([west, south + 1.0], [degrees.0, 0.0], [0.0, -degrees.1])
+    });
     Ok(decoded)
 }
 
@@ -58,9 +62,9 @@ fn size(bytes: u64) -> Result<(u32, u32), BadRaster> {
     }
 }
 
-/// The tile's southern edge in degrees from a name as `N44W072.hgt` or
-/// `s05e100.SRTMGL1.hgt`.
-fn south_latitude(name: &str) -> Option<f64> {
+/// The longitude of the tile's western edge and the latitude of its southern edge, in
+/// degrees, from a name as `N44W072.hgt` or `s05e100.SRTMGL1.hgt`.
+fn south_west(name: &str) -> Option<[f64; 2]> {
     let name = name.to_ascii_uppercase();
     let bytes = name.as_bytes();
     let digits = |range: std::ops::Range<usize>| -> Option<f64> {
@@ -69,12 +73,16 @@ fn south_latitude(name: &str) -> Option<f64> {
         text.parse().ok().filter(|_| all_digits)
     };
     let latitude = digits(1..3).filter(|&degrees| degrees <= 90.0)?;
-    digits(4..7).filter(|&degrees| degrees <= 180.0)?;
-    match (bytes[0], bytes[3]) {
-        (b'N', b'E' | b'W') => Some(latitude),
-        (b'S', b'E' | b'W') => Some(-latitude),
+    let longitude = digits(4..7).filter(|&degrees| degrees <= 180.0)?;
+    let sign = |letter: u8, plus: u8, minus: u8| match letter {
+        letter if letter == plus => Some(1.0),
+        letter if letter == minus => Some(-1.0),
         _ => None,
-    }
+    };
+    Some([
+        longitude * sign(bytes[3], b'E', b'W')?,
+        latitude * sign(bytes[0], b'N', b'S')?,
+    ])
 }
 
 #[cfg(test)]
@@ -82,13 +90,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_tells_the_latitude() {
-        assert_eq!(south_latitude("N44W072.hgt"), Some(44.0));
-        assert_eq!(south_latitude("s05e100.SRTMGL1.hgt"), Some(-5.0));
-        assert_eq!(south_latitude("mountain.hgt"), None);
-        assert_eq!(south_latitude("N99E000.hgt"), None);
-        assert_eq!(south_latitude("é4W072.hgt"), None);
-        assert_eq!(south_latitude(""), None);
+    fn a_name_tells_the_place() {
+        assert_eq!(south_west("N44W072.hgt"), Some([-72.0, 44.0]));
+        assert_eq!(south_west("s05e100.SRTMGL1.hgt"), Some([100.0, -5.0]));
+        assert_eq!(south_west("mountain.hgt"), None);
+        assert_eq!(south_west("N99E000.hgt"), None);
+        assert_eq!(south_west("é4W072.hgt"), None);
+        assert_eq!(south_west(""), None);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use crate::raster::decoded::{Decoded, sides};
 use crate::raster::format::{Claim, Format};
 use crate::raster::input::FileBytes;
-use crate::raster::{BadRaster, CellSize, CellUnit};
+use crate::raster::{BadRaster, CellSize, CellUnit, GroundTransform};
 
 /// USGS ASCII digital elevation models.
 pub(super) const FORMAT: Format = Format {
@@ -50,8 +50,8 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
 
 struct Header {
     profiles: usize,
-    /// Distance between samples along one profile, from south to north.
-    spacing: f64,
+    /// Distance between profiles, and between samples along one from south to north.
+    steps: [f64; 2],
     /// Vertical units a stored unit.
     resolution: f64,
     cell: CellSize,
@@ -84,7 +84,7 @@ impl Header {
             profiles: number::<i64>(bytes, 858, 6)
                 .and_then(|count| usize::try_from(count).ok())
                 .ok_or_else(|| BadRaster::damaged("the header's number of profiles"))?,
-            spacing: north,
+            steps: [east, north],
             resolution: positive(840, "vertical resolution")?,
             cell: CellSize::stated((east * per_unit, north * per_unit), unit, latitude),
             metres_per_vertical_unit: match number::<i64>(bytes, 534, 6) {
@@ -102,7 +102,7 @@ impl Header {
         let mut places = Vec::with_capacity(profiles.len());
         let mut rows = 0;
         for profile in profiles {
-            let steps = ((profile.south - south) / self.spacing).round();
+            let steps = ((profile.south - south) / self.steps[1]).round();
             // A profile that starts this far north is a damaged number.
             if !(0.0..1e6).contains(&steps) {
                 return Err(BadRaster::damaged(format!(
@@ -131,6 +131,13 @@ impl Header {
         let mut decoded = Decoded::new("USGS ASCII DEM".into(), size, samples.into());
         decoded.south_up = true;
         decoded.cell = Some(self.cell);
+        decoded.ground = profiles.first().and_then(|first| {
+            GroundTransform::new(
+                [first.west, south],
+                [self.steps[0], 0.0],
+                [0.0, self.steps[1]],
+            )
+        });
         decoded.metres_per_vertical_unit = Some(self.metres_per_vertical_unit);
         Ok(decoded)
     }
@@ -138,6 +145,7 @@ impl Header {
 
 /// Elevations along one line, from south to north; NaN is a hole.
 struct Profile {
+    west: f64,
     south: f64,
     heights: Vec<f32>,
 }
@@ -173,6 +181,8 @@ fn read_profile(bytes: &[u8], at: usize, header: &Header) -> Result<(Profile, us
     let count = number::<i64>(record, 12, 6)
         .and_then(|count| usize::try_from(count).ok())
         .ok_or_else(|| BadRaster::damaged("its number of elevations is not a number"))?;
+    let west = number::<f64>(record, 24, 24)
+        .ok_or_else(|| BadRaster::damaged("its easting is not a number"))?;
     let south = number::<f64>(record, 48, 24)
         .ok_or_else(|| BadRaster::damaged("its northing is not a number"))?;
     let datum = number::<f64>(record, 72, 24).unwrap_or(0.0);
@@ -194,7 +204,14 @@ fn read_profile(bytes: &[u8], at: usize, header: &Header) -> Result<(Profile, us
         });
     }
     let records = (PROFILE_HEADER + count * HEIGHT_CHARS).div_ceil(USED);
-    Ok((Profile { south, heights }, records))
+    Ok((
+        Profile {
+            west,
+            south,
+            heights,
+        },
+        records,
+    ))
 }
 
 /// Where in a profile's records the elevation of an index is written. Each record

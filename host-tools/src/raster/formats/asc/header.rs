@@ -21,8 +21,10 @@ fn known(key: &str) -> Option<&'static str> {
         "cellsize" => "cellsize",
         "dx" | "xdim" => "dx",
         "dy" | "ydim" => "dy",
-        "xllcorner" | "xllcenter" | "xllcentre" => "xllcorner",
-        "yllcorner" | "yllcenter" | "yllcentre" => "yllcorner",
+        "xllcorner" => "xllcorner",
+        "yllcorner" => "yllcorner",
+        "xllcenter" | "xllcentre" => "xllcenter",
+        "yllcenter" | "yllcentre" => "yllcenter",
         "nodata_value" | "nodata" => "nodata",
         _ => return None,
     })
@@ -88,10 +90,22 @@ impl Header {
         Ok((east, north))
     }
 
-    /// The south-west corner. Whether it is that of the field or of the centre of
-    /// its first sample makes no difference here.
+    /// The south-west corner, roughly: of the field or of the centre of its first sample.
     pub(super) fn corner(&self) -> Option<(f64, f64)> {
-        self.get("xllcorner").zip(self.get("yllcorner"))
+        let x = self.get("xllcorner").or(self.get("xllcenter"));
+        x.zip(self.get("yllcorner").or(self.get("yllcenter")))
+    }
+
+    /// The centre of the south-west sample, with cells of a size.
+    pub(super) fn first_centre(&self, (east, north): (f64, f64)) -> Option<[f64; 2]> {
+        let centre = |centre: &str, corner: &str, side: f64| {
+            let of_corner = || self.get(corner).map(|corner| corner + 0.5 * side);
+            self.get(centre).or_else(of_corner)
+        };
+        Some([
+            centre("xllcenter", "xllcorner", east)?,
+            centre("yllcenter", "yllcorner", north)?,
+        ])
     }
 
     /// The value that means no data.

@@ -10,7 +10,7 @@ mod tests;
 use crate::raster::decoded::Decoded;
 use crate::raster::format::{Claim, Format};
 use crate::raster::input::FileBytes;
-use crate::raster::{BadRaster, CellSize};
+use crate::raster::{BadRaster, CellSize, GroundTransform};
 use header::{Header, looks_like_header};
 use tokens::Tokens;
 
@@ -33,6 +33,13 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let mut decoded = Decoded::new(format, (columns, rows), samples);
     decoded.no_data = Some(header.no_data());
     let (east, north) = header.cell()?;
+    // The file's first row is the northernmost.
+    decoded.ground = header
+        .first_centre((east, north))
+        .and_then(|[west, south]| {
+            let north_row = south + north * (f64::from(rows) - 1.0);
+            GroundTransform::new([west, north_row], [east, 0.0], [0.0, -north])
+        });
     let extent = (east * f64::from(columns), north * f64::from(rows));
     decoded.cell = Some(CellSize::guessed((east, north), header.corner(), extent));
     Ok(decoded)

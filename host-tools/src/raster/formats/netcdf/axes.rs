@@ -6,7 +6,7 @@ use netcdf_reader::{NcFile, NcVariable};
 use super::attributes::text;
 use crate::raster::decoded::Decoded;
 use crate::raster::geometry::metres_in;
-use crate::raster::{BadRaster, CellSize, CellUnit};
+use crate::raster::{BadRaster, CellSize, CellUnit, GroundTransform};
 
 /// The dimensions of a grid.
 pub(super) struct Names {
@@ -53,6 +53,11 @@ pub(super) fn place(file: &NcFile, names: &Names, decoded: &mut Decoded) {
     };
     decoded.south_up = north.step > 0.0;
     decoded.east_first = east.step < 0.0;
+    decoded.ground = GroundTransform::new(
+        [east.first, north.first],
+        [east.step, 0.0],
+        [0.0, north.step],
+    );
     for axis in [&north, &east] {
         if axis.uneven {
             decoded.remarks.push(format!(
@@ -81,6 +86,8 @@ pub(super) fn place(file: &NcFile, names: &Names, decoded: &mut Decoded) {
 
 struct Axis {
     name: String,
+    /// Coordinate of the first sample, and the step to the next.
+    first: f64,
     step: f64,
     low: f64,
     high: f64,
@@ -108,6 +115,7 @@ fn axis(file: &NcFile, name: &str, samples: u32) -> Option<Axis> {
         .any(|pair| ((pair[1] - pair[0]) / step - 1.0).abs() > 0.01);
     Some(Axis {
         name: name.to_owned(),
+        first,
         step,
         low: first.min(last),
         high: first.max(last),

@@ -1,14 +1,14 @@
 //! Where the image lies: cell size, units, which way is north.
 
 use geotiff_core::geokeys::{
-    GEODETIC_CRS_TYPE, GEOG_ANGULAR_UNITS, GT_MODEL_TYPE, GeoKeyDirectory, PROJ_LINEAR_UNITS,
-    PROJECTED_CRS_TYPE, VERTICAL_CS_TYPE, VERTICAL_UNITS,
+    GEODETIC_CRS_TYPE, GEOG_ANGULAR_UNITS, GT_MODEL_TYPE, GT_RASTER_TYPE, GeoKeyDirectory,
+    PROJ_LINEAR_UNITS, PROJECTED_CRS_TYPE, VERTICAL_CS_TYPE, VERTICAL_UNITS,
 };
 use geotiff_core::transform::GeoTransform;
 use tiff_reader::Ifd;
 
 use crate::raster::decoded::Decoded;
-use crate::raster::{CellSize, CellUnit, Certainty, crs};
+use crate::raster::{CellSize, CellUnit, Certainty, GroundTransform, crs};
 
 const MODEL_PIXEL_SCALE: u16 = 33550;
 const MODEL_TIEPOINT: u16 = 33922;
@@ -40,6 +40,7 @@ pub(super) fn apply(image: &Ifd, decoded: &mut Decoded) {
             map.skew_y.atan2(map.pixel_width).to_degrees()
         ));
     }
+    decoded.ground = grid.of_samples(keys.code(GT_RASTER_TYPE) == Some(POINTS));
     let mut cell = grid.cell(&keys, decoded.columns, decoded.rows);
     cell.lean = grid.lean(decoded.south_up);
     if let Some(scale) = grid.map_scale(&keys, &cell, (decoded.columns, decoded.rows)) {
@@ -86,6 +87,19 @@ impl GroundMap {
             .iter()
             .all(|(x, y)| x.is_finite() && y.is_finite());
         (finite && steps.0 > 0.0 && steps.1 > 0.0).then_some(grid)
+    }
+
+    /// The same from a sample's column and row to its own place: in the middle of its
+    /// pixel, unless the file's coordinates are those of points.
+    fn of_samples(&self, points: bool) -> Option<GroundTransform> {
+        let map = &self.0;
+        let middle = if points { 0.0 } else { 0.5 };
+        let origin = map.pixel_to_geo(middle, middle);
+        GroundTransform::new(
+            origin.into(),
+            [map.pixel_width, map.skew_y],
+            [map.skew_x, map.pixel_height],
+        )
     }
 
     /// Distance between columns, and between rows.
@@ -180,6 +194,8 @@ fn numbers(image: &Ifd, tag: u16) -> Vec<f64> {
 /// Values of [`GT_MODEL_TYPE`].
 const PROJECTED: u16 = 1;
 const GEOGRAPHIC: u16 = 2;
+/// Value of [`GT_RASTER_TYPE`] for samples that are points, not areas.
+const POINTS: u16 = 2;
 /// The key of a linear unit's size in metres, where the unit has no code.
 const LINEAR_UNIT_SIZE: u16 = 3077;
 

@@ -1,0 +1,296 @@
+//! Where samples lie in the coordinates of the file's reference system, and what those
+//! coordinates mean.
+//!
+//! Coordinates are always (x, y), which is (east, north) or (longitude, latitude),
+//! whatever order the reference system's own definition has.
+
+use super::crs;
+use super::geometry::{CellSize, CellUnit, Certainty};
+
+/// Ends of the range in which longitudes and latitudes are taken, degrees.
+const LONGITUDES: std::ops::RangeInclusive<f64> = -360.0..=360.0;
+const LATITUDES: std::ops::RangeInclusive<f64> = -90.0..=90.0;
+
+/// The affine map from a sample's column and row to its coordinates:
+/// `origin + column · column_step + row · row_step`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroundTransform {
+    origin: [f64; 2],
+    column_step: [f64; 2],
+    row_step: [f64; 2],
+}
+
+impl GroundTransform {
+    /// A column is its own x and a row its own y.
+    const CELLS: Self = Self {
+        origin: [0.0; 2],
+        column_step: [1.0, 0.0],
+        row_step: [0.0, 1.0],
+    };
+
+    /// From the coordinates of the sample at column 0 and row 0 and the steps to the next
+    /// column and row; `None` where a number is not finite or all samples lie in a line.
+    #[must_use]
+    pub fn new(origin: [f64; 2], column_step: [f64; 2], row_step: [f64; 2]) -> Option<Self> {
+        let map = Self {
+            origin,
+            column_step,
+            row_step,
+        };
+        let numbers = [origin, column_step, row_step];
+        let finite = numbers.iter().flatten().all(|number| number.is_finite());
+        let area = map.determinant().abs() / (length(column_step) * length(row_step));
+        (finite && area > 1e-6).then_some(map)
+    }
+
+    /// Coordinates of a place between samples.
+    #[must_use]
+    pub fn to_ground(&self, [column, row]: [f64; 2]) -> [f64; 2] {
+        let along = |axis: usize| {
+            self.origin[axis] + column * self.column_step[axis] + row * self.row_step[axis]
+        };
+        [along(0), along(1)]
+    }
+
+    /// Column and row of coordinates, which may lie outside of the field.
+    #[must_use]
+    pub fn to_samples(&self, ground: [f64; 2]) -> [f64; 2] {
+        let [x, y] = [ground[0] - self.origin[0], ground[1] - self.origin[1]];
+        let ([a, b], [c, d]) = (self.column_step, self.row_step);
+        let area = self.determinant();
+        [(x * d - y * c) / area, (y * a - x * b) / area]
+    }
+
+    /// The step to the next column, in coordinates.
+    #[must_use]
+    pub const fn column_step(&self) -> [f64; 2] {
+        self.column_step
+    }
+
+    /// The step to the next row, in coordinates.
+    #[must_use]
+    pub const fn row_step(&self) -> [f64; 2] {
+        self.row_step
+    }
+
+    /// The same samples with columns counted from the other side.
+    pub(super) fn with_columns_from(self, last: f64) -> Self {
+        Self {
+            origin: self.to_ground([last, 0.0]),
+            column_step: self.column_step.map(|step| -step),
+            ..self
+        }
+    }
+
+    /// The same samples with rows counted from the other side.
+    pub(super) fn with_rows_from(self, last: f64) -> Self {
+        Self {
+            origin: self.to_ground([0.0, last]),
+            row_step: self.row_step.map(|step| -step),
+            ..self
+        }
+    }
+
+    fn determinant(&self) -> f64 {
+        self.column_step[0] * self.row_step[1] - self.column_step[1] * self.row_step[0]
+    }
+}
+
+fn length([x, y]: [f64; 2]) -> f64 {
+    x.hypot(y)
+}
+
+/// What a file's coordinates are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum System {
+    /// The file knows no place: coordinates are the columns and rows of its samples,
+    /// counted from the south-west sample.
+    Cells,
+    /// Lengths or angles of a reference system that the file does not state.
+    Unstated,
+    /// Longitude and latitude.
+    Geographic {
+        /// EPSG code, where the file states it.
+        epsg: Option<u16>,
+        /// Degrees in a unit of the coordinates.
+        degrees: f64,
+    },
+    /// East and north on a map.
+    Projected {
+        /// EPSG code.
+        epsg: u16,
+    },
+}
+
+/// Where a raster's samples lie: column 0 the westernmost, row 0 the southernmost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Georeference {
+    transform: GroundTransform,
+    system: System,
+    cell: Option<CellSize>,
+    /// Columns and rows less one.
+    last: [f64; 2],
+}
+
+/// A rectangle in coordinates: west, south, east, north.
+pub type Bounds = [f64; 4];
+
+impl Georeference {
+    pub(super) fn new(
+        transform: Option<GroundTransform>,
+        epsg: Option<u16>,
+        cell: Option<CellSize>,
+        last: [f64; 2],
+    ) -> Self {
+        let system = transform.map_or(System::Cells, |map| system(&map, epsg, cell));
+        Self {
+            transform: transform.unwrap_or(GroundTransform::CELLS),
+            system,
+            cell,
+            last,
+        }
+    }
+
+    /// What the coordinates are.
+    #[must_use]
+    pub const fn system(&self) -> System {
+        self.system
+    }
+
+    /// The map from the raster's columns and rows to coordinates.
+    #[must_use]
+    pub const fn transform(&self) -> &GroundTransform {
+        &self.transform
+    }
+
+    /// The smallest rectangle of coordinates around all samples.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        let [columns, rows] = self.last;
+        around(
+            [[0.0, 0.0], [columns, 0.0], [0.0, rows], [columns, rows]]
+                .map(|sample| self.transform.to_ground(sample)),
+        )
+    }
+
+    /// Longitude and latitude (WGS 84, degrees) of coordinates, where the reference
+    /// system is known and its projection has such a place.
+    #[must_use]
+    pub fn to_lonlat(&self, ground: [f64; 2]) -> Option<[f64; 2]> {
+        let lonlat = match self.system {
+            System::Cells | System::Unstated => None,
+            System::Geographic { epsg, degrees } => {
+                let own = ground.map(|angle| angle * degrees);
+                let shifted = epsg.and_then(|code| crs::geographic_to_lonlat(code, own));
+                Some(shifted.unwrap_or(own))
+            }
+            System::Projected { epsg } => crs::to_lonlat(epsg, ground),
+        }?;
+        // Files count longitudes from −180 or from 0: people read the former.
+        Some([wrapped(lonlat[0]), lonlat[1]])
+    }
+
+    /// Coordinates of a longitude and latitude (WGS 84, degrees); the turn of the longitude is the
+    /// one in which the place is in the field, or closest to it. `None` where the reference
+    /// system is not known, or its projection has no such place.
+    #[must_use]
+    pub fn of_lonlat(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {
+        if !(LONGITUDES.contains(&longitude) && LATITUDES.contains(&latitude)) {
+            return None;
+        }
+        let lonlat = [wrapped(longitude), latitude];
+        match self.system {
+            System::Cells | System::Unstated => None,
+            System::Geographic { epsg, degrees } => {
+                let own = epsg.and_then(|code| crs::geographic_of_lonlat(code, lonlat));
+                Some(self.nearest_turn(own.unwrap_or(lonlat).map(|angle| angle / degrees)))
+            }
+            System::Projected { epsg } => crs::of_lonlat(epsg, lonlat),
+        }
+    }
+
+    /// The same place with its longitude in the turn in which it is closest to the
+    /// middle of the field; coordinates that are not angles stay.
+    #[must_use]
+    pub fn nearest_turn(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let System::Geographic { degrees, .. } = self.system else {
+            return [x, y];
+        };
+        let [west, _, east, _] = self.bounds();
+        let (turn, middle) = (360.0 / degrees, 0.5 * (west + east));
+        [x + ((middle - x) / turn).round() * turn, y]
+    }
+
+    /// The size of a cell at a place: of an angle or on a map, a cell is as large as the
+    /// latitude or the map's scale at the place makes it.
+    #[must_use]
+    pub fn cell_at(&self, ground: [f64; 2]) -> Option<CellSize> {
+        let cell = self.cell?;
+        Some(match self.system {
+            System::Cells | System::Unstated => cell,
+            System::Geographic { degrees, .. } => CellSize {
+                latitude: Some((ground[1] * degrees).clamp(-90.0, 90.0)),
+                ..cell
+            },
+            System::Projected { epsg } => CellSize {
+                map_scale: self
+                    .map_scale(epsg, &cell, ground)
+                    .unwrap_or(cell.map_scale),
+                ..cell
+            },
+        })
+    }
+
+    /// Ground metres in a metre of the map along rows and columns at a place.
+    fn map_scale(&self, epsg: u16, cell: &CellSize, [x, y]: [f64; 2]) -> Option<(f64, f64)> {
+        let CellUnit::Length { metres } = cell.unit else {
+            return None;
+        };
+        let (east, north) = crs::local_metres(epsg, (x, y))?;
+        // Along a row and a column, which need not be along x and y.
+        let along = |[dx, dy]: [f64; 2]| (east * dx).hypot(north * dy) / dx.hypot(dy) / metres;
+        let map = &self.transform;
+        Some((along(map.column_step), along(map.row_step)))
+    }
+}
+
+/// The smallest rectangle around places.
+pub(super) fn around(places: impl IntoIterator<Item = [f64; 2]>) -> Bounds {
+    let empty = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
+    places
+        .into_iter()
+        .fold(empty, |[west, south, east, north], [x, y]| {
+            [west.min(x), south.min(y), east.max(x), north.max(y)]
+        })
+}
+
+fn system(map: &GroundTransform, epsg: Option<u16>, cell: Option<CellSize>) -> System {
+    let degree = cell.filter(|cell| cell.unit == CellUnit::Degree);
+    match (degree, epsg) {
+        // A guess that numbers are degrees is no longitude to rely on.
+        (Some(cell), None) if cell.certainty == Certainty::UnitAssumed => System::Unstated,
+        (Some(cell), epsg) => System::Geographic {
+            epsg,
+            degrees: whole(cell.east / length(map.column_step)),
+        },
+        (None, Some(epsg)) => System::Projected { epsg },
+        (None, None) => System::Unstated,
+    }
+}
+
+/// One, where rounding is all that is between a ratio and one.
+fn whole(ratio: f64) -> f64 {
+    match (ratio - 1.0).abs() < 1e-9 {
+        true => 1.0,
+        false => ratio,
+    }
+}
+
+/// A longitude from −180 to 180.
+fn wrapped(longitude: f64) -> f64 {
+    longitude - 360.0 * (longitude / 360.0).round()
+}
+
+#[cfg(test)]
+#[path = "georeference_tests.rs"]
+mod tests;
