@@ -71,8 +71,8 @@ fn longitude_comes_first_and_is_where_proj_has_it() {
     let map = transform([386_000.0, 3_790_000.0], [10.0, 0.0], [0.0, 10.0]);
     let place = Georeference::new(map, Some(26911), Some(metres(10.0)), [9.0, 9.0]);
     let [longitude, latitude] = place.to_lonlat([386_000.0, 3_790_000.0]).expect("there");
-    assert!((longitude + 118.236_5).abs() < 2e-3, "{longitude}");
-    assert!((latitude - 34.244_5).abs() < 2e-3, "{latitude}");
+    assert!((longitude + 118.237_991).abs() < 1e-5, "{longitude}");
+    assert!((latitude - 34.244_867).abs() < 1e-5, "{latitude}");
 }
 
 #[test]

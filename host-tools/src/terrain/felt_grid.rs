@@ -60,18 +60,30 @@ struct Resampling {
 }
 
 impl<'r> FeltGrid<'r> {
-    /// The grid in which a raster is felt.
+    /// The grid in which a raster is felt, of cells as they are in the middle of the field.
     #[must_use]
     pub fn new(raster: &'r Raster, cells: FeltCells) -> Self {
+        Self::of_cell(raster, cells, raster.cell())
+    }
+
+    /// The grid in which a raster is felt, of cells as they are at a place, in the file's
+    /// coordinates: cells of degrees get narrower towards the poles, and a map's scale is
+    /// true in few places.
+    #[must_use]
+    pub fn at(raster: &'r Raster, cells: FeltCells, ground: [f64; 2]) -> Self {
+        Self::of_cell(raster, cells, raster.georeference().cell_at(ground))
+    }
+
+    fn of_cell(raster: &'r Raster, cells: FeltCells, cell: Option<CellSize>) -> Self {
         let stored = Self {
             raster,
             cells,
             columns: raster.columns(),
             rows: raster.rows(),
-            side_m: raster.cell().map(|cell| cell.square_metres()),
+            side_m: cell.map(|cell| cell.square_metres()),
             resampling: None,
         };
-        match (cells, raster.cell()) {
+        match (cells, cell) {
             (FeltCells::Square, Some(cell)) if is_square(&cell) => {
                 let (east, north) = cell.ground_metres();
                 Self {
@@ -170,6 +182,48 @@ impl<'r> FeltGrid<'r> {
     pub fn cells_per_vertical_unit(&self) -> Option<f64> {
         let metres = self.raster.metres_per_vertical_unit();
         self.side_m.map(|side| metres / side)
+    }
+
+    /// The file's coordinates of a place in felt cells from the south-west sample.
+    #[must_use]
+    pub fn to_ground(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let sample = match &self.resampling {
+            None => [u, v],
+            Some(places) => [
+                places.first + u * places.column_step + v * places.lean,
+                v * places.row_step,
+            ],
+        };
+        self.raster.georeference().transform().to_ground(sample)
+    }
+
+    /// The place in felt cells of coordinates of the file, which may lie outside of the field.
+    #[must_use]
+    pub fn of_ground(&self, ground: [f64; 2]) -> [f64; 2] {
+        let [column, row] = self.raster.georeference().transform().to_samples(ground);
+        match &self.resampling {
+            None => [column, row],
+            Some(places) => {
+                let v = row / places.row_step;
+                [
+                    (column - places.first - v * places.lean) / places.column_step,
+                    v,
+                ]
+            }
+        }
+    }
+
+    /// The height of the bilinear surface at a place in felt cells, in the file's vertical
+    /// unit; `None` in a hole and off the field.
+    #[must_use]
+    pub fn surface(&self, [u, v]: [f64; 2]) -> Option<f64> {
+        let ((column, east), (row, north)) = (split(u)?, split(v)?);
+        let across = |row: u32| {
+            mix(east, self.height(column, row), || {
+                self.height(column + 1, row)
+            })
+        };
+        Some(mix(north, across(row), || across(row + 1))).filter(|height| !height.is_nan())
     }
 
     /// The height at a felt sample in the file's vertical unit; NaN in a hole and
