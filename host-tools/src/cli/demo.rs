@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::ValueHint;
+use hapterra_core::phantom::Calibration;
 
 use super::failure::{Failure, OrHint};
 use super::options::emulated_board::{EmulatedBoard, RunsOn};
-use super::options::exaggeration::Exaggeration;
+use super::options::placing::{self, Placing};
 use super::options::rendering::Rendering;
 use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::session_summary::{self, SessionSummary};
@@ -18,20 +19,17 @@ use crate::link::{
 };
 use crate::output::{Output, OutputError, OutputFolder, keep_apart};
 use crate::phantom::HeldPhantom;
-use crate::place::{PlacedTerrain, PlacingError};
+use crate::place::{PlacedTerrain, View};
 use crate::raster::Raster;
 use crate::replay::settings::Device;
 use crate::replay::{LoopColumns, Record, Recording, Settings};
 use crate::synth::{Kind, Synth};
 use crate::telemetry::SampleLog;
-use crate::terrain::Scale;
 
 /// Samples along the side of the terrain that the demo makes itself.
 const OWN_SIZE: u32 = 1024;
 /// What that terrain is called in a recording: how to make it as a file.
 const OWN_TERRAIN: &str = "hapterra synth fractal --size 1024 --seed 1";
-/// Times that heights are halved until the arm reaches the terrain.
-const HALVINGS: u32 = 12;
 
 /// Arguments of `hapterra demo`.
 #[derive(Debug, clap::Args)]
@@ -57,6 +55,10 @@ pub struct Args {
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
 
+    /// Which part of it, and how large.
+    #[command(flatten)]
+    pub placing: Placing,
+
     /// How it feels.
     #[command(flatten)]
     pub rendering: Rendering,
@@ -74,23 +76,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let (raster, name) = terrain_of(args)?;
     let outputs = Outputs::new(&args.out, &name);
     outputs.keep_apart(args.file.as_deref())?;
+    let asked = args.placing.of(&args.rendering, &raster)?;
+    // The virtual Phantom is one.
+    let view = asked.view(&Calibration::PREMIUM_1_5)?;
+    let terrain = view.terrain(asked.grid)?;
     let (law, rule) = (args.rendering.law()?, args.rendering.rule());
-    let grid = args.rendering.grid(&raster);
-    let mut scale = args.rendering.scale(&grid)?;
-    // Heights that the demo was to choose may as well be lower.
-    let may_lower = args.rendering.exaggeration == Some(Exaggeration::Auto);
-    for _ in 0..HALVINGS {
-        let terrain = args.rendering.terrain(grid, scale)?;
-        match PlacedTerrain::new(&terrain, law, rule) {
-            Ok(placed) => return show(args, &placed, &name, &outputs),
-            Err(PlacingError::OutOfReach(_)) if may_lower => {
-                let lower = 0.5 * scale.height_mm_per_unit();
-                scale = Scale::new(scale.cell_mm(), lower).map_err(Failure::new)?;
-            }
-            Err(error) => return Err(error.into()),
-        }
-    }
-    Err("the terrain is too tall for the arm").or_hint("choose a smaller --cell-mm")
+    let placed = PlacedTerrain::in_view(&terrain, &view, law, rule)?;
+    show(args, (&placed, &view), &name, &outputs)
 }
 
 fn terrain_of(args: &Args) -> Result<(Raster, String), Failure> {
@@ -137,7 +129,7 @@ impl Outputs {
 /// Runs the tour and shows what was felt.
 fn show(
     args: &Args,
-    placed: &PlacedTerrain<'_>,
+    (placed, view): (&PlacedTerrain<'_>, &View),
     name: &str,
     outputs: &Outputs,
 ) -> Result<(), Failure> {
@@ -148,6 +140,7 @@ fn show(
         "terrain        {name}: {}",
         session_summary::in_words(terrain)
     );
+    print!("{}", placing::told(view, terrain));
     left_behind::tell([outputs.recording.as_path(), &outputs.picture]);
     let arm = placed.held_phantom();
     let stop_s = args.seconds.unwrap_or(f64::MAX).min(placed.duration_s());
@@ -167,7 +160,8 @@ fn show(
     let summary = &toured.summary;
     print!("{}", summary.text());
     let records: Vec<Record> = toured.rows.iter().map(|(record, _)| *record).collect();
-    summary.draw(&outputs.picture, terrain, name, &records)?;
+    let shown = (terrain, view);
+    summary.draw(&outputs.picture, shown, name, &records)?;
     println!("recording      {}", outputs.recording.display());
     println!("picture        {}", outputs.picture.display());
     match summary.figures.fault {

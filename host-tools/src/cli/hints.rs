@@ -8,7 +8,7 @@ use crate::board::update::{UpdateError, UpdateFailure};
 use crate::calibrate::file::BadFile;
 use crate::calibrate::{FitError, WalkError};
 use crate::link::{EmulatorError, LinkError};
-use crate::place::PlacingError;
+use crate::place::{PlaceError, PlacingError};
 use crate::raster::{BadRaster, Error};
 use crate::replay::ReplayError;
 use crate::replay::settings::OtherTerrain;
@@ -81,7 +81,38 @@ impl Hint for TerrainError {
 
 impl Hint for PlacingError {
     fn hint(&self) -> String {
-        "let the heights be chosen for the hand with --exaggeration auto, or choose a smaller --exaggeration, --height-mm-per-unit or --cell-mm".into()
+        "choose another place with --at, or a smaller --exaggeration, --height-mm-per-unit or --cell-mm"
+            .into()
+    }
+}
+
+impl Hint for PlaceError {
+    fn hint(&self) -> String {
+        let hint = match self {
+            Self::NoSystem { .. } => {
+                "say the place in the file's own coordinates with --at X,Y or --bbox W,S,E,N, or give the file its reference system: gdal_translate -a_srs EPSG:CODE IN OUT.tif"
+            }
+            Self::NotOnMap { .. } | Self::BoxAcrossSeam { .. } => {
+                "say the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N"
+            }
+            Self::Outside { .. } | Self::Hole { .. } => {
+                "choose a place inside: longitude (or x) comes first"
+            }
+            Self::BoxOutside { .. } | Self::BoxOfHoles { .. } => {
+                "choose a box that overlaps it: west, south, east, north"
+            }
+            Self::NoBox(_) => {
+                "say west before east and south before north; only a box of degrees may cross 180°"
+            }
+            Self::BoxTooSmall { .. } => "choose a larger box",
+            Self::NoGroundSize => "state the scale with --cell-mm, hand millimetres a cell",
+            Self::GroundScale(_) => "choose another --ground-m-per-mm",
+            Self::Exaggeration(_) => "choose another --exaggeration; 1 is true to scale",
+            Self::TooTall { .. } => "choose a smaller --height-mm-per-unit",
+            Self::NoReach => "check the record: hapterra status, then hapterra calibrate",
+            Self::Scale(_) => "choose another --cell-mm or --height-mm-per-unit",
+        };
+        hint.into()
     }
 }
 

@@ -17,6 +17,7 @@ mod hints;
 pub mod info;
 pub mod list;
 mod log;
+mod met_device;
 pub mod options;
 pub mod replay;
 pub mod run;

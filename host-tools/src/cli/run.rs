@@ -9,8 +9,9 @@ use std::time::{Duration, Instant};
 use clap::ValueHint;
 use hapterra_core::wire::session::{DEFAULT_SILENCE_S, SILENCE_S};
 
-use super::bringup::required::brought_up;
 use super::failure::{Failure, OrHint};
+use super::met_device::meet;
+use super::options::placing::{self, Placing};
 use super::options::rendering::Rendering;
 use super::options::terrain_file::TerrainFile;
 use super::session_summary::{self, SessionSummary};
@@ -69,6 +70,10 @@ pub struct Args {
     #[arg(long)]
     pub unchecked: bool,
 
+    /// Which part of the terrain, and how large.
+    #[command(flatten)]
+    pub placing: Placing,
+
     /// How the terrain feels.
     #[command(flatten)]
     pub rendering: Rendering,
@@ -101,23 +106,51 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     keep_apart(&outputs, &[&args.terrain.file]).or_hint(OTHER_FILE)?;
     left_behind::tell(args.record.as_deref());
     let raster = args.terrain.open()?;
-    let grid = args.rendering.grid(&raster);
-    let scale = args.rendering.scale(&grid)?;
-    let terrain = args.rendering.terrain(grid, scale)?;
-    let placed = PlacedTerrain::new(&terrain, args.rendering.law()?, args.rendering.rule())?;
+    let asked = args.placing.of(&args.rendering, &raster)?;
+    let (law, rule) = (args.rendering.law()?, args.rendering.rule());
+    // What cannot be recorded is known before anything is armed.
+    let recording = recording(args)?;
     interrupt::listen();
-    let Some(address) = &args.plant else {
-        return serve(args, &placed);
+    let (calibration, transport) = match is_scripted(args) {
+        // The virtual Phantom is one.
+        true => (Calibration::PREMIUM_1_5, None),
+        false => {
+            let met = meet(&args.device, args.unchecked)?;
+            (met.calibration, Some(met.transport))
+        }
     };
-    let arm = placed.held_phantom();
+    let view = asked.view(&calibration)?;
+    let terrain = view.terrain(asked.grid)?;
+    let tour = match is_scripted(args) {
+        true => Some(PlacedTerrain::in_view(&terrain, &view, law, rule)?),
+        false => None,
+    };
+    let served = Served {
+        terrain: &terrain,
+        view,
+        scene: view.scene(&terrain, law, rule)?,
+        tour,
+    };
+    let (Some(address), Some(tour)) = (&args.plant, &served.tour) else {
+        return serve(args, &served, transport, recording);
+    };
+    let arm = tour.held_phantom();
     let done = OnceLock::new();
     std::thread::scope(|scope| {
         scope.spawn(|| move_arm(address, arm, &done));
-        let served = serve(args, &placed);
+        let ended = serve(args, &served, transport, recording);
         // The arm is still there while the board lets its force go out.
         let _ = done.set(Instant::now() + LINGER);
-        served
+        ended
     })
+}
+
+/// What is served, and how an arm that is virtual moves over it.
+struct Served<'t> {
+    terrain: &'t Terrain<'t>,
+    view: View,
+    scene: Scene,
+    tour: Option<PlacedTerrain<'t>>,
 }
 
 /// Moves the virtual Phantom at a board's plant line, which may come and go;
@@ -229,28 +262,23 @@ fn recording(args: &Args) -> Result<Option<Recording>, Failure> {
 fn described(
     mut recording: Option<Recording>,
     args: &Args,
-    placed: &PlacedTerrain<'_>,
+    served: &Served<'_>,
     device: &DeviceHello,
 ) -> Option<Recording> {
     if let Some(recording) = &mut recording {
-        let (file, device) = (args.terrain.file.display(), Device::of(device));
-        let (terrain, home_mm) = (placed.terrain(), placed.home_mm());
-        let file = file.to_string();
-        recording.describe(&Settings::new(
-            &file,
-            terrain,
-            placed.law(),
-            Some(home_mm),
-            device,
-        ));
+        let (file, device) = (args.terrain.file.display().to_string(), Device::of(device));
+        let law = (served.scene.law, served.scene.rule);
+        let home_mm = Some(served.view.home_mm);
+        let settings = Settings::new(&file, served.terrain, law, home_mm, device);
+        recording.describe(&settings);
     }
     recording
 }
 
-fn connect<'t>(
-    args: &Args,
-    placed: &PlacedTerrain<'t>,
-) -> Result<Box<dyn Transport + 't>, LinkError> {
-    let native = || Native::new(HostClock::default(), Some(Box::new(placed.held_phantom())));
+fn connect<'t>(args: &Args, served: &Served<'t>) -> Result<Box<dyn Transport + 't>, LinkError> {
+    let native = || {
+        let arm = served.tour.as_ref().map(PlacedTerrain::held_phantom);
+        Native::new(HostClock::default(), arm.map(|arm| Box::new(arm) as _))
+    };
     args.device.connect(native)
 }

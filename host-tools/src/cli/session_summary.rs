@@ -5,8 +5,10 @@ use std::path::Path;
 use hapterra_core::wire::hello::DeviceHello;
 
 use super::failure::{Failure, OrHint};
+use super::options::placing;
 use crate::link::{INSTRUCTIONS_PER_COUNT, Tally, shown};
-use crate::picture::{SessionPicture, Surface};
+use crate::picture::{GroundFacts, SessionPicture, Surface};
+use crate::place::{View, coordinates_in_words};
 use crate::replay::Record;
 use crate::telemetry::Figures;
 use crate::terrain::Terrain;
@@ -109,11 +111,20 @@ impl SessionSummary {
     pub(super) fn draw(
         &self,
         path: &Path,
-        terrain: &Terrain<'_>,
+        (terrain, view): (&Terrain<'_>, &View),
         title: &str,
         records: &[Record],
     ) -> Result<(), Failure> {
         let height_mm = |east: f64, north: f64| terrain.height_mm(east, north);
+        let file = terrain.raster().georeference();
+        let cell_mm = view.scale.cell_mm();
+        let place_of = |east: f64, north: f64| {
+            let ground = terrain
+                .grid()
+                .to_ground([east, north].map(|mm| mm / cell_mm));
+            coordinates_in_words(&file, ground)
+        };
+        let lines = placing::picture_lines(view, &file);
         let picture = SessionPicture {
             title,
             subtitle: &format!(
@@ -128,6 +139,11 @@ impl SessionSummary {
             },
             records,
             facts: &self.facts(),
+            ground: Some(GroundFacts {
+                metres_per_mm: view.ground_m_per_mm(),
+                place_of: &place_of,
+                lines: &lines,
+            }),
         };
         picture.save(path).or_hint("name another folder with --out")
     }
@@ -141,7 +157,8 @@ pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
         Some(times) => format!("heights × {}", (times * 1e6).round() / 1e6),
         None => format!("{} mm a vertical unit", scale.height_mm_per_unit()),
     };
-    let (columns, rows, cell_mm) = (raster.columns(), raster.rows(), scale.cell_mm());
+    let (columns, rows) = (raster.columns(), raster.rows());
+    let cell_mm = placing::short(scale.cell_mm());
     let felt = match grid.side_m() {
         Some(side) if grid.is_resampled() => format!(
             " felt as {} × {} squares of {side:.3} m,",

@@ -25,6 +25,9 @@ const ENOUGH_RELIEF_MM: f64 = 25.0;
 /// Presses and taps against the slide. With a slide of 1 N all of it stays
 /// below the 1.55 N that a Premium 1.5 holds upwards for ever (1.24 A).
 const STRONG: f64 = 1.5;
+/// A plan's middle is at most this far from a settled home along each axis, mm: about as
+/// far as a Premium 1.5 reaches to its sides.
+const FAR_MM: f64 = 250.0;
 /// Slowest and fastest slide, mm/s, and its length aimed at, s.
 const SLIDE_MM_S: (f64, f64) = (45.0, 120.0);
 const SLIDE_S: f64 = 7.0;
@@ -53,6 +56,9 @@ pub struct TourPlan<'a> {
     pub wall_n_per_mm: f64,
     /// Force of the slide, N; presses and taps are half as strong again.
     pub push_n: f64,
+    /// The terrain point at the arm's home, mm east, north, up, where that is settled; else
+    /// the middle of the plan.
+    pub home_mm: Option<[f64; 3]>,
 }
 
 impl TourPlan<'_> {
@@ -104,20 +110,48 @@ impl TourPlan<'_> {
             .tap(3, STRONG * self.push_n)
             .lift(12.0)
             .finish();
-        let home_mm = middle(&script);
+        let home_mm = self.home_mm.unwrap_or_else(|| middle(&script));
         let placement = Placement { home_mm };
         Tour { script, placement }
     }
 
     fn best_place(&self, half: [f64; 2]) -> [f64; 2] {
         let along = |step: u32, axis: usize| {
-            let room = (0.5 * self.size_mm[axis] - half[axis] / INSIDE).max(0.0);
-            0.5 * self.size_mm[axis] + room * (2.0 * f64::from(step) / f64::from(PLACES - 1) - 1.0)
+            let [low, high] = self.room(axis, half[axis]);
+            low + (high - low) * f64::from(step) / f64::from(PLACES - 1)
         };
         let places = (0..PLACES * PLACES).map(|i| [along(i % PLACES, 0), along(i / PLACES, 1)]);
         let scored = places.map(|place| (self.worth(place, half), place));
         let best = scored.reduce(|best, next| if next.0 > best.0 { next } else { best });
         best.map_or(self.size_mm.map(|side| 0.5 * side), |best| best.1)
+    }
+
+    /// Where along an axis the middle of a plan may be: on the terrain and, where the home
+    /// is settled, not so far from it that no arm gets there.
+    fn room(&self, axis: usize, half: f64) -> [f64; 2] {
+        let (middle, room) = (0.5 * self.size_mm[axis], half / INSIDE);
+        let room = (middle - room).max(0.0);
+        let on_terrain = [middle - room, middle + room];
+        match self.home_mm {
+            None => on_terrain,
+            Some(home) => {
+                [-FAR_MM, FAR_MM].map(|far| (home[axis] + far).clamp(on_terrain[0], on_terrain[1]))
+            }
+        }
+    }
+
+    /// Share of a line that the arm cannot get to from a settled home.
+    fn beyond(&self, line: &[[f64; 2]]) -> f64 {
+        let Some(home_mm) = self.home_mm else {
+            return 0.0;
+        };
+        let place = Placement { home_mm };
+        let beyond = |point: &&[f64; 2]| {
+            let [x, y] = **point;
+            let ground = (self.surface)(x, y);
+            ground.is_some_and(|z| place.joints_at(&self.model, [x, y, z]).is_err())
+        };
+        line.iter().filter(beyond).count() as f64 / line.len() as f64
     }
 
     /// How good a place is: known ground counts most, then relief up to what
@@ -133,7 +167,10 @@ impl TourPlan<'_> {
         // It comes down at one end and taps at the other.
         let ends = [line[0], line[line.len() - 1]];
         let holes = ends.iter().filter(|p| (self.surface)(p[0], p[1]).is_none());
-        10.0 * self.known(&line) + relief - 0.2 * off(0).max(off(1)) - 4.0 * holes.count() as f64
+        10.0 * self.known(&line) + relief
+            - 0.2 * off(0).max(off(1))
+            - 4.0 * holes.count() as f64
+            - 30.0 * self.beyond(&line)
     }
 }
 
@@ -169,6 +206,7 @@ mod tests {
             hand: HandModel::default(),
             wall_n_per_mm: 0.5,
             push_n: 1.0,
+            home_mm: None,
         }
     }
 
@@ -198,6 +236,30 @@ mod tests {
         }
         let wide = east_extent(&tour);
         assert!((wide - 2.0 * HALF_MM[0]).abs() < 1e-6, "{wide}");
+    }
+
+    #[test]
+    fn with_a_settled_home_it_stays_where_the_arm_gets_to() {
+        let ramp = |x: f64, _: f64| Some(0.05 * x);
+        for home in [
+            [500.0, 400.0, 40.0],
+            [60.0, 40.0, 20.0],
+            [990.0, 700.0, 60.0],
+        ] {
+            let plan = TourPlan {
+                home_mm: Some(home),
+                ..plan(&ramp, [1000.0, 800.0])
+            };
+            let tour = plan.plan().expect("in reach");
+            assert_eq!(tour.placement.home_mm, home);
+            assert!(tour.placement.check(&plan.model, &tour.script).is_ok());
+            assert!(east_extent(&tour) > 40.0, "{}", east_extent(&tour));
+        }
+        let far = TourPlan {
+            home_mm: Some([-3000.0, 0.0, 0.0]),
+            ..plan(&ramp, [1000.0, 800.0])
+        };
+        assert!(far.plan().is_err());
     }
 
     #[test]

@@ -8,9 +8,11 @@ use plotters_backend::{BackendCoord, DrawingErrorKind};
 
 use super::axes::{self, Area, Chart, Titles};
 use super::canvas::PictureError;
+use super::ground_marks;
 use super::line;
 use super::map_view::MapView;
 use super::relief::{self, Relief, Surface};
+use super::session::GroundFacts;
 use super::style::{self, HIP, INK, PROXY, SCALE, px, stroke};
 use crate::replay::Record;
 
@@ -19,11 +21,11 @@ pub(super) fn draw(
     area: &Area<'_>,
     surface: &Surface<'_>,
     window: &MapView,
-    records: &[Record],
+    (records, ground_facts): (&[Record], Option<&GroundFacts<'_>>),
 ) -> Result<Relief, PictureError> {
     let titles = Titles {
-        x: "east (mm)",
-        y: "north (mm)",
+        x: "east in the hand (mm)",
+        y: "north in the hand (mm)",
     };
     let east = window.west..window.west + window.width;
     let north = window.south..window.south + window.height;
@@ -34,6 +36,9 @@ pub(super) fn draw(
     ground.draw(&Image(&relief))?;
     let pixel_mm = window.width / f64::from(columns);
     paths(&mut chart, records, pixel_mm)?;
+    if let Some(facts) = ground_facts {
+        ground_marks::draw(&ground, window, facts)?;
+    }
     let (width, height) = ground.dim_in_pixel();
     let corner = (width.cast_signed() - 1, height.cast_signed() - 1);
     let frame = stroke(&style::SOFT_INK, 1.0);

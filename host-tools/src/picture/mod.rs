@@ -9,6 +9,7 @@
 
 pub mod axes;
 pub mod canvas;
+mod ground_marks;
 mod lettering;
 pub mod line;
 mod map;
@@ -21,4 +22,4 @@ mod timeline;
 
 pub use canvas::{Canvas, PictureError};
 pub use relief::Surface;
-pub use session::SessionPicture;
+pub use session::{GroundFacts, SessionPicture};

@@ -16,18 +16,23 @@ const LINE_PX: i32 = 30;
 /// Widest inset and colour scale.
 const WIDE_PX: i32 = 330;
 
+/// A heading, and names with values under it.
+pub(super) type Table<'a> = (&'a str, &'a [(String, String)]);
+
 /// Writes the panel from the top down.
 pub(super) fn draw(
     area: &Area<'_>,
     relief: &Relief,
     surface: &Surface<'_>,
     window: &MapView,
-    facts: &[(String, String)],
+    tables: &[Table<'_>],
 ) -> Result<(), PictureError> {
     let mut y = px(8);
     y = key(area, y, relief.holes)? + px(16);
     y = scale(area, y, relief)? + px(20);
-    y = figures(area, y, facts)? + px(20);
+    for (title, facts) in tables.iter().filter(|table| !table.1.is_empty()) {
+        y = figures(area, y, title, facts)? + px(20);
+    }
     if !window.shows_all(surface.size_mm) {
         heading(area, y, "Where the map lies")?;
         let (width, height) = area.dim_in_pixel();
@@ -124,11 +129,16 @@ fn scale(area: &Area<'_>, top: i32, relief: &Relief) -> Result<i32, PictureError
 }
 
 /// Names on the left, values on the right.
-fn figures(area: &Area<'_>, top: i32, facts: &[(String, String)]) -> Result<i32, PictureError> {
+fn figures(
+    area: &Area<'_>,
+    top: i32,
+    title: &str,
+    facts: &[(String, String)],
+) -> Result<i32, PictureError> {
     if facts.is_empty() {
         return Ok(top);
     }
-    heading(area, top, "Figures")?;
+    heading(area, top, title)?;
     let width = area.dim_in_pixel().0.cast_signed().min(px(WIDE_PX));
     let mut y = top + px(LINE_PX);
     for (name, value) in facts {

@@ -25,6 +25,19 @@ pub struct SessionPicture<'a> {
     pub records: &'a [Record],
     /// Further figures for the panel, name and value with its unit, short.
     pub facts: &'a [(String, String)],
+    /// Where the terrain is on the ground, where it is shown.
+    pub ground: Option<GroundFacts<'a>>,
+}
+
+/// What a picture says of the ground.
+#[derive(Clone, Copy)]
+pub struct GroundFacts<'a> {
+    /// Ground metres a hand millimetre, where the terrain knows its size.
+    pub metres_per_mm: Option<f64>,
+    /// Coordinates of a place in hand millimetres east and north, short.
+    pub place_of: &'a dyn Fn(f64, f64) -> String,
+    /// Scale and place for the panel: name and value with its unit, short.
+    pub lines: &'a [(String, String)],
 }
 
 const WIDTH_PX: i32 = 1600;
@@ -66,11 +79,13 @@ impl SessionPicture<'_> {
         self.header(&part(MARGIN_PX, 0, inner, HEADER_PX))?;
         let (width, height) = (LEFT_PX + map_width, map_height + BELOW_PX);
         let map_area = part(MARGIN_PX, HEADER_PX, width, height);
-        let relief = map::draw(&map_area, surface, &window, records)?;
+        let relief = map::draw(&map_area, surface, &window, (records, self.ground.as_ref()))?;
         let panel_left = MARGIN_PX + width + 40;
         let panel_width = WIDTH_PX - MARGIN_PX - panel_left;
         let side = part(panel_left, HEADER_PX, panel_width, block);
-        panel::draw(&side, &relief, surface, &window, &self.figures())?;
+        let lines = self.ground.map_or(&[][..], |ground| ground.lines);
+        let tables = [("Place and scale", lines), ("Figures", &self.figures()[..])];
+        panel::draw(&side, &relief, surface, &window, &tables)?;
         let time = span(records);
         let heights = part(MARGIN_PX, below, inner, HEIGHTS_PX);
         timeline::heights(&heights, surface, records, &time)?;

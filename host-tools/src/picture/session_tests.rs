@@ -39,6 +39,7 @@ fn session<'a>(records: &'a [Record], size_mm: [f64; 2]) -> SessionPicture<'a> {
         },
         records,
         facts: &[],
+        ground: None,
     }
 }
 

@@ -1,10 +1,23 @@
 //! Where a terrain lies in front of the arm and how large it is there.
 //!
-//! [`suggest_scale`] finds a scale at which a terrain feels good;
-//! [`PlacedTerrain`] puts the terrain into the arm's reach.
+//! [`Target`] and [`ViewOptions`] are what the user asks for. [`Reach`] is what an arm can
+//! get to, by its calibration. [`View::new`] makes of both and of a grid the one answer: the
+//! place under the home position, scale, level and heights, from which terrain and scene
+//! follow. [`PlacedTerrain`] adds a scripted hand for an arm that is virtual.
 
+mod error;
+mod fit;
+mod ground;
 mod placed_terrain;
-mod suggested_scale;
+mod reach;
+mod target;
+mod view;
+mod words;
 
+pub use error::PlaceError;
 pub use placed_terrain::{PlacedTerrain, PlacingError};
-pub use suggested_scale::{SuggestedScale, suggest_scale};
+pub use reach::{Reach, ReachBox};
+pub use target::{Coordinates, Target};
+pub(crate) use view::FELT_MM;
+pub use view::{Heights, Sizing, View, ViewOptions, suited_height};
+pub use words::{bounds_in_words, coordinates_in_words, place_in_words};

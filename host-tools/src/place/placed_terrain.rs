@@ -4,6 +4,7 @@ use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::{Scene, Source};
 
+use super::View;
 use crate::phantom::{HandModel, HeldPhantom, OutOfReach, PhantomModel, TourPlan};
 use crate::terrain::Terrain;
 
@@ -25,7 +26,7 @@ pub struct PlacedTerrain<'t> {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlacingError {
     /// No part of it is within the arm's reach.
-    #[error("the terrain is too tall for the arm: {0}")]
+    #[error("the terrain cannot be toured: {0}")]
     OutOfReach(#[from] OutOfReach),
     /// The place to touch is farther out than can be addressed.
     #[error("the place to touch, ({:.0}, {:.0}, {:.0}) mm, is too far from the origin", .0[0], .0[1], .0[2])]
@@ -39,6 +40,28 @@ impl<'t> PlacedTerrain<'t> {
     /// # Errors
     /// [`PlacingError`].
     pub fn new(terrain: &'t Terrain<'t>, law: ForceLaw, rule: Rule) -> Result<Self, PlacingError> {
+        Self::toured(terrain, law, rule, None)
+    }
+
+    /// Leaves the terrain where a view has it, and tours what the arm gets to of it.
+    ///
+    /// # Errors
+    /// [`PlacingError`].
+    pub fn in_view(
+        terrain: &'t Terrain<'t>,
+        view: &View,
+        law: ForceLaw,
+        rule: Rule,
+    ) -> Result<Self, PlacingError> {
+        Self::toured(terrain, law, rule, Some(view.home_mm))
+    }
+
+    fn toured(
+        terrain: &'t Terrain<'t>,
+        law: ForceLaw,
+        rule: Rule,
+        home_mm: Option<[f64; 3]>,
+    ) -> Result<Self, PlacingError> {
         let (model, hand) = (PhantomModel::premium_1_5(), HandModel::default());
         let surface = |east: f64, north: f64| terrain.height_mm(east, north);
         let tour = TourPlan {
@@ -48,6 +71,7 @@ impl<'t> PlacedTerrain<'t> {
             hand,
             wall_n_per_mm: f64::from(law.stiffness_n_per_mm).max(0.01),
             push_n: PUSH_N,
+            home_mm,
         }
         .plan()?;
         let home_mm = tour.placement.home_mm;

@@ -20,7 +20,7 @@ use crate::phantom::Wiring;
 use terminal::UserAtTerminal;
 
 /// How long a device may take to answer.
-const PATIENCE: Duration = Duration::from_secs(4);
+pub(super) const PATIENCE: Duration = Duration::from_secs(4);
 /// How long a device in this program may take to answer.
 const VIRTUAL_PATIENCE: Duration = Duration::from_secs(20);
 

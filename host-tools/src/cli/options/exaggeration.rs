@@ -8,7 +8,7 @@ pub enum Exaggeration {
     /// So many times; below zero upside down. One where nothing is stated, for every
     /// command.
     Times(f64),
-    /// What [`crate::place::suggest_scale`] chooses for the relief under the hand.
+    /// As many as make the relief large enough to be felt: [`crate::place::suited_height`].
     Auto,
 }
 

@@ -5,7 +5,7 @@ use hapterra_core::force::ForceLaw;
 
 use super::exaggeration::Exaggeration;
 use crate::cli::failure::{Failure, OrHint};
-use crate::place::suggest_scale;
+use crate::place::{Heights, suited_height};
 use crate::raster::Raster;
 use crate::terrain::{FeltCells, FeltGrid, Scale, Terrain};
 
@@ -13,7 +13,7 @@ use crate::terrain::{FeltCells, FeltGrid, Scale, Terrain};
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Feel")]
 pub struct Rendering {
-    /// Hand millimetres a cell [default: 1]
+    /// Hand millimetres a felt cell of level 0 [default: replay 1, else as --fit has it]
     #[arg(long, value_name = "MM")]
     pub cell_mm: Option<f64>,
 
@@ -27,8 +27,8 @@ pub struct Rendering {
     )]
     pub height_mm_per_unit: Option<f64>,
 
-    /// Times that heights are felt higher than true to scale; `auto` chooses what suits
-    /// the hand [default: 1]
+    /// Times that heights are felt higher than true to scale; `auto`: as many as make 15 mm
+    /// of relief, and none where there is more [default: 1]
     #[arg(long, value_name = "TIMES|auto", allow_negative_numbers = true)]
     pub exaggeration: Option<Exaggeration>,
 
@@ -36,7 +36,8 @@ pub struct Rendering {
     #[arg(long, value_enum)]
     pub cells: Option<FeltCells>,
 
-    /// Level of detail: every 2^LEVEL-th sample is felt [default: 0]
+    /// Level of detail: every 2^LEVEL-th sample is felt [default: replay 0, else the finest
+    /// that the encoders tell]
     #[arg(long)]
     pub level: Option<u8>,
 
@@ -73,16 +74,35 @@ impl Rendering {
     /// Numbers that no terrain can be scaled with.
     pub fn scale(&self, grid: &FeltGrid<'_>) -> Result<Scale, Failure> {
         let cell_mm = self.cell_mm.unwrap_or(1.0);
+        let plain = Scale::true_to(grid, cell_mm);
         let scale = match (
             self.height_mm_per_unit,
             self.exaggeration.unwrap_or_default(),
         ) {
             (Some(height), _) => Scale::new(cell_mm, height),
-            (None, Exaggeration::Auto) => suggest_scale(grid, self.cell_mm).map(|s| s.scale),
-            (None, Exaggeration::Times(times)) => Scale::true_to(grid, cell_mm)
-                .and_then(|plain| Scale::new(cell_mm, plain.height_mm_per_unit() * times)),
+            (None, Exaggeration::Auto) => plain.and_then(|plain| {
+                let (plain, summary) = (plain.height_mm_per_unit(), grid.raster().summary());
+                let relief = summary.highest - summary.lowest;
+                Scale::new(cell_mm, suited_height(plain, relief))
+            }),
+            (None, Exaggeration::Times(times)) => {
+                plain.and_then(|plain| Scale::new(cell_mm, plain.height_mm_per_unit() * times))
+            }
         };
         scale.or_hint("choose another --cell-mm, --exaggeration or --height-mm-per-unit")
+    }
+
+    /// How high the terrain is asked to be.
+    #[must_use]
+    pub fn heights(&self) -> Heights {
+        match (
+            self.height_mm_per_unit,
+            self.exaggeration.unwrap_or_default(),
+        ) {
+            (Some(height), _) => Heights::MmPerUnit(height),
+            (None, Exaggeration::Times(times)) => Heights::Exaggerated(times),
+            (None, Exaggeration::Auto) => Heights::Suited,
+        }
     }
 
     /// The grid that is felt of a raster.

@@ -1,0 +1,234 @@
+//! Options that say which part of a terrain lies in front of the arm, and how large;
+//! shared by `run` and `demo`.
+
+use hapterra_core::phantom::Calibration;
+
+use super::rendering::Rendering;
+use crate::cli::failure::Failure;
+use crate::place::{
+    Coordinates, FELT_MM, Reach, Sizing, Target, View, ViewOptions, coordinates_in_words,
+    place_in_words,
+};
+use crate::raster::{Georeference, Raster};
+use crate::terrain::{FeltGrid, Terrain};
+
+/// Relief in the hand below which an exaggeration is suggested, mm.
+const FLAT_MM: f64 = 4.0;
+
+/// Which part of the terrain, and how large. Nothing said: all of it, laid into the arm's
+/// reach.
+#[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Place and scale")]
+pub struct Placing {
+    /// Lay the terrain, or the box, into the reach of the arm: what is done when nothing
+    /// else is said
+    #[arg(long, conflicts_with_all = ["at", "at_lonlat", "ground_m_per_mm", "cell_mm"])]
+    pub fit: bool,
+
+    /// Part of the terrain to lay into the reach: west, south, east and north in the file's
+    /// coordinates (columns and rows from the south-west sample where it has none)
+    #[arg(long, value_name = "W,S,E,N", allow_hyphen_values = true, value_parser = numbers::<4>,
+          conflicts_with_all = ["bbox_lonlat", "at", "at_lonlat", "ground_m_per_mm", "cell_mm"])]
+    pub bbox: Option<[f64; 4]>,
+
+    /// The same by longitude and latitude, degrees (WGS 84)
+    #[arg(long, value_name = "W,S,E,N", allow_hyphen_values = true, value_parser = numbers::<4>,
+          conflicts_with_all = ["at", "at_lonlat", "ground_m_per_mm", "cell_mm"])]
+    pub bbox_lonlat: Option<[f64; 4]>,
+
+    /// Place under the arm's home position, in the file's coordinates; at 1 mm a felt cell
+    /// unless a scale is stated
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = numbers::<2>,
+          conflicts_with = "at_lonlat")]
+    pub at: Option<[f64; 2]>,
+
+    /// The same by longitude and latitude, degrees (WGS 84)
+    #[arg(long, value_name = "LON,LAT", allow_hyphen_values = true, value_parser = numbers::<2>)]
+    pub at_lonlat: Option<[f64; 2]>,
+
+    /// Scale: ground metres a hand millimetre
+    #[arg(
+        long,
+        value_name = "S",
+        allow_negative_numbers = true,
+        conflicts_with = "cell_mm"
+    )]
+    pub ground_m_per_mm: Option<f64>,
+}
+
+/// A grid, and what is asked for of it.
+pub(in crate::cli) struct Asked<'r> {
+    pub(in crate::cli) grid: FeltGrid<'r>,
+    options: ViewOptions,
+}
+
+impl Placing {
+    /// What is asked for of a raster. What is wrong with the place itself is found here,
+    /// before any device is spoken to.
+    ///
+    /// # Errors
+    /// No such place.
+    pub(in crate::cli) fn of<'r>(
+        &self,
+        rendering: &Rendering,
+        raster: &'r Raster,
+    ) -> Result<Asked<'r>, Failure> {
+        let options = self.options(rendering);
+        let grid = options.target.grid(raster, rendering.cells.unwrap_or_default())?;
+        // Whichever arm it will be: of one, all but the reach shows already.
+        let tried = View::new(&grid, &Reach::of(&Calibration::PREMIUM_3_0), &options);
+        tried
+            .map(|_| Asked { grid, options })
+            .map_err(Failure::from)
+    }
+
+    fn options(&self, rendering: &Rendering) -> ViewOptions {
+        let (own, lonlat) = (Coordinates::Own, Coordinates::LonLat);
+        let target = match self {
+            Self { at: Some(at), .. } => Target::At(*at, own),
+            Self {
+                at_lonlat: Some(at),
+                ..
+            } => Target::At(*at, lonlat),
+            Self {
+                bbox: Some(sides), ..
+            } => Target::Box(*sides, own),
+            Self {
+                bbox_lonlat: Some(sides),
+                ..
+            } => Target::Box(*sides, lonlat),
+            _ => Target::Whole,
+        };
+        let sizing = match (self.ground_m_per_mm, rendering.cell_mm) {
+            (Some(scale), _) => Sizing::GroundMPerMm(scale),
+            (None, Some(cell_mm)) => Sizing::CellMm(cell_mm),
+            (None, None) => Sizing::Fit,
+        };
+        ViewOptions {
+            target,
+            sizing,
+            heights: rendering.heights(),
+            level: rendering.level,
+        }
+    }
+}
+
+impl Asked<'_> {
+    /// What lies where in front of an arm with a calibration.
+    ///
+    /// # Errors
+    /// Heights that the arm does not reach.
+    pub(in crate::cli) fn view(&self, arm: &Calibration) -> Result<View, Failure> {
+        Ok(View::new(&self.grid, &Reach::of(arm), &self.options)?)
+    }
+}
+
+/// Where a terrain lies and how large it is, in lines as `run` and `demo` print them.
+pub(in crate::cli) fn told(view: &View, terrain: &Terrain<'_>) -> String {
+    let file = terrain.raster().georeference();
+    let mut text = format!(
+        "place          {} under the home position\nscale          {}\n",
+        place_in_words(&file, view.home_ground),
+        scale_in_words(view),
+    );
+    let relief = view.heights_mm[1] - view.heights_mm[0];
+    if relief > 0.0 && relief < FLAT_MM && view.exaggeration.is_some_and(|times| times == 1.0) {
+        let times = (FELT_MM / relief).round();
+        text += &format!(
+            "relief         {relief:.2} mm in the hand; --exaggeration {times} makes it {:.0} mm\n",
+            times * relief
+        );
+    }
+    text
+}
+
+/// A view's scale, and what a felt cell of its level is.
+pub(in crate::cli) fn scale_in_words(view: &View) -> String {
+    let (level, cell_mm) = (view.level, short(view.felt_cell_mm()));
+    match (view.ground_m_per_mm(), view.felt_cell_m()) {
+        (Some(scale), Some(cell_m)) => format!(
+            "{} ground metres a hand millimetre; at level {level} a felt cell is {} m, {cell_mm} mm in the hand",
+            short(scale),
+            short(cell_m)
+        ),
+        _ => format!("at level {level} a felt cell is {cell_mm} mm in the hand"),
+    }
+}
+
+/// Scale and place, in short lines for a picture: a name and what there is to say.
+pub(in crate::cli) fn picture_lines(view: &View, file: &Georeference) -> Vec<(String, String)> {
+    let mut lines = vec![];
+    if let Some(scale) = view.ground_m_per_mm() {
+        lines.push(("1 mm in the hand".to_owned(), format!("{} m", short(scale))));
+    }
+    let cell_mm = short(view.felt_cell_mm());
+    lines.push(match view.felt_cell_m() {
+        Some(metres) => (
+            format!("felt cell, level {}", view.level),
+            format!("{} m, {cell_mm} mm", short(metres)),
+        ),
+        None => (
+            format!("felt cell, level {}", view.level),
+            format!("{cell_mm} mm"),
+        ),
+    });
+    if let Some(times) = view.exaggeration {
+        let said = match (times - 1.0).abs() < 1e-9 {
+            true => "true to scale".to_owned(),
+            false => format!("× {}", short(times)),
+        };
+        lines.push(("heights".to_owned(), said));
+    }
+    let home = coordinates_in_words(file, view.home_ground);
+    lines.push(("home position".to_owned(), home));
+    if let Some([longitude, latitude]) = file.to_lonlat(view.home_ground) {
+        let said = format!("{longitude:.5}, {latitude:.5}");
+        lines.push(("longitude, latitude".to_owned(), said));
+    }
+    lines
+}
+
+/// Five digits of a number at most.
+pub(in crate::cli) fn short(value: f64) -> String {
+    let decimals = (4.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0);
+    let text = format!("{value:.*}", decimals as usize);
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
+/// So many finite numbers between commas.
+fn numbers<const COUNT: usize>(text: &str) -> Result<[f64; COUNT], String> {
+    let parsed: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    let numbers = parsed.ok().and_then(|numbers| numbers.try_into().ok());
+    numbers
+        .filter(|numbers: &[f64; COUNT]| numbers.iter().all(|number| number.is_finite()))
+        .ok_or_else(|| format!("{COUNT} numbers between commas are wanted"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_between_commas() {
+        assert_eq!(numbers("-72.5, 44"), Ok([-72.5, 44.0]));
+        for bad in ["1", "1,2,3", "1;2", "1,", "inf,0", "nan,1", ""] {
+            assert!(numbers::<2>(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn lengths_are_said_with_five_digits() {
+        for (value, said) in [
+            (10.9, "10.9"),
+            (0.123_456_7, "0.12346"),
+            (1234.567, "1234.6"),
+            (400_000.0, "400000"),
+            (5.0, "5"),
+        ] {
+            assert_eq!(short(value), said);
+        }
+    }
+}

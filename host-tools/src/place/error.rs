@@ -1,0 +1,102 @@
+//! Why a terrain cannot be laid in front of the arm as it was asked for.
+
+use crate::terrain::BadScale;
+
+/// Why a place or a scale cannot be had.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlaceError {
+    /// Longitude and latitude of a file whose reference system is not known.
+    #[error(
+        "the file states no reference system, so it is not known where a longitude and latitude are in it; it covers {bounds}"
+    )]
+    NoSystem {
+        /// What the terrain covers, in its own coordinates.
+        bounds: String,
+    },
+    /// A longitude and latitude that the projection does not have.
+    #[error(
+        "longitude {}, latitude {} is no place of the file's map ({system}); it covers {bounds}", .lonlat[0], .lonlat[1]
+    )]
+    NotOnMap {
+        /// As asked for, degrees.
+        lonlat: [f64; 2],
+        /// The file's reference system.
+        system: String,
+        /// What the terrain covers.
+        bounds: String,
+    },
+    /// A place beyond the samples.
+    #[error("{place} is outside of the terrain, which covers {bounds}")]
+    Outside {
+        /// As asked for.
+        place: String,
+        /// What the terrain covers.
+        bounds: String,
+    },
+    /// A place without a height.
+    #[error("there is no data at {place}: it is a hole; the terrain covers {bounds}")]
+    Hole {
+        /// As asked for.
+        place: String,
+        /// What the terrain covers.
+        bounds: String,
+    },
+    /// A box whose sides are in the wrong order.
+    #[error("a box is west,south,east,north: {0} is not")]
+    NoBox(String),
+    /// A box beyond the samples.
+    #[error("the box {place} is outside of the terrain, which covers {bounds}")]
+    BoxOutside {
+        /// As asked for.
+        place: String,
+        /// What the terrain covers.
+        bounds: String,
+    },
+    /// A box around nothing but holes.
+    #[error("there is no data in the box {place}; the terrain covers {bounds}")]
+    BoxOfHoles {
+        /// As asked for.
+        place: String,
+        /// What the terrain covers.
+        bounds: String,
+    },
+    /// A box that holds no patch.
+    #[error("the box {place} is smaller than a cell of the terrain, which covers {bounds}")]
+    BoxTooSmall {
+        /// As asked for.
+        place: String,
+        /// What the terrain covers.
+        bounds: String,
+    },
+    /// A box of longitude and latitude that a map does not hold in one piece.
+    #[error("the box {place} lies across the seam of the file's map ({system})")]
+    BoxAcrossSeam {
+        /// As asked for.
+        place: String,
+        /// The file's reference system.
+        system: String,
+    },
+    /// Ground metres, of a file that knows none.
+    #[error("the file does not know how large its cells are on the ground")]
+    NoGroundSize,
+    /// A scale that is none.
+    #[error("{0} ground metres a hand millimetre: it must be above zero, and finite")]
+    GroundScale(f64),
+    /// An exaggeration that is none.
+    #[error("heights × {0}: it must be finite and not zero")]
+    Exaggeration(f64),
+    /// Heights that the arm does not reach, however small the terrain is.
+    #[error("the relief is {relief_mm:.0} mm high in the hand; the arm reaches {reach_mm:.0} mm")]
+    TooTall {
+        /// Of the terrain in the hand.
+        relief_mm: f64,
+        /// From the lowest to the highest point that the arm gets to.
+        reach_mm: f64,
+    },
+    /// A calibration whose stops leave no room.
+    #[error("the calibration leaves the arm no room to lay a terrain into")]
+    NoReach,
+    /// Numbers that no terrain can be scaled with.
+    #[error(transparent)]
+    Scale(#[from] BadScale),
+}

@@ -1,0 +1,208 @@
+//! From the coordinates that a user gives to places in a felt grid.
+
+use super::error::PlaceError;
+use super::target::Coordinates;
+use super::words::{asked_in_words, bounds_in_words, box_in_words, system_in_words};
+use crate::raster::{Bounds, Georeference, System};
+use crate::terrain::FeltGrid;
+
+/// Points along each side of a box of longitude and latitude: its sides are bent on a map.
+const ALONG: u32 = 24;
+/// Neighbours on a side of a box that are farther apart than this share of it lie on two
+/// sides of a map's seam.
+const TORN: f64 = 0.5;
+/// A place this far beyond the outermost sample is on it, in samples.
+const ON_SAMPLE: f64 = 1e-6;
+/// Samples looked at along each side of a box for its lowest and highest point.
+const LOOKS: u32 = 257;
+
+/// A place in the file's coordinates.
+pub(super) fn place(
+    file: &Georeference,
+    place: [f64; 2],
+    coordinates: Coordinates,
+) -> Result<[f64; 2], PlaceError> {
+    if coordinates == Coordinates::Own {
+        return Ok(file.nearest_turn(place));
+    }
+    if matches!(file.system(), System::Cells | System::Unstated) {
+        return Err(PlaceError::NoSystem {
+            bounds: bounds_in_words(file),
+        });
+    }
+    file.of_lonlat(place).ok_or_else(|| PlaceError::NotOnMap {
+        lonlat: place,
+        system: system_in_words(file),
+        bounds: bounds_in_words(file),
+    })
+}
+
+/// Points around a box, in the file's coordinates.
+pub(super) fn outline(
+    file: &Georeference,
+    asked: Bounds,
+    coordinates: Coordinates,
+) -> Result<Vec<[f64; 2]>, PlaceError> {
+    let turn = match (coordinates, file.system()) {
+        (Coordinates::LonLat, _) => Some(360.0),
+        (Coordinates::Own, System::Geographic { degrees, .. }) => Some(360.0 / degrees),
+        (Coordinates::Own, _) => None,
+    };
+    let [west, south, mut east, north] = asked;
+    if let Some(turn) = turn.filter(|_| west > east) {
+        east += turn;
+    }
+    if !(west < east && south < north) {
+        return Err(PlaceError::NoBox(box_in_words(asked)));
+    }
+    let corners = [[west, south], [east, south], [east, north], [west, north]];
+    let middle = [0.5 * (west + east), 0.5 * (south + north)];
+    let there = place(file, middle, coordinates)?;
+    if coordinates == Coordinates::Own {
+        let moved = there[0] - middle[0];
+        return Ok(corners.map(|[x, y]| [x + moved, y]).to_vec());
+    }
+    let mut points = Vec::new();
+    for side in 0..4 {
+        let (from, to) = (corners[side], corners[(side + 1) % 4]);
+        for step in 0..ALONG {
+            let share = f64::from(step) / f64::from(ALONG);
+            let lonlat = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
+            points.push(in_turn_of(
+                file,
+                there,
+                place(file, within_turn(lonlat), coordinates)?,
+            ));
+        }
+    }
+    match is_torn(&points) {
+        true => Err(PlaceError::BoxAcrossSeam {
+            place: box_in_words(asked),
+            system: system_in_words(file),
+        }),
+        false => Ok(points),
+    }
+}
+
+/// A longitude that can be asked for.
+fn within_turn([longitude, latitude]: [f64; 2]) -> [f64; 2] {
+    match longitude > 360.0 {
+        true => [longitude - 360.0, latitude],
+        false => [longitude, latitude],
+    }
+}
+
+/// A place with its longitude in the turn of another one.
+fn in_turn_of(file: &Georeference, other: [f64; 2], [x, y]: [f64; 2]) -> [f64; 2] {
+    let System::Geographic { degrees, .. } = file.system() else {
+        return [x, y];
+    };
+    let turn = 360.0 / degrees;
+    [x + ((other[0] - x) / turn).round() * turn, y]
+}
+
+/// Whether neighbours on an outline are too far apart for one piece of a map.
+fn is_torn(points: &[[f64; 2]]) -> bool {
+    let [west, south, east, north] = around(points);
+    let whole = (east - west).hypot(north - south);
+    let next = points.iter().cycle().skip(1);
+    points
+        .iter()
+        .zip(next)
+        .any(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1]) > TORN * whole)
+}
+
+/// The smallest rectangle around places.
+pub(super) fn around(places: &[[f64; 2]]) -> Bounds {
+    let empty = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
+    places
+        .iter()
+        .fold(empty, |[west, south, east, north], [x, y]| {
+            [west.min(*x), south.min(*y), east.max(*x), north.max(*y)]
+        })
+}
+
+/// A place in felt cells that has a height, and this height in the file's vertical unit.
+pub(super) fn spot(
+    grid: &FeltGrid<'_>,
+    asked: [f64; 2],
+    coordinates: Coordinates,
+) -> Result<([f64; 2], f64), PlaceError> {
+    let file = grid.raster().georeference();
+    let ground = place(&file, asked, coordinates)?;
+    let told = || {
+        (
+            asked_in_words(&file, asked, coordinates),
+            bounds_in_words(&file),
+        )
+    };
+    let last = [grid.raster().columns(), grid.raster().rows()].map(|n| f64::from(n) - 1.0);
+    let sample = file.transform().to_samples(ground);
+    let inside = |axis: usize| (-ON_SAMPLE..=last[axis] + ON_SAMPLE).contains(&sample[axis]);
+    if !(inside(0) && inside(1)) {
+        let (place, bounds) = told();
+        return Err(PlaceError::Outside { place, bounds });
+    }
+    let felt = grid.of_ground(ground);
+    let most = [grid.columns(), grid.rows()].map(|n| f64::from(n) - 1.0);
+    let felt = [0, 1].map(|axis| felt[axis].clamp(0.0, most[axis]));
+    match grid.surface(felt) {
+        Some(height) => Ok((felt, height)),
+        None => {
+            let (place, bounds) = told();
+            Err(PlaceError::Hole { place, bounds })
+        }
+    }
+}
+
+/// The part of a terrain in a box: felt cells, and its lowest and highest point in the
+/// file's vertical unit.
+pub(super) fn area(
+    grid: &FeltGrid<'_>,
+    asked: Bounds,
+    coordinates: Coordinates,
+) -> Result<(Bounds, [f64; 2]), PlaceError> {
+    let file = grid.raster().georeference();
+    let told = || (box_in_words(asked), bounds_in_words(&file));
+    let points = outline(&file, asked, coordinates)?;
+    let felt: Vec<_> = points.iter().map(|point| grid.of_ground(*point)).collect();
+    let [west, south, east, north] = around(&felt);
+    let last = [grid.columns(), grid.rows()].map(|n| f64::from(n) - 1.0);
+    let [west, south] = [west.max(0.0), south.max(0.0)];
+    let [east, north] = [east.min(last[0]), north.min(last[1])];
+    if west >= east || south >= north {
+        let (place, bounds) = told();
+        return Err(PlaceError::BoxOutside { place, bounds });
+    }
+    if east - west < 1.0 || north - south < 1.0 {
+        let (place, bounds) = told();
+        return Err(PlaceError::BoxTooSmall { place, bounds });
+    }
+    let cells = [west, south, east, north];
+    match heights(grid, cells) {
+        Some(heights) => Ok((cells, heights)),
+        None => {
+            let (place, bounds) = told();
+            Err(PlaceError::BoxOfHoles { place, bounds })
+        }
+    }
+}
+
+/// Lowest and highest of the samples in a rectangle of felt cells, or of many of them
+/// where they are very many.
+fn heights(grid: &FeltGrid<'_>, [west, south, east, north]: Bounds) -> Option<[f64; 2]> {
+    let along = |from: f64, to: f64| {
+        let looks = LOOKS.min((to.ceil() - from.floor()) as u32 + 1).max(2);
+        (0..looks).map(move |look| {
+            let share = f64::from(look) / f64::from(looks - 1);
+            (from.floor() + share * (to.ceil() - from.floor())).round() as u32
+        })
+    };
+    let known = along(south, north)
+        .flat_map(|row| along(west, east).map(move |column| grid.height(column, row)))
+        .filter(|height| !height.is_nan());
+    known.fold(None, |range: Option<[f64; 2]>, height| {
+        let [low, high] = range.unwrap_or([height; 2]);
+        Some([low.min(height), high.max(height)])
+    })
+}

@@ -1,0 +1,61 @@
+//! Which part of a terrain is asked for.
+
+use super::error::PlaceError;
+use super::ground;
+use crate::raster::{Bounds, Georeference, Raster};
+use crate::terrain::{FeltCells, FeltGrid};
+
+/// What the numbers of a place are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coordinates {
+    /// x and y of the file's own reference system, or columns and rows where it has none.
+    Own,
+    /// Longitude and latitude, degrees, WGS 84.
+    LonLat,
+}
+
+/// Which part of a terrain is asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Target {
+    /// All of it.
+    #[default]
+    Whole,
+    /// A rectangle. Of degrees its west may be larger than its east: then it lies across
+    /// the line where longitudes begin anew.
+    Box(Bounds, Coordinates),
+    /// What is under the tip in the home pose.
+    At([f64; 2], Coordinates),
+}
+
+impl Target {
+    /// The grid in which a raster is felt at this target: its cells are square there.
+    ///
+    /// # Errors
+    /// [`PlaceError`] where there is no such place.
+    pub fn grid<'r>(
+        &self,
+        raster: &'r Raster,
+        cells: FeltCells,
+    ) -> Result<FeltGrid<'r>, PlaceError> {
+        Ok(match self.middle(&raster.georeference())? {
+            Some(ground) => FeltGrid::at(raster, cells, ground),
+            None => FeltGrid::new(raster, cells),
+        })
+    }
+
+    /// The middle of the target in the file's coordinates; of the whole terrain nothing.
+    ///
+    /// # Errors
+    /// As [`Target::grid`].
+    pub fn middle(&self, file: &Georeference) -> Result<Option<[f64; 2]>, PlaceError> {
+        Ok(match *self {
+            Self::Whole => None,
+            Self::At(place, coordinates) => Some(ground::place(file, place, coordinates)?),
+            Self::Box(bounds, coordinates) => {
+                let corners = ground::outline(file, bounds, coordinates)?;
+                let [west, south, east, north] = ground::around(&corners);
+                Some([0.5 * (west + east), 0.5 * (south + north)])
+            }
+        })
+    }
+}

@@ -1,0 +1,349 @@
+//! What of a terrain lies where in front of the arm, and how large.
+
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::scene::{Scene, Source};
+
+use super::PlacingError;
+use super::error::PlaceError;
+use super::fit::{ABOVE_MM, Extent};
+use super::ground;
+use super::reach::Reach;
+use super::target::Target;
+use crate::terrain::{FeltGrid, Scale, Terrain, TerrainError};
+
+/// Relief that a terrain gets in the hand where the file does not know how large its cells
+/// are, so that it has no true proportions, mm.
+const RELIEF_MM: f64 = 25.0;
+/// Relief that can be felt well, mm.
+pub(crate) const FELT_MM: f64 = 15.0;
+/// Hand millimetres a felt cell at a place whose scale nobody states.
+const CELL_MM: f64 = 1.0;
+
+/// How large the terrain is asked to be.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Sizing {
+    /// The target fills the arm's reach; of a place, 1 mm is a felt cell.
+    #[default]
+    Fit,
+    /// Hand millimetres a felt cell of level 0.
+    CellMm(f64),
+    /// Ground metres a hand millimetre.
+    GroundMPerMm(f64),
+}
+
+/// How high the terrain is asked to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Heights {
+    /// So many times its true proportions. A file that does not know how large its cells are has
+    /// none: its relief is then 25 mm times this where it is fitted, and a vertical unit is 1 mm
+    /// times this where its scale is stated.
+    Exaggerated(f64),
+    /// [`suited_height`].
+    Suited,
+    /// Hand millimetres a vertical unit of the file.
+    MmPerUnit(f64),
+}
+
+impl Default for Heights {
+    fn default() -> Self {
+        Self::Exaggerated(1.0)
+    }
+}
+
+/// Hand millimetres a vertical unit for a terrain that may be too flat to be felt: `plain`,
+/// which is true to scale, or as much more as makes a `relief` (vertical units) 15 mm high.
+#[must_use]
+pub fn suited_height(plain: f64, relief: f64) -> f64 {
+    match relief > 0.0 {
+        true => plain.max(FELT_MM / relief),
+        false => plain,
+    }
+}
+
+/// What is asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ViewOptions {
+    /// Which part of the terrain.
+    pub target: Target,
+    /// How large.
+    pub sizing: Sizing,
+    /// How high.
+    pub heights: Heights,
+    /// Level of detail; chosen by what the encoders tell where nobody states it.
+    pub level: Option<u8>,
+}
+
+/// What of a terrain lies where in front of the arm, and how large.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// The point of the terrain under the tip in its home pose, hand millimetres east,
+    /// north and up from the south-west sample at height zero.
+    pub home_mm: [f64; 3],
+    /// The same place in the file's coordinates.
+    pub home_ground: [f64; 2],
+    /// Of level 0.
+    pub scale: Scale,
+    /// Every 2ᴸ-th felt sample is felt.
+    pub level: u8,
+    /// Side of a felt cell of level 0 on the ground, m, where the file knows it.
+    pub side_m: Option<f64>,
+    /// How many times higher than at its true proportions the terrain is, where the file
+    /// knows them.
+    pub exaggeration: Option<f64>,
+    /// What is laid in front of the arm, from west, south to east, north, hand millimetres;
+    /// the whole terrain where only place and scale are stated.
+    pub laid_mm: [f64; 4],
+    /// Lowest and highest point of that in the hand, mm.
+    pub heights_mm: [f64; 2],
+}
+
+impl View {
+    /// Lays a terrain in front of an arm.
+    ///
+    /// The grid is the target's own ([`Target::grid`]): its cells are square at the place.
+    ///
+    /// # Errors
+    /// [`PlaceError`]: no such place or box, nothing known there, a scale that is none,
+    /// heights that the arm does not reach.
+    pub fn new(
+        grid: &FeltGrid<'_>,
+        reach: &Reach,
+        options: &ViewOptions,
+    ) -> Result<Self, PlaceError> {
+        let wanted = Wanted::new(grid, options)?;
+        match (options.target, options.sizing) {
+            (Target::At(place, coordinates), _) => {
+                let (felt, height) = ground::spot(grid, place, coordinates)?;
+                let scale = wanted.stated_scale()?;
+                wanted.over(reach, scale, felt, height)
+            }
+            (Target::Whole, Sizing::CellMm(_) | Sizing::GroundMPerMm(_)) => {
+                let scale = wanted.stated_scale()?;
+                let felt = wanted.last().map(|last| 0.5 * last);
+                // The middle may be a hole; what is around it is felt all the same.
+                let [low, high] = wanted.whole_heights();
+                let height = grid.surface(felt).unwrap_or(0.5 * (low + high));
+                wanted.over(reach, scale, felt, height)
+            }
+            (Target::Whole, Sizing::Fit) => {
+                let [east, north] = wanted.last();
+                wanted.fitted(reach, [0.0, 0.0, east, north], wanted.whole_heights())
+            }
+            (Target::Box(bounds, coordinates), _) => {
+                let (cells, heights) = ground::area(grid, bounds, coordinates)?;
+                wanted.fitted(reach, cells, heights)
+            }
+        }
+    }
+
+    /// Ground metres a hand millimetre, where the file knows its size.
+    #[must_use]
+    pub fn ground_m_per_mm(&self) -> Option<f64> {
+        self.side_m.map(|side| side / self.scale.cell_mm())
+    }
+
+    /// Ground metres a felt cell of the view's level, where the file knows its size.
+    #[must_use]
+    pub fn felt_cell_m(&self) -> Option<f64> {
+        self.side_m.map(|side| side * f64::from(self.level).exp2())
+    }
+
+    /// Hand millimetres a felt cell of the view's level.
+    #[must_use]
+    pub fn felt_cell_mm(&self) -> f64 {
+        self.scale.at_level(self.level).cell_mm()
+    }
+
+    /// The terrain at the view's scale and level.
+    ///
+    /// # Errors
+    /// [`TerrainError`].
+    pub fn terrain<'r>(&self, grid: FeltGrid<'r>) -> Result<Terrain<'r>, TerrainError> {
+        Terrain::over(grid, self.scale, self.level)
+    }
+
+    /// The scene in which the arm feels the view's terrain.
+    ///
+    /// # Errors
+    /// [`PlacingError::FarAway`] where the home position is farther out than can be addressed.
+    pub fn scene(
+        &self,
+        terrain: &Terrain<'_>,
+        law: ForceLaw,
+        rule: Rule,
+    ) -> Result<Scene, PlacingError> {
+        let home = terrain.scale().to_grid(self.home_mm);
+        let home = home.ok_or(PlacingError::FarAway(self.home_mm))?;
+        Ok(terrain.scene(law, rule, Source::Encoders, home))
+    }
+}
+
+/// What is asked for of a grid, its numbers checked.
+struct Wanted<'g> {
+    grid: &'g FeltGrid<'g>,
+    options: ViewOptions,
+}
+
+impl<'g> Wanted<'g> {
+    fn new(grid: &'g FeltGrid<'g>, options: &ViewOptions) -> Result<Self, PlaceError> {
+        match options.sizing {
+            Sizing::GroundMPerMm(scale) if !(scale.is_finite() && scale > 0.0) => {
+                return Err(PlaceError::GroundScale(scale));
+            }
+            Sizing::GroundMPerMm(_) if grid.side_m().is_none() => {
+                return Err(PlaceError::NoGroundSize);
+            }
+            _ => {}
+        }
+        match options.heights {
+            Heights::Exaggerated(times) if !times.is_finite() || times == 0.0 => {
+                return Err(PlaceError::Exaggeration(times));
+            }
+            _ => {}
+        }
+        Ok(Self {
+            grid,
+            options: *options,
+        })
+    }
+
+    /// Columns and rows of the last felt sample.
+    fn last(&self) -> [f64; 2] {
+        [self.grid.columns(), self.grid.rows()].map(|count| f64::from(count) - 1.0)
+    }
+
+    fn whole_heights(&self) -> [f64; 2] {
+        let summary = self.grid.raster().summary();
+        [summary.lowest, summary.highest]
+    }
+
+    fn stated_scale(&self) -> Result<Scale, PlaceError> {
+        let side_m = self.grid.side_m();
+        let cell_mm = match self.options.sizing {
+            Sizing::Fit => CELL_MM,
+            Sizing::CellMm(cell_mm) => cell_mm,
+            Sizing::GroundMPerMm(scale) => side_m.ok_or(PlaceError::NoGroundSize)? / scale,
+        };
+        Ok(Scale::new(cell_mm, self.height_mm_per_unit(cell_mm, None))?)
+    }
+
+    /// Hand millimetres a vertical unit with cells of a size in the hand; `relief` is that
+    /// of what is fitted, in vertical units.
+    fn height_mm_per_unit(&self, cell_mm: f64, relief: Option<f64>) -> f64 {
+        let plain = match (self.grid.cells_per_vertical_unit(), relief) {
+            (Some(cells), _) => cells * cell_mm,
+            (None, Some(relief)) if relief > 0.0 => rounded_down(RELIEF_MM / relief),
+            (None, _) => 1.0,
+        };
+        match self.options.heights {
+            Heights::MmPerUnit(height) => height,
+            Heights::Exaggerated(times) => times * plain,
+            Heights::Suited => {
+                let [low, high] = self.whole_heights();
+                suited_height(plain, relief.unwrap_or(high - low))
+            }
+        }
+    }
+
+    /// A place of the terrain under the home position.
+    fn over(
+        &self,
+        reach: &Reach,
+        scale: Scale,
+        felt: [f64; 2],
+        height: f64,
+    ) -> Result<View, PlaceError> {
+        let [east, north] = felt.map(|cells| cells * scale.cell_mm());
+        // In the home pose the tip hangs in the air over its place.
+        let up = height * scale.height_mm_per_unit() + ABOVE_MM;
+        let [columns, rows] = self.last();
+        let cells = [0.0, 0.0, columns, rows];
+        Ok(self.view(reach, scale, [east, north, up], cells, self.whole_heights()))
+    }
+
+    /// Part of the terrain in the middle of the reach.
+    fn fitted(
+        &self,
+        reach: &Reach,
+        cells: [f64; 4],
+        heights: [f64; 2],
+    ) -> Result<View, PlaceError> {
+        let [west, south, east, north] = cells;
+        let relief = heights[1] - heights[0];
+        let mm_per_unit = |cell_mm: f64| self.height_mm_per_unit(cell_mm, Some(relief));
+        let heights_mm = |cell_mm: f64| sorted(heights.map(|h| h * mm_per_unit(cell_mm)));
+        let extent = Extent {
+            cells: [east - west, north - south],
+            heights_mm: &heights_mm,
+        };
+        let side_m = self.grid.side_m();
+        let fitted = extent.fit(reach, |cell_mm| match side_m {
+            Some(side) => side / rounded_up(side / cell_mm),
+            None => rounded_down(cell_mm),
+        })?;
+        let scale = Scale::new(fitted.cell_mm, mm_per_unit(fitted.cell_mm))?;
+        let middle = [0.5 * (west + east), 0.5 * (south + north)];
+        let [east, north] =
+            [0, 1].map(|axis| middle[axis] * scale.cell_mm() - fitted.middle_mm[axis]);
+        let home_mm = [east, north, fitted.home_up_mm];
+        Ok(self.view(reach, scale, home_mm, cells, heights))
+    }
+
+    fn view(
+        &self,
+        reach: &Reach,
+        scale: Scale,
+        home_mm: [f64; 3],
+        cells: [f64; 4],
+        heights: [f64; 2],
+    ) -> View {
+        let felt = [home_mm[0], home_mm[1]].map(|mm| mm / scale.cell_mm());
+        let true_height = self.grid.cells_per_vertical_unit();
+        View {
+            home_mm,
+            home_ground: self.grid.to_ground(felt),
+            scale,
+            level: self
+                .options
+                .level
+                .unwrap_or_else(|| self.level(reach, &scale)),
+            side_m: self.grid.side_m(),
+            exaggeration: true_height.map(|cells| scale.height_cells(1.0) / cells),
+            laid_mm: cells.map(|cells| cells * scale.cell_mm()),
+            heights_mm: sorted(heights.map(|height| height * scale.height_mm_per_unit())),
+        }
+    }
+
+    /// The finest level whose cells are not finer than a count of the encoders; a lower
+    /// one where that would leave no patch.
+    fn level(&self, reach: &Reach, scale: &Scale) -> u8 {
+        let fewest = self.grid.columns().min(self.grid.rows()) - 1;
+        let last = fewest.max(1).ilog2() as u8;
+        let fine = |level: &u8| scale.at_level(*level).cell_mm() < reach.resolution_mm();
+        (0..last).find(|level| !fine(level)).unwrap_or(last)
+    }
+}
+
+fn sorted([a, b]: [f64; 2]) -> [f64; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// The smallest number of three digits that is not below a positive one.
+fn rounded_up(x: f64) -> f64 {
+    let unit = 10f64.powf(x.log10().floor() - 2.0);
+    let rounded = (x / unit - 1e-9).ceil() * unit;
+    // The digits that people read: 0.3, not 0.30000000000000004.
+    format!("{rounded:.2e}").parse().unwrap_or(rounded)
+}
+
+/// The largest number of three digits that is not above a positive one.
+fn rounded_down(x: f64) -> f64 {
+    let unit = 10f64.powf(x.log10().floor() - 2.0);
+    let rounded = (x / unit + 1e-9).floor() * unit;
+    format!("{rounded:.2e}").parse().unwrap_or(rounded)
+}
+
+#[cfg(test)]
+#[path = "view_tests.rs"]
+mod tests;

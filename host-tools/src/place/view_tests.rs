@@ -1,0 +1,458 @@
+//! Every kind of grid at every kind of place: what is asked for is under the hand.
+
+use super::*;
+use crate::place::{Coordinates, ReachBox};
+use crate::raster::{CellSize, CellUnit, Certainty, GroundTransform, Raster};
+use crate::terrain::FeltCells;
+use hapterra_core::phantom::Calibration;
+
+const LONLAT: Coordinates = Coordinates::LonLat;
+const OWN: Coordinates = Coordinates::Own;
+
+/// Hills of 41 × 31 samples, with heights from 0 to 100 units.
+fn hills() -> Raster {
+    let raster = Raster::from_fn(41, 31, |column, row| {
+        let (x, y) = (column as f32 * 0.2, row as f32 * 0.3);
+        25.0 * (2.0 + x.sin() + y.cos())
+    });
+    raster.expect("raster")
+}
+
+fn cell(sides: (f64, f64), unit: CellUnit, lean: f64) -> CellSize {
+    CellSize {
+        east: sides.0,
+        north: sides.1,
+        lean,
+        unit,
+        map_scale: (1.0, 1.0),
+        latitude: matches!(unit, CellUnit::Degree).then_some(60.0),
+        certainty: Certainty::Stated,
+    }
+}
+
+/// A raster at a place: name, raster, and whether its place on the globe is known.
+fn made() -> Vec<(&'static str, Raster, bool)> {
+    let metre = CellUnit::Length { metres: 1.0 };
+    let at = |origin, column, row, epsg, size| {
+        let ground = GroundTransform::new(origin, column, row).expect("a plane");
+        hills().with_cell(size).with_ground(ground, epsg)
+    };
+    let degrees = cell((0.001, 0.001), CellUnit::Degree, 0.0);
+    let tens = cell((10.0, 10.0), metre, 0.0);
+    let leaning = cell((10.0, 8.0), metre, 0.28);
+    vec![
+        (
+            "degrees at 60° N",
+            at(
+                [10.0, 60.0],
+                [0.001, 0.0],
+                [0.0, 0.001],
+                Some(4326),
+                degrees,
+            ),
+            true,
+        ),
+        (
+            "degrees over the antimeridian",
+            at([179.98, -10.0], [0.001, 0.0], [0.0, 0.001], None, degrees),
+            true,
+        ),
+        (
+            "UTM",
+            at([386e3, 379e4], [10.0, 0.0], [0.0, 10.0], Some(26911), tens),
+            true,
+        ),
+        (
+            "web Mercator at 60° N",
+            at(
+                [1e6, 8_399_000.0],
+                [10.0, 0.0],
+                [0.0, 10.0],
+                Some(3857),
+                tens,
+            ),
+            true,
+        ),
+        (
+            "rotated UTM",
+            at([386e3, 379e4], [8.0, 6.0], [-6.0, 8.0], Some(32612), tens),
+            true,
+        ),
+        (
+            "skewed, no code",
+            at([100.0, 50.0], [10.0, 0.0], [2.24, 7.68], None, leaning),
+            false,
+        ),
+        (
+            "no code",
+            at([386e3, 379e4], [10.0, 0.0], [0.0, 10.0], None, tens),
+            false,
+        ),
+        ("nothing known", hills(), false),
+    ]
+}
+
+fn reach() -> Reach {
+    Reach::of(&Calibration::PREMIUM_1_5)
+}
+
+/// The view, and the grid that it is of.
+fn seen<'r>(raster: &'r Raster, options: &ViewOptions) -> Result<(FeltGrid<'r>, View), PlaceError> {
+    let grid = options.target.grid(raster, FeltCells::Square)?;
+    let view = View::new(&grid, &reach(), options)?;
+    Ok((grid, view))
+}
+
+fn at(place: [f64; 2], coordinates: Coordinates, sizing: Sizing) -> ViewOptions {
+    ViewOptions {
+        target: Target::At(place, coordinates),
+        sizing,
+        ..ViewOptions::default()
+    }
+}
+
+fn boxed(sides: [f64; 4], coordinates: Coordinates) -> ViewOptions {
+    ViewOptions {
+        target: Target::Box(sides, coordinates),
+        ..ViewOptions::default()
+    }
+}
+
+/// The coordinates under the home position of the scene that a device would get.
+fn ground_at_home(grid: &FeltGrid<'_>, view: &View) -> [f64; 2] {
+    let terrain = view.terrain(*grid).expect("a terrain");
+    let scene = view
+        .scene(&terrain, ForceLaw::PREMIUM, Rule::Swept)
+        .expect("a scene");
+    let [east, north, _] = terrain.scale().to_mm(&scene.home);
+    grid.to_ground([east, north].map(|mm| mm / view.scale.cell_mm()))
+}
+
+#[test]
+fn what_is_asked_for_is_under_the_home_position() {
+    for (name, raster, on_globe) in made() {
+        let file = raster.georeference();
+        for sample in [[20.0, 15.0], [3.3, 28.9], [37.7, 1.2]] {
+            let ground = file.transform().to_ground(sample);
+            for level in [None, Some(0), Some(2)] {
+                for sizing in [Sizing::Fit, Sizing::CellMm(0.37), Sizing::CellMm(5.0)] {
+                    let options = ViewOptions {
+                        level,
+                        ..at(ground, OWN, sizing)
+                    };
+                    let (grid, view) = seen(&raster, &options).expect(name);
+                    let found = grid.of_ground(ground_at_home(&grid, &view));
+                    let wanted = grid.of_ground(ground);
+                    let off = (found[0] - wanted[0]).hypot(found[1] - wanted[1]);
+                    assert!(off < 0.5, "{name}, {sample:?}: {off} cells");
+                    // Far better, in truth.
+                    assert!(off < 1e-3, "{name}, {sample:?}: {off} cells");
+                    let height = grid.surface(wanted).expect("known");
+                    let up = height * view.scale.height_mm_per_unit();
+                    assert!((view.home_mm[2] - up - ABOVE_MM).abs() < 1e-6, "{name}");
+                }
+            }
+            let lonlat = file.to_lonlat(ground);
+            assert_eq!(lonlat.is_some(), on_globe, "{name}");
+            if let Some(lonlat) = lonlat {
+                let (_, view) = seen(&raster, &at(lonlat, LONLAT, Sizing::Fit)).expect(name);
+                let off = [0, 1].map(|axis| view.home_ground[axis] - ground[axis]);
+                let step = file.transform().column_step();
+                let share = off[0].hypot(off[1]) / step[0].hypot(step[1]);
+                assert!(share < 1e-2, "{name}: {share} samples");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
+    for record in [
+        Calibration::PREMIUM_1_0,
+        Calibration::PREMIUM_1_5,
+        Calibration::PREMIUM_3_0,
+    ] {
+        let reach = Reach::of(&record);
+        for (name, raster, _) in made() {
+            for times in [1.0, -2.0, 20.0] {
+                let grid = FeltGrid::new(&raster, FeltCells::Square);
+                let options = ViewOptions {
+                    heights: Heights::Exaggerated(times),
+                    ..ViewOptions::default()
+                };
+                let view = View::new(&grid, &reach, &options).expect(name);
+                let around_home = |spare: f64| {
+                    let (laid, heights) = (view.laid_mm, view.heights_mm);
+                    let low = [laid[0], laid[1], heights[0] - spare];
+                    let high = [laid[2], laid[3], heights[1] + spare];
+                    ReachBox {
+                        low: [0, 1, 2].map(|axis| low[axis] - view.home_mm[axis]),
+                        high: [0, 1, 2].map(|axis| high[axis] - view.home_mm[axis]),
+                    }
+                };
+                assert!(reach.holds(&around_home(9.9)), "{name} {:?}", record.model);
+                let size = [
+                    view.laid_mm[2] - view.laid_mm[0],
+                    view.laid_mm[3] - view.laid_mm[1],
+                    view.heights_mm[1] - view.heights_mm[0],
+                ];
+                let larger = size.map(|side| 1.05 * side + 26.0);
+                assert_eq!(reach.middle_of(larger), None, "{name}: {size:?} mm");
+            }
+        }
+    }
+}
+
+#[test]
+fn suited_heights_are_true_to_scale_or_as_high_as_can_be_felt() {
+    let metre = CellUnit::Length { metres: 1.0 };
+    let options = |sizing| ViewOptions {
+        heights: Heights::Suited,
+        sizing,
+        ..ViewOptions::default()
+    };
+    for side in [10.0, 1000.0, 1e5] {
+        let raster = hills().with_cell(cell((side, side), metre, 0.0));
+        for sizing in [Sizing::Fit, Sizing::GroundMPerMm(side / 4.0)] {
+            let (_, view) = seen(&raster, &options(sizing)).expect("fits");
+            let relief = view.heights_mm[1] - view.heights_mm[0];
+            let times = view.exaggeration.expect("known");
+            match side > 10.0 {
+                true => assert!((relief - FELT_MM).abs() < 1e-6 && times > 2.0, "{view:?}"),
+                false => assert!(relief > FELT_MM && times == 1.0, "{view:?}"),
+            }
+        }
+    }
+    assert_eq!(suited_height(0.5, 0.0), 0.5, "a plain that is level");
+}
+
+#[test]
+fn the_scale_is_said_as_it_is_at_the_place_and_level() {
+    for (name, raster, side) in [
+        ("degrees", &made()[0].1, 55.66),
+        ("UTM", &made()[2].1, 10.0),
+        ("web Mercator", &made()[3].1, 5.0),
+    ] {
+        let file = raster.georeference();
+        let ground = file.transform().to_ground([20.0, 15.0]);
+        let options = ViewOptions {
+            level: Some(2),
+            ..at(ground, OWN, Sizing::GroundMPerMm(40.0))
+        };
+        let (grid, view) = seen(raster, &options).expect(name);
+        let found = view.ground_m_per_mm().expect("known");
+        assert!((found - 40.0).abs() < 1e-9, "{name}: {found}");
+        let felt = view.felt_cell_m().expect("known");
+        assert!((felt / (4.0 * side) - 1.0).abs() < 5e-3, "{name}: {felt}");
+        assert!((felt / view.felt_cell_mm() - 40.0).abs() < 1e-9, "{name}");
+        assert_eq!(
+            view.exaggeration.map(|times| (times * 1e6).round()),
+            Some(1e6)
+        );
+        let terrain = view.terrain(grid).expect("a terrain");
+        assert_eq!(terrain.scale().cell_mm(), view.felt_cell_mm());
+    }
+}
+
+#[test]
+fn cells_are_square_at_the_place_that_is_felt() {
+    let degrees = cell((0.01, 0.01), CellUnit::Degree, 0.0);
+    let raster = Raster::from_fn(50, 600, |column, row| (column + row) as f32).expect("raster");
+    let ground = GroundTransform::new([10.0, 57.0], [0.01, 0.0], [0.0, 0.01]);
+    let raster = raster
+        .with_cell(degrees)
+        .with_ground(ground.expect("a plane"), Some(4326));
+    for latitude in [57.5_f64, 62.5] {
+        let options = at([10.2, latitude], OWN, Sizing::Fit);
+        let (grid, _) = seen(&raster, &options).expect("there");
+        let side = grid.side_m().expect("known");
+        let (a, e2) = (6_378_137.0_f64, 0.006_694_379_990_14);
+        let (sin, cos) = latitude.to_radians().sin_cos();
+        let true_side = (a * cos / (1.0 - e2 * sin * sin).sqrt()).to_radians() * 0.01;
+        assert!(
+            (side / true_side - 1.0).abs() < 1e-3,
+            "{latitude}: {side} for {true_side}"
+        );
+    }
+}
+
+#[test]
+fn a_box_lies_in_the_middle_and_its_cells_are_not_finer_than_the_encoders_tell() {
+    let raster = Raster::from_fn(9000, 5000, |column, _| (column % 100) as f32).expect("raster");
+    let ground = GroundTransform::new([5e5, 4e6], [1.0, 0.0], [0.0, 1.0]).expect("a plane");
+    let raster = raster.with_ground(ground, Some(32612));
+    let whole = seen(&raster, &ViewOptions::default()).expect("whole").1;
+    let resolution = reach().resolution_mm();
+    assert!(
+        whole.felt_cell_mm() >= resolution,
+        "{} mm",
+        whole.felt_cell_mm()
+    );
+    assert!(whole.felt_cell_mm() < 2.0 * resolution.max(whole.scale.cell_mm()));
+    assert!(whole.scale.cell_mm() < 0.06, "{}", whole.scale.cell_mm());
+    let sides = [501_000.0, 4_001_000.0, 501_400.0, 4_001_200.0];
+    let (grid, view) = seen(&raster, &boxed(sides, OWN)).expect("there");
+    assert_eq!(view.level, 0);
+    let [west, south, east, north] = view.laid_mm.map(|mm| mm / view.scale.cell_mm());
+    let corners = [grid.to_ground([west, south]), grid.to_ground([east, north])];
+    for (found, wanted) in corners.as_flattened().iter().zip(sides) {
+        assert!((found - wanted).abs() < 1e-3, "{corners:?}");
+    }
+    // The middle is straight before the home position.
+    assert!((view.home_ground[0] - 501_200.0).abs() < 1e-3, "{view:?}");
+    assert!(whole.ground_m_per_mm() > view.ground_m_per_mm());
+}
+
+#[test]
+fn boxes_by_longitude_and_latitude_also_over_the_antimeridian() {
+    let grids = made();
+    let degrees = &grids[0].1;
+    let by = |raster: &Raster, sides, coordinates| {
+        seen(raster, &boxed(sides, coordinates)).map(|(_, view)| view.laid_mm)
+    };
+    let sides = [10.005, 60.005, 10.025, 60.02];
+    let own = by(degrees, sides, OWN).expect("there");
+    let lonlat = by(degrees, sides, LONLAT).expect("there");
+    for side in 0..4 {
+        assert!(
+            (own[side] - lonlat[side]).abs() < 1e-6,
+            "{own:?} {lonlat:?}"
+        );
+    }
+    let utm = &grids[2].1;
+    let file = utm.georeference();
+    let [west, south] = file.to_lonlat([386_100.0, 3_790_100.0]).expect("there");
+    let [east, north] = file.to_lonlat([386_200.0, 3_790_200.0]).expect("there");
+    assert!(by(utm, [west, south, east, north], LONLAT).is_ok());
+    // From 179.99 to 180.01, however its longitudes are written.
+    let pacific = &grids[1].1;
+    let first = by(pacific, [179.99, -9.99, -179.99, -9.98], LONLAT).expect("there");
+    for sides in [
+        [179.99, -9.99, 180.01, -9.98],
+        [-180.01, -9.99, -179.99, -9.98],
+    ] {
+        for coordinates in [OWN, LONLAT] {
+            let again = by(pacific, sides, coordinates).expect("there");
+            for side in 0..4 {
+                assert!(
+                    (again[side] - first[side]).abs() < 1e-5,
+                    "{again:?} {first:?}"
+                );
+            }
+        }
+    }
+    assert!(by(pacific, [179.99, -9.99, -179.99, -9.98], OWN).is_ok());
+    // The world's own map is torn there.
+    let web = &grids[3].1;
+    let torn = by(web, [170.0, -10.0, -170.0, 10.0], LONLAT);
+    assert!(
+        matches!(torn, Err(PlaceError::BoxAcrossSeam { .. })),
+        "{torn:?}"
+    );
+}
+
+#[test]
+fn what_cannot_be_placed_is_refused_with_the_bounds() {
+    let grids = made();
+    let utm = &grids[2].1;
+    let no_code = &grids[6].1;
+    let holes = Raster::from_fn(41, 31, |column, _| match column {
+        0..20 => f32::NAN,
+        _ => 7.0,
+    });
+    let holes = holes.expect("raster");
+    let refused = |raster: &Raster, options: ViewOptions| {
+        let refused = seen(raster, &options).map(|_| ()).expect_err("refused");
+        refused.to_string()
+    };
+    let utm_bounds =
+        "x 386000 to 386400, y 3790000 to 3790300 (EPSG:26911), which is longitude -118.2";
+    for (said, parts) in [
+        (
+            refused(utm, at([0.0, 0.0], OWN, Sizing::Fit)),
+            ["x 0, y 0 (EPSG:26911) is outside", utm_bounds],
+        ),
+        (
+            refused(utm, at([-72.5, 44.0], LONLAT, Sizing::Fit)),
+            ["longitude -72.5, latitude 44 is outside", utm_bounds],
+        ),
+        (
+            refused(utm, at([10.0, 95.0], LONLAT, Sizing::Fit)),
+            ["latitude 95 is no place of the file's map", utm_bounds],
+        ),
+        (
+            refused(no_code, at([-118.2, 34.2], LONLAT, Sizing::Fit)),
+            ["states no reference system", "x 386000 to 386400"],
+        ),
+        (
+            refused(&holes, at([5.0, 5.0], OWN, Sizing::Fit)),
+            ["no data at column 5, row 5", "column 0 to 40, row 0 to 30"],
+        ),
+        (
+            refused(&holes, boxed([1.0, 1.0, 9.0, 9.0], OWN)),
+            ["no data in the box 1,1,9,9", "column 0 to 40"],
+        ),
+        (
+            refused(&holes, boxed([25.0, 10.0, 25.5, 20.0], OWN)),
+            ["smaller than a cell", "column 0 to 40"],
+        ),
+        (
+            refused(utm, boxed([0.0, 0.0, 1.0, 1.0], OWN)),
+            ["the box 0,0,1,1 is outside", utm_bounds],
+        ),
+        (
+            refused(utm, boxed([2.0, 0.0, 1.0, 1.0], OWN)),
+            ["west,south,east,north", "2,0,1,1 is not"],
+        ),
+        (
+            refused(utm, boxed([f64::NAN, 0.0, 1.0, 1.0], OWN)),
+            ["west,south,east,north", "NaN,0,1,1 is not"],
+        ),
+    ] {
+        for part in parts {
+            assert!(said.contains(part), "{part} in: {said}");
+        }
+    }
+    let sized = |sizing| {
+        let options = ViewOptions {
+            sizing,
+            ..ViewOptions::default()
+        };
+        seen(utm, &options).map(|_| ())
+    };
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(
+            sized(Sizing::GroundMPerMm(bad)),
+            Err(PlaceError::GroundScale(_))
+        ));
+        assert!(matches!(
+            sized(Sizing::CellMm(bad)),
+            Err(PlaceError::Scale(_))
+        ));
+    }
+    let tall = ViewOptions {
+        heights: Heights::MmPerUnit(50.0),
+        ..ViewOptions::default()
+    };
+    assert!(matches!(seen(utm, &tall), Err(PlaceError::TooTall { .. })));
+    for times in [0.0, f64::NAN] {
+        let flat = ViewOptions {
+            heights: Heights::Exaggerated(times),
+            ..ViewOptions::default()
+        };
+        assert!(matches!(seen(utm, &flat), Err(PlaceError::Exaggeration(_))));
+    }
+}
+
+#[test]
+fn numbers_that_are_said_have_three_digits() {
+    for (x, up, down) in [
+        (0.123_45, 0.124, 0.123),
+        (300.0, 300.0, 300.0),
+        (9.999, 10.0, 9.99),
+        (1234.0, 1240.0, 1230.0),
+        (0.3, 0.3, 0.3),
+    ] {
+        assert_eq!((rounded_up(x), rounded_down(x)), (up, down), "{x}");
+    }
+}

@@ -1,0 +1,223 @@
+//! Which part of a terrain lies under the hand, as `run` and `demo` are told it, and what
+//! they say where that cannot be.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use hapterra_tests::hapterra_binary;
+
+/// A grid of 40 × 30 cells of a size, its south-west corner at a place; some holes in the
+/// north-east.
+fn grid(folder: &Path, corner: [f64; 2], cell: f64) -> PathBuf {
+    let path = folder.join("terrain.asc");
+    let [x, y] = corner;
+    let mut text = format!("ncols 40\nnrows 30\nxllcenter {x}\nyllcenter {y}\ncellsize {cell}\n");
+    for row in (0..30).rev() {
+        let heights = (0..40).map(|column: i32| match column > 34 && row > 24 {
+            true => "-9999".to_owned(),
+            false => format!("{:.2}", 0.1 * cell * f64::from(column % 7)),
+        });
+        text += &(heights.collect::<Vec<_>>().join(" ") + "\n");
+    }
+    std::fs::write(&path, text).expect("written");
+    path
+}
+
+fn said(output: &Output) -> String {
+    let both = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
+    String::from_utf8_lossy(&both).into_owned()
+}
+
+/// Runs a command for a moment on the device in memory.
+fn hapterra(command: &str, file: &Path, more: &[&str]) -> Output {
+    Command::new(hapterra_binary())
+        .args([command.as_ref(), file.as_os_str()])
+        .args(["--device", "native", "--seconds", "0.05"])
+        .args(more)
+        .current_dir(file.parent().expect("a folder"))
+        .output()
+        .expect("started")
+}
+
+#[test]
+fn nothing_said_lays_all_of_it_into_the_reach_and_says_the_scale() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = grid(folder.path(), [5000.0, 7000.0], 10.0);
+    for command in ["run", "demo"] {
+        let plain = said(&hapterra(command, &file, &[]));
+        let fitted = said(&hapterra(command, &file, &["--fit"]));
+        let place = |text: &str| {
+            let lines = text
+                .lines()
+                .filter(|line| line.starts_with("place") || line.starts_with("scale"));
+            lines.map(str::to_owned).collect::<Vec<_>>()
+        };
+        assert_eq!(place(&plain).len(), 2, "{plain}");
+        assert_eq!(place(&plain), place(&fitted));
+        let scale = &place(&plain)[1];
+        let metres: f64 = scale
+            .split_whitespace()
+            .nth(1)
+            .and_then(|s| s.parse().ok())
+            .expect("a number");
+        // 390 m in 150 to 450 mm.
+        assert!((0.8..2.7).contains(&metres), "{scale}");
+        assert!(scale.contains("at level 0 a felt cell is 10 m"), "{scale}");
+    }
+}
+
+#[test]
+fn place_scale_and_level_are_taken_and_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = grid(folder.path(), [5000.0, 7000.0], 10.0);
+    for (more, parts) in [
+        (
+            &["--at", "5100,7150", "--ground-m-per-mm", "4"][..],
+            [
+                "place          x 5100, y 7150",
+                "4 ground metres a hand millimetre; at level 0 a felt cell is 10 m, 2.5 mm",
+            ],
+        ),
+        (
+            &["--at", "5100,7150"],
+            [
+                "x 5100, y 7150",
+                "10 ground metres a hand millimetre; at level 0 a felt cell is 10 m, 1 mm",
+            ],
+        ),
+        (
+            &["--at=5100,7150", "--cell-mm", "2", "--level", "2"],
+            [
+                "x 5100, y 7150",
+                "5 ground metres a hand millimetre; at level 2 a felt cell is 40 m, 8 mm",
+            ],
+        ),
+        (
+            &["--bbox", "5100,7100,5200,7150"],
+            [
+                "place          x 5150, y 7",
+                "at level 0 a felt cell is 10 m",
+            ],
+        ),
+    ] {
+        let run = hapterra("run", &file, more);
+        let told = said(&run);
+        assert!(run.status.success(), "{more:?}: {told}");
+        for part in parts {
+            assert!(told.contains(part), "{more:?}: {part} in {told}");
+        }
+    }
+    let flat = said(&hapterra(
+        "run",
+        &file,
+        &["--at", "5100,7150", "--cell-mm", "0.5"],
+    ));
+    assert!(flat.contains("mm in the hand; --exaggeration "), "{flat}");
+}
+
+#[test]
+fn what_cannot_be_placed_is_an_error_that_says_the_bounds_and_what_to_do() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = grid(folder.path(), [5000.0, 7000.0], 10.0);
+    let bounds = "x 5000 to 5390, y 7000 to 7290";
+    for (more, parts) in [
+        (
+            &["--at", "0,0"][..],
+            ["x 0, y 0 (the file's own coordinates) is outside", bounds],
+        ),
+        (
+            &["--at", "5380,7280"],
+            ["there is no data at x 5380, y 7280", bounds],
+        ),
+        (
+            &["--at-lonlat", "-118.2,34.2"],
+            ["states no reference system", bounds],
+        ),
+        (
+            &["--bbox-lonlat", "-118.2,34.2,-118.1,34.3"],
+            ["states no reference system", "gdal_translate -a_srs"],
+        ),
+        (
+            &["--bbox", "0,0,10,10"],
+            ["the box 0,0,10,10 is outside", bounds],
+        ),
+        (
+            &["--bbox", "5370,7270,5390,7290"],
+            ["no data in the box", bounds],
+        ),
+        (
+            &["--bbox", "5101,7101,5102,7102"],
+            ["smaller than a cell", bounds],
+        ),
+        (
+            &["--bbox", "5200,7100,5100,7200"],
+            ["is west,south,east,north", "west before east"],
+        ),
+        (
+            &["--ground-m-per-mm", "0"],
+            ["0 ground metres a hand millimetre", "above zero"],
+        ),
+        (&["--cell-mm", "0"], ["a cell of 0 mm", "hint: "]),
+        (
+            &["--exaggeration", "0"],
+            ["heights × 0", "1 is true to scale"],
+        ),
+        (
+            &["--height-mm-per-unit", "900"],
+            ["the relief is", "a smaller --height-mm-per-unit"],
+        ),
+        (
+            &["--level", "9"],
+            ["level 9 leaves nothing", "a lower --level"],
+        ),
+    ] {
+        for command in ["run", "demo"] {
+            let run = hapterra(command, &file, more);
+            let told = said(&run);
+            assert_eq!(run.status.code(), Some(1), "{command} {more:?}: {told}");
+            for part in parts {
+                assert!(told.contains(part), "{command} {more:?}: {part} in {told}");
+            }
+        }
+    }
+}
+
+#[test]
+fn options_that_contradict_each_other_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = grid(folder.path(), [5000.0, 7000.0], 10.0);
+    for more in [
+        &["--fit", "--at", "1,2"][..],
+        &["--fit", "--cell-mm", "1"],
+        &["--fit", "--ground-m-per-mm", "1"],
+        &["--at", "1,2", "--at-lonlat", "1,2"],
+        &["--bbox", "1,2,3,4", "--at", "1,2"],
+        &["--bbox", "1,2,3,4", "--bbox-lonlat", "1,2,3,4"],
+        &["--bbox", "1,2,3,4", "--cell-mm", "1"],
+        &["--bbox-lonlat", "1,2,3,4", "--ground-m-per-mm", "1"],
+        &["--ground-m-per-mm", "1", "--cell-mm", "1"],
+        &["--exaggeration", "2", "--height-mm-per-unit", "1"],
+    ] {
+        let run = hapterra("run", &file, more);
+        assert_eq!(run.status.code(), Some(2), "{more:?}: {}", said(&run));
+        assert!(
+            said(&run).contains("cannot be used with"),
+            "{more:?}: {}",
+            said(&run)
+        );
+    }
+    for more in [
+        &["--at", "1"][..],
+        &["--at", "1,x"],
+        &["--bbox", "1,2,3"],
+        &["--at", "nan,0"],
+    ] {
+        let run = hapterra("run", &file, more);
+        assert_eq!(run.status.code(), Some(2), "{more:?}: {}", said(&run));
+        assert!(
+            said(&run).contains("numbers between commas"),
+            "{more:?}: {}",
+            said(&run)
+        );
+    }
+}
