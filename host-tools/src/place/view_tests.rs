@@ -4,7 +4,8 @@ use super::*;
 use crate::place::{Coordinates, ReachBox};
 use crate::raster::{CellSize, CellUnit, Certainty, GroundTransform, Raster};
 use crate::terrain::FeltCells;
-use hapterra_core::phantom::Calibration;
+use hapterra_core::Vec3;
+use hapterra_core::phantom::{Calibration, Pose};
 
 const LONLAT: Coordinates = Coordinates::LonLat;
 const OWN: Coordinates = Coordinates::Own;
@@ -191,6 +192,16 @@ fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
                     }
                 };
                 assert!(reach.holds(&around_home(9.9)), "{name} {:?}", record.model);
+                let tip = Pose::from_angles(&record, Vec3::ZERO).tip_mm();
+                let held = around_home(9.9);
+                for corner in 0..8 {
+                    let [east, north, up] = [0, 1, 2].map(|axis| match corner >> axis & 1 {
+                        0 => held.low[axis] as f32,
+                        _ => held.high[axis] as f32,
+                    });
+                    let at = tip + Vec3::new(-north, east, up);
+                    assert!(record.joints_at(at).is_ok(), "{name}: {at}");
+                }
                 let size = [
                     view.laid_mm[2] - view.laid_mm[0],
                     view.laid_mm[3] - view.laid_mm[1],
@@ -278,19 +289,17 @@ fn cells_are_square_at_the_place_that_is_felt() {
 
 #[test]
 fn a_box_lies_in_the_middle_and_its_cells_are_not_finer_than_the_encoders_tell() {
-    let raster = Raster::from_fn(9000, 5000, |column, _| (column % 100) as f32).expect("raster");
+    let raster = Raster::from_fn(30_000, 60, |column, _| (column % 100) as f32).expect("raster");
     let ground = GroundTransform::new([5e5, 4e6], [1.0, 0.0], [0.0, 1.0]).expect("a plane");
     let raster = raster.with_ground(ground, Some(32612));
     let whole = seen(&raster, &ViewOptions::default()).expect("whole").1;
     let resolution = reach().resolution_mm();
-    assert!(
-        whole.felt_cell_mm() >= resolution,
-        "{} mm",
-        whole.felt_cell_mm()
-    );
-    assert!(whole.felt_cell_mm() < 2.0 * resolution.max(whole.scale.cell_mm()));
-    assert!(whole.scale.cell_mm() < 0.06, "{}", whole.scale.cell_mm());
-    let sides = [501_000.0, 4_001_000.0, 501_400.0, 4_001_200.0];
+    // Samples are finer than a count, pairs of them are not.
+    assert!(whole.scale.cell_mm() < resolution, "{whole:?}");
+    assert!(whole.felt_cell_mm() >= resolution, "{whole:?}");
+    assert_eq!(whole.level, 1, "{} mm", whole.felt_cell_mm());
+    assert!(0.5 * whole.felt_cell_mm() < resolution, "{whole:?}");
+    let sides = [501_000.0, 4_000_010.0, 501_060.0, 4_000_050.0];
     let (grid, view) = seen(&raster, &boxed(sides, OWN)).expect("there");
     assert_eq!(view.level, 0);
     let [west, south, east, north] = view.laid_mm.map(|mm| mm / view.scale.cell_mm());
@@ -299,7 +308,7 @@ fn a_box_lies_in_the_middle_and_its_cells_are_not_finer_than_the_encoders_tell()
         assert!((found - wanted).abs() < 1e-3, "{corners:?}");
     }
     // The middle is straight before the home position.
-    assert!((view.home_ground[0] - 501_200.0).abs() < 1e-3, "{view:?}");
+    assert!((view.home_ground[0] - 501_030.0).abs() < 1e-3, "{view:?}");
     assert!(whole.ground_m_per_mm() > view.ground_m_per_mm());
 }
 
