@@ -2,6 +2,8 @@
 //!
 //! A hint that depends on the command's own options stands in that command.
 
+mod terrain_files;
+
 use super::failure::Hint;
 use crate::board::ImageError;
 use crate::board::update::{UpdateError, UpdateFailure};
@@ -9,7 +11,6 @@ use crate::calibrate::file::BadFile;
 use crate::calibrate::{FitError, WalkError};
 use crate::link::{EmulatorError, LinkError};
 use crate::place::{PlaceError, PlacingError};
-use crate::raster::{BadRaster, Error};
 use crate::replay::ReplayError;
 use crate::replay::settings::OtherTerrain;
 use crate::synth::{WriteError, WriteFault};
@@ -17,54 +18,6 @@ use crate::terrain::TerrainError;
 
 /// For what no user can have caused.
 const REPORT: &str = "this should not happen: please report it with the file and the options";
-
-impl Hint for Error {
-    fn hint(&self) -> String {
-        let path = self.path();
-        let stem = path.file_stem().unwrap_or(path.as_os_str());
-        let convert = format!(
-            "gdal_translate \"{}\" \"{}-converted.tif\"",
-            path.display(),
-            stem.to_string_lossy()
-        );
-        let hint = match self.fault() {
-            BadRaster::UnknownFormat => {
-                return format!(
-                    "convert it to GeoTIFF: {convert}; or say how raw samples lie with --raw-size WxH"
-                );
-            }
-            BadRaster::Unsupported { .. } => {
-                return format!("convert it to a plain GeoTIFF: {convert} -co COMPRESS=DEFLATE");
-            }
-            BadRaster::NotAHeightField(_) => {
-                return format!(
-                    "take a file with one band of heights, or pick the band: {convert} -b 1"
-                );
-            }
-            BadRaster::NotANumber { value, .. } => {
-                return format!("if that stands for no data, say so: --no-data {value}");
-            }
-            BadRaster::DecoderFailed(_) => {
-                return format!("get the file again, or convert it: {convert}");
-            }
-            BadRaster::Unreadable(_) => "check the path and that you may read the file",
-            BadRaster::RawSizeMissing => {
-                "say how the samples lie: --raw-size WxH --raw-type i16 --raw-endian little"
-            }
-            BadRaster::AmbiguousChannels(_) => {
-                "say which channel holds the height: --png-channel red|green|blue|alpha|grey"
-            }
-            BadRaster::TooSmall { .. } => "take a larger part of the terrain",
-            BadRaster::AllNoData { .. } => {
-                "check that the file covers your area, or name another no-data value with --no-data"
-            }
-            BadRaster::AbsurdSize(_) | BadRaster::Damaged(_) | BadRaster::Truncated(_) => {
-                "get the file again; where it came from, `gdalinfo -checksum` tells whether it is whole"
-            }
-        };
-        hint.into()
-    }
-}
 
 impl Hint for TerrainError {
     fn hint(&self) -> String {

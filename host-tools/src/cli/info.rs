@@ -1,5 +1,7 @@
 //! `hapterra info`: what a terrain file holds and how it would be streamed.
 
+mod place;
+
 use std::fmt::Write as _;
 
 use serde::Serialize;
@@ -10,6 +12,7 @@ use super::failure::Failure;
 use super::options::terrain_file::TerrainFile;
 use crate::raster::{CellSize, CellUnit, Certainty};
 use crate::terrain::{FeltCells, FeltGrid};
+use place::{Rectangle, Vertical, from, told};
 
 /// Arguments of `hapterra info`.
 #[derive(Debug, clap::Args)]
@@ -56,9 +59,16 @@ struct FileReport {
     /// The horizontal reference system, as `EPSG:26911`, where the file states it.
     crs: Option<String>,
     crs_name: Option<String>,
+    /// Where the reference system comes from.
+    crs_from: Option<&'static str>,
+    /// Outer edges of the cells around all samples, in the file's units.
+    bounds: Option<Rectangle>,
+    /// The same in degrees of the file's own datum.
+    bounds_lonlat: Option<Rectangle>,
     cell: Option<Cell>,
     /// Metres per vertical unit, where the file says so.
     metres_per_vertical_unit: Option<f64>,
+    vertical: Vertical,
     /// In the file's vertical unit.
     lowest: f64,
     highest: f64,
@@ -76,8 +86,8 @@ struct Cell {
     unit: &'static str,
     /// Whether the file states the unit; metres or degrees are assumed if not.
     unit_stated: bool,
-    /// Where the unit comes from: the `file`, the `code` of its reference system, or
-    /// it is `assumed`.
+    /// Where the unit comes from: the `file`, the `code` of its reference system, an
+    /// `option` of this command, or it is `assumed`.
     unit_from: &'static str,
     /// Ground length of both sides in metres.
     east_m: f64,
@@ -105,16 +115,21 @@ impl FileReport {
     fn new(input: &TerrainFile, grid: &FeltGrid<'_>) -> Self {
         let raster = grid.raster();
         let summary = raster.summary();
-        let (crs, crs_name) = raster.reference_system().unzip();
+        let system = raster.reference_system();
+        let code = system.and_then(|system| system.code());
         Self {
             file: input.file.display().to_string(),
             format: raster.format().to_owned(),
             columns: raster.columns(),
             rows: raster.rows(),
-            crs: crs.map(|code| format!("EPSG:{code}")),
-            crs_name,
+            crs: code.map(|code| format!("EPSG:{code}")),
+            crs_name: system.map(|system| system.name().to_owned()),
+            crs_from: system.map(|_| from(raster.reference_system_from())),
+            bounds: Rectangle::of(raster),
+            bounds_lonlat: Rectangle::lonlat(raster),
             cell: raster.cell().map(|cell| Cell::new(cell, grid)),
             metres_per_vertical_unit: raster.stated_metres_per_vertical_unit(),
+            vertical: Vertical::of(raster),
             lowest: summary.lowest,
             highest: summary.highest,
             no_data: summary.holes,
@@ -134,12 +149,17 @@ impl FileReport {
         line("file", self.file.clone());
         line("format", self.format.clone());
         line("size", format!("{} × {} samples", self.columns, self.rows));
-        if let (Some(code), Some(name)) = (&self.crs, &self.crs_name) {
-            line("crs", format!("{code} {name}"));
-        }
+        line("crs", self.reference_system());
+        let edges = |edges: &Option<Rectangle>| {
+            let edges = edges.as_ref().map(Rectangle::text);
+            edges.unwrap_or_else(|| "unknown".into())
+        };
+        line("bounds", edges(&self.bounds));
+        line("lon/lat", edges(&self.bounds_lonlat));
         let cell = self.cell.as_ref();
         line("cell", cell.map_or("unknown".into(), Cell::text));
-        line("heights", self.heights());
+        line("heights", format!("{} to {}", self.lowest, self.highest));
+        line("vertical", self.vertical.text());
         let share = 100.0 * self.no_data as f64 / samples as f64;
         line(
             "no data",
@@ -155,19 +175,20 @@ impl FileReport {
         text
     }
 
-    fn heights(&self) -> String {
-        let unit = match self.metres_per_vertical_unit {
-            Some(1.0) => "m".to_owned(),
-            Some(metres) => format!("units of {metres} m"),
-            None => "(unit not stated: metres assumed)".to_owned(),
-        };
-        format!("{} to {} {unit}", self.lowest, self.highest)
+    /// As `EPSG:26911 NAD83 / UTM zone 11N (stated)`.
+    fn reference_system(&self) -> String {
+        let from = self.crs_from.map(told).unwrap_or_default();
+        match (&self.crs, &self.crs_name) {
+            (Some(code), Some(name)) => format!("{code} {name} ({from})"),
+            (None, Some(name)) => format!("{name} ({from}, without a code)"),
+            _ => "not stated".into(),
+        }
     }
 }
 
 impl Cell {
     fn new(cell: CellSize, grid: &FeltGrid<'_>) -> Self {
-        let (east_m, north_m) = cell.metres();
+        let (east_m, north_m) = cell.ground_metres();
         Self {
             east: cell.east,
             north: cell.north,
@@ -177,11 +198,7 @@ impl Cell {
                 CellUnit::Length { .. } => "unit of length",
             },
             unit_stated: cell.certainty == Certainty::Stated,
-            unit_from: match cell.certainty {
-                Certainty::Stated => "file",
-                Certainty::FromCode => "code",
-                Certainty::UnitAssumed => "assumed",
-            },
+            unit_from: from(cell.certainty),
             east_m,
             north_m,
             felt_m: grid.side_m().unwrap_or_default(),
@@ -191,23 +208,21 @@ impl Cell {
     }
 
     fn text(&self) -> String {
-        let assumed = match self.unit_from {
-            "file" => "",
-            "code" => " (unit by the code of its reference system)",
-            _ => " (unit assumed)",
-        };
         let (east_m, north_m, felt_m) = (self.east_m, self.north_m, self.felt_m);
-        let stored = format!("{} × {} {}{assumed}", self.east, self.north, self.unit);
+        let stored = format!(
+            "{} × {} {} ({}), {east_m:.3} east × {north_m:.3} north m on the ground",
+            self.east,
+            self.north,
+            self.unit,
+            told(self.unit_from)
+        );
         let hint = match self.distorted {
             false => "",
             true => " of the same area, not in their true shape (--cells square)",
         };
-        match (self.resampled || self.distorted, self.unit) {
-            (false, "metre") => stored,
-            (false, _) => format!("{stored}, {felt_m:.3} m on the ground"),
-            _ => format!(
-                "{stored}, {east_m:.3} × {north_m:.3} m on the ground, felt as {felt_m:.3} m squares{hint}"
-            ),
+        match self.resampled || self.distorted {
+            false => stored,
+            true => format!("{stored}, felt as {felt_m:.3} m squares{hint}"),
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::error::PlaceError;
 use super::target::Coordinates;
 use super::words::{asked_in_words, bounds_in_words, box_in_words, system_in_words};
-use crate::raster::{Bounds, Georeference, System};
+use crate::raster::{Georeference, Sides, System};
 use crate::terrain::FeltGrid;
 
 /// Points along each side of a box of longitude and latitude: its sides are bent on a map.
@@ -18,7 +18,7 @@ const LOOKS: u32 = 257;
 
 /// A place in the file's coordinates.
 pub(super) fn place(
-    file: &Georeference,
+    file: &Georeference<'_>,
     place: [f64; 2],
     coordinates: Coordinates,
 ) -> Result<[f64; 2], PlaceError> {
@@ -39,13 +39,13 @@ pub(super) fn place(
 
 /// Points around a box, in the file's coordinates.
 pub(super) fn outline(
-    file: &Georeference,
-    asked: Bounds,
+    file: &Georeference<'_>,
+    asked: Sides,
     coordinates: Coordinates,
 ) -> Result<Vec<[f64; 2]>, PlaceError> {
     let turn = match (coordinates, file.system()) {
         (Coordinates::LonLat, _) => Some(360.0),
-        (Coordinates::Own, System::Geographic { degrees, .. }) => Some(360.0 / degrees),
+        (Coordinates::Own, System::Geographic { degrees }) => Some(360.0 / degrees),
         (Coordinates::Own, _) => None,
     };
     let [west, south, mut east, north] = asked;
@@ -93,8 +93,8 @@ fn within_turn([longitude, latitude]: [f64; 2]) -> [f64; 2] {
 }
 
 /// A place with its longitude in the turn of another one.
-fn in_turn_of(file: &Georeference, other: [f64; 2], [x, y]: [f64; 2]) -> [f64; 2] {
-    let System::Geographic { degrees, .. } = file.system() else {
+fn in_turn_of(file: &Georeference<'_>, other: [f64; 2], [x, y]: [f64; 2]) -> [f64; 2] {
+    let System::Geographic { degrees } = file.system() else {
         return [x, y];
     };
     let turn = 360.0 / degrees;
@@ -113,7 +113,7 @@ fn is_torn(points: &[[f64; 2]]) -> bool {
 }
 
 /// The smallest rectangle around places.
-pub(super) fn around(places: &[[f64; 2]]) -> Bounds {
+pub(super) fn around(places: &[[f64; 2]]) -> Sides {
     let empty = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
     places
         .iter()
@@ -159,9 +159,9 @@ pub(super) fn spot(
 /// file's vertical unit.
 pub(super) fn area(
     grid: &FeltGrid<'_>,
-    asked: Bounds,
+    asked: Sides,
     coordinates: Coordinates,
-) -> Result<(Bounds, [f64; 2]), PlaceError> {
+) -> Result<(Sides, [f64; 2]), PlaceError> {
     let file = grid.raster().georeference();
     let told = || (box_in_words(asked), bounds_in_words(&file));
     let points = outline(&file, asked, coordinates)?;
@@ -190,7 +190,7 @@ pub(super) fn area(
 
 /// Lowest and highest of the samples in a rectangle of felt cells, or of many of them
 /// where they are very many.
-fn heights(grid: &FeltGrid<'_>, [west, south, east, north]: Bounds) -> Option<[f64; 2]> {
+fn heights(grid: &FeltGrid<'_>, [west, south, east, north]: Sides) -> Option<[f64; 2]> {
     let along = |from: f64, to: f64| {
         let looks = LOOKS.min((to.ceil() - from.floor()) as u32 + 1).max(2);
         (0..looks).map(move |look| {

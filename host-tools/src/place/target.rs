@@ -2,7 +2,7 @@
 
 use super::error::PlaceError;
 use super::ground;
-use crate::raster::{Bounds, Georeference, Raster};
+use crate::raster::{Georeference, Raster, Sides};
 use crate::terrain::{FeltCells, FeltGrid};
 
 /// What the numbers of a place are.
@@ -22,7 +22,7 @@ pub enum Target {
     Whole,
     /// A rectangle. Of degrees its west may be larger than its east: then it lies across
     /// the line where longitudes begin anew.
-    Box(Bounds, Coordinates),
+    Box(Sides, Coordinates),
     /// What is under the tip in the home pose.
     At([f64; 2], Coordinates),
 }
@@ -47,7 +47,7 @@ impl Target {
     ///
     /// # Errors
     /// As [`Target::grid`].
-    pub fn middle(&self, file: &Georeference) -> Result<Option<[f64; 2]>, PlaceError> {
+    pub fn middle(&self, file: &Georeference<'_>) -> Result<Option<[f64; 2]>, PlaceError> {
         Ok(match *self {
             Self::Whole => None,
             Self::At(place, coordinates) => Some(ground::place(file, place, coordinates)?),

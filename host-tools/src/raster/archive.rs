@@ -7,7 +7,7 @@ use zip::ZipArchive;
 use zip::result::ZipError;
 
 use super::BadRaster;
-use super::format::starts_with_any;
+use super::format::{Claim, starts_with_any};
 use super::input::{DEFLATE_RATIO, FileBytes, ReadSeek};
 
 /// No packed terrain is unpacked past this: unpacking is in memory.
@@ -44,12 +44,23 @@ impl<'i> Zip<'i> {
         extension == "npz" || self.names.iter().any(|name| name.ends_with(".npy"))
     }
 
-    /// Unpacks the one entry with a terrain's name.
+    /// Unpacks the one entry whose name `claims` to be a terrain's. A weak claim, as that
+    /// of a `readme.txt`, counts where there is no other.
     pub(super) fn only_entry(
         &mut self,
-        is_terrain: fn(&str) -> bool,
+        claims: fn(&str) -> Option<Claim>,
     ) -> Result<FileBytes, BadRaster> {
-        let terrain: Vec<&String> = self.names.iter().filter(|name| is_terrain(name)).collect();
+        let entries = self.names.iter().filter(|name| !is_hidden(name));
+        let claimed: Vec<(&String, Claim)> = entries
+            .filter_map(|name| Some((name, claims(name)?)))
+            .collect();
+        let strong = |claim: &Claim| *claim != Claim::Suggests;
+        let any_strong = claimed.iter().any(|(_, claim)| strong(claim));
+        let terrain: Vec<&String> = claimed
+            .iter()
+            .filter(|(_, claim)| strong(claim) || !any_strong)
+            .map(|(name, _)| *name)
+            .collect();
         let refused = match terrain.as_slice() {
             [name] => {
                 let name = (*name).clone();
@@ -101,6 +112,15 @@ fn read_limited(reader: &mut dyn Read, limit: u64) -> Result<Vec<u8>, BadRaster>
         )));
     }
     Ok(bytes)
+}
+
+/// Whether an entry is what a file system notes beside the files.
+fn is_hidden(name: &str) -> bool {
+    name.starts_with("__MACOSX/")
+        || name
+            .rsplit('/')
+            .next()
+            .is_some_and(|name| name.starts_with('.'))
 }
 
 fn fault(error: &ZipError) -> BadRaster {

@@ -1,29 +1,25 @@
-//! Coordinate reference systems by EPSG code: what they are called, their units, and
-//! how long a unit is on the ground.
+//! Coordinate reference systems by EPSG code or as text: what they are called, their
+//! units, how long a unit is on the ground, and where that is on the globe.
 //!
-//! `epsg-utils` knows the codes, `proj4rs` the projections; both are named in this
-//! file only.
+//! `epsg-utils` knows the codes, `proj4wkt` reads texts, `proj4rs` has the projections;
+//! they are named in this file and its folder only.
 
-use std::f64::consts::{PI, TAU};
+mod system;
+pub(super) mod wgs84;
+mod wkt;
 
 use epsg_utils::Crs;
-use epsg_utils::crs::{CoordinateSystem, Unit};
-use proj4rs::Proj;
-use proj4rs::transform::transform;
+use epsg_utils::crs::{CoordinateSystem, Unit as EpsgUnit};
 
-/// Semi-major axis, m, and eccentricity squared of WGS 84.
-const WGS_84: (f64, f64) = (6_378_137.0, 0.006_694_379_990_141_3);
-/// Where a map's units are shorter or longer than this on the ground, the place is
-/// outside of what the projection is for.
-const SENSIBLE: std::ops::RangeInclusive<f64> = 1e-4..=1e4;
+pub use system::ReferenceSystem;
+pub(super) use system::Unit;
+use wkt::Node;
 
-/// A place that a projection gives back this much off is not one of its own, radians:
-/// 60 m on the ground.
-const SAME_RADIANS: f64 = 1e-5;
-
-/// A vertical unit that follows from a code.
+/// A vertical reference system.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Vertical {
+    /// EPSG's code, where it is known.
+    pub(super) code: Option<u16>,
     /// Name of the vertical reference system, as `NAVD88 height (ft)`.
     pub(super) name: String,
     /// Metres in its unit.
@@ -39,6 +35,7 @@ pub(super) fn vertical(code: u16) -> Option<Vertical> {
     };
     let axis = crs.coordinate_system.axes.first();
     Some(Vertical {
+        code: Some(code),
         metres: metres(&crs.coordinate_system)?,
         is_depth: axis.is_some_and(|axis| axis.direction == "down"),
         name: crs.name,
@@ -64,96 +61,31 @@ pub(super) fn metres_per_unit(code: u16) -> Option<f64> {
     }
 }
 
-/// Ground metres in a unit of the map, towards its x and its y, at a place in the
-/// units of the projected system with an EPSG code: a map's scale is true in few
-/// places.
-pub(super) fn local_metres(code: u16, (x, y): (f64, f64)) -> Option<(f64, f64)> {
-    const STEP: f64 = 1.0;
-    let map = Proj::from_epsg_code(code).ok()?;
-    let globe = globe()?;
-    let radians = |x: f64, y: f64| between(&map, &globe, [x, y]).map(|[x, y]| (x, y));
-    let here = radians(x, y)?;
-    let length = |there: (f64, f64)| {
-        let [east, north] = metres_per_radian(here.1);
-        let length = (east * (there.0 - here.0)).hypot(north * (there.1 - here.1)) / STEP;
-        SENSIBLE.contains(&length).then_some(length)
-    };
-    Some((
-        length(radians(x + STEP, y)?)?,
-        length(radians(x, y + STEP)?)?,
-    ))
-}
-
-/// Metres in a radian of longitude and of latitude at a latitude in radians: the radii
-/// of curvature of the ellipsoid.
-fn metres_per_radian(latitude: f64) -> [f64; 2] {
-    let (a, e2) = WGS_84;
-    let (sin, cos) = latitude.sin_cos();
-    let w = (1.0 - e2 * sin * sin).sqrt();
-    [a * cos / w, a * (1.0 - e2) / (w * w * w)]
-}
-
-/// Longitude and latitude (WGS 84, degrees) of a place on the map with an EPSG code.
-pub(super) fn to_lonlat(code: u16, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
-    between(&Proj::from_epsg_code(code).ok()?, &globe()?, [x, y])
-        .map(|radians| radians.map(f64::to_degrees))
-}
-
-/// The place on the map with an EPSG code at a longitude and latitude (WGS 84, degrees).
-pub(super) fn of_lonlat(code: u16, lonlat: [f64; 2]) -> Option<[f64; 2]> {
-    let radians = lonlat.map(f64::to_radians);
-    let map = Proj::from_epsg_code(code).ok()?;
-    let place = between(&globe()?, &map, radians)?;
-    // Far outside of what a projection is for its formulas give numbers all the same.
-    let back = between(&map, &globe()?, place)?;
-    let off = [0, 1].map(|axis| (back[axis] - radians[axis] + PI).rem_euclid(TAU) - PI);
-    let is_there = off.iter().all(|angle| angle.abs() < SAME_RADIANS);
-    is_there.then_some(place)
-}
-
-/// Longitude and latitude (WGS 84, degrees) of those of the geographic system with an
-/// EPSG code.
-pub(super) fn geographic_to_lonlat(code: u16, own: [f64; 2]) -> Option<[f64; 2]> {
-    let own = own.map(f64::to_radians);
-    between(&geographic(code)?, &globe()?, own).map(|radians| radians.map(f64::to_degrees))
-}
-
-/// Longitude and latitude (degrees) in the geographic system with an EPSG code of those
-/// of WGS 84.
-pub(super) fn geographic_of_lonlat(code: u16, lonlat: [f64; 2]) -> Option<[f64; 2]> {
-    let lonlat = lonlat.map(f64::to_radians);
-    between(&globe()?, &geographic(code)?, lonlat).map(|radians| radians.map(f64::to_degrees))
-}
-
-fn geographic(code: u16) -> Option<Proj> {
-    let system = Proj::from_epsg_code(code).ok()?;
-    system.is_latlong().then_some(system)
-}
-
-fn globe() -> Option<Proj> {
-    Proj::from_proj_string("+proj=longlat +datum=WGS84 +no_defs").ok()
-}
-
-/// A place of one system in another; angles in radians.
-fn between(from: &Proj, to: &Proj, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
-    let mut place = (x, y, 0.0);
-    transform(from, to, &mut place).ok()?;
-    let found = [place.0, place.1];
-    found
-        .iter()
-        .all(|number| number.is_finite())
-        .then_some(found)
+impl Vertical {
+    /// A vertical system that is described without a known code.
+    fn from_node(node: &Node) -> Option<Self> {
+        Some(Self {
+            code: None,
+            name: node.name()?.to_owned(),
+            metres: node.unit()?,
+            is_depth: node.has_axis("down"),
+        })
+    }
 }
 
 fn crs(code: u16) -> Option<Crs> {
-    let text = epsg_utils::epsg_to_wkt2(code.into()).ok()?;
-    epsg_utils::parse_wkt2(text).ok()
+    epsg_utils::parse_wkt2(code_wkt(code)?).ok()
+}
+
+/// The text (WKT 2) of a code.
+fn code_wkt(code: u16) -> Option<&'static str> {
+    epsg_utils::epsg_to_wkt2(code.into()).ok()
 }
 
 /// The unit stands with the system or with its axes.
 fn metres(system: &CoordinateSystem) -> Option<f64> {
     let of_axis = system.axes.first().and_then(|axis| axis.unit.as_ref());
-    let unit: Option<&Unit> = system.cs_unit.as_ref().or(of_axis);
+    let unit: Option<&EpsgUnit> = system.cs_unit.as_ref().or(of_axis);
     unit.and_then(|unit| unit.conversion_factor)
         .filter(|metres| metres.is_finite() && *metres > 0.0)
 }
@@ -175,6 +107,10 @@ mod tests {
         assert_eq!(name(26911).as_deref(), Some("NAD83 / UTM zone 11N"));
     }
 
+    fn wkt_of(code: u16) -> &'static str {
+        code_wkt(code).expect("a known code")
+    }
+
     /// Against PROJ's own scale factors (`proj -S`).
     #[test]
     fn a_unit_of_the_map_is_as_long_as_it_is_on_the_ground() {
@@ -182,12 +118,85 @@ mod tests {
             (26911, (386_000.0, 3_790_000.0), 1.000_240),
             (2056, (2_600_000.0, 1_200_000.0), 0.999_992),
             (3857, (0.0, 8_399_737.889_8), 0.500_8),
+            // NAD27 needs no grid of shifts for that.
+            (26711, (386_000.0, 3_790_000.0), 1.000_240),
         ];
         for (code, place, wanted) in cases {
-            let (east, north) = local_metres(code, place).expect("known");
+            let system = ReferenceSystem::from_code(code).expect("known");
+            let (east, north) = system.local_metres(place).expect("in reach");
             assert!((east / wanted - 1.0).abs() < 1e-3, "{code}: {east}");
             assert!((north / wanted - 1.0).abs() < 1e-3, "{code}: {north}");
+            assert_eq!(system.local_metres((1e12, 1e12)), None);
         }
-        assert_eq!(local_metres(26911, (1e12, 1e12)), None);
+    }
+
+    /// Against PROJ 9 (pyproj, to the system's own `geodetic_crs`).
+    #[test]
+    fn places_on_the_globe_and_back() {
+        let cases = [
+            (26911, (386000.0, 3790000.0), (-118.237991257, 34.244866903)),
+            (2056, (2650000.0, 1180000.0), (8.094280924, 46.770599962)),
+            (
+                3857,
+                (-13000000.0, 4000000.0),
+                (-116.780986936, 33.785230070),
+            ),
+            (26710, (562200.0, 5115400.0), (-122.193958766, 46.191297822)),
+            (2229, (6490000.0, 1870000.0), (-118.236814274, 34.130615306)),
+            (27700, (430000.0, 380000.0), (-1.549637734, 53.315809912)),
+            (
+                5070,
+                (-1500000.0, 1800000.0),
+                (-113.341029800, 37.999457522),
+            ),
+            (3031, (500000.0, -1200000.0), (157.380135052, -78.076720143)),
+            (28992, (120000.0, 480000.0), (4.874374687, 52.307857227)),
+            (31370, (150000.0, 170000.0), (4.367486482, 50.840956191)),
+            (32733, (480000.0, 7200000.0), (14.801291350, -25.316419444)),
+            (2154, (700000.0, 6600000.0), (3.000000000, 46.500000000)),
+            (3413, (-300000.0, -1500000.0), (-56.309932474, 75.946884614)),
+            (2193, (1600000.0, 5400000.0), (173.000000000, -41.551664523)),
+            (3577, (900000.0, -3600000.0), (141.682619704, -32.702404944)),
+        ];
+        for (code, place, wanted) in cases {
+            let by_code = ReferenceSystem::from_code(code).expect("known");
+            let (by_text, _) = ReferenceSystem::from_wkt(wkt_of(code));
+            assert_eq!(Some(&by_code), by_text.as_ref(), "the text names its code");
+            let found = by_code.lonlat(place).expect("in reach");
+            let off = (found.0 - wanted.0).abs().max((found.1 - wanted.1).abs());
+            assert!(off < 1e-7, "{code}: {found:?} for {wanted:?}");
+            let back = by_code.from_lonlat(found).expect("in reach");
+            let off = (back.0 - place.0).abs().max((back.1 - place.1).abs());
+            assert!(off < 1e-2, "{code}: {back:?} for {place:?}");
+        }
+    }
+
+    #[test]
+    fn a_text_without_a_code_has_its_own_numbers() {
+        let text = r#"PROJCS["my feet",GEOGCS["GCS_North_American_1983",DATUM["D_North_American_1983",SPHEROID["GRS_1980",6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",1640416.6666666667],PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",-117.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],UNIT["Foot_US",0.3048006096012192]]"#;
+        let (system, vertical) = ReferenceSystem::from_wkt(text);
+        let system = system.expect("a system");
+        assert_eq!((system.code(), system.name()), (None, "my feet"));
+        assert_eq!(system.unit(), Unit::Length(Some(0.304_800_609_601_219_2)));
+        assert_eq!(vertical, None);
+        let (longitude, latitude) = system
+            .lonlat((1_640_416.666_666_666_7, 0.0))
+            .expect("in reach");
+        assert!((longitude + 117.0).abs() < 1e-9 && latitude.abs() < 1e-9);
+        let compound = format!(
+            r#"COMPD_CS["both",{text},VERT_CS["NAVD88 height (ftUS)",VERT_DATUM["North American Vertical Datum 1988",2005],UNIT["US survey foot",0.304800609601219],AXIS["Gravity-related height",UP]]]"#
+        );
+        let (across, up) = ReferenceSystem::from_wkt(&compound);
+        assert_eq!(across.map(|system| system.unit()), Some(system.unit()));
+        let up = up.expect("a vertical system");
+        assert_eq!(
+            (up.name.as_str(), up.is_depth),
+            ("NAVD88 height (ftUS)", false)
+        );
+        assert!((up.metres - 1200.0 / 3937.0).abs() < 1e-9);
+        assert_eq!(
+            ReferenceSystem::from_wkt("LOCAL_CS[\"here\",UNIT[\"m\",1]]").0,
+            None
+        );
     }
 }

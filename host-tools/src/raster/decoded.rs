@@ -1,9 +1,10 @@
 //! What a decoder hands over, and what every format's result must satisfy.
 
-use super::BadRaster;
+use super::crs::{ReferenceSystem, Vertical};
 use super::geometry::CellSize;
-use super::georeference::GroundTransform;
+use super::placed::Place;
 use super::samples::{HoleMask, SampleValue, Samples, with_samples};
+use super::{BadRaster, Certainty, VerticalDatum};
 
 /// No height is larger than this (in the file's vertical unit), whatever the
 /// planet: such a sample is a no-data value that the file forgot to declare.
@@ -33,15 +34,20 @@ pub(super) struct Decoded {
     pub(super) scale: f64,
     /// See `scale`.
     pub(super) offset: f64,
-    /// EPSG code of the reference system, where the file states it.
-    pub(super) epsg: Option<u16>,
-    /// From a sample's column and row, as the file stores them, to the coordinates of its
-    /// centre, where the file knows them.
-    pub(super) ground: Option<GroundTransform>,
+    /// The reference system, where the file states it.
+    pub(super) system: Option<ReferenceSystem>,
+    /// Where that comes from.
+    pub(super) system_from: Certainty,
+    /// Where the samples lie, where the file knows it.
+    pub(super) place: Option<Place>,
     /// Size of a cell, where the file knows it.
     pub(super) cell: Option<CellSize>,
     /// Metres per vertical unit, where the file says so.
     pub(super) metres_per_vertical_unit: Option<f64>,
+    /// Where that comes from.
+    pub(super) vertical_unit_from: Certainty,
+    /// What the heights count from, where the file says so.
+    pub(super) vertical_datum: Option<VerticalDatum>,
     /// What the user should know.
     pub(super) remarks: Vec<String>,
 }
@@ -71,16 +77,47 @@ impl Decoded {
             mask: None,
             scale: 1.0,
             offset: 0.0,
-            epsg: None,
-            ground: None,
+            system: None,
+            system_from: Certainty::Stated,
+            place: None,
             cell: None,
             metres_per_vertical_unit: None,
+            vertical_unit_from: Certainty::Stated,
+            vertical_datum: None,
             remarks: Vec::new(),
         }
     }
 }
 
 impl Decoded {
+    /// Takes unit, datum and direction from a vertical reference system; `stated` are
+    /// the metres in a unit that the file states itself.
+    pub(super) fn set_vertical(&mut self, system: Option<Vertical>, stated: Option<f64>) {
+        self.metres_per_vertical_unit = stated.or(system.as_ref().map(|system| system.metres));
+        if let Some(system) = system {
+            if stated.is_none() && system.code.is_some() {
+                self.vertical_unit_from = Certainty::FromCode;
+            }
+            if system.is_depth {
+                self.turn_depths_into_heights(&system.name);
+            }
+            self.vertical_datum = Some(VerticalDatum {
+                name: system.name,
+                code: system.code,
+            });
+        }
+    }
+
+    /// Takes the vertical reference system with a code of EPSG's for what the format
+    /// counts heights from.
+    pub(super) fn set_vertical_datum(&mut self, code: u16) {
+        let known = super::crs::vertical(code);
+        self.vertical_datum = known.map(|system| VerticalDatum {
+            name: system.name,
+            code: Some(code),
+        });
+    }
+
     /// Turns numbers that grow downwards into heights, and says so.
     pub(super) fn turn_depths_into_heights(&mut self, why: &str) {
         self.scale = -self.scale;

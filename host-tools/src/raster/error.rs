@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use super::options::Encoding;
+
 /// A file that could not be opened as a height field: what is wrong with which file.
 #[derive(Debug, thiserror::Error)]
 #[error("{fault} ({})", path.display())]
@@ -53,6 +55,52 @@ pub enum BadRaster {
     /// Readable, but its samples are not heights.
     #[error("not a height field: {0}")]
     NotAHeightField(String),
+    /// Several parts could hold the heights; none was chosen.
+    #[error("not a height field: of its two-dimensional {kind}s ({}) none is named as heights are", names.join(", "))]
+    SeveralHeights {
+        /// What the file calls its parts.
+        kind: &'static str,
+        /// Their names.
+        names: Vec<String>,
+    },
+    /// A colour image whose bands could each be the height; none was chosen.
+    #[error("not a height field: {what}")]
+    ColourBands {
+        /// What it is.
+        what: String,
+        /// Number of bands.
+        bands: u16,
+    },
+    /// The user chose a band or variable that is not there.
+    #[error("there is no {asked}: {there}")]
+    NoSuchPart {
+        /// What was asked for.
+        asked: String,
+        /// What there is.
+        there: String,
+    },
+    /// The user named a cell size, the file states another.
+    #[error("the file states its own cell size: {0}")]
+    CellKnown(String),
+    /// A colour picture that looks as if its colours encoded heights.
+    #[error("not a height field as it is: a colour picture that looks like {}", match .0 {
+        Encoding::TerrainRgb => "Terrain-RGB heights",
+        Encoding::Terrarium => "Terrarium heights",
+    })]
+    EncodedPicture(Encoding),
+    /// Samples whose header is a file of its own, which is not there.
+    #[error("its header is missing: no {0} lies beside it")]
+    HeaderMissing(String),
+    /// The file is what it says, but holds more than is held in memory.
+    #[error("too large: {columns} × {rows} samples would take {gigabytes} GB of memory")]
+    TooLarge {
+        /// Samples from west to east.
+        columns: u64,
+        /// Samples from south to north.
+        rows: u64,
+        /// Memory that they would take, 10⁹ bytes, rounded up.
+        gigabytes: u64,
+    },
     /// A picture whose channels could each be the height; none was chosen.
     #[error("not a height field: {0}")]
     AmbiguousChannels(String),

@@ -12,8 +12,21 @@ pub(super) struct Format {
     pub(super) begins: fn(head: &[u8]) -> bool,
     /// Extensions in lower case. Inside an archive, a file with one of them is a terrain.
     pub(super) extensions: &'static [(&'static str, Claim)],
+    /// What a file has several of, so that the user may choose.
+    pub(super) parts: Parts,
     /// Reads the heights of a file.
     pub(super) decode: fn(&FileBytes, &OpenOptions) -> Result<Decoded, BadRaster>,
+}
+
+/// What a file of a format has several of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Parts {
+    /// Nothing: one field a file.
+    One,
+    /// Numbered bands.
+    Bands,
+    /// Variables with names.
+    Variables,
 }
 
 /// What an extension says about a file whose beginning says nothing.
@@ -28,10 +41,42 @@ pub(super) enum Claim {
 }
 
 impl Format {
+    /// Checks that the user chooses by what the format has.
+    ///
+    /// # Errors
+    /// [`BadRaster::NoSuchPart`].
+    pub(super) fn check_choice(&self, options: &OpenOptions) -> Result<(), BadRaster> {
+        self.parts.check_choice(self.name, options)
+    }
+
     /// What an extension says, if it is one of this format's.
     pub(super) fn claim(&self, extension: &str) -> Option<Claim> {
         let own = self.extensions.iter().find(|(own, _)| *own == extension);
         own.map(|(_, claim)| *claim)
+    }
+}
+
+impl Parts {
+    /// Checks that the user chooses by what the format of a name has.
+    ///
+    /// # Errors
+    /// [`BadRaster::NoSuchPart`].
+    pub(super) fn check_choice(self, name: &str, options: &OpenOptions) -> Result<(), BadRaster> {
+        let refused = |asked: String, there: String| Err(BadRaster::NoSuchPart { asked, there });
+        let has = match self {
+            Self::One => "one field of heights",
+            Self::Bands => "bands, chosen by number",
+            Self::Variables => "variables, chosen by name",
+        };
+        match (&options.variable, options.band) {
+            (Some(variable), _) if self != Self::Variables => {
+                refused(format!("variable {variable}"), format!("{name} has {has}"))
+            }
+            (_, Some(band)) if self == Self::Variables || (band > 1 && self == Self::One) => {
+                refused(format!("band {band}"), format!("{name} has {has}"))
+            }
+            _ => Ok(()),
+        }
     }
 }
 

@@ -12,15 +12,18 @@ pub enum CellUnit {
     Degree,
 }
 
-/// Where a cell's size comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Where a unit, a reference system or a datum comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Certainty {
-    /// The file states size and unit.
+    /// The file states it, or its format has no other.
+    #[default]
     Stated,
-    /// The file states the size; the unit follows from a code of its reference system.
+    /// It follows from a code of a reference system in the file.
     FromCode,
-    /// The file states the size; the unit is taken to be the usual one.
-    UnitAssumed,
+    /// Nothing says so: it is taken to be the usual one.
+    Assumed,
+    /// The user says so.
+    Given,
 }
 
 /// The size of a cell: the distance between neighbouring samples.
@@ -40,7 +43,7 @@ pub struct CellSize {
     pub map_scale: (f64, f64),
     /// Latitude of the middle of the field in degrees, where known.
     pub latitude: Option<f64>,
-    /// Whether the unit is stated or assumed.
+    /// Where the unit comes from.
     pub certainty: Certainty,
 }
 
@@ -124,7 +127,7 @@ impl CellSize {
             false => CellUnit::Length { metres: 1.0 },
         };
         Self {
-            certainty: Certainty::UnitAssumed,
+            certainty: Certainty::Assumed,
             ..Self::stated((east, north), unit, latitude)
         }
     }
@@ -135,6 +138,15 @@ impl CellSize {
         let usable = |side: f64| side.is_finite() && side > 1e-12 && side < 1e12;
         usable(east) && usable(north) && self.lean.abs() < 0.999
     }
+}
+
+/// What heights count from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct VerticalDatum {
+    /// Name of the vertical reference system, as `NAVD88 height`.
+    pub name: String,
+    /// EPSG's code for it, where it is known.
+    pub code: Option<u16>,
 }
 
 /// Metres in a unit of length by the name files give it, as `ft` or `metre`.

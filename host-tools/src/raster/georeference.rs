@@ -4,7 +4,7 @@
 //! Coordinates are always (x, y), which is (east, north) or (longitude, latitude),
 //! whatever order the reference system's own definition has.
 
-use super::crs;
+use super::crs::{ReferenceSystem, wgs84};
 use super::geometry::{CellSize, CellUnit, Certainty};
 
 /// Ends of the range in which longitudes and latitudes are taken, degrees.
@@ -106,46 +106,45 @@ pub enum System {
     /// The file knows no place: coordinates are the columns and rows of its samples,
     /// counted from the south-west sample.
     Cells,
-    /// Lengths or angles of a reference system that the file does not state.
+    /// Lengths or angles of a reference system that the file does not state, or whose
+    /// projection is not known.
     Unstated,
     /// Longitude and latitude.
     Geographic {
-        /// EPSG code, where the file states it.
-        epsg: Option<u16>,
         /// Degrees in a unit of the coordinates.
         degrees: f64,
     },
     /// East and north on a map.
-    Projected {
-        /// EPSG code.
-        epsg: u16,
-    },
+    Projected,
 }
 
 /// Where a raster's samples lie: column 0 the westernmost, row 0 the southernmost.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Georeference {
+pub struct Georeference<'r> {
     transform: GroundTransform,
     system: System,
+    /// The reference system, where the file states it.
+    reference: Option<&'r ReferenceSystem>,
     cell: Option<CellSize>,
     /// Columns and rows less one.
     last: [f64; 2],
 }
 
 /// A rectangle in coordinates: west, south, east, north.
-pub type Bounds = [f64; 4];
+pub type Sides = [f64; 4];
 
-impl Georeference {
+impl<'r> Georeference<'r> {
     pub(super) fn new(
         transform: Option<GroundTransform>,
-        epsg: Option<u16>,
+        reference: Option<&'r ReferenceSystem>,
         cell: Option<CellSize>,
         last: [f64; 2],
     ) -> Self {
-        let system = transform.map_or(System::Cells, |map| system(&map, epsg, cell));
+        let system = transform.map_or(System::Cells, |map| system(&map, reference, cell));
         Self {
             transform: transform.unwrap_or(GroundTransform::CELLS),
             system,
+            reference,
             cell,
             last,
         }
@@ -157,15 +156,22 @@ impl Georeference {
         self.system
     }
 
+    /// The reference system, where the file states it.
+    #[must_use]
+    pub const fn reference(&self) -> Option<&'r ReferenceSystem> {
+        self.reference
+    }
+
     /// The map from the raster's columns and rows to coordinates.
     #[must_use]
     pub const fn transform(&self) -> &GroundTransform {
         &self.transform
     }
 
-    /// The smallest rectangle of coordinates around all samples.
+    /// The smallest rectangle of coordinates around all samples: their own places, not the
+    /// edges of the cells around them.
     #[must_use]
-    pub fn bounds(&self) -> Bounds {
+    pub fn bounds(&self) -> Sides {
         let [columns, rows] = self.last;
         around(
             [[0.0, 0.0], [columns, 0.0], [0.0, rows], [columns, rows]]
@@ -179,12 +185,12 @@ impl Georeference {
     pub fn to_lonlat(&self, ground: [f64; 2]) -> Option<[f64; 2]> {
         let lonlat = match self.system {
             System::Cells | System::Unstated => None,
-            System::Geographic { epsg, degrees } => {
+            System::Geographic { degrees } => {
                 let own = ground.map(|angle| angle * degrees);
-                let shifted = epsg.and_then(|code| crs::geographic_to_lonlat(code, own));
+                let shifted = self.reference.and_then(|it| wgs84::of_own_degrees(it, own));
                 Some(shifted.unwrap_or(own))
             }
-            System::Projected { epsg } => crs::to_lonlat(epsg, ground),
+            System::Projected => wgs84::to_lonlat(self.reference?, ground),
         }?;
         // Files count longitudes from −180 or from 0: people read the former.
         Some([wrapped(lonlat[0]), lonlat[1]])
@@ -201,11 +207,13 @@ impl Georeference {
         let lonlat = [wrapped(longitude), latitude];
         match self.system {
             System::Cells | System::Unstated => None,
-            System::Geographic { epsg, degrees } => {
-                let own = epsg.and_then(|code| crs::geographic_of_lonlat(code, lonlat));
+            System::Geographic { degrees } => {
+                let own = self
+                    .reference
+                    .and_then(|it| wgs84::to_own_degrees(it, lonlat));
                 Some(self.nearest_turn(own.unwrap_or(lonlat).map(|angle| angle / degrees)))
             }
-            System::Projected { epsg } => crs::of_lonlat(epsg, lonlat),
+            System::Projected => wgs84::of_lonlat(self.reference?, lonlat),
         }
     }
 
@@ -213,7 +221,7 @@ impl Georeference {
     /// middle of the field; coordinates that are not angles stay.
     #[must_use]
     pub fn nearest_turn(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let System::Geographic { degrees, .. } = self.system else {
+        let System::Geographic { degrees } = self.system else {
             return [x, y];
         };
         let [west, _, east, _] = self.bounds();
@@ -228,25 +236,23 @@ impl Georeference {
         let cell = self.cell?;
         Some(match self.system {
             System::Cells | System::Unstated => cell,
-            System::Geographic { degrees, .. } => CellSize {
+            System::Geographic { degrees } => CellSize {
                 latitude: Some((ground[1] * degrees).clamp(-90.0, 90.0)),
                 ..cell
             },
-            System::Projected { epsg } => CellSize {
-                map_scale: self
-                    .map_scale(epsg, &cell, ground)
-                    .unwrap_or(cell.map_scale),
+            System::Projected => CellSize {
+                map_scale: self.map_scale(&cell, ground).unwrap_or(cell.map_scale),
                 ..cell
             },
         })
     }
 
     /// Ground metres in a metre of the map along rows and columns at a place.
-    fn map_scale(&self, epsg: u16, cell: &CellSize, [x, y]: [f64; 2]) -> Option<(f64, f64)> {
+    fn map_scale(&self, cell: &CellSize, [x, y]: [f64; 2]) -> Option<(f64, f64)> {
         let CellUnit::Length { metres } = cell.unit else {
             return None;
         };
-        let (east, north) = crs::local_metres(epsg, (x, y))?;
+        let (east, north) = self.reference?.local_metres((x, y))?;
         // Along a row and a column, which need not be along x and y.
         let along = |[dx, dy]: [f64; 2]| (east * dx).hypot(north * dy) / dx.hypot(dy) / metres;
         let map = &self.transform;
@@ -255,7 +261,7 @@ impl Georeference {
 }
 
 /// The smallest rectangle around places.
-pub(super) fn around(places: impl IntoIterator<Item = [f64; 2]>) -> Bounds {
+pub(super) fn around(places: impl IntoIterator<Item = [f64; 2]>) -> Sides {
     let empty = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
     places
         .into_iter()
@@ -264,17 +270,20 @@ pub(super) fn around(places: impl IntoIterator<Item = [f64; 2]>) -> Bounds {
         })
 }
 
-fn system(map: &GroundTransform, epsg: Option<u16>, cell: Option<CellSize>) -> System {
+fn system(
+    map: &GroundTransform,
+    reference: Option<&ReferenceSystem>,
+    cell: Option<CellSize>,
+) -> System {
     let degree = cell.filter(|cell| cell.unit == CellUnit::Degree);
-    match (degree, epsg) {
+    match (degree, reference) {
         // A guess that numbers are degrees is no longitude to rely on.
-        (Some(cell), None) if cell.certainty == Certainty::UnitAssumed => System::Unstated,
-        (Some(cell), epsg) => System::Geographic {
-            epsg,
+        (Some(cell), None) if cell.certainty == Certainty::Assumed => System::Unstated,
+        (Some(cell), _) => System::Geographic {
             degrees: whole(cell.east / length(map.column_step)),
         },
-        (None, Some(epsg)) => System::Projected { epsg },
-        (None, None) => System::Unstated,
+        (None, Some(reference)) if reference.has_projection() => System::Projected,
+        (None, _) => System::Unstated,
     }
 }
 

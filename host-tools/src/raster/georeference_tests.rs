@@ -14,6 +14,10 @@ fn transform(origin: [f64; 2], column: [f64; 2], row: [f64; 2]) -> Option<Ground
     GroundTransform::new(origin, column, row)
 }
 
+fn reference(epsg: Option<u16>) -> Option<ReferenceSystem> {
+    epsg.map(|code| ReferenceSystem::from_code(code).expect("known"))
+}
+
 #[test]
 fn samples_and_coordinates_are_each_others_inverse_also_rotated_and_skewed() {
     for (column, row) in [
@@ -50,7 +54,8 @@ fn longitude_and_latitude_go_there_and_back_in_every_system() {
         (Some(4269), [350.0, 40.0], 0.001, degrees(0.001)),
     ] {
         let map = transform(origin, [step, 0.0], [0.0, step]);
-        let place = Georeference::new(map, epsg, Some(cell), [100.0, 100.0]);
+        let reference = reference(epsg);
+        let place = Georeference::new(map, reference.as_ref(), Some(cell), [100.0, 100.0]);
         let ground = place.transform().to_ground([12.5, 60.25]);
         let lonlat = place.to_lonlat(ground).expect("on the globe");
         assert!(lonlat[0].abs() <= 180.0 && lonlat[1].abs() <= 90.0);
@@ -69,7 +74,8 @@ fn longitude_and_latitude_go_there_and_back_in_every_system() {
 #[test]
 fn longitude_comes_first_and_is_where_proj_has_it() {
     let map = transform([386_000.0, 3_790_000.0], [10.0, 0.0], [0.0, 10.0]);
-    let place = Georeference::new(map, Some(26911), Some(metres(10.0)), [9.0, 9.0]);
+    let utm = reference(Some(26911));
+    let place = Georeference::new(map, utm.as_ref(), Some(metres(10.0)), [9.0, 9.0]);
     let [longitude, latitude] = place.to_lonlat([386_000.0, 3_790_000.0]).expect("there");
     assert!((longitude + 118.237_991).abs() < 1e-5, "{longitude}");
     assert!((latitude - 34.244_867).abs() < 1e-5, "{latitude}");
@@ -79,7 +85,7 @@ fn longitude_comes_first_and_is_where_proj_has_it() {
 fn what_is_not_stated_is_no_longitude() {
     let map = transform([10.0, 60.0], [0.001, 0.0], [0.0, 0.001]);
     let guessed = CellSize {
-        certainty: Certainty::UnitAssumed,
+        certainty: Certainty::Assumed,
         ..degrees(0.001)
     };
     for (map, cell, system) in [
@@ -110,12 +116,15 @@ fn a_longitude_is_found_in_the_turn_that_the_file_counts_in() {
 #[test]
 fn a_cell_is_as_large_as_it_is_at_the_place() {
     let map = transform([10.0, 59.0], [0.001, 0.0], [0.0, 0.001]);
-    let place = Georeference::new(map, Some(4326), Some(degrees(0.001)), [100.0, 2000.0]);
+    let globe = reference(Some(4326));
+    let cell = Some(degrees(0.001));
+    let place = Georeference::new(map, globe.as_ref(), cell, [100.0, 2000.0]);
     let side = |latitude: f64| place.cell_at([10.0, latitude]).expect("known").metres();
     assert!(side(59.0).0 > 1.05 * side(61.0).0);
     assert!((side(60.0).0 - 55.8).abs() < 0.1, "{:?}", side(60.0));
     let map = transform([0.0, 0.0], [10.0, 0.0], [0.0, 10.0]);
-    let web = Georeference::new(map, Some(3857), Some(metres(10.0)), [9.0, 9.0]);
+    let mercator = reference(Some(3857));
+    let web = Georeference::new(map, mercator.as_ref(), Some(metres(10.0)), [9.0, 9.0]);
     let cell = web.cell_at([0.0, 8_399_737.9]).expect("known");
     let (east, north) = cell.ground_metres();
     assert!(

@@ -20,6 +20,7 @@
 //! infinite sample is an error: it is neither a height nor a declared hole.
 
 mod archive;
+mod beside;
 mod crs;
 mod decoded;
 mod error;
@@ -27,23 +28,28 @@ mod format;
 mod formats;
 mod geometry;
 mod georeference;
+mod ground_map;
 mod guard;
 mod input;
 mod open;
 mod options;
+mod placed;
 mod read;
 mod samples;
 
 use std::path::Path;
 
+pub use crs::ReferenceSystem;
 pub use decoded::{HeightSummary, LARGEST_HEIGHT};
 pub use error::{BadRaster, Error};
-pub use geometry::{CellSize, CellUnit, Certainty};
-pub use georeference::{Bounds, Georeference, GroundTransform, System};
-pub use options::{OpenOptions, PngChannel, RawLayout};
+pub use geometry::{CellSize, CellUnit, Certainty, VerticalDatum};
+pub use georeference::{Georeference, GroundTransform, Sides, System};
+pub use ground_map::Bounds;
+pub use options::{Encoding, OpenOptions, PngChannel, RawLayout};
 pub use samples::{Endian, SampleType, Samples};
 
 use decoded::Decoded;
+use placed::Place;
 use samples::{SampleValue, with_samples};
 
 /// A height field held once, in the compact type of its file.
@@ -66,6 +72,7 @@ impl Raster {
     pub fn open(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Self, Error> {
         let path = path.as_ref();
         open::decode(path, options)
+            .and_then(|decoded| decoded.with_ground_cell(options.ground_cell_m))
             .and_then(|decoded| Self::checked(decoded, options.no_data))
             .map_err(|fault| Error::new(path, fault))
     }
@@ -170,18 +177,47 @@ impl Raster {
         &self.source.format
     }
 
-    /// EPSG code and name of the horizontal reference system, where the file states a
-    /// code that is known.
-    pub fn reference_system(&self) -> Option<(u16, String)> {
-        let code = self.source.epsg?;
-        Some((code, crs::name(code)?))
+    /// The horizontal reference system, where the file states it.
+    pub fn reference_system(&self) -> Option<&ReferenceSystem> {
+        self.source.system.as_ref()
+    }
+
+    /// Where the reference system comes from.
+    pub fn reference_system_from(&self) -> Certainty {
+        self.source.system_from
+    }
+
+    /// Outer edges of the cells around all samples, in the units of the file's
+    /// coordinates, where the file knows its place.
+    pub fn bounds(&self) -> Option<Bounds> {
+        self.source.bounds()
+    }
+
+    /// The same in degrees of longitude and latitude of the file's own datum, where the
+    /// reference system is known. Longitudes run on over 180° where the field does.
+    pub fn bounds_lonlat(&self) -> Option<Bounds> {
+        self.source.bounds_lonlat()
+    }
+
+    /// What the heights count from, where the file says so.
+    pub fn vertical_datum(&self) -> Option<&VerticalDatum> {
+        self.source.vertical_datum.as_ref()
+    }
+
+    /// Where the vertical unit comes from.
+    pub fn vertical_unit_from(&self) -> Certainty {
+        match self.source.metres_per_vertical_unit {
+            Some(_) => self.source.vertical_unit_from,
+            None => Certainty::Assumed,
+        }
     }
 
     /// Where the samples lie in the coordinates of the file's reference system.
-    pub fn georeference(&self) -> Georeference {
+    pub fn georeference(&self) -> Georeference<'_> {
         let source = &self.source;
         let last = [source.columns, source.rows].map(|count| f64::from(count) - 1.0);
-        let ground = source.ground.map(|map| {
+        let ground = source.place.and_then(|place| place.map.of_centres());
+        let ground = ground.map(|map| {
             let map = match source.east_first {
                 true => map.with_columns_from(last[0]),
                 false => map,
@@ -191,15 +227,15 @@ impl Raster {
                 false => map.with_rows_from(last[1]),
             }
         });
-        Georeference::new(ground, source.epsg, source.cell, last)
+        Georeference::new(ground, source.system.as_ref(), source.cell, last)
     }
 
     /// The same samples at a place: the south-west one at `origin`, and the steps to the
     /// next column and row, in coordinates of the reference system with an EPSG code.
     #[must_use]
     pub fn with_ground(mut self, ground: GroundTransform, epsg: Option<u16>) -> Self {
-        self.source.ground = Some(ground);
-        self.source.epsg = epsg;
+        self.source.place = ground_map::GroundMap::of_samples(&ground).map(Place::new);
+        self.source.system = epsg.and_then(ReferenceSystem::from_code);
         self
     }
 

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::archive::{self, Zip};
-use super::format::{Claim, Format};
-use super::formats::{FORMATS, has_terrain_extension, npy, raw};
+use super::format::{Claim, Format, Parts};
+use super::formats::{FORMATS, claim_of, npy, raw};
 use super::guard::guarded;
 use super::input::FileBytes;
 use super::{BadRaster, Decoded, OpenOptions};
@@ -22,9 +22,12 @@ pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadR
     if archive::is_zip(&head) {
         let mut zip = guarded("ZIP", || Zip::open(&input))?;
         if zip.is_numpy(input.extension()) {
-            return guarded("NumPy", || npy::decode_npz(&mut zip));
+            Parts::Variables.check_choice("a NumPy archive", options)?;
+            return guarded("NumPy", || {
+                npy::decode_npz(&mut zip, options.variable.as_deref())
+            });
         }
-        let unpacked = guarded("ZIP", || zip.only_entry(has_terrain_extension))?;
+        let unpacked = guarded("ZIP", || zip.only_entry(claim_of))?;
         decode_packed("ZIP", &unpacked, options)
     } else if archive::is_gzip(&head) {
         let unpacked = guarded("gzip", || archive::unpack_gzip(&input))?;
@@ -60,16 +63,27 @@ fn decode_plain(
     if head.is_empty() {
         return Err(BadRaster::Truncated("it is empty".into()));
     }
-    let format = recognise(head, input.extension())?;
+    if let Some(format) = by_content(head) {
+        return decode_as(format, input, options);
+    }
+    decode_as(by_extension(input.extension())?, input, options)
+}
+
+fn decode_as(
+    format: &Format,
+    input: &FileBytes,
+    options: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
     tracing::debug!(format.name, name = input.name(), "recognised");
+    format.check_choice(options)?;
     guarded(format.name, || (format.decode)(input, options))
 }
 
-/// The content decides, then the extension.
-fn recognise(head: &[u8], extension: &str) -> Result<&'static Format, BadRaster> {
-    if let Some(format) = FORMATS.iter().find(|format| (format.begins)(head)) {
-        return Ok(format);
-    }
+fn by_content(head: &[u8]) -> Option<&'static Format> {
+    FORMATS.iter().find(|format| (format.begins)(head))
+}
+
+fn by_extension(extension: &str) -> Result<&'static Format, BadRaster> {
     let mut claims = FORMATS
         .iter()
         .filter_map(|format| Some((format, format.claim(extension)?)));

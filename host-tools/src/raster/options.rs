@@ -12,6 +12,15 @@ pub struct OpenOptions {
     pub png_channel: Option<PngChannel>,
     /// Stored sample value that means no data; replaces what the file says.
     pub no_data: Option<f64>,
+    /// Which band holds the height, the first being 1. Without it: the first.
+    pub band: Option<u32>,
+    /// Which variable of a NetCDF file or array of an `.npz` holds the height. Without
+    /// it: the one that is named as heights are, or the only one.
+    pub variable: Option<String>,
+    /// Side of a cell on the ground, metres, of a file that does not state it.
+    pub ground_cell_m: Option<f64>,
+    /// How a picture's colours encode heights, if they do.
+    pub encoding: Option<Encoding>,
 }
 
 /// Layout of a raw file: rows from north to south, samples from west to east,
@@ -26,6 +35,15 @@ pub struct RawLayout {
     pub sample: SampleType,
     /// Byte order of a sample.
     pub endian: Endian,
+}
+
+/// How the red, green and blue of a picture encode a height in metres.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Encoding {
+    /// Mapbox Terrain-RGB: −10000 + 0.1 · (65536 R + 256 G + B)
+    TerrainRgb,
+    /// Terrarium: 256 R + G + B / 256 − 32768
+    Terrarium,
 }
 
 /// A channel of a picture.

@@ -2,8 +2,89 @@
 
 use std::io::Read;
 
+use half::f16;
+
 use super::BadRaster;
 use super::samples::{Endian, SampleType, SampleValue, Samples, with_samples};
+
+/// The type of a sample in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stored {
+    /// A type in which samples are held, too.
+    Held(SampleType),
+    /// Half floats, held as single ones.
+    F16,
+    /// 64-bit integers, held as double floats (exact to 2^53).
+    I64,
+    /// The same without a sign.
+    U64,
+}
+
+impl Stored {
+    /// Bytes of a sample in the file.
+    pub(super) const fn bytes(self) -> u64 {
+        match self {
+            Self::Held(sample) => sample.bytes(),
+            Self::F16 => 2,
+            Self::I64 | Self::U64 => 8,
+        }
+    }
+
+    /// Room for `count` samples; the caller has checked that the file holds them.
+    pub(super) fn room(self, count: u64) -> Result<Samples, BadRaster> {
+        let held = match self {
+            Self::Held(sample) => sample,
+            Self::F16 => SampleType::F32,
+            Self::I64 | Self::U64 => SampleType::F64,
+        };
+        let mut samples = held.none();
+        let reserved = usize::try_from(count).ok().and_then(
+            |count| with_samples!(&mut samples, values => values.try_reserve_exact(count).ok()),
+        );
+        reserved.ok_or_else(|| {
+            BadRaster::AbsurdSize(format!("{count} samples are more than memory can hold"))
+        })?;
+        Ok(samples)
+    }
+
+    /// Appends the samples in `bytes`, each of which begins `apart` bytes after the one
+    /// before, to `samples`, which [`Stored::room`] made.
+    pub(super) fn append(self, samples: &mut Samples, bytes: &[u8], apart: usize, endian: Endian) {
+        let each = || bytes.chunks(apart);
+        match (self, samples) {
+            (Self::F16, Samples::F32(values)) => {
+                values
+                    .extend(each().map(|bytes| {
+                        f16::from_bits(u16::from_bytes(&bytes[..2], endian)).to_f32()
+                    }));
+            }
+            (Self::I64, Samples::F64(values)) => {
+                values.extend(each().map(|bytes| i64::from_le_bytes(little(bytes, endian)) as f64));
+            }
+            (Self::U64, Samples::F64(values)) => {
+                values.extend(each().map(|bytes| u64::from_le_bytes(little(bytes, endian)) as f64));
+            }
+            (_, samples) => with_samples!(samples, values => extend(values, each(), endian)),
+        }
+    }
+}
+
+fn extend<'b, T: SampleValue>(
+    values: &mut Vec<T>,
+    stored: impl Iterator<Item = &'b [u8]>,
+    endian: Endian,
+) {
+    values.extend(stored.map(|bytes| T::from_bytes(&bytes[..size_of::<T>()], endian)));
+}
+
+/// The first eight bytes, least significant first.
+fn little(bytes: &[u8], endian: Endian) -> [u8; 8] {
+    let mut eight: [u8; 8] = bytes[..8].try_into().unwrap_or_default();
+    if endian == Endian::Big {
+        eight.reverse();
+    }
+    eight
+}
 
 /// Reads `count` samples; the caller has checked that the file holds them.
 ///
@@ -12,32 +93,22 @@ use super::samples::{Endian, SampleType, SampleValue, Samples, with_samples};
 pub(super) fn read_samples(
     reader: &mut dyn Read,
     count: u64,
-    sample: SampleType,
+    stored: Stored,
     endian: Endian,
 ) -> Result<Samples, BadRaster> {
-    with_samples!(sample.none(), none => Ok(fill(none, reader, count, endian)?.into()))
-}
-
-fn fill<T: SampleValue>(
-    mut values: Vec<T>,
-    reader: &mut dyn Read,
-    count: u64,
-    endian: Endian,
-) -> Result<Vec<T>, BadRaster> {
-    const SAMPLES_AT_ONCE: usize = 8192;
-    let mut left =
-        usize::try_from(count).map_err(|_| BadRaster::AbsurdSize(format!("{count} samples")))?;
-    values.reserve_exact(left);
-    let mut buffer = vec![0; size_of::<T>() * SAMPLES_AT_ONCE];
+    const SAMPLES_AT_ONCE: u64 = 8192;
+    let mut samples = stored.room(count)?;
+    let size = stored.bytes() as usize;
+    let mut buffer = vec![0; size * SAMPLES_AT_ONCE as usize];
+    let mut left = count;
     while left > 0 {
         let now = left.min(SAMPLES_AT_ONCE);
-        let bytes = &mut buffer[..now * size_of::<T>()];
+        let bytes = &mut buffer[..now as usize * size];
         reader
             .read_exact(bytes)
             .map_err(|error| BadRaster::from_io(error, "the samples"))?;
-        let stored = bytes.chunks_exact(size_of::<T>());
-        values.extend(stored.map(|bytes| T::from_bytes(bytes, endian)));
+        stored.append(&mut samples, bytes, size, endian);
         left -= now;
     }
-    Ok(values)
+    Ok(samples)
 }

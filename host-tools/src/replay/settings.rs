@@ -10,6 +10,7 @@ use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use serde::{Deserialize, Serialize};
 
 use crate::link::shown;
+use crate::raster::ReferenceSystem;
 use crate::terrain::{FeltCells, FeltGrid, Scale, Terrain};
 
 /// What the first line of the settings begins with; its value is [`FORMAT`].
@@ -151,7 +152,8 @@ impl Settings {
                 samples: [raster.columns(), raster.rows()],
                 crs: raster
                     .reference_system()
-                    .map(|(code, _)| format!("EPSG:{code}")),
+                    .and_then(ReferenceSystem::code)
+                    .map(|code| format!("EPSG:{code}")),
             },
             felt: Felt {
                 cells: grid.cells(),

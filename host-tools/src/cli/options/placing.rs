@@ -74,7 +74,9 @@ impl Placing {
         raster: &'r Raster,
     ) -> Result<Asked<'r>, Failure> {
         let options = self.options(rendering);
-        let grid = options.target.grid(raster, rendering.cells.unwrap_or_default())?;
+        let grid = options
+            .target
+            .grid(raster, rendering.cells.unwrap_or_default())?;
         // Whichever arm it will be: of one, all but the reach shows already.
         let tried = View::new(&grid, &Reach::of(&Calibration::PREMIUM_3_0), &options);
         tried
@@ -156,7 +158,7 @@ pub(in crate::cli) fn scale_in_words(view: &View) -> String {
 }
 
 /// Scale and place, in short lines for a picture: a name and what there is to say.
-pub(in crate::cli) fn picture_lines(view: &View, file: &Georeference) -> Vec<(String, String)> {
+pub(in crate::cli) fn picture_lines(view: &View, file: &Georeference<'_>) -> Vec<(String, String)> {
     let mut lines = vec![];
     if let Some(scale) = view.ground_m_per_mm() {
         lines.push(("1 mm in the hand".to_owned(), format!("{} m", short(scale))));

@@ -8,7 +8,7 @@ use clap::ValueHint;
 use indicatif::ProgressBar;
 
 use crate::cli::failure::Failure;
-use crate::raster::{Endian, OpenOptions, PngChannel, Raster, RawLayout, SampleType};
+use crate::raster::{Encoding, Endian, OpenOptions, PngChannel, Raster, RawLayout, SampleType};
 
 /// Where `--help` lists these options.
 const INPUT: &str = "Input";
@@ -16,7 +16,8 @@ const INPUT: &str = "Input";
 /// A terrain file, and what the user says about it that it does not say itself.
 #[derive(Clone, Debug, clap::Args)]
 pub struct TerrainFile {
-    /// Terrain file: GeoTIFF, .hgt, .asc, PNG, NetCDF, USGS .dem, .npy/.npz, or raw samples
+    /// Terrain file: GeoTIFF, .hgt, .asc, PNG, NetCDF, USGS .dem, DTED, .flt, .bil, ENVI,
+    /// .npy/.npz, or raw samples
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
 
@@ -43,6 +44,22 @@ pub struct ReadingOptions {
     /// Stored value that means no data (replaces what the file says)
     #[arg(long, allow_negative_numbers = true, value_name = "VALUE", help_heading = INPUT)]
     pub no_data: Option<f64>,
+
+    /// Band that holds the height, the first being 1 (TIFF, .bil, ENVI)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = INPUT)]
+    pub band: Option<u32>,
+
+    /// Variable of a NetCDF file, or array of an .npz, that holds the height
+    #[arg(long, value_name = "NAME", help_heading = INPUT)]
+    pub variable: Option<String>,
+
+    /// Side of a cell on the ground in metres, for files that do not state it
+    #[arg(long, value_name = "M", value_parser = parse_side, help_heading = INPUT)]
+    pub ground_cell_m: Option<f64>,
+
+    /// How the colours of a PNG encode heights
+    #[arg(long, value_enum, conflicts_with = "png_channel", help_heading = INPUT)]
+    pub encoding: Option<Encoding>,
 
     /// Channel of a PNG that holds the height
     #[arg(long, value_enum, value_name = "CHANNEL", help_heading = INPUT)]
@@ -85,7 +102,19 @@ impl ReadingOptions {
             }),
             png_channel: self.png_channel,
             no_data: self.no_data,
+            band: self.band,
+            variable: self.variable.clone(),
+            ground_cell_m: self.ground_cell_m,
+            encoding: self.encoding,
         }
+    }
+}
+
+/// A length of the ground in metres.
+fn parse_side(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(side) if (1e-6..=1e7).contains(&side) => Ok(side),
+        _ => Err("a side is a length in metres from 0.000001 to 10000000, as 30".into()),
     }
 }
 
@@ -108,5 +137,9 @@ mod tests {
         assert_eq!(parse_size("7"), Ok((7, 7)));
         assert!(parse_size("0x4").is_err());
         assert!(parse_size("4x").is_err());
+        assert_eq!(parse_side("0.5"), Ok(0.5));
+        for side in ["0", "-3", "nan", "inf", "1e9", "x"] {
+            assert!(parse_side(side).is_err(), "{side}");
+        }
     }
 }

@@ -2,13 +2,29 @@
 
 use crate::raster::BadRaster;
 
-/// The place in `names` of the first of the names that heights `usual`ly have (words,
-/// the likeliest first), or of the only name. `kind` is what the file calls its
-/// parts, for messages.
+/// The place in `names` of the `asked` one; without that of the first of the names that
+/// heights `usual`ly have (words, the likeliest first), or of the only name. `kind` is
+/// what the file calls its parts, for messages.
 ///
 /// # Errors
-/// When there are none, or several with other names.
-pub(super) fn choose(kind: &str, names: &[&str], usual: &str) -> Result<usize, BadRaster> {
+/// When there are none, several with other names, or not the one that is asked for.
+pub(super) fn choose(
+    kind: &'static str,
+    names: &[&str],
+    usual: &str,
+    asked: Option<&str>,
+) -> Result<usize, BadRaster> {
+    if let Some(asked) = asked {
+        let exact = names.iter().position(|name| *name == asked);
+        let there = match names {
+            [] => format!("it has no two-dimensional {kind} of numbers"),
+            names => format!("its two-dimensional {kind}s are {}", names.join(", ")),
+        };
+        return exact.ok_or_else(|| BadRaster::NoSuchPart {
+            asked: format!("{kind} {asked}"),
+            there,
+        });
+    }
     let place = |wanted: &str| {
         let mut names = names.iter();
         names.position(|name| name.eq_ignore_ascii_case(wanted))
@@ -19,9 +35,9 @@ pub(super) fn choose(kind: &str, names: &[&str], usual: &str) -> Result<usize, B
         (None, []) => Err(BadRaster::NotAHeightField(format!(
             "it has no two-dimensional {kind} of numbers"
         ))),
-        (None, several) => Err(BadRaster::NotAHeightField(format!(
-            "of its two-dimensional {kind}s ({}) none is named as heights are",
-            several.join(", ")
-        ))),
+        (None, several) => Err(BadRaster::SeveralHeights {
+            kind,
+            names: several.iter().map(|name| (*name).to_owned()).collect(),
+        }),
     }
 }

@@ -2,16 +2,19 @@
 //! follow from the file's length and name.
 
 use crate::raster::decoded::Decoded;
-use crate::raster::format::{Claim, Format};
+use crate::raster::format::{Claim, Format, Parts};
+use crate::raster::ground_map::GroundMap;
 use crate::raster::input::FileBytes;
-use crate::raster::read::read_samples;
-use crate::raster::{BadRaster, CellSize, CellUnit, Endian, GroundTransform, SampleType};
+use crate::raster::placed::GroundUnit;
+use crate::raster::read::{Stored, read_samples};
+use crate::raster::{BadRaster, CellSize, CellUnit, Endian, ReferenceSystem, SampleType};
 
 /// SRTM tiles: nothing but their name tells them.
 pub(super) const FORMAT: Format = Format {
     name: "SRTM",
     begins: |_| false,
     extensions: &[("hgt", Claim::Decides)],
+    parts: Parts::One,
     decode: |input, _| decode(input),
 };
 
@@ -23,26 +26,29 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let (columns, rows) = size(input.len())?;
     let reader = &mut *input.reader()?;
     let count = u64::from(columns) * u64::from(rows);
-    let samples = read_samples(reader, count, SampleType::I16, Endian::Big)?;
+    let samples = read_samples(reader, count, Stored::Held(SampleType::I16), Endian::Big)?;
     let format = "SRTM height tile, int16".to_owned();
     let mut decoded = Decoded::new(format, (columns, rows), samples);
     decoded.no_data = Some(VOID);
     decoded.metres_per_vertical_unit = Some(1.0);
-    let corner = south_west(input.name());
-    let latitude = corner.map(|[_, south]| south + 0.5);
-    if latitude.is_none() {
+    // SRTM's heights are above the geoid EGM96, its places on WGS 84.
+    decoded.set_vertical_datum(5773);
+    decoded.system = ReferenceSystem::from_code(4326);
+    let cells = [columns, rows].map(|samples| f64::from(samples.max(2) - 1));
+    let (east, north) = (1.0 / cells[0], 1.0 / cells[1]);
+    let map = corner(input.name()).and_then(|(west, south)| {
+        GroundMap::from_centre([west, east, 0.0], [south + 1.0, 0.0, -north])
+    });
+    if let Some(map) = map {
+        decoded.lay_out(map, Some(GroundUnit::DEGREE));
+    } else {
+        decoded.cell = Some(CellSize::stated((east, north), CellUnit::Degree, None));
         decoded.remarks.push(
             "the name does not say where the tile is (as N44W072.hgt does): \
              its cells are taken to be square"
                 .into(),
         );
     }
-    let cells = [columns, rows].map(|samples| f64::from(samples.max(2) - 1));
-    let degrees = (1.0 / cells[0], 1.0 / cells[1]);
-    decoded.cell = Some(CellSize::stated(degrees, CellUnit::Degree, latitude));
-    decoded.ground = corner.and_then(|[west, south]| {
-        GroundTransform::new([west, south + 1.0], [degrees.0, 0.0], [0.0, -degrees.1])
-    });
     Ok(decoded)
 }
 
@@ -62,9 +68,9 @@ fn size(bytes: u64) -> Result<(u32, u32), BadRaster> {
     }
 }
 
-/// The longitude of the tile's western edge and the latitude of its southern edge, in
-/// degrees, from a name as `N44W072.hgt` or `s05e100.SRTMGL1.hgt`.
-fn south_west(name: &str) -> Option<[f64; 2]> {
+/// Longitude and latitude of the tile's south-western sample in degrees, from a name as
+/// `N44W072.hgt` or `s05e100.SRTMGL1.hgt`.
+fn corner(name: &str) -> Option<(f64, f64)> {
     let name = name.to_ascii_uppercase();
     let bytes = name.as_bytes();
     let digits = |range: std::ops::Range<usize>| -> Option<f64> {
@@ -74,15 +80,13 @@ fn south_west(name: &str) -> Option<[f64; 2]> {
     };
     let latitude = digits(1..3).filter(|&degrees| degrees <= 90.0)?;
     let longitude = digits(4..7).filter(|&degrees| degrees <= 180.0)?;
-    let sign = |letter: u8, plus: u8, minus: u8| match letter {
-        letter if letter == plus => Some(1.0),
-        letter if letter == minus => Some(-1.0),
+    let signed = |letter, [plus, minus]: [u8; 2], degrees: f64| match letter {
+        letter if letter == plus => Some(degrees),
+        letter if letter == minus => Some(-degrees),
         _ => None,
     };
-    Some([
-        longitude * sign(bytes[3], b'E', b'W')?,
-        latitude * sign(bytes[0], b'N', b'S')?,
-    ])
+    let west = signed(bytes[3], *b"EW", longitude)?;
+    Some((west, signed(bytes[0], *b"NS", latitude)?))
 }
 
 #[cfg(test)]
@@ -91,12 +95,13 @@ mod tests {
 
     #[test]
     fn a_name_tells_the_place() {
-        assert_eq!(south_west("N44W072.hgt"), Some([-72.0, 44.0]));
-        assert_eq!(south_west("s05e100.SRTMGL1.hgt"), Some([100.0, -5.0]));
-        assert_eq!(south_west("mountain.hgt"), None);
-        assert_eq!(south_west("N99E000.hgt"), None);
-        assert_eq!(south_west("é4W072.hgt"), None);
-        assert_eq!(south_west(""), None);
+        assert_eq!(corner("N44W072.hgt"), Some((-72.0, 44.0)));
+        assert_eq!(corner("s05e100.SRTMGL1.hgt"), Some((100.0, -5.0)));
+        assert_eq!(corner("mountain.hgt"), None);
+        assert_eq!(corner("N99E000.hgt"), None);
+        assert_eq!(corner("N44X072.hgt"), None);
+        assert_eq!(corner("é4W072.hgt"), None);
+        assert_eq!(corner(""), None);
     }
 
     #[test]

@@ -11,7 +11,7 @@ pub(super) mod raw;
 mod tiff;
 mod usgs_dem;
 
-use super::format::Format;
+use super::format::{Claim, Format};
 
 /// All formats that are told by their content or their extension; the first that
 /// fits decides. Raw samples are not among them: only the user knows those.
@@ -25,8 +25,9 @@ pub(super) const FORMATS: [Format; 7] = [
     hgt::FORMAT,
 ];
 
-/// Whether a file in an archive is a terrain, by its extension.
-pub(super) fn has_terrain_extension(name: &str) -> bool {
-    let extension = name.rsplit_once('.').map(|(_, end)| end.to_lowercase());
-    extension.is_some_and(|end| FORMATS.iter().any(|format| format.claim(&end).is_some()))
+/// What the extension of a file in an archive says, the strongest claim of any format.
+pub(super) fn claim_of(name: &str) -> Option<Claim> {
+    let extension = name.rsplit_once('.')?.1.to_lowercase();
+    let claims = FORMATS.iter().filter_map(|format| format.claim(&extension));
+    claims.min_by_key(|claim| *claim == Claim::Suggests)
 }

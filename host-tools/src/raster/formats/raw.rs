@@ -2,7 +2,7 @@
 
 use crate::raster::decoded::Decoded;
 use crate::raster::input::FileBytes;
-use crate::raster::read::read_samples;
+use crate::raster::read::{Stored, read_samples};
 use crate::raster::{BadRaster, RawLayout};
 
 /// Extensions of files that are nothing but samples.
@@ -32,7 +32,7 @@ pub(in crate::raster) fn decode(
         )));
     }
     let reader = &mut *input.reader()?;
-    let samples = read_samples(reader, samples, layout.sample, layout.endian)?;
+    let samples = read_samples(reader, samples, Stored::Held(layout.sample), layout.endian)?;
     let format = format!("raw {}", samples.type_name());
     Ok(Decoded::new(format, (columns, rows), samples))
 }

@@ -5,21 +5,27 @@
 use std::str::FromStr;
 
 use crate::raster::decoded::{Decoded, sides};
-use crate::raster::format::{Claim, Format};
+use crate::raster::format::{Claim, Format, Parts};
+use crate::raster::ground_map::GroundMap;
 use crate::raster::input::FileBytes;
-use crate::raster::{BadRaster, CellSize, CellUnit, GroundTransform};
+use crate::raster::placed::GroundUnit;
+use crate::raster::{BadRaster, Certainty, ReferenceSystem};
 
 /// USGS ASCII digital elevation models.
 pub(super) const FORMAT: Format = Format {
     name: "USGS DEM",
     begins: looks_like_header,
     extensions: &[("dem", Claim::Decides)],
+    parts: Parts::One,
     decode: |input, _| decode(input),
 };
 
 const RECORD: usize = 1024;
 /// Bytes of a record that are written to.
 const USED: usize = 1020;
+/// Where a header says its horizontal datum. Old headers end before; such models are on
+/// NAD27.
+const DATUM_AT: usize = 890;
 const HEIGHT_CHARS: usize = 6;
 const PROFILE_HEADER: usize = 144;
 /// What these files write where there is no elevation.
@@ -50,11 +56,16 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
 
 struct Header {
     profiles: usize,
-    /// Distance between profiles, and between samples along one from south to north.
-    steps: [f64; 2],
+    /// Distance between samples along one profile, from south to north.
+    spacing: f64,
     /// Vertical units a stored unit.
     resolution: f64,
-    cell: CellSize,
+    east: f64,
+    unit: GroundUnit,
+    system: Option<ReferenceSystem>,
+    states_datum: bool,
+    /// EPSG's code of the vertical datum.
+    vertical: Option<u16>,
     metres_per_vertical_unit: f64,
 }
 
@@ -69,24 +80,27 @@ impl Header {
         };
         let east = positive(816, "spacing from west to east")?;
         let north = positive(828, "spacing from south to north")?;
-        let (unit, per_unit) = match number::<i64>(bytes, 528, 6) {
-            Some(0) => (CellUnit::Degree, 1.0_f64.to_degrees()),
-            Some(1) => (CellUnit::Length { metres: 0.3048 }, 1.0),
-            Some(3) => (CellUnit::Degree, 1.0 / 3600.0),
-            _ => (CellUnit::Length { metres: 1.0 }, 1.0),
+        let unit = match number::<i64>(bytes, 528, 6) {
+            Some(0) => GroundUnit::angle(1.0_f64.to_degrees()),
+            Some(1) => GroundUnit::length(0.3048, Certainty::Stated),
+            Some(3) => GroundUnit::angle(1.0 / 3600.0),
+            _ => GroundUnit::METRE,
         };
-        // Corners are in arc seconds where the ground unit is.
-        let latitudes = number::<f64>(bytes, 570, 24).zip(number::<f64>(bytes, 618, 24));
-        let latitude = latitudes
-            .filter(|_| number::<i64>(bytes, 528, 6) == Some(3))
-            .map(|(south, north)| (south + north) / 2.0 / 3600.0);
         Ok(Self {
             profiles: number::<i64>(bytes, 858, 6)
                 .and_then(|count| usize::try_from(count).ok())
                 .ok_or_else(|| BadRaster::damaged("the header's number of profiles"))?,
-            steps: [east, north],
+            spacing: north,
             resolution: positive(840, "vertical resolution")?,
-            cell: CellSize::stated((east * per_unit, north * per_unit), unit, latitude),
+            east,
+            unit,
+            states_datum: number::<i64>(bytes, DATUM_AT, 2).is_some(),
+            system: horizontal_system(bytes).and_then(ReferenceSystem::from_code),
+            vertical: match number::<i64>(bytes, 888, 2) {
+                Some(2) => Some(5702),
+                Some(3) => Some(5703),
+                _ => None,
+            },
             metres_per_vertical_unit: match number::<i64>(bytes, 534, 6) {
                 Some(1) => 0.3048,
                 _ => 1.0,
@@ -102,7 +116,7 @@ impl Header {
         let mut places = Vec::with_capacity(profiles.len());
         let mut rows = 0;
         for profile in profiles {
-            let steps = ((profile.south - south) / self.steps[1]).round();
+            let steps = ((profile.south - south) / self.spacing).round();
             // A profile that starts this far north is a damaged number.
             if !(0.0..1e6).contains(&steps) {
                 return Err(BadRaster::damaged(format!(
@@ -129,17 +143,38 @@ impl Header {
         }
         let size = sides(columns as u64, rows as u64)?;
         let mut decoded = Decoded::new("USGS ASCII DEM".into(), size, samples.into());
-        decoded.south_up = true;
-        decoded.cell = Some(self.cell);
-        decoded.ground = profiles.first().and_then(|first| {
-            GroundTransform::new(
-                [first.west, south],
-                [self.steps[0], 0.0],
-                [0.0, self.steps[1]],
-            )
-        });
         decoded.metres_per_vertical_unit = Some(self.metres_per_vertical_unit);
+        if let Some(code) = self.vertical {
+            decoded.set_vertical_datum(code);
+        }
+        decoded.system.clone_from(&self.system);
+        if !self.states_datum {
+            decoded.system_from = Certainty::Assumed;
+        }
+        let west = profiles.first().map_or(0.0, |profile| profile.west);
+        let map = GroundMap::from_centre([west, self.east, 0.0], [south, 0.0, self.spacing]);
+        let map = map.ok_or_else(|| BadRaster::damaged("its profiles lie nowhere"))?;
+        decoded.lay_out(map, Some(self.unit));
         Ok(decoded)
+    }
+}
+
+/// EPSG's code of the horizontal system: the header's kind of coordinates, UTM zone and
+/// datum. State plane zones have numbers of their own, which are not resolved.
+fn horizontal_system(bytes: &[u8]) -> Option<u16> {
+    let (nad27, wgs72, wgs84, nad83) = (1, 2, 3, 4);
+    let datum = number::<i64>(bytes, DATUM_AT, 2).unwrap_or(nad27);
+    let zone = number::<u16>(bytes, 162, 6).filter(|zone| (1..=60).contains(zone));
+    match (number::<i64>(bytes, 156, 6)?, datum) {
+        (0, d) if d == nad27 => Some(4267),
+        (0, d) if d == wgs72 => Some(4322),
+        (0, d) if d == wgs84 => Some(4326),
+        (0, d) if d == nad83 => Some(4269),
+        (1, d) if d == nad27 => Some(26_700 + zone.filter(|zone| *zone <= 22)?),
+        (1, d) if d == wgs72 => Some(32_200 + zone?),
+        (1, d) if d == wgs84 => Some(32_600 + zone?),
+        (1, d) if d == nad83 => Some(26_900 + zone.filter(|zone| *zone <= 23)?),
+        _ => None,
     }
 }
 
@@ -204,14 +239,12 @@ fn read_profile(bytes: &[u8], at: usize, header: &Header) -> Result<(Profile, us
         });
     }
     let records = (PROFILE_HEADER + count * HEIGHT_CHARS).div_ceil(USED);
-    Ok((
-        Profile {
-            west,
-            south,
-            heights,
-        },
-        records,
-    ))
+    let profile = Profile {
+        west,
+        south,
+        heights,
+    };
+    Ok((profile, records))
 }
 
 /// Where in a profile's records the elevation of an index is written. Each record

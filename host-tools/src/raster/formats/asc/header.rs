@@ -90,22 +90,15 @@ impl Header {
         Ok((east, north))
     }
 
-    /// The south-west corner, roughly: of the field or of the centre of its first sample.
-    pub(super) fn corner(&self) -> Option<(f64, f64)> {
-        let x = self.get("xllcorner").or(self.get("xllcenter"));
-        x.zip(self.get("yllcorner").or(self.get("yllcenter")))
-    }
-
-    /// The centre of the south-west sample, with cells of a size.
-    pub(super) fn first_centre(&self, (east, north): (f64, f64)) -> Option<[f64; 2]> {
-        let centre = |centre: &str, corner: &str, side: f64| {
-            let of_corner = || self.get(corner).map(|corner| corner + 0.5 * side);
-            self.get(centre).or_else(of_corner)
+    /// The south-west corner of the field of `east × north` cells: stated as such, or
+    /// as the centre of the cell there.
+    pub(super) fn south_west(&self, (east, north): (f64, f64)) -> Option<(f64, f64)> {
+        let side = |corner, centre, step: f64| {
+            let by_centre = || self.get(centre).map(|at| at - step / 2.0);
+            self.get(corner).or_else(by_centre)
         };
-        Some([
-            centre("xllcenter", "xllcorner", east)?,
-            centre("yllcenter", "yllcorner", north)?,
-        ])
+        let west = side("xllcorner", "xllcenter", east)?;
+        Some((west, side("yllcorner", "yllcenter", north)?))
     }
 
     /// The value that means no data.

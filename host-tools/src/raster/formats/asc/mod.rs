@@ -8,17 +8,19 @@ mod values;
 mod tests;
 
 use crate::raster::decoded::Decoded;
-use crate::raster::format::{Claim, Format};
+use crate::raster::format::{Claim, Format, Parts};
+use crate::raster::ground_map::GroundMap;
 use crate::raster::input::FileBytes;
-use crate::raster::{BadRaster, CellSize, GroundTransform};
+use crate::raster::{BadRaster, CellSize, beside};
 use header::{Header, looks_like_header};
-use tokens::Tokens;
+pub(super) use tokens::Tokens;
 
 /// Esri ASCII grids.
 pub(super) const FORMAT: Format = Format {
     name: "Esri ASCII",
     begins: looks_like_header,
     extensions: &[("asc", Claim::Decides), ("txt", Claim::Suggests)],
+    parts: Parts::One,
     decode: |input, _| decode(input),
 };
 
@@ -33,14 +35,17 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let mut decoded = Decoded::new(format, (columns, rows), samples);
     decoded.no_data = Some(header.no_data());
     let (east, north) = header.cell()?;
-    // The file's first row is the northernmost.
-    decoded.ground = header
-        .first_centre((east, north))
-        .and_then(|[west, south]| {
-            let north_row = south + north * (f64::from(rows) - 1.0);
-            GroundTransform::new([west, north_row], [east, 0.0], [0.0, -north])
-        });
-    let extent = (east * f64::from(columns), north * f64::from(rows));
-    decoded.cell = Some(CellSize::guessed((east, north), header.corner(), extent));
+    beside::reference_system(input, &mut decoded);
+    match header.south_west((east, north)) {
+        Some(corner) => {
+            let map = GroundMap::from_south_west(corner, (east, north), rows);
+            let map = map.ok_or_else(|| BadRaster::damaged("its header places it nowhere"))?;
+            decoded.lay_out(map, None);
+        }
+        None => {
+            let extent = (east * f64::from(columns), north * f64::from(rows));
+            decoded.cell = Some(CellSize::guessed((east, north), None, extent));
+        }
+    }
     Ok(decoded)
 }

@@ -6,7 +6,9 @@ use netcdf_reader::{NcFile, NcVariable};
 use super::attributes::text;
 use crate::raster::decoded::Decoded;
 use crate::raster::geometry::metres_in;
-use crate::raster::{BadRaster, CellSize, CellUnit, GroundTransform};
+use crate::raster::ground_map::GroundMap;
+use crate::raster::placed::GroundUnit;
+use crate::raster::{BadRaster, Certainty};
 
 /// The dimensions of a grid.
 pub(super) struct Names {
@@ -51,13 +53,6 @@ pub(super) fn place(file: &NcFile, names: &Names, decoded: &mut Decoded) {
             .push("no coordinates: its first row is taken to be the northernmost".into());
         return;
     };
-    decoded.south_up = north.step > 0.0;
-    decoded.east_first = east.step < 0.0;
-    decoded.ground = GroundTransform::new(
-        [east.first, north.first],
-        [east.step, 0.0],
-        [0.0, north.step],
-    );
     for axis in [&north, &east] {
         if axis.uneven {
             decoded.remarks.push(format!(
@@ -66,31 +61,26 @@ pub(super) fn place(file: &NcFile, names: &Names, decoded: &mut Decoded) {
             ));
         }
     }
-    let steps = (east.step.abs(), north.step.abs());
-    let unit = (east.unit.as_deref(), north.unit.as_deref());
-    let latitude = (north.low + north.high) / 2.0;
-    decoded.cell = Some(match unit {
+    let unit = match (east.unit.as_deref(), north.unit.as_deref()) {
         (Some(east), Some(_)) if east.to_lowercase().starts_with("degree") => {
-            CellSize::stated(steps, CellUnit::Degree, Some(latitude))
+            Some(GroundUnit::DEGREE)
         }
-        (Some(east), Some(_)) if metres_in(east).is_some() => {
-            let metres = metres_in(east).unwrap_or(1.0);
-            CellSize::stated(steps, CellUnit::Length { metres }, None)
+        (Some(east), Some(_)) => {
+            metres_in(east).map(|metres| GroundUnit::length(metres, Certainty::Stated))
         }
-        _ => {
-            let extent = (east.high - east.low, north.high - north.low);
-            CellSize::guessed(steps, Some((east.low, north.low)), extent)
-        }
-    });
+        _ => None,
+    };
+    let map = GroundMap::from_centre([east.first, east.step, 0.0], [north.first, 0.0, north.step]);
+    if let Some(map) = map {
+        decoded.lay_out(map, unit);
+    }
 }
 
 struct Axis {
     name: String,
-    /// Coordinate of the first sample, and the step to the next.
-    first: f64,
     step: f64,
-    low: f64,
-    high: f64,
+    /// Coordinate of the first sample's centre.
+    first: f64,
     uneven: bool,
     unit: Option<String>,
 }
@@ -115,10 +105,8 @@ fn axis(file: &NcFile, name: &str, samples: u32) -> Option<Axis> {
         .any(|pair| ((pair[1] - pair[0]) / step - 1.0).abs() > 0.01);
     Some(Axis {
         name: name.to_owned(),
-        first,
         step,
-        low: first.min(last),
-        high: first.max(last),
+        first,
         uneven,
         unit: text(variable, "units"),
     })

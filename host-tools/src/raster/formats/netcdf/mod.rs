@@ -3,22 +3,23 @@
 
 mod attributes;
 mod axes;
+mod filters;
 
 use std::sync::Arc;
 
 use netcdf_reader::masked::MaskParams;
 use netcdf_reader::unpack::SignParams;
 use netcdf_reader::{
-    BytesStorage, DynStorage, FileStorage, NcFile, NcReadable, NcType, NcVariable,
+    BytesStorage, DynStorage, FileStorage, NcFile, NcOpenOptions, NcReadable, NcType, NcVariable,
 };
 
 use super::height_name;
 use crate::raster::decoded::{Decoded, sides};
-use crate::raster::format::{Claim, Format, starts_with_any};
+use crate::raster::format::{Claim, Format, Parts, starts_with_any};
 use crate::raster::geometry::metres_in;
 use crate::raster::input::{Data, FileBytes};
 use crate::raster::samples::{HoleMask, SampleValue, with_samples};
-use crate::raster::{BadRaster, SampleType, Samples};
+use crate::raster::{BadRaster, ReferenceSystem, SampleType, Samples};
 use attributes::{number, text};
 
 /// NetCDF 3 (three variants) and NetCDF-4, which is HDF5.
@@ -29,7 +30,8 @@ pub(super) const FORMAT: Format = Format {
         starts_with_any(head, &signatures)
     },
     extensions: &[("nc", Claim::Promises), ("grd", Claim::Suggests)],
-    decode: |input, _| decode(input),
+    parts: Parts::Variables,
+    decode: |input, options| decode(input, options.variable.as_deref()),
 };
 
 /// What people call the variable with the heights.
@@ -37,10 +39,15 @@ const HEIGHT_NAMES: &str = "z elevation elev topo topography height altitude dem
                             surface band1";
 
 /// Reads the grid's height variable.
-fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
-    let file = NcFile::from_storage(storage(input)?).map_err(|error| fault(&error))?;
+fn decode(input: &FileBytes, asked: Option<&str>) -> Result<Decoded, BadRaster> {
+    let options = NcOpenOptions {
+        filter_registry: Some(filters::with_zstd()),
+        ..NcOpenOptions::default()
+    };
+    let file = NcFile::from_storage_with_options(storage(input)?, options)
+        .map_err(|error| fault(&error))?;
     let variables = file.variables().map_err(|error| fault(&error))?;
-    let heights = choose(variables)?;
+    let heights = choose(variables, asked)?;
     let mut size = size(heights)?;
     let sample = sample_type(heights)
         .ok_or_else(|| BadRaster::NotAHeightField(format!("{} is no number", heights.name())))?;
@@ -69,8 +76,29 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     if text(heights, "positive").is_some_and(|way| way.eq_ignore_ascii_case("down")) {
         decoded.turn_depths_into_heights("positive = down");
     }
+    reference_system(&file, heights, &mut decoded);
     axes::place(&file, &axes, &mut decoded);
     Ok(decoded)
+}
+
+/// The reference system, where the grid mapping has it as text.
+fn reference_system(file: &NcFile, heights: &NcVariable, decoded: &mut Decoded) {
+    let mapping = text(heights, "grid_mapping").and_then(|name| {
+        // `crs: x y` maps those coordinates.
+        let name = name.split([':', ' ']).next()?.to_owned();
+        file.variable(&name).ok()
+    });
+    let Some(mapping) = mapping else {
+        return;
+    };
+    let names = ["crs_wkt", "spatial_ref", "esri_pe_string"];
+    let wkt = names.iter().find_map(|name| text(mapping, name));
+    let (system, vertical) = wkt.map_or((None, None), |wkt| ReferenceSystem::from_wkt(&wkt));
+    decoded.system = system;
+    if vertical.is_some() {
+        let stated = decoded.metres_per_vertical_unit;
+        decoded.set_vertical(vertical, stated);
+    }
 }
 
 /// The bytes as a store that can be read anywhere.
@@ -87,13 +115,16 @@ fn storage(input: &FileBytes) -> Result<DynStorage, BadRaster> {
 
 /// The height variable: two-dimensional but for leading dimensions of length
 /// one, by its name or because there is no other.
-fn choose(variables: &[NcVariable]) -> Result<&NcVariable, BadRaster> {
+fn choose<'v>(
+    variables: &'v [NcVariable],
+    asked: Option<&str>,
+) -> Result<&'v NcVariable, BadRaster> {
     let grids: Vec<&NcVariable> = variables
         .iter()
         .filter(|variable| size(variable).is_ok() && sample_type(variable).is_some())
         .collect();
     let names: Vec<&str> = grids.iter().map(|variable| variable.name()).collect();
-    Ok(grids[height_name::choose("variable", &names, HEIGHT_NAMES)?])
+    Ok(grids[height_name::choose("variable", &names, HEIGHT_NAMES, asked)?])
 }
 
 /// Columns and rows.
@@ -200,6 +231,19 @@ fn mark_missing(decoded: &mut Decoded, variable: &NcVariable) {
 }
 
 fn fault(error: &netcdf_reader::Error) -> BadRaster {
+    use netcdf_reader::Error::{Hdf5, UnsupportedFeature};
+    if let Hdf5(hdf5_reader::error::Error::UnsupportedFilter(filter)) = error {
+        return BadRaster::Unsupported {
+            format: "NetCDF",
+            feature: format!("compression by {filter} of HDF5's registry"),
+        };
+    }
+    if let UnsupportedFeature(feature) = error {
+        return BadRaster::Unsupported {
+            format: "NetCDF",
+            feature: feature.clone(),
+        };
+    }
     BadRaster::Damaged(format!("NetCDF: {error}"))
 }
 

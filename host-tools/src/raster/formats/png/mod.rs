@@ -1,13 +1,16 @@
 //! PNG pictures: grey, grey with holes, or the height in one channel of a
 //! colour picture.
 
+mod encoded;
+
 use std::io::{BufRead, Seek};
 
 use ::png::{BitDepth, ColorType, Decoder, DecodingError, Limits, Reader, Transformations};
 
+use crate::raster::beside::lay_out_by_world_file;
 use crate::raster::decoded::Decoded;
-use crate::raster::format::{Claim, Format};
-use crate::raster::input::FileBytes;
+use crate::raster::format::{Claim, Format, Parts};
+use crate::raster::input::{FileBytes, ReadSeek};
 use crate::raster::samples::{HoleMask, SampleValue, with_samples};
 use crate::raster::{BadRaster, Endian, PngChannel, Samples};
 
@@ -16,8 +19,19 @@ pub(super) const FORMAT: Format = Format {
     name: "PNG",
     begins: |head| head.starts_with(b"\x89PNG\r\n\x1a\n"),
     extensions: &[("png", Claim::Promises)],
-    decode: |input, options| decode(input, options.png_channel),
+    parts: Parts::One,
+    decode: |input, options| {
+        let mut decoded = match options.encoding {
+            Some(encoding) => encoded::decode(input, encoding)?,
+            None => decode(input, options.png_channel)?,
+        };
+        lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?;
+        Ok(decoded)
+    },
 };
+
+/// Extensions of a PNG's world files.
+const WORLD_FILES: [&str; 3] = ["pgw", "pngw", "pgwx"];
 
 /// Bytes that PNG's own chunks may take (text, profiles, tables).
 const CHUNK_BYTES: usize = 64 << 20;
@@ -34,11 +48,7 @@ const CHUNK_BYTES: usize = 64 << 20;
 ///
 /// `channel` overrides this choice.
 fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, BadRaster> {
-    let limits = Limits { bytes: CHUNK_BYTES };
-    let mut decoder = Decoder::new_with_limits(input.reader()?, limits);
-    decoder.set_transformations(Transformations::IDENTITY);
-    decoder.ignore_checksums(false);
-    let mut reader = decoder.read_info().map_err(fault)?;
+    let mut reader = reader(input)?;
     let info = reader.info();
     let (size, color) = ((info.width, info.height), info.color_type);
     let sample_bytes = match info.bit_depth {
@@ -54,7 +64,7 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Bad
     let pixel_bytes = sample_bytes * color.samples();
     input.check_holds(size.0, size.1, pixel_bytes as u64)?;
     let transparent = transparent_grey(info);
-    let chosen = Choice::new(color, channel)?;
+    let chosen = Choice::new(color, channel).map_err(|fault| encoded::suspected(fault, input))?;
     let count = size.0 as usize * size.1 as usize;
     let mut pixels = Pixels {
         columns: size.0 as usize,
@@ -69,7 +79,7 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Bad
     };
     pixels.read(&mut reader)?;
     if channel.is_none() && chosen.height == PngChannel::Alpha {
-        refuse_opaque(&pixels.samples)?;
+        refuse_opaque(&pixels.samples).map_err(|fault| encoded::suspected(fault, input))?;
     }
     let what = chosen.described(color);
     let format = format!("PNG, {}-bit {what}", 8 * sample_bytes);
@@ -77,6 +87,15 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Bad
     decoded.mask = pixels.mask;
     decoded.no_data = transparent;
     Ok(decoded)
+}
+
+/// A decoder of the picture, its header read.
+fn reader(input: &FileBytes) -> Result<Reader<Box<dyn ReadSeek + '_>>, BadRaster> {
+    let limits = Limits { bytes: CHUNK_BYTES };
+    let mut decoder = Decoder::new_with_limits(input.reader()?, limits);
+    decoder.set_transformations(Transformations::IDENTITY);
+    decoder.ignore_checksums(false);
+    decoder.read_info().map_err(fault)
 }
 
 /// The grey of a `tRNS` chunk, which holds 16 bits whatever the picture's depth.

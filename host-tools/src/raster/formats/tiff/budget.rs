@@ -8,12 +8,30 @@ use crate::raster::BadRaster;
 const SPARSE_FLOOR: u64 = 64 << 20;
 const SPARSE_RATIO: u64 = 1024;
 
+/// More samples than this are not held in memory, however well the file packs them:
+/// 16 GB of them would leave a usual machine no room.
+const MOST_BYTES: u64 = 16 << 30;
+
+/// A sparse or well packed file may hold more than a machine: that is no damage.
+fn too_large(layout: &Layout) -> Result<(), BadRaster> {
+    let (columns, rows) = (u64::from(layout.columns), u64::from(layout.rows));
+    let bytes = (columns * rows).saturating_mul(u64::from(layout.stored.1 / 8));
+    match bytes > MOST_BYTES && layout.of_band().is_some() {
+        true => Err(BadRaster::TooLarge {
+            columns,
+            rows,
+            gigabytes: bytes.div_ceil(1_000_000_000),
+        }),
+        false => Ok(()),
+    }
+}
+
 /// Checks the promised size against the bytes that are stored for it.
 pub(super) fn check(layout: &Layout, file_bytes: u64) -> Result<(), BadRaster> {
     let (columns, rows) = (u64::from(layout.columns), u64::from(layout.rows));
     let absurd = |why: &str| BadRaster::AbsurdSize(format!("{columns} × {rows} samples {why}"));
     let stored = layout
-        .first_band()
+        .of_band()
         .ok_or_else(|| absurd("have no place in its index"))?;
     if stored.iter().all(|&bytes| bytes == 0) {
         return Err(BadRaster::AllNoData {
@@ -23,6 +41,7 @@ pub(super) fn check(layout: &Layout, file_bytes: u64) -> Result<(), BadRaster> {
     // Both sides of a product are at most 2^32 and a texel at most 2^19 bytes.
     let ratio = u128::from(layout.compression.1);
     let texel = u128::from(layout.texel_bytes());
+    too_large(layout)?;
     let image = u128::from(columns) * u128::from(rows) * texel;
     let promised = stored.iter().map(|&bytes| u128::from(bytes)).sum::<u128>() * ratio;
     let in_file = u128::from(file_bytes) * ratio;

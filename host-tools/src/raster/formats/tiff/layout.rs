@@ -13,6 +13,8 @@ pub(super) struct Layout {
     /// Type of a sample.
     pub(super) stored: (SampleFormat, u16),
     pub(super) bands: u16,
+    /// The band that is the height, the first being 0.
+    pub(super) band: usize,
     /// The band that says what is transparent, if one does.
     pub(super) alpha: Option<usize>,
     /// Name, and how many bytes one stored byte may hold.
@@ -45,7 +47,8 @@ fn compression(code: u16) -> Result<(&'static str, u64), BadRaster> {
         // Zstandard repeats a block of 128 KiB with a few bytes.
         50000 => return Ok(("zstd", 40_000)),
         6 | 7 => "JPEG compression",
-        34887 => "LERC compression",
+        // LERC stores a flat block in some hundred bytes; blocks of a megapixel fit.
+        34887 => return Ok(("lerc", 40_000)),
         34925 => "LZMA compression",
         50001 => "WebP compression",
         50002 | 52546 => "JPEG XL compression",
@@ -55,8 +58,9 @@ fn compression(code: u16) -> Result<(&'static str, u64), BadRaster> {
 }
 
 impl Layout {
-    /// Reads and checks the layout of an image.
-    pub(super) fn read(image: &Ifd) -> Result<Self, BadRaster> {
+    /// Reads and checks the layout of an image; `asked` is the band that the user chose,
+    /// the first being 1.
+    pub(super) fn read(image: &Ifd, asked: Option<u32>) -> Result<Self, BadRaster> {
         let (columns, rows) = (image.width(), image.height());
         if columns == 0 || rows == 0 {
             return Err(BadRaster::damaged(format!(
@@ -64,7 +68,8 @@ impl Layout {
             )));
         }
         let bands = image.samples_per_pixel();
-        refuse_colour(image, bands)?;
+        refuse_colour(image, bands, asked.is_some())?;
+        let band = chosen_band(asked, bands)?;
         let (tiled, chunk, chunk_bytes) = match (image.tile_width(), image.tile_height()) {
             (Some(width), Some(height)) => (true, (width, height), image.tile_byte_counts()),
             _ => {
@@ -80,7 +85,8 @@ impl Layout {
             rows,
             stored: stored_type(image)?,
             bands,
-            alpha: alpha(image, bands),
+            band,
+            alpha: alpha(image, bands).filter(|alpha| *alpha != band),
             compression: compression(image.compression())?,
             planar: image.planar_configuration() == 2,
             tiled,
@@ -95,12 +101,17 @@ impl Layout {
         self.columns.div_ceil(self.chunk.0)
     }
 
-    /// Bytes stored for each chunk of the first band; `None` when the index has
-    /// too few.
-    pub(super) fn first_band(&self) -> Option<&[u64]> {
+    /// Bytes stored for each chunk with samples of the band that is the height; `None`
+    /// when the index has too few.
+    pub(super) fn of_band(&self) -> Option<&[u64]> {
         let down = self.rows.div_ceil(self.chunk.1);
         let chunks = u64::from(self.chunks_across()) * u64::from(down);
-        self.chunk_bytes.get(..usize::try_from(chunks).ok()?)
+        let chunks = usize::try_from(chunks).ok()?;
+        let first = match self.planar {
+            true => chunks.checked_mul(self.band)?,
+            false => 0,
+        };
+        self.chunk_bytes.get(first..first.checked_add(chunks)?)
     }
 
     /// Bytes of the samples that are stored together: one of each band, or of one
@@ -140,12 +151,31 @@ fn alpha(image: &Ifd, bands: u16) -> Option<usize> {
     Some(first + alpha).filter(|band| *band > 0)
 }
 
-/// Colours are no heights, however many bands they have.
-fn refuse_colour(image: &Ifd, bands: u16) -> Result<(), BadRaster> {
+/// The band that the user chose, or the first, which is 0.
+fn chosen_band(asked: Option<u32>, bands: u16) -> Result<usize, BadRaster> {
+    let band = asked.unwrap_or(1).max(1);
+    if band > u32::from(bands) {
+        let there = match bands {
+            1 => "the file has one band".to_owned(),
+            bands => format!("the file has bands 1 to {bands}"),
+        };
+        let asked = format!("band {band}");
+        return Err(BadRaster::NoSuchPart { asked, there });
+    }
+    Ok(band as usize - 1)
+}
+
+/// Colours are no heights, however many bands they have, unless the user has `chosen`
+/// one of them.
+fn refuse_colour(image: &Ifd, bands: u16, chosen: bool) -> Result<(), BadRaster> {
     use PhotometricInterpretation as Meaning;
     let what = match image.photometric_interpretation_enum() {
         Some(Meaning::MinIsBlack | Meaning::MinIsWhite) => return Ok(()),
-        Some(Meaning::Rgb) => format!("a colour image of {bands} bands"),
+        Some(Meaning::Rgb | Meaning::Separated) if chosen => return Ok(()),
+        Some(Meaning::Rgb) => {
+            let what = format!("a colour image of {bands} bands");
+            return Err(BadRaster::ColourBands { what, bands });
+        }
         Some(Meaning::Palette) => "an image with a palette".into(),
         Some(Meaning::YCbCr) => "a colour image (YCbCr)".into(),
         Some(Meaning::Separated) => "a colour image (CMYK)".into(),

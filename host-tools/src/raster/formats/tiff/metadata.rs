@@ -10,7 +10,7 @@ const GDAL_NODATA: u16 = 42113;
 /// The file's own notes are short; what is not, is no such note.
 const LONGEST_NOTE: usize = 1 << 20;
 
-/// What GDAL notes beside the first band's samples.
+/// What GDAL notes beside a band's samples.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Metadata {
     pub(super) no_data: Option<f64>,
@@ -20,9 +20,10 @@ pub(super) struct Metadata {
 }
 
 impl Metadata {
-    pub(super) fn read(image: &Ifd) -> Result<Self, BadRaster> {
+    /// The notes on a band, the first being 0.
+    pub(super) fn read(image: &Ifd, band: usize) -> Result<Self, BadRaster> {
         let mut metadata = match text(image, GDAL_METADATA) {
-            Some(xml) => Self::from_xml(xml),
+            Some(xml) => Self::from_xml(xml, band),
             None => Self::default(),
         };
         if let Some(no_data) = text(image, GDAL_NODATA) {
@@ -34,14 +35,14 @@ impl Metadata {
     }
 
     /// `<Item name="SCALE" sample="0" role="scale">0.3048</Item>` and its like.
-    fn from_xml(xml: &str) -> Self {
+    fn from_xml(xml: &str, band: usize) -> Self {
         let mut metadata = Self::default();
         let Ok(document) = roxmltree::Document::parse(xml) else {
             tracing::warn!("the file's GDAL metadata is no XML: it is not used");
             return metadata;
         };
         for item in document.descendants() {
-            if item.attribute("sample").unwrap_or("0") != "0" {
+            if item.attribute("sample").unwrap_or("0").parse() != Ok(band) {
                 continue;
             }
             let value = item.text().unwrap_or_default().trim();
@@ -81,11 +82,12 @@ mod tests {
             offset: Some(100.0),
             metres_per_vertical_unit: Some(0.3048),
         };
-        assert_eq!(Metadata::from_xml(xml), expected);
+        assert_eq!(Metadata::from_xml(xml, 0), expected);
+        assert_eq!(Metadata::from_xml(xml, 1).scale, Some(7.0));
     }
 
     #[test]
     fn notes_that_are_no_xml_are_left_alone() {
-        assert_eq!(Metadata::from_xml("<a"), Metadata::default());
+        assert_eq!(Metadata::from_xml("<a", 0), Metadata::default());
     }
 }

@@ -17,8 +17,9 @@ use tiff_reader::source::{BytesSource, FileSource, SharedSource};
 use tiff_reader::{OpenOptions, ParseBudgets, TiffFile};
 
 use crate::raster::BadRaster;
+use crate::raster::beside::lay_out_by_world_file;
 use crate::raster::decoded::Decoded;
-use crate::raster::format::{Claim, Format, starts_with_any};
+use crate::raster::format::{Claim, Format, Parts, starts_with_any};
 use crate::raster::input::{Data, FileBytes};
 use fault::fault;
 use layout::Layout;
@@ -29,36 +30,42 @@ pub(super) const FORMAT: Format = Format {
     name: "TIFF",
     begins: |head| starts_with_any(head, &[b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"]),
     extensions: &[("tif", Claim::Promises), ("tiff", Claim::Promises)],
-    decode: |input, _| decode(input),
+    parts: Parts::Bands,
+    decode: |input, options| decode(input, options.band),
 };
 
-/// Reads the heights: of several bands the first, of several images the first
-/// that is neither an overview nor a mask.
-fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
+/// Extensions of a TIFF's world files.
+const WORLD_FILES: [&str; 4] = ["tfw", "tifw", "tiffw", "tfwx"];
+
+/// Reads the heights: of several bands the `asked` one (the first being 1) or the
+/// first, of several images the first that is neither an overview nor a mask.
+fn decode(input: &FileBytes, asked: Option<u32>) -> Result<Decoded, BadRaster> {
     let file = open(input)?;
     let image = images::full(&file)?;
-    let layout = Layout::read(image)?;
+    let layout = Layout::read(image, asked)?;
     budget::check(&layout, input.len())?;
-    let samples = samples::read(&file, image, &layout, 0)?;
+    let samples = samples::read(&file, image, &layout, layout.band)?;
     let format = layout.described(file.byte_order());
     let mut decoded = Decoded::new(format, (layout.columns, layout.rows), samples);
     let beside = mask_beside(input)?;
     decoded.mask = samples::holes(&file, image, &layout, beside.as_ref())?;
     let meant = 1 + u16::from(layout.alpha.is_some());
-    if layout.bands > meant {
+    if asked.is_some() {
+        decoded.format += &format!(", band {} of {}", layout.band + 1, layout.bands);
+    } else if layout.bands > meant {
         decoded.remarks.push(format!(
-            "it has {} bands: the first is taken for the height",
+            "it has {} bands: the first is taken for the height (--band)",
             layout.bands
         ));
     }
-    let metadata = Metadata::read(image)?;
+    let metadata = Metadata::read(image, layout.band)?;
     decoded.no_data = metadata.no_data;
     decoded.scale = metadata.scale.unwrap_or(1.0);
     decoded.offset = metadata.offset.unwrap_or(0.0);
-    georef::apply(image, &mut decoded);
-    decoded.metres_per_vertical_unit = metadata
-        .metres_per_vertical_unit
-        .or(decoded.metres_per_vertical_unit);
+    georef::apply(image, &mut decoded, metadata.metres_per_vertical_unit);
+    if decoded.place.is_none() {
+        lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?;
+    }
     Ok(decoded)
 }
 

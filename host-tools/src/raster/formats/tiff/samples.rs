@@ -101,7 +101,7 @@ pub(super) fn holes(
     };
     let (width, height) = (layout.chunk.0 as usize, layout.chunk.1 as usize);
     let across = layout.chunks_across() as usize;
-    let stored = layout.first_band().unwrap_or_default();
+    let stored = layout.of_band().unwrap_or_default();
     for (chunk, _) in stored.iter().enumerate().filter(|(_, bytes)| **bytes == 0) {
         let (west, north) = (chunk % across * width, chunk / across * height);
         for row in north..(north + height).min(rows) {

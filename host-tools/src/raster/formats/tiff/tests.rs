@@ -7,7 +7,7 @@ use tiff::tags::Tag;
 
 use super::decode;
 use crate::raster::input::FileBytes;
-use crate::raster::{BadRaster, Raster};
+use crate::raster::{BadRaster, Certainty, Raster};
 
 /// One image of a file: its kind (`NewSubfileType`), size and samples.
 struct Part<'a> {
@@ -37,7 +37,7 @@ fn file(parts: &[Part<'_>]) -> Vec<u8> {
 }
 
 fn open(bytes: Vec<u8>) -> Result<Raster, BadRaster> {
-    Raster::checked(decode(&FileBytes::unpacked("test.tif", bytes))?, None)
+    Raster::checked(decode(&FileBytes::unpacked("test.tif", bytes), None)?, None)
 }
 
 const FULL: Part<'_> = Part {
@@ -187,7 +187,12 @@ fn a_mask_in_a_file_beside_makes_holes() {
 
 /// A projected grid of 10 units with these GeoKeys besides model type and raster type.
 fn projected(keys: &[(u16, u16)], origin: [f64; 2]) -> Raster {
-    let mut directory = vec![1, 1, 0, 2 + keys.len() as u16, 1024, 0, 1, 1, 1025, 0, 1, 1];
+    let is_point = keys.iter().any(|(key, _)| *key == 1025);
+    let mut directory = vec![1, 1, 0, 1 + keys.len() as u16, 1024, 0, 1, 1];
+    if !is_point {
+        directory[3] += 1;
+        directory.extend([1025, 0, 1, 1]);
+    }
     for (key, value) in keys {
         directory.extend([*key, 0, 1, *value]);
     }
@@ -210,7 +215,14 @@ fn units_follow_from_the_codes_of_the_reference_systems() {
     let (east, _) = feet_up.cell().expect("a cell").ground_metres();
     assert!((east - 10.0024).abs() < 1e-3, "{east}: UTM's scale there");
     let system = feet_up.reference_system().expect("known");
-    assert_eq!(system, (26911, "NAD83 / UTM zone 11N".to_owned()));
+    assert_eq!(system.code(), Some(26911));
+    assert_eq!(system.name(), "NAD83 / UTM zone 11N");
+    assert_eq!(feet_up.vertical_unit_from(), Certainty::FromCode);
+    let datum = feet_up.vertical_datum().expect("stated");
+    assert_eq!(
+        (datum.code, datum.name.as_str()),
+        (Some(8228), "NAVD88 height (ft)")
+    );
     // California zone 5 in US survey feet, without a unit of its own.
     let feet = projected(&[(projected_system, 2229)], [6_490_000.0, 1_870_000.0]);
     let (east, _) = feet.cell().expect("a cell").ground_metres();
@@ -225,4 +237,16 @@ fn units_follow_from_the_codes_of_the_reference_systems() {
         [386_000.0, 3_790_000.0],
     );
     assert_eq!(depth.summary().lowest, -6.0);
+}
+
+#[test]
+fn coordinates_of_points_are_those_of_the_samples_centres() {
+    let sides = |raster: &Raster| {
+        let bounds = raster.bounds().expect("placed");
+        [bounds.west, bounds.south, bounds.east, bounds.north]
+    };
+    let areas = projected(&[(3072, 26911)], [500.0, 400.0]);
+    assert_eq!(sides(&areas), [500.0, 380.0, 530.0, 400.0]);
+    let points = projected(&[(1025, 2), (3072, 26911)], [500.0, 400.0]);
+    assert_eq!(sides(&points), [495.0, 385.0, 525.0, 405.0]);
 }

@@ -1,0 +1,65 @@
+//! What lies beside a file under the same name: a reference system (`.prj`), a world
+//! file. Only a file on disk has neighbours; what comes out of an archive has none.
+
+mod prj;
+mod world_file;
+
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::Read;
+use std::path::PathBuf;
+
+use super::BadRaster;
+use super::input::{Data, FileBytes};
+
+pub(super) use prj::reference_system;
+pub(super) use world_file::lay_out_by_world_file;
+
+/// No neighbour that is text is longer; what is longer is something else.
+const LONGEST_TEXT: u64 = 1 << 20;
+
+/// The file beside `input` whose extension is `extension`, in lower or upper case:
+/// `hills.hdr` beside `hills.flt`, or `hills.flt.hdr`.
+pub(super) fn find(input: &FileBytes, extension: &str) -> Option<PathBuf> {
+    let Data::File(_, path) = input.data() else {
+        return None;
+    };
+    let appended = |extension: &str| {
+        let mut name: OsString = path.as_os_str().to_owned();
+        name.push(".");
+        name.push(extension);
+        PathBuf::from(name)
+    };
+    let upper = extension.to_uppercase();
+    let candidates = [
+        path.with_extension(extension),
+        path.with_extension(&upper),
+        appended(extension),
+        appended(&upper),
+    ];
+    let mut others = candidates.into_iter().filter(|other| other != path);
+    others.find(|other| other.is_file())
+}
+
+/// The text of the file beside `input` with an extension, and that file's name.
+pub(super) fn text(
+    input: &FileBytes,
+    extension: &str,
+) -> Result<Option<(String, String)>, BadRaster> {
+    let Some(path) = find(input, extension) else {
+        return Ok(None);
+    };
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let file = File::open(&path).map_err(BadRaster::Unreadable)?;
+    let mut bytes = Vec::new();
+    file.take(LONGEST_TEXT + 1)
+        .read_to_end(&mut bytes)
+        .map_err(BadRaster::Unreadable)?;
+    if bytes.len() as u64 > LONGEST_TEXT {
+        return Err(BadRaster::AbsurdSize(format!(
+            "{name} beside it is larger than {LONGEST_TEXT} bytes: no such text is"
+        )));
+    }
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    Ok(Some((text, name.into_owned())))
+}

@@ -1,0 +1,228 @@
+//! Where decoded samples lie: what follows from a file's map from columns and rows to
+//! coordinates, whatever its format.
+
+use super::crs::{ReferenceSystem, Unit};
+use super::decoded::Decoded;
+use super::ground_map::{Bounds, GroundMap};
+use super::{BadRaster, CellSize, CellUnit, Certainty};
+
+/// The unit of a file's coordinates, as the file states it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct GroundUnit {
+    unit: CellUnit,
+    /// Degrees in a unit, where it is an angle.
+    degrees: f64,
+    from: Certainty,
+}
+
+impl GroundUnit {
+    /// Degrees, which the file or its format states.
+    pub(super) const DEGREE: Self = Self::angle(1.0);
+    /// Metres, which the file or its format states.
+    pub(super) const METRE: Self = Self::length(1.0, Certainty::Stated);
+
+    /// A stated angle of so many degrees.
+    pub(super) const fn angle(degrees: f64) -> Self {
+        Self {
+            unit: CellUnit::Degree,
+            degrees,
+            from: Certainty::Stated,
+        }
+    }
+
+    /// A length of so many metres.
+    pub(super) const fn length(metres: f64, from: Certainty) -> Self {
+        Self {
+            unit: CellUnit::Length { metres },
+            degrees: 1.0,
+            from,
+        }
+    }
+
+    /// The unit of a reference system.
+    pub(super) fn of(system: &ReferenceSystem) -> Self {
+        let from = match system.code() {
+            Some(_) => Certainty::FromCode,
+            None => Certainty::Stated,
+        };
+        match system.unit() {
+            Unit::Angle(degrees) => Self::angle(degrees),
+            Unit::Length(Some(metres)) => Self::length(metres, from),
+            Unit::Length(None) => Self::length(1.0, Certainty::Assumed),
+        }
+    }
+}
+
+/// Where a field lies.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// From columns and rows in file order.
+    pub(super) map: GroundMap,
+    /// Degrees in a unit of the coordinates, where they are angles.
+    pub(super) degrees: f64,
+}
+
+impl Place {
+    /// A place whose angles, where there are any, are degrees.
+    pub(super) const fn new(map: GroundMap) -> Self {
+        Self { map, degrees: 1.0 }
+    }
+}
+
+impl Decoded {
+    /// Lays the samples out: sets orientation, cell and place. Where the file states
+    /// no `unit`, that of its reference system counts, which is to be set before; else
+    /// the numbers tell.
+    pub(super) fn lay_out(&mut self, map: GroundMap, unit: Option<GroundUnit>) {
+        self.south_up = map.is_south_up();
+        self.east_first = map.is_east_first();
+        if !map.is_straight() {
+            // Felt along its own rows and columns; only a mirror image is turned.
+            self.remarks.push(format!(
+                "the grid is rotated by {:.1}° against east: x runs along its rows, not to the east",
+                map.rotation()
+            ));
+        }
+        let unit = unit.or(self.system.as_ref().map(GroundUnit::of));
+        let degrees = unit.map_or(1.0, |unit| unit.degrees);
+        let mut cell = self.cell_of(&map, unit);
+        cell.lean = map.lean();
+        cell.map_scale = self.map_scale(&map, &cell).unwrap_or((1.0, 1.0));
+        self.cell = Some(cell);
+        self.place = Some(Place { map, degrees });
+    }
+
+    /// Takes a side of the cells in metres from the user, where the file does not state
+    /// it.
+    ///
+    /// # Errors
+    /// [`BadRaster::CellKnown`] where it does.
+    pub(super) fn with_ground_cell(mut self, side_m: Option<f64>) -> Result<Self, BadRaster> {
+        let Some(side_m) = side_m else {
+            return Ok(self);
+        };
+        if let Some(cell) = self
+            .cell
+            .filter(|cell| cell.certainty != Certainty::Assumed)
+        {
+            let (east, north) = cell.ground_metres();
+            return Err(BadRaster::CellKnown(format!("{east:.3} × {north:.3} m")));
+        }
+        let metre = CellUnit::Length { metres: 1.0 };
+        let sides = match self.cell {
+            // Of cells that are not square it is the smaller side.
+            Some(cell) => {
+                let shorter = cell.east.min(cell.north);
+                (cell.east / shorter * side_m, cell.north / shorter * side_m)
+            }
+            None => (side_m, side_m),
+        };
+        self.cell = Some(CellSize {
+            certainty: Certainty::Given,
+            ..CellSize::stated(sides, metre, None)
+        });
+        // Its coordinates are in a unit that stays unknown.
+        self.place = None;
+        Ok(self)
+    }
+
+    fn cell_of(&self, map: &GroundMap, unit: Option<GroundUnit>) -> CellSize {
+        let (east, north) = map.steps();
+        let (columns, rows) = (f64::from(self.columns), f64::from(self.rows));
+        let Some(GroundUnit {
+            unit,
+            degrees,
+            from,
+        }) = unit
+        else {
+            let bounds = map.bounds((self.columns, self.rows));
+            let corner = bounds.map(|bounds| (bounds.west, bounds.south));
+            return CellSize::guessed((east, north), corner, (east * columns, north * rows));
+        };
+        let latitude =
+            (unit == CellUnit::Degree).then(|| map.at(columns / 2.0, rows / 2.0).1 * degrees);
+        CellSize {
+            certainty: from,
+            ..CellSize::stated((east * degrees, north * degrees), unit, latitude)
+        }
+    }
+
+    /// Ground metres in a metre of the map along rows and columns, where the
+    /// projection is known.
+    fn map_scale(&self, map: &GroundMap, cell: &CellSize) -> Option<(f64, f64)> {
+        let CellUnit::Length { metres } = cell.unit else {
+            return None;
+        };
+        let middle = map.at(f64::from(self.columns) / 2.0, f64::from(self.rows) / 2.0);
+        let units = self.system.as_ref()?.local_metres(middle)?;
+        let (east, north) = map.scale(units);
+        Some((east / metres, north / metres))
+    }
+
+    /// Outer edges of all cells in the file's units.
+    pub(super) fn bounds(&self) -> Option<Bounds> {
+        self.place?.map.bounds((self.columns, self.rows))
+    }
+
+    /// Outer edges of all cells in degrees of longitude and latitude of the file's own
+    /// datum. Longitudes run on over 180° where the field does. The edges of a projected
+    /// field are curved: they are followed in `STEPS` steps.
+    pub(super) fn bounds_lonlat(&self) -> Option<Bounds> {
+        const STEPS: u32 = 32;
+        let (columns, rows) = (f64::from(self.columns), f64::from(self.rows));
+        let along = |step: u32| f64::from(step) / f64::from(STEPS);
+        let edges = (0..=STEPS).map(along).flat_map(|share| {
+            let (column, row) = (share * columns, share * rows);
+            [(column, 0.0), (column, rows), (0.0, row), (columns, row)]
+        });
+        let first = self.lonlat(0.0, 0.0)?.0;
+        let places = edges.map(|(column, row)| {
+            let (longitude, latitude) = self.lonlat(column, row)?;
+            let around = ((longitude - first) / 360.0).round() * 360.0;
+            Some((longitude - around, latitude))
+        });
+        let is_angle = self.cell.is_some_and(|cell| cell.unit == CellUnit::Degree);
+        if is_angle {
+            let corners = [(0.0, 0.0), (columns, 0.0), (0.0, rows), (columns, rows)];
+            let corners = corners.map(|(column, row)| self.lonlat(column, row));
+            return Bounds::around(corners.into_iter().flatten());
+        }
+        let bounds = Bounds::around(places.collect::<Option<Vec<_>>>()?)?;
+        Some(self.with_poles(bounds))
+    }
+
+    /// A field around a pole has all longitudes, and the pole is not on its edges.
+    fn with_poles(&self, mut lonlat: Bounds) -> Bounds {
+        let (Some(bounds), Some(system)) = (self.bounds(), self.system.as_ref()) else {
+            return lonlat;
+        };
+        for pole in [-90.0, 90.0] {
+            let Some((x, y)) = system.from_lonlat((0.0, pole)) else {
+                continue;
+            };
+            let inside = (bounds.west..=bounds.east).contains(&x)
+                && (bounds.south..=bounds.north).contains(&y);
+            // Others show a pole as a line, or nowhere.
+            if inside
+                && system
+                    .lonlat((x, y))
+                    .is_some_and(|(_, y)| (y - pole).abs() < 1e-6)
+            {
+                (lonlat.west, lonlat.east) = (-180.0, 180.0);
+                lonlat.south = lonlat.south.min(pole);
+                lonlat.north = lonlat.north.max(pole);
+            }
+        }
+        lonlat
+    }
+
+    /// Longitude and latitude of a place in columns and rows, file order.
+    pub(super) fn lonlat(&self, column: f64, row: f64) -> Option<(f64, f64)> {
+        let place = self.place?;
+        let (x, y) = place.map.at(column, row);
+        match self.cell?.unit {
+            CellUnit::Degree => Some((x * place.degrees, y * place.degrees)),
+            CellUnit::Length { .. } => self.system.as_ref()?.lonlat((x, y)),
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Where terrain files lie: reference systems and bounds as GDAL knows them, and what
+//! `hapterra info` says about each.
+//!
+//! `data/places_by_gdal.csv` was made once by `data/places_by_gdal.py`, which names
+//! its command.
+
+use std::path::Path;
+use std::process::Command;
+
+use hapterra::raster::{Bounds, OpenOptions, Raster};
+use hapterra_tests::{hapterra_binary, shared};
+
+const TABLE: &str = include_str!("../data/places_by_gdal.csv");
+/// Metres or degrees: the table has bounds in full, degrees to 9 digits.
+const SAME_PLACE: f64 = 1e-6;
+
+#[derive(Debug, serde::Deserialize)]
+struct Row {
+    file: String,
+    columns: u32,
+    rows: u32,
+    epsg: String,
+    west: f64,
+    south: f64,
+    east: f64,
+    north: f64,
+    lon_west: Option<f64>,
+    lat_south: Option<f64>,
+    lon_east: Option<f64>,
+    lat_north: Option<f64>,
+}
+
+impl Row {
+    fn bounds(&self) -> [f64; 4] {
+        [self.west, self.south, self.east, self.north]
+    }
+
+    fn lonlat(&self) -> Option<[f64; 4]> {
+        Some([
+            self.lon_west?,
+            self.lat_south?,
+            self.lon_east?,
+            self.lat_north?,
+        ])
+    }
+
+    fn is_a_surface(&self) -> bool {
+        self.columns > 1 && self.rows > 1
+    }
+}
+
+fn sides(bounds: Bounds) -> [f64; 4] {
+    [bounds.west, bounds.south, bounds.east, bounds.north]
+}
+
+fn assert_same(found: Option<Bounds>, wanted: [f64; 4], file: &str) {
+    let found = sides(found.unwrap_or_else(|| panic!("{file}: no bounds")));
+    for (found, wanted) in found.iter().zip(wanted) {
+        assert!(
+            (found - wanted).abs() < SAME_PLACE * wanted.abs().clamp(1.0, 1e3),
+            "{file}: {found} for {wanted}"
+        );
+    }
+}
+
+/// GDAL gives this model the extent of its quadrangle: two rows without any elevation
+/// more than its profiles have.
+fn has_less_rows(row: &Row) -> bool {
+    row.file == "real/SainteHelens.dem"
+}
+
+#[test]
+fn files_lie_where_gdal_sees_them() {
+    let Some(folder) = shared("dem") else {
+        return;
+    };
+    let mut table = csv::Reader::from_reader(TABLE.as_bytes());
+    let mut checked = 0;
+    for row in table.deserialize() {
+        let row: Row = row.expect("a row of the table");
+        let path = folder.join(&row.file);
+        if !row.is_a_surface() || !path.is_file() {
+            continue;
+        }
+        let Ok(raster) = Raster::open(&path, &OpenOptions::default()) else {
+            assert!(row.file.contains("all-nodata"), "{} opens", row.file);
+            continue;
+        };
+        compare(&raster, &row);
+        checked += 1;
+    }
+    println!("{checked} files lie where GDAL sees them");
+    assert!(checked >= 30, "only {checked} files were there");
+}
+
+fn compare(raster: &Raster, row: &Row) {
+    let file = &row.file;
+    let system = raster.reference_system();
+    let code = system.and_then(|system| system.code());
+    if let Ok(epsg) = row.epsg.parse::<u16>() {
+        assert_eq!(code, Some(epsg), "{file}");
+    } else if row.epsg.is_empty() {
+        assert_eq!(system, None, "{file}");
+    } else {
+        assert!(system.is_some() && code.is_none(), "{file}: {system:?}");
+    }
+    if has_less_rows(row) {
+        let found = sides(raster.bounds().expect("placed"));
+        assert_eq!([found[0], found[2]], [row.west, row.east]);
+        let missing = row.rows - raster.rows();
+        let lower = found[1] - row.south + row.north - found[3];
+        assert_eq!(lower, 30.0 * f64::from(missing), "{file}");
+        return;
+    }
+    assert_eq!(
+        [raster.columns(), raster.rows()],
+        [row.columns, row.rows],
+        "{file}"
+    );
+    assert_same(raster.bounds(), row.bounds(), file);
+    if let Some(degrees) = row.lonlat() {
+        assert_same(raster.bounds_lonlat(), degrees, file);
+    }
+}
+
+fn info(path: &Path) -> serde_json::Value {
+    let output = Command::new(hapterra_binary())
+        .args(["info", "--json"])
+        .arg(path)
+        .output()
+        .expect("it runs");
+    assert!(output.status.success(), "{output:?}");
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+/// For each: reference system, bounds, way to longitudes, cell's unit, vertical unit and
+/// datum, where it comes from.
+#[test]
+fn info_says_of_each_whether_it_is_stated_follows_or_is_assumed() {
+    let Some(folder) = shared("dem/real") else {
+        return;
+    };
+    let cases = [
+        (
+            "bigtujunga.tif",
+            ["file", "file", "code", "file", "assumed", ""],
+        ),
+        (
+            "N44W072.hgt",
+            ["file", "file", "file", "file", "file", "file"],
+        ),
+        (
+            "Kilauea.utm.nc",
+            ["file", "file", "file", "file", "assumed", ""],
+        ),
+        (
+            "SRTMGL3_boulder.asc",
+            ["", "assumed", "assumed", "assumed", "assumed", ""],
+        ),
+        (
+            "SainteHelens.dem",
+            ["assumed", "file", "assumed", "file", "file", ""],
+        ),
+        (
+            "hugo_site.asc",
+            ["", "assumed", "", "assumed", "assumed", ""],
+        ),
+        (
+            "jacksboro_fault_dem.npz",
+            ["", "assumed", "assumed", "assumed", "assumed", ""],
+        ),
+    ];
+    for (file, wanted) in cases {
+        let report = info(&folder.join(file));
+        let found = [
+            &report["crs_from"],
+            &report["bounds"]["from"],
+            &report["bounds_lonlat"]["from"],
+            &report["cell"]["unit_from"],
+            &report["vertical"]["unit_from"],
+            &report["vertical"]["datum_from"],
+        ];
+        let found = found.map(|from| from.as_str().unwrap_or_default());
+        assert_eq!(found, wanted, "{file}: {report:#}");
+    }
+    let report = info(&folder.join("bigtujunga.tif"));
+    assert_eq!(report["crs"], "EPSG:32611");
+    assert_eq!(report["crs_name"], "WGS 84 / UTM zone 11N");
+    // UTM's scale 1 km... west of its edge: more than a metre of ground a metre of map.
+    let east = report["cell"]["east_m"].as_f64().expect("a length");
+    assert!((east / 30.0 - 0.9997).abs() < 1e-4, "{east}");
+    let report = info(&folder.join("N44W072.hgt"));
+    assert_eq!(report["vertical"]["datum_code"], "EPSG:5773");
+}
