@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::archive::{self, Zip};
 use super::format::{Claim, Format, Parts};
-use super::formats::{FORMATS, claim_of, npy, raw};
+use super::formats::{FORMATS, claim_of, headered, npy, raw};
 use super::guard::guarded;
 use super::input::FileBytes;
 use super::{BadRaster, Decoded, OpenOptions};
@@ -65,6 +65,10 @@ fn decode_plain(
     }
     if let Some(format) = by_content(head) {
         return decode_as(format, input, options);
+    }
+    // A header beside a file tells more than the file's extension.
+    if let Some(decoded) = guarded("raw", || headered::decode_by_header(input, options))? {
+        return Ok(decoded);
     }
     decode_as(by_extension(input.extension())?, input, options)
 }

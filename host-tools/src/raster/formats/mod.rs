@@ -2,6 +2,9 @@
 //! file with a `FORMAT`, and name it in [`FORMATS`].
 
 mod asc;
+mod dted;
+mod grass;
+pub(super) mod headered;
 mod height_name;
 mod hgt;
 mod netcdf;
@@ -15,14 +18,17 @@ use super::format::{Claim, Format};
 
 /// All formats that are told by their content or their extension; the first that
 /// fits decides. Raw samples are not among them: only the user knows those.
-pub(super) const FORMATS: [Format; 7] = [
+pub(super) const FORMATS: [Format; 10] = [
     tiff::FORMAT,
     png::FORMAT,
     netcdf::FORMAT,
     npy::FORMAT,
     asc::FORMAT,
+    grass::FORMAT,
+    dted::FORMAT,
     usgs_dem::FORMAT,
     hgt::FORMAT,
+    headered::FORMAT,
 ];
 
 /// What the extension of a file in an archive says, the strongest claim of any format.

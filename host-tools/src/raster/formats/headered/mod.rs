@@ -1,0 +1,92 @@
+//! Plain samples whose header is a text of its own beside them: Esri's `.flt`, `.bil`,
+//! `.bip` and `.bsq`, and ENVI's, whose data may have any extension.
+
+mod envi;
+mod esri;
+mod layout;
+
+#[cfg(test)]
+mod tests;
+
+use crate::raster::decoded::Decoded;
+use crate::raster::format::{Claim, Format, Parts};
+use crate::raster::input::FileBytes;
+use crate::raster::{BadRaster, OpenOptions, beside};
+use layout::Layout;
+
+/// Extensions of such data. The header decides where another file has one, too.
+pub(super) const FORMAT: Format = Format {
+    name: "raster with a .hdr",
+    begins: |_| false,
+    extensions: &[
+        ("flt", Claim::Decides),
+        ("bil", Claim::Decides),
+        ("bip", Claim::Decides),
+        ("bsq", Claim::Decides),
+    ],
+    parts: Parts::Bands,
+    decode: |input, options| {
+        let decoded = decode_by_header(input, options)?;
+        decoded.ok_or_else(|| BadRaster::HeaderMissing(header_name(input)))
+    },
+};
+
+/// What a header says.
+struct Header {
+    format: &'static str,
+    layout: Layout,
+    /// Sets what the header says besides the layout.
+    describe: Box<dyn FnOnce(&mut Decoded) -> Result<(), BadRaster>>,
+}
+
+/// Decodes a file by the header beside it; `None` where there is no such header.
+pub(in crate::raster) fn decode_by_header(
+    input: &FileBytes,
+    options: &OpenOptions,
+) -> Result<Option<Decoded>, BadRaster> {
+    let Some((text, name)) = beside::text(input, "hdr")? else {
+        return Ok(None);
+    };
+    let band = options.band.unwrap_or(1);
+    let header = if envi::is_header(&text) {
+        envi::read(&text, band)
+    } else if esri::is_header(&text) {
+        esri::read(&text, input.extension())
+    } else {
+        return Ok(None);
+    };
+    let header = header.map_err(|fault| in_header(fault, &name))?;
+    FORMAT.check_choice(options)?;
+    header.layout.check(band, input.len(), &name)?;
+    let samples = header.layout.read(input, band)?;
+    let bands = match header.layout.bands {
+        1 => String::new(),
+        bands => format!(", band {band} of {bands}"),
+    };
+    let format = format!("{}, {}{bands}", header.format, samples.type_name());
+    let mut decoded = Decoded::new(format, (header.layout.columns, header.layout.rows), samples);
+    beside::reference_system(input, &mut decoded);
+    (header.describe)(&mut decoded).map_err(|fault| in_header(fault, &name))?;
+    if header.layout.bands > 1 && options.band.is_none() {
+        decoded.remarks.push(format!(
+            "it has {} bands: the first is taken for the height (--band)",
+            header.layout.bands
+        ));
+    }
+    Ok(Some(decoded))
+}
+
+/// Damage of a header is not in the file that was named.
+fn in_header(fault: BadRaster, name: &str) -> BadRaster {
+    match fault {
+        BadRaster::Damaged(what) => BadRaster::Damaged(format!("{name} beside it: {what}")),
+        BadRaster::AbsurdSize(what) => BadRaster::AbsurdSize(format!("{name} beside it: {what}")),
+        other => other,
+    }
+}
+
+fn header_name(input: &FileBytes) -> String {
+    let name = input.name();
+    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    format!("{stem}.hdr")
+}
