@@ -64,13 +64,45 @@ fn decode_plain(
         return Err(BadRaster::Truncated("it is empty".into()));
     }
     if let Some(format) = by_content(head) {
-        return decode_as(format, input, options);
+        return or_by_gdal(decode_as(format, input, options), input, options);
     }
     // A header beside a file tells more than the file's extension.
     if let Some(decoded) = guarded("raw", || headered::decode_by_header(input, options))? {
         return Ok(decoded);
     }
-    decode_as(by_extension(input.extension())?, input, options)
+    let format = by_extension(input.extension());
+    let decoded = format.and_then(|format| decode_as(format, input, options));
+    or_by_gdal(decoded, input, options)
+}
+
+/// What is not known or not supported here is given to GDAL, in builds that have it.
+#[cfg(feature = "gdal")]
+fn or_by_gdal(
+    decoded: Result<Decoded, BadRaster>,
+    input: &FileBytes,
+    options: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
+    use BadRaster::{HeaderMissing, UnknownFormat, Unsupported};
+    match decoded {
+        Err(UnknownFormat | HeaderMissing(_) | Unsupported { .. })
+            if options.variable.is_none() =>
+        {
+            match guarded("GDAL", || super::formats::gdal::decode(input, options))? {
+                Some(decoded) => Ok(decoded),
+                None => decoded,
+            }
+        }
+        decoded => decoded,
+    }
+}
+
+#[cfg(not(feature = "gdal"))]
+fn or_by_gdal(
+    decoded: Result<Decoded, BadRaster>,
+    _: &FileBytes,
+    _: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
+    decoded
 }
 
 fn decode_as(

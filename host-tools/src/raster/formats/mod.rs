@@ -3,6 +3,8 @@
 
 mod asc;
 mod dted;
+#[cfg(feature = "gdal")]
+pub(super) mod gdal;
 mod grass;
 pub(super) mod headered;
 mod height_name;
