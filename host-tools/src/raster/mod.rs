@@ -2,10 +2,12 @@
 //!
 //! | format | read by | notes |
 //! |---|---|---|
-//! | GeoTIFF, TIFF, BigTIFF, COG | `tiff-reader` | first full image, first band |
+//! | GeoTIFF, TIFF, BigTIFF, COG | `tiff-reader` | first full image; a band by number |
 //! | SRTM `.hgt`, also zipped or gzipped | here | place from the name |
-//! | Esri ASCII `.asc` | here | |
-//! | PNG | `png` | grey, grey + alpha, depth in the alpha of a colour picture |
+//! | DTED 0 to 2 | here | |
+//! | Esri ASCII `.asc`, GRASS ASCII | here | |
+//! | `.flt`, `.bil`, `.bip`, `.bsq`, ENVI | here | by the `.hdr` beside them |
+//! | PNG | `png` | grey, grey + alpha, depth in the alpha of a colour picture, encoded in its colours |
 //! | raw samples | here | with a stated [`RawLayout`] |
 //! | NetCDF 3 and 4 `.nc`, `.grd` | `netcdf-reader` | |
 //! | USGS ASCII `.dem` | here | |
@@ -14,6 +16,10 @@
 //! Each format is one file or folder of `formats`, and one line in its table. From a
 //! path to samples: `open` unpacks (`archive`), asks the table, and lets the format
 //! decode (`input`, `read`) into `decoded`; [`Raster`] answers from that.
+//!
+//! **Places.** A format hands over its map from columns and rows to coordinates
+//! (`ground_map`) and its reference system (`crs`); what follows from these is worked out
+//! once for all (`placed`). World files and `.prj` files are read by `beside`.
 //!
 //! **Holes.** No-data as the format states it, NaN, masked samples and tiles
 //! that a sparse file leaves out are holes: [`Raster::height`] is NaN there. An

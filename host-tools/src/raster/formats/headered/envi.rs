@@ -75,8 +75,11 @@ fn describe(keys: &Keys, band: u32, decoded: &mut Decoded) -> Result<(), BadRast
     };
     let map_info = MapInfo::read(&info)
         .ok_or_else(|| BadRaster::damaged("its map info is not a place and a cell"))?;
-    if decoded.system.is_none() {
-        decoded.system = map_info.code.and_then(ReferenceSystem::from_code);
+    // Zone and datum tell the code that Esri's texts leave out.
+    let has_code = |system: &ReferenceSystem| system.code().is_some();
+    if !decoded.system.as_ref().is_some_and(has_code) {
+        let by_code = map_info.code.and_then(ReferenceSystem::from_code);
+        decoded.system = by_code.or(decoded.system.take());
     }
     decoded.lay_out(map_info.map, map_info.unit);
     Ok(())

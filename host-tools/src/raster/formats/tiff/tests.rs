@@ -250,3 +250,77 @@ fn coordinates_of_points_are_those_of_the_samples_centres() {
     let points = projected(&[(1025, 2), (3072, 26911)], [500.0, 400.0]);
     assert_eq!(sides(&points), [495.0, 385.0, 525.0, 405.0]);
 }
+
+#[test]
+fn a_band_of_a_colour_image_is_a_height_when_it_is_named() {
+    let mut tags = grey([2, 2], 3);
+    tags[4] = shorts(262, &[2]);
+    let bytes = by_hand(&tags, &[1, 20, 3, 4, 50, 6, 7, 80, 9, 10, 110, 12]);
+    let fault = open(bytes.clone()).expect_err("colours");
+    assert!(
+        matches!(fault, BadRaster::ColourBands { bands: 3, .. }),
+        "{fault}"
+    );
+    let input = FileBytes::unpacked("test.tif", bytes);
+    let green = Raster::checked(decode(&input, Some(2)).expect("a band"), None).expect("heights");
+    assert_eq!((green.height(0, 1), green.height(1, 0)), (20.0, 110.0));
+    assert!(
+        green.format().ends_with("band 2 of 3"),
+        "{}",
+        green.format()
+    );
+    let fault = decode(&input, Some(4)).expect_err("three bands");
+    assert!(fault.to_string().contains("bands 1 to 3"), "{fault}");
+}
+
+/// A sparse file says that it is large, not that it is damaged.
+#[test]
+fn what_memory_cannot_hold_is_no_damage() {
+    let mut tags = grey([16, 16], 1);
+    let long = |tag: u16, values: &[u32]| {
+        let bytes = values.iter().flat_map(|value| value.to_le_bytes());
+        (tag, 4, values.len() as u32, bytes.collect::<Vec<u8>>())
+    };
+    // 200,000 × 200,000 in four tiles, the last of which is stored.
+    let side = 200_000;
+    tags[0] = long(256, &[side]);
+    tags[1] = long(257, &[side]);
+    tags.retain(|tag| ![273, 278, 279].contains(&tag.0));
+    tags.push(long(322, &[100_000]));
+    tags.push(long(323, &[100_000]));
+    tags.push(long(324, &[0, 0, 0, 8]));
+    tags.push(long(325, &[0, 0, 0, 64]));
+    let fault = open(by_hand(&tags, &[1; 64])).expect_err("too large");
+    assert!(
+        matches!(fault, BadRaster::TooLarge { gigabytes: 40, .. }),
+        "{fault}"
+    );
+}
+
+#[test]
+fn a_world_file_places_what_has_no_place_of_its_own() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("plain.tif");
+    std::fs::write(&path, file(&[FULL])).expect("written");
+    let open = || Raster::open(&path, &crate::raster::OpenOptions::default());
+    assert!(open().expect("opens").bounds().is_none());
+    std::fs::write(folder.path().join("plain.TFW"), "30\n0\n0\n-30\n515\n985\n").expect("written");
+    let wkt = epsg_utils::epsg_to_wkt2(32611).expect("known");
+    std::fs::write(folder.path().join("plain.prj"), wkt).expect("written");
+    let raster = open().expect("opens");
+    let bounds = raster.bounds().expect("placed");
+    assert_eq!(
+        [bounds.west, bounds.north, bounds.east],
+        [500.0, 1000.0, 590.0]
+    );
+    assert_eq!(
+        raster.reference_system().and_then(|system| system.code()),
+        Some(32611)
+    );
+    std::fs::write(folder.path().join("plain.TFW"), "30\n0\n0\n").expect("written");
+    let told = open().expect_err("a damaged neighbour").to_string();
+    assert!(
+        told.contains("plain.TFW") && told.contains("six numbers"),
+        "{told}"
+    );
+}

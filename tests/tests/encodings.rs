@@ -1,0 +1,214 @@
+//! One field in encodings that this repository has no encoder for, made by GDAL and by
+//! netCDF's library: `data/by_gdal.py` names the command. Every sample is exact.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use hapterra::raster::{BadRaster, OpenOptions, Raster};
+
+const HOLE: (u32, u32) = (3, 4);
+
+fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("data/by_gdal")
+        .join(name)
+}
+
+/// The height at a column and a row from the north, as `by_gdal.py` has it.
+fn height(column: u32, row: u32) -> f64 {
+    let (column, row) = (f64::from(column), f64::from(row));
+    100.0 + 7.0 * column - 3.0 * row + (column * row) % 5.0
+}
+
+/// Every band is 1000 above the one before.
+fn assert_field(raster: &Raster, (columns, rows): (u32, u32), band: u32, name: &str) {
+    assert_eq!((raster.columns(), raster.rows()), (columns, rows), "{name}");
+    assert_eq!(raster.summary().holes, 1, "{name}");
+    for row in 0..rows {
+        for column in 0..columns {
+            let found = raster.height(column, rows - 1 - row);
+            if (column, row) == HOLE {
+                assert!(found.is_nan(), "{name}: {found} in the hole");
+            } else {
+                let wanted = height(column, row) + 1000.0 * f64::from(band - 1);
+                assert_eq!(found, wanted, "{name}: column {column}, row {row}");
+            }
+        }
+    }
+}
+
+fn open(name: &str, options: &OpenOptions) -> Raster {
+    Raster::open(path(name), options).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn of_band(band: u32) -> OpenOptions {
+    OpenOptions {
+        band: Some(band),
+        ..OpenOptions::default()
+    }
+}
+
+#[test]
+fn every_encoding_holds_the_exact_field_in_its_place() {
+    for name in [
+        "lerc_i16.tif",
+        "lerc_deflate_u16.tif",
+        "lerc_zstd_f32.tif",
+        "lerc_f64.tif",
+        "lerc_bands_i16.tif",
+        "bands_planar_i16.tif",
+        "world.tif",
+        "ehdr.bil",
+        "float.flt",
+        "envi.dat",
+    ] {
+        let raster = open(name, &OpenOptions::default());
+        assert_field(&raster, (40, 30), 1, name);
+        let bounds = raster
+            .bounds()
+            .unwrap_or_else(|| panic!("{name}: no bounds"));
+        let sides = [bounds.west, bounds.south, bounds.east, bounds.north];
+        assert_eq!(
+            sides,
+            [400_000.0, 3_799_100.0, 401_200.0, 3_800_000.0],
+            "{name}"
+        );
+    }
+    let dted = open("n34w119.dt0", &OpenOptions::default());
+    assert_field(&dted, (121, 121), 1, "n34w119.dt0");
+    let bounds = dted.bounds().expect("placed");
+    assert!(
+        (bounds.west + 119.0 + 1.0 / 240.0).abs() < 1e-9,
+        "{bounds:?}"
+    );
+    assert!(
+        (bounds.north - 35.0 - 1.0 / 240.0).abs() < 1e-9,
+        "{bounds:?}"
+    );
+}
+
+#[test]
+fn a_band_is_chosen_by_its_number() {
+    for (name, bands) in [
+        ("lerc_bands_i16.tif", 3),
+        ("bands_planar_i16.tif", 3),
+        ("ehdr.bil", 2),
+        ("envi.dat", 2),
+    ] {
+        for band in 1..=bands {
+            assert_field(&open(name, &of_band(band)), (40, 30), band, name);
+        }
+        let error = Raster::open(path(name), &of_band(bands + 1)).expect_err(name);
+        assert!(
+            matches!(error.fault(), BadRaster::NoSuchPart { .. }),
+            "{error}"
+        );
+        let there = format!("bands 1 to {bands}");
+        assert!(error.to_string().contains(&there), "{error}");
+    }
+    let error = Raster::open(path("n34w119.dt0"), &of_band(2)).expect_err("one field");
+    assert!(error.to_string().contains("DTED has one field"), "{error}");
+}
+
+#[test]
+fn a_variable_is_chosen_by_its_name() {
+    let named = |name: &str| OpenOptions {
+        variable: Some(name.to_owned()),
+        ..OpenOptions::default()
+    };
+    for (band, name) in [(1, "bed"), (2, "thickness")] {
+        assert_field(&open("zstd.nc", &named(name)), (40, 30), band, name);
+    }
+    let refused =
+        |options: &OpenOptions| Raster::open(path("zstd.nc"), options).expect_err("refused");
+    let error = refused(&OpenOptions::default());
+    assert!(
+        matches!(error.fault(), BadRaster::SeveralHeights { .. }),
+        "{error}"
+    );
+    assert!(error.to_string().contains("bed, thickness"), "{error}");
+    let error = refused(&named("z"));
+    assert!(
+        error
+            .to_string()
+            .contains("no variable z: its two-dimensional variables are bed, thickness"),
+        "{error}"
+    );
+    let error = refused(&of_band(1));
+    assert!(error.to_string().contains("chosen by name"), "{error}");
+    let error = Raster::open(path("lerc_i16.tif"), &named("z")).expect_err("a TIFF");
+    assert!(error.to_string().contains("TIFF has bands"), "{error}");
+}
+
+/// A side of the cells is taken where the file states none, and refused where it does.
+#[test]
+fn a_cell_size_is_for_files_that_state_none() {
+    let sized = OpenOptions {
+        ground_cell_m: Some(12.5),
+        ..OpenOptions::default()
+    };
+    let error = Raster::open(path("lerc_i16.tif"), &sized).expect_err("it states 30 m");
+    assert!(matches!(error.fault(), BadRaster::CellKnown(_)), "{error}");
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("bare.asc");
+    for header in ["cellsize 1", "dx 1\ndy 2"] {
+        fs::write(&file, format!("ncols 2\nnrows 2\n{header}\n1 2 3 4")).expect("written");
+        let raster = Raster::open(&file, &sized).expect("its unit was assumed");
+        let (east, north) = raster.cell().expect("given").ground_metres();
+        assert_eq!(
+            (east, north / east),
+            (12.5, if header.contains("dy") { 2.0 } else { 1.0 })
+        );
+    }
+}
+
+/// Cut or changed anywhere, a file is refused or read, and never more than that.
+#[test]
+fn a_damaged_copy_never_panics_and_is_bounded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in [
+        "lerc_i16.tif",
+        "lerc_zstd_f32.tif",
+        "lerc_deflate_u16.tif",
+        "n34w119.dt0",
+        "zstd.nc",
+        "ehdr.bil",
+    ] {
+        let whole = fs::read(path(name)).expect("readable");
+        let file = folder.path().join(name);
+        for header in ["hdr", "prj"] {
+            let beside = path(name).with_extension(header);
+            if beside.is_file() {
+                fs::copy(&beside, file.with_extension(header)).expect("copied");
+            }
+        }
+        for cut in [0, 1, 9, whole.len() / 3, whole.len() / 2, whole.len() - 1] {
+            fs::write(&file, &whole[..cut]).expect("written");
+            let outcome = Raster::open(&file, &OpenOptions::default());
+            // The last byte of a NetCDF or TIFF file need not be a sample's.
+            assert!(
+                outcome.is_err() || cut == whole.len() - 1,
+                "{name} cut at {cut}"
+            );
+        }
+        let mut chance = 1_u64;
+        for _ in 0..300 {
+            let mut bytes = whole.clone();
+            for _ in 0..3 {
+                chance = chance
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                let at = (chance >> 33) as usize % bytes.len();
+                bytes[at] = (chance >> 20) as u8;
+            }
+            fs::write(&file, &bytes).expect("written");
+            // A panic of a decoder would be an error, too: none is wanted.
+            if let Err(error) = Raster::open(&file, &OpenOptions::default()) {
+                assert!(
+                    !matches!(error.fault(), BadRaster::DecoderFailed(_)),
+                    "{name}: {error}"
+                );
+            }
+        }
+    }
+}
