@@ -26,9 +26,6 @@ def height(columns, rows):
 
 
 def write(folder, name, dtype, driver="GTiff", columns=COLUMNS, rows=ROWS, nodata=None, bands=1, **options):
-    samples = height(columns, rows).astype(dtype)
-    if nodata is not None:
-        samples[HOLE[1], HOLE[0]] = nodata
     profile = dict(
         driver=driver, width=columns, height=rows, count=bands, dtype=dtype, nodata=nodata,
         crs="EPSG:32611", transform=from_origin(400000, 3800000, 30, 30),
@@ -37,7 +34,9 @@ def write(folder, name, dtype, driver="GTiff", columns=COLUMNS, rows=ROWS, nodat
     with rasterio.open(os.path.join(folder, name), "w", **profile) as dataset:
         for band in range(bands):
             # Each band is 1000 above the one before.
-            dataset.write((samples + 1000 * band).astype(dtype), band + 1)
+            samples = (height(columns, rows) + 1000 * band).astype(dtype)
+            samples[HOLE[1], HOLE[0]] = nodata
+            dataset.write(samples, band + 1)
 
 
 def netcdf(folder, name):

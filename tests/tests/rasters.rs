@@ -351,6 +351,7 @@ fn third_party_tiffs_are_read_or_refused_for_what_they_are() {
                 matches!(
                     error.fault(),
                     BadRaster::NotAHeightField(_)
+                        | BadRaster::ColourBands { .. }
                         | BadRaster::TooSmall { .. }
                         | BadRaster::AllNoData { .. }
                 ),

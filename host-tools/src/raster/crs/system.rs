@@ -95,6 +95,17 @@ impl ReferenceSystem {
         }
     }
 
+    /// The same system with a projection, as PROJ writes it.
+    pub(in crate::raster) fn with_projection(mut self, projection: String) -> Self {
+        self.projection = Some(projection);
+        self
+    }
+
+    /// The size of its globe, as PROJ writes it.
+    pub(in crate::raster) fn ellipsoid(&self) -> Option<String> {
+        Some(ellipsoid(self.projection.as_deref()?))
+    }
+
     /// EPSG's code, where the file states one or names the system so that it follows.
     #[must_use]
     pub const fn code(&self) -> Option<u16> {
@@ -188,6 +199,14 @@ fn is_geographic(node: &Node) -> bool {
     node.is(&GEOGRAPHIC)
 }
 
+/// The words of a projection that tell the globe's size and datum.
+fn ellipsoid(projection: &str) -> String {
+    const KEYS: [&str; 4] = ["+a=", "+b=", "+rf=", "+towgs84="];
+    let of_globe = |word: &&str| KEYS.iter().any(|key| word.starts_with(key));
+    let words: Vec<&str> = projection.split_whitespace().filter(of_globe).collect();
+    words.join(" ")
+}
+
 /// A projection and the globe that it projects.
 struct Projection {
     map: Proj,
@@ -197,13 +216,7 @@ struct Projection {
 impl Projection {
     fn new(text: &str) -> Option<Self> {
         // Both sides have one datum, so that none is shifted.
-        let of_globe = |word: &&str| {
-            ["+a=", "+b=", "+rf=", "+towgs84="]
-                .iter()
-                .any(|key| word.starts_with(key))
-        };
-        let ellipsoid: Vec<&str> = text.split_whitespace().filter(of_globe).collect();
-        let globe = format!("+proj=longlat {}", ellipsoid.join(" "));
+        let globe = format!("+proj=longlat {}", ellipsoid(text));
         Some(Self {
             map: Proj::from_proj_string(text).ok()?,
             globe: Proj::from_proj_string(&globe).ok()?,

@@ -201,7 +201,10 @@ mod tests {
                 assert_eq!((bounds.west, bounds.south), (400_000.0, 3_799_880.0));
                 // Some formats keep a system's parameters and lose its code.
                 let degrees = raster.bounds_lonlat().expect("a known projection");
-                assert!((degrees.west + 118.0873).abs() < 1e-3, "{driver}: {degrees:?}");
+                assert!(
+                    (degrees.west + 118.0873).abs() < 1e-3,
+                    "{driver}: {degrees:?}"
+                );
             }
             let error = open(&path, Some(3)).expect_err("two bands");
             assert!(error.to_string().contains("bands 1 to 2"), "{error}");

@@ -31,12 +31,15 @@ pub(super) const FORMAT: Format = Format {
     },
 };
 
+/// Sets what a header says besides the layout of the samples.
+type Describe = Box<dyn FnOnce(&mut Decoded) -> Result<(), BadRaster>>;
+
 /// What a header says.
 struct Header {
     format: &'static str,
     layout: Layout,
     /// Sets what the header says besides the layout.
-    describe: Box<dyn FnOnce(&mut Decoded) -> Result<(), BadRaster>>,
+    describe: Describe,
 }
 
 /// Decodes a file by the header beside it; `None` where there is no such header.

@@ -64,7 +64,10 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Bad
     let pixel_bytes = sample_bytes * color.samples();
     input.check_holds(size.0, size.1, pixel_bytes as u64)?;
     let transparent = transparent_grey(info);
-    let chosen = Choice::new(color, channel).map_err(|fault| encoded::suspected(fault, input))?;
+    let chosen = Choice::new(color, channel).map_err(|fault| match channel {
+        None => encoded::suspected(fault, input),
+        Some(_) => fault,
+    })?;
     let count = size.0 as usize * size.1 as usize;
     let mut pixels = Pixels {
         columns: size.0 as usize,

@@ -7,6 +7,7 @@ use geotiff_core::geokeys::{
 };
 use tiff_reader::Ifd;
 
+use super::user_defined;
 use crate::raster::Certainty;
 use crate::raster::crs::{self, ReferenceSystem, Unit};
 use crate::raster::decoded::Decoded;
@@ -80,7 +81,7 @@ const GEOGRAPHIC: u16 = 2;
 const LINEAR_UNIT_SIZE: u16 = 3077;
 
 /// The GeoTIFF keys, if there are any.
-struct GeoKeys(Option<GeoKeyDirectory>);
+pub(super) struct GeoKeys(Option<GeoKeyDirectory>);
 
 impl GeoKeys {
     fn read(image: &Ifd) -> Self {
@@ -92,11 +93,11 @@ impl GeoKeys {
         Self(directory.and_then(|keys| GeoKeyDirectory::parse(keys, &doubles, texts)))
     }
 
-    fn code(&self, key: u16) -> Option<u16> {
+    pub(super) fn code(&self, key: u16) -> Option<u16> {
         self.0.as_ref()?.get_short(key)
     }
 
-    fn number(&self, key: u16) -> Option<f64> {
+    pub(super) fn number(&self, key: u16) -> Option<f64> {
         self.0.as_ref()?.get_double(key)?.first().copied()
     }
 
@@ -121,14 +122,19 @@ impl GeoKeys {
         if let Some(system) = code.and_then(ReferenceSystem::from_code) {
             return Some(system);
         }
-        let (citation, unit) = match self.is_projected()? {
-            true => (PROJ_CITATION, Unit::Length(self.stated_metres())),
-            false => (GEOG_CITATION, Unit::Angle(self.degrees())),
+        let is_projected = self.is_projected()?;
+        let citation = if is_projected {
+            PROJ_CITATION
+        } else {
+            GEOG_CITATION
         };
         let name = self.text(citation).or(self.text(GT_CITATION));
         let named = name.map(str::to_owned);
-        let name = named.or(code.map(|code| format!("EPSG:{code}, not known here")));
-        Some(ReferenceSystem::named(&name?, unit))
+        let name = named.or(code.map(|code| format!("EPSG:{code}, not known here")))?;
+        Some(match is_projected {
+            true => user_defined::system(self, &name, self.known(GEODETIC_CRS_TYPE)),
+            false => ReferenceSystem::named(&name, Unit::Angle(self.degrees())),
+        })
     }
 
     /// A code that is one of EPSG's.
@@ -138,7 +144,7 @@ impl GeoKeys {
     }
 
     /// Metres in the linear unit, where the file states it.
-    fn stated_metres(&self) -> Option<f64> {
+    pub(super) fn stated_metres(&self) -> Option<f64> {
         let named = self.code(PROJ_LINEAR_UNITS).and_then(metres_of_code);
         let metres = named.or(self.number(LINEAR_UNIT_SIZE));
         metres.filter(|metres| metres.is_finite() && *metres > 0.0)
@@ -171,7 +177,7 @@ impl GeoKeys {
     }
 
     /// Degrees in the angular unit.
-    fn degrees(&self) -> f64 {
+    pub(super) fn degrees(&self) -> f64 {
         match self.code(GEOG_ANGULAR_UNITS) {
             Some(9101) => 1.0_f64.to_degrees(),
             Some(9103) => 1.0 / 60.0,

@@ -10,6 +10,7 @@ mod images;
 mod layout;
 mod metadata;
 mod samples;
+mod user_defined;
 
 use std::sync::Arc;
 
