@@ -19,7 +19,8 @@
 //!
 //! **Places.** A format hands over its map from columns and rows to coordinates
 //! (`ground_map`) and its reference system (`crs`); what follows from these is worked out
-//! once for all (`placed`). World files and `.prj` files are read by `beside`.
+//! once for all (`placed`), as are places of samples for the rest of the program
+//! (`georeference`). World files and `.prj` files are read by `beside`.
 //!
 //! **Holes.** No-data as the format states it, NaN, masked samples and tiles
 //! that a sparse file leaves out are holes: [`Raster::height`] is NaN there. An
