@@ -187,8 +187,9 @@ const ROUNDING_N: f64 = 1e-6;
 
 /// Replays a recording and compares: every tick that had its terrain feels the same to the
 /// bit, and where the guard limited nothing, the force is the same but for its rounding.
-fn is_reproduced(folder: &Folder, recording: &str) {
-    folder.replays(recording, "again.csv", &[]);
+fn is_reproduced(folder: &Folder, terrain: &str, recording: &str) {
+    let [terrain, from, to] = [terrain, recording, "again.csv"].map(|name| folder.text(name));
+    folder.runs(&["replay", &terrain, &from, "-o", &to]);
     let (live, again) = (folder.read(recording), folder.read("again.csv"));
     let (live, again) = (rows(&live), rows(&again));
     assert_eq!(live.len(), again.len());
@@ -221,7 +222,7 @@ fn what_run_recorded_is_felt_again_bit_by_bit() {
     let (terrain, record) = (folder.text("hills.tif"), folder.text("run.csv"));
     let words = ["run", &terrain, "--device", "native", "--record", &record];
     folder.runs(&[&words[..], &["--seconds", "6", "--cell-mm", "0.9"]].concat());
-    is_reproduced(&folder, "run.csv");
+    is_reproduced(&folder, "hills.tif", "run.csv");
 }
 
 #[test]
@@ -231,7 +232,27 @@ fn what_demo_recorded_is_felt_again_bit_by_bit() {
     // No image is named, and no device: it runs in the program itself, and says so.
     let told = folder.runs(&["demo", &terrain, "--out", &out, "--seconds", "6"]);
     assert!(told.contains("--device native"), "{told}");
-    is_reproduced(&folder, "demo/hills.csv");
+    is_reproduced(&folder, "hills.tif", "demo/hills.csv");
+}
+
+#[test]
+fn a_place_far_from_the_middle_is_felt_again_with_its_own_cells() {
+    let folder = Folder::new();
+    // Ten degrees from south to north: cells of degrees are not alike.
+    let mut text = "ncols 60\nnrows 101\nxllcenter 10\nyllcenter 55\ncellsize 0.1\n".to_owned();
+    for row in 0..101 {
+        let heights = (0..60).map(|column| (500 + 300 * ((column + row) % 9)).to_string());
+        text += &(heights.collect::<Vec<_>>().join(" ") + "\n");
+    }
+    std::fs::write(folder.path("hills.asc"), text).expect("written");
+    let degrees = r#"GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]"#;
+    std::fs::write(folder.path("hills.prj"), degrees).expect("written");
+    let [terrain, out] = ["hills.asc", "demo"].map(|name| folder.text(name));
+    let words = ["demo", &terrain, "--out", &out, "--seconds", "4"];
+    folder.runs(&[&words[..], &["--at", "13,56", "--exaggeration", "9"]].concat());
+    let text = folder.read("demo/hills.csv");
+    assert!(text.contains("# measured_at = [13.0, 56.0]"), "{text}");
+    is_reproduced(&folder, "hills.asc", "demo/hills.csv");
 }
 
 /// A Python that can read Parquet, and what it reads it with.

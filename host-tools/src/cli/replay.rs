@@ -75,7 +75,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         .cloned();
     let rendering = rendering(args, recorded.as_ref());
     let raster = args.terrain.open()?;
-    let grid = rendering.grid(&raster);
+    let measured_at = recorded.as_ref().and_then(|it| it.felt.measured_at);
+    let grid = rendering.grid(&raster, measured_at);
     let scale = rendering.scale(&grid)?;
     let terrain = rendering.terrain(grid, scale)?;
     let file = args.terrain.file.display().to_string();

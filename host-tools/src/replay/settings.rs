@@ -65,6 +65,10 @@ pub struct Felt {
     /// Side of a felt cell of level 0 on the ground, m, where the file knows it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_m: Option<f64>,
+    /// Where a cell of the file is as large as that, in the file's coordinates, x and y;
+    /// none where it is in the middle of the field.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured_at: Option<[f64; 2]>,
     /// Level of detail: every 2^level-th sample.
     pub level: u8,
     /// Hand millimetres a felt cell of level 0.
@@ -159,6 +163,7 @@ impl Settings {
                 cells: grid.cells(),
                 samples: [grid.columns(), grid.rows()],
                 cell_m: grid.side_m(),
+                measured_at: grid.measured_at(),
                 level: terrain.level(),
                 cell_mm: scale.cell_mm(),
                 height_mm_per_unit: scale.height_mm_per_unit(),

@@ -41,6 +41,10 @@ pub enum FeltCells {
 pub struct FeltGrid<'r> {
     raster: &'r Raster,
     cells: FeltCells,
+    /// A cell of the file where `measured_at` is.
+    cell: Option<CellSize>,
+    /// Where the cell was measured, in the file's coordinates; `None` for the middle.
+    measured_at: Option<[f64; 2]>,
     columns: u32,
     rows: u32,
     /// Side of a felt cell on the ground, metres, where the file knows it.
@@ -71,13 +75,18 @@ impl<'r> FeltGrid<'r> {
     /// true in few places.
     #[must_use]
     pub fn at(raster: &'r Raster, cells: FeltCells, ground: [f64; 2]) -> Self {
-        Self::of_cell(raster, cells, raster.georeference().cell_at(ground))
+        Self {
+            measured_at: Some(ground),
+            ..Self::of_cell(raster, cells, raster.georeference().cell_at(ground))
+        }
     }
 
     fn of_cell(raster: &'r Raster, cells: FeltCells, cell: Option<CellSize>) -> Self {
         let stored = Self {
             raster,
             cells,
+            cell,
+            measured_at: None,
             columns: raster.columns(),
             rows: raster.rows(),
             side_m: cell.map(|cell| cell.square_metres()),
@@ -146,8 +155,14 @@ impl<'r> FeltGrid<'r> {
     /// their true shape.
     #[must_use]
     pub fn is_distorted(&self) -> bool {
-        let cell = self.raster.cell();
-        !self.is_resampled() && cell.is_some_and(|cell| !is_square(&cell))
+        !self.is_resampled() && self.cell.is_some_and(|cell| !is_square(&cell))
+    }
+
+    /// The place in the file's coordinates at which cells are as large as they are felt;
+    /// `None` for the middle of the field.
+    #[must_use]
+    pub const fn measured_at(&self) -> Option<[f64; 2]> {
+        self.measured_at
     }
 
     /// Felt samples from west to east.

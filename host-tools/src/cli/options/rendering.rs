@@ -105,10 +105,15 @@ impl Rendering {
         }
     }
 
-    /// The grid that is felt of a raster.
+    /// The grid that is felt of a raster, of cells as they are at a place in its
+    /// coordinates, else in its middle.
     #[must_use]
-    pub fn grid<'r>(&self, raster: &'r Raster) -> FeltGrid<'r> {
-        FeltGrid::new(raster, self.cells.unwrap_or_default())
+    pub fn grid<'r>(&self, raster: &'r Raster, measured_at: Option<[f64; 2]>) -> FeltGrid<'r> {
+        let cells = self.cells.unwrap_or_default();
+        match measured_at {
+            Some(ground) => FeltGrid::at(raster, cells, ground),
+            None => FeltGrid::new(raster, cells),
+        }
     }
 
     /// The terrain at a scale.
