@@ -172,6 +172,20 @@ mod tests {
     }
 
     #[test]
+    fn angles_of_a_text_may_be_grads() {
+        let text = r#"GEOGCS["old Paris",DATUM["NTF",SPHEROID["Clarke 1880 (IGN)",6378249.2,293.4660212936269]],PRIMEM["Greenwich",0],UNIT["grad",0.01570796326794897]]"#;
+        let (system, _) = ReferenceSystem::from_wkt(text);
+        let place = system
+            .expect("a system")
+            .lonlat((100.0, -50.0))
+            .expect("degrees");
+        assert!(
+            (place.0 - 90.0).abs() < 1e-9 && (place.1 + 45.0).abs() < 1e-9,
+            "{place:?}"
+        );
+    }
+
+    #[test]
     fn a_text_without_a_code_has_its_own_numbers() {
         let text = r#"PROJCS["my feet",GEOGCS["GCS_North_American_1983",DATUM["D_North_American_1983",SPHEROID["GRS_1980",6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",1640416.6666666667],PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",-117.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],UNIT["Foot_US",0.3048006096012192]]"#;
         let (system, vertical) = ReferenceSystem::from_wkt(text);
