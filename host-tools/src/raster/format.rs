@@ -46,6 +46,12 @@ impl Format {
     /// # Errors
     /// [`BadRaster::NoSuchPart`].
     pub(super) fn check_choice(&self, options: &OpenOptions) -> Result<(), BadRaster> {
+        if options.encoding.is_some() && self.name != "PNG" {
+            return Err(BadRaster::NoSuchPart {
+                asked: "picture with heights in its colours".into(),
+                there: format!("the file is {}", self.name),
+            });
+        }
         self.parts.check_choice(self.name, options)
     }
 
@@ -85,4 +91,30 @@ pub(super) fn starts_with_any(head: &[u8], signatures: &[&[u8]]) -> bool {
     signatures
         .iter()
         .any(|signature| head.starts_with(signature))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::formats::FORMATS;
+    use super::*;
+    use crate::raster::Encoding;
+
+    #[test]
+    fn a_choice_that_a_format_does_not_have_is_refused() {
+        let accepting = |options: &OpenOptions| {
+            let formats = FORMATS.iter();
+            let formats = formats.filter(|format| format.check_choice(options).is_ok());
+            formats.map(|format| format.name).collect::<Vec<_>>()
+        };
+        let mut options = OpenOptions::default();
+        assert_eq!(accepting(&options).len(), FORMATS.len());
+        options.band = Some(2);
+        assert_eq!(accepting(&options), ["TIFF", "raster with a .hdr"]);
+        options.band = None;
+        options.variable = Some("z".into());
+        assert_eq!(accepting(&options), ["NetCDF"]);
+        options.variable = None;
+        options.encoding = Some(Encoding::Terrarium);
+        assert_eq!(accepting(&options), ["PNG"]);
+    }
 }
