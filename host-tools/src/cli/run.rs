@@ -7,10 +7,14 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use clap::ValueHint;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::Scene;
+use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::session::{DEFAULT_SILENCE_S, SILENCE_S};
 
+use super::bringup::required::brought_up;
 use super::failure::{Failure, OrHint};
-use super::met_device::meet;
+use super::met_device::calibration_of;
 use super::options::placing::{self, Placing};
 use super::options::rendering::Rendering;
 use super::options::terrain_file::TerrainFile;
@@ -20,11 +24,13 @@ use super::terminal::{interrupt, left_behind};
 use crate::link::{
     Arming, DeviceAddress, HostClock, LinkError, Native, Patience, Tcp, Transport, serve_plant,
 };
-use crate::output::Output;
+use crate::output::{Output, keep_apart};
 use crate::phantom::HeldPhantom;
-use crate::place::PlacedTerrain;
-use crate::replay::Recording;
+use crate::place::{PlacedTerrain, View};
+use crate::replay::settings::Device;
+use crate::replay::{Column, LoopColumns, Recording, Settings};
 use crate::serving::{Service, told_of_last_end};
+use crate::terrain::Terrain;
 use watch::Watch;
 
 /// Between two tries to find a device that is gone.
@@ -111,42 +117,39 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     // What cannot be recorded is known before anything is armed.
     let recording = recording(args)?;
     interrupt::listen();
-    let (calibration, transport) = match is_scripted(args) {
-        // The virtual Phantom is one.
-        true => (Calibration::PREMIUM_1_5, None),
-        false => {
-            let met = meet(&args.device, args.unchecked)?;
-            (met.calibration, Some(met.transport))
-        }
-    };
+    // The virtual Phantom is a Premium 1.5.
+    let (mut calibration, mut met) = (Calibration::PREMIUM_1_5, Ok(()));
+    if !is_scripted(args) {
+        met = calibration_of(&args.device).map(|of_device| calibration = of_device);
+    }
     let view = asked.view(&calibration)?;
     let terrain = view.terrain(asked.grid)?;
     let tour = match is_scripted(args) {
         true => Some(PlacedTerrain::in_view(&terrain, &view, law, rule)?),
         false => None,
     };
-    let served = Served {
+    let placed = Placed {
         terrain: &terrain,
         view,
         scene: view.scene(&terrain, law, rule)?,
         tour,
     };
-    let (Some(address), Some(tour)) = (&args.plant, &served.tour) else {
-        return serve(args, &served, transport, recording);
+    let (Some(address), Some(tour)) = (&args.plant, &placed.tour) else {
+        return serve(args, &placed, met, recording);
     };
     let arm = tour.held_phantom();
     let done = OnceLock::new();
     std::thread::scope(|scope| {
         scope.spawn(|| move_arm(address, arm, &done));
-        let ended = serve(args, &served, transport, recording);
+        let ended = serve(args, &placed, met, recording);
         // The arm is still there while the board lets its force go out.
         let _ = done.set(Instant::now() + LINGER);
         ended
     })
 }
 
-/// What is served, and how an arm that is virtual moves over it.
-struct Served<'t> {
+/// A terrain as it lies under the arm, and how an arm that is virtual moves over it.
+struct Placed<'t> {
     terrain: &'t Terrain<'t>,
     view: View,
     scene: Scene,
@@ -172,20 +175,26 @@ fn is_scripted(args: &Args) -> bool {
     args.plant.is_some() || args.device == DeviceAddress::Native
 }
 
-fn serve(args: &Args, placed: &PlacedTerrain<'_>) -> Result<(), Failure> {
-    // What cannot be recorded is known before anything is armed.
-    let recording = recording(args)?;
-    let scripted = is_scripted(args);
+/// `met`: whether the device has told its calibration. If not, it is said goodbye to: the
+/// arm may be armed from before.
+fn serve(
+    args: &Args,
+    placed: &Placed<'_>,
+    met: Result<(), Failure>,
+    recording: Option<Recording>,
+) -> Result<(), Failure> {
+    let is_checked = !is_scripted(args) && !args.unchecked;
     let service = service(args, placed);
     interrupt::board_may_be_armed(true);
-    let opened = service.open(|line| match scripted || args.unchecked {
-        true => Ok(()),
-        false => brought_up(line),
+    let opened = service.open(|line| match (met, is_checked) {
+        (Ok(()), true) => brought_up(line),
+        (met, _) => met,
     });
     // Where it could not be opened, what has to be told is told.
     let (served, device) = opened.inspect_err(|_| interrupt::board_may_be_armed(false))?;
-    let how = session_summary::in_words(placed.terrain());
+    let how = session_summary::in_words(placed.terrain);
     say(format!("terrain        {}: {how}", args.terrain.name()));
+    show(placing::told(&placed.view, placed.terrain));
     say(format!(
         "device         {}",
         session_summary::device(&device)
@@ -193,6 +202,7 @@ fn serve(args: &Args, placed: &PlacedTerrain<'_>) -> Result<(), Failure> {
     if let Some(line) = told_of_last_end(&device) {
         tell(line);
     }
+    let recording = described(recording, args, placed, &device);
     let mut watch = Watch::new(args, placed, &device, recording);
     let end = served.serve(&mut watch);
     // What was recorded is kept, however it ended, and before anything else is done.
@@ -214,10 +224,10 @@ fn serve(args: &Args, placed: &PlacedTerrain<'_>) -> Result<(), Failure> {
 }
 
 /// What is served, and to which device.
-fn service<'s, 't: 's>(args: &'s Args, placed: &'s PlacedTerrain<'t>) -> Service<'s, 't> {
+fn service<'s, 't: 's>(args: &'s Args, placed: &'s Placed<'t>) -> Service<'s, 't> {
     Service {
-        terrain: placed.terrain(),
-        scene: placed.scene(),
+        terrain: placed.terrain,
+        scene: placed.scene,
         // A virtual arm was switched on in its zero pose; where a real one was,
         // its user has to say.
         arming: match is_scripted(args) {
@@ -262,22 +272,22 @@ fn recording(args: &Args) -> Result<Option<Recording>, Failure> {
 fn described(
     mut recording: Option<Recording>,
     args: &Args,
-    served: &Served<'_>,
+    placed: &Placed<'_>,
     device: &DeviceHello,
 ) -> Option<Recording> {
     if let Some(recording) = &mut recording {
         let (file, device) = (args.terrain.file.display().to_string(), Device::of(device));
-        let law = (served.scene.law, served.scene.rule);
-        let home_mm = Some(served.view.home_mm);
-        let settings = Settings::new(&file, served.terrain, law, home_mm, device);
+        let law = (placed.scene.law, placed.scene.rule);
+        let home_mm = Some(placed.view.home_mm);
+        let settings = Settings::new(&file, placed.terrain, law, home_mm, device);
         recording.describe(&settings);
     }
     recording
 }
 
-fn connect<'t>(args: &Args, served: &Served<'t>) -> Result<Box<dyn Transport + 't>, LinkError> {
+fn connect<'t>(args: &Args, placed: &Placed<'t>) -> Result<Box<dyn Transport + 't>, LinkError> {
     let native = || {
-        let arm = served.tour.as_ref().map(PlacedTerrain::held_phantom);
+        let arm = placed.tour.as_ref().map(PlacedTerrain::held_phantom);
         Native::new(HostClock::default(), arm.map(|arm| Box::new(arm) as _))
     };
     args.device.connect(native)

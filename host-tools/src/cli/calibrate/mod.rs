@@ -16,7 +16,7 @@ use super::failure::{Failure, OrHint};
 use super::options::device::{Device, DeviceChoice};
 use super::terminal::left_behind;
 use super::terminal::voice::say;
-use crate::calibrate::{Attendant, Plan, VirtualUser, walk};
+use crate::calibrate::{Attendant, Plan, VirtualUser, file, walk};
 use crate::link::{DeviceAddress, Dialogue, HostClock, Native};
 use crate::output::keep_apart;
 use questions::UserAtTerminal;
@@ -124,7 +124,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let device = Native::new(HostClock::default(), None)
         .meddled_with(user.hands())
         .restless();
-    if !args.no_walk {
+    if !args.no_walk && args.show.is_none() {
         say("a virtual user calibrates a virtual Phantom that differs from its preset");
     }
     let mut dialogue = Dialogue::open(Box::new(device), PATIENCE)?;
@@ -164,7 +164,7 @@ fn calibrate(
         (record, zero) = (review.after, Some(review.zero));
     }
     if let Some(path) = &args.output {
-        write(path, &record).or_hint("name another file with --output")?;
+        file::write(path, &record).or_hint(OTHER_FILE)?;
         say(format!("written        {}", path.display()));
     }
     hand_over(args, dialogue, record)?;

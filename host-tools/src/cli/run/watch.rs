@@ -6,15 +6,15 @@ use std::time::{Duration, Instant};
 use hapterra_core::scene::Sample;
 use hapterra_core::wire::hello::DeviceHello;
 
-use super::{Args, is_scripted};
+use super::{Args, Placed};
 use crate::cli::terminal::arming_prompts::ArmingPrompts;
 use crate::cli::terminal::voice::{status, tell};
 use crate::link::{Ask, Event, Tally};
 use crate::output::OutputError;
-use crate::place::PlacedTerrain;
-use crate::replay::{Record, Recording, state_name};
+use crate::replay::{LoopColumns, Record, Recording, Value, is_below_ground, state_name};
 use crate::serving::Onlooker;
 use crate::telemetry::{Figures, SampleLog};
+use crate::terrain::Terrain;
 
 /// Between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(2);
@@ -27,6 +27,7 @@ pub(super) struct Watch<'t> {
     latest: Option<(Sample, Record)>,
     recording: Option<Recording>,
     failed: Option<OutputError>,
+    terrain: &'t Terrain<'t>,
     prompts: ArmingPrompts,
     line_due: Instant,
 }
@@ -43,20 +44,21 @@ pub(super) struct Seen {
 impl<'t> Watch<'t> {
     pub(super) fn new(
         args: &Args,
-        placed: &PlacedTerrain<'t>,
+        placed: &Placed<'t>,
         device: &DeviceHello,
         recording: Option<Recording>,
     ) -> Self {
-        let (script_s, prompts) = match is_scripted(args) {
-            true => (placed.duration_s(), ArmingPrompts::for_a_script()),
-            false => (f64::MAX, ArmingPrompts::at_the_terminal()),
+        let (script_s, prompts) = match &placed.tour {
+            Some(tour) => (tour.duration_s(), ArmingPrompts::for_a_script()),
+            None => (f64::MAX, ArmingPrompts::at_the_terminal()),
         };
         Self {
-            log: SampleLog::new(placed.terrain(), device),
+            log: SampleLog::new(placed.terrain, device),
             stop_s: args.seconds.unwrap_or(f64::MAX).min(script_s),
             latest: None,
             recording,
             failed: None,
+            terrain: placed.terrain,
             prompts,
             line_due: Instant::now() + LINE_EVERY,
         }
@@ -81,14 +83,11 @@ impl<'t> Watch<'t> {
     fn record(&mut self, sample: &Sample) -> Record {
         let record = self.log.take(sample);
         if let Some(recording) = &mut self.recording {
-            let state = state_name(sample.state);
-            let more: [&dyn std::fmt::Display; 5] = [
-                &state,
-                &sample.tick,
-                &sample.work,
-                &sample.cost,
-                &sample.late,
-            ];
+            let of_loop = LoopColumns::of(sample);
+            let [state, mode, limits] = of_loop.values();
+            let counts = [sample.tick, sample.work, sample.cost, sample.late];
+            let [tick, work, cost, late] = counts.map(Value::Count);
+            let more = [state, tick, work, cost, late, mode, limits];
             self.failed = self.failed.take().or(recording.write(&record, &more).err());
         }
         record
@@ -119,7 +118,7 @@ impl Onlooker for Watch<'_> {
         let Some((sample, record)) = &self.latest else {
             return;
         };
-        let line = in_words(sample, record, tally);
+        let line = in_words(sample, record, self.terrain, tally);
         if std::io::stderr().is_terminal() {
             status(Some(line));
         } else if Instant::now() >= self.line_due {
@@ -133,9 +132,13 @@ impl Onlooker for Watch<'_> {
     }
 }
 
-fn in_words(sample: &Sample, record: &Record, tally: &Tally) -> String {
+fn in_words(sample: &Sample, record: &Record, terrain: &Terrain<'_>, tally: &Tally) -> String {
     let force = glam::DVec3::from(record.force_n).length();
-    let ([x, y, z], t_s, state) = (record.hip_mm, record.t_s, state_name(sample.state));
+    let ([x, y, z], t_s) = (record.hip_mm, record.t_s);
+    let state = match is_below_ground(sample, record, terrain) {
+        true => "below ground: raise the tip above the surface, then it can be felt",
+        false => state_name(sample.state),
+    };
     let (tiles, lost) = (tally.tiles, tally.lost + tally.dropped);
     let fault = sample.fault;
     let fault = fault.map_or(String::new(), |f| format!(", FAULT {f:?}"));
