@@ -18,6 +18,8 @@ use crate::monitor::{Monitor, Part};
 use crate::motor_memory::{self, Copies};
 use crate::store::Stored;
 
+/// Its name, as a board that has no chip.
+pub const BOARD: &str = "native";
 /// Current at the ends of the range of a device without real amplifiers, A: every
 /// board's.
 pub const FULL_SCALE_A: f32 = 5.5;
@@ -147,7 +149,7 @@ impl<C: TickClock, const D: usize> Device<C, D> {
             haptic_loop,
             link,
             monitor,
-        } = assemble(tiles, memory, hardware, "native");
+        } = assemble(tiles, memory, hardware, BOARD);
         Self {
             haptic_loop,
             link,

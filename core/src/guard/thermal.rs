@@ -153,6 +153,8 @@ impl Motors {
     }
 
     /// Lets `currents_a` flow for a tick.
+    // A few instructions, but for the tick in ten that goes on to the temperatures.
+    #[inline(always)]
     pub fn heat(&mut self, currents_a: Vec3) {
         self.squares += currents_a * currents_a;
         self.ticks += 1;
@@ -161,6 +163,7 @@ impl Motors {
         }
     }
 
+    #[inline(never)]
     fn advance(&mut self) {
         let thermal = &self.thermal;
         let mean = self.squares / self.ticks as f32;

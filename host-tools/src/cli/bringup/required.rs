@@ -2,6 +2,7 @@
 
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::hello::DeviceHello;
+use hapterra_firmware::native;
 
 use super::PATIENCE;
 use crate::board::BOARDS;
@@ -32,10 +33,13 @@ pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Fa
     Ok(dialogue.end()?)
 }
 
-/// Whether a board of this name drives a real arm: it has a chip, and is not emulated.
+/// Whether a board of this name may drive a real arm: all but those that are known to
+/// drive none.
 fn is_real(board: &str) -> bool {
-    let has_chip = |known: &&crate::board::Board| known.name == board && known.chip.is_some();
-    BOARDS.iter().find(has_chip).is_some()
+    let is_emulated = BOARDS
+        .iter()
+        .any(|known| known.name == board && known.chip.is_none());
+    board != native::BOARD && !is_emulated
 }
 
 /// The first step that its log does not have, for the device and record as they are now.
@@ -93,6 +97,7 @@ mod tests {
             ("nucleo-h743zi2-spi", true),
             ("mps2-an386", false),
             ("native", false),
+            ("a board of my own", true),
         ] {
             assert_eq!(is_real(board), real, "{board}");
         }
