@@ -28,7 +28,7 @@ fn at_a_bench() -> (Served, Sender<Task>) {
         let mut user = VirtualUser::new(Wiring::RIGHT);
         let device = user.device(RECORD);
         (device, move || {
-            tasks.try_iter().for_each(|task| user.begin(task))
+            tasks.try_iter().for_each(|task| user.begin(task));
         })
     });
     (served, send)

@@ -23,9 +23,9 @@ impl Attendant for UserAtTerminal {
     }
 
     fn zero_pose(&mut self) -> Result<(), Stopped> {
-        say(format!(
-            "put the arm into its zero pose and hold it: upper link level and pointing at you, fore link hanging straight down"
-        ));
+        say(
+            "put the arm into its zero pose and hold it: upper link level and pointing at you, fore link hanging straight down",
+        );
         ask("  press Enter when it is there (q stops)")
             .map(drop)
             .ok_or(Stopped)
@@ -42,10 +42,10 @@ impl Attendant for UserAtTerminal {
 
     fn hold_still(&mut self, pose: usize) -> Result<Option<[f64; 2]>, Stopped> {
         if pose == 1 {
-            say(format!(
+            say(
                 "gravity: hold the tip by a thread on a spring or kitchen scale, everything still, in poses that differ;\n  \
-                 tell what the scale reads upwards and towards you (negative: down, away from you)"
-            ));
+                 tell what the scale reads upwards and towards you (negative: down, away from you)",
+            );
         }
         let grams = |question: String| number(&question).ok_or(Stopped);
         let Some(up) = grams(format!("  pose {pose}: grams upwards? [no more poses]"))? else {
