@@ -157,6 +157,12 @@ impl Motors {
     #[inline(always)]
     pub fn heat(&mut self, currents_a: Vec3) {
         self.squares += currents_a * currents_a;
+        self.rest();
+    }
+
+    /// A tick passes without current, or after one.
+    #[inline(always)]
+    pub fn rest(&mut self) {
         self.ticks += 1;
         if self.ticks >= self.step_ticks {
             self.advance();

@@ -1,7 +1,5 @@
 //! The checks of a tick's inputs, before anything is driven.
 
-use glam::Vec3;
-
 use super::speed::SpeedCheck;
 use super::{
     Blockers, Fault, Guard, LIMIT_MARGIN_RAD, Limits, Mode, SceneKind, Sense, Surroundings,
@@ -107,7 +105,7 @@ impl Guard {
     }
 
     fn watch_undriven(&mut self, sense: &Sense, around: &Surroundings<'_>) {
-        self.motors.heat(Vec3::ZERO);
+        self.motors.rest();
         self.feedback.rest(sense);
         self.hold.pass();
         self.speed.restart(sense.counts);

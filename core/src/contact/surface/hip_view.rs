@@ -57,12 +57,19 @@ impl HipView {
         window: &Window<'_, D>,
     ) -> (Cell, Ground) {
         let (place, column) = (self.hip.frac(), self.column());
-        let sides = Side::sharing(place.x, place.y).itself_and_neighbours();
-        sides
-            .map(|side| column.offset(side.east, side.north))
-            .map(|cell| (cell, window.ground(cell)))
-            .find(|(_, ground)| *ground != Ground::Hole)
-            .unwrap_or((column, Ground::Hole))
+        let shared = Side::sharing(place.x, place.y);
+        for place in 0..4 {
+            let side = match place {
+                0 => Side::NONE,
+                _ => shared.neighbour(place - 1),
+            };
+            let cell = column.offset(side.east, side.north);
+            let ground = window.ground(cell);
+            if ground != Ground::Hole {
+                return (cell, ground);
+            }
+        }
+        (column, Ground::Hole)
     }
 
     /// Whether the HIP is above the patch of these corners, which it is over.

@@ -53,17 +53,15 @@ impl Step {
         ]
     }
 
-    /// What of this part lies on the border of the cells to the west and south, as they
-    /// have it: a patch has its east and its north border, too.
-    pub(super) fn beside(&self) -> impl Iterator<Item = Self> {
-        let side = Side::sharing(self.to.0, self.to.1);
-        side.itself_and_neighbours()
-            .filter(|side| *side != Side::NONE)
-            .map(|side| self.on_border_of(side))
+    /// Toward the cells to the west and south that have some of this part on their border:
+    /// a patch has its east and its north border, too.
+    pub(super) fn sharing(&self) -> Side {
+        Side::sharing(self.to.0, self.to.1)
     }
 
-    /// All of the part, or only where it ends.
-    fn on_border_of(&self, side: Side) -> Self {
+    /// What of this part lies on the border of the cell on that side, as that has it: all
+    /// of the part, or only where it ends.
+    pub(super) fn on_border_of(&self, side: Side) -> Self {
         let runs_along =
             (side.east == 0 || self.from.0 == 0.0) && (side.north == 0 || self.from.1 == 0.0);
         let (from, z_from) = match runs_along {

@@ -14,7 +14,7 @@ use super::cells::{Step, Steps};
 use super::intersect::{first_crossing, next_crossing};
 use super::look_ahead::look_along;
 use crate::contact::budget::{BOX, Budget, HALF, INTERSECTION};
-use crate::contact::surface::{HipView, SurfacePoint};
+use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::grid::{Altitude, Cell, GridPoint};
 use crate::terrain::{CellBox, Ground, TileIndex, Window};
 
@@ -175,6 +175,7 @@ impl Path {
 
     /// Whether a piece may touch the border of a patch from over a hole, which a look
     /// along it does not see.
+    #[inline(never)]
     fn may_touch_border<const D: usize>(&self, window: &Window<'_, D>, end: &GridPoint) -> bool {
         is_on_grid_line(end)
             && (is_on_grid_line(&self.at) || window.ground(end.column()) == Ground::Hole)
@@ -249,7 +250,12 @@ impl Path {
 /// What a step over a hole meets: a patch on whose border it is, or the hole.
 #[inline(never)]
 fn beside<const D: usize>(window: &Window<'_, D>, step: Step) -> (Step, Ground) {
-    for other in step.beside() {
+    for place in 0..3 {
+        let side = step.sharing().neighbour(place);
+        if side == Side::NONE {
+            continue;
+        }
+        let other = step.on_border_of(side);
         let ground = window.ground(other.cell);
         if ground != Ground::Hole {
             return (other, ground);
