@@ -154,13 +154,24 @@ fn nothing_that_a_device_says_controls_the_terminal() {
 #[test]
 fn nothing_that_a_device_asks_for_floods_the_terminal() {
     let folder = tempfile::tempdir().expect("a folder");
-    let run = Command::new(hapterra_binary())
-        .arg("run")
-        .arg(terrain(folder.path()))
-        .args(["--device", &format!("tcp:{}", started())])
-        .args(["--seconds", "0.5", "--height-mm-per-unit", "1"])
-        .output();
-    let said = said(&run.expect("started"));
+    let device = format!("tcp:{}", started());
+    let run = |more: &[&str]| {
+        Command::new(hapterra_binary())
+            .arg("run")
+            .arg(terrain(folder.path()))
+            .args(["--device", &device])
+            .args(["--seconds", "0.5", "--height-mm-per-unit", "1"])
+            .args(more)
+            .output()
+            .expect("started")
+    };
+    // A board of this name was never brought up.
+    let refused = run(&[]);
+    assert!(!refused.status.success(), "{refused:?}");
+    let why = String::from_utf8_lossy(&refused.stderr);
+    is_plain(&why);
+    assert!(why.contains("was not brought up"), "{why}");
+    let said = said(&run(&["--unchecked"]));
     is_plain(&said);
     let lines = said.lines().count();
     // Some lines of its own, and one a second: it does not take minutes.

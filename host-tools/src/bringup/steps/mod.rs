@@ -19,6 +19,7 @@ use super::board::Board;
 use super::finding::Finding;
 use super::halt::Halt;
 use super::step::Step;
+use crate::link::shown;
 
 /// Goes through one step. Returns what the log keeps of it.
 ///
@@ -62,7 +63,9 @@ fn answers(board: &mut Board<'_, '_>) -> Result<String, Halt> {
     let device = &status.device;
     Ok(format!(
         "{} with firmware {}, {} ticks a second, disarmed",
-        device.board, device.version, device.tick_hz
+        shown(&device.board),
+        shown(&device.version),
+        device.tick_hz
     ))
 }
 

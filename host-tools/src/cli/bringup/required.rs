@@ -8,7 +8,7 @@ use super::PATIENCE;
 use crate::board::BOARDS;
 use crate::bringup::{Identity, Log, Step};
 use crate::cli::failure::Failure;
-use crate::link::{Dialogue, Transport};
+use crate::link::{Dialogue, Transport, shown};
 
 /// Asks the device who it is, and refuses a real board whose log is not complete. The
 /// device keeps what it holds.
@@ -22,7 +22,7 @@ pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Fa
         let device = dialogue.device();
         let log = Log::read(&Log::place(device)?)?;
         if let Some(step) = missing(device, record.as_ref(), log) {
-            let (board, number, title) = (&device.board, step.number(), step.title());
+            let (board, number, title) = (shown(&device.board), step.number(), step.title());
             let serial = device.serial;
             return Err(Failure::new(format!(
                 "{board} {serial} was not brought up with this firmware and calibration: step {number} ({title}) is not passed"
