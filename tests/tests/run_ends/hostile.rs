@@ -4,6 +4,7 @@ use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 
+use hapterra_core::phantom::Calibration;
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
 use hapterra_core::wire::hello::DeviceHello;
@@ -79,6 +80,12 @@ fn answer_to(content: &[u8], taken: &mut Taken) -> Vec<u8> {
             let (epoch, accepted) = (scene.epoch, true);
             wire::from_device(session, &ToHost::SceneTaken { epoch, accepted })
         }
+        // What a host asks before it serves.
+        ToDevice::GetCalibration => {
+            let calibration = ToHost::Calibration(Some(Calibration::PREMIUM_1_5));
+            wire::from_device(session, &calibration)
+        }
+        ToDevice::Detach => wire::from_device(session, &ToHost::Detached),
         _ => vec![],
     }
 }
