@@ -68,7 +68,7 @@ pub struct Point {
     pub hip: GridPoint,
 }
 
-/// One tick's record.
+/// One tick's record; not a sample of the terrain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
     /// Tick since the scene was taken.

@@ -26,6 +26,8 @@
 //! | [`monitor`] | check-ins and counters; whether the watchdog is fed |
 //! | [`store`] | the calibration record in flash |
 //! | [`crash`] | how a program ended, kept over the reset |
+//! | [`motor_memory`] | how warm the motors are, kept over the reset |
+//! | `press` | the press of the dead-man switch without which nothing is stored |
 //! | [`native`] | the same application as a value in a host program |
 //!
 //! The images are in `boards/`.

@@ -3,6 +3,9 @@
 //! -1` would end in a crash, and `hapterra run FILE | head -1` without letting go of the
 //! arm. These go on in silence.
 //!
+//! For commands that hold no device. Where an arm may be armed, `cli::terminal::voice`
+//! writes, for whom nobody waits.
+//!
 //! What a command was asked to write (files, `replay -o -`) is not said by them: there, an
 //! error is an error.
 

@@ -54,7 +54,8 @@
 //! The times are those for a board in real time.
 //!
 //! One request is under way at a time; the next waits for its answer. A request that
-//! is not answered in 4 s, while other answers come, is given up and told; where it
+//! is not answered in 4 s (and 10 s more for a press, where it is to store), while
+//! other answers come, is given up and told; where it
 //! was to arm, a request to disarm follows, which makes the device ignore the first
 //! should it still arrive.
 //!

@@ -13,13 +13,14 @@ use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::MakeWriter;
 
 use super::sparing::Sparing;
+use super::terminal::voice;
 use crate::link::shown;
 
 /// Where the lines come from that a device can cause.
 const BY_DEVICE: &str = "hapterra::link";
 
 /// Starts the log. `RUST_LOG` overrides the `-v` count.
-pub(super) fn to_stderr(verbose: u8) -> Log<io::Stderr> {
+pub(super) fn to_stderr(verbose: u8) -> Log<Spoken> {
     let level = match verbose {
         // A probe library warns of each kind of probe that it cannot look for;
         // what comes of it is said by the error.
@@ -29,7 +30,7 @@ pub(super) fn to_stderr(verbose: u8) -> Log<io::Stderr> {
         _ => "trace",
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
-    let log = Log::to(io::stderr);
+    let log = Log::to(|| Spoken);
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(log.clone())
@@ -40,6 +41,22 @@ pub(super) fn to_stderr(verbose: u8) -> Log<io::Stderr> {
         .log_internal_errors(false)
         .init();
     log
+}
+
+/// Has lines written to standard error by the thread that writes there: whoever logs,
+/// perhaps with an armed arm at the other end of the link, does not wait for a terminal.
+pub(super) struct Spoken;
+
+impl Write for Spoken {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let text = String::from_utf8_lossy(bytes);
+        voice::tell(text.trim_end_matches('\n'));
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 /// The log, over what `open` gives.

@@ -91,8 +91,8 @@ pub fn main() -> ExitCode {
         Command::Flash(args) => flash::run(&args),
         Command::Bench(args) => bench::run(&args),
     };
-    terminal::voice::finish();
     log.end();
+    terminal::voice::finish();
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

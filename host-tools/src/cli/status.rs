@@ -9,6 +9,7 @@ use hapterra_core::wire::status::{
 use super::failure::Failure;
 use super::options::device::Device;
 use super::session_summary;
+use super::terminal::voice::{say, show};
 use crate::link::shown;
 
 /// Arguments of `hapterra status`.
@@ -34,7 +35,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     if !args.disarm && !args.clear {
         return args.device.look(|dialogue| {
-            print!("{}", text(&dialogue.fresh_status()?));
+            show(text(&dialogue.fresh_status()?));
             Ok(())
         });
     }
@@ -43,7 +44,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             dialogue.request(&Request::Disarm)?.map_err(Failure::new)?;
         }
         let status = dialogue.fresh_status()?;
-        print!("{}", text(&status));
+        show(text(&status));
         if args.clear {
             let seen = status.health.report.fault;
             let answer = dialogue.request(&Request::ClearFault { seen })?;
@@ -52,7 +53,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 None => "no fault is latched any more".to_owned(),
                 Some(fault) => format!("but {fault:?} is there again: {}", fault.what_to_do()),
             };
-            println!("cleared        {cleared}");
+            say(format!("cleared        {cleared}"));
         }
         Ok(())
     })

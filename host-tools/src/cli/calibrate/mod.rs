@@ -15,7 +15,7 @@ use hapterra_core::wire::status::PRESS_MS;
 use super::failure::{Failure, OrHint};
 use super::options::device::{Device, DeviceChoice};
 use super::terminal::left_behind;
-use super::terminal::voice::say;
+use super::terminal::voice::{say, show};
 use crate::calibrate::{Attendant, Plan, VirtualUser, file, walk};
 use crate::link::{DeviceAddress, Dialogue, HostClock, Native};
 use crate::output::keep_apart;
@@ -107,9 +107,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Vec::from_iter(args.from.as_deref()),
     );
     keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
-    if let Some(Some(path)) = &args.show {
-        print!("{}", file::to_toml(&file::read(path)?));
-        return Ok(());
+    match &args.show {
+        Some(Some(path)) => {
+            show(file::to_toml(&file::read(path)?));
+            return Ok(());
+        }
+        // Who only looks takes no arm from its host.
+        Some(None) => return args.device.look(show_held),
+        None => {}
     }
     left_behind::tell(args.output.as_deref());
     if args.device.device != DeviceChoice::There(DeviceAddress::Native) {
@@ -124,11 +129,20 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let device = Native::new(HostClock::default(), None)
         .meddled_with(user.hands())
         .restless();
-    if !args.no_walk && args.show.is_none() {
+    if !args.no_walk {
         say("a virtual user calibrates a virtual Phantom that differs from its preset");
     }
     let mut dialogue = Dialogue::open(Box::new(device), PATIENCE)?;
     calibrate(args, &mut dialogue, &mut user)
+}
+
+/// Shows the record that the device holds.
+fn show_held(dialogue: &mut Dialogue<'_>) -> Result<(), Failure> {
+    let held = dialogue
+        .calibration()?
+        .ok_or("the device holds no calibration");
+    show(file::to_toml(&held.or_hint("see hapterra status")?));
+    Ok(())
 }
 
 fn calibrate(
@@ -136,13 +150,6 @@ fn calibrate(
     dialogue: &mut Dialogue<'_>,
     attendant: &mut dyn Attendant,
 ) -> Result<(), Failure> {
-    if args.show.is_some() {
-        let held = dialogue
-            .calibration()?
-            .ok_or("the device holds no calibration");
-        print!("{}", file::to_toml(&held.or_hint("see hapterra status")?));
-        return Ok(());
-    }
     let (begin, whence) = begin(args, dialogue)?;
     say(format!("begins with    {whence}"));
     if (args.no_walk || args.skip_ratios) && !args.unmeasured_ratios && begin.has_guessed_ratios() {

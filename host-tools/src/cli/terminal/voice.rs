@@ -1,4 +1,5 @@
-//! What is written to the terminal while a board may be armed.
+//! What is written to the terminal while a board may be armed, and the log. Commands that
+//! hold no device print (`say.rs`).
 //!
 //! One thread writes, and whoever speaks does not wait for it. A window that was closed,
 //! a reader that is gone and a disk that is full therefore end nothing. A terminal that
