@@ -271,6 +271,18 @@ pub struct Plane {
 }
 
 impl Plane {
+    /// A level plane at this height, felt with a Premium 1.5 at its preset's law.
+    #[must_use]
+    pub fn level(home_mm: [f64; 3], height_mm: f64) -> Self {
+        Self {
+            model: PhantomModel::premium_1_5(),
+            place: Placement { home_mm },
+            slope: [0.0; 2],
+            height_mm,
+            law: ForceLaw::PREMIUM,
+        }
+    }
+
     /// How far (mm) a terrain point is above the plane, along its normal.
     #[must_use]
     pub fn above_mm(&self, [east, north, up]: [f64; 3]) -> f64 {

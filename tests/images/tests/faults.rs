@@ -1,11 +1,9 @@
 //! What goes wrong in the boards' own images: each ends in no current and
 //! amplifiers off, in a number of ticks that is stated here.
 
-use hapterra::phantom::{PhantomModel, Placement};
 use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::Rule;
-use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Fault;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_image_tests::bus::Effect;
@@ -34,17 +32,8 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let plane = Plane {
-            model: PhantomModel::premium_1_5(),
-            place: Placement {
-                home_mm: [100.0, 100.0, 30.0],
-            },
-            slope: [0.0; 2],
-            height_mm: 20.0,
-            law: ForceLaw::PREMIUM,
-        };
         Self {
-            plane,
+            plane: Plane::level([100.0, 100.0, 30.0], 20.0),
             raster: Raster::from_fn(201, 201, |_, _| 20.0).expect("raster"),
             scale: Scale::new(1.0, 1.0).expect("scale"),
         }

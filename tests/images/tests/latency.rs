@@ -1,9 +1,7 @@
 //! Instructions from the read of the encoders to the last command that follows from it,
 //! in the boards' own images.
 
-use hapterra::phantom::{PhantomModel, Placement};
 use hapterra::raster::Raster;
-use hapterra_core::force::ForceLaw;
 use hapterra_image_tests::device::{Device, Plane, on_each_board};
 use hapterra_tests::repository;
 
@@ -29,13 +27,7 @@ fn said(page: &str, board: &str) -> u64 {
 #[test]
 fn the_instructions_from_encoder_to_output_are_at_most_what_the_page_says() {
     let page = std::fs::read_to_string(repository().join("docs/hardware.md")).expect("the page");
-    let plane = Plane {
-        model: PhantomModel::premium_1_5(),
-        place: Placement { home_mm: HOME_MM },
-        slope: [0.0; 2],
-        height_mm: 55.0,
-        law: ForceLaw::PREMIUM,
-    };
+    let plane = Plane::level(HOME_MM, 55.0);
     let raster = Raster::from_fn(201, 201, |x, y| 55.0 + 0.5 * ((x * y) % 3) as f32);
     on_each_board(
         &raster.expect("raster"),

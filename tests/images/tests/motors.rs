@@ -1,21 +1,18 @@
 //! How warm a board takes its motors to be after a start: what it kept in its RAM goes on
 //! after a reset, and everything else is hot.
 
-use hapterra::phantom::{PhantomModel, Placement};
 use hapterra::raster::Raster;
-use hapterra::terrain::{Scale, Terrain};
+use hapterra::terrain::Terrain;
 use hapterra_core::Vec3;
-use hapterra_core::contact::Rule;
-use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Sense;
 use hapterra_core::guard::thermal::{CONTINUOUS_C, UNSEEN_K};
-use hapterra_core::scene::{Scene, Source};
+use hapterra_core::scene::Scene;
 use hapterra_core::wire::status::{BootReport, ResetCause, Status};
 use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::motor_memory::Copies;
 use hapterra_firmware::native::{Device as NativeDevice, StoppedClock};
 use hapterra_firmware::store::Stored;
-use hapterra_image_tests::device::{Device, Plane, machines};
+use hapterra_image_tests::device::{Device, Plane, on_each_board};
 use hapterra_image_tests::machine::{Machine, Stop};
 use hapterra_image_tests::supply::Reset;
 
@@ -31,28 +28,12 @@ fn cold() -> Copies {
     *device.retained()
 }
 
-fn plane() -> (Plane, Raster, Scale) {
-    let plane = Plane {
-        model: PhantomModel::premium_1_5(),
-        place: Placement {
-            home_mm: [100.0, 100.0, 30.0],
-        },
-        slope: [0.0; 2],
-        height_mm: 20.0,
-        law: ForceLaw::PREMIUM,
-    };
-    let raster = Raster::from_fn(201, 201, |_, _| 20.0).expect("raster");
-    (plane, raster, Scale::new(1.0, 1.0).expect("scale"))
-}
-
 fn on_each(mut then: impl FnMut(Machine, &Plane, &Terrain<'_>, Scene)) {
-    let (plane, raster, scale) = plane();
-    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-    let home = scale.to_grid(plane.place.home_mm).expect("addressable");
-    let scene = terrain.scene(plane.law, Rule::Swept, Source::Encoders, home);
-    for machine in machines() {
-        then(machine, &plane, &terrain, scene);
-    }
+    let plane = Plane::level([100.0, 100.0, 30.0], 20.0);
+    let raster = Raster::from_fn(201, 201, |_, _| 20.0).expect("raster");
+    on_each_board(&raster, plane.place.home_mm, |machine, terrain, scene| {
+        then(machine, &plane, terrain, scene);
+    });
 }
 
 /// Where the image keeps the copies.

@@ -1,9 +1,7 @@
 //! What leaves the boards' own images for the amplifiers, and what the amplifiers say
 //! back.
 
-use hapterra::phantom::{PhantomModel, Placement};
 use hapterra::raster::Raster;
-use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Blockers, Fault};
 use hapterra_core::wire::request::Request;
 use hapterra_image_tests::bus::Effect;
@@ -18,13 +16,7 @@ fn ground() -> Raster {
 }
 
 fn plane() -> Plane {
-    Plane {
-        model: PhantomModel::premium_1_5(),
-        place: Placement { home_mm: HOME_MM },
-        slope: [0.0; 2],
-        height_mm: 20.0,
-        law: ForceLaw::PREMIUM,
-    }
+    Plane::level(HOME_MM, 20.0)
 }
 
 /// Changes the machine before it starts, then arms it in its home pose.
