@@ -150,7 +150,8 @@ fn cells(
         .flat_map(|cut| {
             let middle = 0.5 * (cut[0] + cut[1]);
             let (x, y) = (from[0] + middle * way[0], from[1] + middle * way[1]);
-            // A way along a line belongs to the patches on both sides of it.
+            // A way along a line belongs to the patches on both sides of it, and one up or
+            // down through a vertex to the four around it.
             let pair = |c: f64, still: bool| {
                 let cell = c.floor() as i32;
                 let other = if still && c == c.floor() {
@@ -168,6 +169,9 @@ fn cells(
             }
             if ys[1] != ys[0] {
                 all.push((t0, t1, [xs[0], ys[1]]));
+            }
+            if xs[1] != xs[0] && ys[1] != ys[0] {
+                all.push((t0, t1, [xs[1], ys[1]]));
             }
             all
         })
