@@ -63,6 +63,11 @@ fn names(terrain: &Terrain, before: Option<&Seen>, now: &Seen) -> Vec<&'static s
         let count = |d: f64| [0.0, 0.03, 0.06].iter().any(|c| (d - c).abs() < 1e-6);
         let trembles = most > 0.029 && [dx, dy, dz].into_iter().all(count);
         is("trembling by an encoder count", trembles);
+        let deep = terrain.height_about(now.hip[0], now.hip[1]) - now.hip[2];
+        is(
+            "moving 20 to 100 cells deep",
+            most > 0.0 && way < 5.0 && (20.0..100.0).contains(&deep),
+        );
         is("the least step there is", most > 0.0 && most < 2e-6);
     }
     names
@@ -142,6 +147,7 @@ fn all_that_is_promised_is_felt_and_judged() {
         ("a way of 10⁶ cells or more", 50),
         ("a step below 0.01 cell", 500),
         ("trembling by an encoder count", 500),
+        ("moving 20 to 100 cells deep", 500),
         ("the least step there is", 200),
         ("sample not a number", 500),
         ("sample infinite", 500),

@@ -5,6 +5,7 @@
 use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactOutput, ContactState, Execution, Rule, WORK_PER_TICK};
 use hapterra_core::grid::GridPoint;
+use hapterra_core::terrain::TileIndex;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_tests::chance::Chance;
 use hapterra_tests::field::point;
@@ -302,6 +303,33 @@ fn a_contact_out_of_nowhere_is_found() {
         waiting(BELOW),
         forged,
     );
+}
+
+/// Wherever the HIP goes; and not while a tile is missing.
+#[test]
+fn a_proxy_that_gets_no_farther_is_found() {
+    let flies = |tick: usize, height: f64| {
+        let hip = [15.5 + 0.1 * tick as f64, 10.5, 1.5];
+        with(free(hip), |f| {
+            f.converged = false;
+            f.proxy = point([10.5, 10.5, height]);
+        })
+    };
+    let stands: Vec<_> = (0..5).map(|tick| flies(tick, 3.0)).collect();
+    reports_only(
+        Invariant::Advances,
+        &flat(),
+        &stands,
+        flies(5, 2.9),
+        flies(5, 3.0),
+    );
+    let waits = |tick| {
+        with(flies(tick, 3.0), |f| {
+            f.missing_tile = Some(TileIndex::new(0, 0))
+        })
+    };
+    let waits: Vec<_> = (0..50).map(waits).collect();
+    assert_eq!(reports(&flat(), &waits), []);
 }
 
 #[test]

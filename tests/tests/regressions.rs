@@ -442,3 +442,25 @@ fn a_way_up_is_not_stopped_in_a_hairs_breadth() {
     let scene = Scene::random(20_261_128, 2_411);
     scene.run(&mut buffers).expect("holds");
 }
+
+/// A path of 60 cells close over the ground takes more than a tick; the HIP moved in each,
+/// and the path was begun anew: for as long as the HIP moved nothing was felt.
+#[test]
+fn a_proxy_in_the_air_arrives_while_the_hip_moves() {
+    let cliff = field([140, 20], |x, _| match x {
+        ..=50 => 30.0,
+        _ => 29.7 - 0.8 * (x - 50) as f32,
+    });
+    let trembles = |tick: i32| {
+        let off = 0.01 * f64::from(tick % 3);
+        [110.5 + off, 10.5 - off, -18.75]
+    };
+    let mut path = vec![[45.5, 10.5, 35.0], [45.5, 10.5, 28.0]];
+    path.extend((0..40).map(trembles));
+    let states = run(cliff, &path, Execution::RealTime, Supply::Held).expect("holds");
+    let in_the_air = states[2..]
+        .iter()
+        .filter(|state| **state == ContactState::Free);
+    assert!((1..20).contains(&in_the_air.count()), "{states:?}");
+    assert_eq!(states.last(), Some(&ContactState::Touching));
+}

@@ -280,7 +280,7 @@ impl Contact {
     ) {
         match &mut self.phase {
             Phase::Sweeping(sweeping) => {
-                sweeping.path = Path::through_air(sweeping.path.at(), hip);
+                sweeping.path.redirect(hip);
                 sweeping.departures = None;
             }
             Phase::OnSurface(on) => {

@@ -65,6 +65,13 @@ impl GridPoint {
         Cell::new(self.cell[0], self.cell[1])
     }
 
+    /// Whether the point is over or under a line of the grid, on which patches meet.
+    #[must_use]
+    #[inline]
+    pub const fn is_on_grid_line(&self) -> bool {
+        self.frac[0] == 0.0 || self.frac[1] == 0.0
+    }
+
     /// Where in its cell the point lies, each component in `[0, 1)`.
     #[must_use]
     pub const fn frac(&self) -> Vec3 {

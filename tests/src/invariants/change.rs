@@ -15,6 +15,11 @@ const TIE: f64 = 4e-6;
 /// A HIP that moves no farther than this in a tick, in cells, is in the same
 /// contact as before.
 const NEAR: f64 = 0.1;
+/// A HIP that moves by less than this part of the way to it lies in the same direction.
+const AHEAD: f64 = 0.25;
+/// Ticks in which a proxy in the air may come no farther: the longest way there is has
+/// to be halved, looked along and halved again before a first piece of it is gone through.
+const STALLED: u32 = 4;
 
 impl Judge<'_> {
     pub(super) fn was_seen_above(&self, before: &Seen, seen: &Seen) -> Verdict {
@@ -80,6 +85,29 @@ impl Judge<'_> {
         if is > was * (1.0 + TIE) + allowed(seen) + allowed(before) {
             let detail = format!("{is} after {was}: {before:?} then {seen:?}");
             return self.fail(Invariant::Descent, detail);
+        }
+        Ok(())
+    }
+
+    /// By the swept rule, in real time: a tick that is repeated has [`Invariant::Settles`].
+    ///
+    /// At the foot of a needle the place on its side that a proxy rests on is the foot
+    /// itself by rounding; it may leave from there and land again in every tick.
+    pub(super) fn advances(&mut self, before: &Seen, seen: &Seen) -> Verdict {
+        let flies = |seen: &Seen| {
+            let felt = &seen.felt;
+            felt.state == ContactState::Free && !felt.converged && felt.missing_tile.is_none()
+        };
+        let at_needle = matches!(self.terrain.kind, Kind::Spikes | Kind::Twisted);
+        let moved = distance(before.hip, seen.hip);
+        let ahead = moved < AHEAD * distance(seen.proxy, seen.hip);
+        let stays =
+            ahead && !at_needle && flies(before) && flies(seen) && before.proxy == seen.proxy;
+        self.stalled = if stays { self.stalled + 1 } else { 0 };
+        self.measured.stalled = self.measured.stalled.max(self.stalled);
+        if self.stalled > STALLED {
+            let detail = format!("{} ticks, {before:?} then {seen:?}", self.stalled);
+            return self.fail(Invariant::Advances, detail);
         }
         Ok(())
     }

@@ -31,6 +31,8 @@ pub struct Measured {
     pub beyond: u64,
     /// Ways that met the surface and yet ended free: around a pole.
     pub around: u64,
+    /// Most ticks in a row in which a proxy in the air came no farther.
+    pub stalled: u32,
     /// Twins compared to the end: repeated, shifted, in another window, mirrored
     /// or turned.
     pub twins: [u64; 4],
@@ -52,6 +54,7 @@ impl Measured {
         self.judged += other.judged;
         self.beyond += other.beyond;
         self.around += other.around;
+        self.stalled = self.stalled.max(other.stalled);
     }
 }
 
@@ -63,6 +66,8 @@ pub struct Judge<'g> {
     before: Option<Seen>,
     /// What was felt, cells, when the proxy began to let go.
     pub(super) let_go_from: f64,
+    /// Ticks in a row in which a proxy in the air came no farther.
+    pub(super) stalled: u32,
     /// What was learned.
     pub measured: Measured,
 }
@@ -79,6 +84,7 @@ impl<'g> Judge<'g> {
             tick: 0,
             before: None,
             let_go_from: 0.0,
+            stalled: 0,
             measured: Measured::default(),
         }
     }
@@ -135,6 +141,7 @@ impl<'g> Judge<'g> {
         told.extend(self.fades(before, seen).err());
         told.extend(self.lets_go_gently(before, seen).err());
         told.extend(self.descends(before, seen).err());
+        told.extend(self.advances(before, seen).err());
         if before.is_free() {
             told.extend(self.first_crossing(before, seen).err());
         }

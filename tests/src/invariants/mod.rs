@@ -44,6 +44,9 @@ pub enum Invariant {
     FirstCrossing,
     /// A HIP whose path crosses nothing stays free.
     Freedom,
+    /// A proxy on its way through the air that waits for no tile comes farther, wherever
+    /// the HIP moves on ahead of it.
+    Advances,
     /// No free HIP is below the surface.
     AboveSurface,
     /// No contact begins before the HIP was seen above the surface.

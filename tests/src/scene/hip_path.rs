@@ -50,17 +50,7 @@ const HABITS: [Habit; 10] = [
 /// `ticks` positions in cells; the first is high above everything.
 #[must_use]
 pub fn random(terrain: &Terrain, chance: &mut Chance, ticks: usize) -> Vec<[f64; 3]> {
-    let size = terrain.size.map(f64::from);
-    let sky = f64::from(terrain.top()).min(1e7) + 2.0;
-    let at = [chance.between(1.0, size[0]), chance.between(1.0, size[1])];
-    let mut walker = Walker {
-        terrain,
-        size,
-        chance,
-        path: vec![],
-        at,
-    };
-    walker.put(at[0], at[1], sky);
+    let mut walker = Walker::in_the_sky(terrain, chance);
     while walker.path.len() < ticks {
         let habit = match walker.chance.below(20) {
             n if n < HABITS.len() => HABITS[n],
@@ -68,8 +58,23 @@ pub fn random(terrain: &Terrain, chance: &mut Chance, ticks: usize) -> Vec<[f64;
         };
         walker.go_on(habit);
         if walker.chance.below(6) == 0 {
-            let [x, y] = walker.at;
-            walker.put(x, y, sky);
+            walker.rise();
+        }
+    }
+    walker.path.truncate(ticks);
+    walker.path
+}
+
+/// `ticks` positions in cells: down out of the sky, and then far below the surface, as a
+/// hand that presses into small cells: to and fro, slow and fast.
+#[must_use]
+pub fn deep(terrain: &Terrain, chance: &mut Chance, ticks: usize) -> Vec<[f64; 3]> {
+    let mut walker = Walker::in_the_sky(terrain, chance);
+    while walker.path.len() < ticks {
+        let turns = 40 + walker.chance.below(160);
+        walker.press_deep(turns);
+        if walker.chance.below(6) == 0 {
+            walker.rise();
         }
     }
     walker.path.truncate(ticks);
@@ -84,7 +89,28 @@ struct Walker<'a> {
     at: [f64; 2],
 }
 
-impl Walker<'_> {
+impl<'a> Walker<'a> {
+    /// High above everything, somewhere.
+    fn in_the_sky(terrain: &'a Terrain, chance: &'a mut Chance) -> Self {
+        let size = terrain.size.map(f64::from);
+        let at = [chance.between(1.0, size[0]), chance.between(1.0, size[1])];
+        let mut walker = Self {
+            terrain,
+            size,
+            chance,
+            path: vec![],
+            at,
+        };
+        walker.rise();
+        walker
+    }
+
+    fn rise(&mut self) {
+        let [x, y] = self.at;
+        let sky = f64::from(self.terrain.top()).min(1e7) + 2.0;
+        self.put(x, y, sky);
+    }
+
     fn put(&mut self, x: f64, y: f64, z: f64) {
         self.at = [x, y];
         self.path
@@ -135,6 +161,21 @@ impl Walker<'_> {
             let x = (self.at[0] + stride * heading.cos()).clamp(-1.0, self.size[0] + 1.0);
             let y = (self.at[1] + stride * heading.sin()).clamp(-1.0, self.size[1] + 1.0);
             self.above(x, y, height);
+        }
+    }
+
+    fn press_deep(&mut self, ticks: usize) {
+        let stride = self.length(3.0);
+        let mut heading = self.chance.between(0.0, std::f64::consts::TAU);
+        let [x, y] = self.at;
+        let depth = self.chance.between(2.0, 100.0);
+        let mut z = self.terrain.height_about(x, y) - depth;
+        for _ in 0..ticks {
+            heading += self.chance.between(-0.2, 0.2);
+            z += stride * self.chance.between(-1.0, 1.0);
+            let x = (self.at[0] + stride * heading.cos()).clamp(0.0, self.size[0]);
+            let y = (self.at[1] + stride * heading.sin()).clamp(0.0, self.size[1]);
+            self.put(x, y, z);
         }
     }
 

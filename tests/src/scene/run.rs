@@ -13,6 +13,8 @@ use crate::invariants::{Invariant, Violation};
 
 /// Ticks that one HIP may be repeated for in lock-step.
 const PATIENCE: usize = 20_000;
+/// Every so many-th scene has a HIP that stays deep.
+const DEEP_EVERY: u64 = 8;
 
 /// A terrain, a path of the HIP, and the settings it is felt with.
 #[derive(Clone, Debug)]
@@ -64,7 +66,11 @@ impl Scene {
         };
         let terrain = Terrain::new(kind, size, chance.bits());
         let ticks = 300 + chance.below(500);
-        let path = hip_path::random(&terrain, &mut chance, ticks);
+        // By number, so that a scene of the other kind stays what it was.
+        let path = match number % DEEP_EVERY {
+            0 => hip_path::deep(&terrain, &mut chance, ticks),
+            _ => hip_path::random(&terrain, &mut chance, ticks),
+        };
         // The paper's rule wants the whole way at once, and its ticks do not go on.
         let paper = chance.below(12) == 0 && supply == Supply::Held;
         let rule = if paper { Rule::Paper } else { Rule::Swept };
@@ -207,6 +213,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
             self.supplied.supply(self.now, &self.contact, &felt, &hip);
             self.now += 1;
             work = work.max(felt.work);
+
             if felt.converged || self.execution == Execution::RealTime {
                 return Some(ContactOutput { work, ..felt });
             }

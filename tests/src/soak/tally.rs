@@ -99,7 +99,7 @@ impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "terrain            ticks    waiting       free   touching  unsettled  work  off surface  off minimum     beyond   around"
+            "terrain            ticks    waiting       free   touching  unsettled  work  off surface  off minimum     beyond   around  stalled"
         )?;
         for (kind, m) in &self.by_kind {
             row(f, &format!("{:?}", KINDS[*kind]), m)?;
@@ -135,7 +135,7 @@ fn row(f: &mut fmt::Formatter<'_>, name: &str, m: &Measured) -> fmt::Result {
     let (touching, ticks) = (touching + letting_go, m.states.iter().sum::<u64>());
     writeln!(
         f,
-        "{name:13} {ticks:10} {waiting:10} {free:10} {touching:10} {:10} {:5}  {:11.2e}  {:11.2e} {:10} {:8}",
-        m.unconverged, m.work, m.off_surface, m.off_minimum, m.beyond, m.around
+        "{name:13} {ticks:10} {waiting:10} {free:10} {touching:10} {:10} {:5}  {:11.2e}  {:11.2e} {:10} {:8} {:8}",
+        m.unconverged, m.work, m.off_surface, m.off_minimum, m.beyond, m.around, m.stalled
     )
 }

@@ -4,6 +4,7 @@ use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{Side, SurfacePoint};
 use crate::contact::tolerance::{RUNS_ALONG, TINY_STEP};
 use crate::grid::{Cell, GridPoint};
+use crate::terrain::{Ground, Window};
 
 /// The part of a path over one cell.
 pub(super) struct Step {
@@ -94,6 +95,23 @@ impl Step {
     }
 }
 
+/// What a step over a hole meets: a patch on whose border it is, or the hole.
+#[inline(never)]
+pub(super) fn beside<const D: usize>(window: &Window<'_, D>, step: Step) -> (Step, Ground) {
+    for place in 0..3 {
+        let side = step.sharing().neighbour(place);
+        if side == Side::NONE {
+            continue;
+        }
+        let other = step.on_border_of(side);
+        let ground = window.ground(other.cell);
+        if ground != Ground::Hole {
+            return (other, ground);
+        }
+    }
+    (step, Ground::Hole)
+}
+
 /// The cells under a straight path, in order; each begins exactly where the one
 /// before ended, so that nothing slips through between them.
 pub(super) struct Steps {
@@ -142,9 +160,10 @@ impl Steps {
         self.done
     }
 
-    /// The fraction of the path before the last step.
-    pub(super) fn passed(&self) -> f32 {
-        self.t_from
+    /// The fraction of the path up to a fraction of the last step.
+    pub(super) fn passed(&self, part: f32) -> f32 {
+        let t_to = if self.done { 1.0 } else { self.t_to };
+        self.t_from + part * (t_to - self.t_from)
     }
 
     #[inline]

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::cells::{Axis, Step, Steps};
+use super::cells::{Axis, Step, Steps, beside};
 use crate::contact::budget::{BLOCK, BLOCK_CELLS, Budget, CELL, GAP};
 use crate::contact::surface::HipView;
 use crate::contact::tolerance::PATH_NOISE;
@@ -11,6 +11,15 @@ use crate::terrain::{BLOCK_SHIFT, Block, Ground, Window};
 
 /// Cells along a block's side.
 const SIDE: f32 = (1 << BLOCK_SHIFT) as f32;
+
+/// What counts as too near to the ground to tell.
+#[derive(Clone, Copy)]
+struct Near {
+    /// Heights over the ground of less than this, cells.
+    noise: f32,
+    /// The border of a patch, from over a hole.
+    may_touch: bool,
+}
 
 /// Looks along the path from `at` to `end`, a few hundred cells long at most.
 ///
@@ -28,6 +37,8 @@ pub(super) fn look_along<const D: usize>(
     let [_, longest] = extremes(&[way.x, way.y, way.z, 0.0]);
     let noise = PATH_NOISE * longest;
     let [mut east, mut north] = [0, 1].map(|axis| blocks(at, end, axis));
+    let ends_on_line = end.is_on_grid_line();
+    let is_on_lines = ends_on_line && at.is_on_grid_line();
     let mut from = 0.0;
     while budget.has(BLOCK) {
         budget.spend(BLOCK);
@@ -39,17 +50,20 @@ pub(super) fn look_along<const D: usize>(
         } else {
             north.t
         };
+        // The border of a patch may be touched from over a hole beside it.
+        let may_touch = is_on_lines || (ends_on_line && is_last);
         let low = way.z * if way.z < 0.0 { to } else { from };
         let block = Block {
             col: east.square,
             row: north.square,
         };
-        if !window.block_is_clear(block, view.altitude().raised(low - noise)) {
+        if may_touch || !window.block_is_clear(block, view.altitude().raised(low - noise)) {
             let heights = [way.z * from, way.z * to];
             let [u, v] = [&east, &north].map(|axis| cells(axis, [from, to]));
             let mut steps = Steps::along(u, v, heights);
-            if !all_clear(window, &view, &mut steps, noise, budget) {
-                let part = from + (to - from) * steps.passed();
+            let near = Near { noise, may_touch };
+            if let Err(clear) = all_clear(window, &view, &mut steps, near, budget) {
+                let part = from + (to - from) * clear;
                 return Err(part - rounding(at, end, way));
             }
         }
@@ -104,63 +118,90 @@ fn cells(block: &Axis, part: [f32; 2]) -> Axis {
     Axis::new(origin, places.map(cell), places)
 }
 
-/// Whether the path is clear of all cells by more than rounding; it is up to the
-/// last step taken.
+/// Whether the path is clear of all cells by more than rounding; the fraction of it that
+/// is, where it is not clear of all.
 fn all_clear<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,
     steps: &mut Steps,
-    noise: f32,
+    near: Near,
     budget: &mut Budget,
-) -> bool {
+) -> Result<(), f32> {
     if !budget.has(BLOCK_CELLS) {
-        return false;
+        return Err(0.0);
     }
     budget.spend(BLOCK_CELLS);
     while let Some(step) = steps.next() {
-        if !is_clear(window, view, &step, noise, budget) {
-            return false;
-        }
+        is_clear(window, view, step, near, budget).map_err(|clear| steps.passed(clear))?;
     }
-    true
+    Ok(())
 }
 
+/// The same of one cell, and of the part of the path over it.
 fn is_clear<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,
-    step: &Step,
-    noise: f32,
+    mut step: Step,
+    Near { noise, may_touch }: Near,
     budget: &mut Budget,
-) -> bool {
+) -> Result<(), f32> {
     if !budget.has(CELL) {
-        return false;
+        return Err(0.0);
     }
     budget.spend(CELL);
-    let corners = match window.ground(step.cell) {
+    let mut ground = window.ground(step.cell);
+    if may_touch && ground == Ground::Hole {
+        (step, ground) = beside(window, step);
+    }
+    let corners = match ground {
         Ground::Patch(corners) => corners,
-        Ground::Missing => return false,
-        Ground::Hole => return true,
+        Ground::Missing => return Err(0.0),
+        Ground::Hole => return Ok(()),
     };
     let patch = view.patch(&corners);
     let [highest, largest] = extremes(&patch.corners);
     if highest < step.low() - noise {
-        return true;
+        return Ok(());
     }
     if !budget.has(GAP) {
-        return false;
+        return Err(0.0);
     }
     budget.spend(GAP);
     let gap = step.gap(&patch);
-    let noise = if step.runs_along(&gap, largest) {
+    if step.runs_along(&gap, largest) {
         // Along ground as steep as the path, noise in height is next to none across
         // it.
-        0.0
-    } else if largest * PATH_NOISE > noise {
+        return match gap.iter().all(|gap| *gap < 0.0) {
+            true => Ok(()),
+            false => Err(0.0),
+        };
+    }
+    let noise = if largest * PATH_NOISE > noise {
         largest * PATH_NOISE
     } else {
         noise
     };
-    gap.iter().all(|gap| *gap < -noise)
+    clear_part(gap, -noise)
+}
+
+/// Whether a gap is below a limit all along; the fraction of it that is, where not.
+///
+/// A polynomial in Bernstein form is nowhere above the line from its first coefficient
+/// that is above the others.
+fn clear_part([start, middle, end]: [f32; 3], limit: f32) -> Result<(), f32> {
+    let [to_middle, to_end] = [2.0 * (middle - start), end - start];
+    let steepest = if to_middle > to_end {
+        to_middle
+    } else {
+        to_end
+    };
+    if start < limit && middle < limit && end < limit {
+        return Ok(());
+    }
+    Err(match start < limit {
+        true => (limit - start) / steepest,
+        false => 0.0,
+    })
 }
 
 /// The highest of four numbers, and the largest up or down.

@@ -10,11 +10,11 @@
 
 use heapless::Vec;
 
-use super::cells::{Step, Steps};
+use super::cells::{Steps, beside};
 use super::intersect::{first_crossing, next_crossing};
 use super::look_ahead::look_along;
 use crate::contact::budget::{BOX, Budget, HALF, INTERSECTION};
-use crate::contact::surface::{HipView, Side, SurfacePoint};
+use crate::contact::surface::{HipView, SurfacePoint};
 use crate::grid::{Altitude, Cell, GridPoint};
 use crate::terrain::{CellBox, Ground, TileIndex, Window};
 
@@ -26,8 +26,9 @@ const WALK_CELLS: u32 = 4;
 const WALK_HEIGHT: u32 = 16;
 /// Longest piece, in cells along an axis, that is looked along at once.
 const LOOK_CELLS: u32 = 64;
-/// Halvings that bring the longest possible path down to a walk, and one.
-const DEPTH: usize = 30;
+/// Halvings that bring the longest possible path down to a walk, and two: where the
+/// path began, and where it leads since the HIP has moved.
+const DEPTH: usize = 31;
 
 /// How a sweep ended.
 #[derive(Clone, Copy, Debug)]
@@ -69,6 +70,8 @@ pub(in crate::contact) struct Path {
     on_surface: bool,
     /// The last cell passed holds no patch: a hole, or beyond the data.
     over_hole: bool,
+    /// A tile is waited for, and not work.
+    is_missing: bool,
 }
 
 impl Path {
@@ -92,6 +95,26 @@ impl Path {
             clear: None,
             on_surface,
             over_hole: false,
+            is_missing: false,
+        }
+    }
+
+    /// The path leads to another place from now on.
+    ///
+    /// A piece that work has begun on is gone through first if it leads nearer to there: if
+    /// it were given up whenever the HIP moves, a piece that takes more than a tick would
+    /// never come to its end. One that waits for a tile is given up; the new path may not
+    /// need it.
+    pub(in crate::contact) fn redirect(&mut self, to: GridPoint) {
+        let leads_on = |end: &GridPoint| HipView::new(to).is_nearer(end, &self.at);
+        let begun = self.ends.last().copied().filter(leads_on);
+        let begun = begun.filter(|_| !self.is_missing);
+        self.ends.clear();
+        // Capacity is DEPTH > 2.
+        let _ = self.ends.push(to);
+        match begun {
+            Some(end) => drop(self.ends.push(end)),
+            None => self.clear = None,
         }
     }
 
@@ -106,6 +129,7 @@ impl Path {
         window: &Window<'_, D>,
         budget: &mut Budget,
     ) -> Swept {
+        self.is_missing = false;
         while !self.ends.is_empty() {
             if !self.halve(window, budget) || !budget.has(BOX) {
                 return Swept::Suspended;
@@ -122,7 +146,7 @@ impl Path {
                 if let Some(ended) = self.walk(window, end, budget) {
                     return ended;
                 }
-            } else if longer_side(span) > LOOK_CELLS || self.may_touch_border(window, &end) {
+            } else if longer_side(span) > LOOK_CELLS {
                 // Not full: such a piece is walked.
                 let _ = self.ends.push(self.at.midpoint(&end));
                 continue;
@@ -173,14 +197,6 @@ impl Path {
         (longer_side(span) <= WALK_CELLS && is_low) || self.ends.is_full()
     }
 
-    /// Whether a piece may touch the border of a patch from over a hole, which a look
-    /// along it does not see.
-    #[inline(never)]
-    fn may_touch_border<const D: usize>(&self, window: &Window<'_, D>, end: &GridPoint) -> bool {
-        is_on_grid_line(end)
-            && (is_on_grid_line(&self.at) || window.ground(end.column()) == Ground::Hole)
-    }
-
     /// The path is clear from one place to another.
     fn passes<const D: usize>(&mut self, window: &Window<'_, D>, from: GridPoint, to: GridPoint) {
         // On a border, what was passed is the cell before it.
@@ -221,7 +237,10 @@ impl Path {
             }
             let patch = match ground {
                 Ground::Patch(corners) => view.patch(&corners),
-                Ground::Missing => return Some(Swept::Missing(TileIndex::holding(step.cell))),
+                Ground::Missing => {
+                    self.is_missing = true;
+                    return Some(Swept::Missing(TileIndex::holding(step.cell)));
+                }
                 Ground::Hole => {
                     over_hole = true;
                     on_surface = false;
@@ -247,37 +266,15 @@ impl Path {
     }
 }
 
-/// What a step over a hole meets: a patch on whose border it is, or the hole.
-#[inline(never)]
-fn beside<const D: usize>(window: &Window<'_, D>, step: Step) -> (Step, Ground) {
-    for place in 0..3 {
-        let side = step.sharing().neighbour(place);
-        if side == Side::NONE {
-            continue;
-        }
-        let other = step.on_border_of(side);
-        let ground = window.ground(other.cell);
-        if ground != Ground::Hole {
-            return (other, ground);
-        }
-    }
-    (step, Ground::Hole)
-}
-
 /// The cells under a piece of a path, and those on whose border it ends.
-fn span(at: &GridPoint, end: &GridPoint) -> CellBox {
+#[inline]
+pub(in crate::contact) fn span(at: &GridPoint, end: &GridPoint) -> CellBox {
     let mut span = CellBox::around(at.column(), end.column());
-    if is_on_grid_line(end) {
+    if end.is_on_grid_line() {
         // A cell more than need be does no harm.
         span.from = span.from.offset(-1, -1);
     }
     span
-}
-
-#[inline]
-fn is_on_grid_line(point: &GridPoint) -> bool {
-    let place = point.frac();
-    place.x == 0.0 || place.y == 0.0
 }
 
 /// The lower end of a path.
