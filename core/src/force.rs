@@ -62,7 +62,7 @@ pub fn clamp_length(v: Vec3, limit: f32) -> Vec3 {
         return v;
     }
     let largest = v.abs().max_element();
-    if !v.is_finite() || largest == 0.0 {
+    if !is_finite(v) || largest == 0.0 {
         return Vec3::ZERO;
     }
     // Scaled first, so that squaring cannot overflow.
