@@ -52,6 +52,8 @@
 //! 8. [`tick`] is all of it as one pure function, called 1,000 to 10,000 times a
 //!    second ([`rate::TickRate`]).
 //! 9. [`wire`] is what travels between the device and the host.
+//!
+//! [`crc`] is beside them: the check sum of frames and records.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -67,7 +69,7 @@ mod cases;
 struct Readme;
 
 pub mod contact;
-mod crc;
+pub mod crc;
 pub mod force;
 pub mod grid;
 pub mod guard;

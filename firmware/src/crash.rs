@@ -7,7 +7,7 @@
 //! a crash: a record begins with a magic number, ends with a check sum, and zeros
 //! follow it.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use hapterra_core::crc;
 use hapterra_core::wire::status::{CRASH_FILE, Crash, CrashKind};
 use heapless::String;
 
@@ -19,9 +19,6 @@ pub const CRASH_BYTES: usize = 60;
 const MAGIC: u32 = 0x4841_5058;
 /// "HAPB": of a bare record.
 const BARE: u32 = 0x4841_5042;
-
-/// The check sum of what is kept over a reset.
-pub(crate) static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// All kinds of ends.
 const KINDS: [CrashKind; 5] = [
@@ -105,7 +102,7 @@ impl CrashRecord {
         };
         let mut bytes = Self::NONE.0;
         // The longest crash fits.
-        let _ = postcard::to_slice_crc32(&(MAGIC, crash), &mut bytes, CRC.digest());
+        let _ = crc::put(&(MAGIC, crash), &mut bytes);
         Self(bytes)
     }
 
@@ -129,8 +126,7 @@ impl CrashRecord {
                 file: String::new(),
             });
         }
-        let read = postcard::take_from_bytes_crc32(bytes, CRC.digest());
-        let ((magic, crash), rest): ((u32, Crash), _) = read.ok()?;
+        let ((magic, crash), rest): ((u32, Crash), _) = crc::take(bytes)?;
         (magic == MAGIC && rest.iter().all(|byte| *byte == 0)).then_some(crash)
     }
 }

@@ -14,11 +14,10 @@
 //! ```
 
 use hapterra_core::Vec3;
+use hapterra_core::crc;
 use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::rate::TickRate;
 use hapterra_core::wire::status::ResetCause;
-
-use crate::crash::CRC;
 
 /// Words of a copy: a line of an H743's data cache.
 pub const WORDS: usize = 8;
@@ -115,12 +114,9 @@ fn decode(copy: &Words) -> Option<(u32, Temperatures)> {
 }
 
 fn check_sum(words: &[u32; WORDS - 1]) -> u32 {
-    let mut digest = CRC.digest();
-    digest.update(&MAGIC.to_le_bytes());
-    for word in words {
-        digest.update(&word.to_le_bytes());
-    }
-    digest.finalize()
+    let [a, b, c, d, e, f, g] = *words;
+    let summed = [MAGIC, a, b, c, d, e, f, g].map(u32::to_le_bytes);
+    crc::sum(summed.as_flattened())
 }
 
 #[cfg(test)]

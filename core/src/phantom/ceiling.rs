@@ -12,7 +12,7 @@
 use glam::Vec3;
 
 use super::calibration::Calibration;
-use super::check::{BadCalibration, Bound, CalibrationField};
+use super::check::{BadCalibration, Bound, CalibrationField, check};
 
 /// A record's speed limit may be above the preset's by this: at twice the limit no force
 /// is left, and that has to be below the speed at which counts are taken for a jump.
@@ -86,7 +86,7 @@ impl Calibration {
             let (value, least) = (self.torque_constant[axis], least[axis]);
             let bound = self.bound(least, f32::INFINITY);
             let good = value >= least * (1.0 - ROUNDING);
-            bounded(
+            check(
                 CalibrationField::TorqueConstant,
                 Some(axis),
                 value,
@@ -109,7 +109,7 @@ impl Calibration {
             let (value, least) = (mine.min_rad[axis], theirs.min_rad[axis] - STOPS_RAD);
             let bound = self.bound(least, CalibrationField::MinAngle.range().1);
             let good = value >= least - ROUNDING;
-            bounded(CalibrationField::MinAngle, Some(axis), value, bound, good)?;
+            check(CalibrationField::MinAngle, Some(axis), value, bound, good)?;
         }
         self.at_most(
             CalibrationField::Q2MinusQ3,
@@ -142,7 +142,7 @@ impl Calibration {
             };
             // What this number would be at the preset's counts, beside the other number.
             let unit = value / (of_encoder * of_ratio);
-            bounded(
+            check(
                 field,
                 at,
                 value,
@@ -163,7 +163,7 @@ impl Calibration {
             let value = self.peak_current_a[axis];
             let bound = Bound::Board { max: full_scale_a };
             let good = value <= full_scale_a * (1.0 + ROUNDING);
-            bounded(
+            check(
                 CalibrationField::PeakCurrent,
                 Some(axis),
                 value,
@@ -192,7 +192,7 @@ impl Calibration {
             let (value, most) = (values[axis], most[axis]);
             let bound = self.bound(field.range().0, most);
             let good = value <= most * (1.0 + ROUNDING);
-            bounded(field, Some(axis), value, bound, good)?;
+            check(field, Some(axis), value, bound, good)?;
         }
         Ok(())
     }
@@ -204,7 +204,7 @@ impl Calibration {
         most: f32,
     ) -> Result<(), BadCalibration> {
         let bound = self.bound(field.range().0, most);
-        bounded(field, None, value, bound, value <= most * (1.0 + ROUNDING))
+        check(field, None, value, bound, value <= most * (1.0 + ROUNDING))
     }
 
     fn at_least(
@@ -214,26 +214,7 @@ impl Calibration {
         least: f32,
     ) -> Result<(), BadCalibration> {
         let bound = self.bound(least, field.range().1);
-        bounded(field, None, value, bound, value >= least * (1.0 - ROUNDING))
-    }
-}
-
-fn bounded(
-    field: CalibrationField,
-    axis: Option<usize>,
-    value: f32,
-    bound: Bound,
-    good: bool,
-) -> Result<(), BadCalibration> {
-    let axis = axis.map(|axis| axis as u8 + 1);
-    match good {
-        true => Ok(()),
-        false => Err(BadCalibration {
-            field,
-            axis,
-            value,
-            bound,
-        }),
+        check(field, None, value, bound, value >= least * (1.0 - ROUNDING))
     }
 }
 

@@ -236,18 +236,12 @@ impl Calibration {
         let (gravity_2, gravity_3) = (self.gravity_2_nm, self.gravity_3_nm);
         one(CalibrationField::Gravity2, gravity_2)?;
         one(CalibrationField::Gravity3, gravity_3)?;
-        check(
-            CalibrationField::Gravity2,
-            None,
-            gravity_2,
-            gravity_2.abs() <= bearable.y,
-        )?;
-        check(
-            CalibrationField::Gravity3,
-            None,
-            gravity_3,
-            gravity_3.abs() <= bearable.z,
-        )?;
+        for (field, value, most) in [
+            (CalibrationField::Gravity2, gravity_2, bearable.y),
+            (CalibrationField::Gravity3, gravity_3, bearable.z),
+        ] {
+            check(field, None, value, Bound::Range, value.abs() <= most)?;
+        }
         one(CalibrationField::Resistance, thermal.resistance_ohm)?;
         one(CalibrationField::WindingResistance, thermal.winding_k_per_w)?;
         one(CalibrationField::HousingResistance, thermal.housing_k_per_w)?;
@@ -259,19 +253,22 @@ impl Calibration {
     }
 }
 
-fn check(
+/// Names `field` of `axis`, counted from 0, with its `value` and the `bound` that it does
+/// not keep, unless it is `good`.
+pub(super) fn check(
     field: CalibrationField,
-    axis: Option<u8>,
+    axis: Option<usize>,
     value: f32,
+    bound: Bound,
     good: bool,
 ) -> Result<(), BadCalibration> {
     match good {
         true => Ok(()),
         false => Err(BadCalibration {
             field,
-            axis,
+            axis: axis.map(|axis| axis as u8 + 1),
             value,
-            bound: Bound::Range,
+            bound,
         }),
     }
 }
@@ -279,7 +276,8 @@ fn check(
 /// A number in its range.
 fn one(field: CalibrationField, value: f32) -> Result<(), BadCalibration> {
     let (min, max, _) = field.range();
-    check(field, None, value, (min..=max).contains(&value))
+    let good = (min..=max).contains(&value);
+    check(field, None, value, Bound::Range, good)
 }
 
 /// A number for each axis in its range.
@@ -292,8 +290,8 @@ fn each(field: CalibrationField, values: Vec3) -> Result<(), BadCalibration> {
 /// A number for each axis that is as it has to be.
 fn each_is(field: CalibrationField, values: Vec3, good: BVec3) -> Result<(), BadCalibration> {
     (0..3).try_for_each(|axis| {
-        let number = Some(axis as u8 + 1);
-        check(field, number, values[axis], good.test(axis))
+        let (value, good) = (values[axis], good.test(axis));
+        check(field, Some(axis), value, Bound::Range, good)
     })
 }
 

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::calibration::Calibration;
 use super::check::BadCalibration;
-use crate::crc::CRC;
+use crate::crc;
 
 /// Version of the layout. Any change to [`Calibration`] is a new one.
 pub const VERSION: u16 = 1;
@@ -58,8 +58,7 @@ impl Calibration {
             version: VERSION,
             calibration: *self,
         };
-        let written = postcard::to_slice_crc32(&record, buffer, CRC.digest());
-        written.map_or(&[], |bytes| bytes) // a record fits, see the test
+        crc::put(&record, buffer).unwrap_or(&[]) // a record fits, see the test
     }
 
     /// Reads a record and checks it as a whole.
@@ -73,8 +72,7 @@ impl Calibration {
         if found != VERSION {
             return Err(BadRecord::Version { found });
         }
-        let (record, _) = postcard::take_from_bytes_crc32::<Record>(bytes, CRC.digest())
-            .map_err(|_| BadRecord::Damaged)?;
+        let (record, _) = crc::take::<Record>(bytes).ok_or(BadRecord::Damaged)?;
         let calibration = record.calibration;
         calibration.validate().map_err(BadRecord::Invalid)?;
         Ok(calibration)

@@ -1,10 +1,10 @@
 //! Framing: postcard + CRC-32 + COBS, ended by a zero byte.
 
 use heapless::Vec;
-use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
+use postcard::ser_flavors::{Cobs, Flavor, Slice, crc::CrcModifier};
 use serde::{Deserialize, Serialize};
 
-use crate::crc::CRC;
+use crate::crc::{self, CRC};
 
 /// Longest frame in bytes, its zero included: a tile and what is around it.
 pub const MAX_FRAME: usize = 4608;
@@ -25,10 +25,32 @@ pub enum BadFrame {
 /// `None` when it does not fit.
 pub fn encode<'b, T: Serialize + ?Sized>(message: &T, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
     let cobs = Cobs::try_new(Slice::new(buffer)).ok()?;
-    let flavour = CrcModifier::new(cobs, CRC.digest());
-    postcard::serialize_with_flavor(message, flavour)
+    let framing = Framing(CrcModifier::new(cobs, CRC.digest()));
+    postcard::serialize_with_flavor(message, framing)
         .ok()
         .map(|frame| &*frame)
+}
+
+/// Check sum and COBS of a frame under way, each once in an image: they would be copied
+/// to every place where a message's number is written.
+struct Framing<'b>(CrcModifier<'static, Cobs<Slice<'b>>, u32>);
+
+impl<'b> Flavor for Framing<'b> {
+    type Output = &'b mut [u8];
+
+    #[inline(never)]
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        self.0.try_push(byte)
+    }
+
+    #[inline(never)]
+    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
+        bytes.iter().try_for_each(|byte| self.try_push(*byte))
+    }
+
+    fn finalize(self) -> postcard::Result<Self::Output> {
+        self.0.finalize()
+    }
 }
 
 /// Reads a message from a frame's decoded bytes, check sum included.
@@ -37,8 +59,8 @@ pub fn encode<'b, T: Serialize + ?Sized>(message: &T, buffer: &'b mut [u8]) -> O
 /// [`BadFrame::Content`] when the check sum does not fit, or the bytes are no
 /// `T` or more than one.
 pub fn decode<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Result<T, BadFrame> {
-    match postcard::take_from_bytes_crc32(bytes, CRC.digest()) {
-        Ok((message, [])) => Ok(message),
+    match crc::take(bytes) {
+        Some((message, [])) => Ok(message),
         _ => Err(BadFrame::Content),
     }
 }
