@@ -13,7 +13,8 @@ use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_core::wire::session::{LastSession, SessionNumber};
 use hapterra_core::wire::status::Status;
 
-use super::conversation::{Ask, Conversation, News, State};
+use super::ask::Ask;
+use super::conversation::{Conversation, News, State};
 use super::error::LinkError;
 use super::messages::{FromDevice, from_device, next_frame};
 use super::patience::Patience;

@@ -1,17 +1,17 @@
 //! The host's table of states in [`hapterra_core::wire`], as a state machine without
 //! I/O and without a clock: time is handed in.
 
-use std::collections::VecDeque;
-use std::mem::discriminant;
 use std::time::Duration;
 
 use hapterra_core::scene::Scene;
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
 use hapterra_core::wire::message::{ToDevice, ToHost};
-use hapterra_core::wire::request::{Answer, Request};
+use hapterra_core::wire::request::Answer;
 use hapterra_core::wire::session::{InSession, SessionNumber};
 use hapterra_core::wire::version::VersionCheck;
 
+use super::ask::Ask;
+use super::asking::Asking;
 use super::error::LinkError;
 use super::messages::append;
 use super::patience::Patience;
@@ -31,37 +31,6 @@ pub enum State {
     Leaving,
     /// Detach was said: the arm stays as it is.
     Detaching,
-}
-
-/// What a host asks for; repeated until it is answered.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Ask {
-    /// Something to be done, once.
-    Request(Request),
-    /// The device's status.
-    Status,
-    /// The calibration in force.
-    Calibration,
-}
-
-impl Ask {
-    /// Whether both ask for the same kind of thing. Not whether they are equal: what is
-    /// no number, as a request may hold, equals nothing.
-    pub(super) fn is_like(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Request(one), Self::Request(two)) => discriminant(one) == discriminant(two),
-            _ => discriminant(self) == discriminant(other),
-        }
-    }
-}
-
-/// What is under way.
-#[derive(Clone, Copy, Debug)]
-struct Pending {
-    ask: Ask,
-    number: u8,
-    since: Duration,
-    said: Duration,
 }
 
 /// What a message of the device means to whoever holds the conversation.
@@ -108,10 +77,7 @@ pub(super) struct Conversation {
     /// The last hello's number, and whether it was answered.
     hello: u8,
     hello_answered: bool,
-    pending: Option<Pending>,
-    waiting: VecDeque<Ask>,
-    number: u8,
-    unanswered: Vec<Ask>,
+    asking: Asking,
 }
 
 impl Conversation {
@@ -138,10 +104,7 @@ impl Conversation {
             foreign: None,
             hello: 0,
             hello_answered: true,
-            pending: None,
-            waiting: VecDeque::new(),
-            number: 0,
-            unanswered: vec![],
+            asking: Asking::default(),
         }
     }
 
@@ -174,8 +137,7 @@ impl Conversation {
             self.opened_by = 0;
         }
         self.foreign = None;
-        self.number = 0;
-        self.give_up_asking();
+        self.asking.begin_session();
         self.enter(State::Greeting, now);
         self.say_state(now, out);
         draws
@@ -195,8 +157,8 @@ impl Conversation {
         if self.state == State::Closed || self.is_ending() {
             return;
         }
-        self.give_up_asking();
-        self.unanswered.clear();
+        self.asking.give_up();
+        self.asking.take_unanswered();
         self.enter(state, now);
         self.say_state(now, out);
     }
@@ -220,7 +182,7 @@ impl Conversation {
 
     /// Asks for something, after what was asked for before.
     pub(super) fn ask(&mut self, ask: Ask) {
-        self.waiting.push_back(ask);
+        self.asking.ask(ask);
     }
 
     /// Nobody has listened for a while: silence counts from now.
@@ -231,7 +193,7 @@ impl Conversation {
 
     /// What was given up without an answer since it was last taken.
     pub(super) fn take_unanswered(&mut self) -> Vec<Ask> {
-        std::mem::take(&mut self.unanswered)
+        self.asking.take_unanswered()
     }
 
     /// Says what is due.
@@ -286,13 +248,6 @@ impl Conversation {
     fn enter(&mut self, state: State, now: Duration) {
         self.state = state;
         (self.since, self.said) = (now, now);
-    }
-
-    /// What is asked for, or is to be, is not waited for any more.
-    fn give_up_asking(&mut self) {
-        let under_way = self.pending.take().map(|pending| pending.ask);
-        self.unanswered.extend(under_way);
-        self.unanswered.extend(self.waiting.drain(..));
     }
 
     /// Says what the state repeats.
@@ -354,53 +309,13 @@ impl Conversation {
         self.alive_is_due = true;
     }
 
-    /// Says what is under way, again where it is due, and the next where nothing is.
+    /// Says what is asked for, where it is due.
     pub(super) fn say_pending(&mut self, now: Duration, out: &mut Vec<u8>) {
         if self.state != State::Open {
             return;
         }
-        let patience = self.patience;
-        let given_up = |pending: &mut Pending| {
-            now.saturating_sub(pending.since) >= patience.with(&pending.ask)
-        };
-        if let Some(pending) = self.pending.take_if(given_up) {
-            self.unanswered.push(pending.ask);
-            if matches!(pending.ask, Ask::Request(Request::Arm | Request::Jog(_))) {
-                // Its number makes the device ignore the first, should that still come.
-                self.waiting.push_front(Ask::Request(Request::Disarm));
-            }
-        }
-        match self.pending {
-            Some(pending) if !self.is_due(pending.said, now) => return,
-            Some(_) => {}
-            None => {
-                let Some(ask) = self.waiting.pop_front() else {
-                    return;
-                };
-                // Questions have no number: a hundred of them between two requests
-                // would make the second look older than the first.
-                if matches!(ask, Ask::Request(_)) {
-                    self.number = self.number.wrapping_add(1);
-                }
-                self.pending = Some(Pending {
-                    ask,
-                    number: self.number,
-                    since: now,
-                    said: now,
-                });
-            }
-        }
-        if let Some(pending) = &mut self.pending {
-            pending.said = now;
-            let Pending { ask, number, .. } = *pending;
-            self.say(
-                &match ask {
-                    Ask::Request(request) => ToDevice::Request { number, request },
-                    Ask::Status => ToDevice::Status,
-                    Ask::Calibration => ToDevice::GetCalibration,
-                },
-                out,
-            );
+        if let Some(message) = self.asking.due(now, &self.patience) {
+            self.say(&message, out);
         }
     }
 
@@ -487,7 +402,7 @@ impl Conversation {
             return Ok(Some(News::Greeted { device, restarted }));
         }
         if restarted {
-            self.give_up_asking();
+            self.asking.give_up();
         }
         let next = match self.scene {
             Some(_) => State::SceneSent,
@@ -525,18 +440,15 @@ impl Conversation {
     }
 
     fn on_answer(&mut self, now: Duration, answer: Answer) -> Option<News> {
-        let is_it = |pending: &mut Pending| {
-            pending.number == answer.number && matches!(pending.ask, Ask::Request(_))
-        };
-        let pending = self.pending.take_if(is_it)?;
+        let ask = self.asking.request_answered(answer.number)?;
         self.heard = now;
-        Some(News::Answered(pending.ask, ToHost::Answer(answer)))
+        Some(News::Answered(ask, ToHost::Answer(answer)))
     }
 
     fn on_told(&mut self, now: Duration, asked: Ask, message: ToHost) -> Option<News> {
-        let pending = self.pending.take_if(|pending| pending.ask == asked)?;
+        let ask = self.asking.question_answered(asked)?;
         self.heard = now;
-        Some(News::Answered(pending.ask, message))
+        Some(News::Answered(ask, message))
     }
 
     fn on_alive(&mut self, now: Duration, message: &ToHost, out: &mut Vec<u8>) {

@@ -12,7 +12,8 @@ use hapterra_core::wire::request::{Answer, Refusal, Request};
 use hapterra_core::wire::session::ONLY_LOOKS;
 use hapterra_core::wire::status::Status;
 
-use super::conversation::{Ask, Conversation, News, State};
+use super::ask::Ask;
+use super::conversation::{Conversation, News, State};
 use super::error::LinkError;
 use super::line::{LOOK, Line};
 use super::messages::{FromDevice, from_device, next_frame};

@@ -19,6 +19,8 @@
 //! - [`Emulator`] runs the emulated board; [`serve_plant`] moves the virtual
 //!   Phantom at its second line.
 
+mod ask;
+mod asking;
 mod bulk;
 mod client;
 mod conversation;
@@ -38,11 +40,12 @@ mod tcp;
 mod transport;
 mod usb;
 
+pub use ask::Ask;
 pub use bulk::{Bulk, BulkEndpoints, NotOne, Pipes, is_hapterra, printable, the_one};
 #[cfg(test)]
 pub(crate) use client::tests::hello;
 pub use client::{Arming, Client, Event};
-pub use conversation::{Ask, State};
+pub use conversation::State;
 pub use device_address::DeviceAddress;
 pub(crate) use device_address::tcp_address;
 pub use device_text::{shown, shown_lines};

@@ -6,7 +6,7 @@ use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{DEFAULT_SILENCE_S, ONLY_LOOKS};
 use hapterra_core::wire::status::PRESS_MS;
 
-use super::conversation::Ask;
+use super::ask::Ask;
 
 /// The times of the table in [`hapterra_core::wire`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,8 +6,9 @@ use hapterra_core::scene::{Point, Scene};
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::request::Request;
 
+use super::ask::Ask;
 use super::client::{Arming, Client, Event};
-use super::conversation::{Ask, State};
+use super::conversation::State;
 use super::error::LinkError;
 use super::line::{LOOK, Line};
 use super::patience::Patience;
