@@ -61,7 +61,7 @@ fn instead(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
     let mut has_samples = false;
     let said = wire::changed(frame, |message| match message {
         ToHost::Hello(hello) => rename(hello),
-        ToHost::Status(status) => rename(&mut status.device),
+        ToHost::Status { status, .. } => rename(&mut status.device),
         ToHost::SceneTaken { epoch: taken, .. } => *epoch = *taken,
         ToHost::Telemetry(_) => has_samples = true,
         _ => {}

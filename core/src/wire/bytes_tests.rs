@@ -128,7 +128,7 @@ fn a_hello_in_its_session() {
         }),
     };
     // The session is 300 | 128; then variant, protocol, number, seconds.
-    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 5, 9, 0xB4, 0x01]);
+    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 6, 9, 0xB4, 0x01]);
 }
 
 #[test]
@@ -156,7 +156,7 @@ fn a_device_that_introduces_itself() {
         },
     });
     let wanted = [
-        std::vec![0, 5, 9, 8, 1, b'b'],
+        std::vec![0, 6, 9, 8, 1, b'b'],
         serial.to_vec(),
         std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xAC, 0x02, 1, 7],
         std::vec![0xAC, 0x02, 6, 3, 5, 1],
@@ -171,6 +171,19 @@ fn a_device_that_introduces_itself() {
 fn a_detach_and_its_answer() {
     assert_eq!(bytes(&ToDevice::Detach), [10]);
     assert_eq!(bytes(&ToHost::Detached), [11]);
+}
+
+#[test]
+fn a_question_and_its_answer() {
+    let number = 200;
+    assert_eq!(bytes(&ToDevice::Status { number }), [6, 200]);
+    assert_eq!(bytes(&ToDevice::GetCalibration { number }), [7, 200]);
+    let calibration = None;
+    let answer = ToHost::Calibration {
+        number,
+        calibration,
+    };
+    assert_eq!(bytes(&answer), [7, 200, 0]);
 }
 
 #[test]

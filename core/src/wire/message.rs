@@ -42,9 +42,15 @@ pub enum ToDevice<'a> {
         request: Request,
     },
     /// Asks for a [`ToHost::Status`].
-    Status,
+    Status {
+        /// Tells questions apart: one more than the last, wrapping. The answer repeats it.
+        number: u8,
+    },
     /// Asks for a [`ToHost::Calibration`].
-    GetCalibration,
+    GetCalibration {
+        /// Tells questions apart, as that of [`ToDevice::Status`].
+        number: u8,
+    },
     /// Ends the session: disarms and drops the scene. Answered by
     /// [`ToHost::Goodbye`] when the amplifiers are off.
     Bye,
@@ -90,9 +96,19 @@ pub enum ToHost {
     /// it changes.
     Guard(Report),
     /// Answers [`ToDevice::Status`].
-    Status(Status),
+    Status {
+        /// The question's number.
+        number: u8,
+        /// How the device is.
+        status: Status,
+    },
     /// Answers [`ToDevice::GetCalibration`].
-    Calibration(Option<Calibration>),
+    Calibration {
+        /// The question's number.
+        number: u8,
+        /// The calibration in force, if there is one.
+        calibration: Option<Calibration>,
+    },
     /// Answers a request.
     Answer(Answer),
     /// Answers [`ToDevice::Alive`].

@@ -59,6 +59,10 @@
 //! was to arm, a request to disarm follows, which makes the device ignore the first
 //! should it still arrive.
 //!
+//! Questions, for status and calibration, are repeated in the same way. They have numbers
+//! of their own, which their answers repeat: a host takes the answer to its present
+//! question only. One that comes late, to a question before, tells what was.
+//!
 //! A host that goes on over a new line draws a new number, unless the last one was
 //! never answered. The device's hello tells what became of the session before, and
 //! how many samples that had: loss at its end is counted, too.

@@ -67,10 +67,8 @@ impl<const D: usize> Link<'_, D> {
                 | SessionState::Gone,
             ) => {}
             (ToDevice::Alive, _) => self.on_alive(),
-            (ToDevice::Status, _) => self.say(&ToHost::Status(self.status())),
-            (ToDevice::GetCalibration, _) => {
-                self.say(&ToHost::Calibration(self.device.calibration));
-            }
+            (ToDevice::Status { number }, _) => self.tell_status(session, number),
+            (ToDevice::GetCalibration { number }, _) => self.tell_calibration(session, number),
             (_, SessionState::Leaving) => {}
             (ToDevice::Scene(scene), _) => self.take_scene(scene),
             (ToDevice::Tile(tile), _) => self.take_tile(&tile),
@@ -110,13 +108,25 @@ impl<const D: usize> Link<'_, D> {
 
     /// Answers a host that only looks: whose the arm is stays as it is, and for how long.
     fn on_look(&mut self, session: SessionNumber, message: &ToDevice<'_>) {
-        match message {
-            ToDevice::Status => self.say_in(session, &ToHost::Status(self.status())),
-            ToDevice::GetCalibration => {
-                self.say_in(session, &ToHost::Calibration(self.device.calibration));
-            }
+        match *message {
+            ToDevice::Status { number } => self.tell_status(session, number),
+            ToDevice::GetCalibration { number } => self.tell_calibration(session, number),
             _ => {}
         }
+    }
+
+    fn tell_status(&mut self, session: SessionNumber, number: u8) {
+        let status = self.status();
+        self.say_in(session, &ToHost::Status { number, status });
+    }
+
+    fn tell_calibration(&mut self, session: SessionNumber, number: u8) {
+        let calibration = self.device.calibration;
+        let answer = ToHost::Calibration {
+            number,
+            calibration,
+        };
+        self.say_in(session, &answer);
     }
 
     /// Begins a session, which keeps the scene and what is held of it.

@@ -24,8 +24,11 @@ struct Pending {
 pub(super) struct Asking {
     pending: Option<Pending>,
     waiting: VecDeque<Ask>,
-    /// The last request's number.
-    number: u8,
+    /// The last request's number, and the last question's. A hundred questions between two
+    /// requests that were numbered with them would make the second look older than the
+    /// first.
+    request: u8,
+    question: u8,
     unanswered: Vec<Ask>,
 }
 
@@ -38,7 +41,7 @@ impl Asking {
     /// A session begins: requests are numbered anew, and what was asked for in the one
     /// before is given up.
     pub(super) fn begin_session(&mut self) {
-        self.number = 0;
+        self.request = 0;
         self.give_up();
     }
 
@@ -68,8 +71,8 @@ impl Asking {
         }
         self.pending.map(|Pending { ask, number, .. }| match ask {
             Ask::Request(request) => ToDevice::Request { number, request },
-            Ask::Status => ToDevice::Status,
-            Ask::Calibration => ToDevice::GetCalibration,
+            Ask::Status => ToDevice::Status { number },
+            Ask::Calibration => ToDevice::GetCalibration { number },
         })
     }
 
@@ -87,14 +90,14 @@ impl Asking {
     }
 
     fn begin(&mut self, ask: Ask, now: Duration) -> Pending {
-        // Questions have no number: a hundred of them between two requests would make the
-        // second look older than the first.
-        if matches!(ask, Ask::Request(_)) {
-            self.number = self.number.wrapping_add(1);
-        }
+        let number = match ask {
+            Ask::Request(_) => &mut self.request,
+            Ask::Status | Ask::Calibration => &mut self.question,
+        };
+        *number = number.wrapping_add(1);
         Pending {
             ask,
-            number: self.number,
+            number: *number,
             since: now,
             said: now,
         }
@@ -102,15 +105,17 @@ impl Asking {
 
     /// Takes the answer to the request of this number: which that was, if it is under way.
     pub(super) fn request_answered(&mut self, number: u8) -> Option<Ask> {
-        let is_it = |pending: &mut Pending| {
-            pending.number == number && matches!(pending.ask, Ask::Request(_))
-        };
-        self.pending.take_if(is_it).map(|pending| pending.ask)
+        self.answered(number, |ask| matches!(ask, Ask::Request(_)))
     }
 
-    /// Takes the answer to a question: which that was, if it is under way.
-    pub(super) fn question_answered(&mut self, asked: Ask) -> Option<Ask> {
-        let is_it = |pending: &mut Pending| pending.ask == asked;
+    /// Takes the answer to the question of this number: whether that is under way.
+    pub(super) fn question_answered(&mut self, asked: Ask, number: u8) -> Option<Ask> {
+        self.answered(number, |ask| *ask == asked)
+    }
+
+    /// An answer to what was asked for before tells what was.
+    fn answered(&mut self, number: u8, is_it: impl Fn(&Ask) -> bool) -> Option<Ask> {
+        let is_it = |pending: &mut Pending| pending.number == number && is_it(&pending.ask);
         self.pending.take_if(is_it).map(|pending| pending.ask)
     }
 }

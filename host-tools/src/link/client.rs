@@ -362,8 +362,8 @@ impl<'t> Client<'t> {
                 request: &request,
                 result: answer.result,
             }),
-            (_, ToHost::Status(status)) => on(Event::Status(status)),
-            (_, ToHost::Calibration(calibration)) => {
+            (_, ToHost::Status { status, .. }) => on(Event::Status(status)),
+            (_, ToHost::Calibration { calibration, .. }) => {
                 on(Event::Calibration(calibration.as_ref()));
             }
             _ => {}

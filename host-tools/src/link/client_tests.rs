@@ -35,6 +35,8 @@ struct Bench<'t> {
     out: Vec<u8>,
     opened: u32,
     unanswered: Vec<Ask>,
+    /// What was told of the calibration.
+    told: Vec<Option<Calibration>>,
 }
 
 const fn ms(ms: u64) -> Duration {
@@ -53,6 +55,7 @@ fn on_bench(arming: Option<Arming>, test: impl FnOnce(&mut Bench<'_>)) {
         out: vec![],
         opened: 0,
         unanswered: vec![],
+        told: vec![],
     };
     bench.client.greet(bench.now, &mut bench.out);
     test(&mut bench);
@@ -62,11 +65,13 @@ impl Bench<'_> {
     fn hear_in(&mut self, session: SessionNumber, message: &ToHost) -> Result<(), LinkError> {
         let mut frame = [0; MAX_FRAME];
         let bytes = encode(&InSession { session, message }, &mut frame).expect("fits");
-        let opened = &mut self.opened;
-        let mut count =
-            |event: Event<'_>| *opened += u32::from(matches!(event, Event::Opened { .. }));
-        self.client
-            .receive(self.now, bytes, &mut self.out, &mut count)
+        let (opened, told) = (&mut self.opened, &mut self.told);
+        let mut on = |event: Event<'_>| match event {
+            Event::Opened { .. } => *opened += 1,
+            Event::Calibration(calibration) => told.push(calibration.copied()),
+            _ => {}
+        };
+        self.client.receive(self.now, bytes, &mut self.out, &mut on)
     }
 
     fn hear(&mut self, message: &ToHost) {
@@ -125,6 +130,9 @@ impl Bench<'_> {
                 let name = words.split(['(', ' ']).next().unwrap_or_default();
                 match framed.message {
                     ToDevice::Request { number, request } => format!("{number} {request:?}"),
+                    ToDevice::Status { number } | ToDevice::GetCalibration { number } => {
+                        format!("{number} {name}")
+                    }
                     _ => name.to_owned(),
                 }
             })
@@ -244,6 +252,59 @@ fn an_answer_ends_the_repeating_and_brings_the_next_request() {
             }));
         }
         assert_eq!(bench.said(), ["2 Arm"]);
+    });
+}
+
+#[test]
+fn an_answer_to_the_question_before_is_not_taken_for_the_present_one() {
+    on_bench(None, |bench| {
+        bench.open();
+        let told = |number, calibration| ToHost::Calibration {
+            number,
+            calibration,
+        };
+        let (old, new) = (Calibration::OMNI, Calibration::PREMIUM_3_0);
+        for _ in 0..300 {
+            bench.said();
+            bench.client.ask(Ask::Calibration);
+            bench.pass(ms(10)).expect("patient");
+            let said = bench.said();
+            let number = said
+                .iter()
+                .find_map(|said| said.strip_suffix(" GetCalibration"));
+            let number: u8 = number.expect("asked").parse().expect("a number");
+            // Said again after 0.4 s: the second answer is still on its way.
+            bench.hear(&told(number, Some(old)));
+            bench.client.ask(Ask::Calibration);
+            bench.pass(ms(10)).expect("patient");
+            bench.told.clear();
+            bench.hear(&told(number, Some(old)));
+            assert_eq!(bench.told, [], "question {number}");
+            bench.hear(&told(number.wrapping_add(1), Some(new)));
+            assert_eq!(bench.told, [Some(new)], "question {number}");
+        }
+    });
+}
+
+#[test]
+fn a_question_that_is_repeated_keeps_its_number_and_takes_none_of_a_request() {
+    on_bench(None, |bench| {
+        bench.open();
+        bench.said();
+        bench.client.ask(Ask::Status);
+        bench.client.ask(Ask::Request(Request::Disarm));
+        for _ in 0..40 {
+            bench.hear(&bench.alive());
+            bench.pass(ms(50)).expect("alive");
+        }
+        let said = bench.said();
+        assert_eq!(count_of(&said, "1 Status"), 5);
+        bench.hear(&ToHost::Answer(hapterra_core::wire::request::Answer {
+            number: 1,
+            result: Ok(()),
+        }));
+        bench.pass(ms(300)).expect("alive");
+        assert_eq!(count_of(&bench.said(), "1 Status"), 1, "no answer to it");
     });
 }
 

@@ -356,8 +356,12 @@ impl Conversation {
             ToHost::Hello(device) => self.on_hello(now, device, out)?,
             ToHost::SceneTaken { epoch, accepted } => self.on_scene_taken(now, epoch, accepted)?,
             ToHost::Answer(answer) => self.on_answer(now, answer),
-            message @ ToHost::Status(_) => self.on_told(now, Ask::Status, message),
-            message @ ToHost::Calibration(_) => self.on_told(now, Ask::Calibration, message),
+            message @ ToHost::Status { number, .. } => {
+                self.on_told(now, (Ask::Status, number), message)
+            }
+            message @ ToHost::Calibration { number, .. } => {
+                self.on_told(now, (Ask::Calibration, number), message)
+            }
             ToHost::Goodbye(count) => self
                 .on_goodbye(now, out)
                 .then_some(News::Other(ToHost::Goodbye(count))),
@@ -445,8 +449,13 @@ impl Conversation {
         Some(News::Answered(ask, ToHost::Answer(answer)))
     }
 
-    fn on_told(&mut self, now: Duration, asked: Ask, message: ToHost) -> Option<News> {
-        let ask = self.asking.question_answered(asked)?;
+    fn on_told(
+        &mut self,
+        now: Duration,
+        (asked, number): (Ask, u8),
+        message: ToHost,
+    ) -> Option<News> {
+        let ask = self.asking.question_answered(asked, number)?;
         self.heard = now;
         Some(News::Answered(ask, message))
     }

@@ -105,7 +105,7 @@ impl<'t> Dialogue<'t> {
     /// [`LinkError`].
     pub fn status(&mut self) -> Result<Status, LinkError> {
         self.exchange.ask(Ask::Status, |message| match message {
-            ToHost::Status(status) => Some(status),
+            ToHost::Status { status, .. } => Some(status),
             _ => None,
         })
     }
@@ -127,7 +127,7 @@ impl<'t> Dialogue<'t> {
     pub fn calibration(&mut self) -> Result<Option<Calibration>, LinkError> {
         self.exchange
             .ask(Ask::Calibration, |message| match message {
-                ToHost::Calibration(calibration) => Some(calibration),
+                ToHost::Calibration { calibration, .. } => Some(calibration),
                 _ => None,
             })
     }
@@ -232,7 +232,7 @@ impl Exchange<'_> {
         loop {
             let mut found = None;
             let mut answered = |news| {
-                if let News::Answered(Ask::Status, ToHost::Status(status)) = news {
+                if let News::Answered(Ask::Status, ToHost::Status { status, .. }) = news {
                     found = Some(status);
                 }
             };
@@ -418,6 +418,43 @@ mod tests {
         );
         let blocked = dialogue.request(&Request::Arm).expect("it answers");
         assert!(matches!(blocked, Err(Refusal::Blocked(_))), "{blocked:?}");
+    }
+
+    /// A device all of whose answers come again before each new one: as where a line takes
+    /// longer than a question waits to be repeated.
+    struct Late(Native<StoppedClock>, Vec<u8>);
+
+    impl Transport for Late {
+        fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+            self.0.send(bytes)
+        }
+
+        fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
+            let again = self.1.len().min(into.len() / 2);
+            let (before, rest) = into.split_at_mut(again);
+            before.copy_from_slice(&self.1[self.1.len() - again..]);
+            let new = self.0.receive(rest, wait)?;
+            self.1.extend(&rest[..new]);
+            Ok(again + new)
+        }
+    }
+
+    #[test]
+    fn what_was_told_before_is_not_taken_for_what_is() {
+        let device = Late(Native::for_replay().restless(), vec![]);
+        let mut dialogue = Dialogue::open(Box::new(device), PATIENCE).expect("it answers");
+        let look = |dialogue: &mut Dialogue<'_>, expected: Calibration| {
+            let known = dialogue.calibration().expect("it answers");
+            assert_eq!(known, Some(expected));
+            let status = dialogue.status().expect("it answers");
+            assert_eq!(status.model, Some(expected.model));
+        };
+        look(&mut dialogue, Calibration::PREMIUM_1_5);
+        let calibration = Calibration::OMNI;
+        let request = Request::SetCalibration { calibration };
+        let taken = dialogue.request(&request).expect("it answers");
+        assert_eq!(taken, Ok(()));
+        look(&mut dialogue, calibration);
     }
 
     /// A scene for the arm.

@@ -262,8 +262,8 @@ impl Mishap {
                     height: 0.0,
                 },
             }),
-            4 => ToDevice::GetCalibration,
-            _ => ToDevice::Status,
+            4 => ToDevice::GetCalibration { number },
+            _ => ToDevice::Status { number },
         })
     }
 }

@@ -100,9 +100,13 @@ fn host_message<'b>(chance: &mut Chance) -> ToDevice<'b> {
             seq: chance.bits() as u32,
             hip: GridPoint::default(),
         }),
-        6 => ToDevice::Status,
+        6 => ToDevice::Status { number: 0 },
         7 => ToDevice::Alive,
-        8 => [ToDevice::GetCalibration, ToDevice::Bye, ToDevice::Close][chance.below(3)].clone(),
+        8 => {
+            let number = 0;
+            let question = ToDevice::GetCalibration { number };
+            [question, ToDevice::Bye, ToDevice::Close][chance.below(3)].clone()
+        }
         _ => ToDevice::Request {
             number: chance.bits() as u8,
             request: host_request(chance),

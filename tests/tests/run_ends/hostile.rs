@@ -81,9 +81,13 @@ fn answer_to(content: &[u8], taken: &mut Taken) -> Vec<u8> {
             wire::from_device(session, &ToHost::SceneTaken { epoch, accepted })
         }
         // What a host asks before it serves.
-        ToDevice::GetCalibration => {
-            let calibration = ToHost::Calibration(Some(Calibration::PREMIUM_1_5));
-            wire::from_device(session, &calibration)
+        ToDevice::GetCalibration { number } => {
+            let calibration = Some(Calibration::PREMIUM_1_5);
+            let answer = ToHost::Calibration {
+                number,
+                calibration,
+            };
+            wire::from_device(session, &answer)
         }
         ToDevice::Detach => wire::from_device(session, &ToHost::Detached),
         _ => vec![],

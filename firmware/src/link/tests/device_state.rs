@@ -139,10 +139,15 @@ fn a_calibration_is_checked_put_in_force_and_stored() {
     assert_eq!(rig.status().calibration, CalibrationSource::Stored);
     let stored = Stored::Found(Calibration::PREMIUM_3_0);
     assert_eq!(*rig.device.memory(), stored);
-    rig.say(&ToDevice::GetCalibration);
-    rig.run(1);
-    let got = ToHost::Calibration(Some(Calibration::PREMIUM_3_0));
-    assert!(rig.heard.contains(&got));
+    for number in [7, 255, 0] {
+        rig.say(&ToDevice::GetCalibration { number });
+        rig.run(1);
+        let got = ToHost::Calibration {
+            number,
+            calibration: Some(Calibration::PREMIUM_3_0),
+        };
+        assert!(rig.heard.contains(&got), "{:?}", rig.heard.last());
+    }
 }
 
 #[test]
@@ -406,9 +411,14 @@ fn the_status_at_its_longest_fits_its_place() {
     status.bad_frames = u32::MAX;
     status.foreign_frames = u32::MAX;
     status.dropped = u32::MAX;
+    let number = u8::MAX;
+    let calibration = Some(Calibration::PREMIUM_3_0);
     for message in [
-        ToHost::Status(status),
-        ToHost::Calibration(Some(Calibration::PREMIUM_3_0)),
+        ToHost::Status { number, status },
+        ToHost::Calibration {
+            number,
+            calibration,
+        },
     ] {
         let mut queue = TxQueue::new();
         assert!(queue.push(super::rig::FIRST, &message));

@@ -200,7 +200,11 @@ fn who_only_looks_takes_no_arm_and_keeps_none_armed() {
     };
     for second in 0..6 {
         rig.send(&framed(looker, &ToDevice::Hello(looks)));
-        for message in [ToDevice::Status, ToDevice::GetCalibration, ToDevice::Alive] {
+        for message in [
+            ToDevice::Status { number: 0 },
+            ToDevice::GetCalibration { number: 0 },
+            ToDevice::Alive,
+        ] {
             rig.send(&framed(looker, &message));
         }
         rig.run(999);
@@ -209,8 +213,8 @@ fn who_only_looks_takes_no_arm_and_keeps_none_armed() {
     }
     let answers = rig.looked_at.iter().map(|message| match message {
         ToHost::Hello(_) => 'h',
-        ToHost::Status(_) => 's',
-        ToHost::Calibration(_) => 'c',
+        ToHost::Status { .. } => 's',
+        ToHost::Calibration { .. } => 'c',
         _ => '?',
     });
     assert_eq!(answers.collect::<std::string::String>(), "hsc".repeat(6));

@@ -350,10 +350,10 @@ impl Rig {
 
     /// Asks for the status.
     pub(super) fn status(&mut self) -> Status {
-        self.say(&ToDevice::Status);
+        self.say(&ToDevice::Status { number: 0 });
         self.run(1);
         let status = |m: &ToHost| match m {
-            ToHost::Status(status) => Some(status.clone()),
+            ToHost::Status { status, .. } => Some(status.clone()),
             _ => None,
         };
         self.heard.iter().rev().find_map(status).expect("answered")
