@@ -279,10 +279,10 @@ impl Run<'_, '_> {
         };
         let (tally, tap) = (host.tally(), &self.stretch.tap);
         let (told, made) = (tally.samples + tally.lost + tally.dropped, tap.made());
-        // What is dropped last of all no tap sees.
+        // What is dropped last of all, or last of a scene, no tap sees.
         let unseen = match tally.dropped {
             0 => 0,
-            _ => tap.made_since(self.stretch.board.ticks[0]),
+            _ => tap.unseen(self.stretch.board.ticks[0]),
         };
         if self.is_whole && !(made..=made + unseen).contains(&told) {
             return Err(format!(

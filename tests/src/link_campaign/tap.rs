@@ -37,6 +37,11 @@ pub struct Tap {
     ticks: Option<(u32, u32)>,
     /// Samples of the scenes before, since then.
     before: u64,
+    /// Of those scenes, the samples that were made after the last that left, at most: what
+    /// another scene replaces is dropped, and counted by the device.
+    replaced: u64,
+    /// Ticks that the device had run when it took a scene, since the last sample left.
+    taken: Option<u64>,
     /// Ticks of the device that were not the scene's, before it: the least that any sample
     /// was late to leave, so what it is for one that left at once.
     lead: u64,
@@ -52,6 +57,7 @@ impl Tap {
         self.requested.clear();
         self.ticks = None;
         self.before = 0;
+        (self.replaced, self.taken) = (0, None);
         self.lead = u64::MAX;
         self.early = 0;
     }
@@ -63,10 +69,14 @@ impl Tap {
         self.before + self.ticks.map_or(0, length)
     }
 
-    /// How many samples at most were made after the last that left: as many as the device
-    /// has run ticks since.
+    /// How many samples at most were made and have not left when the device has run so
+    /// many ticks: after the last of each scene that did, as many as the device ran ticks.
     #[must_use]
-    pub fn made_since(&self, ticks: u64) -> u64 {
+    pub fn unseen(&self, ticks: u64) -> u64 {
+        self.replaced + self.made_since(ticks)
+    }
+
+    fn made_since(&self, ticks: u64) -> u64 {
         let last = self.ticks.map_or(0, |(_, last)| u64::from(last));
         ticks.saturating_sub(self.lead.saturating_add(last))
     }
@@ -95,17 +105,22 @@ impl Tap {
                 let early = before.is_some_and(|before| when.now < before + EARLY);
                 self.early += u32::from(when.flows && early);
             }
+            ToHost::SceneTaken { accepted: true, .. } => {
+                self.taken.get_or_insert(when.ticks);
+            }
             _ => {}
         }
     }
 
     /// Takes a sample that left when the device had run so many ticks.
     fn on_sample(&mut self, tick: u32, ticks: u64) {
+        let taken = self.taken.take();
         self.ticks = Some(match self.ticks {
             Some((first, last)) if tick > last => (first, tick),
             // A tick that goes back is that of another scene, whose ticks begin with 1.
             Some(scene) => {
                 self.before += length(scene);
+                self.replaced += taken.map_or(0, |ticks| self.made_since(ticks));
                 self.lead = u64::MAX;
                 (1, tick)
             }
@@ -117,4 +132,45 @@ impl Tap {
 
 fn length((first, last): (u32, u32)) -> u64 {
     u64::from(last - first) + 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hapterra_core::scene::Sample;
+    use hapterra_core::wire::message::Telemetry;
+
+    #[test]
+    fn what_is_dropped_at_the_end_of_a_scene_was_made_and_is_not_seen() {
+        let mut tap = Tap::default();
+        tap.begin(None);
+        let mut say = |ticks: u64, message: ToHost| {
+            let (now, flows) = (ticks, true);
+            tap.on_message(&message, &Moment { now, ticks, flows });
+        };
+        let samples = |from: u32| {
+            let sample = |tick| Sample {
+                tick,
+                ..Sample::default()
+            };
+            ToHost::Telemetry(Telemetry {
+                samples: (from..from + 8).map(sample).collect(),
+                ..Telemetry::default()
+            })
+        };
+        let taken = || ToHost::SceneTaken {
+            epoch: 7,
+            accepted: true,
+        };
+        // The first scene runs for 19 ticks; the word for it comes again in between.
+        say(0, taken());
+        say(9, samples(1));
+        say(12, taken());
+        say(17, samples(9));
+        say(20, taken());
+        say(20, taken());
+        say(29, samples(1));
+        assert_eq!((tap.made(), tap.unseen(29)), (24, 3));
+        assert_eq!(tap.unseen(31), 5);
+    }
 }
