@@ -228,6 +228,48 @@ fn a_host_of_another_version_may_speak_at_any_moment() {
 }
 
 #[test]
+fn a_host_whose_device_is_taken_is_told_so_at_once() {
+    let ticks = agree(&Plan::default()).ticks;
+    let mut told = 0;
+    // Once alone, and once with the word for it lost.
+    for (at, late) in (0..ticks)
+        .step_by(MOMENTS)
+        .flat_map(|at| [(at, 0), (at, 900)])
+    {
+        let interruptions = vec![
+            (at, Interruption::Takeover),
+            (at, Interruption::Cut(Direction::ToHost, late)),
+        ];
+        let plan = Plan {
+            interruptions,
+            ..Plan::default()
+        };
+        let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+        // Silence for 0.75 s, and hello every 0.4 s after that.
+        assert!(report.ticks < at + late + 1_300, "{report:?} in {plan:?}");
+        // Its own hello comes after the other's, or its goodbye before.
+        let is_its_own = at == 0 || at + 200 > ticks;
+        assert!(report.end == End::Told || is_its_own, "{plan:?}");
+        told += u32::from(report.end == End::Told);
+    }
+    assert!(told > 40, "{told}");
+}
+
+#[test]
+fn no_answer_that_comes_late_is_taken_for_that_to_a_later_question() {
+    let mut answers = 0;
+    for seed in 0..60 {
+        let plan = Plan {
+            curious: true,
+            ..Plan::random(seed)
+        };
+        let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+        answers += report.answers;
+    }
+    assert!(answers > 3_000, "{answers}");
+}
+
+#[test]
 fn a_device_of_another_version_is_told_and_never_driven() {
     let ticks = agree(&Plan::default()).ticks;
     let other = (0, Interruption::OtherDevice);

@@ -174,6 +174,13 @@ fn a_detach_and_its_answer() {
 }
 
 #[test]
+fn a_hello_that_is_over() {
+    for (end, byte) in [(SessionEnd::Replaced, 2), (SessionEnd::HostSilent, 3)] {
+        assert_eq!(bytes(&ToHost::Over { number: 9, end }), [12, 9, byte]);
+    }
+}
+
+#[test]
 fn a_question_and_its_answer() {
     let number = 200;
     assert_eq!(bytes(&ToDevice::Status { number }), [6, 200]);

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::hello::{DeviceHello, HostHello};
 use super::request::{Answer, Request};
-use super::session::SampleCount;
+use super::session::{SampleCount, SessionEnd};
 use super::status::Status;
 use crate::guard::Report;
 use crate::phantom::Calibration;
@@ -126,6 +126,14 @@ pub enum ToHost {
     Goodbye(SampleCount),
     /// Answers [`ToDevice::Detach`]: the session is over.
     Detached,
+    /// Answers a hello of a session that is over and opens no more.
+    Over {
+        /// The number of the hello that this answers.
+        number: u8,
+        /// Why: [`SessionEnd::Replaced`] where another session was opened since,
+        /// [`SessionEnd::HostSilent`] where none was.
+        end: SessionEnd,
+    },
 }
 
 /// A tile's content.

@@ -47,9 +47,17 @@
 //! A host that has put no scene in force and asked for nothing that drives leaves by
 //! detaching: what another host left is none of its business.
 //!
+//! A session that is over on the device is none any more, whatever its host believes. A
+//! host is told so in answer to its hello (over), and heeds that only in its own session
+//! and only to its last hello: what comes late of an earlier session, or from before a
+//! restart of the device, says nothing about the present one. Where another session was
+//! opened since, another host has taken the device: an error at once, in each state but
+//! detaching, which is closed. Where the device has let go the arm of a host that was
+//! silent, the host goes on in a new session; one that leaves waits for its goodbye.
+//!
 //! An answer is a frame of this session that answers something the host has said:
 //! hello, scene taken, point answer, answer, status, calibration, alive, goodbye,
-//! detached.
+//! detached, over.
 //! Telemetry is none, because it also comes where the device hears nothing.
 //! The times are those for a board in real time.
 //!
@@ -78,8 +86,11 @@
 //! | ended | bye: answered by goodbye; detach: answered by detached; close: the emulated board ends its program | hello of another session: open |
 //!
 //! - A hello of the session that is open is answered and changes nothing. A hello of a
-//!   session that is ended, or of the eight before the present one, is stale: it is not
-//!   heard.
+//!   session that is ended, or of the eight before the present one, is stale: it opens
+//!   none. It is answered by over where another session was opened since, or where the
+//!   host was silent for too long. A host that has left hears goodbye, or detached,
+//!   instead. Nothing else of such a session is answered, and no host answers over: it
+//!   comes once for each hello.
 //! - A hello that names no time for silence, of a session that is not open, opens none:
 //!   its host only looks. It is answered, and so are its questions for status and
 //!   calibration, in its own session's number; the last such host is known. Whoever looks

@@ -6,8 +6,8 @@ use hapterra_core::wire::session::{
 };
 use heapless::HistoryBuf;
 
-/// Sessions that are over and are known: a hello of one of them, which some buffer has kept,
-/// opens none.
+/// Sessions that are over and are known: a hello of one of them, which some buffer has kept
+/// or whose host has heard of no other, opens none.
 const KNOWN: usize = 8;
 
 /// A host that waits for a press says something every half second. One that has said nothing
@@ -38,7 +38,9 @@ pub(super) enum Greeting {
     Opens,
     /// The session is open already: the host has missed the answer.
     Again,
-    /// It comes late, from a session that is over.
+    /// Its session is over in a way that its host has not asked for.
+    Over(SessionEnd),
+    /// Its host has said the session's end, and is answered to that.
     Stale,
 }
 
@@ -110,9 +112,11 @@ impl Conversation {
 
     pub(super) fn greeting(&self, session: SessionNumber) -> Greeting {
         match self.state {
-            SessionState::Open if self.session == session => Greeting::Again,
-            _ if self.is_of(session) || self.over.as_slice().contains(&session) => Greeting::Stale,
-            _ => Greeting::Opens,
+            _ if self.over.as_slice().contains(&session) => Greeting::Over(SessionEnd::Replaced),
+            _ if !self.is_of(session) => Greeting::Opens,
+            SessionState::Open => Greeting::Again,
+            SessionState::Ended(end @ SessionEnd::HostSilent) => Greeting::Over(end),
+            _ => Greeting::Stale,
         }
     }
 

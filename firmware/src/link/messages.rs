@@ -94,6 +94,11 @@ impl<const D: usize> Link<'_, D> {
                 self.foreign_frames = self.foreign_frames.saturating_add(1);
                 return;
             }
+            Greeting::Over(end) => {
+                self.foreign_frames = self.foreign_frames.saturating_add(1);
+                let number = hello.number;
+                return self.say_in(session, &ToHost::Over { number, end });
+            }
             Greeting::Again => {}
             Greeting::Opens => self.open(session, hello.number),
         }

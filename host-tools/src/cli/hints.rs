@@ -116,7 +116,7 @@ impl Hint for LinkError {
             }
             Self::Absent { .. } => "start the emulated board there, or try --device native",
             Self::Several(_) => "name one: --device usb:SERIAL",
-            Self::Gone(_) | Self::Silent(_) | Self::Restarted => {
+            Self::Gone(_) | Self::Silent(_) | Self::LetGo | Self::Restarted => {
                 "check the device and its cable, then start again"
             }
             Self::Version { ours, theirs } if theirs < ours => {

@@ -258,7 +258,8 @@ impl<'t> Client<'t> {
     /// what happened. Frames that make no sense are counted and passed over.
     ///
     /// # Errors
-    /// [`LinkError::Version`] and [`LinkError::SceneRefused`].
+    /// [`LinkError::Version`] and [`LinkError::SceneRefused`]; [`LinkError::Taken`] and
+    /// [`LinkError::LetGo`] where the device says that the session is over.
     pub fn receive(
         &mut self,
         now: Duration,

@@ -4,7 +4,7 @@ use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
 use hapterra_core::wire::frame::{decode, encode};
 use hapterra_core::wire::hello::{PROTOCOL, SerialNumber};
-use hapterra_core::wire::session::{InSession, SampleCount};
+use hapterra_core::wire::session::{InSession, SampleCount, SessionEnd};
 use hapterra_core::wire::version::VersionCheck;
 
 use super::*;
@@ -404,6 +404,104 @@ fn another_host_is_noticed() {
             bench.hear(&bench.alive());
             bench.pass(ms(50)).expect("it is ours");
         }
+    });
+}
+
+/// The answer to the hello of this number of a session that is over.
+const fn over(number: u8, end: SessionEnd) -> ToHost {
+    ToHost::Over { number, end }
+}
+
+#[test]
+fn a_host_whose_session_is_over_is_told_why_at_once() {
+    for (end, is_passing) in [
+        (SessionEnd::Replaced, false),
+        (SessionEnd::HostSilent, true),
+    ] {
+        // Said in greeting, with a scene sent, and open after silence.
+        for steps in 0..3 {
+            on_bench(None, |bench| {
+                let session = bench.client.session();
+                if steps > 0 {
+                    bench.hear(&ToHost::Hello(hello()));
+                }
+                if steps > 1 {
+                    bench.hear(&bench.taken());
+                }
+                if steps > 0 {
+                    bench.pass(ms(800)).expect("patient");
+                    assert!(count_of(&bench.said(), "Hello") > 1);
+                }
+                let number = if steps > 0 { 2 } else { 1 };
+                let told = bench.hear_in(session, &over(number, end));
+                let error = told.expect_err("over");
+                let is_taken = matches!(error, LinkError::Taken);
+                assert!(is_taken != is_passing, "{error}");
+                assert_eq!(error.is_passing(), is_passing, "{error}");
+                // Whoever goes on does so in another session.
+                bench.client.greet(bench.now, &mut bench.out);
+                assert_ne!(bench.client.session(), session);
+            });
+        }
+    }
+}
+
+#[test]
+fn an_old_word_that_a_session_is_over_ends_no_other() {
+    let ends = [SessionEnd::Replaced, SessionEnd::HostSilent];
+    on_bench(None, |bench| {
+        let first = bench.client.session();
+        bench.open();
+        bench.client.greet(bench.now, &mut bench.out);
+        let second = bench.client.session();
+        bench.hear(&ToHost::Hello(DeviceHello {
+            number: 2,
+            ..hello()
+        }));
+        bench.hear(&bench.taken());
+        let other = SessionNumber::new(7);
+        // Of sessions before, of others, and in answer to a hello that was answered, or
+        // that another followed.
+        for end in ends {
+            for (session, number) in [(first, 1), (first, 2), (other, 2), (second, 1), (second, 2)]
+            {
+                let heard = bench.hear_in(session, &over(number, end));
+                heard.expect("passed over");
+            }
+        }
+        // Nobody has taken the device: it is silent.
+        let error = loop {
+            for session in [first, other] {
+                let heard = bench.hear_in(session, &over(2, SessionEnd::Replaced));
+                heard.expect("passed over");
+            }
+            if let Err(error) = bench.pass(ms(50)) {
+                break error;
+            }
+        };
+        assert!(matches!(error, LinkError::Silent(_)), "{error}");
+    });
+}
+
+#[test]
+fn who_leaves_a_session_that_is_over_is_told_or_waits_for_goodbye() {
+    let leaving = |test: fn(&mut Bench<'_>)| {
+        on_bench(None, |bench| {
+            bench.open();
+            bench.client.leave(bench.now, &mut bench.out);
+            test(bench);
+        });
+    };
+    leaving(|bench| {
+        let session = bench.client.session();
+        let error = bench.hear_in(session, &over(2, SessionEnd::Replaced));
+        assert!(matches!(error, Err(LinkError::Taken)), "{error:?}");
+    });
+    leaving(|bench| {
+        bench.hear(&over(2, SessionEnd::HostSilent));
+        assert_eq!(bench.client.state(), State::Leaving);
+        bench.hear(&ToHost::Goodbye(SampleCount::default()));
+        assert_eq!(bench.client.state(), State::Closed);
     });
 }
 

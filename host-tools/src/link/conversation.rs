@@ -7,7 +7,7 @@ use hapterra_core::scene::Scene;
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::request::Answer;
-use hapterra_core::wire::session::{InSession, SessionNumber};
+use hapterra_core::wire::session::{InSession, SessionEnd, SessionNumber};
 use hapterra_core::wire::version::VersionCheck;
 
 use super::ask::Ask;
@@ -346,14 +346,13 @@ impl Conversation {
         out: &mut Vec<u8>,
     ) -> Result<Option<News>, LinkError> {
         if frame.session != self.session || self.state == State::Closed {
-            let previous = self.previous.map(|(session, _)| session);
-            let is_another = previous != Some(frame.session);
-            self.foreign = is_another.then_some(now).or(self.foreign);
+            self.notice(now, &frame);
             return Ok(None);
         }
         self.confirmed = true;
         Ok(match frame.message {
             ToHost::Hello(device) => self.on_hello(now, device, out)?,
+            ToHost::Over { number, end } => self.on_over(now, number, end)?,
             ToHost::SceneTaken { epoch, accepted } => self.on_scene_taken(now, epoch, accepted)?,
             ToHost::Answer(answer) => self.on_answer(now, answer),
             message @ ToHost::Status { number, .. } => {
@@ -381,17 +380,52 @@ impl Conversation {
         })
     }
 
+    /// A frame of another session tells of another host; not one that says that its
+    /// session is over, nor one that is left of the session before.
+    fn notice(&mut self, now: Duration, frame: &InSession<ToHost>) {
+        let previous = self.previous.map(|(session, _)| session);
+        let is_over = matches!(frame.message, ToHost::Over { .. });
+        if !is_over && previous != Some(frame.session) {
+            self.foreign = Some(now);
+        }
+    }
+
+    /// Whether a message answers the last hello and is the first that does. What answers
+    /// an earlier one, and a double, tells what was.
+    fn answers_hello(&mut self, number: u8) -> bool {
+        number == self.hello && !std::mem::replace(&mut self.hello_answered, true)
+    }
+
+    /// The device has ended this session.
+    fn on_over(
+        &mut self,
+        now: Duration,
+        number: u8,
+        end: SessionEnd,
+    ) -> Result<Option<News>, LinkError> {
+        if !self.answers_hello(number) {
+            return Ok(None);
+        }
+        self.heard = now;
+        match (self.state, end) {
+            (State::Detaching, _) => self.enter(State::Closed, now),
+            // The goodbye that was said after the hello is answered, too.
+            (State::Leaving, SessionEnd::HostSilent) => {}
+            (_, SessionEnd::HostSilent) => return Err(LinkError::LetGo),
+            _ => return Err(LinkError::Taken),
+        }
+        Ok(None)
+    }
+
     fn on_hello(
         &mut self,
         now: Duration,
         device: DeviceHello,
         out: &mut Vec<u8>,
     ) -> Result<Option<News>, LinkError> {
-        // An answer to an earlier hello, or this one's double, tells what was.
-        if device.number != self.hello || self.hello_answered {
+        if !self.answers_hello(device.number) {
             return Ok(None);
         }
-        self.hello_answered = true;
         self.heard = now;
         if device.protocol != PROTOCOL {
             return Err(LinkError::version(device.protocol));

@@ -94,7 +94,8 @@ impl<'t> Dialogue<'t> {
     /// Ends the conversation, and returns when the device has said so.
     ///
     /// # Errors
-    /// [`LinkError::NotConfirmed`] where the arm may be armed; else [`LinkError`].
+    /// [`LinkError::NotConfirmed`] and [`LinkError::Taken`] where the arm may be armed; else
+    /// [`LinkError`].
     pub fn end(mut self) -> Result<(), LinkError> {
         self.exchange.end()
     }
@@ -332,9 +333,10 @@ impl Exchange<'_> {
             let polled = self.poll(LOOK, &mut |_| {});
             polled.map_err(|error| {
                 tracing::debug!(%error, "on the way to the end");
-                match self.drives {
-                    true => LinkError::NotConfirmed,
-                    false => error,
+                match error {
+                    LinkError::Taken => error,
+                    _ if self.drives => LinkError::NotConfirmed,
+                    _ => error,
                 }
             })?;
         }
@@ -352,7 +354,7 @@ const fn drives(request: &Request) -> bool {
 
 impl Drop for Exchange<'_> {
     fn drop(&mut self) {
-        if let Err(not_confirmed @ LinkError::NotConfirmed) = self.end() {
+        if let Err(not_confirmed @ (LinkError::NotConfirmed | LinkError::Taken)) = self.end() {
             tracing::error!("{not_confirmed}");
         }
     }

@@ -28,6 +28,9 @@ pub enum LinkError {
     /// The device has another host.
     #[error("another host has taken the device: the arm may be armed")]
     Taken,
+    /// The device has not heard this host for too long, and has disarmed the arm.
+    #[error("the device has not heard this computer for too long, and has disarmed the arm")]
+    LetGo,
     /// Goodbye was not answered.
     #[error("the board did not confirm that it is disarmed: switch the amplifiers off")]
     NotConfirmed,
@@ -67,6 +70,9 @@ impl LinkError {
     /// Whether trying again later can help.
     #[must_use]
     pub const fn is_passing(&self) -> bool {
-        matches!(self, Self::Absent { .. } | Self::Gone(_) | Self::Silent(_))
+        matches!(
+            self,
+            Self::Absent { .. } | Self::Gone(_) | Self::Silent(_) | Self::LetGo
+        )
     }
 }

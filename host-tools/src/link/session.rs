@@ -167,7 +167,8 @@ impl<'t> Session<'t> {
     /// and dropped the scene when this returns; an emulated board ends its program.
     ///
     /// # Errors
-    /// [`LinkError::NotConfirmed`] where the device does not say so in time.
+    /// [`LinkError::NotConfirmed`] where the device does not say so in time;
+    /// [`LinkError::Taken`] where another host has taken the device.
     pub fn say_goodbye(&mut self, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
         self.client.leave(self.line.now(), &mut self.line.out);
         // The user wants the end, and the end is to be heard.
@@ -176,7 +177,10 @@ impl<'t> Session<'t> {
         while self.client.state() != State::Closed {
             self.poll(LOOK, on).map_err(|error| {
                 tracing::debug!(%error, "on the way to goodbye");
-                LinkError::NotConfirmed
+                match error {
+                    LinkError::Taken => error,
+                    _ => LinkError::NotConfirmed,
+                }
             })?;
         }
         Ok(())

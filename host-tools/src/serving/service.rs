@@ -61,8 +61,9 @@ pub struct End {
     /// The error that ended it, where one did.
     pub why: Result<(), LinkError>,
     /// Whether the device has confirmed that it is disarmed:
-    /// [`LinkError::NotConfirmed`] where not. Another host's arm is not this one's to
-    /// disarm; then this is no error and [`End::why`] is [`LinkError::Taken`].
+    /// [`LinkError::NotConfirmed`] where not, and [`LinkError::Taken`] where that says in
+    /// answer that it has another host. Another host's arm is not this one's to disarm:
+    /// where [`End::why`] is [`LinkError::Taken`] this is no error.
     pub disarmed: Result<(), LinkError>,
     /// Counts of what went over the link.
     pub tally: Tally,

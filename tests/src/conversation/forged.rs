@@ -1,4 +1,4 @@
-//! Frames of others: a host and a device of another version.
+//! Frames of others: a host and a device of another version, and another host.
 
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::hello::{HostHello, PROTOCOL};
@@ -31,6 +31,17 @@ pub(super) fn greeting() -> [Vec<u8>; 2] {
             message: hello,
         }),
     ]
+}
+
+/// What another host says that takes the device, and gives it up at once.
+pub(super) fn takeover() -> [Vec<u8>; 2] {
+    let hello = ToDevice::Hello(HostHello {
+        protocol: PROTOCOL,
+        number: 1,
+        silence_s: DEFAULT_SILENCE_S,
+    });
+    let session = SessionNumber::new(0x0BAD_0100);
+    [hello, ToDevice::Bye].map(|message| frame(&InSession { session, message }))
 }
 
 /// The same frame, but for a greeting, which is then of another version.

@@ -27,6 +27,9 @@ pub enum Wrong {
     /// The host took this for the device's words, and the device had not said so in its
     /// session.
     Misled(String),
+    /// The host took this tick's status for the answer to a question that it asked at that
+    /// tick of the device, which was later.
+    Outdated(u32, u32),
     /// The host was told that the device is disarmed, and it is not.
     NotDisarmed(u64),
     /// Samples were not counted once: what the host counted as here or lost, and as

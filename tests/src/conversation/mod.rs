@@ -13,6 +13,7 @@ mod forged;
 mod judge;
 mod line;
 mod plan;
+mod questions;
 mod world;
 
 pub use judge::Wrong;

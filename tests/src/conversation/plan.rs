@@ -16,6 +16,8 @@ pub enum Interruption {
     Echo(Direction),
     /// A host of another version says hello on the same line.
     OtherHost,
+    /// Another host of this version opens a session on the same line, and ends it.
+    Takeover,
     /// From now on the device says that it is of another version.
     OtherDevice,
     /// The host's program is killed, and no other is started.
@@ -31,6 +33,8 @@ pub struct Plan {
     pub interruptions: Vec<(u64, Interruption)>,
     /// The host leaves while the arm is armed, without a request to disarm before.
     pub abrupt: bool,
+    /// The host asks for the status without a pause while it feels and disarms.
+    pub curious: bool,
     /// Harm at random: the seed, and the share of frames in a thousand.
     pub random: Option<(u64, usize)>,
 }

@@ -21,6 +21,7 @@ use super::forged;
 use super::judge::{FADE, Judge, SILENCE_S, Wrong};
 use super::line::{Direction, Line};
 use super::plan::{Interruption, Plan};
+use super::questions::Questions;
 
 /// Ticks after which a run hangs: each step has its deadline, and no plan needs more.
 const LONGEST: u64 = 60_000;
@@ -55,6 +56,8 @@ pub struct Report {
     pub uncertain: u64,
     /// Times that the host gave a session up and began another.
     pub resumptions: u32,
+    /// Questions for the status that were answered.
+    pub answers: u32,
 }
 
 /// What the host is about.
@@ -89,6 +92,11 @@ struct World<'t> {
     driven: bool,
     /// The host leaves without a request to disarm.
     abrupt: bool,
+    /// The host asks for the status without a pause.
+    curious: bool,
+    questions: Questions,
+    /// Ticks of the device since it was started.
+    device_ticks: u32,
     /// The device says that it is of another version.
     other_device: bool,
     /// There is no host any more.
@@ -155,6 +163,9 @@ impl<'t> World<'t> {
             enabled: false,
             driven: false,
             abrupt: plan.abrupt,
+            curious: plan.curious,
+            questions: Questions::default(),
+            device_ticks: 0,
             other_device: false,
             host_gone: false,
         }
@@ -191,6 +202,7 @@ impl<'t> World<'t> {
             driven: self.driven,
             uncertain: self.client.tally().uncertain,
             resumptions: self.resumptions,
+            answers: self.questions.answers,
         })
     }
 
@@ -205,6 +217,7 @@ impl<'t> World<'t> {
                     self.lines[0].break_off();
                     self.sessions.clear();
                     (self.step, self.felt, self.resumptions) = (Step::Arming, 0, 0);
+                    self.questions.forget();
                     self.judge.another_host();
                     self.greet();
                 }
@@ -214,6 +227,8 @@ impl<'t> World<'t> {
                 }
                 Interruption::DeviceReset => {
                     self.device = device();
+                    self.device_ticks = 0;
+                    self.questions.device_restarted();
                     self.lines[1].break_off();
                     self.enabled = false;
                 }
@@ -223,6 +238,11 @@ impl<'t> World<'t> {
                 Interruption::Echo(Direction::ToHost) => self.lines[1].echo(now),
                 Interruption::OtherHost => {
                     for frame in forged::greeting() {
+                        self.lines[0].slip_in(frame, now);
+                    }
+                }
+                Interruption::Takeover => {
+                    for frame in forged::takeover() {
                         self.lines[0].slip_in(frame, now);
                     }
                 }
@@ -265,6 +285,7 @@ impl<'t> World<'t> {
             ..Sense::default()
         };
         self.enabled = self.device.tick(sense).enabled;
+        self.device_ticks += 1;
         self.driven |= self.enabled;
         let session = self.client.session().get();
         self.judge.look(self.now, self.enabled, session)?;
@@ -294,6 +315,7 @@ impl<'t> World<'t> {
         let (step, felt) = (&mut self.step, &mut self.felt);
         let at = self.now;
         let (mut opened, mut samples) = (None, vec![]);
+        let questions = &mut self.questions;
         let mut on = |event: Event<'_>| match event {
             Event::Opened { device, .. } => opened = Some(device.clone()),
             Event::Sample(sample) => {
@@ -308,7 +330,7 @@ impl<'t> World<'t> {
                     answered.get_or_insert(at);
                 }
             }
-            _ => {}
+            event => questions.take(&event),
         };
         let mut heard = Ok(());
         for mut frame in self.lines[1].arrived(self.now) {
@@ -321,6 +343,7 @@ impl<'t> World<'t> {
         self.say(&out);
         let session = self.client.session().get();
         self.judge.told(session, opened.as_ref(), &samples)?;
+        self.questions.judge()?;
         match heard {
             Ok(()) => self.go_on(),
             Err(error) => return self.on_error(error),
@@ -328,8 +351,20 @@ impl<'t> World<'t> {
         Ok(())
     }
 
+    /// Asks for the status, where that was answered.
+    fn wonder(&mut self) {
+        let is_at_leisure = matches!(self.step, Step::Feeling | Step::Disarming(_));
+        if self.curious
+            && is_at_leisure
+            && let Some(ask) = self.questions.ask(self.device_ticks)
+        {
+            self.client.ask(ask);
+        }
+    }
+
     /// The next step, where the last is done.
     fn go_on(&mut self) {
+        self.wonder();
         let is_closed = self.client.state() == State::Closed;
         match self.step {
             Step::Arming if self.felt > 0 => self.step = Step::Feeling,
@@ -369,7 +404,7 @@ impl<'t> World<'t> {
             (LinkError::Version { .. }, _) if self.other_device => {
                 self.step = Step::Over(End::Told);
             }
-            (LinkError::Silent(_), _) if self.resumptions < RESUMPTIONS => {
+            (LinkError::Silent(_) | LinkError::LetGo, _) if self.resumptions < RESUMPTIONS => {
                 self.resumptions += 1;
                 if let Step::Disarming(_) = self.step {
                     self.leave();
@@ -377,7 +412,7 @@ impl<'t> World<'t> {
                     self.greet();
                 }
             }
-            (LinkError::Silent(_), _) => self.leave(),
+            (LinkError::Silent(_) | LinkError::LetGo, _) => self.leave(),
             (error, _) => return Err(Wrong::Error(error.to_string())),
         }
         Ok(())

@@ -16,11 +16,9 @@ use super::surface;
 use super::tap::{Moment, Tap};
 use crate::chance::Chance;
 
-/// How long what the user sees may differ from what is, on a line that works, ms.
+/// How long what the user sees may differ from what is, on a line that works, ms; also
+/// where another program has taken the device, which the user is told.
 const STALE: u64 = 1_500;
-/// The same where another program has taken the device: until the host gives up, which
-/// its user is told.
-const TAKEN: u64 = 4_500;
 /// How long after the line stood still the device may still say what it had to say then,
 /// ms.
 const DRAINS: u64 = 50;
@@ -55,8 +53,6 @@ pub struct Stretch<'t> {
     /// Until when the amplifiers may go on.
     wished: u64,
     was_on: bool,
-    /// Another program has talked to the device while the present host lived.
-    contested: bool,
     /// When the direction to the host had no room last.
     full: u64,
     /// The device has let an arm go whose host was silent, and nobody has talked to it
@@ -93,7 +89,6 @@ impl<'t> Stretch<'t> {
             troubled: 0,
             wished: 0,
             was_on: false,
-            contested: false,
             full: 0,
             let_go: false,
             owed: false,
@@ -110,7 +105,6 @@ impl<'t> Stretch<'t> {
         }
         self.board.watch.forget();
         self.owed = std::mem::take(&mut self.let_go);
-        self.contested = false;
         let mut out = Vec::new();
         let chance = &mut self.chance;
         let host = Host::start(self.terrain, self.scene, self.now, chance, &mut out);
@@ -138,7 +132,6 @@ impl<'t> Stretch<'t> {
     pub fn begin(&mut self, fault: Fault) {
         if fault.kind == Kind::HostileHost {
             (self.let_go, self.owed) = (false, false);
-            self.contested = true;
         }
         let [to_device, to_host] = fault.harms();
         self.to_device.harm(to_device);
@@ -298,8 +291,7 @@ impl<'t> Stretch<'t> {
             return Ok(());
         }
         let since = *self.stale.get_or_insert(self.now);
-        let most = if self.contested { TAKEN } else { STALE };
-        match self.now - since < most {
+        match self.now - since < STALE {
             true => Ok(()),
             false => Err(format!(
                 "the user has seen {:?} for {} ms with the amplifiers {}",

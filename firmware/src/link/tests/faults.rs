@@ -105,16 +105,67 @@ fn a_hello_that_is_repeated_changes_nothing() {
 }
 
 #[test]
-fn a_hello_of_the_session_before_is_stale() {
-    let mut rig = Rig::in_scene(scene(Source::Encoders));
+fn a_hello_of_the_session_before_is_stale_and_its_host_is_told() {
+    let mut rig = Rig::armed();
     let first = rig.session;
     rig.greet_anew();
     rig.run(20);
     let heard = rig.heard.len();
-    rig.send(&framed(first, &ToDevice::Hello(HELLO)));
-    rig.run(1);
-    assert_eq!(rig.heard.len(), heard, "not answered");
-    assert_eq!(rig.status().foreign_frames, 1);
+    for number in [7, 7, 8] {
+        rig.send(&framed(
+            first,
+            &ToDevice::Hello(HostHello { number, ..HELLO }),
+        ));
+        // Of what else it says nothing is answered.
+        for message in [
+            ToDevice::Alive,
+            ToDevice::Status { number },
+            ToDevice::Detach,
+            ToDevice::Bye,
+        ] {
+            rig.send(&framed(first, &message));
+        }
+    }
+    rig.run(300);
+    let end = SessionEnd::Replaced;
+    let over = [7, 7, 8].map(|number| (first, ToHost::Over { number, end }));
+    assert_eq!(rig.heard_before, over);
+    let telemetry = |m: &&ToHost| matches!(m, ToHost::Telemetry(_) | ToHost::Need { .. });
+    let of_the_present = &rig.heard[heard..];
+    assert!(of_the_present.iter().all(|m| telemetry(&m)));
+    assert_eq!(rig.status().foreign_frames, 15);
+    assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
+}
+
+#[test]
+fn a_host_that_was_let_go_is_told_so_and_one_that_has_left_is_not() {
+    let mut rig = Rig::armed();
+    let hello = HostHello {
+        silence_s: 5,
+        ..HELLO
+    };
+    rig.say(&ToDevice::Hello(hello));
+    rig.run(5_200);
+    let over = |rig: &mut Rig, number| {
+        rig.heard_before.clear();
+        rig.say(&ToDevice::Hello(HostHello { number, ..HELLO }));
+        rig.run(1);
+        rig.heard_before.clone()
+    };
+    let end = SessionEnd::HostSilent;
+    let told = (rig.session, ToHost::Over { number: 3, end });
+    assert_eq!(over(&mut rig, 3), [told]);
+    // Goodbye is all that it wants to hear when it leaves.
+    rig.say(&ToDevice::Bye);
+    assert_eq!(over(&mut rig, 4), []);
+    rig.run(250);
+    assert!(matches!(rig.heard.last(), Some(ToHost::Goodbye(_))));
+    assert_eq!(over(&mut rig, 5), []);
+    rig.say(&ToDevice::Close);
+    assert_eq!(over(&mut rig, 6), []);
+    let mut rig = Rig::armed();
+    rig.say(&ToDevice::Detach);
+    assert_eq!(over(&mut rig, 7), []);
 }
 
 #[test]
@@ -292,13 +343,16 @@ fn a_host_that_detaches_leaves_the_arm_as_it_was_and_hides_nothing() {
     look(&mut rig, 60);
     rig.run(500);
     assert!(rig.device.tick(rig.sense).enabled, "rendering goes on");
-    // Its own late hello does not open it again, and neither does the one before's.
+    // Its own late hello does not open it again, and neither does the one before's, which
+    // is answered.
     rig.heard.clear();
     for session in [second, rig.session] {
         rig.send(&framed(session, &ToDevice::Hello(HELLO)));
     }
     rig.run(5);
     assert_eq!(rig.heard, []);
+    let (number, end) = (HELLO.number, SessionEnd::Replaced);
+    assert_eq!(rig.heard_before, [(second, ToHost::Over { number, end })]);
     let device = greeted(&mut rig);
     let (session, end) = (device.last.session, device.last.end);
     assert_eq!((session, end), (first.get(), SessionEnd::Replaced));
@@ -743,11 +797,13 @@ fn no_hello_of_the_last_sessions_opens_one_again() {
         })
         .collect();
     let foreign = rig.status().foreign_frames;
-    for session in sessions {
-        rig.send(&framed(session, &ToDevice::Hello(HELLO)));
+    for session in &sessions {
+        rig.send(&framed(*session, &ToDevice::Hello(HELLO)));
         rig.run(1);
     }
     assert_eq!(rig.status().foreign_frames, foreign + 8);
+    let told: Vec<_> = rig.heard_before.iter().map(|(of, _)| *of).collect();
+    assert_eq!(told, sessions);
 }
 
 #[test]

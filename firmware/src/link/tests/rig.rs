@@ -121,6 +121,8 @@ pub(super) struct Rig {
     /// The session of a host that only looks, and what that has heard.
     pub(super) looker: Option<SessionNumber>,
     pub(super) looked_at: Vec<ToHost>,
+    /// What the hosts of sessions before have heard.
+    pub(super) heard_before: Vec<(SessionNumber, ToHost)>,
     /// The session that is spoken in, and the number of its last request.
     pub(super) session: SessionNumber,
     pub(super) number: u8,
@@ -152,6 +154,7 @@ impl Rig {
             heard: Vec::new(),
             looker: None,
             looked_at: Vec::new(),
+            heard_before: Vec::new(),
             session: FIRST,
             number: 0,
             asked: Vec::new(),
@@ -290,6 +293,10 @@ impl Rig {
             let framed: InSession<ToHost> = decode(content).expect("a message");
             if self.looker == Some(framed.session) {
                 self.looked_at.push(framed.message);
+                continue;
+            }
+            if let ToHost::Over { .. } = framed.message {
+                self.heard_before.push((framed.session, framed.message));
                 continue;
             }
             assert_eq!(framed.session, self.session, "{:?}", framed.message);

@@ -96,8 +96,9 @@ fn bring_up<A: Attendant>(
                 break;
             }
             (Err(error), dialogue) => {
-                if let Err(not_confirmed @ LinkError::NotConfirmed) = dialogue.end() {
-                    tell(not_confirmed);
+                let ended = dialogue.end();
+                if let Err(told @ (LinkError::NotConfirmed | LinkError::Taken)) = ended {
+                    tell(told);
                 }
                 return Err(error.into());
             }
