@@ -94,6 +94,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         RunsOn::Emulated => emulated(args, &felt, &mut trajectory),
     }?;
     let seconds = began.elapsed().as_secs_f64();
+    if trajectory.was_cut() {
+        eprintln!(
+            "{}: its last row is cut in the middle, and left out: the command that wrote it was killed",
+            args.trajectory.display()
+        );
+    }
     if summary.below_ground > 0 {
         eprintln!(
             "{} rows are below ground and not felt: the HIP had not been above the surface before them",

@@ -68,6 +68,19 @@ pub(super) fn lines_before_a_row(stream: impl Read) -> u64 {
     }
 }
 
+/// Whether the row that begins from here on is not ended: the file stops in its middle.
+pub(super) fn row_is_cut(stream: impl Read) -> bool {
+    let (mut reader, mut line) = (BufReader::new(stream), Vec::new());
+    loop {
+        line.clear();
+        let read = reader.read_until(b'\n', &mut line);
+        let passed_over = line.starts_with(b"#") || line.trim_ascii().is_empty();
+        if read.is_err() || line.is_empty() || !passed_over {
+            return !line.is_empty() && !line.ends_with(b"\n");
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

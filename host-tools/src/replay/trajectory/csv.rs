@@ -12,6 +12,7 @@ pub(super) struct Rows<R> {
     reader: csv::Reader<Again<R>>,
     record: ByteRecord,
     columns: usize,
+    was_cut: bool,
 }
 
 impl<R: Read + Seek> Rows<R> {
@@ -29,6 +30,7 @@ impl<R: Read + Seek> Rows<R> {
             reader,
             record: ByteRecord::new(),
             columns: 0,
+            was_cut: false,
         };
         rows.read_header()?;
         Ok((rows, text))
@@ -52,6 +54,10 @@ impl<R: Read + Seek> Rows<R> {
         if !self.read_record()? {
             return Ok(None);
         }
+        if self.record.len() < self.columns && self.columns > COLUMNS.len() && self.is_cut() {
+            self.was_cut = true;
+            return Ok(None);
+        }
         if self.record.len() != self.columns {
             return Err(TrajectoryFault::Columns {
                 at: self.place(),
@@ -64,6 +70,22 @@ impl<R: Read + Seek> Rows<R> {
             *number = self.number(column)?;
         }
         Ok(Some(numbers))
+    }
+
+    /// Whether the file ended in the middle of a row, as that of a recording that was killed
+    /// does. Such a row is none.
+    pub(super) const fn was_cut(&self) -> bool {
+        self.was_cut
+    }
+
+    /// Whether the file ends in the middle of the present row: no row can be read
+    /// afterwards.
+    fn is_cut(&mut self) -> bool {
+        let Some(begin) = self.record.position().map(csv::Position::byte) else {
+            return false;
+        };
+        let stream = self.reader.get_mut();
+        stream.seek(SeekFrom::Start(begin)).is_ok() && comments::row_is_cut(stream)
     }
 
     fn read_record(&mut self) -> Result<bool, TrajectoryFault> {

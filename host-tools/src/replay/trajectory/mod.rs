@@ -113,6 +113,16 @@ impl Trajectory {
         Ok(Some(Row { t_s, hip_mm, hip }))
     }
 
+    /// Whether the last row of the recording was cut in its middle, and is left out: the
+    /// command that wrote it was killed. Known after the last row.
+    #[must_use]
+    pub fn was_cut(&self) -> bool {
+        match &self.form {
+            Form::Csv(rows) => rows.was_cut(),
+            Form::Parquet(_) => false,
+        }
+    }
+
     /// Where the present row is, for a message: no row can be read afterwards.
     fn place(&mut self) -> String {
         match &mut self.form {

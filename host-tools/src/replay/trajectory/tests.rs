@@ -42,6 +42,37 @@ fn forgiving_about_white_space_line_ends_and_marks() {
 }
 
 #[test]
+fn a_recording_that_was_cut_in_a_row_has_the_rows_before() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("t.csv");
+    let whole =
+        "# a remark\nt_s,x_mm,y_mm,z_mm,contact,state\n0,1,2,3,0,free\n0.001,4,5,6,1,touching\n";
+    // Not after the last comma: nobody sees there that the text after it is missing.
+    let last_row = whole.len() - "0.001,4,5,6,1,touching\n".len();
+    let last_comma = whole.len() - "touching\n".len();
+    for end in last_row + 1..last_comma {
+        std::fs::write(&path, &whole[..end]).expect("written");
+        let scale = Scale::new(1.0, 1.0).expect("valid");
+        let mut trajectory = Trajectory::open(&path).expect("a header");
+        let mut next = || trajectory.next_row(&scale).expect("whole rows");
+        assert_eq!(next().map(|row| row.hip_mm), Some([1.0, 2.0, 3.0]));
+        assert_eq!(next(), None, "{:?}", &whole[..end]);
+        assert!(trajectory.was_cut());
+    }
+    // In the middle of a file a short row is a mistake, and so it is where a person wrote it.
+    for wrong in [
+        "t_s,x_mm,y_mm,z_mm,contact\n0,1,2\n0.001,4,5,6,1\n",
+        "t_s,x_mm,y_mm,z_mm,contact\n0,1,2\n",
+        "t_s,x_mm,y_mm,z_mm\n0,1,2",
+    ] {
+        std::fs::write(&path, wrong).expect("written");
+        let error = rows_of(&path).expect_err("is wrong").to_string();
+        assert!(error.contains("line 2 has 3 columns"), "{error}");
+    }
+    assert_eq!(rows(whole).expect("whole").len(), 2);
+}
+
+#[test]
 fn says_what_is_wrong_and_where() {
     let cases = [
         ("", "line 1 is not the header"),
