@@ -7,8 +7,18 @@ use plotters_backend::text_anchor::HPos;
 use super::axes::{self, Area};
 use super::canvas::PictureError;
 use super::map_view::MapView;
-use super::session::GroundFacts;
 use super::style::{self, INK, px};
+
+/// What a picture says of the ground.
+#[derive(Clone, Copy)]
+pub struct GroundFacts<'a> {
+    /// Ground metres a hand millimetre, where the terrain knows its size.
+    pub metres_per_mm: Option<f64>,
+    /// Coordinates of a place in hand millimetres east and north, short.
+    pub place_of: &'a dyn Fn(f64, f64) -> String,
+    /// Scale and place for the panel: name and value with its unit, short.
+    pub lines: &'a [(String, String)],
+}
 
 /// The bar is at most this share of the map's width.
 const BAR_SHARE: f64 = 0.25;

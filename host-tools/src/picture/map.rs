@@ -8,11 +8,10 @@ use plotters_backend::{BackendCoord, DrawingErrorKind};
 
 use super::axes::{self, Area, Chart, Titles};
 use super::canvas::PictureError;
-use super::ground_marks;
+use super::ground_marks::{self, GroundFacts};
 use super::line;
 use super::map_view::MapView;
 use super::relief::{self, Relief, Surface};
-use super::session::GroundFacts;
 use super::style::{self, HIP, INK, PROXY, SCALE, px, stroke};
 use crate::replay::Record;
 

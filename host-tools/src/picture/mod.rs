@@ -21,5 +21,6 @@ pub mod style;
 mod timeline;
 
 pub use canvas::{Canvas, PictureError};
+pub use ground_marks::GroundFacts;
 pub use relief::Surface;
-pub use session::{GroundFacts, SessionPicture};
+pub use session::SessionPicture;

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::axes::{self, Area, BELOW_PX, LEFT_PX};
 use super::canvas::{Canvas, PictureError};
+use super::ground_marks::GroundFacts;
 use super::map_view::MapView;
 use super::relief::Surface;
 use super::style::{self, INK, SOFT_INK, px};
@@ -27,17 +28,6 @@ pub struct SessionPicture<'a> {
     pub facts: &'a [(String, String)],
     /// Where the terrain is on the ground, where it is shown.
     pub ground: Option<GroundFacts<'a>>,
-}
-
-/// What a picture says of the ground.
-#[derive(Clone, Copy)]
-pub struct GroundFacts<'a> {
-    /// Ground metres a hand millimetre, where the terrain knows its size.
-    pub metres_per_mm: Option<f64>,
-    /// Coordinates of a place in hand millimetres east and north, short.
-    pub place_of: &'a dyn Fn(f64, f64) -> String,
-    /// Scale and place for the panel: name and value with its unit, short.
-    pub lines: &'a [(String, String)],
 }
 
 const WIDTH_PX: i32 = 1600;
