@@ -118,6 +118,15 @@ impl Decoded {
         });
     }
 
+    /// Takes the metres in a unit of the heights from the user, whatever the file says.
+    pub(super) fn with_vertical_unit(mut self, metres: Option<f64>) -> Self {
+        if metres.is_some() {
+            self.metres_per_vertical_unit = metres;
+            self.vertical_unit_from = Certainty::Given;
+        }
+        self
+    }
+
     /// Turns numbers that grow downwards into heights, and says so.
     pub(super) fn turn_depths_into_heights(&mut self, why: &str) {
         self.scale = -self.scale;

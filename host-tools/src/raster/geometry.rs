@@ -150,7 +150,7 @@ pub struct VerticalDatum {
 }
 
 /// Metres in a unit of length by the name files give it, as `ft` or `metre`.
-pub(super) fn metres_in(unit: &str) -> Option<f64> {
+pub(crate) fn metres_in(unit: &str) -> Option<f64> {
     let name: String = unit
         .to_lowercase()
         .chars()

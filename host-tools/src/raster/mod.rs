@@ -49,6 +49,7 @@ use std::path::Path;
 pub use crs::ReferenceSystem;
 pub use decoded::{HeightSummary, LARGEST_HEIGHT};
 pub use error::{BadRaster, Error};
+pub(crate) use geometry::metres_in;
 pub use geometry::{CellSize, CellUnit, Certainty, VerticalDatum};
 pub use georeference::{Georeference, GroundTransform, Sides, System};
 pub use ground_map::Bounds;
@@ -80,6 +81,7 @@ impl Raster {
         let path = path.as_ref();
         open::decode(path, options)
             .and_then(|decoded| decoded.with_ground_cell(options.ground_cell_m))
+            .map(|decoded| decoded.with_vertical_unit(options.vertical_unit_m))
             .and_then(|decoded| Self::checked(decoded, options.no_data))
             .map_err(|fault| Error::new(path, fault))
     }

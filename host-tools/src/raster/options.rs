@@ -19,6 +19,8 @@ pub struct OpenOptions {
     pub variable: Option<String>,
     /// Side of a cell on the ground, metres, of a file that does not state it.
     pub ground_cell_m: Option<f64>,
+    /// Metres in a unit of the heights; replaces what the file says.
+    pub vertical_unit_m: Option<f64>,
     /// How a picture's colours encode heights, if they do.
     pub encoding: Option<Encoding>,
 }

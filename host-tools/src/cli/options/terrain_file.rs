@@ -8,7 +8,10 @@ use clap::ValueHint;
 use indicatif::ProgressBar;
 
 use crate::cli::failure::Failure;
-use crate::raster::{Encoding, Endian, OpenOptions, PngChannel, Raster, RawLayout, SampleType};
+use crate::raster::{
+    CellUnit, Certainty, Encoding, Endian, OpenOptions, PngChannel, Raster, RawLayout, SampleType,
+    metres_in,
+};
 
 /// Where `--help` lists these options.
 const INPUT: &str = "Input";
@@ -57,6 +60,11 @@ pub struct ReadingOptions {
     #[arg(long, value_name = "M", value_parser = parse_side, help_heading = INPUT)]
     pub ground_cell_m: Option<f64>,
 
+    /// Unit of the heights, for files that do not state it or state it wrongly: m, ft, us-ft,
+    /// or metres in a unit, as 0.01
+    #[arg(long, value_name = "UNIT", value_parser = parse_unit, help_heading = INPUT)]
+    pub vertical_unit: Option<f64>,
+
     /// How the colours of a PNG encode heights
     #[arg(long, value_enum, conflicts_with = "png_channel", help_heading = INPUT)]
     pub encoding: Option<Encoding>,
@@ -78,6 +86,9 @@ impl TerrainFile {
         waiting.finish_and_clear();
         let raster = opened?;
         tracing::info!(format = raster.format(), "read {}", self.name());
+        if let Some(line) = assumed_unit(&raster) {
+            eprintln!("note: {line}");
+        }
         Ok(raster)
     }
 
@@ -105,9 +116,43 @@ impl ReadingOptions {
             band: self.band,
             variable: self.variable.clone(),
             ground_cell_m: self.ground_cell_m,
+            vertical_unit_m: self.vertical_unit,
             encoding: self.encoding,
         }
     }
+}
+
+/// What to say where heights are only assumed to be metres, and the ground is not in
+/// metres: feet would be felt 3.28 times too steep.
+fn assumed_unit(raster: &Raster) -> Option<String> {
+    let assumed = "the file does not state the unit of its heights: they are taken to be metres";
+    if raster.vertical_unit_from() != Certainty::Assumed {
+        return None;
+    }
+    match raster.cell()?.unit {
+        CellUnit::Length { metres: 1.0 } => None,
+        CellUnit::Length { metres } => {
+            let times = 1.0 / metres;
+            let feet = if metres > 0.304_800_3 { "us-ft" } else { "ft" };
+            let unit = match (metres / 0.3048 - 1.0).abs() < 1e-4 {
+                true => feet.to_owned(),
+                false => metres.to_string(),
+            };
+            Some(format!(
+                "{assumed}, but the ground is in units of {metres} m; if the heights are too, they are felt {times:.2} times too steep: --vertical-unit {unit} (or --vertical-unit m)"
+            ))
+        }
+        CellUnit::Degree => Some(format!("{assumed} (--vertical-unit ft, if they are feet)")),
+    }
+}
+
+/// A unit of height in metres.
+fn parse_unit(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let metres = metres_in(text).or_else(|| text.parse().ok());
+    metres
+        .filter(|metres| (1e-6..=1e6).contains(metres))
+        .ok_or_else(|| "a unit of height is m, ft, us-ft, or metres in a unit, as 0.01".into())
 }
 
 /// A length of the ground in metres.
@@ -137,6 +182,17 @@ mod tests {
         assert_eq!(parse_size("7"), Ok((7, 7)));
         assert!(parse_size("0x4").is_err());
         assert!(parse_size("4x").is_err());
+        for (unit, metres) in [
+            ("m", 1.0),
+            ("ft", 0.3048),
+            ("us-ft", 1200.0 / 3937.0),
+            ("0.01", 0.01),
+        ] {
+            assert_eq!(parse_unit(unit), Ok(metres));
+        }
+        for unit in ["", "furlong", "0", "-1", "nan", "inf"] {
+            assert!(parse_unit(unit).is_err(), "{unit}");
+        }
         assert_eq!(parse_side("0.5"), Ok(0.5));
         for side in ["0", "-3", "nan", "inf", "1e9", "x"] {
             assert!(parse_side(side).is_err(), "{side}");
