@@ -4,30 +4,40 @@
     python3 -m venv venv && venv/bin/pip install rasterio==1.4.4 pyproj==3.7.2
     venv/bin/python tests/data/places_by_gdal.py ../shared/dem > tests/data/places_by_gdal.csv
 
-Longitudes and latitudes belong to the datum of each file's own reference system.
+Longitudes and latitudes are those of WGS 84, by PROJ's best way without grids where a
+datum differs.
 """
 import os
 import sys
 
 import pyproj
 import rasterio
+from pyproj.transformer import TransformerGroup
 
 STEPS = 32
+
+
+def way(system):
+    """To WGS 84, if PROJ knows it."""
+    group = TransformerGroup(system, "EPSG:4326", always_xy=True)
+    known = [one for one in group.transformers if one.accuracy is not None and one.accuracy >= 0]
+    return (known or group.transformers)[0]
 
 
 def lonlat(dataset):
     """Smallest and largest longitude and latitude on the edges."""
     system = pyproj.CRS.from_user_input(dataset.crs.to_wkt())
-    globe = system.geodetic_crs
+    b = dataset.bounds
     if system.is_geographic:
-        b = dataset.bounds
-        return [b.left, b.bottom, b.right, b.top]
-    way = pyproj.Transformer.from_crs(system, globe, always_xy=True)
+        # Longitudes run on over 180 degrees where the field does.
+        moved = way(system).transform([b.left % 360, b.right % 360], [b.bottom, b.top])
+        to_own = [(v - own % 360 + 180) % 360 - 180 + own for v, own in zip(moved[0], (b.left, b.right))]
+        return [to_own[0], moved[1][0], to_own[1], moved[1][1]]
     w, h = dataset.width, dataset.height
     shares = [step / STEPS for step in range(STEPS + 1)]
     edges = [p for s in shares for p in ((s * w, 0), (s * w, h), (0, s * h), (w, s * h))]
     x, y = zip(*(dataset.transform * p for p in edges))
-    lon, lat = way.transform(x, y)
+    lon, lat = way(system).transform(x, y)
     return [min(lon), min(lat), max(lon), max(lat)]
 
 

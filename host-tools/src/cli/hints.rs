@@ -45,7 +45,7 @@ impl Hint for PlaceError {
             Self::NoSystem { .. } => {
                 "say the place in the file's own coordinates with --at X,Y or --bbox W,S,E,N, or give the file its reference system: gdal_translate -a_srs EPSG:CODE IN OUT.tif"
             }
-            Self::NotOnMap { .. } | Self::BoxAcrossSeam { .. } => {
+            Self::NotOnMap { .. } | Self::BoxAcrossSeam { .. } | Self::NoProjection { .. } => {
                 "say the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N"
             }
             Self::Outside { .. } | Self::Hole { .. } => {
@@ -57,6 +57,7 @@ impl Hint for PlaceError {
             Self::NoBox(_) => {
                 "say west before east and south before north; only a box of degrees may cross 180°"
             }
+            Self::BoxInTwoParts { .. } => "name one of both parts, or --at a place",
             Self::BoxTooSmall { .. } => "choose a larger box",
             Self::NoGroundSize => "state the scale with --cell-mm, hand millimetres a cell",
             Self::GroundScale(_) => "choose another --ground-m-per-mm",

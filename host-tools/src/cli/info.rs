@@ -10,7 +10,7 @@ use hapterra_core::terrain::{POSTS, TILE_CELLS};
 
 use super::failure::Failure;
 use super::options::terrain_file::TerrainFile;
-use crate::raster::{CellSize, CellUnit, Certainty};
+use crate::raster::{CellSize, CellUnit, Certainty, ReferenceSystem};
 use crate::terrain::{FeltCells, FeltGrid};
 use place::{Rectangle, Vertical, from, told};
 
@@ -63,8 +63,10 @@ struct FileReport {
     crs_from: Option<&'static str>,
     /// Outer edges of the cells around all samples, in the file's units.
     bounds: Option<Rectangle>,
-    /// The same in degrees of the file's own datum.
+    /// The same in degrees of longitude and latitude: of WGS 84, where the way there is known.
     bounds_lonlat: Option<Rectangle>,
+    #[serde(skip)]
+    projection_known: bool,
     cell: Option<Cell>,
     /// Metres per vertical unit, where the file says so.
     metres_per_vertical_unit: Option<f64>,
@@ -127,6 +129,7 @@ impl FileReport {
             crs_from: system.map(|_| from(raster.reference_system_from())),
             bounds: Rectangle::of(raster),
             bounds_lonlat: Rectangle::lonlat(raster),
+            projection_known: system.is_none_or(ReferenceSystem::has_lonlat),
             cell: raster.cell().map(|cell| Cell::new(cell, grid)),
             metres_per_vertical_unit: raster.stated_metres_per_vertical_unit(),
             vertical: Vertical::of(raster),
@@ -155,7 +158,15 @@ impl FileReport {
             edges.unwrap_or_else(|| "unknown".into())
         };
         line("bounds", edges(&self.bounds));
-        line("lon/lat", edges(&self.bounds_lonlat));
+        line(
+            "lon/lat",
+            match (&self.bounds_lonlat, self.projection_known) {
+                (None, false) => {
+                    "unknown: the projection of its reference system is not known here".into()
+                }
+                (bounds, _) => edges(bounds),
+            },
+        );
         let cell = self.cell.as_ref();
         line("cell", cell.map_or("unknown".into(), Cell::text));
         line("heights", format!("{} to {}", self.lowest, self.highest));

@@ -13,6 +13,16 @@ pub enum PlaceError {
         /// What the terrain covers, in its own coordinates.
         bounds: String,
     },
+    /// Longitude and latitude of a file whose projection is not known.
+    #[error(
+        "the projection of the file's reference system ({system}) is not known here, so it is not known where a longitude and latitude are in it; it covers {bounds}"
+    )]
+    NoProjection {
+        /// Its name.
+        system: String,
+        /// What the terrain covers, in its own coordinates.
+        bounds: String,
+    },
     /// A longitude and latitude that the projection does not have.
     #[error(
         "longitude {}, latitude {} is no place of the file's map ({system}); it covers {bounds}", .lonlat[0], .lonlat[1]
@@ -75,6 +85,16 @@ pub enum PlaceError {
         place: String,
         /// The file's reference system.
         system: String,
+    },
+    /// A box across the end of a field that goes around the globe.
+    #[error(
+        "the box {place} lies across the end of the terrain, which goes around the globe: its parts are --bbox {} and --bbox {}, ask for one of them", .parts[0], .parts[1]
+    )]
+    BoxInTwoParts {
+        /// As asked for.
+        place: String,
+        /// Both parts in the file's own coordinates.
+        parts: [String; 2],
     },
     /// Ground metres, of a file that knows none.
     #[error("the file does not know how large its cells are on the ground")]

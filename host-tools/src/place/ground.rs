@@ -1,9 +1,11 @@
 //! From the coordinates that a user gives to places in a felt grid.
 
+use super::coordinates::Coordinates;
 use super::error::PlaceError;
-use super::target::Coordinates;
-use super::words::{asked_in_words, bounds_in_words, box_in_words, system_in_words};
-use crate::raster::{Georeference, Sides, System};
+use super::words::{
+    asked_in_words, bounds_in_words, box_in_words, own_box_in_words, system_in_words,
+};
+use crate::raster::{Georeference, Sides, System, around};
 use crate::terrain::FeltGrid;
 
 /// Points along each side of a box of longitude and latitude: its sides are bent on a map.
@@ -26,8 +28,13 @@ pub(super) fn place(
         return Ok(file.nearest_turn(place));
     }
     if matches!(file.system(), System::Cells | System::Unstated) {
-        return Err(PlaceError::NoSystem {
-            bounds: bounds_in_words(file),
+        let bounds = bounds_in_words(file);
+        return Err(match file.reference() {
+            Some(system) if !system.has_lonlat() => PlaceError::NoProjection {
+                system: system.name().to_owned(),
+                bounds,
+            },
+            _ => PlaceError::NoSystem { bounds },
         });
     }
     file.of_lonlat(place).ok_or_else(|| PlaceError::NotOnMap {
@@ -60,7 +67,8 @@ pub(super) fn outline(
     let there = place(file, middle, coordinates)?;
     if coordinates == Coordinates::Own {
         let moved = there[0] - middle[0];
-        return Ok(corners.map(|[x, y]| [x + moved, y]).to_vec());
+        let corners = corners.map(|[x, y]| [x + moved, y]);
+        return in_one_piece(file, asked, corners.to_vec());
     }
     let mut points = Vec::new();
     for side in 0..4 {
@@ -68,11 +76,9 @@ pub(super) fn outline(
         for step in 0..ALONG {
             let share = f64::from(step) / f64::from(ALONG);
             let lonlat = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
-            points.push(in_turn_of(
-                file,
-                there,
-                place(file, within_turn(lonlat), coordinates)?,
-            ));
+            let found = place(file, within_turn(lonlat), coordinates)?;
+            let east = lonlat[0] - middle[0];
+            points.push(in_turn_of(file, there, east, found));
         }
     }
     match is_torn(&points) {
@@ -80,7 +86,40 @@ pub(super) fn outline(
             place: box_in_words(asked),
             system: system_in_words(file),
         }),
-        false => Ok(points),
+        false => in_one_piece(file, asked, points),
+    }
+}
+
+/// The outline of a box in a field of degrees. A field that goes all around the globe ends
+/// somewhere, and a box across that end has two parts: only one piece can be laid before
+/// an arm. A box around the globe is the whole field.
+fn in_one_piece(
+    file: &Georeference<'_>,
+    asked: Sides,
+    points: Vec<[f64; 2]>,
+) -> Result<Vec<[f64; 2]>, PlaceError> {
+    let System::Geographic { degrees } = file.system() else {
+        return Ok(points);
+    };
+    let (turn, step) = (360.0 / degrees, file.transform().column_step()[0].abs());
+    let [west, south, east, north] = around(points.iter().copied());
+    let [first, _, last, _] = file.bounds();
+    if east - west > turn - 1.5 * step {
+        let (west, east) = (first, last);
+        return Ok([[west, south], [east, south], [east, north], [west, north]].to_vec());
+    }
+    let part = |turns: f64| {
+        let (from, to) = (west + turns * turn, east + turns * turn);
+        let part = [from.max(first), south, to.min(last), north];
+        (part[2] - part[0] >= step).then_some(part)
+    };
+    let parts: Vec<Sides> = [-1.0, 0.0, 1.0].into_iter().filter_map(part).collect();
+    match parts.as_slice() {
+        [one, other, ..] => Err(PlaceError::BoxInTwoParts {
+            place: box_in_words(asked),
+            parts: [one, other].map(|part| own_box_in_words(file, *part)),
+        }),
+        _ => Ok(points),
     }
 }
 
@@ -92,34 +131,24 @@ fn within_turn([longitude, latitude]: [f64; 2]) -> [f64; 2] {
     }
 }
 
-/// A place with its longitude in the turn of another one.
-fn in_turn_of(file: &Georeference<'_>, other: [f64; 2], [x, y]: [f64; 2]) -> [f64; 2] {
+/// A place with its longitude in the turn in which it is so many degrees east of another.
+fn in_turn_of(file: &Georeference<'_>, other: [f64; 2], east: f64, [x, y]: [f64; 2]) -> [f64; 2] {
     let System::Geographic { degrees } = file.system() else {
         return [x, y];
     };
-    let turn = 360.0 / degrees;
-    [x + ((other[0] - x) / turn).round() * turn, y]
+    let (turn, expected) = (360.0 / degrees, other[0] + east / degrees);
+    [x + ((expected - x) / turn).round() * turn, y]
 }
 
 /// Whether neighbours on an outline are too far apart for one piece of a map.
 fn is_torn(points: &[[f64; 2]]) -> bool {
-    let [west, south, east, north] = around(points);
+    let [west, south, east, north] = around(points.iter().copied());
     let whole = (east - west).hypot(north - south);
     let next = points.iter().cycle().skip(1);
     points
         .iter()
         .zip(next)
         .any(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1]) > TORN * whole)
-}
-
-/// The smallest rectangle around places.
-pub(super) fn around(places: &[[f64; 2]]) -> Sides {
-    let empty = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
-    places
-        .iter()
-        .fold(empty, |[west, south, east, north], [x, y]| {
-            [west.min(*x), south.min(*y), east.max(*x), north.max(*y)]
-        })
 }
 
 /// A place in felt cells that has a height, and this height in the file's vertical unit.
@@ -166,7 +195,7 @@ pub(super) fn area(
     let told = || (box_in_words(asked), bounds_in_words(&file));
     let points = outline(&file, asked, coordinates)?;
     let felt: Vec<_> = points.iter().map(|point| grid.of_ground(*point)).collect();
-    let [west, south, east, north] = around(&felt);
+    let [west, south, east, north] = around(felt);
     let last = [grid.columns(), grid.rows()].map(|n| f64::from(n) - 1.0);
     let [west, south] = [west.max(0.0), south.max(0.0)];
     let [east, north] = [east.min(last[0]), north.min(last[1])];

@@ -5,6 +5,7 @@
 //! place under the home position, scale, level and heights, from which terrain and scene
 //! follow. [`PlacedTerrain`] adds a scripted hand for an arm that is virtual.
 
+mod coordinates;
 mod error;
 mod fit;
 mod ground;
@@ -14,10 +15,11 @@ mod target;
 mod view;
 mod words;
 
+pub use coordinates::Coordinates;
 pub use error::PlaceError;
 pub use placed_terrain::{PlacedTerrain, PlacingError};
 pub use reach::{Reach, ReachBox};
-pub use target::{Coordinates, Target};
+pub use target::Target;
 pub(crate) use view::FELT_MM;
 pub use view::{Heights, Sizing, View, ViewOptions, suited_height};
 pub use words::{bounds_in_words, coordinates_in_words, place_in_words};

@@ -1,18 +1,10 @@
 //! Which part of a terrain is asked for.
 
+use super::coordinates::Coordinates;
 use super::error::PlaceError;
 use super::ground;
-use crate::raster::{Georeference, Raster, Sides};
+use crate::raster::{Georeference, Raster, Sides, around};
 use crate::terrain::{FeltCells, FeltGrid};
-
-/// What the numbers of a place are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Coordinates {
-    /// x and y of the file's own reference system, or columns and rows where it has none.
-    Own,
-    /// Longitude and latitude, degrees, WGS 84.
-    LonLat,
-}
 
 /// Which part of a terrain is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -53,7 +45,7 @@ impl Target {
             Self::At(place, coordinates) => Some(ground::place(file, place, coordinates)?),
             Self::Box(bounds, coordinates) => {
                 let corners = ground::outline(file, bounds, coordinates)?;
-                let [west, south, east, north] = ground::around(&corners);
+                let [west, south, east, north] = around(corners);
                 Some([0.5 * (west + east), 0.5 * (south + north)])
             }
         })

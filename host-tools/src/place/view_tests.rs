@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::place::{Coordinates, ReachBox};
-use crate::raster::{CellSize, CellUnit, Certainty, GroundTransform, Raster};
+use crate::raster::{CellSize, CellUnit, Certainty, Globe, GroundTransform, Raster};
 use crate::terrain::FeltCells;
 use hapterra_core::Vec3;
 use hapterra_core::phantom::{Calibration, Pose};
@@ -27,6 +27,7 @@ fn cell(sides: (f64, f64), unit: CellUnit, lean: f64) -> CellSize {
         unit,
         map_scale: (1.0, 1.0),
         latitude: matches!(unit, CellUnit::Degree).then_some(60.0),
+        globe: Globe::EARTH,
         certainty: Certainty::Stated,
     }
 }
@@ -358,6 +359,44 @@ fn boxes_by_longitude_and_latitude_also_over_the_antimeridian() {
         matches!(torn, Err(PlaceError::BoxAcrossSeam { .. })),
         "{torn:?}"
     );
+}
+
+/// Fields around the globe end somewhere, and nobody may be given half of a box unasked.
+#[test]
+fn a_box_across_the_end_of_a_globe_is_refused_with_its_two_parts() {
+    let globe = |west: f64| {
+        let raster = Raster::from_fn(360, 90, |column, row| (column + row) as f32);
+        let ground = GroundTransform::new([west, -44.5], [1.0, 0.0], [0.0, 1.0]);
+        let raster = raster.expect("raster").with_cell(cell((1.0, 1.0), CellUnit::Degree, 0.0));
+        raster.with_ground(ground.expect("a plane"), Some(4326))
+    };
+    let asked = [170.0, -20.0, -170.0, -10.0];
+    for (west, sides, parts) in [
+        (-179.5, asked, ["--bbox -179.5,-20,-170,-10", "--bbox 170,-20,179.5,-10"]),
+        (0.5, [-10.0, -20.0, 10.0, -10.0], ["--bbox 0.5,-20,10,-10", "--bbox 350,-20,359.5,-10"]),
+    ] {
+        let globe = globe(west);
+        for coordinates in [OWN, LONLAT] {
+            let error = seen(&globe, &boxed(sides, coordinates)).expect_err("two parts");
+            let said = error.to_string();
+            for part in parts {
+                assert!(said.contains(part), "{part} in: {said}");
+            }
+        }
+        // Each part can be had, and so can a box elsewhere and the globe as a whole.
+        for part in parts {
+            let numbers = part.trim_start_matches("--bbox ").split(',');
+            let numbers: Vec<f64> = numbers.map(|side| side.parse().expect("a number")).collect();
+            let sides = numbers.try_into().expect("four");
+            assert!(seen(&globe, &boxed(sides, OWN)).is_ok(), "{part}");
+        }
+        assert!(seen(&globe, &boxed([20.0, -20.0, 40.0, -10.0], LONLAT)).is_ok());
+        let (_, whole) = seen(&globe, &boxed([-180.0, -30.0, 180.0, 30.0], LONLAT)).expect("all");
+        let columns = (whole.laid_mm[2] - whole.laid_mm[0]) / whole.scale.cell_mm();
+        assert!(columns > 358.0, "{columns} columns");
+    }
+    // A field that is longer on one side of 180° than the box has one part only.
+    assert!(seen(&globe(0.5), &boxed(asked, LONLAT)).is_ok());
 }
 
 #[test]

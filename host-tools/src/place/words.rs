@@ -1,7 +1,7 @@
 //! Places and bounds as they are said to the user.
 
-use super::target::Coordinates;
-use crate::raster::{Georeference, Sides, System};
+use super::coordinates::Coordinates;
+use crate::raster::{Georeference, LonLat, Sides, System, around};
 
 /// What a terrain covers, in its own coordinates and, where they are known, in longitude
 /// and latitude.
@@ -12,8 +12,8 @@ pub fn bounds_in_words(file: &Georeference<'_>) -> String {
     let digits = Digits::of(file);
     let [w, s, e, n] = [west, south, east, north].map(|value| digits.say(value));
     let own = format!("{x} {w} to {e}, {y} {s} to {n} ({})", system_in_words(file));
-    if !matches!(file.system(), System::Projected) {
-        return own;
+    if file.counts_lonlat() {
+        return own + &kind_in_words(file.lonlat());
     }
     let corners = [[west, south], [east, south], [west, north], [east, north]];
     let lonlat: Option<Vec<_>> = corners
@@ -22,9 +22,10 @@ pub fn bounds_in_words(file: &Georeference<'_>) -> String {
         .collect();
     match lonlat {
         Some(corners) => {
-            let [west, south, east, north] = super::ground::around(&corners);
+            let [west, south, east, north] = around(corners);
             format!(
-                "{own}, which is longitude {west:.5} to {east:.5}, latitude {south:.5} to {north:.5}"
+                "{own}, which is longitude {west:.5} to {east:.5}, latitude {south:.5} to {north:.5}{}",
+                kind_in_words(file.lonlat())
             )
         }
         None => own,
@@ -35,11 +36,33 @@ pub fn bounds_in_words(file: &Georeference<'_>) -> String {
 #[must_use]
 pub fn place_in_words(file: &Georeference<'_>, ground: [f64; 2]) -> String {
     let own = asked_in_words(file, ground, Coordinates::Own);
-    match (file.system(), file.to_lonlat(ground)) {
-        (System::Projected, Some([longitude, latitude])) => {
-            format!("{own}, which is longitude {longitude:.6}, latitude {latitude:.6}")
+    let kind = kind_in_words(file.lonlat());
+    match file.to_lonlat(ground) {
+        Some(_) if file.counts_lonlat() => own + &kind,
+        Some([longitude, latitude]) => {
+            format!("{own}, which is longitude {longitude:.6}, latitude {latitude:.6}{kind}")
         }
-        _ => own,
+        None => own,
+    }
+}
+
+/// What longitudes and latitudes are, where they are not simply those of WGS 84.
+fn kind_in_words(kind: LonLat<'_>) -> String {
+    /// What is this close needs no word, m.
+    const CLOSE_M: f64 = 5.0;
+    match kind {
+        LonLat::Unstated | LonLat::Wgs84 => String::new(),
+        LonLat::ShiftedToWgs84 { within_m } if within_m < CLOSE_M => String::new(),
+        LonLat::ShiftedToWgs84 { within_m } => {
+            format!(" of WGS 84, usually within {within_m} m")
+        }
+        LonLat::OfOwnDatum { name } => {
+            format!(" of its own datum ({name}), whose way to WGS 84 is not known here")
+        }
+        LonLat::OfBody { name, radius_m } => {
+            let kilometres = radius_m / 1000.0;
+            format!(" on a body of {kilometres} km radius, not the Earth ({name})")
+        }
     }
 }
 
@@ -66,6 +89,12 @@ pub(super) fn asked_in_words(
     }
 }
 
+/// A box in the file's own coordinates, as it can be asked for.
+pub(super) fn own_box_in_words(file: &Georeference<'_>, sides: Sides) -> String {
+    let digits = Digits::of(file);
+    sides.map(|side| digits.say(side)).join(",")
+}
+
 /// A box as it was asked for.
 pub(super) fn box_in_words(sides: Sides) -> String {
     sides.map(|side| side.to_string()).join(",")
@@ -78,19 +107,31 @@ pub(super) fn system_in_words(file: &Georeference<'_>) -> String {
         System::Unstated => "the file's own coordinates".into(),
         System::Geographic { .. } | System::Projected => match file.reference() {
             Some(system) => {
-                (system.code()).map_or(system.name().into(), |code| format!("EPSG:{code}"))
+                let code = system.code().map(|code| format!("EPSG:{code}"));
+                let name = code.unwrap_or_else(|| system.name().into());
+                name + angle_in_words(file.system())
             }
             None => "degrees".into(),
         },
     }
 }
 
-/// What a file's two coordinates are called.
+/// The unit of angles that are not degrees.
+fn angle_in_words(system: System) -> &'static str {
+    match system {
+        System::Geographic { degrees: 1.0 } | System::Projected => "",
+        System::Geographic { degrees: 0.9 } => ", grads",
+        _ => ", angles that are not degrees",
+    }
+}
+
+/// What a file's two coordinates are called: longitude and latitude are those that can be
+/// asked for.
 fn names(file: &Georeference<'_>) -> [&'static str; 2] {
     match file.system() {
         System::Cells => ["column", "row"],
-        System::Unstated | System::Projected => ["x", "y"],
-        System::Geographic { .. } => ["longitude", "latitude"],
+        System::Geographic { .. } if file.counts_lonlat() => ["longitude", "latitude"],
+        _ => ["x", "y"],
     }
 }
 

@@ -1,16 +1,24 @@
 //! Coordinate reference systems by EPSG code or as text: what they are called, their
 //! units, how long a unit is on the ground, and where that is on the globe.
 //!
-//! `epsg-utils` knows the codes, `proj4wkt` reads texts, `proj4rs` has the projections;
-//! they are named in this file and its folder only.
+//! `epsg-utils` knows the codes, `proj4wkt` reads texts, `proj4rs` has the projections,
+//! `crs-definitions` the shifts between datums; they are named in this file and its folder
+//! only.
 
+mod datum;
+mod names;
+mod projection;
+mod shift;
 mod system;
-pub(super) mod wgs84;
 mod wkt;
 
 use epsg_utils::Crs;
 use epsg_utils::crs::{CoordinateSystem, Unit as EpsgUnit};
 
+use super::globe::Globe;
+pub(super) use datum::Datum;
+pub use datum::LonLat;
+pub(super) use shift::Shift;
 pub use system::ReferenceSystem;
 pub(super) use system::Unit;
 use wkt::Node;
@@ -39,17 +47,6 @@ pub(super) fn vertical(code: u16) -> Option<Vertical> {
         metres: metres(&crs.coordinate_system)?,
         is_depth: axis.is_some_and(|axis| axis.direction == "down"),
         name: crs.name,
-    })
-}
-
-/// Name of the reference system with an EPSG code.
-pub(super) fn name(code: u16) -> Option<String> {
-    Some(match crs(code)? {
-        Crs::ProjectedCrs(crs) => crs.name,
-        Crs::GeogCrs(crs) => crs.name,
-        Crs::GeodCrs(crs) => crs.name,
-        Crs::VertCrs(crs) => crs.name,
-        Crs::CompoundCrs(crs) => crs.name,
     })
 }
 
@@ -91,6 +88,9 @@ fn metres(system: &CoordinateSystem) -> Option<f64> {
 }
 
 #[cfg(test)]
+mod lonlat_tests;
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
@@ -104,7 +104,9 @@ mod tests {
         let feet = metres_per_unit(2229).expect("California zone 5");
         assert!((feet - 1200.0 / 3937.0).abs() < 1e-12);
         assert_eq!(metres_per_unit(32767), None);
-        assert_eq!(name(26911).as_deref(), Some("NAD83 / UTM zone 11N"));
+        let named = ReferenceSystem::from_code(26911);
+        let named = named.as_ref().map(ReferenceSystem::name);
+        assert_eq!(named, Some("NAD83 / UTM zone 11N"));
     }
 
     fn wkt_of(code: u16) -> &'static str {
@@ -162,9 +164,10 @@ mod tests {
             let by_code = ReferenceSystem::from_code(code).expect("known");
             let (by_text, _) = ReferenceSystem::from_wkt(wkt_of(code));
             assert_eq!(Some(&by_code), by_text.as_ref(), "the text names its code");
-            let found = by_code.lonlat(place).expect("in reach");
+            let found = by_code.own_degrees(place).expect("in reach");
             let off = (found.0 - wanted.0).abs().max((found.1 - wanted.1).abs());
             assert!(off < 1e-7, "{code}: {found:?} for {wanted:?}");
+            let found = by_code.to_lonlat(place).expect("in reach");
             let back = by_code.from_lonlat(found).expect("in reach");
             let off = (back.0 - place.0).abs().max((back.1 - place.1).abs());
             assert!(off < 1e-2, "{code}: {back:?} for {place:?}");
@@ -177,7 +180,7 @@ mod tests {
         let (system, _) = ReferenceSystem::from_wkt(text);
         let place = system
             .expect("a system")
-            .lonlat((100.0, -50.0))
+            .own_degrees((100.0, -50.0))
             .expect("degrees");
         assert!(
             (place.0 - 90.0).abs() < 1e-9 && (place.1 + 45.0).abs() < 1e-9,
@@ -194,7 +197,7 @@ mod tests {
         assert_eq!(system.unit(), Unit::Length(Some(0.304_800_609_601_219_2)));
         assert_eq!(vertical, None);
         let (longitude, latitude) = system
-            .lonlat((1_640_416.666_666_666_7, 0.0))
+            .to_lonlat((1_640_416.666_666_666_7, 0.0))
             .expect("in reach");
         assert!((longitude + 117.0).abs() < 1e-9 && latitude.abs() < 1e-9);
         let compound = format!(

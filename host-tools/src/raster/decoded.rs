@@ -2,7 +2,7 @@
 
 use super::crs::{ReferenceSystem, Vertical};
 use super::geometry::CellSize;
-use super::placed::Place;
+use super::place::Place;
 use super::samples::{HoleMask, SampleValue, Samples, with_samples};
 use super::{BadRaster, Certainty, VerticalDatum};
 

@@ -1,5 +1,7 @@
 //! What a cell measures on the ground, and a vertical unit in metres.
 
+use super::globe::Globe;
+
 /// The unit of a cell's sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CellUnit {
@@ -43,6 +45,8 @@ pub struct CellSize {
     pub map_scale: (f64, f64),
     /// Latitude of the middle of the field in degrees, where known.
     pub latitude: Option<f64>,
+    /// What degrees are degrees of.
+    pub globe: Globe,
     /// Where the unit comes from.
     pub certainty: Certainty,
 }
@@ -58,28 +62,19 @@ impl CellSize {
             unit,
             map_scale: (1.0, 1.0),
             latitude,
+            globe: Globe::EARTH,
             certainty: Certainty::Stated,
         }
     }
 
-    /// The cell's sides (east, north) in metres.
-    ///
-    /// Degrees are converted at the middle latitude φ of the field with the
-    /// usual series for the WGS 84 ellipsoid, good to about a metre per degree:
-    ///
-    /// - one degree of latitude: 111132.92 − 559.82 cos 2φ + 1.175 cos 4φ metres,
-    /// - one degree of longitude: 111412.84 cos φ − 93.5 cos 3φ + 0.118 cos 5φ metres.
-    ///
-    /// Where the latitude is not known, a degree of longitude counts as long as
-    /// one of latitude at 45°.
+    /// The cell's sides (east, north) in metres: degrees by the radii of curvature of its
+    /// globe at the latitude. Where the latitude is not known, a degree of longitude counts
+    /// as long as one of latitude at 45°.
     pub fn metres(&self) -> (f64, f64) {
         match self.unit {
             CellUnit::Length { metres } => (self.east * metres, self.north * metres),
             CellUnit::Degree => {
-                let phi = self.latitude.unwrap_or(45.0).to_radians();
-                let north = 111_132.92 - 559.82 * (2.0 * phi).cos() + 1.175 * (4.0 * phi).cos();
-                let east =
-                    111_412.84 * phi.cos() - 93.5 * (3.0 * phi).cos() + 0.118 * (5.0 * phi).cos();
+                let [east, north] = self.globe.metres_per_degree(self.latitude.unwrap_or(45.0));
                 let east = self.latitude.map_or(north, |_| east);
                 (self.east * east, self.north * north)
             }

@@ -4,7 +4,7 @@
 //! Coordinates are always (x, y), which is (east, north) or (longitude, latitude),
 //! whatever order the reference system's own definition has.
 
-use super::crs::{ReferenceSystem, wgs84};
+use super::crs::{LonLat, ReferenceSystem};
 use super::geometry::{CellSize, CellUnit, Certainty};
 
 /// Ends of the range in which longitudes and latitudes are taken, degrees.
@@ -179,42 +179,57 @@ impl<'r> Georeference<'r> {
         )
     }
 
-    /// Longitude and latitude (WGS 84, degrees) of coordinates, where the reference
-    /// system is known and its projection has such a place.
+    /// What the longitudes and latitudes of this file are.
     #[must_use]
-    pub fn to_lonlat(&self, ground: [f64; 2]) -> Option<[f64; 2]> {
-        let lonlat = match self.system {
-            System::Cells | System::Unstated => None,
-            System::Geographic { degrees } => {
-                let own = ground.map(|angle| angle * degrees);
-                let shifted = self.reference.and_then(|it| wgs84::of_own_degrees(it, own));
-                Some(shifted.unwrap_or(own))
-            }
-            System::Projected => wgs84::to_lonlat(self.reference?, ground),
-        }?;
-        // Files count longitudes from −180 or from 0: people read the former.
-        Some([wrapped(lonlat[0]), lonlat[1]])
+    pub fn lonlat(&self) -> LonLat<'r> {
+        self.reference
+            .map_or(LonLat::Unstated, ReferenceSystem::lonlat)
     }
 
-    /// Coordinates of a longitude and latitude (WGS 84, degrees); the turn of the longitude is the
-    /// one in which the place is in the field, or closest to it. `None` where the reference
-    /// system is not known, or its projection has no such place.
+    /// Whether the coordinates themselves are these longitudes and latitudes, to 4 m.
+    #[must_use]
+    pub fn counts_lonlat(&self) -> bool {
+        let System::Geographic { degrees } = self.system else {
+            return false;
+        };
+        degrees == 1.0 && self.reference.is_none_or(ReferenceSystem::counts_lonlat)
+    }
+
+    /// Longitude and latitude (degrees, as [`Georeference::lonlat`] says) of coordinates,
+    /// where the reference system is known and its projection has such a place.
+    #[must_use]
+    pub fn to_lonlat(&self, ground: [f64; 2]) -> Option<[f64; 2]> {
+        let (longitude, latitude) = match (self.system, self.reference) {
+            (System::Cells | System::Unstated, _) => None,
+            (_, Some(reference)) => reference.to_lonlat(ground.into()),
+            (System::Geographic { degrees }, None) => {
+                Some((ground[0] * degrees, ground[1] * degrees))
+            }
+            (System::Projected, None) => None,
+        }?;
+        // Files count longitudes from −180 or from 0: people read the former.
+        Some([wrapped(longitude), latitude])
+    }
+
+    /// Coordinates of a longitude and latitude (degrees, as [`Georeference::lonlat`] says);
+    /// the turn of the longitude is the one in which the place is in the field, or closest to
+    /// it. `None` where the reference system is not known, or its projection has no such
+    /// place.
     #[must_use]
     pub fn of_lonlat(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {
         if !(LONGITUDES.contains(&longitude) && LATITUDES.contains(&latitude)) {
             return None;
         }
-        let lonlat = [wrapped(longitude), latitude];
-        match self.system {
-            System::Cells | System::Unstated => None,
-            System::Geographic { degrees } => {
-                let own = self
-                    .reference
-                    .and_then(|it| wgs84::to_own_degrees(it, lonlat));
-                Some(self.nearest_turn(own.unwrap_or(lonlat).map(|angle| angle / degrees)))
+        let lonlat = (wrapped(longitude), latitude);
+        let place = match (self.system, self.reference) {
+            (System::Cells | System::Unstated, _) => None,
+            (_, Some(reference)) => reference.from_lonlat(lonlat),
+            (System::Geographic { degrees }, None) => {
+                Some((lonlat.0 / degrees, lonlat.1 / degrees))
             }
-            System::Projected => wgs84::of_lonlat(self.reference?, lonlat),
-        }
+            (System::Projected, None) => None,
+        };
+        place.map(|(x, y)| self.nearest_turn([x, y]))
     }
 
     /// The same place with its longitude in the turn in which it is closest to the
@@ -261,7 +276,7 @@ impl<'r> Georeference<'r> {
 }
 
 /// The smallest rectangle around places.
-pub(super) fn around(places: impl IntoIterator<Item = [f64; 2]>) -> Sides {
+pub(crate) fn around(places: impl IntoIterator<Item = [f64; 2]>) -> Sides {
     let empty = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
     places
         .into_iter()
@@ -282,17 +297,18 @@ fn system(
         (Some(cell), _) => System::Geographic {
             degrees: whole(cell.east / length(map.column_step)),
         },
-        (None, Some(reference)) if reference.has_projection() => System::Projected,
+        (None, Some(reference)) if reference.has_lonlat() => System::Projected,
         (None, _) => System::Unstated,
     }
 }
 
-/// One, where rounding is all that is between a ratio and one.
+/// One, or the degrees in a grad, where rounding is all that is between.
 fn whole(ratio: f64) -> f64 {
-    match (ratio - 1.0).abs() < 1e-9 {
-        true => 1.0,
-        false => ratio,
-    }
+    let whole = |part: f64| (ratio / part - 1.0).abs() < 1e-9;
+    [1.0, 0.9]
+        .into_iter()
+        .find(|part| whole(*part))
+        .unwrap_or(ratio)
 }
 
 /// A longitude from −180 to 180.

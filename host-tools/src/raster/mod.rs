@@ -35,29 +35,33 @@ mod format;
 mod formats;
 mod geometry;
 mod georeference;
+mod globe;
 mod ground_map;
 mod guard;
 mod input;
 mod open;
 mod options;
+mod place;
 mod placed;
 mod read;
 mod samples;
 
 use std::path::Path;
 
-pub use crs::ReferenceSystem;
+pub use crs::{LonLat, ReferenceSystem};
 pub use decoded::{HeightSummary, LARGEST_HEIGHT};
 pub use error::{BadRaster, Error};
 pub(crate) use geometry::metres_in;
 pub use geometry::{CellSize, CellUnit, Certainty, VerticalDatum};
+pub(crate) use georeference::around;
 pub use georeference::{Georeference, GroundTransform, Sides, System};
+pub use globe::Globe;
 pub use ground_map::Bounds;
 pub use options::{Encoding, OpenOptions, PngChannel, RawLayout};
 pub use samples::{Endian, SampleType, Samples};
 
 use decoded::Decoded;
-use placed::Place;
+use place::Place;
 use samples::{SampleValue, with_samples};
 
 /// A height field held once, in the compact type of its file.
@@ -202,8 +206,8 @@ impl Raster {
         self.source.bounds()
     }
 
-    /// The same in degrees of longitude and latitude of the file's own datum, where the
-    /// reference system is known. Longitudes run on over 180° where the field does.
+    /// The same in degrees of longitude and latitude, as [`Georeference::lonlat`] says,
+    /// where the reference system is known. Longitudes run on over 180° where the field does.
     pub fn bounds_lonlat(&self) -> Option<Bounds> {
         self.source.bounds_lonlat()
     }

@@ -4,7 +4,8 @@
 use super::crs::{ReferenceSystem, Unit};
 use super::decoded::Decoded;
 use super::ground_map::{Bounds, GroundMap};
-use super::{BadRaster, CellSize, CellUnit, Certainty};
+use super::place::Place;
+use super::{BadRaster, CellSize, CellUnit, Certainty, Globe};
 
 /// The unit of a file's coordinates, as the file states it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,20 +54,28 @@ impl GroundUnit {
     }
 }
 
-/// Where a field lies.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
-    /// From columns and rows in file order.
-    pub(super) map: GroundMap,
-    /// Degrees in a unit of the coordinates, where they are angles.
-    pub(super) degrees: f64,
-}
+/// Angles below this are rounding, degrees.
+const STRAIGHT_DEGREES: f64 = 0.05;
 
-impl Place {
-    /// A place whose angles, where there are any, are degrees.
-    pub(super) const fn new(map: GroundMap) -> Self {
-        Self { map, degrees: 1.0 }
+/// How a grid is rotated and sheared, where it is. It is felt along its own rows; only a
+/// mirror image is turned.
+fn turned(map: &GroundMap) -> Vec<String> {
+    let mut words = Vec::new();
+    if map.is_straight() {
+        return words;
     }
+    let (rotation, leaning) = (map.rotation(), map.lean().asin().to_degrees());
+    if rotation.abs() >= STRAIGHT_DEGREES {
+        words.push(format!(
+            "the grid is rotated by {rotation:.1}° against east: x runs along its rows, not to the east"
+        ));
+    }
+    if leaning.abs() >= STRAIGHT_DEGREES {
+        words.push(format!(
+            "the grid is sheared: its columns lean by {leaning:.1}° from the perpendicular of its rows; square cells are felt in their true shape, stored ones (--cells stored) as if they were rectangular"
+        ));
+    }
+    words
 }
 
 impl Decoded {
@@ -76,13 +85,7 @@ impl Decoded {
     pub(super) fn lay_out(&mut self, map: GroundMap, unit: Option<GroundUnit>) {
         self.south_up = map.is_south_up();
         self.east_first = map.is_east_first();
-        if !map.is_straight() {
-            // Felt along its own rows and columns; only a mirror image is turned.
-            self.remarks.push(format!(
-                "the grid is rotated by {:.1}° against east: x runs along its rows, not to the east",
-                map.rotation()
-            ));
-        }
+        self.remarks.extend(turned(&map));
         let unit = unit.or(self.system.as_ref().map(GroundUnit::of));
         let degrees = unit.map_or(1.0, |unit| unit.degrees);
         let mut cell = self.cell_of(&map, unit);
@@ -143,6 +146,7 @@ impl Decoded {
             (unit == CellUnit::Degree).then(|| map.at(columns / 2.0, rows / 2.0).1 * degrees);
         CellSize {
             certainty: from,
+            globe: (self.system.as_ref()).map_or(Globe::EARTH, ReferenceSystem::globe),
             ..CellSize::stated((east * degrees, north * degrees), unit, latitude)
         }
     }
@@ -164,8 +168,7 @@ impl Decoded {
         self.place?.map.bounds((self.columns, self.rows))
     }
 
-    /// Outer edges of all cells in degrees of longitude and latitude of the file's own
-    /// datum. Longitudes run on over 180° where the field does. The edges of a projected
+    /// Outer edges of all cells in degrees of longitude and latitude. Longitudes run on over 180° where the field does. The edges of a projected
     /// field are curved: they are followed in `STEPS` steps.
     pub(super) fn bounds_lonlat(&self) -> Option<Bounds> {
         const STEPS: u32 = 32;
@@ -205,7 +208,7 @@ impl Decoded {
             // Others show a pole as a line, or nowhere.
             if inside
                 && system
-                    .lonlat((x, y))
+                    .to_lonlat((x, y))
                     .is_some_and(|(_, y)| (y - pole).abs() < 1e-6)
             {
                 (lonlat.west, lonlat.east) = (-180.0, 180.0);
@@ -220,9 +223,10 @@ impl Decoded {
     pub(super) fn lonlat(&self, column: f64, row: f64) -> Option<(f64, f64)> {
         let place = self.place?;
         let (x, y) = place.map.at(column, row);
-        match self.cell?.unit {
-            CellUnit::Degree => Some((x * place.degrees, y * place.degrees)),
-            CellUnit::Length { .. } => self.system.as_ref()?.lonlat((x, y)),
+        match (self.cell?.unit, &self.system) {
+            (_, Some(system)) => system.to_lonlat((x, y)),
+            (CellUnit::Degree, None) => Some((x * place.degrees, y * place.degrees)),
+            (CellUnit::Length { .. }, None) => None,
         }
     }
 }

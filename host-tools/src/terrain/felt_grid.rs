@@ -338,7 +338,7 @@ fn is_square(cell: &CellSize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::{CellUnit, Certainty};
+    use crate::raster::{CellUnit, Certainty, Globe};
 
     fn cell(east: f64, north: f64, lean: f64) -> CellSize {
         CellSize {
@@ -348,6 +348,7 @@ mod tests {
             map_scale: (1.0, 1.0),
             unit: CellUnit::Length { metres: 1.0 },
             latitude: None,
+            globe: Globe::EARTH,
             certainty: Certainty::Stated,
         }
     }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::raster::{Bounds, CellUnit, Certainty, Raster};
+use crate::raster::{Bounds, CellUnit, Certainty, LonLat, Raster, ReferenceSystem, System};
 
 /// Where something comes from, as the JSON says it.
 pub(super) const fn from(certainty: Certainty) -> &'static str {
@@ -31,11 +31,66 @@ pub(super) struct Rectangle {
     south: f64,
     east: f64,
     north: f64,
-    /// Of the sides: `metre`, `degree` or `unit of 0.3048 m`.
+    /// Of the sides: `metre`, `degree`, `grad` or `unit of 0.3048 m`.
     unit: String,
     /// Where the unit comes from; of longitudes and latitudes, where the way to them
     /// does.
     from: &'static str,
+    /// Of longitudes and latitudes: what they belong to.
+    #[serde(flatten)]
+    globe: Option<Globe>,
+}
+
+/// What longitudes and latitudes belong to.
+#[derive(Serialize)]
+struct Globe {
+    /// `WGS 84`, the name of a datum or of a body's; nothing where the file states none.
+    datum: Option<String>,
+    /// Of WGS 84 by way of another datum: usually not farther off than this, m.
+    within_m: Option<f64>,
+    /// Of another body than the Earth: its semi-major axis, m.
+    body_radius_m: Option<f64>,
+    #[serde(skip)]
+    text: String,
+}
+
+impl Globe {
+    fn of(kind: LonLat<'_>) -> Self {
+        let wgs84 = || Some("WGS 84".to_owned());
+        let (datum, within_m, body_radius_m, text) = match kind {
+            LonLat::Unstated => (None, None, None, "no datum stated".into()),
+            LonLat::Wgs84 => (wgs84(), None, None, "WGS 84".into()),
+            LonLat::ShiftedToWgs84 { within_m } => (
+                wgs84(),
+                Some(within_m),
+                None,
+                format!("WGS 84, usually within {within_m} m"),
+            ),
+            LonLat::OfOwnDatum { name } => (
+                Some(name.to_owned()),
+                None,
+                None,
+                format!(
+                    "of its own datum, {name}, from Greenwich; its way to WGS 84 is not known here"
+                ),
+            ),
+            LonLat::OfBody { name, radius_m } => (
+                Some(name.to_owned()),
+                None,
+                Some(radius_m),
+                format!(
+                    "on a body of {} km radius, not the Earth: {name}",
+                    radius_m / 1000.0
+                ),
+            ),
+        };
+        Self {
+            datum,
+            within_m,
+            body_radius_m,
+            text,
+        }
+    }
 }
 
 impl Rectangle {
@@ -43,47 +98,59 @@ impl Rectangle {
     pub(super) fn of(raster: &Raster) -> Option<Self> {
         let cell = raster.cell()?;
         let unit = match cell.unit {
-            CellUnit::Degree => "degree".to_owned(),
+            CellUnit::Degree => match raster.georeference().system() {
+                System::Geographic { degrees: 0.9 } => "grad".to_owned(),
+                System::Geographic { degrees } if degrees != 1.0 => {
+                    format!("unit of {degrees} degrees")
+                }
+                _ => "degree".to_owned(),
+            },
             CellUnit::Length { metres: 1.0 } => "metre".to_owned(),
             CellUnit::Length { metres } => format!("unit of {metres} m"),
         };
-        Some(Self::new(raster.bounds()?, unit, from(cell.certainty)))
+        Some(Self::new(raster.bounds()?, unit, cell.certainty, None))
     }
 
     /// The same in longitude and latitude.
     pub(super) fn lonlat(raster: &Raster) -> Option<Self> {
         let way = match (raster.cell()?.unit, raster.reference_system()) {
             _ if raster.reference_system_from() == Certainty::Assumed => Certainty::Assumed,
-            (CellUnit::Degree, _) => raster.cell()?.certainty,
-            (CellUnit::Length { .. }, Some(system)) if system.code().is_some() => {
-                Certainty::FromCode
+            (CellUnit::Degree, system) if system.is_none_or(ReferenceSystem::counts_lonlat) => {
+                raster.cell()?.certainty
             }
-            (CellUnit::Length { .. }, _) => Certainty::Stated,
+            (_, Some(system)) if system.code().is_some() => Certainty::FromCode,
+            _ => Certainty::Stated,
         };
+        let globe = Globe::of(raster.georeference().lonlat());
         Some(Self::new(
             raster.bounds_lonlat()?,
             "degree".into(),
-            from(way),
+            way,
+            Some(globe),
         ))
     }
 
-    fn new(bounds: Bounds, unit: String, from: &'static str) -> Self {
+    fn new(bounds: Bounds, unit: String, certainty: Certainty, globe: Option<Globe>) -> Self {
         Self {
             west: bounds.west,
             south: bounds.south,
             east: bounds.east,
             north: bounds.north,
             unit,
-            from,
+            from: from(certainty),
+            globe,
         }
     }
 
     pub(super) fn text(&self) -> String {
-        let digits = if self.unit == "degree" { 6 } else { 3 };
+        let is_angle = ["degree", "grad"].contains(&self.unit.as_str());
+        let digits = if is_angle { 6 } else { 3 };
+        let globe = self.globe.as_ref();
+        let globe = globe.map_or(String::new(), |globe| format!("; {}", globe.text));
         let [west, south, east, north] = [self.west, self.south, self.east, self.north];
         format!(
             "west {west:.digits$}, south {south:.digits$}, east {east:.digits$}, \
-             north {north:.digits$} ({}, {})",
+             north {north:.digits$} ({}, {}{globe})",
             self.unit,
             told(self.from)
         )

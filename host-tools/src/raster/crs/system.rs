@@ -1,11 +1,11 @@
 //! A horizontal reference system: its name, its code, and where its coordinates are
 //! in longitude and latitude.
 
-use proj4rs::Proj;
-use proj4rs::transform::transform;
-
+use super::code_wkt;
+use super::datum::{Datum, LonLat};
+use super::projection::Projection;
 use super::wkt::Node;
-use super::{Vertical, code_wkt, metres_per_unit, name};
+use super::{Globe, Vertical};
 
 /// Where a map's units are shorter or longer than this on the ground, the place is
 /// outside of what the projection is for.
@@ -17,8 +17,10 @@ pub struct ReferenceSystem {
     code: Option<u16>,
     name: String,
     unit: Unit,
-    /// The projection as PROJ writes it; `None` where it is not known.
-    projection: Option<String>,
+    /// `None` where it is not known.
+    projection: Option<Projection>,
+    /// `None` where the file does not tell it.
+    datum: Option<Datum>,
 }
 
 /// What a coordinate counts.
@@ -33,19 +35,8 @@ pub(in crate::raster) enum Unit {
 impl ReferenceSystem {
     /// The system with a code of EPSG's; `None` where the code is not known.
     pub(in crate::raster) fn from_code(code: u16) -> Option<Self> {
-        let wkt = code_wkt(code)?;
-        let projected = metres_per_unit(code);
-        let unit = match projected {
-            Some(metres) => Unit::Length(Some(metres)),
-            None if is_geographic(&Node::parse(wkt)?) => Unit::Angle(1.0),
-            None => return None,
-        };
-        Some(Self {
-            code: Some(code),
-            name: name(code)?,
-            unit,
-            projection: proj4wkt::wkt_to_projstring(wkt).ok(),
-        })
+        let text = code_wkt(code)?;
+        Self::described(&Node::parse(text)?, text, Some(code))
     }
 
     /// The system that a text describes, and the vertical one that may stand beside
@@ -65,45 +56,57 @@ impl ReferenceSystem {
             true => root.child(&HORIZONTAL),
             false => Some(&root),
         };
-        (across.and_then(|node| Self::from_node(node, text)), up)
+        let by_code = |node: &Node| node.epsg().and_then(Self::from_code);
+        let across =
+            across.and_then(|node| by_code(node).or_else(|| Self::described(node, text, None)));
+        (across, up)
     }
 
-    fn from_node(node: &Node, text: &str) -> Option<Self> {
-        if let Some(system) = node.epsg().and_then(Self::from_code) {
-            return Some(system);
-        }
-        let unit = match is_geographic(node) {
-            true => Unit::Angle(node.unit().map_or(1.0, f64::to_degrees)),
+    fn described(node: &Node, text: &str, code: Option<u16>) -> Option<Self> {
+        let unit = match node.is(&GEOGRAPHIC) {
+            true => Unit::Angle(node.unit().map_or(1.0, degrees)),
             false if node.is(&PROJECTED) => Unit::Length(node.unit()),
             false => return None,
         };
+        let projection = proj4wkt::wkt_to_projstring(text).ok();
+        let meridian = projection.as_deref().map_or(0.0, Projection::meridian_of);
+        let base = node.child(&BASES).unwrap_or(node);
+        let datum = Datum::of(base, code, meridian);
+        let globe = datum.as_ref().map_or(Globe::EARTH, Datum::globe);
         Some(Self {
-            code: None,
+            code,
             name: node.name()?.to_owned(),
             unit,
-            projection: proj4wkt::wkt_to_projstring(text).ok(),
+            projection: projection.map(|text| Projection::new(&text, globe)),
+            datum,
         })
     }
 
-    /// A system of which only the name and the unit are known.
-    pub(in crate::raster) fn named(name: &str, unit: Unit) -> Self {
+    /// A system of which only the name, the unit and perhaps the datum are known.
+    pub(in crate::raster) fn named(name: &str, unit: Unit, datum: Option<Datum>) -> Self {
         Self {
             code: None,
             name: name.to_owned(),
             unit,
             projection: None,
+            datum,
         }
     }
 
     /// The same system with a projection, as PROJ writes it.
-    pub(in crate::raster) fn with_projection(mut self, projection: String) -> Self {
-        self.projection = Some(projection);
+    pub(in crate::raster) fn with_projection(mut self, projection: &str) -> Self {
+        self.projection = Some(Projection::new(projection, self.globe()));
         self
     }
 
-    /// The size of its globe, as PROJ writes it.
-    pub(in crate::raster) fn ellipsoid(&self) -> Option<String> {
-        Some(ellipsoid(self.projection.as_deref()?))
+    /// Its datum, where it is known.
+    pub(in crate::raster) const fn datum(&self) -> Option<&Datum> {
+        self.datum.as_ref()
+    }
+
+    /// The body that it belongs to; the Earth where nothing says otherwise.
+    pub(in crate::raster) fn globe(&self) -> Globe {
+        self.datum.as_ref().map_or(Globe::EARTH, Datum::globe)
     }
 
     /// EPSG's code, where the file states one or names the system so that it follows.
@@ -119,8 +122,9 @@ impl ReferenceSystem {
     }
 
     /// Whether its places on the globe are known.
-    pub(in crate::raster) const fn has_projection(&self) -> bool {
-        self.projection.is_some()
+    #[must_use]
+    pub const fn has_lonlat(&self) -> bool {
+        matches!(self.unit, Unit::Angle(_)) || self.projection.is_some()
     }
 
     /// The unit of its coordinates.
@@ -128,31 +132,58 @@ impl ReferenceSystem {
         self.unit
     }
 
-    /// Longitude and latitude in degrees of a place in the system's units. They belong
-    /// to the system's own datum: no shift to another is made, which would want grids
-    /// of shifts to be better than 100 m. `None` where the projection is not known or
-    /// does not reach.
+    /// What its longitudes and latitudes are.
     #[must_use]
-    pub fn lonlat(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
-        match self.unit {
-            Unit::Angle(degrees) => Some((x * degrees, y * degrees)),
-            Unit::Length(_) => Projection::new(self.projection.as_deref()?)?.degrees((x, y)),
+    pub fn lonlat(&self) -> LonLat<'_> {
+        self.datum
+            .as_ref()
+            .map_or(LonLat::Unstated, |datum| datum.lonlat())
+    }
+
+    /// Whether its own coordinates are these longitudes and latitudes, to 4 m.
+    #[must_use]
+    pub fn counts_lonlat(&self) -> bool {
+        let datum = self.datum.as_ref();
+        self.unit == Unit::Angle(1.0) && datum.is_none_or(Datum::counts_lonlat)
+    }
+
+    /// Longitude and latitude in degrees, as [`ReferenceSystem::lonlat`] says, of a place
+    /// in the system's units. Longitudes count from Greenwich. `None` where the projection is
+    /// not known or does not reach.
+    #[must_use]
+    pub fn to_lonlat(&self, place: (f64, f64)) -> Option<(f64, f64)> {
+        let own = self.own_degrees(place)?;
+        match &self.datum {
+            Some(datum) => datum.to_lonlat(own),
+            None => Some(own),
         }
     }
 
-    /// Place in the system's units of a longitude and latitude in degrees of its own
-    /// datum: the inverse of [`ReferenceSystem::lonlat`].
-    #[must_use]
-    pub fn from_lonlat(&self, (longitude, latitude): (f64, f64)) -> Option<(f64, f64)> {
+    /// Degrees of the system's own datum, from Greenwich.
+    pub(super) fn own_degrees(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
         match self.unit {
-            Unit::Angle(degrees) => Some((longitude / degrees, latitude / degrees)),
-            Unit::Length(_) => {
-                let projection = Projection::new(self.projection.as_deref()?)?;
-                let mut place = (longitude.to_radians(), latitude.to_radians(), 0.0);
-                transform(&projection.globe, &projection.map, &mut place).ok()?;
-                finite((place.0, place.1))
-            }
+            Unit::Angle(degrees) => Some((x * degrees + self.meridian(), y * degrees)),
+            Unit::Length(_) => self.projection.as_ref()?.degrees((x, y)),
         }
+    }
+
+    /// Place in the system's units of a longitude and latitude in degrees: the inverse of
+    /// [`ReferenceSystem::to_lonlat`].
+    #[must_use]
+    pub fn from_lonlat(&self, lonlat: (f64, f64)) -> Option<(f64, f64)> {
+        let own = match &self.datum {
+            Some(datum) => datum.of_lonlat(lonlat)?,
+            None => lonlat,
+        };
+        match self.unit {
+            Unit::Angle(degrees) => Some(((own.0 - self.meridian()) / degrees, own.1 / degrees)),
+            Unit::Length(_) => self.projection.as_ref()?.of_degrees(own),
+        }
+    }
+
+    /// Degrees east of Greenwich at which its longitudes begin.
+    pub(in crate::raster) fn meridian(&self) -> f64 {
+        self.datum.as_ref().map_or(0.0, Datum::meridian)
     }
 
     /// Ground metres in a unit of a projected system, towards its x and its y, at a
@@ -162,9 +193,9 @@ impl ReferenceSystem {
         if matches!(self.unit, Unit::Angle(_)) {
             return None;
         }
-        let projection = Projection::new(self.projection.as_deref()?)?;
+        let projection = self.projection.as_ref()?;
         let here = projection.degrees((x, y))?;
-        let [east, north] = projection.metres_per_degree(here.1);
+        let [east, north] = self.globe().metres_per_degree(here.1);
         let length = |there: (f64, f64)| {
             let length = (east * (there.0 - here.0)).hypot(north * (there.1 - here.1)) / STEP;
             SENSIBLE.contains(&length).then_some(length)
@@ -176,11 +207,30 @@ impl ReferenceSystem {
     }
 }
 
+/// Degrees in an angle of radians; one, where rounding is all that is between.
+fn degrees(radians: f64) -> f64 {
+    let degrees = radians.to_degrees();
+    let whole = |part: f64| (degrees / part - 1.0).abs() < 1e-9;
+    [1.0, 0.9]
+        .into_iter()
+        .find(|part| whole(*part))
+        .unwrap_or(degrees)
+}
+
 const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
 const GEOGRAPHIC: [&str; 5] = [
     "GEOGCS",
     "GEOGCRS",
     "GEOGRAPHICCRS",
+    "GEODCRS",
+    "GEODETICCRS",
+];
+/// The geographic system under a projected one.
+const BASES: [&str; 6] = [
+    "GEOGCS",
+    "BASEGEOGCRS",
+    "BASEGEODCRS",
+    "GEOGCRS",
     "GEODCRS",
     "GEODETICCRS",
 ];
@@ -194,57 +244,3 @@ const HORIZONTAL: [&str; 8] = [
     "GEODCRS",
     "GEODETICCRS",
 ];
-
-fn is_geographic(node: &Node) -> bool {
-    node.is(&GEOGRAPHIC)
-}
-
-/// The words of a projection that tell the globe's size and datum.
-fn ellipsoid(projection: &str) -> String {
-    const KEYS: [&str; 4] = ["+a=", "+b=", "+rf=", "+towgs84="];
-    let of_globe = |word: &&str| KEYS.iter().any(|key| word.starts_with(key));
-    let words: Vec<&str> = projection.split_whitespace().filter(of_globe).collect();
-    words.join(" ")
-}
-
-/// A projection and the globe that it projects.
-struct Projection {
-    map: Proj,
-    globe: Proj,
-}
-
-impl Projection {
-    fn new(text: &str) -> Option<Self> {
-        // Both sides have one datum, so that none is shifted.
-        let globe = format!("+proj=longlat {}", ellipsoid(text));
-        Some(Self {
-            map: Proj::from_proj_string(text).ok()?,
-            globe: Proj::from_proj_string(&globe).ok()?,
-        })
-    }
-
-    fn degrees(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
-        let mut place = (x, y, 0.0);
-        transform(&self.map, &self.globe, &mut place).ok()?;
-        finite((place.0.to_degrees(), place.1.to_degrees()))
-    }
-
-    /// Metres in a degree of longitude and of latitude at a latitude in degrees: the
-    /// radii of curvature of the ellipsoid.
-    fn metres_per_degree(&self, latitude: f64) -> [f64; 2] {
-        let (a, e2) = self.globe_shape();
-        let (sin, cos) = latitude.to_radians().sin_cos();
-        let w = (1.0 - e2 * sin * sin).sqrt();
-        [a * cos / w, a * (1.0 - e2) / (w * w * w)].map(f64::to_radians)
-    }
-
-    /// Semi-major axis, m, and eccentricity squared.
-    fn globe_shape(&self) -> (f64, f64) {
-        let (a, b) = self.globe.ellipse_parameters();
-        (a, 1.0 - (b / a) * (b / a))
-    }
-}
-
-fn finite(place: (f64, f64)) -> Option<(f64, f64)> {
-    (place.0.is_finite() && place.1.is_finite()).then_some(place)
-}

@@ -75,6 +75,19 @@ impl Node {
         authority.values.get(1)?.parse().ok().filter(|_| is_epsg)
     }
 
+    /// One of its values, as a number.
+    pub(super) fn number(&self, index: usize) -> Option<f64> {
+        let number: f64 = self.values.get(index)?.parse().ok()?;
+        number.is_finite().then_some(number)
+    }
+
+    /// Those of its values that are numbers.
+    pub(super) fn numbers(&self) -> Vec<f64> {
+        (self.values.iter())
+            .filter_map(|value| value.parse().ok())
+            .collect()
+    }
+
     /// Size of its unit in metres or radians, by a node of its own or of an axis.
     pub(super) fn unit(&self) -> Option<f64> {
         const UNITS: [&str; 3] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT"];

@@ -9,7 +9,7 @@ use tiff_reader::Ifd;
 
 use super::user_defined;
 use crate::raster::Certainty;
-use crate::raster::crs::{self, ReferenceSystem, Unit};
+use crate::raster::crs::{self, ReferenceSystem};
 use crate::raster::decoded::Decoded;
 use crate::raster::ground_map::GroundMap;
 use crate::raster::placed::GroundUnit;
@@ -101,10 +101,22 @@ impl GeoKeys {
         self.0.as_ref()?.get_double(key)?.first().copied()
     }
 
-    fn text(&self, key: u16) -> Option<&str> {
-        let text = self.0.as_ref()?.get_ascii(key)?;
-        let text = text.split('|').next()?.trim_matches(['\0', ' ']);
+    /// All numbers of a key.
+    pub(super) fn numbers(&self, key: u16) -> &[f64] {
+        let numbers = self.0.as_ref().and_then(|keys| keys.get_double(key));
+        numbers.unwrap_or_default()
+    }
+
+    /// The first line of a text.
+    pub(super) fn text(&self, key: u16) -> Option<&str> {
+        let text = self.whole_text(key)?.split('|').next()?.trim();
         (!text.is_empty()).then_some(text)
+    }
+
+    /// A text, its lines between bars.
+    pub(super) fn whole_text(&self, key: u16) -> Option<&str> {
+        let text = self.0.as_ref()?.get_ascii(key)?;
+        Some(text.trim_matches(['\0', ' ']))
     }
 
     /// Whether coordinates belong to the centres of samples, not to corners of cells.
@@ -123,17 +135,15 @@ impl GeoKeys {
             return Some(system);
         }
         let is_projected = self.is_projected()?;
-        let citation = if is_projected {
-            PROJ_CITATION
-        } else {
-            GEOG_CITATION
-        };
-        let name = self.text(citation).or(self.text(GT_CITATION));
-        let named = name.map(str::to_owned);
-        let name = named.or(code.map(|code| format!("EPSG:{code}, not known here")))?;
+        let own_name = self.text(match is_projected {
+            true => PROJ_CITATION,
+            false => GEOG_CITATION,
+        });
+        let unknown = code.map(|code| format!("EPSG:{code}, not known here"));
+        let name = unknown.as_deref().or(own_name).or(self.text(GT_CITATION));
         Some(match is_projected {
-            true => user_defined::system(self, &name, self.known(GEODETIC_CRS_TYPE)),
-            false => ReferenceSystem::named(&name, Unit::Angle(self.degrees())),
+            true => user_defined::projected(self, name, self.known(GEODETIC_CRS_TYPE)),
+            false => user_defined::geographic(self, name),
         })
     }
 

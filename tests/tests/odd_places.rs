@@ -1,0 +1,174 @@
+//! Terrains whose places are not plain: grads, other meridians and datums, other bodies,
+//! poles, projections that only a file's own keys spell out, sheared grids.
+//!
+//! `data/odd_places.py` made them with GDAL, and the table of where GDAL and PROJ see them.
+
+use std::path::Path;
+use std::process::Command;
+
+use hapterra::place::{Coordinates, Target};
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::terrain::{FeltCells, FeltGrid};
+use hapterra_tests::hapterra_binary;
+
+const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/odd_places");
+/// Metres in a degree of latitude, for what a shift may be off.
+const DEGREE_M: f64 = 110_000.0;
+
+#[derive(Debug, serde::Deserialize)]
+struct Row {
+    file: String,
+    lon_west: f64,
+    lat_south: f64,
+    lon_east: f64,
+    lat_north: f64,
+    lon_middle: f64,
+    lat_middle: f64,
+    along_row_m: f64,
+    along_column_m: f64,
+}
+
+impl Row {
+    fn path(&self) -> String {
+        format!("{FOLDER}/{}.tif", self.file)
+    }
+
+    fn sides(&self) -> [f64; 4] {
+        [self.lon_west, self.lat_south, self.lon_east, self.lat_north]
+    }
+
+    fn raster(&self) -> Raster {
+        Raster::open(self.path(), &OpenOptions::default()).expect("a terrain")
+    }
+}
+
+fn rows() -> Vec<Row> {
+    let table = csv::Reader::from_path(format!("{FOLDER}/places.csv"));
+    let rows: Result<Vec<Row>, _> = table.expect("the table").into_deserialize().collect();
+    let rows = rows.expect("rows");
+    assert!(rows.len() >= 20);
+    rows
+}
+
+fn info(path: &Path) -> serde_json::Value {
+    let output = Command::new(hapterra_binary())
+        .args(["info", "--json"])
+        .arg(path)
+        .output()
+        .expect("it runs");
+    assert!(output.status.success(), "{output:?}");
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+#[test]
+fn info_and_placing_say_the_same_longitudes_and_latitudes_as_proj() {
+    for row in rows() {
+        let report = info(Path::new(&row.path()));
+        let bounds = &report["bounds_lonlat"];
+        let found = ["west", "south", "east", "north"].map(|side| bounds[side].as_f64());
+        let within_m = bounds["within_m"].as_f64().unwrap_or(0.0).max(0.01);
+        for (found, wanted) in found.iter().zip(row.sides()) {
+            let found = found.unwrap_or_else(|| panic!("{}: {report:#}", row.file));
+            let off_m = (found - wanted).abs() * DEGREE_M;
+            // A parallel is curved on most maps: the edges are followed in steps.
+            assert!(off_m < within_m, "{}: {found} for {wanted}", row.file);
+        }
+        let raster = row.raster();
+        let file = raster.georeference();
+        let [west, south, east, north] = file.bounds();
+        let middle = [0.5 * (west + east), 0.5 * (south + north)];
+        let [longitude, latitude] = file.to_lonlat(middle).expect("on the globe");
+        let east = (longitude - row.lon_middle) * row.lat_middle.to_radians().cos();
+        let off_m = DEGREE_M * east.hypot(latitude - row.lat_middle);
+        assert!(off_m < within_m, "{}: {off_m} m off", row.file);
+    }
+}
+
+#[test]
+fn what_is_asked_for_by_longitude_and_latitude_is_there() {
+    for row in rows() {
+        let raster = row.raster();
+        let file = raster.georeference();
+        let target = Target::At([row.lon_middle, row.lat_middle], Coordinates::LonLat);
+        let ground = target.middle(&file).expect(&row.file).expect("a place");
+        let sample = file.transform().to_samples(ground);
+        // A shift may be off by more than a sample.
+        let within_m = info(Path::new(&row.path()))["bounds_lonlat"]["within_m"]
+            .as_f64()
+            .unwrap_or(0.0);
+        let samples = within_m / row.along_row_m.min(row.along_column_m) + 0.01;
+        let off = (sample[0] - 3.5).hypot(sample[1] - 2.5);
+        assert!(off < samples, "{}: at {sample:?}", row.file);
+    }
+}
+
+#[test]
+fn cells_are_as_large_as_on_their_own_body() {
+    for row in rows() {
+        let raster = row.raster();
+        let (along_row, along_column) = raster.cell().expect("known").ground_metres();
+        for (found, wanted) in [
+            (along_row, row.along_row_m),
+            (along_column, row.along_column_m),
+        ] {
+            let off = found / wanted - 1.0;
+            assert!(off.abs() < 1e-4, "{}: {found} for {wanted} m", row.file);
+        }
+    }
+}
+
+fn said(file: &str) -> String {
+    let output = Command::new(hapterra_binary())
+        .args(["info", &format!("{FOLDER}/{file}.tif")])
+        .output()
+        .expect("it runs");
+    String::from_utf8(output.stdout).expect("text")
+}
+
+#[test]
+fn info_says_what_its_longitudes_and_latitudes_are() {
+    for (file, parts) in [
+        (
+            "ntf_paris_grads",
+            ["(grad, stated)", "WGS 84, usually within 45 m"],
+        ),
+        ("nad27", ["(degree, stated)", "WGS 84, usually within 45 m"]),
+        (
+            "south_pole",
+            ["lon/lat   west -180.000000, south -90", "WGS 84)"],
+        ),
+        (
+            "moon",
+            ["Moon 2000", "on a body of 1737.4 km radius, not the Earth"],
+        ),
+        ("modis", ["west 1111950.500", "of its own datum, "]),
+        ("feet", ["unit of 0.304", "WGS 84, usually within 4 m"]),
+    ] {
+        let said = said(file);
+        for part in parts {
+            assert!(said.contains(part), "{part} in:\n{said}");
+        }
+    }
+}
+
+/// A sheared grid is felt in its true shape, and so it is said.
+#[test]
+fn a_sheared_grid_is_true_in_shape_and_said_to_be() {
+    let path = format!("{FOLDER}/sheared.tif");
+    let raster = Raster::open(&path, &OpenOptions::default()).expect("a terrain");
+    let grid = FeltGrid::new(&raster, FeltCells::Square);
+    assert!(grid.is_resampled() && !grid.is_distorted());
+    // 5 cells along a column of the felt grid are straight north on the map.
+    let [from, to] = [[2.0, 0.0], [2.0, 4.0]].map(|cell| grid.to_ground(cell));
+    assert!(
+        (to[0] - from[0]).abs() < 1e-6 && to[1] > from[1],
+        "{from:?} {to:?}"
+    );
+    let said = said("sheared");
+    assert!(said.contains("the grid is sheared"), "{said}");
+    assert!(
+        said.contains("by -16.7°") || said.contains("by 16.7°"),
+        "{said}"
+    );
+    assert!(!said.contains("rotated"), "{said}");
+}
