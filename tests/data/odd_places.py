@@ -2,7 +2,7 @@
 """Writes small terrains whose places are not plain, for `tests/tests/odd_places.rs`, and where
 GDAL and PROJ (without grids) see them:
 
-    python3 -m venv venv && venv/bin/pip install rasterio==1.4.4 pyproj==3.7.2
+    python3 -m venv venv && venv/bin/pip install rasterio==1.4.4 pyproj==3.7.2 netCDF4==1.7.5.1
     venv/bin/python tests/data/odd_places.py tests/data/odd_places
 
 Longitudes and latitudes are those of WGS 84; of another body, and of a datum whose way to
@@ -11,6 +11,7 @@ WGS 84 PROJ does not know, its own.
 import os
 import sys
 
+import netCDF4
 import numpy as np
 import pyproj
 import rasterio
@@ -64,7 +65,18 @@ FILES = {
     "mercator_ts": ("+proj=merc +lat_ts=41 +lon_0=10 +datum=WGS84", (1e5, 4e6), square(100)),
     "polyconic": ("+proj=poly +lat_0=40 +lon_0=-96 +datum=NAD27", (1e5, 2e5), square(100)),
     "robinson": ("+proj=robin +lon_0=0 +datum=WGS84", (1e6, 4e6), square(1000)),
+    "mollweide": ("+proj=moll +datum=WGS84", (1e6, 4e6), square(1000)),
     "polar_scale": ("+proj=stere +lat_0=-90 +k=0.97276 +lon_0=0 +datum=WGS84", (1e5, 2e5), square(100)),
+}
+# The same as NetCDF, whose grid mappings have attributes, and no text.
+MAPPINGS = {
+    "cf_polar": ("EPSG:3413", (-2e6, -1e6), square(1000)),
+    "cf_cone": ("+proj=lcc +lat_0=39 +lon_0=-96 +lat_1=33 +lat_2=45 +x_0=1000 +datum=NAD83", (1e5, 2e5), square(100)),
+    "cf_albers": ("+proj=aea +lat_0=23 +lon_0=-96 +lat_1=29.5 +lat_2=45.5 +datum=NAD83", (1e5, 2e5), square(100)),
+    "cf_utm": ("EPSG:32611", (4e5, 3.8e6), square(30)),
+    "cf_sphere": ("+proj=merc +lon_0=0 +lat_ts=20 +R=6371229", (1e6, 4e6), square(1000)),
+    "cf_sinusoidal": ("+proj=sinu +lon_0=0 +R=6371007.181", (1e6, 4e6), square(1000)),
+    "cf_moon": (MOON, (10.0, 60.0), square(0.01)),
 }
 
 
@@ -77,14 +89,39 @@ def way(system):
     return (known or group.transformers)[0]
 
 
-def row(folder, name):
-    wanted, (x, y), (column_x, row_x, column_y, row_y) = FILES[name]
-    path = os.path.join(folder, f"{name}.tif")
-    transform = Affine(column_x, row_x, x, column_y, row_y, y)
-    samples = np.arange(COLUMNS * ROWS, dtype="int16").reshape(ROWS, COLUMNS)
+def write_tiff(path, wanted, transform, samples):
     profile = dict(driver="GTiff", width=COLUMNS, height=ROWS, count=1, dtype="int16", transform=transform, crs=wanted)
     with rasterio.open(path, "w", **profile) as dataset:
         dataset.write(samples, 1)
+
+
+def write_netcdf(path, wanted, transform, samples):
+    system = pyproj.CRS.from_user_input(wanted)
+    units = ["degrees_north", "degrees_east"] if system.is_geographic else ["m", "m"]
+    with netCDF4.Dataset(path, "w", format="NETCDF3_CLASSIC") as dataset:
+        dataset.createDimension("y", ROWS)
+        dataset.createDimension("x", COLUMNS)
+        y = transform.f + transform.e * (np.arange(ROWS) + 0.5)
+        x = transform.c + transform.a * (np.arange(COLUMNS) + 0.5)
+        for axis, values, unit in (("y", y, units[0]), ("x", x, units[1])):
+            variable = dataset.createVariable(axis, "f8", (axis,))
+            variable.units = unit
+            variable[:] = values
+        mapping = dataset.createVariable("mapping", "i4")
+        attributes = {key: value for key, value in system.to_cf().items() if key != "crs_wkt"}
+        mapping.setncatts(attributes)
+        heights = dataset.createVariable("z", "i2", ("y", "x"))
+        heights.setncatts({"units": "m", "grid_mapping": "mapping"})
+        heights[:] = samples
+
+
+def row(folder, name):
+    is_netcdf = name in MAPPINGS
+    wanted, (x, y), (column_x, row_x, column_y, row_y) = (MAPPINGS if is_netcdf else FILES)[name]
+    transform = Affine(column_x, row_x, x, column_y, row_y, y)
+    samples = np.arange(COLUMNS * ROWS, dtype="int16").reshape(ROWS, COLUMNS)
+    name += ".nc" if is_netcdf else ".tif"
+    (write_netcdf if is_netcdf else write_tiff)(os.path.join(folder, name), wanted, transform, samples)
     system = pyproj.CRS.from_user_input(wanted)
     there = way(system)
     radians = system.geodetic_crs.axis_info[0].unit_conversion_factor
@@ -111,7 +148,7 @@ def main():
     pyproj.network.set_network_enabled(False)
     with open(os.path.join(folder, "places.csv"), "w") as table:
         print("file,lon_west,lat_south,lon_east,lat_north,lon_middle,lat_middle,along_row_m,along_column_m", file=table)
-        for name in FILES:
+        for name in [*FILES, *MAPPINGS]:
             print(",".join(row(folder, name)), file=table)
 
 

@@ -30,7 +30,7 @@ struct Row {
 
 impl Row {
     fn path(&self) -> String {
-        format!("{FOLDER}/{}.tif", self.file)
+        format!("{FOLDER}/{}", self.file)
     }
 
     fn sides(&self) -> [f64; 4] {

@@ -367,13 +367,23 @@ fn a_box_across_the_end_of_a_globe_is_refused_with_its_two_parts() {
     let globe = |west: f64| {
         let raster = Raster::from_fn(360, 90, |column, row| (column + row) as f32);
         let ground = GroundTransform::new([west, -44.5], [1.0, 0.0], [0.0, 1.0]);
-        let raster = raster.expect("raster").with_cell(cell((1.0, 1.0), CellUnit::Degree, 0.0));
+        let raster = raster
+            .expect("raster")
+            .with_cell(cell((1.0, 1.0), CellUnit::Degree, 0.0));
         raster.with_ground(ground.expect("a plane"), Some(4326))
     };
     let asked = [170.0, -20.0, -170.0, -10.0];
     for (west, sides, parts) in [
-        (-179.5, asked, ["--bbox -179.5,-20,-170,-10", "--bbox 170,-20,179.5,-10"]),
-        (0.5, [-10.0, -20.0, 10.0, -10.0], ["--bbox 0.5,-20,10,-10", "--bbox 350,-20,359.5,-10"]),
+        (
+            -179.5,
+            asked,
+            ["--bbox -179.5,-20,-170,-10", "--bbox 170,-20,179.5,-10"],
+        ),
+        (
+            0.5,
+            [-10.0, -20.0, 10.0, -10.0],
+            ["--bbox 0.5,-20,10,-10", "--bbox 350,-20,359.5,-10"],
+        ),
     ] {
         let globe = globe(west);
         for coordinates in [OWN, LONLAT] {
@@ -386,7 +396,9 @@ fn a_box_across_the_end_of_a_globe_is_refused_with_its_two_parts() {
         // Each part can be had, and so can a box elsewhere and the globe as a whole.
         for part in parts {
             let numbers = part.trim_start_matches("--bbox ").split(',');
-            let numbers: Vec<f64> = numbers.map(|side| side.parse().expect("a number")).collect();
+            let numbers: Vec<f64> = numbers
+                .map(|side| side.parse().expect("a number"))
+                .collect();
             let sides = numbers.try_into().expect("four");
             assert!(seen(&globe, &boxed(sides, OWN)).is_ok(), "{part}");
         }

@@ -40,6 +40,11 @@ pub(super) fn names(file: &NcFile, heights: &NcVariable) -> Result<Names, BadRas
     })
 }
 
+/// Metres in a unit of the coordinates, where they are lengths that state it.
+pub(super) fn metres(file: &NcFile, names: &Names) -> Option<f64> {
+    metres_in(&text(file.variable(&names.x).ok()?, "units")?)
+}
+
 /// Cell size and orientation from the coordinate variables.
 pub(super) fn place(file: &NcFile, names: &Names, decoded: &mut Decoded) {
     // A GMT grid with pixels for samples runs from north to south all the same:

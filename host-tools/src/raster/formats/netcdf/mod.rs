@@ -4,6 +4,7 @@
 mod attributes;
 mod axes;
 mod filters;
+mod grid_mapping;
 
 use std::sync::Arc;
 
@@ -76,13 +77,18 @@ fn decode(input: &FileBytes, asked: Option<&str>) -> Result<Decoded, BadRaster> 
     if text(heights, "positive").is_some_and(|way| way.eq_ignore_ascii_case("down")) {
         decoded.turn_depths_into_heights("positive = down");
     }
-    reference_system(&file, heights, &mut decoded);
+    reference_system(&file, heights, &axes, &mut decoded);
     axes::place(&file, &axes, &mut decoded);
     Ok(decoded)
 }
 
-/// The reference system, where the grid mapping has it as text.
-fn reference_system(file: &NcFile, heights: &NcVariable, decoded: &mut Decoded) {
+/// The reference system of the grid mapping: by its text, else by its attributes.
+fn reference_system(
+    file: &NcFile,
+    heights: &NcVariable,
+    axes: &axes::Names,
+    decoded: &mut Decoded,
+) {
     let mapping = text(heights, "grid_mapping").and_then(|name| {
         // `crs: x y` maps those coordinates.
         let name = name.split([':', ' ']).next()?.to_owned();
@@ -94,7 +100,7 @@ fn reference_system(file: &NcFile, heights: &NcVariable, decoded: &mut Decoded) 
     let names = ["crs_wkt", "spatial_ref", "esri_pe_string"];
     let wkt = names.iter().find_map(|name| text(mapping, name));
     let (system, vertical) = wkt.map_or((None, None), |wkt| ReferenceSystem::from_wkt(&wkt));
-    decoded.system = system;
+    decoded.system = system.or_else(|| grid_mapping::system(mapping, axes::metres(file, axes)));
     if vertical.is_some() {
         let stated = decoded.metres_per_vertical_unit;
         decoded.set_vertical(vertical, stated);

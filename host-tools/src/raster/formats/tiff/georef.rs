@@ -131,7 +131,8 @@ impl GeoKeys {
             true => self.known(PROJECTED_CRS_TYPE),
             false => self.known(GEODETIC_CRS_TYPE),
         };
-        if let Some(system) = code.and_then(ReferenceSystem::from_code) {
+        let known = code.and_then(ReferenceSystem::from_code);
+        if let Some(system) = known.or_else(|| self.system_in_text()) {
             return Some(system);
         }
         let is_projected = self.is_projected()?;
@@ -145,6 +146,14 @@ impl GeoKeys {
             true => user_defined::projected(self, name, self.known(GEODETIC_CRS_TYPE)),
             false => user_defined::geographic(self, name),
         })
+    }
+
+    /// Projections that no keys are made for are written as Esri's text into the citation.
+    fn system_in_text(&self) -> Option<ReferenceSystem> {
+        let texts = [PROJ_CITATION, GT_CITATION].map(|key| self.whole_text(key));
+        let mut texts = texts.into_iter().flatten();
+        let text = texts.find_map(|text| text.strip_prefix("ESRI PE String = "))?;
+        ReferenceSystem::from_wkt(text.trim_end_matches('|')).0
     }
 
     /// A code that is one of EPSG's.
@@ -166,6 +175,8 @@ impl GeoKeys {
             Some(PROJECTED) => Some(true),
             Some(GEOGRAPHIC) => Some(false),
             _ if self.code(PROJECTED_CRS_TYPE).is_some() => Some(true),
+            // A map of a kind of its own, which stands on a geographic system.
+            _ if self.code(PROJ_LINEAR_UNITS).is_some() => Some(true),
             _ if self.code(GEODETIC_CRS_TYPE).is_some() => Some(false),
             _ => None,
         }

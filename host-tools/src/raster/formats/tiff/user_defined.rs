@@ -137,7 +137,6 @@ fn projection(keys: &GeoKeys, method: u16, meridian: f64) -> Option<String> {
         16 => format!("+proj=sterea {at} +k={scale}"),
         17 => format!("+proj=eqc {at} +lat_ts={one}"),
         18 => format!("+proj=cass {at}"),
-        20 => format!("+proj=mill +lon_0={longitude}"),
         21 => format!("+proj=ortho {at}"),
         22 => format!("+proj=poly {at}"),
         23 => format!("+proj=robin +lon_0={longitude}"),
