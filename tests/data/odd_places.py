@@ -65,6 +65,7 @@ FILES = {
     "mercator_ts": ("+proj=merc +lat_ts=41 +lon_0=10 +datum=WGS84", (1e5, 4e6), square(100)),
     "polyconic": ("+proj=poly +lat_0=40 +lon_0=-96 +datum=NAD27", (1e5, 2e5), square(100)),
     "robinson": ("+proj=robin +lon_0=0 +datum=WGS84", (1e6, 4e6), square(1000)),
+    "utm_feet": ("+proj=utm +zone=11 +datum=NAD83 +units=us-ft", (1.3e6, 1.2e7), square(100)),
     "mollweide": ("+proj=moll +datum=WGS84", (1e6, 4e6), square(1000)),
     "polar_scale": ("+proj=stere +lat_0=-90 +k=0.97276 +lon_0=0 +datum=WGS84", (1e5, 2e5), square(100)),
 }

@@ -172,3 +172,37 @@ fn a_sheared_grid_is_true_in_shape_and_said_to_be() {
     );
     assert!(!said.contains("rotated"), "{said}");
 }
+
+/// A map in feet whose heights have no unit is felt 3.28 times too steep where they are in
+/// feet, too: every command says so until the unit is stated.
+#[test]
+fn an_assumed_unit_of_height_is_told_until_it_is_stated() {
+    let told = |file: &str, more: &[&str]| {
+        let output = Command::new(hapterra_binary())
+            .args(["info", "--json", &format!("{FOLDER}/{file}")])
+            .args(more)
+            .output()
+            .expect("it runs");
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        let unit = report["vertical"]["metres_per_unit"].as_f64();
+        let from = report["vertical"]["unit_from"].as_str().map(str::to_owned);
+        let said = String::from_utf8(output.stderr).expect("text");
+        (said, unit.expect("a unit"), from.expect("a source"))
+    };
+    let (said, unit, from) = told("feet.tif", &[]);
+    assert!(
+        said.contains("3.28 times too steep: --vertical-unit us-ft"),
+        "{said}"
+    );
+    assert_eq!((unit, from.as_str()), (1.0, "assumed"));
+    let (said, unit, from) = told("feet.tif", &["--vertical-unit", "us-ft"]);
+    assert_eq!((said.as_str(), from.as_str()), ("", "option"));
+    assert!((unit - 1200.0 / 3937.0).abs() < 1e-12, "{unit}");
+    let (said, ..) = told("nad27.tif", &[]);
+    assert!(said.contains("--vertical-unit"), "{said}");
+    // Metres on the ground, or a unit that the file states, need no word.
+    for file in ["rotated.tif", "cf_moon.nc"] {
+        let (said, ..) = told(file, &[]);
+        assert_eq!(said, "", "{file}");
+    }
+}

@@ -196,15 +196,18 @@ impl Decoded {
 
     /// A field around a pole has all longitudes, and the pole is not on its edges.
     fn with_poles(&self, mut lonlat: Bounds) -> Bounds {
-        let (Some(bounds), Some(system)) = (self.bounds(), self.system.as_ref()) else {
+        let centres = self.place.and_then(|place| place.map.of_centres());
+        let (Some(centres), Some(system)) = (centres, self.system.as_ref()) else {
             return lonlat;
         };
+        let size = [self.columns, self.rows].map(f64::from);
         for pole in [-90.0, 90.0] {
             let Some((x, y)) = system.from_lonlat((0.0, pole)) else {
                 continue;
             };
-            let inside = (bounds.west..=bounds.east).contains(&x)
-                && (bounds.south..=bounds.north).contains(&y);
+            // A rotated field does not fill its bounds. Cells reach half a sample outwards.
+            let at = centres.to_samples([x, y]).map(|sample| sample + 0.5);
+            let inside = (0..2).all(|axis| (0.0..=size[axis]).contains(&at[axis]));
             // Others show a pole as a line, or nowhere.
             if inside
                 && system

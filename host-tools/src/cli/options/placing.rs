@@ -31,7 +31,7 @@ pub struct Placing {
           conflicts_with_all = ["bbox_lonlat", "at", "at_lonlat", "ground_m_per_mm", "cell_mm"])]
     pub bbox: Option<[f64; 4]>,
 
-    /// The same by longitude and latitude, degrees (WGS 84)
+    /// The same by longitude and latitude, degrees (WGS 84; of another body, its own)
     #[arg(long, value_name = "W,S,E,N", allow_hyphen_values = true, value_parser = numbers::<4>,
           conflicts_with_all = ["at", "at_lonlat", "ground_m_per_mm", "cell_mm"])]
     pub bbox_lonlat: Option<[f64; 4]>,
@@ -42,7 +42,7 @@ pub struct Placing {
           conflicts_with = "at_lonlat")]
     pub at: Option<[f64; 2]>,
 
-    /// The same by longitude and latitude, degrees (WGS 84)
+    /// The same by longitude and latitude, degrees (WGS 84; of another body, its own)
     #[arg(long, value_name = "LON,LAT", allow_hyphen_values = true, value_parser = numbers::<2>)]
     pub at_lonlat: Option<[f64; 2]>,
 

@@ -67,6 +67,12 @@ impl Datum {
         }
     }
 
+    /// The same with longitudes that begin at a meridian in degrees.
+    pub(in crate::raster) const fn with_meridian(mut self, meridian: f64) -> Self {
+        self.meridian = meridian;
+        self
+    }
+
     /// Of a node of a geographic system, which may have a code; `meridian` is where its
     /// longitudes begin.
     pub(super) fn of(base: &Node, code: Option<u16>, meridian: f64) -> Option<Self> {

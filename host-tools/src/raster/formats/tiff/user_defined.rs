@@ -14,6 +14,7 @@ const INVERSE_FLATTENING: u16 = 2059;
 const PRIME_MERIDIAN: u16 = 2051;
 const PRIME_MERIDIAN_LONGITUDE: u16 = 2061;
 const TO_WGS84: u16 = 2062;
+const PROJECTION: u16 = 3074;
 const COORDINATE_TRANSFORMATION: u16 = 3075;
 const STANDARD_PARALLELS: [u16; 2] = [3078, 3079];
 /// Longitude and latitude of the natural origin, of a false origin, of the centre; each
@@ -51,9 +52,15 @@ pub(super) fn projected(keys: &GeoKeys, name: Option<&str>, base: Option<u16>) -
     };
     let name = name.map_or_else(unnamed, str::to_owned);
     let named = ReferenceSystem::named(&name, Unit::Length(keys.stated_metres()), datum);
-    match method.and_then(|method| projection(keys, method, named.meridian())) {
-        Some(projection) if named.datum().is_some() => named.with_projection(&projection),
-        _ => named,
+    let kind = method.and_then(|method| kind(keys, method));
+    let words = kind.map(|kind| projection(keys, &kind));
+    let words = words.or_else(|| utm(keys));
+    match words.filter(|_| named.datum().is_some()) {
+        Some(words) => {
+            let meridian = named.meridian();
+            named.with_projection(&format!("{words} +pm={meridian}"))
+        }
+        None => named,
     }
 }
 
@@ -70,16 +77,15 @@ fn datum(keys: &GeoKeys, base: Option<u16>) -> Option<Datum> {
     // A datum's code is that of the geographic system with it, and 2000.
     let of_datum = |code: u16| of_code(code.checked_sub(2000)?);
     let known = keys.code(GEODETIC_DATUM).filter(|code| *code != 32767);
-    base.and_then(of_code)
-        .or_else(|| known.and_then(of_datum))
-        .or_else(|| own_datum(keys))
+    let of_keys = || {
+        let datum = known.and_then(of_datum).or_else(|| own_datum(keys))?;
+        Some(datum.with_meridian(meridian(keys).unwrap_or(0.0)))
+    };
+    base.and_then(of_code).or_else(of_keys)
 }
 
-fn own_datum(keys: &GeoKeys) -> Option<Datum> {
-    let major = keys.number(SEMI_MAJOR_AXIS)?;
-    let by_flattening = || Globe::new(major, keys.number(INVERSE_FLATTENING)?);
-    let by_axes = || Globe::from_axes(major, keys.number(SEMI_MINOR_AXIS)?);
-    let globe = by_flattening().or_else(by_axes)?;
+/// Where the keys say that longitudes begin, degrees east of Greenwich.
+fn meridian(keys: &GeoKeys) -> Option<f64> {
     // GDAL writes that of Paris in degrees, whatever the unit.
     let is_paris = |longitude: f64| (longitude - 2.337_229_17).abs() < 1e-7;
     let stated = keys.number(PRIME_MERIDIAN_LONGITUDE);
@@ -92,12 +98,19 @@ fn own_datum(keys: &GeoKeys) -> Option<Datum> {
         let found = MERIDIANS.iter().find(|(known, _)| *known == code);
         found.map(|(_, degrees)| *degrees)
     };
-    let meridian = stated.or_else(by_code).unwrap_or(0.0);
+    stated.or_else(by_code)
+}
+
+fn own_datum(keys: &GeoKeys) -> Option<Datum> {
+    let major = keys.number(SEMI_MAJOR_AXIS)?;
+    let by_flattening = || Globe::new(major, keys.number(INVERSE_FLATTENING)?);
+    let by_axes = || Globe::from_axes(major, keys.number(SEMI_MINOR_AXIS)?);
+    let globe = by_flattening().or_else(by_axes)?;
     let name = part_of_citation(keys, "Datum").or_else(|| keys.text(GEOG_CITATION));
     let name = name.unwrap_or("without a name");
     let shift = keys.numbers(TO_WGS84);
     let shift = Shift::by_numbers(&globe, shift).or_else(|| Shift::of(name, None));
-    Some(Datum::new(name.to_owned(), globe, meridian, shift))
+    Some(Datum::new(name.to_owned(), globe, 0.0, shift))
 }
 
 /// Of `GCS Name = Moon 2000|Datum = D_Moon_2000|…`, as GDAL writes it, the part with a
@@ -110,8 +123,19 @@ fn part_of_citation<'k>(keys: &'k GeoKeys, name: &str) -> Option<&'k str> {
         .map(|(_, value)| value.trim())
 }
 
-/// The projection as PROJ writes it, for the transformations that maps of terrain use.
-fn projection(keys: &GeoKeys, method: u16, meridian: f64) -> Option<String> {
+/// A zone of UTM on a datum or in a unit of its own, by EPSG's code of the projection alone.
+fn utm(keys: &GeoKeys) -> Option<String> {
+    let (zone, south) = match keys.code(PROJECTION)? {
+        north @ 16001..=16060 => (north - 16000, ""),
+        south @ 16101..=16160 => (south - 16100, " +south"),
+        _ => return None,
+    };
+    let metres = keys.stated_metres().unwrap_or(1.0);
+    Some(format!("+proj=utm +zone={zone}{south} +to_meter={metres}"))
+}
+
+/// The transformation as PROJ writes it, for those that maps of terrain use.
+fn kind(keys: &GeoKeys, method: u16) -> Option<String> {
     let first = |of: &[u16]| of.iter().find_map(|key| keys.number(*key));
     let angle = |of: &[u16]| first(of).map(|angle| angle * keys.degrees());
     let longitude = angle(&LONGITUDES).unwrap_or(0.0);
@@ -120,7 +144,7 @@ fn projection(keys: &GeoKeys, method: u16, meridian: f64) -> Option<String> {
     let parallel = |index: usize| angle(&STANDARD_PARALLELS[index..=index]);
     let [one, two] = [0, 1].map(|index| parallel(index).unwrap_or(0.0));
     let at = format!("+lat_0={latitude} +lon_0={longitude}");
-    let kind = match method {
+    Some(match method {
         1 => format!("+proj=tmerc {at} +k={scale}"),
         7 => match parallel(0) {
             Some(parallel) => format!("+proj=merc +lon_0={longitude} +lat_ts={parallel}"),
@@ -143,14 +167,21 @@ fn projection(keys: &GeoKeys, method: u16, meridian: f64) -> Option<String> {
         24 => format!("+proj=sinu +lon_0={longitude}"),
         28 => format!("+proj=cea +lon_0={longitude} +lat_ts={one}"),
         _ => return None,
-    };
+    })
+}
+
+/// A transformation with its origin and its unit, as PROJ writes it.
+fn projection(keys: &GeoKeys, kind: &str) -> String {
     let metres = keys.stated_metres().unwrap_or(1.0);
-    let shift = |of: &[u16]| first(of).unwrap_or(0.0) * metres;
-    Some(format!(
-        "{kind} +x_0={} +y_0={} +to_meter={metres} +pm={meridian}",
+    let shift = |of: &[u16]| {
+        let shift = of.iter().find_map(|key| keys.number(*key));
+        shift.unwrap_or(0.0) * metres
+    };
+    format!(
+        "{kind} +x_0={} +y_0={} +to_meter={metres}",
         shift(&EASTINGS),
         shift(&NORTHINGS)
-    ))
+    )
 }
 
 /// The latitude is that of the true scale, or the pole with a scale at it.
