@@ -59,6 +59,23 @@ impl Scene {
     }
 }
 
+/// Another view of the terrain for an arm that stays armed: another place, scale, height
+/// or stiffness. It is put in while the clutch is open, and felt when that has closed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct View {
+    /// Counts the views of a scene from 1 on, wrapping; samples carry it.
+    pub number: u8,
+    /// The field, its scale and the law. Its home is where the device would begin if it
+    /// were restarted; while it runs the home follows from [`View::hip`].
+    pub scene: Scene,
+    /// The haptic interface point in the view, cells, wherever the tip is when the clutch
+    /// closes. In contact its height is the device's: as deep as before.
+    pub hip: GridPoint,
+    /// Whether the tiles that the device holds are those of this scene: only place and law
+    /// differ.
+    pub keeps_tiles: bool,
+}
+
 /// A haptic interface point (HIP) for one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Point {
@@ -80,6 +97,8 @@ pub struct Sample {
     /// Force commanded, newtons: east, north, up. Zero unless the amplifiers
     /// are on; in a replay, what the scene's law makes.
     pub force_n: Vec3,
+    /// The view in which this was felt ([`View::number`]); 0 for the scene as it was taken.
+    pub view: u8,
     /// What the proxy is doing.
     pub state: ContactState,
     /// The tile without which the tick could not be completed.
@@ -116,4 +135,7 @@ pub struct Health {
     pub currents_a: Vec3,
     /// Winding temperatures by the thermal model, °C.
     pub winding_c: Vec3,
+    /// The point of the terrain that is at the tip in the home pose, cells, where there is
+    /// a scene. The clutch moves it.
+    pub home: Option<GridPoint>,
 }

@@ -7,13 +7,14 @@
 
 use glam::Vec3;
 
+use crate::clutch::Clutch;
 use crate::contact::{Contact, ContactOutput, ContactSettings, Execution};
 use crate::grid::GridPoint;
 use crate::guard::thermal::Temperatures;
 use crate::guard::{Drive, Fault, Guard, Jog, Limits, Report, SceneKind, Sense, Surroundings};
 use crate::phantom::{Calibration, Mechanism, Pose, to_device_frame, to_terrain_frame};
 use crate::rate::TickRate;
-use crate::scene::{Health, Point, Sample, Scene, Source};
+use crate::scene::{Health, Point, Sample, Scene, Source, View};
 use crate::terrain::{Tile, TileKey, Window};
 
 /// What is handed to the loop between ticks.
@@ -23,6 +24,11 @@ pub enum Command<'t> {
     Scene(Scene),
     /// No scene any more. The arm is disarmed likewise.
     DropScene,
+    /// Another view of the scene, already checked. The arm stays armed where the clutch is
+    /// open; else it is as another scene.
+    View(View),
+    /// Hold the clutch, or let it go: while it is held the terrain goes with the hand.
+    Clutch(bool),
     /// A filled tile.
     Tile(&'t mut Tile),
     /// A haptic interface point for one tick, in a scene fed by points.
@@ -112,6 +118,9 @@ pub struct Haptics<'t, const D: usize> {
     scene: Option<Scene>,
     point: Option<Point>,
     tick: u32,
+    clutch: Clutch,
+    /// Number of the view that is felt.
+    view: u8,
 }
 
 impl<'t, const D: usize> Haptics<'t, D> {
@@ -133,6 +142,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
             scene: None,
             point: None,
             tick: 0,
+            clutch: Clutch::new(rate),
+            view: 0,
         }
     }
 
@@ -155,6 +166,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
         match command {
             Command::Scene(scene) => self.take_scene(Some(scene)),
             Command::DropScene => self.take_scene(None),
+            Command::View(view) => self.take_view(&view),
+            Command::Clutch(held) => self.clutch.hold(held),
             Command::Tile(tile) => return Some(self.take_tile(tile)),
             Command::Point(Point { seq, hip }) => {
                 // Whatever bits came over the wire.
@@ -214,6 +227,40 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.contact = self.contact_of(scene.as_ref());
         self.scene = scene;
         self.point = None;
+        self.clutch = Clutch::new(self.rate);
+        self.view = 0;
+    }
+
+    /// Puts another view in. Nothing is felt of the change: the clutch of an arm is open,
+    /// and in a replay no arm is driven. A proxy that touched begins on the surface
+    /// where it was in the hand, as deep as before.
+    fn take_view(&mut self, view: &View) {
+        let &View { scene, hip, .. } = view;
+        let before = self.scene.as_ref();
+        let may_change = before.is_some_and(|before| {
+            before.source == scene.source
+                && (scene.source == Source::Points || self.clutch.is_open())
+        });
+        let stretch = before
+            .zip(self.contact.stretch())
+            .map(|(before, stretch)| stretch * (before.cell_mm / scene.cell_mm));
+        if !may_change || !scene.is_valid() {
+            return self.take_scene(Some(scene));
+        }
+        if !view.keeps_tiles {
+            self.window.reset(scene.level, scene.size, scene.top);
+        }
+        // Whatever bits came over the wire.
+        let hip = hip.normalised();
+        self.contact = self.contact_of(Some(&scene));
+        if let Some(stretch) = stretch {
+            let at = GridPoint::new(hip.cell(), hip.frac() + stretch);
+            self.contact = Contact::landing(*self.contact.settings(), at, stretch);
+        }
+        self.clutch.put(hip);
+        self.scene = Some(scene);
+        self.point = None;
+        self.view = view.number;
     }
 
     /// The tip is somewhere else from now on, so nothing is driven meanwhile.
@@ -255,6 +302,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             angles_rad: self.mechanism.as_ref().map(angles).unwrap_or_default(),
             currents_a: drive.currents_a,
             winding_c: self.guard.motors().winding_c(),
+            home: self.scene.map(|scene| scene.home),
         }
     }
 
@@ -319,11 +367,20 @@ impl<'t, const D: usize> Haptics<'t, D> {
         outcome.answers = None;
         let sample = &mut outcome.sample;
         let mut wanted = Vec3::ZERO;
-        if let (Some((mechanism, pose)), Some(scene)) = (arm, &self.scene) {
-            let hip = place(mechanism, scene, pose);
+        if let (Some((mechanism, pose)), Some(scene)) = (arm, &mut self.scene) {
+            let mut hip = place(mechanism, scene, pose);
             let contact = &mut self.contact;
+            let mut share = 1.0;
+            if !self.clutch.is_closed() {
+                let felt = (&mut *contact, &self.window);
+                (hip, share) = self.clutch.tick(hip, &mut scene.home, felt);
+                // Nothing is armed by holding the clutch in the ground.
+                if !self.guard.mode().drives() {
+                    share = 1.0;
+                }
+            }
             let output = contact.step(&self.window, &hip);
-            wanted = scene.law.force_n(output.displacement * scene.cell_mm);
+            wanted = scene.law.force_n(output.displacement * scene.cell_mm) * share;
             write_output(hip, output, sample);
         } else {
             write_output(GridPoint::default(), &ContactOutput::default(), sample);
@@ -359,6 +416,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
         let mut force_n = Vec3::ZERO;
         if let (Some(scene), Some(point)) = (&self.scene, self.point) {
             let contact = &mut self.contact;
+            // Where the HIP is follows from the point.
+            let _ = contact.land(&self.window);
             let output = contact.step(&self.window, &point.hip);
             force_n = scene.law.force_n(output.displacement * scene.cell_mm);
             write_output(point.hip, output, sample);
@@ -383,7 +442,11 @@ impl<'t, const D: usize> Haptics<'t, D> {
         } = self.guard.report();
         limits.set(Limits::TERRAIN_MISSING, sample.missing_tile.is_some());
         limits.set(Limits::BOUNDARY_FADING, self.contact.boundary_fade() < 1.0);
+        if !self.clutch.is_closed() {
+            limits |= self.clutch.limit();
+        }
         sample.tick = self.tick;
+        sample.view = self.view;
         sample.force_n = force_n;
         (sample.mode, sample.limits, sample.fault) = (mode, limits, fault);
     }

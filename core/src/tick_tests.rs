@@ -11,6 +11,9 @@ use crate::guard::{Blockers, Mode};
 use crate::terrain::testing::buffers;
 use crate::terrain::{FieldSize, TileDemand, TileRequester};
 
+#[path = "tick_tests/views.rs"]
+mod views;
+
 const SIZE: i32 = 640;
 
 fn scene(source: Source) -> Scene {
@@ -34,6 +37,7 @@ struct Device<'t, const D: usize> {
     requester: TileRequester<D>,
     spare: Vec<&'t mut Tile>,
     height: fn(i32, i32) -> f32,
+    size: FieldSize,
     demand: TileDemand,
     served: usize,
     dead_man: bool,
@@ -56,6 +60,7 @@ impl<'t, const D: usize> Device<'t, D> {
             requester,
             spare,
             height,
+            size: scene.size,
             demand: TileDemand::default(),
             served: 0,
             dead_man: false,
@@ -111,8 +116,7 @@ impl<'t, const D: usize> Device<'t, D> {
 
     fn serve(&mut self, key: TileKey) {
         let tile = self.spare.pop().expect("as many spares as requests");
-        let size = FieldSize::new(SIZE, SIZE);
-        tile.fill_from(key, 0, size, self.height).unwrap();
+        tile.fill_from(key, 0, self.size, self.height).unwrap();
         self.requester.received(key);
         let spent = self.haptics.accept(Command::Tile(tile)).unwrap();
         assert_ne!(

@@ -1,5 +1,7 @@
 //! The proxy: what a tick does, and what is remembered from tick to tick.
 
+mod landing;
+
 use glam::Vec3;
 
 use super::boundary_fade::{self, approach};
@@ -13,6 +15,7 @@ use super::surface::{HipView, SurfacePoint};
 use super::sweep::{Path, Swept};
 use crate::grid::{Cell, GridPoint};
 use crate::terrain::{Ground, TileIndex, Window};
+use landing::Landing;
 
 /// After so many departures for one HIP without getting nearer to it the proxy may
 /// leave the surface no more: it only moves to and fro by rounding.
@@ -42,6 +45,8 @@ enum Phase {
     },
     /// By the paper's rule: the cells under a segment are looked at.
     Seeking { cells: Candidates, was_late: bool },
+    /// Another view was put in: the proxy is to begin on its surface.
+    Landing(Landing),
 }
 
 #[derive(Clone, Debug)]
@@ -138,6 +143,12 @@ impl Contact {
             output: ContactOutput::default(),
             felt: None,
         }
+    }
+
+    /// What it was told once.
+    #[must_use]
+    pub const fn settings(&self) -> &ContactSettings {
+        &self.settings
     }
 
     /// How much of the force is felt: less than 1 where it fades at the boundary of
@@ -323,6 +334,7 @@ impl Contact {
             Phase::Sweeping(_) => self.sweeps(window, hip, budget),
             Phase::Seeking { .. } => self.seeks(window, hip, budget),
             Phase::OnSurface(_) => self.descends(window, hip, budget),
+            Phase::Landing(_) => self.waits_to_land(),
         }
     }
 

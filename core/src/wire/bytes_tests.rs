@@ -14,7 +14,7 @@ use crate::contact::{ContactState, Rule};
 use crate::force::ForceLaw;
 use crate::grid::GridPoint;
 use crate::guard::{Fault, Limits, Mode};
-use crate::scene::{Sample, Scene, Source};
+use crate::scene::{Sample, Scene, Source, View};
 use crate::terrain::{FieldSize, TileIndex, TileKey};
 
 fn bytes<T: Serialize>(message: &T) -> Vec<u8> {
@@ -64,6 +64,7 @@ fn a_sample() {
         hip: GridPoint::new([1, 2, 3], Vec3::X * 0.5),
         proxy: GridPoint::new([1, 2, 4], Vec3::X * 0.5),
         force_n: Vec3::Z,
+        view: 3,
         state: ContactState::Touching,
         missing_tile: Some(TileIndex::new(-1, 70)),
         mode: Mode::Armed,
@@ -83,8 +84,8 @@ fn a_sample() {
         float(0.0),
         float(0.0),
         float(1.0),
-        // State; the tile; mode, limits, fault.
-        std::vec![2, 1, 0x01, 0x8C, 0x01, 4, 0x80, 0x01, 1, 13],
+        // View; state; the tile; mode, limits, fault.
+        std::vec![3, 2, 1, 0x01, 0x8C, 0x01, 4, 0x80, 0x01, 1, 13],
         std::vec![0xC8, 0x01, 1, 2, 3],
     ]
     .concat();
@@ -98,6 +99,40 @@ fn a_sample() {
     };
     let telemetry = bytes(&ToHost::Telemetry(telemetry));
     assert_eq!(telemetry, [std::vec![3, 6, 7, 1], wanted].concat());
+}
+
+#[test]
+fn a_view_and_the_clutch() {
+    let scene = Scene {
+        epoch: 7,
+        level: 1,
+        size: FieldSize::new(2, 3),
+        top: 1,
+        cell_mm: 1.5,
+        home: GridPoint::default(),
+        law: ForceLaw::PREMIUM,
+        rule: Rule::Swept,
+        source: Source::Encoders,
+        hold_clock: false,
+    };
+    let view = View {
+        number: 200,
+        scene,
+        hip: GridPoint::new([1, 2, -1], Vec3::ZERO),
+        keeps_tiles: true,
+    };
+    let scene = bytes(&ToDevice::Scene(scene)).split_off(1);
+    let wanted = [
+        std::vec![11, 200],
+        scene,
+        std::vec![2, 4, 1],
+        [float(0.0), float(0.0), float(0.0)].concat(),
+        std::vec![1],
+    ];
+    assert_eq!(bytes(&ToDevice::View(view)), wanted.concat());
+    let request = Request::Clutch { held: true };
+    let asked = ToDevice::Request { number: 4, request };
+    assert_eq!(bytes(&asked), [5, 4, 10, 1]);
 }
 
 #[test]

@@ -12,7 +12,7 @@ use super::session::{SampleCount, SessionEnd};
 use super::status::Status;
 use crate::guard::Report;
 use crate::phantom::Calibration;
-use crate::scene::{Point, Sample, Scene};
+use crate::scene::{Point, Sample, Scene, View};
 use crate::terrain::TileKey;
 
 /// Samples in a telemetry message, at most.
@@ -60,6 +60,10 @@ pub enum ToDevice<'a> {
     /// Ends the session and leaves the arm and the scene as they are: the host has only
     /// looked. Answered by [`ToHost::Detached`].
     Detach,
+    /// Another view of the scene in force, while the clutch is open
+    /// ([`Request::Clutch`]): the arm stays armed. Answered by [`ToHost::SceneTaken`] with
+    /// the epoch of the view's scene.
+    View(View),
 }
 
 /// Device to host.

@@ -106,6 +106,12 @@
 //! - Each request is done once. The number of the last one again: it is answered again,
 //!   or is still under way. An older number (by less than 128, wrapping) is not heard.
 //!   To arm is answered when the loop has decided, to store when it is stored.
+//! - Another view of the scene in force ([`ToDevice::View`](message::ToDevice::View)) is put in
+//!   only while nothing is felt: with the clutch held ([`Request::Clutch`](request::Request::Clutch)) and
+//!   open, as a sample of the view in force says; in a replay between two points. It is answered as a scene is, also where
+//!   it is refused, and nothing is disarmed. The host says it every 0.4 s until it is answered, and gives
+//!   it up after 4 s. A number that is not newer (by less than 128, wrapping) than that of the view in force is
+//!   not heard, but for the same view again. A clutch is let go when its session ends.
 //! - While its time stands still (an emulated board in lock-step), what the device has
 //!   requested and not got is requested again after two messages alive.
 //!

@@ -53,6 +53,12 @@ pub enum Request {
     /// off, or no longer. Only while disarmed and without a fault; it ends by itself
     /// ([`HOLD_S`](crate::guard::HOLD_S)).
     HoldOutputs(Option<[f32; 3]>),
+    /// To hold the clutch, or to let it go: while it is held there is no force, and the
+    /// terrain goes with the hand. It is let go when the session ends.
+    Clutch {
+        /// Whether it is held from now on.
+        held: bool,
+    },
 }
 
 /// Why a request was refused. Nothing was touched.

@@ -11,6 +11,7 @@ use hapterra_core::wire::status::{StackFigures, Status, TickFigures};
 use hapterra_core::wire::version::VersionCheck;
 
 use super::conversation::{Greeting, SessionState};
+use super::views::ClutchOfHost;
 use super::{Link, ReplayProgress, log};
 
 impl<const D: usize> Link<'_, D> {
@@ -71,6 +72,7 @@ impl<const D: usize> Link<'_, D> {
             (ToDevice::GetCalibration { number }, _) => self.tell_calibration(session, number),
             (_, SessionState::Leaving) => {}
             (ToDevice::Scene(scene), _) => self.take_scene(scene),
+            (ToDevice::View(view), _) => self.take_view(view),
             (ToDevice::Tile(tile), _) => self.take_tile(&tile),
             (ToDevice::Point(point), _) => self.take_point(point),
             (ToDevice::Request { number, request }, _) => self.take_request(number, &request),
@@ -137,6 +139,7 @@ impl<const D: usize> Link<'_, D> {
     /// Begins a session, which keeps the scene and what is held of it.
     fn open(&mut self, session: SessionNumber, hello: u8) {
         self.forget_conversation();
+        self.forsake_clutch();
         let dropped = self.samples_dropped();
         self.conversation.open(session, hello, dropped);
         self.device.session_opened();
@@ -188,6 +191,7 @@ impl<const D: usize> Link<'_, D> {
             SessionState::Open => {
                 self.device.forget_press();
                 self.drop_samples();
+                self.forsake_clutch();
                 if self.device.is_being_armed() {
                     self.command(Command::Disarm);
                 }
@@ -213,6 +217,8 @@ impl<const D: usize> Link<'_, D> {
 
     /// Forgets what belongs to the positions of one scene.
     fn forget_positions(&mut self) {
+        self.view = 0;
+        self.clutch = ClutchOfHost::LetGo;
         self.focus = None;
         self.points.clear();
         self.replay = ReplayProgress::default();

@@ -18,6 +18,7 @@
 //!   tile that is held, so a host that comes back goes on where it was.
 //! - A host that vanishes leaves the arm rendering what is held, but not for ever:
 //!   after the time that the host named the arm is disarmed.
+//! - Another view of a scene is put in only while nothing is felt; the arm stays armed.
 //! - Goodbye is answered when the amplifiers are off.
 
 mod conversation;
@@ -32,6 +33,7 @@ pub mod task;
 mod tests;
 mod tiles;
 mod tx_queue;
+mod views;
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::phantom::Calibration;
@@ -51,6 +53,7 @@ pub(crate) use device_state::{DeviceState, KnownArm};
 use loader::LoaderEntry;
 pub use tiles::fill_tile;
 use tx_queue::TxQueue;
+use views::ClutchOfHost;
 
 /// Samples kept for the writer; beyond them, new ones are dropped.
 const SAMPLES: usize = 16;
@@ -101,6 +104,9 @@ pub struct Link<'t, const D: usize> {
     /// The way into the loader in the chip's ROM.
     loader: LoaderEntry,
     scene: Option<Scene>,
+    /// Number of the view that was put in last; samples of another are older.
+    view: u8,
+    clutch: ClutchOfHost,
     requester: TileRequester<D>,
     /// The millisecond in which the tile requester last had nothing to request, while
     /// nothing has changed since. Its search is long, so it does not run at every
@@ -138,6 +144,8 @@ impl<'t, const D: usize> Link<'t, D> {
             device,
             loader: LoaderEntry::default(),
             scene: None,
+            view: 0,
+            clutch: ClutchOfHost::default(),
             requester: TileRequester::new(),
             nothing_to_request_at: None,
             focus: None,
@@ -258,6 +266,8 @@ impl<'t, const D: usize> Link<'t, D> {
             command,
             Command::Scene(_)
                 | Command::DropScene
+                | Command::View(_)
+                | Command::Clutch(_)
                 | Command::Tile(_)
                 | Command::Point(_)
                 | Command::Disarm

@@ -20,6 +20,7 @@ impl<const D: usize> Link<'_, D> {
         self.read_records();
         self.report_state();
         self.watch_host();
+        self.release_forsaken_clutch();
         self.start_next_point();
         self.request_tiles();
         self.pack_telemetry();
@@ -34,7 +35,10 @@ impl<const D: usize> Link<'_, D> {
             };
             self.nothing_to_request_at = None;
             let ticks_per_ms = self.device.ticks_per_ms();
-            self.focus = Some(tiles::focus(&self.last_record, &record, ticks_per_ms));
+            // What was felt before the view that was put in says nothing about it.
+            if record.sample.view == self.view {
+                self.focus = Some(tiles::focus(&self.last_record, &record, ticks_per_ms));
+            }
             self.last_record = record;
             if record.answers.is_some() {
                 self.replay.under_way = None;
@@ -87,6 +91,7 @@ impl<const D: usize> Link<'_, D> {
             log::forsaken();
             self.command(Command::Disarm);
             self.forget_conversation();
+            self.forsake_clutch();
             self.conversation.state = SessionState::Ended(SessionEnd::HostSilent);
         }
     }

@@ -114,6 +114,10 @@ impl<const D: usize> Link<'_, D> {
                 refused => refused,
             },
             Request::Disarm => self.obey(Command::Disarm),
+            Request::Clutch { held } => {
+                self.set_clutch(held);
+                Ok(())
+            }
             Request::ClearFault { seen } => self
                 .device
                 .may_clear(seen)

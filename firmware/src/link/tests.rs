@@ -7,3 +7,4 @@ mod loader;
 mod rig;
 mod session;
 mod task;
+mod views;

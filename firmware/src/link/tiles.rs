@@ -97,8 +97,9 @@ pub fn fill_tile(tile: &mut Tile, message: &TileMessage<'_>) -> Result<(), BadTi
 pub(super) fn focus(last: &TickRecord, record: &TickRecord, ticks_per_ms: u32) -> TileDemand {
     let (last, sample) = (&last.sample, &record.sample);
     let ticks = sample.tick.wrapping_sub(last.tick);
-    // A new scene counts its ticks from one again: that gives no velocity.
-    let velocity = if ticks == 0 || ticks > 100 * ticks_per_ms {
+    // A new scene counts its ticks from one again, and a view has other cells: neither
+    // gives a velocity.
+    let velocity = if ticks == 0 || ticks > 100 * ticks_per_ms || last.view != sample.view {
         [0.0; 2]
     } else {
         let step = last.hip.to(&sample.hip) * (ticks_per_ms as f32 / ticks as f32);

@@ -7,7 +7,7 @@ use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::guard::{Fault, Sense};
 use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::{Point, Scene, Source};
+use hapterra_core::scene::{Point, Scene, Source, View};
 use hapterra_core::terrain::{FieldSize, Tile, TileKey};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 
@@ -31,7 +31,24 @@ pub fn run(data: &[u8]) {
     haptics.configure(Mechanism::new(&Calibration::PREMIUM_1_5).expect("a preset"));
     let mut law = ForceLaw::PREMIUM;
     while !bytes.is_empty() {
-        match bytes.byte() % 8 {
+        let kind = bytes.byte();
+        match kind % 8 {
+            _ if kind >= 252 => {
+                let scene = scene(&mut bytes);
+                let view = View {
+                    number: kind,
+                    scene,
+                    hip: position(&mut bytes),
+                    keeps_tiles: kind % 2 == 0,
+                };
+                if scene.is_valid() {
+                    law = scene.law;
+                }
+                let _ = haptics.accept(Command::View(view));
+            }
+            _ if kind >= 248 => {
+                let _ = haptics.accept(Command::Clutch(kind % 2 == 0));
+            }
             0 => {
                 let scene = scene(&mut bytes);
                 if scene.is_valid() {

@@ -5,7 +5,7 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Point, Sample, Scene, Source};
+use hapterra_core::scene::{Point, Sample, Scene, Source, View};
 use hapterra_core::terrain::{FieldSize, TileKey};
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL, SerialNumber};
 use hapterra_core::wire::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
@@ -73,21 +73,7 @@ fn host_message<'b>(chance: &mut Chance) -> ToDevice<'b> {
             number: chance.bits() as u8,
             silence_s: chance.bits() as u16,
         }),
-        2 => ToDevice::Scene(Scene {
-            epoch,
-            level: chance.bits() as u8,
-            size: FieldSize::new(word(chance), word(chance)),
-            top: word(chance),
-            cell_mm: [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-30, 0.5][chance.below(6)],
-            home: GridPoint::default(),
-            law: ForceLaw {
-                stiffness_n_per_mm: [f32::NAN, -1.0, 1e30, 0.5][chance.below(4)],
-                max_force_n: [f32::INFINITY, -8.0, 8.5][chance.below(3)],
-            },
-            rule: Rule::Swept,
-            source: [Source::Encoders, Source::Points][chance.below(2)],
-            hold_clock: chance.below(2) == 0,
-        }),
+        2 => ToDevice::Scene(host_scene(chance, epoch)),
         3 | 4 => ToDevice::Tile(TileMessage {
             epoch,
             key: TileKey::new(chance.bits() as u8, word(chance), word(chance)),
@@ -101,7 +87,15 @@ fn host_message<'b>(chance: &mut Chance) -> ToDevice<'b> {
             hip: GridPoint::default(),
         }),
         6 => ToDevice::Status { number: 0 },
-        7 => ToDevice::Alive,
+        7 => match chance.below(2) {
+            0 => ToDevice::Alive,
+            _ => ToDevice::View(View {
+                number: chance.bits() as u8,
+                scene: host_scene(chance, epoch),
+                hip: GridPoint::default(),
+                keeps_tiles: chance.below(2) == 0,
+            }),
+        },
         8 => {
             let number = 0;
             let question = ToDevice::GetCalibration { number };
@@ -111,6 +105,27 @@ fn host_message<'b>(chance: &mut Chance) -> ToDevice<'b> {
             number: chance.bits() as u8,
             request: host_request(chance),
         },
+    }
+}
+
+/// A scene that a device may refuse or take.
+fn host_scene(chance: &mut Chance, epoch: u32) -> Scene {
+    let words = [i32::MIN, -1, 0, 1, 1_000_000, i32::MAX];
+    let word = |chance: &mut Chance| words[chance.below(words.len())];
+    Scene {
+        epoch,
+        level: chance.bits() as u8,
+        size: FieldSize::new(word(chance), word(chance)),
+        top: word(chance),
+        cell_mm: [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-30, 0.5][chance.below(6)],
+        home: GridPoint::default(),
+        law: ForceLaw {
+            stiffness_n_per_mm: [f32::NAN, -1.0, 1e30, 0.5][chance.below(4)],
+            max_force_n: [f32::INFINITY, -8.0, 8.5][chance.below(3)],
+        },
+        rule: Rule::Swept,
+        source: [Source::Encoders, Source::Points][chance.below(2)],
+        hold_clock: chance.below(2) == 0,
     }
 }
 
@@ -124,7 +139,9 @@ fn host_request(chance: &mut Chance) -> Request {
         Request::StoreCalibration,
         Request::DropScene,
         Request::ClearFault { seen: None },
-    ][chance.below(6)]
+        Request::Clutch { held: true },
+        Request::Clutch { held: false },
+    ][chance.below(8)]
 }
 
 /// How something that is no device behaves.

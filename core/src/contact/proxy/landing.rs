@@ -1,0 +1,173 @@
+//! A contact that begins on the surface: where the proxy was in the hand before another
+//! view of the terrain was put in.
+
+use glam::Vec3;
+
+use super::{Contact, OnSurface, Phase, Turn};
+use crate::contact::closest_point::position_on;
+use crate::contact::output::{ContactOutput, ContactState};
+use crate::contact::settings::ContactSettings;
+use crate::contact::surface::SurfacePoint;
+use crate::grid::GridPoint;
+use crate::terrain::{Ground, TileIndex, Window};
+
+/// Where a contact is to begin.
+#[derive(Clone, Debug)]
+pub(super) struct Landing {
+    /// Over or under the place of the surface; the height does not count.
+    at: GridPoint,
+    /// From the HIP to the proxy, cells.
+    stretch: Vec3,
+}
+
+impl Contact {
+    /// A contact whose proxy begins on the surface over the column of a place, with the
+    /// HIP as far from it as `stretch` says, cells. Nothing is felt before the terrain
+    /// there is known, and [`Contact::land`] has said where that puts the HIP.
+    #[must_use]
+    pub fn landing(settings: ContactSettings, at: GridPoint, stretch: Vec3) -> Self {
+        Self {
+            phase: Phase::Landing(Landing { at, stretch }),
+            ..Self::new(settings)
+        }
+    }
+
+    /// Whether the contact waits to begin on the surface.
+    #[must_use]
+    pub const fn is_landing(&self) -> bool {
+        matches!(self.phase, Phase::Landing(_))
+    }
+
+    /// The proxy as it is seen from the HIP, cells, while it touches or is about to.
+    #[must_use]
+    pub fn stretch(&self) -> Option<Vec3> {
+        match &self.phase {
+            Phase::Landing(landing) => Some(landing.stretch),
+            _ if self.output.state == ContactState::Touching => {
+                Some(self.hip.to(&self.output.proxy))
+            }
+            _ => None,
+        }
+    }
+
+    /// Puts the proxy of a contact that is landing onto the surface, as soon as the
+    /// terrain there is known, and returns the HIP that is as deep as before. In a hole
+    /// there is no contact.
+    ///
+    /// The force comes in as it does after a late tile.
+    #[must_use]
+    pub fn land<const D: usize>(&mut self, window: &Window<'_, D>) -> Option<GridPoint> {
+        let Phase::Landing(Landing { at, stretch }) = &self.phase else {
+            return None;
+        };
+        let (cell, frac) = (at.column(), at.frac());
+        let (u, v) = (frac.x, frac.y);
+        let point = SurfacePoint { cell, u, v };
+        match window.ground(cell) {
+            Ground::Missing => return None,
+            Ground::Hole => self.phase = Phase::Waiting,
+            Ground::Patch(_) => {
+                let surface = position_on(window, &point)?;
+                let hip = GridPoint::new(surface.cell(), surface.frac() - *stretch);
+                self.phase = Phase::OnSurface(OnSurface::at(point, 0.0));
+                self.hip = hip;
+                return Some(hip);
+            }
+        }
+        None
+    }
+
+    /// The terrain at the place is not here yet.
+    #[cold]
+    pub(super) fn waits_to_land(&mut self) -> Turn {
+        let Phase::Landing(Landing { at, .. }) = &self.phase else {
+            return Turn::Ends;
+        };
+        let (proxy, tile) = (*at, TileIndex::holding(at.column()));
+        self.answers(ContactOutput {
+            proxy,
+            missing_tile: Some(tile),
+            ..ContactOutput::default()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::terrain::testing::{Field, buffers};
+    use crate::terrain::{FieldSize, TileKey};
+
+    fn column(x: f32, y: f32) -> GridPoint {
+        GridPoint::new([0; 3], Vec3::new(x, y, -77.0))
+    }
+
+    /// A wall 30 cells high whose foot is at x = 10 and whose top is at x = 11.
+    fn wall(x: i32, _y: i32) -> f32 {
+        if x <= 10 { 0.0 } else { 30.0 }
+    }
+
+    #[test]
+    fn it_lands_as_deep_as_before_and_stays_on_its_side_of_a_wall() {
+        let mut tiles = buffers::<2>();
+        let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), wall);
+        // Pushed three cells into the wall from the west, as the HIP sees the proxy.
+        let stretch = Vec3::new(-3.0, 0.1, 0.0);
+        let mut contact = Contact::landing(ContactSettings::REAL_TIME, column(10.5, 20.5), stretch);
+        assert!(contact.is_landing());
+        let hip = contact.land(&field.window).expect("the terrain is there");
+        assert!(!contact.is_landing());
+        let expected = GridPoint::new([13, 20, 15], Vec3::new(0.5, 0.4, 0.0));
+        assert!(hip.to(&expected).length() < 1e-5, "{hip:?}");
+        let mut last = Vec3::ZERO;
+        for tick in 0..40 {
+            let output = contact.step(&field.window, &hip);
+            assert_eq!(output.state, ContactState::Touching);
+            let change = (output.displacement - last).length();
+            assert!(change < 0.15, "tick {tick}: {change} cells at once");
+            last = output.displacement;
+        }
+        assert!(last.length() <= stretch.length() + 1e-4, "{last}");
+        assert!(last.x < -2.0, "on its side: {last}");
+    }
+
+    #[test]
+    fn without_its_terrain_it_names_the_tile_and_makes_no_force() {
+        let mut tiles = buffers::<2>();
+        let mut field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), |_, _| 2.0);
+        let stretch = Vec3::new(40.0, 0.0, 1.0);
+        let mut contact = Contact::landing(ContactSettings::REAL_TIME, column(60.5, 5.5), stretch);
+        let hip = GridPoint::new([20, 5, 1], Vec3::splat(0.5));
+        for _ in 0..3 {
+            assert_eq!(contact.land(&field.window), None);
+            let output = *contact.step(&field.window, &hip);
+            assert_eq!(output.missing_tile, Some(TileIndex::new(1, 0)));
+            assert_eq!(output.displacement, Vec3::ZERO);
+        }
+        assert_eq!(
+            contact.stretch(),
+            Some(stretch),
+            "for another view meanwhile"
+        );
+        let _ = field.install(TileKey::new(0, 1, 0));
+        let hip = contact.land(&field.window).expect("now it is there");
+        assert_eq!(hip, GridPoint::new([20, 5, 1], Vec3::new(0.5, 0.5, 0.0)));
+    }
+
+    #[test]
+    fn over_a_hole_there_is_no_contact() {
+        let mut tiles = buffers::<2>();
+        let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), |x, _| {
+            if x > 20 { f32::NAN } else { 0.0 }
+        });
+        let stretch = Vec3::new(0.0, 0.0, 1.0);
+        let mut contact = Contact::landing(ContactSettings::REAL_TIME, column(30.5, 5.5), stretch);
+        assert_eq!(contact.land(&field.window), None);
+        let output = *contact.step(&field.window, &column(30.5, 5.5));
+        assert_eq!(
+            (output.state, output.missing_tile),
+            (ContactState::Waiting, None)
+        );
+        assert!(!contact.is_landing());
+    }
+}

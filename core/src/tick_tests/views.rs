@@ -1,0 +1,338 @@
+//! The clutch, and views that are put in while it is open.
+
+use super::*;
+use crate::guard::MAX_SLEW_N_PER_S;
+use crate::scene::View;
+
+/// Most that the force may change in a tick, N.
+const SLEW_N: f32 = MAX_SLEW_N_PER_S / 1000.0;
+/// Most that it changes in a tick while the clutch moves and the arm stands still: 8.5 N
+/// in 0.1 s, and rounding.
+const GENTLE_N: f32 = 0.0851;
+/// Counts of the axes for a tip some 5 mm in the plane.
+const DEEP: [i32; 3] = [0, -170, 0];
+
+/// What is watched in every tick: the arm stays armed, and the force makes no step.
+struct Watched<'t> {
+    device: Device<'t, 4>,
+    last: Outcome,
+    counts: [i32; 3],
+    most_n: f32,
+}
+
+impl<'t> Watched<'t> {
+    /// Armed, and pressed into the ground.
+    fn pressed(tiles: &'t mut [Tile], height: fn(i32, i32) -> f32) -> Self {
+        let mut device = Device::<4>::armed(tiles, height);
+        let deeper = (0..-DEEP[1]).map(|n| [0, -n, 0]);
+        let way = (0..=420).map(|n| [0, n, 0]);
+        let back = (0..=420).map(|n| [0, 420 - n, 0]);
+        let last = way.chain(back).chain(deeper).map(|c| device.tick(c)).last();
+        Self {
+            device,
+            last: last.expect("ticks"),
+            counts: DEEP,
+            most_n: GENTLE_N,
+        }
+    }
+
+    fn tick(&mut self) -> Sample {
+        let now = self.device.tick(self.counts);
+        assert_eq!(now.sample.mode, Mode::Armed);
+        assert!(now.drive.enabled, "the arm stays armed");
+        assert_eq!(now.sample.fault, None);
+        let change = (now.sample.force_n - self.last.sample.force_n).length();
+        assert!(change <= self.most_n, "{change} N in a tick");
+        self.last = now;
+        now.sample
+    }
+
+    fn ticks(&mut self, count: usize) -> Sample {
+        (0..count).fold(self.last.sample, |_, _| self.tick())
+    }
+
+    fn clutch(&mut self, held: bool) {
+        self.device.say(Command::Clutch(held));
+    }
+
+    /// Puts another view in, which has these heights.
+    fn put(&mut self, view: View, height: fn(i32, i32) -> f32) {
+        let scene = view.scene;
+        self.device.height = height;
+        self.device.size = scene.size;
+        if !view.keeps_tiles {
+            self.device.requester.reset(scene.level, scene.size);
+        }
+        self.device.say(Command::View(view));
+    }
+
+    fn depth_mm(&self, cell_mm: f32) -> f32 {
+        let sample = &self.last.sample;
+        sample.hip.to(&sample.proxy).length() * cell_mm
+    }
+}
+
+fn gentle(x: i32, y: i32) -> f32 {
+    5.5 + 0.3 * hills(x, y)
+}
+
+/// Every second sample of the same ground, in cells of that size.
+fn coarse(x: i32, y: i32) -> f32 {
+    0.5 * gentle(2 * x, 2 * y)
+}
+
+fn view(number: u8, level: u8, hip: GridPoint) -> View {
+    let size = (SIZE >> level, SIZE >> level);
+    View {
+        number,
+        scene: Scene {
+            epoch: 100 + u32::from(number),
+            level,
+            size: FieldSize::new(size.0, size.1),
+            ..scene(Source::Encoders)
+        },
+        hip,
+        keeps_tiles: false,
+    }
+}
+
+/// A place in cells of half the size.
+fn halved(point: GridPoint) -> GridPoint {
+    let [x, y, z] = point.cell();
+    let odd = Vec3::new((x & 1) as f32, (y & 1) as f32, (z & 1) as f32);
+    GridPoint::new([x >> 1, y >> 1, z >> 1], 0.5 * (odd + point.frac()))
+}
+
+#[test]
+fn while_the_clutch_is_held_there_is_no_force_and_the_terrain_goes_with_the_hand() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Watched::pressed(&mut tiles, plane);
+    let felt = arm.tick();
+    assert!(felt.force_n.z > 2.0, "{}", felt.force_n);
+    arm.clutch(true);
+    let opening = arm.ticks(99);
+    assert!(opening.limits.contains(Limits::CLUTCH_MOVES));
+    assert!(opening.force_n.z > 0.0);
+    let open = arm.ticks(2);
+    assert!(open.limits.contains(Limits::CLUTCH_OPEN));
+    assert_eq!(open.force_n, Vec3::ZERO);
+    // The hand goes elsewhere, and the terrain goes with it.
+    for n in 0..200 {
+        arm.counts = [n, DEEP[1] + 2 * n, -n];
+        assert!(arm.tick().hip.is_same(&open.hip));
+    }
+    let home = |arm: &Watched<'_>| {
+        let health = arm
+            .device
+            .haptics
+            .health(&Sense::default(), &Drive::default());
+        health.home.expect("a scene")
+    };
+    let before = home(&arm);
+    arm.clutch(false);
+    let back = arm.ticks(510);
+    assert_eq!(back.limits, Limits::empty());
+    assert!(open.hip.to(&back.hip).length() < 1e-4, "{:?}", back.hip);
+    assert!((back.force_n - felt.force_n).length() < 1e-3);
+    let moved = before.to(&home(&arm));
+    assert!(moved.length() > 5.0 && moved.z < -5.0, "{moved}");
+    // From here on it stands still again.
+    arm.counts = [199, DEEP[1] + 398 + 60, -199];
+    arm.most_n = SLEW_N;
+    assert!(arm.tick().hip.to(&open.hip).z < -1.0);
+}
+
+#[test]
+fn let_go_too_early_it_opens_to_the_end_first() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Watched::pressed(&mut tiles, plane);
+    arm.clutch(true);
+    arm.ticks(20);
+    arm.clutch(false);
+    let mut least = f32::MAX;
+    for _ in 0..620 {
+        least = least.min(arm.tick().force_n.z);
+    }
+    assert_eq!(least, 0.0);
+    let limits = arm.tick().limits;
+    assert_eq!(limits, Limits::empty(), "and closes again");
+    assert!(arm.last.sample.force_n.z > 2.0);
+}
+
+#[test]
+fn another_view_is_felt_as_deep_as_the_one_before_and_the_arm_stays_armed() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Watched::pressed(&mut tiles, gentle);
+    arm.clutch(true);
+    arm.ticks(110);
+    let depth = arm.depth_mm(1.0);
+    assert!(depth > 3.0, "{depth}");
+    let ticks_before = arm.last.sample.tick;
+    // Half of the samples, and as large in the hand: zoomed out by two. The height is wrong
+    // on purpose: the device knows it.
+    let hip = halved(arm.last.sample.hip);
+    let [x, y, z] = hip.cell();
+    let wrong = GridPoint::new([x, y, z + 9], hip.frac());
+    arm.put(view(1, 1, wrong), coarse);
+    arm.ticks(40);
+    let sample = arm.last.sample;
+    assert_eq!((sample.view, sample.state), (1, ContactState::Touching));
+    assert_eq!(sample.force_n, Vec3::ZERO, "not before it is let go");
+    assert!(sample.tick > ticks_before, "ticks go on");
+    arm.clutch(false);
+    arm.ticks(510);
+    let now = arm.depth_mm(1.0);
+    assert!(now <= depth + 1e-3 && now > 0.5 * depth, "{now} of {depth}");
+    assert_eq!(arm.last.sample.limits, Limits::empty());
+    assert!(arm.last.sample.force_n.length() > 1.0);
+}
+
+#[test]
+fn eight_views_one_after_the_other_make_no_step() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Watched::pressed(&mut tiles, gentle);
+    for number in 1..=8 {
+        arm.clutch(true);
+        arm.ticks(101);
+        let hip = arm.last.sample.hip;
+        let mut wanted = view(number, 0, hip);
+        // Twice as large in the hand: the same tiles, in cells.
+        wanted.scene.cell_mm = f32::from(1u16 << number);
+        wanted.keeps_tiles = true;
+        let served = arm.device.served;
+        arm.put(wanted, gentle);
+        arm.clutch(false);
+        arm.ticks(550);
+        assert!(arm.device.served - served < 5, "its tiles stay");
+        assert_eq!(arm.last.sample.view, number);
+        assert!(arm.last.sample.force_n.length() > 0.5);
+    }
+}
+
+#[test]
+fn without_its_tiles_a_view_is_not_felt_and_the_clutch_stays_open() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Watched::pressed(&mut tiles, gentle);
+    arm.clutch(true);
+    arm.ticks(110);
+    let wanted = view(1, 1, halved(arm.last.sample.hip));
+    arm.device.say(Command::View(wanted));
+    arm.clutch(false);
+    let outcome = |arm: &mut Watched<'_>| {
+        let sense = Sense {
+            counts: DEEP,
+            dead_man: true,
+            ..Sense::default()
+        };
+        arm.device.haptics.tick(&sense, true)
+    };
+    for _ in 0..700 {
+        let now = outcome(&mut arm);
+        assert_eq!(now.sample.force_n, Vec3::ZERO);
+        assert_eq!(now.sample.mode, Mode::Armed);
+        assert!(now.sample.missing_tile.is_some());
+        assert!(now.sample.limits.contains(Limits::CLUTCH_OPEN));
+    }
+    arm.device.requester.reset(1, wanted.scene.size);
+    (arm.device.height, arm.device.size) = (coarse, wanted.scene.size);
+    arm.last = outcome(&mut arm);
+    arm.ticks(560);
+    assert!(arm.last.sample.force_n.length() > 1.0);
+}
+
+#[test]
+fn a_view_that_comes_while_force_is_felt_disarms_as_another_scene_does() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Watched::pressed(&mut tiles, gentle);
+    let before = arm.last.sample.force_n;
+    let wanted = view(1, 0, arm.last.sample.hip);
+    arm.device.say(Command::View(wanted));
+    let now = arm.device.tick(DEEP);
+    assert_eq!(now.sample.mode, Mode::Fading);
+    assert!((now.sample.force_n - before).length() < 0.1);
+}
+
+#[test]
+fn whatever_a_host_says_the_force_makes_no_step_and_little_energy_is_given() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Watched::pressed(&mut tiles, gentle);
+    let mut rng = 12_345_u32;
+    let mut given_n = 0.0;
+    for tick in 0..cases(20_000, 2_000) {
+        rng = rng.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let dice = rng >> 24;
+        match dice {
+            0..64 => arm.clutch(true),
+            64..160 => arm.clutch(false),
+            160..200 if arm.last.sample.limits.contains(Limits::CLUTCH_OPEN) => {
+                let mut wanted = view(tick as u8, 0, arm.last.sample.hip);
+                wanted.scene.cell_mm = [0.5, 1.0, 2.0][dice as usize % 3];
+                wanted.keeps_tiles = dice % 2 == 0;
+                arm.put(wanted, gentle);
+            }
+            _ => {}
+        }
+        let before = arm.last.sample.force_n.length();
+        let after = arm.tick().force_n.length();
+        given_n += (after - before).max(0.0);
+    }
+    // All of it comes in no faster than once in 0.5 s.
+    let most = 7.65 * cases(20_000, 2_000) as f32 / 500.0;
+    assert!(given_n <= most, "{given_n} N came in, {most} at most");
+}
+
+#[test]
+fn the_ground_is_not_armed_into_by_holding_the_clutch() {
+    let mut tiles = buffers::<4>();
+    let mut device = Device::<4>::new(&mut tiles, Source::Encoders, plane);
+    device.say(Command::Zero([0; 3]));
+    let deeper = (0..60).map(|n| [0, -n, 0]);
+    let last = dip().chain(deeper).map(|c| device.tick(c)).last();
+    assert_eq!(last.expect("ticks").sample.state, ContactState::Touching);
+    device.say(Command::Clutch(true));
+    for _ in 0..110 {
+        let _ = device.tick([0, -60, 0]);
+    }
+    device.say(Command::Arm);
+    let open = device.tick([0, -60, 0]).sample.limits;
+    assert!(open.contains(Limits::CLUTCH_OPEN));
+    device.dead_man = true;
+    for _ in 0..500 {
+        let sample = device.tick([0, -60, 0]).sample;
+        assert!(!sample.mode.drives());
+    }
+    let blockers = device.haptics.report().blockers;
+    assert!(blockers.contains(Blockers::FORCE_TOO_LARGE));
+}
+
+/// A replay of what an arm felt goes through the same change.
+#[test]
+fn points_go_on_in_another_view() {
+    let mut tiles = buffers::<4>();
+    let mut device = replaying_on(&mut tiles, gentle);
+    let at = |z| GridPoint::new([320, 320, 0], Vec3::new(0.5, 0.5, z));
+    assert_eq!(device.feel(0, at(9.0)).state, ContactState::Free);
+    let before = device.feel(1, at(2.0));
+    assert_eq!(before.state, ContactState::Touching);
+    let wanted = View {
+        scene: Scene {
+            source: Source::Points,
+            ..view(1, 1, at(0.0)).scene
+        },
+        ..view(1, 1, halved(at(2.0)))
+    };
+    device.requester.reset(1, wanted.scene.size);
+    (device.height, device.size) = (coarse, wanted.scene.size);
+    device.say(Command::View(wanted));
+    let after = device.feel(2, wanted.hip);
+    assert_eq!((after.state, after.view), (ContactState::Touching, 1));
+    // As it does on an arm.
+    assert!(after.force_n.length() < 0.1 * before.force_n.length());
+    let after = (3..40).map(|seq| device.feel(seq, wanted.hip)).last();
+    let after = after.expect("points");
+    assert!(after.force_n.length() > 0.5, "{}", after.force_n);
+}
+
+fn replaying_on(tiles: &mut [Tile], height: fn(i32, i32) -> f32) -> Device<'_, 4> {
+    Device::<4>::new(tiles, Source::Points, height)
+}

@@ -1,0 +1,123 @@
+//! Other views of a scene, put in while the clutch is open.
+
+use std::vec::Vec;
+
+use hapterra_core::grid::GridPoint;
+use hapterra_core::guard::{Limits, Mode};
+use hapterra_core::scene::{Sample, Scene, Source, View};
+use hapterra_core::wire::message::{ToDevice, ToHost};
+use hapterra_core::wire::request::Request;
+
+use super::rig::{Rig, scene};
+
+const TO_CLUTCH: fn(&Request) -> bool = |r| matches!(r, Request::Clutch { .. });
+
+fn view(number: u8, hip: GridPoint) -> View {
+    View {
+        number,
+        scene: Scene {
+            epoch: 1_000 + u32::from(number),
+            cell_mm: 2.0,
+            ..scene(Source::Encoders)
+        },
+        hip,
+        keeps_tiles: false,
+    }
+}
+
+/// The latest sample that was told.
+fn latest(rig: &Rig) -> Sample {
+    let told = rig.telemetry();
+    let last = told.last().and_then(|telemetry| telemetry.samples.last());
+    *last.expect("samples")
+}
+
+/// Whether views were taken, in the order of the answers, from the first view on.
+fn taken(rig: &Rig) -> Vec<(u32, bool)> {
+    let answer = |message: &ToHost| match message {
+        ToHost::SceneTaken { epoch, accepted } => Some((*epoch, *accepted)),
+        _ => None,
+    };
+    rig.heard.iter().filter_map(answer).skip(1).collect()
+}
+
+fn with_an_open_clutch() -> Rig {
+    let mut rig = Rig::armed();
+    rig.ask(Request::Clutch { held: true });
+    rig.run(150);
+    assert_eq!(rig.answers(TO_CLUTCH), [Ok(())]);
+    assert!(latest(&rig).limits.contains(Limits::CLUTCH_OPEN));
+    rig
+}
+
+#[test]
+fn a_view_is_put_in_while_the_clutch_is_open_and_the_arm_stays_armed() {
+    let mut rig = with_an_open_clutch();
+    let wanted = view(1, latest(&rig).hip);
+    rig.heard
+        .retain(|message| !matches!(message, ToHost::Need { .. }));
+    rig.say(&ToDevice::View(wanted));
+    rig.run(40);
+    assert_eq!(taken(&rig), [(1_001, true)]);
+    assert!(!rig.needs().is_empty(), "its own tiles are asked for");
+    assert_eq!((latest(&rig).view, latest(&rig).mode), (1, Mode::Armed));
+    // Said again, because the answer was lost.
+    rig.say(&ToDevice::View(wanted));
+    rig.run(10);
+    assert_eq!(taken(&rig), [(1_001, true); 2]);
+    rig.ask(Request::Clutch { held: false });
+    rig.run(600);
+    let sample = latest(&rig);
+    assert_eq!((sample.view, sample.mode), (1, Mode::Armed));
+    assert_eq!(sample.limits, Limits::empty());
+    assert_eq!(rig.status().device.epoch, Some(1_001));
+    // One from before, late.
+    rig.say(&ToDevice::View(view(0, sample.hip)));
+    rig.say(&ToDevice::View(view(200, sample.hip)));
+    rig.run(10);
+    assert_eq!(taken(&rig).len(), 2, "nobody waits for an answer to that");
+}
+
+#[test]
+fn a_view_that_comes_while_something_is_felt_is_refused() {
+    let mut rig = Rig::armed();
+    rig.run(20);
+    let before = latest(&rig);
+    rig.say(&ToDevice::View(view(1, before.hip)));
+    rig.run(20);
+    assert_eq!(taken(&rig), [(1_001, false)]);
+    assert_eq!((latest(&rig).view, latest(&rig).mode), (0, Mode::Armed));
+    // The clutch was held, and is let go: that is no better.
+    let mut rig = with_an_open_clutch();
+    rig.ask(Request::Clutch { held: false });
+    rig.say(&ToDevice::View(view(1, before.hip)));
+    rig.run(20);
+    assert_eq!(taken(&rig), [(1_001, false)]);
+    assert_eq!(latest(&rig).mode, Mode::Armed);
+    // Nor is a replay put in like this.
+    let mut rig = with_an_open_clutch();
+    let mut points = view(1, before.hip);
+    points.scene.source = Source::Points;
+    rig.say(&ToDevice::View(points));
+    rig.run(20);
+    assert_eq!(taken(&rig), [(1_001, false)]);
+    assert_eq!(latest(&rig).mode, Mode::Armed);
+}
+
+#[test]
+fn the_clutch_of_a_host_that_is_gone_is_let_go() {
+    let closed = |rig: &mut Rig| {
+        rig.run(700);
+        latest(rig).limits == Limits::empty()
+    };
+    let mut rig = with_an_open_clutch();
+    assert!(!closed(&mut rig), "the host is there");
+    rig.greet_anew();
+    assert!(closed(&mut rig), "another session");
+    let mut rig = with_an_open_clutch();
+    rig.say(&ToDevice::Detach);
+    rig.run(1_000);
+    rig.greet_anew();
+    assert!(closed(&mut rig), "a host that detached");
+    assert_eq!(latest(&rig).mode, Mode::Armed);
+}

@@ -1,0 +1,100 @@
+//! Other views of the scene in force, and the clutch that lets them in.
+//!
+//! The loop takes commands in their order. So every tile that follows a view in the queue
+//! is the view's own, and a tile of the one before is refused by its epoch.
+
+use hapterra_core::guard::Limits;
+use hapterra_core::scene::{Scene, Source, View};
+use hapterra_core::terrain::TileDemand;
+use hapterra_core::tick::Command;
+use hapterra_core::wire::message::ToHost;
+
+use super::Link;
+
+/// Views whose numbers are at most so far ahead are newer than the one in force; others are
+/// late, or said twice.
+const NEWER: u8 = 128;
+
+/// Who holds the clutch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum ClutchOfHost {
+    /// Nobody.
+    #[default]
+    LetGo,
+    /// The host of this session.
+    Held,
+    /// A host that is gone: it is to be let go.
+    Forsaken,
+}
+
+impl<const D: usize> Link<'_, D> {
+    /// The host holds the clutch, or lets it go.
+    pub(super) fn set_clutch(&mut self, held: bool) {
+        self.clutch = match held {
+            true => ClutchOfHost::Held,
+            false => ClutchOfHost::LetGo,
+        };
+        self.command(Command::Clutch(held));
+    }
+
+    /// The host that may hold the clutch is gone.
+    pub(super) fn forsake_clutch(&mut self) {
+        if self.clutch == ClutchOfHost::Held {
+            self.clutch = ClutchOfHost::Forsaken;
+        }
+    }
+
+    /// Lets the clutch of a host go that is gone.
+    pub(super) fn release_forsaken_clutch(&mut self) {
+        if self.clutch == ClutchOfHost::Forsaken && self.ends.commands.ready() {
+            self.set_clutch(false);
+        }
+    }
+
+    /// Puts another view in, and answers; one that was said twice is answered twice.
+    pub(super) fn take_view(&mut self, view: View) {
+        let (epoch, ahead) = (view.scene.epoch, view.number.wrapping_sub(self.view));
+        let is_again = ahead == 0 && self.scene == Some(view.scene);
+        if !is_again && !(1..NEWER).contains(&ahead) {
+            return;
+        }
+        let accepted = is_again || (view.scene.is_valid() && self.may_change_view(&view.scene));
+        if accepted && !is_again {
+            self.put_in(view);
+        }
+        self.say(&ToHost::SceneTaken { epoch, accepted });
+    }
+
+    /// Whether nothing is felt now: the clutch is open, as the loop has said since it is
+    /// held, or it is a replay between two points.
+    fn may_change_view(&self, scene: &Scene) -> bool {
+        let latest = &self.last_record.sample;
+        let is_open = self.clutch == ClutchOfHost::Held
+            && latest.view == self.view
+            && latest.limits.contains(Limits::CLUTCH_OPEN);
+        self.scene.is_some_and(|before| {
+            before.source == scene.source
+                && match scene.source {
+                    Source::Encoders => is_open,
+                    Source::Points => self.replay.under_way.is_none() && self.points.is_empty(),
+                }
+        })
+    }
+
+    fn put_in(&mut self, view: View) {
+        let (scene, at) = (view.scene, view.hip.column());
+        if !view.keeps_tiles {
+            self.requester.reset(scene.level, scene.size);
+        }
+        self.requester.forget_asked();
+        self.focus = Some(TileDemand {
+            proxy: at,
+            hip: at,
+            ..TileDemand::default()
+        });
+        self.nothing_to_request_at = None;
+        self.scene = Some(scene);
+        self.view = view.number;
+        self.command(Command::View(view));
+    }
+}
