@@ -11,6 +11,7 @@
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
 //! - [`replay`]: a trajectory felt in lock-step, and recordings;
 //! - [`place`]: where a terrain lies in front of the arm, and how large;
+//! - [`steering`]: another view of the terrain while it is touched;
 //! - [`telemetry`]: what a device reports while it is touched, in numbers;
 //! - [`picture`]: what was felt, as PNG files;
 //! - [`board`]: boards, probes, and images onto chips;
@@ -37,6 +38,7 @@ pub mod place;
 pub mod raster;
 pub mod replay;
 pub mod serving;
+pub mod steering;
 pub mod synth;
 pub mod telemetry;
 pub mod terrain;

@@ -11,20 +11,21 @@ use super::failure::{Failure, OrHint};
 use super::options::emulated_board::{EmulatedBoard, RunsOn};
 use super::options::placing::{self, Placing};
 use super::options::rendering::Rendering;
+use super::options::steering::{Commands, ViewControl};
 use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::session_summary::{self, SessionSummary};
-use super::terminal::{interrupt, left_behind, progress};
+use super::terminal::{interrupt, left_behind, progress, voice};
 use crate::link::{
     Arming, Event, HostClock, LinkError, Native, Patience, Session, Transport, move_arm_while,
 };
 use crate::output::{Output, OutputError, OutputFolder, keep_apart};
 use crate::phantom::HeldPhantom;
-use crate::place::{PlacedTerrain, View};
+use crate::place::{Laid, PlacedTerrain, View};
 use crate::raster::Raster;
-use crate::replay::settings::Device;
+use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{LoopColumns, Record, Recording, Settings};
 use crate::synth::{Kind, Synth};
-use crate::telemetry::SampleLog;
+use crate::telemetry::{FeltViews, SampleLog};
 
 /// Samples along the side of the terrain that the demo makes itself.
 const OWN_SIZE: u32 = 1024;
@@ -62,6 +63,10 @@ pub struct Args {
     /// How it feels.
     #[command(flatten)]
     pub rendering: Rendering,
+
+    /// How the view may be changed meanwhile.
+    #[command(flatten)]
+    pub commands: Commands,
 
     /// The emulated board.
     #[command(flatten)]
@@ -142,26 +147,31 @@ fn show(
     );
     print!("{}", placing::told(view, terrain));
     left_behind::tell([outputs.recording.as_path(), &outputs.picture]);
+    let (runs_on, mut control) = (device(args), control(args, placed, view)?);
+    if let Some(line) = control.listen(&args.commands) {
+        voice::put(std::io::stderr(), &format!("{line}\n"));
+    }
     let arm = placed.held_phantom();
     let stop_s = args.seconds.unwrap_or(f64::MAX).min(placed.duration_s());
     interrupt::listen();
-    let toured = match device(args) {
+    let toured = match runs_on {
         RunsOn::Native => {
             let device = Native::new(HostClock::default(), Some(Box::new(arm)));
-            tour(placed, Box::new(device), Patience::REAL_TIME, stop_s)?
+            let until = (Patience::REAL_TIME, stop_s);
+            tour(placed, Box::new(device), until, &mut control)?
         }
-        RunsOn::Emulated => tour_emulated(args, placed, arm, stop_s)?,
+        RunsOn::Emulated => tour_emulated(args, placed, (arm, stop_s), &mut control)?,
     };
+    // The terminal is as it was.
+    drop(control);
     let file = args.file.as_ref();
     let file = file.map_or(OWN_TERRAIN.into(), |file| file.display().to_string());
     let device = Device::of(&toured.summary.device);
     let settings = Settings::new(&file, terrain, placed.law(), Some(placed.home_mm()), device);
-    write(&toured.rows, &settings, &outputs.recording).or_hint(OTHER_FOLDER)?;
+    write(&toured, &settings, &outputs.recording).or_hint(OTHER_FOLDER)?;
     let summary = &toured.summary;
     print!("{}", summary.text());
-    let records: Vec<Record> = toured.rows.iter().map(|(record, _)| *record).collect();
-    let shown = (terrain, view);
-    summary.draw(&outputs.picture, shown, name, &records)?;
+    draw(&toured, view, name, &outputs.picture)?;
     println!("recording      {}", outputs.recording.display());
     println!("picture        {}", outputs.picture.display());
     match summary.figures.fault {
@@ -188,24 +198,57 @@ fn device(args: &Args) -> RunsOn {
     }
 }
 
+/// What keys and commands change.
+fn control<'t>(
+    args: &Args,
+    placed: &PlacedTerrain<'t>,
+    view: &View,
+) -> Result<ViewControl<'t>, Failure> {
+    let ((law, rule), view) = (placed.law(), *view);
+    let arm = (&Calibration::PREMIUM_1_5, args.rendering.level);
+    let served = (placed.terrain(), Laid { view, law }, rule);
+    Ok(ViewControl::new(served, arm, args.commands.open()?))
+}
+
 /// All that was felt on a tour.
-struct Toured {
+struct Toured<'t> {
     /// The rows of the recording, with what the loop did.
     rows: Vec<(Record, LoopColumns)>,
+    views: FeltViews<'t>,
     summary: SessionSummary,
 }
 
+/// Draws what was felt in the last view: places and heights of another are other places of
+/// the hand.
+fn draw(toured: &Toured<'_>, first: &View, name: &str, path: &Path) -> Result<(), Failure> {
+    let last = toured.rows.last().map_or(0, |(_, of_loop)| of_loop.view());
+    let in_last = toured
+        .rows
+        .iter()
+        .filter(|(_, of_loop)| of_loop.view() == last);
+    let records: Vec<Record> = in_last.map(|(record, _)| *record).collect();
+    let felt = toured.views.get(last as usize);
+    let view = felt.laid.as_ref().map_or(*first, |laid| laid.view);
+    let title = match (last, records.first()) {
+        (0, _) | (_, None) => name.to_owned(),
+        (_, Some(began)) => format!("{name}, view {last}, from {:.1} s on", began.t_s),
+    };
+    let summary = &toured.summary;
+    summary.draw(path, (&felt.terrain, &view), &title, &records)
+}
+
 /// Tours on the board in an emulator, the arm in a thread of its own.
-fn tour_emulated(
+fn tour_emulated<'t>(
     args: &Args,
-    placed: &PlacedTerrain<'_>,
-    mut arm: HeldPhantom,
-    stop_s: f64,
-) -> Result<Toured, Failure> {
+    placed: &PlacedTerrain<'t>,
+    (mut arm, stop_s): (HeldPhantom, f64),
+    control: &mut ViewControl<'t>,
+) -> Result<Toured<'t>, Failure> {
     let (emulator, mut lines) = args.board.start()?;
     let report = "please report it with the file";
     move_arm_while(&mut lines.plant, &mut arm, || {
-        match tour(placed, Box::new(lines.link), Patience::EMULATED, stop_s) {
+        let until = (Patience::EMULATED, stop_s);
+        match tour(placed, Box::new(lines.link), until, control) {
             Ok(toured) => {
                 // The arm is still there while the board lets its force go out.
                 let ended = emulator.finish().map(|()| toured);
@@ -225,15 +268,16 @@ fn tour_emulated(
 }
 
 /// Serves the terrain until the tour has come to its end.
-fn tour(
-    placed: &PlacedTerrain<'_>,
-    transport: Box<dyn Transport + '_>,
-    patience: Patience,
-    stop_s: f64,
-) -> Result<Toured, LinkError> {
+fn tour<'t>(
+    placed: &PlacedTerrain<'t>,
+    transport: Box<dyn Transport + 't>,
+    (patience, stop_s): (Patience, f64),
+    control: &mut ViewControl<'t>,
+) -> Result<Toured<'t>, LinkError> {
     let (terrain, scene, arming) = (placed.terrain(), placed.scene(), Some(Arming::VIRTUAL));
     let (mut session, device) = Session::open(terrain, scene, arming, transport, patience)?;
-    println!("device         {}", session_summary::device(&device));
+    let line = format!("device         {}\n", session_summary::device(&device));
+    voice::put(std::io::stdout(), &line);
     let stop_tick = (stop_s * f64::from(device.tick_hz)).ceil() as u64;
     let template = "feeling {bar:30} {human_pos} of {human_len} ticks, {elapsed}";
     let progress = progress::bar(Some(stop_tick), template);
@@ -241,10 +285,22 @@ fn tour(
     let mut toured = Ok(());
     while toured.is_ok() && log.ticks() < stop_tick && !interrupt::requested() {
         toured = session.poll(Duration::from_millis(100), &mut |event| {
+            control.on_event(&event);
+            log.views().on_event(&event);
             if let Event::Sample(sample) = event {
-                rows.push((log.take(sample), LoopColumns::of(sample)));
+                let record = log.take(sample);
+                rows.push((record, LoopColumns::of(sample, log.view().0)));
             }
         });
+        control.look(log.t_s(), &mut |line| {
+            progress.suspend(|| voice::put(std::io::stderr(), &format!("{line}\n")));
+        });
+        for ask in control.asks() {
+            session.ask(ask);
+        }
+        if let Some(put) = control.put(log.views()) {
+            toured = toured.and(session.put_view(put.view, put.terrain));
+        }
         progress.set_position(log.ticks());
     }
     progress.finish_and_clear();
@@ -260,17 +316,26 @@ fn tour(
         figures,
         tally: session.tally().clone(),
     };
-    Ok(Toured { rows, summary })
+    let views = log.into_views();
+    Ok(Toured {
+        rows,
+        views,
+        summary,
+    })
 }
 
-fn write(
-    rows: &[(Record, LoopColumns)],
-    settings: &Settings,
-    path: &Path,
-) -> Result<(), OutputError> {
+fn write(toured: &Toured<'_>, settings: &Settings, path: &Path) -> Result<(), OutputError> {
     let mut recording = Recording::new(Output::create(path)?, &LoopColumns::COLUMNS)?;
     recording.describe(settings);
-    for (record, columns) in rows {
+    let mut described = 0;
+    for (record, columns) in &toured.rows {
+        let (number, felt) = (columns.view(), toured.views.get(columns.view() as usize));
+        if number > described
+            && let Some(laid) = &felt.laid
+        {
+            described = number;
+            recording.view(&ViewSettings::new(number, &felt.terrain, laid))?;
+        }
         recording.write(record, &columns.values())?;
     }
     recording.finish()

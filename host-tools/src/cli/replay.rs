@@ -14,7 +14,7 @@ use super::options::terrain_file::TerrainFile;
 use super::terminal::{interrupt, left_behind, progress};
 use crate::link::{Patience, Transport};
 use crate::output::{Output, keep_apart};
-use crate::replay::settings::Device;
+use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{
     ReplayError, Replayer, Settings, Summary, Trajectory, on_native, replay_trajectory,
 };
@@ -73,7 +73,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         .settings()
         .filter(|_| !args.ignore_settings)
         .cloned();
-    let rendering = rendering(args, recorded.as_ref());
+    let rendering = rendering(args, recorded.as_ref())?;
     let raster = args.terrain.open()?;
     let measured_at = recorded.as_ref().and_then(|it| it.felt.measured_at);
     let grid = rendering.grid(&raster, measured_at);
@@ -86,6 +86,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let felt = Felt {
         terrain: &terrain,
         law: (rendering.law()?, rendering.rule()),
+        views: recorded.map(|recorded| recorded.views).unwrap_or_default(),
         file,
     };
     let began = Instant::now();
@@ -120,20 +121,29 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 struct Felt<'t> {
     terrain: &'t Terrain<'t>,
     law: (ForceLaw, Rule),
+    /// The other views of the recording.
+    views: Vec<ViewSettings>,
     /// The terrain file, as it was named.
     file: String,
 }
 
 /// How it feels: as stated, else as recorded, else as usual.
-fn rendering(args: &Args, recorded: Option<&Settings>) -> Rendering {
+fn rendering(args: &Args, recorded: Option<&Settings>) -> Result<Rendering, Failure> {
     let Some(recorded) = recorded else {
-        return args.rendering.clone();
+        return Ok(args.rendering.clone());
     };
     let (rendering, told) = args.rendering.or_recorded(recorded);
+    if let (Some(line), false) = (told.first(), recorded.views.is_empty()) {
+        let views = 1 + recorded.views.len();
+        return Err(format!(
+            "{line}: a recording of {views} views is felt in its own"
+        ))
+        .or_hint("leave that option out, or take the path alone with --ignore-settings");
+    }
     for line in told {
         eprintln!("note: {line}");
     }
-    rendering
+    Ok(rendering)
 }
 
 fn native(args: &Args, felt: &Felt<'_>, trajectory: &mut Trajectory) -> Result<Summary, Failure> {
@@ -166,7 +176,8 @@ fn replay(
     let progress = progress::bar(None, "{spinner} {human_pos} rows, {per_sec}");
     interrupt::listen();
     let device = Device::of(replayer.device());
-    let settings = Settings::new(&felt.file, felt.terrain, felt.law, None, device);
+    let mut settings = Settings::new(&felt.file, felt.terrain, felt.law, None, device);
+    settings.views.clone_from(&felt.views);
     let output = Output::create_or_standard_output(&args.output).map_err(ReplayError::from)?;
     let summary = replay_trajectory(replayer, trajectory, &settings, output, &mut |rows| {
         progress.set_position(rows);

@@ -17,6 +17,7 @@ use super::failure::{Failure, OrHint};
 use super::met_device::calibration_of;
 use super::options::placing::{self, Placing};
 use super::options::rendering::Rendering;
+use super::options::steering::{Commands, ViewControl};
 use super::options::terrain_file::TerrainFile;
 use super::session_summary::{self, SessionSummary};
 use super::terminal::voice::{say, show, tell};
@@ -26,10 +27,11 @@ use crate::link::{
 };
 use crate::output::{Output, keep_apart};
 use crate::phantom::HeldPhantom;
-use crate::place::{PlacedTerrain, View};
+use crate::place::{Laid, PlacedTerrain, View};
 use crate::replay::settings::Device;
 use crate::replay::{Column, LoopColumns, Recording, Settings};
 use crate::serving::{Service, told_of_last_end};
+use crate::steering::CommandQueue;
 use crate::terrain::Terrain;
 use watch::Watch;
 
@@ -83,6 +85,10 @@ pub struct Args {
     /// How the terrain feels.
     #[command(flatten)]
     pub rendering: Rendering,
+
+    /// How the view may be changed meanwhile.
+    #[command(flatten)]
+    pub commands: Commands,
 }
 
 impl Args {
@@ -116,6 +122,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let (law, rule) = (args.rendering.law()?, args.rendering.rule());
     // What cannot be recorded is known before anything is armed.
     let recording = recording(args)?;
+    let commands = args.commands.open()?;
     interrupt::listen();
     // The virtual Phantom is a Premium 1.5.
     let (mut calibration, mut met) = (Calibration::PREMIUM_1_5, Ok(()));
@@ -132,16 +139,18 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         terrain: &terrain,
         view,
         scene: view.scene(&terrain, law, rule)?,
+        arm: calibration,
         tour,
     };
+    let served = (recording, commands);
     let (Some(address), Some(tour)) = (&args.plant, &placed.tour) else {
-        return serve(args, &placed, met, recording);
+        return serve(args, &placed, met, served);
     };
     let arm = tour.held_phantom();
     let done = OnceLock::new();
     std::thread::scope(|scope| {
         scope.spawn(|| move_arm(address, arm, &done));
-        let ended = serve(args, &placed, met, recording);
+        let ended = serve(args, &placed, met, served);
         // The arm is still there while the board lets its force go out.
         let _ = done.set(Instant::now() + LINGER);
         ended
@@ -153,6 +162,8 @@ struct Placed<'t> {
     terrain: &'t Terrain<'t>,
     view: View,
     scene: Scene,
+    /// Of the arm that feels it.
+    arm: Calibration,
     tour: Option<PlacedTerrain<'t>>,
 }
 
@@ -181,7 +192,7 @@ fn serve(
     args: &Args,
     placed: &Placed<'_>,
     met: Result<(), Failure>,
-    recording: Option<Recording>,
+    (recording, commands): (Option<Recording>, CommandQueue),
 ) -> Result<(), Failure> {
     let is_checked = !is_scripted(args) && !args.unchecked;
     let service = service(args, placed);
@@ -203,7 +214,20 @@ fn serve(
         tell(line);
     }
     let recording = described(recording, args, placed, &device);
-    let mut watch = Watch::new(args, placed, &device, recording);
+    let laid = Laid {
+        view: placed.view,
+        law: placed.scene.law,
+    };
+    let mut control = ViewControl::new(
+        (placed.terrain, laid, placed.scene.rule),
+        (&placed.arm, args.rendering.level),
+        commands,
+    );
+    // Before anybody else asks the keyboard for anything.
+    if let Some(line) = control.listen(&args.commands) {
+        tell(line);
+    }
+    let mut watch = Watch::new(args, placed, &device, recording, control);
     let end = served.serve(&mut watch);
     // What was recorded is kept, however it ended, and before anything else is done.
     let log = watch.finish();
@@ -258,9 +282,9 @@ fn told(why: Result<(), LinkError>, disarmed: Result<(), LinkError>) -> Result<(
 }
 
 fn recording(args: &Args) -> Result<Option<Recording>, Failure> {
-    let [state, mode, limits] = LoopColumns::COLUMNS;
+    let [state, mode, limits, view] = LoopColumns::COLUMNS;
     let [tick, work, cost, late] = ["tick", "work", "cost", "late"].map(Column::Count);
-    let columns = [state, tick, work, cost, late, mode, limits];
+    let columns = [state, tick, work, cost, late, mode, limits, view];
     let recording = args.record.as_deref().map(|path| {
         let output = Output::create(path)?;
         Recording::new(output, &columns)

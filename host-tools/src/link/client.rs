@@ -1,10 +1,11 @@
 //! The host's side of a session about a terrain, without I/O and without a clock.
 
+use std::ops::Deref;
 use std::time::Duration;
 
 use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Point, Sample, Scene};
+use hapterra_core::scene::{Point, Sample, Scene, View};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
 use hapterra_core::wire::hello::DeviceHello;
@@ -44,6 +45,14 @@ pub enum Event<'e> {
     /// Where the device's guard stands; told at the beginning of a session,
     /// whenever it changes, and twice a second.
     Guard(&'e Report),
+    /// A view was put in ([`Client::put_view`]), or was not: the device refuses it, does
+    /// not answer, or was restarted meanwhile.
+    Viewed {
+        /// The view.
+        view: &'e View,
+        /// Whether it is in force.
+        taken: bool,
+    },
     /// The answer to a question for the status.
     Status(&'e Status),
     /// The calibration in force.
@@ -90,7 +99,9 @@ const LOG_EVERY: Duration = Duration::from_secs(1);
 /// [`Client::due`], which is to be called now and then. `now` is the time since any
 /// fixed moment.
 pub struct Client<'t> {
-    terrain: &'t Terrain<'t>,
+    terrain: Lent<'t>,
+    /// The terrain of a view that is not in force yet.
+    next: Option<(View, Terrain<'t>)>,
     scene: Scene,
     arming: Option<Arming>,
     talk: Conversation,
@@ -113,6 +124,23 @@ pub struct Client<'t> {
     tally: Tally,
     samples_since_sign: u32,
     logged: Option<Duration>,
+}
+
+/// A terrain that is served: the one that the client was lent, or that of another view.
+enum Lent<'t> {
+    Whole(&'t Terrain<'t>),
+    View(Terrain<'t>),
+}
+
+impl<'t> Deref for Lent<'t> {
+    type Target = Terrain<'t>;
+
+    fn deref(&self) -> &Terrain<'t> {
+        match self {
+            Self::Whole(terrain) => terrain,
+            Self::View(terrain) => terrain,
+        }
+    }
 }
 
 impl<'t> Client<'t> {
@@ -138,7 +166,8 @@ impl<'t> Client<'t> {
         seed: u64,
     ) -> Self {
         Self {
-            terrain,
+            terrain: Lent::Whole(terrain),
+            next: None,
             scene,
             arming,
             talk: Conversation::new(Some(scene), patience, fastrand::Rng::with_seed(seed)),
@@ -209,6 +238,30 @@ impl<'t> Client<'t> {
         self.talk.ask(ask);
     }
 
+    /// Puts another view of the scene in, of this terrain: says it until it is answered
+    /// ([`Event::Viewed`]). The clutch has to be open
+    /// ([`Request::Clutch`]).
+    pub fn put_view(&mut self, now: Duration, view: View, terrain: Terrain<'t>, out: &mut Vec<u8>) {
+        self.next = Some((view, terrain));
+        self.talk.put_view(view, now, out);
+    }
+
+    /// The view that was put in is in force, where the conversation says so; or it is not and
+    /// will not be. Tells which.
+    fn settle_view(&mut self, over: bool, on: &mut dyn FnMut(Event<'_>)) {
+        let epoch = self.talk.scene().map(|scene| scene.epoch);
+        let taken = |view: &View| epoch == Some(view.scene.epoch);
+        let settled = self.next.take_if(|(view, _)| over || taken(view));
+        if let Some((view, terrain)) = settled {
+            let taken = taken(&view);
+            if taken {
+                self.scene = view.scene;
+                self.terrain = Lent::View(terrain);
+            }
+            on(Event::Viewed { view: &view, taken });
+        }
+    }
+
     /// Has a point felt: says it until it is answered.
     pub fn feel(&mut self, now: Duration, point: Point, out: &mut Vec<u8>) {
         self.point = Some((point, now));
@@ -231,6 +284,9 @@ impl<'t> Client<'t> {
             self.talk.hasten_alive();
         }
         let checked = self.talk.due(now, out);
+        if self.talk.take_lost_view(now).is_some() {
+            self.settle_view(true, on);
+        }
         self.repeat_point(now, out);
         for ask in self.talk.take_unanswered() {
             self.tally.unanswered += 1;
@@ -296,7 +352,11 @@ impl<'t> Client<'t> {
         on: &mut dyn FnMut(Event<'_>),
     ) {
         match news {
-            News::Greeted { device, restarted } => self.on_greeted(device, restarted),
+            News::Greeted { device, restarted } => {
+                self.on_greeted(device, restarted);
+                self.settle_view(true, on);
+            }
+            News::View => self.settle_view(true, on),
             News::SceneTaken => self.on_scene_taken(now, out, on),
             News::Answered(ask, message) => self.on_answered(now, ask, &message, out, on),
             News::Other(message) => self.on_message(now, message, out, on),

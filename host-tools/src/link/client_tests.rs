@@ -37,6 +37,8 @@ struct Bench<'t> {
     unanswered: Vec<Ask>,
     /// What was told of the calibration.
     told: Vec<Option<Calibration>>,
+    /// Views and whether they were taken.
+    viewed: Vec<(u8, bool)>,
 }
 
 const fn ms(ms: u64) -> Duration {
@@ -56,6 +58,7 @@ fn on_bench(arming: Option<Arming>, test: impl FnOnce(&mut Bench<'_>)) {
         opened: 0,
         unanswered: vec![],
         told: vec![],
+        viewed: vec![],
     };
     bench.client.greet(bench.now, &mut bench.out);
     test(&mut bench);
@@ -65,10 +68,11 @@ impl Bench<'_> {
     fn hear_in(&mut self, session: SessionNumber, message: &ToHost) -> Result<(), LinkError> {
         let mut frame = [0; MAX_FRAME];
         let bytes = encode(&InSession { session, message }, &mut frame).expect("fits");
-        let (opened, told) = (&mut self.opened, &mut self.told);
+        let (opened, told, viewed) = (&mut self.opened, &mut self.told, &mut self.viewed);
         let mut on = |event: Event<'_>| match event {
             Event::Opened { .. } => *opened += 1,
             Event::Calibration(calibration) => told.push(calibration.copied()),
+            Event::Viewed { view, taken } => viewed.push((view.number, taken)),
             _ => {}
         };
         self.client.receive(self.now, bytes, &mut self.out, &mut on)
@@ -100,16 +104,33 @@ impl Bench<'_> {
         assert_eq!(self.client.state(), State::Open);
     }
 
+    /// Puts a view in; the epoch of its scene.
+    fn put_view(&mut self, number: u8) -> u32 {
+        let terrain = (*self.client.terrain).clone();
+        let scene = Scene {
+            epoch: 5_000 + u32::from(number),
+            ..*self.client.scene()
+        };
+        let view = View {
+            number,
+            scene,
+            hip: GridPoint::default(),
+            keeps_tiles: true,
+        };
+        self.client.put_view(self.now, view, terrain, &mut self.out);
+        scene.epoch
+    }
+
     /// Lets time pass; what is said meanwhile stays in `out`.
     fn pass(&mut self, time: Duration) -> Result<(), LinkError> {
         let end = self.now + time;
         while self.now < end {
             self.now += ms(10);
-            let unanswered = &mut self.unanswered;
-            let mut keep = |event: Event<'_>| {
-                if let Event::Unanswered(ask) = event {
-                    unanswered.push(*ask);
-                }
+            let (unanswered, viewed) = (&mut self.unanswered, &mut self.viewed);
+            let mut keep = |event: Event<'_>| match event {
+                Event::Unanswered(ask) => unanswered.push(*ask),
+                Event::Viewed { view, taken } => viewed.push((view.number, taken)),
+                _ => {}
             };
             self.client.due(self.now, &mut self.out, &mut keep)?;
         }
@@ -638,4 +659,83 @@ fn a_device_that_asks_for_much_at_once_gets_each_tile_once_and_so_many() {
         heard.expect("understood");
         assert_eq!(count_of(&bench.said(), "Tile"), 1);
     });
+}
+
+#[test]
+fn a_view_is_said_until_it_is_answered_and_in_force_from_then_on() {
+    on_bench(None, |bench| {
+        bench.open();
+        let (before, epoch) = (bench.client.scene().epoch, bench.put_view(1));
+        // A device that has it already, and whose answer is lost, is told no scene anew.
+        bench.out.clear();
+        bench.hear(&ToHost::Alive {
+            count: SampleCount::default(),
+            epoch: Some(epoch),
+            report: Report::default(),
+        });
+        bench.pass(ms(500)).expect("in time");
+        let said = bench.said();
+        assert_eq!(
+            (count_of(&said, "View"), count_of(&said, "Scene")),
+            (1, 0),
+            "{said:?}"
+        );
+        assert_eq!(bench.client.scene().epoch, before);
+        for _ in 0..2 {
+            bench.hear(&ToHost::SceneTaken {
+                epoch,
+                accepted: true,
+            });
+        }
+        assert_eq!(bench.viewed, [(1, true)]);
+        assert_eq!(bench.client.scene().epoch, epoch);
+        bench.out.clear();
+        bench.hear(&bench.alive());
+        bench.pass(ms(600)).expect("in time");
+        let said = bench.said();
+        assert_eq!(
+            (count_of(&said, "View"), count_of(&said, "Scene")),
+            (0, 0),
+            "{said:?}"
+        );
+    });
+}
+
+#[test]
+fn a_view_that_is_refused_or_not_answered_leaves_the_scene_as_it_is() {
+    on_bench(None, |bench| {
+        bench.open();
+        let (before, epoch) = (bench.client.scene().epoch, bench.put_view(1));
+        let accepted = false;
+        bench.hear(&ToHost::SceneTaken { epoch, accepted });
+        assert_eq!(bench.viewed, [(1, false)]);
+        bench.put_view(2);
+        for _ in 0..9 {
+            bench.pass(ms(500)).expect("in time");
+            bench.hear(&bench.alive());
+        }
+        assert_eq!(bench.viewed, [(1, false), (2, false)]);
+        assert_eq!(bench.client.scene().epoch, before);
+        assert_eq!(bench.client.state(), State::Open);
+    });
+}
+
+#[test]
+fn after_a_lost_line_the_device_tells_whether_it_took_the_view() {
+    for took in [true, false] {
+        on_bench(None, |bench| {
+            bench.open();
+            let before = bench.client.scene().epoch;
+            let epoch = bench.put_view(1);
+            bench.client.greet(bench.now, &mut bench.out);
+            let held = if took { epoch } else { before };
+            bench.hear(&ToHost::Hello(DeviceHello {
+                number: 2,
+                epoch: Some(held),
+                ..hello()
+            }));
+            assert_eq!(bench.viewed, [(1, took)]);
+            assert_eq!(bench.client.scene().epoch, held);
+        });
+    }
 }

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use hapterra_core::scene::Scene;
+use hapterra_core::scene::{Scene, View};
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::request::Answer;
@@ -44,6 +44,9 @@ pub(super) enum News {
     },
     /// The scene is in force.
     SceneTaken,
+    /// The view that was said is answered: it is in force, where its scene is the one that
+    /// is to be.
+    View,
     /// What was asked for is answered by this message.
     Answered(Ask, ToHost),
     /// A message that answers nothing, or more than the conversation.
@@ -63,6 +66,8 @@ pub(super) struct Conversation {
     /// The device has answered in this session.
     confirmed: bool,
     scene: Option<Scene>,
+    /// Another view of it that was said and is not answered: since when, and when last.
+    view: Option<(View, Duration, Duration)>,
     patience: Patience,
     state: State,
     /// When the state began, and when its message was said last.
@@ -94,6 +99,7 @@ impl Conversation {
             previous: None,
             confirmed: false,
             scene,
+            view: None,
             patience,
             state: State::Closed,
             since: Duration::ZERO,
@@ -175,6 +181,48 @@ impl Conversation {
         self.say_state(now, out);
     }
 
+    /// Puts another view of the scene in, in place of one that is not answered yet. It is
+    /// said until it is answered.
+    pub(super) fn put_view(&mut self, view: View, now: Duration, out: &mut Vec<u8>) {
+        self.view = Some((view, now, now));
+        if self.state == State::Open {
+            self.say(&ToDevice::View(view), out);
+        }
+    }
+
+    /// A view that nobody answers, once.
+    pub(super) fn take_lost_view(&mut self, now: Duration) -> Option<View> {
+        let give_up = self.patience.give_up;
+        let is_lost = |since: Duration| now.saturating_sub(since) >= give_up;
+        let lost = self.view.take_if(|(_, since, _)| is_lost(*since));
+        lost.map(|(view, _, _)| view)
+    }
+
+    /// Says the view again, where that is due.
+    fn repeat_view(&mut self, now: Duration, out: &mut Vec<u8>) {
+        if let Some((view, since, said)) = self.view
+            && self.is_due(said, now)
+        {
+            self.view = Some((view, since, now));
+            self.say(&ToDevice::View(view), out);
+        }
+    }
+
+    /// Whether the view that is not answered is in force tells the scene that the device
+    /// holds.
+    fn settle_view(&mut self, epoch: Option<u32>) {
+        if let Some((view, _, _)) = self.view.take()
+            && epoch == Some(view.scene.epoch)
+        {
+            self.scene = Some(view.scene);
+        }
+    }
+
+    /// The scene that is to be in force.
+    pub(super) const fn scene(&self) -> Option<&Scene> {
+        self.scene.as_ref()
+    }
+
     /// No scene is to be in force any more: the host asks for its end.
     pub(super) const fn forget_scene(&mut self) {
         self.scene = None;
@@ -222,6 +270,7 @@ impl Conversation {
         }
         if self.state == State::Open {
             self.say_alive(now, out);
+            self.repeat_view(now, out);
             self.say_pending(now, out);
         }
         Ok(())
@@ -435,6 +484,9 @@ impl Conversation {
             return Ok(None);
         }
         self.opened_by = device.opened_by;
+        // Another session, or another life of the device: what it holds tells whether it took
+        // the view.
+        self.settle_view(device.epoch);
         let restarted = !is_first;
         if self.is_ending() {
             return Ok(Some(News::Greeted { device, restarted }));
@@ -466,6 +518,16 @@ impl Conversation {
         epoch: u32,
         accepted: bool,
     ) -> Result<Option<News>, LinkError> {
+        let is_views = |(view, _, _): &mut (View, _, _)| view.scene.epoch == epoch;
+        if self.state == State::Open
+            && let Some((view, _, _)) = self.view.take_if(is_views)
+        {
+            self.heard = now;
+            if accepted {
+                self.scene = Some(view.scene);
+            }
+            return Ok(Some(News::View));
+        }
         if self.state != State::SceneSent || self.lacks_scene(Some(epoch)) {
             return Ok(None);
         }
@@ -499,6 +561,8 @@ impl Conversation {
         if let ToHost::Alive { epoch, .. } = message
             && self.state == State::Open
             && self.lacks_scene(*epoch)
+            // The answer to a view comes, or is asked for again.
+            && self.view.is_none_or(|(view, _, _)| *epoch != Some(view.scene.epoch))
         {
             // The device has taken no scene, or lost it, and its host has missed that.
             self.enter(State::SceneSent, now);

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use hapterra_core::scene::{Point, Scene};
+use hapterra_core::scene::{Point, Scene, View};
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::request::Request;
 
@@ -137,6 +137,18 @@ impl<'t> Session<'t> {
     /// Asks for something to be done, as [`Session::ask`].
     pub fn request(&mut self, request: Request) {
         self.ask(Ask::Request(request));
+    }
+
+    /// Puts another view of the scene in, of this terrain; the clutch has to be open. An
+    /// [`Event::Viewed`] tells what came of it.
+    ///
+    /// # Errors
+    /// [`LinkError::Gone`].
+    pub fn put_view(&mut self, view: View, terrain: Terrain<'t>) -> Result<(), LinkError> {
+        let line = &mut self.line;
+        self.client
+            .put_view(line.now(), view, terrain, &mut line.out);
+        self.flush()
     }
 
     /// Has a point felt: an [`Event::Felt`] tells what is felt there.

@@ -3,9 +3,10 @@
 //! [`Target`] and [`ViewOptions`] are what the user asks for. [`Reach`] is what an arm can
 //! get to, by its calibration. [`View::new`] makes of both and of a grid the one answer: the
 //! place under the home position, scale, level and heights, from which terrain and scene
-//! follow. [`PlacedTerrain`] adds a scripted hand for an arm that is virtual.
+//! follow. [`ViewChange`] makes another view of it while it is felt. [`PlacedTerrain`] adds a scripted hand for an arm that is virtual.
 
 mod coordinates;
+mod change;
 mod error;
 mod fit;
 mod ground;
@@ -16,6 +17,8 @@ mod view;
 mod words;
 
 pub use coordinates::Coordinates;
+pub(crate) use change::STIFFEST_N_PER_MM;
+pub use change::{Bounds, ChangeError, Changed, Hand, Laid, ViewChange};
 pub use error::PlaceError;
 pub use placed_terrain::{PlacedTerrain, PlacingError};
 pub use reach::{Reach, ReachBox};

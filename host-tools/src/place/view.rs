@@ -10,7 +10,7 @@ use super::fit::{ABOVE_MM, Extent};
 use super::ground;
 use super::reach::Reach;
 use super::target::Target;
-use crate::terrain::{FeltGrid, Scale, Terrain, TerrainError};
+use crate::terrain::{BadScale, FeltGrid, Scale, Terrain, TerrainError};
 
 /// Relief that a terrain gets in the hand where the file does not know how large its cells
 /// are, so that it has no true proportions, mm.
@@ -153,6 +153,36 @@ impl View {
     #[must_use]
     pub fn felt_cell_mm(&self) -> f64 {
         self.scale.at_level(self.level).cell_mm()
+    }
+
+    /// The same at another scale: hand millimetres a felt cell of level 0, and a vertical
+    /// unit. The place has yet to be [`Self::moved_to`].
+    pub(super) fn scaled(self, cell_mm: f64, height_mm_per_unit: f64) -> Result<Self, BadScale> {
+        let scale = Scale::new(cell_mm, height_mm_per_unit)?;
+        let steeper = scale.height_cells(1.0) / self.scale.height_cells(1.0);
+        Ok(Self {
+            scale,
+            exaggeration: self.exaggeration.map(|times| times * steeper),
+            ..self
+        })
+    }
+
+    /// The same with another point under the tip in its home pose, hand millimetres, after
+    /// a view at another scale.
+    pub(crate) fn moved_to(self, grid: &FeltGrid<'_>, home_mm: [f64; 3], before: Scale) -> Self {
+        let wider = self.scale.cell_mm() / before.cell_mm();
+        let higher = self.scale.height_mm_per_unit() / before.height_mm_per_unit();
+        let felt = [home_mm[0], home_mm[1]].map(|mm| mm / self.scale.cell_mm());
+        Self {
+            home_mm,
+            home_ground: grid.to_ground(felt),
+            laid_mm: self.laid_mm.map(|mm| mm * wider),
+            heights_mm: match higher.is_finite() {
+                true => self.heights_mm.map(|mm| mm * higher),
+                false => self.heights_mm,
+            },
+            ..self
+        }
     }
 
     /// The terrain at the view's scale and level.
@@ -307,22 +337,22 @@ impl<'g> Wanted<'g> {
             level: self
                 .options
                 .level
-                .unwrap_or_else(|| self.level(reach, &scale)),
+                .unwrap_or_else(|| finest_level(self.grid, reach.resolution_mm(), &scale)),
             side_m: self.grid.side_m(),
             exaggeration: true_height.map(|cells| scale.height_cells(1.0) / cells),
             laid_mm: cells.map(|cells| cells * scale.cell_mm()),
             heights_mm: sorted(heights.map(|height| height * scale.height_mm_per_unit())),
         }
     }
+}
 
-    /// The finest level whose cells are not finer than a count of the encoders; a lower
-    /// one where that would leave no patch.
-    fn level(&self, reach: &Reach, scale: &Scale) -> u8 {
-        let fewest = self.grid.columns().min(self.grid.rows()) - 1;
-        let last = fewest.max(1).ilog2() as u8;
-        let fine = |level: &u8| scale.at_level(*level).cell_mm() < reach.resolution_mm();
-        (0..last).find(|level| !fine(level)).unwrap_or(last)
-    }
+/// The finest level whose cells are not finer than a count of the encoders; a lower
+/// one where that would leave no patch.
+pub(super) fn finest_level(grid: &FeltGrid<'_>, resolution_mm: f64, scale: &Scale) -> u8 {
+    let fewest = grid.columns().min(grid.rows()) - 1;
+    let last = fewest.max(1).ilog2() as u8;
+    let fine = |level: &u8| scale.at_level(*level).cell_mm() < resolution_mm;
+    (0..last).find(|level| !fine(level)).unwrap_or(last)
 }
 
 fn sorted([a, b]: [f64; 2]) -> [f64; 2] {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant, SystemTime};
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::scene::{Point, Sample, Source};
+use hapterra_core::scene::{Point, Sample, Source, View};
 use hapterra_core::wire::hello::DeviceHello;
 
 use crate::link::{Event, LinkError, Patience, Session, Tally, Transport};
@@ -17,7 +17,12 @@ const ANSWERS_A_POINT: u32 = 8;
 
 /// Feels points on a device, in a scene of its own.
 pub struct Replayer<'t> {
-    terrain: &'t Terrain<'t>,
+    terrain: Terrain<'t>,
+    rule: Rule,
+    /// Tells the epochs of this replay from those of another.
+    nonce: u32,
+    /// Number of the view that is felt.
+    view: u8,
     session: Session<'t>,
     device: DeviceHello,
     seq: u32,
@@ -38,10 +43,14 @@ impl<'t> Replayer<'t> {
         let mut scene = terrain.scene(law, rule, Source::Points, GridPoint::default());
         // A device that holds the scene of an earlier replay would go on from
         // where that ended.
-        scene.epoch ^= nonce();
+        let nonce = nonce();
+        scene.epoch ^= nonce;
         let (session, device) = Session::open(terrain, scene, None, transport, patience)?;
         Ok(Self {
-            terrain,
+            terrain: terrain.clone(),
+            rule,
+            nonce,
+            view: 0,
             session,
             device,
             seq: 0,
@@ -50,8 +59,48 @@ impl<'t> Replayer<'t> {
 
     /// The terrain that is felt.
     #[must_use]
-    pub const fn terrain(&self) -> &'t Terrain<'t> {
-        self.terrain
+    pub const fn terrain(&self) -> &Terrain<'t> {
+        &self.terrain
+    }
+
+    /// Goes over to another view of the terrain, with the HIP at a place in it next. A proxy
+    /// that touches begins there on the surface, as it does on an arm.
+    ///
+    /// # Errors
+    /// [`LinkError`]; the replay cannot go on after one.
+    pub fn put_view(
+        &mut self,
+        terrain: Terrain<'t>,
+        law: ForceLaw,
+        hip: GridPoint,
+    ) -> Result<(), LinkError> {
+        self.view = self.view.wrapping_add(1);
+        let mut scene = terrain.scene(law, self.rule, Source::Points, GridPoint::default());
+        // One that comes again is another one.
+        scene.epoch ^= self.nonce.rotate_left(8) ^ u32::from(self.view);
+        let view = View {
+            number: self.view,
+            scene,
+            hip,
+            keeps_tiles: terrain.has_tiles_of(&self.terrain),
+        };
+        self.terrain = terrain.clone();
+        self.session.put_view(view, terrain)?;
+        let deadline = Instant::now() + 2 * self.session.patience().give_up;
+        while Instant::now() < deadline {
+            let (mut answer, wait) = (None, Duration::from_millis(100));
+            self.session.poll(wait, &mut |event| {
+                if let Event::Viewed { taken, .. } = event {
+                    answer = Some(taken);
+                }
+            })?;
+            match answer {
+                Some(true) => return Ok(()),
+                Some(false) => return Err(LinkError::SceneRefused),
+                None => {}
+            }
+        }
+        Err(LinkError::Stuck(self.seq))
     }
 
     /// The device that feels it.

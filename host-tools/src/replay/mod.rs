@@ -16,7 +16,7 @@ pub use felt::Replayer;
 pub use loop_columns::LoopColumns;
 pub use recording::{Column, Record, Recording, Value};
 pub use settings::Settings;
-pub use trajectory::{Row, Trajectory, TrajectoryError};
+pub use trajectory::{Row, Told, Trajectory, TrajectoryError};
 
 use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
@@ -24,7 +24,7 @@ use hapterra_core::scene::Sample;
 
 use crate::link::{LinkError, Native, Patience, Transport};
 use crate::output::{Output, OutputError};
-use crate::terrain::Terrain;
+use crate::terrain::{Terrain, TerrainError};
 
 /// Why a replay did not come to its end. Nothing is left at the output's path.
 #[derive(Debug, thiserror::Error)]
@@ -38,6 +38,14 @@ pub enum ReplayError {
     /// The device.
     #[error(transparent)]
     Link(#[from] LinkError),
+    /// A view of the recording that its terrain cannot be felt in.
+    #[error("view {number} of the recording cannot be felt: {why}")]
+    View {
+        /// The view.
+        number: u32,
+        /// Why not.
+        why: TerrainError,
+    },
     /// The user.
     #[error("interrupted")]
     Interrupted,
@@ -55,8 +63,9 @@ pub struct Summary {
     pub below_ground: u64,
 }
 
-/// The column that a replay's recording has after the usual ones.
-const STATE: Column = Column::Text("state");
+/// The columns that a replay's recording has after the usual ones; the view only where
+/// there are several.
+const MORE: [Column; 2] = [Column::Text("state"), Column::Count("view")];
 
 /// Runs a trajectory through a device and writes what was felt to an output, which
 /// appears only when it is complete.
@@ -73,15 +82,27 @@ pub fn replay_trajectory(
     go_on: &mut dyn FnMut(u64) -> bool,
 ) -> Result<Summary, ReplayError> {
     const ASK_EVERY: u64 = 512;
-    let terrain = replayer.terrain();
-    let scale = *terrain.scale();
-    let mut recording = Recording::new(output, &[STATE])?;
+    let columns = match settings.views.is_empty() {
+        true => &MORE[..1],
+        false => &MORE[..],
+    };
+    let mut recording = Recording::new(output, columns)?;
     recording.describe(settings);
-    let mut summary = Summary::default();
-    while let Some(row) = trajectory.next_row(&scale)? {
+    let (mut summary, mut view) = (Summary::default(), 0);
+    while let Some(told) = trajectory.next_told()? {
+        // Without settings it is a path alone.
+        if told.view != view && !settings.views.is_empty() {
+            view = told.view;
+            go_over(replayer, trajectory, settings, &told, &mut recording)?;
+        }
+        let terrain = replayer.terrain();
+        let scale = *terrain.scale();
+        let row = trajectory.lay(&told, &scale)?;
         let sample = replayer.feel(row.hip)?;
+        let terrain = replayer.terrain();
         let record = Record::new(row.t_s, row.hip_mm, &sample, &scale);
-        recording.write(&record, &[Value::Text(state_name(sample.state))])?;
+        let more = [Value::Text(state_name(sample.state)), Value::Count(view)];
+        recording.write(&record, more.get(..columns.len()).unwrap_or(&more))?;
         summary.rows += 1;
         summary.in_contact += u64::from(record.contact);
         summary.below_ground += u64::from(is_below_ground(&sample, &record, terrain));
@@ -91,6 +112,28 @@ pub fn replay_trajectory(
     }
     recording.finish()?;
     Ok(summary)
+}
+
+/// Goes over to the view of a row, as it was done where it was recorded.
+fn go_over(
+    replayer: &mut Replayer<'_>,
+    trajectory: &mut Trajectory,
+    settings: &Settings,
+    told: &Told,
+    recording: &mut Recording,
+) -> Result<(), ReplayError> {
+    let described = settings.views.iter().find(|view| view.number == told.view);
+    let Some(view) = described else {
+        return Err(trajectory.of_unknown_view(told).into());
+    };
+    let number = view.number;
+    let cannot = |why| ReplayError::View { number, why };
+    let scale = view.scale().map_err(|why| cannot(why.into()))?;
+    let terrain = replayer.terrain().rescaled(scale, view.level);
+    let terrain = terrain.map_err(cannot)?;
+    let row = trajectory.lay(told, terrain.scale())?;
+    replayer.put_view(terrain, view.law(), row.hip)?;
+    Ok(recording.view(view)?)
 }
 
 /// Whether nothing is felt because the HIP is below ground and came there from below, from

@@ -10,8 +10,9 @@ use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use serde::{Deserialize, Serialize};
 
 use crate::link::shown;
+use crate::place::Laid;
 use crate::raster::ReferenceSystem;
-use crate::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use crate::terrain::{BadScale, FeltCells, FeltGrid, Scale, Terrain};
 
 /// What the first line of the settings begins with; its value is [`FORMAT`].
 pub const KEY: &str = "hapterra-recording";
@@ -39,6 +40,80 @@ pub struct Settings {
     pub force: Force,
     /// The device.
     pub device: Device,
+    /// The views that were put in while it was felt, in their order; the one of the
+    /// beginning is [`Self::felt`] and [`Self::force`].
+    #[serde(rename = "view", default, skip_serializing_if = "Vec::is_empty")]
+    pub views: Vec<ViewSettings>,
+}
+
+/// A view that was put in while a terrain was felt.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ViewSettings {
+    /// What the rows of this view have in the column `view`, from 1 on.
+    pub number: u32,
+    /// Level of detail.
+    pub level: u8,
+    /// Hand millimetres a felt cell of level 0.
+    pub cell_mm: f64,
+    /// Hand millimetres a vertical unit of the file.
+    pub height_mm_per_unit: f64,
+    /// Times that heights are higher than true to scale, where the file knows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exaggeration: Option<f64>,
+    /// The point of the terrain that was at the tip in the arm's home pose when the view was
+    /// put in, hand millimetres. The clutch moves it.
+    pub home_mm: [f64; 3],
+    /// Newtons for a millimetre between the HIP and the proxy.
+    pub stiffness_n_per_mm: f32,
+    /// Largest force, N.
+    pub max_force_n: f32,
+}
+
+/// The views alone, as TOML has them.
+#[derive(Serialize)]
+struct Views<'v> {
+    view: [&'v ViewSettings; 1],
+}
+
+impl ViewSettings {
+    /// A view by its number and terrain.
+    #[must_use]
+    pub fn new(number: u32, terrain: &Terrain<'_>, laid: &Laid) -> Self {
+        let scale = terrain.scale_of_level_0();
+        Self {
+            number,
+            level: terrain.level(),
+            cell_mm: scale.cell_mm(),
+            height_mm_per_unit: scale.height_mm_per_unit(),
+            exaggeration: scale.exaggeration(terrain.grid()),
+            home_mm: laid.view.home_mm,
+            stiffness_n_per_mm: laid.law.stiffness_n_per_mm,
+            max_force_n: laid.law.max_force_n,
+        }
+    }
+
+    /// The view as TOML that may follow on [`Settings::to_toml`].
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        toml::to_string(&Views { view: [self] }).unwrap_or_default()
+    }
+
+    /// The force law.
+    #[must_use]
+    pub const fn law(&self) -> ForceLaw {
+        ForceLaw {
+            stiffness_n_per_mm: self.stiffness_n_per_mm,
+            max_force_n: self.max_force_n,
+        }
+    }
+
+    /// The scale of level 0.
+    ///
+    /// # Errors
+    /// Numbers that no terrain can be scaled with.
+    pub fn scale(&self) -> Result<Scale, BadScale> {
+        Scale::new(self.cell_mm, self.height_mm_per_unit)
+    }
 }
 
 /// The terrain of a recording.
@@ -176,6 +251,7 @@ impl Settings {
                 rule,
             },
             device,
+            views: vec![],
         }
     }
 
@@ -184,6 +260,15 @@ impl Settings {
     pub fn to_toml(&self) -> String {
         // Structures of numbers and text always have a form in TOML.
         toml::to_string(self).unwrap_or_default()
+    }
+
+    /// The same without the views that are put in later: what stands before the first row.
+    #[must_use]
+    pub fn without_views(&self) -> Self {
+        Self {
+            views: vec![],
+            ..self.clone()
+        }
     }
 
     /// Reads settings; none where the text is anything else.

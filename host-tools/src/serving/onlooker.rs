@@ -1,10 +1,13 @@
 //! Who looks on while a terrain is served.
 
+use hapterra_core::scene::View;
+
 use crate::link::{Ask, Event, Tally};
+use crate::terrain::Terrain;
 
 /// Is told what happens while a terrain is served, and says what is asked of the device
 /// and when there is enough of it.
-pub trait Onlooker {
+pub trait Onlooker<'t> {
     /// Is told what the device tells.
     fn take(&mut self, event: Event<'_>);
 
@@ -13,6 +16,12 @@ pub trait Onlooker {
 
     /// What is to be asked of the device now; taken after each look at the line.
     fn asks(&mut self) -> Vec<Ask>;
+
+    /// Another view that is to be put in now, with its terrain; taken after each look at
+    /// the line. An [`Event::Viewed`] tells what came of it.
+    fn view(&mut self) -> Option<(View, Terrain<'t>)> {
+        None
+    }
 
     /// May show how it goes; called after each look at the line.
     fn show(&mut self, tally: &Tally);

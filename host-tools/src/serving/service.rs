@@ -108,10 +108,10 @@ impl<'s, 't> Service<'s, 't> {
     }
 }
 
-impl Served<'_, '_> {
+impl<'t> Served<'_, 't> {
     /// Serves until the onlooker has seen enough, an end is asked for, or an error that
     /// waiting does not mend; then says goodbye.
-    pub fn serve(mut self, onlooker: &mut dyn Onlooker) -> End {
+    pub fn serve(mut self, onlooker: &mut dyn Onlooker<'t>) -> End {
         let why = self.until_over(onlooker);
         let disarmed = self.leave(why.as_ref().err(), &mut |event| onlooker.take(event));
         let tally = self.session.tally().clone();
@@ -122,12 +122,17 @@ impl Served<'_, '_> {
         }
     }
 
-    fn until_over(&mut self, onlooker: &mut dyn Onlooker) -> Result<(), LinkError> {
+    fn until_over(&mut self, onlooker: &mut dyn Onlooker<'t>) -> Result<(), LinkError> {
         while (self.goes_on)() && !onlooker.is_over() {
             let polled = self.session.poll(POLL, &mut |event| onlooker.take(event));
             for ask in onlooker.asks() {
                 self.session.ask(ask);
             }
+            // What is wrong with the line is known in a moment anyway.
+            let put = onlooker
+                .view()
+                .map(|(view, terrain)| self.session.put_view(view, terrain));
+            let polled = polled.and(put.unwrap_or(Ok(())));
             onlooker.show(self.session.tally());
             match polled {
                 Err(error) if error.is_passing() => self.wait_for_device(onlooker, &error)?,
@@ -140,7 +145,7 @@ impl Served<'_, '_> {
     /// The device is gone: says so, waits for it and resumes.
     fn wait_for_device(
         &mut self,
-        onlooker: &mut dyn Onlooker,
+        onlooker: &mut dyn Onlooker<'t>,
         why: &LinkError,
     ) -> Result<(), LinkError> {
         let (why, device) = (described(why), &self.device);
@@ -170,7 +175,7 @@ impl Served<'_, '_> {
         Ok(())
     }
 
-    fn resume(&mut self, onlooker: &mut dyn Onlooker) -> Result<DeviceHello, LinkError> {
+    fn resume(&mut self, onlooker: &mut dyn Onlooker<'t>) -> Result<DeviceHello, LinkError> {
         let line = (self.connect)()?;
         let on = &mut |event: Event<'_>| onlooker.take(event);
         self.session.resume(line, self.goes_on, on)

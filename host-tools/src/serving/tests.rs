@@ -153,7 +153,7 @@ impl<'l> Looks<'l> {
     }
 }
 
-impl Onlooker for Looks<'_> {
+impl Onlooker<'_> for Looks<'_> {
     fn take(&mut self, _: Event<'_>) {}
 
     fn hear(&mut self, line: &str) {

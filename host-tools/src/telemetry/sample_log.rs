@@ -3,6 +3,7 @@
 use hapterra_core::scene::Sample;
 use hapterra_core::wire::hello::DeviceHello;
 
+use super::felt_views::{FeltView, FeltViews};
 use super::figures::Figures;
 use super::timeline::Timeline;
 use crate::replay::Record;
@@ -10,7 +11,9 @@ use crate::terrain::Terrain;
 
 /// Keeps time and figures of the samples that were felt on a terrain.
 pub struct SampleLog<'t> {
-    terrain: &'t Terrain<'t>,
+    views: FeltViews<'t>,
+    /// The view of the latest sample.
+    view: usize,
     tick_hz: u32,
     timeline: Timeline,
     figures: Figures,
@@ -21,7 +24,8 @@ impl<'t> SampleLog<'t> {
     #[must_use]
     pub fn new(terrain: &'t Terrain<'t>, device: &DeviceHello) -> Self {
         Self {
-            terrain,
+            views: FeltViews::new(terrain.clone()),
+            view: 0,
             tick_hz: device.tick_hz,
             timeline: Timeline::new(device.tick_hz),
             figures: Figures::default(),
@@ -30,10 +34,29 @@ impl<'t> SampleLog<'t> {
 
     /// Takes a sample; the row that it makes, mm and s since the beginning.
     pub fn take(&mut self, sample: &Sample) -> Record {
-        let mut record = Record::of_tick(sample, self.tick_hz, self.terrain.scale());
+        self.view = self.views.index_of(sample);
+        let terrain = &self.views.get(self.view).terrain;
+        let mut record = Record::of_tick(sample, self.tick_hz, terrain.scale());
         record.t_s = self.timeline.at(sample);
-        self.figures.take(sample, &record, self.terrain);
+        self.figures.take(sample, &record, terrain);
         record
+    }
+
+    /// The views so far.
+    pub const fn views(&mut self) -> &mut FeltViews<'t> {
+        &mut self.views
+    }
+
+    /// The views alone.
+    #[must_use]
+    pub fn into_views(self) -> FeltViews<'t> {
+        self.views
+    }
+
+    /// The view of the latest sample, counted from 0, with its terrain.
+    #[must_use]
+    pub fn view(&self) -> (usize, &FeltView<'t>) {
+        (self.view, self.views.get(self.view))
     }
 
     /// Ticks run since the beginning, over all restarts of the device.

@@ -16,6 +16,7 @@ use crate::raster::Raster;
 const TILE_BYTES: usize = 4 * POSTS * POSTS;
 
 /// A raster at a scale and a level of detail.
+#[derive(Clone)]
 pub struct Terrain<'r> {
     grid: FeltGrid<'r>,
     /// Of the level's cells.
@@ -112,6 +113,28 @@ impl<'r> Terrain<'r> {
             top: top(grid.raster(), &scale)?,
             fingerprint: OnceCell::new(),
         })
+    }
+
+    /// The same grid at another scale of level 0 and another level.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn rescaled(&self, scale: Scale, level: u8) -> Result<Self, TerrainError> {
+        Ok(Self {
+            // Of the same heights.
+            fingerprint: self.fingerprint.clone(),
+            ..Self::over(self.grid, scale, level)?
+        })
+    }
+
+    /// Whether another terrain of the same raster has the same tiles: the same samples at
+    /// the same heights in cells.
+    #[must_use]
+    pub fn has_tiles_of(&self, other: &Self) -> bool {
+        let height = |terrain: &Self| terrain.scale.height_cells(1.0);
+        let (ours, theirs) = (height(self), height(other));
+        self.level == other.level
+            && (ours - theirs).abs() <= f64::from(f32::EPSILON) * 1e-3 * ours.abs()
     }
 
     /// The raster.

@@ -1,7 +1,7 @@
 //! What becomes of the terminal, or of the pipe in its place, does not end the session.
 
 use std::fs::{File, OpenOptions};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::os::fd::OwnedFd;
 use std::process::Stdio;
 use std::sync::atomic::Ordering;
@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use hapterra_core::wire::session::SessionEnd;
 use rustix::io::{FdFlags, fcntl_setfd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{LocalModes, tcgetattr};
 
 use super::served::{Served, command, ended_within, has_begun, signal, start, told};
 
@@ -102,4 +103,91 @@ fn where_nobody_reads_the_first_signal_is_a_goodbye_and_the_second_ends_it_at_on
     let output = ended_within(child, AN_END).expect("it ends");
     assert!(began.elapsed() < Duration::from_secs(1));
     assert_eq!(output.status.code(), Some(130), "{}", told(&output));
+}
+
+/// Reads what is shown in a window until it holds a text.
+fn shows(window: &mut File, text: &str) -> String {
+    let (mut shown, mut chunk) = (String::new(), [0; 4096]);
+    let until = Instant::now() + AN_END;
+    while !shown.contains(text) {
+        assert!(Instant::now() < until, "no `{text}` in {shown}");
+        let n = window.read(&mut chunk).expect("open");
+        shown += &String::from_utf8_lossy(&chunk[..n]);
+    }
+    shown
+}
+
+/// An arm in its zero pose whose hand lets it arm, behind a socket; keys are typed.
+#[test]
+fn keys_change_the_view_ctrl_c_is_a_goodbye_and_the_terminal_is_put_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let served = Served::start();
+    let (mut window, end) = terminal();
+    let modes = |end: &File| tcgetattr(end).expect("a terminal").local_modes;
+    let before = modes(&end);
+    assert!(before.contains(LocalModes::ICANON | LocalModes::ECHO));
+    let stdio = || Stdio::from(OwnedFd::from(end.try_clone().expect("another")));
+    let mut command = command(served.address, folder.path());
+    let child = command
+        .stdin(stdio())
+        .stdout(stdio())
+        .stderr(stdio())
+        .spawn();
+    let child = child.expect("it runs");
+    shows(&mut window, "arrows pan");
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(
+        !modes(&end).contains(LocalModes::ICANON),
+        "keys come one by one"
+    );
+    // Enter answers the prompt: the arm is zeroed, and has samples to steer by.
+    window.write_all(b"\r").expect("typed");
+    shows(&mut window, "zeroed at");
+    window.write_all(b"+").expect("typed");
+    shows(&mut window, "view 1: ");
+    window.write_all(b"\x1b[C").expect("typed");
+    shows(&mut window, "view 2: ");
+    window.write_all(&[3]).expect("typed");
+    let output = ended_within(child, AN_END).expect("it ends");
+    assert!(output.status.success(), "{}", output.status);
+    assert_eq!(modes(&end), before, "the terminal is as it was");
+    assert_eq!(served.last_end(), SessionEnd::Goodbye);
+}
+
+#[test]
+fn a_second_ctrl_c_and_a_signal_put_the_terminal_back_too() {
+    for ends_by in ["interrupts", "signal"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let served = Served::start();
+        let (mut window, end) = terminal();
+        let modes = |end: &File| tcgetattr(end).expect("a terminal").local_modes;
+        let before = modes(&end);
+        let stdio = || Stdio::from(OwnedFd::from(end.try_clone().expect("another")));
+        let mut command = command(served.address, folder.path());
+        let child = command
+            .stdin(stdio())
+            .stdout(stdio())
+            .stderr(stdio())
+            .spawn();
+        let child = child.expect("it runs");
+        shows(&mut window, "arrows pan");
+        std::thread::sleep(Duration::from_millis(300));
+        assert_ne!(modes(&end), before, "{ends_by}");
+        match ends_by {
+            "interrupts" => {
+                served.deaf.store(true, Ordering::Relaxed);
+                window.write_all(&[3]).expect("typed");
+                std::thread::sleep(Duration::from_millis(300));
+                window.write_all(&[3]).expect("typed");
+                let output = ended_within(child, AN_END).expect("it ends");
+                assert_eq!(output.status.code(), Some(130));
+            }
+            _ => {
+                signal(&child, "TERM");
+                let output = ended_within(child, AN_END).expect("it ends");
+                assert!(output.status.success(), "{}", output.status);
+            }
+        }
+        assert_eq!(modes(&end), before, "{ends_by}");
+    }
 }

@@ -7,4 +7,5 @@ pub mod exaggeration;
 pub mod placing;
 pub mod recorded;
 pub mod rendering;
+pub mod steering;
 pub mod terrain_file;

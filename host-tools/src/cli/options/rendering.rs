@@ -5,6 +5,7 @@ use hapterra_core::force::ForceLaw;
 
 use super::exaggeration::Exaggeration;
 use crate::cli::failure::{Failure, OrHint};
+use crate::place::STIFFEST_N_PER_MM;
 use crate::place::{Heights, suited_height};
 use crate::raster::Raster;
 use crate::terrain::{FeltCells, FeltGrid, Scale, Terrain};
@@ -53,10 +54,6 @@ pub struct Rendering {
     #[arg(long, value_enum)]
     pub contact: Option<ContactRule>,
 }
-
-/// Above this a word is said, N/mm: people hold 0.4 to 0.8 N/mm on a Premium 1.5
-/// (`docs/hardware.md`).
-const STIFFEST_N_PER_MM: f32 = 1.0;
 
 /// Contact rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]

@@ -3,14 +3,16 @@
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::{Sample, View};
 use hapterra_core::wire::hello::DeviceHello;
 
 use super::{Args, Placed};
+use crate::cli::options::steering::{self, ViewControl};
 use crate::cli::terminal::arming_prompts::ArmingPrompts;
 use crate::cli::terminal::voice::{status, tell};
 use crate::link::{Ask, Event, Tally};
 use crate::output::OutputError;
+use crate::replay::settings::ViewSettings;
 use crate::replay::{LoopColumns, Record, Recording, Value, is_below_ground, state_name};
 use crate::serving::Onlooker;
 use crate::telemetry::{Figures, SampleLog};
@@ -27,7 +29,9 @@ pub(super) struct Watch<'t> {
     latest: Option<(Sample, Record)>,
     recording: Option<Recording>,
     failed: Option<OutputError>,
-    terrain: &'t Terrain<'t>,
+    /// How many views the recording has been told of.
+    described: usize,
+    control: ViewControl<'t>,
     prompts: ArmingPrompts,
     line_due: Instant,
 }
@@ -47,6 +51,7 @@ impl<'t> Watch<'t> {
         placed: &Placed<'t>,
         device: &DeviceHello,
         recording: Option<Recording>,
+        control: ViewControl<'t>,
     ) -> Self {
         let (script_s, prompts) = match &placed.tour {
             Some(tour) => (tour.duration_s(), ArmingPrompts::for_a_script()),
@@ -58,7 +63,8 @@ impl<'t> Watch<'t> {
             latest: None,
             recording,
             failed: None,
-            terrain: placed.terrain,
+            described: 0,
+            control,
             prompts,
             line_due: Instant::now() + LINE_EVERY,
         }
@@ -82,21 +88,36 @@ impl<'t> Watch<'t> {
 
     fn record(&mut self, sample: &Sample) -> Record {
         let record = self.log.take(sample);
+        let (view, felt) = self.log.view();
+        if view > self.described
+            && let Some(laid) = &felt.laid
+        {
+            self.described = view;
+            tell(steering::told(view, laid, &felt.terrain));
+            if let Some(recording) = &mut self.recording {
+                let number = u32::try_from(view).unwrap_or(u32::MAX);
+                let settings = ViewSettings::new(number, &felt.terrain, laid);
+                let failed = recording.view(&settings).err();
+                self.failed = self.failed.take().or(failed);
+            }
+        }
         if let Some(recording) = &mut self.recording {
-            let of_loop = LoopColumns::of(sample);
-            let [state, mode, limits] = of_loop.values();
+            let of_loop = LoopColumns::of(sample, view);
+            let [state, mode, limits, view] = of_loop.values();
             let counts = [sample.tick, sample.work, sample.cost, sample.late];
             let [tick, work, cost, late] = counts.map(Value::Count);
-            let more = [state, tick, work, cost, late, mode, limits];
+            let more = [state, tick, work, cost, late, mode, limits, view];
             self.failed = self.failed.take().or(recording.write(&record, &more).err());
         }
         record
     }
 }
 
-impl Onlooker for Watch<'_> {
+impl<'t> Onlooker<'t> for Watch<'t> {
     fn take(&mut self, event: Event<'_>) {
         self.prompts.on_event(&event);
+        self.control.on_event(&event);
+        self.log.views().on_event(&event);
         if let Event::Sample(sample) = event {
             self.latest = Some((*sample, self.record(sample)));
         }
@@ -110,7 +131,15 @@ impl Onlooker for Watch<'_> {
         for line in self.prompts.lines() {
             tell(line);
         }
-        self.prompts.messages()
+        self.control.look(self.log.t_s(), &mut |line| tell(line));
+        let mut asks = self.prompts.messages();
+        asks.extend(self.control.asks());
+        asks
+    }
+
+    fn view(&mut self) -> Option<(View, Terrain<'t>)> {
+        let put = self.control.put(self.log.views())?;
+        Some((put.view, put.terrain))
     }
 
     /// One line that is written over, or a line now and then.
@@ -118,7 +147,11 @@ impl Onlooker for Watch<'_> {
         let Some((sample, record)) = &self.latest else {
             return;
         };
-        let line = in_words(sample, record, self.terrain, tally);
+        let (_, felt) = self.log.view();
+        let mut line = in_words(sample, record, &felt.terrain, tally);
+        if self.log.views().count() > 1 {
+            line += &format!("  [{}]", self.control.in_words());
+        }
         if std::io::stderr().is_terminal() {
             status(Some(line));
         } else if Instant::now() >= self.line_due {

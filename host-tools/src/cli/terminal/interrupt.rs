@@ -9,6 +9,7 @@ use std::sync::mpsc::channel;
 use std::thread::Builder;
 use std::time::Duration;
 
+use super::raw_keys;
 use super::voice::put;
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
@@ -28,19 +29,23 @@ const INTERRUPTED: i32 = 130;
 pub(in crate::cli) fn listen() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        let listening = ctrlc::set_handler(|| {
-            if REQUESTED.swap(true, Ordering::Relaxed) {
-                if MAY_BE_ARMED.load(Ordering::Relaxed) {
-                    say_not_confirmed();
-                }
-                exit(INTERRUPTED);
-            }
-        });
+        let listening = ctrlc::set_handler(press);
         if let Err(error) = listening {
             // Then it ends this program the hard way, as without a handler.
             tracing::debug!("cannot listen to Ctrl-C: {error}");
         }
     });
+}
+
+/// Ctrl-C, from wherever it is heard: the first asks for an end, the second ends at once.
+pub(in crate::cli) fn press() {
+    if REQUESTED.swap(true, Ordering::Relaxed) {
+        raw_keys::put_back();
+        if MAY_BE_ARMED.load(Ordering::Relaxed) {
+            say_not_confirmed();
+        }
+        exit(INTERRUPTED);
+    }
 }
 
 /// Writes to a terminal that somebody reads; one that nobody reads does not hold the end

@@ -1,14 +1,18 @@
-//! Lines from standard input, whoever waits for them.
+//! Lines from standard input, whoever waits for them, or its keys one by one.
 //!
 //! A thread reads, so that Ctrl-C is heeded while a line is waited for, and so that what
-//! was typed before a question is not taken for its answer.
+//! was typed before a question is not taken for its answer. Where the terminal is in raw mode
+//! when that begins, it reads keys, and no lines.
 
 use std::io::{self, BufRead, IsTerminal};
+use std::mem;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use super::interrupt;
+use super::raw_keys::{self, Pressed};
+use crate::steering::keys::Key;
 
 /// Lines that wait to be taken.
 const WAITING: usize = 64;
@@ -18,6 +22,11 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Standard input, line by line.
 pub(in crate::cli) struct Keyboard {
     lines: Receiver<String>,
+    pressed: Receiver<Pressed>,
+    /// Keys that were taken while Enter was looked for.
+    keys: Vec<Key>,
+    /// How often Enter was pressed and not taken.
+    enters: usize,
     /// Somebody types: a line that was typed before a question is no answer. What a pipe
     /// holds is there on purpose.
     is_typed: bool,
@@ -33,19 +42,53 @@ pub(in crate::cli) fn keyboard() -> MutexGuard<'static, Keyboard> {
 impl Keyboard {
     fn listening() -> Self {
         let (typed, lines) = sync_channel(WAITING);
+        let (press, pressed) = sync_channel(WAITING);
         let is_typed = io::stdin().is_terminal();
-        std::thread::spawn(move || read(&typed, is_typed));
-        Self { lines, is_typed }
+        let reads_keys = raw_keys::is_raw();
+        std::thread::spawn(move || {
+            if reads_keys {
+                raw_keys::read(&press);
+            }
+            read(&typed, is_typed);
+        });
+        Self {
+            lines,
+            pressed,
+            keys: vec![],
+            enters: 0,
+            is_typed,
+        }
     }
 
-    /// Forgets what was typed so far.
-    pub(in crate::cli) fn forget_typed(&self) {
+    /// Sorts the keys that were pressed.
+    fn sort(&mut self) {
+        for pressed in self.pressed.try_iter() {
+            match pressed {
+                Pressed::Enter => self.enters += 1,
+                Pressed::Key(key) => self.keys.push(key),
+            }
+        }
+    }
+
+    /// The keys besides Enter that were pressed since the last look.
+    pub(in crate::cli) fn keys(&mut self) -> Vec<Key> {
+        self.sort();
+        mem::take(&mut self.keys)
+    }
+
+    /// Forgets what was typed so far. Keys that change a view are no answer anyway.
+    pub(in crate::cli) fn forget_typed(&mut self) {
+        self.sort();
+        self.enters = 0;
         while self.is_typed && self.lines.try_recv().is_ok() {}
     }
 
-    /// Whether a line was typed since the last look; never where nobody types.
-    pub(in crate::cli) fn was_pressed(&self) -> bool {
-        self.is_typed && self.lines.try_iter().count() > 0
+    /// Whether a line was typed, or Enter was pressed, since the last look; never where
+    /// nobody types.
+    pub(in crate::cli) fn was_pressed(&mut self) -> bool {
+        self.sort();
+        let pressed = mem::take(&mut self.enters) > 0;
+        pressed || (self.is_typed && self.lines.try_iter().count() > 0)
     }
 
     /// Waits for the next line; none where the input ends or an end is asked for.
@@ -84,10 +127,22 @@ mod tests {
     #[test]
     fn what_was_typed_before_a_question_is_no_answer_and_what_a_pipe_holds_is() {
         let (typed, lines) = sync_channel(WAITING);
+        let (press, pressed) = sync_channel(WAITING);
         let mut keyboard = Keyboard {
             lines,
+            pressed,
+            keys: vec![],
+            enters: 0,
             is_typed: true,
         };
+        press.send(Pressed::Enter).expect("read");
+        let zoom = Key::Char('+');
+        press.send(Pressed::Key(zoom)).expect("read");
+        keyboard.forget_typed();
+        assert!(!keyboard.was_pressed());
+        assert_eq!(keyboard.keys(), [zoom], "which answers nothing");
+        press.send(Pressed::Enter).expect("read");
+        assert!(keyboard.was_pressed() && !keyboard.was_pressed());
         typed.send("y".into()).expect("read");
         keyboard.forget_typed();
         assert!(!keyboard.was_pressed());

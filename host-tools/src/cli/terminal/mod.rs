@@ -7,4 +7,5 @@ pub(super) mod keyboard;
 pub(super) mod left_behind;
 pub(super) mod progress;
 pub(super) mod questions;
+pub(super) mod raw_keys;
 pub(super) mod voice;

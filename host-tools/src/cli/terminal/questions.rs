@@ -6,7 +6,7 @@ use super::voice::{say, show};
 /// Asks, and gives the answer without the space around it; none where the input ends, an
 /// end is asked for, or the answer is `q`. What was typed before is no answer.
 pub(in crate::cli) fn ask(question: &str) -> Option<String> {
-    let keyboard = keyboard();
+    let mut keyboard = keyboard();
     keyboard.forget_typed();
     show(format!("{question} "));
     match keyboard.line() {

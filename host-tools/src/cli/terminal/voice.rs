@@ -14,6 +14,8 @@ use std::thread::Builder;
 
 use indicatif::ProgressBar;
 
+use super::raw_keys;
+
 /// Lines that wait to be written; beyond them, lines are left out.
 const WAITING: usize = 512;
 
@@ -111,7 +113,10 @@ fn above(bottom: &Option<ProgressBar>, put: impl FnOnce()) {
     }
 }
 
-/// Writes, where that can be written.
+/// Writes, where that can be written. In raw mode a terminal does not go back to the first
+/// column by itself.
 pub(in crate::cli) fn put(mut to: impl Write, text: &str) {
+    let of_raw = raw_keys::is_raw().then(|| text.replace('\n', "\r\n"));
+    let text = of_raw.as_deref().unwrap_or(text);
     let _ = to.write_all(text.as_bytes()).and_then(|()| to.flush());
 }

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use super::{BEFORE_CONTACT, CONTACT, Column, NUMBERS, Record, Value};
 use crate::output::{Output, OutputError};
-use crate::replay::settings::Settings;
+use crate::replay::settings::{Settings, ViewSettings};
 
 /// A CSV recording being written.
 pub(super) struct Csv {
@@ -27,11 +27,23 @@ impl Csv {
     /// Puts the settings before what is not written yet: the header.
     pub(super) fn describe(&mut self, settings: &Settings) {
         let header = std::mem::take(&mut self.text);
-        for line in settings.to_toml().lines() {
+        self.remark(&settings.without_views().to_toml());
+        self.text.extend(header);
+    }
+
+    /// Says between two rows that the rows from here on were felt in another view. What
+    /// passes comments over passes it over, and all comments together are the settings.
+    pub(super) fn view(&mut self, view: &ViewSettings) -> Result<(), OutputError> {
+        self.flush()?;
+        self.remark(&view.to_toml());
+        Ok(())
+    }
+
+    fn remark(&mut self, text: &str) {
+        for line in text.lines() {
             let space = if line.is_empty() { "" } else { " " };
             self.text.extend(format!("#{space}{line}\n").bytes());
         }
-        self.text.extend(header);
     }
 
     pub(super) fn write(&mut self, record: &Record, more: &[Value<'_>]) -> Result<(), OutputError> {

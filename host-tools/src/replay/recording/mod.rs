@@ -12,7 +12,7 @@ use std::path::Path;
 use hapterra_core::contact::ContactState;
 use hapterra_core::scene::Sample;
 
-use super::settings::Settings;
+use super::settings::{Settings, ViewSettings};
 use crate::output::{Output, OutputError};
 use crate::terrain::Scale;
 
@@ -149,6 +149,20 @@ impl Recording {
         match &mut self.0 {
             Form::Csv(csv) => csv.describe(settings),
             Form::Parquet(parquet) => parquet.describe(settings),
+        }
+    }
+
+    /// Says that the rows from here on were felt in another view.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn view(&mut self, view: &ViewSettings) -> Result<(), OutputError> {
+        match &mut self.0 {
+            Form::Csv(csv) => csv.view(view),
+            Form::Parquet(parquet) => {
+                parquet.view(view);
+                Ok(())
+            }
         }
     }
 

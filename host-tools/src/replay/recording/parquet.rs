@@ -17,7 +17,7 @@ use parquet::schema::types::{ColumnPath, Type};
 
 use super::{BEFORE_CONTACT, CONTACT, Column, NUMBERS, Record, Value};
 use crate::output::{Output, OutputError};
-use crate::replay::settings::{KEY, Settings};
+use crate::replay::settings::{KEY, Settings, ViewSettings};
 
 /// Rows that are kept before they are written as one group: a minute of a device.
 const GROUP: usize = 60_000;
@@ -29,6 +29,8 @@ pub(super) struct Parquet {
     /// The rows of the group that is not written yet, by columns.
     columns: Vec<Values>,
     rows: usize,
+    /// Settings and views as TOML.
+    settings: String,
 }
 
 /// The values of one column in a group.
@@ -51,12 +53,17 @@ impl Parquet {
             writer,
             columns: empty(more),
             rows: 0,
+            settings: String::new(),
         })
     }
 
     pub(super) fn describe(&mut self, settings: &Settings) {
-        let entry = KeyValue::new(KEY.to_owned(), settings.to_toml());
-        self.writer.append_key_value_metadata(entry);
+        self.settings = settings.without_views().to_toml();
+    }
+
+    /// Rows of another view follow. The file's metadata is written at its end.
+    pub(super) fn view(&mut self, view: &ViewSettings) {
+        self.settings += &view.to_toml();
     }
 
     pub(super) fn write(&mut self, record: &Record, more: &[Value<'_>]) -> Result<(), OutputError> {
@@ -84,6 +91,10 @@ impl Parquet {
 
     pub(super) fn finish(mut self) -> Result<(), OutputError> {
         self.write_group()?;
+        if !self.settings.is_empty() {
+            let entry = KeyValue::new(KEY.to_owned(), self.settings);
+            self.writer.append_key_value_metadata(entry);
+        }
         let output = self.writer.into_inner();
         output.map_err(|error| failed(&self.path, error))?.finish()
     }

@@ -5,7 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use csv::{ByteRecord, ReaderBuilder, Trim};
 
 use super::comments::{self, Again};
-use super::{COLUMNS, Numbers, TrajectoryFault};
+use super::{COLUMNS, Numbers, Told, TrajectoryFault, VIEW};
 
 /// Rows of a CSV file that are read one by one.
 pub(super) struct Rows<R> {
@@ -13,6 +13,8 @@ pub(super) struct Rows<R> {
     record: ByteRecord,
     columns: usize,
     was_cut: bool,
+    /// Which column tells the view, where there is one.
+    view: Option<usize>,
 }
 
 impl<R: Read + Seek> Rows<R> {
@@ -31,6 +33,7 @@ impl<R: Read + Seek> Rows<R> {
             record: ByteRecord::new(),
             columns: 0,
             was_cut: false,
+            view: None,
         };
         rows.read_header()?;
         Ok((rows, text))
@@ -41,6 +44,7 @@ impl<R: Read + Seek> Rows<R> {
         let names: Vec<_> = self.record.iter().map(String::from_utf8_lossy).collect();
         let fits = names.len() >= COLUMNS.len() && names.iter().zip(COLUMNS).all(|(a, b)| a == b);
         self.columns = names.len();
+        self.view = names.iter().position(|name| name == VIEW);
         if !fits {
             let found = shown(&names.join(","));
             let at = self.place();
@@ -50,7 +54,7 @@ impl<R: Read + Seek> Rows<R> {
     }
 
     /// The next row; `None` after the last.
-    pub(super) fn next(&mut self) -> Result<Option<Numbers>, TrajectoryFault> {
+    pub(super) fn next(&mut self) -> Result<Option<Told>, TrajectoryFault> {
         if !self.read_record()? {
             return Ok(None);
         }
@@ -69,7 +73,21 @@ impl<R: Read + Seek> Rows<R> {
         for (column, number) in numbers.iter_mut().enumerate() {
             *number = self.number(column)?;
         }
-        Ok(Some(numbers))
+        let view = match self.view {
+            Some(column) => self.view(column)?,
+            None => 0,
+        };
+        Ok(Some(Told { numbers, view }))
+    }
+
+    fn view(&mut self, column: usize) -> Result<u32, TrajectoryFault> {
+        let field = String::from_utf8_lossy(self.record.get(column).unwrap_or(&[]));
+        let Ok(view) = field.parse() else {
+            let what = format!("`{}` is no number of a view", shown(&field));
+            let (at, column) = (self.place(), VIEW);
+            return Err(TrajectoryFault::Field { at, column, what });
+        };
+        Ok(view)
     }
 
     /// Whether the file ended in the middle of a row, as that of a recording that was killed

@@ -24,6 +24,9 @@ use fault::TrajectoryFault;
 /// columns are passed over, so what was recorded can be replayed.
 const COLUMNS: [&str; 4] = ["t_s", "x_mm", "y_mm", "z_mm"];
 
+/// The column that tells in which view a row was felt.
+const VIEW: &str = "view";
+
 /// One position of the HIP.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
@@ -33,6 +36,14 @@ pub struct Row {
     pub hip_mm: [f64; 3],
     /// The same on the grid.
     pub hip: GridPoint,
+}
+
+/// What a row tells before its place is laid on a grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Told {
+    numbers: Numbers,
+    /// The view that it was felt in; 0 for the view of the beginning, or where nothing is said.
+    pub view: u32,
 }
 
 /// A trajectory that is read row by row.
@@ -71,8 +82,10 @@ impl Trajectory {
                 (Form::Parquet(Box::new(rows)), text)
             }
             false => {
+                let views = views_of(&mut file)?;
                 let (rows, text) = csv::Rows::open(file)?;
-                (Form::Csv(Box::new(rows)), text)
+                // Remarks that are no settings are followed by no views.
+                (Form::Csv(Box::new(rows)), text + &views)
             }
         };
         Ok(Self {
@@ -96,13 +109,39 @@ impl Trajectory {
     /// # Errors
     /// [`TrajectoryError`] names the line and the column.
     pub fn next_row(&mut self, scale: &Scale) -> Result<Option<Row>, TrajectoryError> {
-        let numbers = match &mut self.form {
+        match self.next_told()? {
+            Some(told) => self.lay(&told, scale).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// The next row as it stands in the file; `None` after the last. [`Self::lay`] puts it on
+    /// the grid of its view.
+    ///
+    /// # Errors
+    /// As [`Self::next_row`].
+    pub fn next_told(&mut self) -> Result<Option<Told>, TrajectoryError> {
+        let told = match &mut self.form {
             Form::Csv(rows) => rows.next(),
             Form::Parquet(rows) => rows.next(),
         };
-        let Some([t_s, x, y, z]) = numbers.map_err(|fault| self.wrong(fault))? else {
-            return Ok(None);
-        };
+        told.map_err(|fault| self.wrong(fault))
+    }
+
+    /// A row that nobody can lay on a grid, because its view is not described.
+    #[must_use]
+    pub fn of_unknown_view(&mut self, told: &Told) -> TrajectoryError {
+        let (at, column) = (self.place(), VIEW);
+        let what = format!("the recording does not describe view {}", told.view);
+        self.wrong(TrajectoryFault::Field { at, column, what })
+    }
+
+    /// The latest row on the grid of a scale.
+    ///
+    /// # Errors
+    /// As [`Self::next_row`].
+    pub fn lay(&mut self, told: &Told, scale: &Scale) -> Result<Row, TrajectoryError> {
+        let [t_s, x, y, z] = told.numbers;
         let hip_mm = [x, y, z];
         let Some(hip) = scale.to_grid(hip_mm) else {
             let (column, what) = far(hip_mm, scale);
@@ -110,7 +149,7 @@ impl Trajectory {
             return Err(self.wrong(TrajectoryFault::Field { at, column, what }));
         };
         self.watch_time(t_s);
-        Ok(Some(Row { t_s, hip_mm, hip }))
+        Ok(Row { t_s, hip_mm, hip })
     }
 
     /// Whether the last row of the recording was cut in its middle, and is left out: the
@@ -156,6 +195,16 @@ fn far(hip_mm: [f64; 3], scale: &Scale) -> (&'static str, String) {
     let mm = hip_mm.get(axis).copied().unwrap_or_default();
     let what = format!("{mm} mm is farther than {MAX_CELL} cells of {cell_mm} mm from the origin");
     (COLUMNS[1 + axis], what)
+}
+
+/// What a CSV file tells of views between its rows; nothing where it cannot be wound back.
+fn views_of(file: &mut File) -> Result<String, TrajectoryFault> {
+    if file.stream_position().is_err() {
+        return Ok(String::new());
+    }
+    let views = comments::views(&mut *file);
+    let views = views.and_then(|views| file.seek(SeekFrom::Start(0)).map(|_| views));
+    views.map_err(TrajectoryFault::Unreadable)
 }
 
 /// Whether a file begins as Parquet does; what cannot be wound back is CSV.

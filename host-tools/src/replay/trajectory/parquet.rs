@@ -4,11 +4,11 @@ use std::fs::File;
 use std::io;
 
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
-use parquet::data_type::DoubleType;
+use parquet::data_type::{DoubleType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
-use super::{COLUMNS, Numbers, TrajectoryFault};
+use super::{COLUMNS, Numbers, Told, TrajectoryFault, VIEW};
 use crate::replay::settings::KEY;
 
 /// Rows that are read at a time.
@@ -21,6 +21,10 @@ pub(super) struct Rows {
     next_group: usize,
     /// What reads the columns of the present group.
     columns: Vec<ColumnReaderImpl<DoubleType>>,
+    /// Which column tells the view, where there is one; what reads it, and what it read.
+    view_column: Option<usize>,
+    view: Option<ColumnReaderImpl<Int64Type>>,
+    views: Vec<i64>,
     /// Rows that were read, and are not told yet from `next` on.
     read: [Vec<f64>; COLUMNS.len()],
     next: usize,
@@ -42,7 +46,11 @@ impl Rows {
             let first: Vec<_> = names.into_iter().take(COLUMNS.len()).collect();
             return Err(TrajectoryFault::Schema(first.join(", ")));
         }
+        let view_column = names.iter().position(|name| *name == VIEW);
         let rows = Self {
+            view_column,
+            view: None,
+            views: Vec::new(),
             reader,
             next_group: 0,
             columns: Vec::new(),
@@ -54,7 +62,7 @@ impl Rows {
     }
 
     /// The next row; `None` after the last.
-    pub(super) fn next(&mut self) -> Result<Option<Numbers>, TrajectoryFault> {
+    pub(super) fn next(&mut self) -> Result<Option<Told>, TrajectoryFault> {
         while self.next >= self.read[0].len() {
             if !self.read_more()? {
                 return Ok(None);
@@ -71,9 +79,15 @@ impl Rows {
                     what: "no finite number".into(),
                 })?;
         }
+        let view = self.views.get(self.next).copied().unwrap_or(0);
+        let view = u32::try_from(view).map_err(|_| TrajectoryFault::Field {
+            at: format!("row {}", self.told + 1),
+            column: VIEW,
+            what: format!("{view} is no number of a view"),
+        })?;
         self.next += 1;
         self.told += 1;
-        Ok(Some(numbers))
+        Ok(Some(Told { numbers, view }))
     }
 
     /// The present row, for a message.
@@ -89,6 +103,11 @@ impl Rows {
         }
         for (column, values) in self.columns.iter_mut().zip(&mut self.read) {
             let read = column.read_records(AT_A_TIME, None, None, values);
+            read.map_err(unreadable)?;
+        }
+        self.views.clear();
+        if let Some(column) = &mut self.view {
+            let read = column.read_records(AT_A_TIME, None, None, &mut self.views);
             read.map_err(unreadable)?;
         }
         if !self.read[0].is_empty() {
@@ -110,6 +129,13 @@ impl Rows {
             };
             self.columns.push(column);
         }
+        self.view = match self.view_column {
+            None => None,
+            Some(index) => match group.get_column_reader(index).map_err(unreadable)? {
+                ColumnReader::Int64ColumnReader(column) => Some(column),
+                _ => return Err(TrajectoryFault::Schema(format!("{VIEW}, another type"))),
+            },
+        };
         Ok(true)
     }
 }

@@ -1,0 +1,158 @@
+//! Options and input of views that change while they are touched; shared by `run` and `demo`.
+
+use std::time::Instant;
+
+use hapterra_core::contact::Rule;
+use hapterra_core::phantom::Calibration;
+
+use super::placing::{self, scale_in_words, short};
+use crate::cli::failure::{Failure, OrHint};
+use crate::cli::terminal::keyboard::keyboard;
+use crate::cli::terminal::raw_keys::RawMode;
+use crate::link::{Ask, Event};
+use crate::place::{Bounds, Laid, Reach};
+use crate::steering::keys::{KEYS, Keys};
+use crate::steering::{CommandQueue, Origin, Put, Steer, Steering};
+use crate::telemetry::FeltViews;
+use crate::terrain::Terrain;
+
+/// How the view may be changed while it is touched.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct Commands {
+    /// Change the view by lines of this file while it is touched, or of standard input where
+    /// it is `-`: `at 2.5 zoom 2`, `pan 5 0`, `exaggerate 1.5`, `stiffness 0.5`, `clutch on`,
+    /// `clutch off`, `reset`
+    #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
+    pub commands: Option<Origin>,
+}
+
+impl Commands {
+    /// Reads them from now on.
+    ///
+    /// # Errors
+    /// A file that cannot be opened.
+    pub(in crate::cli) fn open(&self) -> Result<CommandQueue, Failure> {
+        let Some(origin) = &self.commands else {
+            return Ok(CommandQueue::default());
+        };
+        let told = |error| match origin {
+            Origin::StandardInput => format!("commands cannot be read: {error}"),
+            Origin::File(path) => {
+                format!("commands cannot be read from {}: {error}", path.display())
+            }
+        };
+        CommandQueue::of(origin)
+            .map_err(told)
+            .or_hint("name another file with --commands, or `-` for standard input")
+    }
+}
+
+/// Keys and commands on one side, a session on the other.
+pub(in crate::cli) struct ViewControl<'t> {
+    steering: Steering<'t>,
+    commands: CommandQueue,
+    keys: Keys,
+    /// While keys come one by one.
+    raw: Option<RawMode>,
+    began: Instant,
+}
+
+impl<'t> ViewControl<'t> {
+    /// Begins with what is served first.
+    pub(in crate::cli) fn new(
+        (terrain, laid, rule): (&Terrain<'t>, Laid, Rule),
+        (arm, level): (&Calibration, Option<u8>),
+        commands: CommandQueue,
+    ) -> Self {
+        let bounds = Bounds {
+            first: laid,
+            resolution_mm: Reach::of(arm).resolution_mm(),
+            level,
+        };
+        Self {
+            steering: Steering::new(bounds, rule, terrain.clone()),
+            commands,
+            keys: Keys::default(),
+            raw: None,
+            began: Instant::now(),
+        }
+    }
+
+    /// Takes keys from the terminal from now on, until this is dropped, where there is one
+    /// whose lines are no commands. Returns a line that names them.
+    pub(in crate::cli) fn listen(&mut self, options: &Commands) -> Option<String> {
+        if options.commands == Some(Origin::StandardInput) {
+            return None;
+        }
+        self.raw = RawMode::enter();
+        self.raw.as_ref().map(|_| format!("keys           {KEYS}"))
+    }
+
+    /// Takes what the device tells.
+    pub(in crate::cli) fn on_event(&mut self, event: &Event<'_>) {
+        self.steering.on_event(event);
+    }
+
+    /// Looks at keys and commands at a time of the device, s. What is wrong with them is
+    /// told.
+    pub(in crate::cli) fn look(&mut self, t_s: f64, tell: &mut dyn FnMut(String)) {
+        let now = self.began.elapsed();
+        if self.raw.is_some() {
+            for key in keyboard().keys() {
+                let steer = self.keys.press(key, now);
+                self.take(steer);
+            }
+            let released = self.keys.released(now);
+            self.take(released);
+        }
+        let is_free = self.steering.is_settled();
+        let due = self.commands.due(t_s, is_free, tell);
+        self.take(due);
+        self.steering.lines().into_iter().for_each(tell);
+    }
+
+    fn take(&mut self, steer: Option<Steer>) {
+        if let Some(steer) = steer {
+            self.steering.steer(steer);
+        }
+    }
+
+    /// What is to be asked of the device now.
+    pub(in crate::cli) fn asks(&mut self) -> Vec<Ask> {
+        self.steering.asks()
+    }
+
+    /// The view that is to be put in now, which samples may be felt in from now on.
+    pub(in crate::cli) fn put(&mut self, views: &mut FeltViews<'t>) -> Option<Put<'t>> {
+        let put = self.steering.take_put()?;
+        views.put(put.view.number, put.terrain.clone(), put.laid);
+        Some(put)
+    }
+
+    /// The view in force in a few words, and the keys.
+    pub(in crate::cli) fn in_words(&self) -> String {
+        let Laid { view, law } = self.steering.now();
+        let scale = match view.ground_m_per_mm() {
+            Some(metres) => format!("{} m/mm", short(metres)),
+            None => format!("{} mm a cell", short(view.felt_cell_mm())),
+        };
+        let times = view.exaggeration.unwrap_or(1.0);
+        let stiffness = short(f64::from(law.stiffness_n_per_mm));
+        format!(
+            "{scale}, level {}, heights × {}, {stiffness} N/mm",
+            view.level,
+            short(times)
+        )
+    }
+}
+
+/// What a view that was put in is, in a line.
+pub(in crate::cli) fn told(number: usize, laid: &Laid, terrain: &Terrain<'_>) -> String {
+    let file = terrain.raster().georeference();
+    format!(
+        "view {number}: {}; {} N/mm; {} under the home position",
+        scale_in_words(&laid.view),
+        placing::short(f64::from(laid.law.stiffness_n_per_mm)),
+        crate::place::place_in_words(&file, laid.view.home_ground)
+    )
+}

@@ -1,0 +1,161 @@
+//! Keys one by one, without waiting for Enter.
+//!
+//! The terminal gives them so in raw mode. It is put back on every way out: when this is
+//! dropped, also in a panic, and before a program that is interrupted twice exits
+//! ([`put_back`]). In raw mode Ctrl-C is a key like others, and means what it always does.
+
+use std::io::{self, IsTerminal, Read};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::SyncSender;
+
+use crossterm::terminal::{disable_raw_mode, enable_raw_mode};
+
+use super::interrupt;
+use crate::steering::keys::Key;
+
+/// Whether the terminal is in raw mode: lines then end in CR LF.
+static IS_RAW: AtomicBool = AtomicBool::new(false);
+
+/// What the thread at the keyboard has read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Pressed {
+    /// Enter.
+    Enter,
+    /// A key that may change the view.
+    Key(Key),
+}
+
+/// The terminal in raw mode, until this is dropped.
+pub(in crate::cli) struct RawMode(());
+
+impl RawMode {
+    /// Puts the terminal into raw mode; none where standard input is no terminal, or it
+    /// cannot be.
+    pub(in crate::cli) fn enter() -> Option<Self> {
+        if !io::stdin().is_terminal() || !io::stderr().is_terminal() {
+            return None;
+        }
+        enable_raw_mode().ok()?;
+        IS_RAW.store(true, Ordering::Relaxed);
+        Some(Self(()))
+    }
+}
+
+impl Drop for RawMode {
+    fn drop(&mut self) {
+        put_back();
+    }
+}
+
+/// Puts the terminal back as it was, where it is in raw mode.
+pub(in crate::cli) fn put_back() {
+    if IS_RAW.swap(false, Ordering::Relaxed) {
+        let _ = disable_raw_mode();
+    }
+}
+
+/// Whether the terminal is in raw mode.
+pub(super) fn is_raw() -> bool {
+    IS_RAW.load(Ordering::Relaxed)
+}
+
+/// Reads keys until the terminal is gone.
+pub(super) fn read(pressed: &SyncSender<Pressed>) {
+    let (mut keys, mut chunk, mut stdin) = (Sequence::default(), [0; 64], io::stdin().lock());
+    while let Ok(n @ 1..) = stdin.read(&mut chunk) {
+        for byte in chunk.iter().take(n) {
+            match keys.take(*byte) {
+                Some(Typed::Interrupt) => interrupt::press(),
+                // Whoever types ahead so far is not heeded.
+                Some(Typed::Pressed(key)) => drop(pressed.try_send(key)),
+                None => {}
+            }
+        }
+    }
+    put_back();
+}
+
+/// What a byte, or the last of some, comes to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Typed {
+    /// Ctrl-C, or Ctrl-\.
+    Interrupt,
+    Pressed(Pressed),
+}
+
+/// Bytes of a key so far. Arrows are `ESC [ A` to `D`, or `ESC O A` to `D`; others with as many
+/// bytes are passed over as a whole.
+#[derive(Clone, Copy, Debug, Default)]
+enum Sequence {
+    #[default]
+    None,
+    Escape,
+    Control,
+}
+
+impl Sequence {
+    fn take(&mut self, byte: u8) -> Option<Typed> {
+        let arrow = |east, north| Some(Typed::Pressed(Pressed::Key(Key::Arrow(east, north))));
+        match (std::mem::take(self), byte) {
+            (_, 0x03 | 0x1C) => Some(Typed::Interrupt),
+            (_, 0x1B) => {
+                *self = Self::Escape;
+                None
+            }
+            (Self::Escape, b'[' | b'O') => {
+                *self = Self::Control;
+                None
+            }
+            // What stands before the last byte: of an arrow, the keys that are held with it.
+            (Self::Control, 0x20..=0x3F) => {
+                *self = Self::Control;
+                None
+            }
+            (Self::Control, b'A') => arrow(0, 1),
+            (Self::Control, b'B') => arrow(0, -1),
+            (Self::Control, b'C') => arrow(1, 0),
+            (Self::Control, b'D') => arrow(-1, 0),
+            (Self::Control, _) => None,
+            (_, b'\r' | b'\n') => Some(Typed::Pressed(Pressed::Enter)),
+            (_, b' '..=b'~') => Some(Typed::Pressed(Pressed::Key(Key::Char(byte.into())))),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn typed(bytes: &[u8]) -> Vec<Typed> {
+        let mut keys = Sequence::default();
+        bytes.iter().filter_map(|byte| keys.take(*byte)).collect()
+    }
+
+    #[test]
+    fn keys_are_told_apart() {
+        let key = |key| Typed::Pressed(Pressed::Key(key));
+        let arrow = |east, north| key(Key::Arrow(east, north));
+        for (bytes, expected) in [
+            (
+                &b"+ \r\n"[..],
+                vec![
+                    key(Key::Char('+')),
+                    key(Key::Char(' ')),
+                    Typed::Pressed(Pressed::Enter),
+                    Typed::Pressed(Pressed::Enter),
+                ],
+            ),
+            (
+                b"\x1b[A\x1b[B\x1bOC\x1bOD",
+                vec![arrow(0, 1), arrow(0, -1), arrow(1, 0), arrow(-1, 0)],
+            ),
+            // Held with Ctrl; a page key, whose digits are no keys.
+            (b"\x1b[1;5C\x1b[5~0", vec![arrow(1, 0), key(Key::Char('0'))]),
+            (b"\x1b[\x03", vec![Typed::Interrupt]),
+            (b"\xc3\xa4\x07\x1b\x1b[A", vec![arrow(0, 1)]),
+        ] {
+            assert_eq!(typed(bytes), expected, "{bytes:?}");
+        }
+    }
+}

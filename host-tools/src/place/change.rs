@@ -1,0 +1,266 @@
+//! Changes of a view while it is felt: the view before and what is asked for make the next
+//! one, or say why not.
+
+use hapterra_core::force::ForceLaw;
+
+use super::view::{View, finest_level};
+use crate::terrain::{BadScale, FeltGrid, Terrain, TerrainError};
+
+/// A sample of the file as large as this in the hand is felt as one even patch, mm.
+const LARGEST_CELL_MM: f64 = 50.0;
+/// The longer side of a terrain as small as this in the hand tells nothing any more, mm.
+const SMALLEST_TERRAIN_MM: f64 = 5.0;
+/// Above this an arm most likely buzzes or kicks, N/mm: people hold 0.4 to 0.8 N/mm on a
+/// Premium 1.5 (`docs/hardware.md`).
+pub(crate) const STIFFEST_N_PER_MM: f32 = 1.0;
+/// Less is not felt, N/mm.
+const SOFTEST_N_PER_MM: f32 = 0.005;
+
+/// What may be changed of a view while it is felt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ViewChange {
+    /// Another place under the hand: so many hand millimetres farther east and north.
+    Pan {
+        /// Hand millimetres east.
+        east_mm: f64,
+        /// Hand millimetres north.
+        north_mm: f64,
+    },
+    /// The same in ground metres.
+    PanGround {
+        /// Ground metres east.
+        east_m: f64,
+        /// Ground metres north.
+        north_m: f64,
+    },
+    /// So many times larger, about the place under the hand.
+    Zoom(f64),
+    /// Heights so many times larger.
+    Exaggerate(f64),
+    /// A spring so many times stiffer.
+    Stiffness(f64),
+    /// Scale, heights and stiffness of the beginning, at the place under the hand.
+    Reset,
+}
+
+/// Why a view cannot be changed as it is asked for. The view stays as it is.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ChangeError {
+    /// A place beyond the samples.
+    #[error("that place is outside of the terrain")]
+    Outside,
+    /// Ground metres, of a file that knows none.
+    #[error(
+        "the file does not know how large its cells are on the ground: pan by hand millimetres"
+    )]
+    NoGroundSize,
+    /// A factor that is none.
+    #[error("{0} is no factor: it must be above zero, and finite")]
+    Factor(f64),
+    /// Larger than there is detail.
+    #[error(
+        "a sample of the file would be {cell_mm:.0} mm wide in the hand: it has no more detail"
+    )]
+    NoDetail {
+        /// Hand millimetres a felt cell of level 0.
+        cell_mm: f64,
+    },
+    /// Smaller than can be felt.
+    #[error("the whole terrain would be {size_mm:.1} mm wide in the hand")]
+    TooSmall {
+        /// Its longer side.
+        size_mm: f64,
+    },
+    /// A spring that an arm cannot make.
+    #[error(
+        "a stiffness of {0:.3} N/mm: from {SOFTEST_N_PER_MM} to {STIFFEST_N_PER_MM} N/mm can be had"
+    )]
+    Stiffness(f32),
+    /// Numbers that no terrain can be felt at.
+    #[error(transparent)]
+    Terrain(#[from] TerrainError),
+    /// A scale that none can have.
+    #[error(transparent)]
+    Scale(#[from] BadScale),
+}
+
+/// A view, and the law of its force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Laid {
+    /// Place, scale, level and heights.
+    pub view: View,
+    /// Stiffness and limit.
+    pub law: ForceLaw,
+}
+
+/// What does not change while views do.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// The view of the beginning.
+    pub first: Laid,
+    /// What one count of the encoders is at the tip, mm.
+    pub resolution_mm: f64,
+    /// A level that the user has stated.
+    pub level: Option<u8>,
+}
+
+/// Where the HIP is, and what of the terrain it is about to be changed at: hand
+/// millimetres of the view in force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hand {
+    /// The HIP.
+    pub hip_mm: [f64; 3],
+    /// The proxy, while it touches.
+    pub proxy_mm: Option<[f64; 3]>,
+}
+
+/// Another view, and where the HIP is in it.
+#[derive(Clone)]
+pub struct Changed<'r> {
+    /// The view.
+    pub laid: Laid,
+    /// Its terrain.
+    pub terrain: Terrain<'r>,
+    /// The HIP, hand millimetres of the new view. Its height over the place under
+    /// the hand is what it was.
+    pub hip_mm: [f64; 3],
+}
+
+impl Bounds {
+    /// Applies changes one after the other, at the place under the hand.
+    ///
+    /// # Errors
+    /// [`ChangeError`] of the first that cannot be had; then nothing is changed.
+    pub fn apply<'r>(
+        &self,
+        terrain: &Terrain<'r>,
+        before: &Laid,
+        changes: &[ViewChange],
+        hand: &Hand,
+    ) -> Result<Changed<'r>, ChangeError> {
+        let at_mm = hand.proxy_mm.unwrap_or(hand.hip_mm);
+        let cell_mm = before.view.scale.cell_mm();
+        let mut laid = *before;
+        let mut at = [at_mm[0] / cell_mm, at_mm[1] / cell_mm];
+        for change in changes {
+            (laid, at) = self.step(terrain.grid(), laid, at, change)?;
+        }
+        laid.view.level = match self.level {
+            Some(level) => level,
+            None => finest_level(terrain.grid(), self.resolution_mm, &laid.view.scale),
+        };
+        let terrain_after = terrain.rescaled(laid.view.scale, laid.view.level)?;
+        let hip_mm = hip_after((terrain, &terrain_after), hand, at_mm, at);
+        let moved = |axis: usize| before.view.home_mm[axis] + hip_mm[axis] - hand.hip_mm[axis];
+        let home_mm = [moved(0), moved(1), moved(2)];
+        laid.view = laid
+            .view
+            .moved_to(terrain.grid(), home_mm, before.view.scale);
+        Ok(Changed {
+            laid,
+            terrain: terrain_after,
+            hip_mm,
+        })
+    }
+
+    /// One change, at a place in felt cells of level 0.
+    fn step(
+        &self,
+        grid: &FeltGrid<'_>,
+        mut laid: Laid,
+        mut at: [f64; 2],
+        change: &ViewChange,
+    ) -> Result<(Laid, [f64; 2]), ChangeError> {
+        let Laid { view, law } = &mut laid;
+        let scale = view.scale;
+        let (cell_mm, height) = (scale.cell_mm(), scale.height_mm_per_unit());
+        match *change {
+            ViewChange::Pan { east_mm, north_mm } => {
+                at = [at[0] + east_mm / cell_mm, at[1] + north_mm / cell_mm];
+                within(grid, at)?;
+            }
+            ViewChange::PanGround { east_m, north_m } => {
+                let side = grid.side_m().ok_or(ChangeError::NoGroundSize)?;
+                at = [at[0] + east_m / side, at[1] + north_m / side];
+                within(grid, at)?;
+            }
+            ViewChange::Zoom(factor) => {
+                let factor = factor_of(factor)?;
+                *view = view.scaled(cell_mm * factor, height * factor)?;
+                check_size(grid, view, factor)?;
+            }
+            ViewChange::Exaggerate(factor) => {
+                *view = view.scaled(cell_mm, height * factor_of(factor)?)?;
+            }
+            ViewChange::Stiffness(factor) => {
+                let stiffness = law.stiffness_n_per_mm * factor_of(factor)? as f32;
+                // A stiffness of the user's own may go down, and come back.
+                let most = STIFFEST_N_PER_MM.max(self.first.law.stiffness_n_per_mm);
+                if !(SOFTEST_N_PER_MM..=most).contains(&stiffness) {
+                    return Err(ChangeError::Stiffness(stiffness));
+                }
+                law.stiffness_n_per_mm = stiffness;
+            }
+            ViewChange::Reset => {
+                let first = &self.first.view;
+                let (cell_mm, height) = (first.scale.cell_mm(), first.scale.height_mm_per_unit());
+                *view = view.scaled(cell_mm, height)?;
+                view.exaggeration = first.exaggeration;
+                *law = self.first.law;
+            }
+        }
+        Ok((laid, at))
+    }
+}
+
+/// The HIP in the view that comes after: beside the place under the hand as far as before,
+/// and as high over its ground, or as deep.
+fn hip_after(
+    (before, after): (&Terrain<'_>, &Terrain<'_>),
+    hand: &Hand,
+    at_mm: [f64; 3],
+    at: [f64; 2],
+) -> [f64; 3] {
+    let cell_mm = after.scale_of_level_0().cell_mm();
+    let [east, north] = at.map(|cells| cells * cell_mm);
+    let beside = |axis: usize| hand.hip_mm[axis] - at_mm[axis];
+    let ground_before = match hand.proxy_mm {
+        Some(proxy) => Some(proxy[2]),
+        None => before.height_mm(at_mm[0], at_mm[1]),
+    };
+    // Over a hole the height stays what it is.
+    let risen = ground_before
+        .zip(after.height_mm(east, north))
+        .map_or(0.0, |(before, after)| after - before);
+    [east + beside(0), north + beside(1), hand.hip_mm[2] + risen]
+}
+
+fn factor_of(factor: f64) -> Result<f64, ChangeError> {
+    match factor.is_finite() && factor > 0.0 {
+        true => Ok(factor),
+        false => Err(ChangeError::Factor(factor)),
+    }
+}
+
+fn within(grid: &FeltGrid<'_>, at: [f64; 2]) -> Result<(), ChangeError> {
+    let last = [grid.columns(), grid.rows()].map(|count| f64::from(count) - 1.0);
+    let inside = (0..2).all(|axis| (0.0..=last[axis]).contains(&at[axis]));
+    inside.then_some(()).ok_or(ChangeError::Outside)
+}
+
+/// Refuses what is too large or too small, unless it comes nearer to what is not.
+fn check_size(grid: &FeltGrid<'_>, view: &View, factor: f64) -> Result<(), ChangeError> {
+    let cell_mm = view.scale.cell_mm();
+    let size_mm = f64::from(grid.columns().max(grid.rows()) - 1) * cell_mm;
+    if factor > 1.0 && cell_mm > LARGEST_CELL_MM {
+        return Err(ChangeError::NoDetail { cell_mm });
+    }
+    if factor < 1.0 && size_mm < SMALLEST_TERRAIN_MM {
+        return Err(ChangeError::TooSmall { size_mm });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[path = "change_tests.rs"]
+mod tests;

@@ -1,0 +1,214 @@
+use super::*;
+use crate::place::{Heights, Reach, Sizing, Target, ViewOptions};
+use crate::raster::Raster;
+use hapterra_core::phantom::Calibration;
+
+/// 2049 × 2049 samples, 10 m apart, that rise by 1 m each to the east.
+fn raster() -> Raster {
+    let raster = Raster::from_fn(2049, 2049, |x, _| x as f32).expect("raster");
+    let mut cell = raster.cell().expect("metres");
+    (cell.east, cell.north) = (10.0, 10.0);
+    raster.with_cell(cell)
+}
+
+struct Bench {
+    raster: Raster,
+    level: Option<u8>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self {
+            raster: raster(),
+            level: None,
+        }
+    }
+
+    /// Does something with the terrain at 0.05 mm a cell, and its bounds.
+    fn with<T>(&self, look: impl FnOnce(&Terrain<'_>, Bounds) -> T) -> T {
+        let options = ViewOptions {
+            target: Target::Whole,
+            sizing: Sizing::CellMm(0.05),
+            heights: Heights::default(),
+            level: self.level,
+        };
+        let grid = options.target.grid(&self.raster, Default::default());
+        let grid = grid.expect("a grid");
+        let reach = Reach::of(&Calibration::PREMIUM_1_5);
+        let view = View::new(&grid, &reach, &options).expect("a view");
+        let terrain = view.terrain(grid).expect("a terrain");
+        let bounds = Bounds {
+            first: Laid {
+                view,
+                law: ForceLaw::PREMIUM,
+            },
+            resolution_mm: reach.resolution_mm(),
+            level: self.level,
+        };
+        look(&terrain, bounds)
+    }
+}
+
+/// 2 mm under the ground of the middle, and a proxy beside it.
+fn pressing(terrain: &Terrain<'_>) -> Hand {
+    let ground = terrain.height_mm(51.0, 51.2).expect("ground");
+    Hand {
+        hip_mm: [51.2, 51.2, ground - 2.0],
+        proxy_mm: Some([51.0, 51.2, ground]),
+    }
+}
+
+#[test]
+fn zoomed_about_the_proxy_its_ground_and_the_depth_are_the_same() {
+    Bench::new().with(|terrain, bounds| {
+        let hand = pressing(terrain);
+        let before = bounds.first;
+        let zoom = [ViewChange::Zoom(8.0)];
+        let changed = bounds
+            .apply(terrain, &before, &zoom, &hand)
+            .expect("zoomed");
+        let view = changed.laid.view;
+        assert!((view.scale.cell_mm() - 0.4).abs() < 1e-12);
+        assert_eq!(view.exaggeration, before.view.exaggeration);
+        // The proxy's ground, eight times as far from the first sample.
+        let ground = changed.terrain.height_mm(408.0, 409.6).expect("ground");
+        let [x, y, z] = changed.hip_mm;
+        assert!(
+            (x - 408.2).abs() < 1e-9 && (y - 409.6).abs() < 1e-9,
+            "{x} {y}"
+        );
+        assert!((ground - z - 2.0).abs() < 1e-9, "{}", ground - z);
+        // The arm has not moved: home and HIP move together.
+        for axis in 0..3 {
+            let then = before.view.home_mm[axis] - hand.hip_mm[axis];
+            let now = view.home_mm[axis] - changed.hip_mm[axis];
+            assert!((then - now).abs() < 1e-9);
+        }
+        // The place under the home position, in the file's coordinates.
+        let columns = view.home_mm[0] / 0.4;
+        assert!((view.home_ground[0] - terrain.grid().to_ground([columns, 0.0])[0]).abs() < 1e-6);
+    });
+}
+
+#[test]
+fn the_level_is_chosen_as_a_fit_does_and_a_stated_one_stays() {
+    for (stated, expected) in [(None, [0, 3, 0]), (Some(2), [2, 2, 2])] {
+        let bench = Bench {
+            level: stated,
+            ..Bench::new()
+        };
+        bench.with(|terrain, bounds| {
+            let hand = pressing(terrain);
+            let level = |factor: f64| {
+                let zoom = [ViewChange::Zoom(factor)];
+                let changed = bounds.apply(terrain, &bounds.first, &zoom, &hand);
+                changed.expect("zoomed").laid.view.level
+            };
+            // A count is 0.029 mm.
+            assert_eq!([level(1.0), level(0.1), level(10.0)], expected);
+        });
+    }
+}
+
+#[test]
+fn panned_there_is_other_ground_under_the_hand_as_deep_as_before() {
+    Bench::new().with(|terrain, bounds| {
+        let hand = pressing(terrain);
+        let pan = |change| bounds.apply(terrain, &bounds.first, &[change], &hand);
+        let panned = pan(ViewChange::Pan {
+            east_mm: 5.0,
+            north_mm: -1.0,
+        });
+        let panned = panned.expect("panned");
+        let ground = terrain.height_mm(56.0, 50.2).expect("ground");
+        let expected = [56.2, 50.2, ground - 2.0];
+        for axis in 0..3 {
+            assert!((panned.hip_mm[axis] - expected[axis]).abs() < 1e-9);
+        }
+        assert!(panned.terrain.has_tiles_of(terrain));
+        // 1000 m are 100 cells of 0.05 mm.
+        let far = pan(ViewChange::PanGround {
+            east_m: 1000.0,
+            north_m: -200.0,
+        });
+        assert!((far.expect("panned").hip_mm[0] - expected[0]).abs() < 1e-9);
+        let outside = pan(ViewChange::Pan {
+            east_mm: 60.0,
+            north_mm: 0.0,
+        });
+        assert_eq!(outside.err(), Some(ChangeError::Outside));
+    });
+}
+
+#[test]
+fn heights_and_stiffness_change_by_factors_and_come_back() {
+    Bench::new().with(|terrain, bounds| {
+        let hand = pressing(terrain);
+        let steeper = [ViewChange::Exaggerate(3.0), ViewChange::Stiffness(0.5)];
+        let changed = bounds.apply(terrain, &bounds.first, &steeper, &hand);
+        let changed = changed.expect("changed");
+        let Laid { view, law } = changed.laid;
+        assert!((view.exaggeration.expect("known") - 3.0).abs() < 1e-9);
+        assert_eq!(law.stiffness_n_per_mm, 0.25);
+        assert!(!changed.terrain.has_tiles_of(terrain));
+        let there = Hand {
+            hip_mm: changed.hip_mm,
+            proxy_mm: None,
+        };
+        let back = [ViewChange::Reset];
+        let back = bounds.apply(&changed.terrain, &changed.laid, &back, &there);
+        let back = back.expect("back").laid;
+        assert_eq!(
+            (back.view.scale, back.law),
+            (bounds.first.view.scale, bounds.first.law)
+        );
+        assert_eq!(back.view.exaggeration, bounds.first.view.exaggeration);
+    });
+}
+
+#[test]
+fn what_cannot_be_had_is_said_and_names_the_bound() {
+    Bench::new().with(|terrain, bounds| {
+        let hand = pressing(terrain);
+        for (change, says) in [
+            (ViewChange::Zoom(2000.0), "no more detail"),
+            (ViewChange::Zoom(1e-3), "mm wide"),
+            (ViewChange::Zoom(-1.0), "no factor"),
+            (ViewChange::Zoom(f64::NAN), "no factor"),
+            (ViewChange::Exaggerate(0.0), "no factor"),
+            (ViewChange::Exaggerate(1e12), "can be felt"),
+            (ViewChange::Stiffness(3.0), "1 N/mm"),
+            (ViewChange::Stiffness(1e-4), "0.005"),
+        ] {
+            let refused = bounds.apply(terrain, &bounds.first, &[change], &hand);
+            let said = refused.err().expect("refused").to_string();
+            assert!(said.contains(says), "{change:?}: {said}");
+        }
+    });
+    // What is too large already may be made smaller.
+    let bench = Bench::new();
+    bench.with(|terrain, bounds| {
+        let hand = pressing(terrain);
+        let mut first = bounds.first;
+        first.view = first.view.scaled(80.0, 8.0).expect("a scale");
+        let smaller = [ViewChange::Zoom(0.9)];
+        assert!(bounds.apply(terrain, &first, &smaller, &hand).is_ok());
+    });
+}
+
+#[test]
+fn in_the_air_the_height_over_the_ground_stays() {
+    Bench::new().with(|terrain, bounds| {
+        let ground = terrain.height_mm(51.2, 51.2).expect("ground");
+        let hand = Hand {
+            hip_mm: [51.2, 51.2, ground + 7.0],
+            proxy_mm: None,
+        };
+        let zoom = [ViewChange::Zoom(4.0)];
+        let changed = bounds.apply(terrain, &bounds.first, &zoom, &hand);
+        let changed = changed.expect("zoomed");
+        let [x, y, z] = changed.hip_mm;
+        let ground = changed.terrain.height_mm(x, y).expect("ground");
+        assert!((z - ground - 7.0).abs() < 1e-9, "{}", z - ground);
+    });
+}

@@ -1,0 +1,164 @@
+//! Commands as lines of text.
+
+use super::Steer;
+use crate::place::ViewChange;
+
+/// What is understood, for messages.
+pub const UNDERSTOOD: &str = "pan EAST NORTH (hand mm), pan-m EAST NORTH (ground m), zoom TIMES, \
+     exaggerate TIMES, stiffness TIMES, reset, clutch on, clutch off; `at SECONDS` before any of them";
+
+/// A command, and when it is to be done.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Command {
+    /// Seconds of the device's time since the beginning; as soon as what came before is
+    /// done, where nothing is said.
+    pub at_s: Option<f64>,
+    /// What is to be done.
+    pub steer: Steer,
+}
+
+/// A line that is no command.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{line}` is no command ({why}); understood are: {UNDERSTOOD}")]
+pub struct NoCommand {
+    line: String,
+    why: &'static str,
+}
+
+/// Characters of a line that a message repeats at most.
+const SHOWN: usize = 60;
+
+/// Reads a line; none where it is empty or a remark behind `#`.
+///
+/// # Errors
+/// [`NoCommand`] says what is understood.
+pub fn parse(line: &str) -> Result<Option<Command>, NoCommand> {
+    let text = line.split('#').next().unwrap_or_default();
+    let words: Vec<_> = text.split_whitespace().collect();
+    if words.is_empty() {
+        return Ok(None);
+    }
+    let refused = |why| NoCommand {
+        line: text.trim().chars().take(SHOWN).collect(),
+        why,
+    };
+    read(&words).map(Some).map_err(refused)
+}
+
+fn read(words: &[&str]) -> Result<Command, &'static str> {
+    let (at_s, words) = match words {
+        ["at", time, rest @ ..] => {
+            let at_s = number(time)?;
+            if at_s < 0.0 {
+                return Err("a time is not below zero");
+            }
+            (Some(at_s), rest)
+        }
+        _ => (None, words),
+    };
+    let change = |change| Ok(Steer::Change(change));
+    let steer = match words {
+        ["pan", east, north] => change(ViewChange::Pan {
+            east_mm: number(east)?,
+            north_mm: number(north)?,
+        }),
+        ["pan-m", east, north] => change(ViewChange::PanGround {
+            east_m: number(east)?,
+            north_m: number(north)?,
+        }),
+        ["zoom", times] => change(ViewChange::Zoom(factor(times)?)),
+        ["exaggerate", times] => change(ViewChange::Exaggerate(factor(times)?)),
+        ["stiffness", times] => change(ViewChange::Stiffness(factor(times)?)),
+        ["reset"] => change(ViewChange::Reset),
+        ["clutch", "on"] => Ok(Steer::Clutch(true)),
+        ["clutch", "off"] => Ok(Steer::Clutch(false)),
+        ["pan" | "pan-m", ..] => Err("it takes two numbers"),
+        ["zoom" | "exaggerate" | "stiffness", ..] => Err("it takes one number"),
+        ["clutch", ..] => Err("it is on or off"),
+        [] => Err("a command is missing"),
+        _ => Err("no such word"),
+    };
+    steer.map(|steer| Command { at_s, steer })
+}
+
+fn number(word: &str) -> Result<f64, &'static str> {
+    let number = word.parse().ok().filter(|number: &f64| number.is_finite());
+    number.ok_or("a number is wanted")
+}
+
+fn factor(word: &str) -> Result<f64, &'static str> {
+    match number(word)? {
+        times if times > 0.0 => Ok(times),
+        _ => Err("a factor is above zero"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_command_is_read() {
+        let pan = ViewChange::Pan {
+            east_mm: 5.0,
+            north_mm: -0.5,
+        };
+        let pan_m = ViewChange::PanGround {
+            east_m: -1e3,
+            north_m: 0.0,
+        };
+        for (line, at_s, steer) in [
+            ("pan 5 -0.5", None, Steer::Change(pan)),
+            ("  pan-m -1e3 0 # west", None, Steer::Change(pan_m)),
+            (
+                "at 2.5 zoom 2",
+                Some(2.5),
+                Steer::Change(ViewChange::Zoom(2.0)),
+            ),
+            (
+                "exaggerate 1.5",
+                None,
+                Steer::Change(ViewChange::Exaggerate(1.5)),
+            ),
+            (
+                "stiffness .5",
+                None,
+                Steer::Change(ViewChange::Stiffness(0.5)),
+            ),
+            ("at 0 reset", Some(0.0), Steer::Change(ViewChange::Reset)),
+            ("clutch\ton\r", None, Steer::Clutch(true)),
+            ("clutch off", None, Steer::Clutch(false)),
+        ] {
+            assert_eq!(parse(line), Ok(Some(Command { at_s, steer })), "{line}");
+        }
+        for nothing in ["", "  \r", "# a remark", "   # another"] {
+            assert_eq!(parse(nothing), Ok(None));
+        }
+    }
+
+    #[test]
+    fn what_is_not_understood_is_told_with_what_is() {
+        for (line, why) in [
+            ("zom 2", "no such word"),
+            ("zoom", "one number"),
+            ("zoom 2 3", "one number"),
+            ("zoom two", "a number"),
+            ("zoom 0", "above zero"),
+            ("zoom -1", "above zero"),
+            ("zoom inf", "a number"),
+            ("pan 5", "two numbers"),
+            ("pan 5 nan", "a number"),
+            ("clutch", "on or off"),
+            ("at 2", "missing"),
+            ("at -1 reset", "below zero"),
+            ("at soon reset", "a number"),
+            ("at 1 at 2 reset", "no such word"),
+        ] {
+            let told = parse(line).expect_err(line).to_string();
+            assert!(told.contains(why) && told.contains(line), "{told}");
+            assert!(told.contains("exaggerate TIMES"), "{told}");
+        }
+        let long = parse(&"x".repeat(10_000)).expect_err("no command");
+        assert!(long.to_string().len() < 400);
+    }
+}

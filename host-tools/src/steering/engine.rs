@@ -1,0 +1,274 @@
+//! What the user wants of the view, done with a device.
+
+use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::guard::Limits;
+use hapterra_core::scene::{Sample, Source, View};
+use hapterra_core::wire::request::Request;
+
+use super::Steer;
+use crate::link::{Ask, Event};
+use crate::place::{Bounds, Changed, Hand, Laid, ViewChange};
+use crate::terrain::Terrain;
+
+/// Changes that wait for the clutch to open; they are done at once.
+const WAITING: usize = 64;
+/// The clutch opens in 100 ticks of a millisecond; a device that has not opened it after so
+/// many samples is not going to.
+const SAMPLES_TO_OPEN: u32 = 5_000;
+
+/// A view that is to be put in.
+pub struct Put<'r> {
+    /// What the device is told.
+    pub view: View,
+    /// The terrain that it is felt on.
+    pub terrain: Terrain<'r>,
+    /// Place, scale and law.
+    pub laid: Laid,
+}
+
+/// Where a change stands.
+enum Stage {
+    /// The clutch is closed, as far as this host knows.
+    Idle,
+    /// The clutch was asked to open, so many samples ago.
+    Opening(u32),
+    /// The clutch is open.
+    Open,
+    /// This view was said.
+    Putting(Box<Laid>),
+    /// The clutch was let go, and is still told to be open.
+    Closing,
+}
+
+/// The engine behind keys and commands: from [`Steer`] to what a device is asked, by what it
+/// samples.
+pub struct Steering<'r> {
+    bounds: Bounds,
+    rule: Rule,
+    now: Laid,
+    terrain: Terrain<'r>,
+    /// Number of the view in force on the device.
+    number: u8,
+    waiting: Vec<ViewChange>,
+    /// The user holds the clutch.
+    held: bool,
+    stage: Stage,
+    asks: Vec<Ask>,
+    put: Option<Put<'r>>,
+    /// The terrain of the view that was said.
+    next: Option<Terrain<'r>>,
+    lines: Vec<String>,
+}
+
+impl<'r> Steering<'r> {
+    /// Begins with the view that is served first.
+    #[must_use]
+    pub fn new(bounds: Bounds, rule: Rule, terrain: Terrain<'r>) -> Self {
+        Self {
+            bounds,
+            rule,
+            now: bounds.first,
+            terrain,
+            number: 0,
+            waiting: vec![],
+            held: false,
+            stage: Stage::Idle,
+            asks: vec![],
+            put: None,
+            next: None,
+            lines: vec![],
+        }
+    }
+
+    /// The view in force, as far as this host knows, and its law.
+    #[must_use]
+    pub const fn now(&self) -> &Laid {
+        &self.now
+    }
+
+    /// The terrain of the view in force.
+    #[must_use]
+    pub const fn terrain(&self) -> &Terrain<'r> {
+        &self.terrain
+    }
+
+    /// Whether nothing that was wanted is under way.
+    #[must_use]
+    pub const fn is_settled(&self) -> bool {
+        let rests = match self.stage {
+            Stage::Idle => !self.held,
+            Stage::Open => self.held,
+            _ => false,
+        };
+        rests && self.waiting.is_empty()
+    }
+
+    /// Takes what the user wants.
+    pub fn steer(&mut self, steer: Steer) {
+        match steer {
+            Steer::Clutch(held) => self.held = held,
+            Steer::Change(change) if self.waiting.len() < WAITING => self.waiting.push(change),
+            // A key that is stuck.
+            Steer::Change(_) => {}
+        }
+    }
+
+    /// Lines for the user, in their order.
+    pub fn lines(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.lines)
+    }
+
+    /// What is to be asked of the device now.
+    pub fn asks(&mut self) -> Vec<Ask> {
+        std::mem::take(&mut self.asks)
+    }
+
+    /// The view that is to be put in now.
+    pub fn take_put(&mut self) -> Option<Put<'r>> {
+        self.put.take()
+    }
+
+    /// Takes what the device tells.
+    pub fn on_event(&mut self, event: &Event<'_>) {
+        match event {
+            Event::Sample(sample) => self.on_sample(sample),
+            Event::Viewed { view, taken } => self.on_viewed(view, *taken),
+            Event::Opened { resumed, .. } => {
+                // A clutch is let go with its session, and a device that was restarted begins
+                // with this view.
+                self.stage = Stage::Idle;
+                if !resumed {
+                    self.number = 0;
+                }
+            }
+            Event::Status(status) => self.on_home(status.health.home),
+            Event::Unanswered(Ask::Request(Request::Clutch { .. })) => {
+                self.give_up("the device does not answer: the view stays as it was");
+            }
+            _ => {}
+        }
+    }
+
+    fn give_up(&mut self, why: &str) {
+        self.lines.push(why.to_owned());
+        self.waiting.clear();
+        self.held = false;
+        self.let_go();
+    }
+
+    fn clutch(&mut self, held: bool) {
+        self.asks.push(Ask::Request(Request::Clutch { held }));
+    }
+
+    fn let_go(&mut self) {
+        self.clutch(false);
+        self.stage = Stage::Closing;
+    }
+
+    fn on_sample(&mut self, sample: &Sample) {
+        let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
+        match &mut self.stage {
+            Stage::Idle if self.held || !self.waiting.is_empty() => {
+                self.clutch(true);
+                self.stage = Stage::Opening(0);
+            }
+            Stage::Opening(_) if is_open && sample.view == self.number => {
+                self.stage = Stage::Open;
+                self.go_on(sample);
+            }
+            Stage::Opening(samples) => {
+                *samples += 1;
+                if *samples > SAMPLES_TO_OPEN {
+                    self.give_up("the device does not open its clutch: the view stays as it was");
+                }
+            }
+            Stage::Open if sample.view == self.number => self.go_on(sample),
+            Stage::Closing if !is_open => {
+                self.stage = Stage::Idle;
+                // The clutch has moved the terrain by what the hand did meanwhile.
+                self.asks.push(Ask::Status);
+            }
+            _ => {}
+        }
+    }
+
+    /// With an open clutch: the next view, or the end.
+    fn go_on(&mut self, sample: &Sample) {
+        // A proxy that has yet to land says nothing of the ground.
+        if sample.missing_tile.is_some() {
+            return;
+        }
+        if self.waiting.is_empty() {
+            if !self.held {
+                self.let_go();
+            }
+            return;
+        }
+        let changes = std::mem::take(&mut self.waiting);
+        match self.next_view(&changes, sample) {
+            Ok(put) => {
+                self.stage = Stage::Putting(Box::new(put.laid));
+                self.next = Some(put.terrain.clone());
+                self.put = Some(put);
+            }
+            Err(why) => self.lines.push(format!("the view stays as it was: {why}")),
+        }
+    }
+
+    fn next_view(&self, changes: &[ViewChange], sample: &Sample) -> Result<Put<'r>, String> {
+        let scale = self.terrain.scale();
+        let touches = sample.state == ContactState::Touching;
+        let hand = Hand {
+            hip_mm: scale.to_mm(&sample.hip),
+            proxy_mm: touches.then(|| scale.to_mm(&sample.proxy)),
+        };
+        let changed = self.bounds.apply(&self.terrain, &self.now, changes, &hand);
+        let Changed {
+            laid,
+            terrain,
+            hip_mm,
+        } = changed.map_err(|why| why.to_string())?;
+        let on_grid = |mm| {
+            let point = terrain.scale().to_grid(mm);
+            point.ok_or("that is too far from the first sample")
+        };
+        let (hip, home) = (on_grid(hip_mm)?, on_grid(laid.view.home_mm)?);
+        let view = View {
+            number: self.number.wrapping_add(1),
+            scene: terrain.scene(laid.law, self.rule, Source::Encoders, home),
+            hip,
+            keeps_tiles: terrain.has_tiles_of(&self.terrain),
+        };
+        Ok(Put {
+            view,
+            terrain,
+            laid,
+        })
+    }
+
+    fn on_viewed(&mut self, view: &View, taken: bool) {
+        let Stage::Putting(laid) = &self.stage else {
+            return;
+        };
+        if taken {
+            self.number = view.number;
+            self.now = **laid;
+            if let Some(terrain) = self.next.take() {
+                self.terrain = terrain;
+            }
+        } else {
+            let line = "the device did not take the view: it stays as it was";
+            self.lines.push(line.to_owned());
+        }
+        self.stage = Stage::Open;
+    }
+
+    /// Where the terrain is under the arm by now.
+    fn on_home(&mut self, home: Option<hapterra_core::grid::GridPoint>) {
+        if let Some(home) = home.filter(|_| matches!(self.stage, Stage::Idle)) {
+            let (view, grid) = (self.now.view, self.terrain.grid());
+            let home_mm = self.terrain.scale().to_mm(&home);
+            self.now.view = view.moved_to(grid, home_mm, view.scale);
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Keys that change the view, and the line that names them.
+
+use std::time::Duration;
+
+use super::Steer;
+use crate::place::ViewChange;
+
+/// The keys, for the screen.
+pub const KEYS: &str = "arrows pan, + - zoom, ] [ heights, . , stiffness, space held or c: clutch, 0 reset, Enter goes on";
+/// Hand millimetres of a pan by a key.
+const PAN_MM: f64 = 5.0;
+/// Times larger by a key.
+const ZOOM: f64 = 1.5;
+/// Times higher, or stiffer, by a key.
+const MORE: f64 = 1.25;
+/// A terminal tells that a key is pressed and that it repeats, and not that it is let go. A key
+/// that has not repeated for so long is let go.
+const LET_GO: Duration = Duration::from_millis(800);
+
+/// A key as it matters here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Key {
+    /// A character.
+    Char(char),
+    /// An arrow: east and north, −1, 0 or 1.
+    Arrow(i8, i8),
+}
+
+/// What keys come to: most are one change, and the clutch has a state.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Keys {
+    /// The clutch is held by a key that repeats: when it was heard last.
+    held: Option<Duration>,
+    toggled: bool,
+}
+
+impl Keys {
+    /// What a key means at a time since any fixed moment; none where it has no meaning.
+    pub fn press(&mut self, key: Key, now: Duration) -> Option<Steer> {
+        let change = |change| Some(Steer::Change(change));
+        match key {
+            Key::Arrow(east, north) => change(ViewChange::Pan {
+                east_mm: PAN_MM * f64::from(east),
+                north_mm: PAN_MM * f64::from(north),
+            }),
+            Key::Char('+' | '=') => change(ViewChange::Zoom(ZOOM)),
+            Key::Char('-' | '_') => change(ViewChange::Zoom(1.0 / ZOOM)),
+            Key::Char(']') => change(ViewChange::Exaggerate(MORE)),
+            Key::Char('[') => change(ViewChange::Exaggerate(1.0 / MORE)),
+            Key::Char('.') => change(ViewChange::Stiffness(MORE)),
+            Key::Char(',') => change(ViewChange::Stiffness(1.0 / MORE)),
+            Key::Char('0') => change(ViewChange::Reset),
+            Key::Char(' ') => {
+                let was_held = self.held.replace(now).is_some() || self.toggled;
+                (!was_held).then_some(Steer::Clutch(true))
+            }
+            Key::Char('c') => {
+                self.toggled = !self.toggled;
+                self.held = None;
+                Some(Steer::Clutch(self.toggled))
+            }
+            Key::Char(_) => None,
+        }
+    }
+
+    /// Whether the key that holds the clutch was let go by now, once.
+    pub fn released(&mut self, now: Duration) -> Option<Steer> {
+        let is_over = |heard: &mut Duration| now.saturating_sub(*heard) >= LET_GO;
+        let over = self.held.take_if(is_over).is_some();
+        (over && !self.toggled).then_some(Steer::Clutch(false))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    #[test]
+    fn keys_are_changes_and_go_back() {
+        let mut keys = Keys::default();
+        let mut factor = |key| match keys.press(Key::Char(key), ms(0)) {
+            Some(Steer::Change(
+                ViewChange::Zoom(factor)
+                | ViewChange::Exaggerate(factor)
+                | ViewChange::Stiffness(factor),
+            )) => factor,
+            other => panic!("{key}: {other:?}"),
+        };
+        for (more, less) in [('+', '-'), (']', '['), ('.', ',')] {
+            assert!((factor(more) * factor(less) - 1.0).abs() < 1e-12);
+            assert!(factor(more) > 1.0);
+        }
+        let north = keys.press(Key::Arrow(0, 1), ms(0));
+        let pan = ViewChange::Pan {
+            east_mm: 0.0,
+            north_mm: PAN_MM,
+        };
+        assert_eq!(north, Some(Steer::Change(pan)));
+        assert_eq!(keys.press(Key::Char('x'), ms(0)), None);
+    }
+
+    #[test]
+    fn the_clutch_is_held_while_its_key_repeats() {
+        let mut keys = Keys::default();
+        let space = Key::Char(' ');
+        assert_eq!(keys.press(space, ms(0)), Some(Steer::Clutch(true)));
+        for at in [500, 530, 560] {
+            assert_eq!(keys.released(ms(at)), None);
+            assert_eq!(keys.press(space, ms(at)), None);
+        }
+        assert_eq!(keys.released(ms(1_359)), None);
+        assert_eq!(keys.released(ms(1_360)), Some(Steer::Clutch(false)));
+        assert_eq!(keys.released(ms(5_000)), None);
+        // The other key holds it until it is pressed again.
+        assert_eq!(
+            keys.press(Key::Char('c'), ms(6_000)),
+            Some(Steer::Clutch(true))
+        );
+        assert_eq!(keys.press(space, ms(6_001)), None);
+        assert_eq!(keys.released(ms(9_000)), None);
+        assert_eq!(
+            keys.press(Key::Char('c'), ms(9_001)),
+            Some(Steer::Clutch(false))
+        );
+    }
+}

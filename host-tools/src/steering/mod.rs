@@ -1,0 +1,33 @@
+//! Another view of the terrain while it is touched.
+//!
+//! ```text
+//! keys ─────┐
+//!           ├─ Steer ─ Steering ─ clutch held ─ View put in ─ clutch let go
+//! commands ─┘             ▲                                        │
+//!                         └──────────── samples ───────────────────┘
+//! ```
+//!
+//! [`Steer`] is what the user wants, however it is said: [`command`] reads lines of text,
+//! [`keys`] reads keys. [`Steering`] is the one engine behind both. It has the device
+//! hold its clutch, waits until the terrain goes with the hand, works out the next
+//! view from where HIP and proxy are ([`crate::place::Bounds::apply`]), puts it in, and lets the
+//! clutch go.
+
+pub mod command;
+mod engine;
+pub mod keys;
+mod queue;
+
+use crate::place::ViewChange;
+
+pub use engine::{Put, Steering};
+pub use queue::{CommandQueue, Origin};
+
+/// What the user wants of the view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Steer {
+    /// Another view.
+    Change(ViewChange),
+    /// Hold the clutch, or let it go: while it is held the terrain goes with the hand.
+    Clutch(bool),
+}

@@ -1,0 +1,294 @@
+//! Another view of the terrain while a hand presses on it: the device's own application, a
+//! virtual Phantom, and the engine that keys and commands use.
+
+use std::time::Duration;
+
+use hapterra::link::{Arming, Event, Native, Patience, Session};
+use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
+use hapterra::place::{Bounds, Laid, Reach, Sizing, Target, View, ViewChange, ViewOptions};
+use hapterra::raster::Raster;
+use hapterra::steering::{Steer, Steering};
+use hapterra::terrain::FeltCells;
+use hapterra_core::Vec3;
+use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::force::ForceLaw;
+use hapterra_core::guard::{Limits, MAX_SLEW_N_PER_S, Mode};
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::Sample;
+use hapterra_firmware::native::StoppedClock;
+
+/// Samples along a side.
+const SIZE: u32 = 4097;
+/// A coarse encoder, so that nine levels of a terrain of this size are wide enough for a
+/// hand, mm.
+const RESOLUTION_MM: f64 = 0.5;
+/// The hand presses with this, N: what the motors hold for good, as this hand does not
+/// tremble.
+const PUSH_N: f64 = 1.2;
+/// Most that the force changes in a tick, N: all of it goes out in 100 ticks, and the hand
+/// that gives way moves some 0.1 mm.
+const GENTLE_N: f32 = 0.12;
+
+/// Hills of every size: it looks alike at each level.
+fn hills() -> Raster {
+    let raster = Raster::from_fn(SIZE, SIZE, |x, y| {
+        let (x, y) = (f64::from(x), f64::from(y));
+        let wave = |k: i32| {
+            let long = 20.0 * 2f64.powi(k);
+            0.02 * long * ((x / long).sin() + (y / long + 1.0).cos())
+        };
+        (0..8).map(wave).sum::<f64>() as f32
+    });
+    raster.expect("a raster")
+}
+
+/// A session in which a hand presses, and views are changed.
+struct Touching<'t> {
+    session: Session<'t>,
+    steering: Steering<'t>,
+    samples: Vec<Sample>,
+    said: Vec<String>,
+}
+
+/// At the smallest scale, level 8, with a hand that presses on the middle for so long.
+fn pressed<T>(raster: &Raster, seconds: f64, play: impl FnOnce(&mut Touching<'_>) -> T) -> T {
+    let options = ViewOptions {
+        target: Target::Whole,
+        sizing: Sizing::CellMm(1.05 * RESOLUTION_MM / 256.0),
+        level: Some(8),
+        ..ViewOptions::default()
+    };
+    let grid = options.target.grid(raster, FeltCells::default());
+    let grid = grid.expect("a grid");
+    let reach = Reach::of(&Calibration::PREMIUM_1_5);
+    let view = View::new(&grid, &reach, &options).expect("a view");
+    let terrain = view.terrain(grid).expect("a terrain");
+    let law = ForceLaw::PREMIUM;
+    let scene = view.scene(&terrain, law, Rule::Swept).expect("a scene");
+    let [east, north, _] = view.home_mm;
+    let surface = |x: f64, y: f64| terrain.height_mm(x, y);
+    let (hand, wall) = (HandModel::default(), f64::from(law.stiffness_n_per_mm));
+    let touch = Touch::start(&surface, &hand, wall, [east, north], 10.0);
+    let script: Script = touch.press(PUSH_N, seconds).finish();
+    let home_mm = view.home_mm;
+    let model = PhantomModel::premium_1_5();
+    let arm = HeldPhantom::new(model, hand, Placement { home_mm }, script).expect("in reach");
+    let device: Native = Native::new(StoppedClock, Some(Box::new(arm.arming())));
+    let (arming, patience) = (Some(Arming::VIRTUAL), Patience::REAL_TIME);
+    let opened = Session::open(&terrain, scene, arming, Box::new(device), patience);
+    let bounds = Bounds {
+        first: Laid { view, law },
+        resolution_mm: RESOLUTION_MM,
+        level: None,
+    };
+    let mut touching = Touching {
+        session: opened.expect("opened").0,
+        steering: Steering::new(bounds, Rule::Swept, terrain.clone()),
+        samples: vec![],
+        said: vec![],
+    };
+    // Armed, down, and at rest.
+    touching.run_to(6_000);
+    let played = play(&mut touching);
+    let tally = touching.session.tally();
+    assert_eq!(tally.lost + tally.dropped, 0);
+    touching
+        .session
+        .say_goodbye(&mut |_| {})
+        .expect("confirmed");
+    played
+}
+
+impl Touching<'_> {
+    fn poll(&mut self) {
+        let (samples, steering) = (&mut self.samples, &mut self.steering);
+        let mut take = |event: Event<'_>| {
+            steering.on_event(&event);
+            if let Event::Sample(sample) = event {
+                samples.push(*sample);
+            }
+        };
+        self.session
+            .poll(Duration::ZERO, &mut take)
+            .expect("goes on");
+        for ask in self.steering.asks() {
+            self.session.ask(ask);
+        }
+        if let Some(put) = self.steering.take_put() {
+            self.session.put_view(put.view, put.terrain).expect("said");
+        }
+        self.said.extend(self.steering.lines());
+    }
+
+    fn run_to(&mut self, tick: u32) {
+        while self.samples.last().is_none_or(|last| last.tick < tick) {
+            self.poll();
+        }
+    }
+
+    fn run(&mut self, ticks: u32) -> Sample {
+        let last = self.samples.last().expect("samples").tick;
+        self.run_to(last + ticks);
+        *self.samples.last().expect("samples")
+    }
+
+    /// Wants something, and waits until it is done and the force is there again.
+    fn steer(&mut self, steer: Steer) -> Sample {
+        self.steering.steer(steer);
+        for _ in 0..200_000 {
+            self.poll();
+            if self.steering.is_settled() {
+                return self.run(700);
+            }
+        }
+        panic!("{steer:?} is never done: {:?}", self.said);
+    }
+
+    fn change(&mut self, change: ViewChange) -> Sample {
+        self.steer(Steer::Change(change))
+    }
+
+    fn level(&self) -> u8 {
+        self.steering.now().view.level
+    }
+}
+
+/// The arm stays armed, and no tick changes the force by more than this.
+fn judge(samples: &[Sample], most_n: f32) {
+    for pair in samples.windows(2) {
+        let [before, after] = [pair[0], pair[1]];
+        assert_eq!(after.mode, Mode::Armed, "tick {}", after.tick);
+        assert_eq!(after.fault, None);
+        let change = (after.force_n - before.force_n).length();
+        assert!(change <= most_n, "tick {}: {change} N at once", after.tick);
+        let share = MAX_SLEW_N_PER_S / 1_000.0;
+        assert!(change <= share, "tick {}: {change} N", after.tick);
+    }
+    let worst = samples
+        .windows(2)
+        .map(|p| (p[1].force_n - p[0].force_n).length());
+    let worst = worst.fold(0.0, f32::max);
+    eprintln!(
+        "{} ticks, at most {worst:.4} N from one to the next",
+        samples.len()
+    );
+}
+
+/// The ground is felt again, and no harder than before. It may be felt less: while the clutch
+/// is open the ground goes with a hand that presses, which comes nearer to where it wants to be.
+fn assert_pressed(sample: &Sample, what: &str) {
+    let force = sample.force_n.length();
+    assert_eq!(sample.state, ContactState::Touching, "{what}");
+    assert_eq!(sample.limits, Limits::empty(), "{what}");
+    assert!((0.1..1.5).contains(&force), "{what}: {force} N");
+}
+
+#[test]
+fn zoomed_through_eight_levels_and_back_while_it_is_pressed_the_force_makes_no_step() {
+    let raster = hills();
+    pressed(&raster, 60.0, |touching| {
+        assert_pressed(
+            touching.samples.last().expect("samples"),
+            "at the beginning",
+        );
+        let began = touching.samples.len();
+        assert_eq!(touching.level(), 8);
+        for level in (0..8).rev() {
+            let sample = touching.change(ViewChange::Zoom(2.0));
+            assert_pressed(&sample, &format!("zoomed to level {level}"));
+            assert_eq!(touching.level(), level, "{:?}", touching.said);
+        }
+        for level in 1..=8 {
+            let sample = touching.change(ViewChange::Zoom(0.5));
+            assert_pressed(&sample, &format!("back to level {level}"));
+            assert_eq!(touching.level(), level, "{:?}", touching.said);
+        }
+        assert_eq!(touching.samples.last().map(|last| last.view), Some(16));
+        assert_eq!(touching.said, [""; 0]);
+        judge(&touching.samples[began..], GENTLE_N);
+    });
+}
+
+#[test]
+fn panned_made_steeper_and_softer_while_it_is_pressed_the_force_makes_no_step() {
+    let raster = hills();
+    pressed(&raster, 60.0, |touching| {
+        let began = touching.samples.len();
+        touching.change(ViewChange::Zoom(64.0));
+        let under = |touching: &Touching<'_>| {
+            let sample = touching.samples.last().expect("samples");
+            touching.steering.terrain().scale().to_mm(&sample.proxy)
+        };
+        let before = under(touching);
+        let pan = ViewChange::Pan {
+            east_mm: 20.0,
+            north_mm: -15.0,
+        };
+        assert_pressed(&touching.change(pan), "panned");
+        let after = under(touching);
+        let moved = [after[0] - before[0], after[1] - before[1]];
+        assert!(
+            (moved[0] - 20.0).abs() < 1.5 && (moved[1] + 15.0).abs() < 1.5,
+            "{moved:?}"
+        );
+        assert_pressed(&touching.change(ViewChange::Exaggerate(1.5)), "steeper");
+        let softer = touching.change(ViewChange::Stiffness(0.5));
+        assert_pressed(&softer, "softer");
+        let depth = |sample: &Sample| sample.hip.to(&sample.proxy).length();
+        let harder = touching.change(ViewChange::Stiffness(2.0));
+        assert!(
+            depth(&softer) > 1.5 * depth(&harder),
+            "a softer spring gives more"
+        );
+        assert_pressed(&touching.change(ViewChange::Reset), "as at the beginning");
+        assert_eq!(touching.level(), 8);
+        assert_eq!(touching.said, [""; 0]);
+        judge(&touching.samples[began..], GENTLE_N);
+    });
+}
+
+#[test]
+fn with_the_clutch_the_terrain_goes_with_the_hand_and_is_felt_again_where_it_was() {
+    let raster = hills();
+    pressed(&raster, 30.0, |touching| {
+        let began = touching.samples.len();
+        touching.change(ViewChange::Zoom(64.0));
+        touching.steering.steer(Steer::Clutch(true));
+        let open = touching.run(400);
+        assert!(open.limits.contains(Limits::CLUTCH_OPEN));
+        assert_eq!((open.force_n, open.mode), (Vec3::ZERO, Mode::Armed));
+        let later = touching.run(300);
+        assert!(later.hip.is_same(&open.hip), "it goes with the hand");
+        // Zoomed meanwhile, it stays open.
+        touching
+            .steering
+            .steer(Steer::Change(ViewChange::Zoom(2.0)));
+        let zoomed = touching.run(300);
+        assert!(zoomed.limits.contains(Limits::CLUTCH_OPEN));
+        assert_eq!(zoomed.view, 2);
+        let closed = touching.steer(Steer::Clutch(false));
+        assert_pressed(&closed, "let go");
+        judge(&touching.samples[began..], GENTLE_N);
+    });
+}
+
+#[test]
+fn what_cannot_be_had_changes_nothing_and_is_told() {
+    let raster = hills();
+    pressed(&raster, 30.0, |touching| {
+        let began = touching.samples.len();
+        let far = ViewChange::Pan {
+            east_mm: 500.0,
+            north_mm: 0.0,
+        };
+        assert_pressed(&touching.change(far), "after a place outside");
+        assert!(touching.said[0].contains("outside"), "{:?}", touching.said);
+        assert_pressed(
+            &touching.change(ViewChange::Stiffness(50.0)),
+            "after too much",
+        );
+        assert_eq!(touching.said.len(), 2);
+        assert_eq!(touching.samples.last().map(|last| last.view), Some(0));
+        judge(&touching.samples[began..], GENTLE_N);
+    });
+}
