@@ -267,7 +267,7 @@ fn whatever_a_host_says_the_force_makes_no_step_and_little_energy_is_given() {
             160..200 if arm.last.sample.limits.contains(Limits::CLUTCH_OPEN) => {
                 let mut wanted = view(tick as u8, 0, arm.last.sample.hip);
                 wanted.scene.cell_mm = [0.5, 1.0, 2.0][dice as usize % 3];
-                wanted.keeps_tiles = dice % 2 == 0;
+                wanted.keeps_tiles = dice.is_multiple_of(2);
                 arm.put(wanted, gentle);
             }
             _ => {}

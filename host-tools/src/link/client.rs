@@ -129,7 +129,7 @@ pub struct Client<'t> {
 /// A terrain that is served: the one that the client was lent, or that of another view.
 enum Lent<'t> {
     Whole(&'t Terrain<'t>),
-    View(Terrain<'t>),
+    View(Box<Terrain<'t>>),
 }
 
 impl<'t> Deref for Lent<'t> {
@@ -256,7 +256,7 @@ impl<'t> Client<'t> {
             let taken = taken(&view);
             if taken {
                 self.scene = view.scene;
-                self.terrain = Lent::View(terrain);
+                self.terrain = Lent::View(Box::new(terrain));
             }
             on(Event::Viewed { view: &view, taken });
         }

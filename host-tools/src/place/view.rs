@@ -169,7 +169,7 @@ impl View {
 
     /// The same with another point under the tip in its home pose, hand millimetres, after
     /// a view at another scale.
-    pub(crate) fn moved_to(self, grid: &FeltGrid<'_>, home_mm: [f64; 3], before: Scale) -> Self {
+    pub(super) fn moved_to(self, grid: &FeltGrid<'_>, home_mm: [f64; 3], before: Scale) -> Self {
         let wider = self.scale.cell_mm() / before.cell_mm();
         let higher = self.scale.height_mm_per_unit() / before.height_mm_per_unit();
         let felt = [home_mm[0], home_mm[1]].map(|mm| mm / self.scale.cell_mm());

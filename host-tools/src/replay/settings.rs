@@ -60,8 +60,8 @@ pub struct ViewSettings {
     /// Times that heights are higher than true to scale, where the file knows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exaggeration: Option<f64>,
-    /// The point of the terrain that was at the tip in the arm's home pose when the view was
-    /// put in, hand millimetres. The clutch moves it.
+    /// The point of the terrain at the tip in the arm's home pose, hand millimetres, as far as
+    /// the host knows: the hand moves it while the clutch is open.
     pub home_mm: [f64; 3],
     /// Newtons for a millimetre between the HIP and the proxy.
     pub stiffness_n_per_mm: f32,

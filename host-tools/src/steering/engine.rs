@@ -141,7 +141,6 @@ impl<'r> Steering<'r> {
                     self.number = 0;
                 }
             }
-            Event::Status(status) => self.on_home(status.health.home),
             Event::Unanswered(Ask::Request(Request::Clutch { .. })) => {
                 self.give_up("the device does not answer: the view stays as it was");
             }
@@ -183,11 +182,7 @@ impl<'r> Steering<'r> {
                 }
             }
             Stage::Open if sample.view == self.number => self.go_on(sample),
-            Stage::Closing if !is_open => {
-                self.stage = Stage::Idle;
-                // The clutch has moved the terrain by what the hand did meanwhile.
-                self.asks.push(Ask::Status);
-            }
+            Stage::Closing if !is_open => self.stage = Stage::Idle,
             _ => {}
         }
     }
@@ -261,14 +256,5 @@ impl<'r> Steering<'r> {
             self.lines.push(line.to_owned());
         }
         self.stage = Stage::Open;
-    }
-
-    /// Where the terrain is under the arm by now.
-    fn on_home(&mut self, home: Option<hapterra_core::grid::GridPoint>) {
-        if let Some(home) = home.filter(|_| matches!(self.stage, Stage::Idle)) {
-            let (view, grid) = (self.now.view, self.terrain.grid());
-            let home_mm = self.terrain.scale().to_mm(&home);
-            self.now.view = view.moved_to(grid, home_mm, view.scale);
-        }
     }
 }

@@ -39,7 +39,7 @@ pub fn run(data: &[u8]) {
                     number: kind,
                     scene,
                     hip: position(&mut bytes),
-                    keeps_tiles: kind % 2 == 0,
+                    keeps_tiles: kind.is_multiple_of(2),
                 };
                 if scene.is_valid() {
                     law = scene.law;
@@ -47,7 +47,7 @@ pub fn run(data: &[u8]) {
                 let _ = haptics.accept(Command::View(view));
             }
             _ if kind >= 248 => {
-                let _ = haptics.accept(Command::Clutch(kind % 2 == 0));
+                let _ = haptics.accept(Command::Clutch(kind.is_multiple_of(2)));
             }
             0 => {
                 let scene = scene(&mut bytes);
