@@ -17,8 +17,8 @@ use crate::grid::{Cell, GridPoint};
 use crate::terrain::{Ground, TileIndex, Window};
 use landing::Landing;
 
-/// After so many departures for one HIP without getting nearer to it the proxy may
-/// leave the surface no more: it only moves to and fro by rounding.
+/// After so many departures without getting nearer to the HIP the proxy may leave the
+/// surface no more: it only moves to and fro by rounding.
 const DEPARTURES: u32 = 32;
 /// The same after so many that each come nearer by next to nothing: it creeps along what
 /// is all but vertical, and would for hours.
@@ -89,7 +89,8 @@ enum Turn {
     Ends,
 }
 
-/// The departures from the surface for one HIP, if there was one.
+/// The departures from the surface since the HIP last found the proxy on it, if there was
+/// one.
 type Departures = Option<Departed>;
 
 #[derive(Clone, Copy, Debug)]
@@ -290,10 +291,8 @@ impl Contact {
         budget: &mut Budget,
     ) {
         match &mut self.phase {
-            Phase::Sweeping(sweeping) => {
-                sweeping.path.redirect(hip);
-                sweeping.departures = None;
-            }
+            // Its departures count on: it may come back to where it left.
+            Phase::Sweeping(sweeping) => sweeping.path.redirect(hip),
             Phase::OnSurface(on) => {
                 match (&on.follow, known) {
                     (Some(follow), Some(place)) => {

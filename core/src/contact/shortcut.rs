@@ -11,10 +11,10 @@ use glam::Vec3;
 use super::closest_point::{Convexity, Place, passes_over};
 use super::surface::patch::Patch;
 use super::surface::{HipView, SurfacePoint};
-use super::sweep::{lower, span};
+use super::sweep::lower;
 use super::tolerance::BESIDE_OF_NEAR_HIP;
 use crate::grid::{Cell, GridPoint};
-use crate::terrain::{Ground, Window};
+use crate::terrain::{CellBox, Ground, Window};
 
 /// Whether a free HIP's path is clear, by one comparison or by a look at the nine
 /// samples around it.
@@ -25,7 +25,8 @@ pub(super) fn is_free<const D: usize>(
     to: &GridPoint,
 ) -> bool {
     let low = lower(from, to);
-    low.cell() >= window.top() || window.is_clear_nearby(span(from, to), low)
+    low.cell() >= window.top()
+        || window.is_clear_nearby(CellBox::around(from.column(), to.column()), low)
 }
 
 /// A proxy at rest well inside a convex patch, all of its force felt.

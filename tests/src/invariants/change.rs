@@ -90,19 +90,14 @@ impl Judge<'_> {
     }
 
     /// By the swept rule, in real time: a tick that is repeated has [`Invariant::Settles`].
-    ///
-    /// At the foot of a needle the place on its side that a proxy rests on is the foot
-    /// itself by rounding; it may leave from there and land again in every tick.
     pub(super) fn advances(&mut self, before: &Seen, seen: &Seen) -> Verdict {
         let flies = |seen: &Seen| {
             let felt = &seen.felt;
             felt.state == ContactState::Free && !felt.converged && felt.missing_tile.is_none()
         };
-        let at_needle = matches!(self.terrain.kind, Kind::Spikes | Kind::Twisted);
         let moved = distance(before.hip, seen.hip);
         let ahead = moved < AHEAD * distance(seen.proxy, seen.hip);
-        let stays =
-            ahead && !at_needle && flies(before) && flies(seen) && before.proxy == seen.proxy;
+        let stays = ahead && flies(before) && flies(seen) && before.proxy == seen.proxy;
         self.stalled = if stays { self.stalled + 1 } else { 0 };
         self.measured.stalled = self.measured.stalled.max(self.stalled);
         if self.stalled > STALLED {

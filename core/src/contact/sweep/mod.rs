@@ -6,4 +6,4 @@ mod cells;
 mod look_ahead;
 mod path;
 
-pub(super) use path::{Path, Swept, lower, span};
+pub(super) use path::{Path, Swept, lower};

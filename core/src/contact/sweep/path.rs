@@ -105,6 +105,7 @@ impl Path {
     /// it were given up whenever the HIP moves, a piece that takes more than a tick would
     /// never come to its end. One that waits for a tile is given up; the new path may not
     /// need it.
+    #[inline(never)]
     pub(in crate::contact) fn redirect(&mut self, to: GridPoint) {
         let leads_on = |end: &GridPoint| HipView::new(to).is_nearer(end, &self.at);
         let begun = self.ends.last().copied().filter(leads_on);
@@ -136,9 +137,10 @@ impl Path {
             }
             budget.spend(BOX);
             let Some(&end) = self.ends.last() else { break };
-            let span = span(&self.at, &end);
+            let around = CellBox::around(self.at.column(), end.column());
+            let span = with_borders(around, &end);
             let low = lower(&self.at, &end);
-            if window.is_clear(span, low) || window.is_clear_nearby(span, low) {
+            if window.is_clear(span, low) || window.is_clear_nearby(around, low) {
                 // Above all that is around, so only the field's border matters.
                 self.over_hole = !window.has_cell(end.column());
                 self.on_surface = false;
@@ -146,7 +148,7 @@ impl Path {
                 if let Some(ended) = self.walk(window, end, budget) {
                     return ended;
                 }
-            } else if longer_side(span) > LOOK_CELLS {
+            } else if longer_side(around) > LOOK_CELLS {
                 // Not full: such a piece is walked.
                 let _ = self.ends.push(self.at.midpoint(&end));
                 continue;
@@ -267,9 +269,7 @@ impl Path {
 }
 
 /// The cells under a piece of a path, and those on whose border it ends.
-#[inline]
-pub(in crate::contact) fn span(at: &GridPoint, end: &GridPoint) -> CellBox {
-    let mut span = CellBox::around(at.column(), end.column());
+fn with_borders(mut span: CellBox, end: &GridPoint) -> CellBox {
     if end.is_on_grid_line() {
         // A cell more than need be does no harm.
         span.from = span.from.offset(-1, -1);
