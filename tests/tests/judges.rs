@@ -325,7 +325,7 @@ fn a_proxy_that_gets_no_farther_is_found() {
     );
     let waits = |tick| {
         with(flies(tick, 3.0), |f| {
-            f.missing_tile = Some(TileIndex::new(0, 0))
+            f.missing_tile = Some(TileIndex::new(0, 0));
         })
     };
     let waits: Vec<_> = (0..50).map(waits).collect();

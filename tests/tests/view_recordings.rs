@@ -72,7 +72,7 @@ fn comments(text: &str) -> String {
         .collect()
 }
 
-const COMMANDS: &str = "# while a scripted hand slides\nat 3.8 zoom 1.5\nexaggerate 1.25\n\
+const COMMANDS: &str = "# while a scripted hand slides\nat 3.8 zoom 1.5\nat 4.7 exaggerate 1.25\n\
     spin 3\nat 5.5 pan 2 1\nat 6.5 stiffness 0.5\nat 7.5 clutch on\nat 8 clutch off\n";
 
 /// What a demo with these commands wrote; what it said.
@@ -204,7 +204,7 @@ fn what_cannot_be_replayed_is_refused_and_named() {
     assert!(told.contains("does not describe view 2"), "{told}");
     assert!(told.contains("line "), "{told}");
     let row = text.lines().last().expect("rows");
-    let wrong = format!("{}x", row);
+    let wrong = format!("{row}x");
     folder.write("wrong.csv", &text.replace(row, &wrong));
     let told = refused("wrong.csv", &[]);
     assert!(

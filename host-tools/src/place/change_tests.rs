@@ -122,8 +122,8 @@ fn panned_there_is_other_ground_under_the_hand_as_deep_as_before() {
         let panned = panned.expect("panned");
         let ground = terrain.height_mm(56.0, 50.2).expect("ground");
         let expected = [56.2, 50.2, ground - 2.0];
-        for axis in 0..3 {
-            assert!((panned.hip_mm[axis] - expected[axis]).abs() < 1e-9);
+        for (now, expected) in panned.hip_mm.iter().zip(expected) {
+            assert!((now - expected).abs() < 1e-9);
         }
         assert!(panned.terrain.has_tiles_of(terrain));
         // 1000 m are 100 cells of 0.05 mm.

@@ -5,8 +5,8 @@
 //! place under the home position, scale, level and heights, from which terrain and scene
 //! follow. [`ViewChange`] makes another view of it while it is felt. [`PlacedTerrain`] adds a scripted hand for an arm that is virtual.
 
-mod coordinates;
 mod change;
+mod coordinates;
 mod error;
 mod fit;
 mod ground;
@@ -16,9 +16,9 @@ mod target;
 mod view;
 mod words;
 
-pub use coordinates::Coordinates;
 pub(crate) use change::STIFFEST_N_PER_MM;
 pub use change::{Bounds, ChangeError, Changed, Hand, Laid, ViewChange};
+pub use coordinates::Coordinates;
 pub use error::PlaceError;
 pub use placed_terrain::{PlacedTerrain, PlacingError};
 pub use reach::{Reach, ReachBox};
