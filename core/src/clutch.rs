@@ -19,12 +19,10 @@
 
 use crate::contact::Contact;
 use crate::grid::GridPoint;
-use crate::guard::Limits;
+use crate::guard::{FADE_MS, Limits};
 use crate::rate::TickRate;
 use crate::terrain::Window;
 
-/// How long all of the force takes to go out, ms: as when the arm is disarmed.
-const OUT_MS: u32 = 100;
 /// How long all of it takes to come in again, ms.
 const IN_MS: u32 = 500;
 
@@ -47,7 +45,7 @@ pub(crate) struct Clutch {
     held: bool,
     /// Share of the force that is let through.
     share: f32,
-    /// Most that it may change in a tick.
+    /// Most that it may change in a tick: out as when the arm is disarmed.
     out: f32,
     back: f32,
 }
@@ -59,7 +57,7 @@ impl Clutch {
             state: State::Closed,
             held: false,
             share: 1.0,
-            out: 1.0 / rate.ticks(OUT_MS) as f32,
+            out: 1.0 / rate.ticks(FADE_MS) as f32,
             back: 1.0 / rate.ticks(IN_MS) as f32,
         }
     }

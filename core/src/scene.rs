@@ -135,7 +135,4 @@ pub struct Health {
     pub currents_a: Vec3,
     /// Winding temperatures by the thermal model, °C.
     pub winding_c: Vec3,
-    /// The point of the terrain that is at the tip in the home pose, cells, where there is
-    /// a scene. The clutch moves it.
-    pub home: Option<GridPoint>,
 }

@@ -197,12 +197,16 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.contact = self.contact_of(self.scene.as_ref());
     }
 
-    /// A contact that has felt nothing yet, as a scene wants it: points are felt in
-    /// lock-step, an arm in real time.
+    /// A contact that has felt nothing yet, as a scene wants it.
     fn contact_of(&self, scene: Option<&Scene>) -> Contact {
+        Contact::new(self.settings_of(scene))
+    }
+
+    /// How a scene is felt: points in lock-step, an arm in real time.
+    fn settings_of(&self, scene: Option<&Scene>) -> ContactSettings {
         let rule = scene.map_or_else(Default::default, |scene| scene.rule);
         let from_points = scene.is_some_and(|scene| scene.source == Source::Points);
-        Contact::new(ContactSettings {
+        ContactSettings {
             rule,
             execution: if from_points {
                 Execution::LockStep
@@ -210,7 +214,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
                 Execution::RealTime
             },
             ..ContactSettings::REAL_TIME.at_rate(self.rate)
-        })
+        }
     }
 
     /// Takes a scene, or drops the one there is: force that was there goes out.
@@ -252,11 +256,14 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
         // Whatever bits came over the wire.
         let hip = hip.normalised();
-        self.contact = self.contact_of(Some(&scene));
-        if let Some(stretch) = stretch {
-            let at = GridPoint::new(hip.cell(), hip.frac() + stretch);
-            self.contact = Contact::landing(*self.contact.settings(), at, stretch);
-        }
+        let settings = self.settings_of(Some(&scene));
+        self.contact = match stretch {
+            Some(stretch) => {
+                let at = GridPoint::new(hip.cell(), hip.frac() + stretch);
+                Contact::landing(settings, at, stretch)
+            }
+            None => Contact::new(settings),
+        };
         self.clutch.put(hip);
         self.scene = Some(scene);
         self.point = None;
@@ -302,7 +309,6 @@ impl<'t, const D: usize> Haptics<'t, D> {
             angles_rad: self.mechanism.as_ref().map(angles).unwrap_or_default(),
             currents_a: drive.currents_a,
             winding_c: self.guard.motors().winding_c(),
-            home: self.scene.map(|scene| scene.home),
         }
     }
 

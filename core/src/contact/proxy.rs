@@ -146,12 +146,6 @@ impl Contact {
         }
     }
 
-    /// What it was told once.
-    #[must_use]
-    pub const fn settings(&self) -> &ContactSettings {
-        &self.settings
-    }
-
     /// How much of the force is felt: less than 1 where it fades at the boundary of
     /// the surface, or comes in after a wait.
     #[must_use]

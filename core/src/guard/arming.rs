@@ -15,7 +15,7 @@ const CONFIRM_MS: u32 = 100;
 /// How long force takes to come in, ms.
 const RAMP_MS: u32 = 2_000;
 /// How long it takes to go out, ms.
-const FADE_MS: u32 = 100;
+pub(crate) const FADE_MS: u32 = 100;
 
 /// The force that counts as small, N.
 pub const SMALL_FORCE_N: f32 = 0.2;

@@ -25,6 +25,7 @@ mod watch;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+pub(crate) use arming::FADE_MS;
 pub use arming::{Decision, SMALL_FORCE_N};
 pub use fault::Fault;
 pub use feedback::CURRENT_TOLERANCE_A;

@@ -121,13 +121,7 @@ fn while_the_clutch_is_held_there_is_no_force_and_the_terrain_goes_with_the_hand
         arm.counts = [n, DEEP[1] + 2 * n, -n];
         assert!(arm.tick().hip.is_same(&open.hip));
     }
-    let home = |arm: &Watched<'_>| {
-        let health = arm
-            .device
-            .haptics
-            .health(&Sense::default(), &Drive::default());
-        health.home.expect("a scene")
-    };
+    let home = |arm: &Watched<'_>| arm.device.haptics.scene.expect("a scene").home;
     let before = home(&arm);
     arm.clutch(false);
     let back = arm.ticks(510);

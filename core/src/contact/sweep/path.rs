@@ -107,9 +107,9 @@ impl Path {
     /// need it.
     #[inline(never)]
     pub(in crate::contact) fn redirect(&mut self, to: GridPoint) {
-        let leads_on = |end: &GridPoint| HipView::new(to).is_nearer(end, &self.at);
+        let leads_on =
+            |end: &GridPoint| !self.is_missing && HipView::new(to).is_nearer(end, &self.at);
         let begun = self.ends.last().copied().filter(leads_on);
-        let begun = begun.filter(|_| !self.is_missing);
         self.ends.clear();
         // Capacity is DEPTH > 2.
         let _ = self.ends.push(to);
