@@ -27,15 +27,15 @@ pub struct Put<'r> {
 }
 
 /// Where a change stands.
-enum Stage {
+enum Stage<'r> {
     /// The clutch is closed, as far as this host knows.
     Idle,
     /// The clutch was asked to open, so many samples ago.
     Opening(u32),
     /// The clutch is open.
     Open,
-    /// This view was said.
-    Putting(Box<Laid>),
+    /// This view was said, of this terrain.
+    Putting(Box<(Laid, Terrain<'r>)>),
     /// The clutch was let go, and is still told to be open.
     Closing,
 }
@@ -52,11 +52,9 @@ pub struct Steering<'r> {
     waiting: Vec<ViewChange>,
     /// The user holds the clutch.
     held: bool,
-    stage: Stage,
+    stage: Stage<'r>,
     asks: Vec<Ask>,
     put: Option<Put<'r>>,
-    /// The terrain of the view that was said.
-    next: Option<Terrain<'r>>,
     lines: Vec<String>,
 }
 
@@ -75,7 +73,6 @@ impl<'r> Steering<'r> {
             stage: Stage::Idle,
             asks: vec![],
             put: None,
-            next: None,
             lines: vec![],
         }
     }
@@ -202,8 +199,7 @@ impl<'r> Steering<'r> {
         let changes = std::mem::take(&mut self.waiting);
         match self.next_view(&changes, sample) {
             Ok(put) => {
-                self.stage = Stage::Putting(Box::new(put.laid));
-                self.next = Some(put.terrain.clone());
+                self.stage = Stage::Putting(Box::new((put.laid, put.terrain.clone())));
                 self.put = Some(put);
             }
             Err(why) => self.lines.push(format!("the view stays as it was: {why}")),
@@ -242,15 +238,12 @@ impl<'r> Steering<'r> {
     }
 
     fn on_viewed(&mut self, view: &View, taken: bool) {
-        let Stage::Putting(laid) = &self.stage else {
+        let Stage::Putting(put) = &self.stage else {
             return;
         };
         if taken {
             self.number = view.number;
-            self.now = **laid;
-            if let Some(terrain) = self.next.take() {
-                self.terrain = terrain;
-            }
+            (self.now, self.terrain) = (**put).clone();
         } else {
             let line = "the device did not take the view: it stays as it was";
             self.lines.push(line.to_owned());
