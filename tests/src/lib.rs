@@ -23,6 +23,7 @@ pub mod usb;
 pub mod walk;
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::OnceLock;
 
 /// The repository's root folder.
@@ -71,4 +72,18 @@ pub fn hapterra_binary() -> &'static Path {
             .path()
             .to_path_buf()
     })
+}
+
+/// What `hapterra info --json` says of a terrain.
+///
+/// # Panics
+/// When it fails.
+pub fn info(path: &Path) -> serde_json::Value {
+    let output = Command::new(hapterra_binary())
+        .args(["info", "--json"])
+        .arg(path)
+        .output()
+        .expect("it runs");
+    assert!(output.status.success(), "{output:?}");
+    serde_json::from_slice(&output.stdout).expect("JSON")
 }

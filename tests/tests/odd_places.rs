@@ -9,7 +9,7 @@ use std::process::Command;
 use hapterra::place::{Coordinates, Target};
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{FeltCells, FeltGrid};
-use hapterra_tests::hapterra_binary;
+use hapterra_tests::{hapterra_binary, info};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/odd_places");
 /// Metres in a degree of latitude, for what a shift may be off.
@@ -48,16 +48,6 @@ fn rows() -> Vec<Row> {
     let rows = rows.expect("rows");
     assert!(rows.len() >= 20);
     rows
-}
-
-fn info(path: &Path) -> serde_json::Value {
-    let output = Command::new(hapterra_binary())
-        .args(["info", "--json"])
-        .arg(path)
-        .output()
-        .expect("it runs");
-    assert!(output.status.success(), "{output:?}");
-    serde_json::from_slice(&output.stdout).expect("JSON")
 }
 
 #[test]

@@ -4,11 +4,8 @@
 //! `data/places_by_gdal.csv` was made once by `data/places_by_gdal.py`, which names
 //! its command.
 
-use std::path::Path;
-use std::process::Command;
-
 use hapterra::raster::{Bounds, OpenOptions, Raster};
-use hapterra_tests::{hapterra_binary, shared};
+use hapterra_tests::{info, shared};
 
 const TABLE: &str = include_str!("../data/places_by_gdal.csv");
 /// Metres or degrees: the table has bounds in full, degrees to 9 digits.
@@ -128,16 +125,6 @@ fn compare(raster: &Raster, row: &Row) {
     if let Some(degrees) = row.lonlat() {
         assert_same(raster.bounds_lonlat(), degrees, file);
     }
-}
-
-fn info(path: &Path) -> serde_json::Value {
-    let output = Command::new(hapterra_binary())
-        .args(["info", "--json"])
-        .arg(path)
-        .output()
-        .expect("it runs");
-    assert!(output.status.success(), "{output:?}");
-    serde_json::from_slice(&output.stdout).expect("JSON")
 }
 
 /// For each: reference system, bounds, way to longitudes, cell's unit, vertical unit and

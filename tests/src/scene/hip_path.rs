@@ -50,29 +50,35 @@ const HABITS: [Habit; 10] = [
 /// `ticks` positions in cells; the first is high above everything.
 #[must_use]
 pub fn random(terrain: &Terrain, chance: &mut Chance, ticks: usize) -> Vec<[f64; 3]> {
-    let mut walker = Walker::in_the_sky(terrain, chance);
-    while walker.path.len() < ticks {
+    walked(terrain, chance, ticks, |walker| {
         let habit = match walker.chance.below(20) {
             n if n < HABITS.len() => HABITS[n],
             _ => Habit::Wander,
         };
         walker.go_on(habit);
-        if walker.chance.below(6) == 0 {
-            walker.rise();
-        }
-    }
-    walker.path.truncate(ticks);
-    walker.path
+    })
 }
 
 /// `ticks` positions in cells: down out of the sky, and then far below the surface, as a
 /// hand that presses into small cells: to and fro, slow and fast.
 #[must_use]
 pub fn deep(terrain: &Terrain, chance: &mut Chance, ticks: usize) -> Vec<[f64; 3]> {
-    let mut walker = Walker::in_the_sky(terrain, chance);
-    while walker.path.len() < ticks {
+    walked(terrain, chance, ticks, |walker| {
         let turns = 40 + walker.chance.below(160);
         walker.press_deep(turns);
+    })
+}
+
+/// `ticks` positions: out of the sky, and now and then back to it.
+fn walked(
+    terrain: &Terrain,
+    chance: &mut Chance,
+    ticks: usize,
+    go_on: impl Fn(&mut Walker<'_>),
+) -> Vec<[f64; 3]> {
+    let mut walker = Walker::in_the_sky(terrain, chance);
+    while walker.path.len() < ticks {
+        go_on(&mut walker);
         if walker.chance.below(6) == 0 {
             walker.rise();
         }

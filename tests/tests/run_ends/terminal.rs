@@ -3,7 +3,8 @@
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
 use std::os::fd::OwnedFd;
-use std::process::Stdio;
+use std::path::Path;
+use std::process::{Child, Stdio};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -32,15 +33,25 @@ fn terminal() -> (File, File) {
     (window.into(), end.expect("open"))
 }
 
+/// Starts `run` with a terminal's end for all that it reads and writes.
+fn start_in(end: &File, served: &Served, folder: &Path) -> Child {
+    let end = || Stdio::from(OwnedFd::from(end.try_clone().expect("another")));
+    let mut command = command(served.address, folder);
+    let command = command.stdin(end()).stdout(end()).stderr(end());
+    command.spawn().expect("it runs")
+}
+
+/// Whether the terminal gives lines, and shows what is typed.
+fn modes(end: &File) -> LocalModes {
+    tcgetattr(end).expect("a terminal").local_modes
+}
+
 #[test]
 fn a_terminal_window_that_is_closed_is_a_goodbye() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = Served::start();
     let (mut window, end) = terminal();
-    let end = || Stdio::from(OwnedFd::from(end.try_clone().expect("another")));
-    let mut command = command(served.address, folder.path());
-    let child = command.stdin(end()).stdout(end()).stderr(end()).spawn();
-    let child = child.expect("it runs");
+    let child = start_in(&end, &served, folder.path());
     has_begun(&mut window);
     drop(window);
     // It goes on as long as nobody asks for its end.
@@ -123,17 +134,9 @@ fn keys_change_the_view_ctrl_c_is_a_goodbye_and_the_terminal_is_put_back() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = Served::start();
     let (mut window, end) = terminal();
-    let modes = |end: &File| tcgetattr(end).expect("a terminal").local_modes;
     let before = modes(&end);
     assert!(before.contains(LocalModes::ICANON | LocalModes::ECHO));
-    let stdio = || Stdio::from(OwnedFd::from(end.try_clone().expect("another")));
-    let mut command = command(served.address, folder.path());
-    let child = command
-        .stdin(stdio())
-        .stdout(stdio())
-        .stderr(stdio())
-        .spawn();
-    let child = child.expect("it runs");
+    let child = start_in(&end, &served, folder.path());
     shows(&mut window, "arrows pan");
     std::thread::sleep(Duration::from_millis(300));
     assert!(
@@ -160,16 +163,8 @@ fn a_second_ctrl_c_and_a_signal_put_the_terminal_back_too() {
         let folder = tempfile::tempdir().expect("a folder");
         let served = Served::start();
         let (mut window, end) = terminal();
-        let modes = |end: &File| tcgetattr(end).expect("a terminal").local_modes;
         let before = modes(&end);
-        let stdio = || Stdio::from(OwnedFd::from(end.try_clone().expect("another")));
-        let mut command = command(served.address, folder.path());
-        let child = command
-            .stdin(stdio())
-            .stdout(stdio())
-            .stderr(stdio())
-            .spawn();
-        let child = child.expect("it runs");
+        let child = start_in(&end, &served, folder.path());
         shows(&mut window, "arrows pan");
         std::thread::sleep(Duration::from_millis(300));
         assert_ne!(modes(&end), before, "{ends_by}");

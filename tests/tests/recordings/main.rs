@@ -1,85 +1,15 @@
 //! Recordings describe themselves: what `run`, `demo` and `replay` write, `replay` feels
 //! again as it was.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+mod folder;
+mod views;
+
+use std::path::Path;
+use std::process::Command;
 
 use hapterra_tests::hapterra_binary;
 
-struct Folder(tempfile::TempDir);
-
-impl Folder {
-    /// With a terrain of hills.
-    fn new() -> Self {
-        let folder = Self(tempfile::tempdir().expect("a folder"));
-        let file = folder.text("hills.tif");
-        folder.runs(&["synth", "fractal", "-o", &file, "--size", "256"]);
-        folder
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn text(&self, name: &str) -> String {
-        self.path(name).to_str().expect("a plain path").to_owned()
-    }
-
-    fn run(&self, words: &[&str]) -> Output {
-        let mut command = Command::new(hapterra_binary());
-        let command = command.args(words).env_remove("HAPTERRA_MPS2_ELF");
-        command.output().expect("started")
-    }
-
-    /// Runs a command that succeeds; what it says on standard error.
-    fn runs(&self, words: &[&str]) -> String {
-        let run = self.run(words);
-        assert!(run.status.success(), "{words:?}: {}", said(&run));
-        said(&run)
-    }
-
-    /// Runs a command that fails; what it says.
-    fn fails(&self, words: &[&str]) -> String {
-        let run = self.run(words);
-        assert_eq!(run.status.code(), Some(1), "{words:?}: {}", said(&run));
-        said(&run)
-    }
-
-    /// Replays `from` into `to`; what it says.
-    fn replays(&self, from: &str, to: &str, more: &[&str]) -> String {
-        let [terrain, from, to] = ["hills.tif", from, to].map(|name| self.text(name));
-        let words = ["replay", &terrain, &from, "-o", &to];
-        self.runs(&[&words[..], more].concat())
-    }
-
-    fn read(&self, name: &str) -> String {
-        std::fs::read_to_string(self.path(name)).expect("there")
-    }
-
-    /// Makes a trajectory that goes up and down over the hills.
-    fn write_trajectory(&self, name: &str) {
-        let mut text = "t_s,x_mm,y_mm,z_mm\n".to_owned();
-        for tick in 0..400 {
-            let t = f64::from(tick) / 400.0;
-            let (x, z) = (60.0 + 30.0 * t, 40.0 * (12.0 * t).cos() + 20.0);
-            text += &format!("{t},{x},{},{z}\n", 70.0 - 10.0 * t);
-        }
-        std::fs::write(self.path(name), text).expect("written");
-    }
-}
-
-fn said(run: &Output) -> String {
-    String::from_utf8_lossy(&run.stderr).into_owned()
-}
-
-/// The rows of a recording by the names of its columns.
-fn rows(text: &str) -> Vec<std::collections::HashMap<&str, &str>> {
-    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
-    let header: Vec<_> = lines.next().expect("a header").split(',').collect();
-    lines
-        .map(|line| header.iter().copied().zip(line.split(',')).collect())
-        .collect()
-}
+use folder::{Folder, rows, said};
 
 const SETTINGS: [&str; 6] = [
     "--cell-mm=0.7",

@@ -1,68 +1,15 @@
 //! Views that change while a terrain is touched: commands of `demo` and `run`, their
 //! recordings, and the replay of these.
 
-use std::collections::HashMap;
-use std::path::PathBuf;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
 use hapterra::replay::{Settings, Trajectory};
 use hapterra_tests::hapterra_binary;
 
-struct Folder(tempfile::TempDir);
+use super::folder::{Folder, rows, said};
 
-impl Folder {
-    /// With a terrain of hills.
-    fn new() -> Self {
-        let folder = Self(tempfile::tempdir().expect("a folder"));
-        let file = folder.text("hills.tif");
-        let made = folder.run(&["synth", "fractal", "-o", &file, "--size", "512"]);
-        assert!(made.status.success(), "{}", said(&made));
-        folder
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn text(&self, name: &str) -> String {
-        self.path(name).to_str().expect("a plain path").to_owned()
-    }
-
-    fn run(&self, words: &[&str]) -> Output {
-        let mut command = Command::new(hapterra_binary());
-        let command = command.args(words).env_remove("HAPTERRA_MPS2_ELF");
-        command.stdin(Stdio::null()).output().expect("started")
-    }
-
-    fn read(&self, name: &str) -> String {
-        std::fs::read_to_string(self.path(name)).expect("there")
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        std::fs::write(self.path(name), text).expect("written");
-    }
-
-    /// Replays `from` into `to`.
-    fn replay(&self, from: &str, to: &str, more: &[&str]) -> Output {
-        let [terrain, from, to] = ["hills.tif", from, to].map(|name| self.text(name));
-        self.run(&[&["replay", &terrain, &from, "-o", &to], more].concat())
-    }
-}
-
-fn said(run: &Output) -> String {
-    String::from_utf8_lossy(&run.stderr).into_owned()
-}
-
-type Rows<'t> = Vec<HashMap<&'t str, &'t str>>;
-
-/// The rows of a recording by the names of its columns.
-fn rows(text: &str) -> Rows<'_> {
-    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
-    let header: Vec<_> = lines.next().expect("a header").split(',').collect();
-    lines
-        .map(|line| header.iter().copied().zip(line.split(',')).collect())
-        .collect()
-}
+/// Wide enough to be zoomed and panned.
+const SIZE: u32 = 512;
 
 /// All comments together, as the page on recordings reads them.
 fn comments(text: &str) -> String {
@@ -87,7 +34,7 @@ fn demo(folder: &Folder) -> String {
 
 #[test]
 fn a_recording_says_when_and_how_the_view_changed_and_is_felt_again() {
-    let folder = Folder::new();
+    let folder = Folder::of(SIZE);
     let told = demo(&folder);
     assert!(
         told.contains("line 4 of the commands: `spin 3` is no command"),
@@ -184,7 +131,7 @@ fn a_recording_says_when_and_how_the_view_changed_and_is_felt_again() {
 
 #[test]
 fn what_cannot_be_replayed_is_refused_and_named() {
-    let folder = Folder::new();
+    let folder = Folder::of(SIZE);
     demo(&folder);
     let refused = |from: &str, more: &[&str]| {
         let run = folder.replay(from, "again.csv", more);
@@ -218,7 +165,7 @@ fn what_cannot_be_replayed_is_refused_and_named() {
 
 #[test]
 fn a_parquet_recording_of_views_is_felt_again_too() {
-    let folder = Folder::new();
+    let folder = Folder::of(SIZE);
     folder.write("commands", "at 3.5 zoom 2\nat 4.5 reset\n");
     let names = ["hills.tif", "felt.parquet", "commands"].map(|name| folder.text(name));
     let [terrain, record, commands] = &names;
@@ -240,7 +187,7 @@ fn a_parquet_recording_of_views_is_felt_again_too() {
 #[test]
 fn commands_come_by_standard_input_and_a_file_that_is_not_there_is_told() {
     use std::io::Write;
-    let folder = Folder::new();
+    let folder = Folder::of(SIZE);
     let [terrain, record] = ["hills.tif", "felt.csv"].map(|name| folder.text(name));
     let words = ["run", &terrain, "--device", "native", "--record", &record];
     let more = ["--seconds", "4.5", "--commands"];

@@ -1,0 +1,98 @@
+//! A folder with a terrain of hills, and `hapterra` run on what is in it.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use hapterra_tests::hapterra_binary;
+
+pub(super) struct Folder(tempfile::TempDir);
+
+impl Folder {
+    /// With a terrain of hills, 256 samples wide.
+    pub(super) fn new() -> Self {
+        Self::of(256)
+    }
+
+    /// With a terrain of hills, so many samples wide.
+    pub(super) fn of(size: u32) -> Self {
+        let folder = Self(tempfile::tempdir().expect("a folder"));
+        let (file, size) = (folder.text("hills.tif"), size.to_string());
+        folder.runs(&["synth", "fractal", "-o", &file, "--size", &size]);
+        folder
+    }
+
+    pub(super) fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub(super) fn text(&self, name: &str) -> String {
+        self.path(name).to_str().expect("a plain path").to_owned()
+    }
+
+    pub(super) fn run(&self, words: &[&str]) -> Output {
+        let mut command = Command::new(hapterra_binary());
+        let command = command.args(words).env_remove("HAPTERRA_MPS2_ELF");
+        command.output().expect("started")
+    }
+
+    /// Runs a command that succeeds; what it says on standard error.
+    pub(super) fn runs(&self, words: &[&str]) -> String {
+        let run = self.run(words);
+        assert!(run.status.success(), "{words:?}: {}", said(&run));
+        said(&run)
+    }
+
+    /// Runs a command that fails; what it says.
+    pub(super) fn fails(&self, words: &[&str]) -> String {
+        let run = self.run(words);
+        assert_eq!(run.status.code(), Some(1), "{words:?}: {}", said(&run));
+        said(&run)
+    }
+
+    /// Replays `from` into `to`.
+    pub(super) fn replay(&self, from: &str, to: &str, more: &[&str]) -> Output {
+        let [terrain, from, to] = ["hills.tif", from, to].map(|name| self.text(name));
+        self.run(&[&["replay", &terrain, &from, "-o", &to], more].concat())
+    }
+
+    /// The same where it succeeds; what it says.
+    pub(super) fn replays(&self, from: &str, to: &str, more: &[&str]) -> String {
+        let run = self.replay(from, to, more);
+        assert!(run.status.success(), "{from} {more:?}: {}", said(&run));
+        said(&run)
+    }
+
+    pub(super) fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).expect("there")
+    }
+
+    pub(super) fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path(name), text).expect("written");
+    }
+
+    /// Makes a trajectory that goes up and down over the hills.
+    pub(super) fn write_trajectory(&self, name: &str) {
+        let mut text = "t_s,x_mm,y_mm,z_mm\n".to_owned();
+        for tick in 0..400 {
+            let t = f64::from(tick) / 400.0;
+            let (x, z) = (60.0 + 30.0 * t, 40.0 * (12.0 * t).cos() + 20.0);
+            text += &format!("{t},{x},{},{z}\n", 70.0 - 10.0 * t);
+        }
+        self.write(name, &text);
+    }
+}
+
+/// What a command said on standard error.
+pub(super) fn said(run: &Output) -> String {
+    String::from_utf8_lossy(&run.stderr).into_owned()
+}
+
+/// The rows of a recording by the names of its columns.
+pub(super) fn rows(text: &str) -> Vec<HashMap<&str, &str>> {
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<_> = lines.next().expect("a header").split(',').collect();
+    lines
+        .map(|line| header.iter().copied().zip(line.split(',')).collect())
+        .collect()
+}
