@@ -35,6 +35,13 @@ pub struct TileDemand {
     pub velocity: [f32; 2],
 }
 
+impl TileDemand {
+    /// The tile around which others are wanted: without it nothing goes on.
+    fn centre(&self) -> TileIndex {
+        self.missing_tile.unwrap_or(TileIndex::holding(self.proxy))
+    }
+}
+
 /// Decides which tile of a `D × D` window to ask for next. No I/O, no clock.
 ///
 /// ```
@@ -128,6 +135,10 @@ impl<const D: usize> TileRequester<D> {
     /// nothing is wanted or enough is under way. Call until `None`.
     pub fn next_request(&mut self, now: u32, demand: &TileDemand) -> Option<TileKey> {
         let is_overdue = |at: &u32| now.wrapping_sub(*at) >= RETRY_TICKS;
+        let centre = demand.centre();
+        // The proxy went on meanwhile: an answer now would push out a nearer tile.
+        self.asked
+            .retain(|(key, at)| !is_overdue(at) || Self::reaches(centre, key.index));
         if let Some((key, at)) = self.asked.iter_mut().find(|(_, at)| is_overdue(at)) {
             *at = now;
             return Some(*key);
@@ -145,8 +156,7 @@ impl<const D: usize> TileRequester<D> {
     /// Only tiles nearer to the centre than half the torus are candidates, so
     /// that none can push out a tile that is nearer.
     fn most_urgent(&self, demand: &TileDemand) -> Option<TileKey> {
-        let near_proxy = TileIndex::holding(demand.proxy);
-        let centre = demand.missing_tile.unwrap_or(near_proxy);
+        let centre = demand.centre();
         let ahead = (0..=LOOK_AHEAD).map(|step| {
             let ticks = (step * HORIZON_TICKS / LOOK_AHEAD) as f32;
             // The casts saturate, so any velocity gives some cell.
@@ -180,13 +190,17 @@ impl<const D: usize> TileRequester<D> {
 
     /// The tile as a request, unless outside, too far, held or asked for.
     fn candidate(&self, index: TileIndex, centre: TileIndex) -> Option<TileKey> {
-        let TileIndex { col, row } = index;
-        let reach = (D as i32 / 2 - 1).max(0);
         let level = self.level;
         let key = TileKey { level, index };
-        let far = col.abs_diff(centre.col).max(row.abs_diff(centre.row)) > reach.unsigned_abs();
-        let held = self.held[wrap::<D>(row)][wrap::<D>(col)] == Some(key);
-        (self.size.has_tile(index) && !far && !held && !self.awaits(key)).then_some(key)
+        let held = self.held[wrap::<D>(index.row)][wrap::<D>(index.col)] == Some(key);
+        let wanted = !held && !self.awaits(key) && Self::reaches(centre, index);
+        (wanted && self.size.has_tile(index)).then_some(key)
+    }
+
+    /// Whether a tile is nearer to the centre than half the torus.
+    fn reaches(centre: TileIndex, TileIndex { col, row }: TileIndex) -> bool {
+        let reach = (D as i32 / 2 - 1).max(0);
+        col.abs_diff(centre.col).max(row.abs_diff(centre.row)) <= reach.unsigned_abs()
     }
 }
 
@@ -253,6 +267,17 @@ mod tests {
             drain(&mut requester, 7 + RETRY_TICKS, &at(48, 48)),
             [(1, 1)]
         );
+    }
+
+    #[test]
+    fn a_tile_that_is_out_of_reach_by_now_is_not_asked_for_again() {
+        let mut requester = requester();
+        assert_eq!(drain(&mut requester, 0, &at(48, 48)), [(1, 1)]);
+        let far = drain(&mut requester, RETRY_TICKS, &at(400, 48));
+        assert_eq!(far, [(12, 1)]);
+        assert!(!requester.awaits(TileKey::new(0, 1, 1)));
+        let back = drain(&mut requester, RETRY_TICKS + 1, &at(48, 48));
+        assert_eq!(back, [(1, 1)]);
     }
 
     #[test]
