@@ -43,8 +43,12 @@ enum State {
 pub(crate) struct Clutch {
     state: State,
     held: bool,
-    /// Share of the force that is let through.
+    /// Share of the force that is let through to a driven arm.
     share: f32,
+    /// Share that was let through in the last tick.
+    felt: f32,
+    /// What it says of the last tick.
+    limits: Limits,
     /// Most that it may change in a tick: out as when the arm is disarmed.
     out: f32,
     back: f32,
@@ -57,6 +61,8 @@ impl Clutch {
             state: State::Closed,
             held: false,
             share: 1.0,
+            felt: 1.0,
+            limits: Limits::empty(),
             out: 1.0 / rate.ticks(FADE_MS) as f32,
             back: 1.0 / rate.ticks(IN_MS) as f32,
         }
@@ -88,18 +94,24 @@ impl Clutch {
         }
     }
 
-    /// How a tick is limited by a clutch that is not closed.
-    #[cold]
-    pub(crate) const fn limit(&self) -> Limits {
-        match self.state {
-            State::Open { .. } => Limits::CLUTCH_OPEN,
-            _ => Limits::CLUTCH_MOVES,
-        }
+    /// How it limits the tick: not at all where it is closed.
+    #[inline]
+    pub(crate) const fn limits(&self) -> Limits {
+        self.limits
+    }
+
+    /// Share of the force that it lets through: all where it is closed.
+    #[inline]
+    pub(crate) const fn share(&self) -> f32 {
+        self.felt
     }
 
     /// One tick of a clutch that is not closed, with the tip at a place over the terrain.
-    /// Returns where the HIP is, and the share of its force that is let through. When it
-    /// closes it moves `home`, so that the HIP is where it was.
+    /// Returns where the HIP is. When it closes it moves `home`, so that the HIP is where
+    /// it was.
+    ///
+    /// An arm that is not driven has all of the force in its share: nothing is armed by
+    /// holding the clutch in the ground.
     #[cold]
     #[inline(never)]
     pub(crate) fn tick<const D: usize>(
@@ -107,7 +119,8 @@ impl Clutch {
         tip: GridPoint,
         home: &mut GridPoint,
         (contact, window): (&mut Contact, &Window<'_, D>),
-    ) -> (GridPoint, f32) {
+        drives: bool,
+    ) -> GridPoint {
         let mut hip = tip;
         match &mut self.state {
             State::Closed => {}
@@ -136,6 +149,12 @@ impl Clutch {
                 }
             }
         }
-        (hip, self.share)
+        self.felt = if drives { self.share } else { 1.0 };
+        self.limits = match self.state {
+            State::Closed => Limits::empty(),
+            State::Open { .. } => Limits::CLUTCH_OPEN,
+            State::Opening | State::Closing => Limits::CLUTCH_MOVES,
+        };
+        hip
     }
 }

@@ -376,17 +376,13 @@ impl<'t, const D: usize> Haptics<'t, D> {
         if let (Some((mechanism, pose)), Some(scene)) = (arm, &mut self.scene) {
             let mut hip = place(mechanism, scene, pose);
             let contact = &mut self.contact;
-            let mut share = 1.0;
             if !self.clutch.is_closed() {
                 let felt = (&mut *contact, &self.window);
-                (hip, share) = self.clutch.tick(hip, &mut scene.home, felt);
-                // Nothing is armed by holding the clutch in the ground.
-                if !self.guard.mode().drives() {
-                    share = 1.0;
-                }
+                let drives = self.guard.mode().drives();
+                hip = self.clutch.tick(hip, &mut scene.home, felt, drives);
             }
             let output = contact.step(&self.window, &hip);
-            wanted = scene.law.force_n(output.displacement * scene.cell_mm) * share;
+            wanted = scene.law.force_n(output.displacement * scene.cell_mm) * self.clutch.share();
             write_output(hip, output, sample);
         } else {
             write_output(GridPoint::default(), &ContactOutput::default(), sample);
@@ -448,9 +444,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         } = self.guard.report();
         limits.set(Limits::TERRAIN_MISSING, sample.missing_tile.is_some());
         limits.set(Limits::BOUNDARY_FADING, self.contact.boundary_fade() < 1.0);
-        if !self.clutch.is_closed() {
-            limits |= self.clutch.limit();
-        }
+        limits |= self.clutch.limits();
         sample.tick = self.tick;
         sample.view = self.view;
         sample.force_n = force_n;
