@@ -35,7 +35,7 @@ pub use jog::{FAR_RAD as JOG_FAR_RAD, FAST_RAD_S as JOG_FAST_RAD_S, JOG_MOST_MS,
 pub use mode::Mode;
 pub use stall::TRAVEL as TRAVEL_WHILE_ONE_STANDS;
 
-use crate::phantom::{Mechanism, Pose};
+use crate::phantom::{JointLimits, Mechanism, Pose};
 use crate::rate::TickRate;
 use arming::Arming;
 use feedback::Feedback;
@@ -170,6 +170,8 @@ pub struct Guard {
     /// Most counts and newtons from one tick to the next.
     max_counts: u32,
     max_slew_n: f32,
+    /// Where joints may be, with [`LIMIT_MARGIN_RAD`].
+    stops: JointLimits,
     arming: Arming,
     fault: Option<Fault>,
     blockers: Blockers,
@@ -197,6 +199,7 @@ impl Guard {
         Self {
             max_counts: MAX_COUNTS_PER_S.div_ceil(rate.hz()),
             max_slew_n: MAX_SLEW_N_PER_S / rate.hz() as f32,
+            stops: JointLimits::NOWHERE,
             arming: Arming::new(rate),
             fault: found_at_boot,
             blockers: Blockers::empty(),
@@ -218,6 +221,8 @@ impl Guard {
     /// Takes the bounds of an arm.
     pub fn configure(&mut self, mechanism: &Mechanism) {
         self.max_force_n = WORKING_SHARE * mechanism.calibration().max_force_n;
+        let limits = &mechanism.calibration().limits;
+        self.stops = limits.widened(LIMIT_MARGIN_RAD);
         self.speed.configure(mechanism);
         self.motors.configure(mechanism.calibration());
     }

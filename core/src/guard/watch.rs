@@ -1,9 +1,7 @@
 //! The checks of a tick's inputs, before anything is driven.
 
 use super::speed::SpeedCheck;
-use super::{
-    Blockers, Fault, Guard, LIMIT_MARGIN_RAD, Limits, Mode, SceneKind, Sense, Surroundings,
-};
+use super::{Blockers, Fault, Guard, Limits, Mode, SceneKind, Sense, Surroundings};
 
 impl Guard {
     /// Checks every input of a tick before anything is driven. Returns whether the
@@ -82,11 +80,10 @@ impl Guard {
         if !around.watchdog_live {
             return Some(Fault::TaskStalled);
         }
-        let limits = &mechanism.calibration().limits;
-        if !limits.each_allows(pose.angles(), LIMIT_MARGIN_RAD) {
+        if !self.stops.each_allows(pose.angles()) {
             return Some(Fault::JointLimit);
         }
-        if !limits.linkage_allows(pose.angles(), LIMIT_MARGIN_RAD) {
+        if !self.stops.linkage_allows(pose.angles()) {
             return Some(Fault::Linkage);
         }
         match self.speed.check(sense.counts, mechanism, pose) {
@@ -116,9 +113,9 @@ impl Guard {
 
     /// What keeps the arm from being armed, besides what the user has to do.
     fn find_blockers(&self, sense: &Sense, around: &Surroundings<'_>) -> Blockers {
-        let outside = around.arm.is_some_and(|(mechanism, pose)| {
-            let limits = &mechanism.calibration().limits;
-            !limits.allow(pose.angles(), LIMIT_MARGIN_RAD)
+        let outside = around.arm.is_some_and(|(_, pose)| {
+            let q = pose.angles();
+            !(self.stops.each_allows(q) && self.stops.linkage_allows(q))
         });
         let bits = [
             (around.arm.is_none(), Blockers::NO_CALIBRATION),

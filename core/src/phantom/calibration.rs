@@ -110,27 +110,46 @@ impl Calibration {
 }
 
 impl JointLimits {
+    /// No pose lies inside.
+    pub(crate) const NOWHERE: Self = Self {
+        min_rad: Vec3::INFINITY,
+        max_rad: Vec3::NEG_INFINITY,
+        q2_minus_q3_max_rad: f32::NEG_INFINITY,
+        q3_minus_q2_max_rad: f32::NEG_INFINITY,
+    };
+
+    /// The same, with `margin_rad` more room at every end.
+    #[must_use]
+    pub fn widened(&self, margin_rad: f32) -> Self {
+        let margin = Vec3::splat(margin_rad);
+        Self {
+            min_rad: self.min_rad - margin,
+            max_rad: self.max_rad + margin,
+            q2_minus_q3_max_rad: self.q2_minus_q3_max_rad + margin_rad,
+            q3_minus_q2_max_rad: self.q3_minus_q2_max_rad + margin_rad,
+        }
+    }
+
     /// Whether a pose lies inside, give or take `margin_rad`. Not-a-number
     /// lies outside.
     #[must_use]
     pub fn allow(&self, q: Vec3, margin_rad: f32) -> bool {
-        self.each_allows(q, margin_rad) && self.linkage_allows(q, margin_rad)
+        let wide = self.widened(margin_rad);
+        wide.each_allows(q) && wide.linkage_allows(q)
     }
 
-    /// Whether each joint by itself lies inside, give or take `margin_rad`.
+    /// Whether each joint by itself lies inside.
     #[must_use]
     #[inline]
-    pub fn each_allows(&self, q: Vec3, margin_rad: f32) -> bool {
-        let margin = Vec3::splat(margin_rad);
-        q.cmpge(self.min_rad - margin).all() && q.cmple(self.max_rad + margin).all()
+    pub fn each_allows(&self, q: Vec3) -> bool {
+        q.cmpge(self.min_rad).all() && q.cmple(self.max_rad).all()
     }
 
-    /// Whether the linkage allows q2 and q3 together, give or take
-    /// `margin_rad`.
+    /// Whether the linkage allows q2 and q3 together.
     #[must_use]
-    pub fn linkage_allows(&self, q: Vec3, margin_rad: f32) -> bool {
+    #[inline]
+    pub fn linkage_allows(&self, q: Vec3) -> bool {
         let spread = q.y - q.z;
-        spread <= self.q2_minus_q3_max_rad + margin_rad
-            && -spread <= self.q3_minus_q2_max_rad + margin_rad
+        spread <= self.q2_minus_q3_max_rad && -spread <= self.q3_minus_q2_max_rad
     }
 }
