@@ -14,17 +14,44 @@
 //!
 //! It opens to the end before it closes again, however often it is held and let go. A spring that
 //! gets softer takes energy from the hand and one that gets harder gives some, so one turn gives the
-//! hand at most what the spring held: ½ F² / K, 72 mJ at 8.5 N and 0.5 N/mm, and 0.5 s pass until it may
-//! be given again.
+//! hand at most what the spring holds then: ½ F² / K, 72 mJ at 8.5 N and 0.5 N/mm, and 0.5 s pass until it may
+//! be given again. Where the terrain stays in its place that is more by what the hand has moved meanwhile, 10 mm
+//! at most.
+//!
+//! A hand that presses gives way when the force goes out: it moves on, towards where it wants to
+//! be. Where the terrain goes with it the ground sinks by that. So a clutch that is held for another
+//! view only ([`ClutchHold::InPlace`]) leaves the terrain in its place before the arm: the point that was
+//! under the tip when the clutch opened is there when it closes, and the press comes back.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::contact::Contact;
 use crate::grid::GridPoint;
 use crate::guard::{FADE_MS, Limits};
 use crate::rate::TickRate;
+use crate::scene::Scene;
 use crate::terrain::Window;
 
 /// How long all of it takes to come in again, ms.
 const IN_MS: u32 = 500;
+/// Most that a hand may have moved while the terrain stayed in its place, mm. What it moved
+/// beyond that the terrain goes with it: a hand that gives way under 1.2 N moves some 5 mm.
+const GIVE_MM: f32 = 10.0;
+
+/// How the host holds the clutch. In either way the HIP stays where it is over the terrain,
+/// and nothing is felt.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ClutchHold {
+    /// Not held.
+    #[default]
+    LetGo,
+    /// The terrain goes with the hand: it is felt again where the hand is then.
+    WithHand,
+    /// For another view: the terrain is felt again where it was before the arm, however the hand
+    /// gave way meanwhile, up to 10 mm.
+    InPlace,
+}
 
 #[derive(Clone, Copy, Debug)]
 enum State {
@@ -32,8 +59,10 @@ enum State {
     Closed,
     /// The force goes out.
     Opening,
-    /// The HIP stays at its place over the terrain, wherever the tip goes.
-    Open { hip: GridPoint },
+    /// The HIP stays at its place over the terrain, wherever the tip goes. `tip_mm` is
+    /// where the tip was when it opened, from its home pose: hand millimetres east,
+    /// north and up, which are the same in every view.
+    Open { hip: GridPoint, tip_mm: Vec3 },
     /// The force comes in again.
     Closing,
 }
@@ -42,7 +71,9 @@ enum State {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Clutch {
     state: State,
-    held: bool,
+    held: ClutchHold,
+    /// Since it was held the terrain was to go with the hand.
+    carries: bool,
     /// Share of the force that is let through to a driven arm.
     share: f32,
     /// Share that was let through in the last tick.
@@ -59,7 +90,8 @@ impl Clutch {
     pub(crate) fn new(rate: TickRate) -> Self {
         Self {
             state: State::Closed,
-            held: false,
+            held: ClutchHold::LetGo,
+            carries: false,
             share: 1.0,
             felt: 1.0,
             limits: Limits::empty(),
@@ -79,17 +111,22 @@ impl Clutch {
         matches!(self.state, State::Open { .. })
     }
 
-    /// It is held from now on, or no longer.
-    pub(crate) fn hold(&mut self, held: bool) {
+    /// It is held like this from now on, or no longer.
+    pub(crate) fn hold(&mut self, held: ClutchHold) {
         self.held = held;
-        if held && !self.is_open() {
-            self.state = State::Opening;
+        if held == ClutchHold::LetGo {
+            return;
         }
+        if let State::Closed | State::Closing = self.state {
+            self.state = State::Opening;
+            self.carries = false;
+        }
+        self.carries |= held == ClutchHold::WithHand;
     }
 
     /// Puts the HIP of an open clutch somewhere else.
     pub(crate) fn put(&mut self, there: GridPoint) {
-        if let State::Open { hip } = &mut self.state {
+        if let State::Open { hip, .. } = &mut self.state {
             *hip = there;
         }
     }
@@ -107,8 +144,8 @@ impl Clutch {
     }
 
     /// One tick of a clutch that is not closed, with the tip at a place over the terrain.
-    /// Returns where the HIP is. When it closes it moves `home`, so that the HIP is where
-    /// it was.
+    /// Returns where the HIP is. When it closes it moves the scene's home, so that the
+    /// terrain is where it is to be.
     ///
     /// An arm that is not driven has all of the force in its share: nothing is armed by
     /// holding the clutch in the ground.
@@ -117,10 +154,11 @@ impl Clutch {
     pub(crate) fn tick<const D: usize>(
         &mut self,
         tip: GridPoint,
-        home: &mut GridPoint,
+        scene: &mut Scene,
         (contact, window): (&mut Contact, &Window<'_, D>),
         drives: bool,
     ) -> GridPoint {
+        let from_home_mm = |scene: &Scene| scene.home.to(&tip) * scene.cell_mm;
         let mut hip = tip;
         match &mut self.state {
             State::Closed => {}
@@ -128,16 +166,24 @@ impl Clutch {
                 self.share -= self.out;
                 if self.share <= 0.0 {
                     self.share = 0.0;
-                    self.state = State::Open { hip };
+                    let tip_mm = from_home_mm(scene);
+                    self.state = State::Open { hip, tip_mm };
                 }
             }
-            State::Open { hip: there } => {
+            State::Open { hip: there, tip_mm } => {
                 if let Some(landed) = contact.land(window) {
                     *there = landed;
                 }
                 hip = *there;
-                if !self.held && !contact.is_landing() {
-                    *home = GridPoint::new(home.cell(), home.frac() + tip.to(&hip));
+                if self.held == ClutchHold::LetGo && !contact.is_landing() {
+                    let moved_mm = from_home_mm(scene) - *tip_mm;
+                    let stays_mm = match self.carries {
+                        true => Vec3::ZERO,
+                        false => moved_mm.clamp_length_max(GIVE_MM),
+                    };
+                    let home = scene.home;
+                    let shift = tip.to(&hip) + stays_mm / scene.cell_mm;
+                    scene.home = GridPoint::new(home.cell(), home.frac() + shift);
                     self.state = State::Closing;
                 }
             }

@@ -49,7 +49,7 @@
 //! 5. [`force`] turns proxy and HIP into newtons.
 //! 6. [`guard`] decides what may reach the amplifiers.
 //! 7. [`scene`] is what the loop is given to feel, and what it says of a tick. The
-//!    clutch (`clutch.rs`) lets another view in without a step in force.
+//!    [`clutch`] lets another view in without a step in force.
 //! 8. [`tick`] is all of it as one pure function, called 1,000 to 10,000 times a
 //!    second ([`rate::TickRate`]).
 //! 9. [`wire`] is what travels between the device and the host.
@@ -69,7 +69,7 @@ mod cases;
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-mod clutch;
+pub mod clutch;
 pub mod contact;
 pub mod crc;
 pub mod force;

@@ -68,8 +68,9 @@ pub struct View {
     /// The field, its scale and the law. Its home is where the device would begin if it
     /// were restarted; while it runs the home follows from [`View::hip`].
     pub scene: Scene,
-    /// The haptic interface point in the view, cells, wherever the tip is when the clutch
-    /// closes. In contact its height is the device's: as deep as before.
+    /// The haptic interface point in the view, cells, for the tip where it was when the clutch
+    /// opened, or where it is when that closes ([`ClutchHold`](crate::clutch::ClutchHold)). In contact
+    /// its height is the device's: as deep as before.
     pub hip: GridPoint,
     /// Whether the tiles that the device holds are those of this scene: only place and law
     /// differ.

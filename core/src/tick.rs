@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 
-use crate::clutch::Clutch;
+use crate::clutch::{Clutch, ClutchHold};
 use crate::contact::{Contact, ContactOutput, ContactSettings, Execution};
 use crate::grid::GridPoint;
 use crate::guard::thermal::Temperatures;
@@ -27,8 +27,8 @@ pub enum Command<'t> {
     /// Another view of the scene, already checked. The arm stays armed where the clutch is
     /// open; else it is as another scene.
     View(View),
-    /// Hold the clutch, or let it go: while it is held the terrain goes with the hand.
-    Clutch(bool),
+    /// Hold the clutch, or let it go.
+    Clutch(ClutchHold),
     /// A filled tile.
     Tile(&'t mut Tile),
     /// A haptic interface point for one tick, in a scene fed by points.
@@ -379,7 +379,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             if !self.clutch.is_closed() {
                 let felt = (&mut *contact, &self.window);
                 let drives = self.guard.mode().drives();
-                hip = self.clutch.tick(hip, &mut scene.home, felt, drives);
+                hip = self.clutch.tick(hip, scene, felt, drives);
             }
             let output = contact.step(&self.window, &hip);
             wanted = scene.law.force_n(output.displacement * scene.cell_mm) * self.clutch.share();

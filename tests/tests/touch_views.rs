@@ -25,6 +25,8 @@ const RESOLUTION_MM: f64 = 0.5;
 /// The hand presses with this, N: what the motors hold for good, as this hand does not
 /// tremble.
 const PUSH_N: f64 = 1.2;
+/// Of the spring, N/mm.
+const STIFFNESS: f32 = ForceLaw::PREMIUM.stiffness_n_per_mm;
 /// Most that the force changes in a tick, N: all of it goes out in 100 ticks, and the hand
 /// that gives way moves some 0.1 mm.
 const GENTLE_N: f32 = 0.12;
@@ -148,12 +150,17 @@ impl Touching<'_> {
         self.steer(Steer::Change(change))
     }
 
+    fn last(&self) -> Sample {
+        *self.samples.last().expect("samples")
+    }
+
     fn level(&self) -> u8 {
         self.steering.now().view.level
     }
 }
 
-/// The arm stays armed, and no tick changes the force by more than this.
+/// The arm stays armed, no tick changes the force by more than this, and none makes more of it than
+/// there was at the beginning.
 fn judge(samples: &[Sample], most_n: f32) {
     for pair in samples.windows(2) {
         let [before, after] = [pair[0], pair[1]];
@@ -163,6 +170,9 @@ fn judge(samples: &[Sample], most_n: f32) {
         assert!(change <= most_n, "tick {}: {change} N at once", after.tick);
         let share = MAX_SLEW_N_PER_S / 1_000.0;
         assert!(change <= share, "tick {}: {change} N", after.tick);
+        let (force, first) = (after.force_n.length(), samples[0].force_n.length());
+        // The hand is pushed back, and its damping adds to the press while it moves.
+        assert!(force <= 1.03 * first, "tick {}: {force} N", after.tick);
     }
     let worst = samples
         .windows(2)
@@ -174,33 +184,48 @@ fn judge(samples: &[Sample], most_n: f32) {
     );
 }
 
-/// The ground is felt again, and no harder than before. It may be felt less: while the clutch
-/// is open the ground goes with a hand that presses, which comes nearer to where it wants to be.
-fn assert_pressed(sample: &Sample, what: &str) {
-    let force = sample.force_n.length();
+/// The ground is felt again as it was: the press has come back, and no more than it.
+fn assert_pressed(sample: &Sample, before: &Sample, what: &str) {
+    assert_felt(sample, what);
+    let share = sample.force_n.length() / before.force_n.length();
+    assert!((0.98..1.02).contains(&share), "{what}: {share} of before");
+}
+
+fn assert_felt(sample: &Sample, what: &str) {
     assert_eq!(sample.state, ContactState::Touching, "{what}");
     assert_eq!(sample.limits, Limits::empty(), "{what}");
-    assert!((0.1..1.5).contains(&force), "{what}: {force} N");
+}
+
+/// How much of its force a press has with a spring, N/mm, of what it has with another. The hand
+/// is a spring, too, whose end stays where it is.
+fn in_series(with: f32, of: f32) -> f32 {
+    let give = 1_000.0 * HandModel::default().give_m_per_n() as f32;
+    (give + 1.0 / of) / (give + 1.0 / with)
+}
+
+/// What a press has left when the ground went with the hand to where that wants to be.
+fn all_the_way() -> f32 {
+    let give = 1_000.0 * HandModel::default().give_m_per_n() as f32;
+    (1.0 / STIFFNESS) / (give + 1.0 / STIFFNESS)
 }
 
 #[test]
 fn zoomed_through_eight_levels_and_back_while_it_is_pressed_the_force_makes_no_step() {
     let raster = hills();
     pressed(&raster, 60.0, |touching| {
-        assert_pressed(
-            touching.samples.last().expect("samples"),
-            "at the beginning",
-        );
+        let before = touching.last();
+        assert_felt(&before, "at the beginning");
+        assert!((before.force_n.length() - PUSH_N as f32).abs() < 0.05);
         let began = touching.samples.len();
         assert_eq!(touching.level(), 8);
         for level in (0..8).rev() {
             let sample = touching.change(ViewChange::Zoom(2.0));
-            assert_pressed(&sample, &format!("zoomed to level {level}"));
+            assert_pressed(&sample, &before, &format!("zoomed to level {level}"));
             assert_eq!(touching.level(), level, "{:?}", touching.said);
         }
         for level in 1..=8 {
             let sample = touching.change(ViewChange::Zoom(0.5));
-            assert_pressed(&sample, &format!("back to level {level}"));
+            assert_pressed(&sample, &before, &format!("back to level {level}"));
             assert_eq!(touching.level(), level, "{:?}", touching.said);
         }
         assert_eq!(touching.samples.last().map(|last| last.view), Some(16));
@@ -219,28 +244,37 @@ fn panned_made_steeper_and_softer_while_it_is_pressed_the_force_makes_no_step() 
             let sample = touching.samples.last().expect("samples");
             touching.steering.terrain().scale().to_mm(&sample.proxy)
         };
+        let first = touching.last();
         let before = under(touching);
         let pan = ViewChange::Pan {
             east_mm: 20.0,
             north_mm: -15.0,
         };
-        assert_pressed(&touching.change(pan), "panned");
+        assert_pressed(&touching.change(pan), &first, "panned");
         let after = under(touching);
         let moved = [after[0] - before[0], after[1] - before[1]];
         assert!(
             (moved[0] - 20.0).abs() < 1.5 && (moved[1] + 15.0).abs() < 1.5,
             "{moved:?}"
         );
-        assert_pressed(&touching.change(ViewChange::Exaggerate(1.5)), "steeper");
+        let steeper = touching.change(ViewChange::Exaggerate(1.5));
+        assert_pressed(&steeper, &first, "steeper");
         let softer = touching.change(ViewChange::Stiffness(0.5));
-        assert_pressed(&softer, "softer");
-        let depth = |sample: &Sample| sample.hip.to(&sample.proxy).length();
+        assert_felt(&softer, "softer");
+        let (soft, hard) = (0.5 * STIFFNESS, STIFFNESS);
+        let share = softer.force_n.length() / steeper.force_n.length();
+        assert!((share - in_series(soft, hard)).abs() < 0.02, "{share}");
         let harder = touching.change(ViewChange::Stiffness(2.0));
+        assert_pressed(&harder, &first, "as hard as before");
+        let depth = |sample: &Sample| sample.hip.to(&sample.proxy).length();
+        let deeper = depth(&softer) / depth(&harder);
+        let wanted = 2.0 * in_series(soft, hard);
         assert!(
-            depth(&softer) > 1.5 * depth(&harder),
+            (deeper / wanted - 1.0).abs() < 0.02,
             "a softer spring gives more"
         );
-        assert_pressed(&touching.change(ViewChange::Reset), "as at the beginning");
+        let reset = touching.change(ViewChange::Reset);
+        assert_pressed(&reset, &first, "as at the beginning");
         assert_eq!(touching.level(), 8);
         assert_eq!(touching.said, [""; 0]);
         judge(&touching.samples[began..], GENTLE_N);
@@ -252,7 +286,7 @@ fn with_the_clutch_the_terrain_goes_with_the_hand_and_is_felt_again_where_it_was
     let raster = hills();
     pressed(&raster, 30.0, |touching| {
         let began = touching.samples.len();
-        touching.change(ViewChange::Zoom(64.0));
+        let before = touching.change(ViewChange::Zoom(64.0));
         touching.steering.steer(Steer::Clutch(true));
         let open = touching.run(400);
         assert!(open.limits.contains(Limits::CLUTCH_OPEN));
@@ -267,7 +301,11 @@ fn with_the_clutch_the_terrain_goes_with_the_hand_and_is_felt_again_where_it_was
         assert!(zoomed.limits.contains(Limits::CLUTCH_OPEN));
         assert_eq!(zoomed.view, 2);
         let closed = touching.steer(Steer::Clutch(false));
-        assert_pressed(&closed, "let go");
+        assert_felt(&closed, "let go");
+        // The ground goes with a hand that gives way, and at most all the way to where that
+        // wants to be. Then two springs share what one had.
+        let share = closed.force_n.length() / before.force_n.length();
+        assert!((all_the_way()..1.0).contains(&share), "{share}");
         judge(&touching.samples[began..], GENTLE_N);
     });
 }
@@ -281,10 +319,12 @@ fn what_cannot_be_had_changes_nothing_and_is_told() {
             east_mm: 500.0,
             north_mm: 0.0,
         };
-        assert_pressed(&touching.change(far), "after a place outside");
+        let before = touching.last();
+        assert_pressed(&touching.change(far), &before, "after a place outside");
         assert!(touching.said[0].contains("outside"), "{:?}", touching.said);
         assert_pressed(
             &touching.change(ViewChange::Stiffness(50.0)),
+            &before,
             "after too much",
         );
         assert_eq!(touching.said.len(), 2);

@@ -1,6 +1,7 @@
 //! The clutch, and views that are put in while it is open.
 
 use super::*;
+use crate::clutch::ClutchHold::{self, InPlace, LetGo, WithHand};
 use crate::guard::MAX_SLEW_N_PER_S;
 use crate::scene::View;
 
@@ -51,8 +52,8 @@ impl<'t> Watched<'t> {
         (0..count).fold(self.last.sample, |_, _| self.tick())
     }
 
-    fn clutch(&mut self, held: bool) {
-        self.device.say(Command::Clutch(held));
+    fn clutch(&mut self, hold: ClutchHold) {
+        self.device.say(Command::Clutch(hold));
     }
 
     /// Puts another view in, which has these heights.
@@ -109,7 +110,7 @@ fn while_the_clutch_is_held_there_is_no_force_and_the_terrain_goes_with_the_hand
     let mut arm = Watched::pressed(&mut tiles, plane);
     let felt = arm.tick();
     assert!(felt.force_n.z > 2.0, "{}", felt.force_n);
-    arm.clutch(true);
+    arm.clutch(WithHand);
     let opening = arm.ticks(99);
     assert!(opening.limits.contains(Limits::CLUTCH_MOVES));
     assert!(opening.force_n.z > 0.0);
@@ -123,7 +124,7 @@ fn while_the_clutch_is_held_there_is_no_force_and_the_terrain_goes_with_the_hand
     }
     let home = |arm: &Watched<'_>| arm.device.haptics.scene.expect("a scene").home;
     let before = home(&arm);
-    arm.clutch(false);
+    arm.clutch(LetGo);
     let back = arm.ticks(510);
     assert_eq!(back.limits, Limits::empty());
     assert!(open.hip.to(&back.hip).length() < 1e-4, "{:?}", back.hip);
@@ -136,13 +137,101 @@ fn while_the_clutch_is_held_there_is_no_force_and_the_terrain_goes_with_the_hand
     assert!(arm.tick().hip.to(&open.hip).z < -1.0);
 }
 
+/// Moves the arm there, some counts in each tick.
+fn go(arm: &mut Watched<'_>, counts: [i32; 3], ticks: i32) -> Sample {
+    let from = arm.counts;
+    for n in 1..=ticks {
+        arm.counts = [0, 1, 2].map(|axis| from[axis] + (counts[axis] - from[axis]) * n / ticks);
+        arm.tick();
+    }
+    arm.last.sample
+}
+
+#[test]
+fn held_for_another_view_the_terrain_stays_in_its_place_and_the_press_comes_back() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Watched::pressed(&mut tiles, plane);
+    let felt = arm.tick();
+    arm.clutch(InPlace);
+    let open = arm.ticks(105);
+    // The hand gives way, some 2 mm, and then 3 mm to the side.
+    go(&mut arm, [60, DEEP[1] - 70, 0], 100);
+    assert!(arm.last.sample.hip.is_same(&open.hip));
+    // The same ground, twice as large.
+    let mut wanted = view(1, 0, open.hip);
+    wanted.scene.cell_mm = 2.0;
+    wanted.keeps_tiles = true;
+    arm.put(wanted, plane);
+    arm.ticks(20);
+    arm.clutch(LetGo);
+    let deeper = arm.ticks(510);
+    assert_eq!(deeper.limits, Limits::empty());
+    assert!(
+        deeper.force_n.z > felt.force_n.z + 0.5,
+        "{}",
+        deeper.force_n
+    );
+    // It is pushed back to where it was.
+    let back = go(&mut arm, DEEP, 300);
+    let change = back.force_n - felt.force_n;
+    assert!(
+        change.length() < 2e-3,
+        "{} and {}",
+        felt.force_n,
+        back.force_n
+    );
+}
+
+#[test]
+fn a_hand_that_goes_far_takes_the_terrain_along_however_the_clutch_is_held() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Watched::pressed(&mut tiles, plane);
+    let home = |arm: &Watched<'_>| arm.device.haptics.scene.expect("a scene").home;
+    let before = home(&arm);
+    let hip = arm.tick().hip;
+    arm.clutch(InPlace);
+    arm.ticks(105);
+    go(&mut arm, [0, DEEP[1] + 1_000, 0], 500);
+    arm.clutch(LetGo);
+    let back = arm.ticks(3);
+    // Cells are millimetres here.
+    let kept = hip.to(&back.hip).length();
+    assert!((kept - 10.0).abs() < 0.01, "{kept} mm");
+    let along = before.to(&home(&arm)).length();
+    assert!(along > 15.0, "{along} mm");
+}
+
+#[test]
+fn taken_along_once_the_terrain_has_gone_with_the_hand() {
+    let mut tiles = buffers::<4>();
+    for holds in [[InPlace, WithHand, InPlace], [WithHand, InPlace, InPlace]] {
+        let mut arm = Watched::pressed(&mut tiles, plane);
+        let hip = arm.tick().hip;
+        for hold in holds {
+            arm.clutch(hold);
+            arm.ticks(60);
+        }
+        go(&mut arm, [0, DEEP[1] + 100, 0], 50);
+        arm.clutch(LetGo);
+        let back = arm.ticks(510).hip;
+        assert!(hip.to(&back).length() < 1e-3, "{holds:?}: {back:?}");
+        // The next time begins anew.
+        arm.clutch(InPlace);
+        arm.ticks(110);
+        go(&mut arm, [0, DEEP[1] + 60, 0], 50);
+        arm.clutch(LetGo);
+        let moved = hip.to(&arm.ticks(510).hip).length();
+        assert!(moved > 1.0, "{moved} mm");
+    }
+}
+
 #[test]
 fn let_go_too_early_it_opens_to_the_end_first() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, plane);
-    arm.clutch(true);
+    arm.clutch(WithHand);
     arm.ticks(20);
-    arm.clutch(false);
+    arm.clutch(LetGo);
     let mut least = f32::MAX;
     for _ in 0..620 {
         least = least.min(arm.tick().force_n.z);
@@ -157,7 +246,7 @@ fn let_go_too_early_it_opens_to_the_end_first() {
 fn another_view_is_felt_as_deep_as_the_one_before_and_the_arm_stays_armed() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, gentle);
-    arm.clutch(true);
+    arm.clutch(WithHand);
     arm.ticks(110);
     let depth = arm.depth_mm(1.0);
     assert!(depth > 3.0, "{depth}");
@@ -173,7 +262,7 @@ fn another_view_is_felt_as_deep_as_the_one_before_and_the_arm_stays_armed() {
     assert_eq!((sample.view, sample.state), (1, ContactState::Touching));
     assert_eq!(sample.force_n, Vec3::ZERO, "not before it is let go");
     assert!(sample.tick > ticks_before, "ticks go on");
-    arm.clutch(false);
+    arm.clutch(LetGo);
     arm.ticks(510);
     let now = arm.depth_mm(1.0);
     assert!(now <= depth + 1e-3 && now > 0.5 * depth, "{now} of {depth}");
@@ -186,7 +275,7 @@ fn eight_views_one_after_the_other_make_no_step() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, gentle);
     for number in 1..=8 {
-        arm.clutch(true);
+        arm.clutch(WithHand);
         arm.ticks(101);
         let hip = arm.last.sample.hip;
         let mut wanted = view(number, 0, hip);
@@ -195,7 +284,7 @@ fn eight_views_one_after_the_other_make_no_step() {
         wanted.keeps_tiles = true;
         let served = arm.device.served;
         arm.put(wanted, gentle);
-        arm.clutch(false);
+        arm.clutch(LetGo);
         arm.ticks(550);
         assert!(arm.device.served - served < 5, "its tiles stay");
         assert_eq!(arm.last.sample.view, number);
@@ -207,11 +296,11 @@ fn eight_views_one_after_the_other_make_no_step() {
 fn without_its_tiles_a_view_is_not_felt_and_the_clutch_stays_open() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, gentle);
-    arm.clutch(true);
+    arm.clutch(WithHand);
     arm.ticks(110);
     let wanted = view(1, 1, halved(arm.last.sample.hip));
     arm.device.say(Command::View(wanted));
-    arm.clutch(false);
+    arm.clutch(LetGo);
     let outcome = |arm: &mut Watched<'_>| {
         let sense = Sense {
             counts: DEEP,
@@ -256,8 +345,9 @@ fn whatever_a_host_says_the_force_makes_no_step_and_little_energy_is_given() {
         rng = rng.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         let dice = rng >> 24;
         match dice {
-            0..64 => arm.clutch(true),
-            64..160 => arm.clutch(false),
+            0..32 => arm.clutch(WithHand),
+            32..64 => arm.clutch(InPlace),
+            64..160 => arm.clutch(LetGo),
             160..200 if arm.last.sample.limits.contains(Limits::CLUTCH_OPEN) => {
                 let mut wanted = view(tick as u8, 0, arm.last.sample.hip);
                 wanted.scene.cell_mm = [0.5, 1.0, 2.0][dice as usize % 3];
@@ -283,7 +373,7 @@ fn the_ground_is_not_armed_into_by_holding_the_clutch() {
     let deeper = (0..60).map(|n| [0, -n, 0]);
     let last = dip().chain(deeper).map(|c| device.tick(c)).last();
     assert_eq!(last.expect("ticks").sample.state, ContactState::Touching);
-    device.say(Command::Clutch(true));
+    device.say(Command::Clutch(WithHand));
     for _ in 0..110 {
         let _ = device.tick([0, -60, 0]);
     }

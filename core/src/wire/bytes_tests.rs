@@ -10,6 +10,7 @@ use super::hello::{DeviceHello, HostHello, PROTOCOL, SerialNumber};
 use super::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
 use super::request::{Answer, Refusal, Request};
 use super::session::{InSession, LastSession, SampleCount, SessionEnd, SessionNumber};
+use crate::clutch::ClutchHold;
 use crate::contact::{ContactState, Rule};
 use crate::force::ForceLaw;
 use crate::grid::GridPoint;
@@ -130,9 +131,16 @@ fn a_view_and_the_clutch() {
         std::vec![1],
     ];
     assert_eq!(bytes(&ToDevice::View(view)), wanted.concat());
-    let request = Request::Clutch { held: true };
-    let asked = ToDevice::Request { number: 4, request };
-    assert_eq!(bytes(&asked), [5, 4, 10, 1]);
+    let holds = [
+        (ClutchHold::LetGo, 0),
+        (ClutchHold::WithHand, 1),
+        (ClutchHold::InPlace, 2),
+    ];
+    for (hold, byte) in holds {
+        let request = Request::Clutch { hold };
+        let asked = ToDevice::Request { number: 4, request };
+        assert_eq!(bytes(&asked), [5, 4, 10, byte]);
+    }
 }
 
 #[test]

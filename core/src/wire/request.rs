@@ -7,6 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::clutch::ClutchHold;
 use crate::guard::{Blockers, Fault, Jog};
 use crate::phantom::{BadCalibration, Calibration};
 
@@ -53,11 +54,11 @@ pub enum Request {
     /// off, or no longer. Only while disarmed and without a fault; it ends by itself
     /// ([`HOLD_S`](crate::guard::HOLD_S)).
     HoldOutputs(Option<[f32; 3]>),
-    /// To hold the clutch, or to let it go: while it is held there is no force, and the
-    /// terrain goes with the hand. It is let go when the session ends.
+    /// To hold the clutch, or to let it go: while it is held there is no force, and another
+    /// view may be put in. It is let go when the session ends.
     Clutch {
-        /// Whether it is held from now on.
-        held: bool,
+        /// How it is held from now on.
+        hold: ClutchHold,
     },
 }
 

@@ -114,8 +114,8 @@ impl<const D: usize> Link<'_, D> {
                 refused => refused,
             },
             Request::Disarm => self.obey(Command::Disarm),
-            Request::Clutch { held } => {
-                self.set_clutch(held);
+            Request::Clutch { hold } => {
+                self.set_clutch(hold);
                 Ok(())
             }
             Request::ClearFault { seen } => self

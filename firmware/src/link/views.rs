@@ -3,6 +3,7 @@
 //! The loop takes commands in their order. So every tile that follows a view in the queue
 //! is the view's own, and a tile of the one before is refused by its epoch.
 
+use hapterra_core::clutch::ClutchHold;
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::{Scene, Source, View};
 use hapterra_core::terrain::TileDemand;
@@ -29,12 +30,12 @@ pub(super) enum ClutchOfHost {
 
 impl<const D: usize> Link<'_, D> {
     /// The host holds the clutch, or lets it go.
-    pub(super) fn set_clutch(&mut self, held: bool) {
-        self.clutch = match held {
-            true => ClutchOfHost::Held,
-            false => ClutchOfHost::LetGo,
+    pub(super) fn set_clutch(&mut self, hold: ClutchHold) {
+        self.clutch = match hold {
+            ClutchHold::LetGo => ClutchOfHost::LetGo,
+            ClutchHold::WithHand | ClutchHold::InPlace => ClutchOfHost::Held,
         };
-        self.command(Command::Clutch(held));
+        self.command(Command::Clutch(hold));
     }
 
     /// The host that may hold the clutch is gone.
@@ -47,7 +48,7 @@ impl<const D: usize> Link<'_, D> {
     /// Lets the clutch of a host go that is gone.
     pub(super) fn release_forsaken_clutch(&mut self) {
         if self.clutch == ClutchOfHost::Forsaken && self.ends.commands.ready() {
-            self.set_clutch(false);
+            self.set_clutch(ClutchHold::LetGo);
         }
     }
 

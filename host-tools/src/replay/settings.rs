@@ -61,7 +61,7 @@ pub struct ViewSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exaggeration: Option<f64>,
     /// The point of the terrain at the tip in the arm's home pose, hand millimetres, as far as
-    /// the host knows: the hand moves it while the clutch is open.
+    /// the host knows: a clutch that the user holds moves it.
     pub home_mm: [f64; 3],
     /// Newtons for a millimetre between the HIP and the proxy.
     pub stiffness_n_per_mm: f32,

@@ -1,5 +1,6 @@
 //! What the user wants of the view, done with a device.
 
+use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::{Sample, Source, View};
@@ -52,6 +53,8 @@ pub struct Steering<'r> {
     waiting: Vec<ViewChange>,
     /// The user holds the clutch.
     held: bool,
+    /// How the device was asked to hold it.
+    asked: ClutchHold,
     stage: Stage<'r>,
     asks: Vec<Ask>,
     put: Option<Put<'r>>,
@@ -70,6 +73,7 @@ impl<'r> Steering<'r> {
             number: 0,
             waiting: vec![],
             held: false,
+            asked: ClutchHold::LetGo,
             stage: Stage::Idle,
             asks: vec![],
             put: None,
@@ -134,6 +138,7 @@ impl<'r> Steering<'r> {
                 // A clutch is let go with its session, and a device that was restarted begins
                 // with this view.
                 self.stage = Stage::Idle;
+                self.asked = ClutchHold::LetGo;
                 if !resumed {
                     self.number = 0;
                 }
@@ -152,20 +157,34 @@ impl<'r> Steering<'r> {
         self.let_go();
     }
 
-    fn clutch(&mut self, held: bool) {
-        self.asks.push(Ask::Request(Request::Clutch { held }));
+    fn clutch(&mut self, hold: ClutchHold) {
+        self.asked = hold;
+        self.asks.push(Ask::Request(Request::Clutch { hold }));
+    }
+
+    /// Holds the clutch: for the user the terrain goes with the hand, for another view alone
+    /// it stays in its place.
+    fn hold(&mut self) {
+        self.clutch(match self.held {
+            true => ClutchHold::WithHand,
+            false => ClutchHold::InPlace,
+        });
     }
 
     fn let_go(&mut self) {
-        self.clutch(false);
+        self.clutch(ClutchHold::LetGo);
         self.stage = Stage::Closing;
     }
 
     fn on_sample(&mut self, sample: &Sample) {
         let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
+        // The user takes the terrain along while another view is on its way.
+        if self.held && self.asked == ClutchHold::InPlace {
+            self.hold();
+        }
         match &mut self.stage {
             Stage::Idle if self.held || !self.waiting.is_empty() => {
-                self.clutch(true);
+                self.hold();
                 self.stage = Stage::Opening(0);
             }
             Stage::Opening(_) if is_open && sample.view == self.number => {

@@ -9,7 +9,7 @@
 //!
 //! [`Steer`] is what the user wants, however it is said: [`command`] reads lines of text,
 //! [`keys`] reads keys. [`Steering`] is the one engine behind both. It has the device
-//! hold its clutch, waits until the terrain goes with the hand, works out the next
+//! hold its clutch, waits until there is no force, works out the next
 //! view from where HIP and proxy are ([`crate::place::Bounds::apply`]), puts it in, and lets the
 //! clutch go.
 

@@ -1,6 +1,7 @@
 //! Arbitrary scenes, tiles, points and encoder counts into the tick.
 
 use hapterra_core::Vec3;
+use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::{Rule, WORK_PER_TICK};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
@@ -47,7 +48,9 @@ pub fn run(data: &[u8]) {
                 let _ = haptics.accept(Command::View(view));
             }
             _ if kind >= 248 => {
-                let _ = haptics.accept(Command::Clutch(kind.is_multiple_of(2)));
+                let holds = [ClutchHold::LetGo, ClutchHold::WithHand, ClutchHold::InPlace];
+                let hold = holds[usize::from(kind - 248) % holds.len()];
+                let _ = haptics.accept(Command::Clutch(hold));
             }
             0 => {
                 let scene = scene(&mut bytes);

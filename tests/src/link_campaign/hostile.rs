@@ -1,5 +1,6 @@
 //! Programs that mean no good: one that talks to the device, one that answers a host.
 
+use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
@@ -139,8 +140,15 @@ fn host_request(chance: &mut Chance) -> Request {
         Request::StoreCalibration,
         Request::DropScene,
         Request::ClearFault { seen: None },
-        Request::Clutch { held: true },
-        Request::Clutch { held: false },
+        Request::Clutch {
+            hold: ClutchHold::WithHand,
+        },
+        Request::Clutch {
+            hold: ClutchHold::InPlace,
+        },
+        Request::Clutch {
+            hold: ClutchHold::LetGo,
+        },
     ][chance.below(8)]
 }
 

@@ -2,6 +2,7 @@
 
 use std::vec::Vec;
 
+use hapterra_core::clutch::ClutchHold;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Limits, Mode};
 use hapterra_core::scene::{Sample, Scene, Source, View};
@@ -43,7 +44,9 @@ fn taken(rig: &Rig) -> Vec<(u32, bool)> {
 
 fn with_an_open_clutch() -> Rig {
     let mut rig = Rig::armed();
-    rig.ask(Request::Clutch { held: true });
+    rig.ask(Request::Clutch {
+        hold: ClutchHold::WithHand,
+    });
     rig.run(150);
     assert_eq!(rig.answers(TO_CLUTCH), [Ok(())]);
     assert!(latest(&rig).limits.contains(Limits::CLUTCH_OPEN));
@@ -65,7 +68,9 @@ fn a_view_is_put_in_while_the_clutch_is_open_and_the_arm_stays_armed() {
     rig.say(&ToDevice::View(wanted));
     rig.run(10);
     assert_eq!(taken(&rig), [(1_001, true); 2]);
-    rig.ask(Request::Clutch { held: false });
+    rig.ask(Request::Clutch {
+        hold: ClutchHold::LetGo,
+    });
     rig.run(600);
     let sample = latest(&rig);
     assert_eq!((sample.view, sample.mode), (1, Mode::Armed));
@@ -89,7 +94,9 @@ fn a_view_that_comes_while_something_is_felt_is_refused() {
     assert_eq!((latest(&rig).view, latest(&rig).mode), (0, Mode::Armed));
     // The clutch was held, and is let go: that is no better.
     let mut rig = with_an_open_clutch();
-    rig.ask(Request::Clutch { held: false });
+    rig.ask(Request::Clutch {
+        hold: ClutchHold::LetGo,
+    });
     rig.say(&ToDevice::View(view(1, before.hip)));
     rig.run(20);
     assert_eq!(taken(&rig), [(1_001, false)]);
