@@ -12,6 +12,8 @@
 //! through: from all to nothing in 0.1 s, from nothing to all in 0.5 s. The rest of the path,
 //! the guard and all its bounds, is as it always is.
 //!
+//! The host holds it, or the board's clutch input, or both: it is open until both have let go.
+//!
 //! It opens to the end before it closes again, however often it is held and let go. A spring that
 //! gets softer takes energy from the hand and one that gets harder gives some, so one turn gives the
 //! hand at most what the spring holds then: ½ F² / K, 72 mJ at 8.5 N and 0.5 N/mm, and 0.5 s pass until it may
@@ -71,7 +73,10 @@ enum State {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Clutch {
     state: State,
-    held: ClutchHold,
+    /// How the host holds it.
+    host: ClutchHold,
+    /// The board's clutch input is held: the terrain goes with the hand.
+    input: bool,
     /// Since it was held the terrain was to go with the hand.
     carries: bool,
     /// Share of the force that is let through to a driven arm.
@@ -90,7 +95,8 @@ impl Clutch {
     pub(crate) fn new(rate: TickRate) -> Self {
         Self {
             state: State::Closed,
-            held: ClutchHold::LetGo,
+            host: ClutchHold::LetGo,
+            input: false,
             carries: false,
             share: 1.0,
             felt: 1.0,
@@ -111,17 +117,43 @@ impl Clutch {
         matches!(self.state, State::Open { .. })
     }
 
-    /// It is held like this from now on, or no longer.
-    pub(crate) fn hold(&mut self, held: ClutchHold) {
-        self.held = held;
-        if held == ClutchHold::LetGo {
+    /// As at the beginning of a scene: closed. An input that is held opens the clutch of an
+    /// arm; a replay has no hand.
+    pub(crate) fn begin(&mut self, rate: TickRate, of_arm: bool) {
+        let input = self.input;
+        *self = Self::new(rate);
+        self.input = input;
+        if of_arm {
+            self.open_if_held();
+        }
+    }
+
+    /// The host holds it like this from now on, or no longer.
+    pub(crate) fn hold(&mut self, host: ClutchHold) {
+        self.host = host;
+        self.open_if_held();
+    }
+
+    /// The board's clutch input is held from now on, or no longer.
+    pub(crate) fn press(&mut self, held: bool) {
+        self.input = held;
+        self.open_if_held();
+    }
+
+    /// Whether anybody holds it.
+    const fn is_held(&self) -> bool {
+        self.input || !matches!(self.host, ClutchHold::LetGo)
+    }
+
+    fn open_if_held(&mut self) {
+        if !self.is_held() {
             return;
         }
         if let State::Closed | State::Closing = self.state {
             self.state = State::Opening;
             self.carries = false;
         }
-        self.carries |= held == ClutchHold::WithHand;
+        self.carries |= self.input || self.host == ClutchHold::WithHand;
     }
 
     /// Puts the HIP of an open clutch somewhere else.
@@ -158,6 +190,7 @@ impl Clutch {
         (contact, window): (&mut Contact, &Window<'_, D>),
         drives: bool,
     ) -> GridPoint {
+        let is_held = self.is_held();
         let from_home_mm = |scene: &Scene| scene.home.to(&tip) * scene.cell_mm;
         let mut hip = tip;
         match &mut self.state {
@@ -175,7 +208,7 @@ impl Clutch {
                     *there = landed;
                 }
                 hip = *there;
-                if self.held == ClutchHold::LetGo && !contact.is_landing() {
+                if !is_held && !contact.is_landing() {
                     let moved_mm = from_home_mm(scene) - *tip_mm;
                     let stays_mm = match self.carries {
                         true => Vec3::ZERO,
@@ -196,11 +229,19 @@ impl Clutch {
             }
         }
         self.felt = if drives { self.share } else { 1.0 };
-        self.limits = match self.state {
-            State::Closed => Limits::empty(),
-            State::Open { .. } => Limits::CLUTCH_OPEN,
-            State::Opening | State::Closing => Limits::CLUTCH_MOVES,
-        };
+        self.limits = self.limits_now();
         hip
+    }
+
+    const fn limits_now(&self) -> Limits {
+        let by = match self.input {
+            true => Limits::CLUTCH_INPUT,
+            false => Limits::empty(),
+        };
+        match self.state {
+            State::Closed => Limits::empty(),
+            State::Open { .. } => by.union(Limits::CLUTCH_OPEN),
+            State::Opening | State::Closing => by.union(Limits::CLUTCH_MOVES),
+        }
     }
 }

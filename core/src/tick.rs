@@ -29,6 +29,8 @@ pub enum Command<'t> {
     View(View),
     /// Hold the clutch, or let it go.
     Clutch(ClutchHold),
+    /// The board's clutch input is held from now on, or no longer.
+    ClutchInput(bool),
     /// A filled tile.
     Tile(&'t mut Tile),
     /// A haptic interface point for one tick, in a scene fed by points.
@@ -167,7 +169,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
             Command::Scene(scene) => self.take_scene(Some(scene)),
             Command::DropScene => self.take_scene(None),
             Command::View(view) => self.take_view(&view),
-            Command::Clutch(held) => self.clutch.hold(held),
+            Command::Clutch(hold) => self.clutch.hold(hold),
+            Command::ClutchInput(held) => self.clutch.press(held),
             Command::Tile(tile) => return Some(self.take_tile(tile)),
             Command::Point(Point { seq, hip }) => {
                 // Whatever bits came over the wire.
@@ -231,7 +234,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.contact = self.contact_of(scene.as_ref());
         self.scene = scene;
         self.point = None;
-        self.clutch = Clutch::new(self.rate);
+        let of_arm = scene.is_some_and(|scene| scene.source == Source::Encoders);
+        self.clutch.begin(self.rate, of_arm);
         self.view = 0;
     }
 

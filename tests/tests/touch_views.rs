@@ -1,6 +1,8 @@
 //! Another view of the terrain while a hand presses on it: the device's own application, a
 //! virtual Phantom, and the engine that keys and commands use.
 
+use std::cell::Cell;
+use std::rc::Rc;
 use std::time::Duration;
 
 use hapterra::link::{Arming, Event, Native, Patience, Session};
@@ -50,6 +52,8 @@ struct Touching<'t> {
     steering: Steering<'t>,
     samples: Vec<Sample>,
     said: Vec<String>,
+    /// Whether the board's clutch input is held.
+    pedal: Rc<Cell<bool>>,
 }
 
 /// At the smallest scale, level 8, with a hand that presses on the middle for so long.
@@ -75,7 +79,10 @@ fn pressed<T>(raster: &Raster, seconds: f64, play: impl FnOnce(&mut Touching<'_>
     let home_mm = view.home_mm;
     let model = PhantomModel::premium_1_5();
     let arm = HeldPhantom::new(model, hand, Placement { home_mm }, script).expect("in reach");
-    let device: Native = Native::new(StoppedClock, Some(Box::new(arm.arming())));
+    let pedal = Rc::new(Cell::new(false));
+    let foot = Rc::clone(&pedal);
+    let device: Native = Native::new(StoppedClock, Some(Box::new(arm.arming())))
+        .meddled_with(Box::new(move |_, sense, _| sense.clutch = foot.get()));
     let (arming, patience) = (Some(Arming::VIRTUAL), Patience::REAL_TIME);
     let opened = Session::open(&terrain, scene, arming, Box::new(device), patience);
     let bounds = Bounds {
@@ -88,6 +95,7 @@ fn pressed<T>(raster: &Raster, seconds: f64, play: impl FnOnce(&mut Touching<'_>
         steering: Steering::new(bounds, Rule::Swept, terrain.clone()),
         samples: vec![],
         said: vec![],
+        pedal,
     };
     // Armed, down, and at rest.
     touching.run_to(6_000);
@@ -306,6 +314,43 @@ fn with_the_clutch_the_terrain_goes_with_the_hand_and_is_felt_again_where_it_was
         // wants to be. Then two springs share what one had.
         let share = closed.force_n.length() / before.force_n.length();
         assert!((all_the_way()..1.0).contains(&share), "{share}");
+        judge(&touching.samples[began..], GENTLE_N);
+    });
+}
+
+#[test]
+fn the_boards_clutch_input_opens_it_and_views_are_put_in_meanwhile() {
+    let raster = hills();
+    pressed(&raster, 30.0, |touching| {
+        let began = touching.samples.len();
+        let before = touching.change(ViewChange::Zoom(64.0));
+        touching.pedal.set(true);
+        let open = touching.run(150);
+        let limits = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
+        assert_eq!((open.limits, open.force_n), (limits, Vec3::ZERO));
+        // What the host did not ask for it leaves alone, and puts views in all the same.
+        assert!(touching.steering.is_settled());
+        for view in 2..=3 {
+            let zoomed = touching.change(ViewChange::Zoom(1.2));
+            assert_eq!((zoomed.limits, zoomed.view), (limits, view));
+        }
+        touching.pedal.set(false);
+        let closed = touching.run(700);
+        assert_felt(&closed, "let go");
+        let share = closed.force_n.length() / before.force_n.length();
+        assert!((all_the_way()..1.0).contains(&share), "{share}");
+        // Let go while the host has a view put in: that holds it to the end.
+        touching.pedal.set(true);
+        touching.run(150);
+        touching
+            .steering
+            .steer(Steer::Change(ViewChange::Zoom(1.2)));
+        touching.poll();
+        touching.pedal.set(false);
+        let closed = touching.run(900);
+        assert_felt(&closed, "let go meanwhile");
+        assert_eq!(closed.view, 4);
+        assert_eq!(touching.said, [""; 0]);
         judge(&touching.samples[began..], GENTLE_N);
     });
 }

@@ -64,10 +64,12 @@ bitflags! {
         const TERRAIN_MISSING = 1 << 7;
         /// The surface fades out at its border, or comes in after a wait.
         const BOUNDARY_FADING = 1 << 8;
-        /// The clutch is open: the terrain goes with the hand, and there is no force.
+        /// The clutch is open: there is no force, and the HIP stays where it is over the terrain.
         const CLUTCH_OPEN = 1 << 9;
         /// The clutch opens or closes: the force goes out, or comes in again.
         const CLUTCH_MOVES = 1 << 10;
+        /// The clutch is held by the board's clutch input.
+        const CLUTCH_INPUT = 1 << 11;
     }
 }
 
@@ -134,8 +136,9 @@ impl Limits {
             Self::FADING => "force is going out before disarming",
             Self::TERRAIN_MISSING => "terrain that might be felt here is on its way",
             Self::BOUNDARY_FADING => "the surface fades at its border, or comes in after a wait",
-            Self::CLUTCH_OPEN => "the terrain goes with the hand",
+            Self::CLUTCH_OPEN => "the clutch is open, so that nothing is felt",
             Self::CLUTCH_MOVES => "the force goes out for a change of view, or comes in after one",
+            Self::CLUTCH_INPUT => "the board's clutch input is held",
             _ => "",
         }
     }
@@ -151,7 +154,7 @@ mod tests {
             assert!(!name.is_empty() && !meaning.is_empty(), "{name}");
         }
         assert_eq!(Blockers::all().meanings().count(), 15);
-        assert_eq!(Limits::all().meanings().count(), 11);
+        assert_eq!(Limits::all().meanings().count(), 12);
         assert_eq!(Blockers::empty().meaning(), "");
     }
 }

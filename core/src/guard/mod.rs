@@ -78,6 +78,8 @@ pub struct Sense {
     /// Currents that flow in motors 1 to 3, mA, as of the tick before; none where the
     /// amplifiers have no monitors.
     pub measured_ma: Option<[i16; 3]>,
+    /// Whether the clutch input is held, as it reads in this tick: it may bounce.
+    pub clutch: bool,
 }
 
 /// What the guard is told in a tick besides the inputs.

@@ -226,6 +226,59 @@ fn taken_along_once_the_terrain_has_gone_with_the_hand() {
 }
 
 #[test]
+fn the_boards_input_opens_the_clutch_and_all_who_hold_it_have_to_let_go() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Watched::pressed(&mut tiles, plane);
+    let felt = arm.tick();
+    arm.device.say(Command::ClutchInput(true));
+    let open = arm.ticks(105);
+    let limits = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
+    assert_eq!((open.limits, open.force_n), (limits, Vec3::ZERO));
+    // The terrain goes with the hand, whatever the host asks for.
+    arm.clutch(InPlace);
+    go(&mut arm, [0, DEEP[1] + 100, 0], 50);
+    arm.clutch(LetGo);
+    assert_eq!(arm.ticks(50).limits, limits);
+    arm.clutch(InPlace);
+    arm.device.say(Command::ClutchInput(false));
+    assert_eq!(
+        arm.ticks(50).limits,
+        Limits::CLUTCH_OPEN,
+        "the host holds it"
+    );
+    arm.clutch(LetGo);
+    let back = arm.ticks(510);
+    assert_eq!(back.limits, Limits::empty());
+    assert!((back.force_n - felt.force_n).length() < 1e-3);
+}
+
+#[test]
+fn an_input_that_is_held_opens_the_clutch_of_the_next_scene_too_but_of_no_replay() {
+    let mut tiles = buffers::<4>();
+    let mut device = Device::<4>::armed(&mut tiles, plane);
+    device.say(Command::ClutchInput(true));
+    let mut points = scene(Source::Points);
+    points.epoch = 7;
+    device.requester.reset(0, points.size);
+    device.say(Command::Scene(points));
+    let at = |z| GridPoint::new([320, 320, 0], Vec3::new(0.5, 0.5, z));
+    assert_eq!(device.feel(0, at(9.0)).limits, Limits::empty());
+    let again = scene(Source::Encoders);
+    device.requester.reset(0, again.size);
+    device.say(Command::Scene(again));
+    let mut limits = Limits::empty();
+    for _ in 0..110 {
+        limits = device.tick([0; 3]).sample.limits;
+    }
+    assert_eq!(limits, Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT);
+    device.say(Command::ClutchInput(false));
+    for _ in 0..510 {
+        limits = device.tick([0; 3]).sample.limits;
+    }
+    assert_eq!(limits, Limits::empty());
+}
+
+#[test]
 fn let_go_too_early_it_opens_to_the_end_first() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, plane);
@@ -347,7 +400,9 @@ fn whatever_a_host_says_the_force_makes_no_step_and_little_energy_is_given() {
         match dice {
             0..32 => arm.clutch(WithHand),
             32..64 => arm.clutch(InPlace),
-            64..160 => arm.clutch(LetGo),
+            64..150 => arm.clutch(LetGo),
+            150..155 => arm.device.say(Command::ClutchInput(true)),
+            155..160 => arm.device.say(Command::ClutchInput(false)),
             160..200 if arm.last.sample.limits.contains(Limits::CLUTCH_OPEN) => {
                 let mut wanted = view(tick as u8, 0, arm.last.sample.hip);
                 wanted.scene.cell_mm = [0.5, 1.0, 2.0][dice as usize % 3];

@@ -111,7 +111,8 @@
 //!   open, as a sample of the view in force says; in a replay between two points. It is answered as a scene is, also where
 //!   it is refused, and nothing is disarmed. The host says it every 0.4 s until it is answered, and gives
 //!   it up after 4 s. A number that is not newer (by less than 128, wrapping) than that of the view in force is
-//!   not heard, but for the same view again. A clutch is let go when its session ends.
+//!   not heard, but for the same view again. A clutch is let go when its session ends. The board's clutch input
+//!   (the limit [`CLUTCH_INPUT`](crate::guard::Limits::CLUTCH_INPUT)) opens the clutch, too, and lets no view in by itself.
 //! - While its time stands still (an emulated board in lock-step), what the device has
 //!   requested and not got is requested again after two messages alive.
 //!

@@ -107,6 +107,7 @@ pub(crate) fn take(p: Peripherals) -> Parts {
             inputs: SafetyInputs {
                 emergency_stop: Input::new(p.PC0, Pull::Up),
                 dead_man: Input::new(p.PC1, Pull::Up),
+                clutch: Input::new(p.PC9, Pull::Up),
             },
             feedback: Feedback {
                 ready: [

@@ -10,6 +10,7 @@
 //! | amplifier enable, high is on, pull it down outside | PB0 | |
 //! | emergency stop, closed to ground | PC0 | |
 //! | dead-man switch, closed to ground while held | PC1 | |
+//! | clutch, closed to ground while held | PC9 | |
 //! | amplifier ready 1, 2, 3, closed to ground while ready | PC10, PC11, PC12 | |
 //! | current monitors wired, closed to ground | PC8 | |
 //! | current monitor 1, 2, 3 | PC2, PC3, PB1 | ADC1, 1.65 V is zero |

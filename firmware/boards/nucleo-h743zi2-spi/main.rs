@@ -10,6 +10,7 @@
 //! | amplifier enable, high is on, pull it down outside | PF3 | |
 //! | emergency stop, closed to ground | PE15 | |
 //! | dead-man switch, closed to ground while held | PF5 | |
+//! | clutch, closed to ground while held | PF4 | |
 //! | amplifier ready 1, 2, 3, closed to ground while ready | PF12, PF13, PF14 | |
 //! | current monitors wired, closed to ground | PF15 | |
 //! | current monitor 1, 2, 3 | PA3, PC0, PB1 | ADC1, 1.65 V is zero |

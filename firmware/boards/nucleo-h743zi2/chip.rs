@@ -137,6 +137,7 @@ pub(crate) fn take(p: Peripherals) -> Parts {
             inputs: SafetyInputs {
                 emergency_stop: take_stop!(p),
                 dead_man: Input::new(p.PF5, Pull::Up),
+                clutch: Input::new(p.PF4, Pull::Up),
             },
             feedback: Feedback {
                 ready: [

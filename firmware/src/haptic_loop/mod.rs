@@ -4,6 +4,7 @@
 //! link brought, read the encoders, tick, write the amplifiers, leave a record,
 //! measure what that cost. Everything it does is bounded and nothing waits.
 
+mod clutch_input;
 mod liveness;
 mod reporter;
 mod timing;
@@ -20,6 +21,7 @@ use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, TickClock};
 use crate::monitor::Part;
 use crate::motor_memory::{MotorLog, Words};
 use crate::queues::{LoopEnds, TickRecord};
+use clutch_input::ClutchInput;
 use liveness::Liveness;
 use reporter::Reporter;
 use timing::Timing;
@@ -56,6 +58,7 @@ pub struct HapticLoop<'t, E, A: Amplifiers, C, const D: usize> {
     clock: C,
     timing: Timing,
     hip_source: HipSource,
+    clutch_input: ClutchInput,
     /// The last tick's outcome, kept in its place so that it need not be copied.
     outcome: Outcome,
     liveness: Liveness,
@@ -86,6 +89,7 @@ where
             clock,
             timing: Timing::new::<C>(),
             hip_source: HipSource::None,
+            clutch_input: ClutchInput::new(C::RATE),
             outcome: Outcome::default(),
             liveness: Liveness::new(C::RATE),
             reporter: Reporter::new(C::RATE),
@@ -187,6 +191,9 @@ where
 
     fn render_arm(&mut self, watchdog_live: bool) -> Drive {
         let sense = self.encoders.sense();
+        if let Some(held) = self.clutch_input.tick(sense.clutch) {
+            self.give_to_haptics(Command::ClutchInput(held));
+        }
         self.run_tick(&sense, watchdog_live);
         let drive = self.outcome.drive;
         self.drive(&drive);

@@ -7,6 +7,7 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::{Cell, GridPoint};
+use hapterra_core::guard::Limits;
 use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::{Point, Scene};
@@ -194,4 +195,31 @@ fn held_outputs_reach_the_amplifiers_and_leave_them_off() {
         haptic_loop.tick();
         assert_eq!(*seen.0.borrow(), (false, expected));
     }
+}
+
+/// What the clutch says in each of some ticks in which the input reads like this.
+fn clutched(haptic_loop: &mut Loop, ends: &mut LinkEnds<'_>, ticks: u32, reads: bool) -> Limits {
+    for _ in 0..ticks {
+        haptic_loop.encoders_mut().0.clutch = reads;
+        let _ = haptic_loop.tick();
+    }
+    drain(ends).last().expect("records").sample.limits
+}
+
+#[test]
+fn the_clutch_input_holds_the_clutch_once_it_does_not_bounce() {
+    let (mut haptic_loop, mut ends) = looped(Source::Encoders);
+    let of_clutch = Limits::CLUTCH_INPUT | Limits::CLUTCH_OPEN | Limits::CLUTCH_MOVES;
+    let mut limits = |ticks, reads| clutched(&mut haptic_loop, &mut ends, ticks, reads) & of_clutch;
+    assert_eq!(limits(4, true), Limits::empty());
+    assert_eq!(limits(10, false), Limits::empty());
+    let moves = Limits::CLUTCH_INPUT | Limits::CLUTCH_MOVES;
+    assert_eq!(limits(6, true), moves);
+    let open = Limits::CLUTCH_INPUT | Limits::CLUTCH_OPEN;
+    for _ in 0..3 {
+        assert_eq!(limits(30, true), moves, "it takes 0.1 s");
+    }
+    assert_eq!(limits(30, true), open);
+    assert_eq!(limits(19, false), open);
+    assert_eq!(limits(2, false), Limits::CLUTCH_MOVES);
 }

@@ -182,7 +182,7 @@ fn measured(status: &Status) -> String {
     format!(
         "encoders       {a} {b} {c} counts, {zeroed}\n\
          joints         {}°\n\
-         switches       dead-man {}held, emergency stop {}pressed\n\
+         switches       dead-man {}held, emergency stop {}pressed, clutch {}held\n\
          amplifiers     {}ready, outputs {}as set\n\
          currents       {} A{flowing}\n\
          motors         {} °C by the thermal model\n\
@@ -191,6 +191,7 @@ fn measured(status: &Status) -> String {
         three(health.angles_rad.to_array().map(f32::to_degrees)),
         not(health.sense.dead_man),
         not(health.sense.emergency_stop),
+        not(health.sense.clutch),
         not(!health.sense.amplifier_not_ready),
         not(!health.sense.outputs_not_as_set),
         three(health.currents_a.to_array()),

@@ -76,6 +76,7 @@ impl HeldPhantom {
             outputs_not_as_set: false,
             amplifier_not_ready: !self.plant.amplifiers_are_ready(),
             measured_ma: Some(self.measured_ma),
+            clutch: false,
         }
     }
 

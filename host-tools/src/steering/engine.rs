@@ -31,8 +31,9 @@ pub struct Put<'r> {
 enum Stage<'r> {
     /// The clutch is closed, as far as this host knows.
     Idle,
-    /// The clutch was asked to open, so many samples ago.
-    Opening(u32),
+    /// The clutch was asked to open, so many samples ago, and whether that was answered: the
+    /// board's clutch input may hold it open already, and let go before the host's request is there.
+    Opening { samples: u32, answered: bool },
     /// The clutch is open.
     Open,
     /// This view was said, of this terrain.
@@ -143,6 +144,14 @@ impl<'r> Steering<'r> {
                     self.number = 0;
                 }
             }
+            Event::Answered {
+                request: Request::Clutch { hold },
+                result: Ok(()),
+            } if *hold != ClutchHold::LetGo => {
+                if let Stage::Opening { answered, .. } = &mut self.stage {
+                    *answered = true;
+                }
+            }
             Event::Unanswered(Ask::Request(Request::Clutch { .. })) => {
                 self.give_up("the device does not answer: the view stays as it was");
             }
@@ -178,6 +187,7 @@ impl<'r> Steering<'r> {
 
     fn on_sample(&mut self, sample: &Sample) {
         let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
+        let by_input = sample.limits.contains(Limits::CLUTCH_INPUT);
         // The user takes the terrain along while another view is on its way.
         if self.held && self.asked == ClutchHold::InPlace {
             self.hold();
@@ -185,20 +195,24 @@ impl<'r> Steering<'r> {
         match &mut self.stage {
             Stage::Idle if self.held || !self.waiting.is_empty() => {
                 self.hold();
-                self.stage = Stage::Opening(0);
+                self.stage = Stage::Opening {
+                    samples: 0,
+                    answered: false,
+                };
             }
-            Stage::Opening(_) if is_open && sample.view == self.number => {
+            Stage::Opening { answered: true, .. } if is_open && sample.view == self.number => {
                 self.stage = Stage::Open;
                 self.go_on(sample);
             }
-            Stage::Opening(samples) => {
+            Stage::Opening { samples, .. } => {
                 *samples += 1;
                 if *samples > SAMPLES_TO_OPEN {
                     self.give_up("the device does not open its clutch: the view stays as it was");
                 }
             }
             Stage::Open if sample.view == self.number => self.go_on(sample),
-            Stage::Closing if !is_open => self.stage = Stage::Idle,
+            // The board's clutch input may hold it on.
+            Stage::Closing if !is_open || by_input => self.stage = Stage::Idle,
             _ => {}
         }
     }

@@ -173,6 +173,8 @@ pub struct Chip {
     pub emergency_stop: (u32, u32),
     /// Closed to ground while held.
     pub dead_man: (u32, u32),
+    /// Closed to ground while held.
+    pub clutch: (u32, u32),
     /// Changes in each tick that leaves the amplifiers on.
     pub heartbeat: (u32, u32),
     /// The status LED.
@@ -287,6 +289,7 @@ pub static G474: Chip = Chip {
     enable: (B, 0),
     emergency_stop: (C, 0),
     dead_man: (C, 1),
+    clutch: (C, 9),
     heartbeat: (D, 2),
     led: (A, 8),
     ready: [(C, 10), (C, 11), (C, 12)],
@@ -401,6 +404,7 @@ pub static H743: Chip = Chip {
     enable: (F, 3),
     emergency_stop: (E, 15),
     dead_man: (F, 5),
+    clutch: (F, 4),
     heartbeat: (G, 1),
     led: (B, 0),
     ready: [(F, 12), (F, 13), (F, 14)],

@@ -18,6 +18,7 @@
 //! show is electrical, or a fault of the silicon or of these models.
 
 pub mod adc;
+pub mod bench;
 pub mod bus;
 pub mod chip;
 pub mod converter;

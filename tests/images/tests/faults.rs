@@ -1,14 +1,11 @@
 //! What goes wrong in the boards' own images: each ends in no current and
 //! amplifiers off, in a number of ticks that is stated here.
 
-use hapterra::raster::Raster;
-use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::Rule;
 use hapterra_core::guard::Fault;
-use hapterra_core::scene::{Scene, Source};
+use hapterra_image_tests::bench::Bench;
 use hapterra_image_tests::bus::Effect;
 use hapterra_image_tests::chip::Commands;
-use hapterra_image_tests::device::{Device, Plane, machines};
+use hapterra_image_tests::device::{Device, machines};
 use hapterra_image_tests::elf::Function;
 use hapterra_image_tests::machine::{Machine, Stop};
 use hapterra_image_tests::supply::Reset;
@@ -23,58 +20,6 @@ const CHECK_MS: u64 = 10;
 /// Longest that amplifiers are on after a task hangs: until the next feeding at
 /// most, and 40 ms from there.
 const OFF_MS: u64 = CHECK_MS + 41;
-
-struct Bench {
-    plane: Plane,
-    raster: Raster,
-    scale: Scale,
-}
-
-impl Bench {
-    fn new() -> Self {
-        Self {
-            plane: Plane::level([100.0, 100.0, 30.0], 20.0),
-            raster: Raster::from_fn(201, 201, |_, _| 20.0).expect("raster"),
-            scale: Scale::new(1.0, 1.0).expect("scale"),
-        }
-    }
-
-    fn terrain(&self) -> Terrain<'_> {
-        Terrain::new(&self.raster, self.scale, 0).expect("terrain")
-    }
-
-    fn scene(&self, terrain: &Terrain<'_>) -> Scene {
-        let home = self
-            .scale
-            .to_grid(self.plane.place.home_mm)
-            .expect("addressable");
-        terrain.scene(self.plane.law, Rule::Swept, Source::Encoders, home)
-    }
-
-    /// Presses 3 mm deep and holds still.
-    fn press<'t>(&self, machine: Machine, terrain: &'t Terrain<'t>) -> Device<'t> {
-        let mut device = Device::arm(machine, terrain, self.scene(terrain));
-        device.move_to(self.plane.counts_at([100.0, 100.0], -3.0));
-        device.run_ms(40);
-        device.move_to(self.plane.counts_at([100.0, 100.0], 3.0));
-        device.run_ms(40);
-        let mut machine = device.machine.borrow_mut();
-        assert!(machine.is_enabled(), "{}: pressed", machine.chip.board);
-        // What comes now comes between two ticks.
-        assert_eq!(machine.run_ticks(1), Stop::Asked);
-        let _ = machine.take_effects();
-        drop(machine);
-        device
-    }
-
-    /// Presses on every board and does something to it.
-    fn on_each(&self, mut then: impl FnMut(&mut Device<'_>)) {
-        for machine in machines() {
-            let terrain = self.terrain();
-            then(&mut self.press(machine, &terrain));
-        }
-    }
-}
 
 /// Command for no current: rounded as the drivers round.
 fn idle(machine: &Machine) -> i32 {

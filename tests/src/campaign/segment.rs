@@ -356,6 +356,7 @@ impl<'t> Stretch<'t> {
             outputs_not_as_set: false,
             amplifier_not_ready: !self.arm.plant().amplifiers_are_ready(),
             measured_ma: Some(self.measured_ma),
+            clutch: false,
         };
         self.measured_ma = self.arm.plant().monitors_ma();
         for (count, lost) in sense.counts.iter_mut().zip(self.lost) {

@@ -47,9 +47,13 @@ pub fn run(data: &[u8]) {
                 }
                 let _ = haptics.accept(Command::View(view));
             }
+            _ if kind == 251 => {
+                let held = bytes.byte().is_multiple_of(2);
+                let _ = haptics.accept(Command::ClutchInput(held));
+            }
             _ if kind >= 248 => {
                 let holds = [ClutchHold::LetGo, ClutchHold::WithHand, ClutchHold::InPlace];
-                let hold = holds[usize::from(kind - 248) % holds.len()];
+                let hold = holds[usize::from(kind - 248)];
                 let _ = haptics.accept(Command::Clutch(hold));
             }
             0 => {
@@ -95,6 +99,7 @@ pub fn run(data: &[u8]) {
             outputs_not_as_set: counts[1] == 253,
             amplifier_not_ready: counts[1] == 252,
             measured_ma: (counts[2] > 128).then_some([counts[0] as i16, 0, 0]),
+            clutch: false,
         };
         look(&haptics.tick(&sense, true), &law);
     }

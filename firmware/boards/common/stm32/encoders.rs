@@ -49,6 +49,8 @@ pub(crate) struct SafetyInputs<S> {
     pub(crate) emergency_stop: S,
     /// Closed while held: high when released, and when the wire is broken.
     pub(crate) dead_man: Input<'static>,
+    /// Closed while held: high when let go, and when the wire is broken.
+    pub(crate) clutch: Input<'static>,
 }
 
 /// Counts the quadrature pulses at two pins, filtered. The pull-ups give a wire that is
@@ -102,6 +104,7 @@ impl<A: Timer, B: Timer, C: Timer, S: Stop> Encoders for TimerEncoders<A, B, C, 
             outputs_not_as_set: outputs::not_as_set(),
             amplifier_not_ready: self.feedback.is_unready(),
             measured_ma: measured.unwrap_or_default(),
+            clutch: self.inputs.clutch.is_low(),
         }
     }
 }

@@ -75,7 +75,7 @@ pub struct Machine {
 
 impl Machine {
     /// A powered-up chip with `image` in its flash, the switches as they are
-    /// when nobody is near: emergency stop not pressed, dead-man not held; amplifiers that are
+    /// when nobody is near: emergency stop not pressed, dead-man and clutch not held; amplifiers that are
     /// ready and have no current monitors.
     #[must_use]
     pub fn new(chip: &'static Chip, image: Image) -> Self {
@@ -142,6 +142,7 @@ impl Machine {
         self.protect();
         self.set_input(inputs.emergency_stop, false);
         self.set_input(inputs.dead_man, true);
+        self.set_input(inputs.clutch, true);
         self.set_input(inputs.monitors_fitted, true);
         self.active.clear();
         let flash = self.chip.memories[0].0;

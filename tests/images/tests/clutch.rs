@@ -1,0 +1,82 @@
+//! The boards' clutch input, in the boards' own images.
+
+use hapterra_core::clutch::ClutchHold;
+use hapterra_core::guard::{Limits, Mode};
+use hapterra_core::scene::Sample;
+use hapterra_core::wire::request::Request;
+use hapterra_image_tests::bench::Bench;
+use hapterra_image_tests::device::Device;
+
+/// What the clutch does.
+const OF_CLUTCH: Limits = Limits::CLUTCH_INPUT
+    .union(Limits::CLUTCH_OPEN)
+    .union(Limits::CLUTCH_MOVES);
+
+/// Closes the switch, or opens it.
+fn switch(device: &Device<'_>, closed: bool) {
+    let mut machine = device.machine.borrow_mut();
+    let pin = machine.chip.clutch;
+    machine.set_input(pin, !closed);
+}
+
+fn latest(device: &Device<'_>) -> Sample {
+    let sample = device.latest.expect("samples");
+    assert_eq!((sample.mode, sample.fault), (Mode::Armed, None));
+    sample
+}
+
+fn limits(device: &Device<'_>) -> Limits {
+    latest(device).limits & OF_CLUTCH
+}
+
+#[test]
+fn a_switch_that_is_closed_lets_the_force_out_and_opened_it_comes_in_again() {
+    Bench::new().on_each(|device| {
+        device.wait_for_full_force();
+        device.run_ms(40);
+        assert_eq!(limits(device), Limits::empty());
+        let felt = latest(device).force_n;
+        assert!(felt.z > 1.0, "{felt}");
+        switch(device, true);
+        device.run_ms(150);
+        assert_eq!(limits(device), Limits::CLUTCH_INPUT | Limits::CLUTCH_OPEN);
+        assert_eq!(latest(device).force_n.length(), 0.0);
+        assert!(device.ask_status().health.sense.clutch);
+        // The host holds it, too: both have to let go.
+        let hold = |hold| Request::Clutch { hold };
+        device.request(hold(ClutchHold::WithHand));
+        device.run_ms(20);
+        switch(device, false);
+        device.run_ms(60);
+        assert_eq!(limits(device), Limits::CLUTCH_OPEN);
+        device.request(hold(ClutchHold::LetGo));
+        device.run_ms(600);
+        assert_eq!(limits(device), Limits::empty());
+        let back = latest(device).force_n;
+        assert!((back - felt).length() < 0.01, "{felt} before, {back} after");
+    });
+}
+
+#[test]
+fn a_switch_that_bounces_or_sticks_adds_no_force() {
+    Bench::new().on_each(|device| {
+        device.wait_for_full_force();
+        device.run_ms(40);
+        let felt = latest(device).force_n.length();
+        let mut most: f32 = 0.0;
+        // Bounces of every length from 1 to 40 ms.
+        for ms in (1..=40).chain((1..=40).rev()) {
+            switch(device, ms % 2 == 0);
+            device.run_ms(ms);
+            most = most.max(latest(device).force_n.length());
+        }
+        assert!(most <= felt + 1e-3, "{most} N of {felt} N");
+        switch(device, true);
+        device.run_ms(2_000);
+        assert_eq!(latest(device).force_n.length(), 0.0, "stuck");
+        // Pulled up: a broken wire is a switch that is let go.
+        switch(device, false);
+        device.run_ms(700);
+        assert_eq!(limits(device), Limits::empty());
+    });
+}
