@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use hapterra::link::{Arming, Event, Native, Patience, Session};
+use hapterra::phantom::PlacedTerrain;
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
-use hapterra::place::PlacedTerrain;
 use hapterra::raster::Raster;
 use hapterra::replay::Record;
 use hapterra::synth::{Kind, Synth};

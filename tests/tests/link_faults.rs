@@ -7,7 +7,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use hapterra::link::{Arming, Event, LinkError, Native, Patience, Session, Transport};
-use hapterra::place::PlacedTerrain;
+use hapterra::phantom::PlacedTerrain;
 use hapterra::raster::Raster;
 use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};

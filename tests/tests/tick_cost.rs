@@ -6,7 +6,7 @@ use std::time::Duration;
 use hapterra::link::{
     Arming, Ask, Emulator, Event, INSTRUCTIONS_PER_COUNT, Patience, Session, serve_plant,
 };
-use hapterra::place::PlacedTerrain;
+use hapterra::phantom::PlacedTerrain;
 use hapterra::synth::{Kind, Synth};
 use hapterra::telemetry::Mean;
 use hapterra::terrain::{Scale, Terrain};

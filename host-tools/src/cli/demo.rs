@@ -19,8 +19,8 @@ use crate::link::{
     Arming, Event, HostClock, LinkError, Native, Patience, Session, Transport, move_arm_while,
 };
 use crate::output::{Output, OutputError, OutputFolder, keep_apart};
-use crate::phantom::HeldPhantom;
-use crate::place::{Laid, PlacedTerrain, View};
+use crate::phantom::{HeldPhantom, PlacedTerrain};
+use crate::place::{Laid, View};
 use crate::raster::Raster;
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{LoopColumns, Record, Recording, Settings};
@@ -86,7 +86,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let view = asked.view(&Calibration::PREMIUM_1_5)?;
     let terrain = view.terrain(asked.grid)?;
     let (law, rule) = (args.rendering.law()?, args.rendering.rule());
-    let placed = PlacedTerrain::in_view(&terrain, &view, law, rule)?;
+    let placed = PlacedTerrain::in_view(&terrain, view.home_mm, law, rule)?;
     show(args, (&placed, &view), &name, &outputs)
 }
 

@@ -10,7 +10,8 @@ use crate::board::update::{UpdateError, UpdateFailure};
 use crate::calibrate::file::BadFile;
 use crate::calibrate::{FitError, WalkError};
 use crate::link::{EmulatorError, LinkError};
-use crate::place::{PlaceError, PlacingError};
+use crate::phantom::PlacingError;
+use crate::place::PlaceError;
 use crate::replay::ReplayError;
 use crate::replay::settings::OtherTerrain;
 use crate::synth::{WriteError, WriteFault};
@@ -46,7 +47,7 @@ impl Hint for PlaceError {
                 "say the place in the file's own coordinates with --at X,Y or --bbox W,S,E,N, or give the file its reference system: gdal_translate -a_srs EPSG:CODE IN OUT.tif"
             }
             Self::NotOnMap { .. } | Self::BoxAcrossSeam { .. } | Self::NoProjection { .. } => {
-                "say the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N"
+                "say the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N, or bring the file into longitude and latitude: gdalwarp -t_srs EPSG:4326 IN OUT.tif"
             }
             Self::Outside { .. } | Self::Hole { .. } => {
                 "choose a place inside: longitude (or x) comes first"
@@ -63,6 +64,9 @@ impl Hint for PlaceError {
             Self::GroundScale(_) => "choose another --ground-m-per-mm",
             Self::Exaggeration(_) => "choose another --exaggeration; 1 is true to scale",
             Self::TooTall { .. } => "choose a smaller --height-mm-per-unit",
+            Self::FarAway(_) => {
+                "choose another place with --at, or a smaller --exaggeration, --height-mm-per-unit or --cell-mm"
+            }
             Self::NoReach => "check the record: hapterra status, then hapterra calibrate",
             Self::Scale(_) => "choose another --cell-mm or --height-mm-per-unit",
         };

@@ -26,8 +26,8 @@ use crate::link::{
     Arming, DeviceAddress, HostClock, LinkError, Native, Patience, Tcp, Transport, serve_plant,
 };
 use crate::output::{Output, keep_apart};
-use crate::phantom::HeldPhantom;
-use crate::place::{Laid, PlacedTerrain, View};
+use crate::phantom::{HeldPhantom, PlacedTerrain};
+use crate::place::{Laid, View};
 use crate::replay::settings::Device;
 use crate::replay::{Column, LoopColumns, Recording, Settings};
 use crate::serving::{Service, told_of_last_end};
@@ -132,7 +132,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let view = asked.view(&calibration)?;
     let terrain = view.terrain(asked.grid)?;
     let tour = match is_scripted(args) {
-        true => Some(PlacedTerrain::in_view(&terrain, &view, law, rule)?),
+        true => Some(PlacedTerrain::in_view(&terrain, view.home_mm, law, rule)?),
         false => None,
     };
     let placed = Placed {

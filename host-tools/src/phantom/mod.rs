@@ -12,7 +12,7 @@
 //!
 //! [`HeldPhantom`] is the whole of it: the arm ([`Plant`]), the person's hand
 //! on it ([`Hand`]) and the plan that the hand follows ([`Script`], which
-//! [`Touch`] and [`TourPlan`] write).
+//! [`Touch`] and [`TourPlan`] write). [`PlacedTerrain`] puts a terrain in front of that arm.
 //!
 //! Nothing here reads a clock or draws a random number, and the trigonometry
 //! is `libm`'s, so the same inputs give the same bits on every machine.
@@ -33,6 +33,7 @@ mod held_phantom;
 pub mod kinematics;
 mod model;
 mod motor;
+mod placed_terrain;
 mod placement;
 mod plant;
 mod script;
@@ -47,6 +48,7 @@ pub use hand::{Hand, HandModel};
 pub use held_phantom::HeldPhantom;
 pub use model::{AxisDrive, JointLimits, Lumped, Motor, PhantomModel, STANDARD_GRAVITY};
 pub use motor::MotorTemperature;
+pub use placed_terrain::{PlacedTerrain, PlacingError};
 pub use placement::{OutOfReach, Placement};
 pub use plant::{MAX_SUBSTEP_S, Plant};
 pub use script::{Script, Target};

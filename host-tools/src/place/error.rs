@@ -113,6 +113,9 @@ pub enum PlaceError {
         /// From the lowest to the highest point that the arm gets to.
         reach_mm: f64,
     },
+    /// A home position that is farther out than can be addressed.
+    #[error("the place under the home position, ({:.0}, {:.0}, {:.0}) mm, is too far from the origin", .0[0], .0[1], .0[2])]
+    FarAway([f64; 3]),
     /// A calibration whose stops leave no room.
     #[error("the calibration leaves the arm no room to lay a terrain into")]
     NoReach,

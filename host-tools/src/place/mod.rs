@@ -3,14 +3,13 @@
 //! [`Target`] and [`ViewOptions`] are what the user asks for. [`Reach`] is what an arm can
 //! get to, by its calibration. [`View::new`] makes of both and of a grid the one answer: the
 //! place under the home position, scale, level and heights, from which terrain and scene
-//! follow. [`ViewChange`] makes another view of it while it is felt. [`PlacedTerrain`] adds a scripted hand for an arm that is virtual.
+//! follow. [`ViewChange`] makes another view of it while it is felt.
 
 mod change;
 mod coordinates;
 mod error;
 mod fit;
 mod ground;
-mod placed_terrain;
 mod reach;
 mod target;
 mod view;
@@ -20,7 +19,6 @@ pub(crate) use change::STIFFEST_N_PER_MM;
 pub use change::{Bounds, ChangeError, Changed, Hand, Laid, ViewChange};
 pub use coordinates::Coordinates;
 pub use error::PlaceError;
-pub use placed_terrain::{PlacedTerrain, PlacingError};
 pub use reach::{Reach, ReachBox};
 pub use target::Target;
 pub(crate) use view::FELT_MM;

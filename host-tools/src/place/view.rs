@@ -4,7 +4,6 @@ use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::{Scene, Source};
 
-use super::PlacingError;
 use super::error::PlaceError;
 use super::fit::{ABOVE_MM, Extent};
 use super::ground;
@@ -196,15 +195,15 @@ impl View {
     /// The scene in which the arm feels the view's terrain.
     ///
     /// # Errors
-    /// [`PlacingError::FarAway`] where the home position is farther out than can be addressed.
+    /// [`PlaceError::FarAway`] where the home position is farther out than can be addressed.
     pub fn scene(
         &self,
         terrain: &Terrain<'_>,
         law: ForceLaw,
         rule: Rule,
-    ) -> Result<Scene, PlacingError> {
+    ) -> Result<Scene, PlaceError> {
         let home = terrain.scale().to_grid(self.home_mm);
-        let home = home.ok_or(PlacingError::FarAway(self.home_mm))?;
+        let home = home.ok_or(PlaceError::FarAway(self.home_mm))?;
         Ok(terrain.scene(law, rule, Source::Encoders, home))
     }
 }

@@ -516,3 +516,21 @@ fn numbers_that_are_said_have_three_digits() {
         assert_eq!((rounded_up(x), rounded_down(x)), (up, down), "{x}");
     }
 }
+
+#[test]
+fn a_home_that_is_too_far_to_be_addressed_is_named() {
+    let raster = hills();
+    let grid = Target::Whole
+        .grid(&raster, FeltCells::default())
+        .expect("a grid");
+    let reach = Reach::of(&Calibration::PREMIUM_1_5);
+    let view = View::new(&grid, &reach, &ViewOptions::default()).expect("a view");
+    let terrain = view.terrain(grid).expect("a terrain");
+    let far = View {
+        home_mm: [1e15, 0.0, 0.0],
+        ..view
+    };
+    let scene = |view: &View| view.scene(&terrain, ForceLaw::PREMIUM, Rule::Swept);
+    assert!(scene(&view).is_ok());
+    assert_eq!(scene(&far), Err(PlaceError::FarAway(far.home_mm)));
+}

@@ -4,8 +4,7 @@ use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::{Scene, Source};
 
-use super::View;
-use crate::phantom::{HandModel, HeldPhantom, OutOfReach, PhantomModel, TourPlan};
+use super::{HandModel, HeldPhantom, OutOfReach, PhantomModel, TourPlan};
 use crate::terrain::Terrain;
 
 /// Force of the hand's slide, N; it presses with half as much again.
@@ -43,17 +42,18 @@ impl<'t> PlacedTerrain<'t> {
         Self::toured(terrain, law, rule, None)
     }
 
-    /// Leaves the terrain where a view has it, and tours what the arm gets to of it.
+    /// Leaves the terrain where a view has it, with this point of it at the tip in the home pose
+    /// (hand millimetres), and tours what the arm gets to of it.
     ///
     /// # Errors
     /// [`PlacingError`].
     pub fn in_view(
         terrain: &'t Terrain<'t>,
-        view: &View,
+        home_mm: [f64; 3],
         law: ForceLaw,
         rule: Rule,
     ) -> Result<Self, PlacingError> {
-        Self::toured(terrain, law, rule, Some(view.home_mm))
+        Self::toured(terrain, law, rule, Some(home_mm))
     }
 
     fn toured(
