@@ -67,7 +67,21 @@ FILES = {
     "robinson": ("+proj=robin +lon_0=0 +datum=WGS84", (1e6, 4e6), square(1000)),
     "utm_feet": ("+proj=utm +zone=11 +datum=NAD83 +units=us-ft", (1.3e6, 1.2e7), square(100)),
     "mollweide": ("+proj=moll +datum=WGS84", (1e6, 4e6), square(1000)),
+    "miller": ("+proj=mill +lon_0=11 +x_0=1000 +datum=WGS84", (1e6, 4e6), square(1000)),
+    "hotine": ("+proj=omerc +lat_0=4 +lonc=102.25 +alpha=323.0257964666666 +gamma=323.1301023611111 +k=0.99984 +x_0=804671 +no_uoff +datum=WGS84", (4e5, 5e5), square(100)),
+    "hotine_centre": ("+proj=omerc +lat_0=46 +lonc=-78 +alpha=337.25556 +k=0.9996 +x_0=1000 +y_0=2000 +datum=NAD83", (1e4, 2e4), square(100)),
+    "gnomonic": ("+proj=gnom +lat_0=45 +lon_0=10 +datum=WGS84", (1e5, 2e5), square(100)),
     "polar_scale": ("+proj=stere +lat_0=-90 +k=0.97276 +lon_0=0 +datum=WGS84", (1e5, 2e5), square(100)),
+}
+# Projections that are not known: they are refused by name, and are not in the table.
+UNKNOWN = {
+    "new_zealand": ("+proj=nzmg +lat_0=-41 +lon_0=173 +x_0=2510000 +y_0=6023150 +ellps=intl", (2.6e6, 6.0e6), square(100)),
+    "grinten": ("+proj=vandg +lon_0=0 +R=6371000", (1e6, 4e6), square(1000)),
+}
+# As an ASCII grid with a `.prj` of WKT 2, which binds a system to its way to WGS 84.
+BOUND = {
+    "bound": ("+proj=sterea +lat_0=52.15 +lon_0=5.38 +k=0.9999 +x_0=155000 +y_0=463000 +ellps=bessel +towgs84=565.2,50.1,465.5,-0.4,0.35,-1.87,4.07", (120000, 480000), square(100)),
+    "bound_three": ("+proj=longlat +ellps=intl +towgs84=-87,-98,-121", (2.0, 45.0), square(0.01)),
 }
 # The same as NetCDF, whose grid mappings have attributes, and no text.
 MAPPINGS = {
@@ -116,13 +130,29 @@ def write_netcdf(path, wanted, transform, samples):
         heights[:] = samples
 
 
+def write_grid(path, wanted, transform, samples):
+    with open(path, "w") as grid:
+        y = transform.f + transform.e * ROWS
+        print(f"ncols {COLUMNS}\nnrows {ROWS}\nxllcorner {transform.c:.10g}\nyllcorner {y:.10g}\ncellsize {transform.a:.10g}", file=grid)
+        for line in samples:
+            print(*line, file=grid)
+    with open(path.replace(".asc", ".prj"), "w") as projection:
+        print(pyproj.CRS.from_user_input(wanted).to_wkt("WKT2_2019"), file=projection)
+
+
+# What each kind of file is called, and who writes it.
+KINDS = ((FILES, ".tif", write_tiff), (UNKNOWN, ".tif", write_tiff), (BOUND, ".asc", write_grid), (MAPPINGS, ".nc", write_netcdf))
+
+
 def row(folder, name):
-    is_netcdf = name in MAPPINGS
-    wanted, (x, y), (column_x, row_x, column_y, row_y) = (MAPPINGS if is_netcdf else FILES)[name]
+    files, ending, write = next(kind for kind in KINDS if name in kind[0])
+    wanted, (x, y), (column_x, row_x, column_y, row_y) = files[name]
     transform = Affine(column_x, row_x, x, column_y, row_y, y)
     samples = np.arange(COLUMNS * ROWS, dtype="int16").reshape(ROWS, COLUMNS)
-    name += ".nc" if is_netcdf else ".tif"
-    (write_netcdf if is_netcdf else write_tiff)(os.path.join(folder, name), wanted, transform, samples)
+    name += ending
+    write(os.path.join(folder, name), wanted, transform, samples)
+    if files is UNKNOWN:
+        return None
     system = pyproj.CRS.from_user_input(wanted)
     there = way(system)
     radians = system.geodetic_crs.axis_info[0].unit_conversion_factor
@@ -149,8 +179,9 @@ def main():
     pyproj.network.set_network_enabled(False)
     with open(os.path.join(folder, "places.csv"), "w") as table:
         print("file,lon_west,lat_south,lon_east,lat_north,lon_middle,lat_middle,along_row_m,along_column_m", file=table)
-        for name in [*FILES, *MAPPINGS]:
-            print(",".join(row(folder, name)), file=table)
+        for name in [*FILES, *UNKNOWN, *BOUND, *MAPPINGS]:
+            if (places := row(folder, name)) is not None:
+                print(",".join(places), file=table)
 
 
 main()

@@ -46,7 +46,7 @@ fn rows() -> Vec<Row> {
     let table = csv::Reader::from_path(format!("{FOLDER}/places.csv"));
     let rows: Result<Vec<Row>, _> = table.expect("the table").into_deserialize().collect();
     let rows = rows.expect("rows");
-    assert!(rows.len() >= 20);
+    assert!(rows.len() >= 40);
     rows
 }
 
@@ -194,5 +194,35 @@ fn an_assumed_unit_of_height_is_told_until_it_is_stated() {
     for file in ["rotated.tif", "cf_moon.nc"] {
         let (said, ..) = told(file, &[]);
         assert_eq!(said, "", "{file}");
+    }
+}
+
+/// Projections that nobody here knows are named, with what to do.
+#[test]
+fn a_projection_that_is_not_known_is_named_with_what_to_do() {
+    for (file, name) in [
+        ("new_zealand.tif", "New Zealand Map Grid"),
+        ("grinten.tif", "Van der Grinten"),
+    ] {
+        let path = format!("{FOLDER}/{file}");
+        let report = info(Path::new(&path));
+        assert!(report["bounds_lonlat"].is_null(), "{report:#}");
+        assert!(report["bounds"].is_object(), "{report:#}");
+        let output = Command::new(hapterra_binary())
+            .args([
+                "demo",
+                "--device",
+                "native",
+                "--at-lonlat",
+                "174,-41",
+                &path,
+            ])
+            .output()
+            .expect("it runs");
+        let said = String::from_utf8(output.stderr).expect("text");
+        assert!(!output.status.success());
+        for part in [name, "--at X,Y", "gdalwarp -t_srs EPSG:4326"] {
+            assert!(said.contains(part), "{part} in:\n{said}");
+        }
     }
 }

@@ -5,6 +5,7 @@
 //! `crs-definitions` the shifts between datums; they are named in this file and its folder
 //! only.
 
+mod bound;
 mod datum;
 mod names;
 mod projection;

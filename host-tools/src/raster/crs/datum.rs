@@ -73,6 +73,14 @@ impl Datum {
         self
     }
 
+    /// The same with a shift of three or seven parameters, where those numbers are one.
+    pub(super) fn shifted_by(mut self, numbers: &[f64]) -> Self {
+        if self.globe.is_earth() {
+            self.shift = Shift::by_numbers(&self.globe, numbers).or(self.shift);
+        }
+        self
+    }
+
     /// Of a node of a geographic system, which may have a code; `meridian` is where its
     /// longitudes begin.
     pub(super) fn of(base: &Node, code: Option<u16>, meridian: f64) -> Option<Self> {

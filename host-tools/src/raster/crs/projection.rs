@@ -11,12 +11,12 @@ use super::Globe;
 /// 60 m on the ground.
 const SAME_RADIANS: f64 = 1e-5;
 
-/// A projection, as PROJ writes it, and the globe that it projects. Its longitudes count
+/// A projection and the globe that it projects, both as PROJ writes them. Its longitudes count
 /// from Greenwich.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Projection {
     words: String,
-    globe: Globe,
+    globe: String,
 }
 
 impl Projection {
@@ -28,13 +28,18 @@ impl Projection {
         let is_of = |word: &str, keys: &[&str]| keys.iter().any(|key| word.starts_with(key));
         let words = text.split_whitespace();
         let mut words: Vec<_> = words.filter(|word| !is_of(word, &DATUM)).collect();
-        let size = globe.in_proj();
+        let mut size = globe.in_proj();
+        if words.contains(&"+proj=mill") {
+            // As PROJ does, and so everybody who writes such maps: a sphere of the same area.
+            size += " +R_A";
+            words.retain(|word| !is_of(word, &SIZE) && !word.starts_with("+rf="));
+        }
         if !words.iter().any(|word| is_of(word, &SIZE)) {
             words.push(&size);
         }
         Self {
             words: words.join(" "),
-            globe,
+            globe: size,
         }
     }
 
@@ -70,7 +75,7 @@ impl Projection {
     }
 
     fn longlat(&self) -> Option<Proj> {
-        Proj::from_proj_string(&format!("+proj=longlat {}", self.globe.in_proj())).ok()
+        Proj::from_proj_string(&format!("+proj=longlat {}", self.globe)).ok()
     }
 }
 

@@ -1,6 +1,7 @@
 //! A horizontal reference system: its name, its code, and where its coordinates are
 //! in longitude and latitude.
 
+use super::bound;
 use super::code_wkt;
 use super::datum::{Datum, LonLat};
 use super::projection::Projection;
@@ -51,6 +52,11 @@ impl ReferenceSystem {
             let known = node.epsg().and_then(super::vertical);
             known.or_else(|| Vertical::from_node(node))
         });
+        if let Some((source, shift)) = bound::parts(&root, text) {
+            let (across, of_source) = Self::from_wkt(source);
+            let across = across.map(|system| system.shifted_by(&shift));
+            return (across, up.or(of_source));
+        }
         let compound = root.is(&["COMPD_CS", "COMPOUNDCRS"]);
         let across = match compound {
             true => root.child(&HORIZONTAL),
@@ -96,6 +102,12 @@ impl ReferenceSystem {
     /// The same system with a projection, as PROJ writes it.
     pub(in crate::raster) fn with_projection(mut self, projection: &str) -> Self {
         self.projection = Some(Projection::new(projection, self.globe()));
+        self
+    }
+
+    /// The same system with a shift to WGS 84 of its own, where those numbers are one.
+    fn shifted_by(mut self, numbers: &[f64]) -> Self {
+        self.datum = self.datum.map(|datum| datum.shifted_by(numbers));
         self
     }
 

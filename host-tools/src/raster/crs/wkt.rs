@@ -62,6 +62,11 @@ impl Node {
         self.children.iter().find(|child| child.is(keywords))
     }
 
+    /// The nodes directly below it with one of some keywords.
+    pub(super) fn all<'n>(&'n self, keywords: &'n [&str]) -> impl Iterator<Item = &'n Self> {
+        self.children.iter().filter(|child| child.is(keywords))
+    }
+
     /// Its name: the first of its values.
     pub(super) fn name(&self) -> Option<&str> {
         let name = self.values.first()?.trim();
@@ -90,7 +95,7 @@ impl Node {
 
     /// Size of its unit in metres or radians, by a node of its own or of an axis.
     pub(super) fn unit(&self) -> Option<f64> {
-        const UNITS: [&str; 3] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT"];
+        const UNITS: [&str; 4] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT", "SCALEUNIT"];
         let of_axis = || self.child(&["AXIS"])?.child(&UNITS);
         let unit = self.child(&UNITS).or_else(of_axis)?;
         let size: f64 = unit.values.get(1)?.parse().ok()?;

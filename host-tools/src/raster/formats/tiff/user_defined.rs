@@ -24,6 +24,10 @@ const LATITUDES: [u16; 3] = [3081, 3085, 3089];
 const EASTINGS: [u16; 3] = [3082, 3086, 3090];
 const NORTHINGS: [u16; 3] = [3083, 3087, 3091];
 const SCALES: [u16; 2] = [3092, 3093];
+/// Of an oblique cylinder: where its line of true scale points at the centre, and by how much
+/// the map is turned.
+const AZIMUTH: u16 = 3094;
+const TURN: u16 = 3096;
 
 /// EPSG's codes of prime meridians, and their degrees east of Greenwich.
 const MERIDIANS: [(u16, f64); 13] = [
@@ -47,14 +51,18 @@ pub(super) fn projected(keys: &GeoKeys, name: Option<&str>, base: Option<u16>) -
     let datum = datum(keys, base);
     let method = keys.code(COORDINATE_TRANSFORMATION);
     let unnamed = || match method {
+        Some(25) => "Van der Grinten's projection, without a name".to_owned(),
+        Some(26) => "a projection as that of the New Zealand Map Grid, without a name".to_owned(),
         Some(method) => format!("a projection by method {method} of GeoTIFF, without a name"),
         None => "a projection without a name".to_owned(),
     };
-    let name = name.map_or_else(unnamed, str::to_owned);
-    let named = ReferenceSystem::named(&name, Unit::Length(keys.stated_metres()), datum);
     let kind = method.and_then(|method| kind(keys, method));
     let words = kind.map(|kind| projection(keys, &kind));
     let words = words.or_else(|| utm(keys));
+    // GDAL calls what has no name "unknown", which tells nobody why it cannot be placed.
+    let tells = |name: &&str| words.is_some() || !name.eq_ignore_ascii_case("unknown");
+    let name = name.filter(tells).map_or_else(unnamed, str::to_owned);
+    let named = ReferenceSystem::named(&name, Unit::Length(keys.stated_metres()), datum);
     match words.filter(|_| named.datum().is_some()) {
         Some(words) => {
             let meridian = named.meridian();
@@ -146,6 +154,10 @@ fn kind(keys: &GeoKeys, method: u16) -> Option<String> {
     let at = format!("+lat_0={latitude} +lon_0={longitude}");
     Some(match method {
         1 => format!("+proj=tmerc {at} +k={scale}"),
+        // Easting and northing count from where the line crosses the equator of the cylinder, or
+        // from the centre.
+        3 => format!("{} +no_uoff", oblique(keys, longitude, latitude, scale)?),
+        9815 => oblique(keys, longitude, latitude, scale)?,
         7 => match parallel(0) {
             Some(parallel) => format!("+proj=merc +lon_0={longitude} +lat_ts={parallel}"),
             None => format!("+proj=merc +lon_0={longitude} +k={scale}"),
@@ -161,6 +173,8 @@ fn kind(keys: &GeoKeys, method: u16) -> Option<String> {
         16 => format!("+proj=sterea {at} +k={scale}"),
         17 => format!("+proj=eqc {at} +lat_ts={one}"),
         18 => format!("+proj=cass {at}"),
+        19 => format!("+proj=gnom {at}"),
+        20 => format!("+proj=mill +lon_0={longitude}"),
         21 => format!("+proj=ortho {at}"),
         22 => format!("+proj=poly {at}"),
         23 => format!("+proj=robin +lon_0={longitude}"),
@@ -168,6 +182,16 @@ fn kind(keys: &GeoKeys, method: u16) -> Option<String> {
         28 => format!("+proj=cea +lon_0={longitude} +lat_ts={one}"),
         _ => return None,
     })
+}
+
+/// Oblique Mercator by a centre and an azimuth (Hotine).
+fn oblique(keys: &GeoKeys, longitude: f64, latitude: f64, scale: f64) -> Option<String> {
+    let angle = |key| keys.number(key).map(|angle| angle * keys.degrees());
+    let azimuth = angle(AZIMUTH)?;
+    let turn = angle(TURN).unwrap_or(azimuth);
+    Some(format!(
+        "+proj=omerc +lat_0={latitude} +lonc={longitude} +alpha={azimuth} +gamma={turn} +k={scale}"
+    ))
 }
 
 /// A transformation with its origin and its unit, as PROJ writes it.
