@@ -324,6 +324,27 @@ fn another_view_is_felt_as_deep_as_the_one_before_and_the_arm_stays_armed() {
 }
 
 #[test]
+fn in_the_air_the_hip_is_where_the_view_puts_it() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Watched::pressed(&mut tiles, gentle);
+    go(&mut arm, [0, 420, 0], 600);
+    assert_eq!(arm.tick().state, ContactState::Free);
+    arm.clutch(InPlace);
+    arm.ticks(110);
+    let [x, y, z] = arm.last.sample.hip.cell();
+    let there = GridPoint::new([x + 20, y - 9, z + 3], Vec3::splat(0.25));
+    arm.put(view(1, 0, there), gentle);
+    assert!(arm.ticks(40).hip.is_same(&there));
+    arm.clutch(LetGo);
+    let closed = arm.ticks(510);
+    assert!(closed.hip.to(&there).length() < 1e-3, "{:?}", closed.hip);
+    assert_eq!(
+        (closed.limits, closed.force_n),
+        (Limits::empty(), Vec3::ZERO)
+    );
+}
+
+#[test]
 fn eight_views_one_after_the_other_make_no_step() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, gentle);

@@ -76,11 +76,16 @@ fn a_view_is_put_in_while_the_clutch_is_open_and_the_arm_stays_armed() {
     assert_eq!((sample.view, sample.mode), (1, Mode::Armed));
     assert_eq!(sample.limits, Limits::empty());
     assert_eq!(rig.status().device.epoch, Some(1_001));
+    // Said once more, late: it is in force, and nothing is done.
+    rig.say(&ToDevice::View(wanted));
+    rig.run(10);
+    assert_eq!(taken(&rig), [(1_001, true); 3]);
+    assert_eq!(latest(&rig).mode, Mode::Armed);
     // One from before, late.
     rig.say(&ToDevice::View(view(0, sample.hip)));
     rig.say(&ToDevice::View(view(200, sample.hip)));
     rig.run(10);
-    assert_eq!(taken(&rig).len(), 2, "nobody waits for an answer to that");
+    assert_eq!(taken(&rig).len(), 3, "nobody waits for an answer to that");
 }
 
 #[test]
@@ -101,6 +106,22 @@ fn a_view_that_comes_while_something_is_felt_is_refused() {
     rig.run(20);
     assert_eq!(taken(&rig), [(1_001, false)]);
     assert_eq!(latest(&rig).mode, Mode::Armed);
+    // It is held, and has yet to open.
+    let mut rig = Rig::armed();
+    rig.ask(Request::Clutch {
+        hold: ClutchHold::InPlace,
+    });
+    rig.run(20);
+    rig.say(&ToDevice::View(view(1, before.hip)));
+    rig.run(20);
+    assert_eq!(taken(&rig), [(1_001, false)]);
+    assert_eq!((latest(&rig).view, latest(&rig).mode), (0, Mode::Armed));
+    // It is open, but what the loop has said is of the view before.
+    let mut rig = with_an_open_clutch();
+    rig.say(&ToDevice::View(view(1, before.hip)));
+    rig.say(&ToDevice::View(view(2, before.hip)));
+    rig.run(20);
+    assert_eq!(taken(&rig), [(1_001, true), (1_002, false)]);
     // Nor is a replay put in like this.
     let mut rig = with_an_open_clutch();
     let mut points = view(1, before.hip);
