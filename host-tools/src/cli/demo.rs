@@ -56,6 +56,11 @@ pub struct Args {
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
 
+    /// Make the tour so many times
+    #[arg(long, value_name = "TIMES", default_value_t = 1,
+          value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub rounds: u32,
+
     /// Which part of it, and how large.
     #[command(flatten)]
     pub placing: Placing,
@@ -87,6 +92,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let terrain = view.terrain(asked.grid)?;
     let (law, rule) = (args.rendering.law()?, args.rendering.rule());
     let placed = PlacedTerrain::in_view(&terrain, view.home_mm, law, rule)?;
+    let placed = placed.repeated(args.rounds);
     show(args, (&placed, &view), &name, &outputs)
 }
 

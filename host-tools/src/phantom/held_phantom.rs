@@ -61,9 +61,22 @@ impl HeldPhantom {
         self
     }
 
+    /// The same hand, which follows its script so many times.
+    #[must_use]
+    pub fn repeated(mut self, times: u32) -> Self {
+        self.script = self.script.repeated(times);
+        self
+    }
+
     /// When a script begins whose hand lets the device arm first, s: after the
     /// device has confirmed and force has come in.
     pub const ARMED_S: f64 = 3.0;
+
+    /// How long the script takes, s.
+    #[must_use]
+    pub fn script_s(&self) -> f64 {
+        self.script.duration_s()
+    }
 
     /// What encoders, switches and amplifiers say now.
     #[must_use]

@@ -87,6 +87,14 @@ impl<'t> PlacedTerrain<'t> {
         })
     }
 
+    /// The same tour so many times.
+    #[must_use]
+    pub fn repeated(mut self, times: u32) -> Self {
+        self.arm = self.arm.repeated(times);
+        self.duration_s = HeldPhantom::ARMED_S + self.arm.script_s() + REST_S;
+        self
+    }
+
     /// The terrain that is placed.
     #[must_use]
     pub const fn terrain(&self) -> &'t Terrain<'t> {

@@ -5,6 +5,8 @@ use glam::DVec3;
 
 /// Time to get up to speed and to come to rest, s.
 const RAMP_S: f64 = 0.15;
+/// Speed of the way back to the beginning of a plan, mm/s.
+const BACK_MM_S: f64 = 60.0;
 
 /// Where the hand wants to be at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +62,30 @@ impl Script {
             self.legs.push(leg);
         }
         self
+    }
+
+    /// The plan so many times one after the other; in between the hand goes straight back to
+    /// where it began.
+    #[must_use]
+    pub fn repeated(self, times: u32) -> Self {
+        let begin_mm = self.target(0.0).position_mm;
+        let end_mm = self.end_mm;
+        let (whole, last_s) = (self.clone().go(begin_mm, BACK_MM_S), self.duration_s);
+        let mut legs = Vec::new();
+        for round in 0..times.max(1) {
+            let begin_s = f64::from(round) * whole.duration_s;
+            let round = if round + 1 < times { &whole } else { &self };
+            legs.extend(round.legs.iter().map(|leg| Leg {
+                start_s: begin_s + leg.start_s,
+                ..leg.clone()
+            }));
+        }
+        let before_s = f64::from(times.max(1) - 1) * whole.duration_s;
+        Self {
+            legs,
+            end_mm,
+            duration_s: before_s + last_s,
+        }
     }
 
     /// When the last leg ends, s.
@@ -188,6 +214,24 @@ mod tests {
         assert_eq!(end.position_mm, [11.0, 12.0, 9.0]);
         assert_eq!(end.speed_mm_s, [0.0; 3]);
         assert_eq!(Script::start([1.0; 3]).target(7.0).position_mm, [1.0; 3]);
+    }
+
+    #[test]
+    fn a_repeated_plan_goes_back_to_its_beginning_and_ends_where_it_did() {
+        let (once, thrice) = (plan(), plan().repeated(3));
+        let back_s = (thrice.duration_s() - 3.0 * once.duration_s()) / 2.0;
+        assert!(back_s > 0.0);
+        let round_s = once.duration_s() + back_s;
+        for t_s in [0.1, 0.6, 1.1, 1.6] {
+            for round in 0..3 {
+                let at = thrice.target(f64::from(round) * round_s + t_s).position_mm;
+                let moved = DVec3::from(at).distance(DVec3::from(once.target(t_s).position_mm));
+                assert!(moved < 1e-9, "{t_s} {round}");
+            }
+        }
+        let end = thrice.target(thrice.duration_s() + 1e-9).position_mm;
+        assert_eq!((end, thrice.end_mm()), ([11.0, 12.0, 9.0], once.end_mm()));
+        assert_eq!(plan().repeated(0).duration_s(), once.duration_s());
     }
 
     #[test]
