@@ -14,6 +14,7 @@
 //! - [`steering`]: another view of the terrain while it is touched;
 //! - [`telemetry`]: what a device reports while it is touched, in numbers;
 //! - [`picture`]: what was felt, as PNG files;
+//! - [`view_feed`]: the same, live, to a viewer that nobody waits for;
 //! - [`board`]: boards, probes, and images onto chips;
 //! - [`calibrate`]: from ruler and scale to a calibration record;
 //! - [`bringup`]: the first power-up of a board and its arm, step by step;
@@ -42,3 +43,4 @@ pub mod steering;
 pub mod synth;
 pub mod telemetry;
 pub mod terrain;
+pub mod view_feed;

@@ -15,6 +15,7 @@ use super::options::steering::{Commands, ViewControl};
 use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::session_summary::{self, SessionSummary};
 use super::terminal::{interrupt, left_behind, progress, voice};
+use super::viewing::{Shown, ToBeShown, Viewing};
 use crate::link::{
     Arming, Event, HostClock, LinkError, Native, Patience, Session, Transport, move_arm_while,
 };
@@ -76,6 +77,10 @@ pub struct Args {
     /// The emulated board.
     #[command(flatten)]
     pub board: EmulatedBoard,
+
+    /// Whether it is shown.
+    #[command(flatten)]
+    pub viewing: Viewing,
 }
 
 /// Runs the demonstration.
@@ -160,13 +165,23 @@ fn show(
     let arm = placed.held_phantom();
     let stop_s = args.seconds.unwrap_or(f64::MAX).min(placed.duration_s());
     interrupt::listen();
-    let toured = match runs_on {
+    let viewer = args.viewing.program()?;
+    let shown = viewer.map(|program| ToBeShown::new(program, terrain, view, name));
+    let tour = Tour {
+        placed,
+        stop_s,
+        control: &mut control,
+        shown,
+    };
+    let (toured, shown) = match runs_on {
         RunsOn::Native => {
-            let device = Native::new(HostClock::default(), Some(Box::new(arm)));
-            let until = (Patience::REAL_TIME, stop_s);
-            tour(placed, Box::new(device), until, &mut control)?
+            let mut device = Native::new(HostClock::default(), Some(Box::new(arm)));
+            if args.viewing.view {
+                device = device.in_real_time();
+            }
+            tour.go(Box::new(device), Patience::REAL_TIME)?
         }
-        RunsOn::Emulated => tour_emulated(args, placed, (arm, stop_s), &mut control)?,
+        RunsOn::Emulated => tour_emulated(args, tour, arm)?,
     };
     // The terminal is as it was.
     drop(control);
@@ -180,6 +195,9 @@ fn show(
     draw(&toured, view, name, &outputs.picture)?;
     println!("recording      {}", outputs.recording.display());
     println!("picture        {}", outputs.picture.display());
+    if let Some(shown) = shown {
+        shown.end(|line| println!("{line}"));
+    }
     match summary.figures.fault {
         None => Ok(()),
         Some(fault) => Err(format!(
@@ -246,15 +264,13 @@ fn draw(toured: &Toured<'_>, first: &View, name: &str, path: &Path) -> Result<()
 /// Tours on the board in an emulator, the arm in a thread of its own.
 fn tour_emulated<'t>(
     args: &Args,
-    placed: &PlacedTerrain<'t>,
-    (mut arm, stop_s): (HeldPhantom, f64),
-    control: &mut ViewControl<'t>,
-) -> Result<Toured<'t>, Failure> {
+    tour: Tour<'_, 't>,
+    mut arm: HeldPhantom,
+) -> Result<(Toured<'t>, Option<Shown<'t>>), Failure> {
     let (emulator, mut lines) = args.board.start()?;
     let report = "please report it with the file";
     move_arm_while(&mut lines.plant, &mut arm, || {
-        let until = (Patience::EMULATED, stop_s);
-        match tour(placed, Box::new(lines.link), until, control) {
+        match tour.go(Box::new(lines.link), Patience::EMULATED) {
             Ok(toured) => {
                 // The arm is still there while the board lets its force go out.
                 let ended = emulator.finish().map(|()| toured);
@@ -273,61 +289,83 @@ fn tour_emulated<'t>(
     })
 }
 
-/// Serves the terrain until the tour has come to its end.
-fn tour<'t>(
-    placed: &PlacedTerrain<'t>,
-    transport: Box<dyn Transport + 't>,
-    (patience, stop_s): (Patience, f64),
-    control: &mut ViewControl<'t>,
-) -> Result<Toured<'t>, LinkError> {
-    let (terrain, scene, arming) = (placed.terrain(), placed.scene(), Some(Arming::VIRTUAL));
-    let (mut session, device) = Session::open(terrain, scene, arming, transport, patience)?;
-    let line = format!("device         {}\n", session_summary::device(&device));
-    voice::put(std::io::stdout(), &line);
-    let stop_tick = (stop_s * f64::from(device.tick_hz)).ceil() as u64;
-    let template = "feeling {bar:30} {human_pos} of {human_len} ticks, {elapsed}";
-    let progress = progress::bar(Some(stop_tick), template);
-    let (mut log, mut rows) = (SampleLog::new(terrain, &device), Vec::new());
-    let mut toured = Ok(());
-    while toured.is_ok() && log.ticks() < stop_tick && !interrupt::requested() {
-        toured = session.poll(Duration::from_millis(100), &mut |event| {
-            control.on_event(&event);
-            log.views().on_event(&event);
-            if let Event::Sample(sample) = event {
-                let record = log.take(sample);
-                rows.push((record, LoopColumns::of(sample, log.view().0)));
+/// A tour that is to be made.
+struct Tour<'p, 't> {
+    placed: &'p PlacedTerrain<'t>,
+    stop_s: f64,
+    control: &'p mut ViewControl<'t>,
+    /// What shows it.
+    shown: Option<ToBeShown<'t>>,
+}
+
+impl<'t> Tour<'_, 't> {
+    /// Serves the terrain until the tour has come to its end.
+    fn go(
+        self,
+        transport: Box<dyn Transport + 't>,
+        patience: Patience,
+    ) -> Result<(Toured<'t>, Option<Shown<'t>>), LinkError> {
+        let (terrain, scene) = (self.placed.terrain(), self.placed.scene());
+        let (control, arming) = (self.control, Some(Arming::VIRTUAL));
+        let (mut session, device) = Session::open(terrain, scene, arming, transport, patience)?;
+        let line = format!("device         {}\n", session_summary::device(&device));
+        voice::put(std::io::stdout(), &line);
+        let tell = |line: String| voice::put(std::io::stderr(), &(line + "\n"));
+        let mut shown = self.shown.and_then(|shown| shown.start(&device, tell));
+        let stop_tick = (self.stop_s * f64::from(device.tick_hz)).ceil() as u64;
+        let template = "feeling {bar:30} {human_pos} of {human_len} ticks, {elapsed}";
+        let progress = progress::bar(Some(stop_tick), template);
+        let (mut log, mut rows) = (SampleLog::new(terrain, &device), Vec::new());
+        let mut toured = Ok(());
+        while toured.is_ok() && log.ticks() < stop_tick && !interrupt::requested() {
+            toured = session.poll(Duration::from_millis(100), &mut |event| {
+                control.on_event(&event);
+                log.views().on_event(&event);
+                if let Some(shown) = &mut shown {
+                    shown.on_event(&event);
+                }
+                if let Event::Sample(sample) = event {
+                    let record = log.take(sample);
+                    if let Some(shown) = &mut shown {
+                        shown.take(sample, &record, log.view());
+                    }
+                    rows.push((record, LoopColumns::of(sample, log.view().0)));
+                }
+            });
+            control.look(log.t_s(), &mut |line| {
+                progress.suspend(|| voice::put(std::io::stderr(), &format!("{line}\n")));
+            });
+            for ask in control.asks() {
+                session.ask(ask);
             }
-        });
-        control.look(log.t_s(), &mut |line| {
-            progress.suspend(|| voice::put(std::io::stderr(), &format!("{line}\n")));
-        });
-        for ask in control.asks() {
-            session.ask(ask);
+            if let Some(put) = control.put(log.views()) {
+                toured = toured.and(session.put_view(put.view, put.terrain));
+            }
+            progress.set_position(log.ticks());
+            if let Some(shown) = &mut shown {
+                shown.look(session.tally());
+            }
         }
-        if let Some(put) = control.put(log.views()) {
-            toured = toured.and(session.put_view(put.view, put.terrain));
-        }
-        progress.set_position(log.ticks());
+        progress.finish_and_clear();
+        let figures = log.figures();
+        let ticks = log.ticks();
+        // However the tour ended, the board is told; what it felt after the tour's end
+        // is not shown.
+        let left = session.say_goodbye(&mut |_| {});
+        toured.and(left)?;
+        let summary = SessionSummary {
+            ticks,
+            device,
+            figures,
+            tally: session.tally().clone(),
+        };
+        let toured = Toured {
+            rows,
+            views: log.into_views(),
+            summary,
+        };
+        Ok((toured, shown))
     }
-    progress.finish_and_clear();
-    let figures = log.figures();
-    let ticks = log.ticks();
-    // However the tour ended, the board is told; what it felt after the tour's end
-    // is not shown.
-    let left = session.say_goodbye(&mut |_| {});
-    toured.and(left)?;
-    let summary = SessionSummary {
-        ticks,
-        device,
-        figures,
-        tally: session.tally().clone(),
-    };
-    let views = log.into_views();
-    Ok(Toured {
-        rows,
-        views,
-        summary,
-    })
 }
 
 fn write(toured: &Toured<'_>, settings: &Settings, path: &Path) -> Result<(), OutputError> {

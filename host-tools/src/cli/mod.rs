@@ -26,6 +26,8 @@ mod sparing;
 pub mod status;
 pub mod synth;
 mod terminal;
+pub mod view;
+pub mod viewing;
 
 use std::process::ExitCode;
 
@@ -59,6 +61,8 @@ pub enum Command {
     Demo(demo::Args),
     /// Feel a trajectory tick by tick and write what was felt
     Replay(replay::Args),
+    /// Show a recording again in the viewer, to scrub and replay
+    View(view::Args),
     /// Show boards, debug probes and ports that can be seen from here
     List(list::Args),
     /// Show how a device is: calibration, what keeps it from arming, faults, figures
@@ -84,6 +88,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&args.pinned()),
         Command::Demo(args) => demo::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::View(args) => view::run(&args),
         Command::List(args) => list::run(&args),
         Command::Status(args) => status::run(&args),
         Command::Bringup(args) => bringup::run(&args),

@@ -6,19 +6,22 @@ use std::time::Instant;
 use clap::ValueHint;
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
+use hapterra_core::scene::Sample;
 
 use super::failure::{Failure, OrHint};
 use super::options::emulated_board::{EmulatedBoard, RunsOn};
 use super::options::rendering::Rendering;
 use super::options::terrain_file::TerrainFile;
 use super::terminal::{interrupt, left_behind, progress};
+use super::viewing::{self, Viewing};
 use crate::link::{Patience, Transport};
 use crate::output::{Output, keep_apart};
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{
-    ReplayError, Replayer, Settings, Summary, Trajectory, on_native, replay_trajectory,
+    Record, ReplayError, Replayer, Settings, Summary, Trajectory, on_native, replay_trajectory,
 };
 use crate::terrain::Terrain;
+use crate::view_feed::{Picture, Program, ViewFeed};
 
 /// Arguments of `hapterra replay`.
 #[derive(Debug, clap::Args)]
@@ -58,6 +61,10 @@ pub struct Args {
     /// The emulated board.
     #[command(flatten)]
     pub board: EmulatedBoard,
+
+    /// Whether it is shown.
+    #[command(flatten)]
+    pub viewing: Viewing,
 }
 
 /// Replays the trajectory.
@@ -68,6 +75,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let inputs = [args.terrain.file.as_path(), &args.trajectory];
     keep_apart(&[&args.output], &inputs).or_hint("name another file with --output")?;
     left_behind::tell([args.output.as_path()]);
+    let viewer = args.viewing.program()?;
     let mut trajectory = Trajectory::open(&args.trajectory).map_err(ReplayError::from)?;
     let recorded = trajectory
         .settings()
@@ -86,8 +94,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let felt = Felt {
         terrain: &terrain,
         law: (rendering.law()?, rendering.rule()),
-        views: recorded.map(|recorded| recorded.views).unwrap_or_default(),
         file,
+        title: args.terrain.name(),
+        home_mm: recorded.as_ref().and_then(|it| it.felt.home_mm),
+        views: recorded.map(|recorded| recorded.views).unwrap_or_default(),
+        viewer,
     };
     let began = Instant::now();
     let summary = match args.on {
@@ -125,6 +136,44 @@ struct Felt<'t> {
     views: Vec<ViewSettings>,
     /// The terrain file, as it was named.
     file: String,
+    /// What the viewer calls it.
+    title: String,
+    /// Where the arm's home position was, where a recording says so.
+    home_mm: Option<[f64; 3]>,
+    /// What shows it.
+    viewer: Option<Program>,
+}
+
+impl<'t> Felt<'t> {
+    fn shown(&self, replayer: &Replayer<'_>) -> Result<Option<ViewFeed<'t>>, Failure> {
+        let Some(program) = &self.viewer else {
+            return Ok(None);
+        };
+        let device = replayer.device();
+        let mut picture = self.picture(self.terrain, self.home_mm);
+        picture.facts = vec![("felt by".to_owned(), device.board.to_string())];
+        Ok(Some(ViewFeed::start(
+            program,
+            picture.prepare(),
+            Some(device),
+        )?))
+    }
+
+    fn picture<'p>(
+        &'p self,
+        terrain: &'p Terrain<'t>,
+        home_mm: Option<[f64; 3]>,
+    ) -> Picture<'p, 't> {
+        Picture {
+            terrain,
+            title: &self.title,
+            facts: vec![],
+            home_mm,
+            laid_mm: None,
+            // A replay runs as fast as it can: its time is not the viewer's.
+            is_live: false,
+        }
+    }
 }
 
 /// How it feels: as stated, else as recorded, else as usual.
@@ -167,11 +216,11 @@ fn emulated(args: &Args, felt: &Felt<'_>, trajectory: &mut Trajectory) -> Result
     Ok(summary)
 }
 
-fn replay(
+fn replay<'t>(
     args: &Args,
-    felt: &Felt<'_>,
+    felt: &Felt<'t>,
     trajectory: &mut Trajectory,
-    replayer: &mut Replayer<'_>,
+    replayer: &mut Replayer<'t>,
 ) -> Result<Summary, Failure> {
     let progress = progress::bar(None, "{spinner} {human_pos} rows, {per_sec}");
     interrupt::listen();
@@ -179,10 +228,35 @@ fn replay(
     let mut settings = Settings::new(&felt.file, felt.terrain, felt.law, None, device);
     settings.views.clone_from(&felt.views);
     let output = Output::create_or_standard_output(&args.output).map_err(ReplayError::from)?;
-    let summary = replay_trajectory(replayer, trajectory, &settings, output, &mut |rows| {
-        progress.set_position(rows);
-        !interrupt::requested()
-    });
+    let mut feed = felt.shown(replayer)?;
+    let mut shown = 0;
+    let mut show = |sample: &Sample, record: &Record, (view, terrain): (u32, &Terrain<'t>)| {
+        let Some(feed) = &mut feed else {
+            return;
+        };
+        if view != shown {
+            shown = view;
+            let settings = felt.views.iter().find(|known| known.number == view);
+            let home_mm = settings.map(|settings| settings.home_mm);
+            feed.go_over(felt.picture(terrain, home_mm));
+        }
+        feed.detail(record);
+        feed.take(sample, record);
+    };
+    let summary = replay_trajectory(
+        replayer,
+        trajectory,
+        &settings,
+        output,
+        &mut show,
+        &mut |rows| {
+            progress.set_position(rows);
+            !interrupt::requested()
+        },
+    );
     progress.finish_and_clear();
+    if let Some(feed) = feed {
+        viewing::end(feed, |line| eprintln!("{line}"));
+    }
     Ok(summary?)
 }

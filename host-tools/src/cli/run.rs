@@ -22,6 +22,7 @@ use super::options::terrain_file::TerrainFile;
 use super::session_summary::{self, SessionSummary};
 use super::terminal::voice::{say, show, tell};
 use super::terminal::{interrupt, left_behind};
+use super::viewing::{ToBeShown, Viewing};
 use crate::link::{
     Arming, DeviceAddress, HostClock, LinkError, Native, Patience, Tcp, Transport, serve_plant,
 };
@@ -89,6 +90,9 @@ pub struct Args {
     /// How the view may be changed meanwhile.
     #[command(flatten)]
     pub commands: Commands,
+    /// Whether it is shown.
+    #[command(flatten)]
+    pub viewing: Viewing,
 }
 
 impl Args {
@@ -117,6 +121,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let outputs = Vec::from_iter(args.record.as_deref());
     keep_apart(&outputs, &[&args.terrain.file]).or_hint(OTHER_FILE)?;
     left_behind::tell(args.record.as_deref());
+    let viewer = args.viewing.program()?;
     let raster = args.terrain.open()?;
     let asked = args.placing.of(&args.rendering, &raster)?;
     let (law, rule) = (args.rendering.law()?, args.rendering.rule());
@@ -135,6 +140,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         true => Some(PlacedTerrain::in_view(&terrain, view.home_mm, law, rule)?),
         false => None,
     };
+    let title = args.terrain.name();
+    // The coarse levels are read before anything is armed.
+    let shown = viewer.map(|program| ToBeShown::new(program, &terrain, &view, &title));
     let placed = Placed {
         terrain: &terrain,
         view,
@@ -144,13 +152,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     let served = (recording, commands);
     let (Some(address), Some(tour)) = (&args.plant, &placed.tour) else {
-        return serve(args, &placed, met, served);
+        return serve(args, &placed, met, served, shown);
     };
     let arm = tour.held_phantom();
     let done = OnceLock::new();
     std::thread::scope(|scope| {
         scope.spawn(|| move_arm(address, arm, &done));
-        let ended = serve(args, &placed, met, served);
+        let ended = serve(args, &placed, met, served, shown);
         // The arm is still there while the board lets its force go out.
         let _ = done.set(Instant::now() + LINGER);
         ended
@@ -193,6 +201,7 @@ fn serve(
     placed: &Placed<'_>,
     met: Result<(), Failure>,
     (recording, commands): (Option<Recording>, CommandQueue),
+    shown: Option<ToBeShown<'_>>,
 ) -> Result<(), Failure> {
     let is_checked = !is_scripted(args) && !args.unchecked;
     let service = service(args, placed);
@@ -227,7 +236,9 @@ fn serve(
     if let Some(line) = control.listen(&args.commands) {
         tell(line);
     }
-    let mut watch = Watch::new(args, placed, &device, recording, control);
+    // A viewer that does not start ends nothing.
+    let shown = shown.and_then(|shown| shown.start(&device, tell));
+    let mut watch = Watch::new(args, placed, &device, recording, control).shown(shown);
     let end = served.serve(&mut watch);
     // What was recorded is kept, however it ended, and before anything else is done.
     let log = watch.finish();
@@ -243,6 +254,9 @@ fn serve(
     show(summary.text());
     if let (Ok(()), Some(path)) = (&kept, &args.record) {
         say(format!("recording      {}", path.display()));
+    }
+    if let Some(shown) = log.shown {
+        shown.end(say);
     }
     ended.and(kept)
 }
@@ -312,7 +326,11 @@ fn described(
 fn connect<'t>(args: &Args, placed: &Placed<'t>) -> Result<Box<dyn Transport + 't>, LinkError> {
     let native = || {
         let arm = placed.tour.as_ref().map(PlacedTerrain::held_phantom);
-        Native::new(HostClock::default(), arm.map(|arm| Box::new(arm) as _))
+        let device = Native::new(HostClock::default(), arm.map(|arm| Box::new(arm) as _));
+        match args.viewing.view {
+            true => device.in_real_time(),
+            false => device,
+        }
     };
     args.device.connect(native)
 }

@@ -6,15 +6,12 @@ use hapterra_core::wire::hello::DeviceHello;
 
 use super::failure::{Failure, OrHint};
 use super::options::placing;
-use crate::link::{INSTRUCTIONS_PER_COUNT, Tally, shown};
+use crate::link::{EMULATED, INSTRUCTIONS_PER_COUNT, Tally, shown};
 use crate::picture::{GroundFacts, SessionPicture, Surface};
 use crate::place::{View, coordinates_in_words};
 use crate::replay::Record;
 use crate::telemetry::Figures;
 use crate::terrain::Terrain;
-
-/// The board whose clock counts instructions.
-pub(super) const EMULATED: &str = "mps2-an386";
 
 /// Figures of a session and of its link.
 #[derive(Clone, Debug)]

@@ -10,7 +10,7 @@ use super::failure::Failure;
 use super::options::device::Device;
 use super::session_summary;
 use super::terminal::voice::{say, show};
-use crate::link::shown;
+use crate::link::{EMULATED, shown};
 
 /// Arguments of `hapterra status`.
 #[derive(Debug, clap::Args)]
@@ -90,7 +90,7 @@ fn calibration(status: &Status) -> String {
         CalibrationSource::Refused(bad) => {
             format!("none: the stored record is refused ({bad}); type hapterra calibrate")
         }
-        CalibrationSource::Stored if status.device.board == session_summary::EMULATED => {
+        CalibrationSource::Stored if status.device.board == EMULATED => {
             format!("{model}built into the emulated board, which has no memory to store another in")
         }
         CalibrationSource::Stored => format!("{model}stored on the device"),

@@ -64,6 +64,8 @@ pub enum Event<'e> {
         /// Whether it was done; why not.
         result: Result<(), Refusal>,
     },
+    /// A tile was said to the device, which may lose it and ask again.
+    TileSent(TileKey),
     /// What was asked for was given up: the device does not answer it, or was
     /// restarted meanwhile. Whether it was done is not known.
     Unanswered(&'e Ask),
@@ -291,7 +293,7 @@ impl<'t> Client<'t> {
         for ask in self.talk.take_unanswered() {
             self.tally.unanswered += 1;
             if matches!(ask, Ask::Request(Request::Zero { .. })) {
-                self.hand_over_withheld(out);
+                self.hand_over_withheld(out, on);
             }
             on(Event::Unanswered(&ask));
         }
@@ -416,7 +418,7 @@ impl<'t> Client<'t> {
         // The next goes out at once.
         self.talk.say_pending(now, out);
         if matches!(ask, Ask::Request(Request::Zero { .. })) {
-            self.hand_over_withheld(out);
+            self.hand_over_withheld(out, on);
         }
         match (ask, message) {
             (Ask::Request(request), ToHost::Answer(answer)) => on(Event::Answered {
@@ -450,7 +452,7 @@ impl<'t> Client<'t> {
                 if has_room && !known.contains(&key) {
                     known.push(key);
                     if !self.zeroing {
-                        self.on_need(now, key, out);
+                        self.on_need(now, key, out, on);
                     }
                 }
             }
@@ -480,14 +482,20 @@ impl<'t> Client<'t> {
         }
     }
 
-    fn hand_over_withheld(&mut self, out: &mut Vec<u8>) {
+    fn hand_over_withheld(&mut self, out: &mut Vec<u8>, on: &mut dyn FnMut(Event<'_>)) {
         self.zeroing = false;
         for key in std::mem::take(&mut self.withheld) {
-            self.on_need(Duration::ZERO, key, out);
+            self.on_need(Duration::ZERO, key, out, on);
         }
     }
 
-    fn on_need(&mut self, now: Duration, key: TileKey, out: &mut Vec<u8>) {
+    fn on_need(
+        &mut self,
+        now: Duration,
+        key: TileKey,
+        out: &mut Vec<u8>,
+        on: &mut dyn FnMut(Event<'_>),
+    ) {
         let Some(heights) = self.terrain.tile(key, &mut self.tile) else {
             return self.on_no_tile(now, key);
         };
@@ -499,6 +507,7 @@ impl<'t> Client<'t> {
         let before = out.len();
         self.talk.say(&ToDevice::Tile(message), out);
         self.tally.sent_tile(key, out.len() - before);
+        on(Event::TileSent(key));
     }
 
     /// A device may ask for anything, as often as it likes.

@@ -27,6 +27,8 @@ const END: Duration = Duration::from_secs(10);
 /// Bytes of a report that are read, at most.
 const SAID: u64 = 16 << 10;
 
+/// The board whose clock counts instructions, as it calls itself.
+pub const EMULATED: &str = "mps2-an386";
 /// Instructions that the emulated board executes for each count of its clock:
 /// `-icount shift=3` makes an instruction 8 ns, a count of its 25 MHz clock is
 /// 40 ns.

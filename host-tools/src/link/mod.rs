@@ -51,7 +51,8 @@ pub(crate) use device_address::tcp_address;
 pub use device_text::{shown, shown_lines};
 pub use dialogue::Dialogue;
 pub use emulator::{
-    Emulator, EmulatorError, IMAGE_VARIABLE, INSTRUCTIONS_PER_COUNT, Lines, QEMU, QEMU_VARIABLE,
+    EMULATED, Emulator, EmulatorError, IMAGE_VARIABLE, INSTRUCTIONS_PER_COUNT, Lines, QEMU,
+    QEMU_VARIABLE,
 };
 pub use error::LinkError;
 pub use native::{HostClock, Meddler, Native};

@@ -20,6 +20,13 @@ const WINDOW: usize = 16;
 /// Ticks run while waiting for the device to say something, at most.
 const TICKS_A_CALL: u32 = 1000;
 
+/// A device in real time runs as far ahead of the clock before it waits, and catches up as
+/// much.
+const AHEAD: Duration = Duration::from_millis(4);
+const BEHIND: Duration = Duration::from_millis(100);
+/// Ticks after which the host of such a device looks around.
+const STEPS_IN_REAL_TIME: u32 = 16;
+
 /// Host time as the device's clock: ticks are never late, and cost what they
 /// cost here.
 #[derive(Clone, Copy, Debug)]
@@ -139,6 +146,26 @@ impl<C: TickClock> Native<C> {
     pub fn in_steps_of(mut self, ticks: u32) -> Self {
         self.ticks_a_call = ticks;
         self
+    }
+
+    /// The same device, whose time does not run ahead of this machine's, for somebody who
+    /// looks on. What it falls behind by more than a moment it does not catch up.
+    #[must_use]
+    pub fn in_real_time(self) -> Self {
+        let tick = Duration::from_secs(1) * C::PERIOD / C::HZ;
+        let mut due = Instant::now();
+        let pace: Meddler = Box::new(move |_, _, _| {
+            due += tick;
+            let now = Instant::now();
+            let early = due.saturating_duration_since(now);
+            if early > AHEAD {
+                std::thread::sleep(early);
+            }
+            if now.saturating_duration_since(due) > BEHIND {
+                due = now;
+            }
+        });
+        self.meddled_with(pace).in_steps_of(STEPS_IN_REAL_TIME)
     }
 
     /// The virtual arm, if the device has one.

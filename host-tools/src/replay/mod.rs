@@ -16,7 +16,7 @@ pub use felt::Replayer;
 pub use loop_columns::LoopColumns;
 pub use recording::{Column, Record, Recording, Value};
 pub use settings::Settings;
-pub use trajectory::{Row, Told, Trajectory, TrajectoryError};
+pub use trajectory::{FeltRow, FeltRows, Row, Told, Trajectory, TrajectoryError};
 
 use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
@@ -25,6 +25,7 @@ use hapterra_core::scene::Sample;
 use crate::link::{LinkError, Native, Patience, Transport};
 use crate::output::{Output, OutputError};
 use crate::terrain::{Terrain, TerrainError};
+use settings::ViewSettings;
 
 /// Why a replay did not come to its end. Nothing is left at the output's path.
 #[derive(Debug, thiserror::Error)]
@@ -67,18 +68,23 @@ pub struct Summary {
 /// there are several.
 const MORE: [Column; 2] = [Column::Text("state"), Column::Count("view")];
 
+/// Is told each sample and its row, and the number of its view with its terrain.
+pub type OnFelt<'f, 't> = dyn FnMut(&Sample, &Record, (u32, &Terrain<'t>)) + 'f;
+
 /// Runs a trajectory through a device and writes what was felt to an output, which
 /// appears only when it is complete.
 ///
-/// `go_on` is asked now and then, with the number of rows so far, whether to.
+/// `felt` is told what was felt; `go_on` is asked now and then, with the number of
+/// rows so far, whether to.
 ///
 /// # Errors
 /// [`ReplayError`] says what was wrong, with file, line and column.
-pub fn replay_trajectory(
-    replayer: &mut Replayer<'_>,
+pub fn replay_trajectory<'t>(
+    replayer: &mut Replayer<'t>,
     trajectory: &mut Trajectory,
     settings: &Settings,
     output: Output,
+    felt: &mut OnFelt<'_, 't>,
     go_on: &mut dyn FnMut(u64) -> bool,
 ) -> Result<Summary, ReplayError> {
     const ASK_EVERY: u64 = 512;
@@ -103,6 +109,7 @@ pub fn replay_trajectory(
         let record = Record::new(row.t_s, row.hip_mm, &sample, &scale);
         let more = [Value::Text(state_name(sample.state)), Value::Count(view)];
         recording.write(&record, more.get(..columns.len()).unwrap_or(&more))?;
+        felt(&sample, &record, (view, terrain));
         summary.rows += 1;
         summary.in_contact += u64::from(record.contact);
         summary.below_ground += u64::from(is_below_ground(&sample, &record, terrain));
@@ -112,6 +119,20 @@ pub fn replay_trajectory(
     }
     recording.finish()?;
     Ok(summary)
+}
+
+/// A terrain in another view of its recording.
+///
+/// # Errors
+/// [`ReplayError::View`].
+pub fn terrain_of<'t>(
+    terrain: &Terrain<'t>,
+    view: &ViewSettings,
+) -> Result<Terrain<'t>, ReplayError> {
+    let number = view.number;
+    let cannot = |why| ReplayError::View { number, why };
+    let scale = view.scale().map_err(|why| cannot(why.into()))?;
+    terrain.rescaled(scale, view.level).map_err(cannot)
 }
 
 /// Goes over to the view of a row, as it was done where it was recorded.
@@ -126,11 +147,7 @@ fn go_over(
     let Some(view) = described else {
         return Err(trajectory.of_unknown_view(told).into());
     };
-    let number = view.number;
-    let cannot = |why| ReplayError::View { number, why };
-    let scale = view.scale().map_err(|why| cannot(why.into()))?;
-    let terrain = replayer.terrain().rescaled(scale, view.level);
-    let terrain = terrain.map_err(cannot)?;
+    let terrain = terrain_of(replayer.terrain(), view)?;
     let row = trajectory.lay(told, terrain.scale())?;
     replayer.put_view(terrain, view.law(), row.hip)?;
     Ok(recording.view(view)?)

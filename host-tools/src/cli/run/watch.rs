@@ -10,6 +10,7 @@ use super::{Args, Placed};
 use crate::cli::options::steering::{self, ViewControl};
 use crate::cli::terminal::arming_prompts::ArmingPrompts;
 use crate::cli::terminal::voice::{status, tell};
+use crate::cli::viewing::Shown;
 use crate::link::{Ask, Event, Tally};
 use crate::output::OutputError;
 use crate::replay::settings::ViewSettings;
@@ -34,13 +35,16 @@ pub(super) struct Watch<'t> {
     control: ViewControl<'t>,
     prompts: ArmingPrompts,
     line_due: Instant,
+    shown: Option<Shown<'t>>,
 }
 
 /// What was seen in all.
-pub(super) struct Seen {
+pub(super) struct Seen<'t> {
     /// Ticks run since the scene was taken.
     pub(super) ticks: u64,
     pub(super) figures: Figures,
+    /// The way to the viewer, where there is one.
+    pub(super) shown: Option<Shown<'t>>,
     /// Whether the recording, where there is one, is complete and in its place.
     pub(super) kept: Result<(), OutputError>,
 }
@@ -67,11 +71,17 @@ impl<'t> Watch<'t> {
             control,
             prompts,
             line_due: Instant::now() + LINE_EVERY,
+            shown: None,
         }
     }
 
+    /// The same, and a viewer is told what is felt.
+    pub(super) fn shown(self, shown: Option<Shown<'t>>) -> Self {
+        Self { shown, ..self }
+    }
+
     /// Ends the recording, and takes the line at the bottom of the terminal away.
-    pub(super) fn finish(self) -> Seen {
+    pub(super) fn finish(self) -> Seen<'t> {
         status(None);
         let (ticks, figures) = (self.log.ticks(), self.log.figures());
         let kept = match (self.failed, self.recording) {
@@ -80,6 +90,7 @@ impl<'t> Watch<'t> {
             (None, None) => Ok(()),
         };
         Seen {
+            shown: self.shown,
             ticks,
             figures,
             kept,
@@ -89,6 +100,9 @@ impl<'t> Watch<'t> {
     fn record(&mut self, sample: &Sample) -> Record {
         let record = self.log.take(sample);
         let (view, felt) = self.log.view();
+        if let Some(shown) = &mut self.shown {
+            shown.take(sample, &record, (view, felt));
+        }
         if view > self.described
             && let Some(laid) = &felt.laid
         {
@@ -118,6 +132,9 @@ impl<'t> Onlooker<'t> for Watch<'t> {
         self.prompts.on_event(&event);
         self.control.on_event(&event);
         self.log.views().on_event(&event);
+        if let Some(shown) = &mut self.shown {
+            shown.on_event(&event);
+        }
         if let Event::Sample(sample) = event {
             self.latest = Some((*sample, self.record(sample)));
         }
@@ -144,6 +161,9 @@ impl<'t> Onlooker<'t> for Watch<'t> {
 
     /// One line that is written over, or a line now and then.
     fn show(&mut self, tally: &Tally) {
+        if let Some(shown) = &mut self.shown {
+            shown.look(tally);
+        }
         let Some((sample, record)) = &self.latest else {
             return;
         };

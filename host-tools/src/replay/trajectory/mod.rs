@@ -6,6 +6,7 @@
 mod comments;
 mod csv;
 mod fault;
+mod felt_rows;
 mod parquet;
 
 use std::fs::File;
@@ -15,6 +16,7 @@ use std::path::{Path, PathBuf};
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 
 pub use fault::TrajectoryError;
+pub use felt_rows::{FeltRow, FeltRows};
 
 use super::settings::Settings;
 use crate::terrain::Scale;

@@ -1,0 +1,159 @@
+//! `hapterra view`: a recording in the viewer, to be looked at again.
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueHint;
+
+use super::failure::{Failure, OrHint};
+use super::options::rendering::Rendering;
+use super::options::terrain_file::TerrainFile;
+use super::terminal::interrupt;
+use super::viewing;
+use crate::output::keep_apart;
+use crate::raster::Raster;
+use crate::replay::{FeltRows, ReplayError, Settings, terrain_of};
+use crate::terrain::Terrain;
+use crate::view_feed::{Picture, Program, ViewFeed};
+
+/// Rows between two looks at whether the viewer still reads.
+const LOOK_EVERY: u64 = 10_000;
+
+/// Arguments of `hapterra view`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Recording of `run`, `demo` or `replay`, CSV or Parquet, or a trajectory
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub recording: PathBuf,
+
+    /// The terrain file that was felt
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub terrain: PathBuf,
+
+    /// What the terrain file does not say itself.
+    #[command(flatten)]
+    pub reading: super::options::terrain_file::ReadingOptions,
+
+    /// Show a recording's path on another terrain, too
+    #[arg(long)]
+    pub ignore_settings: bool,
+
+    /// Write a recording for rerun's own viewer, too
+    #[arg(long, value_name = "OUT.rrd", value_hint = ValueHint::FilePath)]
+    pub rrd: Option<PathBuf>,
+
+    /// How the terrain was felt, where the recording does not say.
+    #[command(flatten)]
+    pub rendering: Rendering,
+}
+
+/// Shows a recording until nobody looks any more.
+///
+/// # Errors
+/// What is wrong with the recording or the terrain; no viewer.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let inputs = [args.recording.as_path(), &args.terrain];
+    let outputs = Vec::from_iter(args.rrd.as_deref());
+    keep_apart(&outputs, &inputs).or_hint("name another file with --rrd")?;
+    let program = Program::find()?;
+    let rows = FeltRows::open(&args.recording).map_err(ReplayError::from)?;
+    let recorded = rows.settings().filter(|_| !args.ignore_settings).cloned();
+    let file = TerrainFile {
+        file: args.terrain.clone(),
+        reading: args.reading.clone(),
+    };
+    let raster = file.open()?;
+    let terrain = terrain(args, recorded.as_ref(), &raster)?;
+    if let Some(recorded) = &recorded {
+        recorded.check_terrain(&args.terrain.display().to_string(), &terrain)?;
+    }
+    let picture = Picture {
+        terrain: &terrain,
+        title: &file.name(),
+        facts: facts(&args.recording, recorded.as_ref()),
+        home_mm: recorded.as_ref().and_then(|it| it.felt.home_mm),
+        laid_mm: None,
+        is_live: false,
+    };
+    let program = program.writing(args.rrd.as_deref());
+    interrupt::listen();
+    let feed = ViewFeed::start(&program, picture.prepare(), None)?;
+    let recorded = recorded.as_ref();
+    let cut = show(feed, rows, (&terrain, &file.name(), recorded))?;
+    if cut {
+        let path = args.recording.display();
+        eprintln!("{path}: its last row is cut in the middle, and left out");
+    }
+    Ok(())
+}
+
+/// Whether the recording was cut.
+fn show<'t>(
+    mut feed: ViewFeed<'t>,
+    mut rows: FeltRows,
+    (terrain, title, recorded): (&Terrain<'t>, &str, Option<&Settings>),
+) -> Result<bool, Failure> {
+    let mut shown = 0;
+    for (count, row) in (1..).zip(&mut rows) {
+        let row = row.map_err(ReplayError::from)?;
+        if row.view != shown
+            && let Some(recorded) = recorded
+        {
+            shown = row.view;
+            go_over(&mut feed, terrain, title, (shown, recorded))?;
+        }
+        feed.detail(&row.record);
+        feed.row(&row.record, None);
+        let is_read = count % LOOK_EVERY != 0 || feed.wait_for_room();
+        if !is_read || interrupt::requested() {
+            break;
+        }
+    }
+    viewing::end(feed, |line| eprintln!("{line}"));
+    Ok(rows.was_cut())
+}
+
+fn go_over<'t>(
+    feed: &mut ViewFeed<'t>,
+    first: &Terrain<'t>,
+    title: &str,
+    (number, recorded): (u32, &Settings),
+) -> Result<(), Failure> {
+    let view = recorded.views.iter().find(|view| view.number == number);
+    let terrain = match view {
+        Some(view) => terrain_of(first, view)?,
+        None => first.clone(),
+    };
+    feed.go_over(Picture {
+        terrain: &terrain,
+        title,
+        facts: vec![],
+        home_mm: view.map(|view| view.home_mm).or(recorded.felt.home_mm),
+        laid_mm: None,
+        is_live: false,
+    });
+    Ok(())
+}
+
+fn terrain<'r>(
+    args: &Args,
+    recorded: Option<&Settings>,
+    raster: &'r Raster,
+) -> Result<Terrain<'r>, Failure> {
+    let rendering = match recorded {
+        Some(recorded) => args.rendering.or_recorded(recorded).0,
+        None => args.rendering.clone(),
+    };
+    let measured_at = recorded.and_then(|it| it.felt.measured_at);
+    let grid = rendering.grid(raster, measured_at);
+    let scale = rendering.scale(&grid)?;
+    rendering.terrain(grid, scale)
+}
+
+fn facts(path: &Path, recorded: Option<&Settings>) -> Vec<(String, String)> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut facts = vec![("recording".to_owned(), name.into_owned())];
+    if let Some(recorded) = recorded {
+        facts.push(("felt by".to_owned(), recorded.device.board.clone()));
+    }
+    facts
+}

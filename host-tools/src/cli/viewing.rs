@@ -1,0 +1,169 @@
+//! The viewer, as several commands start it.
+
+use std::time::Duration;
+
+use hapterra_core::scene::Sample;
+use hapterra_core::wire::hello::DeviceHello;
+
+use super::failure::{Failure, Hint};
+use super::options::placing;
+use super::terminal::interrupt;
+use crate::link::{Event, Tally};
+use crate::place::View;
+use crate::replay::Record;
+use crate::telemetry::FeltView;
+use crate::terrain::Terrain;
+use crate::view_feed::{Picture, Prepared, Program, ProgramError, VARIABLE, ViewFeed};
+
+/// Between two looks at whether the viewer has ended.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Whether what is felt is shown.
+#[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Viewer")]
+pub struct Viewing {
+    /// Show what is felt in a browser, live: terrain, hand and plots
+    ///
+    /// Needs the program hapterra-view beside this one or on the PATH. Its options go
+    /// into HAPTERRA_VIEW_OPTIONS; `hapterra-view --help` lists them.
+    #[arg(long)]
+    pub view: bool,
+}
+
+impl Viewing {
+    /// The viewer, where one is asked for: it is looked for before anything is armed.
+    ///
+    /// # Errors
+    /// There is none.
+    pub(in crate::cli) fn program(&self) -> Result<Option<Program>, Failure> {
+        Ok(self.view.then(Program::find).transpose()?)
+    }
+}
+
+impl Hint for ProgramError {
+    fn hint(&self) -> String {
+        match self {
+            Self::Absent => format!(
+                "in hapterra's sources type: cargo xtask view; then put the program that it names beside hapterra, or name it in {VARIABLE}"
+            ),
+            Self::NotStarted { .. } => {
+                format!("build it anew with: cargo xtask view; {VARIABLE} may name another")
+            }
+        }
+    }
+}
+
+/// What a viewer shows of a terrain in front of an arm.
+fn picture<'p, 't>(terrain: &'p Terrain<'t>, view: &View, title: &'p str) -> Picture<'p, 't> {
+    let file = terrain.raster().georeference();
+    Picture {
+        terrain,
+        title,
+        facts: placing::picture_lines(view, &file),
+        home_mm: Some(view.home_mm),
+        laid_mm: Some(view.laid_mm),
+        is_live: true,
+    }
+}
+
+/// A viewer that is to be started when there is something to be shown.
+pub(in crate::cli) struct ToBeShown<'t> {
+    program: Program,
+    prepared: Prepared<'t>,
+    title: String,
+}
+
+impl<'t> ToBeShown<'t> {
+    /// Reads the coarse levels of a terrain in front of an arm.
+    pub(in crate::cli) fn new(
+        program: Program,
+        terrain: &Terrain<'t>,
+        view: &View,
+        title: &str,
+    ) -> Self {
+        Self {
+            program,
+            prepared: picture(terrain, view, title).prepare(),
+            title: title.to_owned(),
+        }
+    }
+
+    /// Starts it. A viewer that does not start is told, and ends nothing.
+    pub(in crate::cli) fn start(
+        self,
+        device: &DeviceHello,
+        tell: impl FnOnce(String),
+    ) -> Option<Shown<'t>> {
+        match ViewFeed::start(&self.program, self.prepared, Some(device)) {
+            Ok(feed) => Some(Shown {
+                feed,
+                title: self.title,
+                view: 0,
+            }),
+            Err(why) => {
+                tell(format!("not shown: {why}"));
+                None
+            }
+        }
+    }
+}
+
+/// What a viewer is told of a session.
+pub(in crate::cli) struct Shown<'t> {
+    feed: ViewFeed<'t>,
+    title: String,
+    /// The view of the latest sample.
+    view: usize,
+}
+
+impl<'t> Shown<'t> {
+    /// Takes what a session tells.
+    pub(in crate::cli) fn on_event(&mut self, event: &Event<'_>) {
+        self.feed.on_event(event);
+    }
+
+    /// Takes a sample with its row, and the view that it was felt in.
+    pub(in crate::cli) fn take(
+        &mut self,
+        sample: &Sample,
+        record: &Record,
+        (view, felt): (usize, &FeltView<'t>),
+    ) {
+        if view != self.view {
+            self.view = view;
+            if let Some(laid) = &felt.laid {
+                let picture = picture(&felt.terrain, &laid.view, &self.title);
+                self.feed.go_over(picture);
+            }
+        }
+        self.feed.take(sample, record);
+    }
+
+    /// As [`ViewFeed::look`].
+    pub(in crate::cli) fn look(&mut self, tally: &Tally) {
+        self.feed.look(tally);
+    }
+
+    /// As [`end`].
+    pub(in crate::cli) fn end(self, say: impl Fn(String)) {
+        end(self.feed, say);
+    }
+}
+
+/// Ends the stream, says what the viewer was not told, and waits until nobody looks any
+/// more or the user has had enough.
+pub(in crate::cli) fn end(feed: ViewFeed<'_>, say: impl Fn(String)) {
+    let (dropped, viewer) = feed.finish();
+    if dropped.messages > 0 {
+        say(format!(
+            "view           {} messages with {} samples were not shown: the viewer was slow, or gone",
+            dropped.messages, dropped.samples
+        ));
+    }
+    let Some(mut viewer) = viewer else {
+        return;
+    };
+    while !interrupt::requested() && matches!(viewer.try_wait(), Ok(None)) {
+        std::thread::sleep(LOOK);
+    }
+}

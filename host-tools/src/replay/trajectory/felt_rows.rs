@@ -1,0 +1,193 @@
+//! Rows of a recording with all that was felt, for whoever shows them again.
+
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use csv::{ReaderBuilder, StringRecord, Trim};
+use parquet::file::reader::SerializedFileReader;
+use parquet::record::Field;
+use parquet::record::reader::RowIter;
+
+use super::fault::{TrajectoryError, TrajectoryFault};
+use super::{Trajectory, is_parquet};
+use crate::replay::{Record, Settings};
+
+/// Columns of a recording by name: time and HIP, then what a trajectory does not have.
+const NAMES: [&str; 11] = [
+    "t_s",
+    "x_mm",
+    "y_mm",
+    "z_mm",
+    "proxy_x_mm",
+    "proxy_y_mm",
+    "proxy_z_mm",
+    "force_x_n",
+    "force_y_n",
+    "force_z_n",
+    "contact",
+];
+
+/// Values of [`NAMES`]; none of columns that there are not.
+type Values = [Option<f64>; NAMES.len()];
+
+/// What was felt in a row.
+#[derive(Clone, Copy, Debug)]
+pub struct FeltRow {
+    /// The view that it was felt in: [`super::Told::view`].
+    pub view: u32,
+    /// What was felt. A trajectory tells a place alone: no contact, and the proxy at the HIP.
+    pub record: Record,
+}
+
+/// Rows of a recording or a trajectory, in the order of the file.
+pub struct FeltRows {
+    path: PathBuf,
+    /// The same rows as a replay reads them: it knows what is wrong with them, where a
+    /// recording was cut, and the view.
+    trajectory: Trajectory,
+    form: Form,
+}
+
+enum Form {
+    Csv {
+        reader: Box<csv::Reader<File>>,
+        /// Where each of [`NAMES`] stands.
+        columns: [Option<usize>; NAMES.len()],
+        record: StringRecord,
+    },
+    Parquet(Box<RowIter<'static>>),
+}
+
+impl FeltRows {
+    /// Opens a recording and checks it as [`Trajectory::open`] does.
+    ///
+    /// # Errors
+    /// [`TrajectoryError`].
+    pub fn open(path: &Path) -> Result<Self, TrajectoryError> {
+        let trajectory = Trajectory::open(path)?;
+        let form = form(path).map_err(|fault| TrajectoryError::new(path, fault))?;
+        Ok(Self {
+            path: path.to_owned(),
+            trajectory,
+            form,
+        })
+    }
+
+    /// With which settings it was recorded, where it says so.
+    #[must_use]
+    pub const fn settings(&self) -> Option<&Settings> {
+        self.trajectory.settings()
+    }
+
+    /// As [`Trajectory::was_cut`].
+    #[must_use]
+    pub fn was_cut(&self) -> bool {
+        self.trajectory.was_cut()
+    }
+
+    fn next_row(&mut self) -> Result<Option<FeltRow>, TrajectoryError> {
+        let Some(told) = self.trajectory.next_told()? else {
+            return Ok(None);
+        };
+        let described = self.trajectory.settings();
+        let knows = |settings: &Settings| {
+            settings.views.is_empty() || settings.views.iter().any(|view| view.number == told.view)
+        };
+        if told.view != 0 && !described.is_none_or(knows) {
+            return Err(self.trajectory.of_unknown_view(&told));
+        }
+        let values = self.form.values();
+        let values = values.map_err(|fault| TrajectoryError::new(&self.path, fault))?;
+        Ok(values.map(|values| FeltRow {
+            view: told.view,
+            record: record(&values),
+        }))
+    }
+}
+
+impl Iterator for FeltRows {
+    type Item = Result<FeltRow, TrajectoryError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.next_row().transpose()
+    }
+}
+
+impl Form {
+    fn values(&mut self) -> Result<Option<Values>, TrajectoryFault> {
+        match self {
+            Self::Csv {
+                reader,
+                columns,
+                record,
+            } => {
+                if !reader.read_record(record).map_err(unreadable)? {
+                    return Ok(None);
+                }
+                let value = |column: &Option<usize>| record.get((*column)?)?.parse().ok();
+                Ok(Some(columns.each_ref().map(value)))
+            }
+            Self::Parquet(rows) => {
+                let Some(row) = rows.next() else {
+                    return Ok(None);
+                };
+                let row = row.map_err(unreadable)?;
+                let mut values = Values::default();
+                for (name, field) in row.get_column_iter() {
+                    let place = NAMES.iter().position(|known| known == name);
+                    if let Some(value) = place.and_then(|place| values.get_mut(place)) {
+                        *value = match field {
+                            Field::Double(number) => Some(*number),
+                            Field::Float(number) => Some(f64::from(*number)),
+                            Field::Int(number) => Some(f64::from(*number)),
+                            Field::Bool(flag) => Some(f64::from(u8::from(*flag))),
+                            _ => None,
+                        };
+                    }
+                }
+                Ok(Some(values))
+            }
+        }
+    }
+}
+
+fn record(values: &Values) -> Record {
+    let known = |value: &Option<f64>| value.filter(|value| value.is_finite());
+    let [t, x, y, z, px, py, pz, fx, fy, fz, contact] = values.each_ref().map(known);
+    let [x, y, z] = [x, y, z].map(Option::unwrap_or_default);
+    let force_n = [fx, fy, fz].map(Option::unwrap_or_default);
+    Record {
+        t_s: t.unwrap_or_default(),
+        hip_mm: [x, y, z],
+        contact: contact.is_some_and(|flag| flag != 0.0),
+        proxy_mm: [px.unwrap_or(x), py.unwrap_or(y), pz.unwrap_or(z)],
+        force_n,
+    }
+}
+
+fn form(path: &Path) -> Result<Form, TrajectoryFault> {
+    let mut file = File::open(path).map_err(TrajectoryFault::Unreadable)?;
+    if is_parquet(&mut file)? {
+        let reader = SerializedFileReader::new(file).map_err(unreadable)?;
+        return Ok(Form::Parquet(Box::new(RowIter::from_file_into(Box::new(
+            reader,
+        )))));
+    }
+    let mut reader = ReaderBuilder::new()
+        .flexible(true)
+        .comment(Some(b'#'))
+        .trim(Trim::All)
+        .from_reader(file);
+    let header = reader.headers().map_err(unreadable)?.clone();
+    let columns = NAMES.map(|name| header.iter().position(|column| column == name));
+    Ok(Form::Csv {
+        reader: Box::new(reader),
+        columns,
+        record: StringRecord::new(),
+    })
+}
+
+fn unreadable(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> TrajectoryFault {
+    TrajectoryFault::Unreadable(io::Error::other(error))
+}

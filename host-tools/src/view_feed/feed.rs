@@ -1,0 +1,433 @@
+//! What is felt, in messages to a viewer.
+
+use std::collections::HashSet;
+use std::io::Write;
+use std::process::Child;
+use std::time::Duration;
+
+use hapterra_core::scene::Sample;
+use hapterra_core::terrain::TileKey;
+use hapterra_core::wire::hello::DeviceHello;
+use hapterra_view_stream::{self as stream, Link, Message, Scene, TickCost};
+
+use super::held_tiles::HeldTiles;
+use super::layers;
+use super::program::{Program, ProgramError};
+use super::queue::Queue;
+use super::scene::{Picture, Prepared};
+use crate::link::{EMULATED, Event, INSTRUCTIONS_PER_COUNT, Tally};
+use crate::replay::Record;
+use crate::terrain::Terrain;
+
+/// Samples in a message: the viewer's hand moves as often as messages come.
+const LIVE_BATCH: usize = 33;
+/// The same where everything comes before it is shown.
+const PATIENT_BATCH: usize = 1000;
+/// Between two counts of the link, s of the device's time.
+const LINK_EVERY_S: f64 = 0.5;
+/// Bytes that may wait for the viewer of a device: some ten seconds of samples.
+const LIVE_BYTES: usize = 4 << 20;
+/// Bytes that may wait where nothing is armed: a replay is faster than a viewer for
+/// moments, and a recording waits.
+const PATIENT_BYTES: usize = 64 << 20;
+/// Tiles that a device asks for before the first sample of a view, at most.
+const MOST_COMING: usize = 1024;
+/// How long the viewer may take at the end for what it was not told yet.
+const AT_THE_END: Duration = Duration::from_secs(5);
+
+/// How many messages, samples in batches among them, the viewer was not told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Dropped {
+    /// Messages.
+    pub messages: u64,
+    /// Samples in them.
+    pub samples: u64,
+}
+
+/// Tells a viewer what is felt, without ever waiting for it.
+pub struct ViewFeed<'t> {
+    terrain: Terrain<'t>,
+    /// The terrain of the beginning, in whose tiles there is detail for good.
+    first: Terrain<'t>,
+    /// A view that the viewer is still to be told: nothing else is until then.
+    scene_due: Option<Box<Scene>>,
+    /// The device took a view of which no sample has come yet; tiles that were sent since.
+    coming: Option<Vec<TileKey>>,
+    queue: Queue,
+    /// The viewer.
+    child: Option<Child>,
+    batch: Vec<stream::Sample>,
+    at_a_time: usize,
+    held: HeldTiles,
+    /// Tiles that are shown for good.
+    detailed: HashSet<TileKey>,
+    /// Tiles that the viewer is still to be told, by slot.
+    untold: Vec<(u32, TileKey)>,
+    link_due_s: f64,
+    latest: Option<stream::Sample>,
+    late: u32,
+    has_cost: bool,
+    tick: Option<TickCost>,
+    dropped: Dropped,
+}
+
+impl<'t> ViewFeed<'t> {
+    /// Starts a viewer of what a device feels, or of a recording.
+    ///
+    /// # Errors
+    /// When it does not start.
+    pub fn start(
+        program: &Program,
+        prepared: Prepared<'t>,
+        device: Option<&DeviceHello>,
+    ) -> Result<Self, ProgramError> {
+        let mut child = program.start()?;
+        let feed = match child.stdin.take() {
+            Some(pipe) => Self::into_pipe(pipe, prepared, device),
+            None => Self::into_pipe(std::io::sink(), prepared, device),
+        };
+        Ok(Self {
+            child: Some(child),
+            ..feed
+        })
+    }
+
+    fn into_pipe(
+        pipe: impl Write + Send + 'static,
+        mut prepared: Prepared<'t>,
+        device: Option<&DeviceHello>,
+    ) -> Self {
+        let (limit, at_a_time) = match prepared.scene.is_live {
+            true => (LIVE_BYTES, LIVE_BATCH),
+            false => (PATIENT_BYTES, PATIENT_BATCH),
+        };
+        let (terrain, has_cost) = (prepared.terrain.clone(), device.is_some());
+        let tick = device.map(tick_cost);
+        prepared.scene.tick.clone_from(&tick);
+        let window = device.map_or(1, |device| device.window);
+        let first = prepared.into_messages();
+        Self {
+            first: terrain.clone(),
+            terrain,
+            scene_due: None,
+            coming: None,
+            tick,
+            queue: Queue::start(pipe, first, limit),
+            child: None,
+            batch: Vec::with_capacity(at_a_time),
+            at_a_time,
+            held: HeldTiles::new(window),
+            detailed: HashSet::new(),
+            untold: vec![],
+            link_due_s: 0.0,
+            latest: None,
+            late: 0,
+            has_cost,
+            dropped: Dropped::default(),
+        }
+    }
+
+    /// Takes a sample and its row.
+    pub fn take(&mut self, sample: &Sample, record: &Record) {
+        self.late = sample.late;
+        self.held.lacks(sample.missing_tile);
+        // The first tick knows of none before it.
+        let cost = (self.has_cost && sample.tick > 1).then_some(sample.cost);
+        self.row(record, cost);
+    }
+
+    /// Takes a row of a recording, or a sample's.
+    pub fn row(&mut self, record: &Record, cost: Option<u32>) {
+        let [x, y, _] = record.hip_mm;
+        let row = stream::Sample {
+            t_s: record.t_s,
+            hip_mm: record.hip_mm,
+            proxy_mm: record.proxy_mm,
+            force_n: record.force_n.map(|newtons| newtons as f32),
+            ground_mm: self.terrain.height_mm(x, y).unwrap_or(f64::NAN),
+            contact: record.contact,
+            cost,
+        };
+        self.latest = Some(row);
+        self.batch.push(row);
+        if self.batch.len() >= self.at_a_time {
+            self.flush();
+        }
+    }
+
+    /// Takes what a session tells of the device's window.
+    pub fn on_event(&mut self, event: &Event<'_>) {
+        match (event, &mut self.coming) {
+            (Event::Viewed { taken: true, .. }, _) => self.coming = Some(vec![]),
+            // More than a window holds are not sent within some samples.
+            (Event::TileSent(key), Some(coming)) if coming.len() < MOST_COMING => coming.push(*key),
+            (Event::TileSent(key), None) => self.tile_sent(*key),
+            (Event::Opened { resumed: false, .. }, _) => self.forget_tiles(),
+            _ => {}
+        }
+    }
+
+    /// Goes over to another view of the terrain, in which the next sample was felt.
+    pub fn go_over(&mut self, picture: Picture<'_, 't>) {
+        self.flush();
+        let keeps_tiles = picture.terrain.has_tiles_of(&self.terrain);
+        // A view that the viewer never heard of leaves what is before it.
+        let before = self.scene_due.as_ref();
+        let all_keep = keeps_tiles && before.is_none_or(|before| before.keeps_tiles);
+        if !keeps_tiles {
+            self.forget_tiles();
+        }
+        self.terrain = picture.terrain.clone();
+        self.scene_due = Some(Box::new(Scene {
+            keeps_tiles: all_keep,
+            tick: self.tick.clone(),
+            ..picture.scene()
+        }));
+        for key in self.coming.take().unwrap_or_default() {
+            self.tile_sent(key);
+        }
+        self.tell_scene();
+    }
+
+    /// The device begins with an empty window.
+    fn forget_tiles(&mut self) {
+        self.held.clear();
+        self.untold.clear();
+    }
+
+    /// Whether the viewer knows the view in force.
+    fn tell_scene(&mut self) -> bool {
+        let Some(scene) = self.scene_due.take() else {
+            return true;
+        };
+        let is_told = self.queue.offer(Message::Scene(scene.clone()));
+        if !is_told {
+            self.scene_due = Some(scene);
+        }
+        is_told
+    }
+
+    fn tile_sent(&mut self, key: TileKey) {
+        let slot = self.held.sent(key);
+        self.untold.retain(|(other, _)| *other != slot);
+        self.untold.push((slot, key));
+    }
+
+    /// Shows the tile under a row's HIP in full detail, for good: for rows that are not
+    /// felt by a device with a window. Beyond so many tiles, others stay coarse.
+    pub fn detail(&mut self, record: &Record) {
+        const MOST: usize = 400;
+        let [x, y, _] = record.hip_mm;
+        let cell_mm = self.terrain.scale_of_level_0().cell_mm();
+        let felt_cells = f64::from(self.first.level()).exp2();
+        let side = f64::from(stream::TILE_CELLS) * felt_cells;
+        let [col, row] = [x, y].map(|mm| (mm / cell_mm / side).floor() as i32);
+        let key = TileKey::new(self.first.level(), col, row);
+        if self.detailed.len() < MOST && self.first.has(key) && self.detailed.insert(key) {
+            self.untold.push((self.detailed.len() as u32, key));
+        }
+        let first = self.first.clone();
+        self.tell_tiles(&first);
+    }
+
+    /// Tells what there is to tell of tiles and link; to be called after each look at the
+    /// line.
+    pub fn look(&mut self, tally: &Tally) {
+        if !self.tell_scene() {
+            return;
+        }
+        let terrain = self.terrain.clone();
+        self.tell_tiles(&terrain);
+        if let Some(tiles) = self.held.take_change()
+            && !self.queue.offer(Message::Tiles(tiles))
+        {
+            self.held.not_told();
+        }
+        let due_s = self.link_due_s;
+        if let Some(latest) = self.latest.filter(|latest| latest.t_s >= due_s) {
+            self.link_due_s = latest.t_s + LINK_EVERY_S;
+            let link = Link {
+                t_s: latest.t_s,
+                tiles: tally.tiles,
+                tile_bytes: tally.tile_bytes,
+                samples: tally.samples,
+                lost: tally.lost + tally.dropped,
+                late: self.late,
+                dropped: self.dropped.messages,
+            };
+            self.offer(Message::Link(link));
+        }
+    }
+
+    /// Waits until the viewer has taken most of what it was told: for recordings alone,
+    /// which nobody else waits for. False where it is gone.
+    pub fn wait_for_room(&self) -> bool {
+        self.queue.wait_for_room(Duration::from_secs(60))
+    }
+
+    /// Ends the stream. The viewer goes on showing what it has; the child is handed over,
+    /// so that whoever likes can wait for it.
+    #[must_use]
+    pub fn finish(mut self) -> (Dropped, Option<Child>) {
+        self.flush();
+        self.queue.end(AT_THE_END);
+        (self.dropped, self.child)
+    }
+
+    /// Heights are read again only for tiles that are told: some each look, so that a
+    /// look stays short.
+    fn tell_tiles(&mut self, terrain: &Terrain<'t>) {
+        const AT_A_TIME: usize = 8;
+        let mut told = 0;
+        for (slot, key) in std::mem::take(&mut self.untold) {
+            // What there is no room for is tried again at the next look.
+            let is_told = told < AT_A_TIME
+                && self
+                    .queue
+                    .offer(Message::Tile(layers::tile(terrain, key.index, slot)));
+            match is_told {
+                true => told += 1,
+                false => self.untold.push((slot, key)),
+            }
+        }
+    }
+
+    fn flush(&mut self) {
+        if self.batch.is_empty() {
+            return;
+        }
+        let batch = std::mem::replace(&mut self.batch, Vec::with_capacity(self.at_a_time));
+        let samples = batch.len() as u64;
+        let is_told = match self.tell_scene() {
+            true => self.offer(Message::Samples(batch)),
+            // They would come to lie in the view before.
+            false => {
+                self.dropped.messages += 1;
+                false
+            }
+        };
+        if !is_told {
+            self.dropped.samples += samples;
+        }
+    }
+
+    fn offer(&mut self, message: Message) -> bool {
+        let is_taken = self.queue.offer(message);
+        self.dropped.messages += u64::from(!is_taken);
+        is_taken
+    }
+}
+
+/// How a device tells the cost of its ticks.
+fn tick_cost(device: &DeviceHello) -> TickCost {
+    let hz = f64::from(device.clock_hz.max(1));
+    let (per_count, unit) = match device.board.as_str() {
+        EMULATED => (INSTRUCTIONS_PER_COUNT, "instructions"),
+        _ => (1e6 / hz, "µs"),
+    };
+    TickCost {
+        unit: unit.into(),
+        per_count,
+        bound: per_count * hz / f64::from(device.tick_hz.max(1)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::Raster;
+    use crate::terrain::Scale;
+    use std::io;
+    use std::sync::mpsc::{SyncSender, sync_channel};
+
+    /// A pipe that takes nothing before somebody reads.
+    struct Pipe(SyncSender<Vec<u8>>);
+
+    impl Write for Pipe {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let sent = self.0.send(bytes.to_vec());
+            sent.map(|()| bytes.len()).map_err(io::Error::other)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn picture<'p, 't>(terrain: &'p Terrain<'t>) -> Picture<'p, 't> {
+        Picture {
+            terrain,
+            title: "plain",
+            facts: vec![],
+            home_mm: None,
+            laid_mm: None,
+            is_live: true,
+        }
+    }
+
+    fn row(feed: &mut ViewFeed<'_>, t_s: f64) {
+        let record = Record {
+            t_s,
+            hip_mm: [1.0; 3],
+            contact: false,
+            proxy_mm: [1.0; 3],
+            force_n: [0.0; 3],
+        };
+        feed.row(&record, None);
+    }
+
+    #[test]
+    fn a_viewer_that_was_slow_is_told_no_sample_of_a_view_before_the_view() {
+        let raster = Raster::from_fn(70, 70, |x, y| (x + y) as f32).expect("raster");
+        let terrain = |mm| Terrain::new(&raster, Scale::new(mm, mm).expect("scale"), 0);
+        let [first, second] = [0.5, 1.0].map(|mm| terrain(mm).expect("terrain"));
+        let (pipe, out) = sync_channel(0);
+        let mut feed = ViewFeed::into_pipe(Pipe(pipe), picture(&first).prepare(), None);
+        let mut rows = 0_u64;
+        while feed.dropped.samples == 0 {
+            row(&mut feed, 0.0);
+            rows += 1;
+        }
+        // Not even for a view.
+        while feed.queue.offer(Message::Link(Link::default())) {}
+        feed.go_over(picture(&second));
+        for _ in 0..2 * LIVE_BATCH {
+            row(&mut feed, 1.0);
+        }
+        assert!(feed.scene_due.is_some());
+        let mut end = Vec::new();
+        stream::write(&mut end, &Message::End).expect("memory");
+        let reader = std::thread::spawn(move || {
+            let mut bytes = Vec::new();
+            while !bytes.ends_with(&end) {
+                bytes.extend(out.recv().expect("more"));
+            }
+            bytes
+        });
+        assert!(feed.wait_for_room());
+        for _ in 0..2 * LIVE_BATCH {
+            row(&mut feed, 1.0);
+        }
+        rows += 4 * LIVE_BATCH as u64;
+        let (dropped, _) = feed.finish();
+        let bytes = reader.join().expect("it reads");
+        let (mut rest, mut views, mut told) = (bytes.as_slice(), 0, 0);
+        while let Some(message) = stream::read(&mut rest).expect("whole") {
+            match message {
+                Message::Scene(scene) => {
+                    views += 1;
+                    assert_eq!(scene.cell_mm, 0.5 * f64::from(views));
+                    assert!(!scene.keeps_tiles || views == 2);
+                }
+                Message::Samples(samples) => {
+                    told += samples.len() as u64;
+                    let of_view = |sample: &stream::Sample| sample.t_s == f64::from(views - 1);
+                    assert!(samples.iter().all(of_view), "in view {views}");
+                }
+                _ => {}
+            }
+        }
+        assert_eq!((views, told + dropped.samples), (2, rows));
+        assert!(dropped.samples >= 2 * LIVE_BATCH as u64);
+    }
+}

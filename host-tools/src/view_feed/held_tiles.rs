@@ -1,0 +1,98 @@
+//! Which tiles a device holds, as far as its host knows.
+
+use std::collections::BTreeMap;
+
+use hapterra_core::terrain::{TileIndex, TileKey};
+use hapterra_view_stream::Tiles;
+
+/// The device's window, by what was sent into it: a tile takes the place of the one
+/// before in its slot ([`hapterra_core::terrain::Window`]). A tile that was lost on the way
+/// counts as held until it is sent again.
+#[derive(Debug, Default)]
+pub(super) struct HeldTiles {
+    side: i32,
+    slots: BTreeMap<u32, TileIndex>,
+    awaited: Option<TileIndex>,
+    has_changed: bool,
+}
+
+impl HeldTiles {
+    /// An empty window of `side` × `side` tiles.
+    pub(super) fn new(side: u8) -> Self {
+        Self {
+            side: i32::from(side.max(1)),
+            has_changed: true,
+            ..Self::default()
+        }
+    }
+
+    /// A tile was sent: the slot that it takes.
+    pub(super) fn sent(&mut self, key: TileKey) -> u32 {
+        let slot = self.slot(key.index);
+        let before = self.slots.insert(slot, key.index);
+        self.has_changed |= before != Some(key.index);
+        slot
+    }
+
+    /// What the loop lacks now.
+    pub(super) fn lacks(&mut self, tile: Option<TileIndex>) {
+        self.has_changed |= self.awaited != tile;
+        self.awaited = tile;
+    }
+
+    /// The device begins with an empty window.
+    pub(super) fn clear(&mut self) {
+        self.slots.clear();
+        self.has_changed = true;
+    }
+
+    /// Where a tile is held.
+    fn slot(&self, index: TileIndex) -> u32 {
+        let [col, row] = [index.col, index.row].map(|i| i.rem_euclid(self.side.max(1)));
+        (row * self.side + col) as u32
+    }
+
+    /// The tiles, where they are others than were last taken from here.
+    pub(super) fn take_change(&mut self) -> Option<Tiles> {
+        std::mem::take(&mut self.has_changed).then(|| Tiles {
+            held: self
+                .slots
+                .values()
+                .map(|tile| [tile.col, tile.row])
+                .collect(),
+            awaited: self
+                .awaited
+                .map(|tile| [tile.col, tile.row])
+                .into_iter()
+                .collect(),
+        })
+    }
+
+    /// The viewer has not been told: the change is there again.
+    pub(super) fn not_told(&mut self) {
+        self.has_changed = true;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tile_takes_the_place_of_the_one_in_its_slot() {
+        let mut held = HeldTiles::new(4);
+        assert_eq!(held.take_change(), Some(Tiles::default()));
+        let slots =
+            [(0, 0), (4, 0), (-4, 8), (1, 0)].map(|(c, r)| held.sent(TileKey::new(0, c, r)));
+        assert_eq!(slots, [0, 0, 0, 1]);
+        held.lacks(Some(TileIndex::new(2, 3)));
+        let tiles = held.take_change().expect("it has changed");
+        assert_eq!(tiles.held, [[-4, 8], [1, 0]]);
+        assert_eq!(tiles.awaited, [[2, 3]]);
+        held.sent(TileKey::new(0, 1, 0));
+        held.lacks(Some(TileIndex::new(2, 3)));
+        assert_eq!(held.take_change(), None);
+        held.clear();
+        assert_eq!(held.take_change().expect("empty").held, [[0; 2]; 0]);
+    }
+}

@@ -1,0 +1,20 @@
+//! What is felt, told to a viewer: `hapterra-view`, a program of its own.
+//!
+//! ```text
+//! samples, tiles ─▶ ViewFeed ─▶ bounded queue ─▶ thread ══ pipe ══▶ hapterra-view
+//! ```
+//!
+//! Whoever serves a device never waits for the viewer. What its queue has no room for is
+//! dropped and counted; a viewer that is slow, hangs or is killed changes nothing else.
+//! The stream's messages are in [`hapterra_view_stream`].
+
+mod feed;
+mod held_tiles;
+mod layers;
+mod program;
+mod queue;
+mod scene;
+
+pub use feed::{Dropped, ViewFeed};
+pub use program::{Program, ProgramError, VARIABLE};
+pub use scene::{Picture, Prepared};

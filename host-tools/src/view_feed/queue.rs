@@ -1,0 +1,219 @@
+//! A queue to the viewer's pipe that never lets anybody wait.
+
+use std::io::Write;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use hapterra_view_stream::{Message, write};
+
+/// Between two looks at whether everything is written.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Messages on their way to a viewer, in order.
+pub(super) struct Queue {
+    messages: Option<Sender<(Message, usize)>>,
+    /// Bytes that wait, about.
+    waiting: Arc<AtomicUsize>,
+    /// The viewer reads no more.
+    is_gone: Arc<AtomicBool>,
+    limit: usize,
+    writer: Option<JoinHandle<()>>,
+}
+
+impl Queue {
+    /// Has `first` written, whatever its size, and then what is offered.
+    pub(super) fn start(
+        to: impl Write + Send + 'static,
+        first: Vec<Message>,
+        limit: usize,
+    ) -> Self {
+        let (messages, waiting_messages) = channel();
+        let (waiting, is_gone) = <(Arc<AtomicUsize>, Arc<AtomicBool>)>::default();
+        let write = Writer {
+            waiting: Arc::clone(&waiting),
+            is_gone: Arc::clone(&is_gone),
+        };
+        let writer = std::thread::Builder::new()
+            .name("to the viewer".into())
+            .spawn(move || write.run(to, first, &waiting_messages))
+            .ok();
+        // Without a thread everything is dropped, and counted.
+        is_gone.fetch_or(writer.is_none(), Ordering::AcqRel);
+        Self {
+            messages: Some(messages),
+            waiting,
+            is_gone,
+            limit,
+            writer,
+        }
+    }
+
+    /// Whether a message was taken. If not there was no room for it.
+    pub(super) fn offer(&self, message: Message) -> bool {
+        let size = size_of(&message);
+        let waiting = self.waiting.load(Ordering::Acquire);
+        let has_room = waiting == 0 || waiting.saturating_add(size) <= self.limit;
+        if self.is_gone.load(Ordering::Acquire) || !has_room {
+            return false;
+        }
+        self.waiting.fetch_add(size, Ordering::AcqRel);
+        let sender = self.messages.as_ref();
+        sender.is_some_and(|messages| messages.send((message, size)).is_ok())
+    }
+
+    /// Waits for at most `wait` until there is room. For a recording, which nobody else
+    /// waits for; false where the viewer is gone.
+    pub(super) fn wait_for_room(&self, wait: Duration) -> bool {
+        let until = Instant::now() + wait;
+        let is_full = || self.waiting.load(Ordering::Acquire) > self.limit / 2;
+        while is_full() && !self.is_gone.load(Ordering::Acquire) && Instant::now() < until {
+            std::thread::sleep(LOOK);
+        }
+        !self.is_gone.load(Ordering::Acquire)
+    }
+
+    /// Ends the stream; what waits is written, if the viewer takes it within `wait`.
+    pub(super) fn end(mut self, wait: Duration) {
+        if let Some(messages) = self.messages.take() {
+            let _ = messages.send((Message::End, 0));
+        }
+        let until = Instant::now() + wait;
+        let is_writing = |writer: &JoinHandle<()>| !writer.is_finished();
+        while self.writer.as_ref().is_some_and(is_writing) && Instant::now() < until {
+            std::thread::sleep(LOOK);
+        }
+        // A thread that still writes then ends with this program.
+    }
+}
+
+struct Writer {
+    waiting: Arc<AtomicUsize>,
+    is_gone: Arc<AtomicBool>,
+}
+
+impl Writer {
+    fn run(&self, mut to: impl Write, first: Vec<Message>, messages: &Receiver<(Message, usize)>) {
+        let first = first.into_iter().map(|message| (message, 0));
+        for (message, size) in first.chain(messages.iter()) {
+            let written = write(&mut to, &message).and_then(|_| Ok(to.flush()?));
+            self.waiting.fetch_sub(size, Ordering::AcqRel);
+            if let Err(why) = written {
+                tracing::info!("the viewer takes no more: {why}");
+                self.is_gone.store(true, Ordering::Release);
+                return;
+            }
+        }
+        // The viewer sees by the pipe whether this program still runs.
+        std::mem::forget(to);
+    }
+}
+
+/// About as many bytes as a message takes.
+fn size_of(message: &Message) -> usize {
+    64 + match message {
+        Message::Samples(samples) => size_of_val(samples.as_slice()),
+        Message::Tile(tile) => size_of_val(tile.heights_mm.as_slice()),
+        Message::Layer(layer) => size_of_val(layer.heights.as_slice()),
+        Message::Tiles(tiles) => 8 * (tiles.held.len() + tiles.awaited.len()),
+        _ => 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hapterra_view_stream::{Hello, Tiles, read};
+    use std::io::{self, Read};
+    use std::sync::mpsc::{SyncSender, sync_channel};
+
+    const SOON: Duration = Duration::from_secs(20);
+
+    /// A pipe that holds one write, then blocks as a pipe does.
+    struct Pipe(SyncSender<Vec<u8>>);
+
+    impl Write for Pipe {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let sent = self.0.send(bytes.to_vec());
+            sent.map(|()| bytes.len()).map_err(io::Error::other)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn tiles(count: usize) -> Message {
+        Message::Tiles(Tiles {
+            held: vec![[1, 2]; count],
+            awaited: vec![],
+        })
+    }
+
+    fn hello() -> Message {
+        Message::Hello(Hello {
+            version: 1,
+            program: String::new(),
+        })
+    }
+
+    #[test]
+    fn a_reader_that_reads_gets_everything_in_order() {
+        let (pipe, out) = sync_channel(1);
+        let queue = Queue::start(Pipe(pipe), vec![hello()], 1 << 20);
+        let mut end = Vec::new();
+        write(&mut end, &Message::End).expect("memory");
+        // The pipe stays open after it.
+        let reader = std::thread::spawn(move || {
+            let mut bytes = Vec::new();
+            while !bytes.ends_with(&end) {
+                bytes.extend(out.recv_timeout(SOON).expect("more"));
+            }
+            bytes
+        });
+        for count in 0..100 {
+            assert!(queue.offer(tiles(count)));
+        }
+        queue.end(SOON);
+        let bytes = reader.join().expect("it reads");
+        let mut rest: &mut dyn Read = &mut bytes.as_slice();
+        let mut next = || read(&mut rest).expect("whole");
+        assert_eq!(next(), Some(hello()));
+        for count in 0..100 {
+            assert_eq!(next(), Some(tiles(count)));
+        }
+        assert_eq!(next(), Some(Message::End));
+    }
+
+    #[test]
+    fn nobody_waits_for_a_reader_that_does_not_read() {
+        let (pipe, out) = sync_channel(0);
+        let queue = Queue::start(Pipe(pipe), vec![hello()], 10_000);
+        let began = Instant::now();
+        let taken = (0..1000).filter(|_| queue.offer(tiles(100))).count();
+        assert!((1..=12).contains(&taken), "{taken}");
+        queue.end(Duration::from_millis(50));
+        assert!(began.elapsed() < SOON);
+        drop(out);
+    }
+
+    #[test]
+    fn a_reader_that_is_gone_takes_nothing() {
+        let (pipe, out) = sync_channel(0);
+        drop(out);
+        let queue = Queue::start(Pipe(pipe), vec![hello()], 10_000);
+        assert!(
+            !queue.wait_for_room(SOON)
+                || !{
+                    while queue.offer(tiles(0)) {
+                        std::thread::sleep(LOOK);
+                    }
+                    false
+                }
+        );
+        assert!(!queue.offer(tiles(1)));
+        queue.end(SOON);
+    }
+}

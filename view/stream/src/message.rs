@@ -1,0 +1,175 @@
+//! The messages.
+
+use serde::{Deserialize, Serialize};
+
+/// Cells along the side of a tile.
+pub const TILE_CELLS: i32 = 32;
+/// Heights along the side of a [`Tile`]: those of its cells' corners, and one more all
+/// around, from which slopes at its border follow.
+pub const TILE_POSTS: usize = TILE_CELLS as usize + 3;
+
+/// One message.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Message {
+    /// The first one.
+    Hello(Hello),
+    /// What is touched, and how large it is in the hand; a later one is another view of the
+    /// same terrain, in whose millimetres the tiles and samples after it are.
+    Scene(Box<Scene>),
+    /// A part of the terrain, coarser than it is felt.
+    Layer(Layer),
+    /// A tile as it is felt.
+    Tile(Tile),
+    /// Which tiles the device holds and lacks.
+    Tiles(Tiles),
+    /// What was felt, in the order of time.
+    Samples(Vec<Sample>),
+    /// What went over the link.
+    Link(Link),
+    /// There is no more.
+    End,
+}
+
+/// The first message.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Hello {
+    /// The writer's [`crate::VERSION`].
+    pub version: u16,
+    /// Version of the program that writes.
+    pub program: String,
+}
+
+/// What is touched, where it lies, and how large it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scene {
+    /// What the user calls the terrain.
+    pub title: String,
+    /// Place, scale and device, for people: a name and what there is to say.
+    pub facts: Vec<(String, String)>,
+    /// Whether samples come as they are felt. A recording is there as a whole.
+    pub is_live: bool,
+    /// Whether the device keeps the tiles of the view before.
+    pub keeps_tiles: bool,
+    /// Level of detail of the tiles: every 2ᴸ-th sample, and felt cells as much larger.
+    pub level: u8,
+    /// Side of a cell of level 0, mm.
+    pub cell_mm: f64,
+    /// Millimetres of a vertical unit of the file.
+    pub mm_per_unit: f64,
+    /// The place under the tip in the arm's home pose, mm. The picture's origin.
+    pub home_mm: [f64; 3],
+    /// What is laid in front of the arm, from west, south to east, north, mm.
+    pub laid_mm: [f64; 4],
+    /// Ground metres in a millimetre; none where the terrain does not know its size, and
+    /// all lengths are told in millimetres.
+    pub ground_m_per_mm: Option<f64>,
+    /// Units of the heights that are told, in a millimetre.
+    pub height_per_mm: f64,
+    /// The unit of the heights that are told, short: `m`.
+    pub height_unit: String,
+    /// The file's coordinates of places, where it knows any.
+    pub coordinates: Option<Coordinates>,
+    /// How the cost of a tick is told, where it is known.
+    pub tick: Option<TickCost>,
+}
+
+/// The file's coordinates: `origin + x · east + y · north` for x and y in mm.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Coordinates {
+    /// Of the south-west sample.
+    pub origin: [f64; 2],
+    /// A millimetre to the east.
+    pub east: [f64; 2],
+    /// A millimetre to the north.
+    pub north: [f64; 2],
+    /// Decimals that tell a felt cell from the next.
+    pub decimals: u8,
+}
+
+/// How the cost of a tick is told.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TickCost {
+    /// `µs`, or what the emulated board counts.
+    pub unit: String,
+    /// Units in a count of [`Sample::cost`].
+    pub per_count: f64,
+    /// Units that are there for a tick: the time until the next one.
+    pub bound: f64,
+}
+
+/// Samples of the terrain at every `step`-th cell of level 0. They belong to all views.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Layer {
+    /// Where its south-west sample is, in cells of level 0.
+    pub first: [i32; 2],
+    /// Cells between samples.
+    pub step: i32,
+    /// Samples west to east.
+    pub columns: u32,
+    /// Samples south to north.
+    pub rows: u32,
+    /// What a finer layer shows of it, in cells: west, south, east, north.
+    pub inner: Option<[i32; 4]>,
+    /// Heights in vertical units of the file, row by row from the south; NaN in a hole.
+    pub heights: Vec<f32>,
+}
+
+/// A tile with all its samples.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tile {
+    /// Where it is kept; a tile that comes to the same place later takes it.
+    pub slot: u32,
+    /// Column and row among the tiles of the felt level.
+    pub index: [i32; 2],
+    /// [`TILE_POSTS`]² heights, mm, row by row from the south, the first one cell south
+    /// and west of the tile's own first; NaN in a hole and off the data.
+    pub heights_mm: Vec<f32>,
+}
+
+/// Which tiles the device holds and which it lacks, by column and row.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Tiles {
+    /// Held, as far as the host knows: it has sent these, and no later one in their place.
+    pub held: Vec<[i32; 2]>,
+    /// Without these the loop could not complete its tick.
+    pub awaited: Vec<[i32; 2]>,
+}
+
+/// What was felt in a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sample {
+    /// Time since the beginning, s.
+    pub t_s: f64,
+    /// The haptic interface point, mm.
+    pub hip_mm: [f64; 3],
+    /// The proxy, mm: at the HIP unless touching.
+    pub proxy_mm: [f64; 3],
+    /// Force on the hand, N: east, north, up.
+    pub force_n: [f32; 3],
+    /// Height of the surface over or under the HIP, mm; NaN in a hole and off the data.
+    pub ground_mm: f64,
+    /// Whether the surface is touched.
+    pub contact: bool,
+    /// What the tick before cost, in counts of the device's clock; none where it is not
+    /// known.
+    pub cost: Option<u32>,
+}
+
+/// What went over the link since the beginning.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Link {
+    /// The device's time, s.
+    pub t_s: f64,
+    /// Tiles sent.
+    pub tiles: u64,
+    /// Their bytes, framing included.
+    pub tile_bytes: u64,
+    /// Samples received.
+    pub samples: u64,
+    /// Samples lost on the link or dropped by the device.
+    pub lost: u64,
+    /// Ticks that began or ended too late.
+    pub late: u32,
+    /// Messages that this stream's writer dropped, because its reader was slow.
+    pub dropped: u64,
+}
