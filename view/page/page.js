@@ -1,0 +1,146 @@
+// The page: starts rerun's viewer and feeds it with the stream of hapterra-view.
+//
+// The stream is read only while somebody can see the page, because a hidden viewer draws
+// nothing and would only pile up what it is told. A page that comes back is told what
+// it missed; what it has already it knows by its number and passes over. The viewer keeps
+// all samples that it was told, so from a size on the page begins anew; not at once, though,
+// where what it is told first is larger already.
+"use strict";
+
+const CHANNEL = "hapterra";
+const AGAIN_MS = 1000;
+const LEAST_MS = 20000;
+const SIGN = 0xffffffff;
+
+const said = document.getElementById("said");
+const pageBytes = Number(said.dataset.pageBytes);
+
+// For tests and figures.
+const state = { pieces: 0, bytes: 0, connections: 0, memory: 0, isOver: false, isStarted: false };
+window.hapterra = state;
+
+// The layout is made for a dark sky: what the browser prefers is not asked.
+const media = window.matchMedia.bind(window);
+window.matchMedia = (query) => {
+  const scheme = /prefers-color-scheme:\s*(\w+)/.exec(query);
+  return media(scheme === null ? query : scheme[1] === "dark" ? "all" : "not all");
+};
+
+function say(text) {
+  said.textContent = text;
+}
+
+function seen() {
+  return document.visibilityState !== "hidden";
+}
+
+function whenSeen() {
+  return new Promise((resolve) => {
+    const look = () => {
+      if (seen()) {
+        document.removeEventListener("visibilitychange", look);
+        resolve();
+      }
+    };
+    document.addEventListener("visibilitychange", look);
+    look();
+  });
+}
+
+// Bytes of a stream, so many at a time.
+class Bytes {
+  constructor(reader) {
+    this.reader = reader;
+    this.parts = [];
+    this.length = 0;
+  }
+
+  // The next `count` bytes; null where the stream ends before.
+  async take(count) {
+    while (this.length < count) {
+      const { done, value } = await this.reader.read();
+      if (done) return null;
+      this.parts.push(value);
+      this.length += value.length;
+    }
+    const taken = new Uint8Array(count);
+    let filled = 0;
+    while (filled < count) {
+      const part = this.parts[0];
+      const some = part.subarray(0, count - filled);
+      taken.set(some, filled);
+      filled += some.length;
+      if (some.length === part.length) this.parts.shift();
+      else this.parts[0] = part.subarray(some.length);
+    }
+    this.length -= count;
+    return taken;
+  }
+}
+
+// Reads the stream once; true where the session has ended.
+async function read(viewer, memory) {
+  const cut = new AbortController();
+  const hide = () => seen() || cut.abort();
+  document.addEventListener("visibilitychange", hide);
+  try {
+    const answer = await fetch("feed", { signal: cut.signal, cache: "no-store" });
+    if (!answer.ok) return false;
+    state.connections += 1;
+    const bytes = new Bytes(answer.body.getReader());
+    for (;;) {
+      const head = await bytes.take(4);
+      if (head === null) return false;
+      const length = new DataView(head.buffer).getUint32(0, true);
+      if (length === 0) return true;
+      if (length === SIGN) continue;
+      const piece = await bytes.take(length);
+      if (piece === null) return false;
+      viewer.send_rrd_to_channel(CHANNEL, piece);
+      say("");
+      state.pieces += 1;
+      state.bytes += length;
+      state.memory = memory.buffer.byteLength;
+      if (state.memory > pageBytes && performance.now() > LEAST_MS) location.reload();
+    }
+  } catch (error) {
+    return false;
+  } finally {
+    document.removeEventListener("visibilitychange", hide);
+    cut.abort();
+  }
+}
+
+async function follow(viewer, memory) {
+  for (;;) {
+    await whenSeen();
+    if (await read(viewer, memory)) break;
+    if (seen() && state.connections > 0) say("hapterra-view has ended, or this page was too slow. Trying again…");
+    await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
+  }
+  state.isOver = true;
+  say("");
+}
+
+async function main() {
+  const program = await wasm_bindgen({ module_or_path: fetch("re_viewer_bg.wasm") });
+  const query = new URLSearchParams(location.search);
+  const viewer = new wasm_bindgen.WebHandle({
+    hide_welcome_screen: true,
+    persist: false,
+    enable_history: false,
+    notebook: false,
+    theme: "dark",
+    render_backend: query.get("renderer") ?? "webgl",
+    panel_state_overrides: { top: "Hidden", blueprint: "Hidden", selection: "Hidden" },
+  });
+  await viewer.start(document.getElementById("view"));
+  state.isStarted = true;
+  viewer.open_channel(CHANNEL, CHANNEL);
+  setInterval(() => {
+    if (viewer.has_panicked()) location.reload();
+  }, 2000);
+  await follow(viewer, program.memory);
+}
+
+main().catch((error) => say(`The viewer cannot start: ${error}`));

@@ -1,0 +1,226 @@
+//! From millimetres of the tip to the picture's metres.
+
+use hapterra_view_stream::{Layer, Scene, TILE_CELLS};
+
+/// Where things are in the picture: metres on the ground, or millimetres of the tip in the
+/// first view where the terrain does not know its size. The origin is at the home position
+/// of the first view, at height zero, so that single precision is finest where the hand is.
+///
+/// Another view of the terrain has other millimetres. In the picture the terrain stays where
+/// it is, and what is told in those millimetres comes to lie on it. Heights are drawn as
+/// they are felt, exaggerated or not.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ground {
+    /// The picture's origin, from the south-west sample.
+    origin: [f64; 2],
+    home_mm: [f64; 3],
+    /// Level of detail that is felt.
+    level: u8,
+    /// Side of a cell of level 0.
+    cell: f64,
+    /// What a vertical unit of the file is.
+    relief: f64,
+    /// What a millimetre of the tip is, level and upright.
+    pub(super) per_mm: f64,
+    up_per_mm: f64,
+    /// Half the side of what is laid in front of the arm and near the hand: how far away the
+    /// eye is.
+    pub(super) near: f64,
+}
+
+/// As much of the terrain as is looked at from the beginning, mm: a palm's width around
+/// the tip.
+const NEAR_MM: f64 = 70.0;
+/// Two views whose heights differ by less than this share have the same terrain.
+const SAME: f64 = 1e-6;
+
+impl Ground {
+    /// Of the first view.
+    pub(super) fn new(scene: &Scene) -> Self {
+        let per_mm = scene.ground_m_per_mm.unwrap_or(1.0);
+        let [x, y, _] = scene.home_mm;
+        Self::laid(scene, per_mm, [x * per_mm, y * per_mm])
+    }
+
+    /// Of another view, after this one.
+    pub(super) fn after(&self, scene: &Scene) -> Self {
+        // Millimetres of the first view, where nothing is known of the ground.
+        let per_mm = scene.ground_m_per_mm.unwrap_or(self.cell / scene.cell_mm);
+        Self::laid(scene, per_mm, self.origin)
+    }
+
+    fn laid(scene: &Scene, per_mm: f64, origin: [f64; 2]) -> Self {
+        let [west, south, east, north] = scene.laid_mm;
+        let laid = 0.5 * (east - west).max(north - south);
+        Self {
+            origin,
+            home_mm: scene.home_mm,
+            level: scene.level,
+            cell: scene.cell_mm * per_mm,
+            relief: scene.mm_per_unit * per_mm,
+            per_mm,
+            up_per_mm: per_mm,
+            near: laid.clamp(1e-3, NEAR_MM) * per_mm,
+        }
+    }
+
+    /// The same view over the terrain of another one, as high as it is there: of a recording,
+    /// whose terrain is drawn once.
+    pub(super) fn over(self, terrain: &Self) -> Self {
+        let stretched = terrain.relief / self.relief;
+        let up_per_mm = match stretched.is_finite() {
+            true => self.per_mm * stretched,
+            false => self.per_mm,
+        };
+        Self { up_per_mm, ..self }
+    }
+
+    /// Whether the terrain of another view is as high in the picture.
+    pub(super) fn is_as_high_as(&self, other: &Self) -> bool {
+        (self.relief - other.relief).abs() <= SAME * self.relief.abs()
+    }
+
+    /// A place in the picture.
+    pub(super) fn at(&self, [x, y, z]: [f64; 3]) -> [f32; 3] {
+        let [east, north] = self.origin;
+        let place = [x * self.per_mm - east, y * self.per_mm - north];
+        [place[0], place[1], z * self.up_per_mm].map(|units| units as f32)
+    }
+
+    /// A sample in the picture; `cell` counts in cells of level 0, `up` in the picture's
+    /// units.
+    pub(super) fn sample(&self, cell: [f64; 2], up: f32) -> [f32; 3] {
+        let [east, north] = self.origin;
+        let [x, y] = cell.map(|cells| cells * self.cell);
+        [(x - east) as f32, (y - north) as f32, up]
+    }
+
+    /// The home position at the height of the tip.
+    pub(super) fn home(&self) -> [f32; 3] {
+        self.at(self.home_mm)
+    }
+
+    /// How far samples are apart that are so many cells of level 0 apart.
+    pub(super) fn step(&self, cells: i32) -> f64 {
+        f64::from(cells) * self.cell
+    }
+
+    /// Heights in vertical units of the file.
+    pub(super) fn heights_of(&self, units: &[f32]) -> Vec<f32> {
+        units.iter().map(|unit| unit * self.relief as f32).collect()
+    }
+
+    /// Heights in millimetres.
+    pub(super) fn heights_of_mm(&self, mm: &[f32]) -> Vec<f32> {
+        mm.iter().map(|mm| mm * self.up_per_mm as f32).collect()
+    }
+
+    /// Cells of level 0 in a felt one, along a side.
+    pub(super) fn felt_cell(&self) -> i32 {
+        1_i32.checked_shl(self.level.into()).unwrap_or(i32::MAX)
+    }
+
+    /// Cells of level 0 in a tile, along a side.
+    pub(super) fn tile_cells(&self) -> i32 {
+        TILE_CELLS.saturating_mul(self.felt_cell())
+    }
+
+    /// The south-west cell of a tile, of level 0.
+    pub(super) fn first_cell(&self, index: [i32; 2]) -> [i32; 2] {
+        index.map(|index| index.saturating_mul(self.tile_cells()))
+    }
+}
+
+/// The cell in which a column and row of a layer's samples are.
+pub(super) fn cell_of(layer: &Layer, column: usize, row: usize) -> [i32; 2] {
+    let [x, y] = layer.first;
+    [
+        x.saturating_add(layer.step.saturating_mul(column as i32)),
+        y.saturating_add(layer.step.saturating_mul(row as i32)),
+    ]
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    pub(crate) fn scene() -> Scene {
+        Scene {
+            title: String::new(),
+            facts: vec![],
+            is_live: true,
+            keeps_tiles: false,
+            level: 0,
+            cell_mm: 0.5,
+            mm_per_unit: 0.01,
+            home_mm: [40.0, 30.0, 12.0],
+            laid_mm: [0.0, 0.0, 80.0, 80.0],
+            ground_m_per_mm: Some(60.0),
+            height_per_mm: 100.0,
+            height_unit: "m".into(),
+            coordinates: None,
+            tick: None,
+        }
+    }
+
+    /// The same place of the terrain, in a view with twice the scale and level 1.
+    fn zoomed(ground_m_per_mm: Option<f64>) -> (Scene, Scene) {
+        let scene = Scene {
+            ground_m_per_mm,
+            ..scene()
+        };
+        let twice = Scene {
+            cell_mm: 1.0,
+            level: 1,
+            mm_per_unit: 0.02,
+            home_mm: [80.0, 60.0, 24.0],
+            laid_mm: [0.0, 0.0, 160.0, 160.0],
+            ground_m_per_mm: ground_m_per_mm.map(|metres| 0.5 * metres),
+            ..scene.clone()
+        };
+        (scene, twice)
+    }
+
+    #[test]
+    fn another_scale_leaves_the_terrain_where_it_is() {
+        for ground in [Some(60.0), None] {
+            let (scene, twice) = zoomed(ground);
+            let before = Ground::new(&scene);
+            let after = before.after(&twice);
+            assert_eq!(before.home(), [0.0, 0.0, (12.0 * before.per_mm) as f32]);
+            assert_eq!(before.home(), after.home(), "{ground:?}");
+            assert_eq!(
+                before.sample([7.0, 9.0], 1.0),
+                after.sample([7.0, 9.0], 1.0)
+            );
+            assert!(after.is_as_high_as(&before));
+            // Felt cells are of another level; the eye comes nearer, or stays where it was
+            // because the palm is still smaller than what is laid.
+            assert_eq!((before.tile_cells(), after.tile_cells()), (32, 64));
+            assert!(after.near < before.near + 1e-9);
+        }
+    }
+
+    #[test]
+    fn other_heights_are_another_terrain_unless_it_was_drawn_once() {
+        let scene = scene();
+        let steeper = Scene {
+            mm_per_unit: 3.0 * scene.mm_per_unit,
+            ..scene.clone()
+        };
+        let before = Ground::new(&scene);
+        let after = before.after(&steeper);
+        assert!(!after.is_as_high_as(&before));
+        let [now, then] = [after, before].map(|ground| ground.heights_of(&[1.0])[0]);
+        assert!((now - 3.0 * then).abs() < 1e-5);
+        // The hand of a recording comes to lie on the terrain of the beginning.
+        let [_, _, up] = after.over(&before).at([40.0, 30.0, 9.0]);
+        assert!((up - before.at([40.0, 30.0, 3.0])[2]).abs() < 1e-3);
+        let level = Scene {
+            mm_per_unit: 0.0,
+            ..scene
+        };
+        let level = before.after(&level).over(&before);
+        assert!(level.at([0.0; 3]).iter().all(|place| place.is_finite()));
+    }
+}

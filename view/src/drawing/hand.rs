@@ -1,0 +1,171 @@
+//! The hand: proxy, HIP, the last tick's ray, force and the trace of the last seconds.
+
+use std::collections::VecDeque;
+
+use anyhow::Result;
+use hapterra_view_stream::Sample;
+use re_sdk_types::archetypes::{Arrows3D, LineStrips3D, Points3D};
+use re_sdk_types::components::Radius;
+
+use super::ground::Ground;
+use super::log::{Entry, Log};
+use super::shade::Rgb;
+
+/// Pictures of the hand in a second.
+const RATE_HZ: f64 = 60.0;
+/// New traces in a second.
+const TRACES_HZ: f64 = 10.0;
+/// How long the trace is, s, and points of it in a second.
+const TRACE_S: f64 = 4.0;
+const TRACE_HZ: f64 = 30.0;
+/// Length of the arrow for a newton, mm of the tip.
+const ARROW_MM_PER_N: f64 = 14.0;
+/// How far the trace floats over the surface, mm of the tip.
+const FLOAT_MM: f64 = 0.15;
+/// Colours.
+pub(super) const PROXY: Rgb = [255, 120, 20];
+pub(super) const HIP: Rgb = [255, 255, 255];
+const RAY: Rgb = [255, 60, 200];
+const FORCE: Rgb = [255, 230, 60];
+const TRACE: Rgb = [255, 170, 90];
+
+/// What the hand was last.
+#[derive(Default)]
+pub(super) struct Hand {
+    /// When the next picture and the next trace are due, s.
+    due_s: f64,
+    trace_due_s: f64,
+    point_due_s: f64,
+    before: Option<Sample>,
+    trace: VecDeque<(f64, [f32; 3])>,
+}
+
+/// How the parts of the hand look.
+pub(super) fn looks(log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
+    let points = |entity: &str, colour: Rgb, width: f32| {
+        let looks = Points3D::update_fields()
+            .with_colors([colour])
+            .with_radii([Radius::new_ui_points(width)]);
+        log.standing(entity, "looks", &looks)
+    };
+    let lines = |entity: &str, colour: Rgb, width: f32| {
+        let looks = LineStrips3D::update_fields()
+            .with_colors([colour])
+            .with_radii([Radius::new_ui_points(width)]);
+        log.standing(entity, "looks", &looks)
+    };
+    let arrow = Arrows3D::update_fields()
+        .with_colors([FORCE])
+        .with_radii([Radius::new_scene_units((0.7 * ground.per_mm) as f32)]);
+    Ok(vec![
+        points("hand/proxy", PROXY, 8.0)?,
+        points("hand/hip", HIP, 5.0)?,
+        lines("hand/ray", RAY, 1.5)?,
+        lines("hand/trace", TRACE, 1.5)?,
+        log.standing("hand/force", "looks", &arrow)?,
+    ])
+}
+
+/// Rows of one batch.
+#[derive(Default)]
+struct Rows {
+    times_s: Vec<f64>,
+    proxies: Vec<[f32; 3]>,
+    hips: Vec<[f32; 3]>,
+    rays: Vec<[[f32; 3]; 2]>,
+    forces: Vec<[f32; 3]>,
+}
+
+impl Hand {
+    /// Goes over to another view: the hand is elsewhere in the terrain at once.
+    pub(super) fn leap(&mut self) {
+        self.before = None;
+        self.trace.clear();
+    }
+
+    /// Draws the hand 60 times a second of the samples' time.
+    pub(super) fn take(
+        &mut self,
+        log: &Log,
+        ground: &Ground,
+        samples: &[Sample],
+    ) -> Result<Vec<Entry>> {
+        let mut rows = Rows::default();
+        let mut traces = Vec::new();
+        for sample in samples {
+            self.leave_trace(ground, sample);
+            if sample.t_s >= self.due_s {
+                self.due_s = sample.t_s + 1.0 / RATE_HZ;
+                rows.push(ground, sample, self.before.as_ref());
+            }
+            if sample.t_s >= self.trace_due_s && self.trace.len() > 1 {
+                self.trace_due_s = sample.t_s + 1.0 / TRACES_HZ;
+                let line: Vec<_> = self.trace.iter().map(|(_, place)| *place).collect();
+                traces.push((sample.t_s, line));
+            }
+            self.before = Some(*sample);
+        }
+        let mut entries = Vec::new();
+        if !rows.times_s.is_empty() {
+            entries.extend(rows.entries(log)?);
+        }
+        if !traces.is_empty() {
+            let (times, lines): (Vec<f64>, Vec<_>) = traces.into_iter().unzip();
+            let strips = LineStrips3D::update_fields().with_strips(lines);
+            let columns = strips.columns_of_unit_batches()?;
+            entries.push(log.happened("hand/trace", &times, columns)?);
+        }
+        Ok(entries)
+    }
+
+    fn leave_trace(&mut self, ground: &Ground, sample: &Sample) {
+        if sample.t_s < self.point_due_s {
+            return;
+        }
+        self.point_due_s = sample.t_s + 1.0 / TRACE_HZ;
+        let [x, y, z] = sample.proxy_mm;
+        self.trace
+            .push_back((sample.t_s, ground.at([x, y, z + FLOAT_MM])));
+        while self
+            .trace
+            .front()
+            .is_some_and(|(at, _)| at + TRACE_S < sample.t_s)
+        {
+            self.trace.pop_front();
+        }
+    }
+}
+
+impl Rows {
+    fn push(&mut self, ground: &Ground, sample: &Sample, before: Option<&Sample>) {
+        let (proxy, hip) = (ground.at(sample.proxy_mm), ground.at(sample.hip_mm));
+        self.times_s.push(sample.t_s);
+        self.proxies.push(proxy);
+        self.hips.push(hip);
+        // The loop looks for the surface between the proxy of the tick before and the HIP.
+        let from = before.map_or(hip, |before| ground.at(before.proxy_mm));
+        self.rays.push([from, hip]);
+        let length = (ARROW_MM_PER_N * ground.per_mm) as f32;
+        self.forces
+            .push(sample.force_n.map(|newtons| newtons * length));
+    }
+
+    fn entries(self, log: &Log) -> Result<[Entry; 4]> {
+        let times = &self.times_s;
+        let points = |entity: &str, places: &[[f32; 3]]| {
+            let points = Points3D::update_fields().with_positions(places.to_vec());
+            log.happened(entity, times, points.columns_of_unit_batches()?)
+        };
+        let rays =
+            LineStrips3D::update_fields().with_strips(self.rays.iter().map(|ray| ray.to_vec()));
+        let arrows = Arrows3D::update_fields()
+            .with_origins(self.proxies.clone())
+            .with_vectors(self.forces);
+        Ok([
+            points("hand/proxy", &self.proxies)?,
+            points("hand/hip", &self.hips)?,
+            log.happened("hand/ray", times, rays.columns_of_unit_batches()?)?,
+            log.happened("hand/force", times, arrows.columns_of_unit_batches()?)?,
+        ])
+    }
+}

@@ -1,0 +1,376 @@
+//! The terrain at coarse levels: meshes in blocks, with the relief as texture.
+//!
+//! A mesh takes every m-th sample of its layer, its texture all of them. Where a finer
+//! layer or a tile is shown the mesh has no triangles; only these are logged anew when
+//! tiles come and go.
+
+use std::collections::BTreeSet;
+
+use anyhow::Result;
+use hapterra_view_stream::Layer;
+use re_sdk_types::archetypes::{Image, Mesh3D};
+
+use super::ground::{Ground, cell_of};
+use super::log::{Entry, Log};
+use super::shade::{Heights, Shade};
+
+/// Meshes have at most so many cells along a side.
+const MESH_CELLS: usize = 320;
+/// Cells of a mesh along a block's side.
+const BLOCK_CELLS: usize = 32;
+
+/// The layers of a terrain.
+#[derive(Default)]
+pub(super) struct Layers {
+    /// As they were told, for a view with other heights.
+    told: Vec<Layer>,
+    layers: Vec<Shown>,
+    /// Colours, by the coarsest layer: it shows the whole.
+    shade: Option<Shade>,
+    cut: Cut,
+}
+
+/// What is shown by tiles: their south-west cells of level 0, and cells along their sides.
+#[derive(Clone, Default, PartialEq, Eq)]
+struct Cut {
+    side: i32,
+    tiles: BTreeSet<[i32; 2]>,
+}
+
+/// A layer in the picture.
+struct Shown {
+    inner: Option<[i32; 4]>,
+    blocks: Vec<Block>,
+}
+
+/// Part of a mesh.
+struct Block {
+    entity: String,
+    /// Its cells with a surface: their extent in cells of level 0 (west, south,
+    /// east, north) and their corners' numbers.
+    cells: Vec<([i32; 4], [u32; 4])>,
+    extent: [i32; 4],
+}
+
+/// What an entity's triangles are known by.
+const TRIANGLES: &str = "triangles";
+
+impl Layers {
+    /// Shows another layer.
+    pub(super) fn add(&mut self, log: &Log, ground: &Ground, layer: Layer) -> Result<Vec<Entry>> {
+        let entries = self.draw(log, ground, &layer)?;
+        self.told.push(layer);
+        Ok(entries)
+    }
+
+    /// Shows all layers anew, as high as they are in another view.
+    pub(super) fn redraw(&mut self, log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
+        let told = std::mem::take(&mut self.told);
+        (self.shade, self.layers) = (None, Vec::new());
+        let mut entries = Vec::new();
+        for layer in &told {
+            entries.extend(self.draw(log, ground, layer)?);
+        }
+        self.told = told;
+        Ok(entries)
+    }
+
+    fn draw(&mut self, log: &Log, ground: &Ground, layer: &Layer) -> Result<Vec<Entry>> {
+        let up = ground.heights_of(&layer.heights);
+        let heights = Heights {
+            columns: layer.columns as usize,
+            rows: layer.rows as usize,
+            step: ground.step(layer.step),
+            up: &up,
+        };
+        let shade = *self.shade.get_or_insert_with(|| Shade::of(&heights));
+        let every = mesh_step(heights.columns.max(heights.rows));
+        let (columns, rows) = (lines(heights.columns, every), lines(heights.rows, every));
+        let mut shown = Shown {
+            inner: layer.inner,
+            blocks: Vec::new(),
+        };
+        let mut entries = Vec::new();
+        for south in (0..rows.len().saturating_sub(1)).step_by(BLOCK_CELLS) {
+            for west in (0..columns.len().saturating_sub(1)).step_by(BLOCK_CELLS) {
+                let part = Part {
+                    layer,
+                    heights: &heights,
+                    columns: slice(&columns, west),
+                    rows: slice(&rows, south),
+                };
+                let number = shown.blocks.len();
+                let entity = format!("terrain/layer{}/{number}", self.layers.len());
+                entries.push(log.standing(&entity, "mesh", &part.mesh(ground, &shade))?);
+                shown.blocks.push(part.block(entity));
+            }
+        }
+        for block in &shown.blocks {
+            entries.push(block.triangles(log, shown.inner, &self.cut)?);
+        }
+        self.layers.push(shown);
+        Ok(entries)
+    }
+
+    /// Cells of level 0 along the side of a cell of the finest mesh; none before the first
+    /// layer are as good as one.
+    pub(super) fn mesh_cell(&self) -> i32 {
+        let of = |layer: &Layer| {
+            let every = mesh_step(layer.columns.max(layer.rows) as usize);
+            layer.step.saturating_mul(every as i32)
+        };
+        self.told.last().map_or(1, of).max(1)
+    }
+
+    /// Colours of this terrain; none before the first layer.
+    pub(super) fn shade(&self) -> Option<Shade> {
+        self.shade
+    }
+
+    /// Leaves the tiles out that are shown themselves.
+    pub(super) fn cut(
+        &mut self,
+        log: &Log,
+        ground: &Ground,
+        tiles: &BTreeSet<[i32; 2]>,
+    ) -> Result<Vec<Entry>> {
+        let cut = Cut {
+            side: ground.tile_cells(),
+            tiles: tiles.iter().map(|tile| ground.first_cell(*tile)).collect(),
+        };
+        let before = std::mem::replace(&mut self.cut, cut);
+        let changed = before.changes_to(&self.cut);
+        let mut entries = Vec::new();
+        for layer in &self.layers {
+            let touched = |block: &&Block| changed.iter().any(|tile| block.has(*tile));
+            for block in layer.blocks.iter().filter(touched) {
+                entries.push(block.triangles(log, layer.inner, &self.cut)?);
+            }
+        }
+        Ok(entries)
+    }
+}
+
+/// Every how many samples a mesh takes one.
+fn mesh_step(samples: usize) -> usize {
+    let mut step = 1;
+    while samples.saturating_sub(1) / step > MESH_CELLS {
+        step *= 2;
+    }
+    step
+}
+
+/// The samples along a side that a mesh takes: with the last one, too.
+fn lines(samples: usize, every: usize) -> Vec<usize> {
+    let last = samples.saturating_sub(1);
+    let mut lines: Vec<_> = (0..last).step_by(every).collect();
+    lines.push(last);
+    lines
+}
+
+fn slice(lines: &[usize], first: usize) -> &[usize] {
+    let last = (first + BLOCK_CELLS + 1).min(lines.len());
+    lines.get(first..last).unwrap_or_default()
+}
+
+/// What a block is made of.
+struct Part<'p> {
+    layer: &'p Layer,
+    heights: &'p Heights<'p>,
+    /// Columns and rows of the layer that it takes.
+    columns: &'p [usize],
+    rows: &'p [usize],
+}
+
+impl Part<'_> {
+    fn ends(&self) -> Option<[usize; 4]> {
+        Some([
+            *self.columns.first()?,
+            *self.rows.first()?,
+            *self.columns.last()?,
+            *self.rows.last()?,
+        ])
+    }
+
+    /// A corner's height; in a hole the mean around it, as far as the next corners. Such a
+    /// hole is seen in the texture, at its true size.
+    fn height(&self, column: usize, row: usize) -> Option<f32> {
+        if let Some(height) = self.heights.at(column, row) {
+            return Some(height);
+        }
+        let every = mesh_step(self.heights.columns.max(self.heights.rows));
+        let near = |middle: usize| middle.saturating_sub(every)..=middle + every;
+        let around = near(row).flat_map(|row| near(column).map(move |column| (column, row)));
+        let known = around.filter_map(|(column, row)| self.heights.at(column, row));
+        let (sum, count) = known.fold((0.0, 0), |(sum, count), height| (sum + height, count + 1));
+        // With one sample between corners a hole is a hole.
+        (every > 1 && count > 0).then(|| sum / count as f32)
+    }
+
+    fn mesh(&self, ground: &Ground, shade: &Shade) -> Mesh3D {
+        let [west, south, east, north] = self.ends().unwrap_or_default();
+        let (width, height) = (east - west + 1, north - south + 1);
+        let (mut positions, mut texcoords) = (Vec::new(), Vec::new());
+        for row in self.rows {
+            for column in self.columns {
+                let cell = cell_of(self.layer, *column, *row).map(f64::from);
+                let up = self.height(*column, *row).unwrap_or(0.0);
+                positions.push(ground.sample(cell, up));
+                // Rows of a texture count from the north.
+                texcoords.push([
+                    ((column - west) as f32 + 0.5) / width as f32,
+                    ((north - row) as f32 + 0.5) / height as f32,
+                ]);
+            }
+        }
+        let places = (south..=north)
+            .rev()
+            .flat_map(|row| (west..=east).map(move |column| (column, row)));
+        let rgb: Vec<u8> = places
+            .flat_map(|(column, row)| shade.colour(self.heights, column, row))
+            .collect();
+        Mesh3D::update_fields()
+            .with_vertex_positions(positions)
+            .with_vertex_texcoords(texcoords)
+            .with_albedo_texture_image(Image::from_rgb24(rgb, [width as u32, height as u32]))
+    }
+
+    fn block(&self, entity: String) -> Block {
+        let across = self.columns.len();
+        let number = |i: usize, j: usize| (j * across + i) as u32;
+        let mut cells = Vec::new();
+        for (j, rows) in self.rows.windows(2).enumerate() {
+            for (i, columns) in self.columns.windows(2).enumerate() {
+                let ([west, east], [south, north]) = (columns, rows) else {
+                    continue;
+                };
+                let corners = [(west, south), (east, south), (east, north), (west, north)];
+                let known = corners.iter().all(|(x, y)| self.height(**x, **y).is_some());
+                if known {
+                    let [low, high] = [
+                        cell_of(self.layer, *west, *south),
+                        cell_of(self.layer, *east, *north),
+                    ];
+                    let numbers = [
+                        number(i, j),
+                        number(i + 1, j),
+                        number(i + 1, j + 1),
+                        number(i, j + 1),
+                    ];
+                    cells.push(([low[0], low[1], high[0], high[1]], numbers));
+                }
+            }
+        }
+        let [west, south, east, north] = self.ends().unwrap_or_default();
+        let [low, high] = [
+            cell_of(self.layer, west, south),
+            cell_of(self.layer, east, north),
+        ];
+        Block {
+            entity,
+            cells,
+            extent: [low[0], low[1], high[0], high[1]],
+        }
+    }
+}
+
+impl Block {
+    /// Whether a square lies in it, or part of one: its first cell and its side.
+    fn has(&self, ([x, y], side): ([i32; 2], i32)) -> bool {
+        let [west, south, east, north] = self.extent;
+        let ends = |first: i32| first.saturating_add(side);
+        x < east && ends(x) > west && y < north && ends(y) > south
+    }
+
+    fn triangles(&self, log: &Log, inner: Option<[i32; 4]>, cut: &Cut) -> Result<Entry> {
+        let shown = self.cells.iter().filter(|(extent, _)| {
+            let in_inner = inner.is_some_and(|inner| contains(inner, *extent));
+            !in_inner && !cut.hides(*extent)
+        });
+        let triangles: Vec<[u32; 3]> = shown
+            .flat_map(|(_, [a, b, c, d])| [[*a, *b, *c], [*a, *c, *d]])
+            .collect();
+        // A mesh without triangles is taken for one whose vertices are triangles.
+        let triangles = match triangles.is_empty() {
+            true => vec![[0, 0, 0]],
+            false => triangles,
+        };
+        let mesh = Mesh3D::update_fields().with_triangle_indices(triangles);
+        log.standing(&self.entity, TRIANGLES, &mesh)
+    }
+}
+
+fn contains(outer: [i32; 4], [west, south, east, north]: [i32; 4]) -> bool {
+    let [w, s, e, n] = outer;
+    west >= w && south >= s && east <= e && north <= n
+}
+
+impl Cut {
+    /// Whether a cell of a mesh lies in one tile that is shown. Cells of the finest layer are
+    /// not larger than a tile; a larger one is never under a single tile, and stays.
+    fn hides(&self, [west, south, east, north]: [i32; 4]) -> bool {
+        let side = self.side.max(1);
+        let first = |cell: i32| cell.div_euclid(side).saturating_mul(side);
+        let low = [west, south].map(first);
+        low == [east - 1, north - 1].map(first) && self.tiles.contains(&low)
+    }
+
+    /// The squares that one of two hides and not the other.
+    fn changes_to(&self, other: &Self) -> Vec<([i32; 2], i32)> {
+        let squares = |cut: &Self| -> BTreeSet<_> {
+            let side = cut.side;
+            cut.tiles.iter().map(|tile| (*tile, side)).collect()
+        };
+        let (ours, theirs) = (squares(self), squares(other));
+        ours.symmetric_difference(&theirs).copied().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mesh_takes_the_last_sample_and_is_not_too_fine() {
+        for samples in [2, 3, 33, 321, 322, 1000, 1025] {
+            let every = mesh_step(samples);
+            let lines = lines(samples, every);
+            assert!(lines.len() <= MESH_CELLS + 2, "{samples}");
+            assert_eq!(
+                (lines.first(), lines.last()),
+                (Some(&0), Some(&(samples - 1)))
+            );
+            assert!(lines.windows(2).all(|pair| pair[0] < pair[1]));
+        }
+    }
+
+    #[test]
+    fn a_tile_hides_what_lies_under_it_and_nothing_else() {
+        let cut = Cut {
+            side: 32,
+            tiles: BTreeSet::from([[32, 32]]),
+        };
+        assert!(cut.hides([32, 32, 36, 36]));
+        assert!(cut.hides([60, 60, 64, 64]));
+        assert!(!cut.hides([28, 32, 32, 36]));
+        assert!(!cut.hides([64, 32, 68, 36]));
+        assert!(!cut.hides([0, 0, 64, 64]));
+    }
+
+    #[test]
+    fn tiles_of_another_level_change_all_that_either_hides() {
+        let cut = |side, tile| Cut {
+            side,
+            tiles: BTreeSet::from([tile]),
+        };
+        let changed = cut(32, [32, 32]).changes_to(&cut(64, [64, 0]));
+        assert_eq!(changed, [([32, 32], 32), ([64, 0], 64)]);
+        assert_eq!(cut(32, [32, 32]).changes_to(&cut(32, [32, 32])), []);
+        let block = Block {
+            entity: String::new(),
+            cells: vec![],
+            extent: [0, 0, 40, 40],
+        };
+        assert!(block.has(changed[0]) && !block.has(changed[1]));
+    }
+}

@@ -1,0 +1,108 @@
+//! Entries of the log in rerun's format.
+
+use anyhow::{Context as _, Result};
+use re_chunk::{Chunk, RowId, TimeColumn};
+use re_log_types::{
+    EntityPath, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreKind, StoreSource, TimePoint,
+};
+use re_sdk_types::{AsComponents, SerializedComponentColumn};
+
+/// What the viewer calls recordings and layouts of this program.
+pub const APPLICATION: &str = "hapterra";
+/// The timeline: the device's time since the beginning.
+pub const TIMELINE: &str = "time";
+
+/// An entry of the log.
+pub struct Entry {
+    /// What a later entry with the same key takes the place of; none of what happened.
+    pub key: Option<String>,
+    /// The entry.
+    pub message: LogMsg,
+}
+
+/// Makes entries of one recording.
+pub(super) struct Log {
+    store: StoreId,
+}
+
+impl Log {
+    pub(super) fn new() -> Self {
+        Self {
+            store: StoreId::random(StoreKind::Recording, APPLICATION),
+        }
+    }
+
+    /// The recording's first entry.
+    pub(super) fn opened(&self) -> Entry {
+        Entry {
+            // Before all others, for a page that comes later.
+            key: Some(" opened".into()),
+            message: opened(&self.store),
+        }
+    }
+
+    /// `what` an entity is, until the same `part` of it is told anew.
+    pub(super) fn standing(
+        &self,
+        entity: &str,
+        part: &str,
+        what: &dyn AsComponents,
+    ) -> Result<Entry> {
+        let message = one(&self.store, entity, TimePoint::STATIC, what)?;
+        Ok(Entry {
+            key: Some(format!("{entity} {part}")),
+            message,
+        })
+    }
+
+    /// What an entity is at times, s, one row of each column a time.
+    pub(super) fn happened(
+        &self,
+        entity: &str,
+        times_s: &[f64],
+        columns: impl IntoIterator<Item = SerializedComponentColumn>,
+    ) -> Result<Entry> {
+        let times = times_s.iter().map(|t_s| nanoseconds(*t_s));
+        let times = TimeColumn::new_duration_nanos(TIMELINE, times);
+        let columns = columns
+            .into_iter()
+            .map(|column| (column.descriptor, column.list_array));
+        let chunk = Chunk::from_columns(EntityPath::from(entity), [times], columns);
+        Ok(Entry {
+            key: None,
+            message: arrow(&self.store, chunk.context("an entry over time")?)?,
+        })
+    }
+}
+
+/// Time in the viewer's unit.
+pub(super) fn nanoseconds(t_s: f64) -> i64 {
+    (t_s * 1e9).round() as i64
+}
+
+/// The first entry of a store.
+pub(super) fn opened(store: &StoreId) -> LogMsg {
+    let source = StoreSource::Other("hapterra-view".into());
+    LogMsg::SetStoreInfo(SetStoreInfo {
+        row_id: *RowId::new(),
+        info: StoreInfo::new(store.clone(), source),
+    })
+}
+
+/// One row of an entity.
+pub(super) fn one(
+    store: &StoreId,
+    entity: &str,
+    at: TimePoint,
+    what: &dyn AsComponents,
+) -> Result<LogMsg> {
+    let chunk = Chunk::builder(EntityPath::from(entity))
+        .with_archetype(RowId::new(), at, what)
+        .build();
+    arrow(store, chunk.context("an entry that stands")?)
+}
+
+fn arrow(store: &StoreId, chunk: Chunk) -> Result<LogMsg> {
+    let message = chunk.to_arrow_msg().context("an entry of the log")?;
+    Ok(LogMsg::ArrowMsg(store.clone(), message))
+}

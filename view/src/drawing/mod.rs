@@ -1,0 +1,303 @@
+//! Messages as rerun's entities: the terrain, the hand and what is plotted, in ground
+//! metres around the home position.
+//!
+//! | entity | what it is | when |
+//! | --- | --- | --- |
+//! | `/terrain/LAYER/BLOCK` | a block of a coarse layer, with its relief as texture | stands; its triangles change where tiles are shown |
+//! | `/terrain/tiles/SLOT` | a tile as it is felt | stands until another takes its slot |
+//! | `/terrain/held`, `/terrain/awaited` | outlines of the tiles that the device holds and lacks | stands |
+//! | `/hand/proxy`, `hip`, `ray`, `force`, `trace` | the hand | 60 a second |
+//! | `/map/…` | the same from above, in pixels of the relief | |
+//! | `/plot/…` | a thousand samples a second | |
+//! | `/words` | place, scale and coordinates | four a second |
+//!
+//! Another view of the terrain while it is touched comes as another scene: the terrain stays
+//! where it is on the ground, the eye comes nearer or goes away, and plots and time go on.
+//!
+//! What stands is logged as static, and the latest takes the place of the one before, in
+//! the history as in the page: a session of hours grows by its samples alone.
+
+mod ground;
+mod hand;
+mod layers;
+mod layout;
+mod log;
+mod map;
+mod plots;
+mod shade;
+mod tiles;
+mod words;
+
+use std::collections::BTreeSet;
+
+use anyhow::Result;
+use hapterra_view_stream::{Message, Scene};
+
+pub use log::{APPLICATION, Entry, TIMELINE};
+
+use ground::Ground;
+use hand::Hand;
+use layers::Layers;
+use log::Log;
+use map::Map;
+use plots::Plots;
+use tiles::Tiles;
+use words::Words;
+
+/// What has been drawn of a scene.
+pub struct Drawing {
+    log: Log,
+    scene: Scene,
+    /// Where the hand is, in the view in force.
+    ground: Ground,
+    /// Where the terrain is: of a recording as in its first view.
+    terrain: Ground,
+    layers: Layers,
+    tiles: Tiles,
+    map: Map,
+    hand: Hand,
+    plots: Plots,
+    words: Words,
+}
+
+impl Drawing {
+    /// Draws a message. `drawing` is none before the first scene.
+    ///
+    /// # Errors
+    /// What cannot be said in rerun's format; it should not happen.
+    pub fn take(drawing: &mut Option<Self>, message: Message) -> Result<Vec<Entry>> {
+        if let Message::Scene(scene) = message {
+            let mut entries = Vec::new();
+            match drawing {
+                Some(drawing) => drawing.change(*scene, &mut entries)?,
+                None => *drawing = Some(Self::begin(*scene, &mut entries)?),
+            }
+            return Ok(entries);
+        }
+        match drawing {
+            Some(drawing) => drawing.go_on(message),
+            // Of no scene.
+            None => Ok(Vec::new()),
+        }
+    }
+
+    /// Draws what still waits, at the end of the stream.
+    ///
+    /// # Errors
+    /// As [`Drawing::take`].
+    pub fn finish(&mut self) -> Result<Vec<Entry>> {
+        self.plots.finish(&self.log)
+    }
+
+    /// Whether samples come as they are felt.
+    #[must_use]
+    pub fn is_live(&self) -> bool {
+        self.scene.is_live
+    }
+
+    fn begin(scene: Scene, entries: &mut Vec<Entry>) -> Result<Self> {
+        let log = Log::new();
+        let ground = Ground::new(&scene);
+        entries.push(log.opened());
+        entries.extend(layout::entries(&scene, &ground)?);
+        entries.extend(hand::looks(&log, &ground)?);
+        entries.extend(plots::looks(&log)?);
+        Ok(Self {
+            plots: Plots::new(&scene),
+            hand: Hand::default(),
+            words: Words::new(&scene),
+            layers: Layers::default(),
+            tiles: Tiles::default(),
+            map: Map::default(),
+            log,
+            ground,
+            terrain: ground,
+            scene,
+        })
+    }
+
+    /// Goes over to another view of the same terrain. What was felt before stays.
+    fn change(&mut self, scene: Scene, entries: &mut Vec<Entry>) -> Result<()> {
+        let log = &self.log;
+        let ground = self.ground.after(&scene);
+        entries.extend(self.plots.change(log, &scene)?);
+        self.words.change(&scene);
+        self.hand.leap();
+        match scene.is_live {
+            true => {
+                self.look_at(&scene, &ground, entries)?;
+                self.ground = ground;
+            }
+            // Its terrain stands for all of its time.
+            false => self.ground = ground.over(&self.terrain),
+        }
+        self.scene = scene;
+        Ok(())
+    }
+
+    /// The terrain as it is felt from now on, and the eye as near as it is large.
+    fn look_at(&mut self, scene: &Scene, ground: &Ground, entries: &mut Vec<Entry>) -> Result<()> {
+        let log = &self.log;
+        if !scene.keeps_tiles {
+            // First what lies under the tiles, so that there is never nothing.
+            entries.extend(self.layers.cut(log, ground, &BTreeSet::new())?);
+            entries.extend(self.tiles.clear(log)?);
+        }
+        if !ground.is_as_high_as(&self.terrain) {
+            entries.extend(self.layers.redraw(log, ground)?);
+        }
+        if (ground.near - self.terrain.near).abs() > 1e-6 * ground.near {
+            entries.extend(layout::entries(scene, ground)?);
+            entries.extend(hand::looks(log, ground)?);
+        }
+        entries.extend(self.map.laid(log, scene)?);
+        self.terrain = *ground;
+        Ok(())
+    }
+
+    fn go_on(&mut self, message: Message) -> Result<Vec<Entry>> {
+        let (log, ground, terrain) = (&self.log, &self.ground, &self.terrain);
+        match message {
+            Message::Layer(layer) => {
+                let mut entries = self.map.layer(log, &self.scene, terrain, &layer)?;
+                entries.extend(self.layers.add(log, terrain, layer)?);
+                Ok(entries)
+            }
+            Message::Tile(tile) => {
+                let mut entries = self.tiles.add(log, terrain, &self.layers, &tile)?;
+                entries.extend(self.layers.cut(log, terrain, &self.tiles.shown())?);
+                Ok(entries)
+            }
+            Message::Tiles(tiles) => {
+                let mut entries = self.tiles.outline(log, terrain, &tiles)?;
+                entries.extend(self.map.tiles(log, terrain, &tiles)?);
+                Ok(entries)
+            }
+            Message::Samples(samples) => {
+                let mut entries = self.plots.take(log, &samples)?;
+                entries.extend(self.hand.take(log, ground, &samples)?);
+                entries.extend(self.map.samples(log, &self.scene, &samples)?);
+                entries.extend(self.words.take(log, &self.scene, &samples)?);
+                Ok(entries)
+            }
+            Message::Link(link) => {
+                self.words.link(&link);
+                self.plots.link(log, &link)
+            }
+            Message::Hello(_) | Message::Scene(_) | Message::End => Ok(Vec::new()),
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use hapterra_view_stream::{Layer, TILE_POSTS, Tile};
+    use re_sdk_types::archetypes::Points3D;
+
+    /// Something that stands under a key, or that happened.
+    pub(crate) fn entry(key: Option<&str>) -> Entry {
+        let log = Log::new();
+        let points = Points3D::new((0..100).map(|i| [i as f32, 0.0, 1.0]));
+        match key {
+            Some(key) => log.standing(key, "", &points).expect("encodes"),
+            None => {
+                let columns = points.columns_of_unit_batches().expect("columns");
+                log.happened("it", &(0..100).map(f64::from).collect::<Vec<_>>(), columns)
+                    .expect("encodes")
+            }
+        }
+    }
+
+    fn scene(change: impl FnOnce(&mut Scene)) -> Message {
+        let mut scene = super::ground::tests::scene();
+        change(&mut scene);
+        Message::Scene(Box::new(scene))
+    }
+
+    fn layer() -> Message {
+        Message::Layer(Layer {
+            first: [0, 0],
+            step: 2,
+            columns: 81,
+            rows: 81,
+            inner: None,
+            heights: (0..81 * 81).map(|i| ((i * 31) % 97) as f32).collect(),
+        })
+    }
+
+    fn tile() -> Message {
+        Message::Tile(Tile {
+            slot: 2,
+            index: [1, 1],
+            heights_mm: vec![1.0; TILE_POSTS * TILE_POSTS],
+        })
+    }
+
+    /// Keys of what a message draws anew.
+    fn keys(drawing: &mut Option<Drawing>, message: Message) -> BTreeSet<String> {
+        let entries = Drawing::take(drawing, message).expect("it is drawn");
+        entries.into_iter().filter_map(|entry| entry.key).collect()
+    }
+
+    fn has(keys: &BTreeSet<String>, begin: &str) -> bool {
+        keys.iter().any(|key| key.starts_with(begin))
+    }
+
+    #[test]
+    fn another_view_draws_anew_what_it_changes_and_no_more() {
+        let mut drawing = None;
+        let mut all = BTreeSet::new();
+        for message in [scene(|_| {}), layer(), tile()] {
+            all.extend(keys(&mut drawing, message));
+        }
+        // Panned: the tiles stay, and so does the eye.
+        let panned = scene(|scene| {
+            scene.keeps_tiles = true;
+            scene.home_mm = [50.0, 30.0, 12.0];
+        });
+        let drawn = keys(&mut drawing, panned);
+        assert_eq!(drawn, BTreeSet::from(["map/laid ".to_owned()]));
+        // Zoomed: the eye comes nearer.
+        let zoom = |scene: &mut Scene| {
+            scene.cell_mm *= 2.0;
+            scene.mm_per_unit *= 2.0;
+            scene.laid_mm = scene.laid_mm.map(|mm| 2.0 * mm);
+            scene.ground_m_per_mm = scene.ground_m_per_mm.map(|metres| 0.5 * metres);
+        };
+        let zoomed = scene(|scene| {
+            zoom(scene);
+            scene.keeps_tiles = true;
+        });
+        let drawn = keys(&mut drawing, zoomed);
+        assert!(
+            has(&drawn, " opened, layout") && !has(&drawn, "terrain/"),
+            "{drawn:?}"
+        );
+        // Steeper: the terrain is another one, and the tiles have yet to come.
+        let steeper = scene(|scene| {
+            zoom(scene);
+            scene.mm_per_unit *= 1.5;
+        });
+        let drawn = keys(&mut drawing, steeper);
+        assert!(has(&drawn, "terrain/layer0/0 mesh") && has(&drawn, "terrain/tiles/2 mesh"));
+        // Whatever it draws takes the place of what was there.
+        assert!(drawn.is_subset(&all), "{drawn:?}");
+        assert!(keys(&mut drawing, tile()).is_subset(&all));
+    }
+
+    #[test]
+    fn the_terrain_of_a_recording_stands() {
+        let mut drawing = None;
+        let recorded = |steeper: f64| {
+            scene(move |scene| {
+                scene.is_live = false;
+                scene.mm_per_unit *= steeper;
+            })
+        };
+        for message in [recorded(1.0), layer(), tile()] {
+            keys(&mut drawing, message);
+        }
+        assert!(keys(&mut drawing, recorded(3.0)).is_empty());
+    }
+}

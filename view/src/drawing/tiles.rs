@@ -1,0 +1,390 @@
+//! Tiles as they are felt, and outlines of those that the device holds and lacks.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use anyhow::Result;
+use hapterra_view_stream::{TILE_CELLS, TILE_POSTS, Tile, Tiles as Told};
+use re_sdk_types::archetypes::{LineStrips3D, Mesh3D};
+use re_sdk_types::components::{Color, Radius};
+
+use super::ground::Ground;
+use super::layers::Layers;
+use super::log::{Entry, Log};
+use super::shade::{HOLE, Heights, Rgb};
+
+/// Samples along the side of a tile.
+const SIDE: usize = TILE_CELLS as usize + 1;
+/// How far an outline floats above the surface, in felt cells.
+const FLOAT_CELLS: f64 = 0.35;
+/// What a tile's samples are known by among the parts of its entity.
+const MESH: &str = "mesh";
+/// Colours of outlines.
+const HELD: Rgb = [64, 224, 208];
+const AWAITED: Rgb = [255, 176, 32];
+
+/// The tiles that are shown.
+#[derive(Default)]
+pub(super) struct Tiles {
+    /// What stands in each slot.
+    slots: BTreeMap<u32, [i32; 2]>,
+    /// The same by column and row, with the colours around each.
+    tiles: BTreeMap<[i32; 2], (Lifted, Vec<Rgb>)>,
+    /// Lines around each tile that is shown.
+    outlines: BTreeMap<[i32; 2], Vec<Vec<[f32; 3]>>>,
+}
+
+/// A tile with its heights in the picture.
+struct Lifted {
+    slot: u32,
+    index: [i32; 2],
+    up: Vec<f32>,
+    step: f64,
+}
+
+impl Lifted {
+    fn heights(&self) -> Heights<'_> {
+        Heights {
+            columns: TILE_POSTS,
+            rows: TILE_POSTS,
+            step: self.step,
+            up: &self.up,
+        }
+    }
+}
+
+impl Tiles {
+    /// Shows a tile in its slot.
+    pub(super) fn add(
+        &mut self,
+        log: &Log,
+        ground: &Ground,
+        layers: &Layers,
+        tile: &Tile,
+    ) -> Result<Vec<Entry>> {
+        if tile.heights_mm.len() != TILE_POSTS * TILE_POSTS {
+            return Ok(Vec::new());
+        }
+        let mut changed = vec![tile.index];
+        if let Some(before) = self.slots.insert(tile.slot, tile.index) {
+            self.outlines.remove(&before);
+            self.tiles.remove(&before);
+            changed.push(before);
+        }
+        let lifted = Lifted {
+            slot: tile.slot,
+            index: tile.index,
+            up: ground.heights_of_mm(&tile.heights_mm),
+            step: ground.step(ground.felt_cell()),
+        };
+        let heights = lifted.heights();
+        let posts = Posts {
+            heights: &heights,
+            ground,
+            first: ground.first_cell(tile.index),
+        };
+        self.outlines.insert(tile.index, posts.outline());
+        let colour = |column: usize, row: usize| {
+            let shade = layers.shade();
+            shade.map_or(HOLE, |shade| shade.colour(&heights, column + 1, row + 1))
+        };
+        let mesh = posts.mesh(&colour);
+        let around = ring().iter().map(|(x, y)| colour(*x, *y)).collect();
+        self.tiles.insert(tile.index, (lifted, around));
+        let mut entries = vec![log.standing(&entity(tile.slot), MESH, &mesh)?];
+        entries.extend(self.skirts(log, ground, layers, &changed)?);
+        Ok(entries)
+    }
+
+    /// The sides of changed tiles and of those beside them: only where no tile is beside.
+    fn skirts(
+        &self,
+        log: &Log,
+        ground: &Ground,
+        layers: &Layers,
+        changed: &[[i32; 2]],
+    ) -> Result<Vec<Entry>> {
+        let every = (layers.mesh_cell() / ground.felt_cell()).clamp(1, TILE_CELLS);
+        let near = changed.iter().flat_map(|index| {
+            [[0, 0], [0, -1], [1, 0], [0, 1], [-1, 0]].map(|step| beside(*index, step))
+        });
+        let near: BTreeSet<_> = near.collect();
+        let shown = near.iter().filter_map(|index| self.tiles.get(index));
+        let entries = shown.map(|(tile, colours)| {
+            let heights = tile.heights();
+            let posts = Posts {
+                heights: &heights,
+                ground,
+                first: ground.first_cell(tile.index),
+            };
+            // In the order in which a ring goes around.
+            let open = [[0, -1], [1, 0], [0, 1], [-1, 0]]
+                .map(|step| !self.tiles.contains_key(&beside(tile.index, step)));
+            let mesh = posts.skirt(colours, open, every as usize);
+            log.standing(&skirt(tile.slot), "", &mesh)
+        });
+        entries.collect()
+    }
+
+    /// Takes all tiles out of the picture: another view has none of them.
+    pub(super) fn clear(&mut self, log: &Log) -> Result<Vec<Entry>> {
+        let slots = std::mem::take(self).slots;
+        let nothing = Mesh3D::new([[0.0; 3]]).with_triangle_indices(at_least_one(Vec::new()));
+        let mut entries = Vec::new();
+        for slot in slots.keys() {
+            entries.push(log.standing(&entity(*slot), MESH, &nothing)?);
+            entries.push(log.standing(&skirt(*slot), "", &nothing)?);
+        }
+        Ok(entries)
+    }
+
+    /// By column and row.
+    pub(super) fn shown(&self) -> BTreeSet<[i32; 2]> {
+        self.slots.values().copied().collect()
+    }
+
+    /// Draws around the tiles that the device holds and lacks.
+    pub(super) fn outline(&self, log: &Log, ground: &Ground, told: &Told) -> Result<Vec<Entry>> {
+        let around = |indices: &[[i32; 2]]| -> Vec<Vec<[f32; 3]>> {
+            let lines = indices.iter().map(|index| match self.outlines.get(index) {
+                Some(lines) => lines.clone(),
+                None => vec![flat(ground, *index)],
+            });
+            lines.flatten().collect()
+        };
+        let drawn = |entity: &str, indices: &[[i32; 2]], colour: Rgb, width: f32| {
+            let strips = LineStrips3D::new(around(indices))
+                .with_colors([colour])
+                .with_radii([Radius::new_ui_points(width)]);
+            log.standing(entity, "", &strips)
+        };
+        Ok(vec![
+            drawn("terrain/held", &told.held, HELD, 0.9)?,
+            drawn("terrain/awaited", &told.awaited, AWAITED, 2.0)?,
+        ])
+    }
+}
+
+/// Where nothing is known of a tile: a square at the home position's height.
+fn flat(ground: &Ground, index: [i32; 2]) -> Vec<[f32; 3]> {
+    let [x, y] = ground.first_cell(index).map(f64::from);
+    let side = f64::from(ground.tile_cells());
+    let [_, _, up] = ground.home();
+    [
+        [0.0, 0.0],
+        [side, 0.0],
+        [side, side],
+        [0.0, side],
+        [0.0, 0.0],
+    ]
+    .map(|[east, north]| {
+        let [x, y, _] = ground.sample([x + east, y + north], 0.0);
+        [x, y, up]
+    })
+    .to_vec()
+}
+
+/// The samples of a tile in the picture.
+struct Posts<'p> {
+    heights: &'p Heights<'p>,
+    ground: &'p Ground,
+    first: [i32; 2],
+}
+
+impl Posts<'_> {
+    /// A sample's height; the tile's own first is one into what was sent.
+    fn height(&self, column: usize, row: usize) -> Option<f32> {
+        self.heights.at(column + 1, row + 1)
+    }
+
+    /// A sample's place, at a height.
+    fn at(&self, column: usize, row: usize, up: f32) -> [f32; 3] {
+        let [x, y] = self.first.map(f64::from);
+        let side = f64::from(self.ground.felt_cell());
+        let cell = [x + side * column as f64, y + side * row as f64];
+        self.ground.sample(cell, up)
+    }
+
+    fn surface(&self, column: usize, row: usize) -> [f32; 3] {
+        self.at(column, row, self.height(column, row).unwrap_or(0.0))
+    }
+
+    fn mesh(&self, colour: &dyn Fn(usize, usize) -> Rgb) -> Mesh3D {
+        let places = || (0..SIDE).flat_map(|row| (0..SIDE).map(move |column| (column, row)));
+        let positions = places().map(|(column, row)| self.surface(column, row));
+        let colours = places().map(|(column, row)| Color::from(colour(column, row)));
+        let mut triangles = Vec::new();
+        for row in 0..SIDE - 1 {
+            for column in 0..SIDE - 1 {
+                let corners = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(x, y)| (column + x, row + y));
+                if corners.iter().all(|(x, y)| self.height(*x, *y).is_some()) {
+                    let [a, b, c, d] = corners.map(|(x, y)| (y * SIDE + x) as u32);
+                    triangles.extend([[a, b, c], [a, c, d]]);
+                }
+            }
+        }
+        Mesh3D::new(positions)
+            .with_vertex_colors(colours)
+            .with_triangle_indices(at_least_one(triangles))
+    }
+
+    /// Walls at the tile's open sides, which close the gap to the coarse mesh: that goes
+    /// straight from every `every`-th sample to the next.
+    fn skirt(&self, colours: &[Rgb], open: [bool; 4], every: usize) -> Mesh3D {
+        let ring = ring();
+        let tops = ring.iter().map(|(x, y)| self.surface(*x, *y));
+        let coarse = ring.iter().enumerate().map(|(i, (x, y))| {
+            let up = self.coarse(&ring, i, every).or_else(|| self.height(*x, *y));
+            self.at(*x, *y, up.unwrap_or(0.0))
+        });
+        let positions: Vec<_> = tops.chain(coarse).collect();
+        let colours = colours.iter().chain(colours).copied().map(Color::from);
+        let mut triangles = Vec::new();
+        for (i, pair) in ring.windows(2).enumerate() {
+            let is_open = open.get(i / (SIDE - 1)).copied().unwrap_or(false);
+            let known = pair.iter().all(|(x, y)| self.height(*x, *y).is_some());
+            if is_open && known {
+                let (a, c) = (i as u32, (i + ring.len()) as u32);
+                triangles.extend([[a, c, a + 1], [a + 1, c, c + 1]]);
+            }
+        }
+        Mesh3D::new(positions)
+            .with_vertex_colors(colours)
+            .with_triangle_indices(at_least_one(triangles))
+    }
+
+    /// Height of the coarse mesh at a place of the ring; none beside a hole.
+    fn coarse(&self, ring: &[(usize, usize)], i: usize, every: usize) -> Option<f32> {
+        let (from, share) = (i - i % every, (i % every) as f32 / every as f32);
+        let height = |i: usize| ring.get(i).and_then(|(x, y)| self.height(*x, *y));
+        let low = height(from)?;
+        match share > 0.0 {
+            true => Some(low + share * (height(from + every)? - low)),
+            false => Some(low),
+        }
+    }
+
+    /// Lines around the tile, broken at holes.
+    fn outline(&self) -> Vec<Vec<[f32; 3]>> {
+        let float = (FLOAT_CELLS * self.ground.step(self.ground.felt_cell())) as f32;
+        let ring = ring();
+        let known = |place: &(usize, usize)| self.height(place.0, place.1).is_some();
+        let lines = ring
+            .split(|place| !known(place))
+            .filter(|line| line.len() > 1);
+        lines
+            .map(|line| {
+                let up = |x, y| self.height(x, y).unwrap_or(0.0) + float;
+                line.iter()
+                    .map(|(x, y)| self.at(*x, *y, up(*x, *y)))
+                    .collect()
+            })
+            .collect()
+    }
+}
+
+/// What a slot is called in the picture.
+fn entity(slot: u32) -> String {
+    format!("terrain/tiles/{slot}")
+}
+
+fn skirt(slot: u32) -> String {
+    format!("terrain/tiles/{slot}/skirt")
+}
+
+/// The tile so many columns and rows farther.
+fn beside([col, row]: [i32; 2], [east, north]: [i32; 2]) -> [i32; 2] {
+    [col.saturating_add(east), row.saturating_add(north)]
+}
+
+/// A mesh without triangles is taken for one whose vertices are triangles.
+fn at_least_one(mut triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
+    if triangles.is_empty() {
+        triangles.push([0, 0, 0]);
+    }
+    triangles
+}
+
+/// Columns and rows around a tile, the first once more at the end.
+fn ring() -> Vec<(usize, usize)> {
+    let last = SIDE - 1;
+    let south = (0..last).map(|i| (i, 0));
+    let east = (0..last).map(|i| (last, i));
+    let north = (0..last).map(|i| (last - i, last));
+    let west = (0..=last).map(|i| (0, last - i));
+    south.chain(east).chain(north).chain(west).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ring_goes_once_around_and_closes() {
+        let ring = ring();
+        assert_eq!(ring.len(), 4 * (SIDE - 1) + 1);
+        assert_eq!(ring.first(), ring.last());
+        for pair in ring.windows(2) {
+            let [(x, y), (u, v)] = pair else {
+                unreachable!()
+            };
+            assert_eq!(x.abs_diff(*u) + y.abs_diff(*v), 1);
+        }
+    }
+
+    #[test]
+    fn a_skirt_goes_from_the_tile_to_the_coarse_mesh_and_no_farther() {
+        let ground = Ground::new(&super::super::ground::tests::scene());
+        let up: Vec<f32> = (0..TILE_POSTS * TILE_POSTS)
+            .map(|i| ((i * 7919) % 101) as f32)
+            .collect();
+        let heights = Heights {
+            columns: TILE_POSTS,
+            rows: TILE_POSTS,
+            step: 1.0,
+            up: &up,
+        };
+        let posts = Posts {
+            heights: &heights,
+            ground: &ground,
+            first: [0, 0],
+        };
+        let ring = ring();
+        for (i, (x, y)) in ring.iter().enumerate() {
+            let own = posts.height(*x, *y).expect("no hole");
+            let coarse = posts.coarse(&ring, i, 4).expect("no hole");
+            // Where the coarse mesh has a corner there is no gap.
+            assert!(i % 4 != 0 || coarse == own, "{i}");
+            let corner = |k: usize| posts.height(ring[k].0, ring[k].1).expect("no hole");
+            let ends = [
+                corner(i / 4 * 4),
+                corner((i / 4 * 4 + 4).min(ring.len() - 1)),
+            ];
+            assert!(
+                (ends[0].min(ends[1])..=ends[0].max(ends[1])).contains(&coarse),
+                "{i}"
+            );
+        }
+        assert_eq!(posts.coarse(&ring, 5, 1), posts.height(5, 0));
+    }
+
+    #[test]
+    fn tiles_that_are_cleared_leave_nothing_in_their_slots() {
+        let (log, layers) = (Log::new(), Layers::default());
+        let ground = Ground::new(&super::super::ground::tests::scene());
+        let mut tiles = Tiles::default();
+        let tile = Tile {
+            slot: 3,
+            index: [1, 2],
+            heights_mm: vec![1.0; TILE_POSTS * TILE_POSTS],
+        };
+        let drawn = tiles
+            .add(&log, &ground, &layers, &tile)
+            .expect("it is drawn");
+        let keys = |entries: &[Entry]| -> BTreeSet<_> {
+            entries.iter().map(|entry| entry.key.clone()).collect()
+        };
+        let cleared = tiles.clear(&log).expect("it is drawn");
+        assert_eq!(keys(&cleared), keys(&drawn));
+        assert!(tiles.shown().is_empty() && tiles.clear(&log).expect("nothing").is_empty());
+    }
+}

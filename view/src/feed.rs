@@ -1,0 +1,119 @@
+//! Messages of `hapterra` from the pipe, drawn and put into the history.
+
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Read, Write as _};
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result, bail};
+use hapterra_view_stream::{Message, VERSION, read};
+use re_log_encoding::Encoder;
+
+use crate::drawing::{Drawing, Entry};
+use crate::history::History;
+
+/// A recording for rerun's own viewer, written beside the page's stream.
+pub struct RrdFile(Encoder<BufWriter<File>>);
+
+impl RrdFile {
+    /// Begins the file.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn create(path: &Path) -> Result<Self> {
+        let named = || format!("cannot write {}", path.display());
+        let file = File::create(path).with_context(named)?;
+        let (version, options) = crate::history::encoding();
+        let encoder = Encoder::new_eager(version, options, BufWriter::new(file));
+        encoder.map(Self).with_context(named)
+    }
+
+    fn put(&mut self, entries: &[Entry]) -> Result<()> {
+        for entry in entries {
+            self.0.append(&entry.message).context("the .rrd file")?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<()> {
+        self.0.finish().context("the .rrd file")?;
+        let mut file = self.0.into_inner().context("the .rrd file")?;
+        file.flush().context("the .rrd file")
+    }
+}
+
+/// How a stream ended.
+pub struct Ended {
+    /// The writer said that there is no more; it was killed where it did not.
+    pub is_told: bool,
+    /// What was wrong with the file for rerun's own viewer. The page goes on without it.
+    pub rrd: Result<()>,
+}
+
+/// Reads until the stream ends, and draws all of it. `on_scene` is called once, when the
+/// first scene is there as a whole: of a recording, when everything is.
+///
+/// # Errors
+/// A stream of another version, or one that is no stream.
+pub fn draw(
+    from: impl Read,
+    history: &Arc<History>,
+    rrd: Option<RrdFile>,
+    on_scene: &mut dyn FnMut(),
+) -> Result<Ended> {
+    let mut from = BufReader::with_capacity(1 << 16, from);
+    let mut drawing: Option<Drawing> = None;
+    let (mut told, mut is_told, mut file) = (false, false, Ok(rrd));
+    greeted(&mut from)?;
+    while let Some(message) = read(&mut from)? {
+        if message == Message::End {
+            is_told = true;
+            break;
+        }
+        let is_felt = matches!(message, Message::Samples(_));
+        if let (Message::Scene(scene), None) = (&message, &drawing) {
+            history.begin(scene.is_live);
+        }
+        let entries = Drawing::take(&mut drawing, message)?;
+        file = file.and_then(|rrd| written(rrd, &entries));
+        history.put(entries)?;
+        let is_live = drawing.as_ref().is_some_and(Drawing::is_live);
+        if is_felt && is_live && !told {
+            told = true;
+            on_scene();
+        }
+    }
+    if let Some(drawing) = &mut drawing {
+        let rest = drawing.finish()?;
+        file = file.and_then(|rrd| written(rrd, &rest));
+        history.put(rest)?;
+    }
+    let rrd = file.and_then(|rrd| rrd.map_or(Ok(()), RrdFile::finish));
+    history.end();
+    if !told && drawing.is_some() {
+        on_scene();
+    }
+    Ok(Ended { is_told, rrd })
+}
+
+fn written(mut rrd: Option<RrdFile>, entries: &[Entry]) -> Result<Option<RrdFile>> {
+    if let Some(rrd) = &mut rrd {
+        rrd.put(entries)?;
+    }
+    Ok(rrd)
+}
+
+fn greeted(from: &mut impl Read) -> Result<()> {
+    match read(from)? {
+        Some(Message::Hello(hello)) if hello.version == VERSION => Ok(()),
+        Some(Message::Hello(hello)) => bail!(
+            "hapterra {} speaks version {} of the viewer's stream, and this is version {VERSION}: build both from one checkout",
+            hello.program,
+            hello.version
+        ),
+        Some(_) => bail!("the stream does not begin with a greeting: is this hapterra's?"),
+        None => bail!(
+            "there is nothing on standard input: hapterra starts this program itself, with `hapterra run|demo|replay --view` or `hapterra view RECORDING`"
+        ),
+    }
+}

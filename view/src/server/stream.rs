@@ -1,0 +1,45 @@
+//! The stream of one page: pieces of a recording, each behind its length.
+//!
+//! A length is four bytes, least significant first. Zero says that the session has ended
+//! and that nothing follows; a stream that ends without it was cut off.
+
+use std::io::{self, Write};
+use std::time::Duration;
+
+use crate::history::{Next, Page};
+
+/// How long nothing may come before the page is told that this program lives, by a
+/// length that no piece has.
+const SIGN_EVERY: Duration = Duration::from_secs(2);
+const SIGN: u32 = u32::MAX;
+
+const HEAD: &str = "HTTP/1.1 200 OK\r\n\
+    Content-Type: application/octet-stream\r\n\
+    X-Content-Type-Options: nosniff\r\n\
+    Cross-Origin-Resource-Policy: same-origin\r\n\
+    Cache-Control: no-store\r\n\
+    Connection: close\r\n\r\n";
+
+/// Tells a page all that is kept and all that comes, until the session ends or the page
+/// goes away or is cut off.
+///
+/// # Errors
+/// When the page has gone away.
+pub(super) fn run(to: &mut dyn Write, page: &Page) -> io::Result<()> {
+    to.write_all(HEAD.as_bytes())?;
+    loop {
+        match page.next(SIGN_EVERY) {
+            Next::Blob(blob) => {
+                to.write_all(&(blob.len() as u32).to_le_bytes())?;
+                to.write_all(&blob)?;
+            }
+            Next::Nothing => to.write_all(&SIGN.to_le_bytes())?,
+            Next::Over => {
+                to.write_all(&0u32.to_le_bytes())?;
+                return to.flush();
+            }
+            Next::Cut => return to.flush(),
+        }
+        to.flush()?;
+    }
+}

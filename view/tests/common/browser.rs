@@ -1,0 +1,262 @@
+//! Chromium without a screen, driven over its debugging pipe.
+
+use std::fs::{File, OpenOptions};
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+/// For one answer of a page that draws in software on a busy machine.
+const ANSWER: Duration = Duration::from_secs(120);
+/// The page's size, px.
+const SIZE: [u32; 2] = [900, 600];
+
+/// The browser that is used: the one that is named, else one on the `PATH`.
+pub fn program() -> Option<PathBuf> {
+    if let Some(named) = std::env::var_os("HAPTERRA_BROWSER") {
+        return Some(named.into());
+    }
+    let names = [
+        "chromium-headless-shell",
+        "chromium",
+        "chromium-browser",
+        "google-chrome",
+    ];
+    let path = std::env::var_os("PATH")?;
+    let folders: Vec<_> = std::env::split_paths(&path).collect();
+    let mut places = names
+        .iter()
+        .flat_map(|name| folders.iter().map(move |f| f.join(name)));
+    places.find(|place| place.is_file())
+}
+
+/// A browser with its pages.
+pub struct Browser {
+    child: Child,
+    to: File,
+    heard: Receiver<Value>,
+    count: u64,
+    /// Requests of pages, by their addresses.
+    pub requests: Vec<String>,
+}
+
+/// A page of a browser.
+#[derive(Clone)]
+pub struct Page {
+    target: String,
+    session: String,
+}
+
+/// Colours of a picture of a page.
+#[derive(Debug)]
+pub struct Colours {
+    /// How many there are.
+    pub count: usize,
+    /// Pixels near each that was asked for.
+    pub near: Vec<usize>,
+    /// A number that differs where pictures do.
+    pub hash: u64,
+}
+
+impl Browser {
+    /// Starts one; `folder` is for what it keeps.
+    pub fn start(program: &Path, folder: &Path) -> Self {
+        let pipes = ["in", "out"].map(|name| folder.join(name));
+        let made = Command::new("mkfifo")
+            .args(&pipes)
+            .status()
+            .expect("mkfifo");
+        assert!(made.success());
+        // Its pipes are the third and fourth file, which only a shell gives it.
+        let line = "exec \"$0\" \"$@\" 3<\"$PIPE_IN\" 4>\"$PIPE_OUT\"";
+        let child = Command::new("sh")
+            .args(["-c", line])
+            .arg(program)
+            .args(["--headless", "--no-sandbox", "--remote-debugging-pipe"])
+            .args(["--use-gl=angle", "--use-angle=swiftshader"])
+            .args(["--enable-unsafe-swiftshader", "--no-first-run"])
+            .arg(format!(
+                "--user-data-dir={}",
+                folder.join("profile").display()
+            ))
+            .env("PIPE_IN", &pipes[0])
+            .env("PIPE_OUT", &pipes[1])
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the browser starts");
+        let to = OpenOptions::new()
+            .write(true)
+            .open(&pipes[0])
+            .expect("a pipe");
+        let from = BufReader::new(File::open(&pipes[1]).expect("a pipe"));
+        let (say, heard) = channel();
+        std::thread::spawn(move || {
+            let texts = from.split(0).map_while(Result::ok);
+            let values = texts.filter_map(|text| serde_json::from_slice(&text).ok());
+            values
+                .into_iter()
+                .try_for_each(|value: Value| say.send(value))
+        });
+        Self {
+            child,
+            to,
+            heard,
+            count: 0,
+            requests: vec![],
+        }
+    }
+
+    fn call(&mut self, method: &str, params: Value, session: Option<&str>) -> Value {
+        let answer = self.ask(method, params, session);
+        assert!(answer.get("error").is_none(), "{method}: {answer}");
+        answer["result"].clone()
+    }
+
+    fn ask(&mut self, method: &str, params: Value, session: Option<&str>) -> Value {
+        self.count += 1;
+        let number = self.count;
+        let mut message = json!({ "id": number, "method": method, "params": params });
+        if let Some(session) = session {
+            message["sessionId"] = session.into();
+        }
+        let mut text = message.to_string().into_bytes();
+        text.push(0);
+        self.to.write_all(&text).expect("the browser reads");
+        let until = Instant::now() + ANSWER;
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            let heard = self.heard.recv_timeout(left);
+            let heard = heard.unwrap_or_else(|_| panic!("no answer to {method}"));
+            if heard["method"] == "Network.requestWillBeSent" {
+                let address = heard["params"]["request"]["url"].as_str();
+                self.requests.push(address.unwrap_or_default().to_owned());
+            }
+            if heard["id"] == number {
+                return heard;
+            }
+        }
+    }
+
+    /// Opens a page.
+    pub fn open(&mut self, address: &str) -> Page {
+        let target = self.call("Target.createTarget", json!({ "url": "about:blank" }), None);
+        let target = target["targetId"].as_str().expect("a page").to_owned();
+        let how = json!({ "targetId": target, "flatten": true });
+        let session = self.call("Target.attachToTarget", how, None);
+        let session = session["sessionId"].as_str().expect("a session").to_owned();
+        let page = Page { target, session };
+        for domain in ["Page.enable", "Network.enable", "Runtime.enable"] {
+            self.call(domain, json!({}), Some(&page.session));
+        }
+        let [width, height] = SIZE;
+        let size =
+            json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
+        self.call(
+            "Emulation.setDeviceMetricsOverride",
+            size,
+            Some(&page.session),
+        );
+        self.call(
+            "Page.navigate",
+            json!({ "url": address }),
+            Some(&page.session),
+        );
+        page
+    }
+
+    /// Loads a page anew.
+    pub fn reload(&mut self, page: &Page) {
+        self.call("Page.reload", json!({}), Some(&page.session));
+    }
+
+    /// Closes a page.
+    pub fn close(&mut self, page: &Page) {
+        self.call(
+            "Target.closeTarget",
+            json!({ "targetId": page.target }),
+            None,
+        );
+    }
+
+    /// The value of an expression in a page.
+    pub fn value(&mut self, page: &Page, expression: &str) -> Value {
+        let what = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
+        let answer = self.call("Runtime.evaluate", what, Some(&page.session));
+        answer["result"]["value"].clone()
+    }
+
+    /// The number that an expression is in a page; none while the page is loaded anew.
+    pub fn number(&mut self, page: &Page, expression: &str) -> Option<f64> {
+        let what = json!({ "expression": expression, "returnByValue": true });
+        let answer = self.ask("Runtime.evaluate", what, Some(&page.session));
+        answer["result"]["result"]["value"].as_f64()
+    }
+
+    /// Takes a picture, as PNG in base 64.
+    pub fn picture(&mut self, page: &Page) -> String {
+        let shot = self.call(
+            "Page.captureScreenshot",
+            json!({ "format": "png" }),
+            Some(&page.session),
+        );
+        shot["data"].as_str().expect("a picture").to_owned()
+    }
+
+    /// The colours of a part of a picture: its place and size in shares of the whole. The
+    /// page itself takes the picture apart.
+    pub fn colours(
+        &mut self,
+        page: &Page,
+        picture: &str,
+        part: [f64; 4],
+        near: &[[u8; 3]],
+    ) -> Colours {
+        let expression = format!(
+            "(async () => {{
+                const image = new Image();
+                image.src = 'data:image/png;base64,{picture}';
+                await image.decode();
+                const [x, y, w, h] = {part:?};
+                const canvas = document.createElement('canvas');
+                const size = [Math.round(w * image.width), Math.round(h * image.height)];
+                [canvas.width, canvas.height] = size;
+                const to = canvas.getContext('2d');
+                to.drawImage(image, -Math.round(x * image.width), -Math.round(y * image.height));
+                const data = to.getImageData(0, 0, ...size).data;
+                const seen = new Set(), wanted = {near:?}, near = wanted.map(() => 0);
+                let hash = 7;
+                for (let i = 0; i < data.length; i += 4) {{
+                    const [r, g, b] = [data[i], data[i + 1], data[i + 2]];
+                    seen.add((r << 16) | (g << 8) | b);
+                    hash = (hash * 31 + r * 7 + g * 5 + b * 3) % 4294967291;
+                    wanted.forEach(([R, G, B], k) => {{
+                        near[k] += Math.abs(r - R) + Math.abs(g - G) + Math.abs(b - B) < 60;
+                    }});
+                }}
+                return {{ count: seen.size, near, hash }};
+            }})()"
+        );
+        let value = self.value(page, &expression);
+        let near = value["near"].as_array().expect("counts");
+        Colours {
+            count: value["count"].as_u64().expect("a count") as usize,
+            near: near
+                .iter()
+                .map(|n| n.as_u64().unwrap_or(0) as usize)
+                .collect(),
+            hash: value["hash"].as_f64().expect("a number") as u64,
+        }
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

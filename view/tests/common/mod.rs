@@ -1,0 +1,132 @@
+//! A viewer that runs, and what it is told.
+#![allow(dead_code)]
+
+pub mod browser;
+pub mod scene;
+
+use std::io::{BufRead, BufReader, Read as _, Write};
+use std::net::TcpStream;
+use std::path::PathBuf;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+use hapterra_view_stream::{Message, write};
+
+/// For what takes long on a busy machine.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A viewer under test. It is killed where it has not ended by itself.
+pub struct Viewer {
+    child: Child,
+    to: Option<ChildStdin>,
+    said: Receiver<String>,
+}
+
+impl Viewer {
+    /// Starts one with options.
+    pub fn start(options: &[&str]) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_hapterra-view"))
+            .args(["--no-browser", "--port", "0"])
+            .args(options)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the viewer starts");
+        let from = BufReader::new(child.stderr.take().expect("a pipe"));
+        let (say, said) = channel();
+        std::thread::spawn(move || {
+            from.lines()
+                .map_while(Result::ok)
+                .try_for_each(|line| say.send(line))
+        });
+        Self {
+            to: child.stdin.take(),
+            child,
+            said,
+        }
+    }
+
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Tells it something; whether it reads.
+    pub fn tell(&mut self, message: &Message) -> bool {
+        let to = self.to.as_mut().expect("the stream is open");
+        write(to, message).is_ok() && to.flush().is_ok()
+    }
+
+    /// Ends the stream.
+    pub fn hang_up(&mut self) {
+        self.to = None;
+    }
+
+    /// The next line that it says.
+    pub fn line(&self) -> String {
+        self.said.recv_timeout(PATIENCE).expect("it says a line")
+    }
+
+    /// Where its page is, as it says.
+    pub fn port(&self) -> u16 {
+        loop {
+            let line = self.line();
+            if let Some((_, port)) = line.rsplit_once(':')
+                && line.starts_with("view ")
+            {
+                return port.trim_matches('/').parse().expect("a port");
+            }
+        }
+    }
+
+    /// Waits for its end; whether it ended well.
+    pub fn end(mut self) -> bool {
+        self.to = None;
+        self.child.wait().expect("it ends").success()
+    }
+
+    /// Memory that it takes, bytes.
+    pub fn memory(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.id()));
+        let status = status.unwrap_or_default();
+        let line = status.lines().find(|line| line.starts_with("VmRSS:"));
+        let kilobytes = line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok());
+        1024 * kilobytes.unwrap_or(0u64)
+    }
+}
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// A request, head and all, and the whole answer.
+pub fn asked(port: u16, request: &str) -> String {
+    let mut line = TcpStream::connect(("127.0.0.1", port)).expect("a connection");
+    line.set_read_timeout(Some(PATIENCE)).expect("a limit");
+    line.write_all(request.as_bytes()).expect("it is read");
+    let mut answer = Vec::new();
+    let _ = line.read_to_end(&mut answer);
+    String::from_utf8_lossy(&answer).into_owned()
+}
+
+/// A folder for one test, empty.
+pub fn folder(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("hapterra-view-{}-{name}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("a folder");
+    folder
+}
+
+/// `hapterra`, as `cargo xtask view --test` names it; none where nobody does.
+pub fn hapterra() -> Option<Command> {
+    let program = std::env::var_os("HAPTERRA")?;
+    let mut command = Command::new(program);
+    command
+        .env("HAPTERRA_VIEW", env!("CARGO_BIN_EXE_hapterra-view"))
+        .stdin(Stdio::null());
+    Some(command)
+}

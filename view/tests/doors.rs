@@ -1,0 +1,180 @@
+//! Who may ask the viewer for what, and that no page does any harm.
+
+mod common;
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+
+use hapterra_view_stream::{Hello, Message};
+
+use common::scene::{batch, greeting, layer, scene};
+use common::{PATIENCE, Viewer, asked};
+
+/// A viewer that shows the beginning of a live session, and its port.
+fn live(options: &[&str]) -> (Viewer, u16) {
+    let mut viewer = Viewer::start(options);
+    let mut held = Vec::new();
+    let messages = [greeting(), scene(true), layer()];
+    for message in messages.iter().chain(&batch(0, 100, &mut held)) {
+        assert!(viewer.tell(message));
+    }
+    let port = viewer.port();
+    (viewer, port)
+}
+
+fn get(port: u16, path: &str, host: &str, more: &str) -> String {
+    asked(
+        port,
+        &format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n{more}Connection: close\r\n\r\n"),
+    )
+}
+
+fn status(answer: &str) -> u16 {
+    let status = answer.split(' ').nth(1).unwrap_or_default();
+    status.parse().unwrap_or(0)
+}
+
+#[test]
+fn foreign_hosts_and_origins_are_refused_and_nothing_can_be_sent() {
+    let (_viewer, port) = live(&[]);
+    let own = format!("127.0.0.1:{port}");
+    let page = get(port, "/", &own, "");
+    assert_eq!(status(&page), 200);
+    assert!(page.contains("default-src 'none'") && page.contains("frame-ancestors 'none'"));
+    assert!(!page.contains("https://"), "the page names another machine");
+    for path in ["/page.js", "/re_viewer.js", "/favicon.ico"] {
+        assert_eq!(status(&get(port, path, &own, "")), 200, "{path}");
+    }
+    for path in ["/nothing", "/../Cargo.toml", "/feed/", "//feed"] {
+        assert_eq!(status(&get(port, path, &own, "")), 404, "{path}");
+    }
+    for host in [
+        "evil.example",
+        &format!("evil.example:{port}"),
+        "127.0.0.1:1",
+    ] {
+        for path in ["/", "/feed", "/page.js"] {
+            assert_eq!(status(&get(port, path, host, "")), 421, "{host} {path}");
+        }
+    }
+    for more in [
+        "Origin: http://evil.example\r\n",
+        "Sec-Fetch-Site: cross-site\r\n",
+    ] {
+        assert_eq!(status(&get(port, "/feed", &own, more)), 403, "{more}");
+    }
+    for method in ["POST", "PUT", "DELETE", "OPTIONS"] {
+        let request = format!(
+            "{method} /feed HTTP/1.1\r\nHost: {own}\r\nContent-Length: 2\r\nConnection: close\r\n\r\nhi"
+        );
+        assert_eq!(status(&asked(port, &request)), 405, "{method}");
+    }
+}
+
+/// Opens the stream, and reads so many bytes of it.
+fn reading(port: u16, bytes: usize) -> TcpStream {
+    let mut line = TcpStream::connect(("127.0.0.1", port)).expect("a connection");
+    line.set_read_timeout(Some(PATIENCE)).expect("a limit");
+    write!(line, "GET /feed HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n").expect("it is read");
+    let mut read = vec![0; bytes];
+    line.read_exact(&mut read).expect("the stream");
+    assert!(read.starts_with(b"HTTP/1.1 200"));
+    line
+}
+
+#[test]
+fn pages_that_come_go_and_hang_hold_nothing_up() {
+    let (mut viewer, port) = live(&[]);
+    let mut held = Vec::new();
+    // One hangs without reading; others come and go.
+    let hanging = reading(port, 200);
+    for round in 1..400u64 {
+        if round % 50 == 0 {
+            drop(reading(port, 20_000));
+        }
+        for message in batch(100 * round, 100 * (round + 1), &mut held) {
+            assert!(viewer.tell(&message), "round {round}");
+        }
+    }
+    drop(hanging);
+    // All of a recording's time is there for whoever comes last, and its end.
+    let mut last = reading(port, 1000);
+    assert!(viewer.tell(&Message::End));
+    let mut rest = Vec::new();
+    last.read_to_end(&mut rest).expect("the stream ends");
+    assert!(rest.ends_with(&[0; 4]), "its end is said");
+    assert!(rest.len() > 100_000, "{}", rest.len());
+}
+
+#[test]
+fn a_stream_of_another_version_or_of_none_is_named() {
+    let mut viewer = Viewer::start(&[]);
+    let other = Message::Hello(Hello {
+        version: 999,
+        program: "9.9".into(),
+    });
+    assert!(viewer.tell(&other));
+    let line = viewer.line();
+    assert!(
+        line.contains("999") && line.contains("build both"),
+        "{line}"
+    );
+    assert!(!viewer.end());
+    let mut viewer = Viewer::start(&[]);
+    viewer.hang_up();
+    assert!(
+        viewer
+            .line()
+            .contains("hapterra starts this program itself")
+    );
+    assert!(!viewer.end());
+}
+
+#[test]
+fn it_ends_by_itself_once_nobody_looks() {
+    let (mut viewer, port) = live(&["--linger", "0.2"]);
+    let page = reading(port, 1000);
+    viewer.hang_up();
+    std::thread::sleep(std::time::Duration::from_millis(100));
+    drop(page);
+    assert!(viewer.end());
+}
+
+#[test]
+fn it_ends_by_itself_where_hapterra_was_killed_and_nobody_ever_looked() {
+    let (mut viewer, _) = live(&[]);
+    // No end is said. Its own patience is 15 s.
+    viewer.hang_up();
+    let began = std::time::Instant::now();
+    assert!(viewer.end());
+    assert!(began.elapsed() < PATIENCE, "{:?}", began.elapsed());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_under_the_rrd_file_leaves_the_page_alone_and_is_told() {
+    let (mut viewer, port) = live(&["--rrd", "/dev/full", "--linger", "0"]);
+    let mut held = Vec::new();
+    for round in 1..100u64 {
+        for message in batch(100 * round, 100 * (round + 1), &mut held) {
+            assert!(viewer.tell(&message), "round {round}");
+        }
+    }
+    assert_eq!(
+        status(&get(port, "/", &format!("127.0.0.1:{port}"), "")),
+        200
+    );
+    assert!(viewer.tell(&Message::End));
+    let line = viewer.line();
+    assert!(
+        line.contains(".rrd") && line.contains("not complete"),
+        "{line}"
+    );
+    assert!(!viewer.end());
+}
+
+#[test]
+fn an_address_that_others_reach_is_warned_of() {
+    let viewer = Viewer::start(&["--bind", "0.0.0.0"]);
+    assert!(viewer.line().contains("warning: other machines"));
+}
