@@ -10,12 +10,15 @@ use crate::board::EMULATED;
 use crate::image;
 use crate::run::{cargo, root, run, say, shown, target_dir, timed};
 use crate::setup::{qemu, toolchain};
+use crate::view;
 
 /// What the user asked for.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Request {
     /// Terrain file; none for one that the demo makes itself.
     pub(crate) file: Option<OsString>,
+    /// Whether it is shown live.
+    pub(crate) view: bool,
     /// Passed on to `hapterra demo` as they are.
     pub(crate) extra: Vec<OsString>,
 }
@@ -46,6 +49,9 @@ pub(crate) fn demo(request: &Request) -> Result<i32> {
     let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
     let mut command = Command::new(target_dir().join("release").join(program));
     command.args(request.words(emulation.as_ref()));
+    if request.view {
+        command.env("HAPTERRA_VIEW", view::build()?);
+    }
     say(format!("running: {}", shown(&command)));
     let status = command
         .status()
@@ -117,6 +123,9 @@ impl Request {
         if self.value("--out").is_none() {
             words.extend(["--out".into(), root().join("demo").into()]);
         }
+        if self.view {
+            words.push("--view".into());
+        }
         words.extend(self.extra.iter().cloned());
         words
     }
@@ -129,6 +138,7 @@ mod tests {
     fn line(file: Option<&str>, extra: &[&str], emulated: bool) -> String {
         let request = Request {
             file: file.map(OsString::from),
+            view: false,
             extra: extra.iter().map(OsString::from).collect(),
         };
         let emulation = Emulation {
@@ -166,11 +176,13 @@ mod tests {
         let words = ["--device=emulated", "--outer", "x", "--out", "y"];
         let request = Request {
             file: None,
+            view: true,
             extra: words.map(OsString::from).into(),
         };
         assert_eq!(request.device().as_deref(), Some("emulated"));
         assert_eq!(request.value("--out").as_deref(), Some("y"));
         assert_eq!(request.value("--seconds"), None);
+        assert!(request.words(None).contains(&OsString::from("--view")));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Licences, bans, sources and advisories of the dependencies, by cargo-deny.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result};
@@ -11,14 +11,7 @@ use crate::run::{cargo, on_path, root, run, say, target_dir};
 /// database can be reached.
 pub(crate) fn check() -> Result<()> {
     let program = ready()?;
-    let deny = |words: &[&str]| {
-        let mut command = Command::new(&program);
-        command
-            .current_dir(root())
-            .args(["--log-level", "error"])
-            .args(words);
-        command
-    };
+    let deny = |words: &[&str]| with(&program, words);
     run(&mut deny(&["check", "bans", "licenses", "sources"]))?;
     let mut fetch = deny(&["fetch", "db"]);
     if run(fetch.stderr(Stdio::null()).stdout(Stdio::null())).is_err() {
@@ -26,6 +19,27 @@ pub(crate) fn check() -> Result<()> {
         return Ok(());
     }
     run(&mut deny(&["check", "--disable-fetch", "advisories"]))
+}
+
+/// Holds another workspace to the same, by its manifest; its advisories are not looked at.
+pub(crate) fn check_workspace(manifest: &str) -> Result<()> {
+    let words = [
+        "--manifest-path",
+        manifest,
+        "check",
+        "--config",
+        "deny.toml",
+    ];
+    run(with(&ready()?, &words).args(["bans", "licenses", "sources"]))
+}
+
+fn with(program: &Path, words: &[&str]) -> Command {
+    let mut command = Command::new(program);
+    command
+        .current_dir(root())
+        .args(["--log-level", "error"])
+        .args(words);
+    command
 }
 
 /// The user's cargo-deny, else one of this workspace's own.

@@ -20,6 +20,7 @@ mod setup;
 mod size;
 mod soak;
 mod test;
+mod view;
 
 use std::process::ExitCode;
 
@@ -31,6 +32,8 @@ cargo xtask COMMAND
 
   demo [FILE] [-- ARGS]  touch a terrain file on the emulated board; without FILE,
                          a terrain made on the spot; ARGS go to `hapterra demo`
+  demo --view [FILE]     the same, live in a browser; builds the viewer, too
+  view [--test]          build the viewer; --test: run its tests, in a browser where there is one
   test [--quick]         all tests, with images, budgets and dependencies;
                          --quick: the emulated board only, no dependencies
   lint                   formatting, clippy and documentation, warnings as errors
@@ -106,6 +109,10 @@ fn command() -> Result<ExitCode> {
                 .map_err(|_| anyhow::anyhow!("say for how many minutes"))?;
             fuzz::fuzz(&target, &minutes.string()?)?;
         }
+        "view" => match flag(&mut words, "test")? {
+            true => view::test()?,
+            false => println!("{}", view::build()?.display()),
+        },
         "flash" => flash::flash(board::by_name(&words.value()?.string()?)?)?,
         plain => {
             if let Some(extra) = words.next()? {
@@ -156,7 +163,7 @@ fn flag(words: &mut lexopt::Parser, name: &str) -> Result<bool> {
     Ok(given)
 }
 
-/// `[FILE] [-- ARGS]`: what follows `--` is not looked at here.
+/// `[--view] [FILE] [-- ARGS]`: what follows `--` is not looked at here.
 fn demo_words(words: &mut lexopt::Parser) -> Result<demo::Request> {
     let mut request = demo::Request::default();
     loop {
@@ -170,6 +177,7 @@ fn demo_words(words: &mut lexopt::Parser) -> Result<demo::Request> {
             Some(_) => {}
         }
         match words.next()? {
+            Some(Long("view")) => request.view = true,
             Some(Value(file)) if request.file.is_none() => request.file = Some(file),
             Some(other) => {
                 let what = other.unexpected();
@@ -199,6 +207,8 @@ mod tests {
         assert_eq!(request.file, Some("a.tif".into()));
         assert_eq!(request.extra, ["--seconds", "3", "--"]);
         assert_eq!(demo(&["--", "b"]).unwrap().file, None);
+        let viewed = demo(&["--view", "a.tif"]).unwrap();
+        assert_eq!((viewed.view, viewed.file), (true, Some("a.tif".into())));
         assert_eq!(demo(&[]).unwrap(), demo::Request::default());
     }
 

@@ -2,6 +2,6 @@
 
 mod distribution;
 pub(crate) mod emulator;
-mod packages;
+pub(crate) mod packages;
 pub(crate) mod qemu;
 pub(crate) mod toolchain;

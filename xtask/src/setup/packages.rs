@@ -26,6 +26,13 @@ pub(crate) const QEMU: Packages = [
     "qemu-system-arm",
     "qemu",
 ];
+/// For the page's own test.
+pub(crate) const BROWSER: Packages = [
+    "chromium-headless-shell",
+    "chromium-headless",
+    "chromium",
+    "",
+];
 pub(crate) const CMAKE_AND_LIBCLANG: Packages = [
     "cmake libclang-dev",
     "cmake clang-devel",

@@ -1,0 +1,87 @@
+//! `cargo xtask view`: the viewer, which is a workspace of its own.
+
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context, Result};
+
+use crate::deny;
+use crate::run::{cargo, on_path, root, run, say, target_dir, timed};
+use crate::setup::packages::{self, found_or_installed};
+
+/// Names the browser that the page is tested with.
+const BROWSER: &str = "HAPTERRA_BROWSER";
+/// What browsers that can be driven are called.
+const BROWSERS: [&str; 5] = [
+    "chromium-headless-shell",
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+];
+
+/// Cargo in the viewer's workspace. What it builds lies beside `hapterra`.
+fn viewers(words: &[&str]) -> Command {
+    let mut command = cargo();
+    command.current_dir(root().join("view")).args(words);
+    command
+}
+
+/// Builds the viewer and gives its path. The first time it takes many minutes.
+pub(crate) fn build() -> Result<PathBuf> {
+    timed(
+        "building the viewer (some ten minutes the first time)",
+        || run(&mut viewers(&["build", "--release", "--locked"])),
+    )?;
+    let program = format!("hapterra-view{}", std::env::consts::EXE_SUFFIX);
+    Ok(target_dir().join("release").join(program))
+}
+
+/// Lints the viewer, holds its dependencies to `deny.toml`, and runs its tests with
+/// `hapterra` beside them; the page's in a browser where there is one or one can be installed.
+/// All of it is here, so that nobody who does not look waits for it.
+pub(crate) fn test() -> Result<()> {
+    timed("linting the viewer", lint)?;
+    timed("checking the viewer's dependencies", || {
+        deny::check_workspace("view/Cargo.toml")
+    })?;
+    // Before the tests: they start it.
+    build()?;
+    timed("building the hapterra command", || {
+        run(cargo().args(["build", "--package", "hapterra", "--bin", "hapterra"]))
+    })?;
+    let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
+    let mut tests = viewers(&["test", "--release", "--locked"]);
+    tests.env("HAPTERRA", target_dir().join("debug").join(program));
+    match browser() {
+        Ok(browser) => drop(tests.env(BROWSER, browser)),
+        Err(why) => say(format!("SKIPPED: the page in a browser: {why:#}")),
+    }
+    timed("running the viewer's tests", || run(&mut tests))
+}
+
+fn browser() -> Result<PathBuf> {
+    if let Some(given) = std::env::var_os(BROWSER) {
+        return Ok(given.into());
+    }
+    let find = || {
+        let found = BROWSERS.iter().find_map(|name| on_path(name));
+        found.context("there is no Chromium on the PATH")
+    };
+    found_or_installed(find, &packages::BROWSER)
+}
+
+/// Formatting and clippy of the viewer.
+fn lint() -> Result<()> {
+    run(&mut viewers(&["fmt", "--check"])).context("type: cd view && cargo fmt")?;
+    let clippy = [
+        "clippy",
+        "--release",
+        "--locked",
+        "--all-targets",
+        "--",
+        "-D",
+        "warnings",
+    ];
+    run(&mut viewers(&clippy))
+}
