@@ -80,9 +80,9 @@ pub(crate) struct Clutch {
     /// Since it was held the terrain was to go with the hand.
     carries: bool,
     /// Share of the force that is let through to a driven arm.
-    share: f32,
+    ramp: f32,
     /// Share that was let through in the last tick.
-    felt: f32,
+    share: f32,
     /// What it says of the last tick.
     limits: Limits,
     /// Most that it may change in a tick: out as when the arm is disarmed.
@@ -98,8 +98,8 @@ impl Clutch {
             host: ClutchHold::LetGo,
             input: false,
             carries: false,
+            ramp: 1.0,
             share: 1.0,
-            felt: 1.0,
             limits: Limits::empty(),
             out: 1.0 / rate.ticks(FADE_MS) as f32,
             back: 1.0 / rate.ticks(IN_MS) as f32,
@@ -172,7 +172,7 @@ impl Clutch {
     /// Share of the force that it lets through: all where it is closed.
     #[inline]
     pub(crate) const fn share(&self) -> f32 {
-        self.felt
+        self.share
     }
 
     /// One tick of a clutch that is not closed, with the tip at a place over the terrain.
@@ -196,9 +196,9 @@ impl Clutch {
         match &mut self.state {
             State::Closed => {}
             State::Opening => {
-                self.share -= self.out;
-                if self.share <= 0.0 {
-                    self.share = 0.0;
+                self.ramp -= self.out;
+                if self.ramp <= 0.0 {
+                    self.ramp = 0.0;
                     let tip_mm = from_home_mm(scene);
                     self.state = State::Open { hip, tip_mm };
                 }
@@ -221,14 +221,14 @@ impl Clutch {
                 }
             }
             State::Closing => {
-                self.share += self.back;
-                if self.share >= 1.0 {
-                    self.share = 1.0;
+                self.ramp += self.back;
+                if self.ramp >= 1.0 {
+                    self.ramp = 1.0;
                     self.state = State::Closed;
                 }
             }
         }
-        self.felt = if drives { self.share } else { 1.0 };
+        self.share = if drives { self.ramp } else { 1.0 };
         self.limits = self.limits_now();
         hip
     }
