@@ -79,6 +79,8 @@ pub(crate) struct Clutch {
     input: bool,
     /// Since it was held the terrain was to go with the hand.
     carries: bool,
+    /// What the terrain has still to go back, relative to the tip, mm.
+    owed_mm: Vec3,
     /// Share of the force that is let through to a driven arm.
     ramp: f32,
     /// Share that was let through in the last tick.
@@ -98,6 +100,7 @@ impl Clutch {
             host: ClutchHold::LetGo,
             input: false,
             carries: false,
+            owed_mm: Vec3::ZERO,
             ramp: 1.0,
             share: 1.0,
             limits: Limits::empty(),
@@ -209,18 +212,21 @@ impl Clutch {
                 }
                 hip = *there;
                 if !is_held && !contact.is_landing() {
-                    let moved_mm = from_home_mm(scene) - *tip_mm;
-                    let stays_mm = match self.carries {
+                    self.owed_mm += from_home_mm(scene) - *tip_mm;
+                    self.owed_mm = match self.carries {
                         true => Vec3::ZERO,
-                        false => moved_mm.clamp_length_max(GIVE_MM),
+                        false => self.owed_mm.clamp_length_max(GIVE_MM),
                     };
-                    let home = scene.home;
-                    let shift = tip.to(&hip) + stays_mm / scene.cell_mm;
-                    scene.home = GridPoint::new(home.cell(), home.frac() + shift);
+                    move_home(scene, tip.to(&hip));
                     self.state = State::Closing;
                 }
             }
             State::Closing => {
+                // With the force, and no faster than a hand: in a leap the proxy would lag.
+                let share = (self.back / (1.0 - self.ramp)).min(1.0);
+                let step_mm = self.owed_mm * share;
+                move_home(scene, step_mm / scene.cell_mm);
+                self.owed_mm -= step_mm;
                 self.ramp += self.back;
                 if self.ramp >= 1.0 {
                     self.ramp = 1.0;
@@ -244,4 +250,9 @@ impl Clutch {
             State::Opening | State::Closing => by.union(Limits::CLUTCH_MOVES),
         }
     }
+}
+
+/// Moves the point that is at the tip in the home pose, cells.
+fn move_home(scene: &mut Scene, shift: Vec3) {
+    scene.home = GridPoint::new(scene.home.cell(), scene.home.frac() + shift);
 }

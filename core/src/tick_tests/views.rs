@@ -193,7 +193,7 @@ fn a_hand_that_goes_far_takes_the_terrain_along_however_the_clutch_is_held() {
     arm.ticks(105);
     go(&mut arm, [0, DEEP[1] + 1_000, 0], 500);
     arm.clutch(LetGo);
-    let back = arm.ticks(3);
+    let back = arm.ticks(510);
     // Cells are millimetres here.
     let kept = hip.to(&back.hip).length();
     assert!((kept - 10.0).abs() < 0.01, "{kept} mm");
