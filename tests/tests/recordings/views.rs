@@ -20,7 +20,7 @@ fn comments(text: &str) -> String {
 }
 
 const COMMANDS: &str = "# while a scripted hand slides\nat 3.8 zoom 1.5\nat 4.7 exaggerate 1.25\n\
-    spin 3\nat 5.5 pan 2 1\nat 6.5 stiffness 0.5\nat 7.5 clutch on\nat 8 clutch off\n";
+    spin 3\nat 5.5 pan 2 1\nat 6.5 stiffness 0.8\nat 7.5 clutch on\nat 8 clutch off\n";
 
 /// What a demo with these commands wrote; what it said.
 fn demo(folder: &Folder) -> String {
@@ -59,7 +59,7 @@ fn a_recording_says_when_and_how_the_view_changed_and_is_felt_again() {
         (panned.cell_mm, panned.level),
         (zoomed.cell_mm, zoomed.level)
     );
-    assert_eq!(softer.stiffness_n_per_mm, 0.25);
+    assert_eq!(softer.stiffness_n_per_mm, 0.4);
     // Rows name their views, in their order, and there are some of each.
     let live = rows(&text);
     let views: Vec<u32> = live
