@@ -181,7 +181,9 @@ impl<'t> Stretch<'t> {
                 epoch: self.scene.epoch.wrapping_add(1),
                 ..self.scene
             }),
-            Kind::HostileCalibration => self.host.request(Request::Disarm),
+            // In a session of its own: a misplaced request before may have had any number, and
+            // in its session the device hears no older one.
+            Kind::HostileCalibration => self.host.greet(self.now, &mut self.chance),
             _ => {}
         }
         let end = mishap.ticks.end + SETTLE;
@@ -218,9 +220,10 @@ impl<'t> Stretch<'t> {
                 let seq = at as u32;
                 self.say(&ToDevice::Point(Point { seq, hip }));
             }
+            Kind::HostileCalibration if at == 30 => self.host.request(Request::Disarm),
             // The force has gone out.
-            Kind::HostileCalibration if at == 150 => self.dead_man = false,
-            Kind::HostileCalibration if at > 150 && left > 0 && at.is_multiple_of(20) => {
+            Kind::HostileCalibration if at == 180 => self.dead_man = false,
+            Kind::HostileCalibration if at > 180 && left > 0 && at.is_multiple_of(20) => {
                 let store = self.chance.below(2) == 0;
                 let calibration = match self.chance.below(5) {
                     0 => hostile::harmless(),
