@@ -125,6 +125,15 @@ fn scale(area: &Area<'_>, top: i32, relief: &Relief) -> Result<i32, PictureError
     label(area, 0, y, &text(low), HPos::Left)?;
     label(area, width / 2, y, &text(0.5 * (low + high)), HPos::Center)?;
     label(area, width, y, &text(high), HPos::Right)?;
+    let (lowest, highest) = relief.ends_mm;
+    if lowest >= low && highest <= high {
+        return Ok(y + px(14));
+    }
+    let y = y + px(24);
+    let clipped = 100.0 * relief::CLIPPED_SHARE;
+    let (lowest, highest) = (text(lowest), text(highest));
+    let note = format!("{clipped} % clipped at each end: {lowest} to {highest} in all");
+    label(area, 0, y, &note, HPos::Left)?;
     Ok(y + px(14))
 }
 

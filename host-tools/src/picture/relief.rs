@@ -54,8 +54,13 @@ pub(super) struct Relief {
     pub(super) rgb: Vec<u8>,
     /// Heights of the first and last tint, mm.
     pub(super) range_mm: (f64, f64),
+    /// The lowest and the highest pixel, mm: what is beyond the tints is clipped.
+    pub(super) ends_mm: (f64, f64),
     pub(super) holes: bool,
 }
+
+/// Share of the pixels that is lower than the first tint, and higher than the last.
+pub(super) const CLIPPED_SHARE: f64 = 0.002;
 
 /// The tint of a height, `t` from 0 (low) to 1 (high).
 pub(super) fn tint(t: f64) -> RGBColor {
@@ -76,7 +81,7 @@ pub(super) fn hole(x: i32, y: i32) -> RGBColor {
 /// Shades a window of a surface into an image.
 pub(super) fn shade(surface: &Surface<'_>, window: &MapView, columns: i32, rows: i32) -> Relief {
     let grid = PixelHeights::sample(surface, window, columns, rows);
-    let range_mm = grid.range();
+    let (range_mm, ends_mm) = grid.ranges();
     let exaggeration = grid.exaggeration();
     let mut rgb = Vec::with_capacity((columns * rows * 3) as usize);
     let mut holes = false;
@@ -99,6 +104,7 @@ pub(super) fn shade(surface: &Surface<'_>, window: &MapView, columns: i32, rows:
         rows,
         rgb,
         range_mm,
+        ends_mm,
         holes,
     }
 }
@@ -175,13 +181,16 @@ impl PixelHeights {
         ]
     }
 
-    /// Heights that nearly all pixels lie between: one spike does not make the
-    /// rest one colour.
-    fn range(&self) -> (f64, f64) {
+    /// Heights that nearly all pixels lie between, so that one spike does not make the
+    /// rest one colour, and those that all lie between.
+    fn ranges(&self) -> ((f64, f64), (f64, f64)) {
         let known = sorted(self.heights.iter().flatten().copied());
-        quantile(&known, 0.002)
-            .zip(quantile(&known, 0.998))
-            .unwrap_or((0.0, 1.0))
+        let between = |clipped: f64| {
+            let low = quantile(&known, clipped);
+            low.zip(quantile(&known, 1.0 - clipped))
+                .unwrap_or((0.0, 1.0))
+        };
+        (between(CLIPPED_SHARE), between(0.0))
     }
 
     fn exaggeration(&self) -> f64 {
@@ -262,6 +271,22 @@ mod tests {
         assert!(relief.holes);
         let RGBColor(r, ..) = hole(50, 50);
         assert_eq!(relief.rgb[(50 * 100 + 50) * 3], r);
+    }
+
+    #[test]
+    fn a_spike_does_not_stretch_the_colours_and_is_told() {
+        let height = |x: f64, y: f64| {
+            let on_spike = x.hypot(y) < 2.0;
+            Some(if on_spike { 900.0 } else { x })
+        };
+        let field = Surface {
+            height_mm: &height,
+            size_mm: [100.0, 100.0],
+            cell_mm: 1.0,
+        };
+        let relief = shade(&field, &MapView::whole(field.size_mm), 100, 100);
+        assert!(relief.range_mm.1 < 101.0, "{:?}", relief.range_mm);
+        assert!(relief.ends_mm.1 > 800.0, "{:?}", relief.ends_mm);
     }
 
     #[test]
