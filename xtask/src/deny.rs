@@ -26,9 +26,9 @@ pub(crate) fn check_workspace(manifest: &str) -> Result<()> {
     let words = [
         "--manifest-path",
         manifest,
-        "check",
         "--config",
         "deny.toml",
+        "check",
     ];
     run(with(&ready()?, &words).args(["bans", "licenses", "sources"]))
 }
