@@ -337,22 +337,8 @@ mod tests {
     use super::*;
     use crate::raster::Raster;
     use crate::terrain::Scale;
-    use std::io;
-    use std::sync::mpsc::{SyncSender, sync_channel};
-
-    /// A pipe that takes nothing before somebody reads.
-    struct Pipe(SyncSender<Vec<u8>>);
-
-    impl Write for Pipe {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            let sent = self.0.send(bytes.to_vec());
-            sent.map(|()| bytes.len()).map_err(io::Error::other)
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-    }
+    use crate::view_feed::pipe::Pipe;
+    use std::sync::mpsc::sync_channel;
 
     fn picture<'p, 't>(terrain: &'p Terrain<'t>) -> Picture<'p, 't> {
         Picture {

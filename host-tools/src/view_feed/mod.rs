@@ -11,6 +11,8 @@
 mod feed;
 mod held_tiles;
 mod layers;
+#[cfg(test)]
+mod pipe;
 mod program;
 mod queue;
 mod scene;

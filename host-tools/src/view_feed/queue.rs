@@ -125,25 +125,12 @@ fn size_of(message: &Message) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::view_feed::pipe::Pipe;
     use hapterra_view_stream::{Hello, Tiles, read};
-    use std::io::{self, Read};
-    use std::sync::mpsc::{SyncSender, sync_channel};
+    use std::io::Read;
+    use std::sync::mpsc::sync_channel;
 
     const SOON: Duration = Duration::from_secs(20);
-
-    /// A pipe that holds one write, then blocks as a pipe does.
-    struct Pipe(SyncSender<Vec<u8>>);
-
-    impl Write for Pipe {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            let sent = self.0.send(bytes.to_vec());
-            sent.map(|()| bytes.len()).map_err(io::Error::other)
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-    }
 
     fn tiles(count: usize) -> Message {
         Message::Tiles(Tiles {

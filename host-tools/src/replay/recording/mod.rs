@@ -17,7 +17,7 @@ use crate::output::{Output, OutputError};
 use crate::terrain::Scale;
 
 /// The columns of every recording that are numbers with a fraction, in their order.
-const NUMBERS: [&str; 10] = [
+pub(super) const NUMBERS: [&str; 10] = [
     "t_s",
     "x_mm",
     "y_mm",
@@ -30,7 +30,7 @@ const NUMBERS: [&str; 10] = [
     "force_z_n",
 ];
 /// The column of every recording that says whether the surface was touched, 0 or 1.
-const CONTACT: &str = "contact";
+pub(super) const CONTACT: &str = "contact";
 /// How many of [`NUMBERS`] stand before [`CONTACT`].
 const BEFORE_CONTACT: usize = 4;
 /// What the name of a Parquet recording ends in.

@@ -11,22 +11,18 @@ use parquet::record::reader::RowIter;
 
 use super::fault::{TrajectoryError, TrajectoryFault};
 use super::{Trajectory, is_parquet};
+use crate::replay::recording::{CONTACT, NUMBERS};
 use crate::replay::{Record, Settings};
 
 /// Columns of a recording by name: time and HIP, then what a trajectory does not have.
-const NAMES: [&str; 11] = [
-    "t_s",
-    "x_mm",
-    "y_mm",
-    "z_mm",
-    "proxy_x_mm",
-    "proxy_y_mm",
-    "proxy_z_mm",
-    "force_x_n",
-    "force_y_n",
-    "force_z_n",
-    "contact",
-];
+const NAMES: [&str; NUMBERS.len() + 1] = {
+    let mut names = [CONTACT; NUMBERS.len() + 1];
+    names
+        .split_at_mut(NUMBERS.len())
+        .0
+        .copy_from_slice(&NUMBERS);
+    names
+};
 
 /// Values of [`NAMES`]; none of columns that there are not.
 type Values = [Option<f64>; NAMES.len()];

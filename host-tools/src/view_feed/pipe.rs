@@ -1,0 +1,18 @@
+//! A pipe for tests.
+
+use std::io::{self, Write};
+use std::sync::mpsc::SyncSender;
+
+/// Blocks once its channel is full, as a pipe does that nobody reads.
+pub(super) struct Pipe(pub(super) SyncSender<Vec<u8>>);
+
+impl Write for Pipe {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let sent = self.0.send(bytes.to_vec());
+        sent.map(|()| bytes.len()).map_err(io::Error::other)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
