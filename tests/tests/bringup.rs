@@ -7,8 +7,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use hapterra::bringup::{
-    Attendant, BringupError, Finding, Identity, Log, Question, Reading, Step, Stopped, Task,
-    VirtualBench, VirtualUser, Walked, walk,
+    Attendant, BenchMistakes, BringupError, Finding, Identity, Log, Question, Reading, Step,
+    Stopped, Task, VirtualBench, VirtualUser, Walked, walk,
 };
 use hapterra::link::{Dialogue, Native};
 use hapterra::phantom::{PhantomModel, Wiring};
@@ -293,8 +293,146 @@ fn a_wrong_ratio_is_named() {
     assert!((record - 11.2).abs() < 1e-4 && (found - 8.96).abs() < 0.1);
 }
 
+/// The step and the finding at which a walk ends whose bench has these mistakes.
+fn found_at(from: Step, mistakes: BenchMistakes) -> (Step, Finding) {
+    found_from(from, wired(Wiring::RIGHT).with_mistakes(mistakes), RECORD)
+}
+
 #[test]
-fn a_missing_amplifier_is_named() {
+fn a_stop_that_is_wired_the_wrong_way_is_named() {
+    let normally_open = BenchMistakes {
+        stop_normally_open: true,
+        ..BenchMistakes::default()
+    };
+    let (step, finding) = found_at(Step::Board, normally_open);
+    assert_eq!(step, Step::Switches);
+    assert_eq!(finding, Finding::NotSeen(Task::ReleaseStop));
+    let for_the_board_alone = BenchMistakes {
+        stop_leaves_power: true,
+        ..BenchMistakes::default()
+    };
+    let (step, finding) = found_at(Step::FirstTouch, for_the_board_alone);
+    assert_eq!(
+        (step, finding),
+        (Step::FirstTouch, Finding::StopLeavesPower)
+    );
+}
+
+#[test]
+fn an_enable_line_without_its_pull_down_is_named() {
+    let floats = BenchMistakes {
+        enable_floats: true,
+        ..BenchMistakes::default()
+    };
+    let (step, finding) = found_at(Step::Board, floats);
+    assert_eq!(
+        (step, finding),
+        (Step::EnableLine, Finding::EnableHigh(3.3))
+    );
+}
+
+#[test]
+fn a_ready_input_that_no_amplifier_drives_is_named() {
+    for axis in 0..3 {
+        let mut mistakes = BenchMistakes::default();
+        mistakes.ready_grounded[axis] = true;
+        let (step, finding) = found_at(Step::Board, mistakes);
+        assert_eq!(step, Step::EnableLine);
+        assert_eq!(finding, Finding::NotSeen(Task::PullReadyWire(axis)));
+        assert!(finding.what_to_do().contains("tied to ground"), "{finding}");
+    }
+}
+
+#[test]
+fn an_output_that_is_off_is_named_where_the_amplifier_gets_it() {
+    for axis in 0..3 {
+        let off = |volts| {
+            let mut mistakes = BenchMistakes::default();
+            mistakes.output_off_v[axis] = volts;
+            mistakes
+        };
+        let (step, finding) = found_at(Step::Board, off(0.5));
+        assert_eq!(step, Step::Outputs);
+        let named = matches!(
+            finding,
+            Finding::Output { axis: found, found: volts, expected, .. }
+                if found == axis + 1 && (volts, expected) == (0.5, 0.0)
+        );
+        assert!(named, "{finding}");
+        // A stage of one-per-cent resistors is not found fault with.
+        let mut log = Log::default();
+        let bench = wired(Wiring::RIGHT).with_mistakes(off(0.3));
+        walked(&mut VirtualUser::at(bench), RECORD, &mut log).expect("to the end");
+    }
+}
+
+#[test]
+fn an_amplifier_that_is_not_there_is_named_before_any_motor_and_if_it_goes_later() {
+    for axis in 0..3 {
+        let mut mistakes = BenchMistakes::default();
+        mistakes.amplifier_missing[axis] = true;
+        for (from, at) in [
+            (Step::Board, Step::EnableLine),
+            (Step::Motor1, Step::Motor1),
+        ] {
+            let (step, finding) = found_at(from, mistakes);
+            assert_eq!(step, at);
+            let not_ready = Blockers::AMPLIFIER_NOT_READY;
+            assert_eq!(finding, Finding::NotReady(not_ready), "{finding}");
+        }
+    }
+}
+
+/// Has amplifiers that do not say whether they are ready.
+struct WithoutReady(VirtualUser);
+
+impl Attendant for WithoutReady {
+    fn hear(&mut self, line: &str) {
+        self.0.hear(line);
+    }
+
+    fn begin(&mut self, task: Task) {
+        self.0.begin(task);
+    }
+
+    fn finish(&mut self, task: Task) -> Result<(), Stopped> {
+        self.0.finish(task)
+    }
+
+    fn read(&mut self, reading: Reading) -> Result<f64, Stopped> {
+        self.0.read(reading)
+    }
+
+    fn confirms(&mut self, question: Question) -> Result<bool, Stopped> {
+        match question {
+            Question::ReadyIsWired => Ok(false),
+            question => self.0.confirms(question),
+        }
+    }
+}
+
+#[test]
+fn amplifiers_that_do_not_say_whether_they_are_ready_are_noted() {
+    let mistakes = BenchMistakes {
+        ready_grounded: [true; 3],
+        ..BenchMistakes::default()
+    };
+    let bench = wired(Wiring::RIGHT).with_mistakes(mistakes);
+    let mut user = WithoutReady(VirtualUser::at(bench));
+    let mut log = Log::default();
+    let device = user.0.device(RECORD);
+    let ended = walked_once(&mut user, device, &mut log).expect("to the enable line");
+    assert_eq!(ended, Walked::BoardWasOff);
+    let last = log.entries.last().expect("an entry");
+    assert_eq!(last.step, Step::EnableLine);
+    assert!(
+        last.result.starts_with("no ready line is wired"),
+        "{last:?}"
+    );
+}
+
+#[test]
+fn a_motor_that_does_not_push_is_named() {
     for (axis, step) in [Step::Motor1, Step::Motor2, Step::Motor3]
         .into_iter()
         .enumerate()

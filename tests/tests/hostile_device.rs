@@ -171,6 +171,17 @@ fn nothing_that_a_device_asks_for_floods_the_terminal() {
     let why = String::from_utf8_lossy(&refused.stderr);
     is_plain(&why);
     assert!(why.contains("was not brought up"), "{why}");
+    // Nor is its arm a virtual one because somebody says so.
+    for more in [
+        &["--plant", "tcp:127.0.0.1:1"][..],
+        &["--plant", "tcp:127.0.0.1:1", "--unchecked"],
+    ] {
+        let refused = run(more);
+        assert!(!refused.status.success(), "{refused:?}");
+        let why = String::from_utf8_lossy(&refused.stderr);
+        is_plain(&why);
+        assert!(why.contains("is a real board"), "{why}");
+    }
     let said = said(&run(&["--unchecked"]));
     is_plain(&said);
     let lines = said.lines().count();

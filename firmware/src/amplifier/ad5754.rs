@@ -2,7 +2,7 @@
 //! 12- and 14-bit relatives (Analog Devices, data sheet rev. G).
 //!
 //! The BIN/2sCOMP pin is tied to ground (two's complement) and LDAC too (each
-//! write takes effect at once); CLR is tied high. A frame has 24 bits: read or write in bit 23,
+//! write takes effect at once); CLR goes to the chip's reset. A frame has 24 bits: read or write in bit 23,
 //! the register in bits 21-19, the channel in bits 18-16, then the value. Outputs A, B and C
 //! command axes 1 to 3; D stays powered down.
 //!

@@ -57,6 +57,10 @@ pub enum Task {
     PullStopWire,
     /// Connect the wire again.
     ConnectStopWire,
+    /// Pull the ready wire of an amplifier (0 to 2) off the board.
+    PullReadyWire(usize),
+    /// Connect it again.
+    ConnectReadyWire(usize),
     /// Press the dead-man switch and hold it.
     PressDeadMan,
     /// Let it go.
@@ -90,6 +94,10 @@ impl fmt::Display for Task {
             Self::ReleaseStop => f.write_str("release the emergency stop"),
             Self::PullStopWire => f.write_str("pull one wire of the emergency stop off the board"),
             Self::ConnectStopWire => f.write_str("connect the wire again"),
+            Self::PullReadyWire(axis) => {
+                write!(f, "pull ready wire {} off the board", axis + 1)
+            }
+            Self::ConnectReadyWire(axis) => write!(f, "connect ready wire {} again", axis + 1),
             Self::PressDeadMan => f.write_str("press the dead-man switch and hold it"),
             Self::ReleaseDeadMan => f.write_str("let the dead-man switch go"),
             Self::ZeroPose => f.write_str(
@@ -179,7 +187,7 @@ impl fmt::Display for Reading {
                 unit,
             } => write!(
                 f,
-                "{unit} at output {}, held at {:+.0} % of full scale?",
+                "{unit}, output {}, held at {:+.0} % of full scale?",
                 axis + 1,
                 100.0 * fraction
             ),
@@ -197,6 +205,10 @@ impl fmt::Display for Reading {
 /// Something to say yes or no to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Question {
+    /// Whether the amplifiers' ready outputs are wired to the board.
+    ReadyIsWired,
+    /// Whether the pressed stop takes the power from the amplifiers.
+    StopTakesPower,
     /// Whether the floor pushed the tip back up.
     PushedBack,
 }
@@ -204,6 +216,12 @@ pub enum Question {
 impl fmt::Display for Question {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::ReadyIsWired => f.write_str(
+                "are the amplifiers' ready outputs wired to the board, their logic supplied?",
+            ),
+            Self::StopTakesPower => f.write_str(
+                "the stop still pressed: are the amplifiers' power stages without power?",
+            ),
             Self::PushedBack => f.write_str("did the floor push the tip up, and only up?"),
         }
     }

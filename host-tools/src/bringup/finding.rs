@@ -146,6 +146,9 @@ pub enum Finding {
         /// How fast, mm/s.
         mm_s: f64,
     },
+    /// The pressed stop leaves the amplifiers their power.
+    #[error("the pressed stop leaves the amplifiers' power stages their power")]
+    StopLeavesPower,
     /// The floor does not push, or not up.
     #[error("the floor does not push the tip back")]
     NoFloor,
@@ -166,9 +169,12 @@ impl Finding {
                 "check the amplifier's full scale against the board's page, then the torque constant of the motor's data sheet"
             }
             Self::NotReady(_) | Self::Refused(_) => "look at hapterra status",
+            Self::NotSeen(Task::PullReadyWire(_) | Task::ConnectReadyWire(_)) => {
+                "check that the amplifier is there, that its logic has power, and that its ready output is low while it is ready; an input that is tied to ground belongs to an amplifier without such an output"
+            }
             Self::NotSeen(_) => "check the switch's wires against the board's page",
             Self::EnableHigh(_) => "add the pull-down at the amplifiers; go no further before it is low",
-            Self::Output { .. } => "check the output's wire and its offset stage; no amplifier is switched on before it is right",
+            Self::Output { .. } => "check the output's wire and its offset stage, which gets 1.65 V for no current from a G474; no amplifier is switched on before it is right",
             Self::DeadEncoder { .. } => "check the encoder's supply, both its channels, and its plug",
             Self::SwappedEncoders { .. } => "exchange the two encoders' wires",
             Self::CountsLost { .. } => "check the encoder's level shifter, its shield and its ground",
@@ -178,8 +184,11 @@ impl Finding {
             Self::Ruler(_) => "measure again, along the ruler; if it stays so, calibrate: hapterra calibrate",
             Self::SwappedMotors { .. } => "exchange the two motors' plugs, or the two commands",
             Self::NoPush { .. } => "check that the amplifier is there, has power and its enable, then fuse and motor cable",
-            Self::Unclear { .. } => "hold the tip more loosely and as still as you can, and try again",
+            Self::Unclear { .. } => {
+                "hold the tip more loosely and as still as you can, and try again; if it stays so, a current may flow that nobody commands: measure the command at the amplifier again (--again-from outputs)"
+            }
             Self::Drifts { .. } | Self::MovesByItself { .. } => "measure the arm's weight again: hapterra calibrate --skip-ratios",
+            Self::StopLeavesPower => "wire the stop's second contact into the supply of the power stages; the board alone is not to be relied on",
             Self::NoFloor => "report it with the log; do not go on to terrain",
         }
         .into()

@@ -29,6 +29,6 @@ pub use finding::Finding;
 pub use halt::Halt;
 pub use log::{Entry, Identity, Log, LogError};
 pub use step::Step;
-pub use virtual_bench::VirtualBench;
+pub use virtual_bench::{BenchMistakes, VirtualBench};
 pub use virtual_user::VirtualUser;
 pub use walk::{BringupError, Walked, walk};

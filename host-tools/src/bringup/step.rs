@@ -12,7 +12,7 @@ pub enum Step {
     Board,
     /// Emergency stop and dead-man switch, each in both positions.
     Switches,
-    /// The enable line is low, whatever becomes of the board.
+    /// The ready lines are seen; the enable line is low, whatever becomes of the board.
     EnableLine,
     /// The command outputs follow, with the amplifiers off.
     Outputs,
@@ -66,7 +66,7 @@ impl Step {
         match self {
             Self::Board => "the board answers",
             Self::Switches => "emergency stop and dead-man switch",
-            Self::EnableLine => "enable line",
+            Self::EnableLine => "ready lines and enable line",
             Self::Outputs => "command outputs, amplifiers off",
             Self::Encoders => "encoders, by hand",
             Self::Calibration => "calibration, against a ruler",
@@ -85,7 +85,7 @@ impl Step {
             Self::Board => Some("nothing is connected to the board but USB"),
             Self::Switches => Some("connect the emergency stop and the dead-man switch"),
             Self::EnableLine => Some(
-                "connect the enable line to the amplifiers, with its pull-down; their power stages stay off, no motor is connected",
+                "connect the enable line to the amplifiers, with its pull-down, and their ready lines; their power stages stay off, no motor is connected",
             ),
             Self::Outputs => {
                 Some("connect the command outputs to the amplifiers; power stages off")

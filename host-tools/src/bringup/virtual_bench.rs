@@ -41,6 +41,23 @@ pub(super) enum Grip {
     Scale,
 }
 
+/// What is wrong between the board and its amplifiers and switches.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BenchMistakes {
+    /// A command at its amplifier's input is off by so many volts.
+    pub output_off_v: [f64; 3],
+    /// The enable line has no pull-down: it is high when nobody drives it.
+    pub enable_floats: bool,
+    /// The stop is a normally open one: pressed it closes its contact, and so does no wire.
+    pub stop_normally_open: bool,
+    /// The stop's second contact is not in the supply of the power stages.
+    pub stop_leaves_power: bool,
+    /// The amplifier is not there, or has no power: it pushes nothing, and says nothing.
+    pub amplifier_missing: [bool; 3],
+    /// The ready input is tied to ground instead of to its amplifier.
+    pub ready_grounded: [bool; 3],
+}
+
 /// An arm, its wires, and the hand on it.
 pub struct VirtualBench {
     plant: Plant,
@@ -51,6 +68,11 @@ pub struct VirtualBench {
     speed_m_s: f64,
     pub(super) dead_man: bool,
     pub(super) stop: bool,
+    /// Whether the stop's wire is off the board.
+    pub(super) stop_wire_off: bool,
+    /// Whether each ready wire is off the board.
+    pub(super) ready_wire_off: [bool; 3],
+    mistakes: BenchMistakes,
     drive: Drive,
     /// Fastest that each joint has turned since the amplifiers first came on, while they
     /// were on or had been within a tenth of a second, rad/s.
@@ -73,10 +95,20 @@ impl VirtualBench {
             speed_m_s: LEAD_M_S,
             dead_man: false,
             stop: false,
+            stop_wire_off: false,
+            ready_wire_off: [false; 3],
+            mistakes: BenchMistakes::default(),
             drive: Drive::default(),
             fastest_rad_s: [0.0; 3],
             since_on_ticks: u32::MAX,
         }
+    }
+
+    /// The same bench with these mistakes.
+    #[must_use]
+    pub const fn with_mistakes(mut self, mistakes: BenchMistakes) -> Self {
+        self.mistakes = mistakes;
+        self
     }
 
     /// One tick: the amplifiers got `drive`; what encoders and switches say after it.
@@ -87,18 +119,36 @@ impl VirtualBench {
         self.at_m += step;
         self.plant
             .aim(self.at_m.to_array(), (step / TICK_S).to_array());
-        let commands_a = match drive.enabled {
+        let mut commands_a = match drive.enabled {
             true => drive.currents_a.to_array().map(f64::from),
             false => [0.0; 3],
         };
+        for (command_a, missing) in commands_a.iter_mut().zip(self.mistakes.amplifier_missing) {
+            *command_a *= f64::from(u8::from(!missing));
+        }
         let counts = self.plant.step(self.wiring.currents_a(commands_a), TICK_S);
         self.watch(drive.enabled);
         Sense {
             counts: self.wiring.counts(counts),
             dead_man: self.dead_man,
-            emergency_stop: self.stop,
+            emergency_stop: self.stop_reads_pressed(),
+            amplifier_not_ready: self.not_ready(),
             ..Sense::default()
         }
+    }
+
+    /// What the board sees of the stop: an open contact.
+    fn stop_reads_pressed(&self) -> bool {
+        let closed = self.stop == self.mistakes.stop_normally_open;
+        self.stop_wire_off || !closed
+    }
+
+    /// Whether a ready input is high: pulled up, and nobody pulls it down.
+    fn not_ready(&self) -> bool {
+        (0..3).any(|axis| {
+            let silent = self.mistakes.amplifier_missing[axis] || self.ready_wire_off[axis];
+            silent && !self.mistakes.ready_grounded[axis]
+        })
     }
 
     fn watch(&mut self, on: bool) {
@@ -165,11 +215,21 @@ impl VirtualBench {
 
     /// What a meter shows at an output, V.
     pub(super) fn output_v(&self, axis: usize) -> f64 {
-        FULL_V * f64::from(self.drive.held[axis])
+        FULL_V * f64::from(self.drive.held[axis]) + self.mistakes.output_off_v[axis]
     }
 
-    /// What a meter shows at the enable line, V.
-    pub(super) fn enable_v(&self) -> f64 {
-        if self.drive.enabled { 3.3 } else { 0.0 }
+    /// What a meter shows at the enable line, V, where the board drives it or not.
+    pub(super) fn enable_v(&self, driven: bool) -> f64 {
+        let high = if driven {
+            self.drive.enabled
+        } else {
+            self.mistakes.enable_floats
+        };
+        if high { 3.3 } else { 0.0 }
+    }
+
+    /// Whether the power stages have power.
+    pub(super) fn has_power(&self) -> bool {
+        !self.stop || self.mistakes.stop_leaves_power
     }
 }

@@ -79,8 +79,12 @@ impl VirtualUser {
         let home_m = bench.home_m();
         match task {
             Task::Wire(_) => {}
-            Task::PressStop | Task::PullStopWire => bench.stop = true,
-            Task::ReleaseStop | Task::ConnectStopWire => bench.stop = false,
+            Task::PressStop => bench.stop = true,
+            Task::ReleaseStop => bench.stop = false,
+            Task::PullStopWire => bench.stop_wire_off = true,
+            Task::ConnectStopWire => bench.stop_wire_off = false,
+            Task::PullReadyWire(axis) => bench.ready_wire_off[axis] = true,
+            Task::ConnectReadyWire(axis) => bench.ready_wire_off[axis] = false,
             Task::PressDeadMan => bench.dead_man = true,
             Task::ReleaseDeadMan => bench.dead_man = false,
             Task::ZeroPose => {
@@ -114,8 +118,7 @@ impl VirtualUser {
     fn reads(&self, reading: Reading) -> f64 {
         let bench = self.bench.borrow();
         match reading {
-            Reading::EnableVolts(BoardIs::Running) => bench.enable_v(),
-            Reading::EnableVolts(_) => 0.0,
+            Reading::EnableVolts(is) => bench.enable_v(is == BoardIs::Running),
             Reading::Output { axis, .. } => bench.output_v(axis),
             Reading::MovedMm(direction, _) => {
                 1e3 * direction.unit().dot(bench.tip_m() - self.before_m)
@@ -156,6 +159,8 @@ impl Attendant for VirtualUser {
 
     fn confirms(&mut self, question: Question) -> Result<bool, Stopped> {
         let yes = match question {
+            Question::ReadyIsWired => true,
+            Question::StopTakesPower => !self.bench.borrow().has_power(),
             Question::PushedBack => self.felt_n > FELT_N,
         };
         (self.says)(&format!(

@@ -12,7 +12,7 @@ use hapterra_core::scene::Scene;
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::session::{DEFAULT_SILENCE_S, SILENCE_S};
 
-use super::bringup::required::brought_up;
+use super::bringup::required::{brought_up, drives_no_arm};
 use super::failure::{Failure, OrHint};
 use super::met_device::calibration_of;
 use super::options::placing::{self, Placing};
@@ -203,13 +203,9 @@ fn serve(
     (recording, commands): (Option<Recording>, CommandQueue),
     shown: Option<ToBeShown<'_>>,
 ) -> Result<(), Failure> {
-    let is_checked = !is_scripted(args) && !args.unchecked;
     let service = service(args, placed);
     interrupt::board_may_be_armed(true);
-    let opened = service.open(|line| match (met, is_checked) {
-        (Ok(()), true) => brought_up(line),
-        (met, _) => met,
-    });
+    let opened = service.open(|line| met.and_then(|()| fit_to_serve(args, line)));
     // Where it could not be opened, what has to be told is told.
     let (served, device) = opened.inspect_err(|_| interrupt::board_may_be_armed(false))?;
     let how = session_summary::in_words(placed.terrain);
@@ -259,6 +255,19 @@ fn serve(
         shown.end(say);
     }
     ended.and(kept)
+}
+
+/// Whether a device may be served: a real board was brought up, and one that is given a
+/// virtual arm drives no real one.
+fn fit_to_serve(args: &Args, line: &mut dyn Transport) -> Result<(), Failure> {
+    match (&args.plant, &args.device) {
+        (_, DeviceAddress::Native) => Ok(()),
+        // Whatever else is said: its zero pose would be taken for known, and its lines for
+        // an arm that hurts nobody.
+        (Some(_), _) => drives_no_arm(line),
+        (None, _) if args.unchecked => Ok(()),
+        (None, _) => brought_up(line),
+    }
 }
 
 /// What is served, and to which device.

@@ -2,6 +2,7 @@
 
 mod encoders;
 mod gravity;
+mod lines;
 mod motors;
 mod outputs;
 mod plane;
@@ -36,7 +37,7 @@ pub(super) fn go(
     match step {
         Step::Board => answers(board),
         Step::Switches => switches::both_positions(board, attendant),
-        Step::EnableLine => outputs::enable_line(attendant),
+        Step::EnableLine => lines::ready_and_enable(board, attendant),
         Step::Outputs => outputs::held(board, attendant),
         Step::Encoders => encoders::by_hand(board, attendant),
         Step::Calibration => ruler::check(board, attendant),

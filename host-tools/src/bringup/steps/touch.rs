@@ -58,11 +58,15 @@ pub(super) fn soft_plane(
     board.trips(attendant, Task::PressStop, Fault::EmergencyStop)?;
     let released = |s: &hapterra_core::wire::status::Status| !s.health.sense.dead_man;
     board.see(attendant, Task::ReleaseDeadMan, released)?;
+    board.leave()?;
+    // Asked with the arm disarmed: a board whose host waits for an answer is on its own.
+    if !attendant.confirms(Question::StopTakesPower)? {
+        return Err(Finding::StopLeavesPower.into());
+    }
     board.see(attendant, Task::ReleaseStop, |s| {
         !s.health.sense.emergency_stop
     })?;
     board.leave()?;
-    // Asked with the amplifiers off: a board whose host waits for an answer is on its own.
     if !attendant.confirms(Question::PushedBack)? {
         return Err(Finding::NoFloor.into());
     }

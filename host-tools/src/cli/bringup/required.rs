@@ -8,6 +8,7 @@ use super::PATIENCE;
 use crate::board::BOARDS;
 use crate::bringup::{Identity, Log, Step};
 use crate::cli::failure::Failure;
+use crate::cli::options::device::EMULATED_PATIENCE;
 use crate::link::{Dialogue, Transport, shown};
 
 /// Asks the device who it is, and refuses a real board whose log is not complete. The
@@ -25,10 +26,28 @@ pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Fa
             let (board, number, title) = (shown(&device.board), step.number(), step.title());
             let serial = device.serial;
             return Err(Failure::new(format!(
-                "{board} {serial} was not brought up with this firmware and calibration: step {number} ({title}) is not passed"
+                "{board} {serial} was not brought up with this version of its firmware and this calibration: step {number} ({title}) is not passed"
             ))
             .hint("type hapterra bringup; or, if you know what you do, say --unchecked"));
         }
+    }
+    Ok(dialogue.end()?)
+}
+
+/// Asks the device who it is, and refuses one that may drive a real arm. The device keeps
+/// what it holds.
+///
+/// # Errors
+/// It may; no answer.
+pub(in crate::cli) fn drives_no_arm(transport: &mut dyn Transport) -> Result<(), Failure> {
+    let dialogue = Dialogue::look(Box::new(transport), EMULATED_PATIENCE)?;
+    let board = &dialogue.device().board;
+    if is_real(board) {
+        let board = shown(board);
+        return Err(Failure::new(format!(
+            "{board} is a real board: its arm is not the virtual one that --plant moves"
+        ))
+        .hint("leave --plant out; it is for a board that QEMU emulates"));
     }
     Ok(dialogue.end()?)
 }

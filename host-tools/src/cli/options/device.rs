@@ -14,7 +14,7 @@ use crate::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script};
 /// How long a real device may take to answer.
 const PATIENCE: Duration = Duration::from_secs(4);
 /// How long an emulated board may take to answer, on a busy machine.
-const EMULATED_PATIENCE: Duration = Duration::from_secs(60);
+pub(in crate::cli) const EMULATED_PATIENCE: Duration = Duration::from_secs(60);
 
 /// A device by the name that the command line gives it.
 #[derive(Clone, Debug, PartialEq, Eq)]

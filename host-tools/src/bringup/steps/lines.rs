@@ -1,0 +1,59 @@
+//! The amplifiers' ready lines, and the enable line with a meter.
+
+use hapterra_core::guard::Blockers;
+use hapterra_core::wire::status::Status;
+
+use super::{Board, Halt};
+use crate::bringup::attendant::{Attendant, BoardIs, Question, Reading, Task};
+use crate::bringup::finding::Finding;
+
+/// What is below this is low for every amplifier's enable input, V.
+const LOW_V: f64 = 0.8;
+
+/// Has each ready wire pulled, and the enable line measured. The board is without power at
+/// its end.
+pub(super) fn ready_and_enable(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+) -> Result<String, Halt> {
+    let ready = match attendant.confirms(Question::ReadyIsWired)? {
+        true => ready_lines(board, attendant)?,
+        false => "no ready line is wired",
+    };
+    Ok(format!("{ready}; {}", enable_line(attendant)?))
+}
+
+/// Has each ready wire pulled: an input that reads as ready without one tells nothing.
+fn ready_lines(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+) -> Result<&'static str, Halt> {
+    let not_ready = |status: &Status| {
+        let blockers = status.health.report.blockers;
+        blockers.contains(Blockers::AMPLIFIER_NOT_READY)
+    };
+    if not_ready(&board.look()?) {
+        return Err(Finding::NotReady(Blockers::AMPLIFIER_NOT_READY).into());
+    }
+    for axis in 0..3 {
+        board.see(attendant, Task::PullReadyWire(axis), not_ready)?;
+        let ready = |status: &Status| !not_ready(status);
+        board.see(attendant, Task::ConnectReadyWire(axis), ready)?;
+    }
+    Ok("each ready line seen ready and with its wire off")
+}
+
+fn enable_line(attendant: &mut dyn Attendant) -> Result<String, Halt> {
+    let mut told = Vec::new();
+    for is in [BoardIs::Running, BoardIs::InReset, BoardIs::Unplugged] {
+        let volts = attendant.read(Reading::EnableVolts(is))?;
+        if volts.is_nan() || volts.abs() > LOW_V {
+            return Err(Finding::EnableHigh(volts).into());
+        }
+        told.push(format!("{volts:.2} V"));
+    }
+    Ok(format!(
+        "enable at {} running, in reset, unplugged",
+        told.join(", ")
+    ))
+}
