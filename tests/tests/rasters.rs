@@ -301,7 +301,7 @@ fn a_large_file_is_held_once_in_its_own_type() {
     };
     let raster = open(&path);
     assert_eq!((raster.columns(), raster.rows()), (10_800, 6_000));
-    assert_eq!(raster.samples().bytes(), 2 * 10_800 * 6_000);
+    assert_eq!(raster.memory_bytes(), 2 * 10_800 * 6_000);
     assert_eq!(raster.summary().highest, 8752.0);
     // Everest is at 27.99° north, 86.93° east; the tile is 0-50° north, 0-90° east.
     let near = (10_420..10_440).flat_map(|column| (3350..3370).map(move |row| (column, row)));
@@ -316,6 +316,47 @@ fn a_large_file_is_held_once_in_its_own_type() {
         row[4..].iter().all(|height| height.is_nan()),
         "outside is no surface"
     );
+}
+
+/// Left in their files and read in blocks, all TIFFs are the same as in memory.
+#[test]
+fn every_tiff_reads_the_same_in_blocks_as_at_once() {
+    let folders = ["dem/real", "dem/variants", "dem/tiff_ok"];
+    let Some(folders) = folders.map(shared).into_iter().collect::<Option<Vec<_>>>() else {
+        return;
+    };
+    let in_blocks = OpenOptions {
+        most_in_memory_bytes: 0,
+        ..OpenOptions::default()
+    };
+    let mut files = 0;
+    for folder in folders {
+        for entry in std::fs::read_dir(folder).expect("folder") {
+            let path = entry.expect("entry").path();
+            if path.extension().is_none_or(|extension| extension != "tif") {
+                continue;
+            }
+            let Ok(held) = Raster::open(&path, &OpenOptions::default()) else {
+                continue;
+            };
+            let blocks = Raster::open(&path, &in_blocks).expect("the same file");
+            let name = path.display();
+            assert!(
+                held.samples().is_some() && blocks.samples().is_none(),
+                "{name}"
+            );
+            assert_eq!(held.bounds(), blocks.bounds(), "{name}");
+            let mut rows = [(); 2].map(|()| vec![0.0; held.columns() as usize + 3]);
+            for row in 0..=held.rows() {
+                held.copy_row(0, row, 0, &mut rows[0]);
+                blocks.copy_row(0, row, 0, &mut rows[1]);
+                let same = |(a, b): (&f64, &f64)| a == b || (a.is_nan() && b.is_nan());
+                assert!(rows[0].iter().zip(&rows[1]).all(same), "{name}: row {row}");
+            }
+            files += 1;
+        }
+    }
+    assert!(files > 20, "{files}");
 }
 
 #[test]

@@ -74,8 +74,14 @@ struct FileReport {
     /// In the file's vertical unit.
     lowest: f64,
     highest: f64,
+    /// Among the samples that were looked at.
     no_data: u64,
-    /// Bytes the samples take on the host.
+    /// Samples that range and number of holes are from: all, or fewer where the raster
+    /// stays in its file.
+    looked_at: u64,
+    /// Whether that is all of them.
+    known_whole: bool,
+    /// Bytes the samples take on the host, at most.
     bytes: usize,
     levels: Vec<Level>,
     remarks: Vec<String>,
@@ -136,14 +142,15 @@ impl FileReport {
             lowest: summary.lowest,
             highest: summary.highest,
             no_data: summary.holes,
-            bytes: raster.samples().bytes(),
+            looked_at: summary.looked_at,
+            known_whole: raster.is_known_whole(),
+            bytes: raster.memory_bytes(),
             levels: levels(grid.columns(), grid.rows()),
             remarks: raster.remarks().to_vec(),
         }
     }
 
     fn text(&self) -> String {
-        let samples = u64::from(self.columns) * u64::from(self.rows);
         let mut text = String::new();
         let mut line = |name: &str, value: String| {
             // Writing to a String cannot fail.
@@ -169,14 +176,25 @@ impl FileReport {
         );
         let cell = self.cell.as_ref();
         line("cell", cell.map_or("unknown".into(), Cell::text));
-        line("heights", format!("{} to {}", self.lowest, self.highest));
+        let looked = match self.known_whole {
+            true => String::new(),
+            false => format!(
+                " among {} samples looked at: the rest is read where it is touched",
+                self.looked_at
+            ),
+        };
+        line(
+            "heights",
+            format!("{} to {}{looked}", self.lowest, self.highest),
+        );
         line("vertical", self.vertical.text());
-        let share = 100.0 * self.no_data as f64 / samples as f64;
+        let share = 100.0 * self.no_data as f64 / self.looked_at as f64;
         line(
             "no data",
-            format!("{} samples ({share:.2} %)", self.no_data),
+            format!("{} samples ({share:.2} %){looked}", self.no_data),
         );
-        line("memory", format!("{} bytes", self.bytes));
+        let at_most = if self.known_whole { "" } else { "at most " };
+        line("memory", format!("{at_most}{} bytes", self.bytes));
         for level in &self.levels {
             line(&format!("level {}", level.level), level.text());
         }

@@ -227,8 +227,11 @@ fn heights(grid: &FeltGrid<'_>, [west, south, east, north]: Sides) -> Option<[f6
             (from.floor() + share * (to.ceil() - from.floor())).round() as u32
         })
     };
+    let apart = (east - west).max(north - south) / f64::from(LOOKS);
+    let level = grid.raster().level_for(apart);
     let known = along(south, north)
-        .flat_map(|row| along(west, east).map(move |column| grid.height(column, row)))
+        .flat_map(|row| along(west, east).map(move |column| (column >> level, row >> level)))
+        .map(|(column, row)| grid.height(level, column, row))
         .filter(|height| !height.is_nan());
     known.fold(None, |range: Option<[f64; 2]>, height| {
         let [low, high] = range.unwrap_or([height; 2]);

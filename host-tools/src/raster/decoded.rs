@@ -1,9 +1,11 @@
 //! What a decoder hands over, and what every format's result must satisfy.
 
+use super::blocks::Survey;
 use super::crs::{ReferenceSystem, Vertical};
 use super::geometry::CellSize;
 use super::place::Place;
-use super::samples::{HoleMask, SampleValue, Samples, with_samples};
+use super::samples::{SampleValue, with_samples};
+use super::storage::Storage;
 use super::{BadRaster, Certainty, VerticalDatum};
 
 /// No height is larger than this (in the file's vertical unit), whatever the
@@ -20,16 +22,14 @@ pub(super) struct Decoded {
     pub(super) columns: u32,
     /// Rows.
     pub(super) rows: u32,
-    /// `columns × rows` samples, the file's first row first.
-    pub(super) samples: Samples,
+    /// Its samples, the file's first row first.
+    pub(super) storage: Storage,
     /// Whether the file's first row is the southernmost.
     pub(super) south_up: bool,
     /// Whether the file's first column is the easternmost.
     pub(super) east_first: bool,
     /// Stored value that means no data.
     pub(super) no_data: Option<f64>,
-    /// Holes that no value marks.
-    pub(super) mask: Option<HoleMask>,
     /// Height = stored × scale + offset.
     pub(super) scale: f64,
     /// See `scale`.
@@ -65,16 +65,19 @@ pub(super) fn sides(columns: u64, rows: u64) -> Result<(u32, u32), BadRaster> {
 
 impl Decoded {
     /// Plain heights, north row first, with nothing else known.
-    pub(super) fn new(format: String, (columns, rows): (u32, u32), samples: Samples) -> Self {
+    pub(super) fn new(
+        format: String,
+        (columns, rows): (u32, u32),
+        storage: impl Into<Storage>,
+    ) -> Self {
         Self {
             format,
             columns,
             rows,
-            samples,
+            storage: storage.into(),
             south_up: false,
             east_first: false,
             no_data: None,
-            mask: None,
             scale: 1.0,
             offset: 0.0,
             system: None,
@@ -146,20 +149,51 @@ pub struct HeightSummary {
     pub highest: f64,
     /// Samples without a height.
     pub holes: u64,
+    /// Samples that were looked at: all, or those of a coarser image or of some places
+    /// where the raster stays in its file.
+    pub looked_at: u64,
+}
+
+impl HeightSummary {
+    /// Of no sample.
+    pub(super) const EMPTY: Self = Self {
+        lowest: f64::INFINITY,
+        highest: f64::NEG_INFINITY,
+        holes: 0,
+        looked_at: 0,
+    };
+
+    /// Counts a height; NaN is a hole.
+    pub(super) fn add(&mut self, height: f64) {
+        self.looked_at += 1;
+        if height.is_nan() {
+            self.holes += 1;
+        } else {
+            self.lowest = self.lowest.min(height);
+            self.highest = self.highest.max(height);
+        }
+    }
+
+    /// Whether no sample has a height.
+    const fn has_none(&self) -> bool {
+        self.lowest > self.highest
+    }
 }
 
 impl Decoded {
     /// Checks what every format must satisfy, and summarises the heights. `no_data`
     /// replaces what the file says.
-    pub(super) fn check(&mut self, no_data: Option<f64>) -> Result<HeightSummary, BadRaster> {
+    pub(super) fn check(&mut self, no_data: Option<f64>) -> Result<Survey, BadRaster> {
         let (columns, rows) = (u64::from(self.columns), u64::from(self.rows));
         if columns < 2 || rows < 2 {
             return Err(BadRaster::TooSmall { columns, rows });
         }
-        if columns.checked_mul(rows) != u64::try_from(self.samples.len()).ok() {
+        if let Some(samples) = self.storage.held()
+            && columns.checked_mul(rows) != u64::try_from(samples.len()).ok()
+        {
             return Err(BadRaster::damaged(format!(
                 "{} samples where {columns} × {rows} were promised",
-                self.samples.len()
+                samples.len()
             )));
         }
         if !(self.scale.is_finite() && self.offset.is_finite()) || self.scale == 0.0 {
@@ -170,56 +204,67 @@ impl Decoded {
         }
         self.no_data = no_data
             .or(self.no_data)
-            .and_then(|value| self.samples.comparable_no_data(value));
+            .and_then(|value| self.storage.sample_type().none().comparable_no_data(value));
         self.cell = self.cell.filter(CellSize::is_valid);
-        summarise(self)
+        let survey = match &self.storage {
+            Storage::Held { .. } => Survey::of_all(self.summarise()?),
+            Storage::Blocks(blocks) => blocks.survey(|stored| self.height_in_file(stored)),
+        };
+        match survey.summary.has_none() {
+            true => Err(BadRaster::AllNoData {
+                samples: survey.summary.holes,
+            }),
+            false => Ok(survey),
+        }
     }
 
     /// Height of a stored value; NaN in a hole.
-    pub(super) fn height_of(&self, stored: f64, index: usize) -> f64 {
-        let hole = self.no_data == Some(stored)
-            || self.mask.as_ref().is_some_and(|mask| mask.contains(index));
-        if hole {
-            f64::NAN
-        } else {
-            stored * self.scale + self.offset
+    pub(super) fn height_of(&self, stored: f64) -> f64 {
+        match self.no_data == Some(stored) {
+            true => f64::NAN,
+            false => stored * self.scale + self.offset,
         }
     }
-}
 
-/// One pass over all samples: range, holes, and the first that is no height.
-fn summarise(source: &Decoded) -> Result<HeightSummary, BadRaster> {
-    let mut summary = HeightSummary {
-        lowest: f64::INFINITY,
-        highest: f64::NEG_INFINITY,
-        holes: 0,
-    };
-    let mut absurd = None;
-    with_samples!(&source.samples, values => {
-        for (index, value) in values.iter().enumerate() {
-            let height = source.height_of(value.widen(), index);
-            if height.is_nan() {
-                summary.holes += 1;
-            } else if height.abs() > LARGEST_HEIGHT {
-                absurd = absurd.or(Some((index, value.widen())));
-            } else {
-                summary.lowest = summary.lowest.min(height);
-                summary.highest = summary.highest.max(height);
-            }
+    /// Height of a value read from the file when it is touched, if there is one. Not all
+    /// values were looked at before: one that is no height is a hole.
+    pub(super) fn height_in_file(&self, stored: Option<f64>) -> f64 {
+        let height = stored.map_or(f64::NAN, |stored| self.height_of(stored));
+        match height.abs() > LARGEST_HEIGHT {
+            true => f64::NAN,
+            false => height,
         }
-    });
-    if let Some((index, value)) = absurd {
-        let columns = source.columns as usize;
-        return Err(BadRaster::NotANumber {
+    }
+
+    /// One pass over all samples in memory: range, holes, and the first that is no height.
+    fn summarise(&self) -> Result<HeightSummary, BadRaster> {
+        let mut summary = HeightSummary::EMPTY;
+        let mut absurd = None;
+        let Storage::Held { samples, mask } = &self.storage else {
+            return Ok(summary);
+        };
+        let hole = |index| mask.as_ref().is_some_and(|mask| mask.contains(index));
+        with_samples!(samples, values => {
+            for (index, value) in values.iter().enumerate() {
+                let height = match hole(index) {
+                    true => f64::NAN,
+                    false => self.height_of(value.widen()),
+                };
+                if height.abs() > LARGEST_HEIGHT {
+                    absurd = absurd.or(Some((index, value.widen())));
+                } else {
+                    summary.add(height);
+                }
+            }
+        });
+        let Some((index, value)) = absurd else {
+            return Ok(summary);
+        };
+        let columns = self.columns as usize;
+        Err(BadRaster::NotANumber {
             column: (index % columns) as u64,
             row: (index / columns) as u64,
             value,
-        });
+        })
     }
-    if summary.lowest > summary.highest {
-        return Err(BadRaster::AllNoData {
-            samples: summary.holes,
-        });
-    }
-    Ok(summary)
 }

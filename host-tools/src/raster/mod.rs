@@ -28,6 +28,8 @@
 
 mod archive;
 mod beside;
+pub(crate) mod bilinear;
+mod blocks;
 mod crs;
 mod decoded;
 mod error;
@@ -45,6 +47,7 @@ mod place;
 mod placed;
 mod read;
 mod samples;
+mod storage;
 
 use std::path::Path;
 
@@ -60,9 +63,11 @@ pub use ground_map::Bounds;
 pub use options::{Encoding, OpenOptions, PngChannel, RawLayout};
 pub use samples::{Endian, SampleType, Samples};
 
+use blocks::{Blocks, Survey};
 use decoded::Decoded;
 use place::Place;
 use samples::{SampleValue, with_samples};
+use storage::Storage;
 
 /// A height field held once, in the compact type of its file.
 ///
@@ -71,7 +76,7 @@ use samples::{SampleValue, with_samples};
 #[derive(Clone, Debug)]
 pub struct Raster {
     source: Decoded,
-    summary: HeightSummary,
+    survey: Survey,
 }
 
 impl Raster {
@@ -104,7 +109,11 @@ impl Raster {
         for row in 0..rows {
             samples.extend((0..columns).map(|column| height(column, row)));
         }
-        let mut decoded = Decoded::new("made in memory".into(), (columns, rows), samples.into());
+        let mut decoded = Decoded::new(
+            "made in memory".into(),
+            (columns, rows),
+            Samples::from(samples),
+        );
         decoded.south_up = true;
         decoded.metres_per_vertical_unit = Some(1.0);
         let metre = CellUnit::Length { metres: 1.0 };
@@ -120,8 +129,8 @@ impl Raster {
     }
 
     fn checked(mut source: Decoded, no_data: Option<f64>) -> Result<Self, BadRaster> {
-        let summary = source.check(no_data)?;
-        Ok(Self { source, summary })
+        let survey = source.check(no_data)?;
+        Ok(Self { source, survey })
     }
 
     /// Samples from west to east.
@@ -137,52 +146,144 @@ impl Raster {
     /// The height at a sample in the file's vertical unit; NaN in a hole and
     /// outside the field. Row 0 is the southernmost.
     pub fn height(&self, column: u32, row: u32) -> f64 {
-        let mut height = [f64::NAN];
-        self.copy_row(0, row, column, &mut height);
-        height[0]
+        self.sample(column, row)
     }
 
     /// Copies heights of a row from `first_column` eastwards, one for each place in
     /// `heights`: the same values as [`Raster::height`].
     ///
-    /// Level *L* is the field with every 2ᴸ-th sample; row and column count in it.
+    /// Level *L* is the field with every 2ᴸ-th sample, or what an overview has there
+    /// ([`Raster::surface`]); row and column count in it.
     pub fn copy_row(&self, level: u8, row: u32, first_column: u32, heights: &mut [f64]) {
         heights.fill(f64::NAN);
-        let (columns, rows) = (u64::from(self.columns()), u64::from(self.rows()));
         let step = 1_u64.checked_shl(level.into()).unwrap_or(u64::MAX);
         let row = u64::from(row).saturating_mul(step);
-        if row >= rows {
+        if row >= u64::from(self.rows()) {
             return;
         }
-        let file_row = if self.source.south_up {
-            row
-        } else {
-            rows - 1 - row
-        };
-        with_samples!(&self.source.samples, values => {
-            for (column, height) in (u64::from(first_column)..).zip(heights) {
-                let column = column.saturating_mul(step);
-                if column >= columns {
-                    return;
-                }
-                let file_column = match self.source.east_first {
-                    true => columns - 1 - column,
-                    false => column,
+        let columns = (u64::from(first_column)..).map(|column| column.saturating_mul(step));
+        let columns = columns.take_while(|column| *column < u64::from(self.columns()));
+        // Both fit: they are inside the field.
+        let each = columns.map(|column| column as u32).zip(heights);
+        let is_coarse = self.image_of(level) > 0;
+        for (column, height) in each {
+            *height = match is_coarse {
+                true => self.surface(level, [f64::from(column), row as f64]),
+                false => self.sample(column, row as u32),
+            };
+        }
+    }
+
+    /// The height between samples, linear along rows and columns, at a place in
+    /// columns and rows of level 0; NaN outside of the field, and where a corner that
+    /// counts has no height.
+    ///
+    /// A raster in memory has one image for all levels. One that stays in its file has the
+    /// heights of level *L* from the coarsest overview that is no coarser than it.
+    pub fn surface(&self, level: u8, [column, row]: [f64; 2]) -> f64 {
+        let image = self.image_of(level);
+        let last = [self.columns(), self.rows()].map(|count| f64::from(count) - 1.0);
+        if !(0.0..=last[0]).contains(&column) || !(0.0..=last[1]).contains(&row) {
+            return f64::NAN;
+        }
+        match &self.source.storage {
+            Storage::Blocks(blocks) if image > 0 => {
+                let column = if self.source.east_first {
+                    last[0] - column
+                } else {
+                    column
                 };
-                let index = (file_row * columns + file_column) as usize;
-                *height = self.source.height_of(values[index].widen(), index);
+                let row = if self.source.south_up {
+                    row
+                } else {
+                    last[1] - row
+                };
+                let height = |stored| self.source.height_in_file(stored);
+                blocks.between(image, [column, row], height)
             }
-        });
+            _ => bilinear::at([column, row], |column, row| self.sample(column, row)),
+        }
     }
 
-    /// Range of the heights and number of holes.
+    /// The image of the file that serves a level: 0 for the full one.
+    fn image_of(&self, level: u8) -> usize {
+        match &self.source.storage {
+            Storage::Held { .. } => 0,
+            Storage::Blocks(blocks) => blocks.image_of(level),
+        }
+    }
+
+    /// The level of detail at which samples that lie `samples` apart are best read one by one:
+    /// 0 in memory, where all are at hand.
+    pub(crate) fn level_for(&self, samples: f64) -> u8 {
+        match self.source.storage {
+            Storage::Held { .. } => 0,
+            Storage::Blocks(_) => samples.max(1.0).log2() as u8,
+        }
+    }
+
+    /// The height at a sample of the full image.
+    fn sample(&self, column: u32, row: u32) -> f64 {
+        if column >= self.columns() || row >= self.rows() {
+            return f64::NAN;
+        }
+        let (column, row) = (self.file_column(column), self.file_row(row));
+        match &self.source.storage {
+            Storage::Held { samples, mask } => {
+                let index =
+                    (u64::from(row) * u64::from(self.columns()) + u64::from(column)) as usize;
+                match mask.as_ref().is_some_and(|mask| mask.contains(index)) {
+                    true => f64::NAN,
+                    false => with_samples!(samples, values => {
+                        self.source.height_of(values[index].widen())
+                    }),
+                }
+            }
+            Storage::Blocks(blocks) => self.source.height_in_file(blocks.stored(0, column, row)),
+        }
+    }
+
+    fn file_column(&self, column: u32) -> u32 {
+        match self.source.east_first {
+            true => self.columns() - 1 - column,
+            false => column,
+        }
+    }
+
+    fn file_row(&self, row: u32) -> u32 {
+        match self.source.south_up {
+            true => row,
+            false => self.rows() - 1 - row,
+        }
+    }
+
+    /// Range of the heights and number of holes: of all samples where they are in memory,
+    /// else of those that were looked at.
     pub fn summary(&self) -> HeightSummary {
-        self.summary
+        self.survey.summary
     }
 
-    /// The samples as the file holds them: its own type and order.
-    pub fn samples(&self) -> &Samples {
-        &self.source.samples
+    /// The samples as the file holds them, its own type and order; `None` where they stay in
+    /// the file.
+    pub fn samples(&self) -> Option<&Samples> {
+        self.source.storage.held()
+    }
+
+    /// Whether all samples were looked at.
+    pub fn is_known_whole(&self) -> bool {
+        let all = u64::from(self.columns()) * u64::from(self.rows());
+        self.samples().is_some() && self.survey.summary.looked_at == all
+    }
+
+    /// Bytes of memory that the samples take, at most.
+    pub fn memory_bytes(&self) -> usize {
+        self.samples().map_or(Blocks::most_bytes(), Samples::bytes)
+    }
+
+    /// A hash of the file's index and of the heights that were looked at, where the samples
+    /// stay in the file.
+    pub(crate) fn print_in_file(&self) -> Option<u64> {
+        self.survey.print
     }
 
     /// Name of the format and variant, as `GeoTIFF, int16, deflate`.

@@ -3,7 +3,7 @@
 use super::samples::{Endian, SampleType};
 
 /// How to open a file. The default believes the file.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct OpenOptions {
     /// The file is raw samples of this layout, whatever its content looks like.
     pub raw: Option<RawLayout>,
@@ -23,6 +23,25 @@ pub struct OpenOptions {
     pub vertical_unit_m: Option<f64>,
     /// How a picture's colours encode heights, if they do.
     pub encoding: Option<Encoding>,
+    /// Samples that take more bytes than this stay in the file, where its format allows it,
+    /// and are read in blocks when they are touched.
+    pub most_in_memory_bytes: u64,
+}
+
+impl Default for OpenOptions {
+    fn default() -> Self {
+        Self {
+            raw: None,
+            png_channel: None,
+            no_data: None,
+            band: None,
+            variable: None,
+            ground_cell_m: None,
+            vertical_unit_m: None,
+            encoding: None,
+            most_in_memory_bytes: 128 << 20,
+        }
+    }
 }
 
 /// Layout of a raw file: rows from north to south, samples from west to east,

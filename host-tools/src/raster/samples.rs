@@ -35,6 +35,13 @@ macro_rules! sample_types {
         }
 
         impl Samples {
+            /// Type of the samples.
+            pub const fn sample_type(&self) -> SampleType {
+                match self {
+                    $(Self::$variant(_) => SampleType::$variant,)*
+                }
+            }
+
             /// Name of the sample type, as `int16`.
             pub const fn type_name(&self) -> &'static str {
                 match self {

@@ -6,13 +6,11 @@
 
 use std::hash::{Hash, Hasher};
 
-use crate::raster::{CellSize, Raster};
+use crate::raster::{CellSize, Raster, bilinear};
 
 /// Cells whose sides differ by less than this share count as square, and keep
 /// their exact samples.
 const SQUARE: f64 = 1e-3;
-/// A place this close to a sample is on it, in samples.
-const ON_SAMPLE: f64 = 1e-9;
 
 /// Which cells of a file are felt.
 #[derive(
@@ -122,7 +120,7 @@ impl<'r> FeltGrid<'r> {
             north * sine * last(self.rows),
         ];
         let samples = |length: f64| {
-            let cells = (length / side + ON_SAMPLE).floor();
+            let cells = (length / side + bilinear::ON_SAMPLE).floor();
             (cells >= 1.0 && cells < f64::from(u32::MAX)).then_some(cells as u32 + 1)
         };
         Some(Self {
@@ -204,10 +202,7 @@ impl<'r> FeltGrid<'r> {
     pub fn to_ground(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let sample = match &self.resampling {
             None => [u, v],
-            Some(places) => [
-                places.first + u * places.column_step + v * places.lean,
-                v * places.row_step,
-            ],
+            Some(places) => places.in_file(u, v),
         };
         self.raster.georeference().transform().to_ground(sample)
     }
@@ -231,44 +226,41 @@ impl<'r> FeltGrid<'r> {
     /// The height of the bilinear surface at a place in felt cells, in the file's vertical
     /// unit; `None` in a hole and off the field.
     #[must_use]
-    pub fn surface(&self, [u, v]: [f64; 2]) -> Option<f64> {
-        let ((column, east), (row, north)) = (split(u)?, split(v)?);
-        let across = |row: u32| {
-            mix(east, self.height(column, row), || {
-                self.height(column + 1, row)
-            })
-        };
-        Some(mix(north, across(row), || across(row + 1))).filter(|height| !height.is_nan())
+    pub fn surface(&self, place: [f64; 2]) -> Option<f64> {
+        let height = bilinear::at(place, |column, row| self.height(0, column, row));
+        Some(height).filter(|height| !height.is_nan())
     }
 
     /// The height at a felt sample in the file's vertical unit; NaN in a hole and
     /// outside the field.
+    ///
+    /// Level *L* is the grid with every 2ᴸ-th sample; row and column count in it.
     #[must_use]
-    pub fn height(&self, column: u32, row: u32) -> f64 {
-        match &self.resampling {
-            None => self.raster.height(column, row),
-            Some(_) if column >= self.columns || row >= self.rows => f64::NAN,
-            Some(resampling) => resampling.height(self.raster, column, row),
+    pub fn height(&self, level: u8, column: u32, row: u32) -> f64 {
+        let whole = |index: u32| u64::from(index).checked_mul(1_u64.checked_shl(level.into())?);
+        let (Some(column), Some(row)) = (whole(column), whole(row)) else {
+            return f64::NAN;
+        };
+        if column >= u64::from(self.columns) || row >= u64::from(self.rows) {
+            return f64::NAN;
         }
+        // Both are below 2^32.
+        let (u, v) = (column as f64, row as f64);
+        let place = match &self.resampling {
+            None => [u, v],
+            Some(places) => places.in_file(u, v),
+        };
+        self.raster.surface(level, place)
     }
 
     /// Copies heights of a row from `first_column` eastwards, one for each place in
     /// `heights`: the same values as [`FeltGrid::height`].
-    ///
-    /// Level *L* is the grid with every 2ᴸ-th sample; row and column count in it.
     pub fn copy_row(&self, level: u8, row: u32, first_column: u32, heights: &mut [f64]) {
         if self.resampling.is_none() {
             return self.raster.copy_row(level, row, first_column, heights);
         }
-        let whole = |index: u32| {
-            let index = u64::from(index).checked_shl(level.into());
-            index.and_then(|index| u32::try_from(index).ok())
-        };
         for (column, height) in (first_column..).zip(heights) {
-            *height = match (whole(column), whole(row)) {
-                (Some(column), Some(row)) => self.height(column, row),
-                _ => f64::NAN,
-            };
+            *height = self.height(level, column, row);
         }
     }
 }
@@ -290,43 +282,12 @@ impl FeltGrid<'_> {
 }
 
 impl Resampling {
-    /// The file's bilinear surface at a felt sample; a hole where a corner that
-    /// counts is one.
-    fn height(&self, raster: &Raster, column: u32, row: u32) -> f64 {
-        let (u, v) = (f64::from(column), f64::from(row));
-        let along = self.first + u * self.column_step + v * self.lean;
-        let Some((column, east)) = split(along) else {
-            return f64::NAN;
-        };
-        let Some((row, north)) = split(v * self.row_step) else {
-            return f64::NAN;
-        };
-        let across = |row: u32| {
-            mix(east, raster.height(column, row), || {
-                raster.height(column + 1, row)
-            })
-        };
-        mix(north, across(row), || across(row + 1))
-    }
-}
-
-/// A place in samples as a sample and the share of the way to the next.
-fn split(place: f64) -> Option<(u32, f64)> {
-    let nearest = place.round();
-    let (sample, share) = if (place - nearest).abs() <= ON_SAMPLE * nearest.abs().max(1.0) {
-        (nearest, 0.0)
-    } else {
-        (place.floor(), place - place.floor())
-    };
-    (sample >= 0.0 && sample < f64::from(u32::MAX)).then_some((sample as u32, share))
-}
-
-/// `share` of the way from one height to the next, which is not asked for where it
-/// does not count.
-fn mix(share: f64, from: f64, to: impl Fn() -> f64) -> f64 {
-    match share {
-        0.0 => from,
-        _ => from * (1.0 - share) + to() * share,
+    /// Column and row of the file at a felt sample or between two.
+    fn in_file(&self, u: f64, v: f64) -> [f64; 2] {
+        [
+            self.first + u * self.column_step + v * self.lean,
+            v * self.row_step,
+        ]
     }
 }
 
@@ -379,9 +340,11 @@ mod tests {
             let mut steps = 0;
             for row in 0..grid.rows() - 1 {
                 for column in 0..grid.columns() - 1 {
-                    let at = grid.height(column, row);
-                    let (east, north) =
-                        (grid.height(column + 1, row), grid.height(column, row + 1));
+                    let at = grid.height(0, column, row);
+                    let (east, north) = (
+                        grid.height(0, column + 1, row),
+                        grid.height(0, column, row + 1),
+                    );
                     if !(at.is_nan() || east.is_nan() || north.is_nan()) {
                         let slopes = [(east - at) / side, (north - at) / side];
                         assert!((slopes[0] - 1.0).abs() < 1e-4, "{slopes:?} east");
@@ -404,7 +367,7 @@ mod tests {
             assert!(!grid.is_resampled());
             assert_eq!(grid.is_distorted(), cells == FeltCells::Stored);
             assert_eq!((grid.columns(), grid.rows()), (41, 31));
-            assert_eq!(grid.height(17, 23), raster.height(17, 23));
+            assert_eq!(grid.height(0, 17, 23), raster.height(17, 23));
         }
     }
 
@@ -414,11 +377,11 @@ mod tests {
         let grid = FeltGrid::new(&raster, FeltCells::Square);
         assert_eq!((grid.columns(), grid.rows()), (41, 76));
         // Row 5 of 10 m is the file's row 2 of 25 m.
-        assert_eq!(grid.height(7, 5), raster.height(7, 2));
+        assert_eq!(grid.height(0, 7, 5), raster.height(7, 2));
         let mut heights = [0.0; 12];
         grid.copy_row(2, 3, 1, &mut heights);
         for (column, height) in (1..).zip(heights) {
-            let single = grid.height(4 * column, 12);
+            let single = grid.height(0, 4 * column, 12);
             assert!(height == single || (height.is_nan() && single.is_nan()));
         }
         assert!(heights[10].is_nan(), "east of the field");
@@ -436,7 +399,7 @@ mod tests {
         let grid = FeltGrid::new(&raster, FeltCells::Square);
         let holes: Vec<_> = (0..grid.rows())
             .flat_map(|row| (0..grid.columns()).map(move |column| (column, row)))
-            .filter(|&(column, row)| grid.height(column, row).is_nan())
+            .filter(|&(column, row)| grid.height(0, column, row).is_nan())
             .collect();
         assert_eq!(holes, [(4, 7), (4, 8), (4, 9)]);
     }

@@ -15,7 +15,13 @@ use crate::raster::Raster;
 /// XXH64 with seed 0 over little-endian bytes. Recordings keep it, so it has to be the
 /// same on every machine and in every later version; the standard library's hasher is not.
 /// It is taken of the samples in memory: the file is not read again.
+///
+/// Of a raster that stays in its file it is the hash of the file's index and of the heights
+/// that were looked at when it was opened.
 pub(super) fn fingerprint(raster: &Raster) -> u64 {
+    if let Some(print) = raster.print_in_file() {
+        return print;
+    }
     let mut hasher = XxHash64::with_seed(0);
     for count in [raster.columns(), raster.rows()] {
         hasher.write(&count.to_le_bytes());

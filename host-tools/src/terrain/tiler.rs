@@ -168,7 +168,8 @@ impl<'r> Terrain<'r> {
     }
 
     /// Hash of all heights of the raster: the same terrain has the same, and a file that
-    /// was changed has another. Worked out once, from the samples in memory.
+    /// was changed has another. Worked out once, from the samples in memory; of a raster that
+    /// stays in its file, from the file's index and the heights looked at.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
         let print = || identity::fingerprint(self.raster());
@@ -181,7 +182,8 @@ impl<'r> Terrain<'r> {
         self.size
     }
 
-    /// A whole height in cells that no sample exceeds.
+    /// A whole height in cells that no sample exceeds: the largest there is, where the raster
+    /// stays in its file and not all heights are known.
     #[must_use]
     pub const fn top(&self) -> i32 {
         self.top
@@ -220,8 +222,8 @@ impl<'r> Terrain<'r> {
         let (column, u) = place(east_mm / self.scale.cell_mm(), self.size[0])?;
         let (row, v) = place(north_mm / self.scale.cell_mm(), self.size[1])?;
         let at = |dx: u32, dy: u32| {
-            let (x, y) = ((column + dx) << self.level, (row + dy) << self.level);
-            self.grid.height(x, y) * self.scale.height_mm_per_unit()
+            let height = self.grid.height(self.level, column + dx, row + dy);
+            height * self.scale.height_mm_per_unit()
         };
         let (south, north) = ([at(0, 0), at(1, 0)], [at(0, 1), at(1, 1)]);
         let mix = |[a, b]: [f64; 2], t: f64| a * (1.0 - t) + b * t;
@@ -274,7 +276,12 @@ impl<'r> Terrain<'r> {
         for (row, line) in (south..).zip(heights.chunks_exact_mut(POSTS)) {
             self.grid.copy_row(self.level, row, west, line);
             for height in line {
-                *height = self.scale.height_cells(*height);
+                let cells = self.scale.height_cells(*height);
+                // Where not all heights were read before, one may leave what can be said.
+                *height = match cells.abs() <= f64::from(MAX_CELL) {
+                    true => cells,
+                    false => f64::NAN,
+                };
             }
         }
     }
@@ -326,6 +333,9 @@ fn top(raster: &Raster, scale: &Scale) -> Result<i32, TerrainError> {
             cells,
             scale: *scale,
         });
+    }
+    if !raster.is_known_whole() {
+        return Ok(MAX_CELL + 1);
     }
     // Rounded to `f32` above the base, a sample reaches the next whole number
     // at most; from 2^23 on, up to 2^30, by as much as its last place.

@@ -72,6 +72,11 @@ pub struct ReadingOptions {
     /// Channel of a PNG that holds the height
     #[arg(long, value_enum, value_name = "CHANNEL", help_heading = INPUT)]
     pub png_channel: Option<PngChannel>,
+
+    /// A terrain whose samples take more megabytes than this stays in its file and is read
+    /// where it is touched, if its format allows it (TIFF)
+    #[arg(long, value_name = "MB", default_value_t = 128, help_heading = INPUT)]
+    pub in_memory_mb: u32,
 }
 
 impl TerrainFile {
@@ -118,6 +123,7 @@ impl ReadingOptions {
             ground_cell_m: self.ground_cell_m,
             vertical_unit_m: self.vertical_unit,
             encoding: self.encoding,
+            most_in_memory_bytes: u64::from(self.in_memory_mb) << 20,
         }
     }
 }

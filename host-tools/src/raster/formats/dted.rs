@@ -8,7 +8,7 @@ use crate::raster::format::{Claim, Format, Parts};
 use crate::raster::ground_map::GroundMap;
 use crate::raster::input::FileBytes;
 use crate::raster::placed::GroundUnit;
-use crate::raster::{BadRaster, ReferenceSystem};
+use crate::raster::{BadRaster, ReferenceSystem, Samples};
 
 /// Digital terrain elevation data.
 pub(super) const FORMAT: Format = Format {
@@ -71,7 +71,7 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let mut decoded = Decoded::new(
         format!("{}, int16", header.name()),
         header.size,
-        samples.heights.into(),
+        Samples::from(samples.heights),
     );
     decoded.no_data = Some(VOID.into());
     decoded.metres_per_vertical_unit = Some(1.0);

@@ -52,7 +52,7 @@ fn field(dataset: &Dataset, bands: usize, options: &OpenOptions) -> Result<Decod
     decoded.no_data = band.no_data_value();
     decoded.scale = band.scale().unwrap_or(1.0);
     decoded.offset = band.offset().unwrap_or(0.0);
-    decoded.mask = holes(&band, (columns, rows))?;
+    decoded.storage.set_holes(holes(&band, (columns, rows))?);
     if bands > 1 && options.band.is_none() {
         decoded.remarks.push(format!(
             "it has {bands} bands: the first is taken for the height (--band)"

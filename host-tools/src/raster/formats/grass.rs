@@ -7,7 +7,7 @@ use crate::raster::decoded::{Decoded, sides};
 use crate::raster::format::{Claim, Format, Parts};
 use crate::raster::ground_map::GroundMap;
 use crate::raster::input::FileBytes;
-use crate::raster::{BadRaster, beside};
+use crate::raster::{BadRaster, Samples, beside};
 
 use super::asc::Tokens;
 
@@ -36,7 +36,7 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let header = Header::read(&mut tokens)?;
     let size = sides(header.count("cols")?, header.count("rows")?)?;
     let samples = samples(&mut tokens, &header, size, input.len())?;
-    let mut decoded = Decoded::new("GRASS ASCII grid".into(), size, samples.into());
+    let mut decoded = Decoded::new("GRASS ASCII grid".into(), size, Samples::from(samples));
     decoded.scale = header.number("multiplier")?.unwrap_or(1.0);
     beside::reference_system(input, &mut decoded);
     let edge = |key: &str| {

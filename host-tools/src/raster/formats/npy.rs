@@ -214,7 +214,8 @@ mod tests {
     }
 
     fn samples(descr: &str, bytes: &[u8]) -> Result<Samples, BadRaster> {
-        Ok((FORMAT.decode)(&npy(descr, bytes), &crate::raster::OpenOptions::default())?.samples)
+        let decoded = (FORMAT.decode)(&npy(descr, bytes), &crate::raster::OpenOptions::default())?;
+        Ok(decoded.storage.held().expect("in memory").clone())
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::raster::format::{Claim, Format, Parts};
 use crate::raster::ground_map::GroundMap;
 use crate::raster::input::FileBytes;
 use crate::raster::placed::GroundUnit;
-use crate::raster::{BadRaster, Certainty, ReferenceSystem};
+use crate::raster::{BadRaster, Certainty, ReferenceSystem, Samples};
 
 /// USGS ASCII digital elevation models.
 pub(super) const FORMAT: Format = Format {
@@ -142,7 +142,7 @@ impl Header {
             }
         }
         let size = sides(columns as u64, rows as u64)?;
-        let mut decoded = Decoded::new("USGS ASCII DEM".into(), size, samples.into());
+        let mut decoded = Decoded::new("USGS ASCII DEM".into(), size, Samples::from(samples));
         decoded.metres_per_vertical_unit = Some(self.metres_per_vertical_unit);
         if let Some(code) = self.vertical {
             decoded.set_vertical_datum(code);

@@ -42,7 +42,11 @@ fn numbers_as_they_are_written() {
 fn samples_take_the_narrowest_type_that_holds_them() {
     let typed = |values: &str| {
         let text = format!("ncols 2\nnrows 2\ncellsize 1\nnodata_value -32768\n{values}");
-        open(&text).expect("a grid").samples().clone()
+        open(&text)
+            .expect("a grid")
+            .samples()
+            .cloned()
+            .expect("in memory")
     };
     assert_eq!(typed("1 2 3 -32768"), Samples::I16(vec![1, 2, 3, -32768]));
     assert_eq!(typed("1 2 3 70000"), Samples::I32(vec![1, 2, 3, 70_000]));

@@ -208,10 +208,10 @@ fn transposed<T: Copy>(values: &[T], along: u32) -> Vec<T> {
 /// written, is no data; so is every other missing value, and what is out of the valid
 /// range.
 fn mark_missing(decoded: &mut Decoded, variable: &NcVariable) {
-    let default = match decoded.samples {
-        Samples::I16(_) => Some(-32767.0),
-        Samples::I32(_) => Some(-2_147_483_647.0),
-        Samples::F32(_) | Samples::F64(_) => Some(9.969_209_968_386_869e36),
+    let default = match decoded.storage.sample_type() {
+        SampleType::I16 => Some(-32767.0),
+        SampleType::I32 => Some(-2_147_483_647.0),
+        SampleType::F32 | SampleType::F64 => Some(9.969_209_968_386_869e36),
         _ => None,
     };
     let Some(stated) = MaskParams::from_variable(variable) else {
@@ -220,12 +220,15 @@ fn mark_missing(decoded: &mut Decoded, variable: &NcVariable) {
     };
     let missing = stated.missing_values.first().copied();
     decoded.no_data = stated.fill_value.or(missing).or(default);
+    let Some(samples) = decoded.storage.held() else {
+        return;
+    };
     let others = stated.missing_values.iter();
-    let others = others.filter_map(|value| decoded.samples.comparable_no_data(*value));
+    let others = others.filter_map(|value| samples.comparable_no_data(*value));
     let others: Vec<f64> = others.collect();
     let valid = stated.valid_min.unwrap_or(f64::MIN)..=stated.valid_max.unwrap_or(f64::MAX);
-    let mut mask = HoleMask::with_capacity(decoded.samples.len());
-    with_samples!(&decoded.samples, values => {
+    let mut mask = HoleMask::with_capacity(samples.len());
+    with_samples!(samples, values => {
         for (index, value) in values.iter().enumerate() {
             let value = value.widen();
             if others.contains(&value) || !(value.is_nan() || valid.contains(&value)) {
@@ -233,7 +236,7 @@ fn mark_missing(decoded: &mut Decoded, variable: &NcVariable) {
             }
         }
     });
-    decoded.mask = Some(mask).filter(|mask| !mask.is_clear());
+    decoded.storage.set_holes(Some(mask));
 }
 
 fn fault(error: &netcdf_reader::Error) -> BadRaster {

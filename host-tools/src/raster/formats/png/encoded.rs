@@ -6,7 +6,7 @@ use super::{fault, reader};
 use crate::raster::decoded::Decoded;
 use crate::raster::input::FileBytes;
 use crate::raster::samples::HoleMask;
-use crate::raster::{BadRaster, Encoding};
+use crate::raster::{BadRaster, Encoding, Samples};
 
 impl Encoding {
     /// Height in metres of the code 0, and metres in a step of the code
@@ -31,10 +31,10 @@ impl Encoding {
 pub(super) fn decode(input: &FileBytes, encoding: Encoding) -> Result<Decoded, BadRaster> {
     let codes = Codes::read(input)?;
     let format = format!("PNG, {} heights", encoding.name());
-    let mut decoded = Decoded::new(format, codes.size, codes.codes.into());
+    let mut decoded = Decoded::new(format, codes.size, Samples::from(codes.codes));
     (decoded.offset, decoded.scale) = encoding.metres();
     decoded.no_data = Some(0.0);
-    decoded.mask = Some(codes.transparent).filter(|mask| !mask.is_clear());
+    decoded.storage.set_holes(Some(codes.transparent));
     decoded.metres_per_vertical_unit = Some(1.0);
     Ok(decoded)
 }

@@ -87,7 +87,7 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Bad
     let what = chosen.described(color);
     let format = format!("PNG, {}-bit {what}", 8 * sample_bytes);
     let mut decoded = Decoded::new(format, size, pixels.samples);
-    decoded.mask = pixels.mask;
+    decoded.storage.set_holes(pixels.mask);
     decoded.no_data = transparent;
     Ok(decoded)
 }

@@ -12,10 +12,10 @@ const SPARSE_RATIO: u64 = 1024;
 /// 16 GB of them would leave a usual machine no room.
 const MOST_BYTES: u64 = 16 << 30;
 
-/// A sparse or well packed file may hold more than a machine: that is no damage.
-fn too_large(layout: &Layout) -> Result<(), BadRaster> {
-    let (columns, rows) = (u64::from(layout.columns), u64::from(layout.rows));
-    let bytes = (columns * rows).saturating_mul(u64::from(layout.stored.1 / 8));
+/// Checks that a machine can hold all samples. A sparse or well packed file may hold more:
+/// that is no damage.
+pub(super) fn check_memory(layout: &Layout) -> Result<(), BadRaster> {
+    let (columns, rows, bytes) = (layout.columns.into(), layout.rows.into(), layout.bytes());
     match bytes > MOST_BYTES && layout.of_band().is_some() {
         true => Err(BadRaster::TooLarge {
             columns,
@@ -41,7 +41,6 @@ pub(super) fn check(layout: &Layout, file_bytes: u64) -> Result<(), BadRaster> {
     // Both sides of a product are at most 2^32 and a texel at most 2^19 bytes.
     let ratio = u128::from(layout.compression.1);
     let texel = u128::from(layout.texel_bytes());
-    too_large(layout)?;
     let image = u128::from(columns) * u128::from(rows) * texel;
     let promised = stored.iter().map(|&bytes| u128::from(bytes)).sum::<u128>() * ratio;
     let in_file = u128::from(file_bytes) * ratio;

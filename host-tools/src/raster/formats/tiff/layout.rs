@@ -3,7 +3,9 @@
 use tiff_reader::{ByteOrder, Ifd, PhotometricInterpretation};
 
 use super::fault::{fault, unsupported};
+use super::samples::sample_type;
 use crate::raster::BadRaster;
+use crate::raster::blocks::Part;
 
 /// How an image's samples are stored.
 #[derive(Debug)]
@@ -26,6 +28,15 @@ pub(super) struct Layout {
     pub(super) chunk: (u32, u32),
     /// Bytes stored for each chunk; 0 for one that a sparse file leaves out.
     chunk_bytes: Vec<u64>,
+}
+
+/// A strip or tile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Chunk {
+    /// Bytes stored for it; 0 for one that a sparse file leaves out.
+    pub(super) bytes: u64,
+    /// Its samples.
+    pub(super) covers: Part,
 }
 
 /// What the bits of a sample mean.
@@ -99,6 +110,33 @@ impl Layout {
     /// Chunks from west to east.
     pub(super) fn chunks_across(&self) -> u32 {
         self.columns.div_ceil(self.chunk.0)
+    }
+
+    /// The chunks that have samples of a part of the band that is the height. Those that the
+    /// index has too few of are left out.
+    pub(super) fn chunks_in(&self, part: &Part) -> impl Iterator<Item = Chunk> {
+        let (width, height) = self.chunk;
+        let across = part.column / width..(part.column + part.columns).div_ceil(width);
+        let down = part.row / height..(part.row + part.rows).div_ceil(height);
+        let places = down.flat_map(move |row| across.clone().map(move |column| (column, row)));
+        places.filter_map(move |(column, row)| {
+            let index = u64::from(row) * u64::from(self.chunks_across()) + u64::from(column);
+            let bytes = *self.of_band()?.get(usize::try_from(index).ok()?)?;
+            let (column, row) = (column * width, row * height);
+            let covers = Part {
+                column,
+                row,
+                columns: width.min(self.columns - column),
+                rows: height.min(self.rows - row),
+            };
+            Some(Chunk { bytes, covers })
+        })
+    }
+
+    /// Bytes that all samples take in memory.
+    pub(super) fn bytes(&self) -> u64 {
+        let samples = u64::from(self.columns) * u64::from(self.rows);
+        samples.saturating_mul(sample_type(self).bytes())
     }
 
     /// Bytes stored for each chunk with samples of the band that is the height; `None`

@@ -1,8 +1,9 @@
 //! TIFF, GeoTIFF, BigTIFF and cloud-optimised GeoTIFF: the first band of the
-//! first full image.
+//! first full image, in memory or, where it is large, read in blocks when it is touched.
 //!
 //! `tiff-reader` decodes; it is named in this folder only.
 
+mod blocks;
 mod budget;
 mod fault;
 mod georef;
@@ -15,13 +16,16 @@ mod user_defined;
 use std::sync::Arc;
 
 use tiff_reader::source::{BytesSource, FileSource, SharedSource};
-use tiff_reader::{OpenOptions, ParseBudgets, TiffFile};
+use tiff_reader::{ParseBudgets, TiffFile};
 
-use crate::raster::BadRaster;
 use crate::raster::beside::lay_out_by_world_file;
+use crate::raster::blocks::Part;
 use crate::raster::decoded::Decoded;
 use crate::raster::format::{Claim, Format, Parts, starts_with_any};
 use crate::raster::input::{Data, FileBytes};
+use crate::raster::storage::Storage;
+use crate::raster::{BadRaster, OpenOptions};
+use blocks::TiffBlocks;
 use fault::fault;
 use layout::Layout;
 use metadata::Metadata;
@@ -32,24 +36,41 @@ pub(super) const FORMAT: Format = Format {
     begins: |head| starts_with_any(head, &[b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"]),
     extensions: &[("tif", Claim::Promises), ("tiff", Claim::Promises)],
     parts: Parts::Bands,
-    decode: |input, options| decode(input, options.band),
+    decode,
 };
 
 /// Extensions of a TIFF's world files.
 const WORLD_FILES: [&str; 4] = ["tfw", "tifw", "tiffw", "tfwx"];
 
-/// Reads the heights: of several bands the `asked` one (the first being 1) or the
-/// first, of several images the first that is neither an overview nor a mask.
-fn decode(input: &FileBytes, asked: Option<u32>) -> Result<Decoded, BadRaster> {
+/// Reads the heights, or lets them stay in the file: of several bands the chosen one or
+/// the first, of several images the first that is neither an overview nor a mask.
+fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+    let asked = options.band;
     let file = open(input)?;
-    let image = images::full(&file)?;
-    let layout = Layout::read(image, asked)?;
+    let image = images::full(&file)?.clone();
+    let layout = Layout::read(&image, asked)?;
+    let stays = layout.bytes() > options.most_in_memory_bytes && blocks::suit(&layout);
+    if !stays {
+        budget::check_memory(&layout)?;
+    }
     budget::check(&layout, input.len())?;
-    let samples = samples::read(&file, image, &layout, layout.band)?;
     let format = layout.described(file.byte_order());
-    let mut decoded = Decoded::new(format, (layout.columns, layout.rows), samples);
-    let beside = mask_beside(input)?;
-    decoded.mask = samples::holes(&file, image, &layout, beside.as_ref())?;
+    let size = (layout.columns, layout.rows);
+    let mask = beside(input, "msk")?;
+    let storage = match stays {
+        true => {
+            let overviews = beside(input, "ovr")?;
+            Storage::from(TiffBlocks::new(file, mask, overviews, asked)?)
+        }
+        false => {
+            let all = Part::whole(layout.columns, layout.rows);
+            let samples = samples::read(&file, &image, &layout, layout.band, &all)?;
+            let mut storage = Storage::from(samples);
+            storage.set_holes(samples::holes(&file, &image, &layout, mask.as_ref(), &all)?);
+            storage
+        }
+    };
+    let mut decoded = Decoded::new(format, size, storage);
     let meant = 1 + u16::from(layout.alpha.is_some());
     if asked.is_some() {
         decoded.format += &format!(", band {} of {}", layout.band + 1, layout.bands);
@@ -59,27 +80,29 @@ fn decode(input: &FileBytes, asked: Option<u32>) -> Result<Decoded, BadRaster> {
             layout.bands
         ));
     }
-    let metadata = Metadata::read(image, layout.band)?;
+    let metadata = Metadata::read(&image, layout.band)?;
     decoded.no_data = metadata.no_data;
     decoded.scale = metadata.scale.unwrap_or(1.0);
     decoded.offset = metadata.offset.unwrap_or(0.0);
-    georef::apply(image, &mut decoded, metadata.metres_per_vertical_unit);
+    georef::apply(&image, &mut decoded, metadata.metres_per_vertical_unit);
     if decoded.place.is_none() {
         lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?;
     }
     Ok(decoded)
 }
 
-/// The mask that GDAL keeps in a file of its own, `NAME.tif.msk`.
-fn mask_beside(input: &FileBytes) -> Result<Option<TiffFile>, BadRaster> {
+/// A file that GDAL keeps beside another, as `NAME.tif.msk` for a mask and `NAME.tif.ovr`
+/// for overviews.
+fn beside(input: &FileBytes, extension: &str) -> Result<Option<TiffFile>, BadRaster> {
     let Data::File(_, path) = input.data() else {
         return Ok(None);
     };
-    let mut mask = path.as_os_str().to_owned();
-    mask.push(".msk");
-    let mask = std::path::Path::new(&mask);
-    match mask.is_file() {
-        true => open(&FileBytes::open(mask)?).map(Some),
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".");
+    beside.push(extension);
+    let beside = std::path::Path::new(&beside);
+    match beside.is_file() {
+        true => open(&FileBytes::open(beside)?).map(Some),
         false => Ok(None),
     }
 }
@@ -88,15 +111,15 @@ fn mask_beside(input: &FileBytes) -> Result<Option<TiffFile>, BadRaster> {
 fn open(input: &FileBytes) -> Result<TiffFile, BadRaster> {
     const LONGEST_LIST: usize = 32 << 20;
     let bytes = usize::try_from(input.len()).unwrap_or(usize::MAX);
-    let options = OpenOptions {
-        // Every block is read once.
+    let options = tiff_reader::OpenOptions {
+        // Blocks are kept where all formats keep theirs.
         block_cache_bytes: 0,
         parse_budgets: ParseBudgets {
             max_ifds: 64,
             max_tag_value_bytes: bytes.min(LONGEST_LIST),
             ..ParseBudgets::default()
         },
-        ..OpenOptions::default()
+        ..tiff_reader::OpenOptions::default()
     };
     let source: SharedSource = match input.data() {
         Data::File(_, path) => Arc::new(FileSource::open(path).map_err(fault)?),

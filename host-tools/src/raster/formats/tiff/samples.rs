@@ -1,4 +1,4 @@
-//! The samples of a band, and which of the first band's are holes that no value marks:
+//! The samples of a part of a band, and which of them are holes that no value marks:
 //! left out of a sparse file, masked, transparent.
 
 use half::f16;
@@ -7,34 +7,48 @@ use tiff_reader::{Ifd, TiffFile, TiffSample};
 use super::fault::fault;
 use super::images::{mask_of, of_same_size};
 use super::layout::{Layout, SampleFormat};
+use crate::raster::blocks::Part;
 use crate::raster::samples::{HoleMask, SampleValue, with_samples};
-use crate::raster::{BadRaster, Samples};
+use crate::raster::{BadRaster, SampleType, Samples};
 
-/// Reads a band, the first being 0.
+/// Reads a part of a band, the first being 0.
 pub(super) fn read(
     file: &TiffFile,
     image: &Ifd,
     layout: &Layout,
     band: usize,
+    part: &Part,
 ) -> Result<Samples, BadRaster> {
     use SampleFormat::{Float, Signed, Unsigned};
-    let band = Band {
-        band,
-        ..Band::first(file, image, layout)
-    };
+    let band = Band { file, image, band };
     Ok(match layout.stored {
-        (Unsigned, 8) => band.read(|value: u8| value)?.into(),
-        (Signed, 8) => band.read(|value: i8| value)?.into(),
-        (Unsigned, 16) => band.read(|value: u16| value)?.into(),
-        (Signed, 16) => band.read(|value: i16| value)?.into(),
-        (Float, 16) => band.read(f16::to_f32)?.into(),
-        (Unsigned, 32) => band.read(|value: u32| value)?.into(),
-        (Signed, 32) => band.read(|value: i32| value)?.into(),
-        (Float, 32) => band.read(|value: f32| value)?.into(),
-        (Unsigned, _) => band.read(|value: u64| value as f64)?.into(),
-        (Signed, _) => band.read(|value: i64| value as f64)?.into(),
-        (Float, _) => band.read(|value: f64| value)?.into(),
+        (Unsigned, 8) => band.read(part, |value: u8| value)?.into(),
+        (Signed, 8) => band.read(part, |value: i8| value)?.into(),
+        (Unsigned, 16) => band.read(part, |value: u16| value)?.into(),
+        (Signed, 16) => band.read(part, |value: i16| value)?.into(),
+        (Float, 16) => band.read(part, f16::to_f32)?.into(),
+        (Unsigned, 32) => band.read(part, |value: u32| value)?.into(),
+        (Signed, 32) => band.read(part, |value: i32| value)?.into(),
+        (Float, 32) => band.read(part, |value: f32| value)?.into(),
+        (Unsigned, _) => band.read(part, |value: u64| value as f64)?.into(),
+        (Signed, _) => band.read(part, |value: i64| value as f64)?.into(),
+        (Float, _) => band.read(part, |value: f64| value)?.into(),
     })
+}
+
+/// The type in which [`read`] hands samples over.
+pub(super) fn sample_type(layout: &Layout) -> SampleType {
+    use SampleFormat::{Float, Signed, Unsigned};
+    match layout.stored {
+        (Unsigned, 8) => SampleType::U8,
+        (Signed, 8) => SampleType::I8,
+        (Unsigned, 16) => SampleType::U16,
+        (Signed, 16) => SampleType::I16,
+        (Unsigned, 32) => SampleType::U32,
+        (Signed, 32) => SampleType::I32,
+        (Float, 16 | 32) => SampleType::F32,
+        _ => SampleType::F64,
+    }
 }
 
 /// A band of an image.
@@ -42,29 +56,22 @@ struct Band<'f> {
     file: &'f TiffFile,
     image: &'f Ifd,
     band: usize,
-    /// Columns and rows.
-    size: (usize, usize),
-    /// Rows of a strip or tile.
-    rows_at_once: usize,
 }
 
-impl<'f> Band<'f> {
-    /// `layout` is that of the full image, which has the same size.
-    fn first(file: &'f TiffFile, image: &'f Ifd, layout: &Layout) -> Self {
-        let height = image.tile_height().unwrap_or(image.rows_per_strip());
-        Self {
-            file,
-            image,
-            band: 0,
-            size: (layout.columns as usize, layout.rows as usize),
-            rows_at_once: height.clamp(1, layout.rows) as usize,
-        }
-    }
-
-    /// Reads all samples, each converted. They are held once: a row of chunks is
+impl Band<'_> {
+    /// Reads the samples of a part, each converted. They are held once: a row of chunks is
     /// decoded, copied to its place and let go.
-    fn read<T: TiffSample, U>(&self, convert: impl Fn(T) -> U) -> Result<Vec<U>, BadRaster> {
-        let (columns, rows) = self.size;
+    fn read<T: TiffSample, U>(
+        &self,
+        part: &Part,
+        convert: impl Fn(T) -> U,
+    ) -> Result<Vec<U>, BadRaster> {
+        let height = self
+            .image
+            .tile_height()
+            .unwrap_or(self.image.rows_per_strip());
+        let [column, row, columns, rows] =
+            [part.column, part.row, part.columns, part.rows].map(|count| count as usize);
         let samples = columns * rows;
         let mut values = Vec::new();
         values.try_reserve_exact(samples).map_err(|_| {
@@ -72,11 +79,14 @@ impl<'f> Band<'f> {
                 "{samples} samples are more than this machine can hold"
             ))
         })?;
-        for first in (0..rows).step_by(self.rows_at_once) {
-            let count = self.rows_at_once.min(rows - first);
+        let rows_at_once = height.clamp(1, part.rows.max(1)) as usize;
+        for first in (row..row + rows).step_by(rows_at_once) {
+            let count = rows_at_once.min(row + rows - first);
             let window = self
                 .file
-                .read_band_window_from_ifd::<T>(self.image, self.band, first, 0, count, columns)
+                .read_band_window_from_ifd::<T>(
+                    self.image, self.band, first, column, count, columns,
+                )
                 .map_err(fault)?;
             let (window, _) = window.into_raw_vec_and_offset();
             values.extend(window.into_iter().map(&convert));
@@ -85,38 +95,47 @@ impl<'f> Band<'f> {
     }
 }
 
-/// The samples in chunks that a sparse file leaves out, those that a mask in the file
-/// or `beside` it calls no data, and those whose alpha is zero.
+/// The samples of a part in chunks that a sparse file leaves out, those that a mask in the
+/// file or `beside` it calls no data, and those whose alpha is zero.
 pub(super) fn holes(
     file: &TiffFile,
     image: &Ifd,
     layout: &Layout,
     beside: Option<&TiffFile>,
+    part: &Part,
 ) -> Result<Option<HoleMask>, BadRaster> {
-    let (columns, rows) = (layout.columns as usize, layout.rows as usize);
+    let columns = part.columns as usize;
     let mut holes = None;
     let mut set = |index| {
-        let holes = holes.get_or_insert_with(|| HoleMask::with_capacity(columns * rows));
+        let size = columns * part.rows as usize;
+        let holes = holes.get_or_insert_with(|| HoleMask::with_capacity(size));
         holes.insert(index);
     };
-    let (width, height) = (layout.chunk.0 as usize, layout.chunk.1 as usize);
-    let across = layout.chunks_across() as usize;
-    let stored = layout.of_band().unwrap_or_default();
-    for (chunk, _) in stored.iter().enumerate().filter(|(_, bytes)| **bytes == 0) {
-        let (west, north) = (chunk % across * width, chunk / across * height);
-        for row in north..(north + height).min(rows) {
-            (west..(west + width).min(columns)).for_each(|column| set(row * columns + column));
+    let (first, last) = (part.row, part.row + part.rows);
+    for left_out in layout.chunks_in(part).filter(|chunk| chunk.bytes == 0) {
+        let covers = left_out.covers;
+        let rows = covers.row.max(first)..(covers.row + covers.rows).min(last);
+        let west = covers.column.max(part.column) - part.column;
+        let east = (covers.column + covers.columns).min(part.column + part.columns) - part.column;
+        for row in rows {
+            let start = (row - first) as usize * columns;
+            (west..east).for_each(|column| set(start + column as usize));
         }
     }
     let inside = mask_of(file, image).map(|mask| (file, mask));
     let outside = beside.and_then(|beside| Some((beside, of_same_size(beside, image)?)));
-    for (file, mask) in inside.into_iter().chain(outside) {
-        let has_data = Band::first(file, mask, layout).read(|value: u8| value != 0)?;
+    for (file, image) in inside.into_iter().chain(outside) {
+        let mask = Band {
+            file,
+            image,
+            band: 0,
+        };
+        let has_data = mask.read(part, |value: u8| value != 0)?;
         let missing = has_data.iter().enumerate().filter(|(_, has)| !**has);
         missing.for_each(|(index, _)| set(index));
     }
     if let Some(band) = layout.alpha {
-        with_samples!(read(file, image, layout, band)?, alpha => {
+        with_samples!(read(file, image, layout, band, part)?, alpha => {
             let clear = alpha.iter().enumerate().filter(|(_, alpha)| alpha.widen() == 0.0);
             clear.for_each(|(index, _)| set(index));
         });

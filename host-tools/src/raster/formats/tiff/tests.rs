@@ -7,7 +7,7 @@ use tiff::tags::Tag;
 
 use super::decode;
 use crate::raster::input::FileBytes;
-use crate::raster::{BadRaster, Certainty, Raster};
+use crate::raster::{BadRaster, Certainty, OpenOptions, Raster};
 
 /// One image of a file: its kind (`NewSubfileType`), size and samples.
 struct Part<'a> {
@@ -36,8 +36,21 @@ fn file(parts: &[Part<'_>]) -> Vec<u8> {
     bytes.into_inner()
 }
 
+fn of_band(band: u32) -> OpenOptions {
+    OpenOptions {
+        band: Some(band),
+        ..OpenOptions::default()
+    }
+}
+
 fn open(bytes: Vec<u8>) -> Result<Raster, BadRaster> {
-    Raster::checked(decode(&FileBytes::unpacked("test.tif", bytes), None)?, None)
+    Raster::checked(
+        decode(
+            &FileBytes::unpacked("test.tif", bytes),
+            &OpenOptions::default(),
+        )?,
+        None,
+    )
 }
 
 const FULL: Part<'_> = Part {
@@ -262,14 +275,15 @@ fn a_band_of_a_colour_image_is_a_height_when_it_is_named() {
         "{fault}"
     );
     let input = FileBytes::unpacked("test.tif", bytes);
-    let green = Raster::checked(decode(&input, Some(2)).expect("a band"), None).expect("heights");
+    let green =
+        Raster::checked(decode(&input, &of_band(2)).expect("a band"), None).expect("heights");
     assert_eq!((green.height(0, 1), green.height(1, 0)), (20.0, 110.0));
     assert!(
         green.format().ends_with("band 2 of 3"),
         "{}",
         green.format()
     );
-    let fault = decode(&input, Some(4)).expect_err("three bands");
+    let fault = decode(&input, &of_band(4)).expect_err("three bands");
     assert!(fault.to_string().contains("bands 1 to 3"), "{fault}");
 }
 

@@ -1,0 +1,260 @@
+//! A raster that stays in its file: blocks of samples are read when they are touched.
+//!
+//! A format that can read a part of an image without the rest hands over a
+//! [`BlockReader`]. [`Blocks`] asks it for what is touched, keeps the blocks touched last
+//! (`cache`), and looks at a few of them when the file is opened (`survey`). Coarser
+//! images of the same field, overviews, serve the coarse levels of detail.
+//!
+//! A block that cannot be read is a hole, with a warning: what is wrong in one place of a
+//! file that is larger than memory is no reason to feel nothing of it.
+
+mod cache;
+mod survey;
+
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::guard::guarded;
+use super::samples::{HoleMask, SampleType, SampleValue, Samples, with_samples};
+use super::{BadRaster, bilinear};
+use cache::{Cache, Key};
+pub(super) use survey::Survey;
+
+/// Blocks of a larger size than this are not read one by one, bytes.
+pub(super) const LARGEST_BLOCK_BYTES: u64 = 32 << 20;
+/// An image serves a level that is coarser than it, or as coarse to this share: overviews
+/// of a field whose size is odd are coarser than a power of two by up to a sample.
+const AS_COARSE: f64 = 1.01;
+/// After so many warnings of blocks that cannot be read one says that there are more.
+const WARNINGS: u32 = 8;
+
+/// Reads parts of a file's images.
+pub(super) trait BlockReader: Send + Sync {
+    /// Name of the format, in messages.
+    fn format(&self) -> &'static str;
+
+    /// The full image, and after it others of the same field, each coarser than the one
+    /// before.
+    fn images(&self) -> &[BlockImage];
+
+    /// Type in which samples are held.
+    fn sample_type(&self) -> SampleType;
+
+    /// Whether the file stores samples there; where it does not, there is a hole.
+    fn is_stored(&self, image: usize, part: &Part) -> bool;
+
+    /// The samples of a part of an image, row after row.
+    ///
+    /// # Errors
+    /// What is wrong with that part of the file.
+    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster>;
+
+    /// A hash of the file's index: where each block is stored and in how many bytes.
+    fn index(&self) -> u64;
+}
+
+/// An image that is read in blocks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct BlockImage {
+    /// Samples a row.
+    pub(super) columns: u32,
+    /// Rows.
+    pub(super) rows: u32,
+    /// Columns and rows of a block; those at the east and south end are cut.
+    pub(super) block: [u32; 2],
+}
+
+/// A rectangle of an image, in the file's order of columns and rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Part {
+    /// Its first column.
+    pub(super) column: u32,
+    /// Its first row.
+    pub(super) row: u32,
+    /// Samples a row.
+    pub(super) columns: u32,
+    /// Rows.
+    pub(super) rows: u32,
+}
+
+/// Samples of a part of an image.
+#[derive(Debug)]
+pub(super) struct Block {
+    /// Row after row.
+    pub(super) samples: Samples,
+    /// Holes that no value marks.
+    pub(super) holes: Option<HoleMask>,
+}
+
+impl Part {
+    /// All of an image.
+    pub(super) const fn whole(columns: u32, rows: u32) -> Self {
+        Self {
+            column: 0,
+            row: 0,
+            columns,
+            rows,
+        }
+    }
+}
+
+impl BlockImage {
+    /// Blocks from west to east and down.
+    fn counts(&self) -> [u32; 2] {
+        let [across, down] = self.block;
+        [self.columns.div_ceil(across), self.rows.div_ceil(down)]
+    }
+
+    /// What a block covers.
+    fn part(&self, [across, down]: [u32; 2]) -> Part {
+        let [column, row] = [across * self.block[0], down * self.block[1]];
+        Part {
+            column,
+            row,
+            columns: self.block[0].min(self.columns - column),
+            rows: self.block[1].min(self.rows - row),
+        }
+    }
+}
+
+/// The blocks of a file, those touched last in memory.
+pub(super) struct Blocks {
+    reader: Box<dyn BlockReader>,
+    kept: Mutex<Kept>,
+}
+
+struct Kept {
+    cache: Cache,
+    /// Blocks that could not be read.
+    unread: u32,
+}
+
+impl Blocks {
+    /// Nothing is read yet.
+    pub(super) fn new(reader: Box<dyn BlockReader>) -> Self {
+        let kept = Kept {
+            cache: Cache::default(),
+            unread: 0,
+        };
+        Self {
+            reader,
+            kept: Mutex::new(kept),
+        }
+    }
+
+    /// Type in which samples are held.
+    pub(super) fn sample_type(&self) -> SampleType {
+        self.reader.sample_type()
+    }
+
+    /// Bytes that blocks in memory take at most.
+    pub(super) const fn most_bytes() -> usize {
+        cache::MOST_BYTES + LARGEST_BLOCK_BYTES as usize
+    }
+
+    /// The image that serves a level of detail: the coarsest that is no coarser than it.
+    pub(super) fn image_of(&self, level: u8) -> usize {
+        let images = self.reader.images();
+        let step = f64::from(level).exp2() * AS_COARSE;
+        let serves = |image: &BlockImage| self.coarseness(image).iter().all(|times| *times <= step);
+        images.iter().rposition(serves).unwrap_or(0)
+    }
+
+    /// A stored sample at a column and row of an image, in the file's order; `None` in a
+    /// hole that no value marks.
+    pub(super) fn stored(&self, image: usize, column: u32, row: u32) -> Option<f64> {
+        let of = self.reader.images().get(image)?;
+        let [across, down] = of.block;
+        let block = self.block(image, [column / across, row / down])?;
+        let columns = of.part([column / across, row / down]).columns as usize;
+        let index = (row % down) as usize * columns + (column % across) as usize;
+        let hole = block
+            .holes
+            .as_ref()
+            .is_some_and(|mask| mask.contains(index));
+        (!hole).then(|| with_samples!(&block.samples, values => values[index].widen()))
+    }
+
+    /// A stored sample between the samples of an image, linear along rows and columns, at a
+    /// place in columns and rows of the full one; every corner that counts must have
+    /// a height. `height` makes one of a stored value.
+    pub(super) fn between(
+        &self,
+        image: usize,
+        [column, row]: [f64; 2],
+        height: impl Fn(Option<f64>) -> f64,
+    ) -> f64 {
+        let Some(of) = self.reader.images().get(image) else {
+            return f64::NAN;
+        };
+        // A sample is the middle of its cell, and the edges of the images are the same.
+        let times = self.coarseness(of);
+        let place = |at: f64, times: f64, count: u32| {
+            ((at + 0.5) / times - 0.5).clamp(0.0, f64::from(count) - 1.0)
+        };
+        let place = [
+            place(column, times[0], of.columns),
+            place(row, times[1], of.rows),
+        ];
+        bilinear::at(place, |column, row| height(self.stored(image, column, row)))
+    }
+
+    /// Samples of the full image in one of another, along rows and columns.
+    fn coarseness(&self, image: &BlockImage) -> [f64; 2] {
+        let full = self.reader.images().first().unwrap_or(image);
+        [
+            f64::from(full.columns) / f64::from(image.columns),
+            f64::from(full.rows) / f64::from(image.rows),
+        ]
+    }
+
+    /// A block, read if it is not in memory; `None` where there is no sample.
+    fn block(&self, image: usize, at: [u32; 2]) -> Option<Arc<Block>> {
+        // Nothing that panics runs while this is held but decoders, whose panics are caught.
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = Key { image, at };
+        if let Some(block) = kept.cache.get(&key) {
+            return block;
+        }
+        let part = self.reader.images().get(image)?.part(at);
+        let block = self.read(image, &part, &mut kept.unread);
+        kept.cache.put(key, block.clone());
+        block
+    }
+
+    fn read(&self, image: usize, part: &Part, unread: &mut u32) -> Option<Arc<Block>> {
+        if !self.reader.is_stored(image, part) {
+            return None;
+        }
+        let read = guarded(self.reader.format(), || self.reader.read(image, part));
+        match read {
+            Ok(block) => Some(Arc::new(block)),
+            Err(fault) => {
+                *unread += 1;
+                if *unread <= WARNINGS {
+                    tracing::warn!(
+                        "columns {} to {}, rows {} to {} of the file cannot be read and are a hole: {fault}",
+                        part.column,
+                        part.column + part.columns - 1,
+                        part.row,
+                        part.row + part.rows - 1
+                    );
+                } else if *unread == WARNINGS + 1 {
+                    tracing::warn!("more of the file cannot be read and are holes");
+                }
+                None
+            }
+        }
+    }
+}
+
+impl fmt::Debug for Blocks {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Blocks")
+            .field("images", &self.reader.images())
+            .finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests;

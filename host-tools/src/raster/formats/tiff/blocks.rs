@@ -1,0 +1,173 @@
+//! A TIFF that stays on disk: full image, overviews and masks, read in blocks of whole
+//! strips or tiles.
+
+use std::hash::Hasher;
+
+use tiff_reader::{Ifd, TiffFile};
+use twox_hash::XxHash64;
+
+use super::images;
+use super::layout::Layout;
+use super::samples::{holes, read, sample_type};
+use crate::raster::blocks::{Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Part};
+use crate::raster::{BadRaster, SampleType};
+
+/// Small strips and tiles are read several at once, samples each way.
+const USUAL_BLOCK: u32 = 256;
+
+/// Whether single blocks of an image can be read: a strip or tile is not too large.
+pub(super) fn suit(layout: &Layout) -> bool {
+    let [columns, rows] = block(layout).map(u64::from);
+    let samples = columns.saturating_mul(rows);
+    samples.saturating_mul(layout.texel_bytes().max(8)) <= LARGEST_BLOCK_BYTES
+}
+
+/// Columns and rows of a block: as few whole strips or tiles as make a usual one.
+fn block(layout: &Layout) -> [u32; 2] {
+    let (columns, rows) = layout.chunk;
+    let several = |chunk: u32| chunk.saturating_mul(USUAL_BLOCK.div_ceil(chunk));
+    // A strip is as wide as the image: of wide ones few are read at once.
+    let usual = USUAL_BLOCK * USUAL_BLOCK / columns.clamp(1, USUAL_BLOCK * USUAL_BLOCK);
+    let down = match columns > USUAL_BLOCK {
+        true => rows.saturating_mul(usual.max(1).div_ceil(rows)),
+        false => several(rows),
+    };
+    [several(columns), down]
+}
+
+/// A TIFF on disk.
+pub(super) struct TiffBlocks {
+    files: Vec<TiffFile>,
+    mask: Option<TiffFile>,
+    /// The full image and its overviews.
+    images: Vec<Image>,
+    /// The same as the rest of the program knows them.
+    blocks: Vec<BlockImage>,
+}
+
+/// The main file, and one of overviews beside it.
+const MAIN: usize = 0;
+
+struct Image {
+    file: usize,
+    directory: Ifd,
+    layout: Layout,
+}
+
+impl TiffBlocks {
+    /// The full image of a file and the overviews in it and in one beside it that are of the
+    /// same kind; `asked` is the band that the user chose.
+    pub(super) fn new(
+        file: TiffFile,
+        mask: Option<TiffFile>,
+        overviews: Option<TiffFile>,
+        asked: Option<u32>,
+    ) -> Result<Self, BadRaster> {
+        let full = images::full(&file)?.clone();
+        let full = Image {
+            file: MAIN,
+            layout: Layout::read(&full, asked)?,
+            directory: full,
+        };
+        let files: Vec<_> = [file].into_iter().chain(overviews).collect();
+        let mut found = vec![full];
+        for (index, file) in files.iter().enumerate() {
+            for directory in images::overviews(file) {
+                // An overview that cannot be used is no reason not to feel the field.
+                let Ok(layout) = Layout::read(directory, asked) else {
+                    continue;
+                };
+                let image = Image {
+                    file: index,
+                    directory: directory.clone(),
+                    layout,
+                };
+                if image.is_overview_of(&found[MAIN]) {
+                    found.push(image);
+                }
+            }
+        }
+        found.sort_by_key(|image| std::cmp::Reverse(image.layout.columns));
+        found.dedup_by_key(|image| image.layout.columns);
+        let blocks = found.iter().map(|image| BlockImage {
+            columns: image.layout.columns,
+            rows: image.layout.rows,
+            block: block(&image.layout),
+        });
+        Ok(Self {
+            blocks: blocks.collect(),
+            files,
+            mask,
+            images: found,
+        })
+    }
+
+    /// The mask beside the file, of this image.
+    fn mask_of(&self, image: &Image) -> Option<&TiffFile> {
+        let mask = self.mask.as_ref()?;
+        images::of_same_size(mask, &image.directory).and(Some(mask))
+    }
+}
+
+impl Image {
+    /// Whether it shows all of another image in fewer samples of the same type and index.
+    fn is_overview_of(&self, full: &Self) -> bool {
+        let (ours, theirs) = (&self.layout, &full.layout);
+        let times = [
+            f64::from(theirs.columns) / f64::from(ours.columns),
+            f64::from(theirs.rows) / f64::from(ours.rows),
+        ];
+        // Half an odd number of samples is rounded up or down.
+        let one = 1.0 / f64::from(ours.columns.min(ours.rows).max(1));
+        ours.stored == theirs.stored
+            && ours.bands == theirs.bands
+            && times[0] > 1.0
+            && (times[0] / times[1] - 1.0).abs() <= 1.5 * one
+            && ours.of_band().is_some()
+            && suit(ours)
+    }
+}
+
+impl BlockReader for TiffBlocks {
+    fn format(&self) -> &'static str {
+        super::FORMAT.name
+    }
+
+    fn images(&self) -> &[BlockImage] {
+        &self.blocks
+    }
+
+    fn sample_type(&self) -> SampleType {
+        sample_type(&self.images[MAIN].layout)
+    }
+
+    fn is_stored(&self, image: usize, part: &Part) -> bool {
+        let mut chunks = self.images[image].layout.chunks_in(part);
+        chunks.any(|chunk| chunk.bytes > 0)
+    }
+
+    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        let image = &self.images[image];
+        let (file, directory, layout) = (&self.files[image.file], &image.directory, &image.layout);
+        let mask = self.mask_of(image);
+        Ok(Block {
+            samples: read(file, directory, layout, layout.band, part)?,
+            holes: holes(file, directory, layout, mask, part)?,
+        })
+    }
+
+    fn index(&self) -> u64 {
+        let mut hasher = XxHash64::with_seed(0);
+        for image in &self.images {
+            hasher.write_u32(image.layout.columns);
+            hasher.write_u32(image.layout.rows);
+            let directory = &image.directory;
+            let places = directory.tile_offsets().or(directory.strip_offsets());
+            let bytes = image.layout.of_band().unwrap_or_default();
+            for number in places.unwrap_or_default().iter().chain(bytes) {
+                hasher.write_u64(*number);
+            }
+        }
+        hasher.finish()
+    }
+}

@@ -1,0 +1,60 @@
+//! Where a raster's samples are: in memory, or in its file until they are touched.
+
+use std::sync::Arc;
+
+use super::blocks::{BlockReader, Blocks};
+use super::samples::{HoleMask, SampleType, Samples};
+
+/// The samples of a raster, in the file's order and type.
+#[derive(Clone, Debug)]
+pub(super) enum Storage {
+    /// All of them in memory.
+    Held {
+        /// `columns × rows` samples, the file's first row first.
+        samples: Samples,
+        /// Holes that no value marks.
+        mask: Option<HoleMask>,
+    },
+    /// In the file.
+    Blocks(Arc<Blocks>),
+}
+
+impl From<Samples> for Storage {
+    fn from(samples: Samples) -> Self {
+        Self::Held {
+            samples,
+            mask: None,
+        }
+    }
+}
+
+impl<R: BlockReader + 'static> From<R> for Storage {
+    fn from(reader: R) -> Self {
+        Self::Blocks(Arc::new(Blocks::new(Box::new(reader))))
+    }
+}
+
+impl Storage {
+    /// The samples, where all are in memory.
+    pub(super) fn held(&self) -> Option<&Samples> {
+        match self {
+            Self::Held { samples, .. } => Some(samples),
+            Self::Blocks(_) => None,
+        }
+    }
+
+    /// The type of a sample.
+    pub(super) fn sample_type(&self) -> SampleType {
+        match self {
+            Self::Held { samples, .. } => samples.sample_type(),
+            Self::Blocks(blocks) => blocks.sample_type(),
+        }
+    }
+
+    /// Marks holes in samples that are in memory.
+    pub(super) fn set_holes(&mut self, holes: Option<HoleMask>) {
+        if let Self::Held { mask, .. } = self {
+            *mask = holes.filter(|holes| !holes.is_clear());
+        }
+    }
+}
