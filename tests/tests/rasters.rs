@@ -6,7 +6,8 @@
 use std::path::{Path, PathBuf};
 
 use hapterra::raster::{BadRaster, CellUnit, OpenOptions, PngChannel, Raster};
-use hapterra::terrain::{FeltCells, FeltGrid};
+use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain, TileBuffer};
+use hapterra_core::terrain::TileKey;
 use hapterra_tests::shared;
 
 const COLUMNS: usize = 512;
@@ -318,6 +319,25 @@ fn a_large_file_is_held_once_in_its_own_type() {
     );
 }
 
+/// The same tiles at each level, of a file whose coarse levels are its own samples.
+fn same_tiles(held: &Raster, blocks: &Raster) {
+    let scale = Scale::new(1.0, 0.01).expect("a scale");
+    for level in 0..3 {
+        let [held, blocks] = [held, blocks].map(|raster| Terrain::new(raster, scale, level));
+        let (Ok(held), Ok(blocks)) = (held, blocks) else {
+            continue;
+        };
+        let [mut one, mut other] = [TileBuffer::default(), TileBuffer::default()];
+        let key = TileKey::new(level, 0, 0);
+        let tiles = (held.tile(key, &mut one), blocks.tile(key, &mut other));
+        if level == 0 {
+            assert_eq!(tiles.0, tiles.1);
+        }
+        assert!(tiles.0.is_some() && tiles.1.is_some());
+        assert!(blocks.top() >= held.top());
+    }
+}
+
 /// Left in their files and read in blocks, all TIFFs are the same as in memory.
 #[test]
 fn every_tiff_reads_the_same_in_blocks_as_at_once() {
@@ -353,6 +373,7 @@ fn every_tiff_reads_the_same_in_blocks_as_at_once() {
                 let same = |(a, b): (&f64, &f64)| a == b || (a.is_nan() && b.is_nan());
                 assert!(rows[0].iter().zip(&rows[1]).all(same), "{name}: row {row}");
             }
+            same_tiles(&held, &blocks);
             files += 1;
         }
     }

@@ -7,10 +7,11 @@ use crate::run::{root, run, say, target_dir, timed};
 
 /// Parts of the names of tests that follow an arm for seconds to hours, tick by
 /// tick. The surveys among the others do less under Miri (core's `cases`).
-const LONG: [&str; 5] = [
+const LONG: [&str; 6] = [
     "guard::tests",
     "guard::thermal",
     "guard::stall",
+    "guard::jog",
     "velocity::tests",
     "tick::tests",
 ];

@@ -34,11 +34,11 @@ pub(super) fn draw(
         y = figures(area, y, title, facts)? + px(20);
     }
     if !window.shows_all(surface.size_mm) {
-        heading(area, y, "Where the map lies")?;
         let (width, height) = area.dim_in_pixel();
         let top = y + px(20);
         let rest = height.cast_signed() - top;
         if rest > px(60) {
+            heading(area, y, "Where the map lies")?;
             let width = width.cast_signed().min(px(WIDE_PX));
             let place = area.clone().shrink((0, top), (width, rest.min(px(300))));
             map::inset(&place, surface, window)?;

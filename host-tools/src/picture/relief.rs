@@ -12,8 +12,9 @@ use super::style::{self, PAPER};
 /// The surface that a picture shows.
 #[derive(Clone, Copy)]
 pub struct Surface<'a> {
-    /// Height in mm at (east, north) in mm; `None` in a hole and off the data.
-    pub height_mm: &'a dyn Fn(f64, f64) -> Option<f64>,
+    /// Height in mm at (east, north) in mm, looked at in places so far apart, mm; `None` in a
+    /// hole and off the data.
+    pub height_mm: &'a dyn Fn(f64, f64, f64) -> Option<f64>,
     /// Extent east and north from the south-west sample, mm.
     pub size_mm: [f64; 2],
     /// One cell, mm.
@@ -232,11 +233,12 @@ fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
 /// hole is a hole.
 fn mean(surface: &Surface<'_>, corner: [f64; 2], step: [f64; 2], samples: u32) -> Option<f64> {
     let (mut sum, mut known) = (0.0, 0);
+    let apart = step[0].abs().min(step[1].abs()) / f64::from(samples);
     let at =
         |i: u32, axis: usize| corner[axis] + (f64::from(i) + 0.5) / f64::from(samples) * step[axis];
     for j in 0..samples {
         for i in 0..samples {
-            let height = (surface.height_mm)(at(i, 0), at(j, 1)).filter(|h| h.is_finite());
+            let height = (surface.height_mm)(at(i, 0), at(j, 1), apart).filter(|h| h.is_finite());
             sum += height.unwrap_or(0.0);
             known += u32::from(height.is_some());
         }
@@ -257,7 +259,7 @@ mod tests {
     #[test]
     fn light_comes_from_the_north_west_and_a_hole_is_striped() {
         // A cone with a hole at its top.
-        let height = |x: f64, y: f64| {
+        let height = |x: f64, y: f64, _: f64| {
             let r = (x - 50.0).hypot(y - 50.0);
             (r > 12.0).then_some(100.0 - r)
         };
@@ -275,7 +277,7 @@ mod tests {
 
     #[test]
     fn a_spike_does_not_stretch_the_colours_and_is_told() {
-        let height = |x: f64, y: f64| {
+        let height = |x: f64, y: f64, _: f64| {
             let on_spike = x.hypot(y) < 2.0;
             Some(if on_spike { 900.0 } else { x })
         };
@@ -292,7 +294,7 @@ mod tests {
     #[test]
     fn a_pixel_that_is_mostly_hole_is_a_hole() {
         let field = |known: &'static dyn Fn(f64) -> bool| {
-            let height = move |x: f64, _: f64| known(x).then_some(2.0);
+            let height = move |x: f64, _: f64, _: f64| known(x).then_some(2.0);
             let field = Surface {
                 height_mm: &height,
                 size_mm: [3.0, 3.0],
@@ -307,7 +309,7 @@ mod tests {
     #[test]
     fn work_is_bounded_by_the_picture_not_the_field() {
         let asked = Cell::new(0u64);
-        let height = |x: f64, y: f64| {
+        let height = |x: f64, y: f64, _: f64| {
             asked.set(asked.get() + 1);
             Some(x.sin() + y.cos())
         };
@@ -324,7 +326,7 @@ mod tests {
     fn nothing_but_holes_and_wild_heights_still_shade() {
         for height in [None, Some(f64::INFINITY), Some(0.0), Some(1e30)] {
             let field = Surface {
-                height_mm: &|_, _| height,
+                height_mm: &|_, _, _| height,
                 size_mm: [10.0, 10.0],
                 cell_mm: 1.0,
             };

@@ -3,7 +3,7 @@
 use super::*;
 use crate::picture::style::{HIP, PROXY};
 
-fn hills(x: f64, y: f64) -> Option<f64> {
+fn hills(x: f64, y: f64, _: f64) -> Option<f64> {
     let far = (x - 70.0).hypot(y - 40.0) > 9.0;
     far.then(|| 12.0 * libm::sin(x / 17.0) * libm::cos(y / 13.0))
 }
@@ -13,7 +13,7 @@ fn walk() -> Vec<Record> {
         .map(|i| {
             let t_s = 1e-3 * f64::from(i);
             let (x, y) = (20.0 + 15.0 * t_s, 50.0 + 25.0 * libm::sin(2.0 * t_s));
-            let ground = hills(x, y).unwrap_or(0.0);
+            let ground = hills(x, y, 0.0).unwrap_or(0.0);
             let depth = 3.0 * libm::sin(3.0 * t_s);
             let contact = depth > 0.0;
             let up = if contact { 0.5 * depth } else { 0.0 };

@@ -21,7 +21,7 @@ pub(super) fn heights(
     records: &[Record],
     time: &Range<f64>,
 ) -> Result<(), PictureError> {
-    let below = |r: &Record| (surface.height_mm)(r.hip_mm[0], r.hip_mm[1]);
+    let below = |r: &Record| (surface.height_mm)(r.hip_mm[0], r.hip_mm[1], 0.0);
     let seen = records
         .iter()
         .flat_map(|r| [Some(r.hip_mm[2]), Some(r.proxy_mm[2]), below(r)]);

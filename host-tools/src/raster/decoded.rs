@@ -175,7 +175,7 @@ impl HeightSummary {
     }
 
     /// Whether no sample has a height.
-    const fn has_none(&self) -> bool {
+    pub(super) const fn has_none(&self) -> bool {
         self.lowest > self.highest
     }
 }

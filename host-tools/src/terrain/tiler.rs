@@ -219,10 +219,26 @@ impl<'r> Terrain<'r> {
     /// millimetres, in `f64`; `None` in a hole and off the data.
     #[must_use]
     pub fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
-        let (column, u) = place(east_mm / self.scale.cell_mm(), self.size[0])?;
-        let (row, v) = place(north_mm / self.scale.cell_mm(), self.size[1])?;
+        self.height_of_level_mm(self.level, [east_mm, north_mm])
+    }
+
+    /// The same where it is only looked at, in places so far apart, mm: of a raster that
+    /// stays in its file, at a level that is quick to read.
+    #[must_use]
+    pub fn seen_mm(&self, east_mm: f64, north_mm: f64, apart_mm: f64) -> Option<f64> {
+        let cells = apart_mm / self.scale_of_level_0().cell_mm();
+        let level = self.raster().level_for(cells).max(self.level);
+        self.height_of_level_mm(level, [east_mm, north_mm])
+    }
+
+    fn height_of_level_mm(&self, level: u8, [east_mm, north_mm]: [f64; 2]) -> Option<f64> {
+        let coarser = level - self.level;
+        let cell_mm = self.scale.cell_mm() * f64::from(coarser).exp2();
+        let size = self.size.map(|patches| patches >> coarser.min(31));
+        let (column, u) = place(east_mm / cell_mm, size[0])?;
+        let (row, v) = place(north_mm / cell_mm, size[1])?;
         let at = |dx: u32, dy: u32| {
-            let height = self.grid.height(self.level, column + dx, row + dy);
+            let height = self.grid.height(level, column + dx, row + dy);
             height * self.scale.height_mm_per_unit()
         };
         let (south, north) = ([at(0, 0), at(1, 0)], [at(0, 1), at(1, 1)]);

@@ -35,23 +35,34 @@ impl Survey {
 
 impl Blocks {
     /// Looks at the coarsest image, all of it where it is small. `height` makes a
-    /// height of a stored sample. The summary's range is empty where there is no height.
+    /// height of a stored sample. The summary's range is empty where there is no height in
+    /// the whole file.
     pub(in crate::raster) fn survey(&self, height: impl Fn(Option<f64>) -> f64) -> Survey {
-        let images = self.reader.images();
-        let image = images.len().saturating_sub(1);
+        let image = self.reader.images().len().saturating_sub(1);
         let mut hasher = XxHash64::with_seed(0);
         hasher.write_u64(self.reader.index());
         let mut summary = HeightSummary::EMPTY;
-        for part in self.looks(image) {
-            let rows = part.row..part.row + part.rows;
-            for (row, column) in rows
-                .flat_map(|row| (part.column..part.column + part.columns).map(move |c| (row, c)))
-            {
-                let height = height(self.stored(image, column, row));
-                let bits = if height.is_nan() { f64::NAN } else { height };
-                hasher.write(&bits.to_le_bytes());
-                summary.add(height);
+        let mut look = |part: Part| {
+            for row in part.row..part.row + part.rows {
+                for column in part.column..part.column + part.columns {
+                    let height = height(self.stored(image, column, row));
+                    let bits = if height.is_nan() { f64::NAN } else { height };
+                    hasher.write(&bits.to_le_bytes());
+                    summary.add(height);
+                }
             }
+            summary.has_none()
+        };
+        let parts = self.stored_parts(image);
+        let is_small = parts.len() <= LOOKS || self.samples(image) <= FEW_SAMPLES;
+        let looks = if is_small { parts.len() } else { LOOKS };
+        let mut nothing_yet = true;
+        for index in 0..looks {
+            nothing_yet = look(parts[index * (parts.len() - 1) / (looks - 1).max(1)]);
+        }
+        if nothing_yet && !is_small {
+            // Most of it holds nothing: the first height anywhere will do.
+            let _ = parts.into_iter().find(|part| !look(*part));
         }
         Survey {
             summary,
@@ -59,21 +70,21 @@ impl Blocks {
         }
     }
 
-    /// Blocks to be looked at.
-    fn looks(&self, image: usize) -> Vec<Part> {
+    fn samples(&self, image: usize) -> u64 {
+        let of = self.reader.images().get(image);
+        of.map_or(0, |of| u64::from(of.columns) * u64::from(of.rows))
+    }
+
+    /// The blocks of an image that hold samples.
+    fn stored_parts(&self, image: usize) -> Vec<Part> {
         let Some(of) = self.reader.images().get(image) else {
             return Vec::new();
         };
         let [across, down] = of.counts();
         let every = (0..down).flat_map(|row| (0..across).map(move |column| [column, row]));
-        let stored = every
-            .map(|at| of.part(at))
-            .filter(|part| self.reader.is_stored(image, part));
-        let stored: Vec<_> = stored.collect();
-        if u64::from(of.columns) * u64::from(of.rows) <= FEW_SAMPLES || stored.len() <= LOOKS {
-            return stored;
-        }
-        let spread = |look: usize| stored[look * (stored.len() - 1) / (LOOKS - 1)];
-        (0..LOOKS).map(spread).collect()
+        let parts = every.map(|at| of.part(at));
+        parts
+            .filter(|part| self.reader.is_stored(image, part))
+            .collect()
     }
 }

@@ -89,6 +89,100 @@ fn the_mask_beside_an_image_makes_holes() {
     assert_eq!(raster.height(2, 1), 3.0);
 }
 
+/// Left in the file, whatever its size.
+fn in_blocks() -> OpenOptions {
+    OpenOptions {
+        most_in_memory_bytes: 0,
+        ..OpenOptions::default()
+    }
+}
+
+/// A full image of 64 × 48 samples, and an overview of a size and one height.
+fn with_overview(size: (u32, u32), height: u8) -> Vec<u8> {
+    let samples: Vec<u8> = (0..64 * 48).map(|index| (index % 199) as u8).collect();
+    let full = Part {
+        kind: 0,
+        size: (64, 48),
+        samples: &samples,
+    };
+    let overview = Part {
+        kind: 1,
+        size,
+        samples: &vec![height; (size.0 * size.1) as usize],
+    };
+    file(&[full, overview])
+}
+
+#[test]
+fn an_overview_serves_coarse_levels_if_it_shows_the_same_field() {
+    for (size, is_used) in [((32, 24), true), ((31, 24), true), ((32, 10), false)] {
+        let input = FileBytes::unpacked("test.tif", with_overview(size, 201));
+        let decoded = decode(&input, &in_blocks()).expect("decoded");
+        let raster = Raster::checked(decoded, None).expect("heights");
+        assert_eq!(raster.height(5, 40), f64::from((7 * 64 + 5) % 199));
+        let coarse = raster.surface(2, [20.0, 20.0]);
+        assert_eq!(coarse == 201.0, is_used, "{size:?}: {coarse}");
+        assert_eq!(raster.summary().highest == 201.0, is_used);
+    }
+}
+
+#[test]
+fn overviews_and_masks_beside_a_file_are_its_own() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("dem.tif");
+    let samples = [7; 64 * 48];
+    let part = |kind, size: (u32, u32), samples| Part {
+        kind,
+        size,
+        samples,
+    };
+    std::fs::write(&path, file(&[part(0, (64, 48), &samples)])).expect("written");
+    let overview = file(&[part(1, (16, 12), &[9; 16 * 12])]);
+    std::fs::write(folder.path().join("dem.tif.ovr"), overview).expect("written");
+    // The mask and its own overview hide the first sample of each.
+    let mut mask = [255; 64 * 48];
+    mask[0] = 0;
+    let mut coarse_mask = [255; 16 * 12];
+    coarse_mask[0] = 0;
+    let mask = file(&[part(4, (64, 48), &mask), part(5, (16, 12), &coarse_mask)]);
+    std::fs::write(folder.path().join("dem.tif.msk"), mask).expect("written");
+    let raster = Raster::open(&path, &in_blocks()).expect("opens");
+    assert!(raster.samples().is_none());
+    assert!(raster.height(0, 47).is_nan() && raster.height(1, 47) == 7.0);
+    assert_eq!(raster.surface(1, [30.0, 30.0]), 7.0);
+    assert_eq!(raster.surface(2, [30.0, 30.0]), 9.0);
+    assert!(raster.surface(2, [0.0, 47.0]).is_nan());
+    assert_eq!(raster.summary().holes, 1);
+}
+
+#[test]
+fn a_strip_that_is_cut_off_is_a_hole_in_a_file_that_is_not_held() {
+    let samples: Vec<u8> = vec![5; 3000 * 900];
+    let parts = [Part {
+        kind: 0,
+        size: (3000, 900),
+        samples: &samples,
+    }];
+    let mut bytes = file(&parts);
+    // The writer puts the samples first and the directory last: move one strip's place.
+    let raster = |bytes: Vec<u8>| {
+        let input = FileBytes::unpacked("test.tif", bytes);
+        Raster::checked(decode(&input, &in_blocks()).expect("decoded"), None).expect("heights")
+    };
+    assert_eq!(raster(bytes.clone()).height(10, 899), 5.0);
+    let directory = u32::from_le_bytes(bytes[4..8].try_into().expect("4 bytes")) as usize;
+    let entries = u16::from_le_bytes(bytes[directory..][..2].try_into().expect("2 bytes"));
+    let offsets = (0..usize::from(entries))
+        .map(|index| directory + 2 + 12 * index)
+        .find(|&at| bytes[at..at + 2] == 273_u16.to_le_bytes())
+        .expect("strips");
+    let list = u32::from_le_bytes(bytes[offsets + 8..][..4].try_into().expect("4")) as usize;
+    bytes[list..list + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+    let raster = raster(bytes);
+    assert!(raster.height(10, 899).is_nan(), "the first strip");
+    assert_eq!(raster.height(10, 0), 5.0);
+}
+
 /// Overwrites the number of the first directory's entry for a tag.
 fn with_tag(mut bytes: Vec<u8>, tag: u16, count: u32, value: u32) -> Vec<u8> {
     let directory = u32::from_le_bytes(bytes[4..8].try_into().expect("4 bytes")) as usize;
