@@ -231,7 +231,7 @@ fn heights(grid: &FeltGrid<'_>, [west, south, east, north]: Sides) -> Option<[f6
     let level = grid.raster().level_for(apart);
     let known = along(south, north)
         .flat_map(|row| along(west, east).map(move |column| (column >> level, row >> level)))
-        .map(|(column, row)| grid.height(level, column, row))
+        .map(|(column, row)| grid.height_of_level(level, column, row))
         .filter(|height| !height.is_nan());
     known.fold(None, |range: Option<[f64; 2]>, height| {
         let [low, high] = range.unwrap_or([height; 2]);

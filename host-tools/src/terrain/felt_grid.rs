@@ -227,16 +227,21 @@ impl<'r> FeltGrid<'r> {
     /// unit; `None` in a hole and off the field.
     #[must_use]
     pub fn surface(&self, place: [f64; 2]) -> Option<f64> {
-        let height = bilinear::at(place, |column, row| self.height(0, column, row));
+        let height = bilinear::at(place, |column, row| self.height(column, row));
         Some(height).filter(|height| !height.is_nan())
     }
 
     /// The height at a felt sample in the file's vertical unit; NaN in a hole and
     /// outside the field.
-    ///
-    /// Level *L* is the grid with every 2ᴸ-th sample; row and column count in it.
     #[must_use]
-    pub fn height(&self, level: u8, column: u32, row: u32) -> f64 {
+    pub fn height(&self, column: u32, row: u32) -> f64 {
+        self.height_of_level(0, column, row)
+    }
+
+    /// The same at a sample of level *L*, the grid with every 2ᴸ-th sample: row and column
+    /// count in it.
+    #[must_use]
+    pub fn height_of_level(&self, level: u8, column: u32, row: u32) -> f64 {
         let whole = |index: u32| u64::from(index).checked_mul(1_u64.checked_shl(level.into())?);
         let (Some(column), Some(row)) = (whole(column), whole(row)) else {
             return f64::NAN;
@@ -254,13 +259,13 @@ impl<'r> FeltGrid<'r> {
     }
 
     /// Copies heights of a row from `first_column` eastwards, one for each place in
-    /// `heights`: the same values as [`FeltGrid::height`].
+    /// `heights`: the same values as [`FeltGrid::height_of_level`].
     pub fn copy_row(&self, level: u8, row: u32, first_column: u32, heights: &mut [f64]) {
         if self.resampling.is_none() {
             return self.raster.copy_row(level, row, first_column, heights);
         }
         for (column, height) in (first_column..).zip(heights) {
-            *height = self.height(level, column, row);
+            *height = self.height_of_level(level, column, row);
         }
     }
 }
@@ -340,11 +345,9 @@ mod tests {
             let mut steps = 0;
             for row in 0..grid.rows() - 1 {
                 for column in 0..grid.columns() - 1 {
-                    let at = grid.height(0, column, row);
-                    let (east, north) = (
-                        grid.height(0, column + 1, row),
-                        grid.height(0, column, row + 1),
-                    );
+                    let at = grid.height(column, row);
+                    let (east, north) =
+                        (grid.height(column + 1, row), grid.height(column, row + 1));
                     if !(at.is_nan() || east.is_nan() || north.is_nan()) {
                         let slopes = [(east - at) / side, (north - at) / side];
                         assert!((slopes[0] - 1.0).abs() < 1e-4, "{slopes:?} east");
@@ -367,7 +370,7 @@ mod tests {
             assert!(!grid.is_resampled());
             assert_eq!(grid.is_distorted(), cells == FeltCells::Stored);
             assert_eq!((grid.columns(), grid.rows()), (41, 31));
-            assert_eq!(grid.height(0, 17, 23), raster.height(17, 23));
+            assert_eq!(grid.height(17, 23), raster.height(17, 23));
         }
     }
 
@@ -377,11 +380,11 @@ mod tests {
         let grid = FeltGrid::new(&raster, FeltCells::Square);
         assert_eq!((grid.columns(), grid.rows()), (41, 76));
         // Row 5 of 10 m is the file's row 2 of 25 m.
-        assert_eq!(grid.height(0, 7, 5), raster.height(7, 2));
+        assert_eq!(grid.height(7, 5), raster.height(7, 2));
         let mut heights = [0.0; 12];
         grid.copy_row(2, 3, 1, &mut heights);
         for (column, height) in (1..).zip(heights) {
-            let single = grid.height(0, 4 * column, 12);
+            let single = grid.height(4 * column, 12);
             assert!(height == single || (height.is_nan() && single.is_nan()));
         }
         assert!(heights[10].is_nan(), "east of the field");
@@ -399,7 +402,7 @@ mod tests {
         let grid = FeltGrid::new(&raster, FeltCells::Square);
         let holes: Vec<_> = (0..grid.rows())
             .flat_map(|row| (0..grid.columns()).map(move |column| (column, row)))
-            .filter(|&(column, row)| grid.height(0, column, row).is_nan())
+            .filter(|&(column, row)| grid.height(column, row).is_nan())
             .collect();
         assert_eq!(holes, [(4, 7), (4, 8), (4, 9)]);
     }

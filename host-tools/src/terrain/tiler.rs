@@ -238,7 +238,7 @@ impl<'r> Terrain<'r> {
         let (column, u) = place(east_mm / cell_mm, size[0])?;
         let (row, v) = place(north_mm / cell_mm, size[1])?;
         let at = |dx: u32, dy: u32| {
-            let height = self.grid.height(level, column + dx, row + dy);
+            let height = self.grid.height_of_level(level, column + dx, row + dy);
             height * self.scale.height_mm_per_unit()
         };
         let (south, north) = ([at(0, 0), at(1, 0)], [at(0, 1), at(1, 1)]);
