@@ -144,8 +144,12 @@ fn standard_output() -> io::Result<File> {
 ///
 /// # Errors
 /// [`OutputError`] names the output and the input.
-pub fn keep_apart(outputs: &[&Path], inputs: &[&Path]) -> Result<(), OutputError> {
-    for output in outputs {
+pub fn keep_apart(
+    outputs: &[impl AsRef<Path>],
+    inputs: &[impl AsRef<Path>],
+) -> Result<(), OutputError> {
+    let inputs: Vec<&Path> = inputs.iter().map(AsRef::as_ref).collect();
+    for output in outputs.iter().map(AsRef::as_ref) {
         // What is not there cannot be the same.
         let same = |input: &&&Path| is_same_file(output, input).unwrap_or(false);
         if let Some(input) = inputs.iter().find(same) {

@@ -22,7 +22,7 @@ use crate::link::{
 use crate::output::{Output, OutputError, OutputFolder, keep_apart};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::{Laid, View};
-use crate::raster::Raster;
+use crate::raster::{Raster, files_read_with};
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{LoopColumns, Record, Recording, Settings};
 use crate::synth::{Kind, Synth};
@@ -90,7 +90,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (raster, name) = terrain_of(args)?;
     let outputs = Outputs::new(&args.out, &name);
-    outputs.keep_apart(args.file.as_deref())?;
+    outputs.keep_apart(args)?;
     let asked = args.placing.of(&args.rendering, &raster)?;
     // The virtual Phantom is one.
     let view = asked.view(&Calibration::PREMIUM_1_5)?;
@@ -136,8 +136,9 @@ impl Outputs {
         }
     }
 
-    fn keep_apart(&self, input: Option<&Path>) -> Result<(), Failure> {
-        let inputs = Vec::from_iter(input);
+    fn keep_apart(&self, args: &Args) -> Result<(), Failure> {
+        let mut inputs = args.file.as_deref().map_or(vec![], files_read_with);
+        inputs.extend(args.commands.file());
         keep_apart(&[&self.recording, &self.picture], &inputs).or_hint(OTHER_FOLDER)
     }
 }

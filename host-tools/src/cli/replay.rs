@@ -72,7 +72,8 @@ pub struct Args {
 /// # Errors
 /// What is wrong with the terrain, the trajectory, the device or the output.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let inputs = [args.terrain.file.as_path(), &args.trajectory];
+    let mut inputs = args.terrain.inputs();
+    inputs.push(args.trajectory.clone());
     keep_apart(&[&args.output], &inputs).or_hint("name another file with --output")?;
     left_behind::tell([args.output.as_path()]);
     let viewer = args.viewing.program()?;

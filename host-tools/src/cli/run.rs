@@ -119,7 +119,9 @@ fn parse_plant(text: &str) -> Result<String, String> {
 /// that goes later is waited for.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let outputs = Vec::from_iter(args.record.as_deref());
-    keep_apart(&outputs, &[&args.terrain.file]).or_hint(OTHER_FILE)?;
+    let mut inputs = args.terrain.inputs();
+    inputs.extend(args.commands.file());
+    keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
     left_behind::tell(args.record.as_deref());
     let viewer = args.viewing.program()?;
     let raster = args.terrain.open()?;

@@ -10,7 +10,7 @@ use super::options::terrain_file::TerrainFile;
 use super::terminal::interrupt;
 use super::viewing;
 use crate::output::keep_apart;
-use crate::raster::Raster;
+use crate::raster::{Raster, files_read_with};
 use crate::replay::{FeltRows, ReplayError, Settings, terrain_of};
 use crate::terrain::Terrain;
 use crate::view_feed::{Picture, Program, ViewFeed};
@@ -51,7 +51,8 @@ pub struct Args {
 /// # Errors
 /// What is wrong with the recording or the terrain; no viewer.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let inputs = [args.recording.as_path(), &args.terrain];
+    let mut inputs = files_read_with(&args.terrain);
+    inputs.push(args.recording.clone());
     let outputs = Vec::from_iter(args.rrd.as_deref());
     keep_apart(&outputs, &inputs).or_hint("name another file with --rrd")?;
     let program = Program::find()?;

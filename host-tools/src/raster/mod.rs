@@ -51,6 +51,7 @@ mod storage;
 
 use std::path::Path;
 
+pub use beside::files_read_with;
 pub use crs::{LonLat, ReferenceSystem};
 pub use decoded::{HeightSummary, LARGEST_HEIGHT};
 pub use error::{BadRaster, Error};

@@ -297,10 +297,55 @@ fn no_command_writes_over_its_own_input() {
     folder.runs(&[&native[..], &["-o", &arm]].concat());
     let record = std::fs::read(&arm).expect("there");
     folder.fails(&[&native[..], &["--from", &arm, "-o", &arm]].concat());
+    // The commands of a run are an input, too.
+    std::fs::write(folder.path("steer.txt"), "at 1 zoom 2\n").expect("written");
+    let steer = folder.text("steer.txt");
+    let native = ["--device", "native", "--seconds", "1"];
+    let by_file = ["--commands", &steer, "--record", &steer];
+    let told = folder.fails(&[&["run", &hills], &native[..], &by_file].concat());
+    assert!(told.contains("it is the input"), "{told}");
+    exists_as_before(&folder.path("steer.txt"), b"at 1 zoom 2\n");
     exists_as_before(&folder.path("hills.tif"), &terrain);
     exists_as_before(&folder.path("in.csv"), &trajectory);
     exists_as_before(&folder.path("dem.png"), &picture);
     exists_as_before(&folder.path("arm.toml"), &record);
+}
+
+/// What lies beside a terrain and is read with it: header, reference system, world file,
+/// mask.
+#[test]
+fn no_command_writes_over_a_file_beside_its_input() {
+    let folder = Folder::new();
+    folder.write_trajectory("in.csv");
+    let header = "ncols 4\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 10\nbyteorder LSBFIRST\n";
+    std::fs::write(folder.path("float.flt"), [0; 48]).expect("written");
+    for (terrain, beside, text) in [
+        ("float.flt", "float.hdr", header),
+        ("float.flt", "float.prj", "GEOGCS[]"),
+        ("hills.tif", "hills.tfw", "1\n0\n0\n-1\n0\n0\n"),
+        ("hills.tif", "hills.TFWX", "1\n0\n0\n-1\n0\n0\n"),
+        ("hills.tif", "hills.tif.msk", "a mask"),
+    ] {
+        let [terrain, output, input] = [terrain, beside, "in.csv"].map(|name| folder.text(name));
+        std::fs::write(&output, text).expect("written");
+        let native = ["--device", "native", "--seconds", "1"];
+        for words in [
+            &["replay", &terrain, &input, "-o", &output][..],
+            &[&["run", &terrain, "--record", &output], &native[..]].concat(),
+            &["view", &input, "--terrain", &terrain, "--rrd", &output],
+        ] {
+            let told = folder.fails(words);
+            assert!(told.contains("it is the input"), "{beside}: {told}");
+        }
+        exists_as_before(Path::new(&output), text.as_bytes());
+    }
+    // The recording of float.flt would be its header.
+    std::fs::rename(folder.path("float.hdr"), folder.path("float.csv")).expect("renamed");
+    std::fs::hard_link(folder.path("float.csv"), folder.path("float.hdr")).expect("linked");
+    let (terrain, here) = (folder.text("float.flt"), folder.text("."));
+    let told = folder.fails(&["demo", &terrain, "--device", "native", "--out", &here]);
+    assert!(told.contains("it is the input"), "{told}");
+    exists_as_before(&folder.path("float.hdr"), header.as_bytes());
 }
 
 #[test]
@@ -374,6 +419,83 @@ fn a_reader_who_goes_away_is_no_crash() {
                 "{words:?}, {closed}: {told}"
             );
         }
+    }
+}
+
+/// Nor is a disk without room, for what is said and for what is written.
+#[test]
+fn an_output_that_cannot_be_written_is_no_crash() {
+    let folder = Folder::new();
+    folder.write_trajectory("in.csv");
+    let [hills, input, out, file] =
+        ["hills.tif", "in.csv", "none/out", "in.csv/out"].map(|name| folder.text(name));
+    let native = ["--device", "native", "--seconds", "0.1"];
+    let of_files = |out: &str| -> [Vec<String>; 5] {
+        let owned = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect();
+        [
+            owned(&["replay", &hills, &input, "-o", out]),
+            owned(&[&["run", &hills, "--record", out][..], &native].concat()),
+            owned(&["synth", "plane", "--size", "8", "-o", &format!("{out}.tif")]),
+            owned(&[
+                "calibrate",
+                "--device",
+                "native",
+                "--no-walk",
+                "--no-store",
+                "-o",
+                out,
+            ]),
+            owned(&["replay", &hills, &input, "-o", &format!("{out}.parquet")]),
+        ]
+    };
+    for words in of_files(&out).iter().chain(&of_files(&file)) {
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        let told = folder.fails(&words);
+        assert!(
+            told.contains("cannot write") && told.contains("hint: "),
+            "{told}"
+        );
+        assert!(!told.contains("panicked"), "{told}");
+    }
+    let told = folder.fails(&[&["demo", &hills, "--out", &file][..], &native].concat());
+    assert!(
+        told.contains("cannot write") && !told.contains("panicked"),
+        "{told}"
+    );
+    let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") else {
+        eprintln!("skipped: there is no /dev/full here");
+        return;
+    };
+    let demo = folder.text("demo");
+    for words in [
+        &["info", &hills][..],
+        &["info", "--json", &hills],
+        &["list"],
+        &["status", "--device", "native"],
+        &["calibrate", "--device", "native", "--show"],
+        &[
+            "synth",
+            "plane",
+            "--size",
+            "8",
+            "-o",
+            &folder.text("plane.tif"),
+        ],
+        &[&["run", &hills][..], &native].concat(),
+        &[&["demo", &hills, "--out", &demo][..], &native].concat(),
+        &["replay", &hills, &input, "-o", "-"],
+    ] {
+        let run = Command::new(hapterra_binary())
+            .args(words)
+            .stdout(full.try_clone().expect("cloned"))
+            .output()
+            .expect("it runs");
+        let told = said(&run);
+        assert!(!told.contains("panicked"), "{words:?}: {told}");
+        assert!(
+            matches!(run.status.code(), Some(0 | 1)),
+            "{words:?}: {told}"
+        );
     }
 }
 

@@ -1,5 +1,6 @@
 //! Options and input of views that change while they are touched; shared by `run` and `demo`.
 
+use std::path::PathBuf;
 use std::time::Instant;
 
 use hapterra_core::contact::Rule;
@@ -27,6 +28,14 @@ pub struct Commands {
 }
 
 impl Commands {
+    /// The file that commands come from, if any.
+    pub(in crate::cli) fn file(&self) -> Option<PathBuf> {
+        match &self.commands {
+            Some(Origin::File(path)) => Some(path.clone()),
+            _ => None,
+        }
+    }
+
     /// Reads them from now on.
     ///
     /// # Errors

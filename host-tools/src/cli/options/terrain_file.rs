@@ -10,7 +10,7 @@ use indicatif::ProgressBar;
 use crate::cli::failure::Failure;
 use crate::raster::{
     CellUnit, Certainty, Encoding, Endian, OpenOptions, PngChannel, Raster, RawLayout, SampleType,
-    metres_in,
+    files_read_with, metres_in,
 };
 
 /// Where `--help` lists these options.
@@ -95,6 +95,11 @@ impl TerrainFile {
             eprintln!("note: {line}");
         }
         Ok(raster)
+    }
+
+    /// The file and those beside it that are read with it: no output may be one of them.
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        files_read_with(&self.file)
     }
 
     /// The file's name without folders.

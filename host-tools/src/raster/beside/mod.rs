@@ -1,5 +1,6 @@
-//! What lies beside a file under the same name: a reference system (`.prj`), a world
-//! file. Only a file on disk has neighbours; what comes out of an archive has none.
+//! What lies beside a file under the same name: a header (`.hdr`), a reference system
+//! (`.prj`), a world file, a mask (`.msk`). Only a file on disk has neighbours; what comes
+//! out of an archive has none.
 
 mod prj;
 mod world_file;
@@ -7,7 +8,7 @@ mod world_file;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::Read;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::BadRaster;
 use super::input::{Data, FileBytes};
@@ -18,12 +19,37 @@ pub(super) use world_file::lay_out_by_world_file;
 /// No neighbour that is text is longer; what is longer is something else.
 const LONGEST_TEXT: u64 = 1 << 20;
 
+/// Extensions of all neighbours that a format may ask for: [`find`] finds no others, so
+/// that no output comes to lie over one that [`files_read_with`] does not know.
+const NEIGHBOURS: [&str; 11] = [
+    "hdr", "prj", "msk", "wld", "tfw", "tifw", "tiffw", "tfwx", "pgw", "pngw", "pgwx",
+];
+
+/// A terrain file and the files beside it that are read with it.
+#[must_use]
+pub fn files_read_with(path: &Path) -> Vec<PathBuf> {
+    let beside = NEIGHBOURS
+        .iter()
+        .flat_map(|extension| candidates(path, extension));
+    let there = beside.filter(|other| other != path && other.is_file());
+    std::iter::once(path.to_owned()).chain(there).collect()
+}
+
 /// The file beside `input` whose extension is `extension`, in lower or upper case:
 /// `hills.hdr` beside `hills.flt`, or `hills.flt.hdr`.
 pub(super) fn find(input: &FileBytes, extension: &str) -> Option<PathBuf> {
     let Data::File(_, path) = input.data() else {
         return None;
     };
+    let known = NEIGHBOURS.iter().find(|known| **known == extension)?;
+    let mut others = candidates(path, known)
+        .into_iter()
+        .filter(|other| other != path);
+    others.find(|other| other.is_file())
+}
+
+/// The names that a file beside `path` may have.
+fn candidates(path: &Path, extension: &str) -> [PathBuf; 4] {
     let appended = |extension: &str| {
         let mut name: OsString = path.as_os_str().to_owned();
         name.push(".");
@@ -31,14 +57,12 @@ pub(super) fn find(input: &FileBytes, extension: &str) -> Option<PathBuf> {
         PathBuf::from(name)
     };
     let upper = extension.to_uppercase();
-    let candidates = [
+    [
         path.with_extension(extension),
         path.with_extension(&upper),
         appended(extension),
         appended(&upper),
-    ];
-    let mut others = candidates.into_iter().filter(|other| other != path);
-    others.find(|other| other.is_file())
+    ]
 }
 
 /// The text of the file beside `input` with an extension, and that file's name.
