@@ -90,11 +90,12 @@ impl CellSize {
 
     /// The side in metres of the square cell that stands for this one.
     ///
-    /// It has the same area, so that the mean slope of cells that are felt as they
-    /// are stored is kept.
+    /// It has the same area on the ground, so that the mean slope of cells that are felt as
+    /// they are stored is kept.
     pub fn square_metres(&self) -> f64 {
-        let (east, north) = self.metres();
-        (east * north).sqrt()
+        let (east, north) = self.ground_metres();
+        let sine = (1.0 - self.lean * self.lean).sqrt();
+        (east * north * sine).sqrt()
     }
 
     /// A size in a unit that the file leaves open: degrees when numbers this

@@ -374,6 +374,24 @@ mod tests {
         }
     }
 
+    /// Also of a map that is not true to scale, and of columns that lean.
+    #[test]
+    fn stored_cells_count_as_squares_of_the_area_that_they_have_on_the_ground() {
+        for (map_scale, lean) in [((0.5, 0.5), 0.0), ((1.0, 1.0), 0.6), ((0.5, 0.8), -0.6)] {
+            let cell = CellSize {
+                map_scale,
+                ..cell(30.0, 10.0, lean)
+            };
+            let raster = plane(cell, [0.3, 0.7]);
+            let grid = FeltGrid::new(&raster, FeltCells::Stored);
+            let area = 300.0 * map_scale.0 * map_scale.1 * (1.0 - lean * lean).sqrt();
+            let side = grid.side_m().expect("known");
+            assert!((side * side / area - 1.0).abs() < 1e-12, "{side}");
+            let metres = grid.cells_per_vertical_unit().expect("known");
+            assert!((metres * side - 1.0).abs() < 1e-12, "{metres}");
+        }
+    }
+
     #[test]
     fn the_finer_axis_keeps_its_samples_and_rows_read_as_single_samples_do() {
         let raster = plane(cell(10.0, 25.0, 0.0), [0.3, 0.7]);
