@@ -15,6 +15,8 @@ use super::style::{self, HIP, INK, PROXY, SOFT_INK, SURFACE, TOUCHING, TOUCHING_
 const LINE_PX: i32 = 30;
 /// Widest inset and colour scale.
 const WIDE_PX: i32 = 330;
+/// Least height of the inset.
+const LEAST_INSET_PX: i32 = 120;
 
 /// A heading, and names with values under it.
 pub(super) type Table<'a> = (&'a str, &'a [(String, String)]);
@@ -34,17 +36,40 @@ pub(super) fn draw(
         y = figures(area, y, title, facts)? + px(20);
     }
     if !window.shows_all(surface.size_mm) {
-        let (width, height) = area.dim_in_pixel();
-        let top = y + px(20);
-        let rest = height.cast_signed() - top;
-        if rest > px(60) {
-            heading(area, y, "Where the map lies")?;
-            let width = width.cast_signed().min(px(WIDE_PX));
-            let place = area.clone().shrink((0, top), (width, rest.min(px(300))));
-            map::inset(&place, surface, window)?;
-        }
+        where_the_map_lies(area, y, surface, window)?;
     }
     Ok(())
+}
+
+/// Height that the panel needs for these tables, finished pixels, of a window and a
+/// terrain.
+pub(super) fn needed_px(surface: &Surface<'_>, window: &MapView, tables: &[Table<'_>]) -> i32 {
+    let listed = tables.iter().filter(|table| !table.1.is_empty());
+    let tables: i32 = listed
+        .map(|(_, facts)| LINE_PX * (facts.len() as i32 + 1) + 20)
+        .sum();
+    let inset = match window.shows_all(surface.size_mm) {
+        true => 0,
+        false => 20 + LEAST_INSET_PX,
+    };
+    // The key and the scale of heights with all that they may hold.
+    8 + 4 + 6 * LINE_PX + 16 + 18 + 16 + 16 + 24 + 14 + 20 + tables + inset
+}
+
+/// The whole terrain with the map's window in it, in what room there is.
+fn where_the_map_lies(
+    area: &Area<'_>,
+    y: i32,
+    surface: &Surface<'_>,
+    window: &MapView,
+) -> Result<(), PictureError> {
+    heading(area, y, "Where the map lies")?;
+    let (width, height) = area.dim_in_pixel();
+    let top = y + px(20);
+    let rest = height.cast_signed() - top;
+    let width = width.cast_signed().min(px(WIDE_PX));
+    let place = area.clone().shrink((0, top), (width, rest.min(px(300))));
+    map::inset(&place, surface, window)
 }
 
 fn heading(area: &Area<'_>, y: i32, name: &str) -> Result<(), PictureError> {

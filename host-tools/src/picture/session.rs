@@ -33,7 +33,6 @@ pub struct SessionPicture<'a> {
 const WIDTH_PX: i32 = 1600;
 const MARGIN_PX: i32 = 30;
 const HEADER_PX: i32 = 96;
-const PANEL_LEAST_PX: i32 = 620;
 const HEIGHTS_PX: i32 = 290;
 const FORCES_PX: i32 = 300;
 const GAP_PX: i32 = 26;
@@ -56,7 +55,11 @@ impl SessionPicture<'_> {
         let path = MapView::around(records.iter().map(|r| [r.hip_mm[0], r.hip_mm[1]]));
         let window = MapView::choose(path, surface.size_mm, surface.cell_mm);
         let (map_width, map_height) = window.map_px();
-        let block = (map_height + BELOW_PX).max(PANEL_LEAST_PX);
+        let lines = self.ground.map_or(&[][..], |ground| ground.lines);
+        let figures = self.figures();
+        let tables = [("Place and scale", lines), ("Figures", &figures[..])];
+        let panel_height = panel::needed_px(surface, &window, &tables);
+        let block = (map_height + BELOW_PX).max(panel_height);
         let below = HEADER_PX + block + GAP_PX;
         let height = below + HEIGHTS_PX + GAP_PX + FORCES_PX + MARGIN_PX;
         let mut canvas = Canvas::new(WIDTH_PX as u16, height as u16);
@@ -73,8 +76,6 @@ impl SessionPicture<'_> {
         let panel_left = MARGIN_PX + width + 40;
         let panel_width = WIDTH_PX - MARGIN_PX - panel_left;
         let side = part(panel_left, HEADER_PX, panel_width, block);
-        let lines = self.ground.map_or(&[][..], |ground| ground.lines);
-        let tables = [("Place and scale", lines), ("Figures", &self.figures()[..])];
         panel::draw(&side, &relief, surface, &window, &tables)?;
         let time = span(records);
         let heights = part(MARGIN_PX, below, inner, HEIGHTS_PX);

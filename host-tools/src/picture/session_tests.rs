@@ -45,11 +45,22 @@ fn session<'a>(records: &'a [Record], size_mm: [f64; 2]) -> SessionPicture<'a> {
 
 /// Pixels of a colour in rows from the first to before the second.
 fn count(canvas: &Canvas, color: plotters::style::RGBColor, rows: [i32; 2]) -> usize {
+    count_from(0, canvas, color, rows)
+}
+
+/// The same from a column eastwards.
+fn count_from(
+    column: usize,
+    canvas: &Canvas,
+    color: plotters::style::RGBColor,
+    rows: [i32; 2],
+) -> usize {
     let rgb = canvas.to_rgb();
-    let row = WIDTH_PX as usize * 3;
-    let part = &rgb[rows[0] as usize * row..rows[1] as usize * row];
+    let pixels = rgb.as_chunks::<3>().0;
+    let (first, last) = (rows[0] as usize, rows[1] as usize);
+    let part = pixels.chunks(WIDTH_PX as usize).take(last).skip(first);
     let same = |p: &&[u8; 3]| **p == [color.0, color.1, color.2];
-    part.as_chunks::<3>().0.iter().filter(same).count()
+    part.flat_map(|row| &row[column..]).filter(same).count()
 }
 
 #[test]
@@ -68,6 +79,34 @@ fn a_session_shows_hip_and_proxy_on_map_and_profile() {
     assert!(count(&canvas, style::INK, [forces, bottom]) > 900);
     let empty = session(&[], [100.0, 90.0]).draw().expect("drawn");
     assert_eq!(count(&empty, HIP, profile), 0);
+}
+
+/// However much the panel says, a part of a terrain is shown on the whole of it.
+#[test]
+fn a_map_of_a_part_shows_where_it_lies() {
+    let samples = walk();
+    let said: Vec<_> = (0..9)
+        .map(|i| (format!("fact {i}"), "value".to_owned()))
+        .collect();
+    let facts = GroundFacts {
+        metres_per_mm: Some(2.0),
+        place_of: &|east, north| format!("{east}, {north}"),
+        lines: &said,
+    };
+    for size_mm in [[5000.0, 3000.0], [1000.0, 3000.0], [5000.0, 400.0]] {
+        let picture = SessionPicture {
+            facts: &said,
+            ground: Some(facts),
+            ..session(&samples, size_mm)
+        };
+        let canvas = picture.draw().expect("drawn");
+        let below = HEIGHTS_PX + GAP_PX + FORCES_PX + MARGIN_PX + GAP_PX;
+        let heights = canvas.size().1.cast_signed() - below;
+        // The frame around the window, below the key and the scale of heights.
+        let panel = (MARGIN_PX + LEFT_PX + 1096) as usize;
+        let framed = count_from(panel, &canvas, PROXY, [HEADER_PX + 400, heights]);
+        assert!(framed > 20, "{size_mm:?}: {framed}");
+    }
 }
 
 #[test]
