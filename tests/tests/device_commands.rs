@@ -46,6 +46,44 @@ fn list_says_what_it_looked_for() {
     }
 }
 
+/// Whoever asks what a command does is told, and where its program is to be had where that
+/// is missing.
+#[test]
+fn bench_tells_what_it_does_where_its_program_is_missing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let alone = folder.path().join("hapterra");
+    std::fs::copy(hapterra_binary(), &alone).expect("copied");
+    let run = |words: &[&str]| {
+        let mut command = Command::new(&alone);
+        // Under cargo the program is built.
+        let output = command.args(words).env_remove("CARGO").output();
+        output.expect("it runs")
+    };
+    let help = run(&["bench", "--help"]);
+    assert!(help.status.success(), "{}", told(&help));
+    assert!(told(&help).contains("hapterra-bench"), "{}", told(&help));
+    let missing = run(&["bench", "hills.tif"]);
+    assert_eq!(missing.status.code(), Some(1));
+    for part in ["is not beside this program", "hint: install it"] {
+        assert!(told(&missing).contains(part), "{}", told(&missing));
+    }
+}
+
+/// A terrain is not served to a board that is emulated for the occasion; what is done
+/// instead is said.
+#[test]
+fn run_says_how_a_terrain_is_felt_on_an_emulated_board() {
+    fails(
+        &["run", "hills.tif", "--device", "emulated"],
+        2,
+        &[
+            "hapterra demo --device emulated",
+            "tcp:HOST:PORT",
+            "--plant",
+        ],
+    );
+}
+
 #[test]
 fn status_of_the_device_in_memory_names_what_blocks_it() {
     let output = hapterra(&["status", "--device", "native"]);
