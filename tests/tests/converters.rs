@@ -100,6 +100,86 @@ fn what_gdal_reads_and_this_does_not_is_converted_by_the_hint() {
     }
 }
 
+/// The hint of a command that fails.
+fn hint_of(words: &[&str], file: &Path) -> String {
+    let output = Command::new(hapterra_binary())
+        .args(words)
+        .arg(file)
+        .output()
+        .expect("it runs");
+    assert!(!output.status.success(), "{words:?}");
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    let hint = told.split_once("hint: ").expect("a hint");
+    hint.1.trim().to_owned()
+}
+
+/// Runs `demo` at a longitude and latitude where none is known, and the command in its
+/// hint; opens what that writes.
+fn brought_to_degrees(folder: &Path, name: &str, program: &str, code: &str) -> Raster {
+    let words = ["demo", "--device", "native", "--at-lonlat", "173,-41"];
+    let hint = hint_of(&words, &folder.join(name));
+    let hint = hint.replace("IN OUT.tif", &format!("{name} brought.tif"));
+    follow(folder, &hint.replace("EPSG:CODE", code), program);
+    let brought = folder.join("brought.tif");
+    let raster = Raster::open(&brought, &OpenOptions::default()).expect("opens");
+    std::fs::remove_file(brought).expect("removed");
+    raster
+}
+
+#[test]
+fn a_map_without_longitudes_gets_them_by_the_hint() {
+    if !has_gdal() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    // Without the hole of the field: what is one afterwards is the command's.
+    let high = "-srcwin 10 8 30 20 -scale 0 1000 1000 2000 -a_nodata none";
+    for (name, projection, ground, lonlat) in [
+        (
+            "grid.tif",
+            "+proj=nzmg +lat_0=-41 +lon_0=173 +x_0=2510000 +y_0=6023150 +ellps=intl",
+            "2600000 6030000 2640000 6000000",
+            // Of the middle, by gdaltransform.
+            [174.31, -41.07],
+        ),
+        (
+            "grinten.tif",
+            "+proj=vandg +lon_0=0 +R=6371000",
+            "3000000 5030000 3040000 5000000",
+            [28.93, 42.22],
+        ),
+    ] {
+        made(
+            at,
+            &format!("{high} -a_srs '{projection}' -a_ullr {ground}"),
+            name,
+        );
+        let raster = brought_to_degrees(at, name, "gdalwarp", "");
+        let bounds = raster.bounds_lonlat().expect("known");
+        let middle = [
+            0.5 * (bounds.west + bounds.east),
+            0.5 * (bounds.south + bounds.north),
+        ];
+        for (found, wanted) in middle.iter().zip(lonlat) {
+            assert!((found - wanted).abs() < 0.02, "{name}: {bounds:?}");
+        }
+        // What lies beside the turned map is no ground.
+        let summary = raster.summary();
+        assert!(summary.lowest > 900.0, "{name}: {}", summary.lowest);
+        assert!(summary.holes > 0, "{name}");
+    }
+    made(
+        at,
+        "-of AAIGrid -a_ullr 400000 3801200 401600 3800000",
+        "own.asc",
+    );
+    std::fs::remove_file(at.join("own.prj")).expect("GDAL had written one");
+    let raster = brought_to_degrees(at, "own.asc", "gdal_translate", "EPSG:32611");
+    let bounds = raster.bounds_lonlat().expect("known");
+    assert!((bounds.west + 118.087).abs() < 1e-3, "{bounds:?}");
+}
+
 /// GDAL knows nothing of NumPy's files; the hint is Python's.
 #[test]
 fn arrays_are_converted_by_numpy() {

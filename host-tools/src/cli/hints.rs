@@ -47,7 +47,7 @@ impl Hint for PlaceError {
                 "say the place in the file's own coordinates with --at X,Y or --bbox W,S,E,N, or give the file its reference system: gdal_translate -a_srs EPSG:CODE IN OUT.tif"
             }
             Self::NotOnMap { .. } | Self::BoxAcrossSeam { .. } | Self::NoProjection { .. } => {
-                "say the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N, or bring the file into longitude and latitude: gdalwarp -t_srs EPSG:4326 IN OUT.tif"
+                "say the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N, or bring the file into longitude and latitude, its edges as holes: gdalwarp -t_srs EPSG:4326 -r bilinear -ot Float32 -dstnodata -9999 IN OUT.tif"
             }
             Self::Outside { .. } | Self::Hole { .. } => {
                 "choose a place inside: longitude (or x) comes first"
