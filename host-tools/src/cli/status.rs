@@ -246,6 +246,18 @@ mod tests {
         }
     }
 
+    /// The emulated board cannot store one, as `hapterra calibrate` says too.
+    #[test]
+    fn where_the_calibration_is_from_is_true_of_the_emulated_board() {
+        let mut status = status();
+        status.calibration = CalibrationSource::Stored;
+        assert!(text(&status).contains("stored on the device"));
+        status.device.board = EMULATED.try_into().expect("a short name");
+        let text = text(&status);
+        assert!(text.contains("no memory to store another in"), "{text}");
+        assert!(!text.contains("stored on the device"), "{text}");
+    }
+
     #[test]
     fn before_the_first_tick_nothing_is_said_of_the_arm() {
         let mut status = status();

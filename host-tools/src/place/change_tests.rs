@@ -84,6 +84,13 @@ fn zoomed_about_the_proxy_its_ground_and_the_depth_are_the_same() {
             let now = view.home_mm[axis] - changed.hip_mm[axis];
             assert!((then - now).abs() < 1e-9);
         }
+        // What is laid in front of the arm has become as much larger.
+        for (now, then) in view.laid_mm.iter().zip(before.view.laid_mm) {
+            assert!((now - 8.0 * then).abs() < 1e-9, "{now} {then}");
+        }
+        for (now, then) in view.heights_mm.iter().zip(before.view.heights_mm) {
+            assert!((now - 8.0 * then).abs() < 1e-9, "{now} {then}");
+        }
         // The place under the home position, in the file's coordinates.
         let columns = view.home_mm[0] / 0.4;
         assert!((view.home_ground[0] - terrain.grid().to_ground([columns, 0.0])[0]).abs() < 1e-6);

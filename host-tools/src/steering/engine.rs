@@ -284,3 +284,7 @@ impl<'r> Steering<'r> {
         self.stage = Stage::Open;
     }
 }
+
+#[cfg(test)]
+#[path = "engine_tests.rs"]
+mod tests;

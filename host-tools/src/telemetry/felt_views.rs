@@ -73,3 +73,82 @@ impl<'t> FeltViews<'t> {
         &self.views[index.min(self.views.len() - 1)]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::hello;
+    use crate::place::{Reach, ViewOptions};
+    use crate::raster::Raster;
+    use hapterra_core::contact::Rule;
+    use hapterra_core::force::ForceLaw;
+    use hapterra_core::grid::GridPoint;
+    use hapterra_core::phantom::Calibration;
+    use hapterra_core::scene::{Source, View};
+
+    fn with(look: impl for<'t> FnOnce(FeltViews<'t>, Terrain<'t>, Laid)) {
+        let raster = Raster::from_fn(9, 9, |x, _| x as f32).expect("raster");
+        let options = ViewOptions::default();
+        let grid = options.target.grid(&raster, Default::default());
+        let grid = grid.expect("a grid");
+        let reach = Reach::of(&Calibration::PREMIUM_1_5);
+        let view = crate::place::View::new(&grid, &reach, &options).expect("a view");
+        let terrain = view.terrain(grid).expect("a terrain");
+        let law = ForceLaw::PREMIUM;
+        let views = FeltViews::new(terrain.clone());
+        look(views, terrain, Laid { view, law });
+    }
+
+    fn of(view: u8) -> Sample {
+        Sample {
+            view,
+            ..Sample::default()
+        }
+    }
+
+    #[test]
+    fn numbers_name_the_views_that_they_were_put_in_with_also_after_they_wrap() {
+        with(|mut views, terrain, laid| {
+            assert_eq!(views.index_of(&of(0)), 0);
+            for count in 1..=300_usize {
+                let number = count as u8;
+                views.put(number, terrain.clone(), laid);
+                assert_eq!(views.index_of(&of(number)), count);
+            }
+            // 300 is 44 in a byte, and 45 still the one before.
+            assert_eq!(views.index_of(&of(44)), 300);
+            assert_eq!((views.index_of(&of(45)), views.count()), (45, 301));
+        });
+    }
+
+    #[test]
+    fn a_view_that_is_not_taken_was_not_felt() {
+        with(|mut views, terrain, laid| {
+            views.put(1, terrain.clone(), laid);
+            let hip = GridPoint::default();
+            let scene = terrain.scene(laid.law, Rule::Swept, Source::Encoders, hip);
+            let view = View {
+                number: 1,
+                scene,
+                hip,
+                keeps_tiles: true,
+            };
+            let (view, taken) = (&view, false);
+            views.on_event(&Event::Viewed { view, taken });
+            assert_eq!(views.count(), 1);
+        });
+    }
+
+    #[test]
+    fn a_device_that_was_restarted_feels_the_latest_view_as_its_first() {
+        with(|mut views, terrain, laid| {
+            views.put(1, terrain.clone(), laid);
+            let device = hello();
+            for (resumed, index) in [(true, 0), (false, 1)] {
+                let device = &device;
+                views.on_event(&Event::Opened { device, resumed });
+                assert_eq!(views.index_of(&of(0)), index);
+            }
+        });
+    }
+}

@@ -169,6 +169,9 @@ mod tests {
         ];
         let in_units = bound("WGS 84", "Position Vector transformation", &in_units);
         assert!(are_close(&found(&in_units), &wanted));
+        let lengths = [r#"0.001,LENGTHUNIT["kilometre",1000]"#, "-2", "3"];
+        let lengths = bound("WGS 84", "Geocentric translations", &lengths);
+        assert!(are_close(&found(&lengths), &wanted[..3]));
         let three = bound("WGS 84", "Geocentric translations", &seven[..3]);
         assert!(are_close(&found(&three), &wanted[..3]));
     }

@@ -165,6 +165,18 @@ fn a_header_beside_wins_over_the_extension() {
     );
 }
 
+/// Rows of each band after another, each with its own padding.
+#[test]
+fn rows_of_bands_may_be_padded() {
+    let header = "NROWS 2\nNCOLS 2\nNBANDS 2\nNBITS 8\nLAYOUT BIL\nBANDROWBYTES 3\n";
+    let bytes = [1, 2, 0, 5, 6, 0, 3, 4, 0, 7, 8, 0];
+    for (band, wanted) in [(1, [1.0, 2.0, 3.0, 4.0]), (2, [5.0, 6.0, 7.0, 8.0])] {
+        let pair = Pair::new("a.bil", &bytes, "a.hdr", header);
+        let raster = pair.open(Some(band)).expect("a grid");
+        assert_eq!(heights(&raster), wanted, "band {band}");
+    }
+}
+
 #[test]
 fn rows_may_be_padded() {
     let header = "NROWS 2\nNCOLS 2\nNBITS 8\nTOTALROWBYTES 5\nSKIPBYTES 1\n";

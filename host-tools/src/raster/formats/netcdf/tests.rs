@@ -153,6 +153,25 @@ fn signed_integers_that_are_called_unsigned_are() {
 }
 
 #[test]
+fn integers_of_every_size_take_the_other_sign() {
+    use crate::raster::samples::{SampleValue, Samples, with_samples};
+    for (stored, wanted) in [
+        (Samples::I8(vec![-1]), 255.0),
+        (Samples::U8(vec![255]), -1.0),
+        (Samples::I16(vec![-1]), 65_535.0),
+        (Samples::U16(vec![65_535]), -1.0),
+        (Samples::I32(vec![-1]), 4_294_967_295.0),
+        (Samples::U32(vec![u32::MAX]), -1.0),
+        (Samples::F32(vec![-1.0]), -1.0),
+    ] {
+        let called = format!("{stored:?}");
+        let found = super::of_the_other_sign(stored);
+        let value = with_samples!(&found, values => values[0].widen());
+        assert_eq!(value, wanted, "{called}");
+    }
+}
+
+#[test]
 fn what_is_out_of_the_valid_range_is_a_hole() {
     for attributes in [
         vec![Attribute::Shorts("valid_range", vec![2, 5])],
