@@ -66,6 +66,7 @@ FILES = {
     "polyconic": ("+proj=poly +lat_0=40 +lon_0=-96 +datum=NAD27", (1e5, 2e5), square(100)),
     "robinson": ("+proj=robin +lon_0=0 +datum=WGS84", (1e6, 4e6), square(1000)),
     "utm_feet": ("+proj=utm +zone=11 +datum=NAD83 +units=us-ft", (1.3e6, 1.2e7), square(100)),
+    "transverse_feet": ("+proj=tmerc +lat_0=33 +lon_0=-118 +k=0.9999 +x_0=609601.2192024384 +y_0=152400.3048006096 +datum=NAD83 +units=us-ft", (1.9e6, 9e5), square(100)),
     "mollweide": ("+proj=moll +datum=WGS84", (1e6, 4e6), square(1000)),
     "miller": ("+proj=mill +lon_0=11 +x_0=1000 +datum=WGS84", (1e6, 4e6), square(1000)),
     "hotine": ("+proj=omerc +lat_0=4 +lonc=102.25 +alpha=323.0257964666666 +gamma=323.1301023611111 +k=0.99984 +x_0=804671 +no_uoff +datum=WGS84", (4e5, 5e5), square(100)),
