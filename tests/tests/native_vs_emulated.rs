@@ -139,3 +139,46 @@ fn the_demonstration_is_the_same_and_never_late_on_the_emulated_board() {
     let as_native = told.replacen("\"mps2-an386\"", "\"native\"", 1);
     assert!(native == as_native.as_bytes(), "the recordings differ");
 }
+
+/// Ctrl-C reaches every process of a terminal, the emulator as well: that is an end like any
+/// other, and what was felt until then is kept.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_demonstration_on_the_emulated_board_ends_in_an_orderly_manner() {
+    use std::io::BufRead;
+    use std::os::unix::process::CommandExt;
+
+    let Some((qemu, image)) = emulated_board() else {
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut demo = Command::new(hapterra_binary())
+        .args(["demo", "--rounds", "50", "--out"])
+        .arg(folder.path())
+        .args(["--image".as_ref(), image.as_os_str()])
+        .args(["--qemu".as_ref(), qemu.as_os_str()])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .process_group(0)
+        .spawn()
+        .expect("started");
+    let mut lines = std::io::BufReader::new(demo.stdout.take().expect("piped")).lines();
+    let device = lines.find(|line| line.as_ref().is_ok_and(|line| line.starts_with("device")));
+    assert!(device.is_some(), "it never says which device");
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    let group = format!("-{}", demo.id());
+    let signal = Command::new("kill").args(["-INT", "--", &group]).status();
+    assert!(signal.expect("kill runs").success());
+    let rest: Vec<String> = lines.map_while(Result::ok).collect();
+    let ended = demo.wait_with_output().expect("it ends");
+    let told = rest.join("\n") + &String::from_utf8_lossy(&ended.stderr);
+    assert!(ended.status.success(), "{told}");
+    for word in ["report", "panicked", "signal", "error: "] {
+        assert!(!told.contains(word), "{word} in {told}");
+    }
+    assert!(
+        told.contains("fractal.csv") && told.contains("fractal.png"),
+        "{told}"
+    );
+    assert!(folder.path().join("fractal.csv").is_file());
+}
