@@ -200,6 +200,30 @@ fn the_stop_ends_the_duty_cycles_without_the_program() {
 }
 
 #[test]
+fn a_supply_that_falls_ends_the_duty_cycles_without_the_program() {
+    on_each(|machine, terrain, scene| {
+        let device = Device::arm(machine, terrain, scene);
+        let mut machine = device.machine.borrow_mut();
+        if machine.bus().drives_duty_cycles().is_none() {
+            return;
+        }
+        let tick = machine.image.function_like(&["HapticLoop", "run_tick"]);
+        machine.patch(tick.address, &HANG);
+        machine.run_ms(3);
+        machine.mask_supply_interrupt();
+        assert_eq!(machine.bus().drives_duty_cycles(), Some(true));
+        machine.set_supply_mv(TOO_LOW_MV);
+        assert_eq!(machine.bus().drives_duty_cycles(), Some(false));
+        machine.run_ms(3);
+        assert!(machine.is_enabled(), "no program has switched off");
+        // Not even when it is back.
+        machine.set_supply_mv(NOMINAL_MV);
+        machine.run_ms(3);
+        assert_eq!(machine.bus().drives_duty_cycles(), Some(false));
+    });
+}
+
+#[test]
 fn a_stop_too_short_for_a_tick_to_see_is_a_stop() {
     on_each(|machine, terrain, scene| {
         let mut device = Device::arm(machine, terrain, scene);

@@ -9,6 +9,9 @@ use super::Machine;
 use crate::bus::Stopwatch;
 use crate::elf::Function;
 
+/// The interrupt controller's first register that disables.
+const NVIC_ICER: u32 = 0xE000_E180;
+
 /// Whether the core loads a word of flash that cannot be read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Load {
@@ -126,6 +129,14 @@ impl Machine {
         code.extend(location.to_le_bytes());
         code.extend((panicking.address | 1).to_le_bytes());
         self.patch(function.address, &code);
+    }
+
+    /// Disables the interrupt of the supply's comparator, as if the program had lost it.
+    pub fn mask_supply_interrupt(&mut self) {
+        let interrupt = self.chip.comparator.interrupt as u32;
+        let clear_enable = NVIC_ICER + 4 * (interrupt / 32);
+        self.bus()
+            .write(clear_enable, 1 << (interrupt % 32), u32::MAX);
     }
 
     /// Puts a function's own code back.
