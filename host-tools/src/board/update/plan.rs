@@ -142,6 +142,42 @@ mod tests {
     }
 
     #[test]
+    fn an_h743_is_written_in_words_of_thirty_two_bytes_and_erased_by_sectors() {
+        const SECTOR: u64 = 128 * 1024;
+        let board = Board::named("nucleo-h743zi2").expect("known");
+        let words = "@Internal Flash   /0x08000000/8*128Kg,8*128Kg";
+        let layout = Layout::read(words).expect("understood");
+        let of = |parts: &[(u64, usize)]| {
+            let memories = Memories::H743;
+            let image = Image {
+                memories,
+                ..image(parts)
+            };
+            Plan::new(board, &image, &layout)
+        };
+        let last = FLASH + 14 * SECTOR;
+        let plan = of(&[(FLASH, 40), (FLASH + SECTOR + 33, 3), (last - 1, 1)]).expect("fits");
+        assert_eq!(plan.erased, [FLASH, FLASH + SECTOR, last - SECTOR]);
+        assert_eq!(
+            (plan.vectors.address, plan.vectors.bytes.len()),
+            (FLASH, 32)
+        );
+        let others = plan.others.iter();
+        let others: Vec<_> = others.map(|s| (s.address - FLASH, s.bytes.len())).collect();
+        let whole = SECTOR as usize;
+        assert_eq!(others, [(32, 32), (SECTOR, 64), (13 * SECTOR, whole)]);
+        assert_eq!(
+            plan.others[0].bytes[..9],
+            [[0x5A; 8].as_slice(), &[ERASED]].concat()
+        );
+        // The calibrations.
+        for part in [(last - 1, 2), (last, 1)] {
+            let refused = of(&[(FLASH, 8), part]);
+            assert!(matches!(refused, Err(UpdateError::Calibrations { .. })));
+        }
+    }
+
+    #[test]
     fn the_calibrations_are_out_of_reach() {
         let calibrations = FLASH + 508 * 1024;
         assert!(plan(&[(FLASH, 8), (calibrations - 8, 8)], G474).is_ok());

@@ -8,12 +8,44 @@ use std::time::Duration;
 use super::loader::{ControlPipe, request};
 
 const FLASH: u64 = 0x0800_0000;
-const FLASH_BYTES: usize = 512 * 1024;
-const PAGE: usize = 2048;
 pub(super) const TRANSFER: usize = 1024;
-/// Times that it asks for, ms.
-const ERASE_MS: u64 = 25;
+/// Time that it asks for to write, ms.
 const WRITE_MS: u64 = 5;
+
+/// What a chip's ROM knows of its flash.
+#[derive(Debug)]
+pub(super) struct Rom {
+    /// The board with this chip.
+    pub(super) board: &'static str,
+    /// What it says of its flash.
+    pub(super) words: &'static str,
+    pub(super) flash_bytes: usize,
+    /// Bytes that are erased at once.
+    pub(super) page: usize,
+    /// Bytes that are written at once: it refuses a part of them.
+    pub(super) word: usize,
+    /// Time that it asks for to erase, ms: a page of a G474, a sector of an H743.
+    pub(super) erase_ms: u64,
+}
+
+pub(super) static G474: Rom = Rom {
+    board: "nucleo-g474re",
+    words: "@Internal Flash   /0x08000000/256*02Kg",
+    flash_bytes: 512 * 1024,
+    page: 2 * 1024,
+    word: 8,
+    erase_ms: 25,
+};
+
+/// Two banks of eight sectors.
+pub(super) static H743: Rom = Rom {
+    board: "nucleo-h743zi2",
+    words: "@Internal Flash   /0x08000000/8*128Kg,8*128Kg",
+    flash_bytes: 2048 * 1024,
+    page: 128 * 1024,
+    word: 32,
+    erase_ms: 4_000,
+};
 
 /// States by their numbers (DFU 1.1, A.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +86,7 @@ pub(super) struct Faults {
 
 /// The loader.
 pub(super) struct Scripted {
+    pub(super) rom: &'static Rom,
     pub(super) flash: Vec<u8>,
     pub(super) state: State,
     status: u8,
@@ -69,9 +102,10 @@ pub(super) struct Scripted {
 
 impl Scripted {
     /// A chip whose flash is full of another program.
-    pub(super) fn new(faults: Faults) -> Self {
+    pub(super) fn new(rom: &'static Rom, faults: Faults) -> Self {
         Self {
-            flash: vec![0xA5; FLASH_BYTES],
+            rom,
+            flash: vec![0xA5; rom.flash_bytes],
             state: State::Idle,
             status: 0,
             pointer: FLASH,
@@ -88,7 +122,7 @@ impl Scripted {
     pub(super) fn again(self) -> Self {
         Self {
             flash: self.flash,
-            ..Self::new(Faults::default())
+            ..Self::new(self.rom, Faults::default())
         }
     }
 
@@ -117,7 +151,7 @@ impl Scripted {
 
     fn place(&self, address: u64, bytes: usize) -> Option<usize> {
         let at = usize::try_from(address.checked_sub(FLASH)?).ok()?;
-        (at + bytes <= FLASH_BYTES).then_some(at)
+        (at + bytes <= self.rom.flash_bytes).then_some(at)
     }
 
     /// Does what the last block said; the status that follows.
@@ -141,8 +175,9 @@ impl Scripted {
             0x21 => self.pointer = address,
             0x41 if self.faults.stuck_page == Some(address) => return 0x04,
             0x41 => {
-                let page = at / PAGE * PAGE;
-                self.flash[page..page + PAGE].fill(0xFF);
+                let bytes = self.rom.page;
+                let page = at / bytes * bytes;
+                self.flash[page..page + bytes].fill(0xFF);
                 self.deeds.push(Deed::Erased(address));
             }
             _ => return 0x0F,
@@ -156,7 +191,8 @@ impl Scripted {
             return 0x08;
         };
         let cells = &mut self.flash[at..at + bytes.len()];
-        if !bytes.len().is_multiple_of(8) || cells.iter().any(|cell| *cell != 0xFF) {
+        let whole = |n: usize| n.is_multiple_of(self.rom.word);
+        if !whole(at) || !whole(bytes.len()) || cells.iter().any(|cell| *cell != 0xFF) {
             return 0x03;
         }
         cells.copy_from_slice(bytes);
@@ -169,7 +205,10 @@ impl Scripted {
         match self.state {
             State::DownloadSync => {
                 let erases = self.block.0 == 0 && self.block.1.first() == Some(&0x41);
-                wait = if erases { ERASE_MS } else { WRITE_MS };
+                wait = match erases {
+                    true => self.rom.erase_ms,
+                    false => WRITE_MS,
+                };
                 self.busy_until = self.now + Duration::from_millis(wait);
                 self.state = State::Busy;
             }

@@ -1,46 +1,81 @@
 //! Whole updates of a scripted loader, honest and with each fault.
 
-use super::scripted::{Deed, Faults, Scripted, State, TRANSFER};
+use super::scripted::{Deed, Faults, G474, H743, Rom, Scripted, State, TRANSFER};
 use super::{ControlPipe, Loader, Plan, Step, UpdateError, UpdateFailure, request, update};
 use crate::board::image::Part;
 use crate::board::{Board, Image, Memories};
 
 const FLASH: u64 = 0x0800_0000;
-const WORDS: &str = "@Internal Flash   /0x08000000/256*02Kg";
+/// The chips whose loaders are played.
+static ROMS: [&Rom; 2] = [&G474, &H743];
 /// Length, type, what it can, time-out, bytes of a transfer, version 1.1a.
 const FUNCTIONAL: [u8; 9] = [9, 0x21, 0x0B, 0xFF, 0, 0, (TRANSFER / 256) as u8, 0x1A, 1];
-/// Pages of the calibrations.
-const CALIBRATIONS: usize = 508 * 1024;
+/// Bytes of a program.
+const PROGRAM: usize = 11_000;
+/// Where its pieces begin: of an H743's, behind the first sector and in the second bank,
+/// because a program that fills these is long to write.
+const G474_PIECES: [u64; 3] = [0, 472, 4_000];
+const H743_PIECES: [u64; 3] = [0, 128 * 1024 + 480, 1024 * 1024];
 
-fn board() -> &'static Board {
-    Board::named("nucleo-g474re").expect("known")
+fn board(rom: &Rom) -> &'static Board {
+    Board::named(rom.board).expect("known")
 }
 
-/// A program of five pages and a bit.
-fn image() -> Image {
-    let bytes: Vec<u8> = (0..11_000_u32).map(|i| (i * 7 % 251) as u8).collect();
-    let (vectors, code) = bytes.split_at(472);
-    let part = |address, bytes: &[u8]| Part {
-        address,
-        bytes: bytes.to_vec(),
+fn memories(rom: &Rom) -> Memories {
+    match rom.page {
+        2048 => Memories::G474,
+        _ => Memories::H743,
+    }
+}
+
+/// A program: on a G474 five pages and a bit in one, on an H743 three sectors with a
+/// beginning in each.
+fn image(rom: &Rom) -> Image {
+    let bytes: Vec<u8> = (0..PROGRAM as u32).map(|i| (i * 7 % 251) as u8).collect();
+    let starts = match rom.page {
+        2048 => G474_PIECES,
+        _ => H743_PIECES,
     };
+    let cuts = [0, 472, 4_000, PROGRAM];
+    let parts = starts
+        .into_iter()
+        .zip(cuts.windows(2))
+        .map(|(start, cut)| Part {
+            address: FLASH + start,
+            bytes: bytes[cut[0]..cut[1]].to_vec(),
+        });
     Image {
-        memories: Memories::G474,
-        parts: vec![part(FLASH + 472, code), part(FLASH, vectors)],
+        memories: memories(rom),
+        // In an order in which nobody writes.
+        parts: parts.rev().collect(),
         placed: vec![],
     }
 }
 
+/// First addresses of the pages that it lies in.
+fn touched(rom: &Rom) -> Vec<u64> {
+    let page = rom.page as u64;
+    let ends = image(rom).parts.into_iter().flat_map(|part| {
+        let end = part.address + part.bytes.len() as u64 - 1;
+        part.address / page..=end / page
+    });
+    let mut pages: Vec<u64> = ends.map(|number| number * page).collect();
+    pages.sort_unstable();
+    pages.dedup();
+    pages
+}
+
 fn try_update(device: Scripted, image: &Image) -> (Scripted, Result<usize, UpdateFailure>) {
     let mut pipe = device;
-    let mut loader = match Loader::open(&mut pipe, WORDS, &FUNCTIONAL) {
+    let rom = pipe.rom;
+    let mut loader = match Loader::open(&mut pipe, rom.words, &FUNCTIONAL) {
         Ok(loader) => loader,
         Err(error) => {
             let erased = false;
             return (pipe, Err(UpdateFailure { error, erased }));
         }
     };
-    let done = update(&mut loader, board(), image, &mut |_| {});
+    let done = update(&mut loader, board(rom), image, &mut |_| {});
     (pipe, done)
 }
 
@@ -72,29 +107,45 @@ fn hint(failure: &UpdateFailure) -> String {
 
 #[test]
 fn an_image_is_written_read_back_and_started_and_nothing_else_is_touched() {
-    let image = image();
-    let (device, done) = try_update(Scripted::new(Faults::default()), &image);
-    assert_eq!(done.ok(), Some(11_000));
-    assert!(is_whole(&device, &image));
-    let untouched = &device.flash[6 * 2048..];
-    assert!(untouched.iter().all(|byte| *byte == 0xA5));
-    assert!(untouched.len() > device.flash.len() - CALIBRATIONS);
-    assert_eq!(device.deeds.last(), Some(&Deed::Started(FLASH)));
+    for rom in ROMS {
+        let image = image(rom);
+        let (device, done) = try_update(Scripted::new(rom, Faults::default()), &image);
+        // Whole words of flash.
+        let written = done.expect("done");
+        assert!(written.is_multiple_of(rom.word), "{}: {written}", rom.board);
+        assert!(is_whole(&device, &image), "{}", rom.board);
+        let touched = touched(rom);
+        let of = |at: usize| FLASH + (at / rom.page * rom.page) as u64;
+        let mut cells = device.flash.iter().enumerate();
+        let stray = cells.find(|(at, byte)| **byte != 0xA5 && !touched.contains(&of(*at)));
+        assert_eq!(stray, None, "{}", rom.board);
+        let erased = |deed: &Deed| match deed {
+            Deed::Erased(page) => Some(*page),
+            _ => None,
+        };
+        let erased: Vec<u64> = device.deeds.iter().filter_map(erased).collect();
+        assert_eq!(erased, touched, "{}", rom.board);
+        assert_eq!(device.deeds.last(), Some(&Deed::Started(FLASH)));
+    }
 }
 
 #[test]
 fn the_vectors_are_erased_first_and_written_last() {
-    let (device, _) = try_update(Scripted::new(Faults::default()), &image());
-    assert_eq!(device.deeds.first(), Some(&Deed::Erased(FLASH)));
-    let writes = device.deeds.iter().filter_map(|deed| match deed {
-        Deed::Wrote(address, _) => Some(*address < FLASH + 8),
-        _ => None,
-    });
-    let writes: Vec<bool> = writes.collect();
-    let [others @ .., last] = &writes[..] else {
-        panic!("nothing was written");
-    };
-    assert!(*last && !others.contains(&true), "{writes:?}");
+    for rom in ROMS {
+        let (device, _) = try_update(Scripted::new(rom, Faults::default()), &image(rom));
+        assert_eq!(device.deeds.first(), Some(&Deed::Erased(FLASH)));
+        let writes = device.deeds.iter().filter_map(|deed| match deed {
+            Deed::Wrote(address, bytes) => Some((*address < FLASH + rom.word as u64, *bytes)),
+            _ => None,
+        });
+        let writes: Vec<(bool, usize)> = writes.collect();
+        let [others @ .., last] = &writes[..] else {
+            panic!("nothing was written");
+        };
+        assert_eq!(*last, (true, rom.word), "{}", rom.board);
+        let early = others.iter().any(|(is_vectors, _)| *is_vectors);
+        assert!(!early, "{}: {writes:?}", rom.board);
+    }
 }
 
 #[test]
@@ -105,72 +156,88 @@ fn a_loader_that_something_else_has_left_in_the_middle_is_brought_to_rest() {
         State::DownloadIdle,
         State::UploadIdle,
     ] {
-        let mut device = Scripted::new(Faults::default());
-        device.state = state;
-        let image = image();
-        let (device, done) = try_update(device, &image);
-        assert!(done.is_ok() && is_whole(&device, &image), "{state:?}");
+        for rom in ROMS {
+            let mut device = Scripted::new(rom, Faults::default());
+            device.state = state;
+            let image = image(rom);
+            let (device, done) = try_update(device, &image);
+            assert!(done.is_ok() && is_whole(&device, &image), "{state:?}");
+        }
     }
 }
 
 #[test]
 fn a_loader_that_goes_away_at_any_moment_leaves_no_half_of_a_program_and_can_be_tried_again() {
-    let image = image();
-    let (whole, _) = try_update(Scripted::new(Faults::default()), &image);
-    let all = whole.requests();
-    for gone_after in 0..all {
-        let faults = Faults {
-            gone_after: Some(gone_after),
-            ..Faults::default()
-        };
-        let (device, done) = try_update(Scripted::new(faults), &image);
-        let Err(failure) = done else {
-            // Its last answer is the one that it need not give.
-            assert!(gone_after + 1 == all, "{gone_after} of {all}");
-            continue;
-        };
-        let gone = matches!(failure.error, UpdateError::Gone { .. });
-        assert!(gone, "{gone_after}: {failure:?}");
-        let erased = !device.deeds.is_empty();
-        assert!(failure.erased || !erased, "{gone_after}: it was touched");
-        let vectors = &device.flash[..8];
-        let (old, none) = (vectors == [0xA5; 8], vectors == [0xFF; 8]);
-        assert!(
-            (old && !erased) || none || is_whole(&device, &image),
-            "{gone_after}: half a program"
-        );
-        let hint = hint(&failure);
-        assert_eq!(hint.contains("BOOT0"), failure.erased, "{hint}");
-        let (device, done) = try_update(device.again(), &image);
-        assert!(
-            done.is_ok() && is_whole(&device, &image),
-            "{gone_after}: again"
-        );
+    for rom in ROMS {
+        let image = image(rom);
+        let (whole, _) = try_update(Scripted::new(rom, Faults::default()), &image);
+        let all = whole.requests();
+        for gone_after in 0..all {
+            goes_away(rom, &image, gone_after, all);
+        }
     }
+}
+
+/// An update whose loader is gone after so many requests of all that it takes, and another.
+fn goes_away(rom: &'static Rom, image: &Image, gone_after: usize, all: usize) {
+    let faults = Faults {
+        gone_after: Some(gone_after),
+        ..Faults::default()
+    };
+    let at = format!("{}: {gone_after} of {all}", rom.board);
+    let (device, done) = try_update(Scripted::new(rom, faults), image);
+    let Err(failure) = done else {
+        // Its last answer is the one that it need not give.
+        assert!(gone_after + 1 == all, "{at}");
+        return;
+    };
+    let gone = matches!(failure.error, UpdateError::Gone { .. });
+    assert!(gone, "{at}: {failure:?}");
+    let erased = !device.deeds.is_empty();
+    assert!(failure.erased || !erased, "{at}: it was touched");
+    let vectors = &device.flash[..rom.word];
+    let all_are = |byte: u8| vectors.iter().all(|found| *found == byte);
+    assert!(
+        (all_are(0xA5) && !erased) || all_are(0xFF) || is_whole(&device, image),
+        "{at}: half a program"
+    );
+    let hint = hint(&failure);
+    assert_eq!(hint.contains("BOOT0"), failure.erased, "{hint}");
+    let (device, done) = try_update(device.again(), image);
+    assert!(done.is_ok() && is_whole(&device, image), "{at}: again");
 }
 
 #[test]
 fn what_does_not_read_back_is_not_started() {
-    for bad in [FLASH, FLASH + 471, FLASH + 5000, FLASH + 10_999] {
-        let faults = Faults {
-            bad_cell: Some(bad),
-            ..Faults::default()
-        };
-        let (device, done) = try_update(Scripted::new(faults), &image());
-        let failure = done.expect_err("found");
-        assert!(matches!(failure.error, UpdateError::Differs(at) if at == bad));
-        assert!(failure.erased);
-        let started = |deed: &Deed| matches!(deed, Deed::Started(_));
-        assert!(!device.deeds.iter().any(started));
-        let elsewhere = bad >= FLASH + 8;
-        assert!(!elsewhere || device.flash[..8] == [0xFF; 8], "no vectors");
+    for rom in ROMS {
+        let image = image(rom);
+        let ends = image.parts.iter().flat_map(|part| {
+            let last = part.address + part.bytes.len() as u64 - 1;
+            [part.address, part.address + 5, last]
+        });
+        for bad in ends {
+            let faults = Faults {
+                bad_cell: Some(bad),
+                ..Faults::default()
+            };
+            let (device, done) = try_update(Scripted::new(rom, faults), &image);
+            let failure = done.expect_err("found");
+            assert!(matches!(failure.error, UpdateError::Differs(at) if at == bad));
+            assert!(failure.erased);
+            let started = |deed: &Deed| matches!(deed, Deed::Started(_));
+            assert!(!device.deeds.iter().any(started));
+            let is_vectors = bad < FLASH + rom.word as u64;
+            let mut vectors = device.flash[..rom.word].iter();
+            let none = vectors.all(|byte| *byte == 0xFF);
+            assert!(is_vectors || none, "{}: no vectors", rom.board);
+        }
     }
 }
 
 #[test]
 fn what_the_loader_refuses_is_told_in_words_and_ends() {
     let refused = |faults| {
-        let (_, done) = try_update(Scripted::new(faults), &image());
+        let (_, done) = try_update(Scripted::new(&G474, faults), &image(&G474));
         done.expect_err("refused").error.to_string()
     };
     let said = refused(Faults {
@@ -205,29 +272,30 @@ fn assert_untouched(device: &Scripted) {
 #[test]
 fn another_chips_loader_or_an_image_that_does_not_belong_there_is_refused_before_anything_is_erased()
  {
-    let mut device = Scripted::new(Faults::default());
-    let words = "@Internal Flash   /0x08000000/16*128Kg";
-    let mut loader = Loader::open(&mut device, words, &FUNCTIONAL).expect("a loader");
-    let refused = update(&mut loader, board(), &image(), &mut |_| {});
-    let failure = refused.expect_err("refused");
-    assert!(matches!(failure.error, UpdateError::OtherChip { .. }) && !failure.erased);
-    assert_untouched(&device);
-    let mut image = image();
-    image.parts.push(Part {
-        address: FLASH + CALIBRATIONS as u64,
-        bytes: vec![0; 8],
-    });
-    let (device, done) = try_update(device, &image);
-    let failure = done.expect_err("refused");
-    assert!(matches!(failure.error, UpdateError::Calibrations { .. }) && !failure.erased);
-    assert!(hint(&failure).contains("nothing was erased"));
-    assert_untouched(&device);
+    for (rom, other) in [(&G474, &H743), (&H743, &G474)] {
+        let mut device = Scripted::new(rom, Faults::default());
+        let mut loader = Loader::open(&mut device, other.words, &FUNCTIONAL).expect("a loader");
+        let refused = update(&mut loader, board(rom), &image(rom), &mut |_| {});
+        let failure = refused.expect_err("refused");
+        assert!(matches!(failure.error, UpdateError::OtherChip { .. }) && !failure.erased);
+        assert_untouched(&device);
+        let mut image = image(rom);
+        image.parts.push(Part {
+            address: FLASH + image.memories.image_bytes,
+            bytes: vec![0; 8],
+        });
+        let (device, done) = try_update(device, &image);
+        let failure = done.expect_err("refused");
+        assert!(matches!(failure.error, UpdateError::Calibrations { .. }) && !failure.erased);
+        assert!(hint(&failure).contains("nothing was erased"));
+        assert_untouched(&device);
+    }
 }
 
 #[test]
 fn what_is_no_loader_of_that_kind_is_refused() {
     let open = |words: &str, functional: &[u8]| {
-        let mut device = Scripted::new(Faults::default());
+        let mut device = Scripted::new(&G474, Faults::default());
         let opened = Loader::open(&mut device, words, functional).map(|_| ());
         assert_untouched(&device);
         opened
@@ -237,7 +305,7 @@ fn what_is_no_loader_of_that_kind_is_refused() {
         functional[at] = byte;
         functional
     };
-    assert!(open(WORDS, &FUNCTIONAL).is_ok());
+    assert!(open(G474.words, &FUNCTIONAL).is_ok());
     for functional in [
         with(1, 0x24),
         with(2, 0),
@@ -245,14 +313,14 @@ fn what_is_no_loader_of_that_kind_is_refused() {
         with(2, 2),
         with(6, 0),
     ] {
-        let opened = open(WORDS, &functional);
+        let opened = open(G474.words, &functional);
         assert!(
             matches!(opened, Err(UpdateError::Cannot(_))),
             "{functional:?}"
         );
     }
     assert!(matches!(
-        open(WORDS, &FUNCTIONAL[..6]),
+        open(G474.words, &FUNCTIONAL[..6]),
         Err(UpdateError::Cannot(_))
     ));
     let other = open("@Option Bytes  /0x1FFF7800/01*048 e", &FUNCTIONAL);
@@ -261,25 +329,30 @@ fn what_is_no_loader_of_that_kind_is_refused() {
 
 #[test]
 fn progress_ends_where_it_said_it_would() {
-    let mut device = Scripted::new(Faults::default());
-    let mut loader = Loader::open(&mut device, WORDS, &FUNCTIONAL).expect("a loader");
-    let image = image();
-    let plan = Plan::new(board(), &image, loader.layout()).expect("fits");
-    let mut steps = vec![];
-    update(&mut loader, board(), &image, &mut |step| steps.push(step)).expect("done");
-    let (pages, bytes) = (plan.erased.len(), plan.bytes());
-    for last in [
-        Step::Erased(pages, pages),
-        Step::Written(bytes, bytes),
-        Step::Compared(bytes, bytes),
-    ] {
-        assert!(steps.contains(&last), "{last:?}");
+    for rom in ROMS {
+        let mut device = Scripted::new(rom, Faults::default());
+        let mut loader = Loader::open(&mut device, rom.words, &FUNCTIONAL).expect("a loader");
+        let image = image(rom);
+        let plan = Plan::new(board(rom), &image, loader.layout()).expect("fits");
+        let mut steps = vec![];
+        update(&mut loader, board(rom), &image, &mut |step| {
+            steps.push(step)
+        })
+        .expect("done");
+        let (pages, bytes) = (plan.erased.len(), plan.bytes());
+        for last in [
+            Step::Erased(pages, pages),
+            Step::Written(bytes, bytes),
+            Step::Compared(bytes, bytes),
+        ] {
+            assert!(steps.contains(&last), "{}: {last:?}", rom.board);
+        }
     }
 }
 
 #[test]
 fn the_scripted_loader_forgives_nothing() {
-    let mut device = Scripted::new(Faults::default());
+    let mut device = Scripted::new(&G474, Faults::default());
     // Too early.
     device
         .write(request::DNLOAD, 0, &[0x41, 0, 0, 0, 8])
@@ -287,12 +360,21 @@ fn the_scripted_loader_forgives_nothing() {
     device.read(request::GETSTATUS, 0, 6).expect("busy");
     assert!(device.read(request::GETSTATUS, 0, 6).is_err());
     // A page that is not erased, and a block while it reads.
-    let mut device = Scripted::new(Faults::default());
+    let mut device = Scripted::new(&G474, Faults::default());
     device
         .read(request::UPLOAD, 2, TRANSFER as u16)
         .expect("read");
     assert!(device.write(request::DNLOAD, 2, &[0; 8]).is_err());
-    let mut device = Scripted::new(Faults::default());
-    let mut loader = Loader::open(&mut device, WORDS, &FUNCTIONAL).expect("a loader");
+    let mut device = Scripted::new(&G474, Faults::default());
+    let mut loader = Loader::open(&mut device, G474.words, &FUNCTIONAL).expect("a loader");
     assert!(loader.write(FLASH, &[0; 8]).is_err());
+    // Half a word of an H743's flash.
+    let mut device = Scripted::new(&H743, Faults::default());
+    let mut loader = Loader::open(&mut device, H743.words, &FUNCTIONAL).expect("a loader");
+    loader.erase(FLASH).expect("erased");
+    assert!(loader.write(FLASH, &[0; 16]).is_err());
+    let mut device = Scripted::new(&H743, Faults::default());
+    let mut loader = Loader::open(&mut device, H743.words, &FUNCTIONAL).expect("a loader");
+    loader.erase(FLASH).expect("erased");
+    assert!(loader.write(FLASH + 16, &[0; 32]).is_err());
 }
