@@ -11,7 +11,7 @@ use embassy_stm32::pac::adc::regs::{Smpr, Smpr2};
 use embassy_stm32::pac::gpio::vals::Odr;
 use embassy_stm32::peripherals::{IWDG, TIM2, TIM3, TIM4, USB};
 use embassy_stm32::usb::{Driver, InterruptHandler};
-use embassy_stm32::{Config, Peripherals, bind_interrupts, interrupt, pac, rcc};
+use embassy_stm32::{Config, Peripherals, interrupt, pac, rcc};
 use hapterra_core::wire::status::ResetCause;
 use hapterra_firmware::amplifier::Off;
 
@@ -21,7 +21,7 @@ use crate::stm32::encoders::{SafetyInputs, TimerEncoders, quadrature};
 use crate::stm32::feedback::{Feedback, Monitors};
 use crate::stm32::priorities::OTHERS;
 use crate::stm32::start::FULL_SCALE_A;
-use crate::stm32::{failure, parts};
+use crate::stm32::{failure, parts, usb_interrupt};
 
 /// Tiles along the side of the window.
 pub(crate) const WINDOW: usize = 4;
@@ -37,9 +37,22 @@ pub(crate) const SUPPLY_INTERRUPT: Interrupt = Interrupt::PVD_PVM;
 /// GPIOB_BSRR and its bit that makes the enable pin low.
 pub(crate) const ENABLE_OFF: (u32, u32) = (0x4800_0418, 1 << 16);
 
-bind_interrupts!(struct Irqs {
-    USB_LP => InterruptHandler<USB>;
-});
+/// USB's interrupt, what embassy calls it, and embassy's handler of it.
+pub(crate) const USB_INTERRUPT: Interrupt = Interrupt::USB_LP;
+pub(crate) type UsbInterrupt = interrupt::typelevel::USB_LP;
+pub(crate) type UsbWork = InterruptHandler<USB>;
+
+/// Says to embassy that its handler is run.
+#[derive(Clone, Copy)]
+struct Irqs;
+
+// SAFETY: a task runs it whenever the interrupt below was raised.
+unsafe impl interrupt::typelevel::Binding<UsbInterrupt, UsbWork> for Irqs {}
+
+#[interrupt]
+fn USB_LP() {
+    usb_interrupt::raised();
+}
 
 pub(crate) type Encoders = TimerEncoders<TIM2, TIM3, TIM4, Input<'static>>;
 pub(crate) type Amplifiers = Off<Outputs, Output<'static>>;

@@ -11,7 +11,7 @@ use embassy_stm32::pac::crs::vals::Syncsrc;
 use embassy_stm32::pac::gpio::vals::Odr;
 use embassy_stm32::peripherals::{IWDG1, TIM3, TIM4, TIM8, USB_OTG_FS};
 use embassy_stm32::usb::{self, Driver, InterruptHandler};
-use embassy_stm32::{Config, Peripherals, bind_interrupts, interrupt, pac, rcc};
+use embassy_stm32::{Config, Peripherals, interrupt, pac, rcc};
 use hapterra_core::wire::status::ResetCause;
 use hapterra_firmware::amplifier::Off;
 use static_cell::ConstStaticCell;
@@ -23,7 +23,7 @@ use crate::stm32::encoders::{SafetyInputs, TimerEncoders, quadrature};
 use crate::stm32::feedback::{Feedback, Monitors};
 use crate::stm32::priorities::OTHERS;
 use crate::stm32::start::FULL_SCALE_A;
-use crate::stm32::{failure, parts};
+use crate::stm32::{failure, parts, usb_interrupt};
 use crate::stop::{EmergencyStop, take_stop};
 
 /// Tiles along the side of the window.
@@ -40,9 +40,22 @@ pub(crate) const SUPPLY_INTERRUPT: Interrupt = Interrupt::PVD_AVD;
 /// GPIOF_BSRR and its bit that makes the enable pin low.
 pub(crate) const ENABLE_OFF: (u32, u32) = (0x5802_1418, 1 << 19);
 
-bind_interrupts!(struct Irqs {
-    OTG_FS => InterruptHandler<USB_OTG_FS>;
-});
+/// USB's interrupt, what embassy calls it, and embassy's handler of it.
+pub(crate) const USB_INTERRUPT: Interrupt = Interrupt::OTG_FS;
+pub(crate) type UsbInterrupt = interrupt::typelevel::OTG_FS;
+pub(crate) type UsbWork = InterruptHandler<USB_OTG_FS>;
+
+/// Says to embassy that its handler is run.
+#[derive(Clone, Copy)]
+struct Irqs;
+
+// SAFETY: a task runs it whenever the interrupt below was raised.
+unsafe impl interrupt::typelevel::Binding<UsbInterrupt, UsbWork> for Irqs {}
+
+#[interrupt]
+fn OTG_FS() {
+    usb_interrupt::raised();
+}
 
 pub(crate) type Encoders = TimerEncoders<TIM8, TIM3, TIM4, EmergencyStop>;
 pub(crate) type Amplifiers = Off<Outputs, Output<'static>>;

@@ -21,3 +21,4 @@ pub(crate) mod stack_guard;
 pub(crate) mod start;
 pub(crate) mod supply;
 pub(crate) mod tasks;
+pub(crate) mod usb_interrupt;

@@ -2,7 +2,7 @@
 
 use core::cell::Cell;
 
-use embassy_futures::join::join;
+use embassy_futures::join::join3;
 use embassy_stm32::gpio::Output;
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
@@ -18,7 +18,7 @@ use hapterra_firmware::monitor::{Monitor, Part};
 use hapterra_firmware::usb::{BulkStream, EndpointFilter};
 
 use super::calibration_memory::CalibrationMemory;
-use super::{loader, stack};
+use super::{loader, stack, usb_interrupt};
 use crate::application::TICK_DONE;
 use crate::chip::{self, UsbDriver, WINDOW, WatchdogTimer};
 use crate::usb::EndpointHalts;
@@ -79,7 +79,7 @@ pub(crate) async fn serve_link(
     run(&mut link, rx, tx, &board).await;
 }
 
-/// Runs the USB stack for ever and checks in for it.
+/// Runs the USB stack and what its interrupt has to do, for ever, and checks in for both.
 #[embassy_executor::task]
 pub(crate) async fn serve_usb(
     mut device: UsbDevice<'static, EndpointFilter<UsbDriver, EndpointHalts>>,
@@ -92,7 +92,8 @@ pub(crate) async fn serve_usb(
             ticker.next().await;
         }
     };
-    join(device.run(), checking_in).await;
+    // What an interrupt tells comes before what the stack makes of it.
+    join3(usb_interrupt::serve(), device.run(), checking_in).await;
 }
 
 /// Feeds the watchdog while all parts run, measures the stack, and shows the LED's
