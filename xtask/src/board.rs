@@ -27,8 +27,11 @@ pub(crate) struct Exception {
     /// Parts of the caller's name, all of them in it: compilers write generic
     /// names in two ways.
     pub(crate) caller: &'static [&'static str],
-    /// Part of the callee's name.
+    /// Part of the callee's name; of a call through a register, nothing.
     pub(crate) callee: &'static str,
+    /// Of a call through a register: parts of the names of what it can lead to. They are
+    /// judged like anything else that an interrupt reaches.
+    pub(crate) leads_to: &'static [&'static str],
     /// Why it is safe.
     #[expect(dead_code, reason = "for the reader of the table")]
     pub(crate) because: &'static str,
@@ -43,12 +46,12 @@ pub(crate) struct Board {
     pub(crate) chip: Option<&'static str>,
     /// Environment variable that tells tests where the image is.
     pub(crate) elf_variable: &'static str,
-    /// Symbol of the interrupt that runs the haptic tick. Nothing that it can
-    /// reach may panic.
-    pub(crate) tick_interrupt: &'static str,
-    /// Calls through a register under that interrupt that someone has followed.
+    /// Interrupts that run tasks, where panics may be reached. Nothing that another
+    /// interrupt or an exception reaches may panic.
+    pub(crate) runs_tasks: &'static [&'static str],
+    /// Calls through a register under an interrupt that someone has followed.
     pub(crate) known_indirect: &'static [Exception],
-    /// Calls to panics, or on the way to one, under that interrupt, that someone
+    /// Calls to panics, or on the way to one, under an interrupt, that someone
     /// has proven never to happen.
     pub(crate) known_calls: &'static [Exception],
     /// Its memories. Bytes outside all of them are an error.
@@ -57,12 +60,79 @@ pub(crate) struct Board {
 
 const KIB: u64 = 1024;
 
-/// The emulated board has only its queues to the tasks to be known for.
-const QUEUES: &[Exception] = &[queue(&["HapticTick"]), queue(&["HapticLoop"])];
+const G474_CALLS: &[Exception] = &[queue(&["TIM7_DAC"]), queue(&["HapticLoop"]), TIMER_QUEUE];
 
-const G474_QUEUES: &[Exception] = &[queue(&["TIM7_DAC"]), queue(&["HapticLoop"])];
+const H743_CALLS: &[Exception] = &[queue(&["TIM7"]), queue(&["HapticLoop"]), TIMER_QUEUE];
 
-const H743_QUEUES: &[Exception] = &[queue(&["TIM7"]), queue(&["HapticLoop"])];
+/// What no board with amplifiers has: serial ports, and a frame to the virtual arm as the last
+/// thing that a failed program sends.
+const EMULATED_CALLS: &[Exception] = &[
+    queue(&["HapticTick"]),
+    queue(&["HapticLoop"]),
+    Exception {
+        caller: &["Serial", "on_received"],
+        callee: "panic_already_borrowed",
+        leads_to: &[],
+        because: "embassy's ring of bytes is borrowed in critical sections only, which hold this \
+                  interrupt back",
+    },
+    Exception {
+        caller: &["Serial", "on_received"],
+        callee: "core::panicking::panic",
+        leads_to: &[],
+        because: "embassy's ring of bytes keeps its places below its length, and was asked whether \
+                  there is room",
+    },
+    Exception {
+        caller: &["wire::frame::Framing"],
+        callee: "core::panicking::panic",
+        leads_to: &[],
+        because: "the frame of a program that has ended: some twenty bytes into 64. A panic there \
+                  would end it once more",
+    },
+];
+
+/// embassy's clock, whose vector is embassy's own and cannot be another.
+const TIMER_QUEUE: Exception = Exception {
+    caller: &["TIM5"],
+    callee: "panic_already_borrowed",
+    leads_to: &[],
+    because: "the queue of timers is borrowed in critical sections only, this interrupt's among \
+              them; they hold this interrupt back, so it finds no borrow",
+};
+
+/// What tells a task that something has happened.
+const WAKERS: &[Exception] = &[
+    waker(&["TIM6_DAC"]),
+    waker(&["TIM5"]),
+    waker(&["USB_LP"]),
+    waker(&["OTG_FS"]),
+];
+
+/// The emulated board's serial ports wake tasks, too. A program there that has failed writes
+/// its last words with `core::fmt`.
+const EMULATED_WAKERS: &[Exception] = &[
+    waker(&["TickDone"]),
+    waker(&["LinkSent"]),
+    waker(&["PlantSent"]),
+    waker(&["Serial", "on_received"]),
+    Exception {
+        caller: &["core::fmt::write"],
+        callee: "",
+        leads_to: &[],
+        because: "the last words of an emulated program that has ended; a panic among them would \
+                  end it once more",
+    },
+];
+
+const fn waker(caller: &'static [&'static str]) -> Exception {
+    Exception {
+        caller,
+        callee: "",
+        leads_to: &["embassy_executor::raw::waker::wake"],
+        because: "a task's waker: all tasks are embassy's, so there is one table of what wakers do",
+    }
+}
 
 const H743_MEMORIES: &[Memory] = &[
     // Plenty; the smaller board is the one that has to be small.
@@ -76,6 +146,7 @@ const fn queue(caller: &'static [&'static str]) -> Exception {
     Exception {
         caller,
         callee: "panic_const_rem_by_zero",
+        leads_to: &[],
         because: "heapless' queues wrap by `% length`, and know their length, never 0, only at run time",
     }
 }
@@ -90,9 +161,10 @@ pub(crate) static BOARDS: [Board; 4] = [
         name: "mps2-an386",
         chip: None,
         elf_variable: "HAPTERRA_MPS2_ELF",
-        tick_interrupt: "HapticTick",
-        known_indirect: &[],
-        known_calls: QUEUES,
+        // On this board alone tasks run in an interrupt, the lowest.
+        runs_tasks: &["Executor"],
+        known_indirect: EMULATED_WAKERS,
+        known_calls: EMULATED_CALLS,
         memories: &[
             // Zero-wait SRAM in the place of flash: held to what the G474 is held to.
             memory("flash", 0x0000_0000, 4096 * KIB, 192 * KIB),
@@ -103,9 +175,9 @@ pub(crate) static BOARDS: [Board; 4] = [
         name: "nucleo-g474re",
         chip: Some("STM32G474RETx"),
         elf_variable: "HAPTERRA_G474_ELF",
-        tick_interrupt: "TIM7_DAC",
-        known_indirect: &[],
-        known_calls: G474_QUEUES,
+        runs_tasks: &[],
+        known_indirect: WAKERS,
+        known_calls: G474_CALLS,
         memories: &[
             memory("flash", 0x0800_0000, 512 * KIB, 192 * KIB),
             // 16 KiB stay for the stack.
@@ -116,18 +188,18 @@ pub(crate) static BOARDS: [Board; 4] = [
         name: "nucleo-h743zi2",
         chip: Some("STM32H743ZITx"),
         elf_variable: "HAPTERRA_H743_ELF",
-        tick_interrupt: "TIM7",
-        known_indirect: &[],
-        known_calls: H743_QUEUES,
+        runs_tasks: &[],
+        known_indirect: WAKERS,
+        known_calls: H743_CALLS,
         memories: H743_MEMORIES,
     },
     Board {
         name: "nucleo-h743zi2-spi",
         chip: Some("STM32H743ZITx"),
         elf_variable: "HAPTERRA_H743_SPI_ELF",
-        tick_interrupt: "TIM7",
-        known_indirect: &[],
-        known_calls: H743_QUEUES,
+        runs_tasks: &[],
+        known_indirect: WAKERS,
+        known_calls: H743_CALLS,
         memories: H743_MEMORIES,
     },
 ];

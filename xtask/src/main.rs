@@ -39,7 +39,7 @@ cargo xtask COMMAND
   lint                   formatting, clippy and documentation, warnings as errors
   setup                  only find or install what the commands need
   size [BOARD]           build the images and hold them to their flash and RAM budgets
-  panics [BOARD]         build the images and prove that no tick can panic
+  panics [BOARD]         build the images and prove that no interrupt can panic
   counts [--write]       instructions of a tick on the emulated Cortex-M4F, beside their
                          targets and the kept table; --write: keep these
   soak MINUTES [--seed N]  random scenes on all cores, every tick judged in f64

@@ -66,7 +66,7 @@ pub(crate) fn check_sizes(images: &[Image]) -> Result<()> {
     size::check(images.iter().map(by_path))
 }
 
-/// An error if a tick can panic in one of the images.
+/// An error if an interrupt can panic in one of the images.
 pub(crate) fn check_panics(images: &[Image]) -> Result<()> {
     images
         .iter()

@@ -1,8 +1,8 @@
-//! The functions of an image and which calls which.
+//! The functions of an image, which calls which, and which the vector table names.
 
 use std::collections::BTreeMap;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 
 use super::decode::{Flow, instruction};
@@ -25,6 +25,9 @@ pub(crate) struct Function {
 pub(crate) struct Calls {
     /// In the order of their addresses.
     pub(crate) functions: Vec<Function>,
+    /// Those that the vector table names, by index, once each: exceptions and interrupts,
+    /// without the start of the program.
+    pub(crate) vectors: Vec<usize>,
 }
 
 /// Where a function lies.
@@ -48,7 +51,10 @@ pub(crate) fn read(elf: &[u8]) -> Result<Calls> {
     let file = object::File::parse(elf).context("not an ELF")?;
     let code = sections(&file)?;
     let (extents, names) = functions(&file, &code);
-    let mut calls = Calls { functions: vec![] };
+    let mut calls = Calls {
+        functions: vec![],
+        vectors: vectors(&file, &extents)?,
+    };
     for (extent, aliases) in extents.iter().zip(names) {
         let (callees, has_indirect) = flow_of(*extent, &code, &extents);
         let name = readable(&aliases);
@@ -60,6 +66,26 @@ pub(crate) fn read(elf: &[u8]) -> Result<Calls> {
         });
     }
     Ok(calls)
+}
+
+/// The functions that the vector table names, without its first two words: the stack and the
+/// start of the program.
+fn vectors(file: &object::File<'_>, extents: &[Extent]) -> Result<Vec<usize>> {
+    let table = file.section_by_name(".vector_table");
+    let bytes = table.context("no section .vector_table")?.data()?;
+    let words = bytes.as_chunks::<4>().0.iter();
+    let addresses = words.map(|word| u32::from_le_bytes(*word)).skip(2);
+    let mut vectors = vec![];
+    for address in addresses.filter(|address| *address != 0) {
+        let function = holder(extents, address & !1);
+        let begins = |i: &usize| extents[*i].start == address & !1;
+        let function = function.filter(begins);
+        vectors.push(function.with_context(|| format!("no function at {address:#x}, a vector"))?);
+    }
+    vectors.sort_unstable();
+    vectors.dedup();
+    ensure!(!vectors.is_empty(), "no vector in the vector table");
+    Ok(vectors)
 }
 
 fn sections<'a>(file: &object::File<'a>) -> Result<Vec<Code<'a>>> {

@@ -1,10 +1,12 @@
-//! Whether the haptic interrupt of an image can reach a panic.
+//! Whether an interrupt of an image can reach a panic.
 //!
 //! The finished ELF is judged, not the source: link-time optimisation removes
-//! most bounds checks, and what it left is what runs. Every direct branch of
-//! every function that the interrupt can reach is followed. A call through a
+//! most bounds checks, and what it left is what runs. Its vector table names what is judged:
+//! every exception and every interrupt, whether it is enabled or not. Every direct branch of
+//! every function that one of them can reach is followed. A call through a
 //! register cannot be followed, so it is an error unless the board's table says
-//! what it is; the walk is complete without guesses about pointers.
+//! what it is; the walk goes on where the table says that it leads. So the walk is complete
+//! without guesses about pointers.
 
 mod calls;
 mod decode;
@@ -12,75 +14,102 @@ mod reach;
 
 use std::path::Path;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 
 use crate::board::{Board, Exception};
 use crate::run::say;
 use calls::{Calls, Function};
+use reach::Reached;
 
-/// Fails if the tick's interrupt in the image at `path` can reach a panic.
+/// Fails if an interrupt of the image at `path` can reach a panic.
 pub(crate) fn check(board: &Board, path: &Path) -> Result<()> {
     let elf = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let calls = calls::read(&elf).with_context(|| path.display().to_string())?;
-    let reached = judge(&calls, board).with_context(|| format!("image {}", board.name))?;
-    let (name, root) = (board.name, board.tick_interrupt);
-    say(format!(
-        "{name}: none of the {reached} functions under {root} can panic"
-    ));
+    let judged = judge(&calls, board).with_context(|| format!("image {}", board.name))?;
+    let (name, list) = (board.name, judged.join(", "));
+    say(format!("{name}: no panic can be reached from {list}"));
     Ok(())
 }
 
-/// How many functions the interrupt reaches, if none of them panics.
-fn judge(calls: &Calls, board: &Board) -> Result<usize> {
+/// The names of all vectors with how many functions each reaches, if none of these panics.
+fn judge(calls: &Calls, board: &Board) -> Result<Vec<String>> {
     let functions = &calls.functions;
     // In an image without any panic, the names looked for are not the real ones.
     ensure!(
         functions.iter().any(|f| panics(&f.name)),
         "no panic function in the whole image: was it stripped?"
     );
-    let root = board.tick_interrupt;
-    let Some(root) = functions
-        .iter()
-        .position(|f| f.aliases.iter().any(|a| a == root))
-    else {
-        bail!("no function {root}: the tick's interrupt is named in xtask/src/board.rs");
-    };
-    // What a panic does in turn says nothing new: the walk ends there.
-    // It does not follow what the table knows either.
-    let found = reach::from(root, |i| {
-        let callees = match panics(&functions[i].name) {
-            true => &[],
-            false => functions[i].callees.as_slice(),
-        };
-        let unknown =
-            |c: &&usize| !is_known(board.known_calls, &functions[i], &functions[**c].name);
-        callees.iter().filter(unknown).copied().collect()
-    });
-    let way_to = |i| {
-        let names = found
-            .chain(i)
-            .into_iter()
-            .map(|j| short(&functions[j].name));
-        names.collect::<Vec<_>>().join("\n    -> ")
-    };
-    let mut wrong = vec![];
-    let inner = found.all().filter(|&i| !panics(&functions[i].name));
-    for i in inner.clone() {
-        let caller = &functions[i];
-        for callee in caller.callees.iter().map(|&c| &functions[c].name) {
-            if panics(callee) && !is_known(board.known_calls, caller, callee) {
-                wrong.push(format!("can panic:\n    {}\n    -> {callee}", way_to(i)));
-            }
+    ensure!(!calls.vectors.is_empty(), "no vectors");
+    let runs_tasks = |f: &Function| f.aliases.iter().any(|a| board.runs_tasks.contains(&&**a));
+    let (mut judged, mut wrong) = (vec![], vec![]);
+    for &root in &calls.vectors {
+        if runs_tasks(&functions[root]) {
+            continue;
         }
-        if caller.has_indirect && !is_known(board.known_indirect, caller, "") {
-            wrong.push(format!(
-                "calls through a register, which cannot be followed:\n    {}",
-                way_to(i)
-            ));
+        let found = reached(calls, board, root);
+        let inner = || found.all().filter(|&i| !panics(&functions[i].name));
+        for i in inner() {
+            wrong.extend(wrongs(calls, board, &found, i));
+        }
+        judged.push(format!("{} ({})", functions[root].name, inner().count()));
+    }
+    // What several interrupts reach is told once.
+    wrong.sort_unstable();
+    wrong.dedup();
+    ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
+    Ok(judged)
+}
+
+/// Everything that a vector reaches. What a panic does in turn says nothing new: the walk ends
+/// there. It does not follow what the table knows either.
+fn reached(calls: &Calls, board: &Board, root: usize) -> Reached {
+    let functions = &calls.functions;
+    reach::from(root, |i| {
+        let caller = &functions[i];
+        if panics(&caller.name) {
+            return vec![];
+        }
+        let unknown = |c: &usize| known(board.known_calls, caller, &functions[*c].name).is_none();
+        let direct = caller.callees.iter().copied().filter(unknown);
+        let leads_to = known(board.known_indirect, caller, "").map_or(&[][..], |e| e.leads_to);
+        let is_led_to = |i: &usize| leads_to.iter().any(|to| functions[*i].name.contains(to));
+        let through_register = (0..functions.len()).filter(|i| caller.has_indirect && is_led_to(i));
+        direct.chain(through_register).collect()
+    })
+}
+
+/// What is wrong with a function that was reached, each with the way to it.
+fn wrongs(calls: &Calls, board: &Board, found: &Reached, i: usize) -> Vec<String> {
+    let functions = &calls.functions;
+    let caller = &functions[i];
+    let names = found
+        .chain(i)
+        .into_iter()
+        .map(|j| short(&functions[j].name));
+    let way = names.collect::<Vec<_>>().join("\n    -> ");
+    let mut wrong = vec![];
+    for callee in caller.callees.iter().map(|&c| &functions[c].name) {
+        if panics(callee) && known(board.known_calls, caller, callee).is_none() {
+            wrong.push(format!("can panic:\n    {way}\n    -> {callee}"));
         }
     }
-    ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
-    Ok(inner.count())
+    if !caller.has_indirect {
+        return wrong;
+    }
+    match known(board.known_indirect, caller, "") {
+        None => wrong.push(format!(
+            "calls through a register, which cannot be followed:\n    {way}"
+        )),
+        Some(entry) => {
+            let is_there = |to: &&&str| !functions.iter().any(|f| f.name.contains(**to));
+            if let Some(to) = entry.leads_to.iter().find(is_there) {
+                wrong.push(format!(
+                    "no function {to}, which the table names for:\n    {way}"
+                ));
+            }
+        }
+    }
+    wrong
 }
 
 /// A name without what makes generic ones fill the screen.
@@ -92,15 +121,15 @@ fn short(name: &str) -> String {
     }
 }
 
-/// Whether the table of exceptions has this caller and callee, each by part of its name.
-fn is_known(table: &[Exception], caller: &Function, callee: &str) -> bool {
+/// The entry of a table of exceptions for this caller and callee, each by part of its name.
+fn known<'t>(table: &'t [Exception], caller: &Function, callee: &str) -> Option<&'t Exception> {
     let is_caller = |parts: &[&str]| {
         let mut names = caller.aliases.iter().chain([&caller.name]);
         names.any(|name| parts.iter().all(|part| name.contains(part)))
     };
     table
         .iter()
-        .any(|e| is_caller(e.caller) && callee.contains(e.callee))
+        .find(|e| is_caller(e.caller) && callee.contains(e.callee))
 }
 
 /// Whether a function of this name is a panic or what all panics end in.
@@ -125,22 +154,30 @@ mod tests {
         }
     }
 
+    /// Two vectors: the tick, which calls what is given, and the supply's.
     fn image(tick_calls: &[usize]) -> Calls {
         let functions = vec![
-            function(EMULATED.tick_interrupt, &[1], false),
+            function("HapticTick", &[1], false),
             function("hapterra_core::tick", tick_calls, false),
             function("core::slice::index::slice_index_fail", &[3], false),
             function("core::panicking::panic_fmt", &[4], false),
             function("__rustc::rust_begin_unwind", &[], true),
             function("hapterra_core::surface", &[], false),
             function("<dyn Waker>::wake", &[], true),
+            function("executor::wake_task", &[], false),
+            function("SupplyLow", &[5], false),
         ];
-        Calls { functions }
+        let vectors = vec![0, 8];
+        Calls { functions, vectors }
+    }
+
+    fn complaint(calls: &Calls, board: &Board) -> String {
+        judge(calls, board).unwrap_err().to_string()
     }
 
     #[test]
     fn a_panic_two_calls_away_is_found_with_its_way() {
-        let message = judge(&image(&[2, 5]), EMULATED).unwrap_err().to_string();
+        let message = complaint(&image(&[2, 5]), EMULATED);
         assert!(
             message.contains("slice_index_fail\n    -> core::panicking::panic_fmt"),
             "{message}"
@@ -151,45 +188,65 @@ mod tests {
 
     #[test]
     fn a_panic_elsewhere_in_the_image_is_no_matter() {
-        assert_eq!(judge(&image(&[5]), EMULATED).unwrap(), 3);
+        let judged = judge(&image(&[5]), EMULATED).unwrap();
+        assert_eq!(judged, ["HapticTick (3)", "SupplyLow (2)"]);
     }
 
     #[test]
-    fn a_call_that_cannot_be_followed_must_be_known() {
-        let message = judge(&image(&[6]), EMULATED).unwrap_err().to_string();
+    fn a_panic_in_any_vector_is_found_but_for_those_that_run_tasks() {
+        let mut calls = image(&[5]);
+        calls.functions[8].callees.push(3);
+        let message = complaint(&calls, EMULATED);
+        assert!(
+            message.contains("SupplyLow\n    -> core::panicking::panic_fmt"),
+            "{message}"
+        );
+        let board = Board {
+            runs_tasks: &["SupplyLow"],
+            ..*EMULATED
+        };
+        assert_eq!(judge(&calls, &board).unwrap(), ["HapticTick (3)"]);
+    }
+
+    #[test]
+    fn a_call_that_cannot_be_followed_must_be_known_and_is_followed_from_there() {
+        let message = complaint(&image(&[6]), EMULATED);
         assert!(message.contains("register"), "{message}");
         let known = &[Exception {
             caller: &["Waker>::wake"],
             callee: "",
+            leads_to: &["wake_task"],
             because: "test",
         }];
         let board = Board {
             known_indirect: known,
             ..*EMULATED
         };
-        assert_eq!(judge(&image(&[6]), &board).unwrap(), 3);
+        let mut calls = image(&[6]);
+        assert_eq!(judge(&calls, &board).unwrap()[0], "HapticTick (4)");
+        calls.functions[7].callees.push(3);
+        let message = complaint(&calls, &board);
+        assert!(message.contains("wake_task\n    -> core"), "{message}");
+        calls.functions[7].name = "something else".into();
+        let message = complaint(&calls, &board);
+        assert!(message.contains("no function wake_task"), "{message}");
     }
 
     #[test]
     fn a_known_panic_is_known_for_one_caller_only() {
-        let known = &[
-            Exception {
-                caller: &["elsewhere"],
-                callee: "panic_fmt",
-                because: "test",
-            },
-            Exception {
-                caller: &["slice_index_fail"],
-                callee: "panic_fmt",
-                because: "test",
-            },
-        ];
+        let known = |caller| Exception {
+            caller,
+            callee: "panic_fmt",
+            leads_to: &[],
+            because: "test",
+        };
+        let table: &[Exception] = &[known(&["elsewhere"]), known(&["slice_index_fail"])];
         let board = Board {
-            known_calls: known,
+            known_calls: Box::leak(table.to_vec().into_boxed_slice()),
             ..*EMULATED
         };
-        assert_eq!(judge(&image(&[2]), &board).unwrap(), 3);
-        let message = judge(&image(&[2, 3]), &board).unwrap_err().to_string();
+        assert!(judge(&image(&[2]), &board).is_ok());
+        let message = complaint(&image(&[2, 3]), &board);
         assert!(
             message.contains("tick\n    -> core::panicking"),
             "{message}"
@@ -201,11 +258,10 @@ mod tests {
         let mut stripped = image(&[5]);
         stripped.functions.truncate(2);
         stripped.functions[1].callees.clear();
+        stripped.vectors.truncate(1);
         assert!(judge(&stripped, EMULATED).is_err());
-        let board = Board {
-            tick_interrupt: "TIMER9",
-            ..*EMULATED
-        };
-        assert!(judge(&image(&[5]), &board).is_err());
+        let mut without = image(&[5]);
+        without.vectors.clear();
+        assert!(judge(&without, EMULATED).is_err());
     }
 }
