@@ -35,6 +35,7 @@ impl Machine {
         self.core
             .mem_write(address.into(), bytes)
             .expect("in a memory");
+        self.cache.borrow_mut().patch(address, bytes);
         let (from, to) = (u64::from(address), u64::from(address) + bytes.len() as u64);
         self.core
             .ctl_remove_cache(from, to)

@@ -1,5 +1,6 @@
 //! The core: reset, exceptions by priority, sleep, time.
 
+mod data_cache;
 mod exceptions;
 mod fault_injection;
 mod halting;
@@ -16,6 +17,7 @@ use crate::bus::{Bus, Effect};
 use crate::chip::Chip;
 use crate::elf::Image;
 use crate::supply::Reset;
+use data_cache::DataCache;
 use exceptions::Active;
 use fault_injection::{Load, UnreadableWord};
 use protection::Protection;
@@ -51,6 +53,8 @@ pub struct Machine {
     unreadable: Vec<UnreadableWord>,
     /// A load of a word that cannot be read.
     load: Rc<Cell<Load>>,
+    /// The data cache, of a core that has one.
+    cache: Rc<RefCell<DataCache>>,
     /// What the memory protection unit forbids.
     protection: Protection,
     /// Vectors taken since it was last cleared.
@@ -91,8 +95,10 @@ impl Machine {
                 .expect("memory");
         }
         let bus = Rc::new(RefCell::new(Bus::new(chip, Reset::PowerUp)));
+        let cache = Rc::<RefCell<DataCache>>::default();
         for (address, bytes) in [(0x4000_0000, 0x2000_0000), (0xE000_0000, 0x10_0000)] {
-            map_peripherals(&mut core, &bus, address, bytes);
+            let cache = chip.is_m7.then_some(&cache);
+            map_peripherals(&mut core, &bus, cache, address, bytes);
         }
         let mut machine = Self {
             chip,
@@ -102,6 +108,7 @@ impl Machine {
             active: vec![],
             unreadable: vec![],
             load: Rc::default(),
+            cache,
             protection: Protection::default(),
             taken: vec![],
             hard_faults: 0,
@@ -131,13 +138,17 @@ impl Machine {
         }
     }
 
-    /// Resets the chip. Memory keeps what it holds, and what is outside of the chip knows of
+    /// Resets the chip. Memory keeps what it holds, but not what only the data cache did, and what is outside of the chip knows of
     /// no reset but a power-up.
     pub fn reset(&mut self, cause: Reset) {
         let inputs = self.chip;
         let before = self.bus.replace(Bus::new(self.chip, cause));
         if cause != Reset::PowerUp {
             self.bus().converter = before.converter.after_reset();
+        }
+        let behind = self.cache.borrow_mut().reset();
+        if let Some((address, bytes)) = behind {
+            self.patch(address, &bytes);
         }
         self.protect();
         self.set_input(inputs.emergency_stop, false);
@@ -251,18 +262,28 @@ impl Port for Machine {
     }
 }
 
-fn map_peripherals(core: &mut Unicorn<'static, ()>, bus: &Rc<RefCell<Bus>>, base: u32, size: u64) {
+fn map_peripherals(
+    core: &mut Unicorn<'static, ()>,
+    bus: &Rc<RefCell<Bus>>,
+    cache: Option<&Rc<RefCell<DataCache>>>,
+    base: u32,
+    size: u64,
+) {
+    let cache = cache.map(Rc::clone);
     let (on_read, on_write) = (Rc::clone(bus), Rc::clone(bus));
     let read = move |_: &mut Unicorn<'_, ()>, offset: u64, bytes: usize| {
         let address = base + offset as u32;
         let word = on_read.borrow_mut().read(address & !3);
         u64::from(word >> (8 * (address & 3)) & ones(bytes))
     };
-    let write = move |_: &mut Unicorn<'_, ()>, offset: u64, bytes: usize, value: u64| {
+    let write = move |core: &mut Unicorn<'_, ()>, offset: u64, bytes: usize, value: u64| {
         let address = base + offset as u32;
         let shift = 8 * (address & 3);
         let mut bus = on_write.borrow_mut();
         bus.write(address & !3, (value as u32) << shift, ones(bytes) << shift);
+        if let Some(cache) = &cache {
+            cache.borrow_mut().follow(core, address, value as u32);
+        }
     };
     core.mmio_map(base.into(), size, Some(read), Some(write))
         .expect("peripherals");

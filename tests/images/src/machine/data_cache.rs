@@ -1,0 +1,63 @@
+//! The data cache of an H743's core (ARM DDI 0403E, B2.2.7; ARM DDI 0489, 1.2): what it holds
+//! and the memory behind it does not is lost at a reset.
+//!
+//! Modelled: DC of CCR, and cleaning by address (DCCMVAC, DCCIMVAC), over the AXI SRAM. The
+//! worst cache is assumed: it writes nothing back that it was not told to, and keeps everything.
+//! Not modelled: sets and ways, an invalidation that drops what was written, other masters of
+//! the bus, and the instruction cache. No image uses DMA, and a test patches both the cache and
+//! the memory.
+
+use unicorn_engine::Unicorn;
+
+/// The memory that is cached: address and bytes. The tightly coupled memory is not.
+const CACHED: (u32, usize) = (0x2400_0000, 512 * 1024);
+/// CCR and its bit that switches the data cache on.
+const CCR: u32 = 0xE000_ED14;
+const DC: u32 = 1 << 16;
+/// Clean a line, and clean and invalidate one, by an address in it.
+const DCCMVAC: u32 = 0xE000_EF68;
+const DCCIMVAC: u32 = 0xE000_EF70;
+/// Bytes of a line.
+const LINE: usize = 32;
+
+/// The cache, as what the memory behind it holds while it is on. Off at first.
+#[derive(Default)]
+pub(super) struct DataCache {
+    behind: Option<Vec<u8>>,
+}
+
+impl DataCache {
+    /// Takes the core's write of a register.
+    pub(super) fn follow(&mut self, core: &Unicorn<'_, ()>, register: u32, value: u32) {
+        let (start, bytes) = CACHED;
+        let held = |at: usize, bytes: usize| {
+            let held = core.mem_read_as_vec(u64::from(start) + at as u64, bytes);
+            held.expect("in a memory")
+        };
+        match (register, &mut self.behind) {
+            (CCR, None) if value & DC != 0 => self.behind = Some(held(0, bytes)),
+            (CCR, Some(_)) if value & DC == 0 => self.behind = None,
+            (DCCMVAC | DCCIMVAC, Some(behind)) => {
+                let at = value.wrapping_sub(start) as usize / LINE * LINE;
+                if let Some(line) = behind.get_mut(at..at + LINE) {
+                    line.copy_from_slice(&held(at, LINE));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// A test changes memory: both what is cached of it and what is behind.
+    pub(super) fn patch(&mut self, address: u32, bytes: &[u8]) {
+        let at = address.wrapping_sub(CACHED.0) as usize;
+        let behind = self.behind.as_mut();
+        if let Some(place) = behind.and_then(|all| all.get_mut(at..at.checked_add(bytes.len())?)) {
+            place.copy_from_slice(bytes);
+        }
+    }
+
+    /// A reset switches it off. Where the memory is that it covered, and what that holds.
+    pub(super) fn reset(&mut self) -> Option<(u32, Vec<u8>)> {
+        self.behind.take().map(|behind| (CACHED.0, behind))
+    }
+}
