@@ -1,9 +1,18 @@
-//! An analogue-to-digital converter of the chips (RM0440 21, RM0433 25): calibration,
-//! enable, and an injected sequence that the program starts.
+//! An analogue-to-digital converter of the chips (RM0440 21, RM0433 25): its regulator, enable,
+//! the channels that are connected to it, and an injected sequence that the program starts.
+//!
+//! Modelled: of CR DEEPPWD, ADVREGEN with its start-up time, ADCAL, ADEN, JADSTART; of ISR
+//! ADRDY, JEOC, JEOS; JQDIS of CFGR; JSQR and JDR; on an H743 PCSEL.
+//!
+//! Not modelled: what a calibration corrects, sampling times and prescalers (a sequence takes
+//! the longest that the slower chip's can take), DIFSEL, offsets, oversampling, resolutions,
+//! queues, triggers, interrupts, DMA, the regular sequence, BOOST, LDORDY, ADDIS and JADSTP.
 
 const ISR: u32 = 0x00;
 const CR: u32 = 0x08;
 const CFGR: u32 = 0x0C;
+/// Which channels are connected: an H743's alone.
+const PCSEL: u32 = 0x1C;
 const JSQR: u32 = 0x4C;
 const JDR1: u32 = 0x80;
 
@@ -14,18 +23,24 @@ const JEOS: u32 = 1 << 6;
 /// Bits of CR.
 const ADEN: u32 = 1 << 0;
 const JADSTART: u32 = 1 << 3;
+const ADVREGEN: u32 = 1 << 28;
+const DEEPPWD: u32 = 1 << 29;
 const ADCAL: u32 = 1 << 31;
 /// Bit of CFGR: no queue of injected sequences. With a queue the program cannot start one.
 const JQDIS: u32 = 1 << 31;
 /// How long a sequence takes, ns: three conversions of the slower chip in its slower revision,
 /// an H743 of revision V, whose converter halves its clock once more.
 const SEQUENCE_NS: u64 = 75_000;
+/// How long the regulator takes to start, ns: a G474's 20 µs, an H743's 10.
+const REGULATOR_NS: [u64; 2] = [20_000, 10_000];
 
 /// The converter, and the voltages at its channels.
 pub struct Adc {
     registers: [u32; 64],
-    /// Bits of a conversion.
+    /// Bits of a conversion: 12 on a G474, 16 on an H743.
     bits: u32,
+    /// Since when the regulator has been on, ns.
+    regulator_ns: Option<u64>,
     /// Until when a sequence is under way, ns.
     busy_until_ns: Option<u64>,
     /// Readings of 12 bits at the channels, by their numbers.
@@ -38,12 +53,38 @@ impl Adc {
     pub fn new(bits: u32) -> Self {
         let mut registers = [0; 64];
         registers[(CFGR / 4) as usize] = JQDIS;
+        registers[(CR / 4) as usize] = DEEPPWD;
         Self {
             registers,
             bits,
+            regulator_ns: None,
             busy_until_ns: None,
             levels: [2048; 20],
         }
+    }
+
+    const fn is_h743(&self) -> bool {
+        self.bits == 16
+    }
+
+    /// Follows the regulator's bits, and takes the enable back where there is no regulator.
+    fn follow_regulator(&mut self, control: u32, now_ns: u64) -> u32 {
+        let is_on = control & (ADVREGEN | DEEPPWD) == ADVREGEN;
+        self.regulator_ns = match self.regulator_ns {
+            _ if !is_on => None,
+            None => Some(now_ns),
+            since => since,
+        };
+        let start_ns = REGULATOR_NS[usize::from(self.is_h743())];
+        let is_up = self.regulator_ns.is_some_and(|ns| now_ns >= ns + start_ns);
+        if is_up { control } else { control & !ADEN }
+    }
+
+    /// What is at a channel: nothing where it is not connected.
+    fn level(&self, channel: u32) -> u16 {
+        let connected = self.registers[(PCSEL / 4) as usize] >> channel & 1 == 1;
+        let level = self.levels.get(channel as usize).copied();
+        level.filter(|_| connected || !self.is_h743()).unwrap_or(0)
     }
 
     fn register(&mut self, offset: u32) -> &mut u32 {
@@ -65,6 +106,7 @@ impl Adc {
             ISR => *self.register(ISR) &= !(value & mask),
             // A calibration is done at once.
             CR => {
+                let written = self.follow_regulator(written, now_ns);
                 *self.register(CR) = written & !(ADCAL | JADSTART);
                 if written & ADEN != 0 {
                     *self.register(ISR) |= ADRDY;
@@ -87,7 +129,7 @@ impl Adc {
         let sequence = *self.register(JSQR);
         for rank in 0..=(sequence & 3) {
             let channel = sequence >> (9 + 6 * rank) & 0x1F;
-            let level = self.levels.get(channel as usize).map_or(0, |level| *level);
+            let level = self.level(channel);
             *self.register(JDR1 + 4 * rank) = u32::from(level) << (self.bits - 12);
         }
         *self.register(ISR) |= JEOC | JEOS;
@@ -98,26 +140,49 @@ impl Adc {
 mod tests {
     use super::*;
 
+    const ON: u32 = ADVREGEN | ADEN;
+    const UP_NS: u64 = 20_000;
+
+    /// Its regulator is up at [`UP_NS`].
+    fn with_regulator(bits: u32) -> Adc {
+        let mut adc = Adc::new(bits);
+        adc.write(CR, ADVREGEN, u32::MAX, 0);
+        adc
+    }
+
     #[test]
     fn a_sequence_is_there_when_its_time_is_up() {
-        let mut adc = Adc::new(16);
+        let mut adc = with_regulator(16);
         adc.levels[9] = 0x123;
-        adc.write(JSQR, 1 | 9 << 9 | 2 << 15, u32::MAX, 0);
-        adc.write(CR, ADEN, u32::MAX, 0);
-        assert_eq!(adc.read(ISR, 0), ADRDY);
-        adc.write(CR, ADEN | JADSTART, u32::MAX, 0);
-        assert_eq!(adc.read(ISR, SEQUENCE_NS - 1), ADRDY);
-        assert_eq!(adc.read(ISR, SEQUENCE_NS), ADRDY | JEOC | JEOS);
-        assert_eq!(adc.read(JDR1, SEQUENCE_NS), 0x1230);
-        adc.write(ISR, JEOS, u32::MAX, SEQUENCE_NS);
-        assert_eq!(adc.read(ISR, SEQUENCE_NS), ADRDY | JEOC);
+        adc.write(JSQR, 1 | 9 << 9 | 2 << 15, u32::MAX, UP_NS);
+        adc.write(PCSEL, 1 << 9, u32::MAX, UP_NS);
+        adc.write(CR, ON, u32::MAX, UP_NS);
+        assert_eq!(adc.read(ISR, UP_NS), ADRDY);
+        adc.write(CR, ON | JADSTART, u32::MAX, UP_NS);
+        let done_ns = UP_NS + SEQUENCE_NS;
+        assert_eq!(adc.read(ISR, done_ns - 1), ADRDY);
+        assert_eq!(adc.read(ISR, done_ns), ADRDY | JEOC | JEOS);
+        assert_eq!(adc.read(JDR1, done_ns), 0x1230);
+        assert_eq!(adc.read(JDR1 + 4, done_ns), 0, "channel 2 is not connected");
+        adc.write(ISR, JEOS, u32::MAX, done_ns);
+        assert_eq!(adc.read(ISR, done_ns), ADRDY | JEOC);
+    }
+
+    #[test]
+    fn without_a_regulator_that_is_up_nothing_is_enabled() {
+        for (control, at_ns) in [(ADEN, UP_NS), (ON | DEEPPWD, UP_NS), (ON, UP_NS - 1)] {
+            let mut adc = with_regulator(12);
+            adc.write(CR, control, u32::MAX, at_ns);
+            assert_eq!(adc.read(ISR, at_ns), 0, "{control:#x} at {at_ns}");
+            assert_eq!(adc.read(CR, at_ns) & ADEN, 0);
+        }
     }
 
     #[test]
     fn with_a_queue_nothing_starts() {
-        let mut adc = Adc::new(12);
-        adc.write(CFGR, 0, u32::MAX, 0);
-        adc.write(CR, ADEN | JADSTART, u32::MAX, 0);
+        let mut adc = with_regulator(12);
+        adc.write(CFGR, 0, u32::MAX, UP_NS);
+        adc.write(CR, ON | JADSTART, u32::MAX, UP_NS);
         assert_eq!(adc.read(ISR, 1_000_000), ADRDY);
     }
 }

@@ -8,7 +8,7 @@ use crate::adc::Adc;
 use crate::chip::{Chip, Commands, Unreadable, UsbKind};
 use crate::converter::Converter;
 use crate::nvic::{self, Nvic};
-use crate::shutdown::{self, BreakAt, Sources};
+use crate::shutdown::{self, BreakAt, Outputs, Sources};
 use crate::supply::{Reset, Supply};
 use crate::timer::{CNT, Timer};
 use crate::usb::{Cable, FullSpeed, Otg, Peripheral};
@@ -200,11 +200,18 @@ impl Bus {
     /// Whether duty cycles leave the chip, on a board that commands by them.
     #[must_use]
     pub fn drives_duty_cycles(&mut self) -> Option<bool> {
+        self.duty_outputs()
+            .map(|outputs| outputs == Outputs::Pulses)
+    }
+
+    /// What is at the pins of the duty cycles, on a board that commands by them.
+    #[must_use]
+    pub fn duty_outputs(&mut self) -> Option<Outputs> {
         let at = self.chip.output_break?;
         let stops = self.chip.freeze.outputs;
         let is_stopped = self.is_halted && stops.is_some_and(|bit| self.is_frozen(bit));
         let timer = self.timer_named(at.timer)?;
-        Some(!is_stopped && shutdown::drives(timer))
+        Some(shutdown::outputs(timer, is_stopped))
     }
 
     fn timer_named(&mut self, name: &str) -> Option<&mut Timer> {

@@ -1,4 +1,9 @@
 //! The interrupt controller and the few system registers the images use.
+//!
+//! Modelled: the registers that enable, disable, raise and take back interrupts, their
+//! priorities with four bits, and the reset by AIRCR. Not modelled: priority groups, the active
+//! bits, STIR, SysTick. What else is in the page reads back what was written; the memory
+//! protection unit, the faults and the data cache take theirs from there.
 
 use std::collections::HashMap;
 

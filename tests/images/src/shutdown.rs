@@ -1,16 +1,32 @@
 //! What stops the arm in hardware: the break of TIM1, and what a halted core stops.
 //!
-//! Modelled as RM0433 has it: of TIM1 (38.3.16, 38.3.28) BKE, BKP and MOE of BDTR, BKINE of
-//! AF1, BIF of SR; of SYSCFG_CFGR (12.3.3) PVDL, which also locks the
+//! Modelled as RM0433 has it: of TIM1 CEN of CR1, the compare modes of CCMR1 and CCMR2, the
+//! enables of CCER (38.4.7 to 38.4.11), and (38.3.16, 38.3.28, 38.4.20) BKE, BKP, OSSI and MOE
+//! of BDTR, BKINE of AF1, BIF of SR; of SYSCFG_CFGR (12.3.3) PVDL, which also locks the
 //! comparator's settings, and CM7L; of DBGMCU (60.5.8) the bits that
 //! stop the watchdog and TIM1 with the core, and of the G474's (RM0440, 47.16) the
-//! watchdog's. The break's filter and its idle levels other than low are not modelled.
+//! watchdog's.
+//!
+//! Not modelled: the break's filter, idle levels other than low, polarities other than high,
+//! complementary outputs and their dead time, the second break, OSSR, AOE, LOCK, the preload of
+//! compare registers.
 
 use crate::timer::Timer;
 
+const CR1: u32 = 0x00;
 const SR: u32 = 0x10;
+/// CCMR1 and CCMR2: two channels each.
+const CCMR: [u32; 2] = [0x18, 0x1C];
+const CCER: u32 = 0x20;
 const BDTR: u32 = 0x44;
 const AF1: u32 = 0x60;
+/// Of CR1: it counts.
+const CEN: u32 = 1 << 0;
+/// Of a channel's byte of CCMR: the channel is an output, in PWM mode 1.
+const CHANNEL: u32 = 0x73;
+const PWM_1: u32 = 6 << 4;
+/// Of BDTR: the outputs are held at their idle level while MOE is not set.
+const OSSI: u32 = 1 << 10;
 /// Of BDTR: break enable, break polarity (set: high), main output enable.
 const BKE: u32 = 1 << 12;
 const BKP: u32 = 1 << 13;
@@ -60,8 +76,90 @@ pub fn follow(timer: &mut Timer, sources: Sources) {
     }
 }
 
-/// Whether the timer's outputs are driven by it.
+/// What a timer does to the pins of its first three channels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outputs {
+    /// Duty cycles.
+    Pulses,
+    /// They are driven low.
+    Low,
+    /// Nothing, on one of them at least: what is outside decides.
+    Floating,
+}
+
+/// What the timer does to its pins. `is_stopped`: the halted core stops it, which is to its
+/// outputs as if MOE were not set.
 #[must_use]
-pub fn drives(timer: &Timer) -> bool {
-    timer.get(BDTR) & MOE != 0
+pub fn outputs(timer: &Timer, is_stopped: bool) -> Outputs {
+    let each = |is: &dyn Fn(u32) -> bool| (0..3).all(is);
+    let is_enabled = |channel: u32| timer.get(CCER) >> (4 * channel) & 1 == 1;
+    if !each(&is_enabled) {
+        return Outputs::Floating;
+    }
+    let bdtr = timer.get(BDTR);
+    if is_stopped || bdtr & MOE == 0 {
+        return match bdtr & OSSI {
+            0 => Outputs::Floating,
+            _ => Outputs::Low,
+        };
+    }
+    let makes_duty_cycles = |channel: u32| {
+        let modes = timer.get(CCMR[(channel / 2) as usize]) >> (8 * (channel % 2));
+        modes & CHANNEL == PWM_1
+    };
+    match timer.get(CR1) & CEN != 0 && each(&makes_duty_cycles) {
+        true => Outputs::Pulses,
+        false => Outputs::Low,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Makes duty cycles on three channels.
+    fn timer() -> Timer {
+        let mut timer = Timer::new(1);
+        let set = [
+            (CR1, CEN),
+            (CCMR[0], PWM_1 | PWM_1 << 8),
+            (CCMR[1], PWM_1),
+            (CCER, 0x111),
+            (BDTR, MOE | OSSI),
+        ];
+        for (register, value) in set {
+            timer.set(register, value);
+        }
+        timer
+    }
+
+    #[test]
+    fn duty_cycles_need_a_counting_timer_a_mode_and_an_enable_of_each_channel() {
+        assert_eq!(outputs(&timer(), false), Outputs::Pulses);
+        let with = |register, value| {
+            let mut timer = timer();
+            timer.set(register, value);
+            outputs(&timer, false)
+        };
+        assert_eq!(with(CR1, 0), Outputs::Low);
+        assert_eq!(with(CCMR[0], PWM_1), Outputs::Low, "channel 2 is frozen");
+        assert_eq!(
+            with(CCMR[1], PWM_1 | 1),
+            Outputs::Low,
+            "channel 3 is an input"
+        );
+        for enabled in [0x110, 0x101, 0x011] {
+            assert_eq!(with(CCER, enabled), Outputs::Floating, "{enabled:#x}");
+        }
+    }
+
+    #[test]
+    fn without_moe_the_pins_are_held_low_or_let_go() {
+        let mut timer = timer();
+        assert_eq!(outputs(&timer, true), Outputs::Low);
+        timer.set(BDTR, OSSI);
+        assert_eq!(outputs(&timer, false), Outputs::Low);
+        timer.set(BDTR, 0);
+        assert_eq!(outputs(&timer, false), Outputs::Floating);
+    }
 }

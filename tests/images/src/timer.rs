@@ -1,4 +1,10 @@
 //! A timer of the chips: counting up, moved by an encoder, or standing still.
+//!
+//! Modelled: CEN, URS and CKD of CR1, the encoder mode on both channels of SMCR, UG of EGR, the
+//! flags and interrupts of the update and of the four compare matches, the input filters of
+//! CCMR1, CNT, PSC, ARR and the compare registers. What a timer does to its pins is in
+//! `shutdown`. Not modelled: counting down, one pulse, repetition, the other slave modes,
+//! capture, DMA, and every preload: what is written counts at once.
 
 use crate::quadrature::{Filter, count};
 
