@@ -5,8 +5,8 @@
 
 use hapterra_core::rate::TickRate;
 
-/// Longest time between two feedings, ms: less than the 50 ms after which a board's
-/// watchdog resets it.
+/// Longest time between two feedings, ms: less than the 42 ms after which a board's
+/// watchdog resets it at the soonest.
 pub(super) const STALL_MS: u32 = 40;
 
 /// Follows the count of feedings, tick by tick.

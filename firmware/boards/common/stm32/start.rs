@@ -20,8 +20,11 @@ use crate::outputs::BOARD;
 
 /// Current in amperes that the ends of an output's range stand for.
 pub(crate) const FULL_SCALE_A: f32 = 5.5;
-/// Time after which the watchdog resets the chip, microseconds.
-const WATCHDOG_US: u32 = 50_000;
+/// Time after which the watchdog resets the chip, microseconds, by an oscillator of 32 kHz.
+/// That oscillator has 29.4 to 34 kHz by the chips' data sheets, so it is 42 to 49 ms: less
+/// than the 50 ms that the documents say, and more than the 40 ms after which the tick
+/// switches off first.
+const WATCHDOG_US: u32 = 45_000;
 
 static DESCRIPTORS: ConstStaticCell<DescriptorBuffers> =
     ConstStaticCell::new(DescriptorBuffers::EMPTY);
