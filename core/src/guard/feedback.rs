@@ -22,6 +22,14 @@ const COMPARE_MS: u32 = 20;
 /// its peak by itself within 5 ms.
 pub const CURRENT_TOLERANCE_A: f32 = 0.55;
 
+/// How far a measured current may be from its command without its sign, A, averaged as
+/// above. An error that changes its sign, as that of an amplifier whose own loop
+/// oscillates, is nothing on the average with its sign. Twice the tolerance: the fastest
+/// change of force, to and fro in every tick, is 0.69 A away for an amplifier that is 1 ms
+/// late, and no more. A sine of 1.8 A is above it. Less than that warms the motor, and the
+/// thermal model sees that.
+pub const CURRENT_ROUGHNESS_A: f32 = 1.1;
+
 /// Follows the amplifiers' ready lines and current monitors, tick by tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Feedback {
@@ -40,8 +48,12 @@ pub(super) struct Feedback {
     before_a: Vec3,
     /// Whether currents were measured in the last tick with the amplifiers off, or since.
     is_measured: bool,
+    /// What was measured in this tick, A, without its sign; zero where nothing was.
+    measured_a: Vec3,
     /// Measured less commanded, averaged, A.
     error_a: Vec3,
+    /// The same without its sign.
+    roughness_a: Vec3,
 }
 
 impl Feedback {
@@ -54,7 +66,9 @@ impl Feedback {
             unready: 0,
             before_a: Vec3::ZERO,
             is_measured: false,
+            measured_a: Vec3::ZERO,
             error_a: Vec3::ZERO,
+            roughness_a: Vec3::ZERO,
         }
     }
 
@@ -64,6 +78,12 @@ impl Feedback {
         let counts = sense.amplifier_not_ready && self.on > self.enable_ticks;
         self.unready = if counts { self.unready + 1 } else { 0 };
         self.unready > self.spike_ticks
+    }
+
+    /// Currents that were measured in this tick, A, without their signs. Zero where there
+    /// are no monitors.
+    pub(super) const fn measured_a(&self) -> Vec3 {
+        self.measured_a
     }
 
     /// The amplifiers are off.
@@ -79,15 +99,20 @@ impl Feedback {
     /// `on`, are a fault of the board's wiring.
     pub(super) fn check(&mut self, sense: &Sense, commanded_a: Vec3, on: bool) -> Option<Fault> {
         let Some([a, b, c]) = sense.measured_ma else {
+            self.measured_a = Vec3::ZERO;
             return (on && self.is_measured).then_some(Fault::Hardware);
         };
         self.is_measured = true;
         let before_a = core::mem::replace(&mut self.before_a, commanded_a);
         let measured_a = Vec3::new(f32::from(a), f32::from(b), f32::from(c)) * 1e-3;
-        self.error_a += (measured_a - before_a - self.error_a) * self.share;
-        let tolerance_a = Vec3::splat(CURRENT_TOLERANCE_A);
+        self.measured_a = measured_a.abs();
+        let error_a = measured_a - before_a;
+        self.error_a += (error_a - self.error_a) * self.share;
+        self.roughness_a += (error_a.abs() - self.roughness_a) * self.share;
+        let within = |error_a: Vec3, most_a| error_a.cmple(Vec3::splat(most_a)).all();
         // Written so that what is not a number disagrees.
-        let agrees = self.error_a.abs().cmple(tolerance_a).all();
+        let agrees = within(self.error_a.abs(), CURRENT_TOLERANCE_A)
+            && within(self.roughness_a, CURRENT_ROUGHNESS_A);
         (!agrees).then_some(Fault::CurrentMismatch)
     }
 }

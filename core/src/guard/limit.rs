@@ -98,7 +98,9 @@ impl Guard {
             let excess = (load / allowed_a).max_element();
             (wanted_a / excess).clamp(-allowed_a, allowed_a)
         };
-        self.motors.heat(self.currents_a);
+        // An amplifier may give more than it was told to.
+        let flowing_a = self.currents_a.abs().max(self.feedback.measured_a());
+        self.motors.heat(flowing_a);
         Drive {
             currents_a: self.currents_a,
             enabled: true,

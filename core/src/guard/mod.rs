@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) use arming::FADE_MS;
 pub use arming::{Decision, SMALL_FORCE_N};
 pub use fault::Fault;
-pub use feedback::CURRENT_TOLERANCE_A;
+pub use feedback::{CURRENT_ROUGHNESS_A, CURRENT_TOLERANCE_A};
 pub use flags::{Blockers, Limits};
 pub use hold::HOLD_S;
 pub use jog::{FAR_RAD as JOG_FAR_RAD, FAST_RAD_S as JOG_FAST_RAD_S, JOG_MOST_MS, JOG_SHARE, Jog};

@@ -102,7 +102,8 @@ impl Guard {
     }
 
     fn watch_undriven(&mut self, sense: &Sense, around: &Surroundings<'_>) {
-        self.motors.rest();
+        // Nothing is commanded: what flows all the same is what was measured.
+        self.motors.heat(self.feedback.measured_a());
         self.feedback.rest(sense);
         self.hold.pass();
         self.speed.restart(sense.counts);

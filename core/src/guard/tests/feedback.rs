@@ -85,6 +85,65 @@ fn a_current_that_was_not_commanded_is_a_fault() {
     assert!(swapped.is_some(), "the motors' wires are swapped");
 }
 
+/// A sine of an amplitude (A) and a frequency (Hz) on top of motor 2's command, as it is
+/// sampled at the beginning of each tick.
+fn oscillating(amplitude_a: f32, hz: f32) -> impl Fn(Vec3) -> Vec3 {
+    let ticks = core::cell::Cell::new(0.0_f32);
+    move |a: Vec3| {
+        ticks.set(ticks.get() + 1.0);
+        let cycles = ticks.get() * hz / 1_000.0;
+        let swing = amplitude_a * (core::f32::consts::TAU * cycles.fract()).sin();
+        Vec3::new(a.x, a.y + swing, a.z)
+    }
+}
+
+#[test]
+fn an_amplifier_that_oscillates_is_a_fault_at_whatever_frequency() {
+    for hz in [333.0, 487.0, 970.0, 1_013.0, 2_477.0] {
+        let took = compared(oscillating(2.0, hz));
+        assert!(took.is_some_and(|ticks| ticks < 100), "{hz} Hz: {took:?}");
+    }
+}
+
+#[test]
+fn a_monitor_that_is_rough_is_no_fault() {
+    for hz in [333.0, 487.0, 970.0] {
+        assert_eq!(compared(oscillating(0.8, hz)), None, "{hz} Hz");
+    }
+}
+
+#[test]
+fn motors_are_as_warm_as_what_flows_and_not_as_what_was_commanded() {
+    // Armed, and with the amplifiers off.
+    for mut bench in [Bench::armed(), Bench::new()] {
+        let winding = |bench: &Bench| bench.guard.motors().winding_c();
+        let begun = winding(&bench);
+        let swing = oscillating(1.5, 333.0);
+        let mut commands = [Vec3::ZERO; 2];
+        bench.ticks(2);
+        for _ in 0..20_000 {
+            let measured = swing(commands[0]) * 1e3;
+            bench.sense.measured_ma = Some(measured.to_array().map(|ma| ma as i16));
+            commands = [commands[1], bench.tick().currents_a];
+            assert_eq!(bench.guard.report().fault, None);
+        }
+        let warmer = winding(&bench) - begun;
+        // 1.13 A² · 2.82 Ω · (3.1 K/W · 0.81 + 14 K/W · 0.03).
+        assert!((8.0..11.0).contains(&warmer.y), "{warmer}");
+        assert!(warmer.x < 1.0 && warmer.z < 1.0, "{warmer}");
+    }
+}
+
+#[test]
+fn monitors_that_tell_nonsense_for_hours_make_no_motor_hotter_than_can_be() {
+    let mut bench = Bench::new();
+    bench.sense.measured_ma = Some([i16::MIN; 3]);
+    bench.ticks(200_000);
+    assert_eq!(bench.guard.report().fault, Some(Fault::CurrentMismatch));
+    let kept = bench.guard.motors().temperatures();
+    assert!(kept.after_reset().is_some(), "{kept:?}");
+}
+
 #[test]
 fn a_current_that_flows_with_the_amplifiers_off_is_a_fault() {
     let mut bench = Bench::new();
