@@ -312,7 +312,7 @@ fn no_command_writes_over_its_own_input() {
 }
 
 /// What lies beside a terrain and is read with it: header, reference system, world file,
-/// mask.
+/// mask, overviews.
 #[test]
 fn no_command_writes_over_a_file_beside_its_input() {
     let folder = Folder::new();
@@ -325,6 +325,7 @@ fn no_command_writes_over_a_file_beside_its_input() {
         ("hills.tif", "hills.tfw", "1\n0\n0\n-1\n0\n0\n"),
         ("hills.tif", "hills.TFWX", "1\n0\n0\n-1\n0\n0\n"),
         ("hills.tif", "hills.tif.msk", "a mask"),
+        ("hills.tif", "hills.tif.ovr", "overviews"),
     ] {
         let [terrain, output, input] = [terrain, beside, "in.csv"].map(|name| folder.text(name));
         std::fs::write(&output, text).expect("written");

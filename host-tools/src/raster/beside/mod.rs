@@ -1,5 +1,5 @@
 //! What lies beside a file under the same name: a header (`.hdr`), a reference system
-//! (`.prj`), a world file, a mask (`.msk`). Only a file on disk has neighbours; what comes
+//! (`.prj`), a world file, a mask (`.msk`), overviews (`.ovr`). Only a file on disk has neighbours; what comes
 //! out of an archive has none.
 
 mod prj;
@@ -21,8 +21,8 @@ const LONGEST_TEXT: u64 = 1 << 20;
 
 /// Extensions of all neighbours that a format may ask for: [`find`] finds no others, so
 /// that no output comes to lie over one that [`files_read_with`] does not know.
-const NEIGHBOURS: [&str; 11] = [
-    "hdr", "prj", "msk", "wld", "tfw", "tifw", "tiffw", "tfwx", "pgw", "pngw", "pgwx",
+const NEIGHBOURS: [&str; 12] = [
+    "hdr", "prj", "msk", "ovr", "wld", "tfw", "tifw", "tiffw", "tfwx", "pgw", "pngw", "pgwx",
 ];
 
 /// A terrain file and the files beside it that are read with it.
