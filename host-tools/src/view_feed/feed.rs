@@ -1,21 +1,19 @@
 //! What is felt, in messages to a viewer.
 
-use std::collections::HashSet;
 use std::io::Write;
 use std::process::Child;
 use std::time::Duration;
 
 use hapterra_core::scene::Sample;
-use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_view_stream::{self as stream, Link, Message, Scene, TickCost};
 
-use super::held_tiles::HeldTiles;
-use super::layers;
 use super::program::{Program, ProgramError};
 use super::queue::Queue;
-use super::scene::{Picture, Prepared};
-use crate::link::{EMULATED, Event, INSTRUCTIONS_PER_COUNT, Tally};
+use super::scene::{Picture, Prepared, home_cells, tick_cost};
+use super::surroundings::Surroundings;
+use super::tiles::Tiles;
+use crate::link::{Event, Tally};
 use crate::replay::Record;
 use crate::terrain::Terrain;
 
@@ -25,13 +23,12 @@ const LIVE_BATCH: usize = 33;
 const PATIENT_BATCH: usize = 1000;
 /// Between two counts of the link, s of the device's time.
 const LINK_EVERY_S: f64 = 0.5;
-/// Bytes that may wait for the viewer of a device: some ten seconds of samples.
-const LIVE_BYTES: usize = 4 << 20;
+/// Bytes that may wait for the viewer of a device: some ten seconds of samples beside the
+/// largest layer.
+const LIVE_BYTES: usize = 8 << 20;
 /// Bytes that may wait where nothing is armed: a replay is faster than a viewer for
 /// moments, and a recording waits.
 const PATIENT_BYTES: usize = 64 << 20;
-/// Tiles that a device asks for before the first sample of a view, at most.
-const MOST_COMING: usize = 1024;
 /// How long the viewer may take at the end for what it was not told yet.
 const AT_THE_END: Duration = Duration::from_secs(5);
 
@@ -51,18 +48,13 @@ pub struct ViewFeed<'t> {
     first: Terrain<'t>,
     /// A view that the viewer is still to be told: nothing else is until then.
     scene_due: Option<Box<Scene>>,
-    /// The device took a view of which no sample has come yet; tiles that were sent since.
-    coming: Option<Vec<TileKey>>,
+    tiles: Tiles,
+    surroundings: Surroundings,
     queue: Queue,
     /// The viewer.
     child: Option<Child>,
     batch: Vec<stream::Sample>,
     at_a_time: usize,
-    held: HeldTiles,
-    /// Tiles that are shown for good.
-    detailed: HashSet<TileKey>,
-    /// Tiles that the viewer is still to be told, by slot.
-    untold: Vec<(u32, TileKey)>,
     link_due_s: f64,
     latest: Option<stream::Sample>,
     late: u32,
@@ -105,20 +97,19 @@ impl<'t> ViewFeed<'t> {
         let tick = device.map(tick_cost);
         prepared.scene.tick.clone_from(&tick);
         let window = device.map_or(1, |device| device.window);
+        let surroundings = Surroundings::new(&terrain, home_cells(&prepared.scene));
         let first = prepared.into_messages();
         Self {
             first: terrain.clone(),
             terrain,
             scene_due: None,
-            coming: None,
+            tiles: Tiles::new(window),
+            surroundings,
             tick,
             queue: Queue::start(pipe, first, limit),
             child: None,
             batch: Vec::with_capacity(at_a_time),
             at_a_time,
-            held: HeldTiles::new(window),
-            detailed: HashSet::new(),
-            untold: vec![],
             link_due_s: 0.0,
             latest: None,
             late: 0,
@@ -130,7 +121,7 @@ impl<'t> ViewFeed<'t> {
     /// Takes a sample and its row.
     pub fn take(&mut self, sample: &Sample, record: &Record) {
         self.late = sample.late;
-        self.held.lacks(sample.missing_tile);
+        self.tiles.lacks(sample.missing_tile);
         // The first tick knows of none before it.
         let cost = (self.has_cost && sample.tick > 1).then_some(sample.cost);
         self.row(record, cost);
@@ -157,14 +148,7 @@ impl<'t> ViewFeed<'t> {
 
     /// Takes what a session tells of the device's window.
     pub fn on_event(&mut self, event: &Event<'_>) {
-        match (event, &mut self.coming) {
-            (Event::Viewed { taken: true, .. }, _) => self.coming = Some(vec![]),
-            // More than a window holds are not sent within some samples.
-            (Event::TileSent(key), Some(coming)) if coming.len() < MOST_COMING => coming.push(*key),
-            (Event::TileSent(key), None) => self.tile_sent(*key),
-            (Event::Opened { resumed: false, .. }, _) => self.forget_tiles(),
-            _ => {}
-        }
+        self.tiles.on_event(event);
     }
 
     /// Goes over to another view of the terrain, in which the next sample was felt.
@@ -174,25 +158,16 @@ impl<'t> ViewFeed<'t> {
         // A view that the viewer never heard of leaves what is before it.
         let before = self.scene_due.as_ref();
         let all_keep = keeps_tiles && before.is_none_or(|before| before.keeps_tiles);
-        if !keeps_tiles {
-            self.forget_tiles();
-        }
+        self.tiles.go_over(keeps_tiles);
         self.terrain = picture.terrain.clone();
-        self.scene_due = Some(Box::new(Scene {
+        let scene = Scene {
             keeps_tiles: all_keep,
             tick: self.tick.clone(),
             ..picture.scene()
-        }));
-        for key in self.coming.take().unwrap_or_default() {
-            self.tile_sent(key);
-        }
+        };
+        self.surroundings.follow(&self.terrain, home_cells(&scene));
+        self.scene_due = Some(Box::new(scene));
         self.tell_scene();
-    }
-
-    /// The device begins with an empty window.
-    fn forget_tiles(&mut self) {
-        self.held.clear();
-        self.untold.clear();
     }
 
     /// Whether the viewer knows the view in force.
@@ -207,27 +182,14 @@ impl<'t> ViewFeed<'t> {
         is_told
     }
 
-    fn tile_sent(&mut self, key: TileKey) {
-        let slot = self.held.sent(key);
-        self.untold.retain(|(other, _)| *other != slot);
-        self.untold.push((slot, key));
-    }
-
     /// Shows the tile under a row's HIP in full detail, for good: for rows that are not
-    /// felt by a device with a window. Beyond so many tiles, others stay coarse.
+    /// felt by a device with a window.
     pub fn detail(&mut self, record: &Record) {
-        const MOST: usize = 400;
         let [x, y, _] = record.hip_mm;
         let cell_mm = self.terrain.scale_of_level_0().cell_mm();
-        let felt_cells = f64::from(self.first.level()).exp2();
-        let side = f64::from(stream::TILE_CELLS) * felt_cells;
-        let [col, row] = [x, y].map(|mm| (mm / cell_mm / side).floor() as i32);
-        let key = TileKey::new(self.first.level(), col, row);
-        if self.detailed.len() < MOST && self.first.has(key) && self.detailed.insert(key) {
-            self.untold.push((self.detailed.len() as u32, key));
-        }
-        let first = self.first.clone();
-        self.tell_tiles(&first);
+        self.tiles
+            .detail(&self.first, [x, y].map(|mm| mm / cell_mm));
+        self.tiles.tell(&self.first, &self.queue);
     }
 
     /// Tells what there is to tell of tiles and link; to be called after each look at the
@@ -236,13 +198,9 @@ impl<'t> ViewFeed<'t> {
         if !self.tell_scene() {
             return;
         }
-        let terrain = self.terrain.clone();
-        self.tell_tiles(&terrain);
-        if let Some(tiles) = self.held.take_change()
-            && !self.queue.offer(Message::Tiles(tiles))
-        {
-            self.held.not_told();
-        }
+        self.tiles.tell(&self.terrain, &self.queue);
+        self.tiles.tell_window(&self.queue);
+        self.surroundings.tell(&self.terrain, &self.queue);
         let due_s = self.link_due_s;
         if let Some(latest) = self.latest.filter(|latest| latest.t_s >= due_s) {
             self.link_due_s = latest.t_s + LINK_EVERY_S;
@@ -274,24 +232,6 @@ impl<'t> ViewFeed<'t> {
         (self.dropped, self.child)
     }
 
-    /// Heights are read again only for tiles that are told: some each look, so that a
-    /// look stays short.
-    fn tell_tiles(&mut self, terrain: &Terrain<'t>) {
-        const AT_A_TIME: usize = 8;
-        let mut told = 0;
-        for (slot, key) in std::mem::take(&mut self.untold) {
-            // What there is no room for is tried again at the next look.
-            let is_told = told < AT_A_TIME
-                && self
-                    .queue
-                    .offer(Message::Tile(layers::tile(terrain, key.index, slot)));
-            match is_told {
-                true => told += 1,
-                false => self.untold.push((slot, key)),
-            }
-        }
-    }
-
     fn flush(&mut self) {
         if self.batch.is_empty() {
             return;
@@ -315,20 +255,6 @@ impl<'t> ViewFeed<'t> {
         let is_taken = self.queue.offer(message);
         self.dropped.messages += u64::from(!is_taken);
         is_taken
-    }
-}
-
-/// How a device tells the cost of its ticks.
-fn tick_cost(device: &DeviceHello) -> TickCost {
-    let hz = f64::from(device.clock_hz.max(1));
-    let (per_count, unit) = match device.board.as_str() {
-        EMULATED => (INSTRUCTIONS_PER_COUNT, "instructions"),
-        _ => (1e6 / hz, "µs"),
-    };
-    TickCost {
-        unit: unit.into(),
-        per_count,
-        bound: per_count * hz / f64::from(device.tick_hz.max(1)),
     }
 }
 

@@ -18,25 +18,30 @@ const MESH: i32 = 4;
 /// Which samples of a terrain a layer has, in cells of level 0: a view of any level may be
 /// felt later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Extent {
+pub(super) struct Extent {
     step: i32,
     /// West, south, east, north.
     cells: [i32; 4],
 }
 
-/// The whole terrain, and where it is large its surroundings of `home` (cells) in finer
-/// layers; coarsest first.
-pub(super) fn of(terrain: &Terrain<'_>, home: [f64; 2]) -> Vec<Layer> {
+impl Extent {
+    /// Whether a place (cells) lies in its middle half, along both sides.
+    pub(super) fn is_around(&self, place: [f64; 2]) -> bool {
+        let [west, south, east, north] = self.cells.map(f64::from);
+        let is_between = |at: f64, low: f64, high: f64| {
+            let margin = 0.25 * (high - low);
+            (low + margin..=high - margin).contains(&at)
+        };
+        is_between(place[0], west, east) && is_between(place[1], south, north)
+    }
+}
+
+/// The layers of a terrain around `home` (cells), coarsest first: the whole, and where it is
+/// large its surroundings of `home` in finer ones.
+pub(super) fn around(terrain: &Terrain<'_>, home: [f64; 2]) -> Vec<Extent> {
     let grid = terrain.grid();
     let cells = |samples: u32| i32::try_from(samples.saturating_sub(1)).unwrap_or(i32::MAX);
-    let extents = extents([cells(grid.columns()), cells(grid.rows())], home);
-    let finer = extents.iter().skip(1).map(|extent| Some(extent.cells));
-    let finer = finer.chain([None]);
-    extents
-        .iter()
-        .zip(finer)
-        .map(|(extent, inner)| layer(terrain, extent, inner))
-        .collect()
+    extents([cells(grid.columns()), cells(grid.rows())], home)
 }
 
 fn extents([columns, rows]: [i32; 2], home: [f64; 2]) -> Vec<Extent> {
@@ -77,26 +82,62 @@ fn extents([columns, rows]: [i32; 2], home: [f64; 2]) -> Vec<Extent> {
     extents
 }
 
-fn layer(terrain: &Terrain<'_>, extent: &Extent, inner: Option<[i32; 4]>) -> Layer {
-    let [west, south, east, north] = extent.cells;
-    let count = |from: i32, to: i32| ((to - from) / extent.step) as u32 + 1;
-    let (columns, rows) = (count(west, east), count(south, north));
-    let level = extent.step.ilog2() as u8;
-    let mut line = vec![f64::NAN; columns as usize];
-    let mut heights = Vec::with_capacity(columns as usize * rows as usize);
-    let first = [west, south].map(|cell| (cell / extent.step) as u32);
-    for row in first[1]..first[1] + rows {
-        terrain.grid().copy_row(level, row, first[0], &mut line);
-        heights.extend(line.iter().map(|height| *height as f32));
+/// A layer that is being read.
+#[derive(Debug)]
+pub(super) struct Reading {
+    layer: Layer,
+    /// Rows that there will be.
+    rows: u32,
+}
+
+impl Reading {
+    /// Nothing is read yet.
+    pub(super) fn new(number: usize, extent: &Extent) -> Self {
+        let [west, south, east, north] = extent.cells;
+        let count = |from: i32, to: i32| ((to - from) / extent.step) as u32 + 1;
+        let (columns, rows) = (count(west, east), count(south, north));
+        let layer = Layer {
+            number: number as u32,
+            first: [west, south],
+            step: extent.step,
+            columns,
+            rows: 0,
+            heights: Vec::with_capacity(columns as usize * rows as usize),
+        };
+        Self { layer, rows }
     }
-    Layer {
-        first: [west, south],
-        step: extent.step,
-        columns,
-        rows,
-        inner,
-        heights,
+
+    /// Reads at most so many rows more; whether there are others.
+    pub(super) fn read(&mut self, terrain: &Terrain<'_>, rows: u32) -> bool {
+        let layer = &mut self.layer;
+        let level = layer.step.ilog2() as u8;
+        let [west, south] = layer.first.map(|cell| (cell / layer.step) as u32);
+        let mut line = vec![f64::NAN; layer.columns as usize];
+        for _ in 0..rows.min(self.rows - layer.rows) {
+            let grid = terrain.grid();
+            grid.copy_row(level, south + layer.rows, west, &mut line);
+            let heights = line.iter().map(|height| *height as f32);
+            layer.heights.extend(heights);
+            layer.rows += 1;
+        }
+        layer.rows < self.rows
     }
+
+    /// What was read.
+    pub(super) fn into_layer(self) -> Layer {
+        self.layer
+    }
+}
+
+/// All layers around `home` (cells).
+pub(super) fn of(terrain: &Terrain<'_>, home: [f64; 2]) -> Vec<Layer> {
+    let extents = around(terrain, home);
+    let whole = |(number, extent)| {
+        let mut reading = Reading::new(number, extent);
+        reading.read(terrain, u32::MAX);
+        reading.into_layer()
+    };
+    extents.iter().enumerate().map(whole).collect()
 }
 
 /// A tile with the samples around it.
@@ -185,7 +226,7 @@ mod tests {
             }
         }
         let layers = of(&terrain, [3.0, 3.0]);
-        assert_eq!(layers.len(), 1);
+        assert_eq!((layers.len(), layers[0].number), (1, 0));
         assert_eq!(
             (layers[0].columns, layers[0].rows, layers[0].step),
             (70, 70, 1)

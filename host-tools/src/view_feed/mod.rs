@@ -16,6 +16,8 @@ mod pipe;
 mod program;
 mod queue;
 mod scene;
+mod surroundings;
+mod tiles;
 
 pub use feed::{Dropped, ViewFeed};
 pub use program::{Program, ProgramError, VARIABLE};

@@ -53,15 +53,23 @@ impl Queue {
 
     /// Whether a message was taken. If not there was no room for it.
     pub(super) fn offer(&self, message: Message) -> bool {
+        self.offer_or_return(message).is_ok()
+    }
+
+    /// The same for what took long to make: gives it back where there was no room for it.
+    pub(super) fn offer_or_return(&self, message: Message) -> Result<(), Message> {
         let size = size_of(&message);
         let waiting = self.waiting.load(Ordering::Acquire);
         let has_room = waiting == 0 || waiting.saturating_add(size) <= self.limit;
         if self.is_gone.load(Ordering::Acquire) || !has_room {
-            return false;
+            return Err(message);
         }
+        let Some(messages) = &self.messages else {
+            return Err(message);
+        };
         self.waiting.fetch_add(size, Ordering::AcqRel);
-        let sender = self.messages.as_ref();
-        sender.is_some_and(|messages| messages.send((message, size)).is_ok())
+        let sent = messages.send((message, size));
+        sent.map_err(|unsent| unsent.0.0)
     }
 
     /// Waits for at most `wait` until there is room. For a recording, which nobody else
@@ -191,16 +199,13 @@ mod tests {
         let (pipe, out) = sync_channel(0);
         drop(out);
         let queue = Queue::start(Pipe(pipe), vec![hello()], 10_000);
-        assert!(
-            !queue.wait_for_room(SOON)
-                || !{
-                    while queue.offer(tiles(0)) {
-                        std::thread::sleep(LOOK);
-                    }
-                    false
-                }
-        );
-        assert!(!queue.offer(tiles(1)));
+        // Its thread has yet to see that.
+        let until = Instant::now() + SOON;
+        while queue.offer(tiles(0)) && Instant::now() < until {
+            std::thread::sleep(LOOK);
+        }
+        assert_eq!(queue.offer_or_return(tiles(1)), Err(tiles(1)));
+        assert!(!queue.wait_for_room(SOON) && Instant::now() < until);
         queue.end(SOON);
     }
 }

@@ -1,8 +1,10 @@
 //! The scene of a terrain, as a viewer is told it.
 
-use hapterra_view_stream::{Coordinates, Hello, Layer, Message, Scene, VERSION};
+use hapterra_core::wire::hello::DeviceHello;
+use hapterra_view_stream::{Coordinates, Hello, Layer, Message, Scene, TickCost, VERSION};
 
 use super::layers;
+use crate::link::{EMULATED, INSTRUCTIONS_PER_COUNT};
 use crate::raster::System;
 use crate::terrain::Terrain;
 
@@ -50,8 +52,7 @@ impl<'t> Picture<'_, 't> {
     pub fn prepare(self) -> Prepared<'t> {
         let terrain = self.terrain.clone();
         let scene = self.scene();
-        let [x, y, _] = scene.home_mm;
-        let layers = layers::of(&terrain, [x, y].map(|mm| mm / scene.cell_mm));
+        let layers = layers::of(&terrain, home_cells(&scene));
         Prepared {
             terrain,
             scene: Box::new(scene),
@@ -90,6 +91,26 @@ impl<'t> Picture<'_, 't> {
             tick: None,
         }
     }
+}
+
+/// How a device tells the cost of its ticks.
+pub(super) fn tick_cost(device: &DeviceHello) -> TickCost {
+    let hz = f64::from(device.clock_hz.max(1));
+    let (per_count, unit) = match device.board.as_str() {
+        EMULATED => (INSTRUCTIONS_PER_COUNT, "instructions"),
+        _ => (1e6 / hz, "µs"),
+    };
+    TickCost {
+        unit: unit.into(),
+        per_count,
+        bound: per_count * hz / f64::from(device.tick_hz.max(1)),
+    }
+}
+
+/// The home position in cells of level 0.
+pub(super) fn home_cells(scene: &Scene) -> [f64; 2] {
+    let [x, y, _] = scene.home_mm;
+    [x, y].map(|mm| mm / scene.cell_mm)
 }
 
 /// The file's coordinates along millimetres, where the file knows any.

@@ -39,7 +39,6 @@ struct Cut {
 
 /// A layer in the picture.
 struct Shown {
-    inner: Option<[i32; 4]>,
     blocks: Vec<Block>,
 }
 
@@ -52,15 +51,43 @@ struct Block {
     extent: [i32; 4],
 }
 
-/// What an entity's triangles are known by.
+/// What an entity's samples and its triangles are known by.
+const MESH: &str = "mesh";
 const TRIANGLES: &str = "triangles";
 
 impl Layers {
-    /// Shows another layer.
-    pub(super) fn add(&mut self, log: &Log, ground: &Ground, layer: Layer) -> Result<Vec<Entry>> {
-        let entries = self.draw(log, ground, &layer)?;
+    /// Shows a layer. Where it takes the place of another, the finer ones go as well, and the
+    /// layer below is whole for a moment: there is never nothing.
+    pub(super) fn put(&mut self, log: &Log, ground: &Ground, layer: Layer) -> Result<Vec<Entry>> {
+        let number = layer.number as usize;
+        if number > self.told.len() {
+            // Of a terrain of which nothing coarser was told.
+            return Ok(Vec::new());
+        }
+        let gone = self.layers.split_off(number);
+        self.told.truncate(number);
+        let mut entries = Vec::new();
+        if !gone.is_empty() {
+            entries.extend(self.triangles(log, number.checked_sub(1))?);
+        }
+        for block in gone.iter().flat_map(|layer| &layer.blocks) {
+            entries.push(block.nothing(log)?);
+        }
+        entries.extend(self.draw(log, ground, &layer)?);
         self.told.push(layer);
+        for block in gone.iter().flat_map(|layer| &layer.blocks) {
+            if !self.has(&block.entity) {
+                entries.push(block.forgotten(log)?);
+            }
+        }
+        entries.extend(self.triangles(log, number.checked_sub(1))?);
         Ok(entries)
+    }
+
+    /// Whether an entity is part of a layer that is shown.
+    fn has(&self, entity: &str) -> bool {
+        let mut blocks = self.layers.iter().flat_map(|layer| &layer.blocks);
+        blocks.any(|block| block.entity == entity)
     }
 
     /// Shows all layers anew, as high as they are in another view.
@@ -72,9 +99,13 @@ impl Layers {
             entries.extend(self.draw(log, ground, layer)?);
         }
         self.told = told;
+        for number in 0..self.layers.len() {
+            entries.extend(self.triangles(log, Some(number))?);
+        }
         Ok(entries)
     }
 
+    /// Draws a layer after those that are shown.
     fn draw(&mut self, log: &Log, ground: &Ground, layer: &Layer) -> Result<Vec<Entry>> {
         let up = ground.heights_of(&layer.heights);
         let heights = Heights {
@@ -86,10 +117,7 @@ impl Layers {
         let shade = *self.shade.get_or_insert_with(|| Shade::of(&heights));
         let every = mesh_step(heights.columns.max(heights.rows));
         let (columns, rows) = (lines(heights.columns, every), lines(heights.rows, every));
-        let mut shown = Shown {
-            inner: layer.inner,
-            blocks: Vec::new(),
-        };
+        let mut shown = Shown { blocks: Vec::new() };
         let mut entries = Vec::new();
         for south in (0..rows.len().saturating_sub(1)).step_by(BLOCK_CELLS) {
             for west in (0..columns.len().saturating_sub(1)).step_by(BLOCK_CELLS) {
@@ -101,15 +129,35 @@ impl Layers {
                 };
                 let number = shown.blocks.len();
                 let entity = format!("terrain/layer{}/{number}", self.layers.len());
-                entries.push(log.standing(&entity, "mesh", &part.mesh(ground, &shade))?);
+                entries.push(log.standing(&entity, MESH, &part.mesh(ground, &shade))?);
                 shown.blocks.push(part.block(entity));
             }
         }
         for block in &shown.blocks {
-            entries.push(block.triangles(log, shown.inner, &self.cut)?);
+            entries.push(block.triangles(log, None, &self.cut)?);
         }
         self.layers.push(shown);
         Ok(entries)
+    }
+
+    /// What is shown of a layer: not what the next finer one shows, nor what tiles show.
+    fn triangles(&self, log: &Log, number: Option<usize>) -> Result<Vec<Entry>> {
+        let Some(layer) = number.and_then(|number| self.layers.get(number)) else {
+            return Ok(Vec::new());
+        };
+        let inner = number.and_then(|number| self.inner(number));
+        let blocks = layer.blocks.iter();
+        blocks
+            .map(|block| block.triangles(log, inner, &self.cut))
+            .collect()
+    }
+
+    /// What a finer layer shows of a layer, in cells of level 0: west, south, east, north.
+    fn inner(&self, number: usize) -> Option<[i32; 4]> {
+        let finer = self.told.get(number + 1)?;
+        let last = |count: u32| count.saturating_sub(1) as usize;
+        let [east, north] = cell_of(finer, last(finer.columns), last(finer.rows));
+        Some([finer.first[0], finer.first[1], east, north])
     }
 
     /// Cells of level 0 along the side of a cell of the finest mesh; none before the first
@@ -141,10 +189,11 @@ impl Layers {
         let before = std::mem::replace(&mut self.cut, cut);
         let changed = before.changes_to(&self.cut);
         let mut entries = Vec::new();
-        for layer in &self.layers {
+        for (number, layer) in self.layers.iter().enumerate() {
+            let inner = self.inner(number);
             let touched = |block: &&Block| changed.iter().any(|tile| block.has(*tile));
             for block in layer.blocks.iter().filter(touched) {
-                entries.push(block.triangles(log, layer.inner, &self.cut)?);
+                entries.push(block.triangles(log, inner, &self.cut)?);
             }
         }
         Ok(entries)
@@ -290,13 +339,29 @@ impl Block {
         let triangles: Vec<[u32; 3]> = shown
             .flat_map(|(_, [a, b, c, d])| [[*a, *b, *c], [*a, *c, *d]])
             .collect();
-        // A mesh without triangles is taken for one whose vertices are triangles.
-        let triangles = match triangles.is_empty() {
-            true => vec![[0, 0, 0]],
-            false => triangles,
-        };
-        let mesh = Mesh3D::update_fields().with_triangle_indices(triangles);
+        match triangles.is_empty() {
+            true => self.nothing(log),
+            false => {
+                let mesh = Mesh3D::update_fields().with_triangle_indices(triangles);
+                log.standing(&self.entity, TRIANGLES, &mesh)
+            }
+        }
+    }
+
+    /// No triangles. A mesh that has none at all is taken for one whose vertices are
+    /// triangles.
+    fn nothing(&self, log: &Log) -> Result<Entry> {
+        let mesh = Mesh3D::update_fields().with_triangle_indices([[0, 0, 0]]);
         log.standing(&self.entity, TRIANGLES, &mesh)
+    }
+
+    /// No samples, where there are no triangles any more.
+    fn forgotten(&self, log: &Log) -> Result<Entry> {
+        let mesh = Mesh3D::update_fields()
+            .with_vertex_positions([[0.0; 3]])
+            .with_vertex_texcoords([[0.0; 2]])
+            .with_albedo_texture_image(Image::from_rgb24(vec![0; 3], [1, 1]));
+        log.standing(&self.entity, MESH, &mesh)
     }
 }
 
@@ -372,5 +437,64 @@ mod tests {
             extent: [0, 0, 40, 40],
         };
         assert!(block.has(changed[0]) && !block.has(changed[1]));
+    }
+
+    /// A layer with samples at every so many cells, from a cell on.
+    fn layer(number: u32, first: i32, step: i32, posts: u32) -> Layer {
+        Layer {
+            number,
+            first: [first; 2],
+            step,
+            columns: posts,
+            rows: posts,
+            heights: (0..posts * posts).map(|i| (i % 97) as f32).collect(),
+        }
+    }
+
+    /// What each key stands for after these entries, as triangles that are shown.
+    fn taken(layers: &Layers) -> Vec<usize> {
+        let shown = |(number, layer): (usize, &Shown)| {
+            let inner = layers.inner(number);
+            let cells = layer.blocks.iter().flat_map(|block| &block.cells);
+            let is_shown = |cell: [i32; 4]| !inner.is_some_and(|inner| contains(inner, cell));
+            cells.filter(|(cell, _)| is_shown(*cell)).count()
+        };
+        layers.layers.iter().enumerate().map(shown).collect()
+    }
+
+    #[test]
+    fn a_finer_layer_that_moves_leaves_no_hole_and_nothing_behind() {
+        let (log, mut layers) = (Log::new(), Layers::default());
+        let ground = Ground::new(&super::super::ground::tests::scene());
+        let put = |layers: &mut Layers, layer| {
+            let entries = layers.put(&log, &ground, layer).expect("it is drawn");
+            let keys = entries.into_iter().filter_map(|entry| entry.key);
+            keys.collect::<Vec<_>>()
+        };
+        put(&mut layers, layer(0, 0, 16, 65));
+        assert_eq!(taken(&layers), [64 * 64]);
+        // 512 cells in the place of 32 × 32 coarse ones, in several blocks.
+        put(&mut layers, layer(1, 0, 8, 65));
+        assert_eq!(taken(&layers), [64 * 64 - 32 * 32, 64 * 64]);
+        let blocks = layers.layers[1].blocks.len();
+        assert_eq!(blocks, 4);
+        // Smaller, and elsewhere: what was cut there is cut no more.
+        let keys = put(&mut layers, layer(1, 512, 8, 33));
+        assert_eq!(taken(&layers), [64 * 64 - 16 * 16, 32 * 32]);
+        let [whole, cut] = ["terrain/layer0/0 triangles"; 2];
+        let at = |key: &str| keys.iter().position(|other| other == key);
+        let last = |key: &str| keys.iter().rposition(|other| other == key);
+        let (whole, cut) = (at(whole).expect("whole"), last(cut).expect("cut"));
+        for block in 0..blocks {
+            let mesh = at(&format!("terrain/layer1/{block} mesh")).expect("drawn");
+            let without = at(&format!("terrain/layer1/{block} triangles"));
+            let without = without.expect("taken out");
+            assert!(whole < without && without < mesh && mesh < cut, "{keys:?}");
+        }
+        // Of a number that is not the next one nothing is known.
+        assert!(put(&mut layers, layer(3, 0, 2, 33)).is_empty());
+        // The coarsest anew: the finer ones are of another terrain.
+        put(&mut layers, layer(0, 0, 16, 65));
+        assert_eq!(taken(&layers), [64 * 64]);
     }
 }

@@ -160,7 +160,11 @@ impl Drawing {
         match message {
             Message::Layer(layer) => {
                 let mut entries = self.map.layer(log, &self.scene, terrain, &layer)?;
-                entries.extend(self.layers.add(log, terrain, layer)?);
+                let before = self.layers.mesh_cell();
+                entries.extend(self.layers.put(log, terrain, layer)?);
+                if self.layers.mesh_cell() != before {
+                    entries.extend(self.tiles.close(log, terrain, &self.layers)?);
+                }
                 Ok(entries)
             }
             Message::Tile(tile) => {
@@ -217,11 +221,11 @@ pub(crate) mod tests {
 
     fn layer() -> Message {
         Message::Layer(Layer {
+            number: 0,
             first: [0, 0],
             step: 2,
             columns: 81,
             rows: 81,
-            inner: None,
             heights: (0..81 * 81).map(|i| ((i * 31) % 97) as f32).collect(),
         })
     }

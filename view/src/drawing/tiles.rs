@@ -95,6 +95,12 @@ impl Tiles {
         Ok(entries)
     }
 
+    /// The sides of all tiles, where the mesh around them has become another one.
+    pub(super) fn close(&self, log: &Log, ground: &Ground, layers: &Layers) -> Result<Vec<Entry>> {
+        let all: Vec<_> = self.tiles.keys().copied().collect();
+        self.skirts(log, ground, layers, &all)
+    }
+
     /// The sides of changed tiles and of those beside them: only where no tile is beside.
     fn skirts(
         &self,

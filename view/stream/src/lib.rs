@@ -4,7 +4,7 @@
 //! body: one [`Message`] in postcard. A body has at most [`MAX_BODY`] bytes. The first
 //! message is [`Message::Hello`] with [`VERSION`]; then comes a [`Scene`] with its
 //! [`Layer`]s, coarsest first, then whatever happens, in the order of time. A later scene
-//! is another view of the same terrain. The stream ends
+//! is another view of the same terrain, and finer layers may follow it. The stream ends
 //! with [`Message::End`], or wherever its writer was killed.
 //!
 //! Any change to a type here is a new [`VERSION`]. The two programs are built from one
@@ -25,4 +25,4 @@ pub use message::{
 };
 
 /// Version of the stream. The first message holds it.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;

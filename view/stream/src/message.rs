@@ -98,8 +98,13 @@ pub struct TickCost {
 }
 
 /// Samples of the terrain at every `step`-th cell of level 0. They belong to all views.
+///
+/// A finer layer is shown in the place of the coarser one below it. One that comes with the
+/// number of another takes its place, and those with higher numbers go: they are told anew.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Layer {
+    /// Counted from the coarsest, which is 0 and shows the whole.
+    pub number: u32,
     /// Where its south-west sample is, in cells of level 0.
     pub first: [i32; 2],
     /// Cells between samples.
@@ -108,8 +113,6 @@ pub struct Layer {
     pub columns: u32,
     /// Samples south to north.
     pub rows: u32,
-    /// What a finer layer shows of it, in cells: west, south, east, north.
-    pub inner: Option<[i32; 4]>,
     /// Heights in vertical units of the file, row by row from the south; NaN in a hole.
     pub heights: Vec<f32>,
 }
