@@ -2,20 +2,27 @@
 
 mod common;
 
+use std::path::Path;
+use std::process::{Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use hapterra_view_stream::Message;
+
 use common::browser::{Browser, Colours, Page, program};
-use common::scene::{batch, greeting, layer, scene};
-use common::{Viewer, folder};
+use common::recorded::{Csv, check, entities};
+use common::scene::{batch, greeting, layer, resting, scene, tiles_around, zoomed_scene};
+use common::{Viewer, folder, hapterra, lines_of, port_said};
 
 /// Until the page shows what is asked of it; software draws it, on a busy machine.
 const SHOWN_WITHIN: Duration = Duration::from_secs(300);
 /// The terrain's part of the page, and the plots'.
 const TERRAIN: [f64; 4] = [0.0, 0.05, 0.56, 0.88];
 const PLOTS: [f64; 4] = [0.6, 0.4, 0.4, 0.5];
-/// The colours of the proxy and of the lines around held tiles.
-const MARKS: [[u8; 3]; 2] = [[255, 120, 20], [64, 224, 208]];
+/// The colours of the proxy and of the lines around held tiles, and of the force's arrow,
+/// which is there while the hand touches.
+const MARKS: [[u8; 3]; 3] = [[255, 120, 20], [64, 224, 208], FORCE];
+const FORCE: [u8; 3] = [255, 230, 60];
 
 /// Software draws the pages: one test at a time.
 static ONE: Mutex<()> = Mutex::new(());
@@ -57,12 +64,12 @@ impl Session {
 fn shown(
     browser: &mut Browser,
     page: &Page,
-    session: &mut Session,
+    go_on: &mut dyn FnMut(),
     is_right: impl Fn(&Colours, &Colours) -> bool,
 ) -> (Colours, Colours) {
     let until = Instant::now() + SHOWN_WITHIN;
     loop {
-        session.go_on(200);
+        go_on();
         std::thread::sleep(Duration::from_millis(200));
         let picture = browser.picture(page);
         let terrain = browser.colours(page, &picture, TERRAIN, &MARKS);
@@ -78,48 +85,59 @@ fn shown(
     }
 }
 
-#[test]
-fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
-    let Some(program) = program() else {
+/// Hundreds of tints of relief, the proxy and outlines of tiles; and curves.
+fn is_whole(terrain: &Colours, plots: &Colours) -> bool {
+    let marks = terrain.near.iter().take(2);
+    terrain.count > 400 && { marks }.all(|marks| *marks > 10) && plots.count > 20
+}
+
+/// The browser; none, and a line that says so, where there is none.
+fn browser_in(folder: &Path) -> Option<Browser> {
+    let program = program();
+    if program.is_none() {
         println!("SKIPPED: no Chromium here; HAPTERRA_BROWSER can name one");
-        return;
-    };
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
-    let folder = folder("browser");
-    let (mut session, port) = Session::start(&["--linger", "0"]);
-    let mut browser = Browser::start(&program, &folder);
-    let address = format!("http://127.0.0.1:{port}/");
-    let page = browser.open(&address);
-    // Hundreds of tints of relief, the proxy and outlines of tiles.
-    let is_whole = |terrain: &Colours, plots: &Colours| {
-        terrain.count > 400 && terrain.near.iter().all(|marks| *marks > 10) && plots.count > 20
-    };
-    let (terrain, plots) = shown(&mut browser, &page, &mut session, is_whole);
-    // They change while the hand moves.
-    let moved = |now: &Colours, then: &Colours| now.hash != then.hash;
-    shown(&mut browser, &page, &mut session, |now, plotted| {
-        is_whole(now, plotted) && moved(now, &terrain) && moved(plotted, &plots)
-    });
-    // A second page, and the first one anew.
-    let second = browser.open(&address);
-    shown(&mut browser, &second, &mut session, is_whole);
-    browser.close(&second);
-    browser.reload(&page);
-    shown(&mut browser, &page, &mut session, is_whole);
-    let foreign: Vec<_> = browser
-        .requests
-        .iter()
-        .filter(|asked| !asked.starts_with(&address))
+    }
+    program.map(|program| Browser::start(&program, folder))
+}
+
+/// What pages asked of other machines than the one at an address.
+fn foreign<'b>(browser: &'b Browser, address: &str) -> Vec<&'b String> {
+    let requests = browser.requests.iter();
+    requests
+        .filter(|asked| !asked.starts_with(address))
         .filter(|asked| {
             !["data:", "blob:", "about:"]
                 .iter()
                 .any(|own| asked.starts_with(own))
         })
-        .collect();
-    assert!(
-        foreign.is_empty(),
-        "requests to other machines: {foreign:?}"
-    );
+        .collect()
+}
+
+#[test]
+fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = folder("browser");
+    let Some(mut browser) = browser_in(&folder) else {
+        return;
+    };
+    let (mut session, port) = Session::start(&["--linger", "0"]);
+    let address = format!("http://127.0.0.1:{port}/");
+    let page = browser.open(&address);
+    let mut go_on = || session.go_on(200);
+    let (terrain, plots) = shown(&mut browser, &page, &mut go_on, is_whole);
+    // They change while the hand moves.
+    let moved = |now: &Colours, then: &Colours| now.hash != then.hash;
+    shown(&mut browser, &page, &mut go_on, |now, plotted| {
+        is_whole(now, plotted) && moved(now, &terrain) && moved(plotted, &plots)
+    });
+    // A second page, and the first one anew.
+    let second = browser.open(&address);
+    shown(&mut browser, &second, &mut go_on, is_whole);
+    browser.close(&second);
+    browser.reload(&page);
+    shown(&mut browser, &page, &mut go_on, is_whole);
+    let foreign = foreign(&browser, &address);
+    assert!(foreign.is_empty(), "requests elsewhere: {foreign:?}");
     assert!(
         browser
             .requests
@@ -135,14 +153,12 @@ fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
 
 #[test]
 fn a_page_that_has_grown_too_large_begins_anew_and_goes_on() {
-    let Some(program) = program() else {
-        println!("SKIPPED: no Chromium here; HAPTERRA_BROWSER can name one");
-        return;
-    };
     let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = folder("grown");
+    let Some(mut browser) = browser_in(&folder) else {
+        return;
+    };
     let (mut session, port) = Session::start(&["--linger", "0", "--page-mb", "64"]);
-    let mut browser = Browser::start(&program, &folder);
     let page = browser.open(&format!("http://127.0.0.1:{port}/"));
     let mut until = |wanted: &dyn Fn(f64, f64) -> bool| {
         let until = Instant::now() + SHOWN_WITHIN;
@@ -164,5 +180,132 @@ fn a_page_that_has_grown_too_large_begins_anew_and_goes_on() {
     until(&|began, bytes| began != first && bytes > 0.0);
     drop(browser);
     assert!(session.viewer.end());
+    std::fs::remove_dir_all(folder).expect("it goes");
+}
+
+#[test]
+fn the_page_shows_what_the_emulated_board_feels_while_it_is_touched() {
+    let image = std::env::var_os("HAPTERRA_MPS2_ELF").filter(|image| !image.is_empty());
+    let (Some(mut demo), Some(image)) = (hapterra(), image) else {
+        println!("SKIPPED: no hapterra and no emulated board; cargo xtask view --test names both");
+        return;
+    };
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = folder("emulated");
+    let Some(mut browser) = browser_in(&folder) else {
+        return;
+    };
+    let live = folder.join("live.rrd");
+    let options = format!("--no-browser --port 0 --linger 0 --rrd {}", live.display());
+    // For as long as it takes a page to be seen on a busy machine: it is ended then.
+    demo.args(["demo", "--device", "emulated", "--rounds", "90", "--view"])
+        .arg("--image")
+        .arg(image)
+        .arg("--out")
+        .arg(&folder)
+        .env("HAPTERRA_VIEW_OPTIONS", options)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    let mut demo = demo.spawn().expect("it starts");
+    let told = lines_of(demo.stdout.take().expect("a pipe"));
+    let said = lines_of(demo.stderr.take().expect("a pipe"));
+    let address = format!("http://127.0.0.1:{}/", port_said(&said));
+    let page = browser.open(&address);
+    let mut is_touched = || {
+        let ended = demo.try_wait().expect("a child");
+        assert!(ended.is_none(), "it ended before the page was seen");
+    };
+    let (terrain, plots) = shown(&mut browser, &page, &mut is_touched, is_whole);
+    shown(&mut browser, &page, &mut is_touched, |now, plotted| {
+        is_whole(now, plotted) && now.hash != terrain.hash && plotted.hash != plots.hash
+    });
+    shown(&mut browser, &page, &mut is_touched, |now, _| {
+        now.near[2] > 10
+    });
+    // So that there is enough to compare.
+    std::thread::sleep(Duration::from_secs(5));
+    is_touched();
+    let foreign = foreign(&browser, &address);
+    assert!(foreign.is_empty(), "requests elsewhere: {foreign:?}");
+    drop(browser);
+    let ended = Command::new("kill")
+        .args(["-INT", &demo.id().to_string()])
+        .status();
+    assert!(ended.expect("kill").success());
+    assert!(demo.wait().expect("it ends").success());
+    // The viewer ends after it, once it has written what it was told.
+    let told = told.iter().chain(&said).collect::<Vec<_>>().join("\n");
+    for figure in [" run, 0 late", " 0 lost on the link, 0 dropped"] {
+        assert!(told.contains(figure), "{told}");
+    }
+    assert!(!told.contains("not shown"), "{told}");
+    check(&Csv::read(&folder.join("fractal.csv")), &entities(&live));
+    std::fs::remove_dir_all(folder).expect("it goes");
+}
+
+/// How far pictures may differ of the same, and how far they have to of something else:
+/// means over all pixels and colours, of 255.
+const SAME: f64 = 0.5;
+const OTHER: f64 = 4.0;
+
+#[test]
+fn pan_and_zoom_move_the_picture_and_back() {
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = folder("moved");
+    let Some(mut browser) = browser_in(&folder) else {
+        return;
+    };
+    let mut viewer = Viewer::start(&["--linger", "0"]);
+    let begin = [greeting(), scene(true), layer()];
+    for message in begin.iter().chain(&tiles_around([2, 2])) {
+        assert!(viewer.tell(message));
+    }
+    let mut tick = 0;
+    let mut rest = |viewer: &mut Viewer, scale: f64, east_mm: f64| {
+        // More than the trace is long: nothing of what was before is left in the picture.
+        let ticks = tick..tick + 6000;
+        tick = ticks.end;
+        let hand = resting(scale, east_mm);
+        let samples = ticks.map(|tick| hand(tick)).collect::<Vec<_>>();
+        for samples in samples.chunks(100) {
+            assert!(viewer.tell(&Message::Samples(samples.to_vec())));
+        }
+    };
+    rest(&mut viewer, 1.0, 0.0);
+    let page = browser.open(&format!("http://127.0.0.1:{}/", viewer.port()));
+    shown(
+        &mut browser,
+        &page,
+        &mut || rest(&mut viewer, 1.0, 0.0),
+        is_whole,
+    );
+    // Two pictures in a row that are alike.
+    let mut still = |viewer: &mut Viewer, scale: f64, east_mm: f64| {
+        rest(viewer, scale, east_mm);
+        let until = Instant::now() + SHOWN_WITHIN;
+        let mut before = browser.picture(&page);
+        loop {
+            std::thread::sleep(Duration::from_secs(1));
+            let picture = browser.picture(&page);
+            if browser.difference(&page, [&before, &picture], TERRAIN) < 0.05 {
+                return picture;
+            }
+            before = picture;
+            assert!(Instant::now() < until, "it does not come to rest");
+        }
+    };
+    let first = still(&mut viewer, 1.0, 0.0);
+    let mut seen = vec![first];
+    for (scale, east_mm) in [(1.0, 25.0), (1.0, 0.0), (2.0, 0.0), (1.0, 0.0)] {
+        assert!(viewer.tell(&zoomed_scene(scale, east_mm)));
+        seen.push(still(&mut viewer, scale, east_mm));
+    }
+    let mut apart = |a: usize, b: usize| browser.difference(&page, [&seen[a], &seen[b]], TERRAIN);
+    let [panned, back, zoomed, again] = [apart(0, 1), apart(0, 2), apart(0, 3), apart(0, 4)];
+    println!("panned {panned}, back {back}, zoomed {zoomed}, back {again}");
+    assert!(panned > OTHER && zoomed > OTHER, "{panned} {zoomed}");
+    assert!(back < SAME && again < SAME, "{back} {again}");
+    drop(browser);
+    assert!(viewer.end());
     std::fs::remove_dir_all(folder).expect("it goes");
 }

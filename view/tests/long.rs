@@ -1,79 +1,94 @@
 //! How memory grows while somebody touches for long: figures for the documentation.
 //!
-//! `cargo test --release --test long -- --ignored --nocapture` takes as many minutes as
-//! `MINUTES` says, ten unless it does, at the device's own pace.
+//! `MINUTES=10 HAPTERRA=PROGRAM cargo test --release --test long -- --ignored --nocapture`
+//! takes so many minutes, at the device's own pace.
 
 mod common;
 
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use common::browser::{Browser, program};
-use common::scene::{batch, greeting, layer, scene};
-use common::{Viewer, folder};
+use common::browser::{Browser, Page, program};
+use common::{folder, hapterra, lines_of, memory_of, port_said, started_by};
 
-const BATCH: u64 = 100;
-/// The viewer's memory may grow by so much from the third minute on: the history is full
-/// after some minutes, and the rest is noise of the allocator.
+/// What the viewer may take: the history is full after some minutes, and the rest is noise
+/// of the allocator.
 const VIEWER_BYTES: u64 = 300 << 20;
+/// From there on a page begins anew: it should not come so far.
 const PAGE_BYTES: u64 = 1 << 30;
+
+/// What a page takes, and what it was told.
+#[derive(Clone, Copy, Debug, Default)]
+struct OfPage {
+    bytes: u64,
+    told: u64,
+    began: f64,
+}
+
+fn of_page(browser: &mut Browser, page: &Page) -> OfPage {
+    let said = browser.value(
+        page,
+        "[window.hapterra?.memory, window.hapterra?.bytes, performance.timeOrigin]",
+    );
+    let number = |i: usize| said[i].as_u64().unwrap_or(0);
+    OfPage {
+        bytes: number(0),
+        told: number(1),
+        began: said[2].as_f64().unwrap_or(0.0),
+    }
+}
 
 #[test]
 #[ignore = "takes ten minutes"]
 fn memory_stays_bounded_while_somebody_touches_for_long() {
-    let minutes = std::env::var("MINUTES")
-        .ok()
-        .and_then(|minutes| minutes.parse().ok());
-    let end = Duration::from_secs(60 * minutes.unwrap_or(10));
-    let mut viewer = Viewer::start(&["--linger", "0"]);
-    let (mut held, mut tick) = (Vec::new(), 0);
-    for message in [greeting(), scene(true), layer()] {
-        assert!(viewer.tell(&message));
-    }
-    for message in batch(0, BATCH, &mut held) {
-        assert!(viewer.tell(&message));
-    }
-    let address = format!("http://127.0.0.1:{}/", viewer.port());
+    let Some(mut demo) = hapterra() else {
+        println!("SKIPPED: HAPTERRA names no program");
+        return;
+    };
+    let minutes = std::env::var("MINUTES").ok();
+    let minutes: u64 = minutes.and_then(|it| it.parse().ok()).unwrap_or(10);
     let folder = folder("long");
-    let mut shown = program().map(|program| {
-        let mut browser = Browser::start(&program, &folder);
-        let page = browser.open(&address);
-        (browser, page)
-    });
-    if shown.is_none() {
-        println!("SKIPPED: the page: no Chromium here");
-    }
-    println!("minute | viewer, MB | page, MB | received by the page, MB");
-    let (began, mut slowest) = (Instant::now(), Duration::ZERO);
-    let (mut most, mut most_of_page, mut minute) = (0, 0, 0);
-    while began.elapsed() < end {
-        tick += BATCH;
-        let told = Instant::now();
-        for message in batch(tick, tick + BATCH, &mut held) {
-            assert!(viewer.tell(&message));
+    let seconds = (60 * minutes).to_string();
+    demo.args(["demo", "--device", "native", "--rounds", "200", "--view"])
+        .args(["--seconds", &seconds, "--out"])
+        .arg(&folder)
+        .env("HAPTERRA_VIEW_OPTIONS", "--no-browser --port 0 --linger 0")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    let mut demo = demo.spawn().expect("it starts");
+    let told = lines_of(demo.stdout.take().expect("a pipe"));
+    let said = lines_of(demo.stderr.take().expect("a pipe"));
+    let address = format!("http://127.0.0.1:{}/", port_said(&said));
+    let viewer = started_by(demo.id()).expect("the viewer runs");
+    let mut browser = Browser::start(&program().expect("a Chromium"), &folder);
+    let page = browser.open(&address);
+    println!("minute | hapterra, MB | viewer, MB | page, MB | told to the page, MB");
+    let (began, mut minute) = (Instant::now(), 0);
+    let (mut most, mut first) = ([0; 2], None);
+    while matches!(demo.try_wait(), Ok(None)) {
+        std::thread::sleep(Duration::from_secs(1));
+        if began.elapsed().as_secs() / 60 == minute {
+            continue;
         }
-        slowest = slowest.max(told.elapsed());
-        let due = Duration::from_millis(tick);
-        std::thread::sleep(due.saturating_sub(began.elapsed()));
-        if began.elapsed().as_secs() / 60 > minute {
-            minute += 1;
-            most = most.max(viewer.memory());
-            let mut state = [0, 0];
-            if let Some((browser, page)) = &mut shown {
-                let figures =
-                    browser.value(page, "[window.hapterra.memory, window.hapterra.bytes]");
-                state = [0, 1].map(|i| figures[i].as_u64().unwrap_or(0));
-                most_of_page = most_of_page.max(state[0]);
-            }
-            let [viewer, page, received] =
-                [viewer.memory(), state[0], state[1]].map(|bytes| bytes >> 20);
-            println!("{minute} | {viewer} | {page} | {received}");
+        minute += 1;
+        let of_page = of_page(&mut browser, &page);
+        let first = *first.get_or_insert(of_page.began);
+        let of_viewer = memory_of(viewer);
+        most = [most[0].max(of_viewer), most[1].max(of_page.bytes)];
+        let figures = [memory_of(demo.id()), of_viewer, of_page.bytes, of_page.told];
+        let [host, viewer, page, told] = figures.map(|bytes| bytes >> 20);
+        println!("{minute} | {host} | {viewer} | {page} | {told}");
+        assert_eq!(of_page.began, first, "the page began anew");
+        if minute == minutes {
+            // The viewer ends with the session once nobody looks.
+            break;
         }
     }
-    println!("the slowest tenth of a second was taken in {slowest:?}");
-    assert!(most < VIEWER_BYTES, "{most}");
-    assert!(most_of_page < PAGE_BYTES, "{most_of_page}");
-    drop(shown);
-    viewer.hang_up();
-    assert!(viewer.end());
+    drop(browser);
+    assert!(demo.wait().expect("it ends").success());
+    let told = told.iter().chain(&said).collect::<Vec<_>>().join("\n");
+    println!("{told}");
+    assert!(told.contains(" 0 lost on the link, 0 dropped") && !told.contains("not shown"));
+    assert!(most[0] < VIEWER_BYTES && most[1] < PAGE_BYTES, "{most:?}");
     let _ = std::fs::remove_dir_all(folder);
 }

@@ -24,9 +24,9 @@ pub(crate) struct Request {
 }
 
 /// The emulated board, ready to start.
-struct Emulation {
-    image: PathBuf,
-    qemu: PathBuf,
+pub(crate) struct Emulation {
+    pub(crate) image: PathBuf,
+    pub(crate) qemu: PathBuf,
 }
 
 /// Builds what is needed and runs `hapterra demo`; gives its exit code.
@@ -60,7 +60,8 @@ pub(crate) fn demo(request: &Request) -> Result<i32> {
     Ok(status.code().unwrap_or(1))
 }
 
-fn emulation() -> Result<Emulation> {
+/// Builds the image; gets QEMU where it can be had.
+pub(crate) fn emulation() -> Result<Emulation> {
     let toolchain = toolchain::ready()?;
     let qemu = qemu::ready()?;
     let image = timed("building the emulated board's image", || {

@@ -5,6 +5,8 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
+use crate::board::EMULATED;
+use crate::demo::emulation;
 use crate::deny;
 use crate::run::{cargo, on_path, root, run, say, target_dir, timed};
 use crate::setup::packages::{self, found_or_installed};
@@ -56,6 +58,14 @@ pub(crate) fn test() -> Result<()> {
     match browser() {
         Ok(browser) => drop(tests.env(BROWSER, browser)),
         Err(why) => say(format!("SKIPPED: the page in a browser: {why:#}")),
+    }
+    match emulation() {
+        Ok(board) => drop(
+            tests
+                .env(EMULATED.elf_variable, board.image)
+                .env("HAPTERRA_QEMU", board.qemu),
+        ),
+        Err(why) => say(format!("SKIPPED: the page of the emulated board: {why:#}")),
     }
     timed("running the viewer's tests", || run(&mut tests))
 }

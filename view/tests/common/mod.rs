@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod browser;
+pub mod recorded;
 pub mod scene;
 
 use std::io::{BufRead, BufReader, Read as _, Write};
@@ -34,13 +35,7 @@ impl Viewer {
             .stderr(Stdio::piped())
             .spawn()
             .expect("the viewer starts");
-        let from = BufReader::new(child.stderr.take().expect("a pipe"));
-        let (say, said) = channel();
-        std::thread::spawn(move || {
-            from.lines()
-                .map_while(Result::ok)
-                .try_for_each(|line| say.send(line))
-        });
+        let said = lines_of(child.stderr.take().expect("a pipe"));
         Self {
             to: child.stdin.take(),
             child,
@@ -70,14 +65,7 @@ impl Viewer {
 
     /// Where its page is, as it says.
     pub fn port(&self) -> u16 {
-        loop {
-            let line = self.line();
-            if let Some((_, port)) = line.rsplit_once(':')
-                && line.starts_with("view ")
-            {
-                return port.trim_matches('/').parse().expect("a port");
-            }
-        }
+        port_said(&self.said)
     }
 
     /// Waits for its end; whether it ended well.
@@ -88,11 +76,7 @@ impl Viewer {
 
     /// Memory that it takes, bytes.
     pub fn memory(&self) -> u64 {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", self.id()));
-        let status = status.unwrap_or_default();
-        let line = status.lines().find(|line| line.starts_with("VmRSS:"));
-        let kilobytes = line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok());
-        1024 * kilobytes.unwrap_or(0u64)
+        memory_of(self.id())
     }
 }
 
@@ -100,6 +84,44 @@ impl Drop for Viewer {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+/// Memory that a process takes, bytes.
+pub fn memory_of(process: u32) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status"));
+    let status = status.unwrap_or_default();
+    let line = status.lines().find(|line| line.starts_with("VmRSS:"));
+    let kilobytes = line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok());
+    1024 * kilobytes.unwrap_or(0u64)
+}
+
+/// A process that another one started; none where it has started none.
+pub fn started_by(process: u32) -> Option<u32> {
+    let children = format!("/proc/{process}/task/{process}/children");
+    let children = std::fs::read_to_string(children).ok()?;
+    children.split_whitespace().next()?.parse().ok()
+}
+
+/// Lines of a stream, as they come.
+pub fn lines_of(from: impl std::io::Read + Send + 'static) -> Receiver<String> {
+    let (say, said) = channel();
+    std::thread::spawn(move || {
+        let lines = BufReader::new(from).lines().map_while(Result::ok);
+        lines.into_iter().try_for_each(|line| say.send(line))
+    });
+    said
+}
+
+/// Where a viewer's page is, as one of the lines says.
+pub fn port_said(said: &Receiver<String>) -> u16 {
+    loop {
+        let line = said.recv_timeout(PATIENCE).expect("it says a line");
+        if let Some((_, port)) = line.rsplit_once(':')
+            && line.starts_with("view ")
+        {
+            return port.trim_matches('/').parse().expect("a port");
+        }
     }
 }
 
