@@ -5,7 +5,7 @@
 //! | --- | --- | --- |
 //! | `/terrain/LAYER/BLOCK` | a block of a coarse layer, with its relief as texture | stands; its triangles change where tiles are shown |
 //! | `/terrain/tiles/SLOT` | a tile as it is felt | stands until another takes its slot |
-//! | `/terrain/held`, `/terrain/awaited` | outlines of the tiles that the device holds and lacks | stands |
+//! | `/terrain/held/SLOT`, `/terrain/awaited` | outlines of the tiles that the device holds and lacks | stands until they are others |
 //! | `/hand/proxy`, `hip`, `ray`, `force`, `trace` | the hand | 60 a second |
 //! | `/map/…` | the same from above, in pixels of the relief | |
 //! | `/plot/…` | a thousand samples a second | |

@@ -31,6 +31,8 @@ pub(super) struct Tiles {
     tiles: BTreeMap<[i32; 2], (Lifted, Vec<Rgb>)>,
     /// Lines around each tile that is shown.
     outlines: BTreeMap<[i32; 2], Vec<Vec<[f32; 3]>>>,
+    /// The tile in each slot around which there are lines in the picture.
+    outlined: BTreeMap<u32, [i32; 2]>,
 }
 
 /// A tile with its heights in the picture.
@@ -83,6 +85,8 @@ impl Tiles {
             first: ground.first_cell(tile.index),
         };
         self.outlines.insert(tile.index, posts.outline());
+        // They may be as high as they were not before.
+        self.outlined.remove(&tile.slot);
         let colour = |column: usize, row: usize| {
             let shade = layers.shade();
             shade.map_or(HOLE, |shade| shade.colour(&heights, column + 1, row + 1))
@@ -133,12 +137,17 @@ impl Tiles {
 
     /// Takes all tiles out of the picture: another view has none of them.
     pub(super) fn clear(&mut self, log: &Log) -> Result<Vec<Entry>> {
-        let slots = std::mem::take(self).slots;
+        let Self {
+            slots, outlined, ..
+        } = std::mem::take(self);
         let nothing = Mesh3D::new([[0.0; 3]]).with_triangle_indices(at_least_one(Vec::new()));
         let mut entries = Vec::new();
         for slot in slots.keys() {
             entries.push(log.standing(&entity(*slot), MESH, &nothing)?);
             entries.push(log.standing(&skirt(*slot), "", &nothing)?);
+        }
+        for slot in outlined.keys() {
+            entries.push(drawn(log, &held_in(*slot), vec![], HELD)?);
         }
         Ok(entries)
     }
@@ -148,26 +157,54 @@ impl Tiles {
         self.slots.values().copied().collect()
     }
 
-    /// Draws around the tiles that the device holds and lacks.
-    pub(super) fn outline(&self, log: &Log, ground: &Ground, told: &Told) -> Result<Vec<Entry>> {
-        let around = |indices: &[[i32; 2]]| -> Vec<Vec<[f32; 3]>> {
-            let lines = indices.iter().map(|index| match self.outlines.get(index) {
-                Some(lines) => lines.clone(),
-                None => vec![flat(ground, *index)],
-            });
-            lines.flatten().collect()
-        };
-        let drawn = |entity: &str, indices: &[[i32; 2]], colour: Rgb, width: f32| {
-            let strips = LineStrips3D::new(around(indices))
-                .with_colors([colour])
-                .with_radii([Radius::new_ui_points(width)]);
-            log.standing(entity, "", &strips)
-        };
-        Ok(vec![
-            drawn("terrain/held", &told.held, HELD, 0.9)?,
-            drawn("terrain/awaited", &told.awaited, AWAITED, 2.0)?,
-        ])
+    /// Draws around the tiles that the device holds and lacks. Lines around a tile are told
+    /// when it comes, and not with every other one again: a window has hundreds.
+    pub(super) fn outline(
+        &mut self,
+        log: &Log,
+        ground: &Ground,
+        told: &Told,
+    ) -> Result<Vec<Entry>> {
+        let mut entries = Vec::new();
+        let held: BTreeSet<_> = told.held.iter().copied().collect();
+        for (slot, index) in &self.slots {
+            let lines = self.outlines.get(index).filter(|_| held.contains(index));
+            let before = self.outlined.get(slot);
+            match lines {
+                Some(_) if before == Some(index) => {}
+                Some(lines) => {
+                    entries.push(drawn(log, &held_in(*slot), lines.clone(), HELD)?);
+                    self.outlined.insert(*slot, *index);
+                }
+                None if before.is_none() => {}
+                None => {
+                    entries.push(drawn(log, &held_in(*slot), vec![], HELD)?);
+                    self.outlined.remove(slot);
+                }
+            }
+        }
+        let unknown = held
+            .iter()
+            .filter(|index| !self.outlines.contains_key(*index));
+        let squares = unknown.map(|index| flat(ground, *index)).collect();
+        entries.push(drawn(log, "terrain/held", squares, HELD)?);
+        let awaited = told.awaited.iter();
+        let awaited = awaited.flat_map(|index| match self.outlines.get(index) {
+            Some(lines) => lines.clone(),
+            None => vec![flat(ground, *index)],
+        });
+        entries.push(drawn(log, "terrain/awaited", awaited.collect(), AWAITED)?);
+        Ok(entries)
     }
+}
+
+/// Lines in a colour.
+fn drawn(log: &Log, entity: &str, lines: Vec<Vec<[f32; 3]>>, colour: Rgb) -> Result<Entry> {
+    let width = if colour == AWAITED { 2.0 } else { 0.9 };
+    let strips = LineStrips3D::new(lines)
+        .with_colors([colour])
+        .with_radii([Radius::new_ui_points(width)]);
+    log.standing(entity, "", &strips)
 }
 
 /// Where nothing is known of a tile: a square at the home position's height.
@@ -297,6 +334,11 @@ fn skirt(slot: u32) -> String {
     format!("terrain/tiles/{slot}/skirt")
 }
 
+/// What the lines around the held tile in a slot are called.
+fn held_in(slot: u32) -> String {
+    format!("terrain/held/{slot}")
+}
+
 /// The tile so many columns and rows farther.
 fn beside([col, row]: [i32; 2], [east, north]: [i32; 2]) -> [i32; 2] {
     [col.saturating_add(east), row.saturating_add(north)]
@@ -392,5 +434,41 @@ mod tests {
         let cleared = tiles.clear(&log).expect("it is drawn");
         assert_eq!(keys(&cleared), keys(&drawn));
         assert!(tiles.shown().is_empty() && tiles.clear(&log).expect("nothing").is_empty());
+    }
+
+    #[test]
+    fn lines_are_told_around_the_tiles_that_came_or_went_and_no_others() {
+        let (log, layers) = (Log::new(), Layers::default());
+        let ground = Ground::new(&super::super::ground::tests::scene());
+        let mut tiles = Tiles::default();
+        let came = |tiles: &mut Tiles, slot, index| {
+            let heights_mm = vec![1.0; TILE_POSTS * TILE_POSTS];
+            let tile = Tile {
+                slot,
+                index,
+                heights_mm,
+            };
+            tiles.add(&log, &ground, &layers, &tile).expect("drawn");
+        };
+        let told = |tiles: &mut Tiles, held: &[[i32; 2]]| -> Vec<String> {
+            let held = Told {
+                held: held.to_vec(),
+                awaited: vec![],
+            };
+            let entries = tiles.outline(&log, &ground, &held).expect("drawn");
+            let keys = entries.into_iter().filter_map(|entry| entry.key);
+            keys.filter(|key| key.starts_with("terrain/held/"))
+                .collect()
+        };
+        came(&mut tiles, 3, [1, 2]);
+        came(&mut tiles, 4, [2, 2]);
+        let [third, fourth] = ["terrain/held/3 ", "terrain/held/4 "];
+        assert_eq!(told(&mut tiles, &[[1, 2], [2, 2]]), [third, fourth]);
+        assert!(told(&mut tiles, &[[1, 2], [2, 2]]).is_empty());
+        // Another in the same slot, and one that is held no more.
+        came(&mut tiles, 3, [9, 2]);
+        assert_eq!(told(&mut tiles, &[[9, 2], [2, 2]]), [third]);
+        assert_eq!(told(&mut tiles, &[[9, 2]]), [fourth]);
+        assert!(told(&mut tiles, &[[9, 2]]).is_empty());
     }
 }
