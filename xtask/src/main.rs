@@ -33,7 +33,9 @@ cargo xtask COMMAND
   demo [FILE] [-- ARGS]  touch a terrain file on the emulated board; without FILE,
                          a terrain made on the spot; ARGS go to `hapterra demo`
   demo --view [FILE]     the same, live in a browser; builds the viewer, too
-  view [--test]          build the viewer; --test: run its tests, in a browser where there is one
+  view [--test|--pictures]
+                         build the viewer; --test: run its tests, in a browser where there is
+                         one; --pictures: take those in docs/
   test [--quick]         all tests, with images, budgets and dependencies;
                          --quick: the emulated board only, no dependencies
   lint                   formatting, clippy and documentation, warnings as errors
@@ -109,9 +111,11 @@ fn command() -> Result<ExitCode> {
                 .map_err(|_| anyhow::anyhow!("say for how many minutes"))?;
             fuzz::fuzz(&target, &minutes.string()?)?;
         }
-        "view" => match flag(&mut words, "test")? {
-            true => view::test()?,
-            false => println!("{}", view::build()?.display()),
+        "view" => match words.next()? {
+            Some(Long("test")) => view::test()?,
+            Some(Long("pictures")) => view::pictures()?,
+            Some(other) => return Err(other.unexpected().into()),
+            None => println!("{}", view::build()?.display()),
         },
         "flash" => flash::flash(board::by_name(&words.value()?.string()?)?)?,
         plain => {

@@ -49,12 +49,7 @@ pub(crate) fn test() -> Result<()> {
     })?;
     // Before the tests: they start it.
     build()?;
-    timed("building the hapterra command", || {
-        run(cargo().args(["build", "--package", "hapterra", "--bin", "hapterra"]))
-    })?;
-    let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
-    let mut tests = viewers(&["test", "--release", "--locked"]);
-    tests.env("HAPTERRA", target_dir().join("debug").join(program));
+    let mut tests = tests()?;
     match browser() {
         Ok(browser) => drop(tests.env(BROWSER, browser)),
         Err(why) => say(format!("SKIPPED: the page in a browser: {why:#}")),
@@ -68,6 +63,28 @@ pub(crate) fn test() -> Result<()> {
         Err(why) => say(format!("SKIPPED: the page of the emulated board: {why:#}")),
     }
     timed("running the viewer's tests", || run(&mut tests))
+}
+
+/// Takes the documentation's pictures of the live view, of the demo's own terrain.
+pub(crate) fn pictures() -> Result<()> {
+    build()?;
+    let mut tests = tests()?;
+    tests
+        .args(["--test", "pictures", "--", "--ignored"])
+        .env(BROWSER, browser()?)
+        .env("HAPTERRA_PICTURES", root().join("docs"));
+    timed("taking pictures of the live view", || run(&mut tests))
+}
+
+/// The viewer's tests, with `hapterra` beside them.
+fn tests() -> Result<Command> {
+    timed("building the hapterra command", || {
+        run(cargo().args(["build", "--package", "hapterra", "--bin", "hapterra"]))
+    })?;
+    let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
+    let mut tests = viewers(&["test", "--release", "--locked"]);
+    tests.env("HAPTERRA", target_dir().join("debug").join(program));
+    Ok(tests)
 }
 
 fn browser() -> Result<PathBuf> {

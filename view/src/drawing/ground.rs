@@ -202,6 +202,26 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn a_pan_leaves_the_terrain_where_it_is_and_takes_home_elsewhere() {
+        let scene = scene();
+        let panned = Scene {
+            home_mm: [45.0, 28.0, 12.0],
+            ..scene.clone()
+        };
+        let before = Ground::new(&scene);
+        let after = before.after(&panned);
+        assert_eq!(
+            before.sample([7.0, 9.0], 1.0),
+            after.sample([7.0, 9.0], 1.0)
+        );
+        let [east, north, _] = after.home();
+        assert_eq!(
+            [east, north],
+            [5.0, -2.0].map(|mm| (mm * before.per_mm) as f32)
+        );
+    }
+
+    #[test]
     fn other_heights_are_another_terrain_unless_it_was_drawn_once() {
         let scene = scene();
         let steeper = Scene {

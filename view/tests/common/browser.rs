@@ -7,6 +7,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
 use serde_json::{Value, json};
 
 /// For one answer of a page that draws in software on a busy machine.
@@ -144,6 +146,11 @@ impl Browser {
 
     /// Opens a page.
     pub fn open(&mut self, address: &str) -> Page {
+        self.open_sized(address, SIZE)
+    }
+
+    /// Opens a page of so many pixels.
+    pub fn open_sized(&mut self, address: &str, [width, height]: [u32; 2]) -> Page {
         let target = self.call("Target.createTarget", json!({ "url": "about:blank" }), None);
         let target = target["targetId"].as_str().expect("a page").to_owned();
         let how = json!({ "targetId": target, "flatten": true });
@@ -153,7 +160,6 @@ impl Browser {
         for domain in ["Page.enable", "Network.enable", "Runtime.enable"] {
             self.call(domain, json!({}), Some(&page.session));
         }
-        let [width, height] = SIZE;
         let size =
             json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
         self.call(
@@ -205,6 +211,17 @@ impl Browser {
             Some(&page.session),
         );
         shot["data"].as_str().expect("a picture").to_owned()
+    }
+
+    /// The same in a form that takes less room: JPEG.
+    pub fn photograph(&mut self, page: &Page) -> Vec<u8> {
+        let shot = self.call(
+            "Page.captureScreenshot",
+            json!({ "format": "jpeg", "quality": 90 }),
+            Some(&page.session),
+        );
+        let shot = shot["data"].as_str().expect("a picture");
+        BASE64_STANDARD.decode(shot).expect("base 64")
     }
 
     /// How far a part differs between two pictures: a mean over its pixels and colours, of 255.

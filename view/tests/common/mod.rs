@@ -10,7 +10,7 @@ use std::net::TcpStream;
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use hapterra_view_stream::{Message, write};
 
@@ -71,7 +71,14 @@ impl Viewer {
     /// Waits for its end; whether it ended well.
     pub fn end(mut self) -> bool {
         self.to = None;
-        self.child.wait().expect("it ends").success()
+        let until = Instant::now() + PATIENCE;
+        loop {
+            if let Some(ended) = self.child.try_wait().expect("a child") {
+                return ended.success();
+            }
+            assert!(Instant::now() < until, "it does not end");
+            std::thread::sleep(Duration::from_millis(50));
+        }
     }
 
     /// Memory that it takes, bytes.

@@ -1,0 +1,99 @@
+//! Pictures of the live view for the documentation: of the terrain that the demo has itself.
+//!
+//! `cargo xtask view --pictures` writes them into `docs/`.
+
+mod common;
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use common::browser::{Browser, Colours, Page, program};
+use common::{folder, hapterra, lines_of, port_said};
+
+const SIZE: [u32; 2] = [1440, 900];
+const TERRAIN: [f64; 4] = [0.0, 0.05, 0.56, 0.88];
+/// The force's arrow.
+const FORCE: [u8; 3] = [255, 230, 60];
+/// Pixels of it: the arrow is long enough to be seen.
+const ARROW: usize = 120;
+const WITHIN: Duration = Duration::from_secs(300);
+/// When the view is zoomed, s of the device's time: twice, while the hand is on the ground.
+const COMMANDS: &str = "at 40 zoom 1.6\nat 43 zoom 1.6\n";
+/// For what came last to be drawn.
+const DRAWN: Duration = Duration::from_secs(4);
+
+/// A page of a demo that goes on.
+struct Shown {
+    browser: Browser,
+    page: Page,
+    began: Instant,
+}
+
+impl Shown {
+    fn until(&mut self, is_right: impl Fn(&Colours) -> bool) {
+        loop {
+            std::thread::sleep(Duration::from_millis(500));
+            let picture = self.browser.picture(&self.page);
+            let colours = self
+                .browser
+                .colours(&self.page, &picture, TERRAIN, &[FORCE]);
+            if is_right(&colours) {
+                return;
+            }
+            assert!(self.began.elapsed() < WITHIN, "{colours:?}");
+        }
+    }
+
+    fn keep(&mut self, name: &str, into: &Path) {
+        let picture = self.browser.photograph(&self.page);
+        std::fs::write(into.join(name), picture).expect("written");
+    }
+}
+
+#[test]
+#[ignore = "takes a minute, and writes into docs/"]
+fn pictures_at_the_start_while_sliding_and_zoomed() {
+    let into = std::env::var_os("HAPTERRA_PICTURES").expect("HAPTERRA_PICTURES names a folder");
+    let folder = folder("pictures");
+    let commands = folder.join("commands");
+    std::fs::write(&commands, COMMANDS).expect("written");
+    let mut demo = hapterra().expect("HAPTERRA names a program");
+    demo.args(["demo", "--device", "native", "--rounds", "30", "--view"])
+        .arg("--commands")
+        .arg(&commands)
+        .arg("--out")
+        .arg(&folder)
+        .env("HAPTERRA_VIEW_OPTIONS", "--no-browser --port 0 --linger 0")
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped());
+    let mut demo = demo.spawn().expect("it starts");
+    let said = lines_of(demo.stderr.take().expect("a pipe"));
+    let address = format!("http://127.0.0.1:{}/", port_said(&said));
+    let began = Instant::now();
+    let mut browser = Browser::start(&program().expect("a Chromium"), &folder);
+    let page = browser.open_sized(&address, SIZE);
+    let mut shown = Shown {
+        browser,
+        page,
+        began,
+    };
+    let into = Path::new(&into);
+    shown.until(|terrain| terrain.count > 400);
+    // Above the ground the arm has nothing to say yet.
+    shown.until(|terrain| terrain.near[0] == 0);
+    shown.keep("view-start.jpg", into);
+    shown.until(|terrain| terrain.near[0] > ARROW);
+    shown.keep("view.jpg", into);
+    let zoomed = Duration::from_secs(45) + DRAWN;
+    std::thread::sleep(zoomed.saturating_sub(began.elapsed()));
+    shown.until(|terrain| terrain.near[0] > ARROW);
+    shown.keep("view-zoomed.jpg", into);
+    drop(shown);
+    let ended = Command::new("kill")
+        .args(["-INT", &demo.id().to_string()])
+        .status();
+    assert!(ended.expect("kill").success());
+    assert!(demo.wait().expect("it ends").success());
+    let _ = std::fs::remove_dir_all(folder);
+}

@@ -1,0 +1,143 @@
+//! What a page is told first: the whole terrain at its coarsest level.
+
+mod common;
+
+use std::collections::BTreeSet;
+use std::io::{BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::PathBuf;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use hapterra_view_stream::{Layer, Message};
+use re_chunk::Chunk;
+use re_log_encoding::Decoder;
+use re_log_types::LogMsg;
+
+use common::scene::{batch, greeting, layer, scene};
+use common::{PATIENCE, Viewer, folder, hapterra, lines_of, port_said};
+
+/// Entities in the order in which a page is told them, whether each stands, and when the last
+/// part of the coarsest level was there.
+struct Told {
+    entities: Vec<(String, bool)>,
+    whole: Option<(usize, Duration)>,
+}
+
+/// Reads a page's stream until something happened in time.
+fn told(port: u16) -> Told {
+    let began = Instant::now();
+    let mut line = TcpStream::connect(("127.0.0.1", port)).expect("a connection");
+    line.set_read_timeout(Some(PATIENCE)).expect("a limit");
+    write!(line, "GET /feed HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n").expect("it is read");
+    let mut from = BufReader::new(line);
+    let mut head = Vec::new();
+    while !head.ends_with(b"\r\n\r\n") {
+        let mut byte = [0];
+        from.read_exact(&mut byte).expect("a head");
+        head.extend(byte);
+    }
+    let mut told = Told {
+        entities: vec![],
+        whole: None,
+    };
+    while told.entities.last().is_none_or(|(_, stands)| *stands) {
+        let mut length = [0; 4];
+        from.read_exact(&mut length).expect("a piece");
+        let mut piece = vec![0; u32::from_le_bytes(length) as usize];
+        from.read_exact(&mut piece).expect("a piece");
+        for message in Decoder::<LogMsg>::decode_eager(piece.as_slice()).expect("an .rrd") {
+            if let LogMsg::ArrowMsg(store, message) = message.expect("a message")
+                && store.is_recording()
+            {
+                let chunk = Chunk::from_arrow_msg(&message).expect("a chunk");
+                let entity = chunk.entity_path().to_string();
+                if entity.starts_with("/terrain/layer0/") {
+                    told.whole = Some((told.entities.len(), began.elapsed()));
+                }
+                told.entities.push((entity, chunk.is_static()));
+            }
+        }
+    }
+    told
+}
+
+/// Nothing finer, and nothing that happened, comes before the coarse whole.
+fn check(told: &Told, finer: &[&str]) -> Duration {
+    let (last, after) = told.whole.expect("the coarsest level");
+    let first = |begin: &str| {
+        let mut entities = told.entities.iter();
+        entities.position(|(entity, _)| entity.starts_with(begin))
+    };
+    for finer in finer {
+        let first = first(finer).unwrap_or_else(|| panic!("{finer} of {:?}", told.entities));
+        assert!(last < first, "{finer}: {:?}", told.entities);
+    }
+    let happened = told.entities.iter().position(|(_, stands)| !stands);
+    assert!(last < happened.expect("something happened"));
+    after
+}
+
+#[test]
+fn a_page_is_told_the_coarse_whole_before_anything_finer() {
+    let mut viewer = Viewer::start(&[]);
+    let Message::Layer(whole) = layer() else {
+        unreachable!()
+    };
+    let finer = Message::Layer(Layer {
+        number: 1,
+        columns: 33,
+        rows: 33,
+        heights: vec![100.0; 33 * 33],
+        ..whole.clone()
+    });
+    // Finer things that came before, to a page that comes later.
+    let mut messages = vec![greeting(), scene(true), Message::Layer(whole), finer];
+    messages.extend(batch(0, 300, &mut vec![]));
+    for message in &messages {
+        assert!(viewer.tell(message));
+    }
+    let told = told(viewer.port());
+    check(&told, &["/terrain/layer1/", "/terrain/tiles/"]);
+    let blocks: BTreeSet<_> = { told.entities.iter() }
+        .filter(|(entity, _)| entity.starts_with("/terrain/layer0/"))
+        .collect();
+    // 160 cells in blocks of 32.
+    assert_eq!(blocks.len(), 25);
+}
+
+/// `TERRAIN=FILE cargo test --release --test start -- --nocapture` measures it with a file.
+#[test]
+fn the_coarse_whole_is_there_within_a_second_of_the_start() {
+    let Some(mut demo) = hapterra() else {
+        println!("SKIPPED: HAPTERRA names no program; cargo xtask view --test does");
+        return;
+    };
+    let folder = folder("start");
+    demo.args(["demo", "--device", "native", "--seconds", "4", "--view"])
+        .args(std::env::var_os("TERRAIN").map(PathBuf::from))
+        .arg("--out")
+        .arg(&folder)
+        .env("HAPTERRA_VIEW_OPTIONS", "--no-browser --port 0 --linger 0")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    let began = Instant::now();
+    let mut demo = demo.spawn().expect("it starts");
+    let lines = lines_of(demo.stdout.take().expect("a pipe"));
+    // The session with the device begins with this line.
+    while !lines
+        .recv_timeout(PATIENCE)
+        .expect("a line")
+        .starts_with("device ")
+    {}
+    let (read, session) = (began.elapsed(), Instant::now());
+    let port = port_said(&lines_of(demo.stderr.take().expect("a pipe")));
+    let said = session.elapsed();
+    let after = check(&told(port), &[]);
+    println!(
+        "terrain read after {read:?}; then the page's address after {said:?}, and the coarse whole {after:?} after it was asked for"
+    );
+    assert!(after < Duration::from_secs(1), "{after:?}");
+    assert!(demo.wait().expect("it ends").success());
+    std::fs::remove_dir_all(folder).expect("it goes");
+}
