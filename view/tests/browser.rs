@@ -266,7 +266,7 @@ fn pan_and_zoom_move_the_picture_and_back() {
         let ticks = tick..tick + 6000;
         tick = ticks.end;
         let hand = resting(scale, east_mm);
-        let samples = ticks.map(|tick| hand(tick)).collect::<Vec<_>>();
+        let samples = ticks.map(hand).collect::<Vec<_>>();
         for samples in samples.chunks(100) {
             assert!(viewer.tell(&Message::Samples(samples.to_vec())));
         }

@@ -18,10 +18,10 @@ const FORCE: [u8; 3] = [255, 230, 60];
 /// Pixels of it: the arrow is long enough to be seen.
 const ARROW: usize = 120;
 const WITHIN: Duration = Duration::from_secs(300);
-/// When the view is zoomed, s of the device's time: twice, while the hand is on the ground.
-const COMMANDS: &str = "at 40 zoom 1.6\nat 43 zoom 1.6\n";
-/// For what came last to be drawn.
-const DRAWN: Duration = Duration::from_secs(4);
+/// When the view is zoomed, s of the device's time: while the hand is on the ground.
+const COMMANDS: &str = "at 6 zoom 1.6\nat 6.8 zoom 1.6\n";
+/// Until that is seen on a machine that draws slowly.
+const ZOOMED: Duration = Duration::from_secs(110);
 
 /// A page of a demo that goes on.
 struct Shown {
@@ -31,23 +31,19 @@ struct Shown {
 }
 
 impl Shown {
-    fn until(&mut self, is_right: impl Fn(&Colours) -> bool) {
+    /// Keeps the first picture in which the terrain's colours are right.
+    fn keep(&mut self, path: &Path, is_right: impl Fn(&Colours) -> bool) {
         loop {
             std::thread::sleep(Duration::from_millis(500));
+            // Both within a moment; the arrow has not gone far.
+            let kept = self.browser.photograph(&self.page);
             let picture = self.browser.picture(&self.page);
-            let colours = self
-                .browser
-                .colours(&self.page, &picture, TERRAIN, &[FORCE]);
+            let colours = { &mut self.browser }.colours(&self.page, &picture, TERRAIN, &[FORCE]);
             if is_right(&colours) {
-                return;
+                return std::fs::write(path, kept).expect("written");
             }
             assert!(self.began.elapsed() < WITHIN, "{colours:?}");
         }
-    }
-
-    fn keep(&mut self, name: &str, into: &Path) {
-        let picture = self.browser.photograph(&self.page);
-        std::fs::write(into.join(name), picture).expect("written");
     }
 }
 
@@ -79,16 +75,15 @@ fn pictures_at_the_start_while_sliding_and_zoomed() {
         began,
     };
     let into = Path::new(&into);
-    shown.until(|terrain| terrain.count > 400);
-    // Above the ground the arm has nothing to say yet.
-    shown.until(|terrain| terrain.near[0] == 0);
-    shown.keep("view-start.jpg", into);
-    shown.until(|terrain| terrain.near[0] > ARROW);
-    shown.keep("view.jpg", into);
-    let zoomed = Duration::from_secs(45) + DRAWN;
-    std::thread::sleep(zoomed.saturating_sub(began.elapsed()));
-    shown.until(|terrain| terrain.near[0] > ARROW);
-    shown.keep("view-zoomed.jpg", into);
+    let is_shown = |terrain: &Colours| terrain.count > 400;
+    // Before the hand is on the ground the arm has nothing to say.
+    shown.keep(&into.join("view-start.jpg"), |terrain| {
+        is_shown(terrain) && terrain.near[0] == 0
+    });
+    let is_touched = |terrain: &Colours| terrain.near[0] > ARROW;
+    shown.keep(&into.join("view.jpg"), is_touched);
+    std::thread::sleep(ZOOMED.saturating_sub(began.elapsed()));
+    shown.keep(&into.join("view-zoomed.jpg"), is_touched);
     drop(shown);
     let ended = Command::new("kill")
         .args(["-INT", &demo.id().to_string()])
