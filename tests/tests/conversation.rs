@@ -269,6 +269,55 @@ fn no_answer_that_comes_late_is_taken_for_that_to_a_later_question() {
     assert!(answers > 3_000, "{answers}");
 }
 
+/// A host that puts another view in while it feels, asks for the calibration, and then has
+/// outputs held, the record stored and a motor jogged.
+fn with_errands(harms: Vec<(Direction, usize, Harm)>) -> Plan {
+    Plan {
+        harms,
+        errands: true,
+        ..Plan::default()
+    }
+}
+
+#[test]
+fn every_request_and_view_is_done_or_refused_once_whichever_frame_is_lost_or_late() {
+    let whole = agree(&with_errands(vec![]));
+    eprintln!("{whole:?}");
+    assert_eq!(whole.came_of, [10, 0, 0], "all are done");
+    let ways = [Direction::ToDevice, Direction::ToHost];
+    for (way, count) in ways.into_iter().zip(whole.frames) {
+        for number in 0..count {
+            for harm in [Harm::Lose, Harm::Repeat(900), Harm::Delay(900)] {
+                let plan = with_errands(vec![(way, number, harm)]);
+                let report = agree(&plan);
+                assert_eq!(report.came_of, whole.came_of, "{plan:?}");
+                assert_eq!(report.uncertain, 0, "{plan:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn whatever_happens_between_requests_the_end_is_agreed_or_told() {
+    let ticks = agree(&with_errands(vec![])).ticks;
+    for what in [
+        Interruption::HostKilled,
+        Interruption::DeviceReset,
+        Interruption::Echo(Direction::ToHost),
+        Interruption::Cut(Direction::ToDevice, 1_500),
+        Interruption::Cut(Direction::ToHost, 1_500),
+    ] {
+        for at in (0..ticks).step_by(4 * MOMENTS) {
+            let plan = Plan {
+                interruptions: vec![(at, what)],
+                ..with_errands(vec![])
+            };
+            let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+            assert_eq!(report.end, End::Agreed, "{plan:?}");
+        }
+    }
+}
+
 #[test]
 fn a_device_of_another_version_is_told_and_never_driven() {
     let ticks = agree(&Plan::default()).ticks;

@@ -9,6 +9,7 @@
 //! ```
 
 mod account;
+mod errands;
 mod forged;
 mod judge;
 mod line;

@@ -35,6 +35,9 @@ pub struct Plan {
     pub abrupt: bool,
     /// The host asks for the status without a pause while it feels and disarms.
     pub curious: bool,
+    /// The host puts another view in while it feels, and asks for more than that when the arm
+    /// is disarmed.
+    pub errands: bool,
     /// Harm at random: the seed, and the share of frames in a thousand.
     pub random: Option<(u64, usize)>,
 }

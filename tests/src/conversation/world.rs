@@ -10,13 +10,14 @@ use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Mode, Sense};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Scene, Source};
+use hapterra_core::scene::{Scene, Source, View};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
 
+use super::errands::{Errand, Errands};
 use super::forged;
 use super::judge::{FADE, Judge, SILENCE_S, Wrong};
 use super::line::{Direction, Line};
@@ -58,6 +59,8 @@ pub struct Report {
     pub resumptions: u32,
     /// Questions for the status that were answered.
     pub answers: u32,
+    /// Things beside arming and disarming that were done, refused, and given up.
+    pub came_of: [u32; 3],
 }
 
 /// What the host is about.
@@ -69,6 +72,8 @@ enum Step {
     Feeling,
     /// To be disarmed, since a tick if that was answered.
     Disarming(Option<u64>),
+    /// To do what the disarmed arm is asked for.
+    Asking,
     /// To end.
     Leaving,
     Over(End),
@@ -95,6 +100,8 @@ struct World<'t> {
     /// The host asks for the status without a pause.
     curious: bool,
     questions: Questions,
+    /// What is asked for while the arm is armed, and then; none where nothing is.
+    errands: Option<[Errands; 2]>,
     /// Ticks of the device since it was started.
     device_ticks: u32,
     /// The device says that it is of another version.
@@ -126,6 +133,10 @@ pub fn check(plan: &Plan) -> Result<Report, Wrong> {
 #[must_use]
 pub fn frames() -> [usize; 2] {
     check(&Plan::default()).expect("nothing goes wrong").frames
+}
+
+fn errands() -> [Errands; 2] {
+    [Errands::armed(), Errands::disarmed()]
 }
 
 fn device() -> Device<StoppedClock, 2> {
@@ -165,6 +176,7 @@ impl<'t> World<'t> {
             abrupt: plan.abrupt,
             curious: plan.curious,
             questions: Questions::default(),
+            errands: plan.errands.then(errands),
             device_ticks: 0,
             other_device: false,
             host_gone: false,
@@ -203,6 +215,9 @@ impl<'t> World<'t> {
             uncertain: self.client.tally().uncertain,
             resumptions: self.resumptions,
             answers: self.questions.answers,
+            came_of: self.errands.map_or([0; 3], |[armed, disarmed]| {
+                std::array::from_fn(|i| armed.came_of[i] + disarmed.came_of[i])
+            }),
         })
     }
 
@@ -218,6 +233,7 @@ impl<'t> World<'t> {
                     self.sessions.clear();
                     (self.step, self.felt, self.resumptions) = (Step::Arming, 0, 0);
                     self.questions.forget();
+                    self.errands = self.errands.is_some().then(errands);
                     self.judge.another_host();
                     self.greet();
                 }
@@ -315,22 +331,27 @@ impl<'t> World<'t> {
         let (step, felt) = (&mut self.step, &mut self.felt);
         let at = self.now;
         let (mut opened, mut samples) = (None, vec![]);
-        let questions = &mut self.questions;
-        let mut on = |event: Event<'_>| match event {
-            Event::Opened { device, .. } => opened = Some(device.clone()),
-            Event::Sample(sample) => {
-                *felt += u32::from(sample.mode == Mode::Ramping);
-                samples.push(sample.tick);
+        let (questions, errands) = (&mut self.questions, &mut self.errands);
+        let mut on = |event: Event<'_>| {
+            for list in errands.iter_mut().flatten() {
+                list.take(&event);
             }
-            Event::Answered {
-                request: Request::Disarm,
-                ..
-            } => {
-                if let Step::Disarming(answered) = step {
-                    answered.get_or_insert(at);
+            match event {
+                Event::Opened { device, .. } => opened = Some(device.clone()),
+                Event::Sample(sample) => {
+                    *felt += u32::from(sample.mode == Mode::Ramping);
+                    samples.push(sample.tick);
                 }
+                Event::Answered {
+                    request: Request::Disarm,
+                    ..
+                } => {
+                    if let Step::Disarming(answered) = step {
+                        answered.get_or_insert(at);
+                    }
+                }
+                event => questions.take(&event),
             }
-            event => questions.take(&event),
         };
         let mut heard = Ok(());
         for mut frame in self.lines[1].arrived(self.now) {
@@ -369,21 +390,72 @@ impl<'t> World<'t> {
         match self.step {
             Step::Arming if self.felt > 0 => self.step = Step::Feeling,
             Step::Feeling if self.felt >= FELT && self.abrupt => self.leave(),
+            Step::Feeling if self.felt >= FELT && self.has_errands(0) => self.run_errands(0),
             Step::Feeling if self.felt >= FELT => {
                 self.client.ask(Ask::Request(Request::Disarm));
                 self.step = Step::Disarming(None);
             }
             Step::Disarming(Some(answered)) => {
                 self.judge.unwished_from(answered + FADE);
-                if self.now > answered + 2 * FADE {
+                if self.now > answered + 2 * FADE && self.errands.is_some() {
+                    self.step = Step::Asking;
+                } else if self.now > answered + 2 * FADE {
                     self.leave();
                 }
             }
+            Step::Asking if self.has_errands(1) => self.run_errands(1),
+            Step::Asking => self.leave(),
             Step::Leaving if is_closed => self.step = Step::Over(End::Agreed),
             // Somebody who waits for too long gives up, and ends it.
             _ if self.now.is_multiple_of(40_000) && self.step != Step::Leaving => self.leave(),
             _ => {}
         }
+    }
+
+    /// Whether something of a list is left or under way.
+    fn has_errands(&self, list: usize) -> bool {
+        let lists = self.errands.as_ref();
+        lists.is_some_and(|lists| !lists[list].are_done())
+    }
+
+    /// Does the next thing of a list, where the one before is over.
+    fn run_errands(&mut self, list: usize) {
+        let lists = self.errands.as_mut();
+        let Some(errand) = lists.and_then(|lists| lists[list].next(self.now)) else {
+            return;
+        };
+        match errand {
+            Errand::Ask(ask) => {
+                match ask {
+                    Ask::Request(Request::Jog(_)) => self.judge.wished(),
+                    // Two deadlines for a request that has to be repeated.
+                    Ask::Request(Request::Disarm) => self.judge.unwished_from(self.now + 9_000),
+                    _ => {}
+                }
+                self.client.ask(ask);
+            }
+            Errand::View(number) => self.put_view(number),
+            // The force that there may be has gone out.
+            Errand::Wait(_) => {}
+        }
+    }
+
+    fn put_view(&mut self, number: u8) {
+        let scene = Scene {
+            epoch: 5_000 + u32::from(number),
+            ..*self.client.scene()
+        };
+        let view = View {
+            number,
+            scene,
+            hip: scene.home,
+            keeps_tiles: true,
+        };
+        let mut out = vec![];
+        let terrain = self.terrain.clone();
+        self.client
+            .put_view(time(self.now), view, terrain, &mut out);
+        self.say(&out);
     }
 
     fn leave(&mut self) {
@@ -406,7 +478,7 @@ impl<'t> World<'t> {
             }
             (LinkError::Silent(_) | LinkError::LetGo, _) if self.resumptions < RESUMPTIONS => {
                 self.resumptions += 1;
-                if let Step::Disarming(_) = self.step {
+                if let Step::Disarming(_) | Step::Asking = self.step {
                     self.leave();
                 } else {
                     self.greet();
