@@ -336,7 +336,7 @@ fn progress_ends_where_it_said_it_would() {
         let plan = Plan::new(board(rom), &image, loader.layout()).expect("fits");
         let mut steps = vec![];
         update(&mut loader, board(rom), &image, &mut |step| {
-            steps.push(step)
+            steps.push(step);
         })
         .expect("done");
         let (pages, bytes) = (plan.erased.len(), plan.bytes());
