@@ -45,8 +45,6 @@ enum Phase {
     },
     /// By the paper's rule: the cells under a segment are looked at.
     Seeking { cells: Candidates, was_late: bool },
-    /// Another view was put in: the proxy is to begin on its surface.
-    Landing(Landing),
 }
 
 #[derive(Clone, Debug)]
@@ -120,6 +118,8 @@ impl OnSurface {
 pub struct Contact {
     settings: ContactSettings,
     phase: Phase,
+    /// Another view was put in: the proxy is to begin on its surface. It waits meanwhile.
+    landing: Option<Landing>,
     /// The HIP of the last tick.
     hip: GridPoint,
     /// The last answer is the answer again while the HIP has not moved: there
@@ -139,6 +139,7 @@ impl Contact {
         Self {
             settings,
             phase: Phase::Waiting,
+            landing: None,
             hip: GridPoint::default(),
             at_rest: false,
             output: ContactOutput::default(),
@@ -327,13 +328,16 @@ impl Contact {
             Phase::Sweeping(_) => self.sweeps(window, hip, budget),
             Phase::Seeking { .. } => self.seeks(window, hip, budget),
             Phase::OnSurface(_) => self.descends(window, hip, budget),
-            Phase::Landing(_) => self.waits_to_land(),
         }
     }
 
     /// Waiting ends when the HIP is above the patch it is over, or above everything.
     #[inline(never)]
     fn looks_around<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Turn {
+        if let Some(landing) = &self.landing {
+            let waits = landing.waits();
+            return self.answers(waits);
+        }
         let view = HipView::new(hip);
         let (cell, ground) = view.ground(window);
         let is_above = view.altitude().cell() >= window.top()

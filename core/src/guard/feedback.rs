@@ -80,6 +80,11 @@ impl Feedback {
         self.unready > self.spike_ticks
     }
 
+    /// Whether currents are measured.
+    pub(super) const fn has_monitors(&self) -> bool {
+        self.is_measured
+    }
+
     /// Currents that were measured in this tick, A, without their signs. Zero where there
     /// are no monitors.
     pub(super) const fn measured_a(&self) -> Vec3 {

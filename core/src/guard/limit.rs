@@ -98,9 +98,11 @@ impl Guard {
             let excess = (load / allowed_a).max_element();
             (wanted_a / excess).clamp(-allowed_a, allowed_a)
         };
-        // An amplifier may give more than it was told to.
-        let flowing_a = self.currents_a.abs().max(self.feedback.measured_a());
-        self.motors.heat(flowing_a);
+        // An amplifier may give more than it was told to, which only a monitor tells.
+        self.motors.heat(match self.feedback.has_monitors() {
+            true => self.currents_a.abs().max(self.feedback.measured_a()),
+            false => self.currents_a,
+        });
         Drive {
             currents_a: self.currents_a,
             enabled: true,

@@ -30,8 +30,8 @@ pub const TRIP_C: f32 = 110.0;
 /// reset, K: 0.2 s of an RE25's peak current, 22 K a second. Temperatures are kept every
 /// 0.1 s, and a watchdog resets within 0.06 s.
 pub const UNSEEN_K: f32 = 5.0;
-/// More than any node can be above the one beside it, K. The model goes no farther, either:
-/// monitors without supply may tell of currents for hours that never flowed.
+/// More than any node can be above the one beside it, K. With the amplifiers off the model goes
+/// no farther, either: monitors without supply may tell of currents for hours that never flowed.
 const MOST_K: Vec3 = Vec3::splat(200.0);
 
 /// What the two nodes of each motor are above the air, K: all that the model has to
@@ -153,7 +153,15 @@ impl Motors {
         self.at.winding_c()
     }
 
-    /// Lets `currents_a` flow for a tick: none of them, where the amplifiers are off.
+    /// A tick with the amplifiers off, in which all the same `measured_a` may flow.
+    pub fn rest(&mut self, measured_a: Vec3) {
+        self.heat(measured_a);
+        // With the amplifiers on, the arm trips long before.
+        self.at.winding_k = self.at.winding_k.min(MOST_K);
+        self.at.housing_k = self.at.housing_k.min(MOST_K);
+    }
+
+    /// Lets `currents_a` flow for a tick.
     // A few instructions, but for the tick in ten that goes on to the temperatures.
     #[inline(always)]
     pub fn heat(&mut self, currents_a: Vec3) {
@@ -172,7 +180,7 @@ impl Motors {
             let step_s = STEP_MS as f32 * 1e-3;
             // K above the other node for A² flowing for ever, and part of the way.
             let end = mean * (thermal.resistance_ohm * k_per_w);
-            (from + (end - from) * (step_s / time_s)).min(MOST_K)
+            from + (end - from) * (step_s / time_s)
         };
         self.at = Temperatures {
             winding_k: toward(

@@ -103,7 +103,7 @@ impl Guard {
 
     fn watch_undriven(&mut self, sense: &Sense, around: &Surroundings<'_>) {
         // Nothing is commanded: what flows all the same is what was measured.
-        self.motors.heat(self.feedback.measured_a());
+        self.motors.rest(self.feedback.measured_a());
         self.feedback.rest(sense);
         self.hold.pass();
         self.speed.restart(sense.counts);

@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::{Contact, OnSurface, Phase, Turn};
+use super::{Contact, OnSurface, Phase};
 use crate::contact::closest_point::position_on;
 use crate::contact::output::{ContactOutput, ContactState};
 use crate::contact::settings::ContactSettings;
@@ -27,7 +27,7 @@ impl Contact {
     #[must_use]
     pub fn landing(settings: ContactSettings, at: GridPoint, stretch: Vec3) -> Self {
         Self {
-            phase: Phase::Landing(Landing { at, stretch }),
+            landing: Some(Landing { at, stretch }),
             ..Self::new(settings)
         }
     }
@@ -35,18 +35,18 @@ impl Contact {
     /// Whether the contact waits to begin on the surface.
     #[must_use]
     pub const fn is_landing(&self) -> bool {
-        matches!(self.phase, Phase::Landing(_))
+        self.landing.is_some()
     }
 
     /// The proxy as it is seen from the HIP, cells, while it touches or is about to.
     #[must_use]
     pub fn stretch(&self) -> Option<Vec3> {
-        match &self.phase {
-            Phase::Landing(landing) => Some(landing.stretch),
-            _ if self.output.state == ContactState::Touching => {
+        match &self.landing {
+            Some(landing) => Some(landing.stretch),
+            None if self.output.state == ContactState::Touching => {
                 Some(self.hip.to(&self.output.proxy))
             }
-            _ => None,
+            None => None,
         }
     }
 
@@ -57,18 +57,17 @@ impl Contact {
     /// The force comes in as it does after a late tile.
     #[must_use]
     pub fn land<const D: usize>(&mut self, window: &Window<'_, D>) -> Option<GridPoint> {
-        let Phase::Landing(Landing { at, stretch }) = &self.phase else {
-            return None;
-        };
+        let Landing { at, stretch } = self.landing.as_ref()?;
         let (cell, frac) = (at.column(), at.frac());
         let (u, v) = (frac.x, frac.y);
         let point = SurfacePoint { cell, u, v };
         match window.ground(cell) {
             Ground::Missing => return None,
-            Ground::Hole => self.phase = Phase::Waiting,
+            Ground::Hole => self.landing = None,
             Ground::Patch(_) => {
                 let surface = position_on(window, &point)?;
                 let hip = GridPoint::new(surface.cell(), surface.frac() - *stretch);
+                self.landing = None;
                 self.phase = Phase::OnSurface(OnSurface::at(point, 0.0));
                 self.hip = hip;
                 return Some(hip);
@@ -76,19 +75,17 @@ impl Contact {
         }
         None
     }
+}
 
-    /// The terrain at the place is not here yet.
+impl Landing {
+    /// The answer while the terrain at the place is not here yet.
     #[cold]
-    pub(super) fn waits_to_land(&mut self) -> Turn {
-        let Phase::Landing(Landing { at, .. }) = &self.phase else {
-            return Turn::Ends;
-        };
-        let (proxy, tile) = (*at, TileIndex::holding(at.column()));
-        self.answers(ContactOutput {
-            proxy,
-            missing_tile: Some(tile),
+    pub(super) fn waits(&self) -> ContactOutput {
+        ContactOutput {
+            proxy: self.at,
+            missing_tile: Some(TileIndex::holding(self.at.column())),
             ..ContactOutput::default()
-        })
+        }
     }
 }
 
