@@ -3,7 +3,7 @@
 //!
 //! [`Contact::step`] takes the HIP of one tick and answers with the proxy. Read in
 //! this order: `proxy` (what a tick does), [`sweep`] (from free space to the
-//! surface), [`closest_point`] (over the surface), [`boundary_fade`] (at the border
+//! surface), [`closest_point`] (over the surface), `friction` (what holds it back there), [`boundary_fade`] (at the border
 //! of the data); [`surface`] is what all of them speak of. `tolerance` says how exact
 //! each is and `budget` how much a tick may do; `paper` is the rule as it was published, and `shortcut` what
 //! nearly every tick is.
@@ -14,6 +14,7 @@ pub mod surface;
 pub mod sweep;
 
 mod budget;
+mod friction;
 mod output;
 mod paper;
 mod proxy;
@@ -30,6 +31,7 @@ mod tally;
 mod tests;
 
 pub use budget::WORK_PER_TICK;
+pub use friction::Friction;
 pub use output::{ContactOutput, ContactState};
 pub use proxy::Contact;
 pub use settings::{ContactSettings, Execution, Rule};

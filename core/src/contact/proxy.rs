@@ -1,6 +1,7 @@
 //! The proxy: what a tick does, and what is remembered from tick to tick.
 
 mod landing;
+mod rubbing;
 
 use glam::Vec3;
 
@@ -16,6 +17,7 @@ use super::sweep::{Path, Swept};
 use crate::grid::{Cell, GridPoint};
 use crate::terrain::{Ground, TileIndex, Window};
 use landing::Landing;
+use rubbing::Rubbing;
 
 /// After so many departures without getting nearer to the HIP the proxy may leave the
 /// surface no more: it only moves to and fro by rounding.
@@ -120,6 +122,8 @@ pub struct Contact {
     phase: Phase,
     /// Another view was put in: the proxy is to begin on its surface. It waits meanwhile.
     landing: Option<Landing>,
+    /// What friction holds of the proxy, where the surface is rough.
+    rubbing: Option<Rubbing>,
     /// The HIP of the last tick.
     hip: GridPoint,
     /// The last answer is the answer again while the HIP has not moved: there
@@ -136,10 +140,20 @@ impl Contact {
     /// A contact that waits to see the HIP above the surface.
     #[must_use]
     pub fn new(settings: ContactSettings) -> Self {
+        let rubbing = match settings.rule {
+            Rule::Swept => Rubbing::on(settings.friction),
+            Rule::Paper => None,
+        };
+        let is_smooth = rubbing.is_none();
         Self {
-            settings,
+            // A proxy that is held back does not follow the HIP.
+            settings: ContactSettings {
+                shortcuts: settings.shortcuts && is_smooth,
+                ..settings
+            },
             phase: Phase::Waiting,
             landing: None,
+            rubbing,
             hip: GridPoint::default(),
             at_rest: false,
             output: ContactOutput::default(),
@@ -200,6 +214,10 @@ impl Contact {
         window: &Window<'_, D>,
         hip: &GridPoint,
     ) -> &ContactOutput {
+        if self.rubbing.is_some() {
+            self.rub(window, *hip);
+            return &self.output;
+        }
         if self.at_rest && self.hip.is_same(hip) {
             self.output.work = 0;
             return &self.output;
@@ -256,6 +274,20 @@ impl Contact {
         known: Option<Place>,
     ) {
         let mut budget = Budget::new(self.settings.work_per_tick);
+        self.remembers_what_was_felt();
+        if !hip.is_same(&self.hip) {
+            self.redirect(window, hip, known, &mut budget);
+        }
+        // Bounded by the budget: of the turns that follow one another without work,
+        // none comes back to the one before.
+        while self.turn(window, hip, &mut budget) == Turn::GoesOn {}
+        self.hip = hip;
+        self.at_rest = self.output.converged && self.boundary_fade() == 1.0;
+        self.output.work = budget.spent();
+    }
+
+    #[inline]
+    fn remembers_what_was_felt(&mut self) {
         if self.output.converged || self.settings.execution == Execution::RealTime {
             let ContactOutput {
                 state,
@@ -266,15 +298,6 @@ impl Contact {
             let touched = *state == ContactState::Touching;
             self.felt = touched.then_some((*proxy, *displacement));
         }
-        if !hip.is_same(&self.hip) {
-            self.redirect(window, hip, known, &mut budget);
-        }
-        // Bounded by the budget: of the turns that follow one another without work,
-        // none comes back to the one before.
-        while self.turn(window, hip, &mut budget) == Turn::GoesOn {}
-        self.hip = hip;
-        self.at_rest = self.output.converged && self.boundary_fade() == 1.0;
-        self.output.work = budget.spent();
     }
 
     /// The HIP has moved: a way under way now leads to its new place.
@@ -535,7 +558,8 @@ impl Contact {
         };
         let mut may_follow = self.settings.shortcuts && self.settings.rule == Rule::Swept;
         if converged || is_real_time {
-            let target = boundary_fade::target(window, &hip, point.cell);
+            let over = self.rubbing.as_ref().map_or(&hip, |rubbing| &rubbing.hip);
+            let target = boundary_fade::target(window, over, point.cell);
             may_follow &= target.over_patch;
             if let (Some(tile), false) = (target.missing, is_real_time) {
                 (converged, missing_tile) = (false, Some(tile));

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::budget::WORK_PER_TICK;
+use super::friction::Friction;
 use crate::rate::TickRate;
 
 /// Which contact rule is in force.
@@ -31,7 +32,7 @@ pub enum Execution {
 }
 
 /// What does not change while a contact lasts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSettings {
     /// The contact rule.
     pub rule: Rule,
@@ -42,6 +43,8 @@ pub struct ContactSettings {
     /// Units of work a tick may spend: [`WORK_PER_TICK`], or at least
     /// [`Self::LEAST_WORK`].
     pub work_per_tick: u32,
+    /// How rough the surface is. The paper's rule knows of no friction.
+    pub friction: Friction,
     /// Whether the shortcuts are taken: free as before, and sliding within a patch.
     /// Without them every answer has the same bits.
     pub shortcuts: bool,
@@ -57,6 +60,7 @@ impl ContactSettings {
         execution: Execution::RealTime,
         rate: TickRate::DEFAULT,
         work_per_tick: WORK_PER_TICK,
+        friction: Friction::NONE,
         shortcuts: true,
     };
 
@@ -70,6 +74,12 @@ impl ContactSettings {
     #[must_use]
     pub const fn with_rule(self, rule: Rule) -> Self {
         Self { rule, ..self }
+    }
+
+    /// The same on a rough surface.
+    #[must_use]
+    pub const fn with_friction(self, friction: Friction) -> Self {
+        Self { friction, ..self }
     }
 
     /// The same at another rate.

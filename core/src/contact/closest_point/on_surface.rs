@@ -127,6 +127,11 @@ impl Descent {
         self.knows_here();
     }
 
+    /// Where it begins, or has come to by entering patches.
+    pub(in crate::contact) const fn entry(&self) -> SurfacePoint {
+        self.at
+    }
+
     /// The patch that the proxy is on.
     pub(in crate::contact) const fn cell(&self) -> Cell {
         self.at.cell
@@ -348,6 +353,16 @@ fn leads_off<const D: usize>(
         return passes_over(patch, at, (east, north));
     }
     leads_off_beyond(window, view, &at.across(side), (east, north))
+}
+
+/// Whether the straight way from a point of the surface to the HIP begins above it.
+#[inline(never)]
+pub(in crate::contact) fn leads_off_surface<const D: usize>(
+    window: &Window<'_, D>,
+    view: &HipView,
+    at: &SurfacePoint,
+) -> bool {
+    patch_at(window, view, at).is_ok_and(|patch| leads_off(window, view, at, at.border(), &patch))
 }
 
 /// The same in the patch that the way leads into, so far east and north.

@@ -1,0 +1,141 @@
+//! How the HIP pulls a proxy along the surface, and how hard it presses.
+//!
+//! With `D` the way from the proxy to the HIP, the pull is the part of `D` along the
+//! steepest direction in which the proxy could go, over all patches that meet at it;
+//! what is left of `D` presses. On an edge or a vertex a patch offers only the directions
+//! that lead into it.
+
+use glam::Vec3;
+
+use crate::contact::surface::patch::Patch;
+use crate::contact::surface::{HipView, Side, SurfacePoint};
+use crate::terrain::{Ground, TileIndex, Window};
+
+/// The way from a proxy to the HIP, in two parts at right angles to each other.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::contact) struct Pull {
+    /// Along the surface, cells: zero where every direction leads away from the HIP.
+    along: Vec3,
+    /// Its length squared, cells².
+    pulls: f32,
+    /// The length of the rest squared, cells².
+    presses: f32,
+}
+
+impl Pull {
+    /// The pull at a point of the surface, over the patches there that are here.
+    ///
+    /// # Errors
+    /// A tile that holds one of the patches and is missing, if the proxy `waits` for it.
+    pub(in crate::contact) fn at<const D: usize>(
+        window: &Window<'_, D>,
+        view: &HipView,
+        point: &SurfacePoint,
+        waits: bool,
+    ) -> Result<Self, TileIndex> {
+        let border = point.border();
+        let mut steepest = Self::NONE;
+        for place in 0..4 {
+            let side = match place {
+                0 => Side::NONE,
+                _ => border.neighbour(place - 1),
+            };
+            if place > 0 && side == Side::NONE {
+                continue;
+            }
+            let there = point.across(side);
+            match window.ground(there.cell) {
+                Ground::Patch(corners) => {
+                    let pull =
+                        Self::in_patch(&view.patch(&corners), view, &there, border.across(side));
+                    if pull.pulls > steepest.pulls || place == 0 {
+                        steepest = pull;
+                    }
+                }
+                Ground::Missing if waits => return Err(TileIndex::holding(there.cell)),
+                Ground::Missing | Ground::Hole => {}
+            }
+        }
+        Ok(steepest)
+    }
+
+    const NONE: Self = Self {
+        along: Vec3::ZERO,
+        pulls: 0.0,
+        presses: 0.0,
+    };
+
+    fn in_patch(patch: &Patch, view: &HipView, at: &SurfacePoint, border: Side) -> Self {
+        let (p, q) = view.in_patch(at.cell);
+        let way = Vec3::new(p - at.u, q - at.v, -patch.height(at.u, at.v));
+        let along = steepest(patch.slope_u(at.v), patch.slope_v(at.u), border, way);
+        Self {
+            along,
+            pulls: along.length_squared(),
+            presses: (way - along).length_squared(),
+        }
+    }
+
+    /// Whether friction of this coefficient holds the proxy.
+    pub(in crate::contact) fn is_within(&self, mu: f32) -> bool {
+        self.pulls <= mu * mu * self.presses
+    }
+
+    /// The same for a proxy that trails by so much, cells, for other reasons.
+    pub(in crate::contact) fn is_within_trailing(&self, mu: f32, trail: f32) -> bool {
+        self.is_within(mu)
+            || (trail > 0.0 && {
+                let left = libm::sqrtf(self.pulls) - trail;
+                left <= 0.0 || left * left <= mu * mu * self.presses
+            })
+    }
+
+    /// By how much of the pull a proxy that slides is held back, by dynamic friction and by
+    /// a viscous part of `drag` ticks: from 0 to the whole.
+    pub(in crate::contact) fn held_back(&self, mu: f32, drag: f32) -> Vec3 {
+        let coulomb = mu * libm::sqrtf(self.presses / self.pulls);
+        if coulomb < 1.0 {
+            self.along * ((coulomb + drag) / (1.0 + drag))
+        } else {
+            self.along
+        }
+    }
+}
+
+/// The part of a way along the tangent plane of these slopes, or, of a point on a border,
+/// along that direction into the patch which has most of it.
+fn steepest(su: f32, sv: f32, border: Side, way: Vec3) -> Vec3 {
+    // The projection onto the plane; multiplied out, so that a wall costs no bits.
+    let (across, norm) = (su * sv, 1.0 + su * su + sv * sv);
+    let free = Vec3::new(
+        ((1.0 + sv * sv) * way.x - across * way.y + su * way.z) / norm,
+        ((1.0 + su * su) * way.y - across * way.x + sv * way.z) / norm,
+        ((su * su + sv * sv) * way.z + su * way.x + sv * way.y) / norm,
+    );
+    if leads_in(free, border) {
+        return free;
+    }
+    let mut best = Vec3::ZERO;
+    if border.north != 0 {
+        let east = (way.x + su * way.z) / (1.0 + su * su);
+        best = longer(best, Vec3::new(east, 0.0, su * east), border);
+    }
+    if border.east != 0 {
+        let north = (way.y + sv * way.z) / (1.0 + sv * sv);
+        best = longer(best, Vec3::new(0.0, north, sv * north), border);
+    }
+    best
+}
+
+/// Whether a direction leads into the patch of a point on this border.
+fn leads_in(way: Vec3, border: Side) -> bool {
+    way.x * border.east as f32 <= 0.0 && way.y * border.north as f32 <= 0.0
+}
+
+fn longer(best: Vec3, other: Vec3, border: Side) -> Vec3 {
+    if leads_in(other, border) && other.length_squared() > best.length_squared() {
+        other
+    } else {
+        best
+    }
+}

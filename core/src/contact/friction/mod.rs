@@ -1,0 +1,69 @@
+//! Friction: a rough surface holds the proxy back (Salisbury et al. 1995; the friction
+//! cone: Harwin and Melder 2002).
+//!
+//! A proxy stays where it is while the way to the HIP lies inside the static friction
+//! cone over the surface there. Outside of it the proxy slides: it goes for a point that
+//! is moved from the HIP back along the surface, by as much as the dynamic friction holds. That
+//! point is all the closest-point search hears of it, so whatever holds for a proxy
+//! without friction holds for its way here too. `cone` measures how the HIP pulls.
+
+mod cone;
+
+use serde::{Deserialize, Serialize};
+
+pub(super) use cone::Pull;
+
+/// How rough a surface is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Friction {
+    /// Coulomb's coefficient at rest: tangential over normal force up to which the
+    /// proxy is held. Not below `dynamic_mu`.
+    pub static_mu: f32,
+    /// Coulomb's coefficient while the proxy slides.
+    pub dynamic_mu: f32,
+    /// The viscous part, as a time in seconds: its coefficient (N·s/mm) over the
+    /// stiffness (N/mm). At a speed v the proxy trails by v times this farther.
+    pub viscous_s: f32,
+}
+
+impl Friction {
+    /// The largest coefficient there may be: tan 84°.
+    pub const MOST: f32 = 10.0;
+    /// The longest [`Self::viscous_s`] there may be.
+    pub const MOST_VISCOUS_S: f32 = 1.0;
+    /// A surface like ice: the proxy is the surface's closest point.
+    pub const NONE: Self = Self {
+        static_mu: 0.0,
+        dynamic_mu: 0.0,
+        viscous_s: 0.0,
+    };
+
+    /// The same coefficient at rest and while it slides.
+    #[must_use]
+    pub const fn coulomb(mu: f32) -> Self {
+        Self {
+            static_mu: mu,
+            dynamic_mu: mu,
+            viscous_s: 0.0,
+        }
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::NONE
+    }
+
+    /// Whether every number is one that a contact can work with.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        let ordered = self.dynamic_mu <= self.static_mu;
+        ordered
+            && (0.0..=Self::MOST).contains(&self.dynamic_mu)
+            && (0.0..=Self::MOST).contains(&self.static_mu)
+            && (0.0..=Self::MOST_VISCOUS_S).contains(&self.viscous_s)
+    }
+}
+
+#[cfg(test)]
+mod tests;

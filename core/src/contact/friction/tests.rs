@@ -1,0 +1,183 @@
+//! Friction as it is felt.
+
+use std::vec::Vec;
+
+use glam::Vec3;
+
+use crate::contact::friction::Friction;
+use crate::contact::{Contact, ContactOutput, ContactSettings, ContactState};
+use crate::grid::GridPoint;
+use crate::terrain::FieldSize;
+use crate::terrain::testing::{Field, buffers};
+
+fn at(p: [f32; 3]) -> GridPoint {
+    GridPoint::new([20, 20, 0], Vec3::from_array(p))
+}
+
+/// A contact on `height`, with the steps of its HIP.
+fn feel(
+    friction: Friction,
+    height: impl Fn(i32, i32) -> f32 + 'static,
+    path: impl IntoIterator<Item = [f32; 3]>,
+) -> Vec<([f32; 3], ContactOutput)> {
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), height);
+    let mut contact = Contact::new(ContactSettings::REAL_TIME.with_friction(friction));
+    path.into_iter()
+        .map(|hip| (hip, *contact.step(&field.window, &at(hip))))
+        .collect()
+}
+
+/// Tangential over normal force on a plane of these slopes.
+fn ratio(felt: &ContactOutput, slope: [f32; 2]) -> f32 {
+    let normal = Vec3::new(-slope[0], -slope[1], 1.0).normalize();
+    let pressed = felt.displacement.dot(normal);
+    (felt.displacement - normal * pressed).length() / pressed
+}
+
+#[test]
+fn on_a_plane_of_any_slope_it_slides_at_its_coefficient() {
+    for slope in [[0.0, 0.0], [0.5, 0.0], [-1.0, 0.3], [0.2, 4.0]] {
+        for mu in [0.05, 0.3, 0.8] {
+            let plane =
+                move |x: i32, y: i32| slope[0] * (x - 20) as f32 + slope[1] * (y - 20) as f32;
+            let normal = Vec3::new(-slope[0], -slope[1], 1.0).normalize();
+            let along = Vec3::new(1.0, 0.4, slope[0] + 0.4 * slope[1]).normalize();
+            let path = (0..400).map(|tick| {
+                let depth = (tick as f32 * 0.02 - 0.2).min(0.7);
+                (along * (0.013 * tick as f32) - normal * depth).to_array()
+            });
+            let felt = feel(Friction::coulomb(mu), plane, path);
+            for (hip, felt) in &felt[200..] {
+                assert_eq!(felt.state, ContactState::Touching);
+                let is = ratio(felt, slope);
+                assert!(
+                    (is / mu - 1.0).abs() < 1e-3,
+                    "{slope:?}: {is} of {mu} at {hip:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn stuck_is_stuck_to_the_bit() {
+    let twisted = |x: i32, y: i32| 0.1 * ((x * 7 + y * 13) % 5) as f32;
+    let path = (0..3_000_u32).map(|tick| {
+        let depth = (tick as f32 * 0.01 - 0.8).min(0.6);
+        let noise = |seed: u32| ((tick * 7919 + seed * 31) % 97) as f32 / 97.0 - 0.5;
+        [
+            0.3 + 0.03 * noise(1),
+            0.3 + 0.03 * noise(2),
+            -depth + 0.03 * noise(3),
+        ]
+    });
+    let felt = feel(Friction::coulomb(0.9), twisted, path);
+    let stuck = felt[300].1.proxy;
+    for (hip, felt) in &felt[300..] {
+        assert_eq!(felt.proxy, stuck, "{hip:?}");
+    }
+}
+
+#[test]
+fn static_friction_holds_until_it_breaks_and_comes_back_after_a_rest() {
+    let friction = Friction {
+        static_mu: 0.8,
+        dynamic_mu: 0.3,
+        viscous_s: 0.0,
+    };
+    let press = (0..100).map(|tick| [0.0, 0.5, 0.5 - 0.015 * tick as f32]);
+    let push = (0..200).map(|tick| [0.01 * tick as f32, 0.5, -1.0]);
+    let rest = (0..50).map(|_| [1.99, 0.5, -1.0]);
+    let again = (0..100).map(|tick| [1.99 + 0.01 * tick as f32, 0.5, -1.0]);
+    let felt = feel(
+        friction,
+        |_, _| 0.0,
+        press.chain(push).chain(rest).chain(again),
+    );
+    let lag = |tick: usize| -felt[tick].1.displacement.x;
+    assert!((lag(178) - 0.78).abs() < 1e-4, "{}", lag(178));
+    assert!((lag(190) - 0.3).abs() < 1e-4, "it broke away: {}", lag(190));
+    let most = (355..450).map(lag).fold(0.0, f32::max);
+    assert!((0.75..=0.8).contains(&most), "it holds again: {most}");
+}
+
+#[test]
+fn an_encoder_count_now_and_then_does_not_make_it_stick() {
+    let friction = Friction {
+        static_mu: 0.8,
+        dynamic_mu: 0.3,
+        viscous_s: 0.0,
+    };
+    let press = (0..100).map(|tick| [0.0, 0.5, 0.5 - 0.015 * tick as f32]);
+    let push = (0..2_000).map(|tick| [(tick / 8) as f32 * 0.03, 0.5, -1.0]);
+    let felt = feel(friction, |_, _| 0.0, press.chain(push));
+    for (hip, felt) in &felt[600..] {
+        assert!(-felt.displacement.x < 0.301, "{hip:?}: {felt:?}");
+    }
+}
+
+#[test]
+fn the_viscous_part_grows_with_the_speed() {
+    let friction = Friction {
+        viscous_s: 0.02,
+        ..Friction::coulomb(0.2)
+    };
+    for speed in [0.002_f32, 0.01] {
+        let press = (0..100).map(|tick| [0.0, 0.5, 0.5 - 0.015 * tick as f32]);
+        let push = (0..600).map(|tick| [speed * tick as f32, 0.5, -1.0]);
+        let felt = feel(friction, |_, _| 0.0, press.chain(push));
+        let lag = -felt[690].1.displacement.x;
+        let expected = 0.2 + 0.02 * speed * 1e3;
+        assert!((lag / expected - 1.0).abs() < 1e-3, "{lag} for {expected}");
+    }
+}
+
+#[test]
+fn lifting_never_drags() {
+    let press = (0..100).map(|tick| [0.0, 0.5, 0.5 - 0.015 * tick as f32]);
+    let push = (0..100).map(|tick| [0.01 * tick as f32, 0.5, -1.0]);
+    let lift = (0..100).map(|tick| [1.0, 0.5, -1.0 + 0.02 * tick as f32]);
+    let felt = feel(
+        Friction::coulomb(0.5),
+        |_, _| 0.0,
+        press.chain(push).chain(lift),
+    );
+    for (hip, felt) in &felt[200..] {
+        let depth = (-hip[2]).max(0.0);
+        let most = 0.5 * depth + 1e-5;
+        assert!(
+            felt.displacement.truncate().length() <= most,
+            "{hip:?}: {felt:?}"
+        );
+        assert!(felt.displacement.z >= 0.0);
+    }
+    assert_eq!(felt[299].1.state, ContactState::Free);
+}
+
+#[test]
+fn what_is_no_friction_is_not_taken() {
+    assert!(Friction::NONE.is_valid() && Friction::NONE.is_none());
+    assert!(Friction::coulomb(0.5).is_valid());
+    assert!(!Friction::coulomb(0.5).is_none());
+    let bad = [
+        Friction::coulomb(-0.1),
+        Friction::coulomb(f32::NAN),
+        Friction::coulomb(f32::INFINITY),
+        Friction {
+            dynamic_mu: 0.6,
+            ..Friction::coulomb(0.5)
+        },
+        Friction {
+            viscous_s: -1.0,
+            ..Friction::NONE
+        },
+        Friction {
+            viscous_s: f32::NAN,
+            ..Friction::NONE
+        },
+    ];
+    for friction in bad {
+        assert!(!friction.is_valid(), "{friction:?}");
+    }
+}
