@@ -1,12 +1,12 @@
 //! A fixed number of the soak's scenes; `cargo xtask soak MINUTES` for more.
 
 use hapterra_tests::scene::supply::Buffers;
-use hapterra_tests::soak::{Broken, Found, Tally, Until, run, soak};
+use hapterra_tests::soak::{Broken, Found, Surface, Tally, Until, run, soak};
 
 const SEED: u64 = 2026;
 
-fn thousand() -> Tally {
-    let tally = soak(SEED, 0, Until::Scenes(1000), 2, |_| {});
+fn thousand(surface: Surface) -> Tally {
+    let tally = soak(SEED, surface, 0, Until::Scenes(1000), 2, |_| {});
     println!("{tally}");
     let [waiting, free, touching, _] = tally.total().states;
     assert!(waiting > 10_000 && free > 50_000 && touching > 50_000);
@@ -39,13 +39,13 @@ fn none<'b>(broken: impl Iterator<Item = &'b Broken>) {
 
 #[test]
 fn everything_holds_in_a_thousand_random_scenes() {
-    none(thousand().broken.iter());
+    none(thousand(Surface::Smooth).broken.iter());
 }
 
 /// A HIP at the foot of a needle of 10⁶: each hop off the needle's side came nearer by
 /// 10⁻⁶ cell, which counted as progress.
 #[test]
 fn a_proxy_does_not_creep_down_a_needle_for_ever() {
-    let found = run(20261201, 15872, &mut Buffers::default());
+    let found = run(20261201, 15872, Surface::Smooth, &mut Buffers::default());
     assert!(matches!(found, Found::Held(..)), "{found:?}");
 }

@@ -1,4 +1,4 @@
-//! `hapterra-soak MINUTES [--seed N] [--scene K]`; see `cargo xtask soak`.
+//! `hapterra-soak MINUTES [--seed N] [--scene K] [--rough]`; see `cargo xtask soak`.
 
 #![forbid(unsafe_code)]
 
@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use hapterra_tests::scene::supply::Buffers;
-use hapterra_tests::soak::{Found, Tally, Until, run, soak};
+use hapterra_tests::soak::{Found, Surface, Tally, Until, run, soak};
 
 /// Violations of each invariant that are told in full.
 const SHOWN: usize = 3;
@@ -16,6 +16,7 @@ struct Wanted {
     minutes: f64,
     seed: u64,
     scene: Option<u64>,
+    surface: Surface,
 }
 
 fn main() -> ExitCode {
@@ -23,11 +24,12 @@ fn main() -> ExitCode {
         Ok(Wanted {
             seed,
             scene: Some(scene),
+            surface,
             ..
-        }) => one(seed, scene),
+        }) => one(seed, scene, surface),
         Ok(wanted) => all(&wanted),
         Err(why) => {
-            eprintln!("error: {why}\nhint: hapterra-soak MINUTES [--seed N] [--scene K]");
+            eprintln!("error: {why}\nhint: hapterra-soak MINUTES [--seed N] [--scene K] [--rough]");
             ExitCode::FAILURE
         }
     }
@@ -38,6 +40,7 @@ fn wanted() -> Result<Wanted, String> {
         minutes: 1.0,
         seed: 1,
         scene: None,
+        surface: Surface::Smooth,
     };
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
@@ -47,6 +50,7 @@ fn wanted() -> Result<Wanted, String> {
         };
         match word.as_str() {
             "--seed" => wanted.seed = number()?,
+            "--rough" => wanted.surface = Surface::Rough,
             "--scene" => wanted.scene = Some(number()?),
             minutes => {
                 let minutes = minutes.parse().ok().filter(|m: &f64| *m > 0.0);
@@ -58,8 +62,8 @@ fn wanted() -> Result<Wanted, String> {
 }
 
 /// One scene again, by its number.
-fn one(seed: u64, number: u64) -> ExitCode {
-    match run(seed, number, &mut Buffers::default()) {
+fn one(seed: u64, number: u64, surface: Surface) -> ExitCode {
+    match run(seed, number, surface, &mut Buffers::default()) {
         Found::Held(kind, measured) => {
             println!("seed {seed}, scene {number}, {kind:?}: holds\n{measured:#?}");
             ExitCode::SUCCESS
@@ -76,13 +80,20 @@ fn all(wanted: &Wanted) -> ExitCode {
     let time = Duration::from_secs_f64(wanted.minutes * 60.0);
     let began = Instant::now();
     let mut last = None;
-    let tally = soak(wanted.seed, 0, Until::Time(time), threads, |tally| {
-        let second = began.elapsed().as_secs();
-        if last != Some(second) {
-            last = Some(second);
-            live(tally, began.elapsed(), time);
-        }
-    });
+    let tally = soak(
+        wanted.seed,
+        wanted.surface,
+        0,
+        Until::Time(time),
+        threads,
+        |tally| {
+            let second = began.elapsed().as_secs();
+            if last != Some(second) {
+                last = Some(second);
+                live(tally, began.elapsed(), time);
+            }
+        },
+    );
     if stderr().is_terminal() {
         eprintln!();
     }

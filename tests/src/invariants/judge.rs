@@ -3,10 +3,11 @@
 //! What a tick says by itself is looked at in `answer`, where its proxy lies in
 //! `place`, how it came there from the tick before in `change`.
 
-use hapterra_core::contact::Rule;
+use hapterra_core::contact::{Friction, Rule};
 
 use super::seen::Seen;
 use super::{Invariant, Violation};
+use crate::scene::run::Scene;
 use crate::scene::terrain::Terrain;
 
 /// What the judge learned that is no yes or no.
@@ -62,8 +63,11 @@ impl Measured {
 pub struct Judge<'g> {
     pub(super) terrain: &'g Terrain,
     rule: Rule,
+    pub(super) friction: Friction,
+    /// Ticks in a row in which the proxy has not moved.
+    pub(super) still: u32,
     tick: usize,
-    before: Option<Seen>,
+    pub(super) before: Option<Seen>,
     /// What was felt, cells, when the proxy began to let go.
     pub(super) let_go_from: f64,
     /// Ticks in a row in which a proxy in the air came no farther.
@@ -81,11 +85,22 @@ impl<'g> Judge<'g> {
         Self {
             terrain,
             rule,
+            friction: Friction::NONE,
+            still: 0,
             tick: 0,
             before: None,
             let_go_from: 0.0,
             stalled: 0,
             measured: Measured::default(),
+        }
+    }
+
+    /// A judge of a scene.
+    #[must_use]
+    pub fn of(scene: &'g Scene) -> Self {
+        Self {
+            friction: scene.friction,
+            ..Self::new(&scene.terrain, scene.rule)
         }
     }
 
@@ -125,7 +140,11 @@ impl<'g> Judge<'g> {
             return;
         }
         if seen.is_touching() && seen.felt.converged {
-            told.extend(self.is_local_minimum(seen).err());
+            if self.friction.is_none() {
+                told.extend(self.is_local_minimum(seen).err());
+            } else {
+                told.extend(self.is_in_cone(seen).err());
+            }
             told.extend(self.is_hip_below(seen).err());
         }
         if seen.is_free() {
@@ -146,6 +165,9 @@ impl<'g> Judge<'g> {
             told.extend(self.first_crossing(before, seen).err());
         }
         told.extend(self.passes_no_wall(before, seen).err());
+        if !self.friction.is_none() {
+            told.extend(self.sticks(before, seen).err());
+        }
     }
 
     pub(super) fn fail(&self, invariant: Invariant, detail: String) -> Verdict {

@@ -9,6 +9,7 @@ mod answer;
 mod change;
 pub mod crossing;
 pub mod descent;
+mod friction;
 pub mod judge;
 mod place;
 pub mod seen;
@@ -33,6 +34,12 @@ pub enum Invariant {
     /// Where a tick leaves no work over, no way along the surface leads from the
     /// proxy nearer to the HIP.
     LocalMinimum,
+    /// With friction: where a tick leaves no work over, the HIP lies inside the friction
+    /// cone over the proxy.
+    Cone,
+    /// With friction: a proxy that the HIP lies inside the friction cone of stays where it
+    /// is, to the bit.
+    Stuck,
     /// In contact the straight way from the proxy to the HIP leads into the ground:
     /// no contact pulls.
     HipBelow,

@@ -96,7 +96,7 @@ impl Judge<'_> {
 
     /// The patches that single precision cannot tell the proxy's place from, and
     /// where in them it is.
-    fn nearby(&self, proxy: [f64; 3]) -> impl Iterator<Item = ([f64; 2], Patch)> + '_ {
+    pub(super) fn nearby(&self, proxy: [f64; 3]) -> impl Iterator<Item = ([f64; 2], Patch)> + '_ {
         let [xs, ys] = [sides(proxy[0]), sides(proxy[1])];
         let starts = xs
             .into_iter()

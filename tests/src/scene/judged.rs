@@ -14,7 +14,7 @@ impl Scene {
     /// # Errors
     /// The first violation.
     pub fn run(&self, buffers: &mut Buffers) -> Result<Measured, Violation> {
-        let mut judge = Judge::new(&self.terrain, self.rule);
+        let mut judge = Judge::of(self);
         let seen = self.feel(buffers, [0; 3], self.supply, |seen| judge.look(seen))?;
         let mut chance = Chance::new(self.seed);
         let wanted = |twin: usize| {

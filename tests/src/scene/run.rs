@@ -1,6 +1,6 @@
 //! A scene by its seed and number, and the run of it, tick by tick.
 
-use hapterra_core::contact::{Contact, ContactOutput, ContactSettings, Execution, Rule};
+use hapterra_core::contact::{Contact, ContactOutput, ContactSettings, Execution, Friction, Rule};
 use hapterra_core::grid::GridPoint;
 
 use super::hip_path;
@@ -29,6 +29,8 @@ pub struct Scene {
     pub execution: Execution,
     /// How the tiles come.
     pub supply: Supply,
+    /// How rough the surface is.
+    pub friction: Friction,
     /// Whether the contact takes its shortcuts.
     pub shortcuts: bool,
     /// Which of the twins are run beside it.
@@ -85,9 +87,29 @@ impl Scene {
             rule,
             execution,
             supply,
+            friction: Friction::NONE,
             shortcuts: true,
             twins: Twins::One(if paper { 0 } else { chance.below(6) }),
             seed: chance.bits(),
+        }
+    }
+
+    /// The same scene on a rough surface.
+    #[must_use]
+    pub fn roughened(self) -> Self {
+        let mut chance = Chance::new(self.seed ^ 0xf71c_7104);
+        let dynamic_mu = [0.05, 0.3, 0.7, 2.0][chance.below(4)];
+        let static_mu = dynamic_mu * [1.0, 1.0, 1.3, 2.0][chance.below(4)];
+        let viscous_s = [0.0, 0.0, 0.003, 0.05][chance.below(4)];
+        let friction = Friction {
+            static_mu,
+            dynamic_mu,
+            viscous_s,
+        };
+        Self {
+            rule: Rule::Swept,
+            friction,
+            ..self
         }
     }
 
@@ -106,6 +128,7 @@ impl Scene {
             rule,
             execution,
             supply,
+            friction: Friction::NONE,
             shortcuts: true,
             twins: Twins::All,
             seed: 1,
@@ -118,6 +141,7 @@ impl Scene {
         ContactSettings {
             rule: self.rule,
             execution: self.execution,
+            friction: self.friction,
             shortcuts: self.shortcuts,
             ..ContactSettings::REAL_TIME
         }

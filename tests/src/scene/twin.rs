@@ -163,7 +163,7 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Comp
     let turned = |p| symmetry.point(&scene.terrain, p);
     let path = scene.path.iter().map(|p| turned(*p)).collect();
     let twin = scene.with(symmetry.terrain(&scene.terrain), path);
-    let mut judge = Judge::new(&twin.terrain, twin.rule);
+    let mut judge = Judge::of(&twin);
     let other = twin.feel(buffers, [0; 3], Supply::Held, |seen| judge.look(seen))?;
     same_way(scene, symmetry, &seen, &other, buffers)
 }

@@ -25,6 +25,16 @@ pub enum Until {
     Scenes(u64),
 }
 
+/// The surfaces of the scenes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Surface {
+    /// Like ice.
+    #[default]
+    Smooth,
+    /// With friction.
+    Rough,
+}
+
 /// Runs the scenes of a seed from number `first` on `threads` threads; `live` is
 /// called now and then with what there is so far.
 ///
@@ -32,6 +42,7 @@ pub enum Until {
 /// When a thread cannot be started.
 pub fn soak(
     seed: u64,
+    surface: Surface,
     first: u64,
     until: Until,
     threads: usize,
@@ -51,7 +62,7 @@ pub fn soak(
             if is_over(number) {
                 return;
             }
-            let found = run(seed, number, &mut buffers);
+            let found = run(seed, number, surface, &mut buffers);
             tally.lock().expect("no panic inside").add(number, found);
         }
     };
@@ -67,8 +78,12 @@ pub fn soak(
 
 /// One scene; a panic is a violation, too.
 #[must_use]
-pub fn run(seed: u64, number: u64, buffers: &mut Buffers) -> Found {
+pub fn run(seed: u64, number: u64, surface: Surface, buffers: &mut Buffers) -> Found {
     let scene = Scene::random(seed, number);
+    let scene = match surface {
+        Surface::Smooth => scene,
+        Surface::Rough => scene.roughened(),
+    };
     let ran = catch_unwind(AssertUnwindSafe(|| scene.run(buffers)));
     let kind = scene.terrain.kind;
     match ran {

@@ -7,6 +7,7 @@
 
 use glam::Vec3;
 
+use crate::contact::closest_point::passes_over;
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::terrain::{Ground, TileIndex, Window};
@@ -23,18 +24,19 @@ pub(in crate::contact) struct Pull {
 }
 
 impl Pull {
-    /// The pull at a point of the surface, over the patches there that are here.
+    /// The pull at a point of the surface. At the border of the data nothing presses a
+    /// proxy whose HIP is above the surface's last patches.
     ///
     /// # Errors
-    /// A tile that holds one of the patches and is missing, if the proxy `waits` for it.
+    /// A tile that holds one of the patches and is not here.
     pub(in crate::contact) fn at<const D: usize>(
         window: &Window<'_, D>,
         view: &HipView,
         point: &SurfacePoint,
-        waits: bool,
     ) -> Result<Self, TileIndex> {
         let border = point.border();
         let mut steepest = Self::NONE;
+        let (mut is_below, mut has_hole) = (false, false);
         for place in 0..4 {
             let side = match place {
                 0 => Side::NONE,
@@ -46,15 +48,19 @@ impl Pull {
             let there = point.across(side);
             match window.ground(there.cell) {
                 Ground::Patch(corners) => {
-                    let pull =
-                        Self::in_patch(&view.patch(&corners), view, &there, border.across(side));
+                    let patch = view.patch(&corners);
+                    is_below |= !passes_over_at(&patch, view, &there);
+                    let pull = Self::in_patch(&patch, view, &there, border.across(side));
                     if pull.pulls > steepest.pulls || place == 0 {
                         steepest = pull;
                     }
                 }
-                Ground::Missing if waits => return Err(TileIndex::holding(there.cell)),
-                Ground::Missing | Ground::Hole => {}
+                Ground::Missing => return Err(TileIndex::holding(there.cell)),
+                Ground::Hole => has_hole = true,
             }
+        }
+        if has_hole && !is_below {
+            steepest.presses = 0.0;
         }
         Ok(steepest)
     }
@@ -78,7 +84,7 @@ impl Pull {
 
     /// Whether friction of this coefficient holds the proxy.
     pub(in crate::contact) fn is_within(&self, mu: f32) -> bool {
-        self.pulls <= mu * mu * self.presses
+        self.pulls < mu * mu * self.presses
     }
 
     /// The same for a proxy that trails by so much, cells, for other reasons.
@@ -86,7 +92,7 @@ impl Pull {
         self.is_within(mu)
             || (trail > 0.0 && {
                 let left = libm::sqrtf(self.pulls) - trail;
-                left <= 0.0 || left * left <= mu * mu * self.presses
+                left <= 0.0 || left * left < mu * mu * self.presses
             })
     }
 
@@ -100,6 +106,12 @@ impl Pull {
             self.along
         }
     }
+}
+
+/// Whether the HIP is above the tangent plane of a patch at a point of it.
+fn passes_over_at(patch: &Patch, view: &HipView, at: &SurfacePoint) -> bool {
+    let (p, q) = view.in_patch(at.cell);
+    passes_over(patch, at, (p - at.u, q - at.v))
 }
 
 /// The part of a way along the tangent plane of these slopes, or, of a point on a border,

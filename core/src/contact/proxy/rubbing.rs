@@ -2,12 +2,13 @@
 
 use super::{Contact, OnSurface, Phase, Turn};
 use crate::contact::budget::{ARRIVAL, Budget, SLOPE};
-use crate::contact::closest_point::leads_off_surface;
+use crate::contact::closest_point::{leads_off_surface, position_on};
 use crate::contact::friction::{Friction, Pull};
 use crate::contact::output::ContactState;
 use crate::contact::settings::Execution;
 use crate::contact::surface::{HipView, SurfacePoint};
 use crate::contact::sweep::Path;
+use crate::contact::tolerance::RESOLUTION;
 use crate::grid::GridPoint;
 use crate::rate::TickRate;
 use crate::terrain::{TileIndex, Window};
@@ -45,6 +46,8 @@ pub(super) struct Rubbing {
     fade: f32,
     /// The proxy slides: dynamic friction holds it, not static.
     slides: bool,
+    /// Its motion in the last tick held it back, too: it goes on though the HIP rests.
+    creeps: bool,
     /// How long it has not moved, ticks.
     still: u32,
 }
@@ -77,20 +80,33 @@ impl Rubbing {
             stood: None,
             fade: 1.0,
             slides: false,
+            creeps: false,
             still: 0,
         })
     }
 
+    /// One more tick. A proxy that slid sticks when it has not moved for a while.
+    fn counts(&mut self, is_still: bool, rate: TickRate) {
+        if self.slides {
+            self.still = if is_still { self.still + 1 } else { 0 };
+            self.slides = (self.still as f32) * rate.tick_s() < STICKS_AFTER_S;
+        }
+    }
+
     /// What becomes of a proxy that the HIP pulls like this.
-    fn judges(&mut self, pull: &Pull, rate: TickRate, now: &GridPoint) -> Verdict {
+    fn judges(&mut self, pull: &Pull, rate: TickRate, here: Option<GridPoint>) -> Verdict {
         let Friction {
             static_mu,
             dynamic_mu,
             viscous_s,
         } = self.friction;
         let drag = viscous_s * rate.hz() as f32;
-        let gone = |stood: Stood| drag * stood.proxy.to(now).length();
-        let trail = self.stood.filter(|_| drag > 0.0).map_or(0.0, gone);
+        let gone = match (self.stood, here) {
+            (Some(stood), Some(here)) if drag > 0.0 => stood.proxy.to(&here).length(),
+            _ => 0.0,
+        };
+        // The way is known to the last places of both its ends.
+        let trail = drag * (gone + 8.0 * RESOLUTION);
         let is_held = match self.times {
             0 if self.slides => pull.is_within(dynamic_mu),
             0 => pull.is_within(static_mu),
@@ -113,14 +129,13 @@ impl Contact {
     /// [`Contact::step`] with friction.
     #[inline(never)]
     pub(super) fn rub<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) {
-        let before = self.output.proxy;
         let Some(rubbing) = &mut self.rubbing else {
             return;
         };
-        let has_moved = !rubbing.hip.is_same(&hip);
+        let has_moved = rubbing.creeps || !rubbing.hip.is_same(&hip);
         if self.at_rest && !has_moved {
             self.output.work = 0;
-            return self.counts_stillness(before);
+            return rubbing.counts(true, self.settings.rate);
         }
         let mut budget = Budget::new(self.settings.work_per_tick);
         self.remembers_what_was_felt();
@@ -128,17 +143,41 @@ impl Contact {
             self.redirect(window, hip, None, &mut budget);
             self.begins_to_rub(hip);
         }
-        self.hip = hip;
         if let (Phase::OnSurface(on), Some(rubbing)) = (&self.phase, &mut self.rubbing) {
             rubbing.fade = on.fade;
         }
         while self.goes_on(window, hip, &mut budget) == Turn::GoesOn {}
+        self.hip = hip;
         self.at_rest = self.output.converged && self.boundary_fade() == 1.0;
         self.output.work = budget.spent();
-        if self.output.state == ContactState::Touching {
-            self.output.displacement = hip.to(&self.output.proxy) * self.boundary_fade();
+        self.answers_from_the_surface(window);
+        self.counts_stillness();
+    }
+
+    /// In contact the answer is told from the surface, not as the HIP or an aim sees it: a
+    /// proxy that stays has the same bits for every HIP.
+    fn answers_from_the_surface<const D: usize>(&mut self, window: &Window<'_, D>) {
+        let Some(rubbing) = &mut self.rubbing else {
+            return;
+        };
+        let has_ended = self.output.converged;
+        rubbing.creeps = has_ended && rubbing.times > 0 && rubbing.friction.viscous_s > 0.0;
+        let Phase::OnSurface(on) = &self.phase else {
+            return;
+        };
+        let view = HipView::new(rubbing.hip);
+        let nearest = on.descent.nearest(window, &view);
+        if let Some((point, _)) = nearest
+            && let Some(proxy) = position_on(window, &point)
+        {
+            self.output.proxy = proxy;
+            self.output.displacement = rubbing.hip.to(&proxy) * on.fade;
+            if has_ended {
+                rubbing.aim = None;
+            } else if self.settings.execution == Execution::RealTime {
+                rubbing.stood = Some(Stood { point, proxy });
+            }
         }
-        self.counts_stillness(before);
     }
 
     /// The HIP has moved: where the proxy stands, if it was felt on the surface.
@@ -171,8 +210,19 @@ impl Contact {
             (Phase::OnSurface(_), Some(aim)) => self.slides(window, aim, hip, budget),
             _ => {
                 (rubbing.aim, rubbing.stood) = (None, None);
-                self.turn(window, hip, budget)
+                let turn = self.turn(window, hip, budget);
+                self.has_landed(window);
+                turn
             }
+        }
+    }
+
+    /// A proxy that came out of the air stands where it met the surface.
+    fn has_landed<const D: usize>(&mut self, window: &Window<'_, D>) {
+        if let (Phase::OnSurface(on), Some(rubbing)) = (&self.phase, &mut self.rubbing) {
+            let point = on.descent.entry();
+            rubbing.fade = on.fade;
+            rubbing.stood = position_on(window, &point).map(|proxy| Stood { point, proxy });
         }
     }
 
@@ -184,7 +234,7 @@ impl Contact {
         budget: &mut Budget,
     ) -> Turn {
         match self.judges(window, hip, budget) {
-            Verdict::Held => self.stays(window, hip),
+            Verdict::Held => self.touches(window, hip, true, None),
             Verdict::Waits(tile) => self.touches(window, hip, false, tile),
             Verdict::Goes(aim) => self.aims_at(aim),
         }
@@ -220,23 +270,15 @@ impl Contact {
         if leads_off_surface(window, &view, &point) {
             return Verdict::Goes(hip);
         }
-        match Pull::at(window, &view, &point, waits) {
-            Ok(pull) => rubbing.judges(&pull, self.settings.rate, &self.output.proxy),
+        match Pull::at(window, &view, &point) {
+            // Held where it has come to; what lies beyond is not known.
+            Err(_) if !waits => Verdict::Goes(hip),
+            Ok(pull) => {
+                let here = position_on(window, &point);
+                rubbing.judges(&pull, self.settings.rate, here)
+            }
             Err(tile) => Verdict::Waits(Some(tile)),
         }
-    }
-
-    /// The proxy is held where it is.
-    fn stays<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Turn {
-        let turn = self.touches(window, hip, true, None);
-        if let (Some(rubbing), ContactState::Touching) = (&self.rubbing, self.output.state)
-            && rubbing.times == 0
-            && let Some(stood) = rubbing.stood
-        {
-            // To the bit: seen from another HIP a height has other last places.
-            self.output.proxy = stood.proxy;
-        }
-        turn
     }
 
     /// The proxy slides toward its aim.
@@ -247,14 +289,15 @@ impl Contact {
         hip: GridPoint,
         budget: &mut Budget,
     ) -> Turn {
-        self.hip = aim;
         let turn = self.turn(window, aim, budget);
-        self.hip = hip;
-        match &mut self.phase {
-            Phase::Sweeping(sweeping) => {
-                sweeping.path = Path::off_surface(sweeping.path.at(), hip);
-                turn
-            }
+        if let Phase::Sweeping(sweeping) = &mut self.phase {
+            let from = sweeping.path.at();
+            sweeping.path = Path::off_surface(from, hip);
+            // Astray or not, the tick goes on.
+            let _ = self.has_gone_astray(hip, from);
+            return Turn::GoesOn;
+        }
+        match &self.phase {
             _ if turn == Turn::GoesOn => turn,
             Phase::OnSurface(_) => self.has_slid(window, aim, hip, budget),
             Phase::Fading { .. } => turn,
@@ -270,33 +313,47 @@ impl Contact {
         hip: GridPoint,
         budget: &mut Budget,
     ) -> Turn {
-        if self.has_gone_astray(hip) {
+        // In lock-step a tick that goes on later does not count.
+        let counts = self.output.converged || self.settings.execution == Execution::RealTime;
+        if counts && self.has_gone_astray(hip, self.output.proxy) {
             return Turn::GoesOn;
         }
         if !self.output.converged || aim.is_same(&hip) {
             return Turn::Ends;
         }
+        if let Phase::OnSurface(on) = &mut self.phase {
+            // What it knows of its patch is as seen from the aim.
+            on.descent.restart(on.descent.entry());
+        }
         match self.judges(window, hip, budget) {
             Verdict::Held => Turn::Ends,
             Verdict::Goes(aim) => self.aims_at(aim),
             Verdict::Waits(tile) => {
-                if let Some(rubbing) = &mut self.rubbing {
-                    rubbing.aim = None;
-                }
+                self.waits_to_be_judged();
                 (self.output.converged, self.output.missing_tile) = (false, tile);
                 Turn::Ends
             }
         }
     }
 
+    /// It cannot be told yet whether the proxy is held. In lock-step the tick does not count.
+    fn waits_to_be_judged(&mut self) {
+        if let (Phase::OnSurface(on), Some(rubbing)) = (&mut self.phase, &mut self.rubbing) {
+            rubbing.aim = None;
+            if self.settings.execution == Execution::LockStep {
+                on.fade = rubbing.fade;
+            }
+        }
+    }
+
     /// Over rough ground an aim may lead astray, farther from the HIP than the proxy stood:
     /// then it begins there again, and goes for the HIP itself.
-    fn has_gone_astray(&mut self, hip: GridPoint) -> bool {
+    fn has_gone_astray(&mut self, hip: GridPoint, to: GridPoint) -> bool {
         let Some(rubbing) = &mut self.rubbing else {
             return false;
         };
         match rubbing.stood {
-            Some(stood) if HipView::new(hip).is_nearer(&stood.proxy, &self.output.proxy) => {
+            Some(stood) if HipView::new(hip).is_nearer(&stood.proxy, &to) => {
                 (rubbing.aim, rubbing.stood) = (Some(hip), None);
                 self.phase = Phase::OnSurface(OnSurface::at(stood.point, rubbing.fade));
                 true
@@ -305,18 +362,19 @@ impl Contact {
         }
     }
 
-    /// A proxy that slid sticks when it has not moved for a while.
-    fn counts_stillness(&mut self, before: GridPoint) {
+    /// Whether the proxy has moved, by the last answers that counted.
+    fn counts_stillness(&mut self) {
+        let is_touching = self.output.state == ContactState::Touching;
         let Some(rubbing) = &mut self.rubbing else {
             return;
         };
-        if !rubbing.slides || !self.output.converged {
-            return;
+        match self.felt {
+            _ if !self.output.converged => {}
+            Some((before, _)) if is_touching => {
+                let way = before.to(&self.output.proxy).abs().max_element();
+                rubbing.counts(way <= STILL, self.settings.rate);
+            }
+            _ => (rubbing.slides, rubbing.still) = (rubbing.slides && is_touching, 0),
         }
-        let moved = before.to(&self.output.proxy).abs().max_element();
-        rubbing.still = if moved > STILL { 0 } else { rubbing.still + 1 };
-        let is_touching = self.output.state == ContactState::Touching;
-        let still_s = rubbing.still as f32 * self.settings.rate.tick_s();
-        rubbing.slides = is_touching && still_s < STICKS_AFTER_S;
     }
 }
