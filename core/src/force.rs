@@ -3,13 +3,15 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use crate::contact::Friction;
+
 /// The spring between the haptic interface point (HIP) and the proxy (paper
-/// §4.3.4), and the limit of what it may ask for. Immutable while a tick runs.
+/// §4.3.4), the limit of what it may ask for, and what holds the proxy back. Immutable while a tick runs.
 ///
 /// ```
-/// use hapterra_core::{Vec3, force::ForceLaw};
+/// use hapterra_core::{Vec3, contact::Friction, force::ForceLaw};
 ///
-/// let law = ForceLaw { stiffness_n_per_mm: 0.5, max_force_n: 8.5 };
+/// let law = ForceLaw { stiffness_n_per_mm: 0.5, max_force_n: 8.5, friction: Friction::NONE };
 /// // The proxy is 4 mm above the HIP: half a newton for each.
 /// assert_eq!(law.force_n(Vec3::Z * 4.0), Vec3::Z * 2.0);
 /// // Farther away the limit is kept, and so is the direction.
@@ -23,20 +25,23 @@ pub struct ForceLaw {
     pub stiffness_n_per_mm: f32,
     /// Largest force in newtons; the direction is kept.
     pub max_force_n: f32,
+    /// How rough the surface is.
+    pub friction: Friction,
 }
 
 impl ForceLaw {
-    /// 0.5 N/mm and 8.5 N: what a Phantom Premium 1.5 can hold.
+    /// 0.5 N/mm and 8.5 N on a surface like ice: what a Phantom Premium 1.5 can hold.
     pub const PREMIUM: Self = Self {
         stiffness_n_per_mm: 0.5,
         max_force_n: 8.5,
+        friction: Friction::NONE,
     };
 
-    /// Whether both numbers are finite and not negative.
+    /// Whether stiffness and limit are finite and not negative, and the friction is one.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let ok = |x: f32| x.is_finite() && x >= 0.0;
-        ok(self.stiffness_n_per_mm) && ok(self.max_force_n)
+        ok(self.stiffness_n_per_mm) && ok(self.max_force_n) && self.friction.is_valid()
     }
 
     /// Force in newtons for a proxy `displacement_mm` away from the HIP.

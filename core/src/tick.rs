@@ -8,7 +8,7 @@
 use glam::Vec3;
 
 use crate::clutch::{Clutch, ClutchHold};
-use crate::contact::{Contact, ContactOutput, ContactSettings, Execution};
+use crate::contact::{Contact, ContactOutput, ContactSettings, Execution, Friction};
 use crate::grid::GridPoint;
 use crate::guard::thermal::Temperatures;
 use crate::guard::{Drive, Fault, Guard, Jog, Limits, Report, SceneKind, Sense, Surroundings};
@@ -216,6 +216,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             } else {
                 Execution::RealTime
             },
+            friction: scene.map_or(Friction::NONE, |scene| scene.law.friction),
             ..ContactSettings::REAL_TIME.at_rate(self.rate)
         }
     }

@@ -3,7 +3,9 @@
 //! reported by none.
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::{ContactOutput, ContactState, Execution, Rule, WORK_PER_TICK};
+use hapterra_core::contact::{
+    ContactOutput, ContactState, Execution, Friction, Rule, WORK_PER_TICK,
+};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::terrain::TileIndex;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
@@ -101,7 +103,10 @@ fn forged_position() -> GridPoint {
 /// All that the judge reports of the last of these ticks. It must report nothing of
 /// those before.
 fn reports(terrain: &Terrain, ticks: &[Seen]) -> Vec<Violation> {
-    let mut judge = Judge::new(terrain, Rule::Swept);
+    reports_of(Judge::new(terrain, Rule::Swept), ticks)
+}
+
+fn reports_of(mut judge: Judge<'_>, ticks: &[Seen]) -> Vec<Violation> {
     let (last, before) = ticks.split_last().expect("there are ticks");
     for seen in before {
         assert_eq!(judge.all(seen), [], "before the forged one");
@@ -122,6 +127,53 @@ fn reports_only(
     assert_eq!(all(honest), [], "{invariant:?}, honest");
     let found: Vec<_> = all(forged).iter().map(|v| v.invariant).collect();
     assert_eq!(found, [invariant], "{forged:?}");
+}
+
+/// With a friction of 0.5, 0.8 at rest: the proxy is outside of the cone, or moves inside
+/// of it, on flat ground and on a ridge.
+#[test]
+fn a_proxy_that_friction_would_hold_otherwise_is_found() {
+    use Invariant::{Cone, Stuck};
+    let friction = Friction {
+        static_mu: 0.8,
+        ..Friction::coulomb(0.5)
+    };
+    let flat = flat();
+    let found = |ticks: &[Seen]| -> Vec<Invariant> {
+        let judge = Judge::new(&flat, Rule::Swept).with_friction(friction);
+        let told = reports_of(judge, ticks);
+        told.iter().map(|violation| violation.invariant).collect()
+    };
+    let at = |x: f64, hip_x: f64| touching([hip_x, 10.5, 1.0], [x, 10.5, 2.0]);
+    let first = at(10.5, 10.6);
+    assert_eq!(found(&[first, at(10.5, 10.9)]), [], "inside of the cone");
+    assert_eq!(
+        found(&[first, at(10.5, 11.29)]),
+        [],
+        "up to static friction"
+    );
+    assert_eq!(found(&[first, at(10.5, 11.32)]), [Cone], "beyond it");
+    assert_eq!(found(&[first, at(11.0, 11.5)]), [], "it slid");
+    assert_eq!(found(&[first, at(10.51, 10.9)]), [Stuck], "it crept");
+    assert_eq!(found(&[first, at(10.501, 10.601)]), [Stuck]);
+    // After a rest static friction holds it.
+    let rest = [first; 25];
+    let broken = at(10.8, 11.2);
+    assert_eq!(found(&[first, broken]), [], "it slid until just now");
+    assert_eq!(found(&[&rest[..], &[broken]].concat()), [Stuck]);
+    // Over the ridge's edge only the side pulls that the HIP is on.
+    let ridge = ridge();
+    let judge = || Judge::new(&ridge, Rule::Swept).with_friction(friction);
+    let edge = |x: f64| touching([x, 10.5, 1.0], [20.0, 10.5, 2.0]);
+    let told = |ticks: &[Seen]| -> Vec<Invariant> {
+        let told = reports_of(judge(), ticks);
+        told.iter().map(|violation| violation.invariant).collect()
+    };
+    assert_eq!(
+        told(&[edge(20.1)]),
+        [Cone],
+        "45° downhill, and friction for 39°"
+    );
 }
 
 const ABOVE: [f64; 3] = [10.5, 10.5, 3.0];

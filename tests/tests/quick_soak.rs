@@ -1,7 +1,8 @@
 //! A fixed number of the soak's scenes; `cargo xtask soak MINUTES` for more.
 
+use hapterra_tests::scene::run::Surface;
 use hapterra_tests::scene::supply::Buffers;
-use hapterra_tests::soak::{Broken, Found, Surface, Tally, Until, run, soak};
+use hapterra_tests::soak::{Broken, Found, Tally, Until, run, soak};
 
 const SEED: u64 = 2026;
 
@@ -22,11 +23,15 @@ fn thousand(surface: Surface) -> Tally {
     tally
 }
 
-fn none<'b>(broken: impl Iterator<Item = &'b Broken>) {
+fn none<'b>(surface: Surface, broken: impl Iterator<Item = &'b Broken>) {
+    let rough = match surface {
+        Surface::Smooth => "",
+        Surface::Rough => " --rough",
+    };
     let told: Vec<String> = broken
         .map(|b| {
             let (kind, what, number) = (b.kind, &b.what, b.number);
-            format!("{kind:?}: {what}\n    again: cargo xtask soak --seed {SEED} --scene {number}")
+            format!("{kind:?}: {what}\n    again: cargo xtask soak --seed {SEED} --scene {number}{rough}")
         })
         .collect();
     assert!(
@@ -39,7 +44,12 @@ fn none<'b>(broken: impl Iterator<Item = &'b Broken>) {
 
 #[test]
 fn everything_holds_in_a_thousand_random_scenes() {
-    none(thousand(Surface::Smooth).broken.iter());
+    none(Surface::Smooth, thousand(Surface::Smooth).broken.iter());
+}
+
+#[test]
+fn everything_holds_with_friction_too() {
+    none(Surface::Rough, thousand(Surface::Rough).broken.iter());
 }
 
 /// A HIP at the foot of a needle of 10⁶: each hop off the needle's side came nearer by

@@ -9,7 +9,7 @@ use hapterra_core::contact::ContactState;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_tests::counting::CountingBoard;
 
-use super::contact::{GridSamples, scene};
+use super::contact::{GridSamples, rough, scene};
 use super::table::{Row, Target, Tick};
 
 /// Ticks on the way down, which do not count.
@@ -56,7 +56,10 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
         p99: None,
         ..in_contact
     };
-    let row = |name, target, counts: &[_], state| arm.row(board, name, target, counts, state);
+    let row = |name, target, counts: &[_], state| {
+        arm.row(board, name, target, (counts, arm.scene()), state)
+    };
+    let fast_rough = (&fast[..], rough(arm.scene()));
     vec![
         row("chain, free", in_the_air, &free, ContactState::Free),
         row(
@@ -69,6 +72,13 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
             "chain, sliding fast",
             in_contact,
             &fast,
+            ContactState::Touching,
+        ),
+        arm.row(
+            board,
+            "chain, sliding fast, rough",
+            in_the_air,
+            fast_rough,
             ContactState::Touching,
         ),
         row(
@@ -124,7 +134,7 @@ impl<'g> Arm<'g> {
         board: &CountingBoard,
         name: &str,
         target: Target,
-        counts: &[[i32; 3]],
+        (counts, scene): (&[[i32; 3]], Scene),
         state: ContactState,
     ) -> Row {
         let pose = |counts: &[i32; 3]| {
@@ -138,7 +148,7 @@ impl<'g> Arm<'g> {
             self.counts_at([x, y, z + above])
         });
         let all: Vec<_> = down.chain(counts.iter().copied()).collect();
-        let ticks = board.chain(&self.scene(), &GridSamples(self.grid), &all);
+        let ticks = board.chain(&scene, &GridSamples(self.grid), &all);
         assert_eq!(ticks.len(), all.len());
         let ticks = ticks.iter().enumerate().skip(APPROACH);
         let there = ticks.filter(|(_, tick)| tick.state == state as u32 && tick.converged);

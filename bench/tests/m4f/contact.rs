@@ -5,7 +5,7 @@ use hapterra_bench::grid::Grid;
 use hapterra_bench::haptics::Hip;
 use hapterra_bench::path;
 use hapterra_bench::state::{STATES, Step, TICKS, terrain};
-use hapterra_core::contact::Rule;
+use hapterra_core::contact::{Friction, Rule};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Scene, Source};
@@ -13,6 +13,15 @@ use hapterra_core::terrain::{FieldSize, TileKey};
 use hapterra_tests::counting::{CountingBoard, Event, Replay, Samples, tiles};
 
 use super::table::{Row, Target, Tick};
+
+/// The friction of rough surfaces.
+pub(crate) const ROUGH: Friction = Friction {
+    static_mu: 0.5,
+    dynamic_mu: 0.3,
+    viscous_s: 0.001,
+};
+/// The states that are counted on them, too.
+const RUBBING: [&str; 4] = ["first contact", "sliding", "sliding fast", "resting"];
 
 /// Targets by state.
 fn target(state: &str) -> Target {
@@ -25,6 +34,11 @@ fn target(state: &str) -> Target {
         "unmoved" => of(Some(80), None),
         "free high" | "free low" => of(Some(200), None),
         "sliding" => of(Some(300), Some(1500)),
+        // The same without friction, and 2,500 instructions.
+        "first contact, rough" => of(None, Some(2_391 + 2_500)),
+        "sliding, rough" => of(None, Some(1_488 + 2_500)),
+        "sliding fast, rough" => of(None, Some(2_373 + 2_500)),
+        "resting, rough" => of(None, Some(291 + 2_500)),
         _ => of(None, None),
     }
 }
@@ -34,8 +48,27 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     let grid = terrain();
     let mut rows: Vec<Row> = STATES
         .iter()
-        .map(|(state, make)| row(board, &grid, state, &make(&grid), tiles(size(&grid))))
+        .map(|(state, make)| {
+            row(
+                board,
+                &grid,
+                state,
+                &make(&grid),
+                tiles(size(&grid)),
+                scene(&grid),
+            )
+        })
         .collect();
+    rows.extend(
+        STATES
+            .iter()
+            .filter(|(state, _)| RUBBING.contains(state))
+            .map(|(state, make)| {
+                let scene = rough(scene(&grid));
+                let name = format!("{state}, rough");
+                row(board, &grid, &name, &make(&grid), tiles(size(&grid)), scene)
+            }),
+    );
     // As far as a device's window reaches.
     let wide = Grid::fractal("512 × 512", [512, 512], 6, 1.0);
     let sweeps = path::sweeps(&wide, "", 500.0, TICKS).expect("500 cells fit");
@@ -46,11 +79,13 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
         "sweep 500, miss",
         &sweeps,
         tiles(size(&wide)),
+        scene(&wide),
     ));
     // Farther than it reaches the tiles are not there: the way is held up.
     let long = Grid::fractal("5120 × 64", [5120, 64], 6, 1.0);
     let near = tiles(FieldSize::new(512, 64));
-    rows.push(row(board, &long, "sweep 5000, held up", &far(&long), near));
+    let (state, steps) = ("sweep 5000, held up", far(&long));
+    rows.push(row(board, &long, state, &steps, near, scene(&long)));
     rows
 }
 
@@ -60,11 +95,12 @@ fn row(
     state: &str,
     steps: &[Step],
     tiles: impl Iterator<Item = TileKey>,
+    scene: Scene,
 ) -> Row {
     let hips = steps.iter().map(|step| Event::Hip(step.hip.grid));
     let events: Vec<Event> = tiles.map(Event::Tile).chain(hips).collect();
     let replay = Replay {
-        scene: &scene(grid),
+        scene: &scene,
         field: &GridSamples(grid),
         events: &events,
     };
@@ -119,6 +155,15 @@ fn far(grid: &Grid) -> Vec<Step> {
 
 fn size(grid: &Grid) -> FieldSize {
     FieldSize::new(grid.columns as i32, grid.rows as i32)
+}
+
+/// The same on a rough surface.
+pub(crate) fn rough(scene: Scene) -> Scene {
+    let law = ForceLaw {
+        friction: ROUGH,
+        ..scene.law
+    };
+    Scene { law, ..scene }
 }
 
 /// A scene of points over the field.

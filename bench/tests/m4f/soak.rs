@@ -8,6 +8,7 @@ use std::thread;
 use hapterra_core::contact::Rule;
 use hapterra_tests::counting::CountingBoard;
 use hapterra_tests::scene::recorded::Recorded;
+use hapterra_tests::scene::run::Surface;
 use hapterra_tests::scene::terrain::{KINDS, Kind};
 
 use super::table::{Row, Target, Tick};
@@ -38,7 +39,7 @@ struct CountedScene {
 /// A row over all scenes of the product's rule, one for each kind of terrain among
 /// them, and one over the scenes of the paper's rule.
 pub(crate) fn rows(board: &CountingBoard, scenes: u64) -> Vec<Row> {
-    let counted = count(board, scenes);
+    let counted = count(board, scenes, Surface::Smooth);
     let target = Target {
         max: Some(MOST),
         ..Target::default()
@@ -57,11 +58,28 @@ pub(crate) fn rows(board: &CountingBoard, scenes: u64) -> Vec<Row> {
         row(&name, &|scene| is_swept(scene) && scene.kind == *kind)
     }));
     rows.push(row("soak, paper's rule", &|scene| !is_swept(scene)));
+    rows.push(rough_row(board, scenes / 4));
     rows
 }
 
+/// A row over scenes with friction, a fourth as many.
+fn rough_row(board: &CountingBoard, scenes: u64) -> Row {
+    let counted = count(board, scenes, Surface::Rough);
+    let target = Target {
+        max: Some(MOST),
+        ..Target::default()
+    };
+    let ticks = counted.iter().flat_map(|scene| scene.ticks.iter().copied());
+    let row = Row::new("soak, rough surfaces", target, ticks.collect());
+    if 4 * scenes < ALL {
+        row.of_a_part()
+    } else {
+        row
+    }
+}
+
 /// Replays the scenes on all cores.
-fn count(board: &CountingBoard, scenes: u64) -> Vec<CountedScene> {
+fn count(board: &CountingBoard, scenes: u64, surface: Surface) -> Vec<CountedScene> {
     let next = AtomicU64::new(0);
     let counted = Mutex::new(Vec::new());
     let work = || loop {
@@ -69,7 +87,7 @@ fn count(board: &CountingBoard, scenes: u64) -> Vec<CountedScene> {
         if first >= scenes {
             return;
         }
-        let batch = count_batch(board, first..scenes.min(first + BATCH));
+        let batch = count_batch(board, first..scenes.min(first + BATCH), surface);
         counted.lock().expect("no panic inside").extend(batch);
     };
     thread::scope(|scope| {
@@ -83,8 +101,13 @@ fn count(board: &CountingBoard, scenes: u64) -> Vec<CountedScene> {
 
 /// Replays so many scenes in one run of the emulated processor, which must answer
 /// as this one does.
-fn count_batch(board: &CountingBoard, numbers: std::ops::Range<u64>) -> Vec<CountedScene> {
-    let recorded: Vec<_> = numbers.clone().map(|n| Recorded::random(SEED, n)).collect();
+fn count_batch(
+    board: &CountingBoard,
+    numbers: std::ops::Range<u64>,
+    surface: Surface,
+) -> Vec<CountedScene> {
+    let random = |number| Recorded::random(SEED, number, surface);
+    let recorded: Vec<_> = numbers.clone().map(random).collect();
     let replays: Vec<_> = recorded.iter().map(Recorded::replay).collect();
     let there = board.contact(&replays);
     let scenes = numbers.zip(&recorded).zip(&there);

@@ -53,6 +53,7 @@ fn a_scene() {
         float(0.0),
         float(0.5),
         float(8.5),
+        std::vec![0; 12],
         std::vec![1, 1, 1],
     ];
     assert_eq!(bytes(&ToDevice::Scene(scene)), wanted.concat());
@@ -171,7 +172,7 @@ fn a_hello_in_its_session() {
         }),
     };
     // The session is 300 | 128; then variant, protocol, number, seconds.
-    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 6, 9, 0xB4, 0x01]);
+    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 7, 9, 0xB4, 0x01]);
 }
 
 #[test]
@@ -199,7 +200,7 @@ fn a_device_that_introduces_itself() {
         },
     });
     let wanted = [
-        std::vec![0, 6, 9, 8, 1, b'b'],
+        std::vec![0, 7, 9, 8, 1, b'b'],
         serial.to_vec(),
         std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xAC, 0x02, 1, 7],
         std::vec![0xAC, 0x02, 6, 3, 5, 1],

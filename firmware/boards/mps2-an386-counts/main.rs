@@ -83,14 +83,14 @@ fn contact(mut scene: Scene, frames: &mut Frames, records: &mut Records) {
     let mut window = Window::new(TILES.take().each_mut().map(|row| row.each_mut()));
     window.reset(scene.level, scene.size, scene.top);
     let mut spare = SPARE.take();
-    let mut contact = Contact::new(ContactSettings::REAL_TIME.with_rule(scene.rule));
+    let mut contact = contact_of(&scene);
     let stopwatch = Stopwatch::start();
     while let Some(message) = frames.next() {
         match message {
             ToDevice::Scene(next) => {
                 scene = next;
                 window.reset(scene.level, scene.size, scene.top);
-                contact = Contact::new(ContactSettings::REAL_TIME.with_rule(scene.rule));
+                contact = contact_of(&scene);
             }
             ToDevice::Tile(tile) => {
                 fill_tile(spare, &tile).expect("the host made it well");
@@ -113,6 +113,12 @@ fn contact(mut scene: Scene, frames: &mut Frames, records: &mut Records) {
             _ => panic!("a replay has scenes, tiles and points only"),
         }
     }
+}
+
+/// A contact that has felt nothing yet.
+fn contact_of(scene: &Scene) -> Contact {
+    let settings = ContactSettings::REAL_TIME.with_rule(scene.rule);
+    Contact::new(settings.with_friction(scene.law.friction))
 }
 
 /// A step of the contact in real time. A function of its own, so that its caller is

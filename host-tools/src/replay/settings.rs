@@ -4,7 +4,7 @@
 //! The text is TOML. In a CSV recording each of its lines stands behind `# ` before the
 //! header; in a Parquet recording it is the value of [`KEY`] among the file's metadata.
 
-use hapterra_core::contact::Rule;
+use hapterra_core::contact::{Friction, Rule};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use serde::{Deserialize, Serialize};
@@ -67,6 +67,9 @@ pub struct ViewSettings {
     pub stiffness_n_per_mm: f32,
     /// Largest force, N.
     pub max_force_n: f32,
+    /// How rough the surface is; left out where it is like ice.
+    #[serde(default, skip_serializing_if = "Friction::is_none")]
+    pub friction: Friction,
 }
 
 /// The views alone, as TOML has them.
@@ -89,6 +92,7 @@ impl ViewSettings {
             home_mm: laid.view.home_mm,
             stiffness_n_per_mm: laid.law.stiffness_n_per_mm,
             max_force_n: laid.law.max_force_n,
+            friction: laid.law.friction,
         }
     }
 
@@ -104,6 +108,7 @@ impl ViewSettings {
         ForceLaw {
             stiffness_n_per_mm: self.stiffness_n_per_mm,
             max_force_n: self.max_force_n,
+            friction: self.friction,
         }
     }
 
@@ -169,6 +174,9 @@ pub struct Force {
     /// The contact rule.
     #[serde(with = "rule_name")]
     pub rule: Rule,
+    /// How rough the surface is; left out where it is like ice.
+    #[serde(default, skip_serializing_if = "Friction::is_none")]
+    pub friction: Friction,
 }
 
 /// The device that felt it, as it described itself.
@@ -249,6 +257,7 @@ impl Settings {
                 stiffness_n_per_mm: law.stiffness_n_per_mm,
                 max_force_n: law.max_force_n,
                 rule,
+                friction: law.friction,
             },
             device,
             views: vec![],
@@ -299,6 +308,7 @@ impl Settings {
         ForceLaw {
             stiffness_n_per_mm: self.force.stiffness_n_per_mm,
             max_force_n: self.force.max_force_n,
+            friction: self.force.friction,
         }
     }
 

@@ -6,8 +6,9 @@ use std::io::{IsTerminal, Write, stderr};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+use hapterra_tests::scene::run::Surface;
 use hapterra_tests::scene::supply::Buffers;
-use hapterra_tests::soak::{Found, Surface, Tally, Until, run, soak};
+use hapterra_tests::soak::{Found, Tally, Until, run, soak};
 
 /// Violations of each invariant that are told in full.
 const SHOWN: usize = 3;
@@ -102,6 +103,10 @@ fn all(wanted: &Wanted) -> ExitCode {
         wanted.seed,
         began.elapsed().as_secs_f64() / 60.0
     );
+    let rough = match wanted.surface {
+        Surface::Smooth => "",
+        Surface::Rough => " --rough",
+    };
     // A few of each kind.
     let mut told: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
     for broken in &tally.broken {
@@ -111,8 +116,8 @@ fn all(wanted: &Wanted) -> ExitCode {
             continue;
         }
         println!(
-            "\n{:?}: {}\n    again: cargo xtask soak --seed {} --scene {}",
-            broken.kind, broken.what, wanted.seed, broken.number
+            "\n{:?}: {}\n    again: cargo xtask soak --seed {} --scene {}{}",
+            broken.kind, broken.what, wanted.seed, broken.number, rough
         );
     }
     if tally.broken.is_empty() {

@@ -2,7 +2,7 @@
 
 use hapterra_core::Vec3;
 use hapterra_core::clutch::ClutchHold;
-use hapterra_core::contact::{Rule, WORK_PER_TICK};
+use hapterra_core::contact::{Friction, Rule, WORK_PER_TICK};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::guard::{Fault, Sense};
@@ -137,6 +137,16 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
         scene.law = ForceLaw {
             stiffness_n_per_mm: bytes.float(),
             max_force_n: bytes.float(),
+            friction: Friction::NONE,
+        };
+    }
+    if kind & 16 != 0 {
+        let share = |byte: u8| f32::from(byte) / 64.0;
+        let dynamic_mu = share(bytes.byte());
+        scene.law.friction = Friction {
+            dynamic_mu,
+            static_mu: dynamic_mu + share(bytes.byte()),
+            viscous_s: share(bytes.byte()) / 32.0,
         };
     }
     scene

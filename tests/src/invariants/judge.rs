@@ -98,10 +98,13 @@ impl<'g> Judge<'g> {
     /// A judge of a scene.
     #[must_use]
     pub fn of(scene: &'g Scene) -> Self {
-        Self {
-            friction: scene.friction,
-            ..Self::new(&scene.terrain, scene.rule)
-        }
+        Self::new(&scene.terrain, scene.rule).with_friction(scene.friction)
+    }
+
+    /// The same of a rough surface.
+    #[must_use]
+    pub fn with_friction(self, friction: Friction) -> Self {
+        Self { friction, ..self }
     }
 
     /// Judges the next tick.

@@ -1,7 +1,7 @@
 //! Programs that mean no good: one that talks to the device, one that answers a host.
 
 use hapterra_core::clutch::ClutchHold;
-use hapterra_core::contact::Rule;
+use hapterra_core::contact::{Friction, Rule};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Report;
@@ -123,6 +123,7 @@ fn host_scene(chance: &mut Chance, epoch: u32) -> Scene {
         law: ForceLaw {
             stiffness_n_per_mm: [f32::NAN, -1.0, 1e30, 0.5][chance.below(4)],
             max_force_n: [f32::INFINITY, -8.0, 8.5][chance.below(3)],
+            friction: Friction::coulomb([0.0, -1.0, f32::NAN][chance.below(3)]),
         },
         rule: Rule::Swept,
         source: [Source::Encoders, Source::Points][chance.below(2)],

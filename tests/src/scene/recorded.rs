@@ -10,7 +10,7 @@ use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Scene as SceneMessage, Source};
 use hapterra_core::terrain::FieldSize;
 
-use super::run::{Player, Scene};
+use super::run::{Player, Scene, Surface};
 use super::supply::Buffers;
 use super::terrain::Terrain;
 use crate::counting::{Counted, Event, Replay, Samples, WINDOW};
@@ -34,10 +34,10 @@ impl Recorded {
     /// # Panics
     /// When a tick in real time gives no answer.
     #[must_use]
-    pub fn random(seed: u64, number: u64) -> Self {
+    pub fn random(seed: u64, number: u64, surface: Surface) -> Self {
         let scene = Scene {
             execution: Execution::RealTime,
-            ..Scene::random(seed, number)
+            ..Scene::random(seed, number).with_surface(surface)
         };
         let mut buffers = Buffers::new(WINDOW);
         let mut player = Player::<WINDOW>::new(&scene, &mut buffers, [0; 3], scene.supply);
@@ -62,7 +62,10 @@ impl Recorded {
             top: scene.terrain.top(),
             cell_mm: 1.0,
             home: GridPoint::default(),
-            law: ForceLaw::PREMIUM,
+            law: ForceLaw {
+                friction: scene.friction,
+                ..ForceLaw::PREMIUM
+            },
             rule: scene.rule,
             source: Source::Points,
             hold_clock: false,

@@ -39,6 +39,16 @@ pub struct Scene {
     pub(super) seed: u64,
 }
 
+/// The surface of a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Surface {
+    /// Like ice.
+    #[default]
+    Smooth,
+    /// With friction, which follows from the scene.
+    Rough,
+}
+
 /// Which twins a scene is compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Twins {
@@ -94,9 +104,12 @@ impl Scene {
         }
     }
 
-    /// The same scene on a rough surface.
+    /// The same scene on such a surface.
     #[must_use]
-    pub fn roughened(self) -> Self {
+    pub fn with_surface(self, surface: Surface) -> Self {
+        if surface == Surface::Smooth {
+            return self;
+        }
         let mut chance = Chance::new(self.seed ^ 0xf71c_7104);
         let dynamic_mu = [0.05, 0.3, 0.7, 2.0][chance.below(4)];
         let static_mu = dynamic_mu * [1.0, 1.0, 1.3, 2.0][chance.below(4)];

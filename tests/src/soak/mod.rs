@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 pub use tally::{Broken, Found, MostWork, Tally};
 
-use crate::scene::run::Scene;
+use crate::scene::run::{Scene, Surface};
 use crate::scene::supply::Buffers;
 
 /// When to stop.
@@ -23,16 +23,6 @@ pub enum Until {
     Time(Duration),
     /// After so many scenes.
     Scenes(u64),
-}
-
-/// The surfaces of the scenes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Surface {
-    /// Like ice.
-    #[default]
-    Smooth,
-    /// With friction.
-    Rough,
 }
 
 /// Runs the scenes of a seed from number `first` on `threads` threads; `live` is
@@ -79,11 +69,7 @@ pub fn soak(
 /// One scene; a panic is a violation, too.
 #[must_use]
 pub fn run(seed: u64, number: u64, surface: Surface, buffers: &mut Buffers) -> Found {
-    let scene = Scene::random(seed, number);
-    let scene = match surface {
-        Surface::Smooth => scene,
-        Surface::Rough => scene.roughened(),
-    };
+    let scene = Scene::random(seed, number).with_surface(surface);
     let ran = catch_unwind(AssertUnwindSafe(|| scene.run(buffers)));
     let kind = scene.terrain.kind;
     match ran {

@@ -15,6 +15,7 @@ pub(super) use cone::Pull;
 
 /// How rough a surface is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Friction {
     /// Coulomb's coefficient at rest: tangential over normal force up to which the
     /// proxy is held. Not below `dynamic_mu`.

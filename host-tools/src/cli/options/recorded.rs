@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use hapterra_core::contact::Rule;
+use hapterra_core::contact::{Friction, Rule};
 
 use super::exaggeration::Exaggeration;
 use super::rendering::{ContactRule, Rendering};
@@ -36,6 +36,19 @@ impl Rendering {
                 force.max_force_n,
                 &mut told,
             )),
+            friction: Some(merged(
+                "friction",
+                self.friction,
+                force.friction.dynamic_mu,
+                &mut told,
+            )),
+            static_friction: self.recorded_static_friction(&force.friction, &mut told),
+            viscous_friction: Some(merged(
+                "viscous-friction",
+                self.viscous_friction,
+                force.friction.viscous_s,
+                &mut told,
+            )),
             contact: Some(merged("contact", self.contact, rule(force.rule), &mut told)),
             ..self.clone()
         };
@@ -57,6 +70,16 @@ impl Rendering {
             (None, None) => rendering.height_mm_per_unit = Some(felt.height_at_cell_mm(cell_mm)),
         }
         (rendering, told)
+    }
+}
+
+impl Rendering {
+    /// Static friction follows a stated dynamic one, as it does without a recording.
+    fn recorded_static_friction(&self, recorded: &Friction, told: &mut Vec<String>) -> Option<f32> {
+        match (self.static_friction, self.friction) {
+            (None, Some(_)) => None,
+            (stated, _) => Some(merged("static-friction", stated, recorded.static_mu, told)),
+        }
     }
 }
 
@@ -113,6 +136,7 @@ mod tests {
         let law = ForceLaw {
             stiffness_n_per_mm: 0.3,
             max_force_n: 4.0,
+            friction: Friction::NONE,
         };
         let device = Device {
             board: "native".into(),
@@ -135,6 +159,33 @@ mod tests {
             (Some(1), Some(4.0))
         );
         assert_eq!(rendering.rule(), Rule::Paper);
+    }
+
+    #[test]
+    fn friction_is_as_recorded_and_a_stated_one_brings_its_own_static_part() {
+        let mut recorded = recorded();
+        recorded.force.rule = Rule::Swept;
+        recorded.force.friction = Friction {
+            static_mu: 0.5,
+            dynamic_mu: 0.3,
+            viscous_s: 0.01,
+        };
+        let (rendering, told) = Rendering::default().or_recorded(&recorded);
+        assert_eq!(told, [""; 0]);
+        let law = rendering.law().expect("valid");
+        assert_eq!(law.friction, recorded.force.friction);
+        let stated = Rendering {
+            friction: Some(0.7),
+            ..Rendering::default()
+        };
+        let (rendering, told) = stated.or_recorded(&recorded);
+        assert_eq!(told, ["--friction 0.7, where the recording has 0.3"]);
+        let friction = rendering.law().expect("valid").friction;
+        let rough = Friction {
+            viscous_s: 0.01,
+            ..Friction::coulomb(0.7)
+        };
+        assert_eq!(friction, rough);
     }
 
     #[test]

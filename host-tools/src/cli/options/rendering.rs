@@ -1,6 +1,6 @@
 //! Options that say how a terrain feels, shared by `replay`, `run` and `demo`.
 
-use hapterra_core::contact::Rule;
+use hapterra_core::contact::{Friction, Rule};
 use hapterra_core::force::ForceLaw;
 
 use super::exaggeration::Exaggeration;
@@ -49,6 +49,19 @@ pub struct Rendering {
     /// Largest force [default: 8.5]
     #[arg(long, value_name = "N")]
     pub max_force_n: Option<f32>,
+
+    /// Friction: tangential over normal force while the tip slides [default: 0, like ice]
+    #[arg(long, value_name = "MU", allow_negative_numbers = true)]
+    pub friction: Option<f32>,
+
+    /// The same until it begins to slide [default: as --friction]
+    #[arg(long, value_name = "MU", allow_negative_numbers = true)]
+    pub static_friction: Option<f32>,
+
+    /// Friction that grows with the speed: the time by which the tip trails; as a
+    /// coefficient, this times the stiffness [default: 0]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub viscous_friction: Option<f32>,
 
     /// Contact rule [default: swept]
     #[arg(long, value_enum)]
@@ -130,10 +143,12 @@ impl Rendering {
         let law = ForceLaw {
             stiffness_n_per_mm: self.stiffness_n_per_mm.unwrap_or(usual.stiffness_n_per_mm),
             max_force_n: self.max_force_n.unwrap_or(usual.max_force_n),
+            friction: self.surface()?,
         };
         let ForceLaw {
             stiffness_n_per_mm: k,
             max_force_n: limit,
+            ..
         } = law;
         if k.is_finite() && k > STIFFEST_N_PER_MM {
             tracing::warn!(
@@ -148,6 +163,39 @@ impl Rendering {
             .or_hint("leave --stiffness-n-per-mm and --max-force-n out for 0.5 N/mm and 8.5 N")
     }
 
+    /// How rough the surface is.
+    ///
+    /// # Errors
+    /// Coefficients that no surface has, or the paper's rule, which knows of no friction.
+    fn surface(&self) -> Result<Friction, Failure> {
+        let dynamic_mu = self.friction.unwrap_or(0.0);
+        let friction = Friction {
+            dynamic_mu,
+            static_mu: self.static_friction.unwrap_or(dynamic_mu),
+            viscous_s: self.viscous_friction.unwrap_or(0.0),
+        };
+        if !friction.is_valid() {
+            let Friction {
+                static_mu,
+                viscous_s,
+                ..
+            } = friction;
+            let why = format!(
+                "a friction of {dynamic_mu}, {static_mu} at rest, trailing by {viscous_s} s"
+            );
+            return Err(why).or_hint(format!(
+                "--friction from 0 to {}, --static-friction not below it, --viscous-friction from 0 to {} s",
+                Friction::MOST,
+                Friction::MOST_VISCOUS_S
+            ));
+        }
+        if !friction.is_none() && self.rule() == Rule::Paper {
+            return Err("friction with the paper's contact rule, which knows of none".to_owned())
+                .or_hint("leave --contact paper or the friction out");
+        }
+        Ok(friction)
+    }
+
     /// The contact rule.
     #[must_use]
     pub const fn rule(&self) -> Rule {
@@ -155,5 +203,41 @@ impl Rendering {
             None | Some(ContactRule::Swept) => Rule::Swept,
             Some(ContactRule::Paper) => Rule::Paper,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn friction_that_no_surface_has_is_refused_with_what_to_do() {
+        let with = |friction, static_friction, viscous_friction| Rendering {
+            friction,
+            static_friction,
+            viscous_friction,
+            ..Rendering::default()
+        };
+        let bad = [
+            with(Some(-0.1), None, None),
+            with(Some(f32::NAN), None, None),
+            with(Some(0.5), Some(0.4), None),
+            with(Some(11.0), None, None),
+            with(None, None, Some(-0.1)),
+            Rendering {
+                contact: Some(ContactRule::Paper),
+                ..with(Some(0.5), None, None)
+            },
+        ];
+        for rendering in bad {
+            assert!(rendering.law().is_err(), "{rendering:?}");
+        }
+        let law = with(Some(0.5), None, None).law().expect("valid");
+        assert_eq!(law.friction, Friction::coulomb(0.5));
+        let law = with(None, Some(0.2), None).law().expect("valid");
+        assert_eq!(
+            (law.friction.static_mu, law.friction.dynamic_mu),
+            (0.2, 0.0)
+        );
     }
 }

@@ -1,0 +1,141 @@
+//! Friction as a user meets it: real ground, an arm's encoders, the command.
+
+use std::path::Path;
+
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::replay::on_native;
+use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra_core::contact::{ContactState, Friction, Rule};
+use hapterra_core::force::ForceLaw;
+use hapterra_core::scene::Sample;
+use hapterra_tests::chance::Chance;
+use hapterra_tests::field::position;
+use hapterra_tests::invariants::surface::distance;
+
+const MU: f64 = 0.4;
+
+fn law(friction: Friction) -> ForceLaw {
+    ForceLaw {
+        friction,
+        ..ForceLaw::PREMIUM
+    }
+}
+
+fn slippery() -> ForceLaw {
+    law(Friction::coulomb(MU as f32))
+}
+
+/// Files of real ground; none where they are not on this machine.
+fn real() -> Vec<Raster> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/dem/real");
+    [
+        "mt_rainier_90m.tif",
+        "SainteHelens.dem",
+        "LisbonElevation.tif",
+    ]
+    .iter()
+    .map(|name| folder.join(name))
+    .filter(|path| path.exists())
+    .map(|path| Raster::open(path, &OpenOptions::default()).expect("opens"))
+    .collect()
+}
+
+fn terrain(raster: &Raster) -> Terrain<'_> {
+    let grid = FeltGrid::new(raster, FeltCells::Square);
+    let scale = Scale::true_to(&grid, 1.0).expect("scale");
+    Terrain::over(grid, scale, 0).expect("terrain")
+}
+
+/// What a HIP feels that slides around the middle of a terrain on an ellipse, `depth` mm
+/// deep, so many millimetres a tick.
+fn slide(terrain: &Terrain<'_>, law: ForceLaw, depth: f64, speed: f64) -> Vec<Sample> {
+    let mut replayer = on_native(terrain, law, Rule::Swept).expect("opened");
+    let size = terrain.size_mm();
+    let radius = size[0].min(size[1]) / 3.0;
+    let mut felt = vec![];
+    for tick in 0..3_000 {
+        let angle = f64::from(tick) * speed / radius;
+        let at = [
+            size[0] / 2.0 + radius * angle.cos(),
+            size[1] / 2.0 + 0.8 * radius * angle.sin(),
+        ];
+        let ground = terrain.height_mm(at[0], at[1]).expect("inside");
+        let above = if tick == 0 { 1.0 } else { -depth };
+        let hip = terrain.scale().to_grid([at[0], at[1], ground + above]);
+        felt.push(replayer.feel(hip.expect("addressable")).expect("felt"));
+    }
+    felt
+}
+
+/// Tangential over normal force at a place of the surface, by the slopes of the terrain
+/// there; none beside a line of the grid, where there are several.
+fn ratio(terrain: &Terrain<'_>, sample: &Sample) -> Option<f64> {
+    let [x, y, _] = position(&sample.proxy);
+    let is_inside = |c: f64| (0.002..0.998).contains(&(c - c.floor()));
+    if !(is_inside(x) && is_inside(y)) {
+        return None;
+    }
+    let step = 1e-3;
+    let height = |x: f64, y: f64| terrain.height_mm(x, y).expect("inside");
+    let east = (height(x + step, y) - height(x - step, y)) / (2.0 * step);
+    let north = (height(x, y + step) - height(x, y - step)) / (2.0 * step);
+    let norm = (1.0 + east * east + north * north).sqrt();
+    let normal = [-east / norm, -north / norm, 1.0 / norm];
+    let force = sample.force_n.as_dvec3().to_array();
+    let pressed: f64 = (0..3).map(|i| force[i] * normal[i]).sum();
+    let along = [0, 1, 2].map(|i| force[i] - pressed * normal[i]);
+    Some(distance(along, [0.0; 3]) / pressed)
+}
+
+#[test]
+fn on_real_ground_it_slides_within_five_parts_in_a_hundred_of_its_coefficient() {
+    let rasters = real();
+    if rasters.is_empty() {
+        println!("skipped: no files of real ground in ../shared/dem/real");
+    }
+    for raster in &rasters {
+        let terrain = terrain(raster);
+        for speed in [0.01, 0.1, 0.5] {
+            let felt = slide(&terrain, slippery(), 0.3, speed);
+            let moves = felt.windows(2).filter(|pair| {
+                let [before, now] = [pair[0], pair[1]];
+                now.state == ContactState::Touching && before.proxy != now.proxy
+            });
+            let ratios: Vec<f64> = moves.filter_map(|pair| ratio(&terrain, &pair[1])).collect();
+            let off = |ratio: &&f64| (**ratio / MU - 1.0).abs() > 0.05;
+            let (least, most) = ratios
+                .iter()
+                .fold((f64::MAX, 0.0_f64), |(a, b), r| (a.min(*r), b.max(*r)));
+            let wrong = ratios.iter().filter(off).count();
+            println!(
+                "{speed} mm a tick: {wrong} of {} slides off, {least:.4} to {most:.4}",
+                ratios.len()
+            );
+        }
+    }
+}
+
+#[test]
+fn an_hour_of_encoder_noise_moves_a_stuck_proxy_by_no_bit() {
+    let raster = Raster::from_fn(64, 64, |x, y| ((x * 7 + y * 3) % 11) as f32 * 0.03).expect("made");
+    let terrain = terrain(&raster);
+    let law = law(Friction::coulomb(0.8));
+    let mut chance = Chance::new(5);
+    // Inside a patch, on an edge, on a vertex.
+    for at in [[20.3, 30.6], [25.0, 30.4], [41.0, 17.0]] {
+        let mut replayer = on_native(&terrain, law, Rule::Swept).expect("opened");
+        let ground = terrain.height_mm(at[0], at[1]).expect("inside");
+        let mut feel = |off: [f64; 3]| {
+            let hip = [at[0] + off[0], at[1] + off[1], ground + off[2]];
+            let hip = terrain.scale().to_grid(hip).expect("addressable");
+            replayer.feel(hip).expect("felt")
+        };
+        let _ = feel([0.0, 0.0, 0.5]);
+        let stuck = feel([0.0, 0.0, -1.0]).proxy;
+        for tick in 0..3_600_000 {
+            let mut count = || 0.03 * (chance.below(3) as f64 - 1.0);
+            let now = feel([count(), count(), -1.0 + count()]).proxy;
+            assert_eq!(now, stuck, "tick {tick} at {at:?}");
+        }
+    }
+}
