@@ -117,7 +117,8 @@ fn on_real_ground_it_slides_within_five_parts_in_a_hundred_of_its_coefficient() 
 
 #[test]
 fn an_hour_of_encoder_noise_moves_a_stuck_proxy_by_no_bit() {
-    let raster = Raster::from_fn(64, 64, |x, y| ((x * 7 + y * 3) % 11) as f32 * 0.03).expect("made");
+    let raster =
+        Raster::from_fn(64, 64, |x, y| ((x * 7 + y * 3) % 11) as f32 * 0.03).expect("made");
     let terrain = terrain(&raster);
     let law = law(Friction::coulomb(0.8));
     let mut chance = Chance::new(5);

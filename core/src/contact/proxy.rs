@@ -116,24 +116,27 @@ impl OnSurface {
 }
 
 /// The proxy and what it remembers from tick to tick.
+// In this order: what every tick reads first lies within reach of its loads, which the phase
+// and what friction remembers are not.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Contact {
-    settings: ContactSettings,
-    phase: Phase,
-    /// Another view was put in: the proxy is to begin on its surface. It waits meanwhile.
-    landing: Option<Landing>,
-    /// What friction holds of the proxy, where the surface is rough.
-    rubbing: Option<Rubbing>,
     /// The HIP of the last tick.
     hip: GridPoint,
+    output: ContactOutput,
     /// The last answer is the answer again while the HIP has not moved: there
     /// is nothing left to do, and no force is fading. (A field does not change;
     /// another one comes with a new contact.)
     at_rest: bool,
-    output: ContactOutput,
+    settings: ContactSettings,
+    phase: Phase,
     /// What was felt by the last answer that counted, one that did not wait in
     /// lock-step: where the proxy was, and the displacement to it.
     felt: Option<(GridPoint, Vec3)>,
+    /// Another view was put in: the proxy is to begin on its surface. It waits meanwhile.
+    landing: Option<Landing>,
+    /// What friction holds of the proxy, where the surface is rough.
+    rubbing: Option<Rubbing>,
 }
 
 impl Contact {
@@ -214,10 +217,6 @@ impl Contact {
         window: &Window<'_, D>,
         hip: &GridPoint,
     ) -> &ContactOutput {
-        if self.rubbing.is_some() {
-            self.rub(window, *hip);
-            return &self.output;
-        }
         if self.at_rest && self.hip.is_same(hip) {
             self.output.work = 0;
             return &self.output;
@@ -273,6 +272,10 @@ impl Contact {
         hip: GridPoint,
         known: Option<Place>,
     ) {
+        if self.rubbing.is_some() {
+            // Nothing was known: with friction no shortcut is taken.
+            return self.rub(window, hip);
+        }
         let mut budget = Budget::new(self.settings.work_per_tick);
         self.remembers_what_was_felt();
         if !hip.is_same(&self.hip) {

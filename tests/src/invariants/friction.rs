@@ -8,7 +8,7 @@ use super::seen::Seen;
 use super::surface::{Patch, distance};
 
 /// Part by which a proxy that has slid may be pulled more than its friction holds.
-const SLACK: f64 = 0.0102;
+const SLACK: f64 = 0.0302;
 /// Ticks at 1 kHz after which a proxy that does not move sticks by static friction.
 const STICKS_AFTER: u32 = 21;
 /// HIPs nearer than this, in cells, press with nothing worth a cone.

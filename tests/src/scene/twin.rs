@@ -187,6 +187,7 @@ pub fn same_way(
         if parted {
             continue;
         }
+        let agree = |proxy, a: &Seen, b: &Seen| agree(scene, proxy, a, b);
         if agree(turned(a.proxy), a, b) {
             parted = !is_near(turned(a.proxy), a, b);
             continue;
@@ -208,8 +209,13 @@ pub fn same_way(
     Ok(true)
 }
 
-/// Rounding apart, the same answer; or another one that is as near to the HIP.
-fn agree(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {
+/// A proxy that slid may be pulled by so much more than friction holds, as a part: where
+/// rounding decides whether it slides on, twins are as far apart.
+const SLACK: f64 = 0.03;
+
+/// Rounding apart, the same answer; or another one that is as near to the HIP; or, with
+/// friction, another that a proxy which slid may stop at.
+fn agree(scene: &Scene, proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {
     let (da, db) = (distance(a.proxy, a.hip), distance(b.proxy, b.hip));
     let tie = (da - db).abs() <= 1e-5 * da.max(1.0);
     // A HIP in the surface may touch it or be free: nothing is felt either way.
@@ -218,7 +224,12 @@ fn agree(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {
         may && seen.felt.displacement.length() <= ERROR as f32
     };
     let same = a.felt.state == b.felt.state || (at_hip(a) && at_hip(b));
-    same && a.felt.converged == b.felt.converged && (is_near(proxy, a, b) || tie)
+    let slack = match scene.friction.is_none() {
+        true => 0.0,
+        false => SLACK * f64::from(1.0 + scene.friction.static_mu) * da.max(db),
+    };
+    let slid = distance(proxy, b.proxy) <= slack;
+    same && a.felt.converged == b.felt.converged && (is_near(proxy, a, b) || tie || slid)
 }
 
 fn is_near(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {

@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 
-use crate::contact::closest_point::passes_over;
+use crate::contact::closest_point::{leads_off_surface, passes_over};
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::terrain::{Ground, TileIndex, Window};
@@ -23,26 +23,56 @@ pub(in crate::contact) struct Pull {
     presses: f32,
 }
 
+/// What is known of the pull at a point of the surface.
+pub(in crate::contact) enum Pulled {
+    /// The pull.
+    By(Pull),
+    /// The straight way to the HIP leads off the surface, or there is none.
+    Off,
+    /// A patch that meets there is in a tile that is not here.
+    Unknown(TileIndex),
+}
+
 impl Pull {
     /// The pull at a point of the surface. At the border of the data nothing presses a
     /// proxy whose HIP is above the surface's last patches.
-    ///
-    /// # Errors
-    /// A tile that holds one of the patches and is not here.
     pub(in crate::contact) fn at<const D: usize>(
         window: &Window<'_, D>,
         view: &HipView,
         point: &SurfacePoint,
-    ) -> Result<Self, TileIndex> {
+    ) -> Pulled {
+        let patch = match window.ground(point.cell) {
+            Ground::Patch(corners) => view.patch(&corners),
+            Ground::Hole => return Pulled::Off,
+            Ground::Missing => return Pulled::Unknown(TileIndex::holding(point.cell)),
+        };
         let border = point.border();
-        let mut steepest = Self::NONE;
-        let (mut is_below, mut has_hole) = (false, false);
-        for place in 0..4 {
-            let side = match place {
-                0 => Side::NONE,
-                _ => border.neighbour(place - 1),
-            };
-            if place > 0 && side == Side::NONE {
+        let pull = Self::in_patch(&patch, view, point, border);
+        let is_above = passes_over_at(&patch, view, point);
+        if border != Side::NONE {
+            return Self::on_border(window, view, point, pull, is_above);
+        }
+        if is_above {
+            Pulled::Off
+        } else {
+            Pulled::By(pull)
+        }
+    }
+
+    /// The same on the border of a patch, in which it is `pull`.
+    #[inline(never)]
+    fn on_border<const D: usize>(
+        window: &Window<'_, D>,
+        view: &HipView,
+        point: &SurfacePoint,
+        pull: Self,
+        is_above: bool,
+    ) -> Pulled {
+        let border = point.border();
+        let (mut steepest, mut is_below, mut has_hole) = (pull, !is_above, false);
+        for place in 0..3 {
+            let side = border.neighbour(place);
+            if side == Side::NONE {
                 continue;
             }
             let there = point.across(side);
@@ -51,25 +81,19 @@ impl Pull {
                     let patch = view.patch(&corners);
                     is_below |= !passes_over_at(&patch, view, &there);
                     let pull = Self::in_patch(&patch, view, &there, border.across(side));
-                    if pull.pulls > steepest.pulls || place == 0 {
+                    if pull.pulls > steepest.pulls {
                         steepest = pull;
                     }
                 }
-                Ground::Missing => return Err(TileIndex::holding(there.cell)),
+                Ground::Missing => return Pulled::Unknown(TileIndex::holding(there.cell)),
                 Ground::Hole => has_hole = true,
             }
         }
-        if has_hole && !is_below {
-            steepest.presses = 0.0;
+        if leads_off_surface(window, view, point) || (has_hole && !is_below) {
+            return Pulled::Off;
         }
-        Ok(steepest)
+        Pulled::By(steepest)
     }
-
-    const NONE: Self = Self {
-        along: Vec3::ZERO,
-        pulls: 0.0,
-        presses: 0.0,
-    };
 
     fn in_patch(patch: &Patch, view: &HipView, at: &SurfacePoint, border: Side) -> Self {
         let (p, q) = view.in_patch(at.cell);

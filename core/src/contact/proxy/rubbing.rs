@@ -2,8 +2,8 @@
 
 use super::{Contact, OnSurface, Phase, Turn};
 use crate::contact::budget::{ARRIVAL, Budget, SLOPE};
-use crate::contact::closest_point::{leads_off_surface, position_on};
-use crate::contact::friction::{Friction, Pull};
+use crate::contact::closest_point::{Leave, position_on};
+use crate::contact::friction::{Friction, Pull, Pulled};
 use crate::contact::output::ContactState;
 use crate::contact::settings::Execution;
 use crate::contact::surface::{HipView, SurfacePoint};
@@ -24,7 +24,7 @@ const STILL: f32 = 1e-3;
 /// A proxy that has slid is asked for again whether friction holds it there: a crease
 /// may have turned the surface under it. By this part it may slide on less far than it
 /// would.
-const SLACK: f32 = 0.01;
+const SLACK: f32 = 0.03;
 /// Times that a proxy slides in a tick; then it goes for the HIP itself, which is inside
 /// of every cone.
 const SLIDES: u32 = 3;
@@ -50,6 +50,9 @@ pub(super) struct Rubbing {
     creeps: bool,
     /// How long it has not moved, ticks.
     still: u32,
+    /// There is nothing left to do while the HIP does not move. ([`Contact`] has a flag for
+    /// this, too; a proxy that rubs counts its ticks at rest.)
+    at_rest: bool,
 }
 
 /// A proxy that was felt on the surface.
@@ -82,6 +85,7 @@ impl Rubbing {
             slides: false,
             creeps: false,
             still: 0,
+            at_rest: false,
         })
     }
 
@@ -133,14 +137,14 @@ impl Contact {
             return;
         };
         let has_moved = rubbing.creeps || !rubbing.hip.is_same(&hip);
-        if self.at_rest && !has_moved {
+        if rubbing.at_rest && !has_moved {
             self.output.work = 0;
             return rubbing.counts(true, self.settings.rate);
         }
         let mut budget = Budget::new(self.settings.work_per_tick);
         self.remembers_what_was_felt();
         if has_moved {
-            self.redirect(window, hip, None, &mut budget);
+            self.begins_anew(window, hip, &mut budget);
             self.begins_to_rub(hip);
         }
         if let (Phase::OnSurface(on), Some(rubbing)) = (&self.phase, &mut self.rubbing) {
@@ -148,7 +152,6 @@ impl Contact {
         }
         while self.goes_on(window, hip, &mut budget) == Turn::GoesOn {}
         self.hip = hip;
-        self.at_rest = self.output.converged && self.boundary_fade() == 1.0;
         self.output.work = budget.spent();
         self.answers_from_the_surface(window);
         self.counts_stillness();
@@ -161,13 +164,21 @@ impl Contact {
             return;
         };
         let has_ended = self.output.converged;
+        rubbing.at_rest = has_ended;
         rubbing.creeps = has_ended && rubbing.times > 0 && rubbing.friction.viscous_s > 0.0;
         let Phase::OnSurface(on) = &self.phase else {
+            rubbing.at_rest &= !matches!(self.phase, Phase::Fading { .. });
             return;
         };
-        let view = HipView::new(rubbing.hip);
-        let nearest = on.descent.nearest(window, &view);
-        if let Some((point, _)) = nearest
+        rubbing.at_rest &= on.fade == 1.0;
+        let point = match has_ended {
+            true => Some(on.descent.entry()),
+            false => {
+                let nearest = on.descent.nearest(window, &HipView::new(rubbing.hip));
+                nearest.map(|(point, _)| point)
+            }
+        };
+        if let Some(point) = point
             && let Some(proxy) = position_on(window, &point)
         {
             self.output.proxy = proxy;
@@ -177,6 +188,23 @@ impl Contact {
             } else if self.settings.execution == Execution::RealTime {
                 rubbing.stood = Some(Stood { point, proxy });
             }
+        }
+    }
+
+    /// The HIP has moved: a way under way leads to its new place. A proxy that had come to
+    /// its end begins where it is, without another look at where that is.
+    fn begins_anew<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        budget: &mut Budget,
+    ) {
+        match &mut self.phase {
+            Phase::OnSurface(on) if self.output.converged => {
+                on.descent.restart(on.descent.entry());
+                (on.leave, on.departures) = (Leave::Anywhere, None);
+            }
+            _ => self.redirect(window, hip, None, budget),
         }
     }
 
@@ -264,20 +292,17 @@ impl Contact {
             return Verdict::Waits(None);
         }
         budget.spend(CONE);
-        let Some((point, _)) = on.descent.nearest(window, &view) else {
-            return Verdict::Goes(hip);
-        };
-        if leads_off_surface(window, &view, &point) {
-            return Verdict::Goes(hip);
-        }
+        let point = on.descent.entry();
         match Pull::at(window, &view, &point) {
-            // Held where it has come to; what lies beyond is not known.
-            Err(_) if !waits => Verdict::Goes(hip),
-            Ok(pull) => {
-                let here = position_on(window, &point);
+            Pulled::By(pull) => {
+                let trails = rubbing.times > 0 && rubbing.friction.viscous_s > 0.0;
+                let here = trails.then(|| position_on(window, &point)).flatten();
                 rubbing.judges(&pull, self.settings.rate, here)
             }
-            Err(tile) => Verdict::Waits(Some(tile)),
+            Pulled::Unknown(tile) if waits => Verdict::Waits(Some(tile)),
+            // Without a patch there is no friction. Before a missing tile the proxy is held
+            // where it has come to; what lies beyond is not known.
+            Pulled::Off | Pulled::Unknown(_) => Verdict::Goes(hip),
         }
     }
 
