@@ -88,8 +88,25 @@ impl Raster {
     /// What is wrong with which file; never a panic, and never an allocation
     /// that the file's own size does not justify.
     pub fn open(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Self, Error> {
-        let path = path.as_ref();
-        open::decode(path, options)
+        Self::opened(path.as_ref(), options, open::decode)
+    }
+
+    /// Opens a terrain file with GDAL, also one that [`Raster::open`] reads by itself: both
+    /// are to say the same of it.
+    ///
+    /// # Errors
+    /// As [`Raster::open`]; what comes in an archive is no file that GDAL could open.
+    #[cfg(feature = "gdal")]
+    pub fn open_by_gdal(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Self, Error> {
+        Self::opened(path.as_ref(), options, open::decode_by_gdal)
+    }
+
+    fn opened(
+        path: &Path,
+        options: &OpenOptions,
+        decode: impl Fn(&Path, &OpenOptions) -> Result<Decoded, BadRaster>,
+    ) -> Result<Self, Error> {
+        decode(path, options)
             .and_then(|decoded| decoded.with_ground_cell(options.ground_cell_m))
             .map(|decoded| decoded.with_vertical_unit(options.vertical_unit_m))
             .and_then(|decoded| Self::checked(decoded, options.no_data))
