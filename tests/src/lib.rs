@@ -16,6 +16,7 @@ pub mod invariants;
 pub mod link_campaign;
 pub mod minima;
 pub mod oracle;
+pub mod readers;
 pub mod rows;
 pub mod scene;
 pub mod soak;

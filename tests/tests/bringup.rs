@@ -150,31 +150,66 @@ fn it_goes_on_where_it_was_and_again_where_the_record_is_another() {
     assert!(said.contains("step 6 of 11") && !said.contains("step 5 of 11"));
 }
 
-/// Never holds the tip while a motor is jogged for the first time.
-struct Careless(VirtualUser);
+/// A user who does and answers some things in another way.
+struct Another {
+    user: VirtualUser,
+    /// What is done where a task is asked for.
+    does: fn(Task) -> Task,
+    /// What is answered whatever is there.
+    answers: fn(Question) -> Option<bool>,
+}
 
-impl Attendant for Careless {
+impl Another {
+    fn than(user: VirtualUser) -> Self {
+        Self {
+            user,
+            does: |task| task,
+            answers: |_| None,
+        }
+    }
+
+    /// Never holds the tip while a motor is jogged for the first time.
+    fn careless(user: VirtualUser) -> Self {
+        Self {
+            does: |task| match task {
+                Task::HoldLoosely => Task::LetGoOfTip,
+                task => task,
+            },
+            ..Self::than(user)
+        }
+    }
+
+    /// Has amplifiers that do not say whether they are ready.
+    fn without_ready(user: VirtualUser) -> Self {
+        Self {
+            answers: |question| (question == Question::ReadyIsWired).then_some(false),
+            ..Self::than(user)
+        }
+    }
+}
+
+impl Attendant for Another {
     fn hear(&mut self, line: &str) {
-        self.0.hear(line);
+        self.user.hear(line);
     }
 
     fn begin(&mut self, task: Task) {
-        self.0.begin(task);
+        self.user.begin(task);
     }
 
     fn finish(&mut self, task: Task) -> Result<(), Stopped> {
-        self.0.finish(match task {
-            Task::HoldLoosely => Task::LetGoOfTip,
-            task => task,
-        })
+        self.user.finish((self.does)(task))
     }
 
     fn read(&mut self, reading: Reading) -> Result<f64, Stopped> {
-        self.0.read(reading)
+        self.user.read(reading)
     }
 
     fn confirms(&mut self, question: Question) -> Result<bool, Stopped> {
-        self.0.confirms(question)
+        match (self.answers)(question) {
+            Some(answer) => Ok(answer),
+            None => self.user.confirms(question),
+        }
     }
 }
 
@@ -185,18 +220,18 @@ fn an_arm_that_nobody_holds_is_stopped_before_it_is_fast() {
     model.gravity_m_s2 = 0.0;
     for gain in [1.0, -1.0] {
         let wiring = Wiring::RIGHT.with_gain(0, gain);
-        let mut user = Careless(VirtualUser::at(VirtualBench::new(model, wiring)));
-        user.0.says = say;
+        let mut user = Another::careless(VirtualUser::at(VirtualBench::new(model, wiring)));
+        user.user.says = say;
         SAID.take();
         let mut log = Log::default();
         let mut ended = Ok(Walked::BoardWasOff);
         while let Ok(Walked::BoardWasOff) = ended {
-            let device = user.0.device(RECORD);
+            let device = user.user.device(RECORD);
             ended = walked_once(&mut user, device, &mut log);
         }
         let said = SAID.take();
         assert!(said.contains("the jog ended with fault 22"), "{said}");
-        let fastest = user.0.bench().borrow().fastest_rad_s();
+        let fastest = user.user.bench().borrow().fastest_rad_s();
         println!("fastest {fastest:?} rad/s");
         let most = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;
         assert!(fastest[0] < most, "{fastest:?}");
@@ -383,34 +418,6 @@ fn an_amplifier_that_is_not_there_is_named_before_any_motor_and_if_it_goes_later
     }
 }
 
-/// Has amplifiers that do not say whether they are ready.
-struct WithoutReady(VirtualUser);
-
-impl Attendant for WithoutReady {
-    fn hear(&mut self, line: &str) {
-        self.0.hear(line);
-    }
-
-    fn begin(&mut self, task: Task) {
-        self.0.begin(task);
-    }
-
-    fn finish(&mut self, task: Task) -> Result<(), Stopped> {
-        self.0.finish(task)
-    }
-
-    fn read(&mut self, reading: Reading) -> Result<f64, Stopped> {
-        self.0.read(reading)
-    }
-
-    fn confirms(&mut self, question: Question) -> Result<bool, Stopped> {
-        match question {
-            Question::ReadyIsWired => Ok(false),
-            question => self.0.confirms(question),
-        }
-    }
-}
-
 #[test]
 fn amplifiers_that_do_not_say_whether_they_are_ready_are_noted() {
     let mistakes = BenchMistakes {
@@ -418,9 +425,9 @@ fn amplifiers_that_do_not_say_whether_they_are_ready_are_noted() {
         ..BenchMistakes::default()
     };
     let bench = wired(Wiring::RIGHT).with_mistakes(mistakes);
-    let mut user = WithoutReady(VirtualUser::at(bench));
+    let mut user = Another::without_ready(VirtualUser::at(bench));
     let mut log = Log::default();
-    let device = user.0.device(RECORD);
+    let device = user.user.device(RECORD);
     let ended = walked_once(&mut user, device, &mut log).expect("to the enable line");
     assert_eq!(ended, Walked::BoardWasOff);
     let last = log.entries.last().expect("an entry");

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use hapterra::raster::{BadRaster, OpenOptions, Raster};
+use hapterra_tests::readers::Reader;
 
 const HOLE: (u32, u32) = (3, 4);
 
@@ -38,7 +39,12 @@ fn assert_field(raster: &Raster, (columns, rows): (u32, u32), band: u32, name: &
 }
 
 fn open(name: &str, options: &OpenOptions) -> Raster {
-    Raster::open(path(name), options).unwrap_or_else(|error| panic!("{error}"))
+    open_by(Reader::Own, name, options)
+}
+
+fn open_by(reader: Reader, name: &str, options: &OpenOptions) -> Raster {
+    let raster = reader.open(&path(name), options);
+    raster.unwrap_or_else(|error| panic!("{reader:?}: {error}"))
 }
 
 fn of_band(band: u32) -> OpenOptions {
@@ -50,6 +56,12 @@ fn of_band(band: u32) -> OpenOptions {
 
 #[test]
 fn every_encoding_holds_the_exact_field_in_its_place() {
+    for reader in Reader::ALL {
+        holds_the_exact_field(*reader);
+    }
+}
+
+fn holds_the_exact_field(reader: Reader) {
     for name in [
         "lerc_i16.tif",
         "lerc_deflate_u16.tif",
@@ -62,7 +74,7 @@ fn every_encoding_holds_the_exact_field_in_its_place() {
         "float.flt",
         "envi.dat",
     ] {
-        let raster = open(name, &OpenOptions::default());
+        let raster = open_by(reader, name, &OpenOptions::default());
         assert_field(&raster, (40, 30), 1, name);
         let bounds = raster
             .bounds()
@@ -74,7 +86,7 @@ fn every_encoding_holds_the_exact_field_in_its_place() {
             "{name}"
         );
     }
-    let dted = open("n34w119.dt0", &OpenOptions::default());
+    let dted = open_by(reader, "n34w119.dt0", &OpenOptions::default());
     assert_field(&dted, (121, 121), 1, "n34w119.dt0");
     let bounds = dted.bounds().expect("placed");
     assert!(
@@ -95,16 +107,20 @@ fn a_band_is_chosen_by_its_number() {
         ("ehdr.bil", 2),
         ("envi.dat", 2),
     ] {
-        for band in 1..=bands {
-            assert_field(&open(name, &of_band(band)), (40, 30), band, name);
+        for reader in Reader::ALL.iter().copied() {
+            for band in 1..=bands {
+                let raster = open_by(reader, name, &of_band(band));
+                assert_field(&raster, (40, 30), band, name);
+            }
+            let error = reader.open(&path(name), &of_band(bands + 1));
+            let error = error.expect_err(name);
+            assert!(
+                matches!(error.fault(), BadRaster::NoSuchPart { .. }),
+                "{error}"
+            );
+            let there = format!("bands 1 to {bands}");
+            assert!(error.to_string().contains(&there), "{error}");
         }
-        let error = Raster::open(path(name), &of_band(bands + 1)).expect_err(name);
-        assert!(
-            matches!(error.fault(), BadRaster::NoSuchPart { .. }),
-            "{error}"
-        );
-        let there = format!("bands 1 to {bands}");
-        assert!(error.to_string().contains(&there), "{error}");
     }
     let error = Raster::open(path("n34w119.dt0"), &of_band(2)).expect_err("one field");
     assert!(error.to_string().contains("DTED has one field"), "{error}");

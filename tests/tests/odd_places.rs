@@ -9,6 +9,7 @@ use std::process::Command;
 use hapterra::place::{Coordinates, Target};
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{FeltCells, FeltGrid};
+use hapterra_tests::readers::Reader;
 use hapterra_tests::{hapterra_binary, info};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/odd_places");
@@ -38,7 +39,12 @@ impl Row {
     }
 
     fn raster(&self) -> Raster {
-        Raster::open(self.path(), &OpenOptions::default()).expect("a terrain")
+        self.raster_by(Reader::Own)
+    }
+
+    fn raster_by(&self, reader: Reader) -> Raster {
+        let raster = reader.open(Path::new(&self.path()), &OpenOptions::default());
+        raster.unwrap_or_else(|error| panic!("{reader:?}: {error}"))
     }
 }
 
@@ -95,14 +101,25 @@ fn what_is_asked_for_by_longitude_and_latitude_is_there() {
 #[test]
 fn cells_are_as_large_as_on_their_own_body() {
     for row in rows() {
-        let raster = row.raster();
-        let (along_row, along_column) = raster.cell().expect("known").ground_metres();
-        for (found, wanted) in [
-            (along_row, row.along_row_m),
-            (along_column, row.along_column_m),
-        ] {
-            let off = found / wanted - 1.0;
-            assert!(off.abs() < 1e-4, "{}: {found} for {wanted} m", row.file);
+        // GDAL 3.6 finds no place in these NetCDF files, as `gdalinfo` shows.
+        let is_placed = |reader: &&Reader| **reader == Reader::Own || !row.file.ends_with(".nc");
+        for reader in Reader::ALL.iter().filter(is_placed) {
+            let raster = row.raster_by(*reader);
+            let (along_row, along_column) = raster
+                .cell()
+                .unwrap_or_else(|| panic!("{} by {reader:?}", row.file))
+                .ground_metres();
+            for (found, wanted) in [
+                (along_row, row.along_row_m),
+                (along_column, row.along_column_m),
+            ] {
+                let off = found / wanted - 1.0;
+                assert!(
+                    off.abs() < 1e-4,
+                    "{} by {reader:?}: {found} for {wanted} m",
+                    row.file
+                );
+            }
         }
     }
 }

@@ -5,6 +5,7 @@
 //! its command.
 
 use hapterra::raster::{Bounds, OpenOptions, Raster};
+use hapterra_tests::readers::Reader;
 use hapterra_tests::{info, shared};
 
 const TABLE: &str = include_str!("../data/places_by_gdal.csv");
@@ -79,14 +80,16 @@ fn files_lie_where_gdal_sees_them() {
         if !row.is_a_surface() || !path.is_file() {
             continue;
         }
-        let raster = match Raster::open(&path, &OpenOptions::default()) {
-            Ok(raster) => raster,
-            // Colours and nothing but no-data.
-            Err(_) if is_foreign(&row) => continue,
-            Err(error) => panic!("{error}"),
-        };
-        compare(&raster, &row);
-        checked += 1;
+        for reader in Reader::ALL.iter().filter(|reader| reader.knows(&row.file)) {
+            let raster = match reader.open(&path, &OpenOptions::default()) {
+                Ok(raster) => raster,
+                // Colours and nothing but no-data.
+                Err(_) if is_foreign(&row) => continue,
+                Err(error) => panic!("{reader:?}: {error}"),
+            };
+            compare(&raster, &row, *reader);
+            checked += 1;
+        }
     }
     println!("{checked} files lie where GDAL sees them");
     assert!(checked >= 30, "only {checked} files were there");
@@ -97,18 +100,20 @@ fn is_foreign(row: &Row) -> bool {
     row.file.starts_with("tiff_ok/")
 }
 
-fn compare(raster: &Raster, row: &Row) {
+fn compare(raster: &Raster, row: &Row, reader: Reader) {
     let file = &row.file;
     let system = raster.reference_system();
     let code = system.and_then(|system| system.code());
-    if let Ok(epsg) = row.epsg.parse::<u16>() {
-        assert_eq!(code, Some(epsg), "{file}");
+    // What GDAL hands over as text may have lost its code: longitudes are compared below.
+    let has_lost_code = reader != Reader::Own && code.is_none() && system.is_some();
+    if let (Ok(epsg), false) = (row.epsg.parse::<u16>(), has_lost_code) {
+        assert_eq!(code, Some(epsg), "{file} by {reader:?}");
     } else if row.epsg.is_empty() {
-        assert_eq!(system, None, "{file}");
+        assert_eq!(system, None, "{file} by {reader:?}");
     } else {
         assert!(system.is_some() && code.is_none(), "{file}: {system:?}");
     }
-    if has_less_rows(row) {
+    if has_less_rows(row) && reader == Reader::Own {
         let found = sides(raster.bounds().expect("placed"));
         assert_eq!([found[0], found[2]], [row.west, row.east]);
         let missing = row.rows - raster.rows();
@@ -122,8 +127,16 @@ fn compare(raster: &Raster, row: &Row) {
         "{file}"
     );
     assert_same(raster.bounds(), row.bounds(), file);
-    if let Some(degrees) = row.lonlat() {
-        assert_same(raster.bounds_lonlat(), degrees, file);
+    let Some(degrees) = row.lonlat() else {
+        return;
+    };
+    if !has_lost_code {
+        return assert_same(raster.bounds_lonlat(), degrees, file);
+    }
+    // Without the code, the way to WGS 84 is that of the datum's name: usually within 45 m.
+    let found = sides(raster.bounds_lonlat().expect("a known projection"));
+    for (found, wanted) in found.iter().zip(degrees) {
+        assert!((found - wanted).abs() * 110_000.0 < 45.0, "{file}: {found}");
     }
 }
 

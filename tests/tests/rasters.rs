@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use hapterra::raster::{BadRaster, CellUnit, OpenOptions, PngChannel, Raster};
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain, TileBuffer};
 use hapterra_core::terrain::TileKey;
+use hapterra_tests::readers::Reader;
 use hapterra_tests::shared;
 
 const COLUMNS: usize = 512;
@@ -110,7 +111,12 @@ fn every_variant_decodes_to_the_exact_samples() {
     let mut checked = 0;
     for (name, description) in variants(&folder) {
         if let Some(truth) = expected(&folder, &name, &description) {
-            assert_heights(&open(&folder.join(&name)), &truth, &name);
+            let path = folder.join(&name);
+            for reader in Reader::ALL.iter().filter(|reader| reader.knows(&name)) {
+                let raster = reader.open(&path, &OpenOptions::default());
+                let raster = raster.unwrap_or_else(|error| panic!("{reader:?}: {error}"));
+                assert_heights(&raster, &truth, &format!("{name} by {reader:?}"));
+            }
             checked += 1;
         }
     }

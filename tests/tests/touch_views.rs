@@ -7,8 +7,10 @@ use std::time::Duration;
 
 use hapterra::link::{Arming, Event, Native, Patience, Session};
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
-use hapterra::place::{Bounds, Laid, Reach, Sizing, Target, View, ViewChange, ViewOptions};
-use hapterra::raster::Raster;
+use hapterra::place::{
+    Bounds, Coordinates, Laid, Reach, Sizing, Target, View, ViewChange, ViewOptions,
+};
+use hapterra::raster::{OpenOptions, Raster};
 use hapterra::steering::{Steer, Steering};
 use hapterra::terrain::FeltCells;
 use hapterra_core::Vec3;
@@ -64,10 +66,20 @@ fn pressed<T>(raster: &Raster, seconds: f64, play: impl FnOnce(&mut Touching<'_>
         level: Some(8),
         ..ViewOptions::default()
     };
+    pressed_at(raster, &options, seconds, play)
+}
+
+/// With a hand that presses on a view's home position for so long.
+fn pressed_at<T>(
+    raster: &Raster,
+    options: &ViewOptions,
+    seconds: f64,
+    play: impl FnOnce(&mut Touching<'_>) -> T,
+) -> T {
     let grid = options.target.grid(raster, FeltCells::default());
     let grid = grid.expect("a grid");
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
-    let view = View::new(&grid, &reach, &options).expect("a view");
+    let view = View::new(&grid, &reach, options).expect("a view");
     let terrain = view.terrain(grid).expect("a terrain");
     let law = ForceLaw::PREMIUM;
     let scene = view.scene(&terrain, law, Rule::Swept).expect("a scene");
@@ -170,6 +182,12 @@ impl Touching<'_> {
 /// The arm stays armed, no tick changes the force by more than this, and none makes more of it than
 /// there was at the beginning.
 fn judge(samples: &[Sample], most_n: f32) {
+    // The hand is pushed back, and its damping adds to the press while it moves.
+    judge_press(samples, most_n, 1.03);
+}
+
+/// The same with so many times the force of the beginning while the hand is pushed back.
+fn judge_press(samples: &[Sample], most_n: f32, most_times: f32) {
     for pair in samples.windows(2) {
         let [before, after] = [pair[0], pair[1]];
         assert_eq!(after.mode, Mode::Armed, "tick {}", after.tick);
@@ -179,8 +197,11 @@ fn judge(samples: &[Sample], most_n: f32) {
         let share = MAX_SLEW_N_PER_S / 1_000.0;
         assert!(change <= share, "tick {}: {change} N", after.tick);
         let (force, first) = (after.force_n.length(), samples[0].force_n.length());
-        // The hand is pushed back, and its damping adds to the press while it moves.
-        assert!(force <= 1.03 * first, "tick {}: {force} N", after.tick);
+        assert!(
+            force <= most_times * first,
+            "tick {}: {force} N",
+            after.tick
+        );
     }
     let worst = samples
         .windows(2)
@@ -376,4 +397,126 @@ fn what_cannot_be_had_changes_nothing_and_is_told() {
         assert_eq!(touching.samples.last().map(|last| last.view), Some(0));
         judge(&touching.samples[began..], GENTLE_N);
     });
+}
+
+/// A geographic grid from 43° to 46° N whose heights rise by a metre a metre on the ground of
+/// WGS 84: to the east along each parallel, or to the north.
+fn slope_of_degrees(axis: usize) -> Raster {
+    const STEP: f64 = 0.002;
+    let (a, e2) = (6_378_137.0_f64, 0.006_694_379_990_14);
+    let metres = |latitude: f64| {
+        let (sin, cos) = latitude.to_radians().sin_cos();
+        let w = 1.0 - e2 * sin * sin;
+        [a * cos / w.sqrt(), a * (1.0 - e2) / (w * w.sqrt())].map(|m| m.to_radians() * STEP)
+    };
+    let (columns, rows) = (61_u32, 1501_u32);
+    let mut north_m = vec![0.0];
+    for row in 1..rows {
+        let middle = metres(43.0 + (f64::from(row) - 0.5) * STEP);
+        north_m.push(north_m[row as usize - 1] + middle[1]);
+    }
+    let mut text =
+        format!("ncols {columns}\nnrows {rows}\nxllcenter 10\nyllcenter 43\ncellsize {STEP}\n");
+    for row in (0..rows).rev() {
+        let [east, _] = metres(43.0 + f64::from(row) * STEP);
+        // From the middle column on, so that it rises to the east alone there.
+        let heights = (0..columns).map(|column| match axis {
+            0 => (f64::from(column) - 30.0) * east,
+            _ => north_m[row as usize],
+        });
+        let heights = heights.map(|height| format!("{height:.4}"));
+        text += &(heights.collect::<Vec<_>>().join(" ") + "\n");
+    }
+    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("degrees{axis}.asc"));
+    std::fs::write(&path, text).expect("writable");
+    let degrees = r#"GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]"#;
+    std::fs::write(path.with_extension("prj"), degrees).expect("writable");
+    Raster::open(path, &OpenOptions::default()).expect("opens")
+}
+
+/// How steep a pressing hand feels the ground, to the east and to the north.
+fn felt_slope(sample: &Sample) -> [f64; 2] {
+    let [x, y, z] = sample.force_n.to_array().map(f64::from);
+    [-x / z, -y / z]
+}
+
+/// At the southern end 1 mm is a felt cell; commands bring the northern one under the hand,
+/// where a degree of longitude is 4.7 % shorter, and back.
+fn a_far_pan(axis: usize) {
+    let raster = slope_of_degrees(axis);
+    let options = ViewOptions {
+        target: Target::At([10.06, 43.1], Coordinates::Own),
+        level: Some(0),
+        ..ViewOptions::default()
+    };
+    pressed_at(&raster, &options, 60.0, |touching| {
+        let first = touching.last();
+        assert_felt(&first, "at the beginning");
+        let began = touching.samples.len();
+        // What a change that changes nothing does to a hand on such a slope.
+        touching.change(ViewChange::Stiffness(1.0));
+        let most = most_times(&touching.samples[began..]);
+        let began = touching.samples.len();
+        let wanted = [[1.0, 0.0], [0.0, 1.0]][axis];
+        let is_true = |sample: &Sample, where_: &str| {
+            let felt = felt_slope(sample);
+            eprintln!("{where_}: {felt:?}");
+            for (felt, wanted) in felt.iter().zip(wanted) {
+                assert!(
+                    (felt - wanted).abs() < 1e-3,
+                    "{where_}: {felt} for {wanted}"
+                );
+            }
+        };
+        is_true(&first, "in the south");
+        let ground = |touching: &Touching<'_>| {
+            let terrain = touching.steering.terrain();
+            let (cell, at) = (terrain.scale().cell_mm(), touching.last().proxy);
+            let [x, y, _] = terrain.scale().to_mm(&at).map(|mm| mm / cell);
+            terrain.grid().to_ground([x, y])
+        };
+        let [_, south] = ground(touching);
+        let metres = |north_m: f64| ViewChange::PanGround {
+            east_m: 0.0,
+            north_m,
+        };
+        let there = touching.change(metres(310_000.0));
+        assert_pressed(&there, &first, "panned to the north");
+        assert!(ground(touching)[1] - south > 2.7, "{:?}", ground(touching));
+        is_true(&there, "in the north");
+        let scale = |touching: &Touching<'_>| {
+            let view = &touching.steering.now().view;
+            (view.ground_m_per_mm().expect("known"), view.exaggeration)
+        };
+        let (m_per_mm, times) = scale(touching);
+        assert!((times.expect("known") - 1.0).abs() < 1e-9);
+        let back = touching.change(metres(-310_000.0));
+        assert_pressed(&back, &first, "panned back");
+        is_true(&back, "in the south again");
+        assert!((scale(touching).0 / m_per_mm - 1.0).abs() < 1e-12);
+        // Beside the hand there is nothing else to be measured: the same tiles serve.
+        let cells = touching.steering.terrain().clone();
+        touching.change(ViewChange::Stiffness(0.9));
+        assert!(touching.steering.terrain().has_tiles_of(&cells));
+        assert_eq!(touching.said, [""; 0]);
+        judge_press(&touching.samples[began..], GENTLE_N, most + 0.01);
+    });
+}
+
+/// The largest force of some samples, in times the first one's.
+fn most_times(samples: &[Sample]) -> f32 {
+    let forces = samples.iter().map(|sample| sample.force_n.length());
+    let most = forces.fold(0.0, f32::max) / samples[0].force_n.length();
+    eprintln!("at most {most} times the force of the beginning");
+    most
+}
+
+#[test]
+fn a_slope_to_the_east_is_true_at_both_ends_of_degrees_and_the_force_makes_no_step() {
+    a_far_pan(0);
+}
+
+#[test]
+fn a_slope_to_the_north_is_true_at_both_ends_of_degrees_and_the_force_makes_no_step() {
+    a_far_pan(1);
 }

@@ -114,6 +114,25 @@ pub struct Hand {
     pub proxy_mm: Option<[f64; 3]>,
 }
 
+impl Hand {
+    /// The place that a view is changed at.
+    fn at_mm(&self) -> [f64; 3] {
+        self.proxy_mm.unwrap_or(self.hip_mm)
+    }
+
+    /// Whether the cells of a terrain at this place are others than they are felt
+    /// ([`FeltGrid::measured_anew`]).
+    #[must_use]
+    pub fn is_far_from_measure(&self, terrain: &Terrain<'_>) -> bool {
+        let cell_mm = terrain.scale_of_level_0().cell_mm();
+        let [east, north, _] = self.at_mm();
+        let anew = terrain
+            .grid()
+            .measured_anew([east / cell_mm, north / cell_mm]);
+        anew.is_some()
+    }
+}
+
 /// Another view, and where the HIP is in it.
 #[derive(Clone)]
 pub struct Changed<'r> {
@@ -127,7 +146,8 @@ pub struct Changed<'r> {
 }
 
 impl Bounds {
-    /// Applies changes one after the other, at the place under the hand.
+    /// Applies changes one after the other, at the place under the hand. Cells are then
+    /// as large as they are there.
     ///
     /// # Errors
     /// [`ChangeError`] of the first that cannot be had; then nothing is changed.
@@ -138,24 +158,29 @@ impl Bounds {
         changes: &[ViewChange],
         hand: &Hand,
     ) -> Result<Changed<'r>, ChangeError> {
-        let at_mm = hand.proxy_mm.unwrap_or(hand.hip_mm);
+        let at_mm = hand.at_mm();
         let cell_mm = before.view.scale.cell_mm();
         let mut laid = *before;
         let mut at = [at_mm[0] / cell_mm, at_mm[1] / cell_mm];
         for change in changes {
             (laid, at) = self.step(terrain.grid(), laid, at, change)?;
         }
+        let mut grid = *terrain.grid();
+        if let Some(anew) = grid.measured_anew(at) {
+            at = anew.of_ground(grid.to_ground(at));
+            laid.view = laid.view.measured_as(&anew)?;
+            grid = anew;
+        }
         laid.view.level = match self.level {
             Some(level) => level,
-            None => finest_level(terrain.grid(), self.resolution_mm, &laid.view.scale),
+            None => finest_level(&grid, self.resolution_mm, &laid.view.scale),
         };
-        let terrain_after = terrain.rescaled(laid.view.scale, laid.view.level)?;
+        let terrain_after = terrain.relaid(grid, laid.view.scale, laid.view.level)?;
         let hip_mm = hip_after((terrain, &terrain_after), hand, at_mm, at);
         let moved = |axis: usize| before.view.home_mm[axis] + hip_mm[axis] - hand.hip_mm[axis];
         let home_mm = [moved(0), moved(1), moved(2)];
-        laid.view = laid
-            .view
-            .moved_to(terrain.grid(), home_mm, before.view.scale);
+        let was = (before.view.scale, terrain.grid());
+        laid.view = laid.view.moved_to(&grid, home_mm, was);
         Ok(Changed {
             laid,
             terrain: terrain_after,
@@ -203,7 +228,8 @@ impl Bounds {
             }
             ViewChange::Reset => {
                 let first = &self.first.view;
-                let (cell_mm, height) = (first.scale.cell_mm(), first.scale.height_mm_per_unit());
+                let cell_mm = first.scale.cell_mm() * first.as_large_as_in(grid);
+                let height = first.scale.height_mm_per_unit();
                 *view = view.scaled(cell_mm, height)?;
                 view.exaggeration = first.exaggeration;
                 *law = self.first.law;

@@ -166,16 +166,41 @@ impl View {
         })
     }
 
+    /// The same over cells that are measured at another place: as large on the ground and in
+    /// the hand, so that scale and exaggeration stay. The place has yet to be
+    /// [`Self::moved_to`].
+    pub(super) fn measured_as(self, anew: &FeltGrid<'_>) -> Result<Self, BadScale> {
+        let cell_mm = self.scale.cell_mm() * self.as_large_as_in(anew);
+        Ok(Self {
+            scale: Scale::new(cell_mm, self.scale.height_mm_per_unit())?,
+            side_m: anew.side_m(),
+            ..self
+        })
+    }
+
+    /// How many times larger a grid's cells are on the ground than the view's; once where
+    /// nobody knows.
+    pub(super) fn as_large_as_in(&self, grid: &FeltGrid<'_>) -> f64 {
+        let sides = grid.side_m().zip(self.side_m);
+        sides.map_or(1.0, |(there, here)| there / here)
+    }
+
     /// The same with another point under the tip in its home pose, hand millimetres, after
-    /// a view at another scale.
-    pub(super) fn moved_to(self, grid: &FeltGrid<'_>, home_mm: [f64; 3], before: Scale) -> Self {
-        let wider = self.scale.cell_mm() / before.cell_mm();
+    /// a view at another scale and of another grid.
+    pub(super) fn moved_to(
+        self,
+        grid: &FeltGrid<'_>,
+        home_mm: [f64; 3],
+        (before, grid_before): (Scale, &FeltGrid<'_>),
+    ) -> Self {
+        let laid = self.laid_mm.map(|mm| mm / before.cell_mm());
+        let laid = grid.around_sides_of(grid_before, laid);
         let higher = self.scale.height_mm_per_unit() / before.height_mm_per_unit();
         let felt = [home_mm[0], home_mm[1]].map(|mm| mm / self.scale.cell_mm());
         Self {
             home_mm,
             home_ground: grid.to_ground(felt),
-            laid_mm: self.laid_mm.map(|mm| mm * wider),
+            laid_mm: laid.map(|cells| cells * self.scale.cell_mm()),
             heights_mm: match higher.is_finite() {
                 true => self.heights_mm.map(|mm| mm * higher),
                 false => self.heights_mm,

@@ -88,8 +88,25 @@ impl Raster {
     /// What is wrong with which file; never a panic, and never an allocation
     /// that the file's own size does not justify.
     pub fn open(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Self, Error> {
-        let path = path.as_ref();
-        open::decode(path, options)
+        Self::opened(path.as_ref(), options, open::decode)
+    }
+
+    /// Opens a terrain file with GDAL, also one that [`Raster::open`] reads by itself: both
+    /// are to say the same of it.
+    ///
+    /// # Errors
+    /// As [`Raster::open`]; what comes in an archive is no file that GDAL could open.
+    #[cfg(feature = "gdal")]
+    pub fn open_by_gdal(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Self, Error> {
+        Self::opened(path.as_ref(), options, open::decode_by_gdal)
+    }
+
+    fn opened(
+        path: &Path,
+        options: &OpenOptions,
+        decode: impl Fn(&Path, &OpenOptions) -> Result<Decoded, BadRaster>,
+    ) -> Result<Self, Error> {
+        decode(path, options)
             .and_then(|decoded| decoded.with_ground_cell(options.ground_cell_m))
             .map(|decoded| decoded.with_vertical_unit(options.vertical_unit_m))
             .and_then(|decoded| Self::checked(decoded, options.no_data))
@@ -166,11 +183,11 @@ impl Raster {
         let columns = columns.take_while(|column| *column < u64::from(self.columns()));
         // Both fit: they are inside the field.
         let each = columns.map(|column| column as u32).zip(heights);
-        let is_coarse = self.image_of(level) > 0;
+        let image = self.image_of(level);
         for (column, height) in each {
-            *height = match is_coarse {
-                true => self.surface(level, [f64::from(column), row as f64]),
-                false => self.sample(column, row as u32),
+            *height = match image {
+                0 => self.sample(column, row as u32),
+                _ => self.surface_of(image, [f64::from(column), row as f64]),
             };
         }
     }
@@ -181,8 +198,12 @@ impl Raster {
     ///
     /// A raster in memory has one image for all levels. One that stays in its file has the
     /// heights of level *L* from the coarsest overview that is no coarser than it.
-    pub fn surface(&self, level: u8, [column, row]: [f64; 2]) -> f64 {
-        let image = self.image_of(level);
+    pub fn surface(&self, level: u8, place: [f64; 2]) -> f64 {
+        self.surface_of(self.image_of(level), place)
+    }
+
+    /// The same of an image of the file.
+    fn surface_of(&self, image: usize, [column, row]: [f64; 2]) -> f64 {
         let last = [self.columns(), self.rows()].map(|count| f64::from(count) - 1.0);
         if !(0.0..=last[0]).contains(&column) || !(0.0..=last[1]).contains(&row) {
             return f64::NAN;
@@ -270,10 +291,9 @@ impl Raster {
         self.source.storage.held()
     }
 
-    /// Whether all samples were looked at.
+    /// Whether all samples were looked at: those in memory always are.
     pub fn is_known_whole(&self) -> bool {
-        let all = u64::from(self.columns()) * u64::from(self.rows());
-        self.samples().is_some() && self.survey.summary.looked_at == all
+        self.samples().is_some()
     }
 
     /// Bytes of memory that the samples take, at most.

@@ -37,6 +37,14 @@ pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadR
     }
 }
 
+/// Decodes a file by GDAL alone.
+#[cfg(feature = "gdal")]
+pub(super) fn decode_by_gdal(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+    let input = FileBytes::open(path)?;
+    let decoded = guarded("GDAL", || super::formats::gdal::decode(&input, options))?;
+    decoded.ok_or(BadRaster::UnknownFormat)
+}
+
 /// Archives inside archives are not opened, so that unpacking ends.
 fn decode_packed(
     packing: &str,

@@ -28,6 +28,12 @@ pub struct OpenOptions {
     pub most_in_memory_bytes: u64,
 }
 
+impl OpenOptions {
+    /// What [`OpenOptions::most_in_memory_bytes`] is unless somebody states it, in units of
+    /// 2²⁰ bytes.
+    pub const IN_MEMORY_MB: u32 = 128;
+}
+
 impl Default for OpenOptions {
     fn default() -> Self {
         Self {
@@ -39,7 +45,7 @@ impl Default for OpenOptions {
             ground_cell_m: None,
             vertical_unit_m: None,
             encoding: None,
-            most_in_memory_bytes: 128 << 20,
+            most_in_memory_bytes: u64::from(Self::IN_MEMORY_MB) << 20,
         }
     }
 }

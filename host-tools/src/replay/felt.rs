@@ -161,3 +161,39 @@ fn nonce() -> u32 {
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     now.map_or(0, |now| now.as_nanos() as u32) | 1
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::Raster;
+    use crate::replay::on_native;
+    use crate::terrain::Scale;
+
+    /// A device takes a view that has the next number, and a tile that has the epoch of the
+    /// view: one that comes again is another one, also when the numbers begin again.
+    #[test]
+    fn every_view_has_the_next_number_and_an_epoch_of_its_own() {
+        let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
+        let scale = Scale::new(1.0, 1.0).expect("scale");
+        let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+        let (law, hip) = (ForceLaw::PREMIUM, GridPoint::default());
+        let mut replayer = on_native(&terrain, law, Rule::Swept).expect("opened");
+        let (mut epochs, mut last) = (std::collections::HashSet::new(), 0);
+        for view in 0..300_u32 {
+            if view > 0 {
+                let again = terrain.clone();
+                replayer.put_view(again, law, hip).expect("taken");
+            }
+            let sample = replayer.feel(hip).expect("felt");
+            assert_eq!(u32::from(sample.view), view % 256);
+            let epoch = replayer.session.scene().epoch;
+            assert!(view == 0 || epoch != last, "view {view}");
+            epochs.insert(epoch);
+            last = epoch;
+        }
+        // As many as there are numbers, and the beginning.
+        assert_eq!(epochs.len(), 257);
+        let another = on_native(&terrain, law, Rule::Swept).expect("opened");
+        assert!(!epochs.contains(&another.session.scene().epoch));
+    }
+}

@@ -24,7 +24,7 @@ use hapterra_core::scene::Sample;
 
 use crate::link::{LinkError, Native, Patience, Transport};
 use crate::output::{Output, OutputError};
-use crate::terrain::{Terrain, TerrainError};
+use crate::terrain::{FeltGrid, Terrain, TerrainError};
 use settings::ViewSettings;
 
 /// Why a replay did not come to its end. Nothing is left at the output's path.
@@ -95,11 +95,13 @@ pub fn replay_trajectory<'t>(
     let mut recording = Recording::new(output, columns)?;
     recording.describe(settings);
     let (mut summary, mut view) = (Summary::default(), 0);
+    let first = replayer.terrain().clone();
     while let Some(told) = trajectory.next_told()? {
         // Without settings it is a path alone.
         if told.view != view && !settings.views.is_empty() {
             view = told.view;
-            go_over(replayer, trajectory, settings, &told, &mut recording)?;
+            let of_views = (&first, settings);
+            go_over(replayer, trajectory, of_views, &told, &mut recording)?;
         }
         let terrain = replayer.terrain();
         let scale = *terrain.scale();
@@ -121,25 +123,29 @@ pub fn replay_trajectory<'t>(
     Ok(summary)
 }
 
-/// A terrain in another view of its recording.
+/// The terrain of a recording's beginning in another of its views.
 ///
 /// # Errors
 /// [`ReplayError::View`].
 pub fn terrain_of<'t>(
-    terrain: &Terrain<'t>,
+    first: &Terrain<'t>,
     view: &ViewSettings,
 ) -> Result<Terrain<'t>, ReplayError> {
+    let grid = match view.measured_at {
+        Some(ground) => FeltGrid::at(first.raster(), first.grid().cells(), ground),
+        None => *first.grid(),
+    };
     let number = view.number;
     let cannot = |why| ReplayError::View { number, why };
     let scale = view.scale().map_err(|why| cannot(why.into()))?;
-    terrain.rescaled(scale, view.level).map_err(cannot)
+    first.relaid(grid, scale, view.level).map_err(cannot)
 }
 
 /// Goes over to the view of a row, as it was done where it was recorded.
-fn go_over(
-    replayer: &mut Replayer<'_>,
+fn go_over<'t>(
+    replayer: &mut Replayer<'t>,
     trajectory: &mut Trajectory,
-    settings: &Settings,
+    (first, settings): (&Terrain<'t>, &Settings),
     told: &Told,
     recording: &mut Recording,
 ) -> Result<(), ReplayError> {
@@ -147,7 +153,7 @@ fn go_over(
     let Some(view) = described else {
         return Err(trajectory.of_unknown_view(told).into());
     };
-    let terrain = terrain_of(replayer.terrain(), view)?;
+    let terrain = terrain_of(first, view)?;
     let row = trajectory.lay(told, terrain.scale())?;
     replayer.put_view(terrain, view.law(), row.hip)?;
     Ok(recording.view(view)?)

@@ -51,6 +51,14 @@ pub struct Settings {
 pub struct ViewSettings {
     /// What the rows of this view have in the column `view`, from 1 on.
     pub number: u32,
+    /// Side of a felt cell of level 0 on the ground, m, where the file knows it; none also in
+    /// recordings of earlier versions, whose cells are those of the beginning.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cell_m: Option<f64>,
+    /// Where a cell of the file is as large as that, in the file's coordinates, x and y;
+    /// none where the cells are those of the beginning.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured_at: Option<[f64; 2]>,
     /// Level of detail.
     pub level: u8,
     /// Hand millimetres a felt cell of level 0.
@@ -82,13 +90,15 @@ impl ViewSettings {
     /// A view by its number and terrain.
     #[must_use]
     pub fn new(number: u32, terrain: &Terrain<'_>, laid: &Laid) -> Self {
-        let scale = terrain.scale_of_level_0();
+        let (grid, scale) = (terrain.grid(), terrain.scale_of_level_0());
         Self {
             number,
+            cell_m: grid.side_m(),
+            measured_at: grid.measured_at(),
             level: terrain.level(),
             cell_mm: scale.cell_mm(),
             height_mm_per_unit: scale.height_mm_per_unit(),
-            exaggeration: scale.exaggeration(terrain.grid()),
+            exaggeration: scale.exaggeration(grid),
             home_mm: laid.view.home_mm,
             stiffness_n_per_mm: laid.law.stiffness_n_per_mm,
             max_force_n: laid.law.max_force_n,

@@ -54,6 +54,10 @@ pub struct Steering<'r> {
     waiting: Vec<ViewChange>,
     /// The user holds the clutch.
     held: bool,
+    /// The board's clutch input holds it open.
+    by_input: bool,
+    /// The user took the clutch, and may have gone far since the cells were measured.
+    measures: bool,
     /// How the device was asked to hold it.
     asked: ClutchHold,
     stage: Stage<'r>,
@@ -74,6 +78,8 @@ impl<'r> Steering<'r> {
             number: 0,
             waiting: vec![],
             held: false,
+            by_input: false,
+            measures: false,
             asked: ClutchHold::LetGo,
             stage: Stage::Idle,
             asks: vec![],
@@ -102,13 +108,16 @@ impl<'r> Steering<'r> {
             Stage::Open => self.held,
             _ => false,
         };
-        rests && self.waiting.is_empty()
+        rests && self.waiting.is_empty() && !self.measures
     }
 
     /// Takes what the user wants.
     pub fn steer(&mut self, steer: Steer) {
         match steer {
-            Steer::Clutch(held) => self.held = held,
+            Steer::Clutch(held) => {
+                self.measures |= held && !self.held;
+                self.held = held;
+            }
             Steer::Change(change) if self.waiting.len() < WAITING => self.waiting.push(change),
             // A key that is stuck.
             Steer::Change(_) => {}
@@ -162,7 +171,7 @@ impl<'r> Steering<'r> {
     fn give_up(&mut self, why: &str) {
         self.lines.push(why.to_owned());
         self.waiting.clear();
-        self.held = false;
+        (self.held, self.measures) = (false, false);
         self.let_go();
     }
 
@@ -188,12 +197,17 @@ impl<'r> Steering<'r> {
     fn on_sample(&mut self, sample: &Sample) {
         let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
         let by_input = sample.limits.contains(Limits::CLUTCH_INPUT);
+        let is_taken = by_input && is_open;
+        if is_taken && !self.by_input && matches!(self.stage, Stage::Idle) {
+            self.measures = self.hand(sample).is_far_from_measure(&self.terrain);
+        }
+        self.by_input = is_taken;
         // The user takes the terrain along while another view is on its way.
         if self.held && self.asked == ClutchHold::InPlace {
             self.hold();
         }
         match &mut self.stage {
-            Stage::Idle if self.held || !self.waiting.is_empty() => {
+            Stage::Idle if self.held || self.measures || !self.waiting.is_empty() => {
                 self.hold();
                 self.stage = Stage::Opening {
                     samples: 0,
@@ -223,7 +237,9 @@ impl<'r> Steering<'r> {
         if sample.missing_tile.is_some() {
             return;
         }
-        if self.waiting.is_empty() {
+        let measures = std::mem::take(&mut self.measures)
+            && self.hand(sample).is_far_from_measure(&self.terrain);
+        if self.waiting.is_empty() && !measures {
             if !self.held {
                 self.let_go();
             }
@@ -239,13 +255,18 @@ impl<'r> Steering<'r> {
         }
     }
 
-    fn next_view(&self, changes: &[ViewChange], sample: &Sample) -> Result<Put<'r>, String> {
+    /// Where a sample has the hand, in the view in force.
+    fn hand(&self, sample: &Sample) -> Hand {
         let scale = self.terrain.scale();
         let touches = sample.state == ContactState::Touching;
-        let hand = Hand {
+        Hand {
             hip_mm: scale.to_mm(&sample.hip),
             proxy_mm: touches.then(|| scale.to_mm(&sample.proxy)),
-        };
+        }
+    }
+
+    fn next_view(&self, changes: &[ViewChange], sample: &Sample) -> Result<Put<'r>, String> {
+        let hand = self.hand(sample);
         let changed = self.bounds.apply(&self.terrain, &self.now, changes, &hand);
         let Changed {
             laid,

@@ -12,12 +12,18 @@ const ZOOM: Steer = Steer::Change(ViewChange::Zoom(2.0));
 
 /// An engine over a plane, at 1 mm a cell.
 fn with<T>(look: impl FnOnce(&mut Steering<'_>) -> T) -> T {
-    let raster = Raster::from_fn(65, 65, |x, _| x as f32).expect("raster");
+    with_raster(
+        &Raster::from_fn(65, 65, |x, _| x as f32).expect("raster"),
+        look,
+    )
+}
+
+fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) -> T {
     let options = ViewOptions {
         sizing: Sizing::CellMm(1.0),
         ..ViewOptions::default()
     };
-    let grid = options.target.grid(&raster, Default::default());
+    let grid = options.target.grid(raster, Default::default());
     let grid = grid.expect("a grid");
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
     let view = PlacedView::new(&grid, &reach, &options).expect("a view");
@@ -181,4 +187,83 @@ fn a_clutch_that_the_boards_input_holds_open_is_let_go_by_the_host() {
         samples(steering, held, 1);
         assert!(steering.is_settled());
     });
+}
+
+/// Ten degrees from south to north, 1 mm a cell of 0.05°.
+fn degrees() -> Raster {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("degrees.asc");
+    let mut text = "ncols 41\nnrows 201\nxllcenter 10\nyllcenter 50\ncellsize 0.05\n".to_owned();
+    text += &("7 ".repeat(41) + "\n").repeat(201);
+    std::fs::write(&path, text).expect("written");
+    let system = r#"GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]"#;
+    std::fs::write(path.with_extension("prj"), system).expect("written");
+    Raster::open(path, &Default::default()).expect("opens")
+}
+
+/// The hand goes so many millimetres north of the middle by itself, or by the clutch: no view
+/// was asked for.
+fn sample_at(steering: &Steering<'_>, north_mm: f64, limits: Limits) -> Sample {
+    let cell_mm = steering.terrain.scale().cell_mm();
+    let middle = steering.terrain.grid().of_ground([11.0, 55.0]);
+    let [east, north] = middle.map(|cells| cells * cell_mm);
+    let hip = [east, north + north_mm, 50.0];
+    Sample {
+        limits,
+        view: steering.number,
+        hip: steering.terrain.scale().to_grid(hip).expect("on the grid"),
+        ..Sample::default()
+    }
+}
+
+#[test]
+fn a_clutch_that_is_taken_far_from_where_cells_were_measured_has_them_measured_anew() {
+    let raster = degrees();
+    let held = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
+    for (north_mm, by_input) in [(80.0, false), (80.0, true), (0.1, false), (0.1, true)] {
+        with_raster(&raster, |steering| {
+            let metres = |steering: &Steering<'_>| steering.now().view.ground_m_per_mm();
+            let before = metres(steering).expect("known");
+            let limits = if by_input { held } else { Limits::empty() };
+            if !by_input {
+                steering.steer(Steer::Clutch(true));
+            }
+            let sample = sample_at(steering, north_mm, limits);
+            steering.on_event(&Event::Sample(&sample));
+            let asked = asked(steering);
+            let wanted = match by_input {
+                true => (north_mm > 1.0).then_some(ClutchHold::InPlace),
+                false => Some(ClutchHold::WithHand),
+            };
+            assert_eq!(asked, wanted);
+            if let Some(hold) = asked {
+                answer(steering, hold);
+            }
+            let open = sample_at(steering, north_mm, limits | Limits::CLUTCH_OPEN);
+            steering.on_event(&Event::Sample(&open));
+            let put = steering.take_put();
+            assert_eq!(put.is_some(), north_mm > 1.0);
+            let Some(put) = put else {
+                return;
+            };
+            let [_, latitude] = put.terrain.grid().measured_at().expect("a place");
+            assert!((57.0..58.0).contains(&latitude), "{latitude}");
+            assert!(!put.view.keeps_tiles);
+            viewed(steering, &put.view, true);
+            assert!((metres(steering).expect("known") / before - 1.0).abs() < 1e-12);
+            // Once, and then it is let go when the user lets it go.
+            let open = Sample {
+                view: 1,
+                hip: put.view.hip,
+                ..open
+            };
+            steering.on_event(&Event::Sample(&open));
+            assert!(steering.take_put().is_none());
+            let rests = match by_input {
+                true => self::asked(steering) == Some(ClutchHold::LetGo),
+                false => steering.is_settled(),
+            };
+            assert!(rests);
+        });
+    }
 }

@@ -6,11 +6,16 @@
 
 use std::hash::{Hash, Hasher};
 
-use crate::raster::{CellSize, Raster, bilinear};
+use crate::raster::{CellSize, Raster, Sides, around, bilinear};
 
 /// Cells whose sides differ by less than this share count as square, and keep
 /// their exact samples.
 const SQUARE: f64 = 1e-3;
+
+/// Cells are measured anew where a side differs by more than this share from what it is
+/// where they were measured. Together with half of [`SQUARE`], which the sides of cells that
+/// keep their samples may be off, it is less than the 0.1 % to which slopes are true.
+const MEASURED: f64 = 2.5e-4;
 
 /// Which cells of a file are felt.
 #[derive(
@@ -77,6 +82,56 @@ impl<'r> FeltGrid<'r> {
             measured_at: Some(ground),
             ..Self::of_cell(raster, cells, raster.georeference().cell_at(ground))
         }
+    }
+
+    /// The grid of cells as they are at a place in felt cells, where that is another grid: a
+    /// cell there is larger, smaller or of another shape than it is felt, by more than a
+    /// quarter of 0.1 %. A place beside the field counts as the next one in it.
+    ///
+    /// `None` where cells are felt as they are there, and where square cells there would be
+    /// too many to be counted.
+    #[must_use]
+    pub fn measured_anew(&self, felt: [f64; 2]) -> Option<Self> {
+        let last = self.last();
+        let inside = [0, 1].map(|axis| felt[axis].clamp(0.0, last[axis]));
+        let ground = self.to_ground(inside);
+        let (now, there) = (self.cell?, self.raster.georeference().cell_at(ground)?);
+        if is_alike(&now, &there) {
+            return None;
+        }
+        let anew = Self::at(self.raster, self.cells, ground);
+        (self.cells == FeltCells::Stored || !anew.is_distorted()).then_some(anew)
+    }
+
+    /// Whether its samples are those of another grid over the same raster.
+    #[must_use]
+    pub fn has_samples_of(&self, other: &Self) -> bool {
+        let what = |grid: &Self| (grid.columns, grid.rows, grid.resampling);
+        what(self) == what(other)
+    }
+
+    /// The smallest rectangle around a rectangle (west, south, east, north) in cells of
+    /// another grid over the same raster.
+    pub(crate) fn around_sides_of(&self, other: &Self, sides: Sides) -> Sides {
+        if self.has_samples_of(other) {
+            return sides;
+        }
+        let [west, south, east, north] = sides;
+        let corners = [[west, south], [east, south], [west, north], [east, north]];
+        let here = corners.map(|corner| self.of_ground(other.to_ground(corner)));
+        let [west, south, east, north] = around(here);
+        let [columns, rows] = self.last();
+        [
+            west.max(0.0),
+            south.max(0.0),
+            east.min(columns),
+            north.min(rows),
+        ]
+    }
+
+    /// Column and row of the last felt sample.
+    fn last(&self) -> [f64; 2] {
+        [self.columns, self.rows].map(|count| f64::from(count) - 1.0)
     }
 
     fn of_cell(raster: &'r Raster, cells: FeltCells, cell: Option<CellSize>) -> Self {
@@ -294,6 +349,13 @@ impl Resampling {
             v * self.row_step,
         ]
     }
+}
+
+/// Whether two cells are as large as each other, to [`MEASURED`].
+fn is_alike(one: &CellSize, other: &CellSize) -> bool {
+    let (a, b) = (one.ground_metres(), other.ground_metres());
+    let is_near = |a: f64, b: f64| (a - b).abs() <= MEASURED * a;
+    is_near(a.0, b.0) && is_near(a.1, b.1)
 }
 
 fn is_square(cell: &CellSize) -> bool {

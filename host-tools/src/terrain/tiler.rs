@@ -115,15 +115,20 @@ impl<'r> Terrain<'r> {
         })
     }
 
-    /// The same grid at another scale of level 0 and another level.
+    /// The same raster in another grid of felt cells, at a scale of level 0 and a level.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn rescaled(&self, scale: Scale, level: u8) -> Result<Self, TerrainError> {
+    pub fn relaid(
+        &self,
+        grid: FeltGrid<'r>,
+        scale: Scale,
+        level: u8,
+    ) -> Result<Self, TerrainError> {
         Ok(Self {
             // Of the same heights.
             fingerprint: self.fingerprint.clone(),
-            ..Self::over(self.grid, scale, level)?
+            ..Self::over(grid, scale, level)?
         })
     }
 
@@ -134,6 +139,7 @@ impl<'r> Terrain<'r> {
         let height = |terrain: &Self| terrain.scale.height_cells(1.0);
         let (ours, theirs) = (height(self), height(other));
         self.level == other.level
+            && self.grid.has_samples_of(&other.grid)
             && (ours - theirs).abs() <= f64::from(f32::EPSILON) * 1e-3 * ours.abs()
     }
 

@@ -11,6 +11,7 @@ use hapterra_view_stream::{self as stream, Link, Message, Scene, TickCost};
 use super::program::{Program, ProgramError};
 use super::queue::Queue;
 use super::scene::{Picture, Prepared, home_cells, tick_cost};
+use super::standing::Standing;
 use super::surroundings::Surroundings;
 use super::tiles::Tiles;
 use crate::link::{Event, Tally};
@@ -46,6 +47,10 @@ pub struct ViewFeed<'t> {
     terrain: Terrain<'t>,
     /// The terrain of the beginning, in whose tiles there is detail for good.
     first: Terrain<'t>,
+    /// Where the terrain of the beginning stands for all of the time.
+    stands: bool,
+    /// The view in force, where it has other cells than the terrain that stands.
+    standing: Option<Standing<'t>>,
     /// A view that the viewer is still to be told: nothing else is until then.
     scene_due: Option<Box<Scene>>,
     tiles: Tiles,
@@ -93,6 +98,7 @@ impl<'t> ViewFeed<'t> {
             true => (LIVE_BYTES, LIVE_BATCH),
             false => (PATIENT_BYTES, PATIENT_BATCH),
         };
+        let stands = !prepared.scene.is_live;
         let (terrain, has_cost) = (prepared.terrain.clone(), device.is_some());
         let tick = device.map(tick_cost);
         prepared.scene.tick.clone_from(&tick);
@@ -102,6 +108,8 @@ impl<'t> ViewFeed<'t> {
         Self {
             first: terrain.clone(),
             terrain,
+            stands,
+            standing: None,
             scene_due: None,
             tiles: Tiles::new(window),
             surroundings,
@@ -129,6 +137,7 @@ impl<'t> ViewFeed<'t> {
 
     /// Takes a row of a recording, or a sample's.
     pub fn row(&mut self, record: &Record, cost: Option<u32>) {
+        let record = &self.shown(record);
         let [x, y, _] = record.hip_mm;
         let row = stream::Sample {
             t_s: record.t_s,
@@ -154,6 +163,31 @@ impl<'t> ViewFeed<'t> {
     /// Goes over to another view of the terrain, in which the next sample was felt.
     pub fn go_over(&mut self, picture: Picture<'_, 't>) {
         self.flush();
+        self.standing = match self.stands {
+            true => Standing::new(&self.first, picture.terrain),
+            false => None,
+        };
+        match self.standing.take() {
+            Some(standing) => {
+                self.tell_view(Picture {
+                    terrain: standing.terrain(),
+                    home_mm: picture.home_mm.map(|home_mm| standing.place(home_mm)),
+                    ..picture
+                });
+                self.standing = Some(standing);
+            }
+            None => self.tell_view(picture),
+        }
+    }
+
+    /// A row as the viewer is told it.
+    fn shown(&self, record: &Record) -> Record {
+        let standing = self.standing.as_ref();
+        standing.map_or(*record, |standing| standing.record(record))
+    }
+
+    fn tell_view(&mut self, picture: Picture<'_, 't>) {
+        let keeps_cells = picture.terrain.grid().has_samples_of(self.terrain.grid());
         let keeps_tiles = picture.terrain.has_tiles_of(&self.terrain);
         // A view that the viewer never heard of leaves what is before it.
         let before = self.scene_due.as_ref();
@@ -165,7 +199,11 @@ impl<'t> ViewFeed<'t> {
             tick: self.tick.clone(),
             ..picture.scene()
         };
-        self.surroundings.follow(&self.terrain, home_cells(&scene));
+        let home = home_cells(&scene);
+        match keeps_cells {
+            true => self.surroundings.follow(&self.terrain, home),
+            false => self.surroundings.begin_anew(&self.terrain, home),
+        }
         self.scene_due = Some(Box::new(scene));
         self.tell_scene();
     }
@@ -185,7 +223,7 @@ impl<'t> ViewFeed<'t> {
     /// Shows the tile under a row's HIP in full detail, for good: for rows that are not
     /// felt by a device with a window.
     pub fn detail(&mut self, record: &Record) {
-        let [x, y, _] = record.hip_mm;
+        let [x, y, _] = self.shown(record).hip_mm;
         let cell_mm = self.terrain.scale_of_level_0().cell_mm();
         self.tiles
             .detail(&self.first, [x, y].map(|mm| mm / cell_mm));

@@ -16,6 +16,7 @@ mod pipe;
 mod program;
 mod queue;
 mod scene;
+mod standing;
 mod surroundings;
 mod tiles;
 

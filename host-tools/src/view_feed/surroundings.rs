@@ -50,6 +50,13 @@ impl Surroundings {
         self.extents = extents;
     }
 
+    /// Begins with the coarsest layer anew, around a home position (cells): the cells are
+    /// others.
+    pub(super) fn begin_anew(&mut self, terrain: &Terrain<'_>, home: [f64; 2]) {
+        *self = Self::new(terrain, home);
+        self.due = self.extents.iter().copied().enumerate().rev().collect();
+    }
+
     /// Reads some rows, and tells a layer that is read: nobody waits for more than these.
     pub(super) fn tell(&mut self, terrain: &Terrain<'_>, queue: &Queue) {
         if let Some(layer) = self.read.take() {

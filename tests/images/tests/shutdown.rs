@@ -186,8 +186,8 @@ fn a_core_that_locks_up_stops_the_duty_cycles_and_the_watchdog_does_the_rest() {
     });
 }
 
-#[test]
-fn the_stop_ends_the_duty_cycles_without_the_program() {
+/// Plays on each board that drives duty cycles, armed, with a tick that never ends.
+fn on_each_hung(play: impl Fn(&mut Machine)) {
     on_each(|machine, terrain, scene| {
         let device = Device::arm(machine, terrain, scene);
         let mut machine = device.machine.borrow_mut();
@@ -197,39 +197,38 @@ fn the_stop_ends_the_duty_cycles_without_the_program() {
         let tick = machine.image.function_like(&["HapticLoop", "run_tick"]);
         machine.patch(tick.address, &HANG);
         machine.run_ms(3);
+        play(&mut machine);
+    });
+}
+
+#[test]
+fn the_stop_ends_the_duty_cycles_without_the_program() {
+    on_each_hung(|machine| {
         assert!(machine.is_enabled(), "nothing else switches off");
         assert_eq!(machine.bus().drives_duty_cycles(), Some(true));
         let pin = machine.chip.emergency_stop;
         machine.set_input(pin, true);
-        assert_low(&machine, "broken off");
+        assert_low(machine, "broken off");
         // Not even when it is released.
         machine.set_input(pin, false);
         machine.run_ms(3);
-        assert_low(&machine, "broken off");
+        assert_low(machine, "broken off");
     });
 }
 
 #[test]
 fn a_supply_that_falls_ends_the_duty_cycles_without_the_program() {
-    on_each(|machine, terrain, scene| {
-        let device = Device::arm(machine, terrain, scene);
-        let mut machine = device.machine.borrow_mut();
-        if machine.bus().drives_duty_cycles().is_none() {
-            return;
-        }
-        let tick = machine.image.function_like(&["HapticLoop", "run_tick"]);
-        machine.patch(tick.address, &HANG);
-        machine.run_ms(3);
+    on_each_hung(|machine| {
         machine.mask_supply_interrupt();
         assert_eq!(machine.bus().drives_duty_cycles(), Some(true));
         machine.set_supply_mv(TOO_LOW_MV);
-        assert_low(&machine, "broken off");
+        assert_low(machine, "broken off");
         machine.run_ms(3);
         assert!(machine.is_enabled(), "no program has switched off");
         // Not even when it is back.
         machine.set_supply_mv(NOMINAL_MV);
         machine.run_ms(3);
-        assert_low(&machine, "broken off");
+        assert_low(machine, "broken off");
     });
 }
 

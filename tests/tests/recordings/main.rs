@@ -165,18 +165,22 @@ fn what_demo_recorded_is_felt_again_bit_by_bit() {
     is_reproduced(&folder, "hills.tif", "demo/hills.csv");
 }
 
-#[test]
-fn a_place_far_from_the_middle_is_felt_again_with_its_own_cells() {
-    let folder = Folder::new();
-    // Ten degrees from south to north: cells of degrees are not alike.
+/// Writes a terrain of ten degrees from south to north, hills.asc: its cells are not alike.
+pub(crate) fn write_degrees(folder: &Folder, height: impl Fn(u32, u32) -> u32) {
     let mut text = "ncols 60\nnrows 101\nxllcenter 10\nyllcenter 55\ncellsize 0.1\n".to_owned();
     for row in 0..101 {
-        let heights = (0..60).map(|column| (500 + 300 * ((column + row) % 9)).to_string());
+        let heights = (0..60).map(|column| height(column, row).to_string());
         text += &(heights.collect::<Vec<_>>().join(" ") + "\n");
     }
     std::fs::write(folder.path("hills.asc"), text).expect("written");
     let degrees = r#"GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]"#;
     std::fs::write(folder.path("hills.prj"), degrees).expect("written");
+}
+
+#[test]
+fn a_place_far_from_the_middle_is_felt_again_with_its_own_cells() {
+    let folder = Folder::new();
+    write_degrees(&folder, |column, row| 500 + 300 * ((column + row) % 9));
     let [terrain, out] = ["hills.asc", "demo"].map(|name| folder.text(name));
     let words = ["demo", &terrain, "--out", &out, "--seconds", "4"];
     folder.runs(&[&words[..], &["--at", "13,56", "--exaggeration", "9"]].concat());

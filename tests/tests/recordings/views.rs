@@ -3,10 +3,12 @@
 
 use std::process::{Command, Stdio};
 
+use hapterra::replay::settings::ViewSettings;
 use hapterra::replay::{Settings, Trajectory};
 use hapterra_tests::hapterra_binary;
 
 use super::folder::{Folder, rows, said};
+use super::write_degrees;
 
 /// Wide enough to be zoomed and panned.
 const SIZE: u32 = 512;
@@ -223,4 +225,129 @@ fn commands_come_by_standard_input_and_a_file_that_is_not_there_is_told() {
         "{}",
         said(&run)
     );
+}
+
+/// In each view cells are as large as they are at the place that is felt; the recording says
+/// where that is, and a replay makes the same cells of it.
+#[test]
+fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
+    let folder = Folder::new();
+    // Hills without edges: where a proxy lands does not hang on how it came there.
+    write_degrees(&folder, |column, row| {
+        let (x, y) = (f64::from(column), f64::from(row));
+        (3000.0 + 900.0 * (x / 7.0).sin() + 700.0 * (y / 9.0).cos()) as u32
+    });
+    let pans = "at 3.6 pan-m 0 300000\nat 4.6 stiffness 0.9\nat 5.4 pan-m 0 -200000\n";
+    folder.write("commands", pans);
+    let names = ["hills.asc", "demo", "commands", "demo/hills.csv"].map(|name| folder.text(name));
+    let [terrain, out, commands, recording] = &names;
+    let words = [
+        "demo",
+        terrain,
+        "--out",
+        out,
+        "--seconds",
+        "6.5",
+        "--commands",
+        commands,
+    ];
+    folder.runs(&[&words[..], &["--at", "13,56", "--exaggeration", "9"]].concat());
+    let text = folder.read("demo/hills.csv");
+    let settings = Settings::from_toml(&comments(&text))
+        .expect("read")
+        .expect("settings");
+    let [north, softer, south] = settings.views[..] else {
+        panic!("{:?}", settings.views);
+    };
+    let first_m = settings.felt.cell_m.expect("known");
+    let latitude = |view: ViewSettings| view.measured_at.expect("a place")[1];
+    let [up, down] = [latitude(north) - 56.0, latitude(softer) - latitude(south)];
+    // The hand goes on meanwhile.
+    assert!(
+        (2.0..6.0).contains(&up) && (0.5..3.0).contains(&down),
+        "{up} {down}"
+    );
+    for view in [north, softer, south] {
+        let measured = latitude(view);
+        // Of longitude, and as large in the hand as before.
+        let narrower = view.cell_m.expect("known") / first_m;
+        let wanted = measured.to_radians().cos() / 56.0_f64.to_radians().cos();
+        assert!(
+            (narrower / wanted - 1.0).abs() < 1e-3,
+            "{narrower} {wanted}"
+        );
+        assert!((view.cell_mm / settings.felt.cell_mm / narrower - 1.0).abs() < 1e-9);
+        assert_eq!(view.exaggeration, settings.felt.exaggeration);
+    }
+    let replay = |from: &str, to: &str| {
+        folder.runs(&["replay", terrain, from, "-o", &folder.text(to)]);
+        folder.read(to)
+    };
+    let again_text = replay(recording, "again.csv");
+    let (live, again) = (rows(&text), rows(&again_text));
+    let mut compared = [0; 4];
+    for (live, again) in live.iter().zip(&again) {
+        if live["mode"] != "armed" || !live["limits"].is_empty() || live["contact"] == "0" {
+            continue;
+        }
+        compared[live["view"].parse::<usize>().expect("a view")] += 1;
+        for column in ["x_mm", "y_mm", "z_mm", "contact", "view", "state"] {
+            assert_eq!(live[column], again[column], "{column} at {} s", live["t_s"]);
+        }
+        for axis in ["x", "y", "z"] {
+            let column = format!("force_{axis}_n");
+            let [live_n, again_n] =
+                [live, again].map(|row| row[column.as_str()].parse::<f64>().expect("N"));
+            let off = (live_n - again_n).abs();
+            assert!(
+                off < 1e-4,
+                "{column} at {} s is off by {off} N",
+                live["t_s"]
+            );
+        }
+    }
+    eprintln!("forces compared in each view: {compared:?}");
+    assert!(compared.iter().all(|count| *count > 50), "{compared:?}");
+    // A replay of the replay is the same file.
+    assert!(replay(&folder.text("again.csv"), "same.csv") == again_text);
+    // Without the places it is another terrain that is felt.
+    let lines = again_text.split_inclusive('\n');
+    let (head, views): (Vec<_>, Vec<_>) = lines.partition(|line| line.contains("measured_at"));
+    assert_eq!(head.len(), 4);
+    folder.write(
+        "blind.csv",
+        &views
+            .concat()
+            .replacen("# level", &(head[0].to_owned() + "# level"), 1),
+    );
+    let blind = replay(&folder.text("blind.csv"), "felt.csv");
+    assert!(
+        rows(&blind)
+            .iter()
+            .zip(&again)
+            .any(|(a, b)| a["force_x_n"] != b["force_x_n"])
+    );
+}
+
+/// Before cells were measured anew, views did not say where: theirs are those of the beginning.
+#[test]
+fn a_recording_whose_views_do_not_say_where_they_were_measured_is_felt_as_it_was() {
+    let folder = Folder::of(SIZE);
+    demo(&folder);
+    folder.replays("demo/hills.csv", "again.csv", &[]);
+    let text = folder.read("demo/hills.csv");
+    let (head, views) = text.split_once("[[view]]").expect("views");
+    let old: String = views
+        .split_inclusive('\n')
+        .filter(|line| !line.starts_with("# cell_m =") && !line.starts_with("# measured_at"))
+        .collect();
+    assert_ne!(old, views);
+    folder.write("old.csv", &format!("{head}[[view]]{old}"));
+    folder.replays("old.csv", "of_old.csv", &[]);
+    let felt = |name: &str| {
+        let text = folder.read(name);
+        let rows = text.lines().filter(|line| !line.starts_with('#'));
+        rows.collect::<Vec<_>>().join("\n")
+    };
+    assert!(felt("of_old.csv") == felt("again.csv"));
 }

@@ -51,7 +51,8 @@ impl Frame {
 }
 
 impl Map {
-    /// The first layer is the relief; the others are parts of it.
+    /// The coarsest layer is the relief; the others are parts of it. One that comes again is
+    /// of other cells.
     pub(super) fn layer(
         &mut self,
         log: &Log,
@@ -59,7 +60,7 @@ impl Map {
         ground: &Ground,
         layer: &Layer,
     ) -> Result<Vec<Entry>> {
-        if self.frame.is_some() {
+        if layer.number > 0 {
             return Ok(Vec::new());
         }
         let (columns, rows) = (layer.columns as usize, layer.rows as usize);

@@ -97,7 +97,8 @@ pub struct TickCost {
     pub bound: f64,
 }
 
-/// Samples of the terrain at every `step`-th cell of level 0. They belong to all views.
+/// Samples of the terrain at every `step`-th cell of level 0. They belong to all views, up to
+/// one of other cells: all layers are told anew for it, the coarsest first.
 ///
 /// A finer layer is shown in the place of the coarser one below it. One that comes with the
 /// number of another takes its place, and those with higher numbers go: they are told anew.

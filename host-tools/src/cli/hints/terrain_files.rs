@@ -117,9 +117,11 @@ fn converted(path: &Path, options: &str) -> String {
             "store one array of two dimensions: python3 -c \"import numpy as n; \
              a = n.load('{from}'); n.save('heights.npy', n.squeeze(a[a.files[0]]).astype('f4'))\""
         ),
-        "las" | "laz" => {
-            "points are no grid: make a GeoTIFF of them with a program for point clouds".into()
-        }
+        // By PDAL's own pages; its writer takes the options behind its name.
+        "las" | "laz" => format!(
+            "points are no grid: make one of a metre with PDAL: pdal translate \"{from}\" \"{to}\" \
+             --writers.gdal.resolution=1 --writers.gdal.output_type=mean"
+        ),
         "zip" => format!("unpack it and name one of its files: python3 -m zipfile -e \"{from}\" ."),
         "gz" => format!("unpack it and name what comes out: gzip -dk \"{from}\""),
         "nc" | "grd" if options.contains("-b") => format!(

@@ -75,7 +75,7 @@ pub struct ReadingOptions {
 
     /// A terrain whose samples take more megabytes than this stays in its file and is read
     /// where it is touched, if its format allows it (TIFF)
-    #[arg(long, value_name = "MB", default_value_t = 128, help_heading = INPUT)]
+    #[arg(long, value_name = "MB", default_value_t = OpenOptions::IN_MEMORY_MB, help_heading = INPUT)]
     pub in_memory_mb: u32,
 }
 

@@ -38,31 +38,49 @@ pub fn files_read_with(path: &Path) -> Vec<PathBuf> {
 /// The file beside `input` whose extension is `extension`, in lower or upper case:
 /// `hills.hdr` beside `hills.flt`, or `hills.flt.hdr`.
 pub(super) fn find(input: &FileBytes, extension: &str) -> Option<PathBuf> {
+    first(input, extension, candidates)
+}
+
+/// The file beside `input` whose name is that of `input` with `extension` behind it, as
+/// `hills.tif.msk`: what GDAL writes for one file alone.
+pub(super) fn find_appended(input: &FileBytes, extension: &str) -> Option<PathBuf> {
+    first(input, extension, |path, extension| {
+        [appended(path, extension)]
+    })
+}
+
+/// The first of some names, made of the path of `input` and a known extension, that is a file.
+fn first<const N: usize>(
+    input: &FileBytes,
+    extension: &str,
+    names: impl Fn(&Path, &str) -> [PathBuf; N],
+) -> Option<PathBuf> {
     let Data::File(_, path) = input.data() else {
         return None;
     };
     let known = NEIGHBOURS.iter().find(|known| **known == extension)?;
-    let mut others = candidates(path, known)
-        .into_iter()
-        .filter(|other| other != path);
+    let others = names(path, known);
+    let mut others = others.into_iter().filter(|other| other != path);
     others.find(|other| other.is_file())
 }
 
 /// The names that a file beside `path` may have.
 fn candidates(path: &Path, extension: &str) -> [PathBuf; 4] {
-    let appended = |extension: &str| {
-        let mut name: OsString = path.as_os_str().to_owned();
-        name.push(".");
-        name.push(extension);
-        PathBuf::from(name)
-    };
     let upper = extension.to_uppercase();
     [
         path.with_extension(extension),
         path.with_extension(&upper),
-        appended(extension),
-        appended(&upper),
+        appended(path, extension),
+        appended(path, &upper),
     ]
+}
+
+/// A path with an extension behind its own.
+fn appended(path: &Path, extension: &str) -> PathBuf {
+    let mut name: OsString = path.as_os_str().to_owned();
+    name.push(".");
+    name.push(extension);
+    PathBuf::from(name)
 }
 
 /// The text of the file beside `input` with an extension, and that file's name.

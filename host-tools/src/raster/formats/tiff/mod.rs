@@ -18,7 +18,7 @@ use std::sync::Arc;
 use tiff_reader::source::{BytesSource, FileSource, SharedSource};
 use tiff_reader::{ParseBudgets, TiffFile};
 
-use crate::raster::beside::lay_out_by_world_file;
+use crate::raster::beside::{find_appended, lay_out_by_world_file};
 use crate::raster::blocks::Part;
 use crate::raster::decoded::Decoded;
 use crate::raster::format::{Claim, Format, Parts, starts_with_any};
@@ -94,17 +94,10 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
 /// A file that GDAL keeps beside another, as `NAME.tif.msk` for a mask and `NAME.tif.ovr`
 /// for overviews.
 fn beside(input: &FileBytes, extension: &str) -> Result<Option<TiffFile>, BadRaster> {
-    let Data::File(_, path) = input.data() else {
+    let Some(beside) = find_appended(input, extension) else {
         return Ok(None);
     };
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".");
-    beside.push(extension);
-    let beside = std::path::Path::new(&beside);
-    match beside.is_file() {
-        true => open(&FileBytes::open(beside)?).map(Some),
-        false => Ok(None),
-    }
+    open(&FileBytes::open(&beside)?).map(Some)
 }
 
 /// Opens the file. No list in its directories may be longer than the file is.
