@@ -3,14 +3,13 @@
 mod common;
 
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use common::browser::{Browser, Colours, Page, program};
 use common::recorded::{Csv, check, entities};
 use common::scene::{batch, greeting, layer, scene};
-use common::{Viewer, folder, hapterra, lines_of, port_said};
+use common::{Running, Viewer, emulated, folder, hapterra};
 
 /// Until the page shows what is asked of it; software draws it, on a busy machine.
 const SHOWN_WITHIN: Duration = Duration::from_secs(300);
@@ -33,7 +32,7 @@ struct Session {
 }
 
 impl Session {
-    fn start(options: &[&str]) -> (Self, u16) {
+    fn start(options: &str) -> (Self, String) {
         let mut session = Self {
             viewer: Viewer::start(options),
             tick: 0,
@@ -43,8 +42,8 @@ impl Session {
             assert!(session.viewer.tell(&message));
         }
         session.go_on(1000);
-        let port = session.viewer.port();
-        (session, port)
+        let address = session.viewer.address();
+        (session, address)
     }
 
     fn go_on(&mut self, ticks: u64) {
@@ -118,8 +117,7 @@ fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
     let Some(mut browser) = browser_in(&folder) else {
         return;
     };
-    let (mut session, port) = Session::start(&["--linger", "0"]);
-    let address = format!("http://127.0.0.1:{port}/");
+    let (mut session, address) = Session::start("--linger 0");
     let page = browser.open(&address);
     let mut go_on = || session.go_on(200);
     let (terrain, plots) = shown(&mut browser, &page, &mut go_on, is_whole);
@@ -156,8 +154,8 @@ fn a_page_that_has_grown_too_large_begins_anew_and_goes_on() {
     let Some(mut browser) = browser_in(&folder) else {
         return;
     };
-    let (mut session, port) = Session::start(&["--linger", "0", "--page-mb", "64"]);
-    let page = browser.open(&format!("http://127.0.0.1:{port}/"));
+    let (mut session, address) = Session::start("--linger 0 --page-mb 64");
+    let page = browser.open(&address);
     let mut until = |wanted: &dyn Fn(f64, f64) -> bool| {
         let until = Instant::now() + SHOWN_WITHIN;
         loop {
@@ -183,8 +181,7 @@ fn a_page_that_has_grown_too_large_begins_anew_and_goes_on() {
 
 #[test]
 fn the_page_shows_what_the_emulated_board_feels_while_it_is_touched() {
-    let image = std::env::var_os("HAPTERRA_MPS2_ELF").filter(|image| !image.is_empty());
-    let (Some(mut demo), Some(image)) = (hapterra(), image) else {
+    let (Some(mut demo), Some(image)) = (hapterra(), emulated()) else {
         println!("SKIPPED: no hapterra and no emulated board; cargo xtask view --test names both");
         return;
     };
@@ -194,24 +191,17 @@ fn the_page_shows_what_the_emulated_board_feels_while_it_is_touched() {
         return;
     };
     let live = folder.join("live.rrd");
-    let options = format!("--no-browser --port 0 --linger 0 --rrd {}", live.display());
     // For as long as it takes a page to be seen on a busy machine: it is ended then.
     demo.args(["demo", "--device", "emulated", "--rounds", "90", "--view"])
         .arg("--image")
         .arg(image)
         .arg("--out")
-        .arg(&folder)
-        .env("HAPTERRA_VIEW_OPTIONS", options)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    let mut demo = demo.spawn().expect("it starts");
-    let told = lines_of(demo.stdout.take().expect("a pipe"));
-    let said = lines_of(demo.stderr.take().expect("a pipe"));
-    let address = format!("http://127.0.0.1:{}/", port_said(&said));
+        .arg(&folder);
+    let mut demo = Running::shown(&mut demo, &format!("--rrd {}", live.display()));
+    let address = demo.address();
     let page = browser.open(&address);
     let mut is_touched = || {
-        let ended = demo.try_wait().expect("a child");
-        assert!(ended.is_none(), "it ended before the page was seen");
+        assert!(demo.goes_on(), "it ended before the page was seen");
     };
     let (terrain, plots) = shown(&mut browser, &page, &mut is_touched, is_whole);
     shown(&mut browser, &page, &mut is_touched, |now, plotted| {
@@ -226,13 +216,9 @@ fn the_page_shows_what_the_emulated_board_feels_while_it_is_touched() {
     let foreign = foreign(&browser, &address);
     assert!(foreign.is_empty(), "requests elsewhere: {foreign:?}");
     drop(browser);
-    let ended = Command::new("kill")
-        .args(["-INT", &demo.id().to_string()])
-        .status();
-    assert!(ended.expect("kill").success());
-    assert!(demo.wait().expect("it ends").success());
-    // The viewer ends after it, once it has written what it was told.
-    let told = told.iter().chain(&said).collect::<Vec<_>>().join("\n");
+    demo.interrupt();
+    assert!(demo.end());
+    let told = demo.words();
     for figure in [" run, 0 late", " 0 lost on the link, 0 dropped"] {
         assert!(told.contains(figure), "{told}");
     }

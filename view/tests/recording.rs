@@ -4,11 +4,17 @@ mod common;
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::process::Command;
 
 use re_chunk::Chunk;
 
 use common::recorded::{Csv, HIP, check, entities, places, scalars};
-use common::{folder, hapterra};
+use common::{Running, folder, hapterra};
+
+/// Writes what is shown into a file, too.
+fn rrd(into: &Path) -> String {
+    format!("--rrd {}", into.display())
+}
 
 #[test]
 fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
@@ -18,23 +24,8 @@ fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
     };
     let folder = folder("demo");
     let live = folder.join("live.rrd");
-    let options = format!("--no-browser --port 0 --linger 0 --rrd {}", live.display());
-    let done = demo
-        .args([
-            "demo",
-            "--device",
-            "native",
-            "--seconds",
-            "4",
-            "--view",
-            "--out",
-        ])
-        .arg(&folder)
-        .env("HAPTERRA_VIEW_OPTIONS", options)
-        .output()
-        .expect("it starts");
-    let said = String::from_utf8_lossy(&done.stdout) + String::from_utf8_lossy(&done.stderr);
-    assert!(done.status.success(), "{said}");
+    demo.args(["demo", "--device", "native", "--seconds", "4", "--view"]);
+    let said = Running::whole(demo.arg("--out").arg(&folder), &rrd(&live));
     assert!(!said.contains("not shown"), "{said}");
     let recording = folder.join("fractal.csv");
     let csv = Csv::read(&recording);
@@ -55,35 +46,13 @@ fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
     assert!(rates.iter().any(|(_, row)| row[0] > 0.0), "{rates:?}");
 
     let terrain = folder.join("hills.tif");
-    let made = hapterra()
-        .expect("named")
-        .args(["synth", "fractal", "--size", "1024", "--seed", "1", "-o"])
-        .arg(&terrain)
-        .output()
-        .expect("it starts");
-    assert!(
-        made.status.success(),
-        "{}",
-        String::from_utf8_lossy(&made.stderr)
-    );
+    let mut synth = hapterra().expect("named");
+    synth.args(["synth", "fractal", "--size", "1024", "--seed", "1", "-o"]);
+    Running::whole(synth.arg(&terrain), "");
     let again = folder.join("again.rrd");
-    let viewed = hapterra()
-        .expect("named")
-        .arg("view")
-        .arg(&recording)
-        .arg("--ignore-settings")
-        .arg("--terrain")
-        .arg(&terrain)
-        .arg("--rrd")
-        .arg(&again)
-        .env("HAPTERRA_VIEW_OPTIONS", "--no-browser --port 0 --linger 0")
-        .output()
-        .expect("it starts");
-    assert!(
-        viewed.status.success(),
-        "{}",
-        String::from_utf8_lossy(&viewed.stderr)
-    );
+    let mut view = hapterra().expect("named");
+    view.arg("view").arg(&recording).arg("--ignore-settings");
+    Running::whole(view.arg("--terrain").arg(&terrain), &rrd(&again));
     check(&csv, &entities(&again));
     std::fs::remove_dir_all(folder).expect("it goes");
 }
@@ -139,15 +108,9 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     let (terrain, commands) = (at("hills.tif"), at("commands"));
     let lines = "at 3.5 zoom 2\nat 4.3 pan 4 3\nat 5.1 exaggerate 1.5\n";
     std::fs::write(&commands, lines).expect("written");
-    let run = |command: &mut std::process::Command, rrd: &Path| {
-        let options = format!("--no-browser --port 0 --linger 0 --rrd {}", rrd.display());
-        let done = command.env("HAPTERRA_VIEW_OPTIONS", options).output();
-        let done = done.expect("it starts");
-        let said = String::from_utf8_lossy(&done.stdout) + String::from_utf8_lossy(&done.stderr);
-        assert!(done.status.success(), "{said}");
-    };
+    let run = |command: &mut Command, into: &Path| Running::whole(command, &rrd(into));
     let size = ["synth", "fractal", "--size", "512", "--seed", "1", "-o"];
-    run(synth.args(size).arg(&terrain), &at("none.rrd"));
+    Running::whole(synth.args(size).arg(&terrain), "");
     let mut demo = hapterra().expect("named");
     demo.args(["demo", "--device", "native", "--seconds", "6", "--view"]);
     demo.arg("--commands").arg(&commands);

@@ -224,32 +224,6 @@ impl Browser {
         BASE64_STANDARD.decode(shot).expect("base 64")
     }
 
-    /// How far a part differs between two pictures: a mean over its pixels and colours, of 255.
-    pub fn difference(&mut self, page: &Page, pictures: [&str; 2], part: [f64; 4]) -> f64 {
-        let expression = format!(
-            "(async () => {{
-                const pixels = async (picture) => {{
-                    const image = new Image();
-                    image.src = 'data:image/png;base64,' + picture;
-                    await image.decode();
-                    const [x, y, w, h] = {part:?};
-                    const canvas = document.createElement('canvas');
-                    const size = [Math.round(w * image.width), Math.round(h * image.height)];
-                    [canvas.width, canvas.height] = size;
-                    const to = canvas.getContext('2d');
-                    to.drawImage(image, -Math.round(x * image.width), -Math.round(y * image.height));
-                    return to.getImageData(0, 0, ...size).data;
-                }};
-                const [a, b] = [await pixels('{}'), await pixels('{}')];
-                let sum = 0;
-                for (let i = 0; i < a.length; i++) sum += Math.abs(a[i] - b[i]);
-                return sum / (0.75 * a.length);
-            }})()",
-            pictures[0], pictures[1]
-        );
-        self.value(page, &expression).as_f64().expect("a number")
-    }
-
     /// The colours of a part of a picture: its place and size in shares of the whole. The
     /// page itself takes the picture apart.
     pub fn colours(
