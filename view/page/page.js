@@ -11,12 +11,13 @@ const CHANNEL = "hapterra";
 const AGAIN_MS = 1000;
 const LEAST_MS = 20000;
 const SIGN = 0xffffffff;
+const LOST = 0xfffffffe;
 
 const said = document.getElementById("said");
 const pageBytes = Number(said.dataset.pageBytes);
 
 // For tests and figures.
-const state = { pieces: 0, bytes: 0, connections: 0, memory: 0, isOver: false, isStarted: false };
+const state = { pieces: 0, bytes: 0, connections: 0, memory: 0, isOver: false, isLost: false, isStarted: false };
 window.hapterra = state;
 
 // The layout is made for a dark sky: what the browser prefers is not asked.
@@ -92,7 +93,8 @@ async function read(viewer, memory) {
       const head = await bytes.take(4);
       if (head === null) return false;
       const length = new DataView(head.buffer).getUint32(0, true);
-      if (length === 0) return true;
+      state.isLost = length === LOST;
+      if (length === 0 || state.isLost) return true;
       if (length === SIGN) continue;
       const piece = await bytes.take(length);
       if (piece === null) return false;
@@ -119,7 +121,7 @@ async function follow(viewer, memory) {
     await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
   }
   state.isOver = true;
-  say("");
+  say(state.isLost ? "hapterra is gone: it was killed, or crashed. This is the last that it told." : "");
 }
 
 async function main() {
