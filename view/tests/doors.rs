@@ -63,11 +63,15 @@ fn foreign_hosts_and_origins_are_refused_and_nothing_can_be_sent() {
     ] {
         assert_eq!(status(&get(port, "/feed", &own, more)), 403, "{more}");
     }
-    for method in ["POST", "PUT", "DELETE", "OPTIONS"] {
+    // The page comes first: an answer to it ends.
+    for (method, path) in ["POST", "PUT", "DELETE", "OPTIONS"]
+        .into_iter()
+        .flat_map(|method| [(method, "/"), (method, "/feed")])
+    {
         let request = format!(
-            "{method} /feed HTTP/1.1\r\nHost: {own}\r\nContent-Length: 2\r\nConnection: close\r\n\r\nhi"
+            "{method} {path} HTTP/1.1\r\nHost: {own}\r\nContent-Length: 2\r\nConnection: close\r\n\r\nhi"
         );
-        assert_eq!(status(&asked(port, &request)), 405, "{method}");
+        assert_eq!(status(&asked(port, &request)), 405, "{method} {path}");
     }
 }
 
@@ -128,6 +132,21 @@ fn a_stream_of_another_version_or_of_none_is_named() {
             .contains("hapterra starts this program itself")
     );
     assert!(!viewer.end());
+}
+
+#[test]
+fn a_page_hears_whether_the_session_ended_or_hapterra_is_gone() {
+    for (is_told, last) in [(true, 0), (false, u32::MAX - 1)] {
+        let (mut viewer, port) = live("");
+        let mut page = reading(port, 1000);
+        if is_told {
+            assert!(viewer.tell(&Message::End));
+        }
+        viewer.hang_up();
+        let mut rest = Vec::new();
+        page.read_to_end(&mut rest).expect("the stream ends");
+        assert!(rest.ends_with(&u32::to_le_bytes(last)), "{is_told}");
+    }
 }
 
 #[test]
