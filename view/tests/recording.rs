@@ -2,13 +2,10 @@
 
 mod common;
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
-use re_chunk::Chunk;
-
-use common::recorded::{Csv, HIP, check, entities, places, scalars};
+use common::recorded::{Csv, check, check_views, entities, scalars};
 use common::{Running, folder, hapterra};
 
 /// Writes what is shown into a file, too.
@@ -55,46 +52,6 @@ fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
     Running::whole(view.arg("--terrain").arg(&terrain), &rrd(&again));
     check(&csv, &entities(&again));
     std::fs::remove_dir_all(folder).expect("it goes");
-}
-
-/// What was felt in several views lies where it lies on the ground: places and heights of
-/// all of them in one scale, in `stretched` views as high as in the first.
-fn check_views(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>, stretched: bool) {
-    let drawn = places(&shown["/hand/hip"]);
-    let heights = scalars(&shown["/plot/height"]);
-    let rows: BTreeMap<i64, usize> = (0..csv.rows.len())
-        .map(|row| ((csv.number(row, "t_s") * 1e9).round() as i64, row))
-        .collect();
-    let (mut cells, mut seen) = (None, [0; 4]);
-    for (time, place) in &drawn {
-        let row = rows[time];
-        let view = csv.number(row, "view") as usize;
-        seen[view] += 1;
-        let ([cell, unit], first) = (csv.scales[view], csv.scales[0]);
-        let [x, y, z] = csv.vector(row, HIP);
-        let upright = match stretched {
-            true => z / unit * first[1] / first[0],
-            false => z / cell,
-        };
-        let felt = [x / cell, y / cell, upright];
-        let place = place[0].map(f64::from);
-        let (cells_at, place_at) = *cells.get_or_insert((felt, place));
-        let [east, north, up] = [0, 1, 2].map(|i| place[i] - place_at[i]);
-        let [x, y, z] = [0, 1, 2].map(|i| csv.units * (felt[i] - cells_at[i]));
-        let off = [east - x, north - y, up - z];
-        assert!(
-            off.iter().all(|off| off.abs() < 2e-3 * csv.units),
-            "row {row}, view {view}: {off:?}"
-        );
-    }
-    assert!(seen.iter().all(|count| *count > 10), "{seen:?}");
-    // Heights in the file's unit, whatever the hand felt.
-    for (time, values) in &heights {
-        let row = rows[time];
-        let [_, unit] = csv.scales[csv.number(row, "view") as usize];
-        let expected = csv.vector(row, HIP)[2] / unit;
-        assert!((values[0] - expected).abs() < 1e-6, "row {row}");
-    }
 }
 
 #[test]

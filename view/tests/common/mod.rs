@@ -92,12 +92,6 @@ impl Running {
         format!("http://127.0.0.1:{}/", self.port())
     }
 
-    /// Writes a line to its standard input.
-    pub fn tell(&mut self, line: &str) {
-        let to = self.child.stdin.as_mut().expect("a pipe");
-        writeln!(to, "{line}").expect("it reads");
-    }
-
     /// Whether it goes on.
     pub fn goes_on(&mut self) -> bool {
         self.child.try_wait().expect("a child").is_none()

@@ -107,6 +107,57 @@ pub fn sample(tick: u64) -> Sample {
     }
 }
 
+/// The first view moved so far to the east, mm of its own, and made so many times larger.
+/// The device keeps its tiles.
+pub fn zoomed_scene(scale: f64, east_mm: f64) -> Message {
+    let Message::Scene(mut scene) = scene(true) else {
+        unreachable!()
+    };
+    let side = f64::from(CELLS) * CELL_MM;
+    scene.keeps_tiles = true;
+    scene.cell_mm *= scale;
+    scene.mm_per_unit *= scale;
+    scene.home_mm = [0.5 * side + east_mm, 0.5 * side, 20.0].map(|mm| scale * mm);
+    // As much in the hand as before.
+    let [x, y, _] = scene.home_mm;
+    let half = 0.5 * side;
+    scene.laid_mm = [x - half, y - half, x + half, y + half];
+    scene.ground_m_per_mm = Some(METRES / scale);
+    scene.height_per_mm = METRES / scale;
+    Message::Scene(scene)
+}
+
+/// A hand that rests over the surface at the home position of such a view, so that no arrow
+/// hides the proxy.
+pub fn resting(scale: f64, east_mm: f64) -> impl Fn(u64) -> Sample {
+    let middle = 0.5 * f64::from(CELLS) * CELL_MM;
+    let (x, y) = (middle + east_mm, middle);
+    let ground = scale * height(x, y);
+    let hip = [scale * x, scale * y, ground + scale];
+    move |tick| Sample {
+        t_s: tick as f64 / 1000.0,
+        hip_mm: hip,
+        proxy_mm: hip,
+        force_n: [0.0; 3],
+        ground_mm: ground,
+        contact: false,
+        cost: None,
+    }
+}
+
+/// The tiles around one, and that the device holds them.
+pub fn tiles_around([col, row]: [i32; 2]) -> Vec<Message> {
+    let around: Vec<_> = (-1..2)
+        .flat_map(|dy| (-1..2).map(move |dx| [col + dx, row + dy]))
+        .collect();
+    let mut messages: Vec<_> = around.iter().map(|index| tile(*index)).collect();
+    messages.push(Message::Tiles(Tiles {
+        held: around,
+        awaited: vec![],
+    }));
+    messages
+}
+
 /// What is told in the batch that ends at a tick: samples, the tiles around the hand where
 /// they have changed, and the link.
 pub fn batch(from: u64, to: u64, held: &mut Vec<[i32; 2]>) -> Vec<Message> {
