@@ -2,21 +2,25 @@
 //
 // The stream is read only while somebody can see the page, because a hidden viewer draws
 // nothing and would only pile up what it is told. A page that comes back is told what
-// it missed; what it has already it knows by its number and passes over. The viewer keeps
-// all samples that it was told, so from a size on the page begins anew; not at once, though,
-// where what it is told first is larger already.
+// it missed; what it has already it knows by its number and passes over. The viewer forgets
+// its oldest samples from a size on. Its memory may be in pieces and grow in spite of that, so
+// from a larger size on the page begins anew; not at once, though, where what it is told first
+// is larger already.
 "use strict";
 
 const CHANNEL = "hapterra";
 const AGAIN_MS = 1000;
 const LEAST_MS = 20000;
+// The part of the page's memory that the viewer fills before it forgets.
+const KEPT = 0.35;
 const SIGN = 0xffffffff;
+const LOST = 0xfffffffe;
 
 const said = document.getElementById("said");
 const pageBytes = Number(said.dataset.pageBytes);
 
 // For tests and figures.
-const state = { pieces: 0, bytes: 0, connections: 0, memory: 0, isOver: false, isStarted: false };
+const state = { pieces: 0, bytes: 0, connections: 0, memory: 0, isOver: false, isLost: false, isStarted: false };
 window.hapterra = state;
 
 // The layout is made for a dark sky: what the browser prefers is not asked.
@@ -92,7 +96,8 @@ async function read(viewer, memory) {
       const head = await bytes.take(4);
       if (head === null) return false;
       const length = new DataView(head.buffer).getUint32(0, true);
-      if (length === 0) return true;
+      state.isLost = length === LOST;
+      if (length === 0 || state.isLost) return true;
       if (length === SIGN) continue;
       const piece = await bytes.take(length);
       if (piece === null) return false;
@@ -119,10 +124,20 @@ async function follow(viewer, memory) {
     await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
   }
   state.isOver = true;
-  say("");
+  say(state.isLost ? "hapterra is gone: it was killed, or crashed. This is the last that it told." : "");
+}
+
+// The viewer reads its limit from the settings that it keeps in the browser, and nowhere else.
+function limit(bytes) {
+  try {
+    localStorage.setItem("app", `(app_options:(memory_limit:Some(${Math.round(bytes)})))`);
+  } catch (error) {
+    // A browser that keeps nothing: the page begins anew where it grows too large.
+  }
 }
 
 async function main() {
+  limit(KEPT * pageBytes);
   const program = await wasm_bindgen({ module_or_path: fetch("re_viewer_bg.wasm") });
   const query = new URLSearchParams(location.search);
   const viewer = new wasm_bindgen.WebHandle({

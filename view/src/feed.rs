@@ -10,7 +10,7 @@ use hapterra_view_stream::{Message, VERSION, read};
 use re_log_encoding::Encoder;
 
 use crate::drawing::{Drawing, Entry};
-use crate::history::History;
+use crate::history::{End, History};
 
 /// A recording for rerun's own viewer, written beside the page's stream.
 pub struct RrdFile(Encoder<BufWriter<File>>);
@@ -89,7 +89,10 @@ pub fn draw(
         history.put(rest)?;
     }
     let rrd = file.and_then(|rrd| rrd.map_or(Ok(()), RrdFile::finish));
-    history.end();
+    history.end(match is_told {
+        true => End::Told,
+        false => End::Lost,
+    });
     if !told && drawing.is_some() {
         on_scene();
     }

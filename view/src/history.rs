@@ -45,7 +45,7 @@ struct State {
     happened: VecDeque<Blob>,
     happened_bytes: usize,
     is_bounded: bool,
-    has_ended: bool,
+    ended: Option<End>,
     pages: Vec<Arc<Page>>,
     /// Pages that have come so far.
     came: u64,
@@ -63,7 +63,16 @@ struct Queue {
     bytes: usize,
     /// It was too slow, or is gone.
     is_cut: bool,
-    is_over: bool,
+    ended: Option<End>,
+}
+
+/// How a session ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// `hapterra` said that there is no more.
+    Told,
+    /// `hapterra` is gone without saying so: it was killed, or crashed.
+    Lost,
 }
 
 /// What a page is told next.
@@ -74,7 +83,7 @@ pub enum Next {
     /// Nothing for now.
     Nothing,
     /// There is no more: the session has ended.
-    Over,
+    Over(End),
     /// It was too slow, and has to come again.
     Cut,
 }
@@ -153,11 +162,11 @@ impl History {
     }
 
     /// Nothing comes any more.
-    pub fn end(&self) {
+    pub fn end(&self, how: End) {
         let mut state = locked(&self.state);
-        state.has_ended = true;
+        state.ended = Some(how);
         for page in &state.pages {
-            page.end();
+            page.end(how);
         }
     }
 
@@ -168,7 +177,7 @@ impl History {
         let kept = state.standing.values().chain(&state.happened);
         let queue = Queue {
             blobs: kept.cloned().collect(),
-            is_over: state.has_ended,
+            ended: state.ended,
             ..Queue::default()
         };
         let page = Arc::new(Page {
@@ -222,7 +231,8 @@ impl Page {
     #[must_use]
     pub fn next(&self, wait: std::time::Duration) -> Next {
         let queue = locked(&self.queue);
-        let idle = |queue: &mut Queue| queue.blobs.is_empty() && !queue.is_over && !queue.is_cut;
+        let idle =
+            |queue: &mut Queue| queue.blobs.is_empty() && queue.ended.is_none() && !queue.is_cut;
         let waited = self.woken.wait_timeout_while(queue, wait, idle);
         let (mut queue, _) = waited.unwrap_or_else(PoisonError::into_inner);
         if queue.is_cut {
@@ -233,8 +243,7 @@ impl Page {
                 queue.bytes = queue.bytes.saturating_sub(blob.len());
                 Next::Blob(blob)
             }
-            None if queue.is_over => Next::Over,
-            None => Next::Nothing,
+            None => queue.ended.map_or(Next::Nothing, Next::Over),
         }
     }
 
@@ -260,8 +269,8 @@ impl Page {
         locked(&self.queue).is_cut
     }
 
-    fn end(&self) {
-        locked(&self.queue).is_over = true;
+    fn end(&self, how: End) {
+        locked(&self.queue).ended = Some(how);
         self.woken.notify_all();
     }
 }
@@ -362,9 +371,13 @@ mod tests {
         assert_eq!(page.next(NOW), Next::Cut);
         let page = history.come();
         history.put(vec![entry(None)]).expect("encodes");
-        history.end();
+        for how in [End::Told, End::Lost] {
+            history.end(how);
+            let late = history.come();
+            assert_eq!(told(&late), 1);
+            assert_eq!(late.next(NOW), Next::Over(how));
+        }
         assert_eq!(told(&page), 1);
-        assert_eq!(page.next(NOW), Next::Over);
-        assert_eq!(told(&history.come()), 1);
+        assert_eq!(page.next(NOW), Next::Over(End::Lost));
     }
 }

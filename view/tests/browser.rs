@@ -3,14 +3,17 @@
 mod common;
 
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use hapterra_view_stream::Message;
+
 use common::browser::{Browser, Colours, Page, program};
 use common::recorded::{Csv, check, entities};
-use common::scene::{batch, greeting, layer, scene};
-use common::{Viewer, folder, hapterra, lines_of, port_said};
+use common::scene::{batch, greeting, layer, resting, scene, tiles_around, zoomed_scene};
+use common::{
+    PATIENCE, Running, Viewer, emulated, folder, hapterra, memory_of, signal, started_by,
+};
 
 /// Until the page shows what is asked of it; software draws it, on a busy machine.
 const SHOWN_WITHIN: Duration = Duration::from_secs(300);
@@ -33,7 +36,7 @@ struct Session {
 }
 
 impl Session {
-    fn start(options: &[&str]) -> (Self, u16) {
+    fn start(options: &str) -> (Self, String) {
         let mut session = Self {
             viewer: Viewer::start(options),
             tick: 0,
@@ -43,8 +46,8 @@ impl Session {
             assert!(session.viewer.tell(&message));
         }
         session.go_on(1000);
-        let port = session.viewer.port();
-        (session, port)
+        let address = session.viewer.address();
+        (session, address)
     }
 
     fn go_on(&mut self, ticks: u64) {
@@ -118,8 +121,7 @@ fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
     let Some(mut browser) = browser_in(&folder) else {
         return;
     };
-    let (mut session, port) = Session::start(&["--linger", "0"]);
-    let address = format!("http://127.0.0.1:{port}/");
+    let (mut session, address) = Session::start("--linger 0");
     let page = browser.open(&address);
     let mut go_on = || session.go_on(200);
     let (terrain, plots) = shown(&mut browser, &page, &mut go_on, is_whole);
@@ -156,8 +158,8 @@ fn a_page_that_has_grown_too_large_begins_anew_and_goes_on() {
     let Some(mut browser) = browser_in(&folder) else {
         return;
     };
-    let (mut session, port) = Session::start(&["--linger", "0", "--page-mb", "64"]);
-    let page = browser.open(&format!("http://127.0.0.1:{port}/"));
+    let (mut session, address) = Session::start("--linger 0 --page-mb 64");
+    let page = browser.open(&address);
     let mut until = |wanted: &dyn Fn(f64, f64) -> bool| {
         let until = Instant::now() + SHOWN_WITHIN;
         loop {
@@ -183,8 +185,7 @@ fn a_page_that_has_grown_too_large_begins_anew_and_goes_on() {
 
 #[test]
 fn the_page_shows_what_the_emulated_board_feels_while_it_is_touched() {
-    let image = std::env::var_os("HAPTERRA_MPS2_ELF").filter(|image| !image.is_empty());
-    let (Some(mut demo), Some(image)) = (hapterra(), image) else {
+    let (Some(mut demo), Some(image)) = (hapterra(), emulated()) else {
         println!("SKIPPED: no hapterra and no emulated board; cargo xtask view --test names both");
         return;
     };
@@ -194,24 +195,17 @@ fn the_page_shows_what_the_emulated_board_feels_while_it_is_touched() {
         return;
     };
     let live = folder.join("live.rrd");
-    let options = format!("--no-browser --port 0 --linger 0 --rrd {}", live.display());
     // For as long as it takes a page to be seen on a busy machine: it is ended then.
     demo.args(["demo", "--device", "emulated", "--rounds", "90", "--view"])
         .arg("--image")
         .arg(image)
         .arg("--out")
-        .arg(&folder)
-        .env("HAPTERRA_VIEW_OPTIONS", options)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    let mut demo = demo.spawn().expect("it starts");
-    let told = lines_of(demo.stdout.take().expect("a pipe"));
-    let said = lines_of(demo.stderr.take().expect("a pipe"));
-    let address = format!("http://127.0.0.1:{}/", port_said(&said));
+        .arg(&folder);
+    let mut demo = Running::shown(&mut demo, &format!("--rrd {}", live.display()));
+    let address = demo.address();
     let page = browser.open(&address);
     let mut is_touched = || {
-        let ended = demo.try_wait().expect("a child");
-        assert!(ended.is_none(), "it ended before the page was seen");
+        assert!(demo.goes_on(), "it ended before the page was seen");
     };
     let (terrain, plots) = shown(&mut browser, &page, &mut is_touched, is_whole);
     shown(&mut browser, &page, &mut is_touched, |now, plotted| {
@@ -226,17 +220,150 @@ fn the_page_shows_what_the_emulated_board_feels_while_it_is_touched() {
     let foreign = foreign(&browser, &address);
     assert!(foreign.is_empty(), "requests elsewhere: {foreign:?}");
     drop(browser);
-    let ended = Command::new("kill")
-        .args(["-INT", &demo.id().to_string()])
-        .status();
-    assert!(ended.expect("kill").success());
-    assert!(demo.wait().expect("it ends").success());
-    // The viewer ends after it, once it has written what it was told.
-    let told = told.iter().chain(&said).collect::<Vec<_>>().join("\n");
+    demo.interrupt();
+    assert!(demo.end());
+    let told = demo.words();
     for figure in [" run, 0 late", " 0 lost on the link, 0 dropped"] {
         assert!(told.contains(figure), "{told}");
     }
     assert!(!told.contains("not shown"), "{told}");
     check(&Csv::read(&folder.join("fractal.csv")), &entities(&live));
     std::fs::remove_dir_all(folder).expect("it goes");
+}
+
+/// How far pictures may differ of the same, and how far they have to of something else:
+/// means over all pixels and colours, of 255.
+const SAME: f64 = 0.5;
+const OTHER: f64 = 4.0;
+
+#[test]
+fn pan_and_zoom_under_a_resting_hand_move_the_picture_and_back() {
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = folder("moved");
+    let Some(mut browser) = browser_in(&folder) else {
+        return;
+    };
+    let mut viewer = Viewer::start("--linger 0");
+    let begin = [greeting(), scene(true), layer()];
+    for message in begin.iter().chain(&tiles_around([2, 2])) {
+        assert!(viewer.tell(message));
+    }
+    let mut tick = 0;
+    let mut rest = |viewer: &mut Viewer, scale: f64, east_mm: f64| {
+        // More than the trace is long: nothing of what was before is left in the picture.
+        let ticks = tick..tick + 6000;
+        tick = ticks.end;
+        let samples = ticks.map(resting(scale, east_mm)).collect::<Vec<_>>();
+        for samples in samples.chunks(100) {
+            assert!(viewer.tell(&Message::Samples(samples.to_vec())));
+        }
+    };
+    rest(&mut viewer, 1.0, 0.0);
+    let page = browser.open(&viewer.address());
+    let mut go_on = || rest(&mut viewer, 1.0, 0.0);
+    shown(&mut browser, &page, &mut go_on, is_whole);
+    // A picture that is as it should be, and so is the next one.
+    let mut settled = |is_right: &dyn Fn(&mut Browser, &str) -> bool| {
+        let until = Instant::now() + SHOWN_WITHIN;
+        let mut before = browser.picture(&page);
+        loop {
+            std::thread::sleep(Duration::from_secs(1));
+            let picture = browser.picture(&page);
+            let is_still = browser.difference(&page, [&before, &picture], TERRAIN) < 0.05;
+            if is_still && is_right(&mut browser, &picture) {
+                return picture;
+            }
+            before = picture;
+            assert!(Instant::now() < until, "it does not come to that");
+        }
+    };
+    let first = settled(&|_, _| true);
+    for (scale, east_mm) in [(1.0, 25.0), (1.0, 0.0), (2.0, 0.0), (1.0, 0.0)] {
+        assert!(viewer.tell(&zoomed_scene(scale, east_mm)));
+        rest(&mut viewer, scale, east_mm);
+        let is_first = (scale, east_mm) == (1.0, 0.0);
+        settled(&|browser, picture| {
+            let apart = browser.difference(&page, [&first, picture], TERRAIN);
+            if is_first {
+                apart < SAME
+            } else {
+                apart > OTHER
+            }
+        });
+    }
+    drop(browser);
+    assert!(viewer.end());
+    std::fs::remove_dir_all(folder).expect("it goes");
+}
+
+/// Who is killed while a page is looked at.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Killed {
+    Hapterra,
+    Viewer,
+}
+
+fn killed(who: Killed, says: &str) {
+    let Some(mut demo) = hapterra() else {
+        println!("SKIPPED: HAPTERRA names no program; cargo xtask view --test does");
+        return;
+    };
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = folder(&format!("killed-{}", who as u8));
+    let Some(mut browser) = browser_in(&folder) else {
+        return;
+    };
+    demo.args([
+        "demo", "--device", "native", "--rounds", "60", "--view", "--out",
+    ]);
+    let mut demo = Running::shown(demo.arg(&folder), "");
+    let page = browser.open(&demo.address());
+    let viewer = started_by(demo.id(), "hapterra-view").expect("a viewer");
+    shown(&mut browser, &page, &mut || {}, is_whole);
+    signal(
+        "-KILL",
+        if who == Killed::Viewer {
+            viewer
+        } else {
+            demo.id()
+        },
+    );
+    let until = Instant::now() + SHOWN_WITHIN;
+    while !{ browser.value(&page, "document.getElementById('said').textContent") }
+        .as_str()
+        .is_some_and(|said| said.contains(says))
+    {
+        assert!(Instant::now() < until, "the page does not say so");
+        std::thread::sleep(Duration::from_millis(200));
+    }
+    drop(browser);
+    if who == Killed::Viewer {
+        std::thread::sleep(Duration::from_secs(1));
+        assert!(demo.goes_on());
+        demo.interrupt();
+        assert!(demo.end());
+        let told = demo.words();
+        assert!(told.contains(" 0 lost on the link, 0 dropped"), "{told}");
+        assert!(
+            told.contains("were not shown: the viewer was slow, or gone"),
+            "{told}"
+        );
+    }
+    // Nobody looks any more.
+    let until = Instant::now() + PATIENCE;
+    while memory_of(viewer) > 0 {
+        assert!(Instant::now() < until, "the viewer does not end");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    std::fs::remove_dir_all(folder).expect("it goes");
+}
+
+#[test]
+fn a_page_says_that_hapterra_was_killed_and_the_viewer_ends_after_it() {
+    killed(Killed::Hapterra, "hapterra is gone");
+}
+
+#[test]
+fn a_page_says_that_the_viewer_was_killed_and_the_session_goes_on() {
+    killed(Killed::Viewer, "hapterra-view has ended");
 }

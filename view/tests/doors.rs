@@ -11,7 +11,7 @@ use common::scene::{batch, greeting, layer, scene};
 use common::{PATIENCE, Viewer, asked};
 
 /// A viewer that shows the beginning of a live session, and its port.
-fn live(options: &[&str]) -> (Viewer, u16) {
+fn live(options: &str) -> (Viewer, u16) {
     let mut viewer = Viewer::start(options);
     let mut held = Vec::new();
     let messages = [greeting(), scene(true), layer()];
@@ -36,7 +36,7 @@ fn status(answer: &str) -> u16 {
 
 #[test]
 fn foreign_hosts_and_origins_are_refused_and_nothing_can_be_sent() {
-    let (_viewer, port) = live(&[]);
+    let (_viewer, port) = live("");
     let own = format!("127.0.0.1:{port}");
     let page = get(port, "/", &own, "");
     assert_eq!(status(&page), 200);
@@ -63,11 +63,15 @@ fn foreign_hosts_and_origins_are_refused_and_nothing_can_be_sent() {
     ] {
         assert_eq!(status(&get(port, "/feed", &own, more)), 403, "{more}");
     }
-    for method in ["POST", "PUT", "DELETE", "OPTIONS"] {
+    // The page comes first: an answer to it ends.
+    for (method, path) in ["POST", "PUT", "DELETE", "OPTIONS"]
+        .into_iter()
+        .flat_map(|method| [(method, "/"), (method, "/feed")])
+    {
         let request = format!(
-            "{method} /feed HTTP/1.1\r\nHost: {own}\r\nContent-Length: 2\r\nConnection: close\r\n\r\nhi"
+            "{method} {path} HTTP/1.1\r\nHost: {own}\r\nContent-Length: 2\r\nConnection: close\r\n\r\nhi"
         );
-        assert_eq!(status(&asked(port, &request)), 405, "{method}");
+        assert_eq!(status(&asked(port, &request)), 405, "{method} {path}");
     }
 }
 
@@ -84,7 +88,7 @@ fn reading(port: u16, bytes: usize) -> TcpStream {
 
 #[test]
 fn pages_that_come_go_and_hang_hold_nothing_up() {
-    let (mut viewer, port) = live(&[]);
+    let (mut viewer, port) = live("");
     let mut held = Vec::new();
     // One hangs without reading; others come and go.
     let hanging = reading(port, 200);
@@ -108,7 +112,7 @@ fn pages_that_come_go_and_hang_hold_nothing_up() {
 
 #[test]
 fn a_stream_of_another_version_or_of_none_is_named() {
-    let mut viewer = Viewer::start(&[]);
+    let mut viewer = Viewer::start("");
     let other = Message::Hello(Hello {
         version: 999,
         program: "9.9".into(),
@@ -120,7 +124,7 @@ fn a_stream_of_another_version_or_of_none_is_named() {
         "{line}"
     );
     assert!(!viewer.end());
-    let mut viewer = Viewer::start(&[]);
+    let mut viewer = Viewer::start("");
     viewer.hang_up();
     assert!(
         viewer
@@ -131,8 +135,23 @@ fn a_stream_of_another_version_or_of_none_is_named() {
 }
 
 #[test]
+fn a_page_hears_whether_the_session_ended_or_hapterra_is_gone() {
+    for (is_told, last) in [(true, 0), (false, u32::MAX - 1)] {
+        let (mut viewer, port) = live("");
+        let mut page = reading(port, 1000);
+        if is_told {
+            assert!(viewer.tell(&Message::End));
+        }
+        viewer.hang_up();
+        let mut rest = Vec::new();
+        page.read_to_end(&mut rest).expect("the stream ends");
+        assert!(rest.ends_with(&u32::to_le_bytes(last)), "{is_told}");
+    }
+}
+
+#[test]
 fn it_ends_by_itself_once_nobody_looks() {
-    let (mut viewer, port) = live(&["--linger", "0.2"]);
+    let (mut viewer, port) = live("--linger 0.2");
     let page = reading(port, 1000);
     viewer.hang_up();
     std::thread::sleep(std::time::Duration::from_millis(100));
@@ -142,7 +161,7 @@ fn it_ends_by_itself_once_nobody_looks() {
 
 #[test]
 fn it_ends_by_itself_where_hapterra_was_killed_and_nobody_ever_looked() {
-    let (mut viewer, _) = live(&[]);
+    let (mut viewer, _) = live("");
     // No end is said. Its own patience is 15 s.
     viewer.hang_up();
     let began = std::time::Instant::now();
@@ -153,7 +172,7 @@ fn it_ends_by_itself_where_hapterra_was_killed_and_nobody_ever_looked() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_under_the_rrd_file_leaves_the_page_alone_and_is_told() {
-    let (mut viewer, port) = live(&["--rrd", "/dev/full", "--linger", "0"]);
+    let (mut viewer, port) = live("--rrd /dev/full --linger 0");
     let mut held = Vec::new();
     for round in 1..100u64 {
         for message in batch(100 * round, 100 * (round + 1), &mut held) {
@@ -175,6 +194,6 @@ fn a_full_disk_under_the_rrd_file_leaves_the_page_alone_and_is_told() {
 
 #[test]
 fn an_address_that_others_reach_is_warned_of() {
-    let viewer = Viewer::start(&["--bind", "0.0.0.0"]);
+    let viewer = Viewer::start("--bind 0.0.0.0");
     assert!(viewer.line().contains("warning: other machines"));
 }

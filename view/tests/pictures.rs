@@ -5,11 +5,10 @@
 mod common;
 
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use common::browser::{Browser, Colours, Page, program};
-use common::{folder, hapterra, lines_of, port_said};
+use common::{Running, folder, hapterra};
 
 const SIZE: [u32; 2] = [1440, 900];
 const TERRAIN: [f64; 4] = [0.0, 0.05, 0.56, 0.88];
@@ -59,13 +58,9 @@ fn pictures_at_the_start_while_sliding_and_zoomed() {
         .arg("--commands")
         .arg(&commands)
         .arg("--out")
-        .arg(&folder)
-        .env("HAPTERRA_VIEW_OPTIONS", "--no-browser --port 0 --linger 0")
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped());
-    let mut demo = demo.spawn().expect("it starts");
-    let said = lines_of(demo.stderr.take().expect("a pipe"));
-    let address = format!("http://127.0.0.1:{}/", port_said(&said));
+        .arg(&folder);
+    let mut demo = Running::shown(&mut demo, "");
+    let address = demo.address();
     let began = Instant::now();
     let mut browser = Browser::start(&program().expect("a Chromium"), &folder);
     let page = browser.open_sized(&address, SIZE);
@@ -85,10 +80,7 @@ fn pictures_at_the_start_while_sliding_and_zoomed() {
     std::thread::sleep(ZOOMED.saturating_sub(began.elapsed()));
     shown.keep(&into.join("view-zoomed.jpg"), is_touched);
     drop(shown);
-    let ended = Command::new("kill")
-        .args(["-INT", &demo.id().to_string()])
-        .status();
-    assert!(ended.expect("kill").success());
-    assert!(demo.wait().expect("it ends").success());
+    demo.interrupt();
+    assert!(demo.end());
     let _ = std::fs::remove_dir_all(folder);
 }

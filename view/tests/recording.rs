@@ -2,13 +2,16 @@
 
 mod common;
 
-use std::collections::BTreeMap;
 use std::path::Path;
+use std::process::Command;
 
-use re_chunk::Chunk;
+use common::recorded::{Csv, check, check_views, entities, scalars};
+use common::{Running, folder, hapterra};
 
-use common::recorded::{Csv, HIP, check, entities, places, scalars};
-use common::{folder, hapterra};
+/// Writes what is shown into a file, too.
+fn rrd(into: &Path) -> String {
+    format!("--rrd {}", into.display())
+}
 
 #[test]
 fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
@@ -18,23 +21,8 @@ fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
     };
     let folder = folder("demo");
     let live = folder.join("live.rrd");
-    let options = format!("--no-browser --port 0 --linger 0 --rrd {}", live.display());
-    let done = demo
-        .args([
-            "demo",
-            "--device",
-            "native",
-            "--seconds",
-            "4",
-            "--view",
-            "--out",
-        ])
-        .arg(&folder)
-        .env("HAPTERRA_VIEW_OPTIONS", options)
-        .output()
-        .expect("it starts");
-    let said = String::from_utf8_lossy(&done.stdout) + String::from_utf8_lossy(&done.stderr);
-    assert!(done.status.success(), "{said}");
+    demo.args(["demo", "--device", "native", "--seconds", "4", "--view"]);
+    let said = Running::whole(demo.arg("--out").arg(&folder), &rrd(&live));
     assert!(!said.contains("not shown"), "{said}");
     let recording = folder.join("fractal.csv");
     let csv = Csv::read(&recording);
@@ -55,77 +43,15 @@ fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
     assert!(rates.iter().any(|(_, row)| row[0] > 0.0), "{rates:?}");
 
     let terrain = folder.join("hills.tif");
-    let made = hapterra()
-        .expect("named")
-        .args(["synth", "fractal", "--size", "1024", "--seed", "1", "-o"])
-        .arg(&terrain)
-        .output()
-        .expect("it starts");
-    assert!(
-        made.status.success(),
-        "{}",
-        String::from_utf8_lossy(&made.stderr)
-    );
+    let mut synth = hapterra().expect("named");
+    synth.args(["synth", "fractal", "--size", "1024", "--seed", "1", "-o"]);
+    Running::whole(synth.arg(&terrain), "");
     let again = folder.join("again.rrd");
-    let viewed = hapterra()
-        .expect("named")
-        .arg("view")
-        .arg(&recording)
-        .arg("--ignore-settings")
-        .arg("--terrain")
-        .arg(&terrain)
-        .arg("--rrd")
-        .arg(&again)
-        .env("HAPTERRA_VIEW_OPTIONS", "--no-browser --port 0 --linger 0")
-        .output()
-        .expect("it starts");
-    assert!(
-        viewed.status.success(),
-        "{}",
-        String::from_utf8_lossy(&viewed.stderr)
-    );
+    let mut view = hapterra().expect("named");
+    view.arg("view").arg(&recording).arg("--ignore-settings");
+    Running::whole(view.arg("--terrain").arg(&terrain), &rrd(&again));
     check(&csv, &entities(&again));
     std::fs::remove_dir_all(folder).expect("it goes");
-}
-
-/// What was felt in several views lies where it lies on the ground: places and heights of
-/// all of them in one scale, in `stretched` views as high as in the first.
-fn check_views(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>, stretched: bool) {
-    let drawn = places(&shown["/hand/hip"]);
-    let heights = scalars(&shown["/plot/height"]);
-    let rows: BTreeMap<i64, usize> = (0..csv.rows.len())
-        .map(|row| ((csv.number(row, "t_s") * 1e9).round() as i64, row))
-        .collect();
-    let (mut cells, mut seen) = (None, [0; 4]);
-    for (time, place) in &drawn {
-        let row = rows[time];
-        let view = csv.number(row, "view") as usize;
-        seen[view] += 1;
-        let ([cell, unit], first) = (csv.scales[view], csv.scales[0]);
-        let [x, y, z] = csv.vector(row, HIP);
-        let upright = match stretched {
-            true => z / unit * first[1] / first[0],
-            false => z / cell,
-        };
-        let felt = [x / cell, y / cell, upright];
-        let place = place[0].map(f64::from);
-        let (cells_at, place_at) = *cells.get_or_insert((felt, place));
-        let [east, north, up] = [0, 1, 2].map(|i| place[i] - place_at[i]);
-        let [x, y, z] = [0, 1, 2].map(|i| csv.units * (felt[i] - cells_at[i]));
-        let off = [east - x, north - y, up - z];
-        assert!(
-            off.iter().all(|off| off.abs() < 2e-3 * csv.units),
-            "row {row}, view {view}: {off:?}"
-        );
-    }
-    assert!(seen.iter().all(|count| *count > 10), "{seen:?}");
-    // Heights in the file's unit, whatever the hand felt.
-    for (time, values) in &heights {
-        let row = rows[time];
-        let [_, unit] = csv.scales[csv.number(row, "view") as usize];
-        let expected = csv.vector(row, HIP)[2] / unit;
-        assert!((values[0] - expected).abs() < 1e-6, "row {row}");
-    }
 }
 
 #[test]
@@ -139,15 +65,9 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     let (terrain, commands) = (at("hills.tif"), at("commands"));
     let lines = "at 3.5 zoom 2\nat 4.3 pan 4 3\nat 5.1 exaggerate 1.5\n";
     std::fs::write(&commands, lines).expect("written");
-    let run = |command: &mut std::process::Command, rrd: &Path| {
-        let options = format!("--no-browser --port 0 --linger 0 --rrd {}", rrd.display());
-        let done = command.env("HAPTERRA_VIEW_OPTIONS", options).output();
-        let done = done.expect("it starts");
-        let said = String::from_utf8_lossy(&done.stdout) + String::from_utf8_lossy(&done.stderr);
-        assert!(done.status.success(), "{said}");
-    };
+    let run = |command: &mut Command, into: &Path| Running::whole(command, &rrd(into));
     let size = ["synth", "fractal", "--size", "512", "--seed", "1", "-o"];
-    run(synth.args(size).arg(&terrain), &at("none.rrd"));
+    Running::whole(synth.args(size).arg(&terrain), "");
     let mut demo = hapterra().expect("named");
     demo.args(["demo", "--device", "native", "--seconds", "6", "--view"]);
     demo.arg("--commands").arg(&commands);

@@ -6,7 +6,6 @@ use std::collections::BTreeSet;
 use std::io::{BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::PathBuf;
-use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use hapterra_view_stream::{Layer, Message};
@@ -15,7 +14,7 @@ use re_log_encoding::Decoder;
 use re_log_types::LogMsg;
 
 use common::scene::{batch, greeting, layer, scene};
-use common::{PATIENCE, Viewer, folder, hapterra, lines_of, port_said};
+use common::{PATIENCE, Running, Viewer, folder, hapterra};
 
 /// Entities in the order in which a page is told them, whether each stands, and when the last
 /// part of the coarsest level was there.
@@ -80,7 +79,7 @@ fn check(told: &Told, finer: &[&str]) -> Duration {
 
 #[test]
 fn a_page_is_told_the_coarse_whole_before_anything_finer() {
-    let mut viewer = Viewer::start(&[]);
+    let mut viewer = Viewer::start("");
     let Message::Layer(whole) = layer() else {
         unreachable!()
     };
@@ -117,27 +116,19 @@ fn the_coarse_whole_is_there_within_a_second_of_the_start() {
     demo.args(["demo", "--device", "native", "--seconds", "4", "--view"])
         .args(std::env::var_os("TERRAIN").map(PathBuf::from))
         .arg("--out")
-        .arg(&folder)
-        .env("HAPTERRA_VIEW_OPTIONS", "--no-browser --port 0 --linger 0")
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
+        .arg(&folder);
     let began = Instant::now();
-    let mut demo = demo.spawn().expect("it starts");
-    let lines = lines_of(demo.stdout.take().expect("a pipe"));
+    let mut demo = Running::shown(&mut demo, "");
     // The session with the device begins with this line.
-    while !lines
-        .recv_timeout(PATIENCE)
-        .expect("a line")
-        .starts_with("device ")
-    {}
+    demo.tells("device ");
     let (read, session) = (began.elapsed(), Instant::now());
-    let port = port_said(&lines_of(demo.stderr.take().expect("a pipe")));
+    let port = demo.port();
     let said = session.elapsed();
     let after = check(&told(port), &[]);
     println!(
         "terrain read after {read:?}; then the page's address after {said:?}, and the coarse whole {after:?} after it was asked for"
     );
     assert!(after < Duration::from_secs(1), "{after:?}");
-    assert!(demo.wait().expect("it ends").success());
+    assert!(demo.end());
     std::fs::remove_dir_all(folder).expect("it goes");
 }

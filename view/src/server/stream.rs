@@ -1,17 +1,20 @@
 //! The stream of one page: pieces of a recording, each behind its length.
 //!
 //! A length is four bytes, least significant first. Zero says that the session has ended
-//! and that nothing follows; a stream that ends without it was cut off.
+//! and that nothing follows, [`LOST`] that it ended because `hapterra` is gone; a stream that
+//! ends without either was cut off.
 
 use std::io::{self, Write};
 use std::time::Duration;
 
-use crate::history::{Next, Page};
+use crate::history::{End, Next, Page};
 
 /// How long nothing may come before the page is told that this program lives, by a
 /// length that no piece has.
 const SIGN_EVERY: Duration = Duration::from_secs(2);
 const SIGN: u32 = u32::MAX;
+/// Says that `hapterra` is gone and did not say why: another length that no piece has.
+const LOST: u32 = u32::MAX - 1;
 
 const HEAD: &str = "HTTP/1.1 200 OK\r\n\
     Content-Type: application/octet-stream\r\n\
@@ -34,8 +37,12 @@ pub(super) fn run(to: &mut dyn Write, page: &Page) -> io::Result<()> {
                 to.write_all(&blob)?;
             }
             Next::Nothing => to.write_all(&SIGN.to_le_bytes())?,
-            Next::Over => {
-                to.write_all(&0u32.to_le_bytes())?;
+            Next::Over(how) => {
+                let said = match how {
+                    End::Told => 0,
+                    End::Lost => LOST,
+                };
+                to.write_all(&said.to_le_bytes())?;
                 return to.flush();
             }
             Next::Cut => return to.flush(),

@@ -224,11 +224,12 @@ impl Browser {
         BASE64_STANDARD.decode(shot).expect("base 64")
     }
 
-    /// How far a part differs between two pictures: a mean over its pixels and colours, of 255.
-    pub fn difference(&mut self, page: &Page, pictures: [&str; 2], part: [f64; 4]) -> f64 {
+    /// What a script makes of a part of pictures: `parts` are their pixels, with their widths.
+    /// The page itself takes the pictures apart.
+    fn of_parts(&mut self, page: &Page, pictures: &[&str], part: [f64; 4], script: &str) -> Value {
         let expression = format!(
             "(async () => {{
-                const pixels = async (picture) => {{
+                const parts = await Promise.all({pictures:?}.map(async (picture) => {{
                     const image = new Image();
                     image.src = 'data:image/png;base64,' + picture;
                     await image.decode();
@@ -238,20 +239,26 @@ impl Browser {
                     [canvas.width, canvas.height] = size;
                     const to = canvas.getContext('2d');
                     to.drawImage(image, -Math.round(x * image.width), -Math.round(y * image.height));
-                    return to.getImageData(0, 0, ...size).data;
-                }};
-                const [a, b] = [await pixels('{}'), await pixels('{}')];
-                let sum = 0;
-                for (let i = 0; i < a.length; i++) sum += Math.abs(a[i] - b[i]);
-                return sum / (0.75 * a.length);
-            }})()",
-            pictures[0], pictures[1]
+                    return to.getImageData(0, 0, ...size);
+                }}));
+                {script}
+            }})()"
         );
-        self.value(page, &expression).as_f64().expect("a number")
+        self.value(page, &expression)
     }
 
-    /// The colours of a part of a picture: its place and size in shares of the whole. The
-    /// page itself takes the picture apart.
+    /// How far a part differs between two pictures: a mean over its pixels and colours, of 255.
+    pub fn difference(&mut self, page: &Page, pictures: [&str; 2], part: [f64; 4]) -> f64 {
+        let script = "
+            const [a, b] = parts.map((part) => part.data);
+            let sum = 0;
+            for (let i = 0; i < a.length; i++) sum += Math.abs(a[i] - b[i]);
+            return sum / (0.75 * a.length);";
+        let value = self.of_parts(page, &pictures, part, script);
+        value.as_f64().expect("a number")
+    }
+
+    /// The colours of a part of a picture: its place and size in shares of the whole.
     pub fn colours(
         &mut self,
         page: &Page,
@@ -259,32 +266,21 @@ impl Browser {
         part: [f64; 4],
         near: &[[u8; 3]],
     ) -> Colours {
-        let expression = format!(
-            "(async () => {{
-                const image = new Image();
-                image.src = 'data:image/png;base64,{picture}';
-                await image.decode();
-                const [x, y, w, h] = {part:?};
-                const canvas = document.createElement('canvas');
-                const size = [Math.round(w * image.width), Math.round(h * image.height)];
-                [canvas.width, canvas.height] = size;
-                const to = canvas.getContext('2d');
-                to.drawImage(image, -Math.round(x * image.width), -Math.round(y * image.height));
-                const data = to.getImageData(0, 0, ...size).data;
-                const seen = new Set(), wanted = {near:?}, near = wanted.map(() => 0);
-                let hash = 7;
-                for (let i = 0; i < data.length; i += 4) {{
-                    const [r, g, b] = [data[i], data[i + 1], data[i + 2]];
-                    seen.add((r << 16) | (g << 8) | b);
-                    hash = (hash * 31 + r * 7 + g * 5 + b * 3) % 4294967291;
-                    wanted.forEach(([R, G, B], k) => {{
-                        near[k] += Math.abs(r - R) + Math.abs(g - G) + Math.abs(b - B) < 60;
-                    }});
-                }}
-                return {{ count: seen.size, near, hash }};
-            }})()"
+        let script = format!(
+            "const data = parts[0].data;
+            const seen = new Set(), wanted = {near:?}, near = wanted.map(() => 0);
+            let hash = 7;
+            for (let i = 0; i < data.length; i += 4) {{
+                const [r, g, b] = [data[i], data[i + 1], data[i + 2]];
+                seen.add((r << 16) | (g << 8) | b);
+                hash = (hash * 31 + r * 7 + g * 5 + b * 3) % 4294967291;
+                wanted.forEach(([R, G, B], k) => {{
+                    near[k] += Math.abs(r - R) + Math.abs(g - G) + Math.abs(b - B) < 60;
+                }});
+            }}
+            return {{ count: seen.size, near, hash }};"
         );
-        let value = self.value(page, &expression);
+        let value = self.of_parts(page, &[picture], part, &script);
         let near = value["near"].as_array().expect("counts");
         Colours {
             count: value["count"].as_u64().expect("a count") as usize,

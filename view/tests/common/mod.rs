@@ -1,4 +1,4 @@
-//! A viewer that runs, and what it is told.
+//! Programs that run under test: the viewer, and `hapterra` with its viewer.
 #![allow(dead_code)]
 
 pub mod browser;
@@ -16,35 +16,142 @@ use hapterra_view_stream::{Message, write};
 
 /// For what takes long on a busy machine.
 pub const PATIENCE: Duration = Duration::from_secs(60);
+/// For a program that does its whole work before it ends.
+const ENDS_WITHIN: Duration = Duration::from_secs(300);
 
-/// A viewer under test. It is killed where it has not ended by itself.
-pub struct Viewer {
+/// How a viewer is started whose page nobody opens by itself, on any port that is free.
+const UNSEEN: &str = "--no-browser --port 0";
+
+/// A program that runs while a test looks at it. It is killed where it has not ended by itself.
+pub struct Running {
     child: Child,
-    to: Option<ChildStdin>,
+    told: Receiver<String>,
     said: Receiver<String>,
 }
 
-impl Viewer {
-    /// Starts one with options.
-    pub fn start(options: &[&str]) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_hapterra-view"))
-            .args(["--no-browser", "--port", "0"])
-            .args(options)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null())
+impl Running {
+    /// Starts a program, and gives its viewer options, separated by spaces.
+    pub fn start(command: &mut Command, options: &str) -> Self {
+        let mut child = command
+            .env("HAPTERRA_VIEW_OPTIONS", format!("{UNSEEN} {options}"))
+            .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
-            .expect("the viewer starts");
-        let said = lines_of(child.stderr.take().expect("a pipe"));
+            .expect("the program starts");
         Self {
-            to: child.stdin.take(),
+            told: lines_of(child.stdout.take().expect("a pipe")),
+            said: lines_of(child.stderr.take().expect("a pipe")),
             child,
-            said,
         }
+    }
+
+    /// Starts `hapterra` with a viewer that ends with it.
+    pub fn shown(command: &mut Command, options: &str) -> Self {
+        Self::start(command, &format!("--linger 0 {options}"))
+    }
+
+    /// Lets `hapterra` run to its end with such a viewer; all that both say.
+    pub fn whole(command: &mut Command, options: &str) -> String {
+        let mut running = Self::shown(command, options);
+        let ended_well = running.end();
+        let words = running.words();
+        assert!(ended_well, "{words}");
+        words
     }
 
     pub fn id(&self) -> u32 {
         self.child.id()
+    }
+
+    /// The next line that it says on standard error.
+    pub fn line(&self) -> String {
+        self.said.recv_timeout(PATIENCE).expect("it says a line")
+    }
+
+    /// Waits for a line on standard output that begins so.
+    pub fn tells(&self, beginning: &str) {
+        while !{ self.told.recv_timeout(PATIENCE).expect("it tells a line") }.starts_with(beginning)
+        {
+        }
+    }
+
+    /// The port of its viewer's page, as one of the lines says.
+    pub fn port(&self) -> u16 {
+        loop {
+            let line = self.line();
+            if let Some((_, port)) = line.rsplit_once(':')
+                && line.starts_with("view ")
+            {
+                return port.trim_matches('/').parse().expect("a port");
+            }
+        }
+    }
+
+    /// Where its viewer's page is.
+    pub fn address(&self) -> String {
+        format!("http://127.0.0.1:{}/", self.port())
+    }
+
+    /// Whether it goes on.
+    pub fn goes_on(&mut self) -> bool {
+        self.child.try_wait().expect("a child").is_none()
+    }
+
+    /// Asks it to end, as Ctrl-C does.
+    pub fn interrupt(&self) {
+        signal("-INT", self.id());
+    }
+
+    /// Waits for its end; whether it ended well.
+    pub fn end(&mut self) -> bool {
+        let until = Instant::now() + ENDS_WITHIN;
+        while self.goes_on() {
+            assert!(Instant::now() < until, "it does not end");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        self.child.wait().expect("a child").success()
+    }
+
+    /// What it says from now on until its viewer has ended, too, and what nobody has read yet.
+    pub fn words(&self) -> String {
+        self.told
+            .iter()
+            .chain(&self.said)
+            .collect::<Vec<_>>()
+            .join("\n")
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Sends a signal to a process.
+pub fn signal(which: &str, process: u32) {
+    let sent = Command::new("kill")
+        .args([which, &process.to_string()])
+        .status();
+    assert!(sent.expect("kill").success());
+}
+
+/// A viewer under test, and what it is told.
+pub struct Viewer {
+    running: Running,
+    to: Option<ChildStdin>,
+}
+
+impl Viewer {
+    /// Starts one with options, separated by spaces.
+    pub fn start(options: &str) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_hapterra-view"));
+        let mut running = Running::start(command.stdin(Stdio::piped()), options);
+        Self {
+            to: running.child.stdin.take(),
+            running,
+        }
     }
 
     /// Tells it something; whether it reads.
@@ -60,37 +167,23 @@ impl Viewer {
 
     /// The next line that it says.
     pub fn line(&self) -> String {
-        self.said.recv_timeout(PATIENCE).expect("it says a line")
+        self.running.line()
     }
 
-    /// Where its page is, as it says.
+    /// The port of its page.
     pub fn port(&self) -> u16 {
-        port_said(&self.said)
+        self.running.port()
+    }
+
+    /// Where its page is.
+    pub fn address(&self) -> String {
+        self.running.address()
     }
 
     /// Waits for its end; whether it ended well.
     pub fn end(mut self) -> bool {
         self.to = None;
-        let until = Instant::now() + PATIENCE;
-        loop {
-            if let Some(ended) = self.child.try_wait().expect("a child") {
-                return ended.success();
-            }
-            assert!(Instant::now() < until, "it does not end");
-            std::thread::sleep(Duration::from_millis(50));
-        }
-    }
-
-    /// Memory that it takes, bytes.
-    pub fn memory(&self) -> u64 {
-        memory_of(self.id())
-    }
-}
-
-impl Drop for Viewer {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        self.running.end()
     }
 }
 
@@ -103,33 +196,29 @@ pub fn memory_of(process: u32) -> u64 {
     1024 * kilobytes.unwrap_or(0u64)
 }
 
-/// A process that another one started; none where it has started none.
-pub fn started_by(process: u32) -> Option<u32> {
+/// The process of a program that another process started; none where it has started none.
+pub fn started_by(process: u32, program: &str) -> Option<u32> {
     let children = format!("/proc/{process}/task/{process}/children");
     let children = std::fs::read_to_string(children).ok()?;
-    children.split_whitespace().next()?.parse().ok()
+    let mut children = { children.split_whitespace() }.filter_map(|child| child.parse().ok());
+    children.find(|child: &u32| {
+        let name = std::fs::read_to_string(format!("/proc/{child}/cmdline"));
+        name.is_ok_and(|name| {
+            name.split('\0')
+                .next()
+                .is_some_and(|it| it.ends_with(program))
+        })
+    })
 }
 
 /// Lines of a stream, as they come.
-pub fn lines_of(from: impl std::io::Read + Send + 'static) -> Receiver<String> {
+fn lines_of(from: impl std::io::Read + Send + 'static) -> Receiver<String> {
     let (say, said) = channel();
     std::thread::spawn(move || {
         let lines = BufReader::new(from).lines().map_while(Result::ok);
         lines.into_iter().try_for_each(|line| say.send(line))
     });
     said
-}
-
-/// Where a viewer's page is, as one of the lines says.
-pub fn port_said(said: &Receiver<String>) -> u16 {
-    loop {
-        let line = said.recv_timeout(PATIENCE).expect("it says a line");
-        if let Some((_, port)) = line.rsplit_once(':')
-            && line.starts_with("view ")
-        {
-            return port.trim_matches('/').parse().expect("a port");
-        }
-    }
 }
 
 /// A request, head and all, and the whole answer.
@@ -158,4 +247,9 @@ pub fn hapterra() -> Option<Command> {
         .env("HAPTERRA_VIEW", env!("CARGO_BIN_EXE_hapterra-view"))
         .stdin(Stdio::null());
     Some(command)
+}
+
+/// The emulated board's image, as `cargo xtask view --test` names it; none where nobody does.
+pub fn emulated() -> Option<std::ffi::OsString> {
+    std::env::var_os("HAPTERRA_MPS2_ELF").filter(|image| !image.is_empty())
 }

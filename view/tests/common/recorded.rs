@@ -26,7 +26,7 @@ pub fn entities(path: &Path) -> BTreeMap<String, Vec<Chunk>> {
 }
 
 /// Rows of an entity's only component over time: time in ns, and values.
-pub fn rows<T>(
+fn rows_of<T>(
     chunks: &[Chunk],
     read: &dyn Fn(&dyn re_chunk::external::arrow::array::Array) -> Vec<T>,
 ) -> Vec<(i64, Vec<T>)> {
@@ -46,14 +46,14 @@ pub fn rows<T>(
 }
 
 pub fn scalars(chunks: &[Chunk]) -> Vec<(i64, Vec<f64>)> {
-    rows(chunks, &|values| {
+    rows_of(chunks, &|values| {
         let values = Scalar::from_arrow(values).expect("scalars");
         values.into_iter().map(|value| value.0.0).collect()
     })
 }
 
 pub fn places(chunks: &[Chunk]) -> Vec<(i64, Vec<[f32; 3]>)> {
-    rows(chunks, &|values| {
+    rows_of(chunks, &|values| {
         let values = Position3D::from_arrow(values).expect("places");
         values.into_iter().map(|value| value.0.0).collect()
     })
@@ -100,6 +100,12 @@ impl Csv {
             .expect("a number")
     }
 
+    /// Rows by their time, ns.
+    fn rows_by_time(&self) -> BTreeMap<i64, usize> {
+        let time = |row| (self.number(row, "t_s") * 1e9).round() as i64;
+        (0..self.rows.len()).map(|row| (time(row), row)).collect()
+    }
+
     pub fn vector(&self, row: usize, names: [&str; 3]) -> [f64; 3] {
         names.map(|name| self.number(row, name))
     }
@@ -115,7 +121,7 @@ pub fn said(text: &str, name: &str) -> Vec<f64> {
         .collect()
 }
 
-pub const HIP: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
+const HIP: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
 const PROXY: [&str; 3] = ["proxy_x_mm", "proxy_y_mm", "proxy_z_mm"];
 const FORCE: [&str; 3] = ["force_x_n", "force_y_n", "force_z_n"];
 
@@ -197,5 +203,43 @@ pub fn check(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>) {
         "/plot/energy",
     ] {
         assert!(shown.contains_key(entity), "{entity} of {:?}", shown.keys());
+    }
+}
+
+/// What was felt in several views lies where it lies on the ground: places and heights of
+/// all of them in one scale, in `stretched` views as high as in the first.
+pub fn check_views(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>, stretched: bool) {
+    let drawn = places(&shown["/hand/hip"]);
+    let heights = scalars(&shown["/plot/height"]);
+    let rows = csv.rows_by_time();
+    let (mut cells, mut seen) = (None, vec![0; csv.scales.len()]);
+    for (time, place) in &drawn {
+        let row = rows[time];
+        let view = csv.number(row, "view") as usize;
+        seen[view] += 1;
+        let ([cell, unit], first) = (csv.scales[view], csv.scales[0]);
+        let [x, y, z] = csv.vector(row, HIP);
+        let upright = match stretched {
+            true => z / unit * first[1] / first[0],
+            false => z / cell,
+        };
+        let felt = [x / cell, y / cell, upright];
+        let place = place[0].map(f64::from);
+        let (cells_at, place_at) = *cells.get_or_insert((felt, place));
+        let [east, north, up] = [0, 1, 2].map(|i| place[i] - place_at[i]);
+        let [x, y, z] = [0, 1, 2].map(|i| csv.units * (felt[i] - cells_at[i]));
+        let off = [east - x, north - y, up - z];
+        assert!(
+            off.iter().all(|off| off.abs() < 2e-3 * csv.units),
+            "row {row}, view {view}: {off:?}"
+        );
+    }
+    assert!(seen.iter().all(|count: &i32| *count > 10), "{seen:?}");
+    // Heights in the file's unit, whatever the hand felt.
+    for (time, values) in &heights {
+        let row = rows[time];
+        let [_, unit] = csv.scales[csv.number(row, "view") as usize];
+        let expected = csv.vector(row, HIP)[2] / unit;
+        assert!((values[0] - expected).abs() < 1e-6, "row {row}");
     }
 }
