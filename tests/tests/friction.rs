@@ -59,7 +59,9 @@ fn slide(terrain: &Terrain<'_>, law: ForceLaw, depth: f64, speed: f64) -> Vec<Sa
             size[0] / 2.0 + radius * angle.cos(),
             size[1] / 2.0 + 0.8 * radius * angle.sin(),
         ];
-        let ground = terrain.height_mm(at[0], at[1]).expect("inside");
+        let Some(ground) = terrain.height_mm(at[0], at[1]) else {
+            continue; // over a hole
+        };
         let above = if tick == 0 { 1.0 } else { -depth };
         let hip = terrain.scale().to_grid([at[0], at[1], ground + above]);
         felt.push(replayer.feel(hip.expect("addressable")).expect("felt"));
@@ -103,14 +105,15 @@ fn on_real_ground_it_slides_within_five_parts_in_a_hundred_of_its_coefficient() 
             });
             let ratios: Vec<f64> = moves.filter_map(|pair| ratio(&terrain, &pair[1])).collect();
             let off = |ratio: &&f64| (**ratio / MU - 1.0).abs() > 0.05;
-            let (least, most) = ratios
-                .iter()
-                .fold((f64::MAX, 0.0_f64), |(a, b), r| (a.min(*r), b.max(*r)));
-            let wrong = ratios.iter().filter(off).count();
-            println!(
-                "{speed} mm a tick: {wrong} of {} slides off, {least:.4} to {most:.4}",
-                ratios.len()
-            );
+            let least = ratios.iter().copied().fold(f64::MAX, f64::min);
+            let most = ratios.iter().copied().fold(0.0, f64::max);
+            let (wrong, all) = (ratios.iter().filter(off).count(), ratios.len());
+            println!("{speed} mm a tick: {wrong} of {all} slides off, {least:.4} to {most:.4}");
+            assert!(all > 1_000, "{all} slides");
+            assert!(most < MU * 1.031, "{most}");
+            // Where a crease turns the ground toward the HIP, a tick may bring the proxy
+            // farther than friction would.
+            assert!(wrong * 50 <= all, "{wrong} of {all}");
         }
     }
 }

@@ -4,6 +4,7 @@
 
 use hapterra_tests::counting::CountingBoard;
 use hapterra_tests::scene::recorded::Recorded;
+use hapterra_tests::scene::run::Surface;
 
 const SEED: u64 = 77;
 
@@ -12,7 +13,15 @@ fn scenes_give_the_same_bits_on_the_emulated_processor() {
     let Some(board) = CountingBoard::found() else {
         return;
     };
-    let scenes: Vec<Recorded> = (0..40).map(|n| Recorded::random(SEED, n)).collect();
+    let scenes: Vec<Recorded> = (0..40)
+        .map(|number| {
+            let surface = match number % 3 {
+                0 => Surface::Rough,
+                _ => Surface::Smooth,
+            };
+            Recorded::random(SEED, number, surface)
+        })
+        .collect();
     let replays: Vec<_> = scenes.iter().map(Recorded::replay).collect();
     let there = board.contact(&replays);
     for (number, (scene, there)) in scenes.iter().zip(&there).enumerate() {

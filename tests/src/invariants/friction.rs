@@ -62,7 +62,7 @@ impl Judge<'_> {
         let moved = before.felt.proxy != seen.felt.proxy;
         let still = self.still;
         self.still = if moved { 0 } else { still + 1 };
-        if !(touches(before) && touches(seen)) || !moved {
+        if !(moved && touches(before) && touches(seen)) {
             return Ok(());
         }
         let Some((_, most)) = self.pulls(before.proxy, seen.hip) else {
