@@ -9,5 +9,5 @@ mod ruling_search;
 
 pub(super) use on_convex_patch::{Convexity, Place};
 pub use on_patch::{MAX_PASSES, Nearest, nearest_downhill};
-pub(super) use on_surface::{Descent, Ended, Leave, leads_off_surface, passes_over, position_on};
+pub(super) use on_surface::{Descent, Ended, Leave, passes_over, position_on};
 pub use ruling_search::MAX_EVALUATIONS;

@@ -344,25 +344,11 @@ fn leads_off<const D: usize>(
 ) -> bool {
     let (p, q) = view.in_patch(at.cell);
     let (east, north) = (p - at.u, q - at.v);
-    let toward = |border: i32, way: f32| if border as f32 * way > 0.0 { border } else { 0 };
-    let side = Side {
-        east: toward(border.east, east),
-        north: toward(border.north, north),
-    };
+    let side = border.toward((p, q), (at.u, at.v));
     if side == Side::NONE {
         return passes_over(patch, at, (east, north));
     }
     leads_off_beyond(window, view, &at.across(side), (east, north))
-}
-
-/// Whether the straight way from a point of the surface to the HIP begins above it.
-#[inline(never)]
-pub(in crate::contact) fn leads_off_surface<const D: usize>(
-    window: &Window<'_, D>,
-    view: &HipView,
-    at: &SurfacePoint,
-) -> bool {
-    patch_at(window, view, at).is_ok_and(|patch| leads_off(window, view, at, at.border(), &patch))
 }
 
 /// The same in the patch that the way leads into, so far east and north.

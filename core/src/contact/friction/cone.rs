@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 
-use crate::contact::closest_point::{leads_off_surface, passes_over};
+use crate::contact::closest_point::passes_over;
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::terrain::{Ground, TileIndex, Window};
@@ -59,7 +59,8 @@ impl Pull {
         }
     }
 
-    /// The same on the border of a patch, in which it is `pull`.
+    /// The same on the border of a patch, in which it is `pull`. The way to the HIP leads off
+    /// the surface if it is above the patch that it leads into.
     #[inline(never)]
     fn on_border<const D: usize>(
         window: &Window<'_, D>,
@@ -69,7 +70,10 @@ impl Pull {
         is_above: bool,
     ) -> Pulled {
         let border = point.border();
-        let (mut steepest, mut is_below, mut has_hole) = (pull, !is_above, false);
+        let into = border.toward(view.in_patch(point.cell), (point.u, point.v));
+        let mut steepest = pull;
+        let (mut leads_off, mut all_above) = (is_above && into == Side::NONE, is_above);
+        let mut has_hole = false;
         for place in 0..3 {
             let side = border.neighbour(place);
             if side == Side::NONE {
@@ -79,7 +83,9 @@ impl Pull {
             match window.ground(there.cell) {
                 Ground::Patch(corners) => {
                     let patch = view.patch(&corners);
-                    is_below |= !passes_over_at(&patch, view, &there);
+                    let is_above = passes_over_at(&patch, view, &there);
+                    leads_off |= is_above && side == into;
+                    all_above &= is_above;
                     let pull = Self::in_patch(&patch, view, &there, border.across(side));
                     if pull.pulls > steepest.pulls {
                         steepest = pull;
@@ -89,12 +95,13 @@ impl Pull {
                 Ground::Hole => has_hole = true,
             }
         }
-        if leads_off_surface(window, view, point) || (has_hole && !is_below) {
+        if leads_off || (has_hole && all_above) {
             return Pulled::Off;
         }
         Pulled::By(steepest)
     }
 
+    #[inline(never)]
     fn in_patch(patch: &Patch, view: &HipView, at: &SurfacePoint, border: Side) -> Self {
         let (p, q) = view.in_patch(at.cell);
         let way = Vec3::new(p - at.u, q - at.v, -patch.height(at.u, at.v));

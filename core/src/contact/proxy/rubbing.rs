@@ -7,7 +7,6 @@ use crate::contact::friction::{Friction, Pull, Pulled};
 use crate::contact::output::ContactState;
 use crate::contact::settings::Execution;
 use crate::contact::surface::{HipView, SurfacePoint};
-use crate::contact::sweep::Path;
 use crate::contact::tolerance::RESOLUTION;
 use crate::grid::GridPoint;
 use crate::rate::TickRate;
@@ -238,11 +237,22 @@ impl Contact {
             (Phase::OnSurface(_), Some(aim)) => self.slides(window, aim, hip, budget),
             _ => {
                 (rubbing.aim, rubbing.stood) = (None, None);
-                let turn = self.turn(window, hip, budget);
+                let turn = self.turn_toward(window, hip, budget);
                 self.has_landed(window);
                 turn
             }
         }
+    }
+
+    /// As [`Self::turn`], which is inlined where it is called: once is enough here.
+    #[inline(never)]
+    fn turn_toward<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        aim: GridPoint,
+        budget: &mut Budget,
+    ) -> Turn {
+        self.turn(window, aim, budget)
     }
 
     /// A proxy that came out of the air stands where it met the surface.
@@ -314,10 +324,10 @@ impl Contact {
         hip: GridPoint,
         budget: &mut Budget,
     ) -> Turn {
-        let turn = self.turn(window, aim, budget);
+        let turn = self.turn_toward(window, aim, budget);
         if let Phase::Sweeping(sweeping) = &mut self.phase {
             let from = sweeping.path.at();
-            sweeping.path = Path::off_surface(from, hip);
+            sweeping.path.begin_toward(hip);
             // Astray or not, the tick goes on.
             let _ = self.has_gone_astray(hip, from);
             return Turn::GoesOn;

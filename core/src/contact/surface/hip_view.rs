@@ -101,6 +101,8 @@ impl HipView {
     /// Whether one position is nearer to the HIP than another, by more than the
     /// last places of the two may be off: of a far HIP the squared distances
     /// themselves would not tell.
+    // A call: five copies of it would be a kilobyte.
+    #[inline(never)]
     pub(in crate::contact) fn is_nearer(&self, this: &GridPoint, other: &GridPoint) -> bool {
         let (way, left) = (other.to(this), this.to(&self.hip));
         let noise = 2.0 * RESOLUTION * (way.abs() + left.abs()).element_sum();

@@ -59,6 +59,16 @@ impl Side {
         }
     }
 
+    /// Of a point on this border: the side on which a way to `to` leads over it.
+    #[inline]
+    pub(in crate::contact) fn toward(self, to: (f32, f32), (u, v): (f32, f32)) -> Self {
+        let toward = |border: i32, way: f32| if border as f32 * way > 0.0 { border } else { 0 };
+        Self {
+            east: toward(self.east, to.0 - u),
+            north: toward(self.north, to.1 - v),
+        }
+    }
+
     /// The patch itself and its neighbours over a border toward this side.
     pub(in crate::contact) fn itself_and_neighbours(self) -> impl Iterator<Item = Self> {
         let neighbours = (0..3).map(move |place| self.neighbour(place));
