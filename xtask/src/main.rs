@@ -44,8 +44,8 @@ cargo xtask COMMAND
   panics [BOARD]         build the images and prove that no interrupt can panic
   counts [--write]       instructions of a tick on the emulated Cortex-M4F, beside their
                          targets and the kept table; --write: keep these
-  soak MINUTES [--seed N]  random scenes on all cores, every tick judged in f64
-  soak --seed N --scene K  one of them again
+  soak MINUTES [--seed N] [--rough]  random scenes on all cores, every tick judged in f64
+  soak --seed N --scene K [--rough]  one of them again
   campaign [--seconds N] [--seed S] [--segment K]
                          the closed loop with everything going wrong at random, 10,000 s of
                          arm time unless told otherwise; writes docs/campaign.md
