@@ -152,7 +152,7 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
         [],
         "up to static friction"
     );
-    assert_eq!(found(&[first, at(10.5, 11.32)]), [Cone], "beyond it");
+    assert_eq!(found(&[first, at(10.5, 11.36)]), [Cone], "beyond it");
     assert_eq!(found(&[first, at(11.0, 11.5)]), [], "it slid");
     assert_eq!(found(&[first, at(10.51, 10.9)]), [Stuck], "it crept");
     assert_eq!(found(&[first, at(10.501, 10.601)]), [Stuck]);
