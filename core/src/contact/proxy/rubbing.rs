@@ -388,8 +388,11 @@ impl Contact {
             return false;
         };
         match rubbing.stood {
-            Some(stood) if HipView::new(hip).is_nearer(&stood.proxy, &to) => {
-                (rubbing.aim, rubbing.stood) = (Some(hip), None);
+            // Once for a HIP: after that its only aim is the HIP.
+            Some(stood)
+                if rubbing.times <= SLIDES && HipView::new(hip).is_nearer(&stood.proxy, &to) =>
+            {
+                (rubbing.aim, rubbing.times) = (Some(hip), SLIDES + 1);
                 self.phase = Phase::OnSurface(OnSurface::at(stood.point, rubbing.fade));
                 true
             }
