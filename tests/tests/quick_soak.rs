@@ -24,10 +24,7 @@ fn thousand(surface: Surface) -> Tally {
 }
 
 fn none<'b>(surface: Surface, broken: impl Iterator<Item = &'b Broken>) {
-    let rough = match surface {
-        Surface::Smooth => "",
-        Surface::Rough => " --rough",
-    };
+    let rough = surface.option();
     let told: Vec<String> = broken
         .map(|b| {
             let (kind, what, number) = (b.kind, &b.what, b.number);

@@ -103,10 +103,6 @@ fn all(wanted: &Wanted) -> ExitCode {
         wanted.seed,
         began.elapsed().as_secs_f64() / 60.0
     );
-    let rough = match wanted.surface {
-        Surface::Smooth => "",
-        Surface::Rough => " --rough",
-    };
     // A few of each kind.
     let mut told: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
     for broken in &tally.broken {
@@ -117,7 +113,11 @@ fn all(wanted: &Wanted) -> ExitCode {
         }
         println!(
             "\n{:?}: {}\n    again: cargo xtask soak --seed {} --scene {}{}",
-            broken.kind, broken.what, wanted.seed, broken.number, rough
+            broken.kind,
+            broken.what,
+            wanted.seed,
+            broken.number,
+            wanted.surface.option()
         );
     }
     if tally.broken.is_empty() {

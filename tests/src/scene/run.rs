@@ -49,6 +49,17 @@ pub enum Surface {
     Rough,
 }
 
+impl Surface {
+    /// What `cargo xtask soak` has to be told for it, after a space.
+    #[must_use]
+    pub const fn option(self) -> &'static str {
+        match self {
+            Self::Smooth => "",
+            Self::Rough => " --rough",
+        }
+    }
+}
+
 /// Which twins a scene is compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Twins {
