@@ -274,8 +274,8 @@ fn fall_into(
         here.v - side.north as f32 - v,
     ];
     let far = BESIDE * RESOLUTION;
-    let beside = beside[0].abs() > far || beside[1].abs() > far;
-    if beside && (here.z - z).abs() > BESIDE * (resolution(p) + resolution(q)) {
+    let is_beside = beside[0].abs() > far || beside[1].abs() > far;
+    if is_beside && (here.z - z).abs() > BESIDE * (resolution(p) + resolution(q)) {
         return None;
     }
     let (zu, zv) = (patch.slope_u(v), patch.slope_v(u));
@@ -284,8 +284,10 @@ fn fall_into(
     let sizes = patch.with_sizes();
     let along = |way: i32, slope: f32| if way == 0 { slope.abs() } else { 0.0 };
     let rounding = sizes.height(u, v) + along(side.east, zu) + along(side.north, zv);
-    // Up a wall beside the edge the slope at the edge says nothing of the place itself.
-    let from_here = (here.z - z).abs() < BESIDE * RESOLUTION * (1.0 + z.abs());
+    // Up a wall beside the edge the slope at the edge says nothing of the place itself; of
+    // a place on the edge it does, though the last place of its coordinate is much height.
+    let is_on_edge = beside == [0.0, 0.0];
+    let from_here = is_on_edge || (here.z - z).abs() < BESIDE * RESOLUTION * (1.0 + z.abs());
     let falls = |way: i32, off: f32, slope: f32| {
         let gradient = way as f32 * (off + z * slope);
         let noise = SLOPE_NOISE * (off.abs() + rounding * slope.abs());
@@ -403,4 +405,44 @@ fn steepness_at(patch: &Patch, (p, q): (f32, f32), at: &SurfacePoint, border: Si
         if outward { 0.0 } else { slope * slope }
     };
     falls(border.east, east) + falls(border.north, north)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::{Nearest, Patch, Side, fall_into};
+    use crate::contact::surface::{HipView, SurfacePoint};
+    use crate::grid::{Cell, GridPoint};
+
+    /// Half way up a wall of 300 the last place of a coordinate is 10⁻⁵ of height: the
+    /// height of the place and that of the way to it differ by as much (seed 4243,
+    /// scene 6738).
+    #[test]
+    fn a_place_on_an_edge_up_a_wall_knows_the_slope_beyond() {
+        let patch = Patch::new([-150.406_48, 149.704_83, -150.454_4, 149.704_83]);
+        let view = HipView::new(GridPoint::new([1, 1, 0], Vec3::new(0.5, 0.0, 0.0)));
+        let entry = SurfacePoint {
+            cell: Cell::new(0, 1),
+            u: 0.501_180_05,
+            v: 0.0,
+        };
+        let side = Side { east: 0, north: 1 };
+        let here = |v: f32| Nearest {
+            u: entry.u,
+            v,
+            z: 0.003_328_164_8,
+            evaluations: 1,
+        };
+        let falls = |v: f32| fall_into(&patch, &view, &entry, side, &here(v));
+        // Of half the squared distance: height over the HIP times slope northward.
+        let slope = 0.003_328_f32 * 0.0479 * (1.0 - entry.u);
+        let steepness = falls(1.0).expect("it falls");
+        assert!(
+            (steepness / (slope * slope) - 1.0).abs() < 0.02,
+            "{steepness:e}"
+        );
+        // Beside the edge its slope says nothing.
+        assert_eq!(falls(1.0 - 2e-7), Some(0.0));
+    }
 }
