@@ -79,6 +79,9 @@ impl<B: FrameBus> Ad5754<B> {
         }
     }
 
+    // A frame takes microseconds on the wire: a call costs nothing beside it, and a copy
+    // of the transfer at each of seven places takes 3 kB of flash.
+    #[inline(never)]
     fn write(&mut self, head: u8, value: u16) -> u16 {
         let [high, low] = value.to_be_bytes();
         let [_, high, low] = self.bus.send([head, high, low]);
