@@ -97,11 +97,12 @@ fn on_real_ground_it_slides_within_five_parts_in_a_hundred_unless_it_flies() {
     }
     for raster in &rasters {
         let terrain = terrain(raster);
-        for (speed, most_wrong) in [(0.01, 0.002), (0.1, 0.02), (0.5, 0.25)] {
+        for (speed, most_wrong) in [(0.01, 0.0), (0.1, 0.015), (0.5, 0.2)] {
             let felt = slide(&terrain, slippery(), 0.3, speed);
+            // The proxy that has just come out of the air has not slid yet.
             let moves = felt.windows(2).filter(|pair| {
-                let [before, now] = [pair[0], pair[1]];
-                now.state == ContactState::Touching && before.proxy != now.proxy
+                let touches = |sample: &Sample| sample.state == ContactState::Touching;
+                touches(&pair[0]) && touches(&pair[1]) && pair[0].proxy != pair[1].proxy
             });
             let ratios: Vec<f64> = moves.filter_map(|pair| ratio(&terrain, &pair[1])).collect();
             let off = |ratio: &&f64| (**ratio / MU - 1.0).abs() > 0.05;
