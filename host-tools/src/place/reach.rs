@@ -110,7 +110,7 @@ impl Reach {
         let mut columns = (0..self.columns).filter(is_reached);
         let out = |column: Option<usize>| self.step_mm * column.unwrap_or(0) as f64;
         let nearest = columns.next();
-        let [near, far] = [nearest, columns.last().or(nearest)].map(out);
+        let [near, far] = [nearest, columns.next_back().or(nearest)].map(out);
         let [left, right] = self.turn_rad.map(|turn| turn.clamp(-PI / 2.0, PI / 2.0));
         let widest = self.turn_rad.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         // The user faces the device: north is towards the base's axis.
@@ -309,7 +309,7 @@ mod tests {
             }
             for (side, (found, said)) in found.iter().zip(reach.sides_mm()).enumerate() {
                 let outwards = if side < 2 { found - said } else { said - found };
-                let room = -1.0 * reach.step_mm..3.0 * reach.step_mm;
+                let room = -reach.step_mm..3.0 * reach.step_mm;
                 assert!(room.contains(&outwards), "side {side}: {found} and {said}");
             }
         }
