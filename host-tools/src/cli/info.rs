@@ -3,6 +3,7 @@
 mod place;
 
 use std::fmt::Write as _;
+use std::io::{ErrorKind, Write as _};
 
 use serde::Serialize;
 
@@ -42,11 +43,24 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let report = FileReport::new(&args.terrain, &grid);
     if args.json {
         let json = serde_json::to_string_pretty(&report).map_err(Failure::new)?;
-        println!("{json}");
+        put(&format!("{json}\n"))
     } else {
-        print!("{}", report.text());
+        put(&report.text())
     }
-    Ok(())
+}
+
+/// Prints the report. A reader who goes away wants no more of it; a disk without room has
+/// lost it.
+fn put(report: &str) -> Result<(), Failure> {
+    let mut output = std::io::stdout().lock();
+    let written = output.write_all(report.as_bytes());
+    match written.and_then(|()| output.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::new(format!("cannot write the report: {error}"))
+                .hint("make room where standard output goes to"))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// What is shown; the fields' names are those of the JSON.

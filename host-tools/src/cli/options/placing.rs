@@ -137,11 +137,12 @@ pub(in crate::cli) fn told(view: &View, terrain: &Terrain<'_>) -> String {
         .worst_reached(terrain.grid())
         .filter(Distortion::is_felt)
     {
-        text += &format!(
-            "shape          {} where the arm reaches, at {}; pan there, or hold the clutch, and the cells are measured anew\n",
-            off_in_words(&worst),
-            place_in_words(&file, worst.ground)
-        );
+        let (off, place) = (off_in_words(&worst), place_in_words(&file, worst.ground));
+        let remedy = match terrain.grid().is_distorted() {
+            true => "--cells square feels them in their true shape",
+            false => "pan there, or hold the clutch, and the cells are measured anew",
+        };
+        text += &format!("shape          {off} where the arm reaches, at {place}; {remedy}\n");
     }
     let relief = view.heights_mm[1] - view.heights_mm[0];
     if relief > 0.0 && relief < FLAT_MM && view.exaggeration.is_some_and(|times| times == 1.0) {
