@@ -39,7 +39,7 @@ def write(folder, name, dtype, driver="GTiff", columns=COLUMNS, rows=ROWS, nodat
             dataset.write(samples, band + 1)
 
 
-def netcdf(folder, name):
+def netcdf(folder, name, compression):
     with netCDF4.Dataset(os.path.join(folder, name), "w") as dataset:
         dataset.createDimension("y", ROWS)
         dataset.createDimension("x", COLUMNS)
@@ -49,7 +49,7 @@ def netcdf(folder, name):
             variable[:] = values
         for band, kind in enumerate(("bed", "thickness")):
             variable = dataset.createVariable(
-                kind, "i2", ("y", "x"), compression="zstd", shuffle=True, fill_value=-1
+                kind, "i2", ("y", "x"), compression=compression, shuffle=True, fill_value=-1
             )
             samples = height(COLUMNS, ROWS) + 1000 * band
             samples[HOLE[1], HOLE[0]] = -1
@@ -74,7 +74,9 @@ def main():
         folder, "n34w119.dt0", "int16", driver="DTED", columns=121, rows=121, nodata=-32767,
         crs="EPSG:4326", transform=from_origin(-119 - 1 / 240, 35 + 1 / 240, 1 / 120, 1 / 120),
     )
-    netcdf(folder, "zstd.nc")
+    netcdf(folder, "zstd.nc", "zstd")
+    # A packing that is not read here: for the hint.
+    netcdf(folder, "bzip2.nc", "bzip2")
     for name in os.listdir(folder):
         if name.endswith((".aux.xml", ".dt0.tmp")):
             os.remove(os.path.join(folder, name))

@@ -5,7 +5,7 @@ GDAL and PROJ (without grids) see them:
     python3 -m venv venv && venv/bin/pip install rasterio==1.4.4 pyproj==3.7.2 netCDF4==1.7.5.1
     venv/bin/python tests/data/odd_places.py tests/data/odd_places
 
-Longitudes and latitudes are those of WGS 84; of another body, and of a datum whose way to
+`lean` is the cosine of the angle between a row and a column on the ground. Longitudes and latitudes are those of WGS 84; of another body, and of a datum whose way to
 WGS 84 PROJ does not know, its own.
 """
 import os
@@ -72,6 +72,9 @@ FILES = {
     "hotine": ("+proj=omerc +lat_0=4 +lonc=102.25 +alpha=323.0257964666666 +gamma=323.1301023611111 +k=0.99984 +x_0=804671 +no_uoff +datum=WGS84", (4e5, 5e5), square(100)),
     "hotine_centre": ("+proj=omerc +lat_0=46 +lonc=-78 +alpha=337.25556 +k=0.9996 +x_0=1000 +y_0=2000 +datum=NAD83", (1e4, 2e4), square(100)),
     "gnomonic": ("+proj=gnom +lat_0=45 +lon_0=10 +datum=WGS84", (1e5, 2e5), square(100)),
+    "europe": ("EPSG:3035", (6.4e6, 2.1e6), square(25)),
+    "america": ("EPSG:5070", (2.1e6, 2.8e6), square(30)),
+    "rotated_degrees": ("EPSG:4326", (10.0, 60.0), (0.008, 0.006, 0.006, -0.008)),
     "polar_scale": ("+proj=stere +lat_0=-90 +k=0.97276 +lon_0=0 +datum=WGS84", (1e5, 2e5), square(100)),
 }
 # Projections that are not known: they are refused by name, and are not in the table.
@@ -167,11 +170,15 @@ def row(folder, name):
     ellipsoid = system.ellipsoid
     geod = pyproj.Geod(a=ellipsoid.semi_major_metre, b=ellipsoid.semi_minor_metre)
     along = [geod.inv(*places[0], *other)[2] for other in places[1:]]
+    near = [transform * (COLUMNS / 2 + dx, ROWS / 2 + dy) for dx, dy in ((0.01, 0), (0, -0.01))]
+    near = [[np.degrees(v * radians) for v in own.transform(*p)] for p in near]
+    turns = [geod.inv(*places[0], *other)[0] for other in near]
+    lean = np.cos(np.radians(turns[0] - turns[1]))
     middle_lonlat = there.transform(*middle[0])
     bounds = [min(lon), min(lat), max(lon), max(lat)]
     if middle_lonlat[1] == -90:
         bounds = [-180, -90, 180, max(lat)]
-    return [name, *(f"{v:.9f}" for v in (*bounds, *middle_lonlat)), *(f"{v:.4f}" for v in along)]
+    return [name, *(f"{v:.9f}" for v in (*bounds, *middle_lonlat)), *(f"{v:.4f}" for v in along), f"{lean:.6f}"]
 
 
 def main():
@@ -179,7 +186,7 @@ def main():
     os.makedirs(folder, exist_ok=True)
     pyproj.network.set_network_enabled(False)
     with open(os.path.join(folder, "places.csv"), "w") as table:
-        print("file,lon_west,lat_south,lon_east,lat_north,lon_middle,lat_middle,along_row_m,along_column_m", file=table)
+        print("file,lon_west,lat_south,lon_east,lat_north,lon_middle,lat_middle,along_row_m,along_column_m,lean", file=table)
         for name in [*FILES, *UNKNOWN, *BOUND, *MAPPINGS]:
             if (places := row(folder, name)) is not None:
                 print(",".join(places), file=table)

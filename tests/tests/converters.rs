@@ -1,5 +1,6 @@
 //! The commands that hints name for files that are refused, run as they stand: what
-//! they write opens. Where GDAL is not installed this says so and is skipped.
+//! they write opens. Where a command's program, or a package of Python's that it names, is not
+//! installed, this says so and is skipped.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -14,6 +15,15 @@ fn has_gdal() -> bool {
         eprintln!("skipped: no gdal_translate is installed");
     }
     runs
+}
+
+/// Whether Python has these packages.
+fn has_python(packages: &str) -> bool {
+    let output = shell(Path::new("."), &format!("python3 -c 'import {packages}'"));
+    if !output.status.success() {
+        eprintln!("skipped: Python has no {packages}");
+    }
+    output.status.success()
 }
 
 fn data(name: &str) -> PathBuf {
@@ -59,14 +69,37 @@ fn hint(file: &Path) -> String {
     hint.1.trim().to_owned()
 }
 
-/// Runs the command in a hint, from its program's name to the end or to a semicolon.
-fn follow(folder: &Path, hint: &str, program: &str) {
+/// The command in a hint, from its program's name to the end or to the next choice.
+fn command<'h>(hint: &'h str, program: &str) -> &'h str {
     let from = hint
         .find(program)
         .unwrap_or_else(|| panic!("no {program} in: {hint}"));
-    let command = hint[from..].split(';').next().unwrap_or_default();
+    hint[from..].split("; or ").next().unwrap_or_default()
+}
+
+/// Runs the command in a hint; what it says.
+fn follow(folder: &Path, hint: &str, program: &str) -> String {
+    let command = command(hint, program);
     let output = shell(folder, command);
     assert!(output.status.success(), "{command}: {output:?}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Opens what a command wrote, and removes it.
+fn taken(path: &Path) -> Raster {
+    let raster = Raster::open(path, &OpenOptions::default());
+    let raster = raster.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    std::fs::remove_file(path).expect("removed");
+    raster
+}
+
+/// Runs Python, which makes files.
+fn python(folder: &Path, script: &str) {
+    let file = folder.join("make.py");
+    std::fs::write(&file, script).expect("written");
+    let output = shell(folder, "python3 make.py");
+    assert!(output.status.success(), "{script}: {output:?}");
+    std::fs::remove_file(file).expect("removed");
 }
 
 #[test]
@@ -180,28 +213,322 @@ fn a_map_without_longitudes_gets_them_by_the_hint() {
     assert!((bounds.west + 118.087).abs() < 1e-3, "{bounds:?}");
 }
 
+/// Pictures and numbers that are no heights as they are: the command takes one band as it is.
+#[test]
+fn what_is_no_height_field_becomes_one_by_the_hint() {
+    if !has_gdal() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let palette = "-ot Byte -scale 0 1000 0 200 -a_nodata none -colorinterp_1 gray -of VRT";
+    let grey = made(at, palette, "grey.vrt");
+    let text = std::fs::read_to_string(&grey).expect("there");
+    let table: String = (0..256)
+        .map(|value| {
+            format!(
+                "<Entry c1=\"{value}\" c2=\"{}\" c3=\"7\" c4=\"255\"/>",
+                255 - value
+            )
+        })
+        .collect();
+    let interpreted = "<ColorInterp>Gray</ColorInterp>";
+    assert!(text.contains(interpreted), "{text}");
+    let coloured = format!("<ColorInterp>Palette</ColorInterp><ColorTable>{table}</ColorTable>");
+    std::fs::write(at.join("palette.vrt"), text.replace(interpreted, &coloured)).expect("written");
+    for (options, name) in [
+        ("-of PNG", "palette.png"),
+        ("", "palette.tif"),
+        (
+            "-co NBITS=1 -co PHOTOMETRIC=MINISBLACK -colorinterp_1 gray",
+            "bit.tif",
+        ),
+        ("-ot CFloat32", "complex.tif"),
+        ("-ot CInt16", "integers.tif"),
+        ("-of ENVI -ot CFloat64", "envi.img"),
+        ("-of EHdr -co NBITS=4 -a_nodata none", "four.bil"),
+        ("-of PNG -co NBITS=4 -a_nodata none", "four.png"),
+        (
+            "-b 1 -b 1 -b 1 -b 1 -co PHOTOMETRIC=CMYK -colorinterp gray,undefined",
+            "cmyk.tif",
+        ),
+    ] {
+        let from = if name.starts_with("palette") {
+            "palette.vrt"
+        } else {
+            "grey.vrt"
+        };
+        let make = format!("gdal_translate -q {options} {from} {name}");
+        let output = shell(at, &make);
+        assert!(output.status.success(), "{make}: {output:?}");
+        follow(at, &hint(&at.join(name)), "gdal_translate");
+        let stem = name.split('.').next().expect("a name");
+        let raster = taken(&at.join(format!("{stem}-converted.tif")));
+        assert_eq!((raster.columns(), raster.rows()), (40, 30), "{name}");
+        assert!(raster.bounds().is_some() || name.ends_with("png"), "{name}");
+    }
+}
+
+/// A name may have anything in it that a shell looks at.
+#[test]
+fn a_name_that_a_shell_would_read_is_quoted() {
+    if !has_gdal() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["two words.img", "a $HOME's `id`.img", "a \"quoted\".img"] {
+        let file = made(folder.path(), "-of HFA", "plain.img");
+        let named = folder.path().join(name);
+        std::fs::rename(file, &named).expect("renamed");
+        follow(folder.path(), &hint(&named), "gdal_translate");
+        let stem = name.strip_suffix(".img").expect("the ending");
+        let raster = taken(&folder.path().join(format!("{stem}-converted.tif")));
+        assert_eq!(raster.columns(), 40, "{name}");
+    }
+}
+
+/// `hapterra info` of two copies of a file, one of them cut: the command tells them apart.
+#[test]
+fn a_check_sum_tells_a_whole_file_from_a_cut_one() {
+    if !has_gdal() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let whole = made(at, "-co COMPRESS=DEFLATE", "whole.tif");
+    let bytes = std::fs::read(&whole).expect("there");
+    let cut = at.join("cut.tif");
+    let damaged: Vec<u8> = (bytes.iter().enumerate())
+        .map(|(at, byte)| {
+            if (500..620).contains(&at) {
+                0xa5
+            } else {
+                *byte
+            }
+        })
+        .collect();
+    std::fs::write(&cut, damaged).expect("written");
+    let hint = hint(&cut);
+    let sum = |told: &str| {
+        let line = told.lines().find(|line| line.contains("Checksum="));
+        line.map(str::trim).map(str::to_owned)
+    };
+    let of_cut = sum(&follow(at, &hint, "gdalinfo"));
+    let there = hint.replace("cut.tif", "whole.tif");
+    let of_whole = sum(&follow(at, &there, "gdalinfo"));
+    assert!(
+        of_whole.is_some() && of_whole != of_cut,
+        "{of_whole:?} {of_cut:?}"
+    );
+}
+
+/// Both commands for a file that is larger than memory, whose strips are too large to be read
+/// one by one. There is nothing in it.
+#[test]
+fn what_is_too_large_is_cut_or_made_coarser_by_the_hint() {
+    if !has_gdal() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let large = "gdal_create -q -ot Float64 -outsize 2000 1100000 -bands 1 -a_srs EPSG:32611 \
+                 -a_ullr 400000 3800000 402000 2700000 -co COMPRESS=LZW -co BLOCKYSIZE=4000 \
+                 -co SPARSE_OK=TRUE large.tif";
+    let output = shell(at, large);
+    assert!(output.status.success(), "{large}: {output:?}");
+    let hint = hint(&at.join("large.tif"));
+    for (program, size) in [
+        ("gdal_translate -srcwin", (2_000, 20_000)),
+        ("gdal_translate -r average", (200, 110_000)),
+    ] {
+        follow(at, &hint, program);
+        let raster = taken(&at.join("large-converted.tif"));
+        assert_eq!((raster.columns(), raster.rows()), size, "{program}");
+    }
+}
+
+/// The variable's name is the user's to put in.
+#[test]
+fn a_layer_of_a_netcdf_file_becomes_a_geotiff_by_the_hint() {
+    if !has_gdal() || !has_python("netCDF4") {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    python(
+        at,
+        "import netCDF4, numpy as n\n\
+         def fill(d):\n    \
+             for name, size in (('t', 3), ('y', 30), ('x', 40)):\n        \
+                 d.createDimension(name, size)\n    \
+             d.createVariable('z', 'f4', ('t', 'y', 'x'))[:] = n.arange(3600.0).reshape(3, 30, 40)\n\
+         with netCDF4.Dataset('months.nc', 'w') as d:\n    fill(d)\n\
+         with netCDF4.Dataset('deep.nc', 'w') as d:\n    fill(d.createGroup('inner'))\n",
+    );
+    for (name, variable) in [("months", "z"), ("deep", "/inner/z")] {
+        let hint = hint(&at.join(format!("{name}.nc")));
+        follow(
+            at,
+            &hint.replace(":NAME", &format!(":{variable}")),
+            "gdal_translate",
+        );
+        let raster = taken(&at.join(format!("{name}-converted.tif")));
+        assert_eq!((raster.columns(), raster.rows()), (40, 30), "{name}");
+        assert_eq!(
+            raster.summary().highest,
+            1199.0,
+            "the first layer of {name}"
+        );
+    }
+}
+
+/// What neither this nor most builds of GDAL can unpack: Python's package can.
+#[test]
+fn a_packing_of_netcdf_that_is_not_read_is_taken_off_by_the_hint() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let file = at.join("bzip2.nc");
+    std::fs::copy(data("bzip2.nc"), &file).expect("copied");
+    let hint = hint_of(&["info", "--variable", "bed"], &file);
+    assert!(hint.contains("pip install netCDF4"), "{hint}");
+    if !has_python("netCDF4") {
+        return;
+    }
+    follow(at, &hint, "python3");
+    let bed = OpenOptions {
+        variable: Some("bed".into()),
+        ..OpenOptions::default()
+    };
+    let [found, wanted] = [at.join("bzip2-converted.nc"), data("zstd.nc")]
+        .map(|path| Raster::open(path, &bed).expect("opens"));
+    assert_eq!(found.bounds(), wanted.bounds());
+    assert_eq!(found.summary().holes, 1);
+    for (column, row) in [(0, 0), (20, 10), (39, 29)] {
+        assert_eq!(found.height(column, row), wanted.height(column, row));
+    }
+}
+
 /// GDAL knows nothing of NumPy's files; the hint is Python's.
 #[test]
 fn arrays_are_converted_by_numpy() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let at = folder.path();
-    let make = "import numpy as n; a = n.arange(12.).reshape(1, 3, 4); n.save('deep.npy', a); \
-                n.savez('deep.npz', a=a)";
-    let output = shell(at, &format!("python3 -c \"{make}\""));
-    if !output.status.success() {
-        eprintln!("skipped: no numpy is installed");
+    if !has_python("numpy") {
         return;
     }
-    for name in ["deep.npy", "deep.npz"] {
-        let hint = hint(&at.join(name));
-        let from = hint
-            .find("python3")
-            .unwrap_or_else(|| panic!("no python3 in: {hint}"));
-        let output = shell(at, &hint[from..]);
-        assert!(output.status.success(), "{hint}: {output:?}");
-        let raster = Raster::open(at.join("heights.npy"), &OpenOptions::default());
-        assert_eq!(raster.expect("opens").height(3, 0), 11.0, "{name}");
-        std::fs::remove_file(at.join("heights.npy")).expect("removed");
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    python(
+        at,
+        "import numpy as n; a = n.arange(12.).reshape(1, 3, 4); n.save('deep.npy', a); \
+         n.savez('deep.npz', a=a); n.save('layers.npy', n.stack([a[0], 2 * a[0]])); \
+         n.save('complex.npy', a[0] + 3j); n.save('bits.npy', a[0] > 5); \
+         n.save('text.npy', a[0].astype(str)); n.save('line.npy', a[0, 0]); \
+         n.save('fields.npy', n.zeros((3, 4), dtype=[('a', 'f4'), ('b', 'f4')]))",
+    );
+    for (name, highest) in [
+        ("deep.npy", 11.0),
+        ("deep.npz", 11.0),
+        ("layers.npy", 11.0),
+        ("complex.npy", 11.0),
+        ("bits.npy", 1.0),
+    ] {
+        follow(at, &hint(&at.join(name)), "python3");
+        assert_eq!(
+            taken(&at.join("heights.npy")).height(3, 0),
+            highest,
+            "{name}"
+        );
+    }
+    // Nothing makes heights of these.
+    for name in ["text.npy", "line.npy", "fields.npy"] {
+        assert_eq!(hint(&at.join(name)), "take a file with heights", "{name}");
+    }
+}
+
+#[test]
+fn archives_are_unpacked_by_the_hint() {
+    if !has_python("zipfile, lzma") {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    for name in ["one.tif", "two.tif"] {
+        std::fs::copy(data("lerc_i16.tif"), at.join(name)).expect("copied");
+    }
+    python(
+        at,
+        "import zipfile as z\n\
+         with z.ZipFile('two files.zip', 'w') as f: f.write('one.tif'); f.write('two.tif')\n\
+         with z.ZipFile('packed.zip', 'w', z.ZIP_LZMA) as f: f.write('one.tif')\n",
+    );
+    for name in ["two files.zip", "packed.zip"] {
+        std::fs::remove_file(at.join("one.tif")).expect("removed");
+        follow(at, &hint(&at.join(name)), "python3");
+        let raster = Raster::open(at.join("one.tif"), &OpenOptions::default());
+        assert_eq!(raster.expect("opens").columns(), 40, "{name}");
+    }
+    if !has_gdal() {
+        return;
+    }
+    // A file inside that is refused: unpacked, it has a hint of its own.
+    let picture = made(at, "-ot Byte -co COMPRESS=JPEG", "picture.tif");
+    assert!(shell(at, "gzip picture.tif").status.success());
+    follow(at, &hint(&at.join("picture.tif.gz")), "gzip");
+    follow(at, &hint(&picture), "gdal_translate");
+    assert_eq!(taken(&at.join("picture-converted.tif")).rows(), 30);
+}
+
+/// Clouds of points: the ground among them, on a grid in their own reference system.
+#[test]
+fn points_become_a_grid_by_the_hint() {
+    if !has_python("laspy, lazrs, pyproj") {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    python(
+        at,
+        "import laspy, numpy as n, pyproj\n\
+         def write(name, crs, corner, classes):\n    \
+             h = laspy.LasHeader(point_format=6, version='1.4')\n    \
+             h.offsets, h.scales = [*corner, 0], [0.001] * 3\n    \
+             if crs: h.add_crs(pyproj.CRS.from_user_input(crs))\n    \
+             y, x = n.mgrid[0:12, 0:20] + 0.5\n    \
+             x, y = [n.repeat(v.ravel(), 2) for v in (x, y)]\n    \
+             keep = ~((x == 5.5) & (y == 3.5))\n    \
+             z = 100 + 2 * x + y\n    \
+             z[1::2] += 30\n    \
+             p = laspy.LasData(h)\n    \
+             p.x, p.y, p.z = corner[0] + x[keep], corner[1] + y[keep], z[keep]\n    \
+             p.classification = n.resize(classes, x.size)[keep]\n    \
+             p.write(name)\n\
+         write('trees.laz', 'EPSG:32611', (400000, 3800000), [2, 5])\n\
+         write('feet.las', 'EPSG:2229+6360', (6490000, 1870000), [2, 5])\n\
+         write('unknown.las', None, (-130, -7), [1, 1])\n",
+    );
+    for (name, system, lifted) in [
+        ("trees.laz", Some(32611), 0.0),
+        ("feet.las", Some(2229), 0.0),
+        // No point is marked as ground: all of them count.
+        ("unknown.las", None, 15.0),
+    ] {
+        follow(at, &hint(&at.join(name)), "python3");
+        let stem = name.split('.').next().expect("a name");
+        let raster = Raster::open(
+            at.join(format!("{stem}-converted.asc")),
+            &OpenOptions::default(),
+        );
+        let raster = raster.unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!((raster.columns(), raster.rows()), (20, 12), "{name}");
+        assert_eq!(raster.summary().holes, 1, "{name}");
+        assert!(raster.height(5, 3).is_nan(), "{name}");
+        let off = raster.height(7, 4) - (100.0 + 15.0 + 4.5 + lifted);
+        assert!(off.abs() < 1e-3, "{name}: {off}");
+        let found = raster.reference_system().and_then(|system| system.code());
+        assert_eq!(found, system, "{name}");
+        if name == "feet.las" {
+            let foot = raster.metres_per_vertical_unit();
+            assert!((foot - 1200.0 / 3937.0).abs() < 1e-9, "{foot}");
+        }
     }
 }
 

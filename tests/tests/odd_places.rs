@@ -27,6 +27,7 @@ struct Row {
     lat_middle: f64,
     along_row_m: f64,
     along_column_m: f64,
+    lean: f64,
 }
 
 impl Row {
@@ -105,10 +106,18 @@ fn cells_are_as_large_as_on_their_own_body() {
         let is_placed = |reader: &&Reader| **reader == Reader::Own || !row.file.ends_with(".nc");
         for reader in Reader::ALL.iter().filter(is_placed) {
             let raster = row.raster_by(*reader);
-            let (along_row, along_column) = raster
+            let cell = raster
                 .cell()
-                .unwrap_or_else(|| panic!("{} by {reader:?}", row.file))
-                .ground_metres();
+                .unwrap_or_else(|| panic!("{} by {reader:?}", row.file));
+            let (along_row, along_column) = cell.ground_metres();
+            let off = cell.lean - row.lean;
+            assert!(
+                off.abs() < 1e-4,
+                "{} by {reader:?}: leans by {} for {}",
+                row.file,
+                cell.lean,
+                row.lean
+            );
             for (found, wanted) in [
                 (along_row, row.along_row_m),
                 (along_column, row.along_column_m),
@@ -122,6 +131,33 @@ fn cells_are_as_large_as_on_their_own_body() {
             }
         }
     }
+}
+
+/// A map that is not conformal shears the ground, and a turned grid of degrees is sheared by
+/// itself: felt cells are square on the ground all the same, in every direction.
+#[test]
+fn what_a_map_shears_is_felt_in_its_true_shape() {
+    let mut sheared = 0;
+    for row in rows() {
+        let raster = row.raster();
+        let grid = FeltGrid::new(&raster, FeltCells::Square);
+        let worst = |grid: &FeltGrid<'_>| {
+            let [u, v] = [grid.columns(), grid.rows()].map(|count| 0.5 * (f64::from(count) - 1.0));
+            grid.worst_in([u, v, u, v])
+                .expect("a cell of known size")
+                .share
+        };
+        assert!(worst(&grid) < 1e-3, "{}: {}", row.file, worst(&grid));
+        if row.lean.abs() > 2e-3 {
+            sheared += 1;
+            let stored = FeltGrid::new(&raster, FeltCells::Stored);
+            let off = worst(&stored);
+            // Half of the shear is what the longest and the shortest direction are off.
+            assert!(off > 0.4 * row.lean.abs(), "{}: {off}", row.file);
+            assert!(stored.is_distorted() && grid.is_resampled(), "{}", row.file);
+        }
+    }
+    assert!(sheared >= 5, "{sheared}");
 }
 
 fn said(file: &str) -> String {

@@ -221,3 +221,74 @@ fn options_that_contradict_each_other_are_refused() {
         );
     }
 }
+
+/// Metres in a degree of longitude at a latitude, on a sphere: what the ellipsoid is off is
+/// less than the figure is rounded to.
+fn narrower(from_deg: f64, to_deg: f64) -> f64 {
+    to_deg.to_radians().cos() / from_deg.to_radians().cos()
+}
+
+/// Cells are measured at one place. Where the arm reaches places at which they are off by more
+/// than 0.1 %, `run` and `demo` say by how much and where; `info` says it of the whole file.
+#[test]
+fn how_far_cells_are_off_within_reach_is_said_at_the_start() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // From 40° to 54.5° north.
+    let file = grid(folder.path(), [10.0, 40.0], 0.5);
+    let degrees = r#"GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]"#;
+    std::fs::write(folder.path().join("terrain.prj"), degrees).expect("written");
+    let shape = |text: &str| {
+        let line = text.lines().find(|line| line.starts_with("shape"));
+        line.map(|line| {
+            let (_, off) = line.split_once("off by up to ").expect("a figure");
+            let percent = off.split(' ').next().expect("a number");
+            let (_, latitude) = line.split_once("latitude ").expect("a place");
+            let latitude = latitude.split([' ', ',']).next().expect("a number");
+            [percent, latitude].map(|number| number.parse::<f64>().expect("a number"))
+        })
+    };
+    let wanted = |from: f64, to: f64| 100.0 * (narrower(from, to) - 1.0).abs();
+    for command in ["run", "demo"] {
+        // All of it is in reach: cells of the middle are too wide in the north.
+        let all = said(&hapterra(command, &file, &["--exaggeration", "9"]));
+        let [percent, latitude] = shape(&all).expect("a line");
+        // The last row of felt cells.
+        assert!((54.0..54.5).contains(&latitude), "{all}");
+        let off = percent - wanted(47.25, latitude);
+        assert!(off.abs() < 0.2, "{percent} for {}", wanted(47.25, latitude));
+        // At a scale at which the arm reaches 20 km to each side cells are as they are felt.
+        let near = ["--at", "15,47", "--ground-m-per-mm", "5"];
+        let near = said(&hapterra(command, &file, &near));
+        assert!(near.contains("place ") && shape(&near).is_none(), "{near}");
+        // What is stored is not square anywhere.
+        let stored = ["--cells", "stored", "--exaggeration", "9"];
+        let stored = said(&hapterra(command, &file, &stored));
+        assert!(
+            shape(&stored).is_some_and(|[percent, _]| percent > 20.0),
+            "{stored}"
+        );
+        for part in ["not in their true shape", "--cells square feels them"] {
+            assert!(stored.contains(part), "{part} in {stored}");
+        }
+    }
+    let info = |more: &[&str]| {
+        let words = [&["info", file.to_str().expect("plain")], more].concat();
+        let output = Command::new(hapterra_binary()).args(words).output();
+        String::from_utf8(output.expect("started").stdout).expect("text")
+    };
+    let [percent, latitude] = shape(&info(&[])).expect("a line");
+    assert!((percent - wanted(47.25, latitude)).abs() < 0.2 && latitude > 54.0);
+    let report: serde_json::Value = serde_json::from_str(&info(&["--json"])).expect("JSON");
+    let share = report["cell"]["worst_share"].as_f64().expect("a share");
+    assert!((100.0 * share - percent).abs() < 0.01, "{report:#}");
+    let there = report["cell"]["worst_at"][1].as_f64().expect("a latitude");
+    assert!((there - latitude).abs() < 0.01, "{report:#}");
+    // A field that is small needs no word.
+    let file = grid(folder.path(), [10.0, 40.0], 0.0005);
+    std::fs::write(folder.path().join("terrain.prj"), degrees).expect("written");
+    let small = said(&hapterra("run", &file, &["--exaggeration", "9"]));
+    assert!(
+        small.contains("place ") && shape(&small).is_none(),
+        "{small}"
+    );
+}

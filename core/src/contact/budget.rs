@@ -35,6 +35,11 @@ pub(super) const GAP: u32 = 1;
 /// Units for a cell whose patch is intersected with a path.
 pub(super) const INTERSECTION: u32 = 8;
 
+/// Units of the largest piece of work: arriving at a patch on a border, and asking its four
+/// neighbours; the cone of friction asks as much. A tick that put work off has spent more
+/// than [`WORK_PER_TICK`] less this.
+pub const LARGEST_PIECE: u32 = ARRIVAL + 4 * SLOPE;
+
 /// What a tick has spent, and what it may.
 #[derive(Debug)]
 pub(super) struct Budget {

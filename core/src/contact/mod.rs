@@ -30,7 +30,7 @@ mod tally;
 #[cfg(test)]
 mod tests;
 
-pub use budget::WORK_PER_TICK;
+pub use budget::{LARGEST_PIECE, WORK_PER_TICK};
 pub use friction::Friction;
 pub use output::{ContactOutput, ContactState};
 pub use proxy::Contact;

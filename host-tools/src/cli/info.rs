@@ -3,15 +3,18 @@
 mod place;
 
 use std::fmt::Write as _;
+use std::io::{ErrorKind, Write as _};
 
 use serde::Serialize;
 
 use hapterra_core::terrain::{POSTS, TILE_CELLS};
 
 use super::failure::Failure;
+use super::options::placing::off_in_words;
 use super::options::terrain_file::TerrainFile;
+use crate::place::place_in_words;
 use crate::raster::{CellSize, CellUnit, Certainty, ReferenceSystem};
-use crate::terrain::{FeltCells, FeltGrid};
+use crate::terrain::{Distortion, FeltCells, FeltGrid};
 use place::{Rectangle, Vertical, from, told};
 
 /// Arguments of `hapterra info`.
@@ -40,11 +43,24 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let report = FileReport::new(&args.terrain, &grid);
     if args.json {
         let json = serde_json::to_string_pretty(&report).map_err(Failure::new)?;
-        println!("{json}");
+        put(&format!("{json}\n"))
     } else {
-        print!("{}", report.text());
+        put(&report.text())
     }
-    Ok(())
+}
+
+/// Prints the report. A reader who goes away wants no more of it; a disk without room has
+/// lost it.
+fn put(report: &str) -> Result<(), Failure> {
+    let mut output = std::io::stdout().lock();
+    let written = output.write_all(report.as_bytes());
+    match written.and_then(|()| output.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::new(format!("cannot write the report: {error}"))
+                .hint("make room where standard output goes to"))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// What is shown; the fields' names are those of the JSON.
@@ -106,6 +122,13 @@ struct Cell {
     resampled: bool,
     /// Whether stored cells that are not square are felt as squares.
     distorted: bool,
+    /// How far slopes and lengths are off at worst somewhere in the field, as a share, where
+    /// cells are felt as they are in its middle.
+    worst_share: Option<f64>,
+    /// Where that is, in the file's coordinates.
+    worst_at: Option<[f64; 2]>,
+    #[serde(skip)]
+    worst: Option<String>,
 }
 
 /// One level of detail: the field with every 2^level-th sample.
@@ -176,6 +199,9 @@ impl FileReport {
         );
         let cell = self.cell.as_ref();
         line("cell", cell.map_or("unknown".into(), Cell::text));
+        if let Some(worst) = cell.and_then(|cell| cell.worst.clone()) {
+            line("shape", worst);
+        }
         let looked = match self.known_whole {
             true => String::new(),
             false => format!(
@@ -218,6 +244,9 @@ impl FileReport {
 impl Cell {
     fn new(cell: CellSize, grid: &FeltGrid<'_>) -> Self {
         let (east_m, north_m) = cell.ground_metres();
+        let last = [grid.columns(), grid.rows()].map(|count| f64::from(count) - 1.0);
+        let worst = grid.worst_in([0.0, 0.0, last[0], last[1]]);
+        let file = grid.raster().georeference();
         Self {
             east: cell.east,
             north: cell.north,
@@ -233,6 +262,17 @@ impl Cell {
             felt_m: grid.side_m().unwrap_or_default(),
             resampled: grid.is_resampled(),
             distorted: grid.is_distorted(),
+            worst_share: worst.map(|worst| worst.share),
+            worst_at: worst.map(|worst| worst.ground),
+            worst: worst.filter(Distortion::is_felt).map(|worst| {
+                let (off, place) = (off_in_words(&worst), place_in_words(&file, worst.ground));
+                match grid.is_distorted() {
+                    true => format!("{off}, at {place}"),
+                    false => format!(
+                        "true in the middle; felt from there, {off}, at {place}: --at and --bbox measure the cells at a place"
+                    ),
+                }
+            }),
         }
     }
 

@@ -1,5 +1,7 @@
 //! What an arm can get to by its calibration, and how finely it tells places apart.
 
+use std::f64::consts::PI;
+
 use hapterra_core::Vec3;
 use hapterra_core::phantom::Calibration;
 
@@ -97,6 +99,28 @@ impl Reach {
             (low.min(row), high.max(row))
         });
         high.saturating_sub(low) as f64 * self.step_mm
+    }
+
+    /// The rectangle around all that the arm gets to, whatever the height: west, south, east
+    /// and north of the tip in its home pose, mm.
+    #[must_use]
+    pub fn sides_mm(&self) -> [f64; 4] {
+        let is_reached =
+            |column: &usize| (0..self.rows).any(|row| self.missing_in([*column; 2], [row; 2]) == 0);
+        let mut columns = (0..self.columns).filter(is_reached);
+        let out = |column: Option<usize>| self.step_mm * column.unwrap_or(0) as f64;
+        let nearest = columns.next();
+        let [near, far] = [nearest, columns.next_back().or(nearest)].map(out);
+        let [left, right] = self.turn_rad.map(|turn| turn.clamp(-PI / 2.0, PI / 2.0));
+        let widest = self.turn_rad.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        // The user faces the device: north is towards the base's axis.
+        let northernmost = [near, far].map(|out| out * widest.min(PI).cos());
+        [
+            far * left.sin(),
+            self.home_mm[0] - far,
+            far * right.sin(),
+            self.home_mm[0] - northernmost[0].min(northernmost[1]),
+        ]
     }
 
     /// Whether the arm gets to every point of a box.
@@ -253,6 +277,40 @@ mod tests {
                     let q = record.joints_at(tip).expect("reached");
                     assert!(record.limits.allow(q, -0.5 * MARGIN_RAD), "{tip} {q}");
                 }
+            }
+        }
+    }
+
+    /// Against poses of all joints within their stops.
+    #[test]
+    fn the_sides_of_the_reach_are_around_every_pose_and_no_farther_out() {
+        for record in PRESETS {
+            let reach = Reach::of(&record);
+            let home = Pose::from_angles(&record, Vec3::ZERO).tip_mm();
+            let nearest = NEAREST * f64::from(record.l1_mm + record.l2_mm);
+            let mut found = [0.0_f64; 4];
+            for pose in 0..41 * 41 * 41 {
+                let steps = [pose % 41, pose / 41 % 41, pose / 1681].map(|step| step as f32 / 40.0);
+                let limits = &record.limits;
+                let angles = limits.min_rad + Vec3::from(steps) * (limits.max_rad - limits.min_rad);
+                let tip = Pose::from_angles(&record, angles).tip_mm();
+                let out = f64::from(tip.x.hypot(tip.y));
+                if !limits.allow(angles, -MARGIN_RAD) || out < nearest {
+                    continue;
+                }
+                let from_home = tip - home;
+                let [east, north] = [from_home.y, -from_home.x].map(f64::from);
+                found = [
+                    found[0].min(east),
+                    found[1].min(north),
+                    found[2].max(east),
+                    found[3].max(north),
+                ];
+            }
+            for (side, (found, said)) in found.iter().zip(reach.sides_mm()).enumerate() {
+                let outwards = if side < 2 { found - said } else { said - found };
+                let room = -reach.step_mm..3.0 * reach.step_mm;
+                assert!(room.contains(&outwards), "side {side}: {found} and {said}");
             }
         }
     }

@@ -9,7 +9,7 @@ use super::fit::{ABOVE_MM, Extent};
 use super::ground;
 use super::reach::Reach;
 use super::target::Target;
-use crate::terrain::{BadScale, FeltGrid, Scale, Terrain, TerrainError};
+use crate::terrain::{BadScale, Distortion, FeltGrid, Scale, Terrain, TerrainError};
 
 /// Relief that a terrain gets in the hand where the file does not know how large its cells
 /// are, so that it has no true proportions, mm.
@@ -95,6 +95,8 @@ pub struct View {
     pub laid_mm: [f64; 4],
     /// Lowest and highest point of that in the hand, mm.
     pub heights_mm: [f64; 2],
+    /// What the arm gets to ([`Reach::sides_mm`]).
+    pub reach_mm: [f64; 4],
 }
 
 impl View {
@@ -152,6 +154,15 @@ impl View {
     #[must_use]
     pub fn felt_cell_mm(&self) -> f64 {
         self.scale.at_level(self.level).cell_mm()
+    }
+
+    /// The felt cell within the arm's reach that is farthest from its true shape; of the
+    /// view's own grid. `None` where the file does not know how large its cells are.
+    #[must_use]
+    pub fn worst_reached(&self, grid: &FeltGrid<'_>) -> Option<Distortion> {
+        let cells =
+            |index: usize| (self.home_mm[index % 2] + self.reach_mm[index]) / self.scale.cell_mm();
+        grid.worst_in([0, 1, 2, 3].map(cells))
     }
 
     /// The same at another scale: hand millimetres a felt cell of level 0, and a vertical
@@ -366,6 +377,7 @@ impl<'g> Wanted<'g> {
             exaggeration: true_height.map(|cells| scale.height_cells(1.0) / cells),
             laid_mm: cells.map(|cells| cells * scale.cell_mm()),
             heights_mm: sorted(heights.map(|height| height * scale.height_mm_per_unit())),
+            reach_mm: reach.sides_mm(),
         }
     }
 }

@@ -3,8 +3,8 @@
 use std::io::Read;
 
 use flate2::bufread::GzDecoder;
-use zip::ZipArchive;
 use zip::result::ZipError;
+use zip::{CompressionMethod, ZipArchive};
 
 use super::BadRaster;
 use super::format::{Claim, starts_with_any};
@@ -77,6 +77,16 @@ impl<'i> Zip<'i> {
     /// Unpacks an entry into memory, never more than its packed size can hold.
     pub(super) fn unpack(&mut self, name: &str) -> Result<Vec<u8>, BadRaster> {
         let mut entry = self.archive.by_name(name).map_err(|error| fault(&error))?;
+        let method = entry.compression();
+        if !matches!(
+            method,
+            CompressionMethod::Stored | CompressionMethod::Deflated
+        ) {
+            return Err(BadRaster::Unsupported {
+                format: "ZIP",
+                feature: format!("compression by {method}"),
+            });
+        }
         let packed = entry.compressed_size();
         let limit = LARGEST_UNPACKED.min(packed.saturating_mul(DEFLATE_RATIO));
         if entry.size() > limit {

@@ -126,10 +126,12 @@ mod tests {
         ];
         for (code, place, wanted) in cases {
             let system = ReferenceSystem::from_code(code).expect("known");
-            let (east, north) = system.local_metres(place).expect("in reach");
-            assert!((east / wanted - 1.0).abs() < 1e-3, "{code}: {east}");
-            assert!((north / wanted - 1.0).abs() < 1e-3, "{code}: {north}");
-            assert_eq!(system.local_metres((1e12, 1e12)), None);
+            let tangents = system.tangents(place).expect("in reach");
+            for lead in [tangents.x, tangents.y] {
+                let length = lead.iter().map(|part| part * part).sum::<f64>().sqrt();
+                assert!((length / wanted - 1.0).abs() < 1e-3, "{code}: {length}");
+            }
+            assert_eq!(system.tangents((1e12, 1e12)), None);
         }
     }
 

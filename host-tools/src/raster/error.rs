@@ -55,6 +55,9 @@ pub enum BadRaster {
     /// Readable, but its samples are not heights.
     #[error("not a height field: {0}")]
     NotAHeightField(String),
+    /// Neither heights nor anything that a converter could make heights of.
+    #[error("not a height field: {0}")]
+    NoNumbers(String),
     /// Several parts could hold the heights; none was chosen.
     #[error("not a height field: of its two-dimensional {kind}s ({}) none is named as heights are", names.join(", "))]
     SeveralHeights {

@@ -35,13 +35,14 @@ pub struct CellSize {
     pub east: f64,
     /// Along a column, south to north, in `unit`s; positive.
     pub north: f64,
-    /// Cosine of the angle between a row and a column: zero where they are
-    /// perpendicular, positive where columns lean to the east.
+    /// Cosine of the angle between a row and a column on the ground: zero where they are
+    /// perpendicular, positive where columns lean to the east. Most maps shear the ground.
     pub lean: f64,
     /// Unit of both.
     pub unit: CellUnit,
-    /// Ground metres in a metre of the map along rows and columns, in the middle of
-    /// the field: a projected system is true to scale in few places.
+    /// Ground metres in a metre of [`CellSize::metres`] along rows and columns, in the middle
+    /// of the field: a projected system is true to scale in few places, and a turned grid of
+    /// degrees is neither as wide as one of longitude nor as high as one of latitude.
     pub map_scale: (f64, f64),
     /// Latitude of the middle of the field in degrees, where known.
     pub latitude: Option<f64>,

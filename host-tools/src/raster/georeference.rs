@@ -6,6 +6,7 @@
 
 use super::crs::{LonLat, ReferenceSystem};
 use super::geometry::{CellSize, CellUnit, Certainty};
+use super::tangents::Tangents;
 
 /// Ends of the range in which longitudes and latitudes are taken, degrees.
 const LONGITUDES: std::ops::RangeInclusive<f64> = -360.0..=360.0;
@@ -89,6 +90,11 @@ impl GroundTransform {
             row_step: self.row_step.map(|step| -step),
             ..self
         }
+    }
+
+    /// Whether columns are along x and rows along y.
+    fn is_straight(&self) -> bool {
+        self.column_step[1] == 0.0 && self.row_step[0] == 0.0
     }
 
     fn determinant(&self) -> f64 {
@@ -244,34 +250,25 @@ impl<'r> Georeference<'r> {
         [x + ((middle - x) / turn).round() * turn, y]
     }
 
-    /// The size of a cell at a place: of an angle or on a map, a cell is as large as the
-    /// latitude or the map's scale at the place makes it.
+    /// The size of a cell at a place: of an angle or on a map, a cell is as large, and its
+    /// rows and columns are as far from perpendicular, as the latitude or the map makes it at
+    /// the place.
     #[must_use]
     pub fn cell_at(&self, ground: [f64; 2]) -> Option<CellSize> {
-        let cell = self.cell?;
-        Some(match self.system {
-            System::Cells | System::Unstated => cell,
-            System::Geographic { degrees } => CellSize {
-                latitude: Some((ground[1] * degrees).clamp(-90.0, 90.0)),
-                ..cell
-            },
-            System::Projected => CellSize {
-                map_scale: self.map_scale(&cell, ground).unwrap_or(cell.map_scale),
-                ..cell
-            },
-        })
-    }
-
-    /// Ground metres in a metre of the map along rows and columns at a place.
-    fn map_scale(&self, cell: &CellSize, [x, y]: [f64; 2]) -> Option<(f64, f64)> {
-        let CellUnit::Length { metres } = cell.unit else {
-            return None;
+        let mut cell = self.cell?;
+        let tangents = match self.system {
+            System::Cells | System::Unstated => None,
+            System::Geographic { degrees } => {
+                let latitude = (ground[1] * degrees).clamp(-90.0, 90.0);
+                cell.latitude = Some(latitude);
+                let turned = || Tangents::of_angles(&cell.globe, latitude, degrees);
+                (!self.transform.is_straight()).then(turned)
+            }
+            System::Projected => (self.reference).and_then(|map| map.tangents(ground.into())),
         };
-        let (east, north) = self.reference?.local_metres((x, y))?;
-        // Along a row and a column, which need not be along x and y.
-        let along = |[dx, dy]: [f64; 2]| (east * dx).hypot(north * dy) / dx.hypot(dy) / metres;
-        let map = &self.transform;
-        Some((along(map.column_step), along(map.row_step)))
+        let (along, up) = (self.transform.column_step, self.transform.row_step);
+        let there = tangents.and_then(|tangents| tangents.cell(cell, along, up));
+        Some(there.unwrap_or(cell))
     }
 }
 

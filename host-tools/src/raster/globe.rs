@@ -67,6 +67,18 @@ impl Globe {
         [self.radius_m * cos / w, north].map(f64::to_radians)
     }
 
+    /// The point of its surface at a longitude and latitude in degrees, m from its middle.
+    pub(super) fn surface(&self, (longitude, latitude): (f64, f64)) -> [f64; 3] {
+        let (sin, cos) = latitude.to_radians().sin_cos();
+        let (east, out) = longitude.to_radians().sin_cos();
+        let radius = self.radius_m / (1.0 - self.e2 * sin * sin).sqrt();
+        [
+            radius * cos * out,
+            radius * cos * east,
+            radius * (1.0 - self.e2) * sin,
+        ]
+    }
+
     /// As PROJ writes it.
     pub(super) fn in_proj(&self) -> String {
         // PROJ has no inverse of a flattening of zero.

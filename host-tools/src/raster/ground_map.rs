@@ -152,15 +152,17 @@ impl GroundMap {
         }
     }
 
-    /// Length of a step along a row and along a column, each over its length in
-    /// coordinates, where a unit of x and of y are `x` and `y` long: rows and columns
-    /// need not be along x and y.
-    pub(super) fn scale(&self, (x, y): (f64, f64)) -> (f64, f64) {
-        let along = |dx: f64, dy: f64| (x * dx).hypot(y * dy) / dx.hypot(dy);
+    /// The steps in coordinates to the next sample eastwards along a row and northwards
+    /// along a column, whatever the order of the file.
+    pub(super) fn steps_east_and_north(&self) -> ([f64; 2], [f64; 2]) {
         let map = &self.0;
+        let turned = |step: [f64; 2], is_turned: bool| match is_turned {
+            true => step.map(|part| -part),
+            false => step,
+        };
         (
-            along(map.pixel_width, map.skew_y),
-            along(map.skew_x, map.pixel_height),
+            turned([map.pixel_width, map.skew_y], self.is_east_first()),
+            turned([map.skew_x, map.pixel_height], !self.is_south_up()),
         )
     }
 

@@ -48,6 +48,7 @@ mod placed;
 mod read;
 mod samples;
 mod storage;
+mod tangents;
 
 use std::path::Path;
 

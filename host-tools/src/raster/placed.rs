@@ -5,6 +5,7 @@ use super::crs::{ReferenceSystem, Unit};
 use super::decoded::Decoded;
 use super::ground_map::{Bounds, GroundMap};
 use super::place::Place;
+use super::tangents::Tangents;
 use super::{BadRaster, CellSize, CellUnit, Certainty, Globe};
 
 /// The unit of a file's coordinates, as the file states it.
@@ -90,8 +91,7 @@ impl Decoded {
         let degrees = unit.map_or(1.0, |unit| unit.degrees);
         let mut cell = self.cell_of(&map, unit);
         cell.lean = map.lean();
-        cell.map_scale = self.map_scale(&map, &cell).unwrap_or((1.0, 1.0));
-        self.cell = Some(cell);
+        self.cell = Some(self.on_ground(&map, cell, degrees).unwrap_or(cell));
         self.place = Some(Place { map, degrees });
     }
 
@@ -151,16 +151,17 @@ impl Decoded {
         }
     }
 
-    /// Ground metres in a metre of the map along rows and columns, where the
-    /// projection is known.
-    fn map_scale(&self, map: &GroundMap, cell: &CellSize) -> Option<(f64, f64)> {
-        let CellUnit::Length { metres } = cell.unit else {
-            return None;
-        };
+    /// A cell as it is on the ground in the middle of the field, where that is known.
+    fn on_ground(&self, map: &GroundMap, cell: CellSize, degrees: f64) -> Option<CellSize> {
         let middle = map.at(f64::from(self.columns) / 2.0, f64::from(self.rows) / 2.0);
-        let units = self.system.as_ref()?.local_metres(middle)?;
-        let (east, north) = map.scale(units);
-        Some((east / metres, north / metres))
+        let tangents = match cell.unit {
+            // Along meridians and parallels a cell is what its latitude makes it.
+            CellUnit::Degree if map.is_straight() => return None,
+            CellUnit::Degree => Tangents::of_angles(&cell.globe, cell.latitude?, degrees),
+            CellUnit::Length { .. } => self.system.as_ref()?.tangents(middle)?,
+        };
+        let (along, up) = map.steps_east_and_north();
+        tangents.cell(cell, along, up)
     }
 
     /// Outer edges of all cells in the file's units.

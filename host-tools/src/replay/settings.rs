@@ -18,9 +18,10 @@ use crate::terrain::{BadScale, FeltCells, FeltGrid, Scale, Terrain};
 pub const KEY: &str = "hapterra-recording";
 /// Version of the settings' format that this program writes and reads.
 pub const FORMAT: u32 = 1;
-/// Lengths and cell sizes that differ by less than this share count as the same: two
-/// machines may round the size of a degree differently.
-const SAME: f64 = 1e-9;
+/// Cells whose sides on the ground differ by less than this share count as the same. Two
+/// machines may round the size of a degree differently, and earlier versions asked a map for
+/// its scale over one metre, which is off by up to 1e-7: what they recorded is felt again.
+const SAME: f64 = 1e-6;
 
 /// The settings with which something was felt.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

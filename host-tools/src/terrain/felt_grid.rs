@@ -278,6 +278,14 @@ impl<'r> FeltGrid<'r> {
         }
     }
 
+    /// Columns and rows of the file that a felt cell leads on to the east, and to the north.
+    pub(super) fn steps_in_file(&self) -> [[f64; 2]; 2] {
+        match &self.resampling {
+            None => [[1.0, 0.0], [0.0, 1.0]],
+            Some(places) => [[places.column_step, 0.0], [places.lean, places.row_step]],
+        }
+    }
+
     /// The height of the bilinear surface at a place in felt cells, in the file's vertical
     /// unit; `None` in a hole and off the field.
     #[must_use]
@@ -351,11 +359,12 @@ impl Resampling {
     }
 }
 
-/// Whether two cells are as large as each other, to [`MEASURED`].
+/// Whether two cells are as large as each other and lean alike, to [`MEASURED`].
 fn is_alike(one: &CellSize, other: &CellSize) -> bool {
     let (a, b) = (one.ground_metres(), other.ground_metres());
     let is_near = |a: f64, b: f64| (a - b).abs() <= MEASURED * a;
-    is_near(a.0, b.0) && is_near(a.1, b.1)
+    let leans_alike = (one.lean - other.lean).abs() <= MEASURED;
+    is_near(a.0, b.0) && is_near(a.1, b.1) && leans_alike
 }
 
 fn is_square(cell: &CellSize) -> bool {

@@ -5,11 +5,13 @@
 //! is a raster at that scale and one level of detail, with its tiles made one
 //! by one when they are asked for: nothing of the raster is copied or kept.
 
+mod distortion;
 mod felt_grid;
 mod identity;
 mod scale;
 mod tiler;
 
+pub use distortion::Distortion;
 pub use felt_grid::{FeltCells, FeltGrid};
 pub use scale::{BadScale, Scale};
 pub use tiler::{Terrain, TerrainError, TileBuffer};

@@ -187,6 +187,18 @@ fn a_place_far_from_the_middle_is_felt_again_with_its_own_cells() {
     let text = folder.read("demo/hills.csv");
     assert!(text.contains("# measured_at = [13.0, 56.0]"), "{text}");
     is_reproduced(&folder, "hills.asc", "demo/hills.csv");
+    // An earlier version measured a map's cells to 1e-7; others are other cells.
+    let (_, cell_m) = text.split_once("# cell_m = ").expect("known");
+    let cell_m = cell_m.lines().next().expect("a number");
+    let with = |share: f64| {
+        let other = cell_m.parse::<f64>().expect("metres") * (1.0 + share);
+        folder.write("other.csv", &text.replace(cell_m, &other.to_string()));
+        let words = ["hills.asc", "other.csv", "again.csv"].map(|name| folder.text(name));
+        folder.run(&["replay", &words[0], &words[1], "-o", &words[2]])
+    };
+    assert!(with(1e-7).status.success(), "{}", said(&with(1e-7)));
+    let told = said(&with(1e-5));
+    assert!(told.contains("cells of another size"), "{told}");
 }
 
 /// A Python that can read Parquet, and what it reads it with.
@@ -501,6 +513,11 @@ fn an_output_that_cannot_be_written_is_no_crash() {
             matches!(run.status.code(), Some(0 | 1)),
             "{words:?}: {told}"
         );
+        // A report that was lost is no success.
+        if words[0] == "info" {
+            assert_eq!(run.status.code(), Some(1), "{words:?}");
+            assert!(told.contains("cannot write the report"), "{told}");
+        }
     }
 }
 
@@ -521,6 +538,16 @@ fn odd_outputs_and_options_are_told() {
     assert!(told.contains("standard output"), "{told}");
     let told = folder.replays("in.csv", "stiff.csv", &["--stiffness-n-per-mm=1e9"]);
     assert!(told.contains("1000000000 N/mm"), "{told}");
+    // What shows a record writes none.
+    let run = folder.run(&[
+        "calibrate",
+        "--device",
+        "native",
+        "--show",
+        "-o",
+        "new.toml",
+    ]);
+    assert!(said(&run).contains("cannot be used with"), "{}", said(&run));
     // Nothing is left of a demo that fails.
     let demo = folder.text("demo");
     let words = [

@@ -5,6 +5,7 @@ use std::process::{Command, Stdio};
 
 use hapterra::replay::settings::ViewSettings;
 use hapterra::replay::{Settings, Trajectory};
+use hapterra_core::contact::{LARGEST_PIECE, WORK_PER_TICK};
 use hapterra_tests::hapterra_binary;
 
 use super::folder::{Folder, rows, said};
@@ -327,6 +328,63 @@ fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
             .zip(&again)
             .any(|(a, b)| a["force_x_n"] != b["force_x_n"])
     );
+}
+
+/// On walls the contact has more to do than a tick has units for, also without another view.
+/// Such a tick goes on in the next one, and a replay does all of it at once: the two differ
+/// there, and as soon as the tick is through they are the same again but for rounding.
+#[test]
+fn on_a_steep_saw_only_ticks_that_ran_out_of_work_are_felt_otherwise() {
+    /// What is left once a tick is through, mm.
+    const ROUNDING_MM: f64 = 1e-5;
+    let folder = Folder::new();
+    write_degrees(&folder, |column, row| 500 + 300 * ((column + row) % 9));
+    let [terrain, record, commands, again] =
+        ["hills.asc", "felt.csv", "commands", "again.csv"].map(|name| folder.text(name));
+    for pan in ["", "at 4.0 pan 2 1\n"] {
+        folder.write("commands", pan);
+        let words = ["run", &terrain, "--device", "native", "--record", &record];
+        let more = ["--seconds", "9", "--at", "13,56", "--exaggeration", "9"];
+        folder.runs(&[&words[..], &more, &["--commands", &commands]].concat());
+        folder.runs(&["replay", &terrain, &record, "-o", &again]);
+        let [live_text, again_text] = ["felt.csv", "again.csv"].map(|name| folder.read(name));
+        let (live, again) = (rows(&live_text), rows(&again_text));
+        assert_eq!(live.len(), again.len());
+        let (mut is_behind, mut held_up, mut worst_n) = (false, 0, 0.0_f64);
+        for (live, again) in live.iter().zip(&again) {
+            if live["limits"].contains("CLUTCH") || live["limits"].contains("TERRAIN") {
+                continue;
+            }
+            let apart = |column: &str| {
+                let [live, again] = [live, again].map(|row| row[column].parse::<f64>());
+                (live.expect("a number") - again.expect("a number")).abs()
+            };
+            let work: u32 = live["work"].parse().expect("units");
+            let proxy_mm = ["proxy_x_mm", "proxy_y_mm", "proxy_z_mm"].map(apart);
+            let off = proxy_mm.into_iter().fold(0.0, f64::max);
+            if off > ROUNDING_MM || live["state"] != again["state"] {
+                assert!(
+                    work > WORK_PER_TICK - LARGEST_PIECE,
+                    "{off} mm off at {} s with {work} units",
+                    live["t_s"]
+                );
+                held_up += 1;
+            } else {
+                assert!(off == 0.0 || is_behind, "{off} mm off at {} s", live["t_s"]);
+            }
+            is_behind = off > 0.0;
+            if live["mode"] == "armed" && live["limits"].is_empty() && live["contact"] == "1" {
+                let force_n = ["force_x_n", "force_y_n", "force_z_n"].map(apart);
+                worst_n = worst_n.max(force_n.into_iter().fold(0.0, f64::max));
+            }
+        }
+        eprintln!("{held_up} ticks were held up by work; forces differ by up to {worst_n:.3} N");
+        // The terrain is one on which that shows.
+        assert!(
+            (2..200).contains(&held_up) && worst_n > 0.1,
+            "{held_up} {worst_n}"
+        );
+    }
 }
 
 /// Before cells were measured anew, views did not say where: theirs are those of the beginning.

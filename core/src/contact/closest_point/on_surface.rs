@@ -6,7 +6,7 @@ use glam::Vec3;
 use super::beyond_border::{Asking, Onward, Start, to_steepest_patch};
 use super::on_convex_patch::Place;
 use super::on_patch::{Nearest, PatchSearch};
-use crate::contact::budget::{ARRIVAL, Budget, CONVEX, SLOPE};
+use crate::contact::budget::{ARRIVAL, Budget, CONVEX, LARGEST_PIECE};
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::contact::tolerance::HEIGHT_NOISE;
@@ -238,11 +238,7 @@ impl Descent {
         let is_known = matches!(self.stage, Stage::ArrivedKnowing);
         let border = self.at.border();
         let on_border = !is_known && border != Side::NONE;
-        let units = if on_border {
-            ARRIVAL + 4 * SLOPE
-        } else {
-            ARRIVAL
-        };
+        let units = if on_border { LARGEST_PIECE } else { ARRIVAL };
         if !budget.has(units) {
             return Some(Ended::Suspended);
         }

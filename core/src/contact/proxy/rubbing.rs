@@ -1,7 +1,7 @@
 //! A tick with friction: the proxy is held, or slides behind the HIP.
 
 use super::{Contact, OnSurface, Phase, Turn};
-use crate::contact::budget::{ARRIVAL, Budget, SLOPE};
+use crate::contact::budget::{Budget, LARGEST_PIECE};
 use crate::contact::closest_point::{Leave, position_on};
 use crate::contact::friction::{Friction, Pull, Pulled};
 use crate::contact::output::ContactState;
@@ -14,7 +14,7 @@ use crate::terrain::{TileIndex, Window};
 
 /// Units of work for asking whether friction holds the proxy: what arriving on a border
 /// costs.
-const CONE: u32 = ARRIVAL + 4 * SLOPE;
+const CONE: u32 = LARGEST_PIECE;
 /// A proxy that slides sticks again when it has not moved for so long, s: longer than
 /// a slow hand waits for its next encoder count.
 const STICKS_AFTER_S: f32 = 0.02;

@@ -40,7 +40,8 @@ pub struct Args {
 
     /// Print a record as the text of a file and do nothing else: the one in FILE, else
     /// what the device holds
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, num_args = 0..=1)]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, num_args = 0..=1,
+          conflicts_with = "output")]
     pub show: Option<Option<PathBuf>>,
 
     /// Begin with the record in this file (TOML, or a binary one of an earlier version)

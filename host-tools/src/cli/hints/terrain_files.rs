@@ -1,7 +1,7 @@
 //! What to do about a terrain file that does not open.
 //!
-//! Commands of other programs are tried by `tests/tests/converters.rs` where GDAL is
-//! installed.
+//! Commands of other programs are tried by `tests/tests/converters.rs` where these
+//! programs are installed.
 
 use std::path::Path;
 
@@ -23,12 +23,19 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
             );
         }
         // The same samples in a type and a packing that are read.
-        BadRaster::Unsupported { .. } => {
-            return converted(path, "-ot Float32 -co COMPRESS=DEFLATE");
-        }
+        BadRaster::Unsupported {
+            format: "NetCDF", ..
+        } => return unpacked_netcdf(path),
+        BadRaster::Unsupported { .. } => return converted(path, PLAIN),
+        // Palettes and single bits do not outlive another type of samples.
         BadRaster::NotAHeightField(_) => {
-            return format!("take a file with heights; or {}", converted(path, "-b 1"));
+            let one_band = format!("-b 1 {PLAIN}");
+            return format!(
+                "take a file with heights; or {}",
+                converted(path, &one_band)
+            );
         }
+        BadRaster::NoNumbers(_) => "take a file with heights",
         BadRaster::ColourBands { bands, .. } => {
             return format!("if one of its bands holds heights, name it: --band 1 to {bands}");
         }
@@ -84,7 +91,10 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
             "get the file again"
         }
         _ => {
-            "get the file again; where it came from, `gdalinfo -checksum` tells whether it is whole"
+            return format!(
+                "get the file again; where it came from, this tells whether it is whole: gdalinfo -checksum {}",
+                names(path).0
+            );
         }
     };
     hint.into()
@@ -103,33 +113,55 @@ fn is_known_to_gdal(path: &Path) -> bool {
     !others.contains(&extension(path).as_str())
 }
 
-/// The command that makes a GeoTIFF of a file, with GDAL's `options`, or what there is
-/// to do where GDAL does not read such files.
+/// GDAL's options for a type and a packing that are read.
+const PLAIN: &str = "-ot Float32 -co COMPRESS=DEFLATE";
+
+/// Stores the last two dimensions of an array's first layer as numbers of a kind that is read.
+const FROM_NPY: &str = "import sys, numpy as n; a = n.squeeze(n.load(sys.argv[1])); \
+    n.save('heights.npy', a.reshape(-1, *a.shape[-2:])[0].astype('f4'))";
+/// The same of the first array of several.
+const FROM_NPZ: &str = "import sys, numpy as n; f = n.load(sys.argv[1]); a = n.squeeze(f[f.files[0]]); \
+    n.save('heights.npy', a.reshape(-1, *a.shape[-2:])[0].astype('f4'))";
+/// Stores all of a NetCDF file without compression. GDAL and `nccopy` of most systems have
+/// fewer of HDF5's filters than this package of Python's brings along.
+const UNPACK_NETCDF: &str = "import sys, netCDF4 as c; f, t = c.Dataset(sys.argv[1]), c.Dataset(sys.argv[2], 'w'); f.set_auto_maskandscale(False); copy = lambda a, b: b.setncatts({k: a.getncattr(k) for k in a.ncattrs() if k != '_FillValue'}); copy(f, t); [t.createDimension(n, len(d)) for n, d in f.dimensions.items()]; [(w := t.createVariable(n, v.dtype, v.dimensions, fill_value=getattr(v, '_FillValue', None)), w.set_auto_maskandscale(False), copy(v, w), w.__setitem__(..., v[...])) for n, v in f.variables.items()]; t.close()";
+/// Lays a grid over points: each cell has the mean height of the ground points in it, or of
+/// all points where none are marked as ground. Cells without points are holes. The points'
+/// reference system is kept in a `.prj`.
+const FROM_POINTS: &str = r"import sys, laspy, numpy as n; f, t, d = sys.argv[1:]; d = float(d); p = laspy.read(f); g = p.classification == 2; p = p[g] if g.any() else p; x, y, z = (n.array(v) for v in (p.x, p.y, p.z)); e = [d * n.arange(n.floor(v.min() / d), n.floor(v.max() / d) + 2) for v in (y, x)]; s, c = n.histogram2d(y, x, e, weights=z)[0], n.histogram2d(y, x, e)[0]; n.savetxt(t + '.asc', n.where(c > 0, s / n.maximum(c, 1), -9999)[::-1], '%.3f', comments='', header='ncols %d\nnrows %d\nxllcorner %.10g\nyllcorner %.10g\ncellsize %.10g\nnodata_value -9999' % (*c.shape[::-1], e[1][0], e[0][0], d)); r = p.header.parse_crs(); r and open(t + '.prj', 'w').write(r.to_wkt())";
+
+/// The command that makes a file that is read of one that is not, with GDAL's `options`
+/// where GDAL knows such files.
 fn converted(path: &Path, options: &str) -> String {
     let (from, to) = names(path);
     let space = if options.is_empty() { "" } else { " " };
     match extension(path).as_str() {
-        "npy" => format!(
-            "store two dimensions of numbers: python3 -c \"import numpy as n; \
-             n.save('heights.npy', n.squeeze(n.load('{from}')).astype('f4'))\""
-        ),
-        "npz" => format!(
-            "store one array of two dimensions: python3 -c \"import numpy as n; \
-             a = n.load('{from}'); n.save('heights.npy', n.squeeze(a[a.files[0]]).astype('f4'))\""
-        ),
-        // By PDAL's own pages; its writer takes the options behind its name.
+        "npy" => format!("store two dimensions of numbers: python3 -c \"{FROM_NPY}\" {from}"),
+        "npz" => {
+            format!("store one array of two dimensions: python3 -c \"{FROM_NPZ}\" {from}")
+        }
         "las" | "laz" => format!(
-            "points are no grid: make one of a metre with PDAL: pdal translate \"{from}\" \"{to}\" \
-             --writers.gdal.resolution=1 --writers.gdal.output_type=mean"
+            "points are no grid: pip install laspy[lazrs] pyproj, and lay one over them, the last number is a cell's side in their unit: python3 -c \"{FROM_POINTS}\" {from} {} 1",
+            quoted(&stem(path))
         ),
-        "zip" => format!("unpack it and name one of its files: python3 -m zipfile -e \"{from}\" ."),
-        "gz" => format!("unpack it and name what comes out: gzip -dk \"{from}\""),
+        "zip" => format!("unpack it and name one of its files: python3 -m zipfile -e {from} ."),
+        "gz" => format!("unpack it and name what comes out: gzip -dk {from}"),
         "nc" | "grd" if options.contains("-b") => format!(
-            "make a GeoTIFF of one of its variables, by its name for NAME: gdal_translate {options} \
-             NETCDF:\"{from}\":NAME \"{to}\""
+            "make a GeoTIFF of one of its variables, by its name for NAME (gdalinfo lists them): \
+             gdal_translate {options} {} {to}",
+            quoted(&format!("NETCDF:{}:NAME", path.display()))
         ),
-        _ => format!("convert it to GeoTIFF: gdal_translate{space}{options} \"{from}\" \"{to}\""),
+        _ => format!("convert it to GeoTIFF: gdal_translate{space}{options} {from} {to}"),
     }
+}
+
+/// The command that takes a packing off a NetCDF file that nothing here unpacks.
+fn unpacked_netcdf(path: &Path) -> String {
+    format!(
+        "pip install netCDF4, and store it without that packing: python3 -c \"{UNPACK_NETCDF}\" {} {}",
+        names(path).0,
+        quoted(&format!("{}.nc", stem(path)))
+    )
 }
 
 /// The command that cuts a part of so many samples out of a file.
@@ -137,16 +169,27 @@ fn cut(path: &Path, (width, height): (u64, u64)) -> String {
     let (from, to) = names(path);
     format!(
         "cut a part out (offsets, then width and height in samples): gdal_translate -srcwin 0 0 \
-         {width} {height} \"{from}\" \"{to}\"; or make it coarser: gdal_translate -r average \
-         -outsize 10% 10% \"{from}\" \"{to}\""
+         {width} {height} {from} {to}; or make it coarser: gdal_translate -r average \
+         -outsize 10% 10% {from} {to}"
     )
 }
 
-/// The file, and what a converted copy of it in this folder is called.
+/// The file, and what a converted copy of it in this folder is called, as a shell takes them.
 fn names(path: &Path) -> (String, String) {
+    let to = format!("{}.tif", stem(path));
+    (quoted(&path.display().to_string()), quoted(&to))
+}
+
+/// What a converted copy is called, without its ending.
+fn stem(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or(path.as_os_str());
-    (
-        path.display().to_string(),
-        format!("{}-converted.tif", stem.to_string_lossy()),
-    )
+    format!("{}-converted", stem.to_string_lossy())
+}
+
+/// A name as one word of a shell, whatever is in it.
+fn quoted(name: &str) -> String {
+    match name.contains(['"', '$', '`', '\\', '!']) && cfg!(unix) {
+        false => format!("\"{name}\""),
+        true => format!("'{}'", name.replace('\'', r"'\''")),
+    }
 }

@@ -10,7 +10,7 @@ use crate::place::{
     place_in_words,
 };
 use crate::raster::{Georeference, Raster};
-use crate::terrain::{FeltGrid, Terrain};
+use crate::terrain::{Distortion, FeltGrid, Terrain};
 
 /// Relief in the hand below which an exaggeration is suggested, mm.
 const FLAT_MM: f64 = 4.0;
@@ -133,6 +133,17 @@ pub(in crate::cli) fn told(view: &View, terrain: &Terrain<'_>) -> String {
         place_in_words(&file, view.home_ground),
         scale_in_words(view),
     );
+    if let Some(worst) = view
+        .worst_reached(terrain.grid())
+        .filter(Distortion::is_felt)
+    {
+        let (off, place) = (off_in_words(&worst), place_in_words(&file, worst.ground));
+        let remedy = match terrain.grid().is_distorted() {
+            true => "--cells square feels them in their true shape",
+            false => "pan there, or hold the clutch, and the cells are measured anew",
+        };
+        text += &format!("shape          {off} where the arm reaches, at {place}; {remedy}\n");
+    }
     let relief = view.heights_mm[1] - view.heights_mm[0];
     if relief > 0.0 && relief < FLAT_MM && view.exaggeration.is_some_and(|times| times == 1.0) {
         let times = (FELT_MM / relief).round();
@@ -142,6 +153,12 @@ pub(in crate::cli) fn told(view: &View, terrain: &Terrain<'_>) -> String {
         );
     }
     text
+}
+
+/// How far the shape of felt cells is off at worst.
+pub(in crate::cli) fn off_in_words(worst: &Distortion) -> String {
+    let percent = 100.0 * worst.share;
+    format!("slopes and lengths are off by up to {percent:.2} %")
 }
 
 /// A view's scale, and what a felt cell of its level is.

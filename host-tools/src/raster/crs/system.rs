@@ -7,10 +7,15 @@ use super::datum::{Datum, LonLat};
 use super::projection::Projection;
 use super::wkt::Node;
 use super::{Globe, Vertical};
+use crate::raster::tangents::Tangents;
 
 /// Where a map's units are shorter or longer than this on the ground, the place is
 /// outside of what the projection is for.
 const SENSIBLE: std::ops::RangeInclusive<f64> = 1e-4..=1e4;
+
+/// How far from a place its scale is asked for, m: a projection's formulas end their
+/// rounds at 1e-10 rad, and its scale changes over kilometres.
+const STEP_M: f64 = 100.0;
 
 /// A horizontal reference system, as far as a file tells it.
 #[derive(Clone, Debug, PartialEq)]
@@ -198,24 +203,26 @@ impl ReferenceSystem {
         self.datum.as_ref().map_or(0.0, Datum::meridian)
     }
 
-    /// Ground metres in a unit of a projected system, towards its x and its y, at a
-    /// place in its units: a map's scale is true in few places.
-    pub(in crate::raster) fn local_metres(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
-        const STEP: f64 = 1.0;
-        if matches!(self.unit, Unit::Angle(_)) {
+    /// Where a unit of a projected system's x and y lead on the ground at a place in its
+    /// units: a map's scale and its angles are true in few places. Its formulas are asked
+    /// [`STEP_M`] to both sides.
+    pub(in crate::raster) fn tangents(&self, (x, y): (f64, f64)) -> Option<Tangents> {
+        let Unit::Length(metres) = self.unit else {
             return None;
-        }
-        let projection = self.projection.as_ref()?;
-        let here = projection.degrees((x, y))?;
-        let [east, north] = self.globe().metres_per_degree(here.1);
-        let length = |there: (f64, f64)| {
-            let length = (east * (there.0 - here.0)).hypot(north * (there.1 - here.1)) / STEP;
-            SENSIBLE.contains(&length).then_some(length)
         };
-        Some((
-            length(projection.degrees((x + STEP, y))?)?,
-            length(projection.degrees((x, y + STEP))?)?,
-        ))
+        let step = STEP_M / metres.unwrap_or(1.0);
+        let projection = self.projection.as_ref()?;
+        let globe = self.globe();
+        let place = |x: f64, y: f64| Some(globe.surface(projection.degrees((x, y))?));
+        let between = |from: [f64; 3], to: [f64; 3]| {
+            let lead = [0, 1, 2].map(|axis| (to[axis] - from[axis]) / (2.0 * step));
+            let length = lead.iter().map(|part| part * part).sum::<f64>().sqrt();
+            SENSIBLE.contains(&length).then_some(lead)
+        };
+        Some(Tangents {
+            x: between(place(x - step, y)?, place(x + step, y)?)?,
+            y: between(place(x, y - step)?, place(x, y + step)?)?,
+        })
     }
 }
 

@@ -129,9 +129,10 @@ fn check_header_length<R: Read + Seek + ?Sized>(reader: &mut R) -> Result<(), Ba
 }
 
 fn sample_type(dtype: &DType) -> Result<(Stored, Endian), BadRaster> {
-    let unsupported = || BadRaster::NotAHeightField(format!("an array of {}", dtype.descr()));
+    let what = || format!("an array of {}", dtype.descr());
+    let unsupported = || BadRaster::NotAHeightField(what());
     let DType::Plain(plain) = dtype else {
-        return Err(unsupported());
+        return Err(BadRaster::NoNumbers(what()));
     };
     let endian = match plain.endianness() {
         Endianness::Big => Endian::Big,
@@ -149,6 +150,9 @@ fn sample_type(dtype: &DType) -> Result<(Stored, Endian), BadRaster> {
         (TypeChar::Uint, 4) => SampleType::U32,
         (TypeChar::Float, 4) => SampleType::F32,
         (TypeChar::Float, 8) => SampleType::F64,
+        (TypeChar::Object | TypeChar::ByteStr | TypeChar::UnicodeStr, _) => {
+            return Err(BadRaster::NoNumbers(what()));
+        }
         _ => return Err(unsupported()),
     };
     Ok((Stored::Held(held), endian))
@@ -158,10 +162,14 @@ impl Array {
     /// The array as heights, its first row the northernmost.
     fn into_heights(self, format: &str) -> Result<Decoded, BadRaster> {
         let &[rows, columns] = self.shape.as_slice() else {
-            return Err(BadRaster::NotAHeightField(format!(
+            let what = format!(
                 "an array of {} dimensions; heights have two",
                 self.shape.len()
-            )));
+            );
+            return Err(match self.shape.len() {
+                0 | 1 => BadRaster::NoNumbers(what),
+                _ => BadRaster::NotAHeightField(what),
+            });
         };
         let size = sides(columns, rows)?;
         let samples = if self.column_major {

@@ -240,8 +240,11 @@ fn mark_missing(decoded: &mut Decoded, variable: &NcVariable) {
 }
 
 fn fault(error: &netcdf_reader::Error) -> BadRaster {
+    use hdf5_reader::error::Error::UnsupportedFilter;
     use netcdf_reader::Error::{Hdf5, UnsupportedFeature};
-    if let Hdf5(hdf5_reader::error::Error::UnsupportedFilter(filter)) = error {
+    if let Hdf5(inner) = error
+        && let UnsupportedFilter(filter) = cause(inner)
+    {
         return BadRaster::Unsupported {
             format: "NetCDF",
             feature: format!("compression by {filter} of HDF5's registry"),
@@ -254,6 +257,14 @@ fn fault(error: &netcdf_reader::Error) -> BadRaster {
         };
     }
     BadRaster::Damaged(format!("NetCDF: {error}"))
+}
+
+/// What is behind an error that names the objects around it.
+fn cause(error: &hdf5_reader::error::Error) -> &hdf5_reader::error::Error {
+    match error {
+        hdf5_reader::error::Error::Context { source, .. } => cause(source),
+        error => error,
+    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,59 @@
+//! How far a step in coordinates leads on the ground, and where to.
+
+use super::geometry::CellSize;
+use super::globe::Globe;
+
+/// Cosines of angles below this are rounding of a projection's formulas: no shear of a
+/// millionth is felt.
+const STRAIGHT: f64 = 1e-6;
+/// Cells whose columns lean farther than this over their rows are no cells.
+const FLATTENED: f64 = 0.999;
+
+/// Where a unit of x and a unit of y lead on the ground at a place, metres: tangents of
+/// the globe, both in the same frame.
+///
+/// They need be neither as long as each other nor perpendicular: most maps that are not
+/// conformal shear the ground, the more the farther from their middle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Tangents {
+    pub(super) x: [f64; 3],
+    pub(super) y: [f64; 3],
+}
+
+impl Tangents {
+    /// Of longitude and latitude in units of so many degrees.
+    pub(super) fn of_angles(globe: &Globe, latitude: f64, degrees: f64) -> Self {
+        let [east, north] = globe.metres_per_degree(latitude);
+        Self {
+            x: [east * degrees, 0.0, 0.0],
+            y: [0.0, north * degrees, 0.0],
+        }
+    }
+
+    /// The size of a cell at the place, whose columns and rows are so far apart in
+    /// coordinates; `None` where it has no area there.
+    pub(super) fn cell(
+        &self,
+        cell: CellSize,
+        column_step: [f64; 2],
+        row_step: [f64; 2],
+    ) -> Option<CellSize> {
+        let (along, up) = (self.lead(column_step), self.lead(row_step));
+        let (long, high) = (dot(along, along).sqrt(), dot(up, up).sqrt());
+        let (east, north) = cell.metres();
+        let lean = dot(along, up) / (long * high);
+        (lean.abs() < FLATTENED).then_some(CellSize {
+            map_scale: (long / east, high / north),
+            lean: if lean.abs() < STRAIGHT { 0.0 } else { lean },
+            ..cell
+        })
+    }
+
+    fn lead(&self, [dx, dy]: [f64; 2]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| dx * self.x[axis] + dy * self.y[axis])
+    }
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,135 @@
+//! How far felt cells are from their true shape where they were not measured.
+//!
+//! Felt cells are all alike, as large as the file's are at one place. The file's own cells are
+//! not: those of degrees get narrower towards the poles, and a map's scale changes.
+
+use super::felt_grid::FeltGrid;
+use crate::raster::{CellSize, Sides};
+
+/// Places looked at along each side of a rectangle, its ends among them: the size of cells
+/// changes smoothly.
+const PLACES: u32 = 17;
+
+/// The worst of the felt cells of a rectangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distortion {
+    /// How far lengths, and so slopes, are off there in the direction in which they are off
+    /// most: 0.01 is one hundredth of the true ones.
+    pub share: f64,
+    /// Where that is, in the file's coordinates.
+    pub ground: [f64; 2],
+}
+
+impl Distortion {
+    /// What a surface counts as true to, as a share.
+    pub const TRUE: f64 = 1e-3;
+
+    /// Whether the surface is not true to 0.1 % all over the rectangle.
+    #[must_use]
+    pub fn is_felt(&self) -> bool {
+        self.share > Self::TRUE
+    }
+}
+
+impl FeltGrid<'_> {
+    /// The felt cell of a rectangle (west, south, east, north, in felt cells) that is
+    /// farthest from its true shape, among 17 × 17 places of the part that is inside the
+    /// field. `None` where the file does not know how large its cells are, and of a rectangle
+    /// beside the field.
+    #[must_use]
+    pub fn worst_in(&self, [west, south, east, north]: Sides) -> Option<Distortion> {
+        let last = [self.columns(), self.rows()].map(|count| f64::from(count) - 1.0);
+        let (low, high) = (
+            [west.max(0.0), south.max(0.0)],
+            [east.min(last[0]), north.min(last[1])],
+        );
+        if low[0] > high[0] || low[1] > high[1] {
+            return None;
+        }
+        let share = |place: u32| f64::from(place) / f64::from(PLACES - 1);
+        let places = (0..PLACES).flat_map(|row| (0..PLACES).map(move |column| [column, row]));
+        let off = places.filter_map(|place| {
+            let along = |axis: usize| low[axis] + share(place[axis]) * (high[axis] - low[axis]);
+            let ground = self.to_ground([along(0), along(1)]);
+            let cell = self.raster().georeference().cell_at(ground)?;
+            let share = self.off_by(&cell)?;
+            Some(Distortion { share, ground })
+        });
+        off.max_by(|one, other| one.share.total_cmp(&other.share))
+    }
+
+    /// How far the longest and the shortest step of a felt cell's side in any direction are
+    /// from that side, as a share, where the file's cells are of a size.
+    fn off_by(&self, cell: &CellSize) -> Option<f64> {
+        let side = self.side_m()?;
+        let ((long, high), cosine) = (cell.ground_metres(), cell.lean);
+        let sine = (1.0 - cosine * cosine).sqrt();
+        let on_ground = |[columns, rows]: [f64; 2]| {
+            let (along, up) = (columns * long / side, rows * high / side);
+            [along + up * cosine, up * sine]
+        };
+        let [east, north] = self.steps_in_file().map(on_ground);
+        // The singular values of the matrix whose columns they are.
+        let sum = 0.5 * (dot(east, east) + dot(north, north));
+        let apart = (0.5 * (dot(east, east) - dot(north, north))).hypot(dot(east, north));
+        let lengths = [sum + apart, sum - apart].map(|square| square.max(0.0).sqrt());
+        Some(
+            lengths
+                .map(|length| (length - 1.0).abs())
+                .into_iter()
+                .fold(0.0, f64::max),
+        )
+    }
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::{CellUnit, Certainty, Globe, Raster};
+    use crate::terrain::FeltCells;
+
+    fn grid_off(lean: f64, (east, north): (f64, f64), cells: FeltCells) -> f64 {
+        let cell = CellSize {
+            east,
+            north,
+            lean,
+            map_scale: (1.0, 1.0),
+            unit: CellUnit::Length { metres: 1.0 },
+            latitude: None,
+            globe: Globe::EARTH,
+            certainty: Certainty::Stated,
+        };
+        let raster = Raster::from_fn(9, 9, |_, _| 0.0)
+            .expect("a raster")
+            .with_cell(cell);
+        let grid = FeltGrid::new(&raster, cells);
+        grid.worst_in([-5.0, 2.0, 3.0, 90.0]).expect("known").share
+    }
+
+    /// A cell of 40 × 10 is felt as one of 20 × 20: half as long, and twice. One that leans by
+    /// 60° is by the eigenvalues of its metric, 1 ± cos 60°, over its area, sin 60°.
+    #[test]
+    fn what_stored_cells_are_off_is_what_the_worst_direction_is() {
+        for (lean, sides, wanted) in [
+            (0.0, (40.0, 10.0), 1.0),
+            (0.5, (10.0, 10.0), (1.5 / 0.75_f64.sqrt()).sqrt() - 1.0),
+            (0.0, (10.0, 10.0), 0.0),
+        ] {
+            let off = grid_off(lean, sides, FeltCells::Stored);
+            assert!((off - wanted).abs() < 1e-9, "{off} for {wanted}");
+            assert!(grid_off(lean, sides, FeltCells::Square) < 1e-9);
+        }
+    }
+
+    #[test]
+    fn beside_the_field_there_is_nothing_to_be_off() {
+        let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("a raster");
+        let grid = FeltGrid::new(&raster, FeltCells::Square);
+        assert_eq!(grid.worst_in([9.0, 0.0, 12.0, 5.0]), None);
+        assert_eq!(grid.worst_in([0.0, -7.0, 3.0, -1.0]), None);
+    }
+}
