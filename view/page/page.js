@@ -2,17 +2,14 @@
 //
 // The stream is read only while somebody can see the page, because a hidden viewer draws
 // nothing and would only pile up what it is told. A page that comes back is told what
-// it missed; what it has already it knows by its number and passes over. The viewer forgets
-// its oldest samples from a size on. Its memory may be in pieces and grow in spite of that, so
-// from a larger size on the page begins anew; not at once, though, where what it is told first
-// is larger already.
+// it missed; what it has already it knows by its number and passes over. The viewer's memory
+// grows with every sample, so from a size on the page begins anew; not at once, though, where
+// what it is told first is larger already.
 "use strict";
 
 const CHANNEL = "hapterra";
 const AGAIN_MS = 1000;
 const LEAST_MS = 20000;
-// The part of the page's memory that the viewer fills before it forgets.
-const KEPT = 0.35;
 const SIGN = 0xffffffff;
 const LOST = 0xfffffffe;
 
@@ -127,17 +124,7 @@ async function follow(viewer, memory) {
   say(state.isLost ? "hapterra is gone: it was killed, or crashed. This is the last that it told." : "");
 }
 
-// The viewer reads its limit from the settings that it keeps in the browser, and nowhere else.
-function limit(bytes) {
-  try {
-    localStorage.setItem("app", `(app_options:(memory_limit:Some(${Math.round(bytes)})))`);
-  } catch (error) {
-    // A browser that keeps nothing: the page begins anew where it grows too large.
-  }
-}
-
 async function main() {
-  limit(KEPT * pageBytes);
   const program = await wasm_bindgen({ module_or_path: fetch("re_viewer_bg.wasm") });
   const query = new URLSearchParams(location.search);
   const viewer = new wasm_bindgen.WebHandle({

@@ -5,22 +5,28 @@
 mod common;
 
 use std::path::Path;
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
 use common::browser::{Browser, Colours, Page, program};
 use common::{Running, folder, hapterra};
 
 const SIZE: [u32; 2] = [1440, 900];
 const TERRAIN: [f64; 4] = [0.0, 0.05, 0.56, 0.88];
-/// The force's arrow.
-const FORCE: [u8; 3] = [255, 230, 60];
-/// Pixels of it: the arrow is long enough to be seen.
+/// The force's arrow, and the trace of a hand that slides.
+const MARKS: [[u8; 3]; 2] = [[255, 230, 60], [255, 170, 90]];
+/// Pixels of them: arrow and trace are long enough to be seen.
 const ARROW: usize = 120;
+const TRACE: usize = 400;
+/// Until the page shows what the hand does now, and no more what it missed.
+const CAUGHT_UP: Duration = Duration::from_secs(30);
 const WITHIN: Duration = Duration::from_secs(300);
-/// When the view is zoomed, s of the device's time: while the hand is on the ground.
-const COMMANDS: &str = "at 6 zoom 1.6\nat 6.8 zoom 1.6\n";
-/// Until that is seen on a machine that draws slowly.
-const ZOOMED: Duration = Duration::from_secs(110);
+/// What is typed for the zoomed picture, and how long it may take until that is seen on a
+/// machine that draws slowly.
+const ZOOM: &str = "zoom 1.6\nzoom 1.6\n";
+const ZOOMED: Duration = Duration::from_secs(30);
 
 /// A page of a demo that goes on.
 struct Shown {
@@ -34,10 +40,10 @@ impl Shown {
     fn keep(&mut self, path: &Path, is_right: impl Fn(&Colours) -> bool) {
         loop {
             std::thread::sleep(Duration::from_millis(500));
-            // Both within a moment; the arrow has not gone far.
             let kept = self.browser.photograph(&self.page);
-            let picture = self.browser.picture(&self.page);
-            let colours = { &mut self.browser }.colours(&self.page, &picture, TERRAIN, &[FORCE]);
+            // Of the very picture that is kept: a browser takes either form.
+            let picture = BASE64_STANDARD.encode(&kept);
+            let colours = { &mut self.browser }.colours(&self.page, &picture, TERRAIN, &MARKS);
             if is_right(&colours) {
                 return std::fs::write(path, kept).expect("written");
             }
@@ -51,14 +57,11 @@ impl Shown {
 fn pictures_at_the_start_while_sliding_and_zoomed() {
     let into = std::env::var_os("HAPTERRA_PICTURES").expect("HAPTERRA_PICTURES names a folder");
     let folder = folder("pictures");
-    let commands = folder.join("commands");
-    std::fs::write(&commands, COMMANDS).expect("written");
     let mut demo = hapterra().expect("HAPTERRA names a program");
     demo.args(["demo", "--device", "native", "--rounds", "30", "--view"])
-        .arg("--commands")
-        .arg(&commands)
-        .arg("--out")
-        .arg(&folder);
+        .args(["--commands", "-", "--out"])
+        .arg(&folder)
+        .stdin(Stdio::piped());
     let mut demo = Running::shown(&mut demo, "");
     let address = demo.address();
     let began = Instant::now();
@@ -71,13 +74,15 @@ fn pictures_at_the_start_while_sliding_and_zoomed() {
     };
     let into = Path::new(&into);
     let is_shown = |terrain: &Colours| terrain.count > 400;
+    std::thread::sleep(CAUGHT_UP);
     // Before the hand is on the ground the arm has nothing to say.
     shown.keep(&into.join("view-start.jpg"), |terrain| {
         is_shown(terrain) && terrain.near[0] == 0
     });
-    let is_touched = |terrain: &Colours| terrain.near[0] > ARROW;
+    let is_touched = |terrain: &Colours| terrain.near[0] > ARROW && terrain.near[1] > TRACE;
     shown.keep(&into.join("view.jpg"), is_touched);
-    std::thread::sleep(ZOOMED.saturating_sub(began.elapsed()));
+    demo.type_lines(ZOOM);
+    std::thread::sleep(ZOOMED);
     shown.keep(&into.join("view-zoomed.jpg"), is_touched);
     drop(shown);
     demo.interrupt();

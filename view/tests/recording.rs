@@ -5,6 +5,7 @@ mod common;
 use std::path::Path;
 use std::process::Command;
 
+use common::framed::check_frames;
 use common::recorded::{Csv, check, check_views, entities, scalars};
 use common::{Running, folder, hapterra};
 
@@ -28,6 +29,7 @@ fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
     let csv = Csv::read(&recording);
     let shown = entities(&live);
     check(&csv, &shown);
+    check_frames(&csv, &shown);
     for entity in ["/terrain/held", "/map/held", "/plot/tick", "/plot/link"] {
         assert!(shown.contains_key(entity), "{entity}");
     }
@@ -76,14 +78,21 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     let recording = at("hills.csv");
     let csv = Csv::read(&recording);
     assert_eq!(csv.scales.len(), 4, "{:?}", csv.scales);
-    check_views(&csv, &entities(&at("live.rrd")), false);
+    let live = entities(&at("live.rrd"));
+    check_views(&csv, &live, false);
+    // The bar is shorter on the ground once the view is zoomed.
+    let bars = check_frames(&csv, &live);
+    let (first, last) = (bars[0], bars[bars.len() - 1]);
+    assert!((0.39..0.51).contains(&(last / first)), "{bars:?}");
     let mut view = hapterra().expect("named");
     view.arg("view")
         .arg(&recording)
         .arg("--terrain")
         .arg(&terrain);
     run(&mut view, &at("viewed.rrd"));
-    check_views(&csv, &entities(&at("viewed.rrd")), true);
+    let viewed = entities(&at("viewed.rrd"));
+    check_views(&csv, &viewed, true);
+    check_frames(&csv, &viewed);
     // What a replay felt is the same, and so is its picture; here as Parquet.
     let felt = at("felt.parquet");
     let mut replay = hapterra().expect("named");

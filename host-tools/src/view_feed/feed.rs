@@ -379,5 +379,8 @@ mod tests {
         }
         assert_eq!((views, told + dropped.samples), (2, rows));
         assert!(dropped.samples >= 2 * LIVE_BATCH as u64);
+        // Each was in a batch, and nothing else was dropped.
+        let batches = dropped.samples / LIVE_BATCH as u64;
+        assert_eq!(dropped.messages, batches, "{dropped:?}");
     }
 }

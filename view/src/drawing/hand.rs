@@ -23,8 +23,8 @@ const ARROW_MM_PER_N: f64 = 14.0;
 /// How far the trace floats over the surface, mm of the tip.
 const FLOAT_MM: f64 = 0.15;
 /// Colours.
-pub(super) const PROXY: Rgb = [255, 120, 20];
-pub(super) const HIP: Rgb = [255, 255, 255];
+const PROXY: Rgb = [255, 120, 20];
+pub(super) const HIP: Rgb = [80, 150, 255];
 const RAY: Rgb = [255, 60, 200];
 const FORCE: Rgb = [255, 230, 60];
 const TRACE: Rgb = [255, 170, 90];
@@ -57,10 +57,15 @@ pub(super) fn looks(log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
     let arrow = Arrows3D::update_fields()
         .with_colors([FORCE])
         .with_radii([Radius::new_scene_units((0.7 * ground.per_mm) as f32)]);
+    // The surface hides a HIP below it, and not its name.
+    let name = Points3D::update_fields()
+        .with_labels(["HIP"])
+        .with_show_labels(true);
     Ok(vec![
         points("hand/proxy", PROXY, 8.0)?,
-        points("hand/hip", HIP, 5.0)?,
-        lines("hand/ray", RAY, 1.5)?,
+        points("hand/hip", HIP, 7.0)?,
+        log.standing("hand/hip", "name", &name)?,
+        lines("hand/ray", RAY, 2.0)?,
         lines("hand/trace", TRACE, 1.5)?,
         log.standing("hand/force", "looks", &arrow)?,
     ])

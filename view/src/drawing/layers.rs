@@ -155,9 +155,7 @@ impl Layers {
     /// What a finer layer shows of a layer, in cells of level 0: west, south, east, north.
     fn inner(&self, number: usize) -> Option<[i32; 4]> {
         let finer = self.told.get(number + 1)?;
-        let last = |count: u32| count.saturating_sub(1) as usize;
-        let [east, north] = cell_of(finer, last(finer.columns), last(finer.rows));
-        Some([finer.first[0], finer.first[1], east, north])
+        Some(extent(finer))
     }
 
     /// Cells of level 0 along the side of a cell of the finest mesh; none before the first
@@ -168,6 +166,19 @@ impl Layers {
             layer.step.saturating_mul(every as i32)
         };
         self.told.last().map_or(1, of).max(1)
+    }
+
+    /// West, south, east and north of the whole, in cells of level 0; none before the first
+    /// layer.
+    pub(super) fn extent(&self) -> Option<[i32; 4]> {
+        self.told.first().map(extent)
+    }
+
+    /// The surface at a place (cells of level 0) in the picture's units, by the finest layer
+    /// there; none in a hole and outside.
+    pub(super) fn up_at(&self, ground: &Ground, place: [f64; 2]) -> Option<f32> {
+        let unit = { self.told.iter().rev() }.find_map(|layer| height_at(layer, place))?;
+        ground.heights_of(&[unit]).first().copied()
     }
 
     /// Colours of this terrain; none before the first layer.
@@ -198,6 +209,38 @@ impl Layers {
         }
         Ok(entries)
     }
+}
+
+/// West, south, east and north of a layer, in cells of level 0.
+fn extent(layer: &Layer) -> [i32; 4] {
+    let last = |count: u32| count.saturating_sub(1) as usize;
+    let [east, north] = cell_of(layer, last(layer.columns), last(layer.rows));
+    [layer.first[0], layer.first[1], east, north]
+}
+
+/// A layer's height at a place (cells of level 0), between its samples; none in a hole and
+/// outside. In vertical units of the file.
+fn height_at(layer: &Layer, place: [f64; 2]) -> Option<f32> {
+    let step = f64::from(layer.step.max(1));
+    let [x, y] = [0, 1].map(|axis| (place[axis] - f64::from(layer.first[axis])) / step);
+    let ([columns, rows], inside) = ([layer.columns, layer.rows], |at: f64, count: u32| {
+        // A place on the border may be rounded to the wrong side of it.
+        let last = f64::from(count.saturating_sub(1));
+        (-1e-6..=last + 1e-6)
+            .contains(&at)
+            .then(|| at.clamp(0.0, last))
+    });
+    let (x, y) = (inside(x, columns)?, inside(y, rows)?);
+    let (column, row) = (x.floor(), y.floor());
+    let corner = |right: f64, up: f64| {
+        let column = (column + right).min(f64::from(columns - 1)) as usize;
+        let row = (row + up).min(f64::from(rows - 1)) as usize;
+        { layer.heights.get(row * columns as usize + column) }.copied()
+    };
+    let mean = |low: f32, high: f32, share: f64| low + (high - low) * share as f32;
+    let south = mean(corner(0.0, 0.0)?, corner(1.0, 0.0)?, x - column);
+    let north = mean(corner(0.0, 1.0)?, corner(1.0, 1.0)?, x - column);
+    Some(mean(south, north, y - row)).filter(|height| height.is_finite())
 }
 
 /// Every how many samples a mesh takes one.
@@ -460,6 +503,44 @@ mod tests {
             cells.filter(|(cell, _)| is_shown(*cell)).count()
         };
         layers.layers.iter().enumerate().map(shown).collect()
+    }
+
+    #[test]
+    fn a_place_has_the_height_of_the_finest_layer_there() {
+        let ground = Ground::new(&super::super::ground::tests::scene());
+        // Heights that say where they are, and of which layer.
+        let told = |number: u32, first: i32, step: i32, posts: i32| Layer {
+            heights: (0..posts * posts)
+                .map(|i| (first + step * (i % posts)) as f32 + 1000.0 * number as f32)
+                .collect(),
+            ..layer(number, first, step, posts as u32)
+        };
+        let mut layers = Layers {
+            told: vec![told(0, 0, 16, 5), told(1, 16, 2, 9)],
+            ..Layers::default()
+        };
+        let unit = ground.heights_of(&[1.0])[0];
+        let up = |layers: &Layers, x: f64, y: f64| layers.up_at(&ground, [x, y]);
+        let is = |found: Option<f32>, units: f32| {
+            let found = found.expect("a height");
+            assert!(
+                (found - units * unit).abs() < 1e-4 * unit * units.max(1.0),
+                "{found}"
+            );
+        };
+        assert_eq!(layers.extent(), Some([0, 0, 64, 64]));
+        is(up(&layers, 3.0, 50.0), 3.0);
+        is(up(&layers, 64.0, 64.0), 64.0);
+        is(up(&layers, 21.5, 17.3), 1021.5);
+        is(up(&layers, 40.0, 17.0), 40.0);
+        for outside in [[-0.1, 5.0], [64.1, 5.0], [5.0, 70.0]] {
+            assert_eq!(up(&layers, outside[0], outside[1]), None);
+        }
+        // A hole, and what is beside it.
+        layers.told.truncate(1);
+        layers.told[0].heights[0] = f32::NAN;
+        assert_eq!(up(&layers, 3.0, 3.0), None);
+        is(up(&layers, 20.0, 20.0), 20.0);
     }
 
     #[test]

@@ -34,7 +34,7 @@ const EYE: [f64; 3] = [-0.5, -1.2, 0.8];
 /// The same for the contact alone: from the south, a little above, so many millimetres of the
 /// tip away.
 const BESIDE: [f64; 3] = [-0.3, -1.0, 0.25];
-const BESIDE_MM: f64 = 28.0;
+const BESIDE_MM: f64 = 22.0;
 
 /// A layout being written.
 struct Layout {
@@ -80,15 +80,15 @@ impl Layout {
         let terrain = self.terrain(ground)?;
         let map = self.view("2D", "Map", "map", 1.0, &[])?;
         let contact = self.contact(ground)?;
-        let words = self.view("TextDocument", "Where", words::WORDS, 0.6, &[])?;
+        let words = self.view("TextDocument", "Where", words::WORDS, 1.7, &[])?;
         let unit = &scene.height_unit;
         let height = self.plot(&format!("Height ({unit})"), plots::HEIGHT, 1.0)?;
         let force = self.plot("Force (N)", plots::FORCE, 1.0)?;
         let depth = self.plot("Penetration (mm)", plots::PENETRATION, 1.0)?;
         let energy = self.plot("Energy (mJ)", plots::ENERGY, 1.0)?;
         let (across, down) = (ContainerKind::Horizontal, ContainerKind::Vertical);
-        let places = self.container(down, 0.4, &[map, contact])?;
-        let top = self.container(across, 2.6, &[places, words])?;
+        let places = self.container(down, 1.0, &[words, contact])?;
+        let top = self.container(across, 4.0, &[map, places])?;
         let third = self.container(across, 1.0, &[depth, energy])?;
         let mut rows = vec![top, height, force, third];
         // A recording knows nothing of the link, and may know nothing of the cost.
@@ -126,7 +126,7 @@ impl Layout {
 
     /// Terrain and hand, with an eye that goes along with the hand.
     fn terrain(&mut self, ground: &Ground) -> Result<Part> {
-        let contents = ["+ /terrain/**", "+ /hand/**"];
+        let contents = ["+ /terrain/**", "+ /hand/**", "+ /frame/**"];
         let eye = (EYE, ground.near);
         self.space("Terrain and hand", ground, eye, (0.58, &contents))
     }

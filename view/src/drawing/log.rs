@@ -3,7 +3,8 @@
 use anyhow::{Context as _, Result};
 use re_chunk::{Chunk, RowId, TimeColumn};
 use re_log_types::{
-    EntityPath, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreKind, StoreSource, TimePoint,
+    EntityPath, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreKind, StoreSource, TimeInt,
+    TimePoint, Timeline,
 };
 use re_sdk_types::{AsComponents, SerializedComponentColumn};
 
@@ -52,6 +53,16 @@ impl Log {
         Ok(Entry {
             key: Some(format!("{entity} {part}")),
             message,
+        })
+    }
+
+    /// `what` an entity is from a time on, s.
+    pub(super) fn at(&self, entity: &str, t_s: f64, what: &dyn AsComponents) -> Result<Entry> {
+        let time = TimeInt::new_temporal(nanoseconds(t_s));
+        let at = TimePoint::default().with(Timeline::new_duration(TIMELINE), time);
+        Ok(Entry {
+            key: None,
+            message: one(&self.store, entity, at, what)?,
         })
     }
 

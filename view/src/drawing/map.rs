@@ -4,20 +4,28 @@
 
 use anyhow::Result;
 use hapterra_view_stream::{Layer, Sample, Scene, Tiles};
-use re_sdk_types::archetypes::{Boxes2D, Image, Points2D};
+use re_sdk_types::archetypes::{Boxes2D, Image, LineStrips2D, Points2D};
 use re_sdk_types::components::Radius;
 
 use super::ground::Ground;
-use super::hand::PROXY;
+use super::hand::HIP;
+use super::lengths::{distances, round_below, written};
 use super::log::{Entry, Log};
 use super::shade::{Heights, Rgb, Shade};
+use super::words;
 
 /// Pixels along the longer side of the relief at most.
 const LARGEST: usize = 512;
 /// Pictures of the hand in a second.
 const RATE_HZ: f64 = 20.0;
 const HELD: Rgb = [64, 224, 208];
-const REACH: Rgb = [255, 255, 255];
+const LAID: Rgb = [190, 200, 210];
+const WHITE: Rgb = [255, 255, 255];
+/// The scale bar is at most as long as this share of the relief is wide.
+const BAR: f64 = 0.4;
+/// Room above and below the relief for coordinates and the bar, and beside it, in shares of
+/// its longer side.
+const ROOM: [f32; 2] = [0.02, 0.14];
 
 /// What the map shows.
 #[derive(Default)]
@@ -47,6 +55,92 @@ impl Frame {
         let ([west, south], [east, north]) = (self.pixel(low), self.pixel(high));
         let middle = [0.5 * (west + east), 0.5 * (south + north)];
         (middle, [0.5 * (east - west), 0.5 * (south - north)])
+    }
+}
+
+impl Frame {
+    /// A scale bar below the relief, and coordinates of its south-west and north-east sample.
+    fn scale(
+        &self,
+        log: &Log,
+        scene: &Scene,
+        ground: &Ground,
+        size: [u32; 2],
+    ) -> Result<Vec<Entry>> {
+        let size = size.map(|pixels| pixels as f32);
+        let [width, height] = size;
+        let room = ROOM.map(|share| share * width.max(height));
+        // The view is as large as this: labels count for nothing there.
+        let whole = Boxes2D::from_mins_and_sizes(
+            [room.map(|room| -room)],
+            [[width + 2.0 * room[0], height + 2.0 * room[1]]],
+        );
+        let mut entries = vec![
+            log.standing("map/room", "", &whole.with_colors([[0, 0, 0]]))?,
+            log.standing(
+                "map/corners",
+                "",
+                &self.corners(scene, ground, size, room[1]),
+            )?,
+        ];
+        if let Some(bar) = self.bar(scene, ground, size, room[1]) {
+            entries.push(log.standing("map/bar", "", &bar)?);
+        }
+        Ok(entries)
+    }
+
+    /// A bar of a round length below the eastern half of the relief.
+    fn bar(
+        &self,
+        scene: &Scene,
+        ground: &Ground,
+        [width, height]: [f32; 2],
+        room: f32,
+    ) -> Option<LineStrips2D> {
+        let of_pixel = self.cells * ground.step(1);
+        let length = round_below(BAR * f64::from(width) * of_pixel)?;
+        let half = (0.5 * length / of_pixel) as f32;
+        let strip = [-half, half].map(|right| [0.75 * width + right, height + 0.3 * room]);
+        let label = written(length, scene.ground_m_per_mm.is_some());
+        Some(
+            LineStrips2D::new([strip])
+                .with_colors([WHITE])
+                .with_radii([Radius::new_ui_points(2.0)])
+                .with_labels([label])
+                .with_show_labels(true),
+        )
+    }
+
+    /// The outermost samples' coordinates, below and above the relief, where there is room.
+    fn corners(
+        &self,
+        scene: &Scene,
+        ground: &Ground,
+        [width, height]: [f32; 2],
+        room: f32,
+    ) -> Points2D {
+        let last = [width, height].map(|pixels| f64::from(pixels - 1.0) * self.cells);
+        let [west, south] = self.first;
+        let text = |name: &str, cell: [f64; 2]| {
+            let [x, y] = cell.map(|cells| cells * scene.cell_mm);
+            let coordinates = words::coordinates(scene, x, y).unwrap_or_else(|| {
+                let place = cell.map(|cells| cells * ground.step(1));
+                distances(place, scene.ground_m_per_mm.is_some())
+            });
+            format!("{name} {coordinates}")
+        };
+        let places = [
+            [0.3 * width, height + 0.1 * room],
+            [0.7 * width, -0.8 * room],
+        ];
+        Points2D::new(places)
+            .with_colors([WHITE])
+            .with_radii([Radius::new_ui_points(0.0)])
+            .with_labels([
+                text("SW", self.first),
+                text("NE", [west + last[0], south + last[1]]),
+            ])
+            .with_show_labels(true)
     }
 }
 
@@ -93,12 +187,13 @@ impl Map {
             .flat_map(|(column, row)| shade.colour(&heights, column, row))
             .collect();
         let looks = Points2D::update_fields()
-            .with_colors([PROXY])
-            .with_radii([Radius::new_ui_points(5.0)]);
+            .with_colors([HIP])
+            .with_radii([Radius::new_ui_points(6.0)]);
         let mut entries = vec![
             log.standing("map/relief", "", &Image::from_rgb24(rgb, size))?,
             log.standing("map/hip", "looks", &looks)?,
         ];
+        entries.extend(frame.scale(log, scene, ground, size)?);
         entries.extend(self.laid(log, scene)?);
         Ok(entries)
     }
@@ -111,9 +206,23 @@ impl Map {
         let [west, south, east, north] = scene.laid_mm.map(|mm| mm / scene.cell_mm);
         let (middle, half) = frame.square([west, south], [east, north]);
         let reach = Boxes2D::from_centers_and_half_sizes([middle], [half])
-            .with_colors([REACH])
+            .with_colors([LAID])
             .with_radii([Radius::new_ui_points(0.7)]);
         log.standing("map/laid", "", &reach).map(Some)
+    }
+
+    /// The square that the eye looks at, as the frame on the terrain: west, south, east and
+    /// north in cells of level 0; nothing where that is none.
+    pub(super) fn looked_at(&self, sides: Option<[f64; 4]>) -> Option<Boxes2D> {
+        let frame = self.frame?;
+        let squares =
+            sides.map(|[west, south, east, north]| frame.square([west, south], [east, north]));
+        let (middles, halves): (Vec<_>, Vec<_>) = squares.into_iter().unzip();
+        Some(
+            Boxes2D::from_centers_and_half_sizes(middles, halves)
+                .with_colors([WHITE])
+                .with_radii([Radius::new_ui_points(1.2)]),
+        )
     }
 
     /// The tiles that the device holds.

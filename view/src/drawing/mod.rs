@@ -7,6 +7,7 @@
 //! | `/terrain/tiles/SLOT` | a tile as it is felt | stands until another takes its slot |
 //! | `/terrain/held/SLOT`, `/terrain/awaited` | outlines of the tiles that the device holds and lacks | stands until they are others |
 //! | `/hand/proxy`, `hip`, `ray`, `force`, `trace` | the hand | 60 a second |
+//! | `/frame/border`, `corners`, `bar` | a frame around the hand, its coordinates, a scale bar | stands until the hand leaves it |
 //! | `/map/…` | the same from above, in pixels of the relief | |
 //! | `/plot/…` | a thousand samples a second | |
 //! | `/words` | place, scale and coordinates | four a second |
@@ -17,10 +18,12 @@
 //! What stands is logged as static, and the latest takes the place of the one before, in
 //! the history as in the page: a session of hours grows by its samples alone.
 
+mod frame;
 mod ground;
 mod hand;
 mod layers;
 mod layout;
+mod lengths;
 mod log;
 mod map;
 mod plots;
@@ -35,6 +38,7 @@ use hapterra_view_stream::{Message, Scene};
 
 pub use log::{APPLICATION, Entry, TIMELINE};
 
+use frame::Frame;
 use ground::Ground;
 use hand::Hand;
 use layers::Layers;
@@ -55,6 +59,7 @@ pub struct Drawing {
     layers: Layers,
     tiles: Tiles,
     map: Map,
+    frame: Frame,
     hand: Hand,
     plots: Plots,
     words: Words,
@@ -109,6 +114,7 @@ impl Drawing {
             layers: Layers::default(),
             tiles: Tiles::default(),
             map: Map::default(),
+            frame: Frame::default(),
             log,
             ground,
             terrain: ground,
@@ -123,6 +129,7 @@ impl Drawing {
         entries.extend(self.plots.change(log, &scene)?);
         self.words.change(&scene);
         self.hand.leap();
+        self.frame.change();
         match scene.is_live {
             true => {
                 self.look_at(&scene, &ground, entries)?;
@@ -162,6 +169,7 @@ impl Drawing {
                 let mut entries = self.map.layer(log, &self.scene, terrain, &layer)?;
                 let before = self.layers.mesh_cell();
                 entries.extend(self.layers.put(log, terrain, layer)?);
+                self.frame.change();
                 if self.layers.mesh_cell() != before {
                     entries.extend(self.tiles.close(log, terrain, &self.layers)?);
                 }
@@ -180,6 +188,15 @@ impl Drawing {
             Message::Samples(samples) => {
                 let mut entries = self.plots.take(log, &samples)?;
                 entries.extend(self.hand.take(log, ground, &samples)?);
+                let grounds = (ground, terrain);
+                let drawn = (&self.layers, &self.map);
+                entries.extend({ &mut self.frame }.take(
+                    log,
+                    &self.scene,
+                    grounds,
+                    drawn,
+                    &samples,
+                )?);
                 entries.extend(self.map.samples(log, &self.scene, &samples)?);
                 entries.extend(self.words.take(log, &self.scene, &samples)?);
                 Ok(entries)
@@ -196,7 +213,7 @@ impl Drawing {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use hapterra_view_stream::{Layer, TILE_POSTS, Tile};
+    use hapterra_view_stream::{Layer, Sample, TILE_POSTS, Tile};
     use re_sdk_types::archetypes::Points3D;
 
     /// Something that stands under a key, or that happened.
@@ -288,6 +305,51 @@ pub(crate) mod tests {
         // Whatever it draws takes the place of what was there.
         assert!(drawn.is_subset(&all), "{drawn:?}");
         assert!(keys(&mut drawing, tile()).is_subset(&all));
+    }
+
+    #[test]
+    fn the_frame_is_laid_anew_where_the_hand_leaves_it_and_in_each_view() {
+        let mut drawing = None;
+        let samples = |x: f64, scale: f64| {
+            Message::Samples(vec![Sample {
+                t_s: 0.0,
+                hip_mm: [scale * x, scale * 30.0, 0.0],
+                proxy_mm: [scale * x, scale * 30.0, 0.0],
+                force_n: [0.0; 3],
+                ground_mm: 0.0,
+                contact: false,
+                cost: None,
+            }])
+        };
+        for message in [scene(|_| {}), layer()] {
+            keys(&mut drawing, message);
+        }
+        let laid = [
+            "frame/bar ",
+            "frame/border ",
+            "frame/corners ",
+            "map/frame ",
+        ];
+        let mut is_laid = |message: Message| {
+            let drawn = keys(&mut drawing, message);
+            let count = laid.iter().filter(|key| drawn.contains(**key)).count();
+            assert!(count == 0 || count == laid.len(), "{drawn:?}");
+            count > 0
+        };
+        assert!(is_laid(samples(40.0, 1.0)));
+        assert!(!is_laid(samples(41.0, 1.0)));
+        assert!(is_laid(samples(75.0, 1.0)));
+        assert!(is_laid(samples(40.0, 1.0)));
+        is_laid(scene(|scene| {
+            scene.keeps_tiles = true;
+            scene.cell_mm *= 2.0;
+            scene.mm_per_unit *= 2.0;
+            scene.home_mm = scene.home_mm.map(|mm| 2.0 * mm);
+            scene.laid_mm = scene.laid_mm.map(|mm| 2.0 * mm);
+            scene.ground_m_per_mm = scene.ground_m_per_mm.map(|metres| 0.5 * metres);
+        }));
+        // At the same place of the ground.
+        assert!(is_laid(samples(40.0, 2.0)));
     }
 
     #[test]

@@ -37,7 +37,7 @@ pub(super) const LINK: &str = "plot/link";
 const PLOTS: [Plot; 6] = [
     Plot {
         entity: HEIGHT,
-        series: &[("HIP", AMBER), ("surface", BLUE)],
+        series: &[("HIP", BLUE), ("surface", AMBER)],
     },
     Plot {
         entity: FORCE,

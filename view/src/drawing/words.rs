@@ -111,8 +111,8 @@ fn facts(scene: &Scene) -> String {
     facts
 }
 
-/// The file's coordinates of a place.
-fn coordinates(scene: &Scene, x: f64, y: f64) -> Option<String> {
+/// The file's coordinates of a place, mm; none where the file knows none.
+pub(super) fn coordinates(scene: &Scene, x: f64, y: f64) -> Option<String> {
     let known = scene.coordinates.as_ref()?;
     let at = |axis: usize| {
         let [origin, east, north] = [&known.origin, &known.east, &known.north];

@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod browser;
+pub mod framed;
 pub mod recorded;
 pub mod scene;
 
@@ -95,6 +96,12 @@ impl Running {
     /// Whether it goes on.
     pub fn goes_on(&mut self) -> bool {
         self.child.try_wait().expect("a child").is_none()
+    }
+
+    /// Types lines for it, where its standard input is a pipe.
+    pub fn type_lines(&mut self, lines: &str) {
+        let to = self.child.stdin.as_mut().expect("a pipe");
+        to.write_all(lines.as_bytes()).expect("it reads");
     }
 
     /// Asks it to end, as Ctrl-C does.

@@ -1,0 +1,146 @@
+//! Scale bars and coordinates of a recording beside the CSV of the same run.
+
+use std::collections::BTreeMap;
+
+use re_chunk::Chunk;
+use re_sdk_types::Loggable;
+use re_sdk_types::components::{
+    HalfSize2D, LineStrip2D, LineStrip3D, Position2D, Position3D, Text,
+};
+
+use super::recorded::{Csv, places};
+
+type Shown = BTreeMap<String, Vec<Chunk>>;
+
+const HIP: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
+/// How far single precision may be off, m.
+const OFF: f64 = 0.02;
+/// Coordinates of a file are told to the metre here, and a metre of a map is one on the ground
+/// up to this share.
+const ROUNDED: f64 = 0.51;
+const MAP_METRE: f64 = 5e-4;
+
+/// What a chunk's only row says of a component.
+fn read<T: Loggable>(chunk: &Chunk, component: &'static str) -> Vec<T> {
+    let rows = chunk.components().get_array(component.into());
+    let rows = rows.unwrap_or_else(|| panic!("{component} of {:?}", chunk.entity_path()));
+    T::from_arrow(&rows.value(0)).expect("what it is called")
+}
+
+fn texts(chunk: &Chunk, component: &'static str) -> Vec<String> {
+    let texts = read::<Text>(chunk, component).into_iter();
+    texts.map(|text| text.0.as_str().to_owned()).collect()
+}
+
+/// The length that a label says, m.
+fn metres(label: &str) -> f64 {
+    let (value, unit) = label.split_once(' ').expect("a unit");
+    let metres = match unit {
+        "km" => 1000.0,
+        "m" => 1.0,
+        "cm" => 0.01,
+        _ => panic!("{label}"),
+    };
+    metres * value.parse::<f64>().expect("a number")
+}
+
+/// The place that a label says, m: in the file's coordinates, or from its south-west sample.
+fn place(label: &str) -> [f64; 2] {
+    let label = label.trim_start_matches(|c: char| c.is_ascii_uppercase() || c == ' ');
+    let label = label.strip_suffix(" m").unwrap_or(label);
+    let (east, north) = label.split_once(", ").expect("two");
+    [east, north].map(|number| number.parse().expect("a number"))
+}
+
+fn is_round(length: f64) -> bool {
+    let digit = length / 10_f64.powf((length * 1.000_001).log10().floor());
+    [1.0, 2.0, 5.0]
+        .iter()
+        .any(|round| (digit - round).abs() < 1e-6)
+}
+
+/// Where rows of the CSV are, m from the south-west sample, by their time.
+fn on_ground(csv: &Csv) -> BTreeMap<i64, [f64; 2]> {
+    let rows = 0..csv.rows.len();
+    rows.map(|row| {
+        let [x, y, _] = csv.vector(row, HIP);
+        let [cell, _] = csv.scales[csv.number(row, "view") as usize];
+        let time = (csv.number(row, "t_s") * 1e9).round() as i64;
+        (time, [x, y].map(|mm| mm / cell * csv.units))
+    })
+    .collect()
+}
+
+/// Scale bars are as long on the ground as their labels say, and round; corners are where
+/// theirs say. Gives the lengths of the bars on the terrain, in their order, m.
+pub fn check_frames(csv: &Csv, shown: &Shown) -> Vec<f64> {
+    let ground = on_ground(csv);
+    let (time, hip) = places(&shown["/hand/hip"]).swap_remove(0);
+    let origin = [0, 1].map(|axis| ground[&time][axis] - f64::from(hip[0][axis]));
+    let base = place(&texts(&shown["/map/corners"][0], "Points2D:labels")[0]);
+    let mut lengths = Vec::new();
+    for chunk in &shown["/frame/bar"] {
+        let strips = read::<LineStrip3D>(chunk, "LineStrips3D:strips");
+        let (first, last) = (&strips[0].0, &strips[strips.len() - 1].0);
+        let (from, to) = (first[0].0, last[last.len() - 1].0);
+        let [east, north, up] = [0, 1, 2].map(|axis| f64::from(to[axis] - from[axis]));
+        let label = metres(&texts(chunk, "LineStrips3D:labels")[0]);
+        assert!(
+            (east - label).abs() < OFF && north == 0.0 && up == 0.0,
+            "{label}: {east}"
+        );
+        assert!(is_round(label), "{label}");
+        lengths.push(label);
+    }
+    for chunk in &shown["/frame/corners"] {
+        let at = read::<Position3D>(chunk, "Points3D:positions");
+        let labels = texts(chunk, "Points3D:labels");
+        assert_eq!((labels.len(), labels[2].as_str()), (3, "N"));
+        for (at, label) in at.iter().zip(&labels).take(2) {
+            for axis in 0..2 {
+                let said = place(label)[axis] - base[axis];
+                let off = f64::from(at.0.0[axis]) + origin[axis] - said;
+                assert!(off.abs() < ROUNDED + MAP_METRE * said, "{label}: {off}");
+            }
+        }
+    }
+    check_map(shown, &ground);
+    lengths
+}
+
+fn check_map(shown: &Shown, ground: &BTreeMap<i64, [f64; 2]>) {
+    let mut pixels = Vec::new();
+    for chunk in shown["/map/hip"].iter().filter(|chunk| !chunk.is_static()) {
+        let (_, times) = chunk.timelines().iter().next().expect("a timeline");
+        let rows = chunk.components().get_array("Points2D:positions".into());
+        let rows = rows.expect("places");
+        for (i, time) in times.times_raw().iter().enumerate() {
+            let at = Position2D::from_arrow(&rows.value(i)).expect("a place");
+            pixels.push((*time, at[0].0.0));
+        }
+    }
+    let east = |pixel: &(i64, [f32; 2])| ground[&pixel.0][0];
+    let west_most = pixels.iter().min_by(|a, b| east(a).total_cmp(&east(b)));
+    let east_most = pixels.iter().max_by(|a, b| east(a).total_cmp(&east(b)));
+    let (low, high) = (west_most.expect("one"), east_most.expect("one"));
+    let of_pixel = (east(high) - east(low)) / f64::from(high.1[0] - low.1[0]);
+    let bar = &shown["/map/bar"][0];
+    let strip = &read::<LineStrip2D>(bar, "LineStrips2D:strips")[0].0;
+    let length = of_pixel * f64::from(strip[1].0[0] - strip[0].0[0]);
+    let label = metres(&texts(bar, "LineStrips2D:labels")[0]);
+    assert!(
+        (length / label - 1.0).abs() < 1e-3 && is_round(label),
+        "{label}: {length}"
+    );
+    // The first box on the map is where the first frame is on the terrain.
+    let labels = texts(&shown["/frame/corners"][0], "Points3D:labels");
+    let [from, to] = [place(&labels[0]), place(&labels[1])];
+    let half = read::<HalfSize2D>(&shown["/map/frame"][0], "Boxes2D:half_sizes");
+    for axis in 0..2 {
+        let side = of_pixel * 2.0 * f64::from(half[0].0.0[axis]);
+        assert!(
+            (side - (to[axis] - from[axis])).abs() < 0.002 * side,
+            "{side} {labels:?}"
+        );
+    }
+}

@@ -1,0 +1,65 @@
+//! How long it takes until a browser shows the terrain.
+//!
+//! `HAPTERRA=PROGRAM TERRAIN=FILE cargo test --release --test loading -- --ignored --nocapture`
+//! measures it; without a file it takes the terrain that the demo has itself.
+
+mod common;
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use common::browser::{Browser, program};
+use common::{Running, folder, hapterra};
+
+/// The terrain's part of the page.
+const TERRAIN: [f64; 4] = [0.0, 0.05, 0.56, 0.88];
+/// Tints of relief that are only there where the terrain is.
+const TINTS: usize = 400;
+const WITHIN: Duration = Duration::from_secs(300);
+
+#[test]
+#[ignore = "a figure of this machine"]
+fn the_time_until_a_browser_shows_the_terrain() {
+    let (Some(mut demo), Some(program)) = (hapterra(), program()) else {
+        println!("SKIPPED: no hapterra, or no Chromium here");
+        return;
+    };
+    let folder = folder("loading");
+    let mut browser = Browser::start(&program, &folder);
+    demo.args(["demo", "--device", "native", "--rounds", "20", "--view"])
+        .args(std::env::var_os("TERRAIN").map(PathBuf::from))
+        .arg("--out")
+        .arg(&folder);
+    let mut demo = Running::shown(&mut demo, "");
+    // The session with the device begins with this line.
+    demo.tells("device ");
+    let session = Instant::now();
+    let address = demo.address();
+    let said = session.elapsed();
+    let page = browser.open(&address);
+    let (mut started, mut told) = (None, None);
+    loop {
+        let mut is_so = |expression: &str| { browser.value(&page, expression) } == true;
+        if started.is_none() && is_so("window.hapterra?.isStarted") {
+            started = Some(session.elapsed());
+        }
+        if told.is_none() && is_so("window.hapterra?.pieces > 0") {
+            told = Some(session.elapsed());
+        }
+        let picture = browser.picture(&page);
+        let colours = browser.colours(&page, &picture, TERRAIN, &[]);
+        if colours.count > TINTS {
+            break;
+        }
+        assert!(session.elapsed() < WITHIN, "{colours:?}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let shown = session.elapsed();
+    println!(
+        "from the session's begin: address {said:?}, viewer started {started:?}, first piece {told:?}, terrain seen {shown:?}"
+    );
+    drop(browser);
+    demo.interrupt();
+    assert!(demo.end());
+    let _ = std::fs::remove_dir_all(folder);
+}
