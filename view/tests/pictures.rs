@@ -4,7 +4,7 @@
 
 mod common;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
@@ -20,22 +20,44 @@ const MARKS: [[u8; 3]; 2] = [[255, 230, 60], [255, 170, 90]];
 /// Pixels of them: arrow and trace are long enough to be seen.
 const ARROW: usize = 120;
 const TRACE: usize = 400;
-/// Until the page shows what the hand does now, and no more what it missed.
-const CAUGHT_UP: Duration = Duration::from_secs(30);
 const WITHIN: Duration = Duration::from_secs(300);
-/// What is typed for the zoomed picture, and how long it may take until that is seen on a
-/// machine that draws slowly.
+/// What is typed for the zoomed picture.
 const ZOOM: &str = "zoom 1.6\nzoom 1.6\n";
-const ZOOMED: Duration = Duration::from_secs(30);
 
 /// A page of a demo that goes on.
 struct Shown {
     browser: Browser,
     page: Page,
     began: Instant,
+    demo: Running,
+    folder: PathBuf,
 }
 
 impl Shown {
+    /// A demo to which this was typed before a page looked: a page that software draws shows
+    /// everything in its order, and much later.
+    fn start(name: &str, typed: &str) -> Self {
+        let folder = folder(name);
+        let mut demo = hapterra().expect("HAPTERRA names a program");
+        demo.args(["demo", "--device", "native", "--rounds", "30", "--view"])
+            .args(["--commands", "-", "--out"])
+            .arg(&folder)
+            .stdin(Stdio::piped());
+        let mut demo = Running::shown(&mut demo, "");
+        let address = demo.address();
+        demo.type_lines(typed);
+        let began = Instant::now();
+        let mut browser = Browser::start(&program().expect("a Chromium"), &folder);
+        let page = browser.open_sized(&address, SIZE);
+        Self {
+            browser,
+            page,
+            began,
+            demo,
+            folder,
+        }
+    }
+
     /// Keeps the first picture in which the terrain's colours are right.
     fn keep(&mut self, path: &Path, is_right: impl Fn(&Colours) -> bool) {
         loop {
@@ -50,42 +72,36 @@ impl Shown {
             assert!(self.began.elapsed() < WITHIN, "{colours:?}");
         }
     }
+
+    fn end(self) {
+        let Self {
+            browser,
+            mut demo,
+            folder,
+            ..
+        } = self;
+        drop(browser);
+        demo.interrupt();
+        assert!(demo.end());
+        let _ = std::fs::remove_dir_all(folder);
+    }
 }
 
 #[test]
 #[ignore = "takes a minute, and writes into docs/"]
 fn pictures_at_the_start_while_sliding_and_zoomed() {
     let into = std::env::var_os("HAPTERRA_PICTURES").expect("HAPTERRA_PICTURES names a folder");
-    let folder = folder("pictures");
-    let mut demo = hapterra().expect("HAPTERRA names a program");
-    demo.args(["demo", "--device", "native", "--rounds", "30", "--view"])
-        .args(["--commands", "-", "--out"])
-        .arg(&folder)
-        .stdin(Stdio::piped());
-    let mut demo = Running::shown(&mut demo, "");
-    let address = demo.address();
-    let began = Instant::now();
-    let mut browser = Browser::start(&program().expect("a Chromium"), &folder);
-    let page = browser.open_sized(&address, SIZE);
-    let mut shown = Shown {
-        browser,
-        page,
-        began,
-    };
     let into = Path::new(&into);
     let is_shown = |terrain: &Colours| terrain.count > 400;
-    std::thread::sleep(CAUGHT_UP);
+    let is_touched = |terrain: &Colours| terrain.near[0] > ARROW && terrain.near[1] > TRACE;
+    let mut shown = Shown::start("pictures", "");
     // Before the hand is on the ground the arm has nothing to say.
     shown.keep(&into.join("view-start.jpg"), |terrain| {
         is_shown(terrain) && terrain.near[0] == 0
     });
-    let is_touched = |terrain: &Colours| terrain.near[0] > ARROW && terrain.near[1] > TRACE;
     shown.keep(&into.join("view.jpg"), is_touched);
-    demo.type_lines(ZOOM);
-    std::thread::sleep(ZOOMED);
+    shown.end();
+    let mut shown = Shown::start("zoomed", ZOOM);
     shown.keep(&into.join("view-zoomed.jpg"), is_touched);
-    drop(shown);
-    demo.interrupt();
-    assert!(demo.end());
-    let _ = std::fs::remove_dir_all(folder);
+    shown.end();
 }
