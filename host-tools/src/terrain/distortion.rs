@@ -89,23 +89,14 @@ fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::{CellUnit, Certainty, Globe, Raster};
+    use crate::raster::Raster;
     use crate::terrain::FeltCells;
+    use crate::terrain::felt_grid::tests::cell;
 
     fn grid_off(lean: f64, (east, north): (f64, f64), cells: FeltCells) -> f64 {
-        let cell = CellSize {
-            east,
-            north,
-            lean,
-            map_scale: (1.0, 1.0),
-            unit: CellUnit::Length { metres: 1.0 },
-            latitude: None,
-            globe: Globe::EARTH,
-            certainty: Certainty::Stated,
-        };
         let raster = Raster::from_fn(9, 9, |_, _| 0.0)
             .expect("a raster")
-            .with_cell(cell);
+            .with_cell(cell(east, north, lean));
         let grid = FeltGrid::new(&raster, cells);
         grid.worst_in([-5.0, 2.0, 3.0, 90.0]).expect("known").share
     }

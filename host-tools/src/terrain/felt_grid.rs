@@ -373,11 +373,12 @@ fn is_square(cell: &CellSize) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::raster::{CellUnit, Certainty, Globe};
 
-    fn cell(east: f64, north: f64, lean: f64) -> CellSize {
+    /// A cell in metres, whose columns lean over its rows by an angle of that cosine.
+    pub(in crate::terrain) fn cell(east: f64, north: f64, lean: f64) -> CellSize {
         CellSize {
             east,
             north,
