@@ -56,12 +56,18 @@ fn made(folder: &Path, options: &str, name: &str) -> PathBuf {
 
 /// The hint that `hapterra info` gives for a file.
 fn hint(file: &Path) -> String {
+    hint_of(&["info"], file)
+}
+
+/// The hint of a command that refuses a file.
+fn hint_of(words: &[&str], file: &Path) -> String {
     let output = Command::new(hapterra_binary())
-        .arg("info")
+        .args(words)
         .arg(file)
         .output();
     let output = output.expect("it runs");
-    assert!(!output.status.success(), "{} opens", file.display());
+    let opens = output.status.success();
+    assert!(!opens, "{words:?} opens {}", file.display());
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     let hint = told
         .split_once("hint: ")
@@ -118,32 +124,16 @@ fn what_gdal_reads_and_this_does_not_is_converted_by_the_hint() {
         ("-of RST -ot Float32", "idrisi.rst"),
     ] {
         let file = made(at, options, name);
-        let hint = hint(&file);
-        follow(at, &hint, "gdal_translate");
+        follow(at, &hint(&file), "gdal_translate");
         let stem = Path::new(name)
             .file_stem()
             .expect("a name")
             .to_string_lossy();
-        let converted = at.join(format!("{stem}-converted.tif"));
-        let raster = Raster::open(&converted, &OpenOptions::default());
-        let raster = raster.unwrap_or_else(|error| panic!("{name}: {hint}: {error}"));
+        let raster = taken(&at.join(format!("{stem}-converted.tif")));
         assert_eq!((raster.columns(), raster.rows()), (40, 30), "{name}");
         let off = raster.height(20, 10) - (100.0 + 7.0 * 20.0 - 3.0 * 19.0);
         assert!(name == "jpeg.tif" || off.abs() < 1e-9, "{name}: {off} off");
     }
-}
-
-/// The hint of a command that fails.
-fn hint_of(words: &[&str], file: &Path) -> String {
-    let output = Command::new(hapterra_binary())
-        .args(words)
-        .arg(file)
-        .output()
-        .expect("it runs");
-    assert!(!output.status.success(), "{words:?}");
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    let hint = told.split_once("hint: ").expect("a hint");
-    hint.1.trim().to_owned()
 }
 
 /// Runs `demo` at a longitude and latitude where none is known, and the command in its
@@ -153,10 +143,7 @@ fn brought_to_degrees(folder: &Path, name: &str, program: &str, code: &str) -> R
     let hint = hint_of(&words, &folder.join(name));
     let hint = hint.replace("IN OUT.tif", &format!("{name} brought.tif"));
     follow(folder, &hint.replace("EPSG:CODE", code), program);
-    let brought = folder.join("brought.tif");
-    let raster = Raster::open(&brought, &OpenOptions::default()).expect("opens");
-    std::fs::remove_file(brought).expect("removed");
-    raster
+    taken(&folder.join("brought.tif"))
 }
 
 #[test]
@@ -460,11 +447,10 @@ fn archives_are_unpacked_by_the_hint() {
          with z.ZipFile('two files.zip', 'w') as f: f.write('one.tif'); f.write('two.tif')\n\
          with z.ZipFile('packed.zip', 'w', z.ZIP_LZMA) as f: f.write('one.tif')\n",
     );
+    std::fs::remove_file(at.join("one.tif")).expect("removed");
     for name in ["two files.zip", "packed.zip"] {
-        std::fs::remove_file(at.join("one.tif")).expect("removed");
         follow(at, &hint(&at.join(name)), "python3");
-        let raster = Raster::open(at.join("one.tif"), &OpenOptions::default());
-        assert_eq!(raster.expect("opens").columns(), 40, "{name}");
+        assert_eq!(taken(&at.join("one.tif")).columns(), 40, "{name}");
     }
     if !has_gdal() {
         return;
@@ -513,11 +499,7 @@ fn points_become_a_grid_by_the_hint() {
     ] {
         follow(at, &hint(&at.join(name)), "python3");
         let stem = name.split('.').next().expect("a name");
-        let raster = Raster::open(
-            at.join(format!("{stem}-converted.asc")),
-            &OpenOptions::default(),
-        );
-        let raster = raster.unwrap_or_else(|error| panic!("{name}: {error}"));
+        let raster = taken(&at.join(format!("{stem}-converted.asc")));
         assert_eq!((raster.columns(), raster.rows()), (20, 12), "{name}");
         assert_eq!(raster.summary().holes, 1, "{name}");
         assert!(raster.height(5, 3).is_nan(), "{name}");
