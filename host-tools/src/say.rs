@@ -1,13 +1,15 @@
 //! `print!`, `println!`, `eprint!` and `eprintln!` of this crate, under the names of the
-//! standard library's. Those panic where nobody reads any more: `hapterra info FILE | head
+//! standard library's. Those panic where nobody reads any more: `hapterra list | head
 //! -1` would end in a crash, and `hapterra run FILE | head -1` without letting go of the
 //! arm. These go on in silence.
 //!
 //! For commands that hold no device. Where an arm may be armed, `cli::terminal::voice`
 //! writes, for whom nobody waits.
 //!
-//! What a command was asked to write (files, `replay -o -`) is not said by them: there, an
-//! error is an error.
+//! What a command was asked to write (files, `replay -o -`) and the one report that a command
+//! exists to print (`cli::report`) are not said by them: there, an error is an error. `list`
+//! says each line once it knows it, as a silent board takes more than a second, and ends well
+//! also where nobody could read them.
 
 /// Says something on standard output.
 macro_rules! print {

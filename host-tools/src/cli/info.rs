@@ -3,7 +3,6 @@
 mod place;
 
 use std::fmt::Write as _;
-use std::io::{ErrorKind, Write as _};
 
 use serde::Serialize;
 
@@ -12,6 +11,7 @@ use hapterra_core::terrain::{POSTS, TILE_CELLS};
 use super::failure::Failure;
 use super::options::placing::off_in_words;
 use super::options::terrain_file::TerrainFile;
+use super::report::put;
 use crate::place::place_in_words;
 use crate::raster::{CellSize, CellUnit, Certainty, ReferenceSystem};
 use crate::terrain::{Distortion, FeltCells, FeltGrid};
@@ -46,20 +46,6 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         put(&format!("{json}\n"))
     } else {
         put(&report.text())
-    }
-}
-
-/// Prints the report. A reader who goes away wants no more of it; a disk without room has
-/// lost it.
-fn put(report: &str) -> Result<(), Failure> {
-    let mut output = std::io::stdout().lock();
-    let written = output.write_all(report.as_bytes());
-    match written.and_then(|()| output.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(Failure::new(format!("cannot write the report: {error}"))
-                .hint("make room where standard output goes to"))
-        }
-        _ => Ok(()),
     }
 }
 

@@ -4,6 +4,7 @@
 //! - [`options`]: what several subcommands let their user say;
 //! - `terminal`: progress, Ctrl-C, and prompts while a command runs;
 //! - [`failure`] and `hints`: what an error looks like, and what to do about it;
+//! - `report`: what a command exists to print;
 //! - `log` and `sparing`: diagnostics, and lines that a device can cause kept to so many
 //!   a second.
 
@@ -20,6 +21,7 @@ mod log;
 mod met_device;
 pub mod options;
 pub mod replay;
+mod report;
 pub mod run;
 mod session_summary;
 mod sparing;

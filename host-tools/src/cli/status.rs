@@ -8,6 +8,7 @@ use hapterra_core::wire::status::{
 
 use super::failure::Failure;
 use super::options::device::Device;
+use super::report::put;
 use super::session_summary;
 use super::terminal::voice::{say, show};
 use crate::link::{EMULATED, shown};
@@ -31,13 +32,11 @@ pub struct Args {
 /// Shows how the device is.
 ///
 /// # Errors
-/// No device, or one that does not answer.
+/// No device, one that does not answer, or a status that cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
     if !args.disarm && !args.clear {
-        return args.device.look(|dialogue| {
-            show(text(&dialogue.fresh_status()?));
-            Ok(())
-        });
+        let status = args.device.look(|dialogue| Ok(dialogue.fresh_status()?))?;
+        return put(&text(&status));
     }
     args.device.talk(|dialogue| {
         if args.disarm {

@@ -14,8 +14,9 @@ use hapterra_core::wire::status::PRESS_MS;
 
 use super::failure::{Failure, OrHint};
 use super::options::device::{Device, DeviceChoice};
+use super::report::put;
 use super::terminal::left_behind;
-use super::terminal::voice::{say, show};
+use super::terminal::voice::say;
 use crate::calibrate::{Attendant, Plan, VirtualUser, file, walk};
 use crate::link::{DeviceAddress, Dialogue, HostClock, Native};
 use crate::output::keep_apart;
@@ -109,12 +110,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     );
     keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
     match &args.show {
-        Some(Some(path)) => {
-            show(file::to_toml(&file::read(path)?));
-            return Ok(());
-        }
+        Some(Some(path)) => return put(&file::to_toml(&file::read(path)?)),
         // Who only looks takes no arm from its host.
-        Some(None) => return args.device.look(show_held),
+        Some(None) => return put(&file::to_toml(&args.device.look(held)?)),
         None => {}
     }
     left_behind::tell(args.output.as_deref());
@@ -137,13 +135,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     calibrate(args, &mut dialogue, &mut user)
 }
 
-/// Shows the record that the device holds.
-fn show_held(dialogue: &mut Dialogue<'_>) -> Result<(), Failure> {
+/// The record that the device holds.
+fn held(dialogue: &mut Dialogue<'_>) -> Result<Calibration, Failure> {
     let held = dialogue
         .calibration()?
         .ok_or("the device holds no calibration");
-    show(file::to_toml(&held.or_hint("see hapterra status")?));
-    Ok(())
+    held.or_hint("see hapterra status")
 }
 
 fn calibrate(
