@@ -56,7 +56,7 @@ fn bench_tells_what_it_does_where_its_program_is_missing() {
     let alone = folder.path().join("hapterra");
     // A link, not a copy: a program that was just written may not be started while another
     // test's child holds the file open ("Text file busy").
-    std::fs::hard_link(&program, &alone).expect("linked");
+    std::fs::hard_link(program, &alone).expect("linked");
     let run = |words: &[&str]| {
         let mut command = Command::new(&alone);
         // Under cargo the program is built.
