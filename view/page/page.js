@@ -2,7 +2,9 @@
 //
 // The stream is read only while somebody can see the page, because a hidden viewer draws
 // nothing and would only pile up what it is told. A page that comes back is told what
-// it missed; what it has already it knows by its number and passes over. The viewer's memory
+// it missed; what it has already it knows by its number and passes over. A page that is drawn
+// by software takes few pieces a second, and asks for what happens half a second at a time.
+// The viewer's memory
 // grows with every sample, so from a size on the page begins anew; not at once, though, where
 // what it is told first is larger already.
 "use strict";
@@ -48,6 +50,14 @@ function whenSeen() {
   });
 }
 
+// Whether the browser draws with the computer's processor alone: by the names of what draws.
+function isDrawnBySoftware() {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const unmasked = context?.getExtension("WEBGL_debug_renderer_info");
+  const name = context?.getParameter(unmasked?.UNMASKED_RENDERER_WEBGL ?? context.RENDERER);
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
+
 // Bytes of a stream, so many at a time.
 class Bytes {
   constructor(reader) {
@@ -80,12 +90,12 @@ class Bytes {
 }
 
 // Reads the stream once; true where the session has ended.
-async function read(viewer, memory) {
+async function read(viewer, memory, feed) {
   const cut = new AbortController();
   const hide = () => seen() || cut.abort();
   document.addEventListener("visibilitychange", hide);
   try {
-    const answer = await fetch("feed", { signal: cut.signal, cache: "no-store" });
+    const answer = await fetch(feed, { signal: cut.signal, cache: "no-store" });
     if (!answer.ok) return false;
     state.connections += 1;
     const bytes = new Bytes(answer.body.getReader());
@@ -113,10 +123,10 @@ async function read(viewer, memory) {
   }
 }
 
-async function follow(viewer, memory) {
+async function follow(viewer, memory, feed) {
   for (;;) {
     await whenSeen();
-    if (await read(viewer, memory)) break;
+    if (await read(viewer, memory, feed)) break;
     if (seen() && state.connections > 0) say("hapterra-view has ended, or this page was too slow. Trying again…");
     await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
   }
@@ -138,11 +148,17 @@ async function main() {
   });
   await viewer.start(document.getElementById("view"));
   state.isStarted = true;
+  // The device's second that is shown, once there is one.
+  state.shown = () => {
+    const recording = viewer.get_active_recording_id();
+    return recording ? viewer.get_time_for_timeline(recording, "time") / 1e9 : null;
+  };
   viewer.open_channel(CHANNEL, CHANNEL);
   setInterval(() => {
     if (viewer.has_panicked()) location.reload();
   }, 2000);
-  await follow(viewer, program.memory);
+  const isGathered = query.has("gathered") || isDrawnBySoftware();
+  await follow(viewer, program.memory, isGathered ? "feed?gathered" : "feed");
 }
 
 main().catch((error) => say(`The viewer cannot start: ${error}`));

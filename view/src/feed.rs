@@ -92,7 +92,7 @@ pub fn draw(
     history.end(match is_told {
         true => End::Told,
         false => End::Lost,
-    });
+    })?;
     if !told && drawing.is_some() {
         on_scene();
     }

@@ -142,7 +142,7 @@ fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
         browser
             .requests
             .iter()
-            .any(|asked| asked.ends_with("/feed"))
+            .any(|asked| asked.ends_with("/feed?gathered"))
     );
     // Killing the browser does no harm.
     drop(browser);

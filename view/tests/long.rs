@@ -30,6 +30,8 @@ struct OfPage {
     told: u64,
     /// Since it began, or began anew.
     age_s: f64,
+    /// The device's second that it shows.
+    shown_s: f64,
 }
 
 fn of_page(browser: &mut Browser, page: &Page) -> OfPage {
@@ -38,6 +40,7 @@ fn of_page(browser: &mut Browser, page: &Page) -> OfPage {
         bytes: number("window.hapterra?.memory") as u64,
         told: number("window.hapterra?.bytes") as u64,
         age_s: number("performance.now() / 1000"),
+        shown_s: number("window.hapterra?.shown?.()"),
     }
 }
 
@@ -103,13 +106,16 @@ fn ten_minutes_of_touching_stay_bounded_and_pages_and_viewer_may_come_and_go() {
     let minutes: u64 = minutes.and_then(|it| it.parse().ok()).unwrap_or(10);
     let is_alone = std::env::var_os("ALONE").is_some();
     let options = std::env::var("HAPTERRA_VIEW_OPTIONS").unwrap_or_default();
+    let since = Instant::now();
     let mut demo = Running::shown(&mut demo, &options);
     let address = demo.address();
     let viewer = started_by(demo.id(), "hapterra-view").expect("the viewer runs");
     let mut browser = Browser::start(&program().expect("a Chromium"), &folder);
     let page = browser.open(&address);
     let mut second = None;
-    println!("minute | hapterra, MB | viewer, MB | page, MB, for s | told to the page, MB");
+    println!(
+        "minute | hapterra, MB | viewer, MB | page, MB, for s | told to the page, MB | second shown, of the session's"
+    );
     let began = Instant::now();
     let mut most = [0; 3];
     for minute in 1..=minutes {
@@ -123,7 +129,10 @@ fn ten_minutes_of_touching_stay_bounded_and_pages_and_viewer_may_come_and_go() {
         }
         let [host, viewer_now, page_now] = figures.map(|bytes| bytes >> 20);
         let (age, told) = (of_page.age_s, of_page.told >> 20);
-        println!("{minute} | {host} | {viewer_now} | {page_now}, {age:.0} | {told}");
+        let (shown, is) = (of_page.shown_s, since.elapsed().as_secs_f64());
+        println!(
+            "{minute} | {host} | {viewer_now} | {page_now}, {age:.0} | {told} | {shown:.1}, {is:.1}"
+        );
         // Once each: loaded anew, opened twice, closed; at last the viewer is killed.
         match minutes - minute {
             _ if is_alone => {}

@@ -3,18 +3,14 @@
 mod common;
 
 use std::collections::BTreeSet;
-use std::io::{BufReader, Read, Write};
-use std::net::TcpStream;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use hapterra_view_stream::{Layer, Message};
-use re_chunk::Chunk;
-use re_log_encoding::Decoder;
-use re_log_types::LogMsg;
 
+use common::feed::Feed;
 use common::scene::{batch, greeting, layer, scene};
-use common::{PATIENCE, Running, Viewer, folder, hapterra};
+use common::{Running, Viewer, folder, hapterra};
 
 /// Entities in the order in which a page is told them, whether each stands, and when the last
 /// part of the coarsest level was there.
@@ -26,36 +22,18 @@ struct Told {
 /// Reads a page's stream until something happened in time.
 fn told(port: u16) -> Told {
     let began = Instant::now();
-    let mut line = TcpStream::connect(("127.0.0.1", port)).expect("a connection");
-    line.set_read_timeout(Some(PATIENCE)).expect("a limit");
-    write!(line, "GET /feed HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n").expect("it is read");
-    let mut from = BufReader::new(line);
-    let mut head = Vec::new();
-    while !head.ends_with(b"\r\n\r\n") {
-        let mut byte = [0];
-        from.read_exact(&mut byte).expect("a head");
-        head.extend(byte);
-    }
     let mut told = Told {
         entities: vec![],
         whole: None,
     };
-    while told.entities.last().is_none_or(|(_, stands)| *stands) {
-        let mut length = [0; 4];
-        from.read_exact(&mut length).expect("a piece");
-        let mut piece = vec![0; u32::from_le_bytes(length) as usize];
-        from.read_exact(&mut piece).expect("a piece");
-        for message in Decoder::<LogMsg>::decode_eager(piece.as_slice()).expect("an .rrd") {
-            if let LogMsg::ArrowMsg(store, message) = message.expect("a message")
-                && store.is_recording()
-            {
-                let chunk = Chunk::from_arrow_msg(&message).expect("a chunk");
-                let entity = chunk.entity_path().to_string();
-                if entity.starts_with("/terrain/layer0/") {
-                    told.whole = Some((told.entities.len(), began.elapsed()));
-                }
-                told.entities.push((entity, chunk.is_static()));
-            }
+    for chunk in Feed::open(port, "/feed").flatten() {
+        let entity = chunk.entity_path().to_string();
+        if entity.starts_with("/terrain/layer0/") {
+            told.whole = Some((told.entities.len(), began.elapsed()));
+        }
+        told.entities.push((entity, chunk.is_static()));
+        if !chunk.is_static() {
+            break;
         }
     }
     told

@@ -230,6 +230,12 @@ pub(crate) mod tests {
         }
     }
 
+    /// Something that happened at a time, s.
+    pub(crate) fn at(t_s: f64) -> Entry {
+        let point = Points3D::new([[1.0, 2.0, 3.0]]);
+        Log::new().at("it", t_s, &point).expect("encodes")
+    }
+
     fn scene(change: impl FnOnce(&mut Scene)) -> Message {
         let mut scene = super::ground::tests::scene();
         change(&mut scene);

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::{Context as _, Result, anyhow};
 use tiny_http::{Header, Request, Response};
 
-use crate::history::History;
+use crate::history::{History, Pieces};
 use files::Files;
 use gate::Asked;
 
@@ -108,12 +108,20 @@ fn answer(request: Request, shared: &Shared) {
         found.map(|header| header.value.as_str().to_owned())
     };
     let [host, origin, site] = ["Host", "Origin", "Sec-Fetch-Site"].map(header);
+    let (path, query) = match request.url().split_once('?') {
+        Some((path, query)) => (path, query),
+        None => (request.url(), ""),
+    };
+    let pieces = match query {
+        "gathered" => Pieces::Gathered,
+        _ => Pieces::Fine,
+    };
     let asked = Asked {
         method: request.method().as_str(),
         host: host.as_deref(),
         origin: origin.as_deref(),
         site: site.as_deref(),
-        path: request.url().split('?').next().unwrap_or_default(),
+        path,
     };
     if let Err(status) = asked.check(shared.port) {
         return refuse(request, status);
@@ -121,7 +129,7 @@ fn answer(request: Request, shared: &Shared) {
     let is_head = asked.method == "HEAD";
     match asked.path {
         "/feed" if !is_head => {
-            let page = shared.history.come();
+            let page = shared.history.come(pieces);
             let mut to = request.into_writer();
             // Whether it ended, was cut off or has gone away: the page comes again.
             let _ = stream::run(&mut to, &page);

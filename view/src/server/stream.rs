@@ -7,12 +7,14 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
-use crate::history::{End, Next, Page};
+use crate::history::{End, Next, Page, Pieces};
 
 /// How long nothing may come before the page is told that this program lives, by a
 /// length that no piece has.
 const SIGN_EVERY: Duration = Duration::from_secs(2);
 const SIGN: u32 = u32::MAX;
+/// How long what comes is gathered, where the page is told what was gathered.
+const GATHERED: Duration = Duration::from_millis(500);
 /// Says that `hapterra` is gone and did not say why: another length that no piece has.
 const LOST: u32 = u32::MAX - 1;
 
@@ -31,6 +33,9 @@ const HEAD: &str = "HTTP/1.1 200 OK\r\n\
 pub(super) fn run(to: &mut dyn Write, page: &Page) -> io::Result<()> {
     to.write_all(HEAD.as_bytes())?;
     loop {
+        if page.pieces() == Pieces::Gathered && page.is_told_all() {
+            std::thread::sleep(GATHERED);
+        }
         match page.next(SIGN_EVERY) {
             Next::Blob(blob) => {
                 to.write_all(&(blob.len() as u32).to_le_bytes())?;

@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod browser;
+pub mod feed;
 pub mod framed;
 pub mod recorded;
 pub mod scene;

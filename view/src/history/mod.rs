@@ -1,15 +1,18 @@
 //! What a page that comes now has to be told, and the queues of the pages that are there.
 //!
 //! What stands still (terrain, tiles, layout) is kept once, by key: a later entry takes
-//! the place of an earlier one. What happens in time is kept up to so many bytes, the
-//! oldest forgotten first. Nothing else grows, however long a session lasts.
+//! the place of an earlier one. What happens in time is [put together](gather) and kept up to
+//! so many bytes, the oldest forgotten first. Nothing else grows, however long a session lasts.
 //!
 //! A page whose queue is full is cut off, so that neither this program nor another page
 //! waits for it. It comes back by itself and is told the present state.
 
+mod gather;
+mod page;
+
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use anyhow::{Context as _, Result};
 use re_build_info::CrateVersion;
@@ -17,12 +20,11 @@ use re_log_encoding::{Encoder, EncodingOptions};
 use re_log_types::LogMsg;
 
 use crate::drawing::Entry;
+use gather::Gather;
+pub use page::{Next, Page, Pieces};
 
 /// A piece of a page's stream: a whole little `.rrd`.
 pub type Blob = Arc<Vec<u8>>;
-
-/// Bytes that may wait for one page.
-const QUEUE_BYTES: usize = 32 << 20;
 
 /// Version and options of everything that is encoded here.
 #[must_use]
@@ -42,28 +44,17 @@ pub struct History {
 #[derive(Default)]
 struct State {
     standing: BTreeMap<String, Blob>,
+    /// What happened, put together.
     happened: VecDeque<Blob>,
     happened_bytes: usize,
+    /// What happened since and waits to be put together, and the pieces that it came in.
+    waiting: Gather,
+    latest: Vec<Blob>,
     is_bounded: bool,
     ended: Option<End>,
     pages: Vec<Arc<Page>>,
     /// Pages that have come so far.
     came: u64,
-}
-
-/// A page's queue.
-pub struct Page {
-    queue: Mutex<Queue>,
-    woken: Condvar,
-}
-
-#[derive(Default)]
-struct Queue {
-    blobs: VecDeque<Blob>,
-    bytes: usize,
-    /// It was too slow, or is gone.
-    is_cut: bool,
-    ended: Option<End>,
 }
 
 /// How a session ended.
@@ -73,19 +64,6 @@ pub enum End {
     Told,
     /// `hapterra` is gone without saying so: it was killed, or crashed.
     Lost,
-}
-
-/// What a page is told next.
-#[derive(Debug, PartialEq, Eq)]
-pub enum Next {
-    /// This.
-    Blob(Blob),
-    /// Nothing for now.
-    Nothing,
-    /// There is no more: the session has ended.
-    Over(End),
-    /// It was too slow, and has to come again.
-    Cut,
 }
 
 /// Figures of a history.
@@ -126,6 +104,8 @@ impl History {
         state.standing.clear();
         state.happened.clear();
         state.happened_bytes = 0;
+        state.waiting = Gather::default();
+        state.latest.clear();
         state.is_bounded = is_live;
         for page in &state.pages {
             page.cut();
@@ -139,20 +119,21 @@ impl History {
     pub fn put(&self, entries: Vec<Entry>) -> Result<()> {
         let (standing, happened): (Vec<_>, Vec<_>) =
             entries.into_iter().partition(|entry| entry.key.is_some());
-        let mut new = Vec::new();
-        for entry in standing {
-            let blob = encoded([&entry.message])?;
-            new.push((entry.key, blob));
+        let happened: Vec<_> = happened.into_iter().map(|entry| entry.message).collect();
+        let mut state = locked(&self.state);
+        for Entry { key, message } in standing {
+            let blob = encoded([&message])?;
+            for page in &state.pages {
+                page.offer(key.as_deref(), &blob);
+            }
+            state.standing.extend(key.map(|key| (key, blob)));
         }
         if !happened.is_empty() {
-            new.push((None, encoded(happened.iter().map(|entry| &entry.message))?));
-        }
-        let mut state = locked(&self.state);
-        for (key, blob) in new {
-            state.keep(key, &blob, self.limit);
-            for page in &state.pages {
-                page.offer(&blob);
-            }
+            let blob = encoded(&happened)?;
+            state.tell(Pieces::Fine, &blob);
+            state.latest.push(blob);
+            let together = state.waiting.take(&happened)?;
+            state.keep(&together, self.limit)?;
         }
         let before = state.pages.len();
         state.pages.retain(|page| !page.is_cut());
@@ -162,28 +143,30 @@ impl History {
     }
 
     /// Nothing comes any more.
-    pub fn end(&self, how: End) {
+    ///
+    /// # Errors
+    /// An entry that cannot be encoded.
+    pub fn end(&self, how: End) -> Result<()> {
         let mut state = locked(&self.state);
+        let rest = state.waiting.rest()?;
+        state.keep(&rest, self.limit)?;
         state.ended = Some(how);
         for page in &state.pages {
             page.end(how);
         }
+        Ok(())
     }
 
     /// A page comes: its queue, which begins with all that is kept.
     #[must_use]
-    pub fn come(&self) -> Arc<Page> {
+    pub fn come(&self, pieces: Pieces) -> Arc<Page> {
         let mut state = locked(&self.state);
-        let kept = state.standing.values().chain(&state.happened);
-        let queue = Queue {
-            blobs: kept.cloned().collect(),
-            ended: state.ended,
-            ..Queue::default()
-        };
-        let page = Arc::new(Page {
-            queue: Mutex::new(queue),
-            woken: Condvar::new(),
-        });
+        let standing = state.standing.iter();
+        let standing = standing.map(|(key, blob)| (Some(key.clone()), Arc::clone(blob)));
+        let latest = state.latest.iter().filter(|_| pieces == Pieces::Fine);
+        let happened = state.happened.iter().chain(latest);
+        let happened = happened.map(|blob| (None, Arc::clone(blob)));
+        let page = Page::new(pieces, standing.chain(happened), state.ended);
         state.came += 1;
         state.pages.push(Arc::clone(&page));
         page
@@ -210,68 +193,30 @@ impl History {
 }
 
 impl State {
-    fn keep(&mut self, key: Option<String>, blob: &Blob, limit: usize) {
-        let Some(key) = key else {
-            self.happened_bytes += blob.len();
-            self.happened.push_back(Arc::clone(blob));
-            while self.is_bounded && self.happened_bytes > limit {
-                let Some(oldest) = self.happened.pop_front() else {
-                    break;
-                };
-                self.happened_bytes -= oldest.len();
-            }
-            return;
-        };
-        self.standing.insert(key, Arc::clone(blob));
-    }
-}
-
-impl Page {
-    /// What the page is told next, waiting for at most `wait`.
-    #[must_use]
-    pub fn next(&self, wait: std::time::Duration) -> Next {
-        let queue = locked(&self.queue);
-        let idle =
-            |queue: &mut Queue| queue.blobs.is_empty() && queue.ended.is_none() && !queue.is_cut;
-        let waited = self.woken.wait_timeout_while(queue, wait, idle);
-        let (mut queue, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        if queue.is_cut {
-            return Next::Cut;
-        }
-        match queue.blobs.pop_front() {
-            Some(blob) => {
-                queue.bytes = queue.bytes.saturating_sub(blob.len());
-                Next::Blob(blob)
-            }
-            None => queue.ended.map_or(Next::Nothing, Next::Over),
+    /// Tells what happened to the pages that are told it in such pieces.
+    fn tell(&self, pieces: Pieces, blob: &Blob) {
+        for page in self.pages.iter().filter(|page| page.pieces() == pieces) {
+            page.offer(None, blob);
         }
     }
 
-    fn offer(&self, blob: &Blob) {
-        let mut queue = locked(&self.queue);
-        queue.bytes += blob.len();
-        match queue.bytes > QUEUE_BYTES {
-            true => {
-                queue.is_cut = true;
-                queue.blobs.clear();
-            }
-            false => queue.blobs.push_back(Arc::clone(blob)),
+    /// Keeps what happened, put together, and forgets the oldest.
+    fn keep(&mut self, together: &[LogMsg], limit: usize) -> Result<()> {
+        if together.is_empty() {
+            return Ok(());
         }
-        self.woken.notify_all();
-    }
-
-    fn cut(&self) {
-        locked(&self.queue).is_cut = true;
-        self.woken.notify_all();
-    }
-
-    fn is_cut(&self) -> bool {
-        locked(&self.queue).is_cut
-    }
-
-    fn end(&self, how: End) {
-        locked(&self.queue).ended = Some(how);
-        self.woken.notify_all();
+        let blob = encoded(together)?;
+        self.tell(Pieces::Gathered, &blob);
+        self.latest.clear();
+        self.happened_bytes += blob.len();
+        self.happened.push_back(blob);
+        while self.is_bounded && self.happened_bytes > limit {
+            let Some(oldest) = self.happened.pop_front() else {
+                break;
+            };
+            self.happened_bytes -= oldest.len();
+        }
+        Ok(())
     }
 }
 
@@ -292,8 +237,9 @@ fn encoded<'m>(messages: impl IntoIterator<Item = &'m LogMsg>) -> Result<Blob> {
 
 #[cfg(test)]
 mod tests {
+    use super::page::QUEUE_BYTES;
     use super::*;
-    use crate::drawing::tests::entry;
+    use crate::drawing::tests::{at, entry};
     use std::time::Duration;
 
     const NOW: Duration = Duration::ZERO;
@@ -328,7 +274,7 @@ mod tests {
         );
         assert!(kept.happened <= 20_000 && kept.happened + 2_000 > happened);
         // Three places, and what is left of the rest.
-        let page = history.come();
+        let page = history.come(Pieces::Fine);
         assert!(told(&page) < 100);
     }
 
@@ -339,16 +285,16 @@ mod tests {
         for _ in 0..50 {
             history.put(vec![entry(None)]).expect("encodes");
         }
-        assert_eq!(told(&history.come()), 50);
+        assert_eq!(told(&history.come(Pieces::Fine)), 50);
     }
 
     #[test]
     fn a_page_that_does_not_read_is_cut_off_and_no_other() {
         let history = History::new(1 << 20);
         history.begin(true);
-        let (slow, quick) = (history.come(), history.come());
+        let (slow, quick) = (history.come(Pieces::Fine), history.come(Pieces::Fine));
         let big = |page: &Arc<Page>| {
-            page.offer(&Arc::new(vec![0; QUEUE_BYTES / 2 + 1]));
+            page.offer(None, &Arc::new(vec![0; QUEUE_BYTES / 2 + 1]));
         };
         big(&slow);
         assert_eq!(told(&slow) + told(&quick), 1);
@@ -362,18 +308,55 @@ mod tests {
     }
 
     #[test]
+    fn what_stands_and_waits_is_told_once_and_bytes_are_counted_to_the_last() {
+        let history = History::new(1 << 20);
+        history.begin(true);
+        history.put(vec![entry(Some("first"))]).expect("encodes");
+        let page = history.come(Pieces::Fine);
+        let of = |fill: u8| Arc::new(vec![fill; QUEUE_BYTES / 3]);
+        for (key, fill) in [("first ", 1), ("other ", 2), ("first ", 3), ("first ", 4)] {
+            page.offer(Some(key), &of(fill));
+        }
+        let fills = std::iter::from_fn(|| match page.next(NOW) {
+            Next::Blob(blob) => Some(blob[0]),
+            _ => None,
+        });
+        assert_eq!(fills.collect::<Vec<_>>(), [2, 4]);
+        // Nothing waits: three more have their place, and a fourth has not.
+        for fill in 0..3 {
+            page.offer(None, &of(fill));
+        }
+        assert!(!page.is_cut());
+        page.offer(None, &of(3));
+        assert!(page.is_cut());
+    }
+
+    #[test]
+    fn time_that_stands_still_gathers_no_more_than_so_many_entries() {
+        let history = History::new(1 << 20);
+        history.begin(true);
+        let (gathered, fine) = (history.come(Pieces::Gathered), history.come(Pieces::Fine));
+        for _ in 0..2500 {
+            history.put(vec![at(1.0)]).expect("encodes");
+        }
+        assert_eq!((told(&gathered), told(&fine)), (2, 2500));
+        history.end(End::Told).expect("encodes");
+        assert_eq!(told(&gathered), 1);
+    }
+
+    #[test]
     fn pages_hear_the_end_and_a_new_scene_makes_them_come_again() {
         let history = History::new(1 << 20);
         history.begin(true);
-        let page = history.come();
+        let page = history.come(Pieces::Fine);
         assert_eq!(page.next(NOW), Next::Nothing);
         history.begin(true);
         assert_eq!(page.next(NOW), Next::Cut);
-        let page = history.come();
+        let page = history.come(Pieces::Fine);
         history.put(vec![entry(None)]).expect("encodes");
         for how in [End::Told, End::Lost] {
-            history.end(how);
-            let late = history.come();
+            history.end(how).expect("encodes");
+            let late = history.come(Pieces::Fine);
             assert_eq!(told(&late), 1);
             assert_eq!(late.next(NOW), Next::Over(how));
         }

@@ -1,0 +1,103 @@
+//! What happened is told to a page that is drawn by software half a second at a time, and so
+//! is what a page missed.
+
+mod common;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use hapterra_view_stream::Message;
+use re_chunk::Chunk;
+
+use common::Viewer;
+use common::feed::Feed;
+use common::scene::{batch, greeting, layer, scene};
+
+/// Ticks of the session, and of each batch, as `hapterra` sends them.
+const TICKS: u64 = 10_300;
+const BATCH: u64 = 16;
+
+/// What a page was told: entries that happened, and their rows by entity and number.
+#[derive(Default)]
+struct Told {
+    entries: usize,
+    most_ns: u64,
+    rows: BTreeMap<(String, String), (i64, String)>,
+    /// What stands, by entity and part.
+    standing: BTreeMap<(String, BTreeSet<String>), Vec<String>>,
+}
+
+fn told(feed: Feed) -> Told {
+    let mut told = Told::default();
+    feed.flatten().for_each(|chunk| told.add(&chunk));
+    told
+}
+
+impl Told {
+    fn add(&mut self, chunk: &Chunk) {
+        let entity = chunk.entity_path().to_string();
+        let all = chunk.components().list_arrays();
+        if chunk.is_static() {
+            let parts = chunk.components_identifiers().map(|part| part.to_string());
+            let part = (entity, parts.collect());
+            let values = all.map(|values| format!("{values:?}"));
+            self.standing.insert(part, values.collect());
+            return;
+        }
+        let (_, times) = chunk.timelines().iter().next().expect("a timeline");
+        self.entries += 1;
+        self.most_ns = self.most_ns.max(times.time_range().abs_length());
+        let columns: Vec<_> = all.collect();
+        for (i, (row, time)) in chunk.row_ids().zip(times.times_raw()).enumerate() {
+            let values = columns
+                .iter()
+                .map(|column| format!("{:?}", column.value(i)));
+            let values = values.collect::<Vec<_>>().concat();
+            let before = self
+                .rows
+                .insert((entity.clone(), row.to_string()), (*time, values));
+            assert!(before.is_none(), "a row of {entity} twice");
+        }
+    }
+}
+
+#[test]
+fn the_same_rows_come_in_a_tenth_of_the_entries() {
+    let mut viewer = Viewer::start("--linger 5");
+    for message in [greeting(), scene(true), layer()] {
+        assert!(viewer.tell(&message));
+    }
+    let mut held = Vec::new();
+    let mut go_on = |viewer: &mut Viewer, from: u64, to: u64| {
+        for begin in (from..to).step_by(BATCH as usize) {
+            for message in batch(begin, to.min(begin + BATCH), &mut held) {
+                assert!(viewer.tell(&message), "tick {begin}");
+            }
+        }
+    };
+    go_on(&mut viewer, 0, 100);
+    let port = viewer.port();
+    let reading = |path: &'static str| {
+        let feed = Feed::open(port, path);
+        std::thread::spawn(move || told(feed))
+    };
+    let pages = [reading("/feed"), reading("/feed?gathered")];
+    go_on(&mut viewer, 100, TICKS / 2);
+    let amid = reading("/feed");
+    go_on(&mut viewer, TICKS / 2, TICKS);
+    assert!(viewer.tell(&Message::End));
+    let [fine, gathered] = pages.map(|page| page.join().expect("the stream is read"));
+    let amid = amid.join().expect("the stream is read");
+    let late = told(Feed::open(port, "/feed"));
+    assert!(viewer.end());
+
+    assert!(fine.rows.len() > 1000, "{}", fine.rows.len());
+    for other in [&amid, &gathered, &late] {
+        assert!(fine.rows == other.rows, "{} rows", other.rows.len());
+        assert!(fine.standing == other.standing);
+    }
+    for other in [&gathered, &late] {
+        let entries = other.entries;
+        assert!(10 * entries < fine.entries, "{entries} of {}", fine.entries);
+        assert!(other.most_ns < 600_000_000, "{}", other.most_ns);
+    }
+}
