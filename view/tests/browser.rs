@@ -3,6 +3,7 @@
 mod common;
 
 use std::path::Path;
+use std::process::Stdio;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -24,6 +25,12 @@ const PLOTS: [f64; 4] = [0.6, 0.5, 0.4, 0.4];
 /// which is there while the hand touches.
 const MARKS: [[u8; 3]; 3] = [[255, 120, 20], [64, 224, 208], FORCE];
 const FORCE: [u8; 3] = [255, 230, 60];
+
+/// The map's part, and the colour of the square on it that the eye looks at.
+const MAP: [f64; 4] = [0.58, 0.05, 0.21, 0.4];
+const WHITE: [u8; 3] = [255, 255, 255];
+/// Pixels of that square's lines that go at least where its sides are a quarter as long.
+const SHORTER: usize = 80;
 
 /// Software draws the pages: one test at a time.
 static ONE: Mutex<()> = Mutex::new(());
@@ -295,6 +302,52 @@ fn pan_and_zoom_under_a_resting_hand_move_the_picture_and_back() {
     }
     drop(browser);
     assert!(viewer.end());
+    std::fs::remove_dir_all(folder).expect("it goes");
+}
+
+#[test]
+fn commands_of_a_session_zoom_its_page_and_reset_it() {
+    let Some(mut demo) = hapterra() else {
+        println!("SKIPPED: HAPTERRA names no program; cargo xtask view --test does");
+        return;
+    };
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = folder("commands");
+    let Some(mut browser) = browser_in(&folder) else {
+        return;
+    };
+    demo.args(["demo", "--device", "native", "--rounds", "60", "--view"])
+        .args(["--commands", "-", "--out"])
+        .arg(&folder)
+        .stdin(Stdio::piped());
+    let mut demo = Running::shown(&mut demo, "");
+    let page = browser.open(&demo.address());
+    shown(&mut browser, &page, &mut || {}, is_whole);
+    // White on the map until it is as it should be, twice: what passes over lines goes on.
+    let mut white = |is_right: &dyn Fn(usize) -> bool| {
+        let (until, mut before) = (Instant::now() + SHOWN_WITHIN, false);
+        loop {
+            std::thread::sleep(Duration::from_millis(500));
+            let picture = browser.picture(&page);
+            let count = browser.colours(&page, &picture, MAP, &[WHITE]).near[0];
+            let is_so = is_right(count);
+            if is_so && before {
+                return count;
+            }
+            before = is_so;
+            assert!(Instant::now() < until, "{count} pixels");
+        }
+    };
+    let whole = white(&|count| count > SHORTER);
+    demo.type_lines("zoom 2\nzoom 2\n");
+    let zoomed = white(&|count| count + SHORTER < whole);
+    demo.type_lines("reset\n");
+    white(&|count| count > zoomed + SHORTER / 2);
+    drop(browser);
+    demo.interrupt();
+    assert!(demo.end());
+    let told = demo.words();
+    assert!(!told.contains("not shown"), "{told}");
     std::fs::remove_dir_all(folder).expect("it goes");
 }
 

@@ -5,7 +5,7 @@ mod common;
 use std::path::Path;
 use std::process::Command;
 
-use common::framed::check_frames;
+use common::framed::{check_frames, laid};
 use common::recorded::{Csv, check, check_views, entities, scalars};
 use common::{Running, folder, hapterra};
 
@@ -106,5 +106,33 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     view.arg("view").arg(&felt).arg("--terrain").arg(&terrain);
     run(&mut view, &at("parquet.rrd"));
     check_views(&csv, &entities(&at("parquet.rrd")), true);
+    std::fs::remove_dir_all(folder).expect("it goes");
+}
+
+#[test]
+fn the_map_says_what_is_laid_in_front_of_the_arm() {
+    let Some(mut synth) = hapterra() else {
+        println!("SKIPPED: HAPTERRA names no program; cargo xtask view --test does");
+        return;
+    };
+    let folder = folder("laid");
+    let (terrain, shown) = (folder.join("hills.tif"), folder.join("shown.rrd"));
+    let size = ["synth", "fractal", "--size", "512", "--seed", "1", "-o"];
+    Running::whole(synth.args(size).arg(&terrain), "");
+    let mut demo = hapterra().expect("named");
+    demo.args(["demo", "--device", "native", "--seconds", "4", "--view"])
+        .args(["--bbox", "501000,1500,503000,3000", "--out"])
+        .arg(&folder)
+        .arg(&terrain);
+    Running::whole(&mut demo, &rrd(&shown));
+    let csv = Csv::read(&folder.join("hills.csv"));
+    let sides = laid(&csv, &entities(&shown));
+    // The first sample is at 500,005, 5; a metre of this map is 1.0004 on the ground here.
+    let wanted = [995.0, 1495.0, 2995.0, 2995.0].map(|metres| 1.0004 * metres);
+    let off = sides
+        .iter()
+        .zip(wanted)
+        .map(|(side, wanted)| (side - wanted).abs());
+    assert!(off.fold(0.0, f64::max) < 1.0, "{sides:?}");
     std::fs::remove_dir_all(folder).expect("it goes");
 }

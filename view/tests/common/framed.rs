@@ -108,22 +108,62 @@ pub fn check_frames(csv: &Csv, shown: &Shown) -> Vec<f64> {
     lengths
 }
 
-fn check_map(shown: &Shown, ground: &BTreeMap<i64, [f64; 2]>) {
-    let mut pixels = Vec::new();
-    for chunk in shown["/map/hip"].iter().filter(|chunk| !chunk.is_static()) {
-        let (_, times) = chunk.timelines().iter().next().expect("a timeline");
-        let rows = chunk.components().get_array("Points2D:positions".into());
-        let rows = rows.expect("places");
-        for (i, time) in times.times_raw().iter().enumerate() {
-            let at = Position2D::from_arrow(&rows.value(i)).expect("a place");
-            pixels.push((*time, at[0].0.0));
+/// Where the map's pixels are: metres a pixel, and a pixel with its place, m from the
+/// south-west sample.
+struct OnMap {
+    of_pixel: f64,
+    pixel: [f64; 2],
+    place: [f64; 2],
+}
+
+impl OnMap {
+    /// By where the hand is on the map, and was by the CSV.
+    fn new(shown: &Shown, ground: &BTreeMap<i64, [f64; 2]>) -> Self {
+        let mut pixels = Vec::new();
+        for chunk in shown["/map/hip"].iter().filter(|chunk| !chunk.is_static()) {
+            let (_, times) = chunk.timelines().iter().next().expect("a timeline");
+            let rows = chunk.components().get_array("Points2D:positions".into());
+            let rows = rows.expect("places");
+            for (i, time) in times.times_raw().iter().enumerate() {
+                let at = Position2D::from_arrow(&rows.value(i)).expect("a place");
+                pixels.push((ground[time], at[0].0.0.map(f64::from)));
+            }
+        }
+        pixels.sort_by(|(a, _), (b, _)| a[0].total_cmp(&b[0]));
+        let ((place, pixel), (east, at)) = (pixels[0], pixels[pixels.len() - 1]);
+        let of_pixel = (east[0] - place[0]) / (at[0] - pixel[0]);
+        Self {
+            of_pixel,
+            pixel,
+            place,
         }
     }
-    let east = |pixel: &(i64, [f32; 2])| ground[&pixel.0][0];
-    let west_most = pixels.iter().min_by(|a, b| east(a).total_cmp(&east(b)));
-    let east_most = pixels.iter().max_by(|a, b| east(a).total_cmp(&east(b)));
-    let (low, high) = (west_most.expect("one"), east_most.expect("one"));
-    let of_pixel = (east(high) - east(low)) / f64::from(high.1[0] - low.1[0]);
+
+    /// Pixels go to the east and to the south.
+    fn place(&self, pixel: [f64; 2]) -> [f64; 2] {
+        let [right, down] = [0, 1].map(|axis| self.of_pixel * (pixel[axis] - self.pixel[axis]));
+        [self.place[0] + right, self.place[1] - down]
+    }
+}
+
+/// West, south, east and north of what the map says to be laid in front of the arm, m from the
+/// south-west sample.
+pub fn laid(csv: &Csv, shown: &Shown) -> [f64; 4] {
+    let map = OnMap::new(shown, &on_ground(csv));
+    let boxes = &shown["/map/laid"][0];
+    let [middle] = read::<Position2D>(boxes, "Boxes2D:centers")[..] else {
+        panic!("one box")
+    };
+    let half = read::<HalfSize2D>(boxes, "Boxes2D:half_sizes")[0].0.0;
+    let corner = |side: [f32; 2]| {
+        map.place([0, 1].map(|axis| f64::from(middle.0.0[axis] + side[axis] * half[axis])))
+    };
+    let ([west, south], [east, north]) = (corner([-1.0, 1.0]), corner([1.0, -1.0]));
+    [west, south, east, north]
+}
+
+fn check_map(shown: &Shown, ground: &BTreeMap<i64, [f64; 2]>) {
+    let of_pixel = OnMap::new(shown, ground).of_pixel;
     let bar = &shown["/map/bar"][0];
     let strip = &read::<LineStrip2D>(bar, "LineStrips2D:strips")[0].0;
     let length = of_pixel * f64::from(strip[1].0[0] - strip[0].0[0]);
