@@ -3,7 +3,7 @@
 // The stream is read only while somebody can see the page, because a hidden viewer draws
 // nothing and would only pile up what it is told. A page that comes back is told what
 // it missed; what it has already it knows by its number and passes over. A page that is drawn
-// by software takes few pieces a second, and asks for what happens half a second at a time.
+// by software takes few entries a second, and asks for what happens a second at a time.
 // The viewer's memory
 // grows with every sample, so from a size on the page begins anew; not at once, though, where
 // what it is told first is larger already.

@@ -104,9 +104,9 @@ impl Frame {
             true => log.standing(entity, "", what),
             false => log.at(entity, sample.t_s, what),
         };
-        let cells = picture
-            .sides
-            .map(|sides| sides.map(|at| at / terrain.step(1)));
+        let cells = picture.sides.map(|[west, south, east, north]| {
+            [[west, south], [east, north]].map(|corner| terrain.cells(corner))
+        });
         let mut entries = Vec::new();
         if let Some(looked_at) = map.looked_at(cells) {
             entries.push(entry("map/frame", &looked_at)?);
@@ -151,7 +151,7 @@ impl Picture<'_> {
 
     /// A place of the surface in the picture; none in a hole.
     fn at(&self, place: [f64; 2]) -> Option<[f32; 3]> {
-        let cell = place.map(|at| at / self.terrain.step(1));
+        let cell = self.terrain.cells(place);
         let up = self.layers.up_at(self.terrain, cell)?;
         Some(self.terrain.sample(cell, up + self.float()))
     }
@@ -224,8 +224,7 @@ impl Picture<'_> {
             let up = highest.unwrap_or(0.0) + self.float();
             let cut = |part: usize| {
                 let at = from[0] + length * part as f64 / PARTS as f64;
-                let cell = [at, south].map(|at| at / self.terrain.step(1));
-                self.terrain.sample(cell, up)
+                self.terrain.sample(self.terrain.cells([at, south]), up)
             };
             strips.extend((0..PARTS).map(|part| [cut(part), cut(part + 1)]));
         }

@@ -100,6 +100,11 @@ impl Ground {
         self.at(self.home_mm)
     }
 
+    /// Where a place of the picture is, in cells of level 0 from the south-west sample.
+    pub(super) fn cells(&self, place: [f64; 2]) -> [f64; 2] {
+        place.map(|at| at / self.step(1))
+    }
+
     /// How far samples are apart that are so many cells of level 0 apart.
     pub(super) fn step(&self, cells: i32) -> f64 {
         f64::from(cells) * self.cell

@@ -211,12 +211,11 @@ impl Map {
         log.standing("map/laid", "", &reach).map(Some)
     }
 
-    /// The square that the eye looks at, as the frame on the terrain: west, south, east and
-    /// north in cells of level 0; nothing where that is none.
-    pub(super) fn looked_at(&self, sides: Option<[f64; 4]>) -> Option<Boxes2D> {
+    /// The square that the eye looks at, as the frame on the terrain: its south-west and
+    /// north-east corner in cells of level 0; nothing where that is none.
+    pub(super) fn looked_at(&self, corners: Option<[[f64; 2]; 2]>) -> Option<Boxes2D> {
         let frame = self.frame?;
-        let squares =
-            sides.map(|[west, south, east, north]| frame.square([west, south], [east, north]));
+        let squares = corners.map(|[low, high]| frame.square(low, high));
         let (middles, halves): (Vec<_>, Vec<_>) = squares.into_iter().unzip();
         Some(
             Boxes2D::from_centers_and_half_sizes(middles, halves)

@@ -1,8 +1,8 @@
-//! What happened, put together: half a second of an entity as one entry.
+//! What happened, put together: some time of an entity as one entry.
 //!
 //! The viewer takes about a millisecond for each entry that it is told, however small. A page
-//! that comes late, and one that is drawn by software, are told the same rows in a tenth of
-//! the entries.
+//! that comes late, and one that is drawn by software, are told the same rows in far fewer
+//! entries.
 
 use std::collections::BTreeMap;
 
@@ -10,16 +10,34 @@ use anyhow::{Context as _, Result};
 use re_chunk::{Chunk, TimelineName};
 use re_log_types::{AbsoluteTimeRange, EntityPath, LogMsg, StoreId};
 
+use super::{Blob, encoded};
 use crate::drawing::TIMELINE;
 
-/// What is put together spans so much of the device's time, ns.
-const SPAN_NS: u64 = 500_000_000;
-/// Or so many entries, where the device's time stands still.
+/// So many entries are put together at most: the device's time may stand still.
 const MOST: usize = 1000;
 
-/// Entries that wait for others.
-#[derive(Default)]
+/// A piece of what happened.
+pub(super) struct Piece {
+    pub(super) blob: Blob,
+    entries: Vec<LogMsg>,
+}
+
+impl Piece {
+    /// None of nothing.
+    pub(super) fn of(entries: Vec<LogMsg>) -> Result<Option<Self>> {
+        if entries.is_empty() {
+            return Ok(None);
+        }
+        let blob = encoded(&entries)?;
+        Ok(Some(Self { blob, entries }))
+    }
+}
+
+/// Entries that wait for others, and the pieces that they came in.
 pub(super) struct Gather {
+    /// What is put together spans so much of the device's time, ns.
+    least_ns: u64,
+    pieces: Vec<Blob>,
     waiting: BTreeMap<EntityPath, Vec<(StoreId, Chunk)>>,
     count: usize,
     /// From the first to the last of them.
@@ -27,12 +45,26 @@ pub(super) struct Gather {
 }
 
 impl Gather {
-    /// Takes entries that happened; gives those that are put together now.
-    pub(super) fn take<'m>(
-        &mut self,
-        entries: impl IntoIterator<Item = &'m LogMsg>,
-    ) -> Result<Vec<LogMsg>> {
-        for entry in entries {
+    /// Puts together what spans so much of the device's time, s.
+    pub(super) fn new(span_s: u32) -> Self {
+        Self {
+            least_ns: u64::from(span_s) * 1_000_000_000,
+            pieces: Vec::new(),
+            waiting: BTreeMap::new(),
+            count: 0,
+            span: None,
+        }
+    }
+
+    /// What came since it last gave anything.
+    pub(super) fn pieces(&self) -> &[Blob] {
+        &self.pieces
+    }
+
+    /// Takes a piece of what happened; gives what is put together now.
+    pub(super) fn take(&mut self, piece: &Piece) -> Result<Option<Piece>> {
+        self.pieces.push(Blob::clone(&piece.blob));
+        for entry in &piece.entries {
             // What happened is nothing but rows.
             let LogMsg::ArrowMsg(store, rows) = entry else {
                 continue;
@@ -49,22 +81,28 @@ impl Gather {
             of_entity.or_default().push((store.clone(), chunk));
             self.count += 1;
         }
-        let is_long = self.span.is_some_and(|span| span.abs_length() >= SPAN_NS);
+        let is_long = self
+            .span
+            .is_some_and(|span| span.abs_length() >= self.least_ns);
         match is_long || self.count >= MOST {
             true => self.rest(),
-            false => Ok(Vec::new()),
+            false => Ok(None),
         }
     }
 
     /// Gives all that waits.
-    pub(super) fn rest(&mut self) -> Result<Vec<LogMsg>> {
-        let Self { waiting, .. } = std::mem::take(self);
+    pub(super) fn rest(&mut self) -> Result<Option<Piece>> {
+        (self.count, self.span) = (0, None);
+        self.pieces.clear();
         let mut together = Vec::new();
-        for (store, chunk) in waiting.into_values().flat_map(joined) {
+        for (store, chunk) in std::mem::take(&mut self.waiting)
+            .into_values()
+            .flat_map(joined)
+        {
             let rows = chunk.to_arrow_msg().context("entries put together")?;
             together.push(LogMsg::ArrowMsg(store, rows));
         }
-        Ok(together)
+        Piece::of(together)
     }
 }
 

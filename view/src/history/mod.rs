@@ -20,11 +20,16 @@ use re_log_encoding::{Encoder, EncodingOptions};
 use re_log_types::LogMsg;
 
 use crate::drawing::Entry;
-use gather::Gather;
+use gather::{Gather, Piece};
 pub use page::{Next, Page, Pieces};
 
 /// A piece of a page's stream: a whole little `.rrd`.
 pub type Blob = Arc<Vec<u8>>;
+
+/// What happened is told to pages that take it gathered so much at a time, s.
+const SHORT_S: u32 = 1;
+/// And to pages that missed it, s.
+const LONG_S: u32 = 10;
 
 /// Version and options of everything that is encoded here.
 #[must_use]
@@ -41,15 +46,15 @@ pub struct History {
     cut: AtomicU64,
 }
 
-#[derive(Default)]
 struct State {
     standing: BTreeMap<String, Blob>,
-    /// What happened, put together.
+    /// What happened, [`LONG_S`] at a time.
     happened: VecDeque<Blob>,
     happened_bytes: usize,
-    /// What happened since and waits to be put together, and the pieces that it came in.
-    waiting: Gather,
-    latest: Vec<Blob>,
+    /// What happened since, [`SHORT_S`] at a time.
+    recent: Gather,
+    /// What happened since, as it came.
+    latest: Gather,
     is_bounded: bool,
     ended: Option<End>,
     pages: Vec<Arc<Page>>,
@@ -92,7 +97,17 @@ impl History {
     pub fn new(limit: usize) -> Arc<Self> {
         Arc::new(Self {
             limit,
-            state: Mutex::default(),
+            state: Mutex::new(State {
+                standing: BTreeMap::new(),
+                happened: VecDeque::new(),
+                happened_bytes: 0,
+                recent: Gather::new(LONG_S),
+                latest: Gather::new(SHORT_S),
+                is_bounded: false,
+                ended: None,
+                pages: Vec::new(),
+                came: 0,
+            }),
             cut: AtomicU64::new(0),
         })
     }
@@ -104,8 +119,8 @@ impl History {
         state.standing.clear();
         state.happened.clear();
         state.happened_bytes = 0;
-        state.waiting = Gather::default();
-        state.latest.clear();
+        state.recent = Gather::new(LONG_S);
+        state.latest = Gather::new(SHORT_S);
         state.is_bounded = is_live;
         for page in &state.pages {
             page.cut();
@@ -119,7 +134,7 @@ impl History {
     pub fn put(&self, entries: Vec<Entry>) -> Result<()> {
         let (standing, happened): (Vec<_>, Vec<_>) =
             entries.into_iter().partition(|entry| entry.key.is_some());
-        let happened: Vec<_> = happened.into_iter().map(|entry| entry.message).collect();
+        let happened = happened.into_iter().map(|entry| entry.message).collect();
         let mut state = locked(&self.state);
         for Entry { key, message } in standing {
             let blob = encoded([&message])?;
@@ -128,12 +143,10 @@ impl History {
             }
             state.standing.extend(key.map(|key| (key, blob)));
         }
-        if !happened.is_empty() {
-            let blob = encoded(&happened)?;
-            state.tell(Pieces::Fine, &blob);
-            state.latest.push(blob);
-            let together = state.waiting.take(&happened)?;
-            state.keep(&together, self.limit)?;
+        if let Some(piece) = Piece::of(happened)? {
+            state.tell(Pieces::Fine, &piece.blob);
+            let together = state.latest.take(&piece)?;
+            state.gather(together, self.limit)?;
         }
         let before = state.pages.len();
         state.pages.retain(|page| !page.is_cut());
@@ -148,8 +161,8 @@ impl History {
     /// An entry that cannot be encoded.
     pub fn end(&self, how: End) -> Result<()> {
         let mut state = locked(&self.state);
-        let rest = state.waiting.rest()?;
-        state.keep(&rest, self.limit)?;
+        let rest = state.latest.rest()?;
+        state.gather(rest, self.limit)?;
         state.ended = Some(how);
         for page in &state.pages {
             page.end(how);
@@ -163,8 +176,11 @@ impl History {
         let mut state = locked(&self.state);
         let standing = state.standing.iter();
         let standing = standing.map(|(key, blob)| (Some(key.clone()), Arc::clone(blob)));
-        let latest = state.latest.iter().filter(|_| pieces == Pieces::Fine);
-        let happened = state.happened.iter().chain(latest);
+        let latest = state.latest.pieces().iter();
+        let latest = latest.filter(|_| pieces == Pieces::Fine);
+        let happened = { state.happened.iter() }
+            .chain(state.recent.pieces())
+            .chain(latest);
         let happened = happened.map(|blob| (None, Arc::clone(blob)));
         let page = Page::new(pieces, standing.chain(happened), state.ended);
         state.came += 1;
@@ -200,14 +216,21 @@ impl State {
         }
     }
 
-    /// Keeps what happened, put together, and forgets the oldest.
-    fn keep(&mut self, together: &[LogMsg], limit: usize) -> Result<()> {
-        if together.is_empty() {
-            return Ok(());
+    /// Tells what was put together, and puts it together with more.
+    fn gather(&mut self, together: Option<Piece>, limit: usize) -> Result<()> {
+        if let Some(piece) = together {
+            self.tell(Pieces::Gathered, &piece.blob);
+            let together = self.recent.take(&piece)?;
+            self.keep(together, limit);
         }
-        let blob = encoded(together)?;
-        self.tell(Pieces::Gathered, &blob);
-        self.latest.clear();
+        Ok(())
+    }
+
+    /// Keeps what happened, and forgets the oldest.
+    fn keep(&mut self, together: Option<Piece>, limit: usize) {
+        let Some(Piece { blob, .. }) = together else {
+            return;
+        };
         self.happened_bytes += blob.len();
         self.happened.push_back(blob);
         while self.is_bounded && self.happened_bytes > limit {
@@ -216,7 +239,6 @@ impl State {
             };
             self.happened_bytes -= oldest.len();
         }
-        Ok(())
     }
 }
 

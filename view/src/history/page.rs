@@ -16,7 +16,7 @@ pub(super) const QUEUE_BYTES: usize = 32 << 20;
 pub enum Pieces {
     /// As it happens.
     Fine,
-    /// Half a second at a time: for a page that is drawn by software, a few pictures a second,
+    /// A second at a time: for a page that is drawn by software, a few pictures a second,
     /// and takes no more than a few dozen entries with each.
     Gathered,
 }

@@ -14,7 +14,7 @@ use crate::history::{End, Next, Page, Pieces};
 const SIGN_EVERY: Duration = Duration::from_secs(2);
 const SIGN: u32 = u32::MAX;
 /// How long what comes is gathered, where the page is told what was gathered.
-const GATHERED: Duration = Duration::from_millis(500);
+const GATHERED: Duration = Duration::from_secs(1);
 /// Says that `hapterra` is gone and did not say why: another length that no piece has.
 const LOST: u32 = u32::MAX - 1;
 
