@@ -9,6 +9,7 @@
 //! - [`link`]: the terrain served to a device, tile by tile;
 //! - [`serving`]: that session from its first line to an end that is known;
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
+//! - [`stability`]: how stiff a surface may be before a hand on that Phantom feels the ticks;
 //! - [`replay`]: a trajectory felt in lock-step, and recordings;
 //! - [`place`]: where a terrain lies in front of the arm, and how large;
 //! - [`steering`]: another view of the terrain while it is touched;
@@ -39,6 +40,7 @@ pub mod place;
 pub mod raster;
 pub mod replay;
 pub mod serving;
+pub mod stability;
 pub mod steering;
 pub mod synth;
 pub mod telemetry;

@@ -25,6 +25,7 @@ mod report;
 pub mod run;
 mod session_summary;
 mod sparing;
+pub mod stability;
 pub mod status;
 pub mod synth;
 mod terminal;
@@ -75,6 +76,8 @@ pub enum Command {
     Calibrate(calibrate::Args),
     /// Write an image to a board, through its debug probe or over USB
     Flash(flash::Args),
+    /// Try on a virtual arm how stiff a surface may be before the hand feels the ticks
+    Stability(stability::Args),
     /// Measure run time against error, beside other ways to render a height field
     Bench(bench::Args),
 }
@@ -96,6 +99,7 @@ pub fn main() -> ExitCode {
         Command::Bringup(args) => bringup::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Flash(args) => flash::run(&args),
+        Command::Stability(args) => stability::run(&args),
         Command::Bench(args) => bench::run(&args),
     };
     log.end();

@@ -1,0 +1,99 @@
+//! `hapterra stability`: how stiff a surface may be before the hand feels the ticks.
+
+use std::path::PathBuf;
+
+use clap::ValueHint;
+use hapterra_core::rate::TickRate;
+
+use super::failure::{Failure, OrHint as _};
+use super::report;
+use super::terminal::{interrupt, progress};
+use crate::output::{Output, OutputError};
+use crate::stability::map::{Map, Plan};
+use crate::stability::picture;
+
+const OTHER_FILE: &str = "name another file with --output";
+const OTHER_PICTURE: &str = "name another file with --picture";
+
+/// Arguments of `hapterra stability`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Tick rates, Hz: whole kilohertz from 1000 to 10000
+    #[arg(long, value_name = "HZ,…", value_delimiter = ',', default_value = "1000,2000,4000,10000", value_parser = parse_rate)]
+    pub rate: Vec<TickRate>,
+
+    /// Stiffnesses, N/mm
+    #[arg(long, value_name = "N_PER_MM,…", value_delimiter = ',', default_value = "0.1,0.2,0.5,1,1.5,2,2.5,3,4,6,8,12,20", value_parser = parse_stiffness)]
+    pub stiffness: Vec<f64>,
+
+    /// File for every trial, as CSV
+    #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub output: Option<PathBuf>,
+
+    /// File for a picture of it, as PNG
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub picture: Option<PathBuf>,
+}
+
+/// Tries all of it and says the limits.
+///
+/// # Errors
+/// When it is interrupted, or a file cannot be written.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let mut plan = Plan {
+        rates: args.rate.clone(),
+        stiffness_n_per_mm: args.stiffness.clone(),
+    };
+    plan.rates.sort_by_key(|rate| rate.hz());
+    plan.rates.dedup();
+    plan.stiffness_n_per_mm.sort_by(f64::total_cmp);
+    plan.stiffness_n_per_mm.dedup();
+    // A place that cannot be written to is said before the trials.
+    if let Some(path) = &args.picture {
+        drop(Output::create(path).or_hint(OTHER_PICTURE)?);
+    }
+    let csv = args
+        .output
+        .as_deref()
+        .map(Output::create)
+        .transpose()
+        .or_hint(OTHER_FILE)?;
+    let progress = progress::bar(Some(0), "{bar:30} {pos}/{len} trials, {eta} left");
+    interrupt::listen();
+    let map = plan.map(&|of| {
+        progress.set_length(of as u64);
+        progress.inc(1);
+        !interrupt::requested()
+    });
+    progress.finish_and_clear();
+    let map = map.map_err(|error| Failure::new(error.to_string()))?;
+    let map = map.ok_or_else(|| Failure::new("interrupted: no limits are said"))?;
+    if let Some(csv) = csv {
+        write(csv, &map).or_hint(OTHER_FILE)?;
+    }
+    if let Some(path) = &args.picture {
+        let drawn = picture::draw(&map).and_then(|canvas| canvas.save(path));
+        drawn.or_hint(OTHER_PICTURE)?;
+    }
+    report::put(&map.summary())
+}
+
+fn write(mut csv: Output, map: &Map) -> Result<(), OutputError> {
+    let written = map.write_csv(&mut csv);
+    written.map_err(|source| OutputError {
+        path: csv.path().to_owned(),
+        source,
+    })?;
+    csv.finish()
+}
+
+fn parse_rate(text: &str) -> Result<TickRate, String> {
+    let rate = text.trim().parse().ok().and_then(TickRate::new);
+    rate.ok_or_else(|| "expected whole kilohertz from 1000 to 10000 Hz".to_owned())
+}
+
+fn parse_stiffness(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok();
+    let number = number.filter(|number| (0.001..=100.0).contains(number));
+    number.ok_or_else(|| "expected 0.001 to 100 N/mm".to_owned())
+}

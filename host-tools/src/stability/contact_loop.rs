@@ -1,0 +1,123 @@
+//! The boards' tick around a virtual arm over a level plane.
+
+use hapterra_core::Vec3;
+use hapterra_core::contact::{Friction, Rule};
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::phantom::{Calibration, Mechanism};
+use hapterra_core::rate::TickRate;
+use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::terrain::{FieldSize, Tile, TileDemand, TileKey, TileRequester};
+use hapterra_core::tick::{Command, Haptics};
+
+use crate::phantom::{HeldPhantom, Placement};
+
+/// Tiles to a side of the loop's window, and cells of the plane, of 4 mm.
+const WINDOW: usize = 4;
+const CELLS: i32 = 64;
+const CELL_MM: f64 = 4.0;
+/// The plane's height, and the place of the arm's home pose: in its middle, close above it.
+pub(super) const PLANE_MM: f64 = 20.0;
+pub(super) const HOME: Placement = Placement {
+    home_mm: [128.0, 128.0, 24.0],
+};
+/// Largest force, N: that of every other scene.
+const MOST_N: f32 = ForceLaw::PREMIUM.max_force_n;
+
+/// What one tick was.
+pub(super) struct Step {
+    /// What the tick reported.
+    pub(super) sample: Sample,
+    /// True height of the tip after it, mm.
+    pub(super) height_mm: f64,
+    /// And by how much it had risen since the tick before, mm.
+    pub(super) rise_mm: f64,
+}
+
+/// Runs a held arm for some time from the moment that its script begins, and shows every tick.
+/// Ends early where `look` says so.
+pub(super) fn run(
+    rate: TickRate,
+    stiffness_n_per_mm: f64,
+    arm: HeldPhantom,
+    look: &mut dyn FnMut(f64, &Step) -> bool,
+) {
+    let mut tiles = vec![Tile::VACANT; WINDOW * WINDOW + 1];
+    let mut spare: Vec<_> = tiles.iter_mut().collect();
+    let slots = std::array::from_fn(|_| {
+        std::array::from_fn(|_| spare.pop().unwrap_or_else(|| unreachable!("a tile a slot")))
+    });
+    let mut haptics = Haptics::<WINDOW>::new(slots, rate, None);
+    if let Ok(mechanism) = Mechanism::new(&Calibration::PREMIUM_1_5) {
+        haptics.configure(mechanism);
+    }
+    let scene = scene(stiffness_n_per_mm);
+    for command in [Command::Scene(scene), Command::Zero([0; 3]), Command::Arm] {
+        let _ = haptics.accept(command);
+    }
+    let mut requester = TileRequester::<WINDOW>::new();
+    requester.reset(scene.level, scene.size);
+
+    let mut arm = arm.arming();
+    let tick_s = 1.0 / f64::from(rate.hz());
+    let ticks = ((HeldPhantom::ARMED_S + arm.script_s()) / tick_s) as u32;
+    let mut before = height_mm(&arm);
+    for tick in 0..ticks {
+        let outcome = haptics.tick(&arm.sense(), true);
+        let sample = outcome.sample;
+        let demand = TileDemand {
+            missing_tile: sample.missing_tile,
+            proxy: sample.proxy.column(),
+            hip: sample.hip.column(),
+            velocity: [0.0; 2],
+        };
+        while let Some(key) = requester.next_request(sample.tick, &demand) {
+            let Some(tile) = spare.pop() else { break };
+            fill(tile, key, scene.size);
+            requester.received(key);
+            spare.extend(haptics.accept(Command::Tile(tile)));
+        }
+        arm.step(outcome.drive.currents_a.to_array().map(f64::from), tick_s);
+        let height_mm = height_mm(&arm);
+        let step = Step {
+            sample,
+            height_mm,
+            rise_mm: height_mm - before,
+        };
+        before = height_mm;
+        if !look(f64::from(tick) * tick_s - HeldPhantom::ARMED_S, &step) {
+            return;
+        }
+    }
+}
+
+fn scene(stiffness_n_per_mm: f64) -> Scene {
+    let [east, north, up] = HOME.home_mm.map(|mm| mm / CELL_MM);
+    Scene {
+        epoch: 1,
+        level: 0,
+        size: FieldSize::new(CELLS, CELLS),
+        top: 64,
+        cell_mm: CELL_MM as f32,
+        home: GridPoint::new([east as i32, north as i32, up as i32], Vec3::ZERO),
+        law: ForceLaw {
+            stiffness_n_per_mm: stiffness_n_per_mm as f32,
+            max_force_n: MOST_N,
+            friction: Friction::NONE,
+        },
+        rule: Rule::Swept,
+        source: Source::Encoders,
+        hold_clock: false,
+    }
+}
+
+fn fill(tile: &mut Tile, key: TileKey, size: FieldSize) {
+    // A level plane fits into every tile.
+    let _ = tile.fill_from(key, 0, size, |_, _| (PLANE_MM / CELL_MM) as f32);
+}
+
+/// True height of the tip, mm over the terrain's datum.
+fn height_mm(arm: &HeldPhantom) -> f64 {
+    let plant = arm.plant();
+    HOME.to_terrain_mm(plant.model(), plant.tip_m())[2]
+}

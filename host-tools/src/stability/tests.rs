@@ -1,0 +1,91 @@
+//! What is known of a spring that is felt in ticks, beside what the trials say.
+
+use hapterra_core::rate::TickRate;
+
+use super::bounds::AtTip;
+use super::grasp::Grasp;
+use super::map::Plan;
+use super::trial::{Press, Setting, Trial, Verdict};
+use crate::phantom::PhantomModel;
+
+fn tried(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp) -> Trial {
+    let setting = Setting {
+        rate: TickRate::new(hz).expect("a rate"),
+        stiffness_n_per_mm,
+        grasp,
+    };
+    setting.tried().expect("in reach")
+}
+
+fn verdict(trial: &Trial) -> Verdict {
+    let arm = AtTip::new(&PhantomModel::premium_1_5());
+    trial.press.verdict(arm.count_mm)
+}
+
+#[test]
+fn the_arm_at_its_tip_is_what_its_data_say() {
+    let arm = AtTip::new(&PhantomModel::premium_1_5());
+    // The upper link of 209.55 mm lifts the tip, geared 11.2 to 1 to 4,096 counts a turn.
+    let (lever_m, counts) = (0.209_55, 11.2 * 4096.0);
+    let count_mm = 1e3 * lever_m * std::f64::consts::TAU / counts;
+    assert!((arm.count_mm - count_mm).abs() < 1e-9, "{arm:?}");
+    assert!((arm.coulomb_n - 0.01 / lever_m).abs() < 1e-9, "{arm:?}");
+    let damping = 0.0005 / (lever_m * lever_m);
+    assert!((arm.damping_ns_per_m - damping).abs() < 1e-9, "{arm:?}");
+    let bound = 2.0 * (0.01 / lever_m) / count_mm;
+    assert!((arm.by_friction() - bound).abs() < 1e-9);
+    let two_khz = TickRate::new(2000).expect("a rate");
+    assert!((arm.by_damping(two_khz) - 1e-3 * 2.0 * damping / 0.0005).abs() < 1e-9);
+}
+
+#[test]
+fn a_soft_surface_is_still_in_every_hand_and_a_stiff_one_shakes_a_limp_one_until_it_ticks_faster() {
+    for grasp in Grasp::ALL {
+        let soft = tried(1000, 0.5, grasp);
+        assert_eq!(verdict(&soft), Verdict::Still, "{soft:?}");
+    }
+    let shaken = tried(1000, 6.0, Grasp::Limp);
+    assert_eq!(verdict(&shaken), Verdict::Unstable, "{shaken:?}");
+    let Press::Held { swings_hz, .. } = shaken.press else {
+        panic!("{shaken:?}")
+    };
+    assert!((2.0..200.0).contains(&swings_hz), "{swings_hz}");
+    let faster = tried(4000, 6.0, Grasp::Limp);
+    assert_eq!(verdict(&faster), Verdict::Still, "{faster:?}");
+}
+
+#[test]
+fn what_a_tap_gives_falls_as_the_ticks_get_shorter() {
+    // The force of a tick is that of its beginning: too little on the way in, too much on the
+    // way out, both in proportion to the tick.
+    let given = |hz| tried(hz, 1.0, Grasp::Normal).given_mj[1].expect("it is held");
+    let (slow, fast) = (given(1000), given(4000));
+    assert!(slow > 0.1, "{slow} mJ");
+    assert!((3.4..4.6).contains(&(slow / fast)), "{slow} and {fast} mJ");
+}
+
+#[test]
+fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
+    let plan = Plan {
+        rates: vec![TickRate::DEFAULT],
+        stiffness_n_per_mm: vec![0.5, 6.0],
+    };
+    let map = plan.map(&|of| of == 6).expect("in reach").expect("whole");
+    let mut csv = Vec::new();
+    map.write_csv(&mut csv).expect("written");
+    let csv = String::from_utf8(csv).expect("text");
+    let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 1 + 6);
+    assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{csv}");
+    let begins: Vec<_> = rows[1..].iter().map(|row| row[..3].join(",")).collect();
+    let wanted = Grasp::ALL
+        .map(|grasp| ["0.5", "6"].map(|stiffness| format!("1000,{},{stiffness}", grasp.name())));
+    assert_eq!(begins, wanted.concat());
+    let limit = |grasp| map.up_to(TickRate::DEFAULT, grasp, Verdict::Hum);
+    assert_eq!(
+        (limit(Grasp::Limp), limit(Grasp::Firm)),
+        (Some(0.5), Some(6.0))
+    );
+    let none = plan.map(&|_| false).expect("in reach");
+    assert!(none.is_none(), "interrupted");
+}

@@ -1,0 +1,189 @@
+//! One stiffness in one hand at one tick rate: a press, and taps.
+
+use hapterra_core::contact::ContactState;
+use hapterra_core::guard::Fault;
+use hapterra_core::rate::TickRate;
+
+use super::contact_loop::{self, HOME, PLANE_MM};
+use super::grasp::Grasp;
+use crate::phantom::{HeldPhantom, OutOfReach, PhantomModel, Script, Touch};
+
+/// The press, N, and how long it is held; what is looked at is its last second.
+const PRESS_N: f64 = 1.0;
+const HELD_S: f64 = 2.5;
+const LOOKED_AT_S: f64 = 1.0;
+/// The hand begins so far above the surface, mm.
+const ABOVE_MM: f64 = 30.0;
+/// A tap aims so far below it, mm.
+const BELOW_MM: f64 = 25.0;
+/// Taps of each speed.
+const TAPS: usize = 3;
+/// The tip swings by more than this, mm: no hand holds it.
+const UNSTABLE_MM: f64 = 1.0;
+
+/// Speeds of the tapping hand, m/s.
+pub const TAP_SPEEDS_M_S: [f64; 3] = [0.1, 0.2, 0.5];
+
+/// What is tried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// How often the loop ticks.
+    pub rate: TickRate,
+    /// The surface's stiffness, N/mm.
+    pub stiffness_n_per_mm: f64,
+    /// Who holds the tip.
+    pub grasp: Grasp,
+}
+
+/// What a press did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Press {
+    /// The tip swung by so much from its lowest to its highest place in the last second, mm,
+    /// and so often a second.
+    Held {
+        /// From lowest to highest, mm.
+        swing_mm: f64,
+        /// Swings a second.
+        swings_hz: f64,
+    },
+    /// The guard switched the force off.
+    Tripped(Fault),
+}
+
+/// What a trial showed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trial {
+    /// What was tried.
+    pub setting: Setting,
+    /// The press.
+    pub press: Press,
+    /// What the surface gave to the hand in one tap at most, mJ, for each of
+    /// [`TAP_SPEEDS_M_S`]; none where the guard switched the force off. A passive surface
+    /// gives nothing.
+    pub given_mj: [Option<f64>; 3],
+}
+
+/// What the hand feels of a press.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Verdict {
+    /// The tip swings by no more than an encoder count.
+    Still,
+    /// It swings: a hum.
+    Hum,
+    /// It swings by more than a millimetre, or the guard has switched the force off.
+    Unstable,
+}
+
+impl Verdict {
+    /// Its name, in tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Still => "still",
+            Self::Hum => "hum",
+            Self::Unstable => "unstable",
+        }
+    }
+}
+
+impl Press {
+    /// What the hand feels, where an encoder count is so much of the tip's way, mm.
+    #[must_use]
+    pub fn verdict(&self, count_mm: f64) -> Verdict {
+        match *self {
+            Self::Held { swing_mm, .. } if swing_mm <= count_mm => Verdict::Still,
+            Self::Held { swing_mm, .. } if swing_mm <= UNSTABLE_MM => Verdict::Hum,
+            Self::Held { .. } | Self::Tripped(_) => Verdict::Unstable,
+        }
+    }
+}
+
+impl Setting {
+    /// Presses and taps.
+    ///
+    /// # Errors
+    /// [`OutOfReach`] where the hand would have to leave the arm's reach.
+    pub fn tried(self) -> Result<Trial, OutOfReach> {
+        let press = self.press()?;
+        let mut given_mj = [None; 3];
+        for (given, speed_m_s) in given_mj.iter_mut().zip(TAP_SPEEDS_M_S) {
+            *given = self.taps(speed_m_s)?;
+        }
+        Ok(Trial {
+            setting: self,
+            press,
+            given_mj,
+        })
+    }
+
+    fn press(self) -> Result<Press, OutOfReach> {
+        let (hand, wall) = (self.grasp.hand(), self.stiffness_n_per_mm);
+        let [east, north, _] = HOME.home_mm;
+        let above = Touch::start(&|_, _| Some(PLANE_MM), &hand, wall, [east, north], 10.0);
+        let arm = self.arm(above.press(PRESS_N, HELD_S).finish())?;
+        let from_s = arm.script_s() - LOOKED_AT_S;
+        let (mut heights, mut fault) = (Vec::new(), None);
+        self.run(arm, &mut |t_s, step| {
+            fault = step.sample.fault;
+            if t_s >= from_s {
+                heights.push(step.height_mm);
+            }
+            fault.is_none()
+        });
+        Ok(match fault {
+            Some(fault) => Press::Tripped(fault),
+            None => swings(&heights),
+        })
+    }
+
+    /// What the surface gave in one tap at most, mJ.
+    fn taps(self, speed_m_s: f64) -> Result<Option<f64>, OutOfReach> {
+        let [east, north, _] = HOME.home_mm;
+        let (above, below) = (PLANE_MM + ABOVE_MM, PLANE_MM - BELOW_MM);
+        let mut script = Script::start([east, north, above]);
+        for _ in 0..TAPS {
+            for up_mm in [below, above] {
+                script = script.go([east, north, up_mm], 1e3 * speed_m_s);
+            }
+        }
+        let arm = self.arm(script.wait(0.2))?;
+        let (mut given_mj, mut most_mj, mut is_tripped) = (0.0, f64::NEG_INFINITY, false);
+        self.run(arm, &mut |_, step| {
+            // The force of a tick is there until the next one.
+            given_mj += f64::from(step.sample.force_n.z) * step.rise_mm;
+            if step.sample.state == ContactState::Free {
+                most_mj = if given_mj == 0.0 {
+                    most_mj
+                } else {
+                    given_mj.max(most_mj)
+                };
+                given_mj = 0.0;
+            }
+            is_tripped = step.sample.fault.is_some();
+            !is_tripped
+        });
+        Ok((!is_tripped).then_some(most_mj.max(given_mj)))
+    }
+
+    fn arm(self, script: Script) -> Result<HeldPhantom, OutOfReach> {
+        HeldPhantom::new(PhantomModel::premium_1_5(), self.grasp.hand(), HOME, script)
+    }
+
+    fn run(self, arm: HeldPhantom, look: &mut dyn FnMut(f64, &contact_loop::Step) -> bool) {
+        contact_loop::run(self.rate, self.stiffness_n_per_mm, arm, look);
+    }
+}
+
+/// How far and how often heights of a second go up and down.
+fn swings(heights_mm: &[f64]) -> Press {
+    let low = heights_mm.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = heights_mm.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let middle = 0.5 * (low + high);
+    // A swing goes through the middle twice.
+    let sides = heights_mm.iter().map(|height| *height > middle);
+    let crossings = sides.clone().zip(sides.skip(1)).filter(|(a, b)| a != b);
+    Press::Held {
+        swing_mm: high - low,
+        swings_hz: 0.5 * crossings.count() as f64 / LOOKED_AT_S,
+    }
+}

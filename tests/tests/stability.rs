@@ -1,0 +1,61 @@
+//! `hapterra stability` as a command.
+
+use std::process::{Command, Output};
+
+use hapterra_tests::hapterra_binary;
+
+fn stability(words: &[&str]) -> Output {
+    let mut command = Command::new(hapterra_binary());
+    let output = command.arg("stability").args(words).output();
+    output.expect("it runs")
+}
+
+fn told(output: &Output) -> String {
+    let both = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
+    String::from_utf8_lossy(&both).into_owned()
+}
+
+#[test]
+fn it_says_limits_and_writes_every_trial_and_a_picture() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [csv, png] = ["trials.csv", "limits.png"].map(|name| folder.path().join(name));
+    let [to_csv, to_png] = [&csv, &png].map(|path| path.to_str().expect("text"));
+    let words = ["--rate", "2000,1000", "--stiffness", "0.5", "-o", to_csv];
+    let output = stability(&[&words[..], &["--picture", to_png]].concat());
+    assert!(output.status.success(), "{}", told(&output));
+    for part in ["  1000 Hz  limp 0.5 / 0.5", "  2000 Hz", "Colgate"] {
+        assert!(told(&output).contains(part), "{}", told(&output));
+    }
+    let rows = std::fs::read_to_string(csv).expect("a table");
+    assert_eq!(rows.lines().count(), 1 + 2 * 3, "{rows}");
+    assert!(
+        rows.lines()
+            .nth(1)
+            .is_some_and(|row| row.starts_with("1000,limp,0.5,still,"))
+    );
+    let picture = std::fs::read(png).expect("a picture");
+    assert!(picture.starts_with(b"\x89PNG") && picture.len() > 10_000);
+}
+
+#[test]
+fn what_cannot_be_tried_or_written_is_said_at_once() {
+    for (words, code, part) in [
+        (["--rate", "1500"], 2, "whole kilohertz"),
+        (["--stiffness", "0"], 2, "N/mm"),
+        (["--stiffness", "nan"], 2, "N/mm"),
+        (
+            ["-o", "/nowhere/at/all.csv"],
+            1,
+            "cannot write /nowhere/at/all.csv",
+        ),
+        (
+            ["--picture", "/nowhere/at/all.png"],
+            1,
+            "/nowhere/at/all.png",
+        ),
+    ] {
+        let output = stability(&words);
+        assert_eq!(output.status.code(), Some(code), "{}", told(&output));
+        assert!(told(&output).contains(part), "{}", told(&output));
+    }
+}
