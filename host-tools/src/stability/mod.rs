@@ -3,7 +3,7 @@
 //! grasp.
 //!
 //! - [`grasp`]: how the hand holds the tip;
-//! - [`contact_loop`]: the tick and the arm, step by step;
+//! - `contact_loop`: the tick and the arm, step by step;
 //! - [`trial`]: what a press and taps show: hum, and energy that the surface gave;
 //! - [`bounds`]: stiffness that theory says is passive;
 //! - [`map`]: many trials, and the table of them;

@@ -1,7 +1,7 @@
 //! What a page that comes now has to be told, and the queues of the pages that are there.
 //!
 //! What stands still (terrain, tiles, layout) is kept once, by key: a later entry takes
-//! the place of an earlier one. What happens in time is [put together](gather) and kept up to
+//! the place of an earlier one. What happens in time is put together (`gather`) and kept up to
 //! so many bytes, the oldest forgotten first. Nothing else grows, however long a session lasts.
 //!
 //! A page whose queue is full is cut off, so that neither this program nor another page
