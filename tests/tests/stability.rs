@@ -31,7 +31,7 @@ fn it_says_limits_and_writes_every_trial_and_a_picture() {
     assert!(
         rows.lines()
             .nth(1)
-            .is_some_and(|row| row.starts_with("1000,limp,0.5,still,"))
+            .is_some_and(|row| row.starts_with("1000,limp,0.5,80,still,"))
     );
     let picture = std::fs::read(png).expect("a picture");
     assert!(picture.starts_with(b"\x89PNG") && picture.len() > 10_000);
@@ -39,10 +39,17 @@ fn it_says_limits_and_writes_every_trial_and_a_picture() {
 
 #[test]
 fn what_cannot_be_tried_or_written_is_said_at_once() {
+    let twice = stability(&["-o", "both", "--picture", "both"]);
+    assert!(
+        told(&twice).contains("cannot be one file"),
+        "{}",
+        told(&twice)
+    );
     for (words, code, part) in [
         (["--rate", "1500"], 2, "whole kilohertz"),
         (["--stiffness", "0"], 2, "N/mm"),
         (["--stiffness", "nan"], 2, "N/mm"),
+        (["--delay-us", "20000"], 2, "10000"),
         (
             ["-o", "/nowhere/at/all.csv"],
             1,

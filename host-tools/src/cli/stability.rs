@@ -7,7 +7,7 @@ use hapterra_core::rate::TickRate;
 
 use super::failure::{Failure, OrHint as _};
 use super::report;
-use super::terminal::{interrupt, progress};
+use super::terminal::{interrupt, left_behind, progress};
 use crate::output::{Output, OutputError};
 use crate::stability::map::{Map, Plan};
 use crate::stability::picture;
@@ -26,6 +26,11 @@ pub struct Args {
     #[arg(long, value_name = "N_PER_MM,…", value_delimiter = ',', default_value = "0.1,0.2,0.5,1,1.5,2,2.5,3,4,6,8,12,20", value_parser = parse_stiffness)]
     pub stiffness: Vec<f64>,
 
+    /// Microseconds from reading the encoders to the amplifiers; 80 is what a nucleo-g474re
+    /// may take, and amplifiers that are commanded by duty cycles take up to 1000 more
+    #[arg(long, value_name = "US", default_value_t = 80, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    pub delay_us: u32,
+
     /// File for every trial, as CSV
     #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub output: Option<PathBuf>,
@@ -43,11 +48,20 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut plan = Plan {
         rates: args.rate.clone(),
         stiffness_n_per_mm: args.stiffness.clone(),
+        delay_s: 1e-6 * f64::from(args.delay_us),
     };
     plan.rates.sort_by_key(|rate| rate.hz());
     plan.rates.dedup();
     plan.stiffness_n_per_mm.sort_by(f64::total_cmp);
     plan.stiffness_n_per_mm.dedup();
+    if args.output.is_some() && args.output == args.picture {
+        return Err(Failure::new("the table and the picture cannot be one file").hint(OTHER_FILE));
+    }
+    left_behind::tell(
+        { args.output.iter() }
+            .chain(&args.picture)
+            .map(PathBuf::as_path),
+    );
     // A place that cannot be written to is said before the trials.
     if let Some(path) = &args.picture {
         drop(Output::create(path).or_hint(OTHER_PICTURE)?);
@@ -68,6 +82,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     progress.finish_and_clear();
     let map = map.map_err(|error| Failure::new(error.to_string()))?;
     let map = map.ok_or_else(|| Failure::new("interrupted: no limits are said"))?;
+    report::put(&map.summary())?;
     if let Some(csv) = csv {
         write(csv, &map).or_hint(OTHER_FILE)?;
     }
@@ -75,7 +90,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let drawn = picture::draw(&map).and_then(|canvas| canvas.save(path));
         drawn.or_hint(OTHER_PICTURE)?;
     }
-    report::put(&map.summary())
+    Ok(())
 }
 
 fn write(mut csv: Output, map: &Map) -> Result<(), OutputError> {

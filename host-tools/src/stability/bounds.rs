@@ -13,7 +13,7 @@ pub struct AtTip {
     pub damping_ns_per_m: f64,
     /// Coulomb friction, N.
     pub coulomb_n: f64,
-    /// The tip's way for one count of the encoder that moves it most, mm.
+    /// The tip's displacement for one count of the encoder that moves it most, mm.
     pub count_mm: f64,
 }
 
@@ -44,7 +44,7 @@ impl AtTip {
         1e-3 * 2.0 * self.damping_ns_per_m * f64::from(rate.hz())
     }
 
-    /// Abbott and Okamura 2005: the friction swallows what an encoder's counts create up to
+    /// Abbott and Okamura 2005: the friction takes up what an encoder's counts create up to
     /// 2·fc/Δ, N/mm; with it the wall is passive up to the smaller of both bounds.
     #[must_use]
     pub fn by_friction(&self) -> f64 {

@@ -1,5 +1,7 @@
 //! The boards' tick around a virtual arm over a level plane.
 
+use std::collections::VecDeque;
+
 use hapterra_core::Vec3;
 use hapterra_core::contact::{Friction, Rule};
 use hapterra_core::force::ForceLaw;
@@ -24,34 +26,38 @@ pub(super) const HOME: Placement = Placement {
 /// Largest force, N: that of every other scene.
 const MOST_N: f32 = ForceLaw::PREMIUM.max_force_n;
 
-/// What one tick was.
+/// What happened in one tick.
 pub(super) struct Step {
     /// What the tick reported.
     pub(super) sample: Sample,
     /// True height of the tip after it, mm.
     pub(super) height_mm: f64,
-    /// And by how much it had risen since the tick before, mm.
-    pub(super) rise_mm: f64,
+    /// What the surface gave to the tip meanwhile, mJ: the upward force that the amplifiers
+    /// were asked for, times the tip's displacement.
+    pub(super) given_mj: f64,
 }
 
-/// Runs a held arm for some time from the moment that its script begins, and shows every tick.
-/// Ends early where `look` says so.
-pub(super) fn run(
-    rate: TickRate,
-    stiffness_n_per_mm: f64,
-    arm: HeldPhantom,
-    look: &mut dyn FnMut(f64, &Step) -> bool,
-) {
+/// What is felt, and by which loop.
+pub(super) struct Felt {
+    pub(super) rate: TickRate,
+    pub(super) stiffness_n_per_mm: f64,
+    /// From reading the encoders to the amplifiers, s.
+    pub(super) delay_s: f64,
+}
+
+/// Runs a held arm until its script ends, and shows every tick with the time since the script
+/// began, s. Ends early where `look` says so.
+pub(super) fn run(felt: &Felt, arm: HeldPhantom, look: &mut dyn FnMut(f64, &Step) -> bool) {
     let mut tiles = vec![Tile::VACANT; WINDOW * WINDOW + 1];
     let mut spare: Vec<_> = tiles.iter_mut().collect();
     let slots = std::array::from_fn(|_| {
         std::array::from_fn(|_| spare.pop().unwrap_or_else(|| unreachable!("a tile a slot")))
     });
-    let mut haptics = Haptics::<WINDOW>::new(slots, rate, None);
+    let mut haptics = Haptics::<WINDOW>::new(slots, felt.rate, None);
     if let Ok(mechanism) = Mechanism::new(&Calibration::PREMIUM_1_5) {
         haptics.configure(mechanism);
     }
-    let scene = scene(stiffness_n_per_mm);
+    let scene = scene(felt.stiffness_n_per_mm);
     for command in [Command::Scene(scene), Command::Zero([0; 3]), Command::Arm] {
         let _ = haptics.accept(command);
     }
@@ -59,9 +65,9 @@ pub(super) fn run(
     requester.reset(scene.level, scene.size);
 
     let mut arm = arm.arming();
-    let tick_s = 1.0 / f64::from(rate.hz());
+    let tick_s = 1.0 / f64::from(felt.rate.hz());
+    let mut wire = Wire::new(felt.delay_s, tick_s);
     let ticks = ((HeldPhantom::ARMED_S + arm.script_s()) / tick_s) as u32;
-    let mut before = height_mm(&arm);
     for tick in 0..ticks {
         let outcome = haptics.tick(&arm.sense(), true);
         let sample = outcome.sample;
@@ -77,17 +83,65 @@ pub(super) fn run(
             requester.received(key);
             spare.extend(haptics.accept(Command::Tile(tile)));
         }
-        arm.step(outcome.drive.currents_a.to_array().map(f64::from), tick_s);
-        let height_mm = height_mm(&arm);
+        let sent = Sent {
+            currents_a: outcome.drive.currents_a.to_array().map(f64::from),
+            up_n: f64::from(sample.force_n.z),
+        };
+        let given_mj = wire.carry(sent, &mut arm);
         let step = Step {
             sample,
-            height_mm,
-            rise_mm: height_mm - before,
+            height_mm: height_mm(&arm),
+            given_mj,
         };
-        before = height_mm;
         if !look(f64::from(tick) * tick_s - HeldPhantom::ARMED_S, &step) {
             return;
         }
+    }
+}
+
+/// What a tick sends to the motors.
+#[derive(Clone, Copy, Default)]
+struct Sent {
+    currents_a: [f64; 3],
+    /// The surface's part of it at the tip, N.
+    up_n: f64,
+}
+
+/// The time that a board takes from its encoders to its amplifiers.
+struct Wire {
+    /// On its way: what the motors have, then what comes later.
+    sent: VecDeque<Sent>,
+    /// For so much of a tick the motors still have what they had before, s.
+    late_s: f64,
+    tick_s: f64,
+}
+
+impl Wire {
+    fn new(delay_s: f64, tick_s: f64) -> Self {
+        let whole = (delay_s / tick_s).floor();
+        Self {
+            sent: VecDeque::from(vec![Sent::default(); whole as usize + 1]),
+            late_s: delay_s - whole * tick_s,
+            tick_s,
+        }
+    }
+
+    /// Takes what a tick sends, and moves the arm for as long as it lasts; gives what the
+    /// surface gave to the tip meanwhile, mJ.
+    fn carry(&mut self, sent: Sent, arm: &mut HeldPhantom) -> f64 {
+        self.sent.push_back(sent);
+        let before = self.sent.pop_front().unwrap_or(sent);
+        let now = self.sent.front().copied().unwrap_or(sent);
+        let parts = [(before, self.late_s), (now, self.tick_s - self.late_s)];
+        let mut given_mj = 0.0;
+        for (Sent { currents_a, up_n }, for_s) in parts {
+            if for_s > 0.0 {
+                let from_mm = height_mm(arm);
+                arm.step(currents_a, for_s);
+                given_mj += up_n * (height_mm(arm) - from_mm);
+            }
+        }
+        given_mj
     }
 }
 

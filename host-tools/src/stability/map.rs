@@ -26,6 +26,8 @@ pub struct Plan {
     pub rates: Vec<TickRate>,
     /// Stiffnesses, N/mm.
     pub stiffness_n_per_mm: Vec<f64>,
+    /// From reading the encoders to the amplifiers, s.
+    pub delay_s: f64,
 }
 
 impl Plan {
@@ -38,6 +40,7 @@ impl Plan {
                     rate: *rate,
                     stiffness_n_per_mm: *stiffness,
                     grasp,
+                    delay_s: self.delay_s,
                 }));
             }
         }
@@ -74,12 +77,10 @@ impl Plan {
         let mut done = std::thread::scope(|scope| {
             let workers: Vec<_> = (1..workers).map(|_| scope.spawn(work)).collect();
             let mut done = work();
-            done.extend(
-                workers
-                    .into_iter()
-                    .filter_map(|worker| worker.join().ok())
-                    .flatten(),
-            );
+            for worker in workers {
+                let of_worker = worker.join();
+                done.extend(of_worker.unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            }
             done
         });
         if done.len() < settings.len() {
@@ -127,7 +128,7 @@ impl Map {
         let taps = TAP_SPEEDS_M_S.map(|speed| format!("given_mj_at_{speed}_m_s"));
         writeln!(
             to,
-            "tick_hz,grasp,stiffness_n_per_mm,press,swing_mm,swings_hz,fault,{}",
+            "tick_hz,grasp,stiffness_n_per_mm,delay_us,press,swing_mm,swings_hz,fault,{}",
             taps.join(",")
         )?;
         for trial in &self.trials {
@@ -135,6 +136,7 @@ impl Map {
                 rate,
                 stiffness_n_per_mm,
                 grasp,
+                delay_s,
             } = trial.setting;
             let verdict = trial.press.verdict(self.at_tip.count_mm).name();
             let press = match trial.press {
@@ -149,9 +151,10 @@ impl Map {
                 .map(|given| given.map_or_else(String::new, |mj| format!("{mj:.6}")));
             writeln!(
                 to,
-                "{},{},{stiffness_n_per_mm},{verdict},{press},{}",
+                "{},{},{stiffness_n_per_mm},{:.0},{verdict},{press},{}",
                 rate.hz(),
                 grasp.name(),
+                1e6 * delay_s,
                 given.join(",")
             )?;
         }

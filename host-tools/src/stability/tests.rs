@@ -9,10 +9,15 @@ use super::trial::{Press, Setting, Trial, Verdict};
 use crate::phantom::PhantomModel;
 
 fn tried(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp) -> Trial {
+    tried_late(hz, stiffness_n_per_mm, grasp, 0.0)
+}
+
+fn tried_late(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp, delay_s: f64) -> Trial {
     let setting = Setting {
         rate: TickRate::new(hz).expect("a rate"),
         stiffness_n_per_mm,
         grasp,
+        delay_s,
     };
     setting.tried().expect("in reach")
 }
@@ -43,6 +48,9 @@ fn a_soft_surface_is_still_in_every_hand_and_a_stiff_one_shakes_a_limp_one_until
     for grasp in Grasp::ALL {
         let soft = tried(1000, 0.5, grasp);
         assert_eq!(verdict(&soft), Verdict::Still, "{soft:?}");
+        // It was touched: an arm that is not armed is still, too.
+        let is_felt = { soft.given_mj.iter() }.all(|mj| mj.is_some_and(|mj| mj > 0.0));
+        assert!(is_felt, "{soft:?}");
     }
     let shaken = tried(1000, 6.0, Grasp::Limp);
     assert_eq!(verdict(&shaken), Verdict::Unstable, "{shaken:?}");
@@ -65,10 +73,29 @@ fn what_a_tap_gives_falls_as_the_ticks_get_shorter() {
 }
 
 #[test]
+fn a_force_that_comes_late_gives_as_much_as_longer_ticks() {
+    // The force of a tick is half a tick old on average, and as much older as it comes late.
+    let given = |hz, delay_s| {
+        let trial = tried_late(hz, 1.0, Grasp::Normal, delay_s);
+        trial.given_mj[1].expect("it is held")
+    };
+    for (hz, delay_s) in [(1000, 0.5e-3), (4000, 0.5e-3), (2000, 0.2e-3)] {
+        let tick_s = 1.0 / f64::from(hz);
+        let wanted = (0.5 * tick_s + delay_s) / (0.5 * tick_s);
+        let found = given(hz, delay_s) / given(hz, 0.0);
+        assert!(
+            (found / wanted - 1.0).abs() < 0.15,
+            "{hz} Hz: {found}, {wanted} wanted"
+        );
+    }
+}
+
+#[test]
 fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
     let plan = Plan {
         rates: vec![TickRate::DEFAULT],
         stiffness_n_per_mm: vec![0.5, 6.0],
+        delay_s: 80e-6,
     };
     let map = plan.map(&|of| of == 6).expect("in reach").expect("whole");
     let mut csv = Vec::new();

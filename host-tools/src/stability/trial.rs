@@ -1,10 +1,9 @@
 //! One stiffness in one hand at one tick rate: a press, and taps.
 
-use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Fault;
 use hapterra_core::rate::TickRate;
 
-use super::contact_loop::{self, HOME, PLANE_MM};
+use super::contact_loop::{self, Felt, HOME, PLANE_MM};
 use super::grasp::Grasp;
 use crate::phantom::{HeldPhantom, OutOfReach, PhantomModel, Script, Touch};
 
@@ -16,6 +15,8 @@ const LOOKED_AT_S: f64 = 1.0;
 const ABOVE_MM: f64 = 30.0;
 /// A tap aims so far below it, mm.
 const BELOW_MM: f64 = 25.0;
+/// Between two taps the tip is higher above it than this, mm.
+const APART_MM: f64 = 10.0;
 /// Taps of each speed.
 const TAPS: usize = 3;
 /// The tip swings by more than this, mm: no hand holds it.
@@ -33,6 +34,8 @@ pub struct Setting {
     pub stiffness_n_per_mm: f64,
     /// Who holds the tip.
     pub grasp: Grasp,
+    /// From reading the encoders to the amplifiers, s.
+    pub delay_s: f64,
 }
 
 /// What a press did.
@@ -149,14 +152,10 @@ impl Setting {
         let arm = self.arm(script.wait(0.2))?;
         let (mut given_mj, mut most_mj, mut is_tripped) = (0.0, f64::NEG_INFINITY, false);
         self.run(arm, &mut |_, step| {
-            // The force of a tick is there until the next one.
-            given_mj += f64::from(step.sample.force_n.z) * step.rise_mm;
-            if step.sample.state == ContactState::Free {
-                most_mj = if given_mj == 0.0 {
-                    most_mj
-                } else {
-                    given_mj.max(most_mj)
-                };
+            given_mj += step.given_mj;
+            // Whatever is still on its way to the motors belongs to the tap.
+            if step.height_mm > PLANE_MM + APART_MM && given_mj != 0.0 {
+                most_mj = given_mj.max(most_mj);
                 given_mj = 0.0;
             }
             is_tripped = step.sample.fault.is_some();
@@ -170,7 +169,12 @@ impl Setting {
     }
 
     fn run(self, arm: HeldPhantom, look: &mut dyn FnMut(f64, &contact_loop::Step) -> bool) {
-        contact_loop::run(self.rate, self.stiffness_n_per_mm, arm, look);
+        let felt = Felt {
+            rate: self.rate,
+            stiffness_n_per_mm: self.stiffness_n_per_mm,
+            delay_s: self.delay_s,
+        };
+        contact_loop::run(&felt, arm, look);
     }
 }
 
