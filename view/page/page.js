@@ -1,12 +1,11 @@
 // The page: starts rerun's viewer and feeds it with the stream of hapterra-view.
 //
 // The stream is read only while somebody can see the page, because a hidden viewer draws
-// nothing and would only pile up what it is told. A page that comes back is told what
-// it missed; what it has already it knows by its number and passes over. A page that is drawn
-// by software takes few entries a second, and asks for what happens a second at a time.
-// The viewer's memory
-// grows with every sample, so from a size on the page begins anew; not at once, though, where
-// what it is told first is larger already.
+// nothing and would only pile up what it is told. A page that comes back begins anew: what it
+// missed is told in other pieces than what it has, and the viewer would keep both. A page that
+// is drawn by software takes few entries a second, and asks for what happens a second at a
+// time. The viewer's memory grows with every sample, so from a size on the page begins anew;
+// not at once, though, where what it is told first is larger already.
 "use strict";
 
 const CHANNEL = "hapterra";
@@ -97,6 +96,7 @@ async function read(viewer, memory, feed) {
   try {
     const answer = await fetch(feed, { signal: cut.signal, cache: "no-store" });
     if (!answer.ok) return false;
+    if (state.connections > 0) location.reload();
     state.connections += 1;
     const bytes = new Bytes(answer.body.getReader());
     for (;;) {

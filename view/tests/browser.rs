@@ -137,10 +137,19 @@ fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
     shown(&mut browser, &page, &mut go_on, |now, plotted| {
         is_whole(now, plotted) && moved(now, &terrain) && moved(plotted, &plots)
     });
-    // A second page, and the first one anew.
+    // A second page hides the first, which begins anew once it is seen again; and the first
+    // one loaded anew.
+    let began = browser.number(&page, "performance.timeOrigin");
     let second = browser.open(&address);
     shown(&mut browser, &second, &mut go_on, is_whole);
     browser.close(&second);
+    let until = Instant::now() + SHOWN_WITHIN;
+    while browser.number(&page, "performance.timeOrigin") == began {
+        go_on();
+        std::thread::sleep(Duration::from_millis(200));
+        assert!(Instant::now() < until, "it goes on with what it had");
+    }
+    shown(&mut browser, &page, &mut go_on, is_whole);
     browser.reload(&page);
     shown(&mut browser, &page, &mut go_on, is_whole);
     let foreign = foreign(&browser, &address);

@@ -13,6 +13,13 @@ use serde_json::{Value, json};
 
 /// For one answer of a page that draws in software on a busy machine.
 const ANSWER: Duration = Duration::from_secs(120);
+/// What a page says that is just being loaded: it is asked again.
+const LOADING: [&str; 4] = [
+    "Not attached to an active page",
+    "Cannot find default execution context",
+    "Execution context was destroyed",
+    "Inspected target navigated",
+];
 /// The page's size, px.
 const SIZE: [u32; 2] = [900, 600];
 
@@ -114,9 +121,17 @@ impl Browser {
     }
 
     fn call(&mut self, method: &str, params: Value, session: Option<&str>) -> Value {
-        let answer = self.ask(method, params, session);
-        assert!(answer.get("error").is_none(), "{method}: {answer}");
-        answer["result"].clone()
+        let until = Instant::now() + ANSWER;
+        loop {
+            let answer = self.ask(method, params.clone(), session);
+            let error = answer["error"]["message"].as_str().unwrap_or_default();
+            let is_loading = LOADING.iter().any(|part| error.contains(part));
+            if !is_loading || Instant::now() > until {
+                assert!(answer.get("error").is_none(), "{method}: {answer}");
+                return answer["result"].clone();
+            }
+            std::thread::sleep(Duration::from_millis(100));
+        }
     }
 
     fn ask(&mut self, method: &str, params: Value, session: Option<&str>) -> Value {
