@@ -136,4 +136,7 @@ pub struct Health {
     pub currents_a: Vec3,
     /// Winding temperatures by the thermal model, °C.
     pub winding_c: Vec3,
+    /// Energy that the ticks have created at the tip and that was not taken back yet, mJ; zero
+    /// where the passivity controller is off.
+    pub created_mj: f32,
 }

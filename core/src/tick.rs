@@ -9,9 +9,12 @@ use glam::Vec3;
 
 use crate::clutch::{Clutch, ClutchHold};
 use crate::contact::{Contact, ContactOutput, ContactSettings, Execution, Friction};
+use crate::force::Damper;
 use crate::grid::GridPoint;
 use crate::guard::thermal::Temperatures;
-use crate::guard::{Drive, Fault, Guard, Jog, Limits, Report, SceneKind, Sense, Surroundings};
+use crate::guard::{
+    Drive, Fault, Guard, Jog, Limits, Mode, Report, SceneKind, Sense, Surroundings,
+};
 use crate::phantom::{Calibration, Mechanism, Pose, to_device_frame, to_terrain_frame};
 use crate::rate::TickRate;
 use crate::scene::{Health, Point, Sample, Scene, Source, View};
@@ -123,6 +126,10 @@ pub struct Haptics<'t, const D: usize> {
     clutch: Clutch,
     /// Number of the view that is felt.
     view: u8,
+    /// The damping of a scene that has some.
+    damper: Option<Damper>,
+    /// Where the point before was, in a scene fed by points.
+    before: Option<GridPoint>,
 }
 
 impl<'t, const D: usize> Haptics<'t, D> {
@@ -146,6 +153,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
             tick: 0,
             clutch: Clutch::new(rate),
             view: 0,
+            damper: None,
+            before: None,
         }
     }
 
@@ -221,6 +230,11 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
     }
 
+    /// The damping that a scene has.
+    fn damper_of(&self, scene: &Scene) -> Option<Damper> {
+        Damper::of(&scene.law, self.rate, scene.source == Source::Encoders)
+    }
+
     /// Takes a scene, or drops the one there is: force that was there goes out.
     fn take_scene(&mut self, scene: Option<Scene>) {
         match scene {
@@ -233,8 +247,9 @@ impl<'t, const D: usize> Haptics<'t, D> {
             self.tick = 0;
         }
         self.contact = self.contact_of(scene.as_ref());
+        self.damper = scene.and_then(|scene| self.damper_of(&scene));
         self.scene = scene;
-        self.point = None;
+        (self.point, self.before) = (None, None);
         let of_arm = scene.is_some_and(|scene| scene.source == Source::Encoders);
         self.clutch.begin(self.rate, of_arm);
         self.view = 0;
@@ -270,8 +285,9 @@ impl<'t, const D: usize> Haptics<'t, D> {
             None => Contact::new(settings),
         };
         self.clutch.put(hip);
+        self.damper = self.damper_of(&scene);
         self.scene = Some(scene);
-        self.point = None;
+        (self.point, self.before) = (None, None);
         self.view = view.number;
     }
 
@@ -297,6 +313,11 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.window.install(tile)
     }
 
+    /// The energy that the ticks have created and that was not taken back yet, mJ.
+    fn created_mj(&self) -> f32 {
+        self.damper.as_ref().map_or(0.0, Damper::created_mj)
+    }
+
     /// The calibration in force.
     #[must_use]
     pub fn calibration(&self) -> Option<&Calibration> {
@@ -314,6 +335,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             angles_rad: self.mechanism.as_ref().map(angles).unwrap_or_default(),
             currents_a: drive.currents_a,
             winding_c: self.guard.motors().winding_c(),
+            created_mj: self.created_mj(),
         }
     }
 
@@ -388,6 +410,11 @@ impl<'t, const D: usize> Haptics<'t, D> {
             }
             let output = contact.step(&self.window, &hip);
             wanted = scene.law.force_n(output.displacement * scene.cell_mm) * self.clutch.share();
+            if let Some(damper) = &mut self.damper {
+                let felt = (&*scene, &hip, output);
+                let driven = (&mut self.guard, mechanism, pose);
+                damp(damper, &mut wanted, felt, self.clutch.is_closed(), driven);
+            }
             write_output(hip, output, sample);
         } else {
             write_output(GridPoint::default(), &ContactOutput::default(), sample);
@@ -426,9 +453,16 @@ impl<'t, const D: usize> Haptics<'t, D> {
             // Where the HIP is follows from the point.
             let _ = contact.land(&self.window);
             let output = contact.step(&self.window, &point.hip);
-            force_n = scene.law.force_n(output.displacement * scene.cell_mm);
+            let displacement_mm = output.displacement * scene.cell_mm;
+            force_n = scene.law.force_n(displacement_mm);
+            if let Some(damper) = &mut self.damper {
+                let from = self.before.unwrap_or(point.hip);
+                let velocity_mm_s = from.to(&point.hip) * (scene.cell_mm * self.rate.hz() as f32);
+                force_n = damper.force_n(force_n, velocity_mm_s);
+            }
             write_output(point.hip, output, sample);
             if output.converged {
+                self.before = Some(point.hip);
                 outcome.answers = Some(point.seq);
                 self.point = None;
             }
@@ -464,6 +498,31 @@ fn write_output(hip: GridPoint, output: &ContactOutput, sample: &mut Sample) {
     sample.state = output.state;
     sample.missing_tile = output.missing_tile;
     sample.work = output.work;
+}
+
+/// Damps the spring's force of a tick of an arm.
+// Apart, so that the tick of a scene without damping has nothing of it.
+#[cold]
+#[inline(never)]
+fn damp(
+    damper: &mut Damper,
+    force_n: &mut Vec3,
+    (scene, hip, output): (&Scene, &GridPoint, &ContactOutput),
+    is_closed: bool,
+    (guard, mechanism, pose): (&mut Guard, &Mechanism, &Pose),
+) {
+    if guard.mode() != Mode::Armed || !is_closed {
+        return damper.rest();
+    }
+    let displacement_mm = output.displacement * scene.cell_mm;
+    let tip_mm = scene.home.to(hip) * scene.cell_mm;
+    let (asked_n, most_n) = (guard.force_n(), guard.most_force_n());
+    damper.observe(displacement_mm, tip_mm, asked_n, most_n);
+    if damper.created_mj() > 0.0 {
+        guard.says(Limits::ENERGY_TAKEN_BACK);
+    }
+    let velocity_mm_s = to_terrain_frame(guard.tip_velocity_mm_s(mechanism, pose));
+    *force_n = damper.force_n(*force_n, velocity_mm_s);
 }
 
 /// Where the tip is over the terrain.

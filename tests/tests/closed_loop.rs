@@ -11,7 +11,7 @@ use hapterra::replay::Record;
 use hapterra::synth::{Kind, Synth};
 use hapterra::telemetry::Figures;
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::{ContactState, Friction, Rule};
+use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_firmware::native::StoppedClock;
@@ -62,7 +62,7 @@ fn press(stiffness_n_per_mm: f32) -> (Vec<Sample>, usize, Scale) {
     let law = ForceLaw {
         stiffness_n_per_mm,
         max_force_n: 8.5,
-        friction: Friction::NONE,
+        ..ForceLaw::PREMIUM
     };
     let home = scale.to_grid(home_mm).expect("addressable");
     let scene = terrain.scene(law, Rule::Swept, Source::Encoders, home);

@@ -119,7 +119,10 @@ fn what_gdal_reads_and_this_does_not_is_converted_by_the_hint() {
         ("-ot Byte -co COMPRESS=JPEG", "jpeg.tif"),
         ("-ot UInt16 -co NBITS=12", "bits.tif"),
         ("-of HFA", "erdas.img"),
-        ("-of VRT", "a virtual one.vrt"),
+        (
+            "-of VRT -scale 0 1000 0 1000 -exponent 1",
+            "a virtual one.vrt",
+        ),
         ("-of SAGA", "saga.sdat"),
         ("-of RST -ot Float32", "idrisi.rst"),
     ] {

@@ -23,15 +23,20 @@ fn it_says_limits_and_writes_every_trial_and_a_picture() {
     let words = ["--rate", "2000,1000", "--stiffness", "0.5", "-o", to_csv];
     let output = stability(&[&words[..], &["--picture", to_png]].concat());
     assert!(output.status.success(), "{}", told(&output));
-    for part in ["  1000 Hz  limp 0.5 / 0.5", "  2000 Hz", "Colgate"] {
+    for part in [
+        "  1000 Hz, no damping:                limp 0.5 / 0.5",
+        "  1000 Hz, controller:                limp 0.5 / 0.5",
+        "  2000 Hz, no damping:",
+        "Colgate",
+    ] {
         assert!(told(&output).contains(part), "{}", told(&output));
     }
     let rows = std::fs::read_to_string(csv).expect("a table");
-    assert_eq!(rows.lines().count(), 1 + 2 * 3, "{rows}");
+    assert_eq!(rows.lines().count(), 1 + 2 * 2 * 3, "{rows}");
     assert!(
         rows.lines()
             .nth(1)
-            .is_some_and(|row| row.starts_with("1000,limp,0.5,80,still,"))
+            .is_some_and(|row| row.starts_with("1000,0.0,false,limp,0.5,80,still,"))
     );
     let picture = std::fs::read(png).expect("a picture");
     assert!(picture.starts_with(b"\x89PNG") && picture.len() > 10_000);
@@ -50,6 +55,9 @@ fn what_cannot_be_tried_or_written_is_said_at_once() {
         (["--stiffness", "0"], 2, "N/mm"),
         (["--stiffness", "nan"], 2, "N/mm"),
         (["--delay-us", "20000"], 2, "10000"),
+        (["--damping", "21"], 2, "0 to 20 N·s/m"),
+        (["--damping", "nan"], 2, "0 to 20 N·s/m"),
+        (["--passivity", "auto"], 2, "off, on"),
         (
             ["-o", "/nowhere/at/all.csv"],
             1,

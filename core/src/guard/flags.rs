@@ -43,7 +43,7 @@ bitflags! {
 }
 
 bitflags! {
-    /// Why the force is less than the scene asked for. The bits are stable.
+    /// Why the force is not what the scene asked for. The bits are stable.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
     pub struct Limits: u16 {
         /// The force was longer than the device may make.
@@ -70,6 +70,8 @@ bitflags! {
         const CLUTCH_MOVES = 1 << 10;
         /// The clutch is held by the board's clutch input.
         const CLUTCH_INPUT = 1 << 11;
+        /// The ticks have created energy, and damping takes it back.
+        const ENERGY_TAKEN_BACK = 1 << 12;
     }
 }
 
@@ -139,6 +141,7 @@ impl Limits {
             Self::CLUTCH_OPEN => "the clutch is open, so that nothing is felt",
             Self::CLUTCH_MOVES => "the force goes out for a change of view, or comes in after one",
             Self::CLUTCH_INPUT => "the board's clutch input is held",
+            Self::ENERGY_TAKEN_BACK => "the surface is damped, to take back energy of the ticks",
             _ => "",
         }
     }
@@ -154,7 +157,7 @@ mod tests {
             assert!(!name.is_empty() && !meaning.is_empty(), "{name}");
         }
         assert_eq!(Blockers::all().meanings().count(), 15);
-        assert_eq!(Limits::all().meanings().count(), 12);
+        assert_eq!(Limits::all().meanings().count(), 13);
         assert_eq!(Blockers::empty().meaning(), "");
     }
 }

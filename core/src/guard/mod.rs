@@ -6,7 +6,7 @@
 //! the currents.
 //!
 //! [`Fault`]s are latched and switch the amplifiers off. [`Limits`] say why a
-//! force is less than what was asked for. [`Blockers`] say why the arm cannot
+//! force is not what was asked for. [`Blockers`] say why the arm cannot
 //! be armed. The steps from off to on and back are in [`Mode`].
 
 mod arming;
@@ -251,6 +251,31 @@ impl Guard {
             fault: self.fault,
             decision: self.arming.decision,
         }
+    }
+
+    /// The force that the motors have had since the last tick, N; zero unless the amplifiers
+    /// were on.
+    #[must_use]
+    pub const fn force_n(&self) -> Vec3 {
+        self.force_n
+    }
+
+    /// Most force that it lets through, N.
+    #[must_use]
+    pub const fn most_force_n(&self) -> f32 {
+        self.max_force_n
+    }
+
+    /// Has the tick's report say this, too.
+    pub(crate) fn says(&mut self, limits: Limits) {
+        self.limits |= limits;
+    }
+
+    /// How fast the tip of a driven arm moves, device frame, mm/s, by the readings of every
+    /// millisecond (FOAW).
+    #[must_use]
+    pub fn tip_velocity_mm_s(&self, mechanism: &Mechanism, pose: &Pose) -> Vec3 {
+        self.speed.velocity_mm_s(mechanism, pose)
     }
 
     /// How warm the motors are.

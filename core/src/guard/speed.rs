@@ -107,6 +107,12 @@ impl SpeedMonitor {
         }
     }
 
+    /// How fast the tip is, device frame, mm/s.
+    pub(super) fn velocity_mm_s(&self, mechanism: &Mechanism, pose: &Pose) -> Vec3 {
+        let counts = self.readings.velocity();
+        pose.tip_velocity_mm_s(counts * self.hz * mechanism.radians_per_count())
+    }
+
     /// Whether the tip is below the limit in every pose.
     fn is_surely_slow(&self, moved: [i32; 3]) -> bool {
         let slow = |axis: usize| moved[axis].unsigned_abs() <= self.surely_slow[axis];

@@ -12,7 +12,7 @@ use super::request::{Answer, Refusal, Request};
 use super::session::{InSession, LastSession, SampleCount, SessionEnd, SessionNumber};
 use crate::clutch::ClutchHold;
 use crate::contact::{ContactState, Rule};
-use crate::force::ForceLaw;
+use crate::force::{Controller, Damping, ForceLaw};
 use crate::grid::GridPoint;
 use crate::guard::{Fault, Limits, Mode};
 use crate::scene::{Sample, Scene, Source, View};
@@ -38,7 +38,13 @@ fn a_scene() {
         top: -3,
         cell_mm: 1.5,
         home: GridPoint::new([320, -7, 5], Vec3::new(0.25, 0.5, 0.0)),
-        law: ForceLaw::PREMIUM,
+        law: ForceLaw {
+            damping: Damping {
+                ns_per_m: 2.0,
+                controller: Controller::On,
+            },
+            ..ForceLaw::PREMIUM
+        },
         rule: Rule::Paper,
         source: Source::Points,
         hold_clock: true,
@@ -54,6 +60,8 @@ fn a_scene() {
         float(0.5),
         float(8.5),
         std::vec![0; 12],
+        float(2.0),
+        std::vec![1],
         std::vec![1, 1, 1],
     ];
     assert_eq!(bytes(&ToDevice::Scene(scene)), wanted.concat());
@@ -172,7 +180,7 @@ fn a_hello_in_its_session() {
         }),
     };
     // The session is 300 | 128; then variant, protocol, number, seconds.
-    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 7, 9, 0xB4, 0x01]);
+    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 8, 9, 0xB4, 0x01]);
 }
 
 #[test]
@@ -200,7 +208,7 @@ fn a_device_that_introduces_itself() {
         },
     });
     let wanted = [
-        std::vec![0, 7, 9, 8, 1, b'b'],
+        std::vec![0, 8, 9, 8, 1, b'b'],
         serial.to_vec(),
         std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xAC, 0x02, 1, 7],
         std::vec![0xAC, 0x02, 6, 3, 5, 1],

@@ -36,7 +36,8 @@ const OWN_TERRAIN: &str = "hapterra synth fractal --size 1024 --seed 1";
 /// Arguments of `hapterra demo`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Terrain file; without one the demo makes a terrain
+    /// Terrain file, or many: a folder, a quoted pattern, a .vrt; without one the demo makes a
+    /// terrain
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: Option<PathBuf>,
 
@@ -311,6 +312,7 @@ impl<'t> Tour<'_, 't> {
         let (mut session, device) = Session::open(terrain, scene, arming, transport, patience)?;
         let line = format!("device         {}\n", session_summary::device(&device));
         voice::put(std::io::stdout(), &line);
+        crate::stability::limits::warn(&scene.law, device.tick_hz);
         let tell = |line: String| voice::put(std::io::stderr(), &(line + "\n"));
         let mut shown = self.shown.and_then(|shown| shown.start(&device, tell));
         let stop_tick = (self.stop_s * f64::from(device.tick_hz)).ceil() as u64;

@@ -32,6 +32,7 @@ use crate::place::{Laid, View};
 use crate::replay::settings::Device;
 use crate::replay::{Column, LoopColumns, Recording, Settings};
 use crate::serving::{Service, told_of_last_end};
+use crate::stability::limits;
 use crate::steering::CommandQueue;
 use crate::terrain::Terrain;
 use watch::Watch;
@@ -220,6 +221,7 @@ fn serve(
     if let Some(line) = told_of_last_end(&device) {
         tell(line);
     }
+    limits::warn(&placed.scene.law, device.tick_hz);
     let recording = described(recording, args, placed, &device);
     let laid = Laid {
         view: placed.view,

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::ValueHint;
+use hapterra_core::force::{Controller, Damping};
 use hapterra_core::rate::TickRate;
 
 use super::failure::{Failure, OrHint as _};
@@ -26,6 +27,20 @@ pub struct Args {
     #[arg(long, value_name = "N_PER_MM,…", value_delimiter = ',', default_value = "0.1,0.2,0.5,1,1.5,2,2.5,3,4,6,8,12,20", value_parser = parse_stiffness)]
     pub stiffness: Vec<f64>,
 
+    /// Dampings of the surface, N·s/m
+    #[arg(long, value_name = "NS_PER_M,…", value_delimiter = ',', default_value = "0", value_parser = parse_damping)]
+    pub damping: Vec<Damping>,
+
+    /// Whether the passivity controller acts
+    #[arg(
+        long,
+        value_name = "off|on,…",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "off,on"
+    )]
+    pub passivity: Vec<Passivity>,
+
     /// Microseconds from reading the encoders to the amplifiers; 80 is what a nucleo-g474re
     /// may take, and amplifiers that are commanded by duty cycles take up to 1000 more
     #[arg(long, value_name = "US", default_value_t = 80, value_parser = clap::value_parser!(u32).range(0..=10_000))]
@@ -40,6 +55,15 @@ pub struct Args {
     pub picture: Option<PathBuf>,
 }
 
+/// Whether the passivity controller acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+pub enum Passivity {
+    /// It does not
+    Off,
+    /// It does
+    On,
+}
+
 /// Tries all of it and says the limits.
 ///
 /// # Errors
@@ -48,6 +72,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut plan = Plan {
         rates: args.rate.clone(),
         stiffness_n_per_mm: args.stiffness.clone(),
+        dampings: dampings(args),
         delay_s: 1e-6 * f64::from(args.delay_us),
     };
     plan.rates.sort_by_key(|rate| rate.hz());
@@ -93,6 +118,28 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Every damping with every controller that is asked for.
+fn dampings(args: &Args) -> Vec<Damping> {
+    let mut values = args.damping.clone();
+    values.sort_by(|a, b| a.ns_per_m.total_cmp(&b.ns_per_m));
+    values.dedup();
+    let mut controllers = args.passivity.clone();
+    controllers.sort();
+    controllers.dedup();
+    let with_each = |damping: Damping| {
+        let controllers = controllers.iter().map(|passivity| match passivity {
+            Passivity::Off => Controller::Off,
+            Passivity::On => Controller::On,
+        });
+        let dampings = controllers.map(move |controller| Damping {
+            controller,
+            ..damping
+        });
+        dampings.collect::<Vec<_>>()
+    };
+    values.into_iter().flat_map(with_each).collect()
+}
+
 fn write(mut csv: Output, map: &Map) -> Result<(), OutputError> {
     let written = map.write_csv(&mut csv);
     written.map_err(|source| OutputError {
@@ -111,4 +158,14 @@ fn parse_stiffness(text: &str) -> Result<f64, String> {
     let number = text.trim().parse::<f64>().ok();
     let number = number.filter(|number| (0.001..=100.0).contains(number));
     number.ok_or_else(|| "expected 0.001 to 100 N/mm".to_owned())
+}
+
+fn parse_damping(text: &str) -> Result<Damping, String> {
+    let number = text.trim().parse::<f32>().ok();
+    let damping = number.map(|ns_per_m| Damping {
+        ns_per_m,
+        ..Damping::NONE
+    });
+    let most = Damping::MOST_NS_PER_M;
+    { damping.filter(Damping::is_valid) }.ok_or_else(|| format!("expected 0 to {most} N·s/m"))
 }

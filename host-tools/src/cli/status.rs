@@ -185,6 +185,7 @@ fn measured(status: &Status) -> String {
          amplifiers     {}ready, outputs {}as set\n\
          currents       {} A{flowing}\n\
          motors         {} °C by the thermal model\n\
+         energy         {:.3} mJ created by the ticks and not taken back yet\n\
          ticks          {} run, {} late; the last cost {:.1} µs, the costliest {:.1} µs\n\
          stack          {stack}\n",
         three(health.angles_rad.to_array().map(f32::to_degrees)),
@@ -195,6 +196,7 @@ fn measured(status: &Status) -> String {
         not(!health.sense.outputs_not_as_set),
         three(health.currents_a.to_array()),
         three(health.winding_c.to_array()),
+        health.created_mj,
         ticks.run,
         ticks.late,
         us(ticks.cost),

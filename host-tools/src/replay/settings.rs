@@ -5,7 +5,7 @@
 //! header; in a Parquet recording it is the value of [`KEY`] among the file's metadata.
 
 use hapterra_core::contact::{Friction, Rule};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::{Damping, ForceLaw};
 use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use serde::{Deserialize, Serialize};
 
@@ -79,6 +79,9 @@ pub struct ViewSettings {
     /// How rough the surface is; left out where it is like ice.
     #[serde(default, skip_serializing_if = "Friction::is_none")]
     pub friction: Friction,
+    /// What takes energy out of a motion against it; left out where nothing is asked for.
+    #[serde(default, skip_serializing_if = "Damping::is_none")]
+    pub damping: Damping,
 }
 
 /// The views alone, as TOML has them.
@@ -104,6 +107,7 @@ impl ViewSettings {
             stiffness_n_per_mm: laid.law.stiffness_n_per_mm,
             max_force_n: laid.law.max_force_n,
             friction: laid.law.friction,
+            damping: laid.law.damping,
         }
     }
 
@@ -120,6 +124,7 @@ impl ViewSettings {
             stiffness_n_per_mm: self.stiffness_n_per_mm,
             max_force_n: self.max_force_n,
             friction: self.friction,
+            damping: self.damping,
         }
     }
 
@@ -188,6 +193,9 @@ pub struct Force {
     /// How rough the surface is; left out where it is like ice.
     #[serde(default, skip_serializing_if = "Friction::is_none")]
     pub friction: Friction,
+    /// What takes energy out of a motion against it; left out where nothing is asked for.
+    #[serde(default, skip_serializing_if = "Damping::is_none")]
+    pub damping: Damping,
 }
 
 /// The device that felt it, as it described itself.
@@ -269,6 +277,7 @@ impl Settings {
                 max_force_n: law.max_force_n,
                 rule,
                 friction: law.friction,
+                damping: law.damping,
             },
             device,
             views: vec![],
@@ -320,6 +329,7 @@ impl Settings {
             stiffness_n_per_mm: self.force.stiffness_n_per_mm,
             max_force_n: self.force.max_force_n,
             friction: self.force.friction,
+            damping: self.force.damping,
         }
     }
 

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{Friction, Rule};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::{Damping, ForceLaw};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::rate::TickRate;
@@ -41,6 +41,7 @@ pub(super) struct Step {
 pub(super) struct Felt {
     pub(super) rate: TickRate,
     pub(super) stiffness_n_per_mm: f64,
+    pub(super) damping: Damping,
     /// From reading the encoders to the amplifiers, s.
     pub(super) delay_s: f64,
 }
@@ -57,7 +58,7 @@ pub(super) fn run(felt: &Felt, arm: HeldPhantom, look: &mut dyn FnMut(f64, &Step
     if let Ok(mechanism) = Mechanism::new(&Calibration::PREMIUM_1_5) {
         haptics.configure(mechanism);
     }
-    let scene = scene(felt.stiffness_n_per_mm);
+    let scene = scene(felt);
     for command in [Command::Scene(scene), Command::Zero([0; 3]), Command::Arm] {
         let _ = haptics.accept(command);
     }
@@ -145,7 +146,7 @@ impl Wire {
     }
 }
 
-fn scene(stiffness_n_per_mm: f64) -> Scene {
+fn scene(felt: &Felt) -> Scene {
     let [east, north, up] = HOME.home_mm.map(|mm| mm / CELL_MM);
     Scene {
         epoch: 1,
@@ -155,9 +156,10 @@ fn scene(stiffness_n_per_mm: f64) -> Scene {
         cell_mm: CELL_MM as f32,
         home: GridPoint::new([east as i32, north as i32, up as i32], Vec3::ZERO),
         law: ForceLaw {
-            stiffness_n_per_mm: stiffness_n_per_mm as f32,
+            stiffness_n_per_mm: felt.stiffness_n_per_mm as f32,
             max_force_n: MOST_N,
             friction: Friction::NONE,
+            damping: felt.damping,
         },
         rule: Rule::Swept,
         source: Source::Encoders,

@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use hapterra_core::force::{Controller, Damping};
 use hapterra_core::rate::TickRate;
 
 use super::bounds::AtTip;
@@ -11,11 +12,11 @@ use super::grasp::Grasp;
 use super::trial::{Press, Setting, TAP_SPEEDS_M_S, Trial, Verdict};
 use crate::phantom::{OutOfReach, PhantomModel};
 
-/// Trials of every stiffness in every grasp at every rate.
+/// Trials of every stiffness in every grasp with every damping at every rate.
 pub struct Map {
     /// The arm at its tip.
     pub at_tip: AtTip,
-    /// By rate, grasp and stiffness, each rising.
+    /// By rate, damping, grasp and stiffness, in the order in which they were asked for.
     pub trials: Vec<Trial>,
 }
 
@@ -26,6 +27,8 @@ pub struct Plan {
     pub rates: Vec<TickRate>,
     /// Stiffnesses, N/mm.
     pub stiffness_n_per_mm: Vec<f64>,
+    /// Dampings, with the passivity controller on or off.
+    pub dampings: Vec<Damping>,
     /// From reading the encoders to the amplifiers, s.
     pub delay_s: f64,
 }
@@ -34,17 +37,27 @@ impl Plan {
     /// All that is tried.
     fn settings(&self) -> Vec<Setting> {
         let mut settings = Vec::new();
-        for rate in &self.rates {
+        for (rate, damping) in self.columns() {
             for grasp in Grasp::ALL {
                 settings.extend(self.stiffness_n_per_mm.iter().map(|stiffness| Setting {
-                    rate: *rate,
+                    rate,
                     stiffness_n_per_mm: *stiffness,
+                    damping,
                     grasp,
                     delay_s: self.delay_s,
                 }));
             }
         }
         settings
+    }
+
+    /// Every rate with every damping.
+    fn columns(&self) -> impl Iterator<Item = (TickRate, Damping)> {
+        let with_each = |rate: &TickRate| {
+            let rate = *rate;
+            self.dampings.iter().map(move |damping| (rate, *damping))
+        };
+        self.rates.iter().flat_map(with_each)
     }
 
     /// Tries all of it on all processors. `on_trial` hears of every one that is done, of how
@@ -96,16 +109,32 @@ impl Plan {
 }
 
 impl Map {
-    /// Trials of one rate and grasp, by stiffness.
-    pub fn of(&self, rate: TickRate, grasp: Grasp) -> impl Iterator<Item = &Trial> {
+    /// Trials of one rate, damping and grasp, by stiffness.
+    pub fn of(
+        &self,
+        rate: TickRate,
+        damping: Damping,
+        grasp: Grasp,
+    ) -> impl Iterator<Item = &Trial> {
         let trials = self.trials.iter();
-        trials.filter(move |Trial { setting, .. }| (setting.rate, setting.grasp) == (rate, grasp))
+        trials.filter(move |Trial { setting, .. }| {
+            (setting.rate, setting.damping, setting.grasp) == (rate, damping, grasp)
+        })
+    }
+
+    /// Rates that were tried, each with every damping.
+    #[must_use]
+    pub fn columns(&self) -> Vec<(TickRate, Damping)> {
+        let settings = self.trials.iter().map(|trial| trial.setting);
+        let mut columns: Vec<_> = settings.map(|tried| (tried.rate, tried.damping)).collect();
+        columns.dedup();
+        columns
     }
 
     /// Rates that were tried.
     #[must_use]
     pub fn rates(&self) -> Vec<TickRate> {
-        let mut rates: Vec<_> = self.trials.iter().map(|trial| trial.setting.rate).collect();
+        let mut rates: Vec<_> = self.columns().iter().map(|(rate, _)| *rate).collect();
         rates.dedup();
         rates
     }
@@ -113,10 +142,16 @@ impl Map {
     /// Highest stiffness up to which every press was as good as this, N/mm; none where the
     /// lowest was not.
     #[must_use]
-    pub fn up_to(&self, rate: TickRate, grasp: Grasp, verdict: Verdict) -> Option<f64> {
+    pub fn up_to(
+        &self,
+        rate: TickRate,
+        damping: Damping,
+        grasp: Grasp,
+        verdict: Verdict,
+    ) -> Option<f64> {
         let count_mm = self.at_tip.count_mm;
         let good = |trial: &&Trial| trial.press.verdict(count_mm) <= verdict;
-        let last = self.of(rate, grasp).take_while(good).last();
+        let last = self.of(rate, damping, grasp).take_while(good).last();
         last.map(|trial| trial.setting.stiffness_n_per_mm)
     }
 
@@ -128,13 +163,14 @@ impl Map {
         let taps = TAP_SPEEDS_M_S.map(|speed| format!("given_mj_at_{speed}_m_s"));
         writeln!(
             to,
-            "tick_hz,grasp,stiffness_n_per_mm,delay_us,press,swing_mm,swings_hz,fault,{}",
+            "tick_hz,damping_ns_per_m,controller,grasp,stiffness_n_per_mm,delay_us,press,swing_mm,swings_hz,fault,{}",
             taps.join(",")
         )?;
         for trial in &self.trials {
             let Setting {
                 rate,
                 stiffness_n_per_mm,
+                damping,
                 grasp,
                 delay_s,
             } = trial.setting;
@@ -151,8 +187,10 @@ impl Map {
                 .map(|given| given.map_or_else(String::new, |mj| format!("{mj:.6}")));
             writeln!(
                 to,
-                "{},{},{stiffness_n_per_mm},{:.0},{verdict},{press},{}",
+                "{},{:.1},{},{},{stiffness_n_per_mm},{:.0},{verdict},{press},{}",
                 rate.hz(),
+                damping.ns_per_m,
+                is_controlled(damping),
                 grasp.name(),
                 1e6 * delay_s,
                 given.join(",")
@@ -168,16 +206,21 @@ impl Map {
         let mut lines = vec![format!(
             "stiffness in N/mm up to which a press of 1 N is still (no swing above one encoder count, {count_mm:.3} mm), and up to which it is held at all:"
         )];
-        for rate in self.rates() {
+        for (rate, damping) in self.columns() {
             let limits = Grasp::ALL.map(|grasp| {
                 let limit = |verdict| {
-                    let limit = self.up_to(rate, grasp, verdict);
+                    let limit = self.up_to(rate, damping, grasp, verdict);
                     limit.map_or_else(|| "none".to_owned(), |n_per_mm| n_per_mm.to_string())
                 };
                 let (still, held) = (limit(Verdict::Still), limit(Verdict::Hum));
                 format!("{} {still} / {held}", grasp.name())
             });
-            lines.push(format!("{:>6} Hz  {}", rate.hz(), limits.join(", ")));
+            lines.push(format!(
+                "{:>6} Hz, {:<26} {}",
+                rate.hz(),
+                name(damping),
+                limits.join(", ")
+            ));
         }
         lines.push(format!(
             "theory for the arm alone: {} N/mm by its damping (Colgate & Schenkel), {:.2} N/mm by its friction (Abbott & Okamura)",
@@ -185,5 +228,21 @@ impl Map {
             self.at_tip.by_friction()
         ));
         lines.join("\n") + "\n"
+    }
+}
+
+/// Whether the passivity controller acts.
+const fn is_controlled(damping: Damping) -> bool {
+    matches!(damping.controller, Controller::On)
+}
+
+/// What a damping is called.
+pub(super) fn name(damping: Damping) -> String {
+    let ns_per_m = damping.ns_per_m;
+    match (ns_per_m > 0.0, is_controlled(damping)) {
+        (false, false) => "no damping:".to_owned(),
+        (false, true) => "controller:".to_owned(),
+        (true, false) => format!("{ns_per_m} N·s/m:"),
+        (true, true) => format!("{ns_per_m} N·s/m, controller:"),
     }
 }

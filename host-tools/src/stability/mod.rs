@@ -7,6 +7,7 @@
 //! - [`trial`]: what a press and taps show: hum, and energy that the surface gave;
 //! - [`bounds`]: stiffness that theory says is passive;
 //! - [`map`]: many trials, and the table of them;
+//! - [`limits`]: what of it is said before a surface is felt;
 //! - [`picture`]: the table as a picture.
 //!
 //! Friction of the surface is left out: a hand that is held back hums less.
@@ -14,6 +15,7 @@
 pub mod bounds;
 mod contact_loop;
 pub mod grasp;
+pub mod limits;
 pub mod map;
 pub mod picture;
 pub mod trial;

@@ -7,10 +7,11 @@ use plotters::element::{Circle, Cross};
 use plotters::style::{Color, RGBColor};
 use plotters_backend::text_anchor::HPos;
 
+use hapterra_core::force::Damping;
 use hapterra_core::rate::TickRate;
 
 use super::grasp::Grasp;
-use super::map::Map;
+use super::map::{self, Map};
 use super::trial::{TAP_SPEEDS_M_S, Trial, Verdict};
 use crate::picture::axes::{self, Area, Titles};
 use crate::picture::style::{self, INK, SERIES, SOFT_INK, px, stroke};
@@ -31,8 +32,14 @@ const COLOURS: [RGBColor; 3] = [SERIES[1], SERIES[0], SERIES[2]];
 /// # Errors
 /// As `plotters`.
 pub fn draw(map: &Map) -> Result<Canvas, PictureError> {
-    let rates = map.rates();
-    let rows = rates.len().div_ceil(2) as i32;
+    // A row a rate, a column a damping; of a single damping, the rates in two columns.
+    let columns = map.columns();
+    let across = match columns.len() / map.rates().len() {
+        1 => 2,
+        dampings => dampings,
+    };
+    let rows = columns.len().div_ceil(across) as i32;
+    let across = across as i32;
     let height = HEADER_PX + rows * CHART_PX + MARGIN_PX;
     let mut canvas = Canvas::new(WIDTH_PX as u16, height as u16);
     let sheet = canvas.pen().into_drawing_area();
@@ -42,17 +49,14 @@ pub fn draw(map: &Map) -> Result<Canvas, PictureError> {
             .shrink((px(x), px(y)), (px(width), px(height)))
     };
     header(&part(MARGIN_PX, 0, WIDTH_PX - 2 * MARGIN_PX, HEADER_PX))?;
-    let width = (WIDTH_PX - 3 * MARGIN_PX) / 2;
-    for (i, rate) in (0..).zip(&rates) {
+    let width = (WIDTH_PX - (across + 1) * MARGIN_PX) / across;
+    for (i, column) in (0..).zip(columns) {
         let (left, top) = (
-            MARGIN_PX + (i % 2) * (width + MARGIN_PX),
-            HEADER_PX + i / 2 * CHART_PX,
+            MARGIN_PX + (i % across) * (width + MARGIN_PX),
+            HEADER_PX + i / across * CHART_PX,
         );
-        chart(
-            &part(left, top, width, CHART_PX - MARGIN_PX / 2),
-            map,
-            *rate,
-        )?;
+        let area = part(left, top, width, CHART_PX - MARGIN_PX / 2);
+        chart(&area, map, column)?;
     }
     drop(sheet);
     Ok(canvas)
@@ -77,7 +81,11 @@ fn header(area: &Area<'_>) -> Result<(), PictureError> {
     Ok(())
 }
 
-fn chart(area: &Area<'_>, map: &Map, rate: TickRate) -> Result<(), PictureError> {
+fn chart(
+    area: &Area<'_>,
+    map: &Map,
+    (rate, damping): (TickRate, Damping),
+) -> Result<(), PictureError> {
     let all = map
         .trials
         .iter()
@@ -86,7 +94,12 @@ fn chart(area: &Area<'_>, map: &Map, rate: TickRate) -> Result<(), PictureError>
         (low.min(stiffness), high.max(stiffness))
     });
     let range = 0.8 * low..1.25 * high;
-    let x = format!("stiffness (N/mm) at {} Hz", rate.hz());
+    let named = map::name(damping);
+    let x = format!(
+        "stiffness (N/mm) at {} Hz, {}",
+        rate.hz(),
+        named.trim_end_matches(':')
+    );
     let titles = Titles {
         x: &x,
         y: "given in a tap (mJ)",
@@ -104,9 +117,9 @@ fn chart(area: &Area<'_>, map: &Map, rate: TickRate) -> Result<(), PictureError>
         }
     }
     for (grasp, colour) in Grasp::ALL.into_iter().zip(COLOURS) {
-        let points: Vec<_> = map.of(rate, grasp).map(place).collect();
+        let points: Vec<_> = map.of(rate, damping, grasp).map(place).collect();
         line::draw(&mut chart, &[points], stroke(&colour, 2.0))?;
-        for trial in map.of(rate, grasp) {
+        for trial in map.of(rate, damping, grasp) {
             let at = place(trial);
             let (ring, dot) = (stroke(&colour, 2.0), colour.filled());
             match trial.press.verdict(map.at_tip.count_mm) {

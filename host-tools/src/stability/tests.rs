@@ -1,21 +1,39 @@
 //! What is known of a spring that is felt in ticks, beside what the trials say.
 
+use hapterra_core::force::{Controller, Damping};
 use hapterra_core::rate::TickRate;
 
 use super::bounds::AtTip;
 use super::grasp::Grasp;
+use super::limits::STILL_N_PER_MM;
 use super::map::Plan;
 use super::trial::{Press, Setting, Trial, Verdict};
 use crate::phantom::PhantomModel;
+
+const UNDAMPED: Damping = Damping {
+    ns_per_m: 0.0,
+    controller: Controller::Off,
+};
 
 fn tried(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp) -> Trial {
     tried_late(hz, stiffness_n_per_mm, grasp, 0.0)
 }
 
 fn tried_late(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp, delay_s: f64) -> Trial {
+    tried_damped(hz, stiffness_n_per_mm, grasp, delay_s, UNDAMPED)
+}
+
+fn tried_damped(
+    hz: u32,
+    stiffness_n_per_mm: f64,
+    grasp: Grasp,
+    delay_s: f64,
+    damping: Damping,
+) -> Trial {
     let setting = Setting {
         rate: TickRate::new(hz).expect("a rate"),
         stiffness_n_per_mm,
+        damping,
         grasp,
         delay_s,
     };
@@ -91,10 +109,71 @@ fn a_force_that_comes_late_gives_as_much_as_longer_ticks() {
 }
 
 #[test]
+fn with_the_controller_a_tap_gives_nothing_and_a_stiffer_surface_is_still() {
+    let controlled = Damping {
+        controller: Controller::On,
+        ..UNDAMPED
+    };
+    for (hz, grasp) in [
+        (1000, Grasp::Limp),
+        (1000, Grasp::Firm),
+        (4000, Grasp::Normal),
+    ] {
+        let without = tried_late(hz, 1.0, grasp, 80e-6).given_mj;
+        let with = tried_damped(hz, 1.0, grasp, 80e-6, controlled).given_mj;
+        for (with, without) in with.into_iter().zip(without) {
+            let [with, without] = [with, without].map(|given| given.expect("it is held"));
+            assert!(without > 0.02, "{without} mJ");
+            assert!(with < 0.02 * without, "{with} and {without} mJ");
+        }
+    }
+    let stiff = tried_damped(1000, 6.0, Grasp::Limp, 80e-6, controlled);
+    assert_eq!(verdict(&stiff), Verdict::Still, "{stiff:?}");
+}
+
+#[test]
+fn what_is_said_before_a_surface_is_felt_is_what_the_trials_show() {
+    let with_controller = Damping {
+        controller: Controller::On,
+        ..UNDAMPED
+    };
+    // The next stiffness of the command's own list is held still no more.
+    let next = |still: f32| match still {
+        3.0 => 4.0,
+        4.0 => 6.0,
+        6.0 => 8.0,
+        _ => 12.0,
+    };
+    for (hz, without, with) in STILL_N_PER_MM {
+        for (still, damping) in [(without, UNDAMPED), (with, with_controller)] {
+            let at = |stiffness| verdict(&tried_damped(hz, stiffness, Grasp::Limp, 80e-6, damping));
+            assert_eq!(at(still.into()), Verdict::Still, "{hz} Hz, {still} N/mm");
+            assert_ne!(
+                at(next(still)),
+                Verdict::Still,
+                "{hz} Hz, above {still} N/mm"
+            );
+        }
+    }
+}
+
+#[test]
+fn damping_takes_from_what_a_tap_gives() {
+    let damped = Damping {
+        ns_per_m: 2.0,
+        ..UNDAMPED
+    };
+    let with = tried_damped(1000, 1.0, Grasp::Normal, 80e-6, damped).given_mj[1];
+    let without = tried_late(1000, 1.0, Grasp::Normal, 80e-6).given_mj[1];
+    assert!(with < without, "{with:?} and {without:?} mJ");
+}
+
+#[test]
 fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
     let plan = Plan {
         rates: vec![TickRate::DEFAULT],
         stiffness_n_per_mm: vec![0.5, 6.0],
+        dampings: vec![UNDAMPED],
         delay_s: 80e-6,
     };
     let map = plan.map(&|of| of == 6).expect("in reach").expect("whole");
@@ -104,11 +183,12 @@ fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
     let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
     assert_eq!(rows.len(), 1 + 6);
     assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{csv}");
-    let begins: Vec<_> = rows[1..].iter().map(|row| row[..3].join(",")).collect();
-    let wanted = Grasp::ALL
-        .map(|grasp| ["0.5", "6"].map(|stiffness| format!("1000,{},{stiffness}", grasp.name())));
+    let begins: Vec<_> = rows[1..].iter().map(|row| row[..5].join(",")).collect();
+    let wanted = Grasp::ALL.map(|grasp| {
+        ["0.5", "6"].map(|stiffness| format!("1000,0.0,false,{},{stiffness}", grasp.name()))
+    });
     assert_eq!(begins, wanted.concat());
-    let limit = |grasp| map.up_to(TickRate::DEFAULT, grasp, Verdict::Hum);
+    let limit = |grasp| map.up_to(TickRate::DEFAULT, UNDAMPED, grasp, Verdict::Hum);
     assert_eq!(
         (limit(Grasp::Limp), limit(Grasp::Firm)),
         (Some(0.5), Some(6.0))

@@ -1,5 +1,6 @@
 //! One stiffness in one hand at one tick rate: a press, and taps.
 
+use hapterra_core::force::Damping;
 use hapterra_core::guard::Fault;
 use hapterra_core::rate::TickRate;
 
@@ -32,6 +33,8 @@ pub struct Setting {
     pub rate: TickRate,
     /// The surface's stiffness, N/mm.
     pub stiffness_n_per_mm: f64,
+    /// Its damping, and whether the passivity controller acts.
+    pub damping: Damping,
     /// Who holds the tip.
     pub grasp: Grasp,
     /// From reading the encoders to the amplifiers, s.
@@ -172,6 +175,7 @@ impl Setting {
         let felt = Felt {
             rate: self.rate,
             stiffness_n_per_mm: self.stiffness_n_per_mm,
+            damping: self.damping,
             delay_s: self.delay_s,
         };
         contact_loop::run(&felt, arm, look);

@@ -449,7 +449,7 @@ fn scene(terrain: &Terrain<'_>, arm: &Arm<'_>, chance: &mut Chance) -> Scene {
     let law = ForceLaw {
         stiffness_n_per_mm: chance.between(0.3, 0.8) as f32,
         max_force_n: 8.5,
-        friction: hapterra_core::contact::Friction::NONE,
+        ..ForceLaw::PREMIUM
     };
     let home = terrain.scale().to_grid(arm.home_mm()).expect("in range");
     Scene {

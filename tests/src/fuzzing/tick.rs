@@ -3,7 +3,7 @@
 use hapterra_core::Vec3;
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::{Friction, Rule, WORK_PER_TICK};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::{Controller, Damping, ForceLaw};
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::guard::{Fault, Sense};
 use hapterra_core::phantom::{Calibration, Mechanism};
@@ -137,7 +137,7 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
         scene.law = ForceLaw {
             stiffness_n_per_mm: bytes.float(),
             max_force_n: bytes.float(),
-            friction: Friction::NONE,
+            ..ForceLaw::PREMIUM
         };
     }
     if kind & 16 != 0 {
@@ -147,6 +147,12 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
             dynamic_mu,
             static_mu: dynamic_mu + share(bytes.byte()),
             viscous_s: share(bytes.byte()) / 32.0,
+        };
+    }
+    if kind & 32 != 0 {
+        scene.law.damping = Damping {
+            ns_per_m: f32::from(bytes.byte()) / 255.0 * Damping::MOST_NS_PER_M,
+            controller: Controller::On,
         };
     }
     scene

@@ -2,7 +2,7 @@
 
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::{Friction, Rule};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::{Controller, Damping, ForceLaw};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
@@ -124,6 +124,10 @@ fn host_scene(chance: &mut Chance, epoch: u32) -> Scene {
             stiffness_n_per_mm: [f32::NAN, -1.0, 1e30, 0.5][chance.below(4)],
             max_force_n: [f32::INFINITY, -8.0, 8.5][chance.below(3)],
             friction: Friction::coulomb([0.0, -1.0, f32::NAN][chance.below(3)]),
+            damping: Damping {
+                ns_per_m: [0.0, -1.0, f32::NAN, 1e30][chance.below(4)],
+                controller: Controller::On,
+            },
         },
         rule: Rule::Swept,
         source: [Source::Encoders, Source::Points][chance.below(2)],

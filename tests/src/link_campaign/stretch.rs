@@ -2,7 +2,7 @@
 //! other end, millisecond by millisecond.
 
 use hapterra::terrain::Terrain;
-use hapterra_core::contact::{Friction, Rule};
+use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::wire::session::SessionEnd;
@@ -308,7 +308,7 @@ fn scene(terrain: &Terrain<'_>, board: &Board<'_>, chance: &mut Chance) -> Scene
     let law = ForceLaw {
         stiffness_n_per_mm: chance.between(0.3, 0.8) as f32,
         max_force_n: 8.5,
-        friction: Friction::NONE,
+        ..ForceLaw::PREMIUM
     };
     let home = terrain.scale().to_grid(board.home_mm()).expect("in range");
     Scene {

@@ -1,7 +1,7 @@
 //! A flat plane under the arm, without a terrain file.
 
 use glam::{DVec3, Vec3};
-use hapterra_core::contact::{Friction, Rule};
+use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::phantom::{Calibration, to_terrain_frame};
@@ -20,7 +20,7 @@ const CELLS: i32 = 64;
 pub(super) const SOFT: ForceLaw = ForceLaw {
     stiffness_n_per_mm: 0.05,
     max_force_n: 0.5,
-    friction: Friction::NONE,
+    ..ForceLaw::PREMIUM
 };
 
 /// A plane that lies `below_mm` under the tip as it is now.

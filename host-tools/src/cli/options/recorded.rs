@@ -3,9 +3,10 @@
 use std::fmt::Debug;
 
 use hapterra_core::contact::{Friction, Rule};
+use hapterra_core::force::Controller;
 
 use super::exaggeration::Exaggeration;
-use super::rendering::{ContactRule, Rendering};
+use super::rendering::{ContactRule, PassivityController, Rendering};
 use crate::replay::Settings;
 
 impl Rendering {
@@ -47,6 +48,18 @@ impl Rendering {
                 "viscous-friction",
                 self.viscous_friction,
                 force.friction.viscous_s,
+                &mut told,
+            )),
+            damping_ns_per_m: Some(merged(
+                "damping-ns-per-m",
+                self.damping_ns_per_m,
+                force.damping.ns_per_m,
+                &mut told,
+            )),
+            passivity: Some(merged(
+                "passivity",
+                self.passivity,
+                controller(force.damping.controller),
                 &mut told,
             )),
             contact: Some(merged("contact", self.contact, rule(force.rule), &mut told)),
@@ -113,6 +126,14 @@ fn told(name: &str, given: &str, recorded: &str) -> String {
     format!("--{name} {given}, where the recording has {recorded}")
 }
 
+const fn controller(controller: Controller) -> PassivityController {
+    match controller {
+        Controller::Auto => PassivityController::Auto,
+        Controller::On => PassivityController::On,
+        Controller::Off => PassivityController::Off,
+    }
+}
+
 const fn rule(rule: Rule) -> ContactRule {
     match rule {
         Rule::Swept => ContactRule::Swept,
@@ -122,7 +143,7 @@ const fn rule(rule: Rule) -> ContactRule {
 
 #[cfg(test)]
 mod tests {
-    use hapterra_core::force::ForceLaw;
+    use hapterra_core::force::{Damping, ForceLaw};
 
     use super::*;
     use crate::raster::Raster;
@@ -136,7 +157,7 @@ mod tests {
         let law = ForceLaw {
             stiffness_n_per_mm: 0.3,
             max_force_n: 4.0,
-            friction: Friction::NONE,
+            ..ForceLaw::PREMIUM
         };
         let device = Device {
             board: "native".into(),
@@ -159,6 +180,33 @@ mod tests {
             (Some(1), Some(4.0))
         );
         assert_eq!(rendering.rule(), Rule::Paper);
+    }
+
+    #[test]
+    fn damping_is_as_recorded_and_what_is_stated_wins() {
+        let mut recorded = recorded();
+        recorded.force.damping = Damping {
+            ns_per_m: 2.5,
+            controller: Controller::On,
+        };
+        let (rendering, told) = Rendering::default().or_recorded(&recorded);
+        assert_eq!(told, [""; 0]);
+        let law = rendering.law().expect("valid");
+        assert_eq!(law.damping, recorded.force.damping);
+        let stated = Rendering {
+            damping_ns_per_m: Some(0.0),
+            passivity: Some(PassivityController::Auto),
+            ..Rendering::default()
+        };
+        let (rendering, told) = stated.or_recorded(&recorded);
+        assert_eq!(rendering.law().expect("valid").damping, Damping::NONE);
+        assert_eq!(told.len(), 2, "{told:?}");
+        let text = recorded.to_toml();
+        assert!(
+            text.contains("[force.damping]\nns_per_m = 2.5\ncontroller = \"on\""),
+            "{text}"
+        );
+        assert_eq!(Settings::from_toml(&text).expect("read"), Some(recorded));
     }
 
     #[test]

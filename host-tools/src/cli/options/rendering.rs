@@ -1,11 +1,10 @@
 //! Options that say how a terrain feels, shared by `replay`, `run` and `demo`.
 
 use hapterra_core::contact::{Friction, Rule};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::{Controller, Damping, ForceLaw};
 
 use super::exaggeration::Exaggeration;
 use crate::cli::failure::{Failure, OrHint};
-use crate::place::STIFFEST_N_PER_MM;
 use crate::place::{Heights, suited_height};
 use crate::raster::Raster;
 use crate::terrain::{FeltCells, FeltGrid, Scale, Terrain};
@@ -63,6 +62,14 @@ pub struct Rendering {
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub viscous_friction: Option<f32>,
 
+    /// Damping along the force, N·s/m: at most as much as the spring's force [default: 0]
+    #[arg(long, value_name = "NS/M", allow_negative_numbers = true)]
+    pub damping_ns_per_m: Option<f32>,
+
+    /// Whether energy that the ticks create is taken back by damping [default: auto]
+    #[arg(long, value_enum)]
+    pub passivity: Option<PassivityController>,
+
     /// Contact rule [default: swept]
     #[arg(long, value_enum)]
     pub contact: Option<ContactRule>,
@@ -75,6 +82,17 @@ pub enum ContactRule {
     Swept,
     /// As published in the paper, for comparison
     Paper,
+}
+
+/// When the passivity controller acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum PassivityController {
+    /// Where the stiffness is above what the device's rate allows without it
+    Auto,
+    /// Always
+    On,
+    /// Never
+    Off,
 }
 
 impl Rendering {
@@ -144,17 +162,13 @@ impl Rendering {
             stiffness_n_per_mm: self.stiffness_n_per_mm.unwrap_or(usual.stiffness_n_per_mm),
             max_force_n: self.max_force_n.unwrap_or(usual.max_force_n),
             friction: self.surface()?,
+            damping: self.damping()?,
         };
         let ForceLaw {
             stiffness_n_per_mm: k,
             max_force_n: limit,
             ..
         } = law;
-        if k.is_finite() && k > STIFFEST_N_PER_MM {
-            tracing::warn!(
-                "a stiffness of {k} N/mm: people hold 0.4 to 0.8 N/mm on a Phantom Premium 1.5; above {STIFFEST_N_PER_MM} N/mm an arm most likely buzzes or kicks"
-            );
-        }
         law.is_valid()
             .then_some(law)
             .ok_or_else(|| {
@@ -196,6 +210,30 @@ impl Rendering {
         Ok(friction)
     }
 
+    /// What takes energy out of a motion against the surface.
+    ///
+    /// # Errors
+    /// Damping that no tick can make.
+    fn damping(&self) -> Result<Damping, Failure> {
+        let ns_per_m = self.damping_ns_per_m.unwrap_or(0.0);
+        let damping = Damping {
+            ns_per_m,
+            controller: match self.passivity {
+                None | Some(PassivityController::Auto) => Controller::Auto,
+                Some(PassivityController::On) => Controller::On,
+                Some(PassivityController::Off) => Controller::Off,
+            },
+        };
+        damping
+            .is_valid()
+            .then_some(damping)
+            .ok_or_else(|| format!("a damping of {ns_per_m} N·s/m"))
+            .or_hint(format!(
+                "--damping-ns-per-m from 0 to {}",
+                Damping::MOST_NS_PER_M
+            ))
+    }
+
     /// The contact rule.
     #[must_use]
     pub const fn rule(&self) -> Rule {
@@ -209,6 +247,17 @@ impl Rendering {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn damping_that_no_tick_can_make_is_refused() {
+        for bad in [-1.0, 20.5, f32::NAN, f32::INFINITY] {
+            let rendering = Rendering {
+                damping_ns_per_m: Some(bad),
+                ..Rendering::default()
+            };
+            assert!(rendering.law().is_err(), "{bad}");
+        }
+    }
 
     #[test]
     fn friction_that_no_surface_has_is_refused_with_what_to_do() {

@@ -1,17 +1,23 @@
 //! From proxy and haptic interface point to newtons.
 
+mod damping;
+pub mod passivity;
+
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::Friction;
+use crate::rate::TickRate;
+pub(crate) use damping::Damper;
+pub use damping::{Controller, Damping};
 
 /// The spring between the haptic interface point (HIP) and the proxy (paper
 /// §4.3.4), the limit of what it may ask for, and what holds the proxy back. Immutable while a tick runs.
 ///
 /// ```
-/// use hapterra_core::{Vec3, contact::Friction, force::ForceLaw};
+/// use hapterra_core::{Vec3, force::ForceLaw};
 ///
-/// let law = ForceLaw { stiffness_n_per_mm: 0.5, max_force_n: 8.5, friction: Friction::NONE };
+/// let law = ForceLaw { stiffness_n_per_mm: 0.5, max_force_n: 8.5, ..ForceLaw::PREMIUM };
 /// // The proxy is 4 mm above the HIP: half a newton for each.
 /// assert_eq!(law.force_n(Vec3::Z * 4.0), Vec3::Z * 2.0);
 /// // Farther away the limit is kept, and so is the direction.
@@ -27,6 +33,8 @@ pub struct ForceLaw {
     pub max_force_n: f32,
     /// How rough the surface is.
     pub friction: Friction,
+    /// What takes energy out of a motion against it.
+    pub damping: Damping,
 }
 
 impl ForceLaw {
@@ -35,13 +43,18 @@ impl ForceLaw {
         stiffness_n_per_mm: 0.5,
         max_force_n: 8.5,
         friction: Friction::NONE,
+        damping: Damping::NONE,
     };
 
-    /// Whether stiffness and limit are finite and not negative, and the friction is one.
+    /// Whether stiffness and limit are finite and not negative, and friction and damping are
+    /// such.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let ok = |x: f32| x.is_finite() && x >= 0.0;
-        ok(self.stiffness_n_per_mm) && ok(self.max_force_n) && self.friction.is_valid()
+        ok(self.stiffness_n_per_mm)
+            && ok(self.max_force_n)
+            && self.friction.is_valid()
+            && self.damping.is_valid()
     }
 
     /// Force in newtons for a proxy `displacement_mm` away from the HIP.
@@ -51,6 +64,25 @@ impl ForceLaw {
     #[must_use]
     pub fn force_n(&self, displacement_mm: Vec3) -> Vec3 {
         clamp_length(displacement_mm * self.stiffness_n_per_mm, self.max_force_n)
+    }
+
+    /// Whether the passivity controller acts on an arm at a rate.
+    #[must_use]
+    pub fn is_controlled(&self, rate: TickRate) -> bool {
+        match self.damping.controller {
+            Controller::Auto => self.stiffness_n_per_mm > passivity::stiffest_n_per_mm(rate),
+            Controller::On => true,
+            Controller::Off => false,
+        }
+    }
+
+    /// What the spring holds, mJ, for a proxy `displacement_mm` away from the HIP, where it may
+    /// make up to `most_n`.
+    fn stored_mj(&self, displacement_mm: Vec3, most_n: f32) -> f32 {
+        let stretched_n = displacement_mm.length() * self.stiffness_n_per_mm;
+        let at_limit_n = stretched_n.min(self.max_force_n).min(most_n);
+        // Beyond the limit the force stays as it is: F (d - d_m) more than at the limit.
+        at_limit_n * (stretched_n - 0.5 * at_limit_n) / self.stiffness_n_per_mm
     }
 }
 

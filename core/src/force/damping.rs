@@ -1,0 +1,129 @@
+//! Damping along the force, of a scene's choice and of the passivity controller's.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use super::passivity::Passivity;
+use super::{ForceLaw, clamp_length};
+use crate::rate::TickRate;
+
+/// How a surface takes energy out of a motion against it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Damping {
+    /// Newtons for a metre a second along the force. What it adds or takes is never more
+    /// than the spring's force: it comes in with the depth, and never pulls.
+    pub ns_per_m: f32,
+    /// Whether energy that the ticks create is taken back.
+    pub controller: Controller,
+}
+
+/// When the [passivity controller](super::passivity) acts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[serde(rename_all = "lowercase")]
+pub enum Controller {
+    /// Where the stiffness is above what the device's rate allows without it
+    /// ([`stiffest_n_per_mm`](super::passivity::stiffest_n_per_mm)).
+    #[default]
+    Auto,
+    /// Always.
+    On,
+    /// Never.
+    Off,
+}
+
+impl Damping {
+    /// Most that a scene may ask for, N·s/m.
+    pub const MOST_NS_PER_M: f32 = 20.0;
+    /// None, and a controller where the rate needs one.
+    pub const NONE: Self = Self {
+        ns_per_m: 0.0,
+        controller: Controller::Auto,
+    };
+
+    /// Whether nothing else than usual is asked for.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::NONE
+    }
+
+    /// Whether its number is one that a loop can work with.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        (0.0..=Self::MOST_NS_PER_M).contains(&self.ns_per_m)
+    }
+}
+
+/// The damping of one scene at one rate; a scene without any has none.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Damper {
+    law: ForceLaw,
+    controller: Option<Passivity>,
+}
+
+impl Damper {
+    /// Of a scene that is felt with an arm, or with points: those have no hand that energy
+    /// could be given to.
+    pub(crate) fn of(law: &ForceLaw, rate: TickRate, with_arm: bool) -> Option<Self> {
+        let is_controlled = with_arm && law.is_controlled(rate);
+        let controller = is_controlled.then(|| Passivity::new(law, rate));
+        (controller.is_some() || law.damping.ns_per_m > 0.0).then_some(Self {
+            law: *law,
+            controller,
+        })
+    }
+
+    /// The energy that was created and not taken back yet, mJ, where it is watched.
+    pub(crate) fn created_mj(&self) -> f32 {
+        self.controller.as_ref().map_or(0.0, Passivity::created_mj)
+    }
+
+    /// Nothing is felt, or less than the spring's force: what was created before is forgotten.
+    pub(crate) fn rest(&mut self) {
+        if let Some(controller) = &mut self.controller {
+            controller.rest();
+        }
+    }
+
+    /// Books the energy since the tick before, which asked for `asked_n`: the tip is at this place
+    /// of a frame that stays, and the proxy `displacement_mm` away from it. The guard lets through
+    /// up to `most_n`.
+    pub(crate) fn observe(
+        &mut self,
+        displacement_mm: Vec3,
+        tip_mm: Vec3,
+        asked_n: Vec3,
+        most_n: f32,
+    ) {
+        if let Some(controller) = &mut self.controller {
+            let stored_mj = self.law.stored_mj(displacement_mm, most_n);
+            controller.observe(stored_mj, tip_mm, asked_n);
+        }
+    }
+
+    /// The force of a tick: the spring's, damped.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn force_n(&self, spring_n: Vec3, velocity_mm_s: Vec3) -> Vec3 {
+        // Along the force, times its size: positive where the tip gives way to it.
+        let along = velocity_mm_s.dot(spring_n);
+        let squared = spring_n.length_squared();
+        let mut ns_per_mm = 1e-3 * self.law.damping.ns_per_m;
+        if let Some(controller) = &self.controller {
+            ns_per_mm += controller.damping_ns_per_mm(along * along / squared);
+        }
+        let share = ns_per_mm * along / squared;
+        // No number without a force.
+        if share.is_finite() {
+            let damped_n = spring_n * (1.0 - share.clamp(-1.0, 1.0));
+            clamp_length(damped_n, self.law.max_force_n)
+        } else {
+            spring_n
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "damping_tests.rs"]
+mod tests;

@@ -1,0 +1,98 @@
+//! What the map says to who is about to feel a surface.
+
+use hapterra_core::force::{ForceLaw, passivity};
+use hapterra_core::rate::TickRate;
+
+/// Stiffness up to which a press is still in a limp hand, N/mm: ticks a second, without and
+/// with the passivity controller. Tried again in the tests.
+pub(super) const STILL_N_PER_MM: [(u32, f32, f32); 4] = [
+    (1_000, 3.0, 6.0),
+    (2_000, 4.0, 8.0),
+    (4_000, 6.0, 8.0),
+    (10_000, 8.0, 8.0),
+];
+
+/// Warns of a surface that is too stiff for a device of so many ticks a second.
+pub fn warn(law: &ForceLaw, tick_hz: u32) {
+    let rate = TickRate::new(tick_hz);
+    if let Some(warning) = rate.and_then(|rate| warning(law, rate)) {
+        tracing::warn!("{warning}");
+    }
+}
+
+/// What has to be said of a surface at a device's rate; `None` where every hand on the
+/// virtual arm holds it still, and theory does not speak against it.
+#[must_use]
+fn warning(law: &ForceLaw, rate: TickRate) -> Option<String> {
+    let (stiffness, hz) = (law.stiffness_n_per_mm, rate.hz());
+    let is_controlled = law.is_controlled(rate);
+    let with = if is_controlled { "with" } else { "without" };
+    let (still, passive) = (
+        still_n_per_mm(rate, is_controlled),
+        passivity::stiffest_n_per_mm(rate),
+    );
+    if stiffness > still {
+        return Some(format!(
+            "a stiffness of {stiffness} N/mm: on the virtual arm a limp hand shakes above {still} N/mm at {hz} ticks a second, {with} the passivity controller (hapterra stability)"
+        ));
+    }
+    let controller = match is_controlled {
+        true => "the passivity controller takes back what the ticks create",
+        false => "--passivity on takes back what the ticks create",
+    };
+    (stiffness > passive).then(|| {
+        format!(
+            "a stiffness of {stiffness} N/mm: people hold 0.4 to 0.8 N/mm on a Phantom Premium 1.5; above {passive} N/mm at {hz} ticks a second a limp hand alone does not hold it, and an arm may buzz or kick; {controller}"
+        )
+    })
+}
+
+/// Of the rates that were tried, the fastest that is no faster counts.
+fn still_n_per_mm(rate: TickRate, is_controlled: bool) -> f32 {
+    let slower = STILL_N_PER_MM
+        .iter()
+        .rev()
+        .find(|(hz, ..)| *hz <= rate.hz());
+    let (_, without, with) = slower.unwrap_or(&STILL_N_PER_MM[0]);
+    if is_controlled { *with } else { *without }
+}
+
+#[cfg(test)]
+mod tests {
+    use hapterra_core::force::{Controller, Damping};
+
+    use super::*;
+
+    fn told(stiffness_n_per_mm: f32, hz: u32, controller: Controller) -> String {
+        let law = ForceLaw {
+            stiffness_n_per_mm,
+            damping: Damping {
+                controller,
+                ..Damping::NONE
+            },
+            ..ForceLaw::PREMIUM
+        };
+        let rate = TickRate::new(hz).expect("a rate");
+        warning(&law, rate).unwrap_or_default()
+    }
+
+    #[test]
+    fn a_surface_is_warned_of_by_the_rate() {
+        for (stiffness, hz) in [(0.5, 1000), (1.0, 1000), (2.0, 2000), (3.3, 10_000)] {
+            assert_eq!(told(stiffness, hz, Controller::Auto), "", "{hz}");
+        }
+        let auto = told(1.5, 1000, Controller::Auto);
+        assert!(
+            auto.contains("the passivity controller takes back"),
+            "{auto}"
+        );
+        let off = told(1.5, 1000, Controller::Off);
+        assert!(off.contains("--passivity on"), "{off}");
+        let shakes = |stiffness, hz, controller| {
+            told(stiffness, hz, controller).contains("a limp hand shakes above")
+        };
+        assert!(shakes(3.5, 1000, Controller::Off) && !shakes(3.5, 1000, Controller::Auto));
+        assert!(shakes(6.5, 1000, Controller::Auto) && !shakes(6.5, 3000, Controller::Auto));
+        assert!(shakes(5.0, 3000, Controller::Off) && !shakes(5.0, 4000, Controller::Off));
+    }
+}
