@@ -133,11 +133,17 @@ fn what_is_no_terrain_file_at_all_is_said_to_be_that() {
         missing.expect_err("missing").fault(),
         BadRaster::Unreadable(_)
     ));
+    // Of a folder it is the first file, by name, that is to be a terrain.
     let itself = Raster::open(&folder, &OpenOptions::default());
-    assert!(matches!(
-        itself.expect_err("a folder").fault(),
-        BadRaster::Unreadable(_)
-    ));
+    let itself = itself.expect_err("a folder");
+    match itself.fault() {
+        BadRaster::InTile { file, fault } => {
+            assert!(file.ends_with("cut.hgt.gz"), "{itself}");
+            assert!(fault.to_string().contains("truncated"), "{itself}");
+        }
+        _ => panic!("{itself}"),
+    }
+    assert!(!assert_ends_well(&folder));
     std::fs::remove_dir_all(&folder).expect("the tries are removed");
 }
 

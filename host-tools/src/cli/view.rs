@@ -25,7 +25,7 @@ pub struct Args {
     #[arg(value_hint = ValueHint::FilePath)]
     pub recording: PathBuf,
 
-    /// The terrain file that was felt
+    /// The terrain that was felt: a file, a folder, a quoted pattern, or a .vrt
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub terrain: PathBuf,
 

@@ -15,7 +15,6 @@ mod target;
 mod view;
 mod words;
 
-pub(crate) use change::STIFFEST_N_PER_MM;
 pub use change::{Bounds, ChangeError, Changed, Hand, Laid, ViewChange};
 pub use coordinates::Coordinates;
 pub use error::PlaceError;

@@ -202,9 +202,7 @@ impl Decoded {
                 self.scale, self.offset
             )));
         }
-        self.no_data = no_data
-            .or(self.no_data)
-            .and_then(|value| self.storage.sample_type().none().comparable_no_data(value));
+        self.settle_no_data(no_data);
         self.cell = self.cell.filter(CellSize::is_valid);
         let survey = match &self.storage {
             Storage::Held { .. } => Survey::of_all(self.summarise()?),
@@ -216,6 +214,13 @@ impl Decoded {
             }),
             false => Ok(survey),
         }
+    }
+
+    /// Takes `no_data`, or else what the file says, for no data: as a sample can hold it.
+    pub(super) fn settle_no_data(&mut self, no_data: Option<f64>) {
+        self.no_data = no_data
+            .or(self.no_data)
+            .and_then(|value| self.storage.sample_type().none().comparable_no_data(value));
     }
 
     /// Height of a stored value; NaN in a hole.

@@ -131,6 +131,30 @@ pub enum BadRaster {
         /// The sample.
         value: f64,
     },
+    /// A folder, pattern or VRT without a file that could be read.
+    #[error("no terrain: {0}")]
+    NoTiles(String),
+    /// One file of many is at fault.
+    #[error("{fault}; it is in {}", file.display())]
+    InTile {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with it.
+        fault: Box<BadRaster>,
+    },
+    /// A file among many that is on no grid.
+    #[error("cannot be one of many files: {0}")]
+    NoPlace(String),
+    /// Files that are to be one terrain have no common grid.
+    #[error("its files do not fit together: of {} {why}, as {}", file.display(), other.display())]
+    TilesDiffer {
+        /// The file that does not fit.
+        file: PathBuf,
+        /// What it does not fit to.
+        other: PathBuf,
+        /// What differs.
+        why: String,
+    },
     /// The header promises more than the file can hold or a machine should.
     #[error("absurd size in the header: {0}")]
     AbsurdSize(String),
@@ -149,6 +173,14 @@ impl BadRaster {
     /// Damage described in place.
     pub(super) fn damaged(what: impl Into<String>) -> Self {
         Self::Damaged(what.into())
+    }
+
+    /// A fault of one file of many.
+    pub(super) fn in_tile(file: &Path, fault: Self) -> Self {
+        Self::InTile {
+            file: file.to_owned(),
+            fault: Box::new(fault),
+        }
     }
 
     /// An input error while decoding: an early end is a truncated file.

@@ -19,6 +19,7 @@ pub(super) struct FileBytes {
     extension: String,
     len: u64,
     data: Data,
+    outline: bool,
 }
 
 /// Where the bytes are.
@@ -61,7 +62,19 @@ impl FileBytes {
             extension: extension.unwrap_or_default(),
             len,
             data,
+            outline: false,
         }
+    }
+
+    /// The same bytes, of which only what their header says is wanted.
+    pub(super) fn in_outline(self, outline: bool) -> Self {
+        Self { outline, ..self }
+    }
+
+    /// Whether only what the header says is wanted: size, type of samples and place. A
+    /// format that can tells these without reading the samples, and hands over none.
+    pub(super) const fn is_outline(&self) -> bool {
+        self.outline
     }
 
     /// The file's name without folders, which may tell format and place.

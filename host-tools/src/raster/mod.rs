@@ -15,7 +15,8 @@
 //!
 //! Each format is one file or folder of `formats`, and one line in its table. From a
 //! path to samples: `open` unpacks (`archive`), asks the table, and lets the format
-//! decode (`input`, `read`) into `decoded`; [`Raster`] answers from that.
+//! decode (`input`, `read`) into `decoded`; [`Raster`] answers from that. A folder, a pattern
+//! of names and a GDAL VRT are many files as one terrain (`mosaic`).
 //!
 //! **Places.** A format hands over its map from columns and rows to coordinates
 //! (`ground_map`) and its reference system (`crs`); what follows from these is worked out
@@ -41,6 +42,8 @@ mod globe;
 mod ground_map;
 mod guard;
 mod input;
+mod mosaic;
+mod one_file;
 mod open;
 mod options;
 mod place;
@@ -52,7 +55,6 @@ mod tangents;
 
 use std::path::Path;
 
-pub use beside::files_read_with;
 pub use crs::{LonLat, ReferenceSystem};
 pub use decoded::{HeightSummary, LARGEST_HEIGHT};
 pub use error::{BadRaster, Error};
@@ -62,10 +64,11 @@ pub(crate) use georeference::around;
 pub use georeference::{Georeference, GroundTransform, Sides, System};
 pub use globe::Globe;
 pub use ground_map::Bounds;
+pub use mosaic::files_read_with;
 pub use options::{Encoding, OpenOptions, PngChannel, RawLayout};
 pub use samples::{Endian, SampleType, Samples};
 
-use blocks::{Blocks, Survey};
+use blocks::Survey;
 use decoded::Decoded;
 use place::Place;
 use samples::{SampleValue, with_samples};
@@ -110,7 +113,10 @@ impl Raster {
         decode(path, options)
             .and_then(|decoded| decoded.with_ground_cell(options.ground_cell_m))
             .map(|decoded| decoded.with_vertical_unit(options.vertical_unit_m))
-            .and_then(|decoded| Self::checked(decoded, options.no_data))
+            .and_then(|decoded| {
+                decoded.storage.set_path(path);
+                Self::checked(decoded, options.no_data)
+            })
             .map_err(|fault| Error::new(path, fault))
     }
 
@@ -299,7 +305,10 @@ impl Raster {
 
     /// Bytes of memory that the samples take, at most.
     pub fn memory_bytes(&self) -> usize {
-        self.samples().map_or(Blocks::most_bytes(), Samples::bytes)
+        match &self.source.storage {
+            Storage::Held { samples, .. } => samples.bytes(),
+            Storage::Blocks(blocks) => blocks.most_bytes(),
+        }
     }
 
     /// A hash of the file's index and of the heights that were looked at, where the samples

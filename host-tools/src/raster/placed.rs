@@ -80,6 +80,17 @@ fn turned(map: &GroundMap) -> Vec<String> {
 }
 
 impl Decoded {
+    /// The unit of the coordinates of samples that were laid out, where it was not guessed.
+    pub(super) fn ground_unit(&self) -> Option<GroundUnit> {
+        let (cell, place) = (self.cell?, self.place?);
+        let is_guess = cell.certainty == Certainty::Assumed && self.system.is_none();
+        (!is_guess).then_some(GroundUnit {
+            unit: cell.unit,
+            degrees: place.degrees,
+            from: cell.certainty,
+        })
+    }
+
     /// Lays the samples out: sets orientation, cell and place. Where the file states
     /// no `unit`, that of its reference system counts, which is to be set before; else
     /// the numbers tell.

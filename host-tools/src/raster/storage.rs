@@ -1,5 +1,6 @@
 //! Where a raster's samples are: in memory, or in its file until they are touched.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use super::blocks::{BlockReader, Blocks};
@@ -48,6 +49,13 @@ impl Storage {
         match self {
             Self::Held { samples, .. } => samples.sample_type(),
             Self::Blocks(blocks) => blocks.sample_type(),
+        }
+    }
+
+    /// Names the file in warnings about what is touched later.
+    pub(super) fn set_path(&self, path: &Path) {
+        if let Self::Blocks(blocks) = self {
+            blocks.set_path(path);
         }
     }
 

@@ -127,7 +127,7 @@ fn a_scenes_epoch_follows_heights_scale_and_law() {
         let law = ForceLaw {
             stiffness_n_per_mm,
             max_force_n: 8.5,
-            friction: hapterra_core::contact::Friction::NONE,
+            ..ForceLaw::PREMIUM
         };
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
         let home = GridPoint::default();

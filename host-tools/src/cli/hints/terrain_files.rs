@@ -27,6 +27,18 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
             format: "NetCDF", ..
         } => return unpacked_netcdf(path),
         BadRaster::Unsupported { .. } => return converted(path, PLAIN),
+        BadRaster::InTile { file, fault } => return hint(file, fault),
+        BadRaster::TilesDiffer { file, .. } => return brought_together(path, file),
+        BadRaster::NoPlace(_) => {
+            return format!(
+                "leave it out with a pattern of names in quotes, as 'tiles/*.tif'; or bring it onto rows and columns of its map: gdalwarp -r bilinear {} {}",
+                names(path).0,
+                names(path).1
+            );
+        }
+        BadRaster::NoTiles(_) => {
+            "name a folder with terrain files, or a pattern in quotes, as 'tiles/*.tif' or 'tiles/**/*.tif'"
+        }
         // Palettes and single bits do not outlive another type of samples.
         BadRaster::NotAHeightField(_) => {
             let one_band = format!("-b 1 {PLAIN}");
@@ -171,6 +183,23 @@ fn cut(path: &Path, (width, height): (u64, u64)) -> String {
         "cut a part out (offsets, then width and height in samples): gdal_translate -srcwin 0 0 \
          {width} {height} {from} {to}; or make it coarser: gdal_translate -r average \
          -outsize 10% 10% {from} {to}"
+    )
+}
+
+/// The command that lays files of different grids onto one.
+fn brought_together(path: &Path, file: &Path) -> String {
+    let files = match path.is_dir() {
+        true => format!(
+            "{}/*.{}",
+            quoted(&path.display().to_string()),
+            extension(file)
+        ),
+        false => path.display().to_string().replace(' ', "\\ "),
+    };
+    format!(
+        "leave it out with a pattern of names in quotes, as 'tiles/*.tif'; or lay all of them onto one grid: \
+         gdalwarp -r bilinear -ot Float32 -dstnodata -9999 -co TILED=YES -co COMPRESS=DEFLATE \
+         -co BIGTIFF=IF_SAFER {files} one.tif"
     )
 }
 

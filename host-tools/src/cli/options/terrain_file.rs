@@ -20,7 +20,8 @@ const INPUT: &str = "Input";
 #[derive(Clone, Debug, clap::Args)]
 pub struct TerrainFile {
     /// Terrain file: GeoTIFF, .hgt, .asc, PNG, NetCDF, USGS .dem, DTED, .flt, .bil, ENVI,
-    /// .npy/.npz, or raw samples
+    /// .npy/.npz, or raw samples; or many as one: a folder, a quoted pattern ('tiles/*.tif'), a
+    /// GDAL .vrt
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
 
@@ -74,7 +75,7 @@ pub struct ReadingOptions {
     pub png_channel: Option<PngChannel>,
 
     /// A terrain whose samples take more megabytes than this stays in its file and is read
-    /// where it is touched, if its format allows it (TIFF)
+    /// where it is touched, if its format allows it (TIFF); many files always do
     #[arg(long, value_name = "MB", default_value_t = OpenOptions::IN_MEMORY_MB, help_heading = INPUT)]
     pub in_memory_mb: u32,
 }

@@ -27,7 +27,7 @@ const NEIGHBOURS: [&str; 12] = [
 
 /// A terrain file and the files beside it that are read with it.
 #[must_use]
-pub fn files_read_with(path: &Path) -> Vec<PathBuf> {
+pub(super) fn files_read_with(path: &Path) -> Vec<PathBuf> {
     let beside = NEIGHBOURS
         .iter()
         .flat_map(|extension| candidates(path, extension));

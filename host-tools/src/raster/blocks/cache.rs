@@ -6,7 +6,7 @@ use lru::LruCache;
 
 use super::Block;
 
-/// Blocks are kept until they take more than this, bytes.
+/// Blocks of a terrain are kept until they take more than this, bytes.
 pub(super) const MOST_BYTES: usize = 64 << 20;
 /// What a hole takes, and a block besides its samples, bytes: about.
 const ENTRY_BYTES: usize = 128;
@@ -25,25 +25,25 @@ pub(super) struct Cache {
     /// `None` where there is no sample.
     blocks: LruCache<Key, Option<Arc<Block>>>,
     bytes: usize,
-}
-
-impl Default for Cache {
-    fn default() -> Self {
-        Self {
-            blocks: LruCache::unbounded(),
-            bytes: 0,
-        }
-    }
+    most_bytes: usize,
 }
 
 impl Cache {
+    /// Nothing yet, and blocks of so many bytes at most.
+    pub(super) fn new(most_bytes: usize) -> Self {
+        Self {
+            blocks: LruCache::unbounded(),
+            bytes: 0,
+            most_bytes,
+        }
+    }
+
     /// A block that is kept.
     pub(super) fn get(&mut self, key: &Key) -> Option<Option<Arc<Block>>> {
         self.blocks.get(key).cloned()
     }
 
     /// Bytes that all kept blocks take.
-    #[cfg(test)]
     pub(super) const fn bytes(&self) -> usize {
         self.bytes
     }
@@ -54,7 +54,7 @@ impl Cache {
         if let Some((_, replaced)) = self.blocks.push(key, block) {
             self.bytes -= bytes(replaced.as_deref());
         }
-        while self.bytes > MOST_BYTES && self.blocks.len() > 1 {
+        while self.bytes > self.most_bytes && self.blocks.len() > 1 {
             let Some((_, gone)) = self.blocks.pop_lru() else {
                 return;
             };

@@ -12,13 +12,14 @@ mod cache;
 mod survey;
 
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::guard::guarded;
 use super::samples::{HoleMask, SampleType, SampleValue, Samples, with_samples};
 use super::{BadRaster, bilinear};
 use cache::{Cache, Key};
-pub(super) use survey::Survey;
+pub(super) use survey::{Looks, Survey};
 
 /// Blocks of a larger size than this are not read one by one, bytes.
 pub(super) const LARGEST_BLOCK_BYTES: u64 = 32 << 20;
@@ -51,6 +52,16 @@ pub(super) trait BlockReader: Send + Sync {
 
     /// A hash of the file's index: where each block is stored and in how many bytes.
     fn index(&self) -> u64;
+
+    /// What is looked at when the raster is opened; `None` for its coarsest image.
+    fn looks(&self) -> Option<Looks> {
+        None
+    }
+
+    /// Bytes that the reader itself keeps at most, besides the blocks that it hands over.
+    fn kept_bytes(&self) -> usize {
+        0
+    }
 }
 
 /// An image that is read in blocks.
@@ -62,6 +73,9 @@ pub(super) struct BlockImage {
     pub(super) rows: u32,
     /// Columns and rows of a block; those at the east and south end are cut.
     pub(super) block: [u32; 2],
+    /// It has every so many-th sample of the full image, the first one first. Else its
+    /// samples are the middles of its own cells, and its edges those of the full image.
+    pub(super) every: Option<u32>,
 }
 
 /// A rectangle of an image, in the file's order of columns and rows.
@@ -84,6 +98,14 @@ pub(super) struct Block {
     pub(super) samples: Samples,
     /// Holes that no value marks.
     pub(super) holes: Option<HoleMask>,
+}
+
+impl Block {
+    /// A sample by its place in the block; `None` in a hole that no value marks.
+    pub(super) fn stored(&self, index: usize) -> Option<f64> {
+        let hole = (self.holes.as_ref()).is_some_and(|mask| mask.contains(index));
+        (!hole).then(|| with_samples!(&self.samples, values => values[index].widen()))
+    }
 }
 
 impl Part {
@@ -121,6 +143,8 @@ impl BlockImage {
 pub(super) struct Blocks {
     reader: Box<dyn BlockReader>,
     kept: Mutex<Kept>,
+    /// The file, for warnings.
+    path: OnceLock<PathBuf>,
 }
 
 struct Kept {
@@ -133,13 +157,38 @@ impl Blocks {
     /// Nothing is read yet.
     pub(super) fn new(reader: Box<dyn BlockReader>) -> Self {
         let kept = Kept {
-            cache: Cache::default(),
+            cache: Cache::new(cache::MOST_BYTES),
             unread: 0,
         };
         Self {
             reader,
             kept: Mutex::new(kept),
+            path: OnceLock::new(),
         }
+    }
+
+    /// Names the file in warnings.
+    pub(super) fn set_path(&self, path: &Path) {
+        // A second name of the same file is no better.
+        let _ = self.path.set(path.to_owned());
+    }
+
+    /// Keeps no more than so many bytes of blocks, and counts `unread` blocks as warned of.
+    pub(super) fn set_share(&self, most_bytes: usize, unread: u32) {
+        let mut kept = self.kept();
+        kept.cache = Cache::new(most_bytes);
+        kept.unread = unread;
+    }
+
+    /// Bytes that the blocks in memory take, and how many blocks could not be read.
+    pub(super) fn share(&self) -> (usize, u32) {
+        let kept = self.kept();
+        (kept.cache.bytes(), kept.unread)
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Kept> {
+        // Nothing that panics runs while this is held but decoders, whose panics are caught.
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Type in which samples are held.
@@ -147,9 +196,9 @@ impl Blocks {
         self.reader.sample_type()
     }
 
-    /// Bytes that blocks in memory take at most.
-    pub(super) const fn most_bytes() -> usize {
-        cache::MOST_BYTES + LARGEST_BLOCK_BYTES as usize
+    /// Bytes that blocks in memory take at most, and what their reader keeps.
+    pub(super) fn most_bytes(&self) -> usize {
+        cache::MOST_BYTES + LARGEST_BLOCK_BYTES as usize + self.reader.kept_bytes()
     }
 
     /// The image that serves a level of detail: the coarsest that is no coarser than it.
@@ -168,11 +217,7 @@ impl Blocks {
         let block = self.block(image, [column / across, row / down])?;
         let columns = of.part([column / across, row / down]).columns as usize;
         let index = (row % down) as usize * columns + (column % across) as usize;
-        let hole = block
-            .holes
-            .as_ref()
-            .is_some_and(|mask| mask.contains(index));
-        (!hole).then(|| with_samples!(&block.samples, values => values[index].widen()))
+        block.stored(index)
     }
 
     /// A stored sample between the samples of an image, linear along rows and columns, at a
@@ -189,8 +234,9 @@ impl Blocks {
         };
         // A sample is the middle of its cell, and the edges of the images are the same.
         let times = self.coarseness(of);
+        let middle = if of.every.is_some() { 0.0 } else { 0.5 };
         let place = |at: f64, times: f64, count: u32| {
-            ((at + 0.5) / times - 0.5).clamp(0.0, f64::from(count) - 1.0)
+            ((at + middle) / times - middle).clamp(0.0, f64::from(count) - 1.0)
         };
         let place = [
             place(column, times[0], of.columns),
@@ -201,6 +247,9 @@ impl Blocks {
 
     /// Samples of the full image in one of another, along rows and columns.
     fn coarseness(&self, image: &BlockImage) -> [f64; 2] {
+        if let Some(every) = image.every {
+            return [f64::from(every); 2];
+        }
         let full = self.reader.images().first().unwrap_or(image);
         [
             f64::from(full.columns) / f64::from(image.columns),
@@ -210,8 +259,7 @@ impl Blocks {
 
     /// A block, read if it is not in memory; `None` where there is no sample.
     fn block(&self, image: usize, at: [u32; 2]) -> Option<Arc<Block>> {
-        // Nothing that panics runs while this is held but decoders, whose panics are caught.
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.kept();
         let key = Key { image, at };
         if let Some(block) = kept.cache.get(&key) {
             return block;
@@ -230,17 +278,19 @@ impl Blocks {
         match read {
             Ok(block) => Some(Arc::new(block)),
             Err(fault) => {
-                *unread += 1;
+                *unread = unread.saturating_add(1);
+                let name =
+                    (self.path.get()).map_or("the file".into(), |path| path.display().to_string());
                 if *unread <= WARNINGS {
                     tracing::warn!(
-                        "columns {} to {}, rows {} to {} of the file cannot be read and are a hole: {fault}",
+                        "columns {} to {}, rows {} to {} of {name} cannot be read and are a hole: {fault}",
                         part.column,
                         part.column + part.columns - 1,
                         part.row,
                         part.row + part.rows - 1
                     );
                 } else if *unread == WARNINGS + 1 {
-                    tracing::warn!("more of the file cannot be read and are holes");
+                    tracing::warn!("more of {name} cannot be read and are holes");
                 }
                 None
             }

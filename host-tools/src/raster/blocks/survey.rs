@@ -33,40 +33,96 @@ impl Survey {
     }
 }
 
+/// What of a raster is looked at when it is opened.
+#[derive(Debug)]
+pub(in crate::raster) struct Looks {
+    /// The image to look at.
+    pub(in crate::raster) image: usize,
+    /// Parts of it, of which a few are looked at.
+    pub(in crate::raster) parts: Vec<Part>,
+}
+
+/// What was looked at so far.
+struct Seen {
+    hasher: XxHash64,
+    summary: HeightSummary,
+}
+
+impl Seen {
+    /// Counts a height; NaN is a hole.
+    fn add(&mut self, height: f64) {
+        let bits = if height.is_nan() { f64::NAN } else { height };
+        self.hasher.write(&bits.to_le_bytes());
+        self.summary.add(height);
+    }
+}
+
 impl Blocks {
-    /// Looks at the coarsest image, all of it where it is small. `height` makes a
-    /// height of a stored sample. The summary's range is empty where there is no height in
-    /// the whole file.
+    /// Looks at what the reader chooses, or at the coarsest image, all of it where it is
+    /// small. `height` makes a height of a stored sample. The summary's range is empty where
+    /// there is no height in the whole file.
     pub(in crate::raster) fn survey(&self, height: impl Fn(Option<f64>) -> f64) -> Survey {
-        let image = self.reader.images().len().saturating_sub(1);
-        let mut hasher = XxHash64::with_seed(0);
-        hasher.write_u64(self.reader.index());
-        let mut summary = HeightSummary::EMPTY;
-        let mut look = |part: Part| {
-            for row in part.row..part.row + part.rows {
-                for column in part.column..part.column + part.columns {
-                    let height = height(self.stored(image, column, row));
-                    let bits = if height.is_nan() { f64::NAN } else { height };
-                    hasher.write(&bits.to_le_bytes());
-                    summary.add(height);
-                }
-            }
-            summary.has_none()
+        let mut seen = Seen {
+            hasher: XxHash64::with_seed(0),
+            summary: HeightSummary::EMPTY,
         };
-        let parts = self.stored_parts(image);
-        let is_small = parts.len() <= LOOKS || self.samples(image) <= FEW_SAMPLES;
-        let looks = if is_small { parts.len() } else { LOOKS };
-        let mut nothing_yet = true;
+        seen.hasher.write_u64(self.reader.index());
+        let chosen = self.reader.looks();
+        let (is_chosen, Looks { image, parts }) = match chosen {
+            Some(looks) => (true, looks),
+            None => (false, self.coarsest()),
+        };
+        let look = |part: &Part, seen: &mut Seen| match is_chosen {
+            true => self.look_once(image, part, |stored| seen.add(height(stored))),
+            false => self.look_at_block(image, part, |stored| seen.add(height(stored))),
+        };
+        let is_small = !is_chosen && self.samples(image) <= FEW_SAMPLES;
+        let looks = match is_small || parts.len() <= LOOKS {
+            true => parts.len(),
+            false => LOOKS,
+        };
         for index in 0..looks {
-            nothing_yet = look(parts[index * (parts.len() - 1) / (looks - 1).max(1)]);
+            let part = index * (parts.len() - 1) / (looks - 1).max(1);
+            look(&parts[part], &mut seen);
         }
-        if nothing_yet && !is_small {
-            // Most of it holds nothing: the first height anywhere will do.
-            let _ = parts.into_iter().find(|part| !look(*part));
+        if looks < parts.len() {
+            // Most of it may hold nothing: then the first height anywhere will do.
+            for part in &parts {
+                if !seen.summary.has_none() {
+                    break;
+                }
+                look(part, &mut seen);
+            }
         }
         Survey {
-            summary,
-            print: Some(hasher.finish()),
+            summary: seen.summary,
+            print: Some(seen.hasher.finish()),
+        }
+    }
+
+    /// The samples of a block, which is kept.
+    fn look_at_block(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
+        for row in part.row..part.row + part.rows {
+            for column in part.column..part.column + part.columns {
+                add(self.stored(image, column, row));
+            }
+        }
+    }
+
+    /// The samples of a part that is no block: neither is it kept, nor is read what lies
+    /// around it.
+    fn look_once(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
+        let block = self.read(image, part, &mut self.kept().unread);
+        for index in 0..part.columns as usize * part.rows as usize {
+            add(block.as_ref().and_then(|block| block.stored(index)));
+        }
+    }
+
+    fn coarsest(&self) -> Looks {
+        let image = self.reader.images().len().saturating_sub(1);
+        Looks {
+            image,
+            parts: self.stored_parts(image),
         }
     }
 

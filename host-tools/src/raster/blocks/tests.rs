@@ -31,6 +31,7 @@ fn image(size: [u32; 2]) -> BlockImage {
         columns: size[0],
         rows: size[1],
         block: BLOCK,
+        every: None,
     }
 }
 

@@ -64,10 +64,15 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
             input.len()
         )));
     }
-    let mut reader = input.reader()?;
-    let skipped = std::io::SeekFrom::Start((start + HEADER) as u64);
-    reader.seek(skipped).map_err(BadRaster::Unreadable)?;
-    let samples = Records::new(header.size, record).read(&mut reader)?;
+    let samples = match input.is_outline() {
+        true => Records::new((0, 0), record),
+        false => {
+            let mut reader = input.reader()?;
+            let skipped = std::io::SeekFrom::Start((start + HEADER) as u64);
+            reader.seek(skipped).map_err(BadRaster::Unreadable)?;
+            Records::new(header.size, record).read(&mut reader)?
+        }
+    };
     let mut decoded = Decoded::new(
         format!("{}, int16", header.name()),
         header.size,

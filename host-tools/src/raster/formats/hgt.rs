@@ -24,9 +24,14 @@ const VOID: f64 = -32768.0;
 /// A tile covers one degree by one degree and shares its borders with the next.
 fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let (columns, rows) = size(input.len())?;
-    let reader = &mut *input.reader()?;
-    let count = u64::from(columns) * u64::from(rows);
-    let samples = read_samples(reader, count, Stored::Held(SampleType::I16), Endian::Big)?;
+    let samples = match input.is_outline() {
+        true => SampleType::I16.none(),
+        false => {
+            let reader = &mut *input.reader()?;
+            let count = u64::from(columns) * u64::from(rows);
+            read_samples(reader, count, Stored::Held(SampleType::I16), Endian::Big)?
+        }
+    };
     let format = "SRTM height tile, int16".to_owned();
     let mut decoded = Decoded::new(format, (columns, rows), samples);
     decoded.no_data = Some(VOID);

@@ -11,7 +11,7 @@ use crate::raster::decoded::Decoded;
 use crate::raster::format::{Claim, Format, Parts};
 use crate::raster::ground_map::GroundMap;
 use crate::raster::input::FileBytes;
-use crate::raster::{BadRaster, CellSize, beside};
+use crate::raster::{BadRaster, CellSize, SampleType, beside};
 use header::{Header, looks_like_header};
 pub(super) use tokens::Tokens;
 
@@ -30,7 +30,11 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let mut tokens = Tokens::new(input.reader()?);
     let header = Header::read(&mut tokens)?;
     let (columns, rows) = header.size()?;
-    let samples = values::read(&mut tokens, &header, columns, rows, input.len())?;
+    let samples = match input.is_outline() {
+        // What the numbers need is not known before they are read; heights need no more.
+        true => SampleType::F32.none(),
+        false => values::read(&mut tokens, &header, columns, rows, input.len())?,
+    };
     let format = format!("Esri ASCII grid, {}", samples.type_name());
     let mut decoded = Decoded::new(format, (columns, rows), samples);
     decoded.no_data = Some(header.no_data());

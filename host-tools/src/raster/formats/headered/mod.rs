@@ -61,7 +61,10 @@ pub(in crate::raster) fn decode_by_header(
     let header = header.map_err(|fault| in_header(fault, &name))?;
     FORMAT.check_choice(options)?;
     header.layout.check(band, input.len(), &name)?;
-    let samples = header.layout.read(input, band)?;
+    let samples = match input.is_outline() {
+        true => header.layout.stored.room(0)?,
+        false => header.layout.read(input, band)?,
+    };
     let bands = match header.layout.bands {
         1 => String::new(),
         bands => format!(", band {band} of {bands}"),

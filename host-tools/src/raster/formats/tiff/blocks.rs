@@ -93,6 +93,7 @@ impl TiffBlocks {
             columns: image.layout.columns,
             rows: image.layout.rows,
             block: block(&image.layout),
+            every: None,
         });
         Ok(Self {
             blocks: blocks.collect(),

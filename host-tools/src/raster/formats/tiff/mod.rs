@@ -58,6 +58,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     let size = (layout.columns, layout.rows);
     let mask = beside(input, "msk")?;
     let storage = match stays {
+        false if input.is_outline() => Storage::from(samples::sample_type(&layout).none()),
         true => {
             let overviews = beside(input, "ovr")?;
             Storage::from(TiffBlocks::new(file, mask, overviews, asked)?)

@@ -1,0 +1,158 @@
+//! The files of a terrain that are open: few, and those touched last.
+
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+use lru::LruCache;
+
+use super::super::guard::guarded;
+use super::super::storage::Storage;
+use super::super::{BadRaster, Decoded, OpenOptions};
+use super::source::{Opened, Source, Values};
+use super::tile_file;
+
+/// No more files are open at once: each may have a mask and overviews beside it.
+const MOST_OPEN: usize = 32;
+/// What open files keep in memory, bytes; the one touched last may take more alone.
+const MOST_BYTES: usize = 64 << 20;
+/// What blocks of one file take of that, bytes.
+const SHARE_BYTES: usize = 16 << 20;
+/// A file that has no blocks is held as a whole, and has to fit, bytes.
+const MOST_WHOLE_BYTES: u64 = 64 << 20;
+
+/// Open files by their number among the terrain's.
+pub(super) struct Pool {
+    options: OpenOptions,
+    open: LruCache<usize, Arc<Opened>>,
+    /// Files that could not be read: each was warned of, and is not tried again.
+    failed: HashSet<usize>,
+    /// Blocks of files closed since that could not be read.
+    unread: HashMap<usize, u32>,
+}
+
+impl Pool {
+    pub(super) fn new(options: &OpenOptions) -> Self {
+        Self {
+            options: options_for_tiles(options),
+            open: LruCache::unbounded(),
+            failed: HashSet::new(),
+            unread: HashMap::new(),
+        }
+    }
+
+    /// Bytes that all open files take at most: one that was just decoded beside the others.
+    pub(super) const fn most_bytes() -> usize {
+        MOST_BYTES + MOST_WHOLE_BYTES as usize
+    }
+
+    /// An open file; `None`, with a warning the first time, where it cannot be read.
+    pub(super) fn get(&mut self, number: usize, source: &Source) -> Option<Arc<Opened>> {
+        if let Some(opened) = self.open.get(&number) {
+            return Some(opened.clone());
+        }
+        if self.failed.contains(&number) {
+            return None;
+        }
+        match self.opened(number, source) {
+            Ok(opened) => {
+                let opened = Arc::new(opened);
+                self.open.push(number, opened.clone());
+                Some(opened)
+            }
+            Err(fault) => {
+                self.failed.insert(number);
+                // That it holds nothing is no fault of a file among others.
+                if !matches!(fault, BadRaster::AllNoData { .. }) {
+                    let path = source.path.display();
+                    tracing::warn!("{path} cannot be read and is a hole: {fault}");
+                }
+                None
+            }
+        }
+    }
+
+    fn opened(&mut self, number: usize, source: &Source) -> Result<Opened, BadRaster> {
+        let mut options = self.options.clone();
+        options.band = source.band.or(options.band);
+        let whole = whole_bytes(&outline(source, &options)?)?;
+        self.make_room(usize::try_from(whole).unwrap_or(usize::MAX));
+        let mut decoded = guarded("terrain", || tile_file::decode(&source.path, &options))?;
+        let found = (decoded.columns, decoded.rows);
+        if let Some((columns, rows)) = source.size.filter(|size| *size != found) {
+            return Err(BadRaster::damaged(format!(
+                "it had {columns} × {rows} samples and now has {} × {}",
+                found.0, found.1
+            )));
+        }
+        decoded.settle_no_data(match source.values {
+            Values::Heights => options.no_data,
+            Values::Stored { .. } => None,
+        });
+        if let Storage::Blocks(blocks) = &decoded.storage {
+            blocks.set_path(&source.path);
+            let unread = self.unread.get(&number).copied().unwrap_or_default();
+            blocks.set_share(SHARE_BYTES, unread);
+        }
+        Ok(Opened::new(decoded, source.values))
+    }
+
+    /// Closes files until those that stay, and `more` bytes, are within bounds. The last one
+    /// stays where it alone is too large.
+    pub(super) fn make_room(&mut self, more: usize) {
+        let bytes = |open: &LruCache<usize, Arc<Opened>>| {
+            open.iter()
+                .map(|(_, opened)| opened.share().0)
+                .sum::<usize>()
+        };
+        let fewest = usize::from(more == 0);
+        while self.open.len() > fewest
+            && (self.open.len() >= MOST_OPEN || bytes(&self.open).saturating_add(more) > MOST_BYTES)
+        {
+            let Some((number, closed)) = self.open.pop_lru() else {
+                return;
+            };
+            let unread = closed.share().1;
+            if unread > 0 {
+                self.unread.insert(number, unread);
+            }
+        }
+    }
+
+    /// Number of open files.
+    #[cfg(test)]
+    pub(super) fn len(&self) -> usize {
+        self.open.len()
+    }
+}
+
+/// How files among others are opened: those that can be are read in blocks.
+pub(super) fn options_for_tiles(options: &OpenOptions) -> OpenOptions {
+    OpenOptions {
+        most_in_memory_bytes: 0,
+        ..options.clone()
+    }
+}
+
+/// What the header of a file says.
+fn outline(source: &Source, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+    tile_file::outline(&source.path, options)
+}
+
+/// Bytes that a file takes that is held as a whole; none where it is read in blocks.
+///
+/// # Errors
+/// [`BadRaster::Unsupported`] where these are too many.
+pub(super) fn whole_bytes(outline: &Decoded) -> Result<u64, BadRaster> {
+    let Storage::Held { samples, .. } = &outline.storage else {
+        return Ok(0);
+    };
+    let (columns, rows) = (outline.columns, outline.rows);
+    let count = u64::from(columns) * u64::from(rows);
+    match count.saturating_mul(samples.sample_type().bytes()) {
+        bytes if bytes <= MOST_WHOLE_BYTES => Ok(bytes),
+        _ => Err(BadRaster::Unsupported {
+            format: "a terrain of many files",
+            feature: format!("a file of {columns} × {rows} samples that cannot be read in blocks"),
+        }),
+    }
+}

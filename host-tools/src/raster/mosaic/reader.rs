@@ -1,0 +1,240 @@
+//! Reads samples of a terrain of many files, from those files that have them.
+
+use std::hash::Hasher;
+use std::sync::{Mutex, PoisonError};
+
+use fixedbitset::FixedBitSet;
+use twox_hash::XxHash64;
+
+use super::super::blocks::{Block, BlockImage, BlockReader, Looks, Part};
+use super::super::{BadRaster, OpenOptions, SampleType};
+use super::pool::Pool;
+use super::source::{Opened, Source};
+
+/// Samples of a block each way; fewer in coarse images, where a block is of many files.
+const BLOCK: u32 = 256;
+const COARSE_BLOCK: u32 = 32;
+/// Of a terrain with so few samples and files all samples are looked at when it is opened.
+const FEW_SAMPLES: u64 = 1 << 20;
+const FEW_FILES: usize = 64;
+/// Else places all over it: so many, or one a file, each of so many samples each way.
+const PLACES: usize = 32;
+const PLACE: u32 = 64;
+
+/// The files of a terrain, the last on top.
+pub(super) struct Mosaic {
+    sources: Vec<Source>,
+    images: Vec<BlockImage>,
+    sample: SampleType,
+    pool: Mutex<Pool>,
+}
+
+impl Mosaic {
+    /// A terrain of a size from files, none of which is opened yet. `sample` is
+    /// [`SampleType::F32`] where that holds all their samples.
+    pub(super) fn new(
+        (columns, rows): (u32, u32),
+        sources: Vec<Source>,
+        sample: SampleType,
+        options: &OpenOptions,
+    ) -> Self {
+        let image = |k: u32| {
+            let [columns, rows] = [columns, rows].map(|count| ((count.max(1) - 1) >> k) + 1);
+            let block = (BLOCK >> k).max(COARSE_BLOCK);
+            BlockImage {
+                columns,
+                rows,
+                block: [block; 2],
+                every: Some(1 << k),
+            }
+        };
+        let has_cells = |image: &BlockImage| image.columns > 1 && image.rows > 1;
+        let coarser = (1..31).map(image).take_while(has_cells);
+        Self {
+            images: std::iter::once(image(0)).chain(coarser).collect(),
+            sources,
+            sample,
+            pool: Mutex::new(Pool::new(options)),
+        }
+    }
+
+    /// Number of open files.
+    #[cfg(test)]
+    pub(super) fn open_files(&self) -> usize {
+        self.pool
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .len()
+    }
+}
+
+/// Samples that are filled from the last file to the first.
+struct Filling<'p> {
+    part: &'p Part,
+    values: Vec<f64>,
+    done: FixedBitSet,
+    left: usize,
+}
+
+impl<'p> Filling<'p> {
+    fn new(part: &'p Part) -> Self {
+        let count = part.columns as usize * part.rows as usize;
+        Self {
+            part,
+            values: vec![f64::NAN; count],
+            done: FixedBitSet::with_capacity(count),
+            left: count,
+        }
+    }
+
+    /// Places in an overlap that nothing covers yet: column, row and index.
+    fn open_places(&self, overlap: &Part) -> Vec<[u32; 3]> {
+        let part = self.part;
+        let rows = overlap.row..overlap.row + overlap.rows;
+        let places = rows.flat_map(|row| {
+            let columns = overlap.column..overlap.column + overlap.columns;
+            columns.map(move |column| {
+                [
+                    column,
+                    row,
+                    (row - part.row) * part.columns + column - part.column,
+                ]
+            })
+        });
+        places
+            .filter(|[_, _, index]| !self.done.contains(*index as usize))
+            .collect()
+    }
+
+    /// Fills places from a file.
+    fn fill(&mut self, level: u8, source: &Source, opened: &Opened, places: &[[u32; 3]]) {
+        let [columns, rows] = opened.size();
+        for &[column, row, index] in places {
+            // Both fit: they are inside the terrain.
+            let [column, row] = [column, row].map(|index| index << level);
+            let column = source.axes[0].of(column, columns);
+            let row = source.axes[1].of(row, rows);
+            let value = column.zip(row);
+            let value = value.and_then(|(column, row)| opened.value(level, column, row));
+            if let Some(value) = value {
+                self.values[index as usize] = value;
+                self.done.insert(index as usize);
+                self.left -= 1;
+            }
+        }
+    }
+}
+
+impl BlockReader for Mosaic {
+    fn format(&self) -> &'static str {
+        "terrain of many files"
+    }
+
+    fn images(&self) -> &[BlockImage] {
+        &self.images
+    }
+
+    fn sample_type(&self) -> SampleType {
+        self.sample
+    }
+
+    fn is_stored(&self, image: usize, part: &Part) -> bool {
+        let mut sources = self.sources.iter();
+        sources.any(|source| source.overlap(image as u32, part).is_some())
+    }
+
+    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        let mut filling = Filling::new(part);
+        let mut pool = self.pool.lock().unwrap_or_else(PoisonError::into_inner);
+        for (number, source) in self.sources.iter().enumerate().rev() {
+            if filling.left == 0 {
+                break;
+            }
+            let Some(overlap) = source.overlap(image as u32, part) else {
+                continue;
+            };
+            let places = filling.open_places(&overlap);
+            if places.is_empty() {
+                continue;
+            }
+            if let Some(opened) = pool.get(number, source) {
+                filling.fill(image as u8, source, &opened, &places);
+            }
+            pool.make_room(0);
+        }
+        let values = filling.values;
+        Ok(Block {
+            samples: match self.sample {
+                SampleType::F32 => values
+                    .iter()
+                    .map(|value| *value as f32)
+                    .collect::<Vec<_>>()
+                    .into(),
+                _ => values.into(),
+            },
+            holes: None,
+        })
+    }
+
+    fn index(&self) -> u64 {
+        let mut hasher = XxHash64::with_seed(0);
+        for source in &self.sources {
+            // A folder may be moved.
+            let name = source.path.file_name().unwrap_or_default();
+            hasher.write(name.as_encoded_bytes());
+            hasher.write_u64(source.bytes);
+            let covers = &source.covers;
+            for number in [covers.column, covers.row, covers.columns, covers.rows] {
+                hasher.write_u32(number);
+            }
+        }
+        hasher.finish()
+    }
+
+    fn looks(&self) -> Option<Looks> {
+        let full = &self.images[0];
+        let samples = u64::from(full.columns) * u64::from(full.rows);
+        let parts = match samples <= FEW_SAMPLES && self.sources.len() <= FEW_FILES {
+            true => vec![Part::whole(full.columns, full.rows)],
+            false => self.places(),
+        };
+        Some(Looks { image: 0, parts })
+    }
+
+    fn kept_bytes(&self) -> usize {
+        let names = self.sources.iter().map(|source| source.path.capacity());
+        Pool::most_bytes() + names.sum::<usize>() + self.sources.len() * size_of::<Source>()
+    }
+}
+
+impl Mosaic {
+    /// Places all over the terrain, in the order of the files.
+    fn places(&self) -> Vec<Part> {
+        let each = PLACES.div_ceil(self.sources.len().max(1)).isqrt() as u32 + 1;
+        let each = if self.sources.len() >= PLACES {
+            1
+        } else {
+            each
+        };
+        let along = |first: u32, count: u32, number: u32| {
+            let share = count / each;
+            let size = PLACE.min(share).max(1);
+            (first + number * share + (share - size.min(share)) / 2, size)
+        };
+        let of_source = |source: &Source| {
+            let covers = source.covers;
+            let numbers = (0..each).flat_map(move |row| (0..each).map(move |column| (column, row)));
+            numbers.map(move |(column, row)| {
+                let (column, columns) = along(covers.column, covers.columns, column);
+                let (row, rows) = along(covers.row, covers.rows, row);
+                Part {
+                    column,
+                    row,
+                    columns,
+                    rows,
+                }
+            })
+        };
+        self.sources.iter().flat_map(of_source).collect()
+    }
+}

@@ -1,0 +1,201 @@
+//! Files as one terrain, made on the spot: what is opened when, and how much is held.
+
+use std::path::Path;
+
+use super::super::blocks::{BlockReader, Part};
+use super::super::samples::SampleType;
+use super::super::{OpenOptions, Raster};
+use super::pool::Pool;
+use super::reader::Mosaic;
+use super::source::{Axis, Source, Values};
+
+/// Samples of a tile each way.
+const SIDE: u32 = 40;
+
+/// The height of the sample at a column and row of all tiles together.
+fn height(column: u32, row: u32) -> u32 {
+    (column * 7 + row * 3) % 1000
+}
+
+/// A square of `count × count` tiles without a gap, as SRTM's files without a header.
+fn tiles(folder: &Path, count: u32) {
+    for (across, up) in (0..count * count).map(|number| (number % count, number / count)) {
+        let mut text = format!(
+            "ncols {SIDE}\nnrows {SIDE}\nxllcorner {}\nyllcorner {}\ncellsize 1\n",
+            across * SIDE,
+            up * SIDE
+        );
+        for row in (0..SIDE).rev() {
+            for column in 0..SIDE {
+                let height = height(across * SIDE + column, up * SIDE + row);
+                text.push_str(&format!("{height} "));
+            }
+            text.push('\n');
+        }
+        let name = format!("{up:03}-{across:03}.asc");
+        std::fs::write(folder.join(name), text).expect("written");
+    }
+}
+
+fn source(folder: &Path, name: &str, column: u32, row: u32) -> Source {
+    Source {
+        path: folder.join(name),
+        bytes: 0,
+        band: None,
+        covers: Part {
+            column,
+            row,
+            columns: SIDE,
+            rows: SIDE,
+        },
+        axes: [
+            Axis {
+                start: -f64::from(column),
+                step: 1.0,
+            },
+            Axis {
+                start: f64::from(row + SIDE),
+                step: -1.0,
+            },
+        ],
+        size: Some((SIDE, SIDE)),
+        values: Values::Heights,
+    }
+}
+
+#[test]
+fn few_files_are_open_at_once_and_all_are_felt() {
+    const COUNT: u32 = 9;
+    let folder = tempfile::tempdir().expect("a folder");
+    tiles(folder.path(), COUNT);
+    let side = SIDE * COUNT;
+    let sources = (0..COUNT * COUNT).map(|number| {
+        let (across, up) = (number % COUNT, number / COUNT);
+        let name = format!("{up:03}-{across:03}.asc");
+        source(folder.path(), &name, across * SIDE, up * SIDE)
+    });
+    let options = OpenOptions::default();
+    let mosaic = Mosaic::new((side, side), sources.collect(), SampleType::F32, &options);
+    assert_eq!(mosaic.open_files(), 0);
+    let all = mosaic.read(0, &Part::whole(side, side)).expect("all");
+    for row in 0..side {
+        for column in 0..side {
+            let found = all.stored((row * side + column) as usize);
+            assert_eq!(
+                found,
+                Some(f64::from(height(column, row))),
+                "{column} {row}"
+            );
+        }
+    }
+    assert!(
+        (2..=32).contains(&mosaic.open_files()),
+        "{}",
+        mosaic.open_files()
+    );
+    // A coarse image has the very samples.
+    let part = Part {
+        column: 3,
+        row: 5,
+        columns: 20,
+        rows: 11,
+    };
+    let coarse = mosaic.read(3, &part).expect("a part");
+    for (index, (row, column)) in (5..16)
+        .flat_map(|row| (3..23).map(move |c| (row, c)))
+        .enumerate()
+    {
+        assert_eq!(
+            coarse.stored(index),
+            Some(f64::from(height(column * 8, row * 8)))
+        );
+    }
+}
+
+#[test]
+fn what_is_not_touched_is_not_opened() {
+    let folder = tempfile::tempdir().expect("a folder");
+    tiles(folder.path(), 2);
+    let names = ["000-000.asc", "000-001.asc", "001-000.asc"];
+    let at = [(0, 0), (SIDE, 0), (0, SIDE)];
+    let sources = names.iter().zip(at);
+    let sources = sources.map(|(name, (column, row))| source(folder.path(), name, column, row));
+    let options = OpenOptions::default();
+    let size = (2 * SIDE, 2 * SIDE);
+    let mosaic = Mosaic::new(size, sources.collect(), SampleType::F32, &options);
+    let part = |column, row| Part {
+        column,
+        row,
+        columns: 5,
+        rows: 5,
+    };
+    assert!(mosaic.is_stored(0, &part(0, 0)) && !mosaic.is_stored(0, &part(SIDE, SIDE)));
+    mosaic.read(0, &part(SIDE + 1, 1)).expect("a part");
+    assert_eq!(mosaic.open_files(), 1);
+    mosaic.read(0, &part(SIDE - 2, 1)).expect("two files' part");
+    assert_eq!(mosaic.open_files(), 2);
+    // What lies under another file is not opened for it, whatever lies beside both.
+    let covered = [names[1], names[0]].map(|name| source(folder.path(), name, 0, 0));
+    let mosaic = Mosaic::new(size, covered.to_vec(), SampleType::F32, &options);
+    let block = mosaic.read(0, &part(SIDE - 2, 0)).expect("a part");
+    assert_eq!(block.stored(0), Some(f64::from(height(SIDE - 2, 0))));
+    assert_eq!(mosaic.open_files(), 1);
+}
+
+/// Each is warned of once, however often it is touched.
+#[test]
+fn a_file_that_failed_is_not_tried_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sources = vec![source(folder.path(), "000-000.asc", 0, 0)];
+    let options = OpenOptions::default();
+    let mosaic = Mosaic::new((SIDE, SIDE), sources, SampleType::F32, &options);
+    for _ in 0..2 {
+        let block = mosaic.read(0, &Part::whole(SIDE, SIDE)).expect("a part");
+        assert!(block.stored(0).is_some_and(f64::is_nan));
+        tiles(folder.path(), 1);
+    }
+}
+
+/// Samples, open files and index of a terrain of many files take at most 256 MB.
+#[test]
+fn the_memory_of_many_files_is_bounded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    tiles(folder.path(), 3);
+    let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
+    assert!(raster.samples().is_none());
+    assert!(raster.memory_bytes() > Pool::most_bytes());
+    assert!(
+        raster.memory_bytes() <= 256 << 20,
+        "{}",
+        raster.memory_bytes()
+    );
+    // A file that is not read in blocks and too large to be held is refused.
+    let text = "ncols 9000\nnrows 9000\nxllcorner 120\nyllcorner 0\ncellsize 1\n";
+    std::fs::write(folder.path().join("large.asc"), text).expect("written");
+    let error = Raster::open(folder.path(), &OpenOptions::default()).expect_err("too large");
+    let error = error.to_string();
+    assert!(
+        error.contains("large.asc") && error.contains("9000 × 9000"),
+        "{error}"
+    );
+}
+
+#[test]
+fn the_same_files_are_the_same_terrain_and_changed_ones_another() {
+    let prints = [0, 1, 2].map(|change| {
+        let folder = tempfile::tempdir().expect("a folder");
+        tiles(folder.path(), 2);
+        let path = folder.path().join("001-001.asc");
+        let text = std::fs::read_to_string(&path).expect("text");
+        match change {
+            0 => {}
+            1 => std::fs::write(path, text.replace(" 500 ", " 501 ")).expect("written"),
+            _ => std::fs::remove_file(path).expect("removed"),
+        }
+        let again = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
+        let first = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
+        assert_eq!(again.print_in_file(), first.print_in_file());
+        first.print_in_file()
+    });
+    assert!(prints[0].is_some() && prints[0] != prints[1] && prints[0] != prints[2]);
+}
