@@ -67,6 +67,8 @@ fn no_frame_to_the_converter_comes_too_soon() {
             // Time goes on with each instruction: what lies between two frames counts.
             let mut machine = device.machine.borrow_mut();
             machine.slice = 1;
+            // To the end of a tick, so that the three that follow are whole.
+            assert_eq!(machine.run_ticks(1), Stop::Asked);
             let _ = machine.take_effects();
             assert_eq!(machine.run_ticks(3), Stop::Asked);
             let sent = machine.take_effects().len();
