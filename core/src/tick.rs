@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use crate::clutch::{Clutch, ClutchHold};
 use crate::contact::{Contact, ContactOutput, ContactSettings, Execution, Friction};
-use crate::force::Damper;
+use crate::force::{Damper, Effects};
 use crate::grid::GridPoint;
 use crate::guard::thermal::Temperatures;
 use crate::guard::{
@@ -126,8 +126,8 @@ pub struct Haptics<'t, const D: usize> {
     clutch: Clutch,
     /// Number of the view that is felt.
     view: u8,
-    /// The damping of a scene that has some.
-    damper: Option<Damper>,
+    /// What the scene adds to the spring's force, if anything.
+    effects: Option<Effects>,
     /// Where the point before was, in a scene fed by points.
     before: Option<GridPoint>,
 }
@@ -153,7 +153,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             tick: 0,
             clutch: Clutch::new(rate),
             view: 0,
-            damper: None,
+            effects: None,
             before: None,
         }
     }
@@ -230,9 +230,9 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
     }
 
-    /// The damping that a scene has.
-    fn damper_of(&self, scene: &Scene) -> Option<Damper> {
-        Damper::of(&scene.law, self.rate, scene.source == Source::Encoders)
+    /// What a scene adds to the spring's force.
+    fn effects_of(&self, scene: &Scene) -> Option<Effects> {
+        Effects::of(&scene.law, self.rate, scene.source == Source::Encoders)
     }
 
     /// Takes a scene, or drops the one there is: force that was there goes out.
@@ -247,7 +247,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             self.tick = 0;
         }
         self.contact = self.contact_of(scene.as_ref());
-        self.damper = scene.and_then(|scene| self.damper_of(&scene));
+        self.effects = scene.and_then(|scene| self.effects_of(&scene));
         self.scene = scene;
         (self.point, self.before) = (None, None);
         let of_arm = scene.is_some_and(|scene| scene.source == Source::Encoders);
@@ -285,7 +285,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             None => Contact::new(settings),
         };
         self.clutch.put(hip);
-        self.damper = self.damper_of(&scene);
+        self.effects = self.effects_of(&scene);
         self.scene = Some(scene);
         (self.point, self.before) = (None, None);
         self.view = view.number;
@@ -315,7 +315,11 @@ impl<'t, const D: usize> Haptics<'t, D> {
 
     /// The energy that the ticks have created and that was not taken back yet, mJ.
     fn created_mj(&self) -> f32 {
-        self.damper.as_ref().map_or(0.0, Damper::created_mj)
+        let damper = self
+            .effects
+            .as_ref()
+            .and_then(|effects| effects.damper.as_ref());
+        damper.map_or(0.0, Damper::created_mj)
     }
 
     /// The calibration in force.
@@ -410,15 +414,14 @@ impl<'t, const D: usize> Haptics<'t, D> {
             }
             let output = contact.step(&self.window, &hip);
             wanted = scene.law.force_n(output.displacement * scene.cell_mm) * self.clutch.share();
-            if let Some(damper) = &mut self.damper {
-                let felt = (&*scene, &hip, output);
-                let driven = (&mut self.guard, mechanism, pose);
-                damp(damper, &mut wanted, felt, self.clutch.is_closed(), driven);
-            }
             write_output(hip, output, sample);
+            if self.effects.is_some() {
+                wanted = self.force_with_effects(pose, sample);
+            }
         } else {
             write_output(GridPoint::default(), &ContactOutput::default(), sample);
         }
+        let arm = self.mechanism.as_ref().zip(pose);
         let force_n = match arm {
             Some(_) => self.guard.limit_force(wanted),
             None => Vec3::ZERO,
@@ -440,6 +443,36 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.write_state(force_n, &mut outcome.sample);
     }
 
+    /// The force of a scene with effects, after the contact's tick.
+    // Apart, so that the tick of a scene without them has nothing of them.
+    #[cold]
+    #[inline(never)]
+    fn force_with_effects(&mut self, pose: &Pose, sample: &mut Sample) -> Vec3 {
+        let (Some(mechanism), Some(scene), Some(effects)) =
+            (&self.mechanism, &self.scene, &mut self.effects)
+        else {
+            return Vec3::ZERO;
+        };
+        let displacement_mm = effects.displacement(&self.window, &self.contact) * scene.cell_mm;
+        sample.missing_tile = sample.missing_tile.or(effects.missing());
+        let spring_n = scene.law.force_n(displacement_mm) * self.clutch.share();
+        let Some(damper) = &mut effects.damper else {
+            return spring_n;
+        };
+        if self.guard.mode() != Mode::Armed || !self.clutch.is_closed() {
+            damper.rest();
+            return spring_n;
+        }
+        let tip_mm = scene.home.to(&sample.hip) * scene.cell_mm;
+        let (asked_n, most_n) = (self.guard.force_n(), self.guard.most_force_n());
+        damper.observe(displacement_mm, tip_mm, asked_n, most_n);
+        if damper.created_mj() > 0.0 {
+            self.guard.says(Limits::ENERGY_TAKEN_BACK);
+        }
+        let velocity_mm_s = to_terrain_frame(self.guard.tip_velocity_mm_s(mechanism, pose));
+        damper.force_n(spring_n, velocity_mm_s)
+    }
+
     /// Replay: the host's point in place of the arm, amplifiers off. The tick
     /// is repeated until no tile is missing and no work is left; only then is the
     /// point answered.
@@ -450,18 +483,28 @@ impl<'t, const D: usize> Haptics<'t, D> {
         let mut force_n = Vec3::ZERO;
         if let (Some(scene), Some(point)) = (&self.scene, self.point) {
             let contact = &mut self.contact;
-            // Where the HIP is follows from the point.
-            let _ = contact.land(&self.window);
-            let output = contact.step(&self.window, &point.hip);
-            let displacement_mm = output.displacement * scene.cell_mm;
-            force_n = scene.law.force_n(displacement_mm);
-            if let Some(damper) = &mut self.damper {
+            let waited = self.effects.as_ref().and_then(Effects::missing);
+            // What only waited for an effect's tile has its contact.
+            if waited.is_none() || !contact.has_answered(&point.hip) {
+                // Where the HIP is follows from the point.
+                let _ = contact.land(&self.window);
+                contact.step(&self.window, &point.hip);
+            }
+            write_output(point.hip, contact.output(), sample);
+            let mut displacement = contact.output().displacement;
+            let mut missing = None;
+            if let Some(effects) = &mut self.effects {
+                displacement = effects.displacement(&self.window, contact);
+                missing = effects.missing();
+                sample.missing_tile = sample.missing_tile.or(missing);
+            }
+            force_n = scene.law.force_n(displacement * scene.cell_mm);
+            if let Some(damper) = self.effects.as_ref().and_then(|e| e.damper.as_ref()) {
                 let from = self.before.unwrap_or(point.hip);
                 let velocity_mm_s = from.to(&point.hip) * (scene.cell_mm * self.rate.hz() as f32);
                 force_n = damper.force_n(force_n, velocity_mm_s);
             }
-            write_output(point.hip, output, sample);
-            if output.converged {
+            if contact.output().converged && missing.is_none() {
                 self.before = Some(point.hip);
                 outcome.answers = Some(point.seq);
                 self.point = None;
@@ -498,31 +541,6 @@ fn write_output(hip: GridPoint, output: &ContactOutput, sample: &mut Sample) {
     sample.state = output.state;
     sample.missing_tile = output.missing_tile;
     sample.work = output.work;
-}
-
-/// Damps the spring's force of a tick of an arm.
-// Apart, so that the tick of a scene without damping has nothing of it.
-#[cold]
-#[inline(never)]
-fn damp(
-    damper: &mut Damper,
-    force_n: &mut Vec3,
-    (scene, hip, output): (&Scene, &GridPoint, &ContactOutput),
-    is_closed: bool,
-    (guard, mechanism, pose): (&mut Guard, &Mechanism, &Pose),
-) {
-    if guard.mode() != Mode::Armed || !is_closed {
-        return damper.rest();
-    }
-    let displacement_mm = output.displacement * scene.cell_mm;
-    let tip_mm = scene.home.to(hip) * scene.cell_mm;
-    let (asked_n, most_n) = (guard.force_n(), guard.most_force_n());
-    damper.observe(displacement_mm, tip_mm, asked_n, most_n);
-    if damper.created_mj() > 0.0 {
-        guard.says(Limits::ENERGY_TAKEN_BACK);
-    }
-    let velocity_mm_s = to_terrain_frame(guard.tip_velocity_mm_s(mechanism, pose));
-    *force_n = damper.force_n(*force_n, velocity_mm_s);
 }
 
 /// Where the tip is over the terrain.

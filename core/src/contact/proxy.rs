@@ -164,6 +164,22 @@ impl Contact {
         }
     }
 
+    /// The last tick's answer.
+    #[must_use]
+    pub const fn output(&self) -> &ContactOutput {
+        &self.output
+    }
+
+    /// Whether what the last tick answered is felt: in lock-step only once all is done.
+    pub(crate) fn is_felt(&self) -> bool {
+        self.output.converged || self.settings.execution == Execution::RealTime
+    }
+
+    /// Whether the last tick did all there was to do, for this HIP.
+    pub(crate) fn has_answered(&self, hip: &GridPoint) -> bool {
+        self.output.converged && self.hip.is_same(hip)
+    }
+
     /// How much of the force is felt: less than 1 where it fades at the boundary of
     /// the surface, or comes in after a wait.
     #[must_use]
@@ -291,7 +307,7 @@ impl Contact {
 
     #[inline]
     fn remembers_what_was_felt(&mut self) {
-        if self.output.converged || self.settings.execution == Execution::RealTime {
+        if self.is_felt() {
             let ContactOutput {
                 state,
                 proxy,

@@ -1,7 +1,9 @@
 //! From proxy and haptic interface point to newtons.
 
 mod damping;
+mod effects;
 pub mod passivity;
+mod shading;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -10,6 +12,8 @@ use crate::contact::Friction;
 use crate::rate::TickRate;
 pub(crate) use damping::Damper;
 pub use damping::{Controller, Damping};
+pub(crate) use effects::Effects;
+pub use shading::{Shader, Shading};
 
 /// The spring between the haptic interface point (HIP) and the proxy (paper
 /// §4.3.4), the limit of what it may ask for, and what holds the proxy back. Immutable while a tick runs.
@@ -35,6 +39,8 @@ pub struct ForceLaw {
     pub friction: Friction,
     /// What takes energy out of a motion against it.
     pub damping: Damping,
+    /// Which normals the force follows.
+    pub shading: Shading,
 }
 
 impl ForceLaw {
@@ -44,6 +50,7 @@ impl ForceLaw {
         max_force_n: 8.5,
         friction: Friction::NONE,
         damping: Damping::NONE,
+        shading: Shading::None,
     };
 
     /// Whether stiffness and limit are finite and not negative, and friction and damping are

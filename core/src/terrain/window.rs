@@ -26,6 +26,21 @@ pub struct Corners {
     pub heights: [f32; 4],
 }
 
+impl Corners {
+    /// Corners without a sample.
+    pub(crate) const NONE: Self = Self {
+        base: 0,
+        heights: [f32::NAN; 4],
+    };
+
+    /// The heights in cells above another base; to the last places of the largest.
+    #[inline(never)]
+    pub(crate) fn above(&self, base: i32) -> [f32; 4] {
+        let lower = self.base.wrapping_sub(base) as f32;
+        self.heights.map(|height| height + lower)
+    }
+}
+
 /// `D × D` tiles; tile `(col, row)` always lives in slot `(col mod D, row mod D)`.
 /// `D` is a power of two.
 ///
@@ -96,6 +111,8 @@ impl<'t, const D: usize> Window<'t, D> {
 
     /// Forgets every tile and takes a new field: its level, its size, and a
     /// whole height in cells no sample exceeds.
+    // A call: the loop over the tiles is unrolled wherever it is inlined.
+    #[inline(never)]
     pub fn reset(&mut self, level: u8, size: FieldSize, top: i32) {
         for tile in self.slots.as_flattened_mut() {
             tile.vacate();
@@ -168,6 +185,19 @@ impl<'t, const D: usize> Window<'t, D> {
         Ground::Patch(Corners {
             base: tile.base(),
             heights,
+        })
+    }
+
+    /// The samples at the corners of a cell, also of one that is a hole: NaN where there is
+    /// none. `None` if the tile is not here yet.
+    #[inline(never)]
+    pub(crate) fn corners(&self, cell: Cell) -> Option<Corners> {
+        if !self.has_cell(cell) {
+            return Some(Corners::NONE);
+        }
+        self.held(TileIndex::holding(cell)).map(|tile| Corners {
+            base: tile.base(),
+            heights: tile.corners(cell),
         })
     }
 

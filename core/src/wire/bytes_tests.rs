@@ -12,7 +12,7 @@ use super::request::{Answer, Refusal, Request};
 use super::session::{InSession, LastSession, SampleCount, SessionEnd, SessionNumber};
 use crate::clutch::ClutchHold;
 use crate::contact::{ContactState, Rule};
-use crate::force::{Controller, Damping, ForceLaw};
+use crate::force::{Controller, Damping, ForceLaw, Shading};
 use crate::grid::GridPoint;
 use crate::guard::{Fault, Limits, Mode};
 use crate::scene::{Sample, Scene, Source, View};
@@ -43,6 +43,7 @@ fn a_scene() {
                 ns_per_m: 2.0,
                 controller: Controller::On,
             },
+            shading: Shading::Smooth,
             ..ForceLaw::PREMIUM
         },
         rule: Rule::Paper,
@@ -61,7 +62,7 @@ fn a_scene() {
         float(8.5),
         std::vec![0; 12],
         float(2.0),
-        std::vec![1],
+        std::vec![1, 1],
         std::vec![1, 1, 1],
     ];
     assert_eq!(bytes(&ToDevice::Scene(scene)), wanted.concat());
@@ -180,7 +181,7 @@ fn a_hello_in_its_session() {
         }),
     };
     // The session is 300 | 128; then variant, protocol, number, seconds.
-    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 8, 9, 0xB4, 0x01]);
+    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 9, 9, 0xB4, 0x01]);
 }
 
 #[test]
@@ -208,7 +209,7 @@ fn a_device_that_introduces_itself() {
         },
     });
     let wanted = [
-        std::vec![0, 8, 9, 8, 1, b'b'],
+        std::vec![0, 9, 9, 8, 1, b'b'],
         serial.to_vec(),
         std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xAC, 0x02, 1, 7],
         std::vec![0xAC, 0x02, 6, 3, 5, 1],

@@ -1,5 +1,7 @@
 //! A tick with friction: the proxy is held, or slides behind the HIP.
 
+use glam::Vec3;
+
 use super::{Contact, OnSurface, Phase, Turn};
 use crate::contact::budget::{Budget, LARGEST_PIECE};
 use crate::contact::closest_point::{Leave, position_on};
@@ -36,6 +38,9 @@ pub(super) struct Rubbing {
     pub(super) hip: GridPoint,
     /// What a proxy on the surface goes for in the HIP's place, once that is known.
     aim: Option<GridPoint>,
+    /// From the last aim to the HIP that it stood for, cells: how far friction held the proxy
+    /// back when it last slid. Zero where the aim was the HIP.
+    back: Vec3,
     /// How often the proxy has slid for this HIP.
     times: u32,
     /// Where the proxy stood when the HIP came to where it is, until it has gone away.
@@ -78,6 +83,7 @@ impl Rubbing {
             friction,
             hip: GridPoint::default(),
             aim: None,
+            back: Vec3::ZERO,
             times: 0,
             stood: None,
             fade: 1.0,
@@ -129,6 +135,15 @@ impl Rubbing {
 }
 
 impl Contact {
+    /// The part of the last displacement that friction holds rather than the surface, cells: as
+    /// it was when the proxy last slid.
+    pub(crate) fn held_back(&self) -> Vec3 {
+        match &self.rubbing {
+            Some(rubbing) => rubbing.back * -self.boundary_fade(),
+            None => Vec3::ZERO,
+        }
+    }
+
     /// [`Contact::step`] with friction.
     #[inline(never)]
     pub(super) fn rub<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) {
@@ -237,6 +252,7 @@ impl Contact {
             (Phase::OnSurface(_), Some(aim)) => self.slides(window, aim, hip, budget),
             _ => {
                 (rubbing.aim, rubbing.stood) = (None, None);
+                rubbing.back = Vec3::ZERO;
                 let turn = self.turn_toward(window, hip, budget);
                 self.has_landed(window);
                 turn
@@ -281,6 +297,7 @@ impl Contact {
     fn aims_at(&mut self, aim: GridPoint) -> Turn {
         if let (Phase::OnSurface(on), Some(rubbing)) = (&mut self.phase, &mut self.rubbing) {
             rubbing.aim = Some(aim);
+            rubbing.back = aim.to(&rubbing.hip);
             on.fade = rubbing.fade;
         }
         Turn::GoesOn
@@ -393,6 +410,7 @@ impl Contact {
                 if rubbing.times <= SLIDES && HipView::new(hip).is_nearer(&stood.proxy, &to) =>
             {
                 (rubbing.aim, rubbing.times) = (Some(hip), SLIDES + 1);
+                rubbing.back = Vec3::ZERO;
                 self.phase = Phase::OnSurface(OnSurface::at(stood.point, rubbing.fade));
                 true
             }

@@ -1,0 +1,156 @@
+//! The slopes of the surface, and slopes that change evenly from patch to patch (after
+//! Morgenbesser and Srinivasan 1996).
+//!
+//! The slope eastward of a patch mixes those of its two edges that lead east, so it is
+//! continuous northward and jumps from one edge of a row to the next. Each row of edges is
+//! therefore smoothed along itself: at a sample its direction is the mean of the two edges
+//! that meet there; away from the sample it becomes that of the edge. At a gentle bend this
+//! takes the whole edge, at a sharp one, which is meant, a fifth of it. Columns and the slope
+//! northward are smoothed likewise.
+
+use super::hip_view::HipView;
+use super::patch::mix;
+use crate::grid::GridPoint;
+use crate::terrain::{Corners, Ground, TileIndex, Window};
+
+/// Cosine of the bend up to which the direction changes along a whole edge: 45°.
+const GENTLE: f32 = core::f32::consts::FRAC_1_SQRT_2;
+/// Cosine of the bend from which the direction changes along [`NARROW`] of an edge: 75°.
+const SHARP: f32 = 0.258_819_04;
+/// Part of an edge along which the direction changes at a sharp bend.
+const NARROW: f32 = 0.2;
+
+/// Slopes eastward and northward: ∂z/∂x and ∂z/∂y.
+pub(crate) type Slopes = [f32; 2];
+
+/// How the surface slopes at one of its points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SlopesAt {
+    /// Least and largest slope eastward of the patches that meet there.
+    pub(crate) east: [f32; 2],
+    /// Least and largest slope northward of the patches that meet there.
+    pub(crate) north: [f32; 2],
+    /// Slopes that change evenly from patch to patch.
+    pub(crate) smoothed: Slopes,
+    /// A tile that is not here and holds a sample beside the patch. The surface is taken to
+    /// end before it.
+    pub(crate) missing: Option<TileIndex>,
+}
+
+impl SlopesAt {
+    /// The slopes at a point of the surface, by the samples of a patch and of its four
+    /// neighbours; `None` where there is no patch.
+    pub(crate) fn point<const D: usize>(window: &Window<'_, D>, at: &GridPoint) -> Option<Self> {
+        let view = HipView::new(*at);
+        let (cell, Ground::Patch(own)) = view.ground(window) else {
+            return None;
+        };
+        let (u, v) = view.in_patch(cell);
+        let mut missing = None;
+        let mut beside = |east, north| {
+            let there = cell.offset(east, north);
+            window.corners(there).unwrap_or_else(|| {
+                missing = Some(TileIndex::holding(there));
+                Corners::NONE
+            })
+        };
+        let south = beside(0, -1).above(own.base);
+        let north = beside(0, 1).above(own.base);
+        let west = beside(-1, 0).above(own.base);
+        let east = beside(1, 0).above(own.base);
+        let [sw, se, nw, ne] = own.heights;
+        let rows = [
+            Edges::between([west[0], sw, se, east[1]]),
+            Edges::between([west[2], nw, ne, east[3]]),
+        ];
+        let columns = [
+            Edges::between([south[0], sw, nw, north[2]]),
+            Edges::between([south[1], se, ne, north[3]]),
+        ];
+        Some(Self {
+            east: met(&rows, u, v),
+            north: met(&columns, v, u),
+            smoothed: [smoothed(&rows, u, v), smoothed(&columns, v, u)],
+            missing,
+        })
+    }
+}
+
+/// The slopes of three edges of a row or column one after the other; NaN where there is none.
+struct Edges {
+    before: f32,
+    own: f32,
+    after: f32,
+}
+
+impl Edges {
+    fn between([first, from, to, last]: [f32; 4]) -> Self {
+        Self {
+            before: from - first,
+            own: to - from,
+            after: last - to,
+        }
+    }
+
+    /// The smoothed slope at a place of the middle edge, from 0 to 1.
+    fn smoothed(&self, place: f32) -> f32 {
+        let own = direction(self.own);
+        let at_start = bent(own, self.before, place);
+        let at_end = bent(own, self.after, 1.0 - place);
+        (own[1] + at_start[1] + at_end[1]) / (own[0] + at_start[0] + at_end[0])
+    }
+}
+
+/// By how much the direction of an edge changes at a place so far from the sample where it
+/// meets an edge of the slope `beside`.
+fn bent(own: [f32; 2], beside: f32, place: f32) -> [f32; 2] {
+    if beside.is_nan() {
+        return [0.0; 2];
+    }
+    let other = direction(beside);
+    let bend = own[0] * other[0] + own[1] * other[1];
+    let reach = NARROW + (1.0 - NARROW) / (GENTLE - SHARP) * (bend - SHARP);
+    let share = 0.5 * (1.0 - place / reach.clamp(NARROW, 1.0));
+    if share > 0.0 {
+        [share * (other[0] - own[0]), share * (other[1] - own[1])]
+    } else {
+        [0.0; 2]
+    }
+}
+
+/// The direction of a slope: along the ground and up, of length 1.
+fn direction(slope: f32) -> [f32; 2] {
+    let along = one_over_root(1.0 + slope * slope);
+    [along, slope * along]
+}
+
+/// 1/√x of a normal x, to 3e-7 of it: by three of Newton's steps from the exponent halved. An eighth
+/// of the instructions of a root to the last bit, fourteen times a tick.
+pub(crate) fn one_over_root(x: f32) -> f32 {
+    let mut y = f32::from_bits(0x5F37_5A86 - (x.to_bits() >> 1));
+    for _ in 0..3 {
+        y *= 1.5 - 0.5 * x * y * y;
+    }
+    y
+}
+
+/// The smoothed slope across a patch between two rows or columns of edges.
+fn smoothed([first, second]: &[Edges; 2], along: f32, across: f32) -> f32 {
+    mix(first.smoothed(along), second.smoothed(along), across)
+}
+
+/// Least and largest slope at a place of a patch: those of the edges before and after it where
+/// it is on the border between them.
+fn met([first, second]: &[Edges; 2], along: f32, across: f32) -> [f32; 2] {
+    let own = mix(first.own, second.own, across);
+    if along != 0.0 {
+        return [own; 2];
+    }
+    let before = match across {
+        0.0 => first.before,
+        1.0 => second.before,
+        _ => mix(first.before, second.before, across),
+    };
+    // Not a number where there is no patch; then its own slope is all there is.
+    [own.min(before), own.max(before)]
+}

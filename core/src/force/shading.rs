@@ -1,0 +1,180 @@
+//! Force shading: the force turns evenly from patch to patch, while the proxy stays where it
+//! is (Morgenbesser and Srinivasan 1996).
+//!
+//! The force is turned as a whole, from the normal that the contact has to the normal of the
+//! [smoothed slopes](crate::contact::surface), and keeps its size. Without friction it then
+//! points along the smoothed normal; what friction adds is turned with it.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::contact::surface::{Slopes, SlopesAt, one_over_root};
+use crate::contact::{Contact, ContactState};
+use crate::terrain::{TileIndex, Window};
+
+/// Which normals the force follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[serde(rename_all = "lowercase")]
+pub enum Shading {
+    /// Those of the patches: an edge between patches is felt as an edge.
+    #[default]
+    None,
+    /// Normals that turn evenly over the edges between patches.
+    Smooth,
+}
+
+impl Shading {
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::None
+    }
+}
+
+/// The shading of a scene: the turn of the force, and what it waits for.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Shader {
+    /// Of the last contact; the force that fades when the surface ends keeps it.
+    turn: Turn,
+    /// The tile without which the last tick's turn is not the one of the whole terrain.
+    missing: Option<TileIndex>,
+}
+
+impl Shader {
+    /// Of a scene; one without shading has none.
+    #[must_use]
+    pub fn of(shading: Shading) -> Option<Self> {
+        (shading == Shading::Smooth).then(Self::default)
+    }
+
+    /// The displacement of the contact's last tick in cells, turned: as long as without
+    /// shading, but for the last places.
+    ///
+    /// ```
+    /// use hapterra_core::Vec3;
+    /// use hapterra_core::contact::{Contact, ContactSettings};
+    /// use hapterra_core::force::{Shader, Shading};
+    /// use hapterra_core::grid::GridPoint;
+    /// use hapterra_core::terrain::{FieldSize, FieldStorage};
+    ///
+    /// // A valley of two slopes that meet in column 20.
+    /// let size = FieldSize::new(40, 40);
+    /// let mut field = FieldStorage::<2>::from_fn(size, |x, _| 0.5 * (x - 20).abs() as f32)?;
+    /// let window = field.window();
+    /// let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    /// let mut shader = Shader::of(Shading::Smooth).expect("smooth");
+    /// for height in [1.0, 0.0] {
+    ///     contact.step(&window, &GridPoint::new([20, 20, 0], Vec3::new(0.1, 0.5, height)));
+    /// }
+    /// // A tenth of a cell east of the bottom the force leans west, but for a tenth.
+    /// let (plain, shaded) = (contact.output().displacement, shader.shade(&window, &contact));
+    /// assert!((shaded.length() - plain.length()).abs() < 1e-6);
+    /// assert!(shaded.x.abs() < 0.2 * plain.x.abs());
+    /// # Ok::<(), hapterra_core::terrain::BadField>(())
+    /// ```
+    pub fn shade<const D: usize>(&mut self, window: &Window<'_, D>, contact: &Contact) -> Vec3 {
+        let output = contact.output();
+        self.missing = None;
+        if output.state == ContactState::Touching
+            && contact.is_felt()
+            && let Some(slopes) = SlopesAt::point(window, &output.proxy)
+        {
+            let normal = output.displacement - contact.held_back();
+            self.turn = Turn::between(met_by(&slopes, normal), slopes.smoothed);
+            self.missing = slopes.missing;
+        }
+        self.turn.of(output.displacement)
+    }
+
+    /// A tile without which the last turn may not be that of the whole terrain.
+    #[must_use]
+    pub const fn missing(&self) -> Option<TileIndex> {
+        self.missing
+    }
+}
+
+/// The slopes whose normal a force is along: those of the patch, or between those of the
+/// patches that meet.
+fn met_by(slopes: &SlopesAt, force: Vec3) -> Slopes {
+    let SlopesAt { east, north, .. } = slopes;
+    // Upward, or all but level.
+    let up = if force.z > 0.0 {
+        force.z
+    } else {
+        f32::MIN_POSITIVE
+    };
+    // Not `f32::clamp`, which may panic.
+    let along = |way: f32, [least, most]: [f32; 2]| match -way / up {
+        slope if slope < least => least,
+        slope if slope > most => most,
+        slope => slope,
+    };
+    [along(force.x, *east), along(force.y, *north)]
+}
+
+/// Most that a force is turned: 60°. A bend of 120° is felt evenly.
+const MOST: Angle = Angle {
+    cos: 0.5,
+    sin: 0.866_025_4,
+};
+
+struct Angle {
+    cos: f32,
+    sin: f32,
+}
+
+/// The shortest turn from one direction to another: `cos` of its angle, and the axis times
+/// its `sin`.
+#[derive(Clone, Copy, Debug)]
+struct Turn {
+    cos: f32,
+    axis: Vec3,
+}
+
+impl Default for Turn {
+    fn default() -> Self {
+        let (cos, axis) = (1.0, Vec3::ZERO);
+        Self { cos, axis }
+    }
+}
+
+impl Turn {
+    /// From the normal of some slopes to that of others, [`MOST`] of the way at most: beyond
+    /// a right angle the force would pull.
+    fn between(from: Slopes, to: Slopes) -> Self {
+        if from == to {
+            return Self::default();
+        }
+        let (from, to) = (normal(from), normal(to));
+        let (cos, axis) = (from.dot(to), from.cross(to));
+        if cos >= MOST.cos {
+            return Self { cos, axis };
+        }
+        let squared = axis.length_squared();
+        // Next to spikes, where the one is all but the opposite of the other.
+        if !squared.is_normal() {
+            return Self::default();
+        }
+        Self {
+            cos: MOST.cos,
+            axis: axis * (MOST.sin * one_over_root(squared)),
+        }
+    }
+
+    /// A vector, turned.
+    fn of(&self, v: Vec3) -> Vec3 {
+        let along = self.axis.dot(v) / (1.0 + self.cos);
+        v * self.cos + self.axis.cross(v) + self.axis * along
+    }
+}
+
+/// The upward normal, of length 1.
+fn normal([east, north]: Slopes) -> Vec3 {
+    let up = one_over_root(1.0 + east * east + north * north);
+    Vec3::new(-east * up, -north * up, up)
+}
+
+#[cfg(test)]
+#[path = "shading_tests.rs"]
+mod tests;

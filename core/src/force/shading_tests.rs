@@ -1,0 +1,358 @@
+//! Shading, judged in f64 by the samples themselves.
+
+use std::vec::Vec;
+
+use super::*;
+use crate::cases::cases;
+use crate::contact::{ContactSettings, Friction};
+use crate::grid::{Cell, GridPoint};
+use crate::terrain::testing::{Field, buffers};
+use crate::terrain::{FieldSize, TileKey};
+
+/// How deep the HIP is below the surface, cells: the proxy is all but over it.
+const DEPTH: f64 = 0.01;
+/// From one HIP to the next, cells.
+const STEP: f64 = 0.01;
+
+/// What a HIP felt: where the proxy was, without shading and with it.
+struct Felt {
+    proxy: GridPoint,
+    plain: Vec3,
+    shaded: Vec3,
+    missing: Option<TileIndex>,
+}
+
+/// A height in cells at a sample.
+type Height = fn(i32, i32) -> f32;
+
+/// The height at a place, in f64.
+fn height_at(height: Height, [x, y]: [f64; 2]) -> f64 {
+    let (col, row) = (x.floor() as i32, y.floor() as i32);
+    let (u, v) = (x - x.floor(), y - y.floor());
+    let at = |east, north| f64::from(height(col + east, row + north));
+    let south = at(0, 0) * (1.0 - u) + at(1, 0) * u;
+    let north = at(0, 1) * (1.0 - u) + at(1, 1) * u;
+    south * (1.0 - v) + north * v
+}
+
+/// A HIP so far above a height function.
+fn hip_over(height: Height, [x, y]: [f64; 2], above: f64) -> GridPoint {
+    let (cell, z) = (
+        [x.floor() as i32, y.floor() as i32],
+        height_at(height, [x, y]) + above,
+    );
+    let frac = [x - x.floor(), y - y.floor(), z - z.floor()];
+    let [u, v, w] = frac.map(|f| f as f32);
+    GridPoint::new([cell[0], cell[1], z.floor() as i32], Vec3::new(u, v, w))
+}
+
+/// What is felt along a way, after a landing at its first place.
+fn felt_along<const D: usize>(
+    field: &Field<'_, D>,
+    height: Height,
+    friction: Friction,
+    way: impl IntoIterator<Item = [f64; 2]>,
+) -> Vec<Felt> {
+    let settings = ContactSettings {
+        friction,
+        ..ContactSettings::REAL_TIME
+    };
+    let mut contact = Contact::new(settings);
+    let mut shader = Shader::of(Shading::Smooth).expect("shaded");
+    let mut way = way.into_iter().peekable();
+    let first = *way.peek().expect("a place");
+    contact.step(&field.window, &hip_over(height, first, 1.0));
+    way.map(|at| {
+        let output = *contact.step(&field.window, &hip_over(height, at, -DEPTH));
+        assert_eq!(output.state, ContactState::Touching, "at {at:?}");
+        Felt {
+            proxy: output.proxy,
+            plain: output.displacement,
+            shaded: shader.shade(&field.window, &contact),
+            missing: shader.missing(),
+        }
+    })
+    .collect()
+}
+
+fn degrees(a: Vec3, b: Vec3) -> f32 {
+    a.cross(b).length().atan2(a.dot(b)).to_degrees()
+}
+
+/// Largest change of direction from one HIP to the next, degrees: without shading, and with it.
+fn largest_turns(felt: &[Felt]) -> (f32, f32) {
+    felt.windows(2).fold((0.0, 0.0), |(plain, shaded), pair| {
+        let turned = |of: fn(&Felt) -> Vec3| degrees(of(&pair[0]), of(&pair[1]));
+        (
+            f32::max(plain, turned(|felt| felt.plain)),
+            f32::max(shaded, turned(|felt| felt.shaded)),
+        )
+    })
+}
+
+/// A straight way with a HIP every [`STEP`].
+fn straight(from: [f64; 2], to: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
+    let (x, y) = (to[0] - from[0], to[1] - from[1]);
+    let steps = (x.hypot(y) / STEP) as u32;
+    (0..=steps).map(move |i| {
+        let share = f64::from(i) / f64::from(steps);
+        [from[0] + share * x, from[1] + share * y]
+    })
+}
+
+/// Rough ground: bends of up to some 50°.
+fn rough(x: i32, y: i32) -> f32 {
+    let hash = (x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_663)) as u32;
+    let noise = (hash.wrapping_mul(2_654_435_761) >> 22) as f32 / 1024.0;
+    0.25 * noise + 0.4 * x as f32 - 0.2 * y as f32
+}
+
+fn plane(x: i32, y: i32) -> f32 {
+    0.5 * x as f32 - 0.25 * y as f32
+}
+
+/// A valley along column 12 and a ridge along column 20, of 53° each.
+fn folds(x: i32, _: i32) -> f32 {
+    0.5 * (x.min(20) - 12).abs() as f32 - 0.5 * (x - 20).max(0) as f32
+}
+
+/// A cliff of 8 cells between columns 10 and 11.
+fn cliff(x: i32, _: i32) -> f32 {
+    if x > 10 { 8.0 } else { 0.0 }
+}
+
+#[test]
+fn a_plane_is_felt_as_without() {
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), plane);
+    let way = straight([3.3, 4.1], [35.2, 36.7]).step_by(cases(1, 100) as usize);
+    for felt in felt_along(&field, plane, Friction::NONE, way) {
+        let off = (felt.shaded - felt.plain).length();
+        assert!(off < 2e-6 * felt.plain.length(), "{off}");
+        assert_eq!(felt.missing, None);
+    }
+}
+
+#[test]
+fn the_force_turns_evenly_over_valley_and_ridge() {
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), folds);
+    for (from, to) in [(8.0, 16.0), (16.0, 24.0)] {
+        let way = straight([from, 9.3], [to, 10.1]);
+        let felt = felt_along(&field, folds, Friction::NONE, way);
+        let (plain, shaded) = largest_turns(&felt);
+        assert!(
+            plain > 20.0 && shaded < 0.1 * plain,
+            "{plain}° and {shaded}°"
+        );
+        for felt in &felt {
+            let sizes = (felt.shaded.length(), felt.plain.length());
+            assert!((sizes.0 - sizes.1).abs() < 1e-6 * sizes.1, "{sizes:?}");
+        }
+    }
+}
+
+#[test]
+fn at_every_sample_the_force_is_along_the_mean_of_the_edges_that_meet() {
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), rough);
+    for i in 0..cases(400, 20) as i32 {
+        // Samples on tiles' borders among them.
+        let (x, y) = (
+            1 + (7 * i) % 58,
+            if i % 3 == 0 { 32 } else { 1 + (5 * i) % 58 },
+        );
+        let mean = |before: f32, at: f32, after: f32| {
+            let unit = |rise: f32| {
+                let rise = f64::from(rise);
+                [1.0 / rise.hypot(1.0), rise / rise.hypot(1.0)]
+            };
+            let (one, other) = (unit(at - before), unit(after - at));
+            (one[1] + other[1]) / (one[0] + other[0])
+        };
+        let at = rough(x, y);
+        let east = mean(rough(x - 1, y), at, rough(x + 1, y));
+        let north = mean(rough(x, y - 1), at, rough(x, y + 1));
+        let wanted = Vec3::new(-east as f32, -north as f32, 1.0);
+        let floor = at.floor();
+        let proxy = GridPoint::new([x, y, floor as i32], Vec3::new(0.0, 0.0, at - floor));
+        let slopes = SlopesAt::point(&field.window, &proxy).expect("a patch");
+        let off = degrees(normal(slopes.smoothed), wanted);
+        assert!(off < 1e-3, "at {x}, {y}: {off}°");
+    }
+}
+
+#[test]
+fn on_rough_ground_no_step_turns_the_force_by_more_than_a_tenth() {
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), rough);
+    let (mut plain, mut shaded) = (0.0_f32, 0.0_f32);
+    for i in 0..cases(40, 1) {
+        let y = 2.0 + f64::from(i);
+        let way = straight([2.1, y], [57.9, y + 13.0 * f64::from(i % 2)]);
+        let felt = felt_along(&field, rough, Friction::NONE, way);
+        let (a, b) = largest_turns(&felt);
+        (plain, shaded) = (plain.max(a), shaded.max(b));
+    }
+    assert!(
+        plain > 20.0 && shaded < 0.1 * plain,
+        "{plain}° and {shaded}°"
+    );
+}
+
+#[test]
+fn a_cliff_stays_a_cliff() {
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), cliff);
+    let felt = felt_along(
+        &field,
+        cliff,
+        Friction::NONE,
+        straight([6.5, 9.5], [9.99, 9.5]),
+    );
+    for felt in felt {
+        let to_foot = 10.0 - (felt.proxy.cell()[0] as f32 + felt.proxy.frac().x);
+        let off = degrees(felt.shaded, Vec3::Z);
+        assert!(
+            off < 0.01 || to_foot < NARROW_AT_MOST,
+            "{to_foot} before it: {off}°"
+        );
+    }
+    // Its face: by far most of it is felt as it is.
+    for u in [0.21_f32, 0.5, 0.79] {
+        let proxy = GridPoint::new([10, 9, 0], Vec3::new(u, 0.4, 8.0 * u));
+        let slopes = SlopesAt::point(&field.window, &proxy).expect("a patch");
+        assert!((slopes.smoothed[0] - 8.0).abs() < 1e-4, "{slopes:?}");
+    }
+}
+
+/// How far from a cliff its bend may be felt, cells.
+const NARROW_AT_MOST: f32 = 0.2;
+
+#[test]
+fn a_tiles_border_is_felt_as_its_inside() {
+    // The same ground twice, once moved so that a tile's corner is in it.
+    fn moved(x: i32, y: i32) -> f32 {
+        rough(x - 22, y - 22)
+    }
+    let mut tiles = (buffers::<2>(), buffers::<2>());
+    let inside = Field::<2>::held(&mut tiles.0, FieldSize::new(60, 60), rough);
+    let across = Field::<2>::held(&mut tiles.1, FieldSize::new(60, 60), moved);
+    let way = || straight([6.3, 7.9], [14.2, 12.1]);
+    let shifted = way().map(|[x, y]| [x + 22.0, y + 22.0]);
+    let one = felt_along(&inside, rough, Friction::NONE, way());
+    let other = felt_along(&across, moved, Friction::NONE, shifted);
+    for (one, other) in one.iter().zip(&other) {
+        let off = degrees(one.shaded, other.shaded);
+        assert!(off < 0.05, "{:?}: {off}°", one.proxy);
+        assert_eq!(other.missing, None);
+    }
+}
+
+#[test]
+fn a_tile_that_is_not_here_is_named_and_felt_as_the_end() {
+    let mut tiles = buffers::<2>();
+    let mut field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), folds);
+    field.install(TileKey::holding(0, Cell::new(5, 5)));
+    let felt = felt_along(&field, folds, Friction::NONE, [[30.5, 5.5], [31.5, 5.5]]);
+    let missing: Vec<_> = felt.iter().map(|felt| felt.missing).collect();
+    assert_eq!(missing, [None, Some(TileIndex::new(1, 0))]);
+    assert!(degrees(felt[1].shaded, felt[1].plain) < 1e-3);
+}
+
+#[test]
+fn next_to_a_hole_the_force_turns_evenly_and_the_pull_back_stays() {
+    fn holed(x: i32, y: i32) -> f32 {
+        match (x, y) {
+            (15..=16, 10..=11) => f32::NAN,
+            _ => rough(x, y),
+        }
+    }
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), holed);
+    // Along the hole's southern border, half a cell and a tenth of one beside it.
+    for y in [8.5, 8.9] {
+        let felt = felt_along(
+            &field,
+            holed,
+            Friction::NONE,
+            straight([11.1, y], [20.3, y]),
+        );
+        let (plain, shaded) = largest_turns(&felt);
+        assert!(
+            plain > 10.0 && shaded < 0.1 * plain,
+            "{plain}° and {shaded}°"
+        );
+    }
+    // Over the hole: the border pulls the HIP back as without shading.
+    fn level(x: i32, y: i32) -> f32 {
+        if x > 15 && y < 30 { f32::NAN } else { 3.0 }
+    }
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), level);
+    let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    let mut shader = Shader::of(Shading::Smooth).expect("shaded");
+    let mut faded = 0;
+    for (x, z) in [(14.5, 3.5), (14.9, 2.9)]
+        .into_iter()
+        .chain((0..200).map(|i| (15.0 + 0.01 * i as f32, 2.9)))
+    {
+        let hip = GridPoint::new([0, 5, 0], Vec3::new(x, 0.5, z));
+        let output = *contact.step(&field.window, &hip);
+        assert_eq!(shader.shade(&field.window, &contact), output.displacement);
+        faded += i32::from(output.state == ContactState::Touching && x > 15.0);
+    }
+    assert!(faded > 10);
+}
+
+#[test]
+fn a_tile_may_count_its_heights_from_anywhere() {
+    let size = FieldSize::new(60, 60);
+    let mut tiles = (buffers::<2>(), buffers::<2>());
+    let even = Field::<2>::held(&mut tiles.0, size, rough);
+    let mut slots = tiles.1.iter_mut();
+    let mut next = || slots.next().expect("a buffer for every slot");
+    let mut window = Window::new([[next(), next()], [next(), next()]]);
+    window.reset(0, size, 100);
+    for (tile, base) in size.tiles().zip([0, 40, -7, 1_000]) {
+        let buffer = next();
+        let key = TileKey {
+            level: 0,
+            index: tile,
+        };
+        let filled = buffer.fill_from(key, base, size, |x, y| rough(x, y) - base as f32);
+        assert_eq!(filled, Ok(()));
+        let _ = window.install(buffer);
+    }
+    for at in straight([31.2, 20.4], [31.9, 40.3]) {
+        let proxy = hip_over(rough, at, 0.0);
+        let slopes = |window| SlopesAt::point(window, &proxy).expect("a patch").smoothed;
+        let off = degrees(normal(slopes(&window)), normal(slopes(&even.window)));
+        assert!(off < 0.02, "{at:?}: {off}°");
+    }
+}
+
+#[test]
+fn what_friction_holds_is_turned_with_the_rest() {
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), folds);
+    for (from, to) in [(11.0, 13.0), (13.0, 11.0)] {
+        // Into the valley and out of it.
+        let felt = felt_along(
+            &field,
+            folds,
+            Friction::coulomb(0.5),
+            straight([from, 9.3], [to, 9.3]),
+        );
+        let (plain, shaded) = largest_turns(&felt);
+        assert!(
+            plain > 50.0 && shaded < 1.0,
+            "{from}: {plain}° and {shaded}°"
+        );
+        for felt in &felt {
+            let sizes = (felt.shaded.length(), felt.plain.length());
+            assert!((sizes.0 - sizes.1).abs() < 1e-6 * sizes.1, "{sizes:?}");
+            assert!(felt.shaded.z > 0.0);
+        }
+    }
+}
