@@ -5,7 +5,7 @@
 //! header; in a Parquet recording it is the value of [`KEY`] among the file's metadata.
 
 use hapterra_core::contact::{Friction, Rule};
-use hapterra_core::force::{Damping, ForceLaw};
+use hapterra_core::force::{Damping, ForceLaw, Shading};
 use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use serde::{Deserialize, Serialize};
 
@@ -76,6 +76,9 @@ pub struct ViewSettings {
     pub stiffness_n_per_mm: f32,
     /// Largest force, N.
     pub max_force_n: f32,
+    /// Which normals the force follows; left out where they are those of the patches.
+    #[serde(default, skip_serializing_if = "Shading::is_none")]
+    pub shading: Shading,
     /// How rough the surface is; left out where it is like ice.
     #[serde(default, skip_serializing_if = "Friction::is_none")]
     pub friction: Friction,
@@ -106,6 +109,7 @@ impl ViewSettings {
             home_mm: laid.view.home_mm,
             stiffness_n_per_mm: laid.law.stiffness_n_per_mm,
             max_force_n: laid.law.max_force_n,
+            shading: laid.law.shading,
             friction: laid.law.friction,
             damping: laid.law.damping,
         }
@@ -125,6 +129,7 @@ impl ViewSettings {
             max_force_n: self.max_force_n,
             friction: self.friction,
             damping: self.damping,
+            shading: self.shading,
         }
     }
 
@@ -190,6 +195,9 @@ pub struct Force {
     /// The contact rule.
     #[serde(with = "rule_name")]
     pub rule: Rule,
+    /// Which normals the force follows; left out where they are those of the patches.
+    #[serde(default, skip_serializing_if = "Shading::is_none")]
+    pub shading: Shading,
     /// How rough the surface is; left out where it is like ice.
     #[serde(default, skip_serializing_if = "Friction::is_none")]
     pub friction: Friction,
@@ -276,6 +284,7 @@ impl Settings {
                 stiffness_n_per_mm: law.stiffness_n_per_mm,
                 max_force_n: law.max_force_n,
                 rule,
+                shading: law.shading,
                 friction: law.friction,
                 damping: law.damping,
             },
@@ -330,6 +339,7 @@ impl Settings {
             max_force_n: self.force.max_force_n,
             friction: self.force.friction,
             damping: self.force.damping,
+            shading: self.force.shading,
         }
     }
 

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::{Friction, Rule};
+use hapterra_core::contact::Rule;
 use hapterra_core::force::{Damping, ForceLaw};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::phantom::{Calibration, Mechanism};
@@ -158,8 +158,8 @@ fn scene(felt: &Felt) -> Scene {
         law: ForceLaw {
             stiffness_n_per_mm: felt.stiffness_n_per_mm as f32,
             max_force_n: MOST_N,
-            friction: Friction::NONE,
             damping: felt.damping,
+            ..ForceLaw::PREMIUM
         },
         rule: Rule::Swept,
         source: Source::Encoders,

@@ -3,10 +3,10 @@
 use std::fmt::Debug;
 
 use hapterra_core::contact::{Friction, Rule};
-use hapterra_core::force::Controller;
+use hapterra_core::force::{Controller, Shading};
 
 use super::exaggeration::Exaggeration;
-use super::rendering::{ContactRule, PassivityController, Rendering};
+use super::rendering::{ContactRule, ForceShading, PassivityController, Rendering};
 use crate::replay::Settings;
 
 impl Rendering {
@@ -60,6 +60,12 @@ impl Rendering {
                 "passivity",
                 self.passivity,
                 controller(force.damping.controller),
+                &mut told,
+            )),
+            shading: Some(merged(
+                "shading",
+                self.shading,
+                shading(force.shading),
                 &mut told,
             )),
             contact: Some(merged("contact", self.contact, rule(force.rule), &mut told)),
@@ -131,6 +137,13 @@ const fn controller(controller: Controller) -> PassivityController {
         Controller::Auto => PassivityController::Auto,
         Controller::On => PassivityController::On,
         Controller::Off => PassivityController::Off,
+    }
+}
+
+const fn shading(shading: Shading) -> ForceShading {
+    match shading {
+        Shading::None => ForceShading::None,
+        Shading::Smooth => ForceShading::Smooth,
     }
 }
 
@@ -206,6 +219,25 @@ mod tests {
             text.contains("[force.damping]\nns_per_m = 2.5\ncontroller = \"on\""),
             "{text}"
         );
+        assert_eq!(Settings::from_toml(&text).expect("read"), Some(recorded));
+    }
+
+    #[test]
+    fn shading_is_as_recorded_and_what_is_stated_wins() {
+        let mut recorded = recorded();
+        recorded.force.shading = Shading::Smooth;
+        let (rendering, told) = Rendering::default().or_recorded(&recorded);
+        assert_eq!(told, [""; 0]);
+        assert_eq!(rendering.law().expect("valid").shading, Shading::Smooth);
+        let stated = Rendering {
+            shading: Some(ForceShading::None),
+            ..Rendering::default()
+        };
+        let (rendering, told) = stated.or_recorded(&recorded);
+        assert_eq!(told, ["--shading none, where the recording has smooth"]);
+        assert_eq!(rendering.law().expect("valid").shading, Shading::None);
+        let text = recorded.to_toml();
+        assert!(text.contains("\nshading = \"smooth\"\n"), "{text}");
         assert_eq!(Settings::from_toml(&text).expect("read"), Some(recorded));
     }
 

@@ -1,7 +1,7 @@
 //! Options that say how a terrain feels, shared by `replay`, `run` and `demo`.
 
 use hapterra_core::contact::{Friction, Rule};
-use hapterra_core::force::{Controller, Damping, ForceLaw};
+use hapterra_core::force::{Controller, Damping, ForceLaw, Shading};
 
 use super::exaggeration::Exaggeration;
 use crate::cli::failure::{Failure, OrHint};
@@ -70,6 +70,10 @@ pub struct Rendering {
     #[arg(long, value_enum)]
     pub passivity: Option<PassivityController>,
 
+    /// Whether the force turns evenly over the edges between patches [default: none]
+    #[arg(long, value_enum)]
+    pub shading: Option<ForceShading>,
+
     /// Contact rule [default: swept]
     #[arg(long, value_enum)]
     pub contact: Option<ContactRule>,
@@ -82,6 +86,15 @@ pub enum ContactRule {
     Swept,
     /// As published in the paper, for comparison
     Paper,
+}
+
+/// Which normals the force follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ForceShading {
+    /// Those of the patches
+    None,
+    /// Normals that turn evenly from patch to patch
+    Smooth,
 }
 
 /// When the passivity controller acts.
@@ -163,6 +176,7 @@ impl Rendering {
             max_force_n: self.max_force_n.unwrap_or(usual.max_force_n),
             friction: self.surface()?,
             damping: self.damping()?,
+            shading: self.normals(),
         };
         let ForceLaw {
             stiffness_n_per_mm: k,
@@ -232,6 +246,14 @@ impl Rendering {
                 "--damping-ns-per-m from 0 to {}",
                 Damping::MOST_NS_PER_M
             ))
+    }
+
+    /// Which normals the force follows.
+    const fn normals(&self) -> Shading {
+        match self.shading {
+            None | Some(ForceShading::None) => Shading::None,
+            Some(ForceShading::Smooth) => Shading::Smooth,
+        }
     }
 
     /// The contact rule.
