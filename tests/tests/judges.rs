@@ -12,7 +12,7 @@ use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_tests::chance::Chance;
 use hapterra_tests::field::point;
 use hapterra_tests::invariants::judge::Judge;
-use hapterra_tests::invariants::seen::Seen;
+use hapterra_tests::invariants::seen::{Seen, Shaded};
 use hapterra_tests::invariants::{Invariant, Violation};
 use hapterra_tests::scene::run::Scene;
 use hapterra_tests::scene::supply::{Buffers, Supply};
@@ -173,6 +173,45 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
         told(&[edge(20.1)]),
         [Cone],
         "45° downhill, and friction for 39°"
+    );
+}
+
+/// With shading the force is as long as without, and along the smoothed normal.
+#[test]
+fn a_force_that_is_shaded_otherwise_is_found() {
+    let ridge = ridge();
+    // A quarter of a cell east of the edge, under a side that falls by 1 a cell; there the
+    // slope goes from 0 at the edge to 1 at the next sample, its direction evenly.
+    let shaded = |[x, z]: [f64; 2], is_whole| {
+        let displacement = Vec3::new(x as f32, 0.0, z as f32);
+        let seen = touching([20.2, 10.5, 1.7], [20.25, 10.5, 1.75]);
+        let shaded = Some(Shaded {
+            displacement,
+            is_whole,
+        });
+        Seen { shaded, ..seen }
+    };
+    let found = |seen: Seen| -> Vec<Invariant> {
+        let told = reports_of(Judge::new(&ridge, Rule::Swept), &[seen]);
+        told.iter().map(|violation| violation.invariant).collect()
+    };
+    // Bends of 90° are turned along a fifth of an edge: this is beyond it.
+    let along = [0.05, 0.05];
+    assert_eq!(found(shaded(along, true)), []);
+    assert_eq!(
+        found(shaded([0.06, 0.037_416_57], true)),
+        [Invariant::Shading],
+        "turned by 13°"
+    );
+    assert_eq!(
+        found(shaded([0.06, 0.037_416_57], false)),
+        [],
+        "a sample was missing"
+    );
+    assert_eq!(
+        found(shaded([0.051, 0.051], false)),
+        [Invariant::Shading],
+        "longer than without"
     );
 }
 

@@ -3,7 +3,7 @@
 use hapterra_core::Vec3;
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::{Friction, Rule, WORK_PER_TICK};
-use hapterra_core::force::{Controller, Damping, ForceLaw};
+use hapterra_core::force::{Controller, Damping, ForceLaw, Shading};
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::guard::{Fault, Sense};
 use hapterra_core::phantom::{Calibration, Mechanism};
@@ -154,6 +154,9 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
             ns_per_m: f32::from(bytes.byte()) / 255.0 * Damping::MOST_NS_PER_M,
             controller: Controller::On,
         };
+    }
+    if kind & 64 != 0 {
+        scene.law.shading = Shading::Smooth;
     }
     scene
 }

@@ -136,6 +136,7 @@ impl<'g> Judge<'g> {
         told.extend(self.is_clamped(seen).err());
         let swept = self.rule == Rule::Swept;
         told.extend(self.is_consistent(seen, swept).err());
+        told.extend(self.is_shaded(seen, swept).err());
         if seen.is_touching() {
             told.extend(self.is_on_surface(seen).err());
         }

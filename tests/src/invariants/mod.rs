@@ -13,6 +13,7 @@ mod friction;
 pub mod judge;
 mod place;
 pub mod seen;
+mod shading;
 pub mod surface;
 
 /// What every tick must keep.
@@ -62,6 +63,8 @@ pub enum Invariant {
     Wall,
     /// The force fades in and out at a bounded rate.
     Fade,
+    /// With shading: the force is as long as without, and along the smoothed normal.
+    Shading,
     /// The same input gives the same bits.
     Repeatable,
     /// A scene shifted by whole cells gives the same bits.

@@ -1,5 +1,6 @@
 //! One tick as the judge sees it, and how exact it has to be.
 
+use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactOutput, ContactState};
 use hapterra_core::force::ForceLaw;
 
@@ -23,10 +24,21 @@ pub struct Seen {
     pub hip: [f64; 3],
     /// The answer.
     pub felt: ContactOutput,
+    /// The displacement as shading turns it, where there is shading.
+    pub shaded: Option<Shaded>,
     /// The proxy, where the terrain was made.
     pub proxy: [f64; 3],
     /// The force that the product's law gives for it, N, by [`CELLS_MM`].
     pub force_n: [[f64; 3]; CELLS_MM.len()],
+}
+
+/// What shading makes of a displacement.
+#[derive(Clone, Copy, Debug)]
+pub struct Shaded {
+    /// The displacement, turned.
+    pub displacement: Vec3,
+    /// Whether every sample that it takes was here.
+    pub is_whole: bool,
 }
 
 impl Seen {
@@ -37,6 +49,7 @@ impl Seen {
         Self {
             hip,
             felt,
+            shaded: None,
             proxy: [0, 1, 2].map(|i| at[i] - f64::from(shift[i])),
             force_n: CELLS_MM.map(|cell_mm| {
                 let force = LAW.force_n(felt.displacement * cell_mm);

@@ -2,7 +2,7 @@
 
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::{Friction, Rule};
-use hapterra_core::force::{Controller, Damping, ForceLaw};
+use hapterra_core::force::{Controller, Damping, ForceLaw, Shading};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
@@ -128,6 +128,7 @@ fn host_scene(chance: &mut Chance, epoch: u32) -> Scene {
                 ns_per_m: [0.0, -1.0, f32::NAN, 1e30][chance.below(4)],
                 controller: Controller::On,
             },
+            shading: [Shading::None, Shading::Smooth][chance.below(2)],
         },
         rule: Rule::Swept,
         source: [Source::Encoders, Source::Points][chance.below(2)],

@@ -64,6 +64,7 @@ impl Recorded {
             home: GridPoint::default(),
             law: ForceLaw {
                 friction: scene.friction,
+                shading: scene.shading,
                 ..ForceLaw::PREMIUM
             },
             rule: scene.rule,

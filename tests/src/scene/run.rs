@@ -1,14 +1,17 @@
 //! A scene by its seed and number, and the run of it, tick by tick.
 
+use hapterra_core::Vec3;
 use hapterra_core::contact::{Contact, ContactOutput, ContactSettings, Execution, Friction, Rule};
+use hapterra_core::force::{Shader, Shading};
 use hapterra_core::grid::GridPoint;
+use hapterra_core::terrain::TileIndex;
 
 use super::hip_path;
 use super::supply::{Buffers, SIDE, SuppliedWindow, Supply};
 use super::terrain::{KINDS, Terrain};
 use crate::chance::Chance;
 use crate::field::point;
-use crate::invariants::seen::Seen;
+use crate::invariants::seen::{Seen, Shaded};
 use crate::invariants::{Invariant, Violation};
 
 /// Ticks that one HIP may be repeated for in lock-step.
@@ -31,6 +34,8 @@ pub struct Scene {
     pub supply: Supply,
     /// How rough the surface is.
     pub friction: Friction,
+    /// Which normals the force follows.
+    pub shading: Shading,
     /// Whether the contact takes its shortcuts.
     pub shortcuts: bool,
     /// Which of the twins are run beside it.
@@ -109,6 +114,8 @@ impl Scene {
             execution,
             supply,
             friction: Friction::NONE,
+            // By number, as the path.
+            shading: [Shading::None, Shading::Smooth][(number / 2 % 2) as usize],
             shortcuts: true,
             twins: Twins::One(if paper { 0 } else { chance.below(6) }),
             seed: chance.bits(),
@@ -153,6 +160,7 @@ impl Scene {
             execution,
             supply,
             friction: Friction::NONE,
+            shading: Shading::Smooth,
             shortcuts: true,
             twins: Twins::All,
             seed: 1,
@@ -205,7 +213,7 @@ impl Scene {
                 tick,
                 detail: format!("never settles for {hip:?}"),
             })?;
-            let seen = Seen::new(*hip, felt, shift);
+            let seen = player.seen(*hip, felt);
             look(&seen)?;
             all.push(seen);
         }
@@ -227,6 +235,9 @@ impl Scene {
 pub struct Player<'t, 'g, const D: usize> {
     /// Its state, for those who want to try a tick twice.
     pub contact: Contact,
+    shader: Option<Shader>,
+    /// The last displacement, shaded.
+    shaded: Vec3,
     /// Where it feels.
     pub supplied: SuppliedWindow<'t, 'g, D>,
     execution: Execution,
@@ -244,6 +255,8 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
     ) -> Self {
         Self {
             contact: Contact::new(scene.settings()),
+            shader: Shader::of(scene.shading),
+            shaded: Vec3::ZERO,
             supplied: SuppliedWindow::new(buffers, &scene.terrain, shift, supply),
             execution: scene.execution,
             shift,
@@ -256,17 +269,66 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
     pub fn feel(&mut self, hip: [f64; 3]) -> Option<ContactOutput> {
         let hip = shifted(hip, self.shift);
         let mut work = 0;
+        let in_real_time = self.execution == Execution::RealTime;
         for _ in 0..PATIENCE {
             let felt = *self.contact.step(&self.supplied.window, &hip);
-            self.supplied.supply(self.now, &self.contact, &felt, &hip);
-            self.now += 1;
             work = work.max(felt.work);
-
-            if felt.converged || self.execution == Execution::RealTime {
+            let has_ended = felt.converged || in_real_time;
+            self.shaded = self.shade();
+            let missing = self.missing();
+            let waits_for = ContactOutput {
+                missing_tile: felt.missing_tile.or(missing),
+                ..felt
+            };
+            self.supplied
+                .supply(self.now, &self.contact, &waits_for, &hip);
+            self.now += 1;
+            if has_ended && (in_real_time || missing.is_none() || self.waits(&hip)) {
                 return Some(ContactOutput { work, ..felt });
             }
         }
         None
+    }
+
+    /// Waits for the tiles that shading wants, while the contact stays as it is.
+    fn waits(&mut self, hip: &GridPoint) -> bool {
+        for _ in 0..PATIENCE {
+            let waits_for = ContactOutput {
+                missing_tile: self.missing(),
+                ..*self.contact.output()
+            };
+            self.supplied
+                .supply(self.now, &self.contact, &waits_for, hip);
+            self.now += 1;
+            self.shaded = self.shade();
+            if self.missing().is_none() {
+                return true;
+            }
+        }
+        false
+    }
+
+    fn shade(&mut self) -> Vec3 {
+        match &mut self.shader {
+            Some(shader) => shader.shade(&self.supplied.window, &self.contact),
+            None => self.contact.output().displacement,
+        }
+    }
+
+    fn missing(&self) -> Option<TileIndex> {
+        self.shader.as_ref().and_then(Shader::missing)
+    }
+
+    /// What the last HIP felt, as the judge sees it.
+    #[must_use]
+    pub fn seen(&self, hip: [f64; 3], felt: ContactOutput) -> Seen {
+        Seen {
+            shaded: self.shader.as_ref().map(|shader| Shaded {
+                displacement: self.shaded,
+                is_whole: shader.missing().is_none(),
+            }),
+            ..Seen::new(hip, felt, self.shift)
+        }
     }
 }
 

@@ -111,6 +111,8 @@ pub fn same_bits(invariant: Invariant, seen: &[Seen], other: &[Seen], shift: [i3
             (
                 seen.felt.state,
                 seen.felt.displacement.to_array().map(f32::to_bits),
+                seen.shaded
+                    .map(|shaded| shaded.displacement.to_array().map(f32::to_bits)),
                 [0, 1, 2].map(|i| cell[i] - shift[i]),
                 frac.to_array().map(f32::to_bits),
             )
@@ -190,6 +192,14 @@ pub fn same_way(
         let agree = |proxy, a: &Seen, b: &Seen| agree(scene, proxy, a, b);
         if agree(turned(a.proxy), a, b) {
             parted = !is_near(turned(a.proxy), a, b);
+            if !parted && !is_shaded_likewise(scene, symmetry, a, b) {
+                let detail = format!("{symmetry:?}: shaded {a:?} but {b:?}");
+                return Err(Violation {
+                    invariant: Invariant::Symmetry,
+                    tick,
+                    detail,
+                });
+            }
             continue;
         }
         let decides = |there: &Seen, hair: f64| {
@@ -207,6 +217,27 @@ pub fn same_way(
         });
     }
     Ok(true)
+}
+
+/// Whether a shaded force points the same way. A place that is off by as much as rounding
+/// allows turns it by less than this, rad, on ground that mirrored scenes are compared on.
+const TURNED: f32 = 0.01;
+
+fn is_shaded_likewise(scene: &Scene, symmetry: Symmetry, a: &Seen, b: &Seen) -> bool {
+    let (Some(one), Some(other)) = (a.shaded, b.shaded) else {
+        return true;
+    };
+    let short = a.felt.displacement.length() < 0.1;
+    if short || !scene.friction.is_none() || a.felt.state != b.felt.state {
+        return true;
+    }
+    let tip = one.displacement.as_dvec3().to_array();
+    let ends = [[0.0; 3], tip].map(|end| symmetry.point(&scene.terrain, end));
+    let [x, y, z] = [0, 1, 2].map(|i| (ends[1][i] - ends[0][i]) as f32);
+    let wanted = hapterra_core::Vec3::new(x, y, z);
+    let along = wanted.dot(other.displacement);
+    let across = wanted.cross(other.displacement).length();
+    across <= TURNED * along
 }
 
 /// A proxy that slid may be pulled by so much more than friction holds, as a part: where

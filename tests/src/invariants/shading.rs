@@ -1,0 +1,111 @@
+//! The force with shading.
+
+use std::f64::consts::FRAC_PI_4;
+
+use glam::DVec3;
+
+use super::Invariant;
+use super::judge::{Judge, Verdict};
+use super::seen::Seen;
+use super::surface::Patch;
+use crate::scene::terrain::Terrain;
+
+/// Part by which the length may be off.
+const LENGTH: f64 = 1e-5;
+/// A shorter force has no direction to speak of, cells.
+const SHORT: f64 = 1e-2;
+/// Rounding of a direction, rad.
+const ANGLE: f64 = 1e-3;
+/// A proxy so near to its patch's border may be on it, where patches meet.
+const BORDER: f64 = 1e-5;
+/// Most that a force is turned.
+const MOST_TURN: f64 = 60.0 / 45.0 * FRAC_PI_4;
+/// Bend up to which the direction changes along a whole edge, and from which along a fifth.
+const GENTLE: f64 = FRAC_PI_4;
+const SHARP: f64 = 75.0 / 45.0 * FRAC_PI_4;
+
+impl Judge<'_> {
+    /// As long as without shading; inside of a patch along the smoothed normal, on ice.
+    pub(super) fn is_shaded(&self, seen: &Seen, swept: bool) -> Verdict {
+        let Some(shaded) = seen.shaded else {
+            return Ok(());
+        };
+        let is_whole = shaded.is_whole;
+        let shaded = shaded.displacement.as_dvec3();
+        let plain = seen.felt.displacement.as_dvec3();
+        let off = (shaded.length() - plain.length()).abs();
+        let is_long_enough = off <= LENGTH * plain.length() + 1e-30;
+        if !is_long_enough {
+            return self.fail(Invariant::Shading, format!("{shaded} of {plain}"));
+        }
+        let [x, y, _] = seen.proxy;
+        let inside = |c: f64| (BORDER..1.0 - BORDER).contains(&(c - c.floor()));
+        let is_told =
+            is_whole && seen.is_touching() && seen.felt.converged && plain.length() > SHORT;
+        if !is_told || !inside(x) || !inside(y) || !self.friction.is_none() || !swept {
+            return Ok(());
+        }
+        let Some(smoothed) = smoothed_normal(self.terrain, [x, y]) else {
+            return Ok(());
+        };
+        let Some(patch) = Patch::at(self.terrain, [x.floor() as i32, y.floor() as i32]) else {
+            return Ok(());
+        };
+        let [east, north] = patch.slopes(x, y);
+        let normal = DVec3::new(-east, -north, 1.0);
+        // The force is off its normal by as much as it is without shading.
+        let allowed = ANGLE + angle(plain, normal);
+        let wanted = angle(normal, smoothed).min(MOST_TURN);
+        let left = (angle(normal, smoothed) - wanted).max(0.0);
+        let off = angle(shaded, smoothed);
+        if (off - left).abs() > allowed || shaded.dot(normal) < 0.0 {
+            let detail = format!("{shaded} is {off} rad from {smoothed}, {left} wanted: {seen:?}");
+            return self.fail(Invariant::Shading, detail);
+        }
+        Ok(())
+    }
+}
+
+/// The angle between two vectors, rad.
+fn angle(a: DVec3, b: DVec3) -> f64 {
+    a.cross(b).length().atan2(a.dot(b))
+}
+
+/// By the samples around; `None` next to a hole or the border of the data, or where a step is
+/// so high that rounding decides.
+fn smoothed_normal(terrain: &Terrain, [x, y]: [f64; 2]) -> Option<DVec3> {
+    let (col, row) = (x.floor() as i32, y.floor() as i32);
+    let (u, v) = (x - x.floor(), y - y.floor());
+    let line = |at: fn(i32, i32) -> [i32; 2], across: i32, place: f64| {
+        let post = |along: i32| {
+            let [east, north] = at(along, across);
+            f64::from(terrain.post(col + east, row + north))
+        };
+        smoothed_slope([-1, 0, 1, 2].map(post), place)
+    };
+    let eastward = |across| line(|along, across| [along, across], across, u);
+    let northward = |across| line(|along, across| [across, along], across, v);
+    let east = eastward(0)? * (1.0 - v) + eastward(1)? * v;
+    let north = northward(0)? * (1.0 - u) + northward(1)? * u;
+    Some(DVec3::new(-east, -north, 1.0))
+}
+
+/// The slope at a place between the middle two of four samples.
+fn smoothed_slope(posts: [f64; 4], place: f64) -> Option<f64> {
+    let angle = |i: usize| (posts[i + 1] - posts[i]).atan();
+    let [before, own, after] = [angle(0), angle(1), angle(2)];
+    if !(before + own + after).is_finite() || posts.iter().any(|post| post.abs() > 1e4) {
+        return None;
+    }
+    let reach = |bend: f64| {
+        let part = (bend.cos() - SHARP.cos()) / (GENTLE.cos() - SHARP.cos());
+        0.2 + 0.8 * part.clamp(0.0, 1.0)
+    };
+    // Directions are mixed, not angles.
+    let part = |bend: f64, away: f64| 0.5 * (1.0 - away / reach(bend)).max(0.0);
+    let (first, last) = (part(before - own, place), part(after - own, 1.0 - place));
+    let mix = |of: fn(f64) -> f64| {
+        of(own) + first * (of(before) - of(own)) + last * (of(after) - of(own))
+    };
+    Some(mix(f64::sin) / mix(f64::cos))
+}
