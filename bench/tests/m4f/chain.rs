@@ -6,10 +6,11 @@ use hapterra_bench::grid::Grid;
 use hapterra_bench::path::Dice;
 use hapterra_bench::state::{TICKS, terrain};
 use hapterra_core::contact::ContactState;
+use hapterra_core::force::{Controller, Damping, ForceLaw, Shading};
 use hapterra_core::scene::{Scene, Source};
 use hapterra_tests::counting::CountingBoard;
 
-use super::contact::{GridSamples, rough, scene};
+use super::contact::{GridSamples, rough, scene, with_law};
 use super::table::{Row, Target, Tick};
 
 /// Ticks on the way down, which do not count.
@@ -60,6 +61,21 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
         arm.row(board, name, target, (counts, arm.scene()), state)
     };
     let fast_rough = (&fast[..], rough(arm.scene()));
+    let smooth = |law| ForceLaw {
+        shading: Shading::Smooth,
+        ..law
+    };
+    let damped = |law| ForceLaw {
+        damping: Damping {
+            ns_per_m: 2.0,
+            controller: Controller::On,
+        },
+        ..law
+    };
+    let shaded = (&sliding[..], with_law(arm.scene(), smooth));
+    let damping = (&sliding[..], with_law(arm.scene(), damped));
+    let all = with_law(with_law(rough(arm.scene()), smooth), damped);
+    let all = (&fast[..], all);
     vec![
         row("chain, free", in_the_air, &free, ContactState::Free),
         row(
@@ -79,6 +95,27 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
             "chain, sliding fast, rough",
             in_the_air,
             fast_rough,
+            ContactState::Touching,
+        ),
+        arm.row(
+            board,
+            "chain, sliding, shaded",
+            in_the_air,
+            shaded,
+            ContactState::Touching,
+        ),
+        arm.row(
+            board,
+            "chain, sliding, damped",
+            in_the_air,
+            damping,
+            ContactState::Touching,
+        ),
+        arm.row(
+            board,
+            "chain, sliding fast, all effects",
+            in_the_air,
+            all,
             ContactState::Touching,
         ),
         row(

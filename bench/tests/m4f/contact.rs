@@ -159,10 +159,15 @@ fn size(grid: &Grid) -> FieldSize {
 
 /// The same on a rough surface.
 pub(crate) fn rough(scene: Scene) -> Scene {
-    let law = ForceLaw {
+    with_law(scene, |law| ForceLaw {
         friction: ROUGH,
-        ..scene.law
-    };
+        ..law
+    })
+}
+
+/// The same under another law.
+pub(crate) fn with_law(scene: Scene, change: impl FnOnce(ForceLaw) -> ForceLaw) -> Scene {
+    let law = change(scene.law);
     Scene { law, ..scene }
 }
 
