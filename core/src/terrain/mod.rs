@@ -3,6 +3,7 @@
 mod extent;
 mod index;
 mod max_pyramid;
+pub mod packed;
 mod storage;
 #[cfg(test)]
 pub(crate) mod testing;

@@ -2,6 +2,7 @@
 
 use super::extent::FieldSize;
 use super::index::{BLOCK_SHIFT, TILE_CELLS, TileKey};
+use super::packed::Unpacker;
 use crate::grid::{Altitude, Cell, MAX_CELL};
 
 /// Samples along a tile's side; the last row and column are shared with the
@@ -19,6 +20,8 @@ pub enum BadTile {
     Length,
     /// The base lies outside ±[`MAX_CELL`].
     Base,
+    /// No packed heights of 33 × 33 samples, or more than these.
+    Packed,
 }
 
 /// One buffer of the window: 33 × 33 heights and their block maxima.
@@ -138,6 +141,22 @@ impl Tile {
                 .get(row * POSTS + col)
                 .map_or(f32::NAN, |le| f32::from_le_bytes(*le))
         })
+    }
+
+    /// Fills the buffer from [packed](super::packed) heights. The samples need no other
+    /// buffer.
+    ///
+    /// # Errors
+    /// [`BadTile::Packed`] unless the bytes are the packed heights of a tile, and no more.
+    pub fn unpack(&mut self, key: TileKey, base: i32, bytes: &[u8]) -> Result<(), BadTile> {
+        self.vacate();
+        let mut heights = Unpacker::new(bytes).ok_or(BadTile::Packed)?;
+        self.fill(key, base, |col, _| heights.next(col))?;
+        if !heights.is_at_end() {
+            self.vacate();
+            return Err(BadTile::Packed);
+        }
+        Ok(())
     }
 
     /// The integer height, in cells, that [`Self::corners`] counts from.

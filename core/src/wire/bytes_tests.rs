@@ -168,6 +168,17 @@ fn a_tile_and_the_request_for_it() {
     });
     let wanted = [std::vec![2, 7, 1, 3, 0xC8, 0x01, 1, 1], float(0.5)].concat();
     assert_eq!(bytes(&tile), wanted);
+    let heights = Heights::Packed {
+        base: -3,
+        bytes: &[9, 0, 7],
+    };
+    let tile = ToDevice::Tile(TileMessage {
+        epoch: 7,
+        key,
+        heights,
+    });
+    let wanted = [2, 7, 1, 3, 0xC8, 0x01, 3, 5, 3, 9, 0, 7];
+    assert_eq!(bytes(&tile), wanted);
 }
 
 #[test]

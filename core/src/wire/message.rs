@@ -173,6 +173,15 @@ pub enum Heights<'a> {
         #[serde(borrow)]
         bytes: &'a [u8],
     },
+    /// The same samples in the form of [`packed`](crate::terrain::packed): bit for bit,
+    /// but for the bits of a NaN.
+    Packed {
+        /// Whole cells.
+        base: i32,
+        /// At most [`MAX_PACKED`](crate::terrain::packed::MAX_PACKED) bytes.
+        #[serde(borrow)]
+        bytes: &'a [u8],
+    },
 }
 
 /// A run of samples. Numbers are consecutive over the session, so a gap

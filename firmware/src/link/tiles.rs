@@ -89,6 +89,7 @@ pub fn fill_tile(tile: &mut Tile, message: &TileMessage<'_>) -> Result<(), BadTi
         Heights::Hole => tile.fill(key, 0, |_, _| f32::NAN),
         Heights::Flat { base, height } => tile.fill(key, base, |_, _| height),
         Heights::Samples { base, bytes } => tile.load(key, base, bytes),
+        Heights::Packed { base, bytes } => tile.unpack(key, base, bytes),
     }
 }
 

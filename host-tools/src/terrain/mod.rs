@@ -9,6 +9,7 @@ mod distortion;
 mod felt_grid;
 mod identity;
 mod scale;
+mod steps;
 mod tiler;
 
 pub use distortion::Distortion;

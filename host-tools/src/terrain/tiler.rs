@@ -6,9 +6,11 @@ use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::scene::{Scene, Source};
+use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
 use hapterra_core::terrain::{FieldSize, POSTS, TILE_CELLS, TileKey};
 use hapterra_core::wire::message::Heights;
 
+use super::steps::{BinaryUnit, rounded, rounding, steps};
 use super::{BadScale, FeltCells, FeltGrid, Scale, identity};
 use crate::raster::Raster;
 
@@ -25,6 +27,8 @@ pub struct Terrain<'r> {
     /// Patches of the level, east and north.
     size: [i32; 2],
     top: i32,
+    /// Step of heights that are interpolated, in the file's vertical unit.
+    rounding: Option<f64>,
     fingerprint: OnceCell<u64>,
 }
 
@@ -63,6 +67,8 @@ pub enum TerrainError {
 /// Room for one tile's samples, used again for each.
 pub struct TileBuffer {
     heights: Box<[f64; POSTS * POSTS]>,
+    /// Above the tile's base.
+    singles: Box<[f32; POSTS * POSTS]>,
     bytes: Box<[u8; TILE_BYTES]>,
 }
 
@@ -70,7 +76,26 @@ impl Default for TileBuffer {
     fn default() -> Self {
         Self {
             heights: Box::new([f64::NAN; POSTS * POSTS]),
+            singles: Box::new([f32::NAN; POSTS * POSTS]),
             bytes: Box::new([0; TILE_BYTES]),
+        }
+    }
+}
+
+impl TileBuffer {
+    /// The tile as it is shortest on the link.
+    fn packed(&mut self, base: i32, steps: &[Step]) -> Heights<'_> {
+        let room = &mut self.bytes[..MAX_PACKED];
+        if let Some(length) = pack(&self.singles, base, steps, room).map(<[u8]>::len) {
+            let bytes = &self.bytes[..length];
+            return Heights::Packed { base, bytes };
+        }
+        for (to, height) in self.bytes.chunks_exact_mut(4).zip(self.singles.iter()) {
+            to.copy_from_slice(&height.to_le_bytes());
+        }
+        Heights::Samples {
+            base,
+            bytes: self.bytes.as_slice(),
         }
     }
 }
@@ -105,12 +130,14 @@ impl<'r> Terrain<'r> {
             });
         }
         let scale = scale.at_level(level);
+        let rounding = rounding(&grid);
         Ok(Self {
             grid,
             scale,
             level,
             size,
-            top: top(grid.raster(), &scale)?,
+            top: top(grid.raster(), &scale, rounding)?,
+            rounding,
             fingerprint: OnceCell::new(),
         })
     }
@@ -245,7 +272,7 @@ impl<'r> Terrain<'r> {
         let (row, v) = place(north_mm / cell_mm, size[1])?;
         let at = |dx: u32, dy: u32| {
             let height = self.grid.height_of_level(level, column + dx, row + dy);
-            height * self.scale.height_mm_per_unit()
+            rounded(height, self.rounding) * self.scale.height_mm_per_unit()
         };
         let (south, north) = ([at(0, 0), at(1, 0)], [at(0, 1), at(1, 1)]);
         let mix = |[a, b]: [f64; 2], t: f64| a * (1.0 - t) + b * t;
@@ -270,7 +297,7 @@ impl<'r> Terrain<'r> {
         if !self.has(key) {
             return None;
         }
-        self.read(key, &mut buffer.heights);
+        let unit = self.read(key, &mut buffer.heights);
         let Some((low, high, known)) = range(buffer.heights.as_slice()) else {
             return Some(Heights::Hole);
         };
@@ -282,23 +309,25 @@ impl<'r> Terrain<'r> {
                 height: relative(low),
             });
         }
-        for (to, height) in buffer.bytes.chunks_exact_mut(4).zip(buffer.heights.iter()) {
-            to.copy_from_slice(&relative(*height).to_le_bytes());
+        for (single, height) in buffer.singles.iter_mut().zip(buffer.heights.iter()) {
+            *single = relative(*height);
         }
-        Some(Heights::Samples {
-            base,
-            bytes: buffer.bytes.as_slice(),
-        })
+        let steps = steps(unit, self.scale.height_cells(1.0));
+        Some(buffer.packed(base, &Vec::from_iter(steps)))
     }
 
-    /// Copies the tile's samples, in cells; NaN in holes and off the data.
-    fn read(&self, key: TileKey, heights: &mut [f64; POSTS * POSTS]) {
+    /// Copies the tile's samples, in cells; NaN in holes and off the data. Returns what they
+    /// are multiples of in the file's vertical unit.
+    fn read(&self, key: TileKey, heights: &mut [f64; POSTS * POSTS]) -> BinaryUnit {
         let first = |index: i32| index as u32 * TILE_CELLS as u32;
         let (west, south) = (first(key.index.col), first(key.index.row));
+        let mut unit = BinaryUnit::ANY;
         for (row, line) in (south..).zip(heights.chunks_exact_mut(POSTS)) {
             self.grid.copy_row(self.level, row, west, line);
             for height in line {
-                let cells = self.scale.height_cells(*height);
+                let in_file = rounded(*height, self.rounding);
+                unit = unit.with(in_file);
+                let cells = self.scale.height_cells(in_file);
                 // Where not all heights were read before, one may leave what can be said.
                 *height = match cells.abs() <= f64::from(MAX_CELL) {
                     true => cells,
@@ -306,6 +335,7 @@ impl<'r> Terrain<'r> {
                 };
             }
         }
+        unit
     }
 
     /// How many samples of the tile lie in the field.
@@ -345,7 +375,7 @@ fn base(low: f64, high: f64) -> i32 {
     base.floor() as i32 // both within ±MAX_CELL
 }
 
-fn top(raster: &Raster, scale: &Scale) -> Result<i32, TerrainError> {
+fn top(raster: &Raster, scale: &Scale, step: Option<f64>) -> Result<i32, TerrainError> {
     let summary = raster.summary();
     let ends = [summary.lowest, summary.highest].map(|h| scale.height_cells(h));
     let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
@@ -366,7 +396,9 @@ fn top(raster: &Raster, scale: &Scale) -> Result<i32, TerrainError> {
     } else {
         64
     };
-    Ok((high.ceil() as i32 + rounding).min(MAX_CELL + 1))
+    // Interpolated heights may be half a step above the samples.
+    let up = 0.5 * scale.height_cells(step.unwrap_or(0.0)).abs();
+    Ok(((high + up).ceil() as i32 + rounding).min(MAX_CELL + 1))
 }
 
 #[cfg(test)]

@@ -1,5 +1,8 @@
 //! Tiles against the raster they are cut from.
 
+use hapterra_core::grid::Cell;
+use hapterra_core::terrain::Tile;
+
 use super::*;
 
 fn key(level: u8, col: i32, row: i32) -> TileKey {
@@ -13,18 +16,30 @@ fn unit() -> Scale {
 /// The samples of a tile as the device would hold them, in cells.
 fn samples(terrain: &Terrain<'_>, key: TileKey) -> Vec<f64> {
     let mut buffer = TileBuffer::default();
-    match terrain.tile(key, &mut buffer).expect("a tile") {
-        Heights::Hole => vec![f64::NAN; POSTS * POSTS],
-        Heights::Flat { base, height } => {
-            vec![f64::from(base) + f64::from(height); POSTS * POSTS]
-        }
-        Heights::Samples { base, bytes } => bytes
-            .as_chunks::<4>()
-            .0
-            .iter()
-            .map(|le| f64::from(base) + f64::from(f32::from_le_bytes(*le)))
-            .collect(),
+    let heights = terrain.tile(key, &mut buffer).expect("a tile");
+    let mut tile = Box::new(Tile::VACANT);
+    match heights {
+        Heights::Hole => tile.fill(key, 0, |_, _| f32::NAN),
+        Heights::Flat { base, height } => tile.fill(key, base, |_, _| height),
+        Heights::Samples { base, bytes } => tile.load(key, base, bytes),
+        Heights::Packed { base, bytes } => tile.unpack(key, base, bytes),
     }
+    .expect("heights of a tile");
+    let base = f64::from(tile.base());
+    let held = held(&tile);
+    held.into_iter().map(|h| base + f64::from(h)).collect()
+}
+
+/// The samples that a tile holds, in cells above its base.
+fn held(tile: &Tile) -> Vec<f32> {
+    let sample = |i: usize| {
+        // The last row and column are corners of the patches before them.
+        let (col, row) = (i % POSTS, i / POSTS);
+        let (u, v) = (col.min(TILE_CELLS - 1), row.min(TILE_CELLS - 1));
+        let corners = tile.corners(Cell::new(u as i32, v as i32));
+        corners[(col - u) + 2 * (row - v)]
+    };
+    (0..POSTS * POSTS).map(sample).collect()
 }
 
 #[test]

@@ -1,0 +1,230 @@
+//! The encoder, which a host uses.
+
+use super::bits::BitWriter;
+use super::line::{Line, of_rank, rank};
+use super::prediction::Prediction;
+use super::rice::{MAX_PARAMETER, Rice, write_run};
+use super::{HEAD, HOLES, LINE, PARAMETER_SHIFT};
+use crate::grid::MAX_CELL;
+use crate::terrain::POSTS;
+
+/// A height in cells above the base that single precision tells to 2⁻⁴⁴ of a cell, which
+/// is as exact as `f64` tells it above a base far up.
+const TINY: f64 = 1.0 / (1 << 20) as f64;
+/// Samples of a tile.
+const SAMPLES: usize = POSTS * POSTS;
+
+/// Longest packed form, bytes: one less than the samples take as they are.
+pub const MAX_PACKED: usize = 4 * SAMPLES - 1;
+
+/// Of what heights may be whole multiples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// A height is a multiple of so many cells.
+    Cells(f64),
+    /// A height is a multiple of `unit`, held in single precision, times `cells`: a file
+    /// of centimetres that holds `f32` metres.
+    Single {
+        /// In the file's vertical unit.
+        unit: f64,
+        /// Cells a vertical unit.
+        cells: f64,
+    },
+}
+
+/// Packs the heights of a tile, in cells above `base`, row by row from the south; NaN is a
+/// hole, and so is what is beyond ±[`MAX_CELL`].
+///
+/// The first of the `steps` is taken of which every height is made bit for bit. Where
+/// there is none the bits of the heights are packed. `None` where the packed form does not
+/// fit `buffer`: with [`MAX_PACKED`] bytes, where packing does not pay.
+pub fn pack<'b>(
+    heights: &[f32; SAMPLES],
+    base: i32,
+    steps: &[Step],
+    buffer: &'b mut [u8],
+) -> Option<&'b [u8]> {
+    let first = heights.iter().position(|height| !is_hole(*height))?;
+    let mut numbers = [0; SAMPLES];
+    let known = || heights.iter().filter(|height| !is_hole(**height));
+    let nearest = known().fold(f32::INFINITY, |nearest, height| {
+        if height.abs() < nearest.abs() {
+            *height
+        } else {
+            nearest
+        }
+    });
+    let mut fitted = steps.iter().filter_map(|step| {
+        let lines = Lines::of(step, heights, nearest, f64::from(base))?;
+        lines.number(heights, &mut numbers).then_some(lines)
+    });
+    let lines = fitted.next();
+    if lines.is_none() {
+        for (number, height) in numbers.iter_mut().zip(heights) {
+            *number = rank(*height);
+        }
+    }
+    write(
+        heights,
+        &numbers,
+        numbers[first],
+        lines.as_ref().map_or(&[], |lines| lines.written()),
+        buffer,
+    )
+}
+
+fn is_hole(height: f32) -> bool {
+    height.is_nan() || height.abs() > MAX_CELL as f32
+}
+
+/// The lines by which heights are made of a step.
+struct Lines {
+    lines: [Line; 2],
+    count: usize,
+    /// The number of a height is `(height + up) · per_cell`, counted from `from`.
+    up: f64,
+    per_cell: f64,
+    from: f64,
+}
+
+impl Lines {
+    /// `height` is that of the heights which is nearest to the base.
+    fn of(step: &Step, heights: &[f32; SAMPLES], height: f32, base: f64) -> Option<Self> {
+        let known = || heights.iter().filter(|height| !is_hole(**height));
+        let above = |height: f32| f64::from(height) + base;
+        let span = known().fold(0.0, |span: f64, other| {
+            span.max((f64::from(*other) - f64::from(height)).abs())
+        });
+        let (step_cells, unit) = match *step {
+            Step::Cells(cells) => (cells, cells),
+            Step::Single { unit, cells } => (unit * cells, unit),
+        };
+        let from = libm::rint(above(height) / step_cells);
+        // The lowest height is next to the base, where a rounding anywhere else would be seen.
+        let there = |number: f64, cells: f64| match f64::from(height) {
+            tiny if tiny.abs() < TINY => tiny,
+            _ => libm::fma(number, cells, -base),
+        };
+        let lines = match *step {
+            Step::Cells(cells) => {
+                let line = Line::through(0, there(from, cells), cells, span / cells)?;
+                [line, Line::NONE]
+            }
+            Step::Single { cells, .. } => {
+                let in_file = |height: f32| (above(height) / cells).abs();
+                let least = known()
+                    .map(|height| in_file(*height))
+                    .filter(|height| *height > 0.5 * unit)
+                    .fold(f64::INFINITY, f64::min);
+                if !least.is_finite() {
+                    return None;
+                }
+                // Of single precision at the lowest height, times its last place.
+                let place = libm::ldexp(1.0, libm::ilogb(least) - 23);
+                let single = |number: f64| f64::from((number * unit) as f32) / place;
+                let (middle, step, cell) = (single(from), unit / place, place * cells);
+                let span_file = (span / cells).abs();
+                [
+                    Line::through(-from as i64, 0.0, step, from.abs() + span_file / unit)?,
+                    Line::through(middle as i64, there(middle, cell), cell, span_file / place)?,
+                ]
+            }
+        };
+        Some(Self {
+            lines,
+            count: match step {
+                Step::Cells(_) => 1,
+                Step::Single { .. } => 2,
+            },
+            up: base,
+            per_cell: 1.0 / step_cells,
+            from,
+        })
+    }
+
+    fn written(&self) -> &[Line] {
+        &self.lines[..self.count]
+    }
+
+    /// Finds the numbers of all heights; whether the lines make these very heights of them.
+    fn number(&self, heights: &[f32; SAMPLES], numbers: &mut [i32; SAMPLES]) -> bool {
+        numbers.iter_mut().zip(heights).all(|(number, height)| {
+            let exact = (f64::from(*height) + self.up) * self.per_cell - self.from;
+            // Saturates.
+            *number = libm::rint(exact) as i32;
+            is_hole(*height) || height_of(self.written(), *number).to_bits() == height.to_bits()
+        })
+    }
+}
+
+fn height_of(lines: &[Line], number: i32) -> f32 {
+    match lines {
+        [] => of_rank(number),
+        [line] => line.at(number),
+        [first, second, ..] => second.at(first.at(number) as i32),
+    }
+}
+
+fn write<'b>(
+    heights: &[f32; SAMPLES],
+    numbers: &[i32; SAMPLES],
+    predicted: i32,
+    lines: &[Line],
+    buffer: &'b mut [u8],
+) -> Option<&'b [u8]> {
+    let holes = heights.iter().any(|height| is_hole(*height));
+    let parameter = parameter(heights, numbers, predicted);
+    let (head, _) = buffer.split_first_chunk_mut::<HEAD>()?;
+    head[0] =
+        lines.len() as u8 | if holes { HOLES } else { 0 } | (parameter as u8) << PARAMETER_SHIFT;
+    head[1..].copy_from_slice(&predicted.to_le_bytes());
+    let mut front = HEAD;
+    for line in lines {
+        buffer
+            .get_mut(front..front + LINE)?
+            .copy_from_slice(&line.write());
+        front += LINE;
+    }
+    let mut bits = BitWriter::new(buffer.get_mut(front..)?);
+    let mut prediction = Prediction::new(predicted);
+    let mut rice = Rice::new(parameter);
+    if holes {
+        bits.number(u32::from(is_hole(heights[0])), 1)?;
+    }
+    let mut run = None;
+    for (i, height) in heights.iter().enumerate() {
+        let hole = is_hole(*height);
+        if holes && run != Some(hole) {
+            run = Some(hole);
+            let rest = heights[i..].iter();
+            let length = rest.take_while(|height| is_hole(**height) == hole).count();
+            write_run(length as u32, &mut bits)?;
+        }
+        let mut difference = None;
+        prediction.next(i % POSTS, |predicted, west| {
+            if hole {
+                return west;
+            }
+            difference = Some(numbers[i].wrapping_sub(predicted));
+            numbers[i]
+        });
+        if let Some(difference) = difference {
+            rice.write(difference, &mut bits)?;
+        }
+    }
+    let length = front + bits.len();
+    buffer.get(..length)
+}
+
+/// The Rice parameter that suits the first samples that are known.
+fn parameter(heights: &[f32; SAMPLES], numbers: &[i32; SAMPLES], predicted: i32) -> u32 {
+    let known = heights.iter().zip(numbers);
+    let known = known.filter(|(height, _)| !is_hole(**height));
+    let (mut sum, mut count, mut last) = (0_u64, 0_u64, predicted);
+    for (_, number) in known.take(POSTS) {
+        sum += 2 * u64::from(number.wrapping_sub(last).unsigned_abs());
+        count += 1;
+        last = *number;
+    }
+    (sum / count.max(1)).max(1).ilog2().min(MAX_PARAMETER)
+}

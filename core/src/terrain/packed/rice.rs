@@ -1,0 +1,80 @@
+//! Rice codes whose parameter follows the mean of what was coded.
+
+use super::bits::{BitReader, BitWriter};
+
+/// As many zeros announce a number of 32 bits.
+const MOST_ZEROS: u32 = 20;
+/// Longest parameter.
+pub(super) const MAX_PARAMETER: u32 = 27;
+/// Bits by which the mean is divided: it follows some sixteen numbers.
+const SLOWNESS: u32 = 4;
+/// Bits after the first of a run's length, at most: more than a tile's samples need.
+const MAX_RUN_BITS: u32 = 15;
+
+/// Where the parameter is.
+pub(super) struct Rice {
+    /// Sixteen times the mean.
+    sum: u32,
+}
+
+impl Rice {
+    pub(super) const fn new(parameter: u32) -> Self {
+        Self {
+            sum: 1 << (parameter + SLOWNESS),
+        }
+    }
+
+    #[inline]
+    fn parameter(&self) -> u32 {
+        31 - ((self.sum >> SLOWNESS) | 1).leading_zeros()
+    }
+
+    #[inline]
+    fn follow(&mut self, u: u32) {
+        // At most 2^31 + 2^27.
+        self.sum = self.sum - (self.sum >> SLOWNESS) + u.min(1 << MAX_PARAMETER);
+    }
+
+    /// Reads a difference.
+    #[inline]
+    pub(super) fn read(&mut self, bits: &mut BitReader<'_>) -> i32 {
+        let parameter = self.parameter();
+        let zeros = bits.zeros(MOST_ZEROS);
+        let u = match zeros {
+            MOST_ZEROS => bits.number(32),
+            _ => (zeros << parameter) | bits.number(parameter),
+        };
+        self.follow(u);
+        (u >> 1) as i32 ^ -((u & 1) as i32)
+    }
+
+    /// Writes a difference.
+    pub(super) fn write(&mut self, difference: i32, bits: &mut BitWriter<'_>) -> Option<()> {
+        let u = ((difference << 1) ^ (difference >> 31)) as u32;
+        let parameter = self.parameter();
+        let zeros = u >> parameter;
+        if zeros < MOST_ZEROS {
+            bits.number(1, zeros + 1)?;
+            bits.number(u & ((1 << parameter) - 1), parameter)?;
+        } else {
+            bits.number(0, MOST_ZEROS)?;
+            bits.number(u, 32)?;
+        }
+        self.follow(u);
+        Some(())
+    }
+}
+
+/// Reads the length of a run, one at least.
+#[inline(never)]
+pub(super) fn read_run(bits: &mut BitReader<'_>) -> u32 {
+    let zeros = bits.zeros(MAX_RUN_BITS);
+    (1 << zeros) | bits.number(zeros)
+}
+
+/// Writes the length of a run of a tile's samples.
+pub(super) fn write_run(length: u32, bits: &mut BitWriter<'_>) -> Option<()> {
+    let zeros = length.max(1).ilog2();
+    bits.number(1, zeros + 1)?;
+    bits.number(length & ((1 << zeros) - 1), zeros)
+}

@@ -1,0 +1,302 @@
+//! Whether a tile is bit for bit what it was, and bytes that are no tile are refused.
+//!
+//! The judge is [`Tile::load`] with the bytes of the same heights.
+
+use std::boxed::Box;
+use std::vec::Vec;
+
+use super::*;
+use crate::grid::Cell;
+use crate::terrain::{BadTile, POSTS, Tile, TileKey};
+
+mod by_the_book;
+
+const KEY: TileKey = TileKey::new(0, 2, 5);
+const SAMPLES: usize = POSTS * POSTS;
+
+/// The bits of all samples that a tile holds.
+fn held(tile: &Tile) -> Vec<u32> {
+    let sample = |i: usize| {
+        let (col, row) = (i % POSTS, i / POSTS);
+        // The last row and column are corners of the patches before them.
+        let (u, v) = (col.min(POSTS - 2), row.min(POSTS - 2));
+        tile.corners(Cell::new(u as i32, v as i32))[(col - u) + 2 * (row - v)].to_bits()
+    };
+    (0..SAMPLES).map(sample).collect()
+}
+
+fn loaded(heights: &[f32; SAMPLES], base: i32) -> Vec<u32> {
+    let mut tile = Box::new(Tile::VACANT);
+    let bytes: Vec<u8> = heights.iter().flat_map(|h| h.to_le_bytes()).collect();
+    tile.load(KEY, base, &bytes).unwrap();
+    held(&tile)
+}
+
+/// Packs heights, and says what the tile that is unpacked of them is; `None` where packing
+/// does not pay.
+fn packed(heights: &[f32; SAMPLES], base: i32, steps: &[Step]) -> Option<Vec<u8>> {
+    let mut buffer = [0xAA; MAX_PACKED];
+    let bytes = pack(heights, base, steps, &mut buffer)?.to_vec();
+    let mut tile = Box::new(Tile::VACANT);
+    assert_eq!(tile.unpack(KEY, base, &bytes), Ok(()));
+    assert_eq!((tile.key(), tile.base()), (Some(KEY), base));
+    let wanted = loaded(heights, base);
+    assert!(held(&tile) == wanted, "{} bytes", bytes.len());
+    assert!(by_the_book::heights(&bytes) == wanted, "by the book");
+    Some(bytes)
+}
+
+/// Numbers that look random, the same in every run.
+struct Dice(u64);
+
+impl Dice {
+    fn roll(&mut self) -> u32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 16) as u32
+    }
+
+    fn below(&mut self, bound: u32) -> u32 {
+        self.roll() % bound
+    }
+}
+
+fn by_sample(mut height: impl FnMut(usize, usize) -> f32) -> [f32; SAMPLES] {
+    core::array::from_fn(|i| height(i % POSTS, i / POSTS))
+}
+
+/// Hills in whole metres, in cells of some length above a base.
+fn hills(metres_a_cell: f64, base: i32) -> [f32; SAMPLES] {
+    by_sample(|col, row| {
+        let (x, y) = (col as f64, row as f64);
+        let metres = 1500.0 + 40.0 * (x / 7.0).sin() * (y / 5.0).cos() + 3.0 * x;
+        (metres.round() / metres_a_cell - f64::from(base)) as f32
+    })
+}
+
+#[test]
+fn whole_metres_take_half_a_byte_a_sample() {
+    for metres in [1.0, 10.0, 29.97, 91.3] {
+        let base = (1450.0 / metres) as i32;
+        let steps = [Step::Cells(1.0 / metres)];
+        let bytes = packed(&hills(metres, base), base, &steps).unwrap();
+        assert_eq!(bytes[0] & 7, 1, "one line, no holes");
+        assert!(bytes.len() < 600, "{}", bytes.len());
+    }
+}
+
+#[test]
+fn centimetres_in_single_precision_are_two_lines() {
+    for (base, cells) in [(0, 1.0), (88, 1.0), (88, 0.999_85), (0, 0.037_8)] {
+        let heights = by_sample(|col, row| {
+            let file = ((9000 + 31 * col + col * row) as f32 / 100.0).max(90.5);
+            (f64::from(file) * cells - f64::from(base)) as f32
+        });
+        let steps = [
+            Step::Cells(0.01 * cells),
+            Step::Single { unit: 0.01, cells },
+        ];
+        let bytes = packed(&heights, base, &steps).unwrap();
+        // Single precision of the file's heights is that of the tile's: one line will do.
+        let same = base == 0 && cells == 1.0;
+        assert_eq!(bytes[0] & 7, if same { 1 } else { 2 }, "{base} {cells}");
+        assert!(bytes.len() < 500, "{}", bytes.len());
+    }
+}
+
+#[test]
+fn a_height_of_zero_above_base_zero_is_zero() {
+    let heights = by_sample(|col, row| (col.min(row) as f64 / 29.99) as f32);
+    for steps in [
+        &[Step::Cells(1.0 / 29.99)],
+        &[Step::Cells(1.0 / (8.0 * 29.99))],
+    ] {
+        assert_eq!(packed(&heights, 0, steps).unwrap()[0] & 3, 1);
+    }
+}
+
+#[test]
+fn floats_without_a_step_are_whole_too() {
+    let heights = by_sample(|col, row| ((col as f32 / 9.0).sin() + row as f32 / 7.0) * 3.7);
+    for steps in [&[][..], &[Step::Cells(0.1)], &[Step::Cells(f64::NAN)]] {
+        let bytes = packed(&heights, 0, steps).unwrap();
+        assert_eq!(bytes[0] & 7, 0);
+    }
+}
+
+#[test]
+fn holes_stay_where_they_are() {
+    let base = 50;
+    let hills = hills(30.0, base);
+    let mut dice = Dice(3);
+    let steps = [Step::Cells(1.0 / 30.0)];
+    let holes: [&mut dyn FnMut(usize, usize) -> bool; 6] = [
+        &mut |col, row| (col, row) != (17, 4),
+        &mut |col, row| (col, row) == (0, 0),
+        &mut |col, row| (col, row) == (32, 32),
+        &mut |col, _| col > 20,
+        &mut |_, row| row < 9,
+        &mut |_, _| dice.below(3) == 0,
+    ];
+    for is_hole in holes {
+        let heights = by_sample(|col, row| match is_hole(col, row) {
+            true => f32::NAN,
+            false => hills[row * POSTS + col],
+        });
+        let bytes = packed(&heights, base, &steps).unwrap();
+        assert_eq!(bytes[0] & HOLES, HOLES);
+        assert!(bytes.len() < 1200, "{}", bytes.len());
+    }
+    let mut buffer = [0; MAX_PACKED];
+    assert_eq!(pack(&[f32::NAN; SAMPLES], 0, &steps, &mut buffer), None);
+}
+
+#[test]
+fn odd_numbers_are_whole_too() {
+    let odd = [
+        0.0,
+        -0.0,
+        1e-45,
+        -1e-45,
+        f32::MIN_POSITIVE,
+        1.0,
+        536_870_912.0,
+        -536_870_912.0,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::NAN,
+        -f32::NAN,
+        f32::MAX,
+    ];
+    let mut dice = Dice(5);
+    let steps = [
+        Step::Cells(1e-45),
+        Step::Cells(0.0),
+        Step::Cells(-2.0),
+        Step::Single {
+            unit: 0.1,
+            cells: 1e30,
+        },
+        Step::Single {
+            unit: 1e-300,
+            cells: 1e300,
+        },
+        Step::Cells(1.0),
+    ];
+    let mut packs = 0;
+    for round in 0..300 {
+        let common = odd[round % odd.len()];
+        let rare = 1 + dice.below(60);
+        let heights = by_sample(|_, _| match dice.below(rare) {
+            0 => odd[dice.below(odd.len() as u32) as usize],
+            _ => common,
+        });
+        packs += u32::from(packed(&heights, round as i32 - 150, &steps).is_some());
+    }
+    assert!(packs > 100, "{packs}");
+}
+
+#[test]
+fn random_bits_do_not_pay_or_are_whole() {
+    let mut dice = Dice(7);
+    let mut packs = 0;
+    for bits in 1..=32 {
+        for _ in 0..6 {
+            let from = dice.roll();
+            let heights =
+                by_sample(|_, _| f32::from_bits(from.wrapping_add(dice.roll() >> (32 - bits))));
+            packs += u32::from(packed(&heights, -7, &[]).is_some());
+        }
+    }
+    assert!((90..180).contains(&packs), "{packs}");
+}
+
+/// Some packed tiles of every kind.
+fn some() -> Vec<Vec<u8>> {
+    let mut hollow = hills(30.0, 50);
+    for i in (0..SAMPLES).filter(|i| i % 37 < 9) {
+        hollow[i] = f32::NAN;
+    }
+    let step = [Step::Cells(1.0 / 30.0)];
+    let rough = by_sample(|col, row| (col * row % 11) as f32 * 0.37);
+    let single = by_sample(|col, row| (6000 + col * 3 + row) as f32 / 100.0);
+    let steps = [Step::Single {
+        unit: 0.01,
+        cells: 1.0,
+    }];
+    std::vec![
+        packed(&hills(30.0, 50), 50, &step).unwrap(),
+        packed(&hollow, 50, &step).unwrap(),
+        packed(&rough, 0, &[]).unwrap(),
+        packed(&single, 0, &steps).unwrap(),
+    ]
+}
+
+#[test]
+fn part_of_a_tile_is_refused_and_so_is_more_than_a_tile() {
+    for whole in some() {
+        let mut tile = Box::new(Tile::VACANT);
+        for length in 0..whole.len() {
+            tile.fill(KEY, 0, |_, _| 0.0).unwrap();
+            let refused = tile.unpack(KEY, 0, &whole[..length]);
+            assert_eq!(refused, Err(BadTile::Packed), "{length}");
+            assert_eq!(tile.key(), None);
+        }
+        for more in [0, 1, 0x80] {
+            let longer = [&whole[..], &[more]].concat();
+            assert_eq!(tile.unpack(KEY, 0, &longer), Err(BadTile::Packed));
+            assert_eq!(tile.key(), None);
+        }
+        assert_eq!(tile.unpack(KEY, i32::MIN, &whole), Err(BadTile::Base));
+        assert_eq!(tile.key(), None);
+        assert_eq!(tile.unpack(KEY, 0, &whole), Ok(()));
+    }
+}
+
+#[test]
+fn a_damaged_byte_gives_a_tile_or_a_refusal_as_the_book_says() {
+    let (mut taken, mut refused) = (0, 0);
+    for whole in some() {
+        let mut tile = Box::new(Tile::VACANT);
+        for place in 0..whole.len() {
+            for change in [1, 0x10, 0x80, 0xFF] {
+                let mut bytes = whole.clone();
+                bytes[place] ^= change;
+                match tile.unpack(KEY, 0, &bytes) {
+                    Ok(()) => {
+                        taken += 1;
+                        assert!(held(&tile) == by_the_book::heights(&bytes), "{place}");
+                    }
+                    Err(error) => {
+                        refused += 1;
+                        assert_eq!((error, tile.key()), (BadTile::Packed, None));
+                    }
+                }
+            }
+        }
+    }
+    assert!(taken > 1000 && refused > 1000, "{taken} {refused}");
+}
+
+#[test]
+fn any_bytes_are_taken_or_refused() {
+    let mut dice = Dice(11);
+    let mut tile = Box::new(Tile::VACANT);
+    for _ in 0..3000 {
+        let length = dice.below(5000);
+        // Long zeros and long ones as well.
+        let calm = dice.below(4);
+        let mut bytes: Vec<u8> = (0..length)
+            .map(|_| match dice.below(1 + 8 * calm) {
+                0 => dice.roll() as u8,
+                _ => [0, 0xFF][calm as usize % 2],
+            })
+            .collect();
+        if let Some(kind) = bytes.first_mut() {
+            *kind = *kind & 0x7C | dice.below(3) as u8;
+        }
+        let taken = tile.unpack(KEY, 0, &bytes).is_ok();
+        assert_eq!(tile.key().is_some(), taken);
+    }
+}

@@ -1,0 +1,103 @@
+//! Packed bytes, sample by sample.
+
+use super::bits::BitReader;
+use super::line::{Line, of_rank};
+use super::prediction::Prediction;
+use super::rice::{MAX_PARAMETER, Rice, read_run};
+use super::{HEAD, HOLES, LINE, PARAMETER_SHIFT};
+
+/// A tile's heights under way out of their packed form.
+pub(in crate::terrain) struct Unpacker<'b> {
+    bits: BitReader<'b>,
+    prediction: Prediction,
+    rice: Rice,
+    lines: u8,
+    first: Line,
+    second: Line,
+    runs: Option<Runs>,
+}
+
+impl<'b> Unpacker<'b> {
+    /// Reads what stands in front of the codes; `None` where that is nothing that
+    /// [`super::pack`] writes.
+    pub(in crate::terrain) fn new(bytes: &'b [u8]) -> Option<Self> {
+        let ([kind, predicted @ ..], bytes) = bytes.split_first_chunk::<HEAD>()?;
+        let (lines, parameter) = (kind & 3, u32::from(kind >> PARAMETER_SHIFT));
+        if lines > 2 || parameter > MAX_PARAMETER {
+            return None;
+        }
+        let (first, bytes) = line(lines > 0, bytes)?;
+        let (second, bytes) = line(lines > 1, bytes)?;
+        let mut bits = BitReader::new(bytes);
+        Some(Self {
+            runs: (kind & HOLES != 0).then(|| Runs::new(&mut bits)),
+            bits,
+            prediction: Prediction::new(i32::from_le_bytes(*predicted)),
+            rice: Rice::new(parameter),
+            lines,
+            first,
+            second,
+        })
+    }
+
+    /// The height of the next sample, whose column is given; NaN for a hole.
+    #[inline]
+    pub(in crate::terrain) fn next(&mut self, col: usize) -> f32 {
+        let (rice, bits) = (&mut self.rice, &mut self.bits);
+        if self.runs.as_mut().is_some_and(|runs| runs.is_hole(bits)) {
+            self.prediction.next(col, |_, west| west);
+            return f32::NAN;
+        }
+        let number = self
+            .prediction
+            .next(col, |predicted, _| predicted.wrapping_add(rice.read(bits)));
+        match self.lines {
+            0 => of_rank(number),
+            1 => self.first.at(number),
+            // The cast saturates.
+            _ => self.second.at(self.first.at(number) as i32),
+        }
+    }
+
+    /// Whether the bytes were those of all samples until now, and no more.
+    pub(in crate::terrain) fn is_at_end(&self) -> bool {
+        self.bits.is_at_end() && self.runs.as_ref().is_none_or(|runs| runs.left == 0)
+    }
+}
+
+/// A line in front of the codes, where there is one.
+fn line(there_is: bool, bytes: &[u8]) -> Option<(Line, &[u8])> {
+    if !there_is {
+        return Some((Line::NONE, bytes));
+    }
+    let (line, rest) = bytes.split_first_chunk::<LINE>()?;
+    Some((Line::read(*line)?, rest))
+}
+
+/// Runs of samples with and without a height, in turn.
+struct Runs {
+    /// Samples left of this run.
+    left: u32,
+    holes: bool,
+}
+
+impl Runs {
+    /// The first bit tells what the first run is of.
+    fn new(bits: &mut BitReader<'_>) -> Self {
+        Self {
+            left: 0,
+            holes: bits.number(1) == 0,
+        }
+    }
+
+    /// Whether the next sample is a hole.
+    #[inline]
+    fn is_hole(&mut self, bits: &mut BitReader<'_>) -> bool {
+        if self.left == 0 {
+            self.holes = !self.holes;
+            self.left = read_run(bits);
+        }
+        self.left -= 1; // a run is at least one
+        self.holes
+    }
+}
