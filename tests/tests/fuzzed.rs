@@ -8,12 +8,13 @@ use hapterra_core::contact::WORK_PER_TICK;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Point, Source};
-use hapterra_core::terrain::TileKey;
+use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
+use hapterra_core::terrain::{POSTS, TileKey};
 use hapterra_core::tick::Outcome;
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::request::Request;
 use hapterra_tests::chance::Chance;
-use hapterra_tests::fuzzing::{tick, wire};
+use hapterra_tests::fuzzing::{tick, tile, wire};
 
 fn random(chance: &mut Chance, length: usize) -> Vec<u8> {
     (0..length).map(|_| chance.bits() as u8).collect()
@@ -144,5 +145,38 @@ fn no_bytes_break_the_link() {
             }
         };
         wire.run(&input);
+    }
+}
+
+/// Hills in steps of a 32nd of a cell, some of them with holes, packed.
+fn sensible_tile(chance: &mut Chance) -> Vec<u8> {
+    let (rough, holes) = (chance.between(0.0, 40.0), chance.below(3) * 40);
+    let heights: [f32; POSTS * POSTS] = std::array::from_fn(|i| {
+        let height = (i % POSTS) as f64 + chance.between(0.0, rough);
+        match chance.below(holes.max(1)) {
+            1 => f32::NAN,
+            _ => height.round() as f32 / 32.0,
+        }
+    });
+    let steps = [Step::Cells(1.0 / 32.0)];
+    let steps = &steps[..chance.below(2)];
+    let mut buffer = [0; MAX_PACKED];
+    let packed = pack(&heights, 0, steps, &mut buffer);
+    packed.expect("packing pays").to_vec()
+}
+
+#[test]
+fn no_bytes_break_a_tile() {
+    let mut chance = Chance::new(13);
+    for round in 0..4_000 {
+        let length = chance.below(5000);
+        let input = match round % 3 {
+            0 => random(&mut chance, length),
+            _ => {
+                let sensible = sensible_tile(&mut chance);
+                mutated(&mut chance, &sensible)
+            }
+        };
+        tile::run(&input);
     }
 }

@@ -1,4 +1,4 @@
-//! `cargo xtask fuzz TARGET MINUTES`: libFuzzer on the tick or on the wire.
+//! `cargo xtask fuzz TARGET MINUTES`: libFuzzer on the tick, on packed tiles or on the wire.
 
 use anyhow::{Context, Result, bail};
 
@@ -6,7 +6,7 @@ use crate::nightly;
 use crate::run::{on_path, output, root, run, target_dir, timed};
 
 /// The programs in `fuzz/fuzz_targets`.
-const TARGETS: [&str; 2] = ["tick", "wire"];
+const TARGETS: [&str; 3] = ["tick", "tile", "wire"];
 
 /// Bytes of an input at most: some hundred ticks, or messages.
 const LONGEST: u32 = 4096;

@@ -52,7 +52,7 @@ cargo xtask COMMAND
   campaign --link [--seconds N] [--seed S] [--segment K]
                          faults of the link, killed and hostile hosts and devices, an hour of
                          device time unless told otherwise; writes docs/link-campaign.md
-  fuzz TARGET MINUTES    libFuzzer on `tick` or `wire`; installs cargo-fuzz and a nightly
+  fuzz TARGET MINUTES    libFuzzer on `tick`, `tile` or `wire`; installs cargo-fuzz and a nightly
                          compiler where they are missing
   miri                   core's tests under Miri, where it can run
   deny                   licences, bans, sources and advisories of dependencies

@@ -1,5 +1,6 @@
 //! `hapterra info`: what a terrain file holds and how it would be streamed.
 
+mod link;
 mod place;
 
 use std::fmt::Write as _;
@@ -15,6 +16,7 @@ use super::report::put;
 use crate::place::place_in_words;
 use crate::raster::{CellSize, CellUnit, Certainty, ReferenceSystem};
 use crate::terrain::{Distortion, FeltCells, FeltGrid};
+use link::LinkFigures;
 use place::{Rectangle, Vertical, from, told};
 
 /// Arguments of `hapterra info`.
@@ -28,9 +30,22 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t)]
     pub cells: FeltCells,
 
+    /// Work out what the tiles take on a link of so many megabytes a second (1 where no
+    /// number is given), and how many cells a second the HIP may move along an axis
+    #[arg(long, value_name = "MB_PER_S", num_args = 0..=1, default_missing_value = "1", value_parser = rate)]
+    pub link: Option<f64>,
+
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+}
+
+/// A rate of the link.
+fn rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate) if rate.is_finite() && rate > 0.0 => Ok(rate),
+        _ => Err("megabytes a second above zero, as 1 or 0.5".into()),
+    }
 }
 
 /// Shows what the file holds.
@@ -40,7 +55,11 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let raster = args.terrain.open()?;
     let grid = FeltGrid::new(&raster, args.cells);
-    let report = FileReport::new(&args.terrain, &grid);
+    let link = args.link.map(|rate| LinkFigures::of(&grid, rate));
+    let report = FileReport {
+        link: link.transpose().map_err(Failure::new)?,
+        ..FileReport::new(&args.terrain, &grid)
+    };
     if args.json {
         let json = serde_json::to_string_pretty(&report).map_err(Failure::new)?;
         put(&format!("{json}\n"))
@@ -86,6 +105,8 @@ struct FileReport {
     /// Bytes the samples take on the host, at most.
     bytes: usize,
     levels: Vec<Level>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    link: Option<LinkFigures>,
     remarks: Vec<String>,
 }
 
@@ -155,6 +176,7 @@ impl FileReport {
             known_whole: raster.is_known_whole(),
             bytes: raster.memory_bytes(),
             levels: levels(grid.columns(), grid.rows()),
+            link: None,
             remarks: raster.remarks().to_vec(),
         }
     }
@@ -209,6 +231,9 @@ impl FileReport {
         line("memory", format!("{at_most}{} bytes", self.bytes));
         for level in &self.levels {
             line(&format!("level {}", level.level), level.text());
+        }
+        for figures in self.link.iter().flat_map(LinkFigures::lines) {
+            line("link", figures);
         }
         for remark in &self.remarks {
             line("remark", remark.clone());

@@ -3,4 +3,5 @@
 
 mod bytes;
 pub mod tick;
+pub mod tile;
 pub mod wire;

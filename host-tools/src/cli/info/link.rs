@@ -1,0 +1,168 @@
+//! What the tiles of a file take on the link, and how fast a HIP may move over them.
+
+use serde::Serialize;
+
+use hapterra_core::terrain::{MARGIN_CELLS, POSTS, TILE_CELLS, TileKey};
+use hapterra_core::wire::frame::{MAX_FRAME, encode};
+use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
+use hapterra_core::wire::session::{InSession, SessionNumber};
+
+use crate::terrain::{FeltGrid, Scale, Terrain, TerrainError, TileBuffer};
+
+/// Tiles that are looked at, at most: of more, evenly spread ones.
+const MOST_TILES: u64 = 8192;
+
+/// Figures of the tiles of level 0, true to scale with cells of 1 mm. Tiles without a
+/// surface and level ones, of a few bytes, do not count.
+#[derive(Serialize)]
+pub(super) struct LinkFigures {
+    /// Megabytes (10⁶ bytes) a second that the link takes.
+    mb_per_s: f64,
+    /// Tiles that count.
+    tiles: u64,
+    /// Level tiles and tiles without a surface, among those looked at.
+    others: u64,
+    /// As they travel.
+    sent: Form,
+    /// With each sample as a single float.
+    floats: Form,
+}
+
+/// One way to send tiles.
+#[derive(Serialize)]
+struct Form {
+    /// Bytes of a tile's frame: mean, and the most.
+    mean_bytes: f64,
+    worst_bytes: u64,
+    /// What the link carries, by the mean.
+    tiles_per_s: f64,
+    /// Speed along an axis at which they come in time, by the mean.
+    cells_per_s: f64,
+}
+
+impl LinkFigures {
+    /// # Errors
+    /// Where the file cannot be felt true to scale.
+    pub(super) fn of(grid: &FeltGrid<'_>, mb_per_s: f64) -> Result<Self, TerrainError> {
+        let scale = Scale::true_to(grid, 1.0)?;
+        let terrain = Terrain::over(*grid, scale, 0)?;
+        let [columns, rows] = terrain
+            .size()
+            .map(|cells| (cells.unsigned_abs() as usize).div_ceil(TILE_CELLS) as u64);
+        let stride = (columns * rows).div_ceil(MOST_TILES) as usize;
+        let mut buffer = TileBuffer::default();
+        let (mut tiles, mut others, mut sum, mut worst) = (0, 0, 0, 0);
+        for at in (0..columns * rows).step_by(stride) {
+            let key = TileKey::new(0, (at % columns) as i32, (at / columns) as i32);
+            match terrain.tile(key, &mut buffer) {
+                None | Some(Heights::Hole | Heights::Flat { .. }) => others += 1,
+                Some(heights) => {
+                    let bytes = frame_bytes(key, heights);
+                    (tiles, sum, worst) = (tiles + 1, sum + bytes, worst.max(bytes));
+                }
+            }
+        }
+        let bytes = [1; 4 * POSTS * POSTS];
+        let floats = frame_bytes(
+            TileKey::new(0, 0, 0),
+            Heights::Samples {
+                base: 0,
+                bytes: &bytes,
+            },
+        );
+        Ok(Self {
+            mb_per_s,
+            tiles,
+            others,
+            sent: Form::new(sum as f64 / tiles.max(1) as f64, worst, mb_per_s),
+            floats: Form::new(floats as f64, floats, mb_per_s),
+        })
+    }
+
+    pub(super) fn lines(&self) -> [String; 2] {
+        let Self {
+            mb_per_s,
+            tiles,
+            others,
+            ..
+        } = self;
+        let what = |form: &Form, of: String| {
+            format!(
+                "{:.0} bytes a tile, at worst {}; at {mb_per_s} MB/s {:.0} tiles and {:.0} cells along an axis a second: {of}",
+                form.mean_bytes, form.worst_bytes, form.tiles_per_s, form.cells_per_s
+            )
+        };
+        [
+            what(
+                &self.sent,
+                format!("packed, {tiles} tiles and {others} of a few bytes"),
+            ),
+            what(&self.floats, "each sample a float".into()),
+        ]
+    }
+}
+
+impl Form {
+    fn new(mean_bytes: f64, worst_bytes: u64, mb_per_s: f64) -> Self {
+        let tiles_per_s = match mean_bytes > 0.0 {
+            true => mb_per_s * 1e6 / mean_bytes,
+            false => 0.0,
+        };
+        Self {
+            mean_bytes,
+            worst_bytes,
+            tiles_per_s,
+            cells_per_s: tiles_per_s * TILE_CELLS as f64 / f64::from(tiles_across()),
+        }
+    }
+}
+
+/// Tiles of a new column that a HIP requests on its way along a row of tiles, at most: what
+/// is within the margin on both sides of it.
+const fn tiles_across() -> i32 {
+    (2 * MARGIN_CELLS + TILE_CELLS as i32 - 1) / TILE_CELLS as i32 + 1
+}
+
+/// Bytes of the frame in which a tile travels.
+fn frame_bytes(key: TileKey, heights: Heights<'_>) -> u64 {
+    let message = InSession {
+        session: SessionNumber::new(u32::MAX),
+        message: ToDevice::Tile(TileMessage {
+            epoch: u32::MAX,
+            key,
+            heights,
+        }),
+    };
+    encode(&message, &mut [0; MAX_FRAME]).map_or(0, <[u8]>::len) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::Raster;
+    use crate::terrain::FeltCells;
+
+    #[test]
+    fn a_hip_along_an_axis_needs_two_tiles_every_32_cells() {
+        assert_eq!(tiles_across(), 2);
+        let metres = Raster::from_fn(100, 70, |x, y| (x * y % 50) as f32).expect("raster");
+        let grid = FeltGrid::new(&metres, FeltCells::Square);
+        let figures = LinkFigures::of(&grid, 2.0).expect("figures");
+        assert_eq!((figures.tiles, figures.others), (12, 0));
+        let floats = &figures.floats;
+        assert!((4356..4450).contains(&floats.worst_bytes));
+        let cells = 2e6 / floats.mean_bytes * 16.0;
+        assert!((floats.cells_per_s - cells).abs() < 1e-6);
+        assert!(figures.sent.worst_bytes < floats.worst_bytes / 2);
+        assert!(figures.sent.mean_bytes <= figures.sent.worst_bytes as f64);
+    }
+
+    #[test]
+    fn level_ground_and_holes_take_nothing_worth_counting() {
+        let level = Raster::from_fn(70, 70, |x, _| if x > 40 { f32::NAN } else { 3.0 });
+        let level = level.expect("raster");
+        let figures = LinkFigures::of(&FeltGrid::new(&level, FeltCells::Square), 1.0);
+        let figures = figures.expect("figures");
+        assert_eq!((figures.tiles, figures.others), (3, 6));
+    }
+}

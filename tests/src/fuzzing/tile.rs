@@ -1,0 +1,63 @@
+//! Arbitrary bytes as a packed tile, and arbitrary heights through the packed form.
+
+use hapterra_core::grid::Cell;
+use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
+use hapterra_core::terrain::{BadTile, POSTS, Tile, TileKey};
+
+use super::bytes::Bytes;
+
+const KEY: TileKey = TileKey::new(0, 1, 2);
+
+/// Unpacks the bytes, and packs heights that are made of them.
+///
+/// # Panics
+/// When a tile is filled of what was refused, or is not what it was after packing.
+pub fn run(data: &[u8]) {
+    let mut tile = Box::new(Tile::VACANT);
+    match tile.unpack(KEY, 0, data) {
+        Ok(()) => assert_eq!(tile.key(), Some(KEY)),
+        Err(error) => assert_eq!((error, tile.key()), (BadTile::Packed, None)),
+    }
+    packed(&mut Bytes(data), &mut tile);
+}
+
+fn packed(bytes: &mut Bytes<'_>, tile: &mut Tile) {
+    let base = bytes.int() >> (2 + bytes.byte() % 30);
+    let cells = f64::from(bytes.float());
+    let steps = [
+        Step::Cells(cells),
+        Step::Single { unit: 0.01, cells },
+        Step::Cells(1.0 / 32.0),
+    ];
+    let (kind, odd) = (bytes.byte(), bytes.byte());
+    let mut last = 0.0;
+    let heights = core::array::from_fn(|i| {
+        if i % usize::from(odd % 16 + 1) == 0 && !bytes.is_empty() {
+            last = match kind % 4 {
+                0 => bytes.float(),
+                1 => (f64::from(bytes.byte()) * cells) as f32,
+                2 => (f64::from(f32::from(bytes.byte()) / 100.0) * cells) as f32,
+                _ => bytes.height(),
+            };
+        }
+        last
+    });
+    let le: Vec<u8> = heights.iter().flat_map(|h: &f32| h.to_le_bytes()).collect();
+    if tile.load(KEY, base, &le).is_err() {
+        return;
+    }
+    let wanted = bits(tile);
+    let mut buffer = [0; MAX_PACKED];
+    if let Some(packed) = pack(&heights, base, &steps, &mut buffer) {
+        assert_eq!(tile.unpack(KEY, base, packed), Ok(()));
+        assert!(bits(tile) == wanted, "{kind} {odd} {cells:e} {base}");
+    }
+}
+
+/// All samples of a tile, some of them more than once.
+fn bits(tile: &Tile) -> Vec<[u32; 4]> {
+    let cells = POSTS as i32 - 1;
+    let corners = |i: i32| tile.corners(Cell::new(i % cells, i / cells));
+    let all = (0..cells * cells).map(corners);
+    all.map(|corners| corners.map(f32::to_bits)).collect()
+}

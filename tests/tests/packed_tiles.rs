@@ -1,0 +1,112 @@
+//! Every tile of real terrain arrives as it was made: bit for bit what the file's heights
+//! are in cells, worked out here, and half as long as with a float for each sample.
+
+use std::path::Path;
+
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain, TileBuffer};
+use hapterra_core::grid::Cell;
+use hapterra_core::terrain::{POSTS, TILE_CELLS, Tile, TileKey};
+use hapterra_core::wire::message::{Heights, TileMessage};
+use hapterra_firmware::link::fill_tile;
+use hapterra_tests::shared;
+
+/// Bytes of a tile's samples as floats.
+const FLOATS: usize = 4 * POSTS * POSTS;
+
+#[test]
+fn tiles_of_real_terrain_arrive_as_they_were_made_and_take_half() {
+    let Some(folder) = shared("dem/real") else {
+        return;
+    };
+    let files = std::fs::read_dir(folder).expect("a folder");
+    let mut paths: Vec<_> = files.map(|file| file.expect("a file").path()).collect();
+    paths.sort();
+    for path in paths {
+        let raster = Raster::open(&path, &OpenOptions::default()).expect("opens");
+        let grid = FeltGrid::new(&raster, FeltCells::Square);
+        let scale = Scale::true_to(&grid, 1.0).expect("a scale");
+        let mean = checked(&path, &grid, scale, 0);
+        println!("{}: {mean} bytes a tile", path.display());
+        assert!(mean <= FLOATS / 2, "{}: {mean}", path.display());
+        for (cell_mm, times, level) in [(0.37, -7.3, 1), (2.0, 0.031, 0), (1.0, 1.0, 3)] {
+            let height = scale.height_mm_per_unit() * cell_mm * times;
+            let scale = Scale::new(cell_mm, height).expect("a scale");
+            if i32::try_from(grid.columns().min(grid.rows()) >> level).is_ok_and(|left| left > 1) {
+                checked(&path, &grid, scale, level);
+            }
+        }
+    }
+}
+
+/// Holds all tiles against the file; the mean bytes of those that are no single number.
+fn checked(path: &Path, grid: &FeltGrid<'_>, scale: Scale, level: u8) -> usize {
+    let terrain = Terrain::over(*grid, scale, level).expect("terrain");
+    let last = terrain.size().map(|cells| (cells - 1) / TILE_CELLS as i32);
+    let mut buffer = TileBuffer::default();
+    let mut tile = Box::new(Tile::VACANT);
+    let (mut sum, mut tiles) = (0, 0);
+    for (row, col) in (0..=last[1]).flat_map(|row| (0..=last[0]).map(move |col| (row, col))) {
+        let key = TileKey::new(level, col, row);
+        let heights = terrain.tile(key, &mut buffer).expect("there is one");
+        // One number for all of it, also off the field, where nothing is felt.
+        let flat = matches!(heights, Heights::Flat { .. });
+        if let Heights::Samples { bytes, .. } | Heights::Packed { bytes, .. } = heights {
+            (sum, tiles) = (sum + bytes.len(), tiles + 1);
+        }
+        let message = TileMessage {
+            epoch: 0,
+            key,
+            heights,
+        };
+        fill_tile(&mut tile, &message).expect("heights of a tile");
+        assert_eq!(tile.key(), Some(key));
+        let context = || format!("{} {key:?} {scale:?}", path.display());
+        let felt = flat.then_some(terrain.size());
+        assert_held(&tile, grid, &scale, felt, &context);
+    }
+    sum / tiles.max(1)
+}
+
+/// Holds the samples against the file; where `felt` states a size, those within it.
+fn assert_held(
+    tile: &Tile,
+    grid: &FeltGrid<'_>,
+    scale: &Scale,
+    felt: Option<[i32; 2]>,
+    context: &dyn Fn() -> String,
+) {
+    let key = tile.key().expect("a tile");
+    let summary = grid.raster().summary();
+    // 2⁻¹⁷ of the relief, or up to twice as fine: a power of two.
+    let relief = summary.highest - summary.lowest;
+    let mut step = f64::exp2(200.0);
+    while step > relief / 131_072.0 {
+        step *= 0.5;
+    }
+    for row in 0..POSTS as u32 {
+        for col in 0..POSTS as u32 {
+            let place = [key.index.col, key.index.row].map(|i| i.unsigned_abs() * 32);
+            let (x, y) = (place[0] + col, place[1] + row);
+            let is_off = |[columns, rows]: [i32; 2]| x as i32 > columns || y as i32 > rows;
+            if felt.is_some_and(is_off) {
+                continue;
+            }
+            let file = grid.height_of_level(key.level, x, y);
+            let felt = match grid.is_resampled() {
+                true => (file / step).round() * step,
+                false => file,
+            };
+            assert!(felt.is_nan() || (felt - file).abs() <= relief / 262_144.0);
+            let level_mm = scale.cell_mm() * f64::from(1 << key.level);
+            let cells = felt * scale.height_mm_per_unit() / level_mm;
+            let wanted = (cells - f64::from(tile.base())) as f32;
+            // The last row and column are corners of the patches before them.
+            let (u, v) = (col.min(31), row.min(31));
+            let corner = (col - u) + 2 * (row - v);
+            let held = tile.corners(Cell::new(u as i32, v as i32))[corner as usize];
+            let same = held.to_bits() == wanted.to_bits() || held.is_nan() && wanted.is_nan();
+            assert!(same, "{}: {col} {row}: {held:e} {wanted:e}", context());
+        }
+    }
+}
