@@ -117,6 +117,15 @@ fn a_height_of_zero_above_base_zero_is_zero() {
 }
 
 #[test]
+fn a_zero_below_zero_stays_below_zero() {
+    let mut heights = by_sample(|col, row| col.min(row) as f32);
+    heights[40] = -0.0;
+    packed(&heights, 0, &[Step::Cells(1.0)]).unwrap();
+    heights[40] = 0.0;
+    packed(&heights, 0, &[Step::Cells(1.0)]).unwrap();
+}
+
+#[test]
 fn floats_without_a_step_are_whole_too() {
     let heights = by_sample(|col, row| ((col as f32 / 9.0).sin() + row as f32 / 7.0) * 3.7);
     for steps in [&[][..], &[Step::Cells(0.1)], &[Step::Cells(f64::NAN)]] {
@@ -243,8 +252,8 @@ fn part_of_a_tile_is_refused_and_so_is_more_than_a_tile() {
             assert_eq!(refused, Err(BadTile::Packed), "{length}");
             assert_eq!(tile.key(), None);
         }
-        for more in [0, 1, 0x80] {
-            let longer = [&whole[..], &[more]].concat();
+        for more in [&[0][..], &[1], &[0x80], &[0; 9], &[1; 9]] {
+            let longer = [&whole[..], more].concat();
             assert_eq!(tile.unpack(KEY, 0, &longer), Err(BadTile::Packed));
             assert_eq!(tile.key(), None);
         }
