@@ -70,6 +70,17 @@ impl Tile {
         base: i32,
         mut height: impl FnMut(usize, usize) -> f32,
     ) -> Result<(), BadTile> {
+        self.fill_with(key, base, &mut height)
+    }
+
+    /// The same, once in an image however many functions tiles are filled from.
+    #[inline(never)]
+    fn fill_with(
+        &mut self,
+        key: TileKey,
+        base: i32,
+        height: &mut dyn FnMut(usize, usize) -> f32,
+    ) -> Result<(), BadTile> {
         self.vacate();
         if base.unsigned_abs() > MAX_CELL.unsigned_abs() {
             return Err(BadTile::Base);

@@ -85,9 +85,10 @@ impl<'t, const D: usize> Link<'t, D> {
 /// When the message's heights are not those of a tile. The buffer is then to be vacated.
 pub fn fill_tile(tile: &mut Tile, message: &TileMessage<'_>) -> Result<(), BadTile> {
     let key = message.key;
+    let mut flat = |base, height| tile.fill(key, base, |_, _| height);
     match message.heights {
-        Heights::Hole => tile.fill(key, 0, |_, _| f32::NAN),
-        Heights::Flat { base, height } => tile.fill(key, base, |_, _| height),
+        Heights::Hole => flat(0, f32::NAN),
+        Heights::Flat { base, height } => flat(base, height),
         Heights::Samples { base, bytes } => tile.load(key, base, bytes),
         Heights::Packed { base, bytes } => tile.unpack(key, base, bytes),
     }

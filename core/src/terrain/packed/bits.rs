@@ -22,7 +22,7 @@ impl<'b> BitReader<'b> {
     }
 
     /// Sees to it that at least 25 bits are ahead. At most four bytes are taken.
-    #[inline]
+    #[inline(never)] // once in an image
     fn refill(&mut self) {
         while self.held <= 24 {
             let byte = self.bytes.next().copied().unwrap_or_else(|| {
@@ -36,7 +36,7 @@ impl<'b> BitReader<'b> {
 
     /// Takes the zeros in front of a one, and the one; as many zeros as `most` (at most 24)
     /// are taken alone.
-    #[inline]
+    #[inline(never)]
     pub(super) fn zeros(&mut self, most: u32) -> u32 {
         self.refill();
         let zeros = self.ahead.leading_zeros().min(most);
@@ -45,21 +45,16 @@ impl<'b> BitReader<'b> {
     }
 
     /// The next `count` bits, at most 32, as a number.
-    #[inline]
+    #[inline(never)]
     pub(super) fn number(&mut self, count: u32) -> u32 {
-        match count {
-            0 => 0,
-            1..=16 => self.few(count),
-            _ => (self.few(count - 16) << 16) | self.few(16),
+        let (mut number, mut left) = (0, count);
+        while left > 0 {
+            let few = left.min(16);
+            self.refill();
+            number = (number << few) | (self.ahead >> (32 - few));
+            self.skip(few);
+            left -= few;
         }
-    }
-
-    /// The next bits, 1 to 16.
-    #[inline]
-    fn few(&mut self, count: u32) -> u32 {
-        self.refill();
-        let number = self.ahead >> (32 - count);
-        self.skip(count);
         number
     }
 

@@ -38,7 +38,7 @@ impl Line {
         bytes
     }
 
-    #[inline]
+    #[inline(never)]
     pub(super) fn at(&self, k: i32) -> f32 {
         let sum = i64::from(k)
             .wrapping_mul(self.step)

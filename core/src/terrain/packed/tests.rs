@@ -234,7 +234,14 @@ fn some() -> Vec<Vec<u8>> {
         unit: 0.01,
         cells: 1.0,
     }];
+    // A last code of 19 bits, of 25 that the reader holds: none of the bytes that may follow.
+    let last = by_sample(|col, row| match (col, row) {
+        (32, 32) => 9.0,
+        (0, _) => 4.0,
+        _ => 0.0,
+    });
     std::vec![
+        packed(&last, 0, &[Step::Cells(1.0)]).unwrap(),
         packed(&hills(30.0, 50), 50, &step).unwrap(),
         packed(&hollow, 50, &step).unwrap(),
         packed(&rough, 0, &[]).unwrap(),
