@@ -1,4 +1,4 @@
-//! Instructions of single ticks on an emulated Cortex-M4F, beside the table that
+//! Instructions of single ticks, and of filling a buffer with a tile, on an emulated Cortex-M4F, beside the table that
 //! is kept and the targets that were set.
 //!
 //! Exact counts of the code that a board runs; no other load disturbs them.
@@ -11,7 +11,7 @@ mod m4f;
 
 use hapterra_tests::counting::CountingBoard;
 use m4f::table::{Row, Table};
-use m4f::{chain, contact, soak};
+use m4f::{chain, contact, soak, tiles};
 
 #[test]
 fn no_state_of_the_tick_costs_more_than_it_did() {
@@ -26,6 +26,7 @@ fn no_state_of_the_tick_costs_more_than_it_did() {
     };
     let mut rows = contact::rows(&board);
     rows.extend(chain::rows(&board));
+    rows.extend(tiles::rows(&board));
     rows.extend(soak::rows(&board, scenes));
     println!("{}", Row::TITLES);
     rows.iter().for_each(|row| println!("{row}"));

@@ -105,6 +105,8 @@ impl CountingBoard {
         let folder = tempfile::tempdir().expect("a folder");
         write_replays(folder.path(), replays);
         let mut ticks = self.run(folder.path()).into_iter();
+        let tiles = records(folder.path(), "tiles.bin");
+        assert!(tiles.iter().all(|tile| tile.converged), "a tile is refused");
         let is_tick = |event: &&Event| matches!(event, Event::Hip(_));
         let lengths = replays
             .iter()
@@ -147,6 +149,30 @@ impl CountingBoard {
         self.run(folder.path())
     }
 
+    /// Fills a buffer with one tile after the other; gives what each took, and as
+    /// `converged` whether it was a tile.
+    ///
+    /// # Panics
+    /// When the emulated program fails.
+    #[must_use]
+    pub fn tiles(&self, scene: &Scene, tiles: &[Heights<'_>]) -> Vec<Counted> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut frames = Frames::create(&folder.path().join("replay.frames"));
+        frames.add(&ToDevice::Scene(*scene));
+        for heights in tiles {
+            frames.add(&ToDevice::Tile(TileMessage {
+                epoch: scene.epoch,
+                key: TileKey::new(0, 0, 0),
+                heights: *heights,
+            }));
+        }
+        frames.close();
+        self.run(folder.path());
+        let counted = records(folder.path(), "tiles.bin");
+        assert_eq!(counted.len(), tiles.len(), "a record of every tile");
+        counted
+    }
+
     fn run(&self, folder: &Path) -> Vec<Counted> {
         let ran = Command::new(&self.qemu)
             .current_dir(folder)
@@ -161,14 +187,16 @@ impl CountingBoard {
             .expect("QEMU starts");
         let said = String::from_utf8_lossy(&ran.stderr);
         assert!(ran.status.success(), "{}: {said}", ran.status);
-        let bytes = std::fs::read(folder.join("ticks.bin")).expect("the image left its records");
-        let words = bytes.chunks_exact(4).map(|le| match le {
-            [a, b, c, d] => u32::from_le_bytes([*a, *b, *c, *d]),
-            _ => unreachable!("chunks of four"),
-        });
-        let words: Vec<u32> = words.collect();
-        words.chunks_exact(RECORD).map(counted).collect()
+        records(folder, "ticks.bin")
     }
+}
+
+/// What the image left of it.
+fn records(folder: &Path, name: &str) -> Vec<Counted> {
+    let bytes = std::fs::read(folder.join(name)).expect("the image left its records");
+    let words = bytes.as_chunks::<4>().0.iter();
+    let words: Vec<u32> = words.map(|le| u32::from_le_bytes(*le)).collect();
+    words.chunks_exact(RECORD).map(counted).collect()
 }
 
 /// The keys of all tiles of a field.

@@ -4,3 +4,4 @@ pub(crate) mod chain;
 pub(crate) mod contact;
 pub(crate) mod soak;
 pub(crate) mod table;
+pub(crate) mod tiles;

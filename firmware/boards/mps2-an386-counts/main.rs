@@ -22,7 +22,8 @@
 //!   [`Haptics::tick`], count to current, once the arm was armed where the
 //!   first of them is.
 //!
-//! and leaves `ticks.bin`: [`RECORD`] little-endian words a tick.
+//! and leaves `ticks.bin`: [`RECORD`] little-endian words a tick; of a scene fed by points
+//! `tiles.bin`, too: as many for each tile, which count filling a buffer with it.
 #![no_std]
 #![no_main]
 
@@ -38,6 +39,7 @@ mod stopwatch;
 use core::hint::black_box;
 
 use cortex_m_rt::entry;
+use hapterra_core::Vec3;
 use hapterra_core::contact::{Contact, ContactOutput, ContactSettings};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Sense;
@@ -85,6 +87,7 @@ fn contact(mut scene: Scene, frames: &mut Frames, records: &mut Records) {
     let mut spare = SPARE.take();
     let mut contact = contact_of(&scene);
     let stopwatch = Stopwatch::start();
+    let mut tiles = Records::create(c"tiles.bin");
     while let Some(message) = frames.next() {
         match message {
             ToDevice::Scene(next) => {
@@ -93,8 +96,13 @@ fn contact(mut scene: Scene, frames: &mut Frames, records: &mut Records) {
                 contact = contact_of(&scene);
             }
             ToDevice::Tile(tile) => {
-                fill_tile(spare, &tile).expect("the host made it well");
-                spare = window.install(spare);
+                let tile = black_box(tile);
+                let (cost, filled) = stopwatch.counted(|| fill_tile(spare, &tile).is_ok());
+                let (none, nowhere) = (Vec3::ZERO, GridPoint::default());
+                tiles.add([cost, 0, u32::from(filled), 0], none, &nowhere);
+                if filled {
+                    spare = window.install(spare);
+                }
             }
             ToDevice::Point(point) => {
                 let hip = black_box(point.hip);

@@ -38,7 +38,9 @@ impl<'b> BitReader<'b> {
     /// are taken alone.
     #[inline(never)]
     pub(super) fn zeros(&mut self, most: u32) -> u32 {
-        self.refill();
+        if self.held < most {
+            self.refill();
+        }
         let zeros = self.ahead.leading_zeros().min(most);
         self.skip(zeros + u32::from(zeros < most));
         zeros
@@ -50,7 +52,9 @@ impl<'b> BitReader<'b> {
         let (mut number, mut left) = (0, count);
         while left > 0 {
             let few = left.min(16);
-            self.refill();
+            if self.held < few {
+                self.refill();
+            }
             number = (number << few) | (self.ahead >> (32 - few));
             self.skip(few);
             left -= few;

@@ -1,0 +1,118 @@
+//! Filling a buffer with a tile, in each form in which tiles travel, and with bytes that
+//! are made to take long.
+
+use hapterra_bench::path::Dice;
+use hapterra_bench::state::terrain;
+use hapterra_core::terrain::POSTS;
+use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
+use hapterra_core::wire::message::Heights;
+use hapterra_tests::counting::CountingBoard;
+
+use super::contact::scene;
+use super::table::{Row, Target, Tick};
+
+const TILES: usize = 100;
+const SAMPLES: usize = POSTS * POSTS;
+
+/// All of them.
+pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
+    let mut dice = Dice(31);
+    // 1/30 of a cell a metre; heights to 1/128 m, as interpolated ones are.
+    let metres = Step::Cells(1.0 / 30.0);
+    let parts = Step::Cells(1.0 / (128.0 * 30.0));
+    let whole = packed(&[metres], || (3.0 * dice.between(0.0, 1.0)).floor() / 30.0);
+    let mut dice = Dice(32);
+    let between = packed(&[parts], || {
+        (400.0 * dice.between(0.0, 1.0)).floor() / (128.0 * 30.0)
+    });
+    let mut dice = Dice(33);
+    let centimetres = Step::Single {
+        unit: 0.01,
+        cells: 0.999_85,
+    };
+    let single = packed(&[centimetres], || {
+        0.999_85 * f64::from((80.0 + (40.0 * dice.between(0.0, 1.0)).floor() / 100.0) as f32)
+    });
+    let mut dice = Dice(34);
+    let floats: Vec<Vec<u8>> = (0..TILES)
+        .map(|_| {
+            (0..SAMPLES)
+                .flat_map(|_| (dice.between(0.0, 1.0) as f32).to_le_bytes())
+                .collect()
+        })
+        .collect();
+    let mut dice = Dice(35);
+    let hostile = (0..TILES).map(|_| hostile(&mut dice)).collect::<Vec<_>>();
+    let as_floats = |bytes| Heights::Samples { base: 1, bytes };
+    let as_packed = |bytes| Heights::Packed { base: 1, bytes };
+    vec![
+        row(board, "tile, floats", &floats, as_floats, true),
+        row(board, "tile, whole metres", &whole, as_packed, true),
+        row(board, "tile, interpolated", &between, as_packed, true),
+        row(board, "tile, two lines", &single, as_packed, true),
+        row(board, "tile, hostile bytes", &hostile, as_packed, false),
+    ]
+}
+
+/// Hills with something on top, packed by one of the steps.
+fn packed(steps: &[Step], mut rough: impl FnMut() -> f64) -> Vec<Vec<u8>> {
+    let mut tile = |_| {
+        let heights: [f32; SAMPLES] = std::array::from_fn(|i| {
+            let slope = (i % POSTS + i / POSTS) / 4;
+            (slope as f64 * unit(steps) + rough()) as f32
+        });
+        let mut buffer = [0; MAX_PACKED];
+        let bytes = pack(&heights, 0, steps, &mut buffer).expect("packing pays");
+        assert!(bytes[0] & 3 > 0, "by a line");
+        bytes.to_vec()
+    };
+    (0..TILES).map(&mut tile).collect()
+}
+
+/// Cells of a step that a slope may have.
+fn unit(steps: &[Step]) -> f64 {
+    match steps {
+        [Step::Cells(cells)] => *cells,
+        _ => 0.0,
+    }
+}
+
+/// Two lines, holes in runs of one, and long numbers: each sample takes as many steps as
+/// bytes can make it take. It ends with too few bytes, which is told at the end only.
+fn hostile(dice: &mut Dice) -> Vec<u8> {
+    let mut bytes = vec![2 | 4 | 27 << 3, 0, 0, 0, 0x40];
+    for _ in 0..2 {
+        bytes.push(20);
+        bytes.extend((0..16).map(|_| (256.0 * dice.between(0.0, 1.0)) as u8));
+    }
+    while bytes.len() < MAX_PACKED {
+        // Escapes, or one zero after the other.
+        bytes.push(if dice.between(0.0, 1.0) < 0.3 {
+            (256.0 * dice.between(0.0, 1.0)) as u8
+        } else {
+            0
+        });
+    }
+    bytes
+}
+
+fn row<'b>(
+    board: &CountingBoard,
+    name: &str,
+    tiles: &'b [Vec<u8>],
+    heights: impl Fn(&'b [u8]) -> Heights<'b>,
+    are_tiles: bool,
+) -> Row {
+    let tiles: Vec<_> = tiles.iter().map(|bytes| heights(bytes)).collect();
+    let counted = board.tiles(&scene(&terrain()), &tiles);
+    let ticks = (0..).zip(counted).map(|(index, tile)| {
+        assert!(tile.converged == are_tiles, "{name}");
+        Tick {
+            instructions: tile.instructions,
+            units: 0,
+            scene: None,
+            index,
+        }
+    });
+    Row::new(name, Target::default(), ticks.collect())
+}
