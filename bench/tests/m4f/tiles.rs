@@ -17,13 +17,13 @@ const SAMPLES: usize = POSTS * POSTS;
 /// All of them.
 pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     let mut dice = Dice(31);
-    // 1/30 of a cell a metre; heights to 1/128 m, as interpolated ones are.
+    // 1/30 of a cell a metre; heights to 1/1,024 m.
     let metres = Step::Cells(1.0 / 30.0);
-    let parts = Step::Cells(1.0 / (128.0 * 30.0));
+    let parts = Step::Cells(1.0 / (1024.0 * 30.0));
     let whole = packed(&[metres], || (3.0 * dice.between(0.0, 1.0)).floor() / 30.0);
     let mut dice = Dice(32);
     let between = packed(&[parts], || {
-        (400.0 * dice.between(0.0, 1.0)).floor() / (128.0 * 30.0)
+        (3200.0 * dice.between(0.0, 1.0)).floor() / (1024.0 * 30.0)
     });
     let mut dice = Dice(33);
     let centimetres = Step::Single {
@@ -48,7 +48,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     vec![
         row(board, "tile, floats", &floats, as_floats, true),
         row(board, "tile, whole metres", &whole, as_packed, true),
-        row(board, "tile, interpolated", &between, as_packed, true),
+        row(board, "tile, parts of a metre", &between, as_packed, true),
         row(board, "tile, two lines", &single, as_packed, true),
         row(board, "tile, hostile bytes", &hostile, as_packed, false),
     ]

@@ -2,34 +2,12 @@
 
 use hapterra_core::terrain::packed::Step;
 
-use super::FeltGrid;
-
-/// Interpolated heights are multiples of a power of two that is at most this share of the
-/// relief of the file.
-const ROUNDING: f64 = 1.0 / (1 << 17) as f64;
 /// Decimal units that files have their heights in, besides whole ones.
 const DECIMALS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
 /// Decimals that single precision tells apart at the heights of mountains.
 const SINGLES: usize = 3;
 /// A binary unit no finer than this is taken before decimals are tried.
 const COARSE: i32 = -4;
-
-/// The step of interpolated heights, in the file's vertical unit; `None` where the felt
-/// samples are the file's own, which are not rounded.
-///
-/// A file holds what was measured; what lies between is made up, and as `f64` it would fill
-/// every bit that a sample has. 1/131,072 of the relief is below what an arm tells apart:
-/// of mountains 100 mm high in the hand 0.8 µm, where a count of the encoders is 16 µm.
-pub(super) fn rounding(grid: &FeltGrid<'_>) -> Option<f64> {
-    let summary = grid.raster().summary();
-    let step = (summary.highest - summary.lowest) * ROUNDING;
-    (grid.is_resampled() && step.is_normal()).then(|| f64::exp2(step.log2().floor()))
-}
-
-/// A height as the multiple of a step.
-pub(super) fn rounded(height: f64, step: Option<f64>) -> f64 {
-    step.map_or(height, |step| (height / step).round() * step)
-}
 
 /// The largest power of two that numbers are multiples of.
 #[derive(Clone, Copy)]

@@ -10,7 +10,7 @@ use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
 use hapterra_core::terrain::{FieldSize, POSTS, TILE_CELLS, TileKey};
 use hapterra_core::wire::message::Heights;
 
-use super::steps::{BinaryUnit, rounded, rounding, steps};
+use super::steps::{BinaryUnit, steps};
 use super::{BadScale, FeltCells, FeltGrid, Scale, identity};
 use crate::raster::Raster;
 
@@ -27,8 +27,6 @@ pub struct Terrain<'r> {
     /// Patches of the level, east and north.
     size: [i32; 2],
     top: i32,
-    /// Step of heights that are interpolated, in the file's vertical unit.
-    rounding: Option<f64>,
     fingerprint: OnceCell<u64>,
 }
 
@@ -130,14 +128,12 @@ impl<'r> Terrain<'r> {
             });
         }
         let scale = scale.at_level(level);
-        let rounding = rounding(&grid);
         Ok(Self {
             grid,
             scale,
             level,
             size,
-            top: top(grid.raster(), &scale, rounding)?,
-            rounding,
+            top: top(grid.raster(), &scale)?,
             fingerprint: OnceCell::new(),
         })
     }
@@ -272,7 +268,7 @@ impl<'r> Terrain<'r> {
         let (row, v) = place(north_mm / cell_mm, size[1])?;
         let at = |dx: u32, dy: u32| {
             let height = self.grid.height_of_level(level, column + dx, row + dy);
-            rounded(height, self.rounding) * self.scale.height_mm_per_unit()
+            height * self.scale.height_mm_per_unit()
         };
         let (south, north) = ([at(0, 0), at(1, 0)], [at(0, 1), at(1, 1)]);
         let mix = |[a, b]: [f64; 2], t: f64| a * (1.0 - t) + b * t;
@@ -325,9 +321,8 @@ impl<'r> Terrain<'r> {
         for (row, line) in (south..).zip(heights.chunks_exact_mut(POSTS)) {
             self.grid.copy_row(self.level, row, west, line);
             for height in line {
-                let in_file = rounded(*height, self.rounding);
-                unit = unit.with(in_file);
-                let cells = self.scale.height_cells(in_file);
+                unit = unit.with(*height);
+                let cells = self.scale.height_cells(*height);
                 // Where not all heights were read before, one may leave what can be said.
                 *height = match cells.abs() <= f64::from(MAX_CELL) {
                     true => cells,
@@ -375,7 +370,7 @@ fn base(low: f64, high: f64) -> i32 {
     base.floor() as i32 // both within ±MAX_CELL
 }
 
-fn top(raster: &Raster, scale: &Scale, step: Option<f64>) -> Result<i32, TerrainError> {
+fn top(raster: &Raster, scale: &Scale) -> Result<i32, TerrainError> {
     let summary = raster.summary();
     let ends = [summary.lowest, summary.highest].map(|h| scale.height_cells(h));
     let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
@@ -396,9 +391,7 @@ fn top(raster: &Raster, scale: &Scale, step: Option<f64>) -> Result<i32, Terrain
     } else {
         64
     };
-    // Interpolated heights may be half a step above the samples.
-    let up = 0.5 * scale.height_cells(step.unwrap_or(0.0)).abs();
-    Ok(((high + up).ceil() as i32 + rounding).min(MAX_CELL + 1))
+    Ok((high.ceil() as i32 + rounding).min(MAX_CELL + 1))
 }
 
 #[cfg(test)]
