@@ -143,6 +143,8 @@ fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
     let second = browser.open(&address);
     shown(&mut browser, &second, &mut go_on, is_whole);
     browser.close(&second);
+    // Chromium may leave it hidden where no window is.
+    browser.bring_to_front(&page);
     let until = Instant::now() + SHOWN_WITHIN;
     while browser.number(&page, "performance.timeOrigin") == began {
         go_on();

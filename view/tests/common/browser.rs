@@ -204,6 +204,11 @@ impl Browser {
         );
     }
 
+    /// Brings a page to the front, as a user does.
+    pub fn bring_to_front(&mut self, page: &Page) {
+        self.call("Page.bringToFront", json!({}), Some(&page.session));
+    }
+
     /// The value of an expression in a page.
     pub fn value(&mut self, page: &Page, expression: &str) -> Value {
         let what = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
