@@ -113,16 +113,9 @@ fn met_by(slopes: &SlopesAt, force: Vec3) -> Slopes {
     [along(force.x, *east), along(force.y, *north)]
 }
 
-/// Most that a force is turned: 60°. A bend of 120° is felt evenly.
-const MOST: Angle = Angle {
-    cos: 0.5,
-    sin: 0.866_025_4,
-};
-
-struct Angle {
-    cos: f32,
-    sin: f32,
-}
+/// Cosine and sine of the most that a force is turned: 60°. A bend of 120° is felt evenly.
+const MOST_COS: f32 = 0.5;
+const MOST_SIN: f32 = 0.866_025_4;
 
 /// The shortest turn from one direction to another: `cos` of its angle, and the axis times
 /// its `sin`.
@@ -140,7 +133,7 @@ impl Default for Turn {
 }
 
 impl Turn {
-    /// From the normal of some slopes to that of others, [`MOST`] of the way at most: beyond
+    /// From the normal of some slopes to that of others, 60° at most: beyond
     /// a right angle the force would pull.
     fn between(from: Slopes, to: Slopes) -> Self {
         if from == to {
@@ -148,7 +141,7 @@ impl Turn {
         }
         let (from, to) = (normal(from), normal(to));
         let (cos, axis) = (from.dot(to), from.cross(to));
-        if cos >= MOST.cos {
+        if cos >= MOST_COS {
             return Self { cos, axis };
         }
         let squared = axis.length_squared();
@@ -157,8 +150,8 @@ impl Turn {
             return Self::default();
         }
         Self {
-            cos: MOST.cos,
-            axis: axis * (MOST.sin * one_over_root(squared)),
+            cos: MOST_COS,
+            axis: axis * (MOST_SIN * one_over_root(squared)),
         }
     }
 

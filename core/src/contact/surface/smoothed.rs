@@ -124,8 +124,8 @@ fn direction(slope: f32) -> [f32; 2] {
     [along, slope * along]
 }
 
-/// 1/√x of a normal x, to 3e-7 of it: by three of Newton's steps from the exponent halved. An eighth
-/// of the instructions of a root to the last bit, fourteen times a tick.
+/// 1/√x of a normal x, to 3e-7 of it: by three of Newton's steps from the exponent halved. A
+/// shaded tick takes 540 instructions less than with roots to the last bit.
 pub(crate) fn one_over_root(x: f32) -> f32 {
     let mut y = f32::from_bits(0x5F37_5A86 - (x.to_bits() >> 1));
     for _ in 0..3 {
