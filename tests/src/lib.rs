@@ -17,6 +17,7 @@ pub mod link_campaign;
 pub mod minima;
 pub mod oracle;
 pub mod readers;
+pub mod real_ground;
 pub mod rows;
 pub mod scene;
 pub mod soak;

@@ -1,16 +1,15 @@
 //! Friction as a user meets it: real ground, an arm's encoders, the command.
 
-use std::path::Path;
-
-use hapterra::raster::{OpenOptions, Raster};
+use hapterra::raster::Raster;
 use hapterra::replay::on_native;
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra::terrain::Terrain;
 use hapterra_core::contact::{ContactState, Friction, Rule};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::Sample;
 use hapterra_tests::chance::Chance;
 use hapterra_tests::field::position;
 use hapterra_tests::invariants::surface::distance;
+use hapterra_tests::real_ground::{self, terrain};
 
 const MU: f64 = 0.4;
 
@@ -23,27 +22,6 @@ fn law(friction: Friction) -> ForceLaw {
 
 fn slippery() -> ForceLaw {
     law(Friction::coulomb(MU as f32))
-}
-
-/// Files of real ground; none where they are not on this machine.
-fn real() -> Vec<Raster> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/dem/real");
-    [
-        "mt_rainier_90m.tif",
-        "SainteHelens.dem",
-        "LisbonElevation.tif",
-    ]
-    .iter()
-    .map(|name| folder.join(name))
-    .filter(|path| path.exists())
-    .map(|path| Raster::open(path, &OpenOptions::default()).expect("opens"))
-    .collect()
-}
-
-fn terrain(raster: &Raster) -> Terrain<'_> {
-    let grid = FeltGrid::new(raster, FeltCells::Square);
-    let scale = Scale::true_to(&grid, 1.0).expect("scale");
-    Terrain::over(grid, scale, 0).expect("terrain")
 }
 
 /// What a HIP feels that slides around the middle of a terrain on an ellipse, `depth` mm
@@ -91,11 +69,7 @@ fn ratio(terrain: &Terrain<'_>, sample: &Sample) -> Option<f64> {
 
 #[test]
 fn on_real_ground_it_slides_within_five_parts_in_a_hundred_unless_it_flies() {
-    let rasters = real();
-    if rasters.is_empty() {
-        println!("skipped: no files of real ground in ../shared/dem/real");
-    }
-    for raster in &rasters {
+    for (_, raster) in &real_ground::files() {
         let terrain = terrain(raster);
         for (speed, most_wrong) in [(0.01, 0.0), (0.1, 0.015), (0.5, 0.2)] {
             let felt = slide(&terrain, slippery(), 0.3, speed);

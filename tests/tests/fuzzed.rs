@@ -37,6 +37,21 @@ fn mutated(chance: &mut Chance, input: &[u8]) -> Vec<u8> {
     bytes
 }
 
+/// Every third time random bytes, fewer than so many; else sensible ones, changed.
+fn input(
+    chance: &mut Chance,
+    round: u32,
+    fewer_than: usize,
+    sensible: fn(&mut Chance) -> Vec<u8>,
+) -> Vec<u8> {
+    let length = chance.below(fewer_than);
+    if round.is_multiple_of(3) {
+        return random(chance, length);
+    }
+    let sensible = sensible(chance);
+    mutated(chance, &sensible)
+}
+
 /// A scene of points, a tile, and points that go down into it.
 fn sensible_ticks(chance: &mut Chance) -> Vec<u8> {
     let mut bytes = vec![0, chance.below(4) as u8, 0, 0, 0, 0, 0, 0];
@@ -54,15 +69,7 @@ fn sensible_ticks(chance: &mut Chance) -> Vec<u8> {
 fn no_bytes_break_the_tick() {
     let mut chance = Chance::new(11);
     for round in 0..20_000 {
-        let length = chance.below(400);
-        let input = match round % 3 {
-            0 => random(&mut chance, length),
-            _ => {
-                let sensible = sensible_ticks(&mut chance);
-                mutated(&mut chance, &sensible)
-            }
-        };
-        tick::run(&input);
+        tick::run(&input(&mut chance, round, 400, sensible_ticks));
     }
 }
 
@@ -136,15 +143,7 @@ fn no_bytes_break_the_link() {
     let mut chance = Chance::new(12);
     let mut wire = wire::Wire::default();
     for round in 0..20_000 {
-        let length = chance.below(600);
-        let input = match round % 3 {
-            0 => random(&mut chance, length),
-            _ => {
-                let sensible = sensible_talk(&mut chance);
-                mutated(&mut chance, &sensible)
-            }
-        };
-        wire.run(&input);
+        wire.run(&input(&mut chance, round, 600, sensible_talk));
     }
 }
 
@@ -169,14 +168,6 @@ fn sensible_tile(chance: &mut Chance) -> Vec<u8> {
 fn no_bytes_break_a_tile() {
     let mut chance = Chance::new(13);
     for round in 0..4_000 {
-        let length = chance.below(5000);
-        let input = match round % 3 {
-            0 => random(&mut chance, length),
-            _ => {
-                let sensible = sensible_tile(&mut chance);
-                mutated(&mut chance, &sensible)
-            }
-        };
-        tile::run(&input);
+        tile::run(&input(&mut chance, round, 5000, sensible_tile));
     }
 }

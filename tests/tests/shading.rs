@@ -1,42 +1,18 @@
 //! Force shading on real ground: how evenly the force turns, and what it costs in energy.
 
-use std::path::Path;
-
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::replay::on_native;
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra::terrain::Terrain;
 use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::{ForceLaw, Shading};
 use hapterra_core::scene::Sample;
 use hapterra_tests::field::position;
+use hapterra_tests::real_ground;
 
 /// From one HIP to the next, cells.
 const STEP: f64 = 0.01;
 /// HIPs of a way.
 const STEPS: u32 = 30_000;
-
-/// Files of real ground; none where they are not on this machine.
-fn real() -> Vec<(&'static str, Raster)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/dem/real");
-    let there = [
-        "mt_rainier_90m.tif",
-        "SainteHelens.dem",
-        "LisbonElevation.tif",
-    ];
-    let there = there
-        .map(|name| (name, folder.join(name)))
-        .into_iter()
-        .filter(|(_, path)| path.exists());
-    there
-        .map(|(name, path)| {
-            (
-                name,
-                Raster::open(path, &OpenOptions::default()).expect("opens"),
-            )
-        })
-        .collect()
-}
 
 /// What a HIP feels on a circle around the middle of a terrain, `depth` mm deep: true to
 /// scale, a cell a millimetre.
@@ -89,14 +65,8 @@ fn given_mj(felt: &[Sample]) -> f64 {
 
 #[test]
 fn on_real_ground_the_force_turns_a_tenth_as_fast() {
-    let rasters = real();
-    if rasters.is_empty() {
-        println!("skipped: no files of real ground in ../shared/dem/real");
-    }
-    for (name, raster) in &rasters {
-        let grid = FeltGrid::new(raster, FeltCells::Square);
-        let scale = Scale::true_to(&grid, 1.0).expect("scale");
-        let terrain = Terrain::over(grid, scale, 0).expect("terrain");
+    for (name, raster) in &real_ground::files() {
+        let terrain = real_ground::terrain(raster);
         for depth in [0.02, 0.1, 0.3] {
             let plain = circle(&terrain, Shading::None, depth);
             let shaded = circle(&terrain, Shading::Smooth, depth);

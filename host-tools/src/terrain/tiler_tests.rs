@@ -2,6 +2,8 @@
 
 use hapterra_core::grid::Cell;
 use hapterra_core::terrain::Tile;
+use hapterra_core::wire::message::TileMessage;
+use hapterra_firmware::link::fill_tile;
 
 use super::*;
 
@@ -18,13 +20,12 @@ fn samples(terrain: &Terrain<'_>, key: TileKey) -> Vec<f64> {
     let mut buffer = TileBuffer::default();
     let heights = terrain.tile(key, &mut buffer).expect("a tile");
     let mut tile = Box::new(Tile::VACANT);
-    match heights {
-        Heights::Hole => tile.fill(key, 0, |_, _| f32::NAN),
-        Heights::Flat { base, height } => tile.fill(key, base, |_, _| height),
-        Heights::Samples { base, bytes } => tile.load(key, base, bytes),
-        Heights::Packed { base, bytes } => tile.unpack(key, base, bytes),
-    }
-    .expect("heights of a tile");
+    let message = TileMessage {
+        epoch: 0,
+        key,
+        heights,
+    };
+    fill_tile(&mut tile, &message).expect("heights of a tile");
     let base = f64::from(tile.base());
     let held = held(&tile);
     held.into_iter().map(|h| base + f64::from(h)).collect()

@@ -270,10 +270,13 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
         let hip = shifted(hip, self.shift);
         let mut work = 0;
         let in_real_time = self.execution == Execution::RealTime;
+        let mut only_shading_waits = false;
         for _ in 0..PATIENCE {
-            let felt = *self.contact.step(&self.supplied.window, &hip);
+            if !only_shading_waits {
+                self.contact.step(&self.supplied.window, &hip);
+            }
+            let felt = *self.contact.output();
             work = work.max(felt.work);
-            let has_ended = felt.converged || in_real_time;
             self.shaded = self.shade();
             let missing = self.missing();
             let waits_for = ContactOutput {
@@ -283,29 +286,12 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
             self.supplied
                 .supply(self.now, &self.contact, &waits_for, &hip);
             self.now += 1;
-            if has_ended && (in_real_time || missing.is_none() || self.waits(&hip)) {
+            only_shading_waits = felt.converged && missing.is_some();
+            if in_real_time || (felt.converged && missing.is_none()) {
                 return Some(ContactOutput { work, ..felt });
             }
         }
         None
-    }
-
-    /// Waits for the tiles that shading wants, while the contact stays as it is.
-    fn waits(&mut self, hip: &GridPoint) -> bool {
-        for _ in 0..PATIENCE {
-            let waits_for = ContactOutput {
-                missing_tile: self.missing(),
-                ..*self.contact.output()
-            };
-            self.supplied
-                .supply(self.now, &self.contact, &waits_for, hip);
-            self.now += 1;
-            self.shaded = self.shade();
-            if self.missing().is_none() {
-                return true;
-            }
-        }
-        false
     }
 
     fn shade(&mut self) -> Vec3 {

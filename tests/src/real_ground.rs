@@ -1,0 +1,37 @@
+//! Files of real ground that several tests slide over.
+
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+
+use crate::shared;
+
+/// Three of them by name: mountains, a volcano with sharp ridges, a city. None where they are
+/// not on this machine, which is said.
+///
+/// # Panics
+/// When one of them does not open.
+#[must_use]
+pub fn files() -> Vec<(&'static str, Raster)> {
+    let names = [
+        "mt_rainier_90m.tif",
+        "SainteHelens.dem",
+        "LisbonElevation.tif",
+    ];
+    let paths = names.map(|name| (name, shared(&format!("dem/real/{name}"))));
+    let there = paths
+        .into_iter()
+        .filter_map(|(name, path)| Some((name, path?)));
+    let open = |path| Raster::open(path, &OpenOptions::default()).expect("opens");
+    there.map(|(name, path)| (name, open(path))).collect()
+}
+
+/// A raster true to scale, a cell a millimetre.
+///
+/// # Panics
+/// When it cannot be felt so.
+#[must_use]
+pub fn terrain(raster: &Raster) -> Terrain<'_> {
+    let grid = FeltGrid::new(raster, FeltCells::Square);
+    let scale = Scale::true_to(&grid, 1.0).expect("scale");
+    Terrain::over(grid, scale, 0).expect("terrain")
+}
