@@ -140,11 +140,11 @@ fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
     // A second page hides the first, which begins anew once it is seen again; and the first
     // one loaded anew.
     let began = browser.number(&page, "performance.timeOrigin");
+    browser.set_seen(&page, false);
     let second = browser.open(&address);
     shown(&mut browser, &second, &mut go_on, is_whole);
     browser.close(&second);
-    // Chromium may leave it hidden where no window is.
-    browser.bring_to_front(&page);
+    browser.set_seen(&page, true);
     let until = Instant::now() + SHOWN_WITHIN;
     while browser.number(&page, "performance.timeOrigin") == began {
         go_on();

@@ -204,9 +204,15 @@ impl Browser {
         );
     }
 
-    /// Brings a page to the front, as a user does.
-    pub fn bring_to_front(&mut self, page: &Page) {
-        self.call("Page.bringToFront", json!({}), Some(&page.session));
+    /// Tells a page that nobody can see it, or that somebody can again. A Chromium without a
+    /// window may take every page to be seen, whichever is in front.
+    pub fn set_seen(&mut self, page: &Page, is_seen: bool) {
+        let state = if is_seen { "visible" } else { "hidden" };
+        let told = format!(
+            "Object.defineProperty(document, \"visibilityState\", {{ value: \"{state}\", configurable: true }});
+            document.dispatchEvent(new Event(\"visibilitychange\"))"
+        );
+        self.value(page, &told);
     }
 
     /// The value of an expression in a page.
