@@ -83,6 +83,6 @@ mod tests {
         assert_eq!(seconds("0.5").unwrap(), 30);
         assert!(seconds("0").is_err() && seconds("soon").is_err());
         let message = fuzz("tock", "1").unwrap_err().to_string();
-        assert!(message.contains("tick, wire"), "{message}");
+        assert!(message.contains("tick, tile, wire"), "{message}");
     }
 }
