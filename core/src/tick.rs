@@ -232,7 +232,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
 
     /// What a scene adds to the spring's force.
     fn effects_of(&self, scene: &Scene) -> Option<Effects> {
-        Effects::of(&scene.law, self.rate, scene.source == Source::Encoders)
+        let with_arm = scene.source == Source::Encoders;
+        Effects::of(&scene.law, scene.cell_mm, self.rate, with_arm)
     }
 
     /// Takes a scene, or drops the one there is: force that was there goes out.

@@ -175,6 +175,11 @@ impl Contact {
         self.output.converged || self.settings.execution == Execution::RealTime
     }
 
+    /// Whether a tick is repeated until all is done.
+    pub(crate) fn is_in_lock_step(&self) -> bool {
+        self.settings.execution == Execution::LockStep
+    }
+
     /// Whether the last tick did all there was to do, for this HIP.
     pub(crate) fn has_answered(&self, hip: &GridPoint) -> bool {
         self.output.converged && self.hip.is_same(hip)

@@ -3,7 +3,9 @@
 mod damping;
 mod effects;
 pub mod passivity;
+mod relief;
 mod shading;
+mod texture;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -14,6 +16,7 @@ pub(crate) use damping::Damper;
 pub use damping::{Controller, Damping};
 pub(crate) use effects::Effects;
 pub use shading::{Shader, Shading};
+pub use texture::{Pattern, Texture, Texturer};
 
 /// The spring between the haptic interface point (HIP) and the proxy (paper
 /// §4.3.4), the limit of what it may ask for, and what holds the proxy back. Immutable while a tick runs.
@@ -41,6 +44,8 @@ pub struct ForceLaw {
     pub damping: Damping,
     /// Which normals the force follows.
     pub shading: Shading,
+    /// The micro-relief of the surface.
+    pub texture: Texture,
 }
 
 impl ForceLaw {
@@ -51,10 +56,11 @@ impl ForceLaw {
         friction: Friction::NONE,
         damping: Damping::NONE,
         shading: Shading::None,
+        texture: Texture::NONE,
     };
 
-    /// Whether stiffness and limit are finite and not negative, and friction and damping are
-    /// such.
+    /// Whether stiffness and limit are finite and not negative, and friction, damping and texture
+    /// are such.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let ok = |x: f32| x.is_finite() && x >= 0.0;
@@ -62,6 +68,7 @@ impl ForceLaw {
             && ok(self.max_force_n)
             && self.friction.is_valid()
             && self.damping.is_valid()
+            && self.texture.is_valid()
     }
 
     /// Force in newtons for a proxy `displacement_mm` away from the HIP.

@@ -12,7 +12,7 @@ use super::request::{Answer, Refusal, Request};
 use super::session::{InSession, LastSession, SampleCount, SessionEnd, SessionNumber};
 use crate::clutch::ClutchHold;
 use crate::contact::{ContactState, Rule};
-use crate::force::{Controller, Damping, ForceLaw, Shading};
+use crate::force::{Controller, Damping, ForceLaw, Pattern, Shading, Texture};
 use crate::grid::GridPoint;
 use crate::guard::{Fault, Limits, Mode};
 use crate::scene::{Sample, Scene, Source, View};
@@ -44,6 +44,13 @@ fn a_scene() {
                 controller: Controller::On,
             },
             shading: Shading::Smooth,
+            texture: Texture {
+                pattern: Pattern::Grating,
+                amplitude_mm: 0.125,
+                wavelength_mm: 2.0,
+                direction_deg: -45.0,
+                seed: 300,
+            },
             ..ForceLaw::PREMIUM
         },
         rule: Rule::Paper,
@@ -62,7 +69,13 @@ fn a_scene() {
         float(8.5),
         std::vec![0; 12],
         float(2.0),
+        // Controller, shading; the texture; rule, source, clock.
         std::vec![1, 1],
+        std::vec![2],
+        float(0.125),
+        float(2.0),
+        float(-45.0),
+        std::vec![0xAC, 0x02],
         std::vec![1, 1, 1],
     ];
     assert_eq!(bytes(&ToDevice::Scene(scene)), wanted.concat());

@@ -5,7 +5,7 @@
 //! header; in a Parquet recording it is the value of [`KEY`] among the file's metadata.
 
 use hapterra_core::contact::{Friction, Rule};
-use hapterra_core::force::{Damping, ForceLaw, Shading};
+use hapterra_core::force::{Damping, ForceLaw, Shading, Texture};
 use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use serde::{Deserialize, Serialize};
 
@@ -85,6 +85,9 @@ pub struct ViewSettings {
     /// What takes energy out of a motion against it; left out where nothing is asked for.
     #[serde(default, skip_serializing_if = "Damping::is_none")]
     pub damping: Damping,
+    /// Its micro-relief; left out where it is even.
+    #[serde(default, skip_serializing_if = "Texture::is_none")]
+    pub texture: Texture,
 }
 
 /// The views alone, as TOML has them.
@@ -110,6 +113,7 @@ impl ViewSettings {
             stiffness_n_per_mm: laid.law.stiffness_n_per_mm,
             max_force_n: laid.law.max_force_n,
             shading: laid.law.shading,
+            texture: laid.law.texture,
             friction: laid.law.friction,
             damping: laid.law.damping,
         }
@@ -130,6 +134,7 @@ impl ViewSettings {
             friction: self.friction,
             damping: self.damping,
             shading: self.shading,
+            texture: self.texture,
         }
     }
 
@@ -204,6 +209,9 @@ pub struct Force {
     /// What takes energy out of a motion against it; left out where nothing is asked for.
     #[serde(default, skip_serializing_if = "Damping::is_none")]
     pub damping: Damping,
+    /// Its micro-relief; left out where it is even.
+    #[serde(default, skip_serializing_if = "Texture::is_none")]
+    pub texture: Texture,
 }
 
 /// The device that felt it, as it described itself.
@@ -285,6 +293,7 @@ impl Settings {
                 max_force_n: law.max_force_n,
                 rule,
                 shading: law.shading,
+                texture: law.texture,
                 friction: law.friction,
                 damping: law.damping,
             },
@@ -340,6 +349,7 @@ impl Settings {
             friction: self.force.friction,
             damping: self.force.damping,
             shading: self.force.shading,
+            texture: self.force.texture,
         }
     }
 

@@ -1,6 +1,6 @@
 //! What the map says to who is about to feel a surface.
 
-use hapterra_core::force::{ForceLaw, passivity};
+use hapterra_core::force::{ForceLaw, Texture, passivity};
 use hapterra_core::rate::TickRate;
 
 /// Stiffness up to which a press is still in a limp hand, N/mm: ticks a second, without and
@@ -15,9 +15,22 @@ pub(super) const STILL_N_PER_MM: [(u32, f32, f32); 4] = [
 /// Warns of a surface that is too stiff for a device of so many ticks a second.
 pub fn warn(law: &ForceLaw, tick_hz: u32) {
     let rate = TickRate::new(tick_hz);
-    if let Some(warning) = rate.and_then(|rate| warning(law, rate)) {
+    let warnings = rate.map(|rate| [warning(law, rate), too_fine(&law.texture, rate)]);
+    for warning in warnings.into_iter().flatten().flatten() {
         tracing::warn!("{warning}");
     }
+}
+
+/// What has to be said of a texture so fine that a slow hand does not feel it in whole.
+fn too_fine(texture: &Texture, rate: TickRate) -> Option<String> {
+    let (wavelength, shortest) = (texture.wavelength_mm, Texture::shortest_mm(rate));
+    let hz = rate.hz();
+    let whole_mm_s = wavelength * hz as f32 / 8.0;
+    (!texture.is_none() && wavelength < shortest).then(|| {
+        format!(
+            "a texture with a wavelength of {wavelength} mm: at {hz} ticks a second it fades from {whole_mm_s:.0} mm/s on, and is gone at twice that; from {shortest} mm on a slow hand feels it in whole"
+        )
+    })
 }
 
 /// What has to be said of a surface at a device's rate; `None` where every hand on the
@@ -59,7 +72,7 @@ fn still_n_per_mm(rate: TickRate, is_controlled: bool) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use hapterra_core::force::{Controller, Damping};
+    use hapterra_core::force::{Controller, Damping, Pattern};
 
     use super::*;
 
@@ -74,6 +87,28 @@ mod tests {
         };
         let rate = TickRate::new(hz).expect("a rate");
         warning(&law, rate).unwrap_or_default()
+    }
+
+    #[test]
+    fn a_texture_is_warned_of_that_fades_under_a_slow_hand() {
+        let told = |wavelength_mm, hz| {
+            let texture = Texture {
+                pattern: Pattern::Grain,
+                wavelength_mm,
+                ..Texture::NONE
+            };
+            too_fine(&texture, TickRate::new(hz).expect("a rate")).unwrap_or_default()
+        };
+        let fine = told(0.3, 1000);
+        assert!(
+            fine.contains("from 38 mm/s on") && fine.contains("from 0.4 mm on"),
+            "{fine}"
+        );
+        assert_eq!(
+            [told(0.3, 2000), told(0.4, 1000)],
+            [String::new(), String::new()]
+        );
+        assert_eq!(too_fine(&Texture::NONE, TickRate::DEFAULT), None);
     }
 
     #[test]

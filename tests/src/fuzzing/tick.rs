@@ -3,7 +3,7 @@
 use hapterra_core::Vec3;
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::{Friction, Rule, WORK_PER_TICK};
-use hapterra_core::force::{Controller, Damping, ForceLaw, Shading};
+use hapterra_core::force::{Controller, Damping, ForceLaw, Pattern, Shading, Texture};
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::guard::{Fault, Sense};
 use hapterra_core::phantom::{Calibration, Mechanism};
@@ -158,7 +158,34 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
     if kind & 64 != 0 {
         scene.law.shading = Shading::Smooth;
     }
+    if kind & 128 != 0 {
+        scene.law.texture = texture(bytes);
+    }
     scene
+}
+
+/// A texture that a scene may have, or any numbers.
+fn texture(bytes: &mut Bytes<'_>) -> Texture {
+    let (kind, share) = (bytes.byte(), f32::from(bytes.byte()) / 255.0);
+    let pattern = [Pattern::Grain, Pattern::Grating][usize::from(kind % 2)];
+    if kind >= 250 {
+        return Texture {
+            pattern,
+            amplitude_mm: bytes.float(),
+            wavelength_mm: bytes.float(),
+            direction_deg: bytes.float(),
+            seed: bytes.int() as u32,
+        };
+    }
+    let (shortest, longest) = Texture::WAVELENGTHS_MM;
+    let wavelength_mm = [shortest, 1.0, 7.0, longest][usize::from(kind / 2 % 4)];
+    Texture {
+        pattern,
+        amplitude_mm: (share * wavelength_mm * Texture::STEEPEST).min(Texture::MOST_AMPLITUDE_MM),
+        wavelength_mm,
+        direction_deg: f32::from(kind),
+        seed: u32::from(kind),
+    }
 }
 
 fn fill(tile: &mut Tile, bytes: &mut Bytes<'_>) {

@@ -2,7 +2,7 @@
 
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::{Friction, Rule};
-use hapterra_core::force::{Controller, Damping, ForceLaw, Shading};
+use hapterra_core::force::{Controller, Damping, ForceLaw, Pattern, Shading, Texture};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
@@ -129,6 +129,13 @@ fn host_scene(chance: &mut Chance, epoch: u32) -> Scene {
                 controller: Controller::On,
             },
             shading: [Shading::None, Shading::Smooth][chance.below(2)],
+            texture: Texture {
+                pattern: [Pattern::None, Pattern::Grain, Pattern::Grating][chance.below(3)],
+                amplitude_mm: [0.1, 0.0, -1.0, f32::NAN, 1e30][chance.below(5)],
+                wavelength_mm: [1.0, 0.0, f32::NAN, 1e30][chance.below(4)],
+                direction_deg: [0.0, 1e30, f32::NAN][chance.below(3)],
+                seed: chance.bits() as u32,
+            },
         },
         rule: Rule::Swept,
         source: [Source::Encoders, Source::Points][chance.below(2)],

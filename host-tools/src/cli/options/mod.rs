@@ -9,3 +9,4 @@ pub mod recorded;
 pub mod rendering;
 pub mod steering;
 pub mod terrain_file;
+pub mod texture;

@@ -68,6 +68,7 @@ impl Rendering {
                 shading(force.shading),
                 &mut told,
             )),
+            texture: self.texture.or_recorded(&force.texture, &mut told),
             contact: Some(merged("contact", self.contact, rule(force.rule), &mut told)),
             ..self.clone()
         };
@@ -102,7 +103,7 @@ impl Rendering {
     }
 }
 
-fn merged<T: PartialEq + Debug + Copy>(
+pub(super) fn merged<T: PartialEq + Debug + Copy>(
     name: &str,
     given: Option<T>,
     recorded: T,
@@ -156,8 +157,9 @@ const fn rule(rule: Rule) -> ContactRule {
 
 #[cfg(test)]
 mod tests {
-    use hapterra_core::force::{Damping, ForceLaw};
+    use hapterra_core::force::{Damping, ForceLaw, Pattern, Texture};
 
+    use super::super::texture::{SurfacePattern, SurfaceTexture};
     use super::*;
     use crate::raster::Raster;
     use crate::replay::settings::Device;
@@ -238,6 +240,56 @@ mod tests {
         assert_eq!(rendering.law().expect("valid").shading, Shading::None);
         let text = recorded.to_toml();
         assert!(text.contains("\nshading = \"smooth\"\n"), "{text}");
+        assert_eq!(Settings::from_toml(&text).expect("read"), Some(recorded));
+    }
+
+    #[test]
+    fn texture_is_as_recorded_and_what_is_stated_wins() {
+        let mut recorded = recorded();
+        let grating = Texture {
+            pattern: Pattern::Grating,
+            amplitude_mm: 0.1,
+            wavelength_mm: 1.5,
+            direction_deg: 30.0,
+            seed: 4,
+        };
+        recorded.force.texture = grating;
+        let with = |change: fn(&mut SurfaceTexture)| {
+            let mut rendering = Rendering::default();
+            change(&mut rendering.texture);
+            let (rendering, told) = rendering.or_recorded(&recorded);
+            (rendering.law().map(|law| law.texture).ok(), told)
+        };
+        assert_eq!(with(|_| ()), (Some(grating), vec![]));
+        let (texture, told) = with(|stated| stated.texture_amplitude = Some(0.15));
+        let amplitude_mm = 0.15;
+        assert_eq!(
+            texture,
+            Some(Texture {
+                amplitude_mm,
+                ..grating
+            })
+        );
+        assert_eq!(
+            told,
+            ["--texture-amplitude 0.15, where the recording has 0.1"]
+        );
+        let (texture, told) = with(|stated| stated.texture = Some(SurfacePattern::None));
+        assert_eq!(texture, Some(Texture::NONE));
+        assert_eq!(told, ["--texture none, where the recording has grating"]);
+        let (texture, told) = with(|stated| stated.texture = Some(SurfacePattern::Grain));
+        let (pattern, direction_deg) = (Pattern::Grain, 0.0);
+        let grain = Texture {
+            pattern,
+            direction_deg,
+            ..grating
+        };
+        assert_eq!((texture, told.len()), (Some(grain), 1));
+        let text = recorded.to_toml();
+        assert!(
+            text.contains("[force.texture]\npattern = \"grating\"\n"),
+            "{text}"
+        );
         assert_eq!(Settings::from_toml(&text).expect("read"), Some(recorded));
     }
 

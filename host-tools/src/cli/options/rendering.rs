@@ -4,6 +4,7 @@ use hapterra_core::contact::{Friction, Rule};
 use hapterra_core::force::{Controller, Damping, ForceLaw, Shading};
 
 use super::exaggeration::Exaggeration;
+use super::texture::SurfaceTexture;
 use crate::cli::failure::{Failure, OrHint};
 use crate::place::{Heights, suited_height};
 use crate::raster::Raster;
@@ -73,6 +74,10 @@ pub struct Rendering {
     /// Whether the force turns evenly over the edges between patches [default: none]
     #[arg(long, value_enum)]
     pub shading: Option<ForceShading>,
+
+    /// The micro-relief.
+    #[command(flatten)]
+    pub texture: SurfaceTexture,
 
     /// Contact rule [default: swept]
     #[arg(long, value_enum)]
@@ -177,6 +182,7 @@ impl Rendering {
             friction: self.surface()?,
             damping: self.damping()?,
             shading: self.normals(),
+            texture: self.texture.relief()?,
         };
         let ForceLaw {
             stiffness_n_per_mm: k,

@@ -1,0 +1,381 @@
+//! Texture on planes, by what a hand would feel.
+
+use std::vec::Vec;
+
+use super::*;
+use crate::cases::cases;
+use crate::contact::{Contact, ContactSettings};
+use crate::terrain::{FieldSize, FieldStorage};
+
+const RATE: TickRate = TickRate::DEFAULT;
+/// A tick, s.
+const TICK_S: f64 = 1e-3;
+/// A cell, mm.
+const CELL_MM: f32 = 2.0;
+
+const GRATING: Texture = Texture {
+    pattern: Pattern::Grating,
+    amplitude_mm: 0.1,
+    wavelength_mm: 1.0,
+    ..Texture::NONE
+};
+const GRAIN: Texture = Texture {
+    pattern: Pattern::Grain,
+    seed: 7,
+    ..GRATING
+};
+
+fn texturer(texture: &Texture) -> Texturer {
+    Texturer::of(texture, CELL_MM, RATE).expect("textured")
+}
+
+/// A place so many millimetres east and north of cell 30.
+fn place(x_mm: f64, y_mm: f64) -> GridPoint {
+    let split = |mm: f64| {
+        let cells = mm / f64::from(CELL_MM);
+        (30 + cells.floor() as i32, (cells - cells.floor()) as f32)
+    };
+    let ((x, u), (y, v)) = (split(x_mm), split(y_mm));
+    GridPoint::new([x, y, 0], Vec3::new(u, v, 0.0))
+}
+
+/// The displacement in millimetres, tick by tick, of a hand `depth_mm` deep in a level plane
+/// that goes east at so many mm/s; the first 100 ms are left out.
+fn felt(texture: &Texture, speed_mm_s: f64, depth_mm: f32, ticks: u32) -> Vec<Vec3> {
+    let mut texturer = texturer(texture);
+    let displacement = Vec3::Z * (depth_mm / CELL_MM);
+    let all = (0..100 + ticks).map(|tick| {
+        let way_mm = speed_mm_s * TICK_S * f64::from(tick);
+        texturer.add(displacement, &place(way_mm, 0.3)) * CELL_MM
+    });
+    all.skip(100).collect()
+}
+
+/// The amplitude of a frequency in Hz.
+fn amplitude(felt: &[Vec3], hz: f64, part: fn(&Vec3) -> f32) -> f64 {
+    let turn = std::f64::consts::TAU * hz * TICK_S;
+    let sums = felt.iter().enumerate().fold((0.0, 0.0), |(c, s), (i, v)| {
+        let (value, angle) = (f64::from(part(v)), turn * i as f64);
+        (c + value * angle.cos(), s + value * angle.sin())
+    });
+    2.0 / felt.len() as f64 * sums.0.hypot(sums.1)
+}
+
+#[test]
+fn a_slow_hand_feels_the_amplitude_that_was_asked_for() {
+    for (texture, ticks) in [(GRATING, 2_000), (GRAIN, cases(400_000, 200))] {
+        let felt = felt(&texture, 10.0, 1.0, ticks);
+        let most = felt.iter().map(|v| v.z - 1.0).fold(f32::MIN, f32::max);
+        let least = felt.iter().map(|v| v.z - 1.0).fold(f32::MAX, f32::min);
+        assert!(most <= 0.100_01 && least >= -0.100_01, "{most} {least}");
+        if texture.pattern == Pattern::Grating {
+            assert!(most > 0.099 && least < -0.099, "{most} {least}");
+        } else if !cfg!(miri) {
+            // A straight way meets a highest and a lowest grain seldom in their middle.
+            assert!(most > 0.08 && least < -0.08, "{most} {least}");
+        }
+    }
+}
+
+#[test]
+fn a_hand_at_speed_feels_the_frequency_of_the_wavelength() {
+    for hz in [10.0, 50.0, 100.0, 125.0] {
+        // A wave a millimetre.
+        let felt = felt(&GRATING, hz, 1.0, 4_000);
+        let there = amplitude(&felt, hz, |v| v.z);
+        assert!((there - 0.1).abs() < 1e-3, "{hz} Hz: {there}");
+        for other in (1..=100).map(|i| 5.0 * f64::from(i)).filter(|o| *o != hz) {
+            let (up, along) = (
+                amplitude(&felt, other, |v| v.z),
+                amplitude(&felt, other, |v| v.x),
+            );
+            let most = if other == 500.0 { 2e-3 } else { 1e-3 };
+            assert!(
+                up < most && along < most,
+                "{other} Hz at {hz}: {up} {along}"
+            );
+        }
+    }
+}
+
+/// Grain has no waves shorter than its wavelength, but for what its even rises need.
+#[test]
+fn grain_is_felt_up_to_the_frequency_of_its_wavelength() {
+    let felt = felt(&GRAIN, 50.0, 1.0, cases(20_000, 400));
+    let power = |from: u32, to: u32| -> f64 {
+        let all = (from..to).map(|hz| amplitude(&felt, f64::from(hz), |v| v.z).powi(2));
+        all.sum()
+    };
+    let (within, beyond) = (power(1, 60), power(60, 400));
+    assert!(
+        cfg!(miri) || beyond < 0.1 * within,
+        "{beyond:e} of {within:e}"
+    );
+    assert!(cfg!(miri) || power(120, 400) < 1e-3 * within);
+}
+
+#[test]
+fn texture_fades_before_it_would_alias() {
+    let swing = |mm_s| {
+        let felt = felt(&GRATING, mm_s, 1.0, 2_000);
+        let up = felt.iter().map(|v| (v.z - 1.0).abs());
+        up.fold(0.0, f32::max)
+    };
+    assert!(swing(120.0) > 0.099);
+    // Half of the way from an eighth of a wave a tick to a quarter.
+    let half = swing(187.5);
+    assert!((half - 0.05).abs() < 1e-3, "{half}");
+    assert!(swing(160.0) > half && half > swing(220.0) && swing(220.0) > 0.0);
+    for too_fast in [250.1, 300.0, 999.0, 1_000.0, 5_000.0] {
+        assert_eq!(swing(too_fast), 0.0, "{too_fast} mm/s");
+    }
+}
+
+#[test]
+fn a_place_feels_the_same_from_everywhere() {
+    for texture in [GRATING, GRAIN] {
+        let there = place(0.7, -0.4);
+        let rested = |from: GridPoint| {
+            let mut texturer = texturer(&texture);
+            texturer.add(Vec3::Z, &from);
+            (0..200).map(|_| texturer.add(Vec3::Z, &there)).last()
+        };
+        let first = rested(there);
+        for (x, y) in [(0.1, 0.2), (-50.0, 3.0), (1e6, -1e6), (0.7, -0.4)] {
+            assert_eq!(rested(place(x, y)), first, "{x} {y}");
+        }
+    }
+}
+
+/// In steps of a millionth of a wave no force jumps: over cells, tiles and grains, and where the
+/// hand lands and lifts.
+#[test]
+fn nothing_steps_on_the_way() {
+    let textures = [
+        GRATING,
+        GRAIN,
+        Texture {
+            direction_deg: 33.0,
+            ..GRATING
+        },
+    ];
+    for texture in textures {
+        let mut texturer = texturer(&texture);
+        let depth = |i: f64| 0.3 * (1.0 - (i / 3_000.0).cos());
+        let mut before: Option<Vec3> = None;
+        const STEPS: u32 = cases(40_000, 500);
+        for i in 0..STEPS {
+            // Over the border of the tile that ends with column and row 32.
+            let (way, depth) = (3.6 + f64::from(i) * 2e-5, depth(f64::from(i)) as f32);
+            let normal = Vec3::new(0.6, 0.0, 0.8);
+            let felt = texturer.add(normal * depth, &place(way, way));
+            if let Some(before) = before
+                && i > 100
+            {
+                let step = (felt - before).length();
+                assert!(step < 4e-4, "{texture:?} {i}: {step:e}");
+            }
+            before = Some(felt);
+        }
+    }
+}
+
+/// Along the force the texture never turns it round; it adds no more than is stated; and with the
+/// depth it is gone.
+#[test]
+fn it_never_pulls_and_keeps_its_bounds() {
+    let steep = Texture {
+        amplitude_mm: 0.125,
+        ..GRAIN
+    };
+    for texture in [GRATING, GRAIN, steep] {
+        let mut texturer = texturer(&texture);
+        let (a, l) = (texture.amplitude_mm, texture.wavelength_mm);
+        for i in 0..cases(50_000, 500) {
+            let depth_mm = [1e-30, 1e-6, 0.01, 0.1, 0.5, 3.0, 1e3, 1e9][i as usize % 8];
+            let normal = [Vec3::Z, Vec3::X, Vec3::new(-0.48, 0.6, 0.64)][i as usize % 3];
+            let plain = normal * (depth_mm / CELL_MM);
+            let felt = texturer.add(plain, &place(0.013 * f64::from(i), 0.007 * f64::from(i)));
+            let more_mm = (felt - plain) * CELL_MM;
+            let (up, along) = (more_mm.dot(normal), more_mm.reject_from_normalized(normal));
+            let rounding = 1e-5 * depth_mm;
+            assert!(felt.dot(normal) >= -1e-30, "{depth_mm} {felt}");
+            assert!(
+                up.abs() <= a.min(depth_mm) * 1.000_01 + rounding,
+                "{depth_mm}: {up}"
+            );
+            let most = (depth_mm * std::f32::consts::TAU * a / l).min(0.131 * l);
+            assert!(
+                along.length() <= most * 1.000_1 + rounding,
+                "{depth_mm}: {along}"
+            );
+        }
+    }
+}
+
+/// So that a hand that presses hard does not shake on a wave.
+#[test]
+fn along_the_surface_it_is_no_stiffer_than_the_surface() {
+    for texture in [
+        GRATING,
+        GRAIN,
+        Texture {
+            amplitude_mm: 0.125,
+            ..GRAIN
+        },
+    ] {
+        for depth_mm in [0.05, 0.2, 1.0, 15.0] {
+            let felt = felt(&texture, 1.0, depth_mm, cases(20_000, 200));
+            let pairs = felt.windows(2);
+            let changes = pairs.map(|pair| (pair[1].x - pair[0].x).abs() / 1e-3);
+            let stiffest = changes.fold(0.0, f32::max);
+            assert!(stiffest < 1.02, "{texture:?} {depth_mm} mm: {stiffest}");
+        }
+    }
+}
+
+/// Up to the depth at which the part along the surface stays as it is, the force is that of
+/// a spring of the surface with its relief: a round gives nothing.
+#[test]
+fn a_round_gives_no_energy() {
+    for texture in [GRATING, GRAIN] {
+        let mut texturer = texturer(&texture);
+        let (mut given, mut size) = (0.0_f64, 0.0);
+        let mut before: Option<([f64; 3], Vec3)> = None;
+        const STEPS: u32 = cases(40_000, 2_000);
+        for i in 0..=2 * STEPS {
+            let angle = std::f64::consts::TAU * f64::from(i) / f64::from(STEPS);
+            let [x, y] = [1.7 * angle.cos(), 1.7 * angle.sin()];
+            let depth = 0.15 + 0.04 * (3.0 * angle).sin();
+            let felt = texturer.add(Vec3::Z * (depth as f32 / CELL_MM), &place(x, y)) * CELL_MM;
+            let here = [x, y, -depth];
+            if let Some((there, force)) = before
+                && i > STEPS
+            {
+                let force = (0.5 * (felt + force)).to_array();
+                let work: f64 = (0..3)
+                    .map(|k| f64::from(force[k]) * (here[k] - there[k]))
+                    .sum();
+                given += work;
+                size += work.abs();
+            }
+            before = Some((here, felt));
+        }
+        assert!(
+            cfg!(miri) || given.abs() < 2e-3 * size,
+            "{given:e} of {size:e}"
+        );
+    }
+}
+
+/// With the contact itself: the proxy stays where it is without texture.
+#[test]
+fn the_proxy_is_not_moved_and_texture_is_along_the_slopes_normal() {
+    let size = FieldSize::new(60, 60);
+    let mut field = FieldStorage::<2>::from_fn(size, |x, _| 0.75 * x as f32).expect("a field");
+    let window = field.window();
+    let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    let mut texturer = texturer(&GRATING);
+    contact.step(
+        &window,
+        &GridPoint::new([20, 20, 0], Vec3::new(0.0, 0.5, 17.0)),
+    );
+    let normal = Vec3::new(-0.6, 0.0, 0.8);
+    let mut most = 0.0_f32;
+    for i in 0..3_000 {
+        let x = i as f32 * 1e-3;
+        let hip = GridPoint::new(
+            [20, 20, 0],
+            Vec3::new(x, 0.5, 0.75 * (20.0 + x)) - normal * 0.3,
+        );
+        let output = *contact.step(&window, &hip);
+        let felt = texturer.add(output.displacement, &output.proxy);
+        let up = felt.dot(normal) - 0.3;
+        most = most.max(up.abs());
+        assert!(felt.y.abs() < 1e-5, "the ridges lead north: {felt}");
+    }
+    let wanted = GRATING.amplitude_mm / CELL_MM;
+    assert!((most - wanted).abs() < 0.01 * wanted, "{most}");
+}
+
+#[test]
+fn what_no_number_is_gives_none() {
+    for texture in [GRATING, GRAIN] {
+        let mut texturer = texturer(&texture);
+        for bad in [
+            f32::NAN,
+            f32::INFINITY,
+            f32::MAX,
+            f32::MIN_POSITIVE,
+            1e-45,
+            0.0,
+        ] {
+            let at = GridPoint::new([i32::MAX; 3], Vec3::splat(bad));
+            let felt = texturer.add(Vec3::new(0.0, bad, 1.0), &at);
+            let force = crate::force::ForceLaw::PREMIUM.force_n(felt);
+            assert!(force.is_finite(), "{bad}: {force}");
+        }
+        // And is forgotten.
+        let felt: Vec<_> = (0..100)
+            .map(|_| texturer.add(Vec3::Z, &place(0.3, 0.3)))
+            .collect();
+        assert!(felt[99].is_finite() && felt[99] != Vec3::Z, "{}", felt[99]);
+    }
+}
+
+#[test]
+fn only_textures_that_can_be_felt_are_valid() {
+    assert!(Texture::NONE.is_valid() && GRATING.is_valid() && GRAIN.is_valid());
+    let bad = [f32::NAN, f32::INFINITY, -1.0];
+    let with = |change: fn(&mut Texture, f32), value| {
+        let mut texture = GRATING;
+        change(&mut texture, value);
+        texture
+    };
+    for value in bad.into_iter().chain([0.126]) {
+        assert!(
+            !with(|t, x| t.amplitude_mm = x, value).is_valid(),
+            "{value}"
+        );
+    }
+    for value in bad.into_iter().chain([0.0, 0.24, 101.0]) {
+        assert!(
+            !with(|t, x| t.wavelength_mm = x, value).is_valid(),
+            "{value}"
+        );
+    }
+    for value in [f32::NAN, 361.0, -361.0] {
+        assert!(
+            !with(|t, x| t.direction_deg = x, value).is_valid(),
+            "{value}"
+        );
+    }
+    let wide = Texture {
+        wavelength_mm: 100.0,
+        ..GRATING
+    };
+    assert!(
+        Texture {
+            amplitude_mm: 2.0,
+            ..wide
+        }
+        .is_valid()
+    );
+    assert!(
+        !Texture {
+            amplitude_mm: 2.1,
+            ..wide
+        }
+        .is_valid()
+    );
+    assert!(GRATING.fits(1.0) && !GRATING.fits(1e7) && !GRATING.fits(1e-7));
+    assert!(!GRATING.fits(f32::NAN) && Texture::NONE.fits(1e7));
+    assert!(Texturer::of(&GRATING, 1e7, RATE).is_none());
+}
+
+#[test]
+fn a_slow_hand_feels_the_shortest_wave_in_whole() {
+    assert_eq!(Texture::shortest_mm(RATE), 0.4);
+    let fast = TickRate::new(4_000).expect("a rate");
+    assert_eq!(Texture::shortest_mm(fast), 0.25);
+}
