@@ -6,6 +6,7 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::{
     ContactOutput, ContactState, Execution, Friction, Rule, WORK_PER_TICK,
 };
+use hapterra_core::force::{Pattern, Texture};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::terrain::TileIndex;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
@@ -213,6 +214,65 @@ fn a_force_that_is_shaded_otherwise_is_found() {
         [Invariant::Shading],
         "longer than without"
     );
+}
+
+/// With texture the force is the one without and what the relief adds, once the proxy has been
+/// slow for some time.
+#[test]
+fn a_force_that_is_textured_otherwise_is_found() {
+    let flat = flat();
+    let grating = Texture {
+        pattern: Pattern::Grating,
+        amplitude_mm: 0.1,
+        wavelength_mm: 1.0,
+        ..Texture::NONE
+    };
+    // Half a cell deep, on a crest and where the relief rises eastward; there 2π/10 times
+    // the depth at which the part along the surface grows no more is felt, westward.
+    let on = |x: f64, [along, up]: [f64; 2]| Seen {
+        textured: Some(Vec3::new(along as f32, 0.0, up as f32)),
+        ..touching([x, 10.5, 1.5], [x, 10.5, 2.0])
+    };
+    let (crest, slope) = ([0.0, 0.6], [-std::f64::consts::TAU / 48.0, 0.5]);
+    let told = |honest: Option<Seen>, last: Seen| -> Vec<Invariant> {
+        let mut judge = Judge::new(&flat, Rule::Swept).with_texture(grating);
+        for seen in honest
+            .iter()
+            .cycle()
+            .take(60 * usize::from(honest.is_some()))
+        {
+            // What comes in is not looked at here.
+            let _ = judge.all(seen);
+        }
+        let told = judge.all(&last);
+        told.iter().map(|violation| violation.invariant).collect()
+    };
+    let plain = [0.0, 0.5];
+    assert_eq!(told(None, on(10.25, plain)), [], "it comes in");
+    assert_eq!(told(None, on(10.25, crest)), [Invariant::Texture]);
+    for (x, honest) in [(10.25, crest), (10.0, slope)] {
+        let rested = Some(on(x, honest));
+        assert_eq!(told(rested, on(x, honest)), []);
+        for forged in [
+            [0.0, 0.605],
+            [0.01, 0.6],
+            [-0.13, 0.505],
+            plain,
+            [0.0, -0.6],
+        ] {
+            assert_eq!(
+                told(rested, on(x, forged)),
+                [Invariant::Texture],
+                "{forged:?}"
+            );
+        }
+        // Too fast: nothing at all of it.
+        assert_eq!(told(rested, on(x + 0.25, plain)), [], "to the bit");
+        assert_eq!(
+            told(rested, on(x + 0.26, [0.0, 0.500_001])),
+            [Invariant::Texture]
+        );
+    }
 }
 
 const ABOVE: [f64; 3] = [10.5, 10.5, 3.0];
@@ -489,7 +549,14 @@ fn other_bits(seen: &[Seen]) -> Vec<Vec<Seen>> {
             forged[1] = with(forged[1], change);
             forged
         })
-        .to_vec()
+        .into_iter()
+        .chain(std::iter::once({
+            let mut forged = seen.to_vec();
+            let textured = forged[1].textured.as_mut().expect("textured");
+            textured.z = f32::from_bits(textured.z.to_bits() ^ 1);
+            forged
+        }))
+        .collect()
 }
 
 fn only<T: std::fmt::Debug>(invariant: Invariant, verdict: Result<T, Violation>) {

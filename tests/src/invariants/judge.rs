@@ -4,8 +4,10 @@
 //! `place`, how it came there from the tick before in `change`.
 
 use hapterra_core::contact::{Friction, Rule};
+use hapterra_core::force::Texture;
 
 use super::seen::Seen;
+use super::texture::TextureJudge;
 use super::{Invariant, Violation};
 use crate::scene::run::Scene;
 use crate::scene::terrain::Terrain;
@@ -64,6 +66,7 @@ pub struct Judge<'g> {
     pub(super) terrain: &'g Terrain,
     rule: Rule,
     pub(super) friction: Friction,
+    texture: Option<TextureJudge>,
     /// Ticks in a row in which the proxy has not moved.
     pub(super) still: u32,
     tick: usize,
@@ -76,7 +79,8 @@ pub struct Judge<'g> {
     pub measured: Measured,
 }
 
-pub(super) type Verdict = Result<(), Violation>;
+/// What is wrong with a tick.
+pub type Verdict = Result<(), Violation>;
 
 impl<'g> Judge<'g> {
     /// A judge over a terrain.
@@ -86,6 +90,7 @@ impl<'g> Judge<'g> {
             terrain,
             rule,
             friction: Friction::NONE,
+            texture: None,
             still: 0,
             tick: 0,
             before: None,
@@ -98,7 +103,9 @@ impl<'g> Judge<'g> {
     /// A judge of a scene.
     #[must_use]
     pub fn of(scene: &'g Scene) -> Self {
-        Self::new(&scene.terrain, scene.rule).with_friction(scene.friction)
+        Self::new(&scene.terrain, scene.rule)
+            .with_friction(scene.friction)
+            .with_texture(scene.texture)
     }
 
     /// The same of a rough surface.
@@ -107,12 +114,29 @@ impl<'g> Judge<'g> {
         Self { friction, ..self }
     }
 
+    /// The same of a surface with a texture, or an even one.
+    #[must_use]
+    pub fn with_texture(self, texture: Texture) -> Self {
+        let texture = (!texture.is_none()).then(|| TextureJudge::new(texture));
+        Self { texture, ..self }
+    }
+
     /// Judges the next tick.
     ///
     /// # Errors
     /// The first invariant that it breaks.
     pub fn look(&mut self, seen: &Seen) -> Verdict {
         self.all(seen).into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Judges the texture of the next tick, and nothing else.
+    ///
+    /// # Errors
+    /// [`Invariant::Texture`].
+    pub fn look_at_texture(&mut self, seen: &Seen) -> Verdict {
+        let verdict = self.is_textured(seen);
+        self.tick += 1;
+        verdict
     }
 
     /// Judges the next tick: everything that it breaks.
@@ -137,6 +161,7 @@ impl<'g> Judge<'g> {
         let swept = self.rule == Rule::Swept;
         told.extend(self.is_consistent(seen, swept).err());
         told.extend(self.is_shaded(seen, swept).err());
+        told.extend(self.is_textured(seen).err());
         if seen.is_touching() {
             told.extend(self.is_on_surface(seen).err());
         }
@@ -171,6 +196,15 @@ impl<'g> Judge<'g> {
         told.extend(self.passes_no_wall(before, seen).err());
         if !self.friction.is_none() {
             told.extend(self.sticks(before, seen).err());
+        }
+    }
+
+    /// The force is the one without texture, and what the texture adds.
+    fn is_textured(&mut self, seen: &Seen) -> Verdict {
+        let judged = self.texture.as_mut().map(|judge| judge.look(seen));
+        match judged {
+            Some(Err(detail)) => self.fail(Invariant::Texture, detail),
+            _ => Ok(()),
         }
     }
 

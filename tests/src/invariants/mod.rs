@@ -15,6 +15,7 @@ mod place;
 pub mod seen;
 mod shading;
 pub mod surface;
+pub mod texture;
 
 /// What every tick must keep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -65,6 +66,8 @@ pub enum Invariant {
     Fade,
     /// With shading: the force is as long as without, and along the smoothed normal.
     Shading,
+    /// With texture: the force is the one without and what the relief adds; it never pulls.
+    Texture,
     /// The same input gives the same bits.
     Repeatable,
     /// A scene shifted by whole cells gives the same bits.

@@ -26,6 +26,8 @@ pub struct Seen {
     pub felt: ContactOutput,
     /// The displacement as shading turns it, where there is shading.
     pub shaded: Option<Shaded>,
+    /// The same, or the plain displacement, as texture changes it, where there is texture.
+    pub textured: Option<Vec3>,
     /// The proxy, where the terrain was made.
     pub proxy: [f64; 3],
     /// The force that the product's law gives for it, N, by [`CELLS_MM`].
@@ -50,6 +52,7 @@ impl Seen {
             hip,
             felt,
             shaded: None,
+            textured: None,
             proxy: [0, 1, 2].map(|i| at[i] - f64::from(shift[i])),
             force_n: CELLS_MM.map(|cell_mm| {
                 let force = LAW.force_n(felt.displacement * cell_mm);

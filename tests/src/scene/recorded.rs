@@ -65,6 +65,7 @@ impl Recorded {
             law: ForceLaw {
                 friction: scene.friction,
                 shading: scene.shading,
+                texture: scene.texture,
                 ..ForceLaw::PREMIUM
             },
             rule: scene.rule,

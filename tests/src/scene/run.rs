@@ -2,8 +2,9 @@
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{Contact, ContactOutput, ContactSettings, Execution, Friction, Rule};
-use hapterra_core::force::{Shader, Shading};
+use hapterra_core::force::{Pattern, Shader, Shading, Texture, Texturer};
 use hapterra_core::grid::GridPoint;
+use hapterra_core::rate::TickRate;
 use hapterra_core::terrain::TileIndex;
 
 use super::hip_path;
@@ -36,6 +37,8 @@ pub struct Scene {
     pub friction: Friction,
     /// Which normals the force follows.
     pub shading: Shading,
+    /// Its micro-relief, of cells of a millimetre.
+    pub texture: Texture,
     /// Whether the contact takes its shortcuts.
     pub shortcuts: bool,
     /// Which of the twins are run beside it.
@@ -62,6 +65,33 @@ impl Surface {
             Self::Smooth => "",
             Self::Rough => " --rough",
         }
+    }
+}
+
+/// The grating of a scene of one's own.
+const GRATING: Texture = Texture {
+    pattern: Pattern::Grating,
+    amplitude_mm: 0.05,
+    wavelength_mm: 0.5,
+    ..Texture::NONE
+};
+
+/// The texture of a scene, if any.
+fn texture(mixed: u64) -> Texture {
+    // Its own dice, so that all else of a scene stays what it was.
+    let mut chance = Chance::new(mixed ^ 0x7e87_0e5e);
+    let pattern = [Pattern::None, Pattern::Grain, Pattern::Grating][chance.below(3)];
+    if pattern == Pattern::None {
+        return Texture::NONE;
+    }
+    let wavelength_mm = [0.25, 0.5, 1.0, 1.7, 8.0, 32.0, 100.0][chance.below(7)];
+    let most_mm = (wavelength_mm * Texture::STEEPEST).min(Texture::MOST_AMPLITUDE_MM);
+    Texture {
+        pattern,
+        amplitude_mm: most_mm * [0.02, 0.4, 1.0][chance.below(3)],
+        wavelength_mm,
+        direction_deg: [0.0, 0.0, 33.0, -120.0][chance.below(4)],
+        seed: [0, 1, chance.bits() as u32][chance.below(3)],
     }
 }
 
@@ -116,6 +146,7 @@ impl Scene {
             friction: Friction::NONE,
             // By number, as the path.
             shading: [Shading::None, Shading::Smooth][(number / 2 % 2) as usize],
+            texture: texture(mixed),
             shortcuts: true,
             twins: Twins::One(if paper { 0 } else { chance.below(6) }),
             seed: chance.bits(),
@@ -161,6 +192,7 @@ impl Scene {
             supply,
             friction: Friction::NONE,
             shading: Shading::Smooth,
+            texture: GRATING,
             shortcuts: true,
             twins: Twins::All,
             seed: 1,
@@ -220,6 +252,24 @@ impl Scene {
         Ok(all)
     }
 
+    /// Whether it feels the same a multiple of 32 cells away: a texture lies fast on the
+    /// terrain's cells.
+    #[must_use]
+    pub fn is_textured_alike(&self) -> bool {
+        let Texture {
+            pattern,
+            wavelength_mm,
+            direction_deg,
+            ..
+        } = self.texture;
+        let fits = [0.25, 0.5, 1.0, 8.0, 32.0].contains(&wavelength_mm);
+        match pattern {
+            Pattern::None => true,
+            Pattern::Grain => false,
+            Pattern::Grating => fits && direction_deg == 0.0,
+        }
+    }
+
     /// The same settings over another terrain, with another path of the HIP.
     #[must_use]
     pub fn with(&self, terrain: Terrain, path: Vec<[f64; 3]>) -> Self {
@@ -238,6 +288,9 @@ pub struct Player<'t, 'g, const D: usize> {
     shader: Option<Shader>,
     /// The last displacement, shaded.
     shaded: Vec3,
+    texturer: Option<Texturer>,
+    /// The last displacement, shaded and textured.
+    textured: Vec3,
     /// Where it feels.
     pub supplied: SuppliedWindow<'t, 'g, D>,
     execution: Execution,
@@ -257,6 +310,8 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
             contact: Contact::new(scene.settings()),
             shader: Shader::of(scene.shading),
             shaded: Vec3::ZERO,
+            texturer: Texturer::of(&scene.texture, 1.0, TickRate::DEFAULT),
+            textured: Vec3::ZERO,
             supplied: SuppliedWindow::new(buffers, &scene.terrain, shift, supply),
             execution: scene.execution,
             shift,
@@ -288,6 +343,9 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
             self.now += 1;
             only_shading_waits = felt.converged && missing.is_some();
             if in_real_time || (felt.converged && missing.is_none()) {
+                if let Some(texturer) = &mut self.texturer {
+                    self.textured = texturer.add(self.shaded, &felt.proxy);
+                }
                 return Some(ContactOutput { work, ..felt });
             }
         }
@@ -313,6 +371,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
                 displacement: self.shaded,
                 is_whole: shader.missing().is_none(),
             }),
+            textured: self.texturer.as_ref().map(|_| self.textured),
             ..Seen::new(hip, felt, self.shift)
         }
     }

@@ -35,7 +35,7 @@ const BESIDE: f64 = 128.0;
 /// How far above or below, cells: farther down than any spike reaches up.
 const DEEP: f64 = 4e6;
 
-/// Up to 10⁸ cells away: the same bits.
+/// Up to 10⁸ cells away: the same bits, but for textures that are others there.
 ///
 /// Both runs are away from the origin, so that what lies beyond the field is
 /// alike: not here, until it is asked for. By whole tiles, and by any whole cells
@@ -63,13 +63,18 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Com
         scene.terrain.clone(),
         scene.path.iter().map(beside).collect(),
     );
-    let near = scene.feel(
-        buffers,
-        [256, 256, 0],
-        Supply::Pulled { latency: 0 },
-        |_| Ok(()),
-    )?;
-    let away = scene.feel(buffers, shift, Supply::Pulled { latency: 0 }, |_| Ok(()))?;
+    let mut felt = |shift| {
+        // Of grain, and of most gratings, another part is there; it is judged as well.
+        let mut judge = Judge::new(&scene.terrain, scene.rule).with_texture(scene.texture);
+        let pulled = Supply::Pulled { latency: 0 };
+        let seen = scene.feel(buffers, shift, pulled, |seen| judge.look_at_texture(seen))?;
+        Ok(seen.into_iter().map(|seen| Seen {
+            textured: seen.textured.filter(|_| scene.is_textured_alike()),
+            ..seen
+        }))
+    };
+    let near = Vec::from_iter(felt([256, 256, 0])?);
+    let away = Vec::from_iter(felt(shift)?);
     let by = [shift[0] - 256, shift[1] - 256, shift[2]];
     same_bits(Invariant::Shift, &near, &away, by).map(|()| true)
 }
@@ -113,6 +118,8 @@ pub fn same_bits(invariant: Invariant, seen: &[Seen], other: &[Seen], shift: [i3
                 seen.felt.displacement.to_array().map(f32::to_bits),
                 seen.shaded
                     .map(|shaded| shaded.displacement.to_array().map(f32::to_bits)),
+                seen.textured
+                    .map(|textured| textured.to_array().map(f32::to_bits)),
                 [0, 1, 2].map(|i| cell[i] - shift[i]),
                 frac.to_array().map(f32::to_bits),
             )

@@ -1,0 +1,184 @@
+//! The force with texture, by the formulas of docs/effects.md, in f64 and whole numbers.
+
+use glam::DVec3;
+use hapterra_core::force::{Pattern, Texture};
+use hapterra_core::grid::GridPoint;
+
+use super::seen::Seen;
+
+/// A tick of the soak, s.
+const TICK_S: f64 = 1e-3;
+/// Rounding, as a part of the depth and of the amplitude.
+const ROUNDING: f64 = 1e-5;
+/// The part along the surface is so far from it.
+const PULL: f64 = 1e-6;
+/// The product's sine is so far off at most, and its slope.
+const SINE: f64 = 5e-4;
+const SLOPE: f64 = 1e-2;
+/// Grain's rounding, of heights and slopes of 1.
+const GRAIN: f64 = 1e-5;
+/// A force that is felt in whole is so far in the texture's share, by rounding of a speed.
+const SHARE: f64 = 1e-3;
+/// Depths whose squares are no normal numbers have no texture, cells.
+const SHALLOW: f64 = 2e-19;
+const DEEP: f64 = 1e18;
+
+/// Judges the texture of one scene, of cells of a millimetre, tick by tick.
+#[derive(Clone, Debug)]
+pub struct TextureJudge {
+    texture: Texture,
+    before: Option<GridPoint>,
+    /// Wavelengths a tick.
+    speed: f64,
+}
+
+/// What is wrong with a textured force.
+type Verdict = Result<(), String>;
+
+impl TextureJudge {
+    /// Before the first tick.
+    #[must_use]
+    pub const fn new(texture: Texture) -> Self {
+        Self {
+            texture,
+            before: None,
+            speed: 0.0,
+        }
+    }
+
+    /// Judges the next tick.
+    ///
+    /// # Errors
+    /// What is wrong with its force.
+    pub fn look(&mut self, seen: &Seen) -> Verdict {
+        let share = self.share(&seen.felt.proxy);
+        let Some(textured) = seen.textured else {
+            return Ok(());
+        };
+        let shaded = seen.shaded.map(|shaded| shaded.displacement);
+        let plain = shaded.unwrap_or(seen.felt.displacement).as_dvec3();
+        let (textured, depth) = (textured.as_dvec3(), plain.length());
+        if !(SHALLOW..DEEP).contains(&depth) {
+            let same = (textured - plain).length() <= SHALLOW;
+            return held(same || depth >= DEEP, || format!("{textured} of {plain}"));
+        }
+        let normal = plain / depth;
+        held(textured.dot(normal) >= -PULL * depth, || {
+            format!("{textured} pulls, of {plain}")
+        })?;
+        let (amplitude, wavelength) = self.sizes();
+        let (height, slopes) = height_and_slopes(&self.texture, &seen.felt.proxy);
+        let slopes = slopes - normal * slopes.dot(normal);
+        let deepest = wavelength * wavelength / (48.0 * amplitude);
+        let felt = depth.min(deepest);
+        let wanted = normal * (amplitude * height * (depth / amplitude).min(1.0)) - slopes * felt;
+        let (high, steep) = match self.texture.pattern {
+            Pattern::Grain => (GRAIN, GRAIN),
+            _ => (SINE, SLOPE),
+        };
+        let misplaced = std::f64::consts::TAU / wavelength * self.misplaced(&seen.felt.proxy);
+        let steepest = std::f64::consts::TAU * amplitude / wavelength;
+        let allowed = amplitude.min(depth) * (high + misplaced)
+            + felt * steepest * (steep + 8.0 * misplaced)
+            + SHARE * (amplitude.min(depth) + felt * steepest) * f64::from(u8::from(share < 1.0))
+            + ROUNDING * depth;
+        let off = (textured - plain - wanted * share).length();
+        let told = || {
+            format!(
+                "{textured} is {off:e} off {plain} and {share} of {wanted}, {allowed:e} may be: {seen:?}"
+            )
+        };
+        // To the bit, where the proxy is too fast.
+        let is_gone = (2.0 - 8.0 * self.speed) < -1e-5;
+        held(off <= allowed && (!is_gone || textured == plain), told)
+    }
+
+    /// How far a place is known, cells: to 2⁻²³; along a way of any direction, which is rounded, to
+    /// the last place of the distance from the origin.
+    fn misplaced(&self, at: &GridPoint) -> f64 {
+        let [x, y, _] = at.cell().map(|cell| f64::from(cell.unsigned_abs()));
+        let is_turned = self.texture.direction_deg != 0.0;
+        let cells = if is_turned { x + y } else { 0.0 };
+        1.2e-7 * (1.0 + 2.0 * cells)
+    }
+
+    fn sizes(&self) -> (f64, f64) {
+        (
+            f64::from(self.texture.amplitude_mm),
+            f64::from(self.texture.wavelength_mm),
+        )
+    }
+
+    /// How much is felt of a texture at a proxy: the speed that was is forgotten by a tenth a tick.
+    fn share(&mut self, proxy: &GridPoint) -> f64 {
+        let now = self.before.map_or(1.0, |before| {
+            let way = before.to(proxy).as_dvec3();
+            (way.x.hypot(way.y) / self.sizes().1).min(1.0)
+        });
+        self.before = Some(*proxy);
+        self.speed = now.max(self.speed * (1.0 - 100.0 * TICK_S));
+        let left = (2.0 - 8.0 * self.speed).clamp(0.0, 1.0);
+        left * left * (3.0 - 2.0 * left)
+    }
+}
+
+fn held(holds: bool, told: impl Fn() -> String) -> Verdict {
+    holds.then_some(()).ok_or_else(told)
+}
+
+/// The height of a texture as high as 1 at a place, and the slopes of the one that is asked for.
+fn height_and_slopes(texture: &Texture, at: &GridPoint) -> (f64, DVec3) {
+    let amplitude = f64::from(texture.amplitude_mm);
+    let waves = 1.0 / texture.wavelength_mm;
+    let (cell, frac) = (at.cell(), at.frac());
+    if texture.pattern == Pattern::Grain {
+        let grains = 2.0 * waves;
+        let ((col, u), (row, v)) = (
+            counted(grains, cell[0], frac.x),
+            counted(grains, cell[1], frac.y),
+        );
+        let corner = |east, north| drawn(col + east, row + north, texture.seed);
+        let ((u, steep_u), (v, steep_v)) = (eased(u), eased(v));
+        let [sw, se, nw, ne] = [corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)];
+        let height = (sw * (1.0 - u) + se * u) * (1.0 - v) + (nw * (1.0 - u) + ne * u) * v;
+        let east = ((se - sw) * (1.0 - v) + (ne - nw) * v) * steep_u;
+        let north = ((nw - sw) * (1.0 - u) + (ne - se) * u) * steep_v;
+        let per_cell = amplitude * f64::from(grains);
+        return (height, DVec3::new(east, north, 0.0) * per_cell);
+    }
+    let angle = f64::from(texture.direction_deg).to_radians();
+    let way = DVec3::new(angle.cos(), angle.sin(), 0.0);
+    // Rounded once, as the texture is made of it.
+    let [east, north] = [way.x, way.y].map(|part| (part as f32) * waves);
+    let seed = f64::from(scrambled(texture.seed)) / 2_f64.powi(32);
+    let turns = counted(east, cell[0], frac.x).1 + counted(north, cell[1], frac.y).1 + seed;
+    let (sin, cos) = (std::f64::consts::TAU * turns).sin_cos();
+    let steepness = amplitude * std::f64::consts::TAU * f64::from(waves) * cos;
+    (sin, way * steepness)
+}
+
+/// A coordinate times a number a cell: whole ones, and the rest.
+fn counted(per_cell: f32, cell: i32, frac: f32) -> (i64, f64) {
+    let per_cell = (f64::from(per_cell) * 2_f64.powi(32)) as i128;
+    let place = (i128::from(cell) << 30) + (f64::from(frac) * 2_f64.powi(30)) as i128;
+    let product = per_cell * place;
+    let rest = product & ((1 << 62) - 1);
+    ((product >> 62) as i64, rest as f64 / 2_f64.powi(62))
+}
+
+fn eased(x: f64) -> (f64, f64) {
+    (x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x))
+}
+
+fn drawn(col: i64, row: i64, seed: u32) -> f64 {
+    let corner = (i128::from(col) * 0x9E37_79B1 + i128::from(row) * 0x85EB_CA77) as u32;
+    let number = scrambled(corner.wrapping_add(scrambled(seed)));
+    f64::from(number as i32) / 2_f64.powi(31)
+}
+
+/// Wellons' `lowbias32`.
+fn scrambled(x: u32) -> u32 {
+    let x = (x ^ (x >> 16)).wrapping_mul(0x7FEB_352D);
+    let x = (x ^ (x >> 15)).wrapping_mul(0x846C_A68B);
+    x ^ (x >> 16)
+}
