@@ -10,7 +10,7 @@ use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::{ContactState, Rule};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::{ForceLaw, Pattern, Shading, Texture};
 use hapterra_core::scene::Sample;
 use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::hapterra_binary;
@@ -63,15 +63,31 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
         return;
     };
     let made = |kind| Synth::new(kind, 3, 25.0).raster(150, 140).expect("raster");
-    for (name, raster, rule) in [
-        ("fractal", made(Kind::Fractal), Rule::Swept),
-        ("steps", made(Kind::Steps), Rule::Swept),
-        ("holes", holed(), Rule::Swept),
-        ("fractal", made(Kind::Fractal), Rule::Paper),
+    let plain = ForceLaw::PREMIUM;
+    let with = |pattern| ForceLaw {
+        shading: Shading::Smooth,
+        texture: Texture {
+            pattern,
+            amplitude_mm: 0.2,
+            wavelength_mm: 1.7,
+            direction_deg: 33.0,
+            seed: 9,
+        },
+        ..plain
+    };
+    for (name, raster, rule, law) in [
+        ("fractal", made(Kind::Fractal), Rule::Swept, plain),
+        (
+            "steps",
+            made(Kind::Steps),
+            Rule::Swept,
+            with(Pattern::Grating),
+        ),
+        ("holes", holed(), Rule::Swept, with(Pattern::Grain)),
+        ("fractal", made(Kind::Fractal), Rule::Paper, plain),
     ] {
         let scale = Scale::new(0.8, 0.9).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-        let law = ForceLaw::PREMIUM;
         let path = wander(&terrain, 17, 300, -2.0);
         let mut native = on_native(&terrain, law, rule).expect("opened");
         let expected = walk(&mut native, &path);

@@ -1,0 +1,209 @@
+//! Texture in a replay, by the judge of the soak, and from the command line.
+
+use std::path::Path;
+use std::process::Command;
+
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::replay::on_native;
+use hapterra::synth::{Kind, Synth};
+use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra_core::contact::{ContactOutput, ContactState, Rule};
+use hapterra_core::force::{ForceLaw, Pattern, Shading, Texture};
+use hapterra_core::scene::Sample;
+use hapterra_tests::field::position;
+use hapterra_tests::hapterra_binary;
+use hapterra_tests::invariants::seen::Seen;
+use hapterra_tests::invariants::texture::TextureJudge;
+
+/// HIPs of a way, and from one to the next, mm.
+const STEPS: u32 = 4_000;
+const STEP: f64 = 0.02;
+
+const GRAIN: Texture = Texture {
+    pattern: Pattern::Grain,
+    amplitude_mm: 0.1,
+    wavelength_mm: 1.0,
+    direction_deg: 0.0,
+    seed: 3,
+};
+const GRATING: Texture = Texture {
+    pattern: Pattern::Grating,
+    direction_deg: -30.0,
+    ..GRAIN
+};
+
+/// Ground that is made here, and files of real ground where they are on this machine.
+fn rasters() -> Vec<(&'static str, Raster)> {
+    let made = Synth::new(Kind::Fractal, 3, 25.0).raster(300, 200);
+    let mut all = vec![("fractal", made.expect("raster"))];
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/dem/real");
+    for name in ["mt_rainier_90m.tif", "SainteHelens.dem"] {
+        let path = folder.join(name);
+        match path.exists() {
+            true => all.push((
+                name,
+                Raster::open(&path, &OpenOptions::default()).expect("opens"),
+            )),
+            false => println!("skipped: no {name} in ../shared/dem/real"),
+        }
+    }
+    all
+}
+
+/// What a HIP feels on a circle, half a millimetre deep, that sets out from the air. In the middle
+/// it lifts twice and goes fast for some time. A cell is a millimetre, so that the force is half of
+/// the displacement, to the bit.
+fn circle(terrain: &Terrain<'_>, law: ForceLaw) -> Vec<Sample> {
+    let mut replayer = on_native(terrain, law, Rule::Swept).expect("opened");
+    let size = terrain.size_mm();
+    let radius = STEP * f64::from(STEPS) / std::f64::consts::TAU;
+    let radius = radius.min(0.4 * size[0].min(size[1]));
+    let mut way = 0.0;
+    let felt = (0..=STEPS).filter_map(|tick| {
+        let is_fast = (1_600..1_650).contains(&tick);
+        way += if is_fast { 0.3 } else { STEP };
+        let angle = way / radius;
+        let at = [
+            size[0] / 2.0 + radius * angle.cos(),
+            size[1] / 2.0 + radius * angle.sin(),
+        ];
+        let ground = terrain.height_mm(at[0], at[1])?;
+        let lifts = tick % 1_200 < 20;
+        let above = if lifts { 1.0 } else { -0.5 };
+        let hip = terrain.scale().to_grid([at[0], at[1], ground + above]);
+        Some(replayer.feel(hip.expect("addressable")).expect("felt"))
+    });
+    felt.collect()
+}
+
+/// The textured tick as the judge sees it: the displacement is what the same scene without
+/// texture makes.
+fn seen(plain: &Sample, textured: &Sample) -> Seen {
+    let felt = ContactOutput {
+        state: textured.state,
+        proxy: textured.proxy,
+        displacement: plain.force_n * 2.0,
+        converged: true,
+        ..ContactOutput::default()
+    };
+    Seen {
+        textured: Some(textured.force_n * 2.0),
+        ..Seen::new(position(&textured.hip), felt, [0; 3])
+    }
+}
+
+#[test]
+fn a_replay_is_textured_and_the_proxy_is_where_it_is_without() {
+    for (name, raster) in &rasters() {
+        let grid = FeltGrid::new(raster, FeltCells::Square);
+        let scale = Scale::true_to(&grid, 1.0).expect("scale");
+        let terrain = Terrain::over(grid, scale, 0).expect("terrain");
+        let law = ForceLaw {
+            shading: Shading::Smooth,
+            ..ForceLaw::PREMIUM
+        };
+        let plain = circle(&terrain, law);
+        for texture in [GRAIN, GRATING] {
+            let textured = circle(&terrain, ForceLaw { texture, ..law });
+            assert_eq!(plain.len(), textured.len());
+            let mut judge = TextureJudge::new(texture);
+            let (mut touched, mut most) = (0, 0.0_f32);
+            for (tick, (plain, textured)) in plain.iter().zip(&textured).enumerate() {
+                assert_eq!(plain.proxy, textured.proxy);
+                let judged = judge.look(&seen(plain, textured));
+                assert_eq!(judged, Ok(()), "{name}, {texture:?}, tick {tick}");
+                touched += u32::from(textured.state == ContactState::Touching);
+                most = most.max((textured.force_n - plain.force_n).length());
+            }
+            println!(
+                "{name}, {:?}: {touched} ticks, up to {most} N",
+                texture.pattern
+            );
+            assert!(touched > STEPS / 2, "{name}: {touched}");
+            assert!((0.03..0.09).contains(&most), "{name}: {most} N");
+        }
+    }
+}
+
+/// A demonstration with a texture is recorded with it, replayed with it, and replayed again to the
+/// same bytes.
+#[test]
+fn a_recording_keeps_its_texture() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let hapterra = |args: &[&str]| {
+        let run = Command::new(hapterra_binary())
+            .args(args)
+            .current_dir(folder.path())
+            .output()
+            .expect("started");
+        let said = String::from_utf8_lossy(&run.stderr).into_owned();
+        (run.status.success(), said)
+    };
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("there");
+    let synth = [
+        "synth",
+        "fractal",
+        "--size",
+        "129",
+        "--seed",
+        "4",
+        "--output",
+        "hills.tif",
+    ];
+    let (made, said) = hapterra(&synth);
+    assert!(made, "{said}");
+    let demo = [
+        "demo",
+        "hills.tif",
+        "--seconds",
+        "4",
+        "--texture",
+        "grating",
+    ];
+    let numbers = [
+        "--texture-amplitude",
+        "0.15",
+        "--texture-wavelength",
+        "2.5",
+        "--texture-direction",
+        "-40",
+        "--texture-seed",
+        "6",
+    ];
+    let (felt, said) = hapterra(&[&demo[..], &numbers].concat());
+    assert!(felt, "{said}");
+    let recording = read("demo/hills.csv");
+    assert!(
+        recording.contains("# [force.texture]\n# pattern = \"grating\"\n"),
+        "{said}"
+    );
+    for (more, output) in [
+        (&[][..], "a.csv"),
+        (&[], "b.csv"),
+        (&["--texture", "none"], "c.csv"),
+    ] {
+        let replay = ["replay", "hills.tif", "demo/hills.csv", "--output", output];
+        let (replayed, said) = hapterra(&[&replay[..], more].concat());
+        assert!(replayed, "{said}");
+    }
+    let [a, b, c] = ["a.csv", "b.csv", "c.csv"].map(read);
+    assert_eq!(a, b);
+    assert!(a.contains("# wavelength_mm = 2.5\n"));
+    assert!(!c.contains("force.texture"));
+    let rows = |text: &str| -> Vec<String> {
+        let rows = text.lines().filter(|line| !line.starts_with('#'));
+        rows.map(str::to_owned).collect()
+    };
+    assert!(rows(&a).len() > 3_000 && rows(&a) != rows(&c));
+    let (replayed, said) = hapterra(
+        &[
+            &["replay", "hills.tif", "demo/hills.csv", "--output", "d.csv"][..],
+            &["--texture-amplitude", "0.5"],
+        ]
+        .concat(),
+    );
+    assert!(
+        !replayed && said.contains("hint: --texture-amplitude"),
+        "{said}"
+    );
+}
