@@ -6,7 +6,7 @@ use hapterra_bench::grid::Grid;
 use hapterra_bench::path::Dice;
 use hapterra_bench::state::{TICKS, terrain};
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::{Controller, Damping, ForceLaw, Shading};
+use hapterra_core::force::{Controller, Damping, ForceLaw, Pattern, Shading, Texture};
 use hapterra_core::scene::{Scene, Source};
 use hapterra_tests::counting::CountingBoard;
 
@@ -72,9 +72,33 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
         },
         ..law
     };
+    let grained = |law| ForceLaw {
+        texture: Texture {
+            pattern: Pattern::Grain,
+            amplitude_mm: 0.1,
+            wavelength_mm: 1.0,
+            direction_deg: 0.0,
+            seed: 1,
+        },
+        ..law
+    };
+    let grated = |law| {
+        let mut law = grained(law);
+        (law.texture.pattern, law.texture.direction_deg) = (Pattern::Grating, 30.0);
+        law
+    };
+    let grain = (&sliding[..], with_law(arm.scene(), grained));
+    let grating = (&sliding[..], with_law(arm.scene(), grated));
     let shaded = (&sliding[..], with_law(arm.scene(), smooth));
     let damping = (&sliding[..], with_law(arm.scene(), damped));
     let all = with_law(with_law(rough(arm.scene()), smooth), damped);
+    // Slower than half a cell a tick, at which it has faded.
+    let coarse = |law| {
+        let mut law = grained(law);
+        law.texture.wavelength_mm = 8.0;
+        law
+    };
+    let all = with_law(all, coarse);
     let all = (&fast[..], all);
     vec![
         row("chain, free", in_the_air, &free, ContactState::Free),
@@ -102,6 +126,20 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
             "chain, sliding, shaded",
             in_the_air,
             shaded,
+            ContactState::Touching,
+        ),
+        arm.row(
+            board,
+            "chain, sliding, grain",
+            in_the_air,
+            grain,
+            ContactState::Touching,
+        ),
+        arm.row(
+            board,
+            "chain, sliding, grating",
+            in_the_air,
+            grating,
             ContactState::Touching,
         ),
         arm.row(
