@@ -11,6 +11,8 @@ use crate::guard::{Blockers, Mode};
 use crate::terrain::testing::buffers;
 use crate::terrain::{FieldSize, TileDemand, TileRequester};
 
+#[path = "tick_tests/textured.rs"]
+mod textured;
 #[path = "tick_tests/views.rs"]
 mod views;
 

@@ -109,7 +109,7 @@ const GONE: f32 = 0.25;
 const DEEPEST: f32 = 1.0 / 48.0;
 /// Speed of a proxy that was elsewhere before, or nowhere, wavelengths a tick.
 const JUMP: f32 = 1.0;
-/// How fast the speed that was is forgotten, 1/s: encoders tell a slow hand's speed in jumps.
+/// How fast the speed falls, 1/s: encoders tell a slow hand's speed in jumps.
 const FORGETS_PER_S: f32 = 100.0;
 
 /// The texture of one scene at one rate.
@@ -121,7 +121,7 @@ pub struct Texturer {
     /// Cells.
     deepest: f32,
     waves_per_cell: f32,
-    /// What a tick leaves of the speed.
+    /// What a tick leaves of the speed that was above.
     keeps: f32,
     /// The proxy's speed, wavelengths a tick.
     speed: f32,
@@ -206,7 +206,8 @@ impl Texturer {
             None => JUMP,
         };
         self.before = Some(*proxy);
-        self.speed = larger(now, self.speed * self.keeps);
+        // At once where it rises; where it falls, by and by.
+        self.speed = now + larger(0.0, self.speed - now) * self.keeps;
         let left = (GONE - self.speed) / (GONE - WHOLE);
         let left = left.clamp(0.0, 1.0);
         left * left * (3.0 - 2.0 * left)

@@ -191,8 +191,9 @@ fn it_never_pulls_and_keeps_its_bounds() {
     for texture in [GRATING, GRAIN, steep] {
         let mut texturer = texturer(&texture);
         let (a, l) = (texture.amplitude_mm, texture.wavelength_mm);
+        let mut farthest = 0.0_f32;
         for i in 0..cases(50_000, 500) {
-            let depth_mm = [1e-30, 1e-6, 0.01, 0.1, 0.5, 3.0, 1e3, 1e9][i as usize % 8];
+            let depth_mm = [1e-30, 1e-6, 0.01, 0.1, 0.5, 3.0, 1e3, 1e9][i as usize / 3 % 8];
             let normal = [Vec3::Z, Vec3::X, Vec3::new(-0.48, 0.6, 0.64)][i as usize % 3];
             let plain = normal * (depth_mm / CELL_MM);
             let felt = texturer.add(plain, &place(0.013 * f64::from(i), 0.007 * f64::from(i)));
@@ -209,7 +210,19 @@ fn it_never_pulls_and_keeps_its_bounds() {
                 along.length() <= most * 1.000_1 + rounding,
                 "{depth_mm}: {along}"
             );
+            if depth_mm == 3.0 {
+                farthest = farthest.max(along.length());
+            }
         }
+        let wanted = if texture.pattern == Pattern::Grain {
+            0.09
+        } else {
+            0.13
+        };
+        assert!(
+            cfg!(miri) || farthest > wanted * l,
+            "{texture:?}: {farthest}"
+        );
     }
 }
 
@@ -268,6 +281,33 @@ fn a_round_gives_no_energy() {
     }
 }
 
+/// A slow hand's proxy goes by an encoder count in one tick and stands in others, and after a jump
+/// a texture comes in evenly.
+#[test]
+fn the_share_of_a_texture_neither_flutters_nor_jumps() {
+    let mut coarse = texturer(&GRATING);
+    let mut fine = texturer(&GRATING);
+    for tick in 0..cases(3_000, 300) {
+        // On one line of equal height: 180 mm/s on average, by turns 0.2 and 0.16 mm a tick.
+        let y_mm = 0.18 * f64::from(tick) + if tick % 2 == 0 { 0.02 } else { 0.0 };
+        let [by_counts, evenly] = [(&mut coarse, y_mm), (&mut fine, 0.2 * f64::from(tick))]
+            .map(|(texturer, y_mm)| texturer.add(Vec3::Z, &place(0.25, y_mm)).z);
+        if tick > 100 {
+            assert!((by_counts - evenly).abs() < 0.01, "{by_counts} {evenly}");
+        }
+    }
+    let mut texturer = texturer(&GRATING);
+    texturer.add(Vec3::Z, &place(500.0, 500.0));
+    let crest = place(0.25, 0.0);
+    let shares: Vec<f32> = (0..40)
+        .map(|_| (texturer.add(Vec3::Z, &crest).z - 1.0) * CELL_MM / 0.1)
+        .collect();
+    let largest = shares.windows(2).map(|pair| pair[1] - pair[0]);
+    let largest = largest.fold(0.0, f32::max);
+    assert!(shares[10] == 0.0 && shares[21] > 0.99, "{shares:?}");
+    assert!(largest < 0.25, "{largest} in a tick");
+}
+
 /// With the contact itself: the proxy stays where it is without texture.
 #[test]
 fn the_proxy_is_not_moved_and_texture_is_along_the_slopes_normal() {
@@ -320,6 +360,9 @@ fn what_no_number_is_gives_none() {
             .map(|_| texturer.add(Vec3::Z, &place(0.3, 0.3)))
             .collect();
         assert!(felt[99].is_finite() && felt[99] != Vec3::Z, "{}", felt[99]);
+        // Too deep for a texture: what there is stays.
+        let deep = Vec3::new(-3e24, 4e30, 1e20);
+        assert_eq!(texturer.add(deep, &place(0.3, 0.3)), deep);
     }
 }
 

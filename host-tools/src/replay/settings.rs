@@ -471,7 +471,10 @@ mod rule_name {
 
 #[cfg(test)]
 mod tests {
+    use hapterra_core::force::Pattern;
+
     use super::*;
+    use crate::place::View;
     use crate::raster::Raster;
 
     fn raster(height: f32) -> Raster {
@@ -507,6 +510,49 @@ mod tests {
         assert_eq!(Settings::from_toml(&text).expect("read"), Some(settings));
         assert!(text.contains("rule = \"paper\"") && text.contains("level = 1"));
         assert!(text.contains("cell_mm = 2.0"), "of level 0: {text}");
+    }
+
+    #[test]
+    fn a_law_comes_back_with_all_that_a_surface_has() {
+        let law = ForceLaw {
+            stiffness_n_per_mm: 0.75,
+            max_force_n: 6.0,
+            friction: Friction::coulomb(0.3),
+            damping: Damping {
+                ns_per_m: 1.0,
+                ..Damping::NONE
+            },
+            shading: Shading::Smooth,
+            texture: Texture {
+                pattern: Pattern::Grain,
+                amplitude_mm: 0.1,
+                wavelength_mm: 1.5,
+                direction_deg: 0.0,
+                seed: 3,
+            },
+        };
+        let raster = raster(0.0);
+        let terrain = terrain(&raster);
+        let mut settings = settings(&terrain);
+        settings = Settings::new("t.tif", &terrain, (law, Rule::Swept), None, settings.device);
+        assert_eq!(settings.law(), law);
+        let (grid, scale) = (terrain.grid(), terrain.scale_of_level_0());
+        let view = View {
+            home_mm: [1.0; 3],
+            home_ground: [0.0; 2],
+            scale,
+            level: 1,
+            side_m: grid.side_m(),
+            exaggeration: None,
+            laid_mm: [0.0; 4],
+            heights_mm: [0.0; 2],
+            reach_mm: [0.0; 4],
+        };
+        let view = ViewSettings::new(1, &terrain, &Laid { view, law });
+        assert_eq!(view.law(), law);
+        settings.views = vec![view];
+        let text = settings.to_toml();
+        assert_eq!(Settings::from_toml(&text).expect("read"), Some(settings));
     }
 
     #[test]

@@ -109,14 +109,14 @@ impl TextureJudge {
         )
     }
 
-    /// How much is felt of a texture at a proxy: the speed that was is forgotten by a tenth a tick.
+    /// How much is felt of a texture at a proxy: a speed that falls does so by a tenth a tick.
     fn share(&mut self, proxy: &GridPoint) -> f64 {
         let now = self.before.map_or(1.0, |before| {
             let way = before.to(proxy).as_dvec3();
             (way.x.hypot(way.y) / self.sizes().1).min(1.0)
         });
         self.before = Some(*proxy);
-        self.speed = now.max(self.speed * (1.0 - 100.0 * TICK_S));
+        self.speed = now + (self.speed - now).max(0.0) * (1.0 - 100.0 * TICK_S);
         let left = (2.0 - 8.0 * self.speed).clamp(0.0, 1.0);
         left * left * (3.0 - 2.0 * left)
     }
