@@ -443,6 +443,14 @@ fn a_way_up_is_not_stopped_in_a_hairs_breadth() {
     scene.run(&mut buffers).expect("holds");
 }
 
+/// A proxy beside a needle of 10⁶ left an edge and was held beyond it, 32 times, and then
+/// rested on the edge's far side, below the HIP, which it pulled.
+#[test]
+fn a_proxy_that_may_leave_no_more_rests_where_it_was_held() {
+    let mut buffers = Buffers::default();
+    Scene::random(31, 12_943).run(&mut buffers).expect("holds");
+}
+
 /// A path of 60 cells close over the ground takes more than a tick; the HIP moved in each,
 /// and the path was begun anew: for as long as the HIP moved nothing was felt.
 #[test]

@@ -113,6 +113,21 @@ impl OnSurface {
             follow: None,
         }
     }
+
+    /// Of a proxy that may leave no more: where it was held it rests above the HIP. A patch's
+    /// closest point may lie below the HIP, and there it would pull.
+    #[inline(never)]
+    fn stays_above<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        held: SurfacePoint,
+    ) {
+        let is_below = |(_, z): (SurfacePoint, f32)| z < 0.0;
+        if self.descent.nearest(window, view).is_some_and(is_below) {
+            self.descent.restart(held);
+        }
+    }
 }
 
 /// The proxy and what it remembers from tick to tick.
@@ -522,7 +537,12 @@ impl Contact {
         let waits = self.settings.execution == Execution::LockStep;
         match on.descent.advance(window, &view, leave, waits, budget) {
             Ended::Rests if is_paper => self.decides(window, &view, hip),
-            Ended::Rests => self.touches(window, hip, true, None),
+            Ended::Rests => {
+                if let Leave::NoMore(held) = on.leave {
+                    on.stays_above(window, &view, held);
+                }
+                self.touches(window, hip, true, None)
+            }
             Ended::Missing(tile) => self.touches(window, hip, false, Some(tile)),
             Ended::Suspended => self.touches(window, hip, false, None),
             Ended::Leaves => self.leaves(window, &view, hip),
@@ -737,7 +757,7 @@ fn may_leave<const D: usize>(
     };
     match departures {
         Some(before) if before.in_vain >= DEPARTURES || before.creeping >= CREEPING => {
-            Leave::Nowhere
+            Leave::NoMore(hit)
         }
         Some(before) if !is_nearer(&before.nearest) => Leave::ButAt(hit),
         _ => Leave::Anywhere,

@@ -42,7 +42,9 @@ pub(in crate::contact) enum Leave {
     Anywhere,
     /// Not here: it has just tried to, and was held at once.
     ButAt(SurfacePoint),
-    /// Nowhere: it has left too often, or the rule does not know of leaving.
+    /// Nowhere any more: it has left too often. Here it was held last, above the HIP.
+    NoMore(SurfacePoint),
+    /// Nowhere: the rule does not know of leaving.
     Nowhere,
 }
 
@@ -52,7 +54,7 @@ impl Leave {
         match self {
             Self::Anywhere => true,
             Self::ButAt(place) => !point.is_same_place(place),
-            Self::Nowhere => false,
+            Self::NoMore(_) | Self::Nowhere => false,
         }
     }
 }
