@@ -113,21 +113,6 @@ impl OnSurface {
             follow: None,
         }
     }
-
-    /// Of a proxy that may leave no more: where it was held it rests above the HIP. A patch's
-    /// closest point may lie below the HIP, and there it would pull.
-    #[inline(never)]
-    fn stays_above<const D: usize>(
-        &mut self,
-        window: &Window<'_, D>,
-        view: &HipView,
-        held: SurfacePoint,
-    ) {
-        let is_below = |(_, z): (SurfacePoint, f32)| z < 0.0;
-        if self.descent.nearest(window, view).is_some_and(is_below) {
-            self.descent.restart(held);
-        }
-    }
 }
 
 /// The proxy and what it remembers from tick to tick.
@@ -533,16 +518,11 @@ impl Contact {
         };
         let view = HipView::new(hip);
         let is_paper = self.settings.rule == Rule::Paper;
-        let leave = if is_paper { Leave::Nowhere } else { on.leave };
+        let leave = if is_paper { &Leave::Nowhere } else { &on.leave };
         let waits = self.settings.execution == Execution::LockStep;
         match on.descent.advance(window, &view, leave, waits, budget) {
             Ended::Rests if is_paper => self.decides(window, &view, hip),
-            Ended::Rests => {
-                if let Leave::NoMore(held) = on.leave {
-                    on.stays_above(window, &view, held);
-                }
-                self.touches(window, hip, true, None)
-            }
+            Ended::Rests => self.touches(window, hip, true, None),
             Ended::Missing(tile) => self.touches(window, hip, false, Some(tile)),
             Ended::Suspended => self.touches(window, hip, false, None),
             Ended::Leaves => self.leaves(window, &view, hip),

@@ -175,7 +175,7 @@ impl Descent {
         &mut self,
         window: &Window<'_, D>,
         view: &HipView,
-        leave: Leave,
+        leave: &Leave,
         waits: bool,
         budget: &mut Budget,
     ) -> Ended {
@@ -208,7 +208,7 @@ impl Descent {
             let (asking, search) = (&mut self.asking, &mut self.search);
             match asking.advance(window, view, &start, &mut patch, search, budget) {
                 Onward::Into => {
-                    if let Some(ended) = self.enter(window, view) {
+                    if let Some(ended) = self.enter(window, view, leave) {
                         return ended;
                     }
                     if is_resumed {
@@ -233,7 +233,7 @@ impl Descent {
         window: &Window<'_, D>,
         view: &HipView,
         patch: &mut Patch,
-        leave: Leave,
+        leave: &Leave,
         waits: bool,
         budget: &mut Budget,
     ) -> Option<Ended> {
@@ -274,7 +274,12 @@ impl Descent {
     }
 
     /// The way goes on in a neighbouring patch, whose closest point is known.
-    fn enter<const D: usize>(&mut self, window: &Window<'_, D>, view: &HipView) -> Option<Ended> {
+    fn enter<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        leave: &Leave,
+    ) -> Option<Ended> {
         let Some(offer) = &self.asking.best else {
             return Some(Ended::Rests);
         };
@@ -282,7 +287,7 @@ impl Descent {
         if self.idle.is_some() || !offer.is_surely_nearer {
             let position = position(window, view, &self.at, self.here.z);
             if count_unless_nearer(&mut self.idle, position, view) >= IDLE {
-                return Some(Ended::Rests);
+                return Some(self.rests(leave));
             }
         }
         self.at = offer.entry;
@@ -293,17 +298,31 @@ impl Descent {
 
     /// No neighbour offers a way.
     fn ends<const D: usize>(
-        &self,
+        &mut self,
         window: &Window<'_, D>,
         view: &HipView,
         patch: &Patch,
-        leave: Leave,
+        leave: &Leave,
     ) -> Ended {
         let z = self.here.z;
-        let leaves = leave.is_allowed_at(&self.at)
-            && is_hardly_above(patch, z)
+        if !leave.is_allowed_at(&self.at) {
+            return self.rests(leave);
+        }
+        let leaves = is_hardly_above(patch, z)
             && (z < 0.0 || leads_off(window, view, &self.at, self.at.border(), patch));
         if leaves { Ended::Leaves } else { Ended::Rests }
+    }
+
+    /// Rests, and not below the HIP where it may leave no more: there it would pull. A patch's
+    /// closest point may lie there; the place where the proxy was held does not.
+    #[inline(never)]
+    fn rests(&mut self, leave: &Leave) -> Ended {
+        if let Leave::NoMore(held) = leave
+            && self.here.z < 0.0
+        {
+            self.restart(*held);
+        }
+        Ended::Rests
     }
 }
 
