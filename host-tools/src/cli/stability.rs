@@ -7,6 +7,7 @@ use hapterra_core::force::{Controller, Damping};
 use hapterra_core::rate::TickRate;
 
 use super::failure::{Failure, OrHint as _};
+use super::options::texture::SurfaceTexture;
 use super::report;
 use super::terminal::{interrupt, left_behind, progress};
 use crate::output::{Output, OutputError};
@@ -30,6 +31,10 @@ pub struct Args {
     /// Dampings of the surface, N·s/m
     #[arg(long, value_name = "NS_PER_M,…", value_delimiter = ',', default_value = "0", value_parser = parse_damping)]
     pub damping: Vec<Damping>,
+
+    /// What the surface has for a micro-relief
+    #[command(flatten)]
+    pub texture: SurfaceTexture,
 
     /// Whether the passivity controller acts
     #[arg(
@@ -73,6 +78,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         rates: args.rate.clone(),
         stiffness_n_per_mm: args.stiffness.clone(),
         dampings: dampings(args),
+        texture: args.texture.relief()?,
         delay_s: 1e-6 * f64::from(args.delay_us),
     };
     plan.rates.sort_by_key(|rate| rate.hz());

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::Rule;
-use hapterra_core::force::{Damping, ForceLaw};
+use hapterra_core::force::{Damping, ForceLaw, Texture};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::rate::TickRate;
@@ -30,8 +30,8 @@ const MOST_N: f32 = ForceLaw::PREMIUM.max_force_n;
 pub(super) struct Step {
     /// What the tick reported.
     pub(super) sample: Sample,
-    /// True height of the tip after it, mm.
-    pub(super) height_mm: f64,
+    /// True place of the tip after it, east, north and up, mm.
+    pub(super) tip_mm: [f64; 3],
     /// What the surface gave to the tip meanwhile, mJ: the upward force that the amplifiers
     /// were asked for, times the tip's displacement.
     pub(super) given_mj: f64,
@@ -42,6 +42,7 @@ pub(super) struct Felt {
     pub(super) rate: TickRate,
     pub(super) stiffness_n_per_mm: f64,
     pub(super) damping: Damping,
+    pub(super) texture: Texture,
     /// From reading the encoders to the amplifiers, s.
     pub(super) delay_s: f64,
 }
@@ -91,7 +92,7 @@ pub(super) fn run(felt: &Felt, arm: HeldPhantom, look: &mut dyn FnMut(f64, &Step
         let given_mj = wire.carry(sent, &mut arm);
         let step = Step {
             sample,
-            height_mm: height_mm(&arm),
+            tip_mm: tip_mm(&arm),
             given_mj,
         };
         if !look(f64::from(tick) * tick_s - HeldPhantom::ARMED_S, &step) {
@@ -137,9 +138,9 @@ impl Wire {
         let mut given_mj = 0.0;
         for (Sent { currents_a, up_n }, for_s) in parts {
             if for_s > 0.0 {
-                let from_mm = height_mm(arm);
+                let [.., from_mm] = tip_mm(arm);
                 arm.step(currents_a, for_s);
-                given_mj += up_n * (height_mm(arm) - from_mm);
+                given_mj += up_n * (tip_mm(arm)[2] - from_mm);
             }
         }
         given_mj
@@ -159,6 +160,7 @@ fn scene(felt: &Felt) -> Scene {
             stiffness_n_per_mm: felt.stiffness_n_per_mm as f32,
             max_force_n: MOST_N,
             damping: felt.damping,
+            texture: felt.texture,
             ..ForceLaw::PREMIUM
         },
         rule: Rule::Swept,
@@ -172,8 +174,8 @@ fn fill(tile: &mut Tile, key: TileKey, size: FieldSize) {
     let _ = tile.fill_from(key, 0, size, |_, _| (PLANE_MM / CELL_MM) as f32);
 }
 
-/// True height of the tip, mm over the terrain's datum.
-fn height_mm(arm: &HeldPhantom) -> f64 {
+/// True place of the tip, mm, its height over the terrain's datum.
+fn tip_mm(arm: &HeldPhantom) -> [f64; 3] {
     let plant = arm.plant();
-    HOME.to_terrain_mm(plant.model(), plant.tip_m())[2]
+    HOME.to_terrain_mm(plant.model(), plant.tip_m())
 }

@@ -12,6 +12,9 @@ pub(super) const STILL_N_PER_MM: [(u32, f32, f32); 4] = [
     (10_000, 8.0, 8.0),
 ];
 
+/// What is left of that on a textured surface: its steepest slopes rock a limp hand, too.
+pub(super) const LEFT_WITH_TEXTURE: f32 = 0.5;
+
 /// Warns of a surface that is too stiff for a device of so many ticks a second.
 pub fn warn(law: &ForceLaw, tick_hz: u32) {
     let rate = TickRate::new(tick_hz);
@@ -41,12 +44,16 @@ fn warning(law: &ForceLaw, rate: TickRate) -> Option<String> {
     let is_controlled = law.is_controlled(rate);
     let with = if is_controlled { "with" } else { "without" };
     let (still, passive) = (
-        still_n_per_mm(rate, is_controlled),
+        still_n_per_mm(rate, is_controlled, &law.texture),
         passivity::stiffest_n_per_mm(rate),
     );
     if stiffness > still {
+        let shakes = match law.texture.is_none() {
+            true => "shakes",
+            false => "may shake on a texture",
+        };
         return Some(format!(
-            "a stiffness of {stiffness} N/mm: on the virtual arm a limp hand shakes above {still} N/mm at {hz} ticks a second, {with} the passivity controller (hapterra stability)"
+            "a stiffness of {stiffness} N/mm: on the virtual arm a limp hand {shakes} above {still} N/mm at {hz} ticks a second, {with} the passivity controller (hapterra stability)"
         ));
     }
     let controller = match is_controlled {
@@ -61,13 +68,17 @@ fn warning(law: &ForceLaw, rate: TickRate) -> Option<String> {
 }
 
 /// Of the rates that were tried, the fastest that is no faster counts.
-fn still_n_per_mm(rate: TickRate, is_controlled: bool) -> f32 {
+pub(super) fn still_n_per_mm(rate: TickRate, is_controlled: bool, texture: &Texture) -> f32 {
     let slower = STILL_N_PER_MM
         .iter()
         .rev()
         .find(|(hz, ..)| *hz <= rate.hz());
     let (_, without, with) = slower.unwrap_or(&STILL_N_PER_MM[0]);
-    if is_controlled { *with } else { *without }
+    let even = if is_controlled { *with } else { *without };
+    match texture.is_none() {
+        true => even,
+        false => LEFT_WITH_TEXTURE * even,
+    }
 }
 
 #[cfg(test)]
@@ -109,6 +120,31 @@ mod tests {
             [String::new(), String::new()]
         );
         assert_eq!(too_fine(&Texture::NONE, TickRate::DEFAULT), None);
+    }
+
+    #[test]
+    fn a_textured_surface_is_warned_of_at_half_the_stiffness() {
+        let told = |stiffness_n_per_mm| {
+            let law = ForceLaw {
+                stiffness_n_per_mm,
+                texture: Texture {
+                    pattern: Pattern::Grain,
+                    amplitude_mm: 0.1,
+                    wavelength_mm: 1.0,
+                    ..Texture::NONE
+                },
+                ..ForceLaw::PREMIUM
+            };
+            // Above 1 N/mm the controller is on by itself.
+            warning(&law, TickRate::DEFAULT).unwrap_or_default()
+        };
+        assert_eq!(told(1.0), "");
+        let shakes = told(3.1);
+        assert!(
+            shakes.contains("may shake on a texture above 3 N/mm"),
+            "{shakes}"
+        );
+        assert!(!told(3.0).contains("shake"));
     }
 
     #[test]

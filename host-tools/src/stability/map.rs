@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use hapterra_core::force::{Controller, Damping};
+use hapterra_core::force::{Controller, Damping, Pattern, Texture};
 use hapterra_core::rate::TickRate;
 
 use super::bounds::AtTip;
@@ -29,6 +29,8 @@ pub struct Plan {
     pub stiffness_n_per_mm: Vec<f64>,
     /// Dampings, with the passivity controller on or off.
     pub dampings: Vec<Damping>,
+    /// Micro-relief of the surface.
+    pub texture: Texture,
     /// From reading the encoders to the amplifiers, s.
     pub delay_s: f64,
 }
@@ -43,6 +45,7 @@ impl Plan {
                     rate,
                     stiffness_n_per_mm: *stiffness,
                     damping,
+                    texture: self.texture,
                     grasp,
                     delay_s: self.delay_s,
                 }));
@@ -163,7 +166,7 @@ impl Map {
         let taps = TAP_SPEEDS_M_S.map(|speed| format!("given_mj_at_{speed}_m_s"));
         writeln!(
             to,
-            "tick_hz,damping_ns_per_m,controller,grasp,stiffness_n_per_mm,delay_us,press,swing_mm,swings_hz,fault,{}",
+            "tick_hz,damping_ns_per_m,controller,grasp,stiffness_n_per_mm,delay_us,texture,amplitude_mm,wavelength_mm,press,swing_mm,swings_hz,fault,{}",
             taps.join(",")
         )?;
         for trial in &self.trials {
@@ -171,6 +174,7 @@ impl Map {
                 rate,
                 stiffness_n_per_mm,
                 damping,
+                texture,
                 grasp,
                 delay_s,
             } = trial.setting;
@@ -187,12 +191,15 @@ impl Map {
                 .map(|given| given.map_or_else(String::new, |mj| format!("{mj:.6}")));
             writeln!(
                 to,
-                "{},{:.1},{},{},{stiffness_n_per_mm},{:.0},{verdict},{press},{}",
+                "{},{:.1},{},{},{stiffness_n_per_mm},{:.0},{},{},{},{verdict},{press},{}",
                 rate.hz(),
                 damping.ns_per_m,
                 is_controlled(damping),
                 grasp.name(),
                 1e6 * delay_s,
+                pattern(texture),
+                texture.amplitude_mm,
+                texture.wavelength_mm,
                 given.join(",")
             )?;
         }
@@ -234,6 +241,15 @@ impl Map {
 /// Whether the passivity controller acts.
 const fn is_controlled(damping: Damping) -> bool {
     matches!(damping.controller, Controller::On)
+}
+
+/// What a texture is called.
+const fn pattern(texture: Texture) -> &'static str {
+    match texture.pattern {
+        Pattern::None => "none",
+        Pattern::Grain => "grain",
+        Pattern::Grating => "grating",
+    }
 }
 
 /// What a damping is called.

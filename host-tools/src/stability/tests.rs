@@ -1,11 +1,11 @@
 //! What is known of a spring that is felt in ticks, beside what the trials say.
 
-use hapterra_core::force::{Controller, Damping};
+use hapterra_core::force::{Controller, Damping, Pattern, Texture};
 use hapterra_core::rate::TickRate;
 
 use super::bounds::AtTip;
 use super::grasp::Grasp;
-use super::limits::STILL_N_PER_MM;
+use super::limits::{LEFT_WITH_TEXTURE, STILL_N_PER_MM};
 use super::map::Plan;
 use super::trial::{Press, Setting, Trial, Verdict};
 use crate::phantom::PhantomModel;
@@ -30,10 +30,29 @@ fn tried_damped(
     delay_s: f64,
     damping: Damping,
 ) -> Trial {
+    tried_on(
+        Texture::NONE,
+        hz,
+        stiffness_n_per_mm,
+        grasp,
+        delay_s,
+        damping,
+    )
+}
+
+fn tried_on(
+    texture: Texture,
+    hz: u32,
+    stiffness_n_per_mm: f64,
+    grasp: Grasp,
+    delay_s: f64,
+    damping: Damping,
+) -> Trial {
     let setting = Setting {
         rate: TickRate::new(hz).expect("a rate"),
         stiffness_n_per_mm,
         damping,
+        texture,
         grasp,
         delay_s,
     };
@@ -157,6 +176,40 @@ fn what_is_said_before_a_surface_is_felt_is_what_the_trials_show() {
     }
 }
 
+/// The highest and steepest grain there is, on which a limp hand is rocked most of all that
+/// were tried.
+#[test]
+fn a_texture_is_held_still_up_to_half_the_stiffness() {
+    let texture = Texture {
+        pattern: Pattern::Grain,
+        amplitude_mm: Texture::MOST_AMPLITUDE_MM,
+        wavelength_mm: Texture::MOST_AMPLITUDE_MM / Texture::STEEPEST,
+        ..Texture::NONE
+    };
+    assert!(texture.is_valid());
+    let controlled = Damping {
+        controller: Controller::On,
+        ..UNDAMPED
+    };
+    let at = |hz, stiffness, damping| {
+        let trial = tried_on(texture, hz, stiffness, Grasp::Limp, 80e-6, damping);
+        verdict(&trial)
+    };
+    for (hz, without, with) in STILL_N_PER_MM {
+        for (still, damping) in [(without, UNDAMPED), (with, controlled)] {
+            let half = f64::from(LEFT_WITH_TEXTURE * still);
+            assert_eq!(
+                at(hz, half, damping),
+                Verdict::Still,
+                "{hz} Hz, {half} N/mm"
+            );
+        }
+    }
+    // What an even surface bears is too much here: a hand that slides sideways is rocked.
+    let (hz, without, _) = STILL_N_PER_MM[0];
+    assert_eq!(at(hz, without.into(), UNDAMPED), Verdict::Unstable);
+}
+
 #[test]
 fn damping_takes_from_what_a_tap_gives() {
     let damped = Damping {
@@ -174,6 +227,7 @@ fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
         rates: vec![TickRate::DEFAULT],
         stiffness_n_per_mm: vec![0.5, 6.0],
         dampings: vec![UNDAMPED],
+        texture: Texture::NONE,
         delay_s: 80e-6,
     };
     let map = plan.map(&|of| of == 6).expect("in reach").expect("whole");

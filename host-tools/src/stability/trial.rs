@@ -1,6 +1,6 @@
 //! One stiffness in one hand at one tick rate: a press, and taps.
 
-use hapterra_core::force::Damping;
+use hapterra_core::force::{Damping, Texture};
 use hapterra_core::guard::Fault;
 use hapterra_core::rate::TickRate;
 
@@ -35,6 +35,8 @@ pub struct Setting {
     pub stiffness_n_per_mm: f64,
     /// Its damping, and whether the passivity controller acts.
     pub damping: Damping,
+    /// Its micro-relief.
+    pub texture: Texture,
     /// Who holds the tip.
     pub grasp: Grasp,
     /// From reading the encoders to the amplifiers, s.
@@ -44,10 +46,10 @@ pub struct Setting {
 /// What a press did.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Press {
-    /// The tip swung by so much from its lowest to its highest place in the last second, mm,
-    /// and so often a second.
+    /// The tip swung by so much and so often in the last second: eastward, northward or up,
+    /// whichever is most.
     Held {
-        /// From lowest to highest, mm.
+        /// From end to end, mm.
         swing_mm: f64,
         /// Swings a second.
         swings_hz: f64,
@@ -128,17 +130,17 @@ impl Setting {
         let above = Touch::start(&|_, _| Some(PLANE_MM), &hand, wall, [east, north], 10.0);
         let arm = self.arm(above.press(PRESS_N, HELD_S).finish())?;
         let from_s = arm.script_s() - LOOKED_AT_S;
-        let (mut heights, mut fault) = (Vec::new(), None);
+        let (mut places, mut fault) = (Vec::new(), None);
         self.run(arm, &mut |t_s, step| {
             fault = step.sample.fault;
             if t_s >= from_s {
-                heights.push(step.height_mm);
+                places.push(step.tip_mm);
             }
             fault.is_none()
         });
         Ok(match fault {
             Some(fault) => Press::Tripped(fault),
-            None => swings(&heights),
+            None => swings(&places),
         })
     }
 
@@ -157,7 +159,7 @@ impl Setting {
         self.run(arm, &mut |_, step| {
             given_mj += step.given_mj;
             // Whatever is still on its way to the motors belongs to the tap.
-            if step.height_mm > PLANE_MM + APART_MM && given_mj != 0.0 {
+            if step.tip_mm[2] > PLANE_MM + APART_MM && given_mj != 0.0 {
                 most_mj = given_mj.max(most_mj);
                 given_mj = 0.0;
             }
@@ -176,22 +178,61 @@ impl Setting {
             rate: self.rate,
             stiffness_n_per_mm: self.stiffness_n_per_mm,
             damping: self.damping,
+            texture: self.texture,
             delay_s: self.delay_s,
         };
         contact_loop::run(&felt, arm, look);
     }
 }
 
-/// How far and how often heights of a second go up and down.
-fn swings(heights_mm: &[f64]) -> Press {
-    let low = heights_mm.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = heights_mm.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let middle = 0.5 * (low + high);
-    // A swing goes through the middle twice.
-    let sides = heights_mm.iter().map(|height| *height > middle);
-    let crossings = sides.clone().zip(sides.skip(1)).filter(|(a, b)| a != b);
+/// How far and how often places of a second go to and fro along the axis where they do most.
+fn swings(places_mm: &[[f64; 3]]) -> Press {
+    let along = |axis: usize| {
+        let coordinates = places_mm.iter().map(move |place| place[axis]);
+        let low = coordinates.clone().fold(f64::INFINITY, f64::min);
+        let high = coordinates.clone().fold(f64::NEG_INFINITY, f64::max);
+        let middle = 0.5 * (low + high);
+        // A swing goes through the middle twice.
+        let sides = coordinates.map(|coordinate| coordinate > middle);
+        let crossings = sides.clone().zip(sides.skip(1)).filter(|(a, b)| a != b);
+        (high - low, crossings.count())
+    };
+    let widest = |a: (f64, usize), b: (f64, usize)| if b.0 > a.0 { b } else { a };
+    let (swing_mm, crossings) = [along(0), along(1)].into_iter().fold(along(2), widest);
     Press::Held {
-        swing_mm: high - low,
-        swings_hz: 0.5 * crossings.count() as f64 / LOOKED_AT_S,
+        swing_mm,
+        swings_hz: 0.5 * crossings as f64 / LOOKED_AT_S,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tip_swings_along_whichever_axis() {
+        for axis in 0..3 {
+            let places: Vec<_> = (0..1000)
+                .map(|tick| {
+                    let mut place = [1.0, 2.0, 3.0];
+                    // A swing of 20 ticks up to 0.5 mm, and less along another axis.
+                    place[axis] += if tick % 20 < 10 { 0.25 } else { -0.25 };
+                    place[(axis + 1) % 3] += if tick % 4 < 2 { 0.01 } else { -0.01 };
+                    place
+                })
+                .collect();
+            let Press::Held {
+                swing_mm,
+                swings_hz,
+            } = swings(&places)
+            else {
+                panic!("it is held")
+            };
+            assert!((swing_mm - 0.5).abs() < 1e-12, "axis {axis}: {swing_mm} mm");
+            assert!(
+                (swings_hz - 49.5).abs() < 1.0,
+                "axis {axis}: {swings_hz} Hz"
+            );
+        }
     }
 }
