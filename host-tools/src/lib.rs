@@ -4,6 +4,7 @@
 //! Read top to bottom, the modules follow the data:
 //!
 //! - [`raster`]: files of every supported format become one [`raster::Raster`];
+//! - `remote`: files at URLs, of which what is touched is fetched;
 //! - [`synth`]: terrains made by formula, for trying and testing;
 //! - [`terrain`]: a raster at a scale, cut into tiles;
 //! - [`link`]: the terrain served to a device, tile by tile;
@@ -38,6 +39,7 @@ pub mod phantom;
 pub mod picture;
 pub mod place;
 pub mod raster;
+mod remote;
 pub mod replay;
 pub mod serving;
 pub mod stability;

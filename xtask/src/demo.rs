@@ -37,14 +37,15 @@ pub(crate) fn demo(request: &Request) -> Result<i32> {
         Some(_) => None,
     };
     timed("building the hapterra command", || {
-        run(cargo().args([
+        let words = [
             "build",
             "--release",
             "--package",
             "hapterra",
             "--bin",
             "hapterra",
-        ]))
+        ];
+        run(cargo().args(words).args(request.features()))
     })?;
     let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
     let mut command = Command::new(target_dir().join("release").join(program));
@@ -100,6 +101,15 @@ impl Request {
     /// Where the user wants the loop to run, if that was said.
     fn device(&self) -> Option<String> {
         self.value("--device")
+    }
+
+    /// What a build has to have for the file.
+    fn features(&self) -> &'static [&'static str] {
+        let file = self.file.as_ref().map(|file| file.to_string_lossy());
+        match file.is_some_and(|file| file.contains("://")) {
+            true => &["--features", "remote"],
+            false => &[],
+        }
     }
 
     /// The arguments of the `hapterra` command.
@@ -158,6 +168,20 @@ mod tests {
             line,
             "demo a b.tif --exaggeration auto --image ELF --qemu QEMU --out=x --seconds 3"
         );
+    }
+
+    #[test]
+    fn only_a_url_needs_a_build_with_urls() {
+        let features = |file: &str| {
+            let file = Some(file.into());
+            let request = Request {
+                file,
+                ..Request::default()
+            };
+            request.features().len()
+        };
+        assert_eq!(features("https://h/a.tif"), 2);
+        assert_eq!(features("C:/a.tif"), 0);
     }
 
     #[test]

@@ -26,6 +26,9 @@ pub(crate) fn lint() -> Result<()> {
         ];
         run(cargo().args(words))
     })?;
+    timed("clippy for the program as it is usually built", || {
+        run(cargo().args(["clippy", "--package", "hapterra", "--", "-D", "warnings"]))
+    })?;
     let toolchain = toolchain::ready()?;
     toolchain.with_clippy()?;
     let boards = BOARDS.iter().map(|board| (board, board.name));

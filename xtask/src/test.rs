@@ -12,8 +12,13 @@ use crate::{counts, deny, image, panics, size};
 /// A board and the ELF of its image.
 pub(crate) type Image = (&'static Board, PathBuf);
 
-/// `quick` has no images of the real boards, and nothing to build what runs them.
-const WITHOUT_IMAGES: [&str; 2] = ["--exclude", "hapterra-image-tests"];
+/// `quick` has no images of the real boards, and builds neither what runs them nor servers.
+const QUICK: [&str; 4] = [
+    "--exclude",
+    "hapterra-image-tests",
+    "--exclude",
+    "hapterra-url-tests",
+];
 /// Otherwise the image tests need probe-rs anyway, and the command is tested with
 /// it, too.
 const WITH_PROBES: [&str; 2] = ["--features", "hapterra/probe"];
@@ -40,7 +45,7 @@ pub(crate) fn test(quick: bool) -> Result<()> {
         let mut command = cargo();
         command
             .args(["test", "--workspace"])
-            .args(if quick { WITHOUT_IMAGES } else { WITH_PROBES })
+            .args(if quick { &QUICK[..] } else { &WITH_PROBES })
             .env("HAPTERRA_QEMU", qemu)
             .env(image::COUNTS_VARIABLE, &counts);
         for (board, path) in &images {

@@ -23,6 +23,7 @@ use crate::output::{Output, OutputError, OutputFolder, keep_apart};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::{Laid, View};
 use crate::raster::{Raster, files_read_with};
+use crate::remote::without_key;
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{LoopColumns, Record, Recording, Settings};
 use crate::synth::{Kind, Synth};
@@ -188,7 +189,7 @@ fn show(
     // The terminal is as it was.
     drop(control);
     let file = args.file.as_ref();
-    let file = file.map_or(OWN_TERRAIN.into(), |file| file.display().to_string());
+    let file = file.map_or(OWN_TERRAIN.into(), |file| without_key(file));
     let device = Device::of(&toured.summary.device);
     let settings = Settings::new(&file, terrain, placed.law(), Some(placed.home_mm()), device);
     write(&toured, &settings, &outputs.recording).or_hint(OTHER_FOLDER)?;

@@ -15,6 +15,7 @@ use super::options::terrain_file::TerrainFile;
 use super::report::put;
 use crate::place::place_in_words;
 use crate::raster::{CellSize, CellUnit, Certainty, ReferenceSystem};
+use crate::remote::without_key;
 use crate::terrain::{Distortion, FeltCells, FeltGrid};
 use link::LinkFigures;
 use place::{Rectangle, Vertical, from, told};
@@ -156,7 +157,7 @@ impl FileReport {
         let system = raster.reference_system();
         let code = system.and_then(|system| system.code());
         Self {
-            file: input.file.display().to_string(),
+            file: without_key(&input.file),
             format: raster.format().to_owned(),
             columns: raster.columns(),
             rows: raster.rows(),

@@ -93,6 +93,11 @@ const SAMPLES_A_SIGN: u32 = 500;
 const SAID_AT_ONCE: usize = 32 * 1024;
 /// Tiles that are held back, or sent to one reception, at most.
 const WITHHELD: usize = 16;
+/// For so long a tile that is on its way from elsewhere is sent when it comes: a device asks
+/// again for what it still wants ([`hapterra_core::terrain`]).
+const AWAITED_FOR: Duration = Duration::from_secs(1);
+/// Tiles that are awaited at once, at most.
+const AWAITED: usize = 64;
 /// Between two lines of the log about requests for tiles that there are not.
 const LOG_EVERY: Duration = Duration::from_secs(1);
 
@@ -120,6 +125,8 @@ pub struct Client<'t> {
     withheld: Vec<TileKey>,
     /// Tiles that the present reception was answered with.
     sent: Vec<TileKey>,
+    /// Tiles whose heights have not come yet from elsewhere, and when they were asked for.
+    awaited: Vec<(TileKey, Duration)>,
     zeroing: bool,
     /// The point of a replay that is to be felt, and when it was said.
     point: Option<(Point, Duration)>,
@@ -180,6 +187,7 @@ impl<'t> Client<'t> {
             has_armed: false,
             withheld: vec![],
             sent: vec![],
+            awaited: vec![],
             zeroing: false,
             point: None,
             tally: Tally::default(),
@@ -223,6 +231,7 @@ impl<'t> Client<'t> {
         *self.reader = FrameReader::new();
         self.is_new = true;
         self.withheld.clear();
+        self.awaited.clear();
         self.zeroing = false;
         if self.talk.greet(now, out) {
             self.tally.drawn();
@@ -258,6 +267,7 @@ impl<'t> Client<'t> {
             let taken = taken(&view);
             if taken {
                 self.scene = view.scene;
+                self.awaited.clear();
                 self.terrain = Lent::View(Box::new(terrain));
             }
             on(Event::Viewed { view: &view, taken });
@@ -343,6 +353,7 @@ impl<'t> Client<'t> {
                 }
             }
         }
+        self.say_awaited(now, out, on);
         Ok(())
     }
 
@@ -496,9 +507,14 @@ impl<'t> Client<'t> {
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
     ) {
+        let before = self.terrain.raster().not_yet();
         let Some(heights) = self.terrain.tile(key, &mut self.tile) else {
             return self.on_no_tile(now, key);
         };
+        if self.terrain.raster().not_yet() != before {
+            // Some of its holes are none.
+            return self.wait_for(now, key);
+        }
         let message = TileMessage {
             epoch: self.scene.epoch,
             key,
@@ -508,6 +524,26 @@ impl<'t> Client<'t> {
         self.talk.say(&ToDevice::Tile(message), out);
         self.tally.sent_tile(key, out.len() - before);
         on(Event::TileSent(key));
+    }
+
+    /// Sends a tile when its heights have come.
+    fn wait_for(&mut self, asked: Duration, key: TileKey) {
+        self.awaited.retain(|(other, _)| *other != key);
+        if self.awaited.len() < AWAITED {
+            self.awaited.push((key, asked));
+        }
+    }
+
+    /// Sends the tiles whose heights have come since.
+    fn say_awaited(&mut self, now: Duration, out: &mut Vec<u8>, on: &mut dyn FnMut(Event<'_>)) {
+        for (key, asked) in std::mem::take(&mut self.awaited) {
+            let is_wanted = now.saturating_sub(asked) <= AWAITED_FOR;
+            if is_wanted && out.len() < SAID_AT_ONCE {
+                self.on_need(asked, key, out, on);
+            } else if is_wanted {
+                self.wait_for(asked, key);
+            }
+        }
     }
 
     /// A device may ask for anything, as often as it likes.

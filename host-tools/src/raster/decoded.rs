@@ -206,7 +206,13 @@ impl Decoded {
         self.cell = self.cell.filter(CellSize::is_valid);
         let survey = match &self.storage {
             Storage::Held { .. } => Survey::of_all(self.summarise()?),
-            Storage::Blocks(blocks) => blocks.survey(|stored| self.height_in_file(stored)),
+            Storage::Blocks(blocks) => {
+                let survey = blocks.survey(|stored| self.height_in_file(stored));
+                if let Some(outage) = blocks.take_outage() {
+                    return Err(outage);
+                }
+                survey
+            }
         };
         match survey.summary.has_none() {
             true => Err(BadRaster::AllNoData {

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::options::Encoding;
+use crate::remote::{is_lost, is_on_its_way, is_outage, without_key};
 
 /// A file that could not be opened as a height field: what is wrong with which file.
 #[derive(Debug, thiserror::Error)]
-#[error("{fault} ({})", path.display())]
+#[error("{fault} ({})", without_key(path))]
 pub struct Error {
     path: PathBuf,
     fault: BadRaster,
@@ -38,6 +39,12 @@ pub enum BadRaster {
     /// The operating system does not let us read it.
     #[error("cannot read the file: {0}")]
     Unreadable(std::io::Error),
+    /// What is at a URL cannot be read, or not at present.
+    #[error("cannot read what is there: {0}")]
+    Elsewhere(std::io::Error),
+    /// It is on its way from elsewhere, and nobody may wait for it.
+    #[error("it has not come yet")]
+    NotYet,
     /// Neither content nor extension say what it is.
     #[error("unknown file format")]
     UnknownFormat,
@@ -184,6 +191,19 @@ impl BadRaster {
     }
 
     /// An input error while decoding: an early end is a truncated file.
+    /// What went wrong with a file at a URL.
+    pub(super) fn elsewhere(error: std::io::Error) -> Self {
+        match is_on_its_way(&error) {
+            true => Self::NotYet,
+            false => Self::Elsewhere(error),
+        }
+    }
+
+    /// Whether another try may find more: nothing is known of the file's samples.
+    pub(super) const fn is_of_the_line(&self) -> bool {
+        matches!(self, Self::Elsewhere(_) | Self::NotYet)
+    }
+
     pub(super) fn from_io(error: std::io::Error, during: &str) -> Self {
         match error.kind() {
             std::io::ErrorKind::UnexpectedEof => {
@@ -191,6 +211,9 @@ impl BadRaster {
             }
             std::io::ErrorKind::InvalidData | std::io::ErrorKind::InvalidInput => {
                 Self::Damaged(format!("{during}: {error}"))
+            }
+            _ if is_outage(&error) || is_lost(&error) || is_on_its_way(&error) => {
+                Self::elsewhere(error)
             }
             _ => Self::Unreadable(error),
         }

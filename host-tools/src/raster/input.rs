@@ -1,10 +1,12 @@
-//! The bytes to decode: a file, or what was packed inside one.
+//! The bytes to decode: a file, here or at a URL, or what was packed inside one.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Error, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::BadRaster;
+use crate::remote::{Elsewhere, RemoteFile, RemoteReader, file_name, is_url};
 
 /// Deflate packs at most this many bytes into one.
 pub(super) const DEFLATE_RATIO: u64 = 1040;
@@ -20,6 +22,8 @@ pub(super) struct FileBytes {
     len: u64,
     data: Data,
     outline: bool,
+    /// Where neighbours that have URLs are.
+    elsewhere: Elsewhere,
 }
 
 /// Where the bytes are.
@@ -28,11 +32,30 @@ pub(super) enum Data {
     File(File, PathBuf),
     /// In memory.
     Memory(Vec<u8>),
+    /// At a server, and its URL.
+    Remote(Arc<RemoteFile>, String),
 }
 
 impl FileBytes {
-    /// A file on disk.
-    pub(super) fn open(path: &Path) -> Result<Self, BadRaster> {
+    /// A file on disk or at a URL.
+    pub(super) fn open(path: &Path, elsewhere: &Elsewhere) -> Result<Self, BadRaster> {
+        let bytes = match path.to_str().filter(|name| is_url(name)) {
+            Some(url) => Self::at_url(url, elsewhere)?,
+            None => Self::on_disk(path)?,
+        };
+        Ok(Self {
+            elsewhere: elsewhere.clone(),
+            ..bytes
+        })
+    }
+
+    fn at_url(url: &str, elsewhere: &Elsewhere) -> Result<Self, BadRaster> {
+        let file = elsewhere.open(url).map_err(BadRaster::elsewhere)?;
+        let (len, data) = (file.len(), Data::Remote(file, url.to_owned()));
+        Ok(Self::new(file_name(url), len, data))
+    }
+
+    fn on_disk(path: &Path) -> Result<Self, BadRaster> {
         let file = File::open(path).map_err(BadRaster::Unreadable)?;
         let metadata = file.metadata().map_err(BadRaster::Unreadable)?;
         if metadata.is_dir() {
@@ -63,6 +86,7 @@ impl FileBytes {
             len,
             data,
             outline: false,
+            elsewhere: Elsewhere::default(),
         }
     }
 
@@ -97,6 +121,19 @@ impl FileBytes {
         &self.data
     }
 
+    /// The files at URLs among which this one is.
+    pub(super) const fn elsewhere(&self) -> &Elsewhere {
+        &self.elsewhere
+    }
+
+    /// The file, where it is at a URL.
+    pub(super) fn remote(&self) -> Option<Arc<RemoteFile>> {
+        match &self.data {
+            Data::Remote(file, _) => Some(file.clone()),
+            Data::File(..) | Data::Memory(_) => None,
+        }
+    }
+
     /// A buffered reader at the start.
     pub(super) fn reader(&self) -> Result<Box<dyn ReadSeek + '_>, BadRaster> {
         Ok(match &self.data {
@@ -107,6 +144,10 @@ impl FileBytes {
                 Box::new(BufReader::with_capacity(1 << 16, file))
             }
             Data::Memory(bytes) => Box::new(Cursor::new(bytes.as_slice())),
+            Data::Remote(file, _) => {
+                let reader = RemoteReader::new(file.clone());
+                Box::new(BufReader::with_capacity(1 << 16, reader))
+            }
         })
     }
 
@@ -116,8 +157,20 @@ impl FileBytes {
         self.reader()?
             .take(count)
             .read_to_end(&mut head)
-            .map_err(BadRaster::Unreadable)?;
+            .map_err(|error| BadRaster::from_io(error, "its beginning"))?;
         Ok(head)
+    }
+
+    /// All bytes, for decoders that cannot wait for some.
+    pub(super) fn all(&self) -> Result<Vec<u8>, BadRaster> {
+        const LARGEST: u64 = 1 << 30;
+        if self.len > LARGEST {
+            return Err(BadRaster::Unsupported {
+                format: "a file at a URL",
+                feature: format!("{} MB in a format that is read as a whole", self.len >> 20),
+            });
+        }
+        self.head(self.len)
     }
 
     /// Checks that so many samples, packed with deflate at its best, fit into the

@@ -55,6 +55,7 @@ mod tangents;
 
 use std::path::Path;
 
+pub use crate::remote::Elsewhere;
 pub use crs::{LonLat, ReferenceSystem};
 pub use decoded::{HeightSummary, LARGEST_HEIGHT};
 pub use error::{BadRaster, Error};
@@ -82,6 +83,7 @@ use storage::Storage;
 pub struct Raster {
     source: Decoded,
     survey: Survey,
+    elsewhere: Elsewhere,
 }
 
 impl Raster {
@@ -116,6 +118,10 @@ impl Raster {
             .and_then(|decoded| {
                 decoded.storage.set_path(path);
                 Self::checked(decoded, options.no_data)
+            })
+            .map(|raster| Self {
+                elsewhere: options.elsewhere.clone(),
+                ..raster
             })
             .map_err(|fault| Error::new(path, fault))
     }
@@ -155,7 +161,26 @@ impl Raster {
 
     fn checked(mut source: Decoded, no_data: Option<f64>) -> Result<Self, BadRaster> {
         let survey = source.check(no_data)?;
-        Ok(Self { source, survey })
+        Ok(Self {
+            source,
+            survey,
+            elsewhere: Elsewhere::default(),
+        })
+    }
+
+    /// From now on nothing waits for what is fetched from elsewhere: what is not here yet is
+    /// a hole for the moment, and [`Raster::not_yet`] counts it.
+    pub fn stop_waiting(&self) {
+        self.elsewhere.stop_waiting(true);
+    }
+
+    /// How often heights were asked for that were not here yet. Where it grows while heights
+    /// are read, some of their holes are none.
+    pub fn not_yet(&self) -> u64 {
+        match &self.source.storage {
+            Storage::Held { .. } => 0,
+            Storage::Blocks(blocks) => blocks.not_yet(),
+        }
     }
 
     /// Samples from west to east.

@@ -12,7 +12,7 @@ pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadR
     if let Some(files) = mosaic::named(path)? {
         return mosaic::of_files(files, options);
     }
-    let input = FileBytes::open(path)?;
+    let input = FileBytes::open(path, &options.elsewhere)?;
     if options.raw.is_none() && mosaic::is_vrt(&input)? {
         let decoded = guarded(mosaic::VRT, || mosaic::of_vrt(&input, path, options));
         return or_by_gdal(decoded, &input, options);
@@ -23,7 +23,7 @@ pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadR
 /// Decodes a file by GDAL alone.
 #[cfg(feature = "gdal")]
 pub(super) fn decode_by_gdal(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
-    let input = FileBytes::open(path)?;
+    let input = FileBytes::open(path, &options.elsewhere)?;
     let decoded = guarded("GDAL", || super::formats::gdal::decode(&input, options))?;
     decoded.ok_or(BadRaster::UnknownFormat)
 }

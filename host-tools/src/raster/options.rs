@@ -1,6 +1,7 @@
 //! What the user may say about a file that the file does not say itself.
 
 use super::samples::{Endian, SampleType};
+use crate::remote::Elsewhere;
 
 /// How to open a file. The default believes the file.
 #[derive(Clone, Debug)]
@@ -26,6 +27,8 @@ pub struct OpenOptions {
     /// Samples that take more bytes than this stay in the file, where its format allows it,
     /// and are read in blocks when they are touched.
     pub most_in_memory_bytes: u64,
+    /// The files at URLs that are read with these options.
+    pub elsewhere: Elsewhere,
 }
 
 impl OpenOptions {
@@ -46,6 +49,7 @@ impl Default for OpenOptions {
             vertical_unit_m: None,
             encoding: None,
             most_in_memory_bytes: u64::from(Self::IN_MEMORY_MB) << 20,
+            elsewhere: Elsewhere::default(),
         }
     }
 }

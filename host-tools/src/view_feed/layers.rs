@@ -107,7 +107,7 @@ impl Reading {
         Self { layer, rows }
     }
 
-    /// Reads at most so many rows more; whether there are others.
+    /// Reads at most so many rows more, those that are here; whether there are others.
     pub(super) fn read(&mut self, terrain: &Terrain<'_>, rows: u32) -> bool {
         let layer = &mut self.layer;
         let level = layer.step.ilog2() as u8;
@@ -115,7 +115,12 @@ impl Reading {
         let mut line = vec![f64::NAN; layer.columns as usize];
         for _ in 0..rows.min(self.rows - layer.rows) {
             let grid = terrain.grid();
+            let before = terrain.raster().not_yet();
             grid.copy_row(level, south + layer.rows, west, &mut line);
+            if terrain.raster().not_yet() != before {
+                // It is on its way from elsewhere: another look finds it.
+                return true;
+            }
             let heights = line.iter().map(|height| *height as f32);
             layer.heights.extend(heights);
             layer.rows += 1;

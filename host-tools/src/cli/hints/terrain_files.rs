@@ -3,10 +3,12 @@
 //! Commands of other programs are tried by `tests/tests/converters.rs` where these
 //! programs are installed.
 
+use std::io::ErrorKind;
 use std::path::Path;
 
 use crate::cli::failure::Hint;
 use crate::raster::{BadRaster, Encoding, Error};
+use crate::remote::is_url;
 
 impl Hint for Error {
     fn hint(&self) -> String {
@@ -86,6 +88,8 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
             return format!("get the file again; or {}", converted(path, ""));
         }
         BadRaster::Unreadable(_) => "check the path and that you may read the file",
+        BadRaster::Elsewhere(error) => elsewhere(path, error),
+        BadRaster::NotYet => "try again",
         BadRaster::RawSizeMissing => {
             "say how the samples lie: --raw-size WxH --raw-type i16 --raw-endian little"
         }
@@ -110,6 +114,33 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
         }
     };
     hint.into()
+}
+
+/// What to do about a file at a URL.
+fn elsewhere(path: &Path, error: &std::io::Error) -> &'static str {
+    const NO_URLS: &str = "build it with them: cargo build --release --features remote (cargo xtask demo URL does); or fetch the file and name that";
+    let scheme = path.to_str().and_then(|url| Some(url.split_once("://")?.0));
+    let key = match scheme {
+        Some("s3" | "s3a") => {
+            "set what the server wants: AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or AWS_SKIP_SIGNATURE=true for a public bucket; AWS_REGION; AWS_ENDPOINT_URL where it is not Amazon's"
+        }
+        Some("gs") => {
+            "set what the server wants: GOOGLE_APPLICATION_CREDENTIALS, or GOOGLE_SKIP_SIGNATURE=true for a public bucket"
+        }
+        Some("az" | "azure" | "abfs" | "abfss" | "adl") => {
+            "set what the server wants: AZURE_STORAGE_ACCOUNT_NAME, and AZURE_STORAGE_ACCOUNT_KEY or AZURE_SKIP_SIGNATURE=true for a public container"
+        }
+        _ => "check the URL; a key goes behind it, as ?KEY=VALUE",
+    };
+    match error.kind() {
+        ErrorKind::Unsupported if !cfg!(feature = "remote") => NO_URLS,
+        ErrorKind::Unsupported => "fetch the file with another program and name that",
+        ErrorKind::NotFound => "check the URL",
+        ErrorKind::PermissionDenied | ErrorKind::InvalidInput => key,
+        // Where a key is missing, one is asked for at places that are not there.
+        _ if !matches!(scheme, Some("http" | "https")) => key,
+        _ => "check the URL and the line, and try again",
+    }
 }
 
 /// The extension in lower case.
@@ -206,7 +237,13 @@ fn brought_together(path: &Path, file: &Path) -> String {
 /// The file, and what a converted copy of it in this folder is called, as a shell takes them.
 fn names(path: &Path) -> (String, String) {
     let to = format!("{}.tif", stem(path));
-    (quoted(&path.display().to_string()), quoted(&to))
+    let from = path.display().to_string();
+    // As GDAL calls what is elsewhere.
+    let from = match from.starts_with("http") && is_url(&from) {
+        true => format!("/vsicurl/{from}"),
+        false => from,
+    };
+    (quoted(&from), quoted(&to))
 }
 
 /// What a converted copy is called, without its ending.

@@ -12,6 +12,7 @@ use crate::raster::{
     CellUnit, Certainty, Encoding, Endian, OpenOptions, PngChannel, Raster, RawLayout, SampleType,
     files_read_with, metres_in,
 };
+use crate::remote::{file_name, is_url};
 
 /// Where `--help` lists these options.
 const INPUT: &str = "Input";
@@ -21,7 +22,7 @@ const INPUT: &str = "Input";
 pub struct TerrainFile {
     /// Terrain file: GeoTIFF, .hgt, .asc, PNG, NetCDF, USGS .dem, DTED, .flt, .bil, ENVI,
     /// .npy/.npz, or raw samples; or many as one: a folder, a quoted pattern ('tiles/*.tif'), a
-    /// GDAL .vrt
+    /// GDAL .vrt; or one of these at a URL (https, s3, gs, az), in builds with them
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
 
@@ -105,6 +106,9 @@ impl TerrainFile {
 
     /// The file's name without folders.
     pub fn name(&self) -> String {
+        if let Some(url) = self.file.to_str().filter(|file| is_url(file)) {
+            return file_name(url).to_owned();
+        }
         self.file
             .file_name()
             .unwrap_or(self.file.as_os_str())
@@ -130,6 +134,7 @@ impl ReadingOptions {
             vertical_unit_m: self.vertical_unit,
             encoding: self.encoding,
             most_in_memory_bytes: u64::from(self.in_memory_mb) << 20,
+            ..OpenOptions::default()
         }
     }
 }

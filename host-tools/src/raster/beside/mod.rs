@@ -1,17 +1,16 @@
 //! What lies beside a file under the same name: a header (`.hdr`), a reference system
-//! (`.prj`), a world file, a mask (`.msk`), overviews (`.ovr`). Only a file on disk has neighbours; what comes
-//! out of an archive has none.
+//! (`.prj`), a world file, a mask (`.msk`), overviews (`.ovr`). A file on disk or at a URL has
+//! neighbours; what comes out of an archive has none.
 
 mod prj;
 mod world_file;
 
 use std::ffi::OsString;
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::BadRaster;
 use super::input::{Data, FileBytes};
+use crate::remote::{is_missing, neighbour};
 
 pub(super) use prj::reference_system;
 pub(super) use world_file::lay_out_by_world_file;
@@ -37,31 +36,59 @@ pub(super) fn files_read_with(path: &Path) -> Vec<PathBuf> {
 
 /// The file beside `input` whose extension is `extension`, in lower or upper case:
 /// `hills.hdr` beside `hills.flt`, or `hills.flt.hdr`.
-pub(super) fn find(input: &FileBytes, extension: &str) -> Option<PathBuf> {
-    first(input, extension, candidates)
+fn find(input: &FileBytes, extension: &str) -> Result<Option<FileBytes>, BadRaster> {
+    match (input.data(), known(extension)) {
+        (Data::File(_, path), Some(known)) => on_disk(path, &candidates(path, known), input),
+        (Data::Remote(_, url), Some(known)) => elsewhere(url, &neighbour(url, known), input),
+        _ => Ok(None),
+    }
 }
 
 /// The file beside `input` whose name is that of `input` with `extension` behind it, as
 /// `hills.tif.msk`: what GDAL writes for one file alone.
-pub(super) fn find_appended(input: &FileBytes, extension: &str) -> Option<PathBuf> {
-    first(input, extension, |path, extension| {
-        [appended(path, extension)]
-    })
-}
-
-/// The first of some names, made of the path of `input` and a known extension, that is a file.
-fn first<const N: usize>(
+pub(super) fn find_appended(
     input: &FileBytes,
     extension: &str,
-    names: impl Fn(&Path, &str) -> [PathBuf; N],
-) -> Option<PathBuf> {
-    let Data::File(_, path) = input.data() else {
-        return None;
-    };
-    let known = NEIGHBOURS.iter().find(|known| **known == extension)?;
-    let others = names(path, known);
-    let mut others = others.into_iter().filter(|other| other != path);
-    others.find(|other| other.is_file())
+) -> Result<Option<FileBytes>, BadRaster> {
+    match (input.data(), known(extension)) {
+        (Data::File(_, path), Some(known)) => on_disk(path, &[appended(path, known)], input),
+        (Data::Remote(_, url), Some(known)) => elsewhere(url, &neighbour(url, known)[1..], input),
+        _ => Ok(None),
+    }
+}
+
+/// An extension that no output may have.
+fn known(extension: &str) -> Option<&'static str> {
+    let known = NEIGHBOURS.iter().find(|known| **known == extension);
+    known.copied()
+}
+
+/// The first of some paths that is a file, and not `path` itself.
+fn on_disk(
+    path: &Path,
+    others: &[PathBuf],
+    input: &FileBytes,
+) -> Result<Option<FileBytes>, BadRaster> {
+    let mut others = others.iter().filter(|other| *other != path);
+    let found = others.find(|other| other.is_file());
+    let open = |other: &PathBuf| FileBytes::open(other, input.elsewhere());
+    found.map(open).transpose()
+}
+
+/// The first of some URLs at which there is a file. Where that cannot be told, the file that
+/// has them as neighbours cannot be read: a mask that is not known of would be felt.
+fn elsewhere(
+    own: &str,
+    urls: &[String],
+    input: &FileBytes,
+) -> Result<Option<FileBytes>, BadRaster> {
+    for url in urls.iter().filter(|url| *url != own) {
+        match FileBytes::open(Path::new(url), input.elsewhere()) {
+            Err(BadRaster::Elsewhere(error)) if is_missing(&error) => {}
+            other => return other.map(Some),
+        }
+    }
+    Ok(None)
 }
 
 /// The names that a file beside `path` may have.
@@ -88,20 +115,16 @@ pub(super) fn text(
     input: &FileBytes,
     extension: &str,
 ) -> Result<Option<(String, String)>, BadRaster> {
-    let Some(path) = find(input, extension) else {
+    let Some(beside) = find(input, extension)? else {
         return Ok(None);
     };
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let file = File::open(&path).map_err(BadRaster::Unreadable)?;
-    let mut bytes = Vec::new();
-    file.take(LONGEST_TEXT + 1)
-        .read_to_end(&mut bytes)
-        .map_err(BadRaster::Unreadable)?;
+    let name = beside.name().to_owned();
+    let bytes = beside.head(LONGEST_TEXT + 1)?;
     if bytes.len() as u64 > LONGEST_TEXT {
         return Err(BadRaster::AbsurdSize(format!(
             "{name} beside it is larger than {LONGEST_TEXT} bytes: no such text is"
         )));
     }
     let text = String::from_utf8_lossy(&bytes).into_owned();
-    Ok(Some((text, name.into_owned())))
+    Ok(Some((text, name)))
 }

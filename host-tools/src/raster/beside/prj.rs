@@ -1,16 +1,25 @@
 //! The reference system in a `.prj` file, as Esri's programs write it.
 
 use super::text;
+use crate::raster::BadRaster;
 use crate::raster::crs::ReferenceSystem;
 use crate::raster::decoded::Decoded;
 use crate::raster::input::FileBytes;
 
 /// Sets the reference system from a `.prj` beside the file, where there is one; it is
 /// to be called before the samples are laid out.
-pub(in crate::raster) fn reference_system(input: &FileBytes, decoded: &mut Decoded) {
-    // A neighbour that cannot be read costs the place, not the heights.
-    let Ok(Some((wkt, name))) = text(input, "prj") else {
-        return;
+///
+/// # Errors
+/// Where it is elsewhere and cannot be read at present.
+pub(in crate::raster) fn reference_system(
+    input: &FileBytes,
+    decoded: &mut Decoded,
+) -> Result<(), BadRaster> {
+    let (wkt, name) = match text(input, "prj") {
+        Ok(Some(found)) => found,
+        Err(error) if error.is_of_the_line() => return Err(error),
+        // A neighbour that cannot be read costs the place, not the heights.
+        Ok(None) | Err(_) => return Ok(()),
     };
     let (system, vertical) = ReferenceSystem::from_wkt(&wkt);
     if system.is_none() {
@@ -22,4 +31,5 @@ pub(in crate::raster) fn reference_system(input: &FileBytes, decoded: &mut Decod
     if vertical.is_some() && decoded.metres_per_vertical_unit.is_none() {
         decoded.set_vertical(vertical, None);
     }
+    Ok(())
 }

@@ -25,7 +25,7 @@ pub(in crate::raster) fn lay_out_by_world_file(
                 "{name} beside it is no world file: six numbers are wanted, the steps not zero"
             ))
         })?;
-        super::reference_system(input, decoded);
+        super::reference_system(input, decoded)?;
         decoded.lay_out(map, None);
         decoded.format += &format!(", placed by {name}");
         return Ok(());

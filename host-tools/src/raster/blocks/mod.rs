@@ -6,18 +6,23 @@
 //! images of the same field, overviews, serve the coarse levels of detail.
 //!
 //! A block that cannot be read is a hole, with a warning: what is wrong in one place of a
-//! file that is larger than memory is no reason to feel nothing of it.
+//! file that is larger than memory is no reason to feel nothing of it. What has not come yet
+//! from elsewhere is not known: it is counted, and asked for again.
 
 mod cache;
 mod survey;
 
+use std::collections::HashMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
 
 use super::guard::guarded;
 use super::samples::{HoleMask, SampleType, SampleValue, Samples, with_samples};
 use super::{BadRaster, bilinear};
+use crate::remote::without_key;
 use cache::{Cache, Key};
 pub(super) use survey::{Looks, Survey};
 
@@ -28,6 +33,10 @@ pub(super) const LARGEST_BLOCK_BYTES: u64 = 32 << 20;
 const AS_COARSE: f64 = 1.01;
 /// After so many warnings of blocks that cannot be read one says that there are more.
 const WARNINGS: u32 = 8;
+/// A block that was not here yet is looked for again after so long.
+const AGAIN: Duration = Duration::from_millis(20);
+/// Blocks that are known to be on their way, at most.
+const MOST_AWAITED: usize = 1024;
 
 /// Reads parts of a file's images.
 pub(super) trait BlockReader: Send + Sync {
@@ -49,6 +58,12 @@ pub(super) trait BlockReader: Send + Sync {
     /// # Errors
     /// What is wrong with that part of the file.
     fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster>;
+
+    /// Is told which parts are going to be read, one after the other: what is elsewhere is
+    /// fetched meanwhile.
+    fn want(&self, image: usize, parts: &[Part]) {
+        let _ = (image, parts);
+    }
 
     /// A hash of the file's index: where each block is stored and in how many bytes.
     fn index(&self) -> u64;
@@ -143,14 +158,23 @@ impl BlockImage {
 pub(super) struct Blocks {
     reader: Box<dyn BlockReader>,
     kept: Mutex<Kept>,
+    /// How often something was asked for that is not here yet.
+    not_yet: AtomicU64,
     /// The file, for warnings.
     path: OnceLock<PathBuf>,
 }
+
+/// What was asked for is elsewhere.
+struct NotHere;
 
 struct Kept {
     cache: Cache,
     /// Blocks that could not be read.
     unread: u32,
+    /// Blocks that are not here yet, and when they were looked for.
+    awaited: HashMap<Key, Instant>,
+    /// What the line said last.
+    outage: Option<BadRaster>,
 }
 
 impl Blocks {
@@ -159,10 +183,13 @@ impl Blocks {
         let kept = Kept {
             cache: Cache::new(cache::MOST_BYTES),
             unread: 0,
+            awaited: HashMap::new(),
+            outage: None,
         };
         Self {
             reader,
             kept: Mutex::new(kept),
+            not_yet: AtomicU64::new(0),
             path: OnceLock::new(),
         }
     }
@@ -184,6 +211,16 @@ impl Blocks {
     pub(super) fn share(&self) -> (usize, u32) {
         let kept = self.kept();
         (kept.cache.bytes(), kept.unread)
+    }
+
+    /// How often something was asked for that is not here yet.
+    pub(super) fn not_yet(&self) -> u64 {
+        self.not_yet.load(Ordering::Relaxed)
+    }
+
+    /// What the line said last, where something did not come.
+    pub(super) fn take_outage(&self) -> Option<BadRaster> {
+        self.kept().outage.take()
     }
 
     fn kept(&self) -> MutexGuard<'_, Kept> {
@@ -264,23 +301,49 @@ impl Blocks {
         if let Some(block) = kept.cache.get(&key) {
             return block;
         }
+        let looked = kept.awaited.get(&key);
+        if looked.is_some_and(|looked| looked.elapsed() < AGAIN) {
+            self.not_yet.fetch_add(1, Ordering::Relaxed);
+            return None;
+        }
         let part = self.reader.images().get(image)?.part(at);
-        let block = self.read(image, &part, &mut kept.unread);
+        let Ok(block) = self.read(image, &part, &mut kept) else {
+            if kept.awaited.len() >= MOST_AWAITED {
+                kept.awaited.clear();
+            }
+            kept.awaited.insert(key, Instant::now());
+            return None;
+        };
+        kept.awaited.remove(&key);
         kept.cache.put(key, block.clone());
         block
     }
 
-    fn read(&self, image: usize, part: &Part, unread: &mut u32) -> Option<Arc<Block>> {
+    /// A part of an image; `None` where there is no sample.
+    ///
+    /// # Errors
+    /// [`NotHere`], which is counted.
+    fn read(
+        &self,
+        image: usize,
+        part: &Part,
+        kept: &mut Kept,
+    ) -> Result<Option<Arc<Block>>, NotHere> {
         if !self.reader.is_stored(image, part) {
-            return None;
+            return Ok(None);
         }
         let read = guarded(self.reader.format(), || self.reader.read(image, part));
         match read {
-            Ok(block) => Some(Arc::new(block)),
+            Ok(block) => Ok(Some(Arc::new(block))),
+            Err(fault) if fault.is_of_the_line() => {
+                self.not_yet.fetch_add(1, Ordering::Relaxed);
+                kept.outage = Some(fault);
+                Err(NotHere)
+            }
             Err(fault) => {
+                let unread = &mut kept.unread;
                 *unread = unread.saturating_add(1);
-                let name =
-                    (self.path.get()).map_or("the file".into(), |path| path.display().to_string());
+                let name = (self.path.get()).map_or("the file".into(), |path| without_key(path));
                 if *unread <= WARNINGS {
                     tracing::warn!(
                         "columns {} to {}, rows {} to {} of {name} cannot be read and are a hole: {fault}",
@@ -292,7 +355,7 @@ impl Blocks {
                 } else if *unread == WARNINGS + 1 {
                     tracing::warn!("more of {name} cannot be read and are holes");
                 }
-                None
+                Ok(None)
             }
         }
     }

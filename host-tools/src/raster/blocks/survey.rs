@@ -81,9 +81,11 @@ impl Blocks {
             true => parts.len(),
             false => LOOKS,
         };
-        for index in 0..looks {
-            let part = index * (parts.len() - 1) / (looks - 1).max(1);
-            look(&parts[part], &mut seen);
+        let chosen = (0..looks).map(|index| parts[index * (parts.len() - 1) / (looks - 1).max(1)]);
+        let chosen: Vec<Part> = chosen.collect();
+        self.reader.want(image, &chosen);
+        for part in &chosen {
+            look(part, &mut seen);
         }
         if looks < parts.len() {
             // Most of it may hold nothing: then the first height anywhere will do.
@@ -112,7 +114,8 @@ impl Blocks {
     /// The samples of a part that is no block: neither is it kept, nor is read what lies
     /// around it.
     fn look_once(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
-        let block = self.read(image, part, &mut self.kept().unread);
+        let read = self.read(image, part, &mut self.kept());
+        let block = read.ok().flatten();
         for index in 0..part.columns as usize * part.rows as usize {
             add(block.as_ref().and_then(|block| block.stored(index)));
         }

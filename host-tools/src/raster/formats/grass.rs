@@ -38,7 +38,7 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let samples = samples(&mut tokens, &header, size, input.len())?;
     let mut decoded = Decoded::new("GRASS ASCII grid".into(), size, Samples::from(samples));
     decoded.scale = header.number("multiplier")?.unwrap_or(1.0);
-    beside::reference_system(input, &mut decoded);
+    beside::reference_system(input, &mut decoded)?;
     let edge = |key: &str| {
         let at = header.coordinate(key)?;
         at.ok_or_else(|| BadRaster::damaged(format!("the header has no {key}")))

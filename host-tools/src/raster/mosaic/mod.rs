@@ -27,6 +27,7 @@ use std::path::{Path, PathBuf};
 
 use super::input::FileBytes;
 use super::{BadRaster, Decoded, OpenOptions, beside};
+use crate::remote::{Elsewhere, is_url};
 pub(super) use names::named;
 pub(super) use vrt::decode as of_vrt;
 pub(super) use vrt::xml::is_vrt;
@@ -53,10 +54,14 @@ pub fn files_read_with(path: &Path) -> Vec<PathBuf> {
         let each = files.iter().flat_map(|file| beside::files_read_with(file));
         each.collect()
     };
+    if path.to_str().is_some_and(is_url) {
+        // Nothing is written there.
+        return Vec::new();
+    }
     if let Ok(Some(files)) = named(path) {
         return with_neighbours(files);
     }
-    let input = FileBytes::open(path);
+    let input = FileBytes::open(path, &Elsewhere::default());
     let sources = input.and_then(|input| match is_vrt(&input)? {
         true => vrt::sources(&input, path),
         false => Ok(Vec::new()),

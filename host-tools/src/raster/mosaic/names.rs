@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::super::BadRaster;
 use super::super::format::Claim;
 use super::super::formats::claim_of;
+use crate::remote::is_url;
 
 /// No terrain has more files: the 30 m tiles of all the Earth's land are 26,450.
 const MOST_FILES: usize = 1 << 20;
@@ -15,6 +16,9 @@ const MOST_FILES: usize = 1 << 20;
 /// # Errors
 /// [`BadRaster::NoTiles`]; a folder that cannot be read.
 pub(in crate::raster) fn named(path: &Path) -> Result<Option<Vec<PathBuf>>, BadRaster> {
+    if path.to_str().is_some_and(is_url) {
+        return Ok(None);
+    }
     let files = if path.is_dir() {
         in_folder(path)?
     } else if let Some(pattern) = pattern(path) {

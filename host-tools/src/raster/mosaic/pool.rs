@@ -10,6 +10,7 @@ use super::super::storage::Storage;
 use super::super::{BadRaster, Decoded, OpenOptions};
 use super::source::{Opened, Source, Values};
 use super::tile_file;
+use crate::remote::without_key;
 
 /// No more files are open at once: each may have a mask and overviews beside it.
 const MOST_OPEN: usize = 32;
@@ -46,27 +47,35 @@ impl Pool {
     }
 
     /// An open file; `None`, with a warning the first time, where it cannot be read.
-    pub(super) fn get(&mut self, number: usize, source: &Source) -> Option<Arc<Opened>> {
+    ///
+    /// # Errors
+    /// Where it is elsewhere, and cannot be read at present.
+    pub(super) fn get(
+        &mut self,
+        number: usize,
+        source: &Source,
+    ) -> Result<Option<Arc<Opened>>, BadRaster> {
         if let Some(opened) = self.open.get(&number) {
-            return Some(opened.clone());
+            return Ok(Some(opened.clone()));
         }
         if self.failed.contains(&number) {
-            return None;
+            return Ok(None);
         }
         match self.opened(number, source) {
             Ok(opened) => {
                 let opened = Arc::new(opened);
                 self.open.push(number, opened.clone());
-                Some(opened)
+                Ok(Some(opened))
             }
+            Err(fault) if fault.is_of_the_line() => Err(fault),
             Err(fault) => {
                 self.failed.insert(number);
                 // That it holds nothing is no fault of a file among others.
                 if !matches!(fault, BadRaster::AllNoData { .. }) {
-                    let path = source.path.display();
+                    let path = without_key(&source.path);
                     tracing::warn!("{path} cannot be read and is a hole: {fault}");
                 }
-                None
+                Ok(None)
             }
         }
     }

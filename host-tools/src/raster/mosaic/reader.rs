@@ -10,6 +10,7 @@ use super::super::blocks::{Block, BlockImage, BlockReader, Looks, Part};
 use super::super::{BadRaster, OpenOptions, SampleType};
 use super::pool::Pool;
 use super::source::{Opened, Source};
+use crate::remote::{RemoteFile, is_url};
 
 /// Samples of a block each way; fewer in coarse images, where a block is of many files.
 const BLOCK: u32 = 256;
@@ -157,8 +158,12 @@ impl BlockReader for Mosaic {
             if places.is_empty() {
                 continue;
             }
-            if let Some(opened) = pool.get(number, source) {
+            if let Some(opened) = pool.get(number, source)? {
+                let before = opened.not_yet();
                 filling.fill(image as u8, source, &opened, &places);
+                if opened.not_yet() != before {
+                    return Err(BadRaster::NotYet);
+                }
             }
             pool.make_room(0);
         }
@@ -203,7 +208,12 @@ impl BlockReader for Mosaic {
 
     fn kept_bytes(&self) -> usize {
         let names = self.sources.iter().map(|source| source.path.capacity());
-        Pool::most_bytes() + names.sum::<usize>() + self.sources.len() * size_of::<Source>()
+        let is_elsewhere = |source: &Source| source.path.to_str().is_some_and(is_url);
+        let pages = match self.sources.iter().any(is_elsewhere) {
+            true => RemoteFile::kept_bytes(),
+            false => 0,
+        };
+        pages + Pool::most_bytes() + names.sum::<usize>() + self.sources.len() * size_of::<Source>()
     }
 }
 

@@ -39,7 +39,7 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let mut decoded = Decoded::new(format, (columns, rows), samples);
     decoded.no_data = Some(header.no_data());
     let (east, north) = header.cell()?;
-    beside::reference_system(input, &mut decoded);
+    beside::reference_system(input, &mut decoded)?;
     match header.south_west((east, north)) {
         Some(corner) => {
             let map = GroundMap::from_south_west(corner, (east, north), rows);

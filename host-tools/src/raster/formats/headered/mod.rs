@@ -71,7 +71,7 @@ pub(in crate::raster) fn decode_by_header(
     };
     let format = format!("{}, {}{bands}", header.format, samples.type_name());
     let mut decoded = Decoded::new(format, (header.layout.columns, header.layout.rows), samples);
-    beside::reference_system(input, &mut decoded);
+    beside::reference_system(input, &mut decoded)?;
     (header.describe)(&mut decoded).map_err(|fault| in_header(fault, &name))?;
     if header.layout.bands > 1 && options.band.is_none() {
         decoded.remarks.push(format!(

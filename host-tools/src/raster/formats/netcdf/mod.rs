@@ -116,6 +116,7 @@ fn storage(input: &FileBytes) -> Result<DynStorage, BadRaster> {
             Arc::new(storage.map_err(|error| BadRaster::Unreadable(std::io::Error::other(error)))?)
         }
         Data::Memory(bytes) => Arc::new(BytesStorage::from_owner(bytes.clone())),
+        Data::Remote(..) => Arc::new(BytesStorage::from_owner(input.all()?)),
     })
 }
 

@@ -2,6 +2,7 @@
 //! strips or tiles.
 
 use std::hash::Hasher;
+use std::sync::Arc;
 
 use tiff_reader::{Ifd, TiffFile};
 use twox_hash::XxHash64;
@@ -11,6 +12,7 @@ use super::layout::Layout;
 use super::samples::{holes, read, sample_type};
 use crate::raster::blocks::{Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Part};
 use crate::raster::{BadRaster, SampleType};
+use crate::remote::RemoteFile;
 
 /// Small strips and tiles are read several at once, samples each way.
 const USUAL_BLOCK: u32 = 256;
@@ -38,12 +40,17 @@ fn block(layout: &Layout) -> [u32; 2] {
 /// A TIFF on disk.
 pub(super) struct TiffBlocks {
     files: Vec<TiffFile>,
+    /// Those of the files that are elsewhere.
+    remote: Vec<Option<Arc<RemoteFile>>>,
     mask: Option<TiffFile>,
     /// The full image and its overviews.
     images: Vec<Image>,
     /// The same as the rest of the program knows them.
     blocks: Vec<BlockImage>,
 }
+
+/// A file, and the same as it is elsewhere.
+pub(super) type Opened = (TiffFile, Option<Arc<RemoteFile>>);
 
 /// The main file, and one of overviews beside it.
 const MAIN: usize = 0;
@@ -58,9 +65,9 @@ impl TiffBlocks {
     /// The full image of a file and the overviews in it and in one beside it that are of the
     /// same kind; `asked` is the band that the user chose.
     pub(super) fn new(
-        file: TiffFile,
+        (file, remote): Opened,
         mask: Option<TiffFile>,
-        overviews: Option<TiffFile>,
+        overviews: Option<Opened>,
         asked: Option<u32>,
     ) -> Result<Self, BadRaster> {
         let full = images::full(&file)?.clone();
@@ -69,7 +76,9 @@ impl TiffBlocks {
             layout: Layout::read(&full, asked)?,
             directory: full,
         };
-        let files: Vec<_> = [file].into_iter().chain(overviews).collect();
+        let (also, also_remote) = overviews.unzip();
+        let files: Vec<_> = [file].into_iter().chain(also).collect();
+        let remote = [remote].into_iter().chain(also_remote).collect();
         let mut found = vec![full];
         for (index, file) in files.iter().enumerate() {
             for directory in images::overviews(file) {
@@ -98,6 +107,7 @@ impl TiffBlocks {
         Ok(Self {
             blocks: blocks.collect(),
             files,
+            remote,
             mask,
             images: found,
         })
@@ -147,7 +157,28 @@ impl BlockReader for TiffBlocks {
         chunks.any(|chunk| chunk.bytes > 0)
     }
 
+    fn want(&self, image: usize, parts: &[Part]) {
+        let Image {
+            file,
+            directory,
+            layout,
+        } = &self.images[image];
+        let Some(remote) = &self.remote[*file] else {
+            return;
+        };
+        let places = directory.tile_offsets().or(directory.strip_offsets());
+        let places = places.unwrap_or_default();
+        let chunks = parts.iter().flat_map(|part| layout.chunks_in(part));
+        let ranges = chunks.filter_map(|chunk| {
+            let from = *places.get(chunk.number)?;
+            Some(from..from.saturating_add(chunk.bytes))
+        });
+        remote.want(ranges);
+    }
+
     fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        // The decoder asks for one chunk after the other.
+        self.want(image, std::slice::from_ref(part));
         let image = &self.images[image];
         let (file, directory, layout) = (&self.files[image.file], &image.directory, &image.layout);
         let mask = self.mask_of(image);
@@ -155,6 +186,13 @@ impl BlockReader for TiffBlocks {
             samples: read(file, directory, layout, layout.band, part)?,
             holes: holes(file, directory, layout, mask, part)?,
         })
+    }
+
+    fn kept_bytes(&self) -> usize {
+        match self.remote.iter().any(Option::is_some) {
+            true => RemoteFile::kept_bytes(),
+            false => 0,
+        }
     }
 
     fn index(&self) -> u64 {

@@ -35,6 +35,8 @@ pub(super) struct Layout {
 pub(super) struct Chunk {
     /// Bytes stored for it; 0 for one that a sparse file leaves out.
     pub(super) bytes: u64,
+    /// Its number among those of all bands.
+    pub(super) number: usize,
     /// Its samples.
     pub(super) covers: Part,
 }
@@ -121,7 +123,9 @@ impl Layout {
         let places = down.flat_map(move |row| across.clone().map(move |column| (column, row)));
         places.filter_map(move |(column, row)| {
             let index = u64::from(row) * u64::from(self.chunks_across()) + u64::from(column);
-            let bytes = *self.of_band()?.get(usize::try_from(index).ok()?)?;
+            let number = usize::try_from(index).ok()?;
+            let bytes = *self.of_band()?.get(number)?;
+            let number = number.checked_add(self.first_of_band()?)?;
             let (column, row) = (column * width, row * height);
             let covers = Part {
                 column,
@@ -129,7 +133,11 @@ impl Layout {
                 columns: width.min(self.columns - column),
                 rows: height.min(self.rows - row),
             };
-            Some(Chunk { bytes, covers })
+            Some(Chunk {
+                bytes,
+                number,
+                covers,
+            })
         })
     }
 
@@ -145,11 +153,18 @@ impl Layout {
         let down = self.rows.div_ceil(self.chunk.1);
         let chunks = u64::from(self.chunks_across()) * u64::from(down);
         let chunks = usize::try_from(chunks).ok()?;
-        let first = match self.planar {
-            true => chunks.checked_mul(self.band)?,
-            false => 0,
-        };
+        let first = self.first_of_band()?;
         self.chunk_bytes.get(first..first.checked_add(chunks)?)
+    }
+
+    /// Number of the band's first chunk among those of all bands.
+    fn first_of_band(&self) -> Option<usize> {
+        let down = self.rows.div_ceil(self.chunk.1);
+        let chunks = usize::try_from(u64::from(self.chunks_across()) * u64::from(down)).ok()?;
+        match self.planar {
+            true => chunks.checked_mul(self.band),
+            false => Some(0),
+        }
     }
 
     /// Bytes of the samples that are stored together: one of each band, or of one

@@ -10,9 +10,11 @@ mod georef;
 mod images;
 mod layout;
 mod metadata;
+mod remote_source;
 mod samples;
 mod user_defined;
 
+use std::iter::once;
 use std::sync::Arc;
 
 use tiff_reader::source::{BytesSource, FileSource, SharedSource};
@@ -29,6 +31,7 @@ use blocks::TiffBlocks;
 use fault::fault;
 use layout::Layout;
 use metadata::Metadata;
+use remote_source::RemoteSource;
 
 /// TIFF and BigTIFF of either byte order.
 pub(super) const FORMAT: Format = Format {
@@ -38,6 +41,9 @@ pub(super) const FORMAT: Format = Format {
     parts: Parts::Bands,
     decode,
 };
+
+/// A file at a URL whose samples take no more than this is fetched as a whole.
+const FEW_BYTES: u64 = 1 << 20;
 
 /// Extensions of a TIFF's world files.
 const WORLD_FILES: [&str; 4] = ["tfw", "tifw", "tiffw", "tfwx"];
@@ -49,22 +55,35 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     let file = open(input)?;
     let image = images::full(&file)?.clone();
     let layout = Layout::read(&image, asked)?;
-    let stays = layout.bytes() > options.most_in_memory_bytes && blocks::suit(&layout);
+    let most = match input.remote() {
+        // What is not touched is not fetched, either.
+        Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
+        None => options.most_in_memory_bytes,
+    };
+    let stays = layout.bytes() > most && blocks::suit(&layout);
     if !stays {
         budget::check_memory(&layout)?;
     }
     budget::check(&layout, input.len())?;
     let format = layout.described(file.byte_order());
     let size = (layout.columns, layout.rows);
-    let mask = beside(input, "msk")?;
+    let mask = find_appended(input, "msk")?;
+    let mask = mask.as_ref().map(open).transpose()?;
     let storage = match stays {
         false if input.is_outline() => Storage::from(samples::sample_type(&layout).none()),
         true => {
-            let overviews = beside(input, "ovr")?;
+            let overviews = match find_appended(input, "ovr")? {
+                Some(beside) => Some((open(&beside)?, beside.remote())),
+                None => None,
+            };
+            let file = (file, input.remote());
             Storage::from(TiffBlocks::new(file, mask, overviews, asked)?)
         }
         false => {
             let all = Part::whole(layout.columns, layout.rows);
+            if let Some(remote) = input.remote() {
+                remote.want(once(0..input.len()));
+            }
             let samples = samples::read(&file, &image, &layout, layout.band, &all)?;
             let mut storage = Storage::from(samples);
             storage.set_holes(samples::holes(&file, &image, &layout, mask.as_ref(), &all)?);
@@ -92,15 +111,6 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     Ok(decoded)
 }
 
-/// A file that GDAL keeps beside another, as `NAME.tif.msk` for a mask and `NAME.tif.ovr`
-/// for overviews.
-fn beside(input: &FileBytes, extension: &str) -> Result<Option<TiffFile>, BadRaster> {
-    let Some(beside) = find_appended(input, extension) else {
-        return Ok(None);
-    };
-    open(&FileBytes::open(&beside)?).map(Some)
-}
-
 /// Opens the file. No list in its directories may be longer than the file is.
 fn open(input: &FileBytes) -> Result<TiffFile, BadRaster> {
     const LONGEST_LIST: usize = 32 << 20;
@@ -118,6 +128,7 @@ fn open(input: &FileBytes) -> Result<TiffFile, BadRaster> {
     let source: SharedSource = match input.data() {
         Data::File(_, path) => Arc::new(FileSource::open(path).map_err(fault)?),
         Data::Memory(bytes) => Arc::new(BytesSource::new(bytes.clone())),
+        Data::Remote(file, _) => Arc::new(RemoteSource(file.clone())),
     };
     TiffFile::from_source_with_options(source, options).map_err(fault)
 }

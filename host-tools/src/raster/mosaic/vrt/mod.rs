@@ -23,6 +23,7 @@ use super::super::{BadRaster, OpenOptions};
 use super::VRT;
 use super::reader::Mosaic;
 use super::source::Source;
+use crate::remote::is_url;
 use sources::Taking;
 use xml::{Element, Xml};
 
@@ -92,7 +93,7 @@ pub(in crate::raster) fn decode(
     decoded.set_vertical(vertical, band.unit.and_then(|unit| metres_in(&unit)));
     decoded.system = system;
     if decoded.system.is_none() {
-        beside::reference_system(input, &mut decoded);
+        beside::reference_system(input, &mut decoded)?;
     }
     // The terrain's rows are counted from the south.
     decoded.south_up = true;
@@ -122,6 +123,10 @@ pub(in crate::raster) fn sources(
 
 /// Bytes of a source's file; none, with a warning, where it is not there.
 fn bytes_of(source: &Source) -> u64 {
+    if source.path.to_str().is_some_and(is_url) {
+        // How many they are is known when it is opened.
+        return 1;
+    }
     match std::fs::metadata(&source.path) {
         Ok(metadata) if metadata.is_file() => metadata.len(),
         Ok(_) => {
@@ -170,7 +175,13 @@ fn read(input: &FileBytes, path: &Path, asked: Option<u32>, looks: bool) -> Resu
         if element.name == "VRTRasterBand" {
             vrt.bands += 1;
             let is_asked = vrt.bands == asked.unwrap_or(1);
-            let band = read_band(&mut xml, &element, Taking { path, size, looks })?;
+            let taking = Taking {
+                path,
+                size,
+                looks,
+                elsewhere: input.elsewhere(),
+            };
+            let band = read_band(&mut xml, &element, taking)?;
             if is_asked {
                 vrt.band = band?;
             }

@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use super::super::super::samples::SampleType;
-use super::super::super::{BadRaster, OpenOptions};
+use super::super::super::{BadRaster, Elsewhere, OpenOptions};
 use super::super::pool::options_for_tiles;
 use super::super::source::{Source, Values};
 use super::super::tile_file;
 use super::rectangles::Rectangle;
 use super::unsupported;
 use super::xml::{Element, number};
+use crate::remote::{beside, is_url};
 
 /// What sources are of.
 #[derive(Clone, Copy)]
@@ -20,6 +21,8 @@ pub(super) struct Taking<'p> {
     pub(super) size: (u32, u32),
     /// Whether files may be looked into for their sizes.
     pub(super) looks: bool,
+    /// The files at URLs.
+    pub(super) elsewhere: &'p Elsewhere,
 }
 
 /// Elements of a source that are understood, or that change no sample.
@@ -92,6 +95,9 @@ impl Taking<'_> {
         let is_beside = named
             .attribute("relativeToVRT")
             .is_some_and(|text| text.trim() == "1");
+        if let Some(url) = url(name) {
+            return Ok(url.into());
+        }
         let is_gdals = name.starts_with("/vsi") || name.starts_with('<');
         let has_parts = name.contains(":\"") || name.ends_with('"');
         if is_gdals || has_parts {
@@ -102,17 +108,39 @@ impl Taking<'_> {
         if name.to_lowercase().ends_with(".vrt") {
             return Err(unsupported(format!("a VRT as a source of a VRT ({name})")));
         }
+        if let Some(vrt) = self.path.to_str().filter(|path| is_url(path)) {
+            // Where a VRT is elsewhere, so are its files.
+            return Ok(beside(vrt, name).into());
+        }
         let folder = self.path.parent().filter(|_| is_beside);
         Ok(folder.map_or_else(|| PathBuf::from(name), |folder| folder.join(name)))
     }
 
     /// The size of a file that the VRT does not state.
     fn looked_up_size(&self, path: &Path) -> Result<(u32, u32), BadRaster> {
-        let options = options_for_tiles(&OpenOptions::default());
+        let options = options_for_tiles(&OpenOptions {
+            elsewhere: self.elsewhere.clone(),
+            ..OpenOptions::default()
+        });
         let outline = tile_file::outline(path, &options);
         let outline = outline.map_err(|fault| BadRaster::in_tile(path, fault))?;
         Ok((outline.columns, outline.rows))
     }
+}
+
+/// The URL that a name is, be it in GDAL's way.
+fn url(name: &str) -> Option<String> {
+    const GDALS: [(&str, &str); 4] = [
+        ("/vsicurl/", ""),
+        ("/vsis3/", "s3://"),
+        ("/vsigs/", "gs://"),
+        ("/vsiaz/", "az://"),
+    ];
+    let gdals = GDALS.iter().find_map(|(prefix, scheme)| {
+        let rest = name.strip_prefix(prefix)?;
+        Some(format!("{scheme}{rest}"))
+    });
+    Some(gdals.unwrap_or_else(|| name.to_owned())).filter(|name| is_url(name))
 }
 
 /// The band of a source; `None` for the first.

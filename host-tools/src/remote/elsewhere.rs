@@ -1,0 +1,128 @@
+//! The files at URLs that a terrain is made of.
+
+use std::fmt;
+use std::io::{Error, ErrorKind, Result};
+use std::num::NonZeroUsize;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use lru::LruCache;
+use tokio::runtime::Runtime;
+
+use super::file::RemoteFile;
+use super::line::{Line, background, spawn};
+use super::store::Opened;
+use super::url::shown;
+use super::{is_outage, store};
+
+/// Files that are known at once: open, missing or on their way.
+const MOST_FILES: NonZeroUsize = NonZeroUsize::new(256).unwrap();
+/// A server that did not answer is asked again after so long, where nobody waits.
+const BETWEEN_TRIES: Duration = Duration::from_secs(1);
+
+/// Files at URLs, open or being opened. Clones are of the same.
+#[derive(Clone)]
+pub struct Elsewhere(Arc<Shared>);
+
+struct Shared {
+    line: Arc<Line>,
+    files: Mutex<LruCache<String, Known>>,
+    answered: Condvar,
+}
+
+/// What is known of a URL.
+#[derive(Clone)]
+enum Known {
+    OnItsWay,
+    Open(Arc<RemoteFile>),
+    /// Why not, and since when.
+    Failed(Instant, ErrorKind, String),
+}
+
+impl Default for Elsewhere {
+    fn default() -> Self {
+        Self(Arc::new(Shared {
+            line: Arc::default(),
+            files: Mutex::new(LruCache::new(MOST_FILES)),
+            answered: Condvar::new(),
+        }))
+    }
+}
+
+impl Elsewhere {
+    /// The file at a URL. A file that is open is not opened again, and one that is missing
+    /// is not looked for again.
+    ///
+    /// # Errors
+    /// [`ErrorKind::WouldBlock`] where it is on its way and nobody may wait;
+    /// [`super::is_missing`], [`super::is_outage`], or what is wrong with the URL.
+    pub(crate) fn open(&self, url: &str) -> Result<Arc<RemoteFile>> {
+        let background = background()?;
+        let mut has_asked = false;
+        let mut files = self.files();
+        loop {
+            let waits = self.0.line.waits();
+            match files.get(url).cloned() {
+                Some(Known::Open(file)) => return Ok(file),
+                Some(Known::OnItsWay) if !waits => return Err(ErrorKind::WouldBlock.into()),
+                Some(Known::OnItsWay) => {
+                    has_asked = true;
+                    let waited = self.0.answered.wait(files);
+                    files = waited.unwrap_or_else(PoisonError::into_inner);
+                }
+                Some(Known::Failed(at, kind, why)) => {
+                    let error = Error::new(kind, why);
+                    if !is_outage(&error) || waits && has_asked {
+                        return Err(error);
+                    }
+                    if !waits && at.elapsed() < BETWEEN_TRIES {
+                        return Err(ErrorKind::WouldBlock.into());
+                    }
+                    self.ask(background, &mut files, url);
+                }
+                None => self.ask(background, &mut files, url),
+            }
+        }
+    }
+
+    /// From now on nobody waits, or everybody does again.
+    pub(crate) fn stop_waiting(&self, stop: bool) {
+        self.0.line.stop_waiting(stop);
+    }
+
+    fn files(&self) -> MutexGuard<'_, LruCache<String, Known>> {
+        // Nothing that panics runs while this is held.
+        self.0.files.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn ask(&self, background: &'static Runtime, files: &mut LruCache<String, Known>, url: &str) {
+        files.put(url.to_owned(), Known::OnItsWay);
+        let (line, asked) = (self.0.line.clone(), url.to_owned());
+        let work = async move {
+            let _turn = line.turn().await;
+            store::open(&asked).await
+        };
+        let (this, url) = (self.clone(), url.to_owned());
+        spawn(background, work, move |opened| {
+            this.answered(background, url, opened);
+        });
+    }
+
+    fn answered(&self, background: &'static Runtime, url: String, opened: Result<Opened>) {
+        let known = match opened {
+            Ok(opened) => {
+                let file = RemoteFile::new(shown(&url), &self.0.line, background, opened);
+                Known::Open(Arc::new(file))
+            }
+            Err(error) => Known::Failed(Instant::now(), error.kind(), error.to_string()),
+        };
+        self.files().put(url, known);
+        self.0.answered.notify_all();
+    }
+}
+
+impl fmt::Debug for Elsewhere {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Elsewhere")
+    }
+}

@@ -1,0 +1,215 @@
+//! A file at a URL, of which the pages touched last are here.
+
+use std::fmt;
+use std::io::{Error, ErrorKind, Result};
+use std::iter::once;
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use tokio::runtime::Runtime;
+
+use super::line::{Held, Line, Trouble, spawn};
+use super::pages;
+use super::store::{Object, Opened};
+use super::{LOST, OUTAGE, is_outage};
+
+/// After a request that failed the next one is made after so long, where nobody waits.
+const BETWEEN_TRIES: Duration = Duration::from_secs(1);
+/// Between two looks at whether a page may be asked for, where many are on their way.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// A file at a URL.
+pub(crate) struct RemoteFile {
+    name: String,
+    number: u64,
+    line: Arc<Line>,
+    background: &'static Runtime,
+    object: Object,
+    /// All of it, where it is short or its server knows no ranges.
+    all: Option<Vec<u8>>,
+}
+
+impl RemoteFile {
+    /// A file that a server has answered for.
+    pub(super) fn new(
+        name: &str,
+        line: &Arc<Line>,
+        background: &'static Runtime,
+        opened: Opened,
+    ) -> Self {
+        let number = line.number();
+        let all = opened.is_all;
+        if !all {
+            line.held().pages.arrived(number, 0..1, &opened.first);
+        }
+        Self {
+            name: name.to_owned(),
+            number,
+            line: line.clone(),
+            background,
+            object: opened.object,
+            all: all.then_some(opened.first),
+        }
+    }
+
+    /// Bytes that all files keep in memory together, at most.
+    pub(crate) const fn kept_bytes() -> usize {
+        pages::MOST_BYTES
+    }
+
+    /// Number of bytes.
+    pub(crate) fn len(&self) -> u64 {
+        match &self.all {
+            Some(all) => all.len() as u64,
+            None => self.object.len(),
+        }
+    }
+
+    /// Has bytes fetched that are going to be read; waits for nothing.
+    pub(crate) fn want(self: &Arc<Self>, ranges: impl Iterator<Item = Range<u64>>) {
+        if self.all.is_some() {
+            return;
+        }
+        for run in self.take_missing(ranges) {
+            let (file, range) = (self.clone(), pages::bytes(&run, self.len()));
+            let work = async move {
+                let _turn = file.line.turn().await;
+                file.object.get(range).await
+            };
+            let file = self.clone();
+            spawn(self.background, work, move |got| file.arrived(run, got));
+        }
+    }
+
+    fn take_missing(&self, ranges: impl Iterator<Item = Range<u64>>) -> Vec<Range<u64>> {
+        let mut held = self.line.held();
+        let has_to_rest = match held.troubles.get(&self.number) {
+            Some(Trouble::Outage(at, _)) => !self.line.waits() && at.elapsed() < BETWEEN_TRIES,
+            Some(Trouble::Lost(_)) => true,
+            None => false,
+        };
+        if has_to_rest {
+            return vec![];
+        }
+        let pages = ranges.map(|range| pages::of(&range, self.len()));
+        let runs = pages.flat_map(|pages| held.pages.take_missing(self.number, pages));
+        runs.collect()
+    }
+
+    /// Bytes of the file, all of them inside of it.
+    ///
+    /// # Errors
+    /// [`ErrorKind::WouldBlock`] where they are on their way and nobody may wait;
+    /// [`is_outage`]; that the file was changed.
+    pub(crate) fn read_at(self: &Arc<Self>, offset: u64, count: usize) -> Result<Vec<u8>> {
+        let end = offset.checked_add(count as u64);
+        let Some(end) = end.filter(|end| *end <= self.len()) else {
+            return Err(ErrorKind::UnexpectedEof.into());
+        };
+        if let Some(all) = &self.all {
+            return Ok(all[offset as usize..end as usize].to_vec());
+        }
+        let wanted = offset..end;
+        self.want(once(wanted.clone()));
+        let mut bytes = Vec::with_capacity(count);
+        for number in pages::of(&wanted, self.len()) {
+            let page = self.page(number)?;
+            let first = number * pages::PAGE;
+            let from = offset.saturating_sub(first) as usize;
+            let to = (end - first).min(page.len() as u64) as usize;
+            bytes.extend_from_slice(&page[from..to]);
+        }
+        Ok(bytes)
+    }
+
+    /// A page; waited for where that may be.
+    fn page(self: &Arc<Self>, number: u64) -> Result<Arc<[u8]>> {
+        let key = (self.number, number);
+        let mut has_waited = false;
+        loop {
+            let mut held = self.line.held();
+            if let Some(page) = held.pages.get(key) {
+                return Ok(page);
+            }
+            if !self.line.waits() {
+                return Err(ErrorKind::WouldBlock.into());
+            }
+            match held.troubles.get(&self.number) {
+                Some(Trouble::Lost(why)) => return Err(Error::new(LOST, why.clone())),
+                Some(Trouble::Outage(_, why)) if has_waited && !held.pages.is_coming(key) => {
+                    return Err(Error::new(OUTAGE, why.clone()));
+                }
+                _ => {}
+            }
+            if !held.pages.is_coming(key) {
+                drop(held);
+                // Others were on their way, or it has gone again since.
+                let first = number * pages::PAGE;
+                self.want(once(first..first + 1));
+                held = self.line.held();
+            }
+            has_waited |= held.pages.is_coming(key);
+            if held.pages.get(key).is_none() {
+                drop(self.line.arrived.wait_timeout(held, LOOK));
+            }
+        }
+    }
+
+    fn arrived(&self, run: Range<u64>, got: Result<Vec<u8>>) {
+        let mut held = self.line.held();
+        match got {
+            Ok(bytes) => {
+                held.pages.arrived(self.number, run, &bytes);
+                if let Some(Trouble::Outage(..)) = held.troubles.get(&self.number) {
+                    held.troubles.remove(&self.number);
+                    tracing::warn!("{} can be read again", self.name);
+                }
+            }
+            Err(why) => {
+                held.pages.failed(self.number, run);
+                self.note(&mut held, &why);
+            }
+        }
+        drop(held);
+        self.line.arrived.notify_all();
+    }
+
+    /// Notes what is wrong, and tells the user where nobody else does: an error that
+    /// somebody waits for is told by him.
+    fn note(&self, held: &mut Held, why: &Error) {
+        let name = &self.name;
+        let trouble = match is_outage(why) {
+            true => Trouble::Outage(Instant::now(), why.to_string()),
+            false => Trouble::Lost(why.to_string()),
+        };
+        let tells = !self.line.waits();
+        match (held.troubles.get(&self.number), &trouble) {
+            // Its last word.
+            (Some(Trouble::Lost(_)), _) => return,
+            (None, Trouble::Outage(..)) if tells => tracing::warn!(
+                "{name} cannot be read at present; what was read stays, the rest is asked for again and again: {why}"
+            ),
+            (_, Trouble::Lost(_)) if tells => {
+                tracing::warn!("{name} is not read on; what was read stays: {why}");
+            }
+            _ => {}
+        }
+        held.troubles.insert(self.number, trouble);
+    }
+}
+
+impl Drop for RemoteFile {
+    fn drop(&mut self) {
+        // Its pages go when others want their room.
+        self.line.held().troubles.remove(&self.number);
+    }
+}
+
+impl fmt::Debug for RemoteFile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("RemoteFile")
+            .field("name", &self.name)
+            .finish_non_exhaustive()
+    }
+}

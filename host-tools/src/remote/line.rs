@@ -1,0 +1,111 @@
+//! What all remote files of a terrain share: the pages, the turns of their requests, and
+//! whether anybody waits.
+
+use std::collections::HashMap;
+use std::io::{Error, Result};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::Instant;
+
+use tokio::runtime::{Builder, Runtime};
+use tokio::sync::{Semaphore, SemaphorePermit};
+
+use super::OUTAGE;
+use super::pages::Pages;
+
+/// Requests under way at once.
+const AT_ONCE: usize = 16;
+
+/// Shared by the files of a terrain.
+pub(super) struct Line {
+    has_stopped_waiting: AtomicBool,
+    requests: Semaphore,
+    files: AtomicU64,
+    held: Mutex<Held>,
+    pub(super) arrived: Condvar,
+}
+
+/// What is here of all files.
+#[derive(Default)]
+pub(super) struct Held {
+    pub(super) pages: Pages,
+    /// What is wrong with files, by their numbers.
+    pub(super) troubles: HashMap<u64, Trouble>,
+}
+
+/// What is wrong with a file.
+pub(super) enum Trouble {
+    /// Its last request failed, then, and why; another may go well.
+    Outage(Instant, String),
+    /// Why no request can go well any more.
+    Lost(String),
+}
+
+impl Default for Line {
+    fn default() -> Self {
+        Self {
+            has_stopped_waiting: AtomicBool::new(false),
+            requests: Semaphore::new(AT_ONCE),
+            files: AtomicU64::new(0),
+            held: Mutex::default(),
+            arrived: Condvar::new(),
+        }
+    }
+}
+
+impl Line {
+    /// A number for another file.
+    pub(super) fn number(&self) -> u64 {
+        self.files.fetch_add(1, Ordering::Relaxed)
+    }
+
+    /// What is here.
+    pub(super) fn held(&self) -> MutexGuard<'_, Held> {
+        // Nothing that panics runs while this is held.
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// From now on nobody waits, or everybody does again.
+    pub(super) fn stop_waiting(&self, stop: bool) {
+        self.has_stopped_waiting.store(stop, Ordering::Release);
+    }
+
+    /// Whether whoever reads waits for what is not here yet.
+    pub(super) fn waits(&self) -> bool {
+        !self.has_stopped_waiting.load(Ordering::Acquire)
+    }
+
+    /// Waits until there are few enough requests under way.
+    pub(super) async fn turn(&self) -> Option<SemaphorePermit<'_>> {
+        self.requests.acquire().await.ok()
+    }
+}
+
+/// What fetches, for the whole program and as long as that runs.
+///
+/// # Errors
+/// Where the system has no thread for it.
+pub(super) fn background() -> Result<&'static Runtime> {
+    static BACKGROUND: OnceLock<std::result::Result<Runtime, String>> = OnceLock::new();
+    let made = BACKGROUND.get_or_init(|| {
+        let mut builder = Builder::new_multi_thread();
+        let builder = builder.worker_threads(1).enable_all();
+        let made = builder.thread_name("fetching").build();
+        made.map_err(|error| error.to_string())
+    });
+    made.as_ref().map_err(|why| Error::other(why.clone()))
+}
+
+/// Does something in the background, and `then` takes what came of it, in any case.
+pub(super) fn spawn<T: Send + 'static>(
+    background: &'static Runtime,
+    work: impl Future<Output = Result<T>> + Send + 'static,
+    then: impl FnOnce(Result<T>) + Send + 'static,
+) {
+    let work = background.spawn(work);
+    background.spawn(async move {
+        // A panic of the library's is an error like others.
+        let done = work.await;
+        then(done.unwrap_or_else(|error| Err(Error::new(OUTAGE, error.to_string()))));
+    });
+}

@@ -1,0 +1,155 @@
+//! The pages of all remote files that are here, and those on their way.
+
+use std::collections::HashSet;
+use std::ops::Range;
+use std::sync::Arc;
+
+use lru::LruCache;
+
+/// Bytes of a page.
+pub(super) const PAGE: u64 = 64 << 10;
+/// Pages that one request asks for, at most.
+const RUN: u64 = 16;
+/// Pages that are kept: 64 MB, besides those on their way.
+const MOST_KEPT: usize = 1024;
+/// Pages on their way at once: 32 MB.
+const MOST_COMING: usize = 512;
+
+/// Bytes that all pages take at most.
+pub(super) const MOST_BYTES: usize = (MOST_KEPT + MOST_COMING) * PAGE as usize;
+
+/// A page by the number of its file and its own.
+type Key = (u64, u64);
+
+/// Pages of files that are numbered.
+pub(super) struct Pages {
+    here: LruCache<Key, Arc<[u8]>>,
+    coming: HashSet<Key>,
+}
+
+impl Default for Pages {
+    fn default() -> Self {
+        Self {
+            here: LruCache::unbounded(),
+            coming: HashSet::new(),
+        }
+    }
+}
+
+impl Pages {
+    /// A page that is here, now the one touched last.
+    pub(super) fn get(&mut self, key: Key) -> Option<Arc<[u8]>> {
+        self.here.get(&key).cloned()
+    }
+
+    /// Whether a page is on its way.
+    pub(super) fn is_coming(&self, key: Key) -> bool {
+        self.coming.contains(&key)
+    }
+
+    /// The pages of a file in `wanted` that are neither here nor on their way, as runs that one
+    /// request each asks for: from now on they are on their way. What is more than may be
+    /// is left out, and has to be wanted again.
+    pub(super) fn take_missing(&mut self, file: u64, wanted: Range<u64>) -> Vec<Range<u64>> {
+        let mut runs: Vec<Range<u64>> = vec![];
+        for page in wanted {
+            let key = (file, page);
+            if self.here.contains(&key) || self.coming.contains(&key) {
+                continue;
+            }
+            if self.coming.len() >= MOST_COMING {
+                break;
+            }
+            self.coming.insert(key);
+            match runs.last_mut() {
+                Some(run) if run.end == page && page - run.start < RUN => run.end += 1,
+                _ => runs.push(page..page + 1),
+            }
+        }
+        runs
+    }
+
+    /// A run has come; what is missing of it may be asked for again.
+    pub(super) fn arrived(&mut self, file: u64, run: Range<u64>, bytes: &[u8]) {
+        self.failed(file, run.clone());
+        for (page, bytes) in run.zip(bytes.chunks(PAGE as usize)) {
+            self.here.put((file, page), bytes.into());
+            if self.here.len() > MOST_KEPT {
+                self.here.pop_lru();
+            }
+        }
+    }
+
+    /// A run is not on its way any more.
+    pub(super) fn failed(&mut self, file: u64, run: Range<u64>) {
+        for page in run {
+            self.coming.remove(&(file, page));
+        }
+    }
+}
+
+/// The pages that hold some bytes of a file of `len` bytes.
+pub(super) fn of(bytes: &Range<u64>, len: u64) -> Range<u64> {
+    let end = bytes.end.min(len);
+    bytes.start / PAGE..end.div_ceil(PAGE).max(bytes.start / PAGE)
+}
+
+/// The bytes of some pages of a file of `len` bytes.
+pub(super) fn bytes(pages: &Range<u64>, len: u64) -> Range<u64> {
+    pages.start * PAGE..(pages.end * PAGE).min(len)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one(run: Range<u64>) -> Vec<Range<u64>> {
+        std::iter::once(run).collect()
+    }
+
+    #[test]
+    fn what_is_missing_is_asked_for_once_and_together() {
+        let mut pages = Pages::default();
+        assert_eq!(pages.take_missing(1, 3..5), one(3..5));
+        assert_eq!(pages.take_missing(1, 0..22), [0..3, 5..21, 21..22]);
+        assert!(
+            pages.take_missing(1, 0..22).is_empty(),
+            "all are on their way"
+        );
+        pages.failed(1, 5..21);
+        assert_eq!(pages.take_missing(1, 4..7), one(5..7));
+        pages.arrived(1, 3..5, &vec![7; PAGE as usize + 1]);
+        assert_eq!(
+            pages.get((1, 3)).map(|page| page.len()),
+            Some(PAGE as usize)
+        );
+        assert_eq!(pages.get((1, 4)).as_deref(), Some(&[7_u8][..]));
+        assert!(pages.take_missing(1, 3..5).is_empty(), "both are here");
+        assert_eq!(
+            pages.take_missing(2, 3..5),
+            one(3..5),
+            "those of another file are not"
+        );
+    }
+
+    #[test]
+    fn neither_what_is_kept_nor_what_is_on_its_way_grows_without_end() {
+        let mut pages = Pages::default();
+        let asked = |runs: Vec<Range<u64>>| runs.iter().map(|run| run.end - run.start).sum::<u64>();
+        assert_eq!(asked(pages.take_missing(1, 0..10_000)), MOST_COMING as u64);
+        assert_eq!(asked(pages.take_missing(1, 0..10_000)), 0);
+        for page in 0..2000 {
+            pages.arrived(1, page..page + 1, &[0]);
+        }
+        assert_eq!(pages.here.len(), MOST_KEPT);
+        assert!(pages.get((1, 1999)).is_some() && pages.get((1, 0)).is_none());
+    }
+
+    #[test]
+    fn the_last_page_is_cut() {
+        assert_eq!(of(&(PAGE - 1..PAGE + 1), 10 * PAGE), 0..2);
+        assert_eq!(of(&(0..u64::MAX), PAGE + 5), 0..2);
+        assert!(of(&(9 * PAGE..9 * PAGE + 1), PAGE).is_empty());
+        assert_eq!(bytes(&(1..2), PAGE + 5), PAGE..PAGE + 5);
+    }
+}

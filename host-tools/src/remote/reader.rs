@@ -1,0 +1,55 @@
+//! A remote file read from its beginning to its end.
+
+use std::io::{Read, Result, Seek, SeekFrom};
+use std::iter::once;
+use std::sync::Arc;
+
+use super::RemoteFile;
+
+/// Bytes that are fetched ahead of what is read: what comes in order is waited for once,
+/// not once a page.
+const AHEAD: u64 = 4 << 20;
+
+/// Reads a remote file from any place on.
+pub(crate) struct RemoteReader {
+    file: Arc<RemoteFile>,
+    at: u64,
+}
+
+impl RemoteReader {
+    /// Begins at the first byte.
+    pub(crate) const fn new(file: Arc<RemoteFile>) -> Self {
+        Self { file, at: 0 }
+    }
+}
+
+impl Read for RemoteReader {
+    fn read(&mut self, into: &mut [u8]) -> Result<usize> {
+        let left = self.file.len().saturating_sub(self.at);
+        let count = left.min(into.len() as u64) as usize;
+        if count == 0 {
+            return Ok(0);
+        }
+        // The first bytes may be all that is looked at.
+        if self.at > 0 {
+            self.file.want(once(self.at..self.at.saturating_add(AHEAD)));
+        }
+        let bytes = self.file.read_at(self.at, count)?;
+        into[..count].copy_from_slice(&bytes);
+        self.at += count as u64;
+        Ok(count)
+    }
+}
+
+impl Seek for RemoteReader {
+    fn seek(&mut self, to: SeekFrom) -> Result<u64> {
+        let (from, by) = match to {
+            SeekFrom::Start(at) => (at, 0),
+            SeekFrom::Current(by) => (self.at, by),
+            SeekFrom::End(by) => (self.file.len(), by),
+        };
+        let at = from.checked_add_signed(by);
+        self.at = at.ok_or(std::io::ErrorKind::InvalidInput)?;
+        Ok(self.at)
+    }
+}

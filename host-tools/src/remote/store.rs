@@ -1,0 +1,277 @@
+//! Requests to a server: `object_store` is named here only.
+
+use std::io::{Error, ErrorKind, Result};
+use std::ops::Range;
+use std::sync::Once;
+
+use object_store::aws::{AmazonS3Builder, AmazonS3ConfigKey};
+use object_store::azure::{AzureConfigKey, MicrosoftAzureBuilder};
+use object_store::client::ClientConfigKey;
+use object_store::gcp::{GoogleCloudStorageBuilder, GoogleConfigKey};
+use object_store::http::HttpBuilder;
+use object_store::path::Path;
+use object_store::{
+    Error as StoreError, GetOptions, GetRange, ObjectMeta, ObjectStore, RetryConfig,
+};
+
+use super::url::shown;
+use super::{LOST, OUTAGE, pages};
+
+/// A request without an answer is given up after so long.
+const REQUEST: &str = "10 seconds";
+const CONNECT: &str = "5 seconds";
+/// So often, and in all for so long, a request is made again that the server could not
+/// answer.
+const RETRIES: usize = 3;
+const RETRIES_SECONDS: u64 = 15;
+/// No answer of a server is shown at more length than this, characters.
+const SHOWN: usize = 300;
+
+/// A file at a server, in the state in which it was opened.
+#[derive(Debug)]
+pub(super) struct Object {
+    store: Box<dyn ObjectStore>,
+    path: Path,
+    /// As it was when it was opened.
+    was: ObjectMeta,
+}
+
+/// A file that was opened, and its first bytes.
+pub(super) struct Opened {
+    pub(super) object: Object,
+    /// The first page, or all of the file where it is shorter or cannot be read in ranges.
+    pub(super) first: Vec<u8>,
+    /// Whether that is all of it.
+    pub(super) is_all: bool,
+}
+
+/// Opens the file at a URL. One request tells how long it is and how it begins.
+pub(super) async fn open(url: &str) -> Result<Opened> {
+    let (store, path) = at(url)?;
+    let first = GetOptions {
+        range: Some(GetRange::Bounded(0..pages::PAGE)),
+        ..GetOptions::default()
+    };
+    match store.get_opts(&path, first).await {
+        Ok(got) => {
+            let (was, range) = (got.meta.clone(), got.range.clone());
+            let first = got.bytes().await.map_err(|error| told(&error))?.to_vec();
+            if first.len() as u64 != range.end - range.start {
+                return Err(short(first.len(), &range));
+            }
+            let is_all = first.len() as u64 == was.size;
+            Ok(Opened {
+                object: Object { store, path, was },
+                first,
+                is_all,
+            })
+        }
+        Err(error) if is_without_ranges(&error) => whole(store, path).await,
+        Err(error) => Err(told(&error)),
+    }
+}
+
+/// A server that knows no ranges hands over all of a file, which then is held in memory.
+async fn whole(store: Box<dyn ObjectStore>, path: Path) -> Result<Opened> {
+    const LARGEST: u64 = 256 << 20;
+    let got = store.get_opts(&path, GetOptions::default()).await;
+    let got = got.map_err(|error| told(&error))?;
+    let was = got.meta.clone();
+    if was.size > LARGEST {
+        let why = format!(
+            "the server hands out no parts of files, and this one has {} MB",
+            was.size >> 20
+        );
+        return Err(Error::new(ErrorKind::Unsupported, why));
+    }
+    let first = got.bytes().await.map_err(|error| told(&error))?.to_vec();
+    Ok(Opened {
+        object: Object { store, path, was },
+        first,
+        is_all: true,
+    })
+}
+
+impl Object {
+    /// Bytes of the file.
+    pub(super) const fn len(&self) -> u64 {
+        self.was.size
+    }
+
+    /// Some of its bytes, all of them inside the file.
+    ///
+    /// # Errors
+    /// [`super::is_outage`] where another try may go well; else nothing more comes of it.
+    pub(super) async fn get(&self, range: Range<u64>) -> Result<Vec<u8>> {
+        let options = GetOptions {
+            range: Some(GetRange::Bounded(range.clone())),
+            ..GetOptions::default()
+        };
+        let got = self.store.get_opts(&self.path, options).await;
+        let got = got.map_err(|error| told(&error))?;
+        let is = &got.meta;
+        let same = is.size == self.was.size
+            && is.e_tag == self.was.e_tag
+            && (is.e_tag.is_some() || is.last_modified == self.was.last_modified);
+        if !same {
+            let why = "it was changed at its server since it was opened";
+            return Err(Error::new(LOST, why));
+        }
+        let bytes = got.bytes().await.map_err(|error| told(&error))?;
+        match bytes.len() as u64 == range.end - range.start {
+            true => Ok(bytes.to_vec()),
+            false => Err(short(bytes.len(), &range)),
+        }
+    }
+}
+
+/// The server of a URL, and the path there.
+fn at(url: &str) -> Result<(Box<dyn ObjectStore>, Path)> {
+    use ClientConfigKey::{AllowHttp, ConnectTimeout, Timeout};
+    static CHOSEN: Once = Once::new();
+    CHOSEN.call_once(|| {
+        // Somebody else's choice is as good.
+        let _ = rustls::crypto::ring::default_provider().install_default();
+    });
+    let retry = RetryConfig {
+        max_retries: RETRIES,
+        retry_timeout: std::time::Duration::from_secs(RETRIES_SECONDS),
+        ..RetryConfig::default()
+    };
+    let (scheme, rest) = url.split_once("://").unwrap_or_default();
+    // Of a URL without what follows its path.
+    let in_bucket = || {
+        let (_, key) = shown(rest).split_once('/').unwrap_or_default();
+        Path::from_url_path(key).map_err(|error| wrong(&error))
+    };
+    macro_rules! store {
+        ($builder:expr, $key:path) => {
+            $builder
+                .with_retry(retry)
+                .with_config($key(Timeout), REQUEST)
+                .with_config($key(ConnectTimeout), CONNECT)
+                .build()
+                .map_err(|error| wrong(&error))?
+        };
+    }
+    Ok(match scheme {
+        "s3" | "s3a" => {
+            let builder = AmazonS3Builder::from_env().with_url(shown(url));
+            (
+                Box::new(store!(builder, AmazonS3ConfigKey::Client)),
+                in_bucket()?,
+            )
+        }
+        "gs" => {
+            let builder = GoogleCloudStorageBuilder::from_env().with_url(shown(url));
+            (
+                Box::new(store!(builder, GoogleConfigKey::Client)),
+                in_bucket()?,
+            )
+        }
+        "az" | "azure" | "abfs" | "abfss" | "adl" => {
+            let builder = MicrosoftAzureBuilder::from_env().with_url(shown(url));
+            (
+                Box::new(store!(builder, AzureConfigKey::Client)),
+                in_bucket()?,
+            )
+        }
+        "http" | "https" => {
+            let path = shown(rest).find('/').map_or("", |at| &shown(rest)[at..]);
+            let (host, query) = (
+                &rest[..shown(rest).len() - path.len()],
+                &rest[shown(rest).len()..],
+            );
+            let query = query.split('#').next().unwrap_or_default();
+            let store = HttpBuilder::new()
+                .with_url(format!("{scheme}://{host}/{query}"))
+                .with_retry(retry)
+                .with_config(AllowHttp, "true")
+                .with_config(Timeout, REQUEST)
+                .with_config(ConnectTimeout, CONNECT)
+                .build()
+                .map_err(|error| wrong(&error))?;
+            let path = Path::from_url_path(path).map_err(|error| wrong(&error))?;
+            (Box::new(store), path)
+        }
+        other => {
+            let why =
+                format!("no files are read by {other}://: https, http, s3, gs and az are known");
+            return Err(Error::new(ErrorKind::Unsupported, why));
+        }
+    })
+}
+
+/// A server that answers a request for a range with all of the file.
+fn is_without_ranges(error: &StoreError) -> bool {
+    // What the library finds is in its text alone.
+    let text = match error {
+        StoreError::NotSupported { source } | StoreError::Generic { source, .. } => {
+            source.to_string()
+        }
+        _ => return false,
+    };
+    text.contains("Range request not supported") || text.contains("non-partial response")
+}
+
+/// What is wrong with a URL or with what the environment says.
+fn wrong(error: &dyn std::error::Error) -> Error {
+    Error::new(ErrorKind::InvalidInput, in_short(&error.to_string()))
+}
+
+fn short(got: usize, range: &Range<u64>) -> Error {
+    let wanted = range.end - range.start;
+    Error::new(OUTAGE, format!("{got} bytes of {wanted} came"))
+}
+
+/// What a server's answer means.
+fn told(error: &StoreError) -> Error {
+    let kind = match error {
+        StoreError::NotFound { .. } => {
+            return Error::new(ErrorKind::NotFound, "there is no such file");
+        }
+        StoreError::PermissionDenied { .. } | StoreError::Unauthenticated { .. } => {
+            return Error::new(
+                ErrorKind::PermissionDenied,
+                "it may not be read without a key",
+            );
+        }
+        StoreError::InvalidPath { .. } | StoreError::UnknownConfigurationKey { .. } => {
+            ErrorKind::InvalidInput
+        }
+        _ => OUTAGE,
+    };
+    Error::new(kind, in_short(&error.to_string()))
+}
+
+/// On one line, without keys, and not more of it than somebody reads.
+fn in_short(text: &str) -> String {
+    // A key may follow a path.
+    let words: Vec<&str> = text.split_whitespace().map(shown).collect();
+    let line: String = words.join(" ").chars().take(SHOWN).collect();
+    line.chars().filter(|c| !c.is_control()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_server_says_is_short_on_one_line_and_holds_no_key() {
+        let said =
+            "GET https://h/a.tif?sig=secret:\n\t500 \u{1b}[2J".to_owned() + &" x".repeat(900);
+        let told = in_short(&said);
+        assert!(told.starts_with("GET https://h/a.tif 500 [2J x"), "{told}");
+        assert!(told.len() <= SHOWN);
+    }
+
+    #[test]
+    fn a_path_and_its_key_go_to_the_server_as_they_are() {
+        let (_, path) = at("https://h:81/a%20b/c.tif?sig=x%2Fy#part").expect("a URL");
+        assert_eq!(path.as_ref(), "a b/c.tif");
+        let (_, path) = at("s3://bucket/a/b.tif").expect("a URL");
+        assert_eq!(path.as_ref(), "a/b.tif");
+        assert!(at("ftp://h/a.tif").is_err());
+        assert!(at("https:///a.tif").is_err());
+    }
+}

@@ -1,0 +1,160 @@
+//! What a server or the line to it may do wrong: it is told, and nothing wrong is felt.
+
+use std::time::Duration;
+
+use hapterra::raster::{BadRaster, OpenOptions, Raster};
+use hapterra_url_tests::cog::cog;
+use hapterra_url_tests::http::{Fault, Server};
+
+const SIZE: [u32; 2] = [2500, 2100];
+
+fn height(column: u32, row: u32) -> f32 {
+    (3 * column + 10_000 * (row % 100)) as f32
+}
+
+fn hills() -> (tempfile::TempDir, Server) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let bytes = cog(SIZE[0], SIZE[1], 3, height);
+    std::fs::write(folder.path().join("hills.tif"), bytes).expect("written");
+    let server = Server::of(folder.path());
+    (folder, server)
+}
+
+fn open(server: &Server, name: &str) -> Result<Raster, String> {
+    let opened = Raster::open(server.url(name), &OpenOptions::default());
+    opened.map_err(|error| match error.fault() {
+        BadRaster::Elsewhere(_) => error.to_string(),
+        other => panic!("{other:?}"),
+    })
+}
+
+fn expected(column: u32, row: u32) -> f64 {
+    f64::from(height(column, SIZE[1] - 1 - row))
+}
+
+#[test]
+fn what_the_server_cannot_answer_once_is_asked_for_again() {
+    for fault in [Fault::Error500, Fault::Cut] {
+        let (_folder, server) = hills();
+        server.fail(fault, 2);
+        let raster = open(&server, "hills.tif").expect("in the end");
+        server.fail(fault, 2);
+        assert_eq!(raster.height(1200, 700), expected(1200, 700), "{fault:?}");
+    }
+}
+
+#[test]
+fn what_it_never_answers_is_told_with_the_file_and_why() {
+    let (_folder, server) = hills();
+    let told = open(&server, "valleys.tif").expect_err("none");
+    assert!(told.contains("there is no such file"), "{told}");
+    assert!(told.contains("valleys.tif"), "{told}");
+    server.fail(Fault::Forbidden, 1);
+    let told = open(&server, "hills.tif").expect_err("forbidden");
+    assert!(told.contains("without a key"), "{told}");
+    server.fail(Fault::Error500, usize::MAX);
+    let told = open(&server, "hills.tif").expect_err("broken");
+    assert!(told.contains("500"), "{told}");
+    drop(server);
+    let nobody = "http://127.0.0.1:1/hills.tif";
+    let error = Raster::open(nobody, &OpenOptions::default()).expect_err("nobody");
+    assert!(matches!(error.fault(), BadRaster::Elsewhere(_)), "{error}");
+    for (url, why) in [
+        ("ftp://h/hills.tif", "ftp://"),
+        ("https://h h/hills.tif", "cannot read what is there"),
+        ("s3://", "no such file"),
+    ] {
+        let error = Raster::open(url, &OpenOptions::default()).expect_err(url);
+        assert!(error.to_string().contains(why) || url == "s3://", "{error}");
+    }
+}
+
+#[test]
+fn bytes_that_were_not_asked_for_are_not_taken() {
+    for fault in [Fault::OtherRange, Fault::Short] {
+        let (_folder, server) = hills();
+        server.fail(fault, usize::MAX);
+        let told = open(&server, "hills.tif").expect_err("from the beginning");
+        let why = match fault {
+            Fault::Short => "bytes of",
+            _ => "Requested",
+        };
+        assert!(told.contains(why), "{told}");
+        server.fail(Fault::None, 0);
+        let raster = open(&server, "hills.tif").expect("a right answer");
+        server.fail(fault, usize::MAX);
+        assert!(raster.height(1200, 700).is_nan(), "{fault:?}");
+        assert!(raster.not_yet() > 0);
+        server.fail(Fault::None, 0);
+        let known = comes(&raster, 1200, 700);
+        assert_eq!(known, expected(1200, 700), "{fault:?}");
+    }
+}
+
+/// A height, as soon as it has come.
+fn comes(raster: &Raster, column: u32, row: u32) -> f64 {
+    for _ in 0..2000 {
+        let height = raster.height(column, row);
+        if !height.is_nan() {
+            return height;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    panic!("it does not come");
+}
+
+#[test]
+fn a_mask_that_cannot_be_asked_for_is_not_taken_for_none() {
+    let (_folder, server) = hills();
+    server.fail_at(".msk", Fault::Error500, usize::MAX);
+    let told = open(&server, "hills.tif").expect_err("who knows what is masked");
+    assert!(told.contains("500"), "{told}");
+    // Who may not list a folder is told of what is not there that it is forbidden.
+    server.fail_at(".msk", Fault::Forbidden, usize::MAX);
+    open(&server, "hills.tif").expect("no mask");
+}
+
+#[test]
+fn what_was_not_looked_at_for_want_of_an_answer_is_no_hole() {
+    let (_folder, server) = hills();
+    server.fail_beyond(Fault::Error500);
+    let told = open(&server, "hills.tif").expect_err("its overview is beyond");
+    assert!(told.contains("500"), "{told}");
+}
+
+#[test]
+fn a_file_that_was_changed_meanwhile_is_not_mixed_with_what_is_held() {
+    let (_folder, server) = hills();
+    let raster = open(&server, "hills.tif").expect("opens");
+    assert_eq!(raster.height(100, 2000), expected(100, 2000));
+    server.change();
+    assert!(raster.height(2400, 100).is_nan());
+    assert_eq!(
+        raster.height(100, 2000),
+        expected(100, 2000),
+        "what is held"
+    );
+    assert!(raster.not_yet() > 0, "no hole, but not known");
+    let again = open(&server, "hills.tif").expect("the file as it is now");
+    assert_eq!(again.height(2400, 100), expected(2400, 100));
+}
+
+#[test]
+fn a_file_that_ends_before_its_header_says_is_told_as_one_on_disk() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let bytes = cog(SIZE[0], SIZE[1], 3, height);
+    std::fs::write(folder.path().join("cut.tif"), &bytes[..900_000]).expect("written");
+    std::fs::write(folder.path().join("empty.tif"), b"").expect("written");
+    let server = Server::of(folder.path());
+    let fault = |path: &str| {
+        let opened = Raster::open(path, &OpenOptions::default());
+        opened
+            .map(|_| ())
+            .map_err(|error| error.fault().to_string())
+    };
+    let here = fault(&folder.path().join("cut.tif").to_string_lossy());
+    assert!(here.is_err(), "{here:?}");
+    let there = fault(&server.url("cut.tif"));
+    assert!(there.is_err(), "{there:?}");
+    assert!(fault(&server.url("empty.tif")).is_err());
+}

@@ -1,0 +1,188 @@
+//! Of a file at a URL what is touched is fetched, and is the same as of the file on disk.
+
+use std::path::{Path, PathBuf};
+
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::terrain::{Scale, Terrain, TileBuffer};
+use hapterra_core::terrain::TileKey;
+use hapterra_tests::shared;
+use hapterra_url_tests::cog::cog;
+use hapterra_url_tests::http::{Fault, Server};
+
+fn height(column: u32, row: u32) -> f32 {
+    (column * 7 % 1000) as f32 + 0.25 * (row % 400) as f32
+}
+
+fn open(path: impl AsRef<Path>) -> Raster {
+    Raster::open(path, &OpenOptions::default()).expect("opens")
+}
+
+fn in_blocks(path: &Path) -> Raster {
+    let options = OpenOptions {
+        most_in_memory_bytes: 0,
+        ..OpenOptions::default()
+    };
+    Raster::open(path, &options).expect("opens")
+}
+
+/// A folder with a file of these bytes, and a server of it.
+fn served(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf, Server) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).expect("written");
+    let server = Server::of(folder.path());
+    (folder, path, server)
+}
+
+fn same_tiles(one: &Raster, other: &Raster, level: u8) {
+    let scale = Scale::new(1.0, 0.01).expect("a scale");
+    let [one, other] = [one, other].map(|raster| Terrain::new(raster, scale, level));
+    let (one, other) = (one.expect("a terrain"), other.expect("a terrain"));
+    assert_eq!(one.fingerprint(), other.fingerprint());
+    let mut buffers = [TileBuffer::default(), TileBuffer::default()];
+    let [a, b] = &mut buffers;
+    for (column, row) in [(0, 0), (3, 1), (1, 2)] {
+        let key = TileKey::new(level, column, row);
+        assert_eq!(one.tile(key, a), other.tile(key, b), "{key:?}");
+    }
+}
+
+#[test]
+fn a_cog_is_the_same_from_its_server_and_little_of_it_is_fetched() {
+    let bytes = cog(3000, 2000, 3, height);
+    let (_folder, path, server) = served("hills.tif", &bytes);
+    let (here, there) = (in_blocks(&path), open(server.url("hills.tif")));
+    let (requests, fetched) = server.seen();
+    assert!(requests.len() <= 8, "{requests:?}");
+    assert!(fetched < bytes.len() / 8, "{fetched} of {}", bytes.len());
+    assert_eq!(here.format(), there.format());
+    assert_eq!(here.reference_system(), there.reference_system());
+    for level in 0..4 {
+        same_tiles(&here, &there, level);
+    }
+    for (column, row) in [(0, 0), (2999, 1999), (1500, 3), (255, 256), (256, 255)] {
+        assert_eq!(there.height(column, row), here.height(column, row));
+        assert_eq!(
+            there.height(column, row),
+            f64::from(height(column, 1999 - row))
+        );
+    }
+    let (again, _) = server.seen();
+    assert_eq!(there.height(1500, 3), here.height(1500, 3));
+    assert_eq!(server.seen().0, again, "what is here is not fetched again");
+}
+
+#[test]
+fn neighbours_of_a_file_are_found_beside_it_at_its_server() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes);
+    let heights: Vec<u8> = (0..600 * 500_u32)
+        .flat_map(|index| height(index % 600, index / 600).to_le_bytes())
+        .collect();
+    let header = "ncols 600\nnrows 500\nxllcorner 500000\nyllcorner 4000000\ncellsize 30\nbyteorder LSBFIRST\n";
+    let system = r#"PROJCS["WGS 84 / UTM zone 11N",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["latitude_of_origin",0],PARAMETER["central_meridian",-117],PARAMETER["scale_factor",0.9996],PARAMETER["false_easting",500000],PARAMETER["false_northing",0],UNIT["metre",1]]"#;
+    write("hills.flt", &heights).expect("written");
+    write("hills.hdr", header.as_bytes()).expect("written");
+    write("hills.prj", system.as_bytes()).expect("written");
+    let server = Server::of(folder.path());
+    let here = open(folder.path().join("hills.flt"));
+    // A key behind the path goes with all of them.
+    let there = open(server.url("hills.flt?key=a/b.c"));
+    assert_eq!(there.format(), here.format());
+    assert!(there.reference_system().is_some());
+    assert_eq!(there.reference_system(), here.reference_system());
+    assert_eq!(there.height(599, 0), f64::from(height(599, 499)));
+    let (requests, _) = server.seen();
+    assert!(
+        requests.iter().all(|line| line.ends_with("?key=a/b.c")),
+        "{requests:?}"
+    );
+}
+
+#[test]
+fn a_vrt_and_its_files_may_be_elsewhere() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes);
+    let server = Server::of(folder.path());
+    for (name, first) in [("west.tif", 0), ("east.tif", 800)] {
+        let tile = cog(800, 600, 1, |column, row| height(first + column, row));
+        write(name, &tile).expect("written");
+    }
+    let source = |name: &str, is_beside: u8, first: u32| {
+        format!(
+            r#"<SimpleSource><SourceFilename relativeToVRT="{is_beside}">{name}</SourceFilename>
+            <SourceBand>1</SourceBand><SourceProperties RasterXSize="800" RasterYSize="600"/>
+            <SrcRect xOff="0" yOff="0" xSize="800" ySize="600"/>
+            <DstRect xOff="{first}" yOff="0" xSize="800" ySize="600"/></SimpleSource>"#
+        )
+    };
+    let vrt = |west: &str, is_beside: u8| {
+        let east = format!("/vsicurl/{}", server.url("east.tif"));
+        format!(
+            r#"<VRTDataset rasterXSize="1600" rasterYSize="600">
+            <GeoTransform>500000,30,0,4000000,0,-30</GeoTransform>
+            <VRTRasterBand dataType="Float32" band="1">{}{}</VRTRasterBand></VRTDataset>"#,
+            source(west, is_beside, 0),
+            source(&east, 0, 800)
+        )
+    };
+    write("there.vrt", vrt("west.tif", 1).as_bytes()).expect("written");
+    let here = folder.path().join("here.vrt");
+    std::fs::write(&here, vrt(&server.url("west.tif"), 0)).expect("written");
+    for raster in [open(server.url("there.vrt")), open(here)] {
+        for (column, row) in [(0, 0), (799, 599), (800, 3), (1599, 300)] {
+            let expected = f64::from(height(column, 599 - row));
+            assert_eq!(raster.height(column, row), expected, "{column} {row}");
+        }
+    }
+}
+
+#[test]
+fn a_server_without_ranges_hands_over_all_of_a_file() {
+    let bytes = cog(700, 500, 1, height);
+    let (_folder, path, server) = served("hills.tif", &bytes);
+    server.fail(Fault::NoRanges, usize::MAX);
+    let (here, there) = (in_blocks(&path), open(server.url("hills.tif")));
+    same_tiles(&here, &there, 0);
+}
+
+/// Every format, be it packed or with another file beside it.
+#[test]
+fn real_files_are_the_same_from_a_server() {
+    let Some(folder) = shared("dem/real") else {
+        return;
+    };
+    let server = Server::of(&folder);
+    let mut compared = 0;
+    for entry in std::fs::read_dir(&folder).expect("a folder") {
+        let entry = entry.expect("an entry");
+        let size = entry.metadata().expect("its size").len();
+        if size > 16 << 20 || !entry.path().is_file() {
+            continue;
+        }
+        let name = entry.file_name().to_string_lossy().replace(' ', "%20");
+        let here = Raster::open(entry.path(), &OpenOptions::default());
+        let there = Raster::open(server.url(&name), &OpenOptions::default());
+        let (here, there) = match (here, there) {
+            (Ok(here), Ok(there)) => (here, there),
+            (Err(here), Err(there)) => {
+                let [here, there] = [here, there].map(|error| error.fault().to_string());
+                assert_eq!(here, there, "{name}");
+                continue;
+            }
+            (here, there) => panic!("{name}: {here:?} {there:?}"),
+        };
+        assert_eq!(here.format(), there.format(), "{name}");
+        assert_eq!(here.cell(), there.cell(), "{name}");
+        assert_eq!(here.reference_system(), there.reference_system(), "{name}");
+        let (columns, rows) = (here.columns(), here.rows());
+        assert_eq!((columns, rows), (there.columns(), there.rows()), "{name}");
+        for step in 0..200 {
+            let (column, row) = (step * 7919 % columns, step * 104_729 % rows);
+            let [here, there] = [&here, &there].map(|raster| raster.height(column, row));
+            assert_eq!(here.to_bits(), there.to_bits(), "{name} {column} {row}");
+        }
+        compared += 1;
+    }
+    assert!(compared > 10, "{compared} files");
+}

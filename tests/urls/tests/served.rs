@@ -1,0 +1,217 @@
+//! Whoever holds the arm waits for no server.
+
+use std::cell::Cell;
+use std::io;
+use std::rc::Rc;
+use std::time::Duration;
+
+use hapterra::link::{Event, Native, Patience, Session, Transport};
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::terrain::{Scale, Terrain, TileBuffer};
+use hapterra_core::Vec3;
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::scene::Source;
+use hapterra_core::terrain::TileKey;
+use hapterra_url_tests::cog::{cog, in_tiles};
+use hapterra_url_tests::http::{Fault, Server};
+
+fn height(column: u32, row: u32) -> f32 {
+    (column % 100) as f32 + 0.5 * (row % 64) as f32
+}
+
+fn hills() -> (tempfile::TempDir, Raster, Server) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("hills.tif");
+    std::fs::write(&path, cog(2200, 1800, 3, height)).expect("written");
+    let server = Server::of(folder.path());
+    let raster = Raster::open(server.url("hills.tif"), &OpenOptions::default());
+    (folder, raster.expect("opens"), server)
+}
+
+fn terrain(raster: &Raster) -> Terrain<'_> {
+    let scale = Scale::new(1.0, 0.05).expect("a scale");
+    Terrain::new(raster, scale, 0).expect("a terrain")
+}
+
+const KEY: TileKey = TileKey::new(0, 20, 20);
+
+/// Bytes of the tile, where all of it has come.
+fn tile(terrain: &Terrain<'_>) -> Option<String> {
+    let before = terrain.raster().not_yet();
+    let mut buffer = TileBuffer::default();
+    let heights = format!(
+        "{:?}",
+        terrain.tile(KEY, &mut buffer).expect("there is one")
+    );
+    (terrain.raster().not_yet() == before).then_some(heights)
+}
+
+fn comes(terrain: &Terrain<'_>) -> String {
+    for _ in 0..2000 {
+        if let Some(heights) = tile(terrain) {
+            return heights;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    panic!("it does not come");
+}
+
+#[test]
+fn what_is_not_here_yet_is_asked_for_and_comes_later() {
+    let (_folder, raster, server) = hills();
+    let terrain = terrain(&raster);
+    raster.stop_waiting();
+    // Who waited would wait for ever.
+    server.hold(true);
+    for _ in 0..5 {
+        assert_eq!(tile(&terrain), None);
+    }
+    server.hold(false);
+    let from_server = comes(&terrain);
+    let at = |column: u32, row: u32| f64::from(height(column, 1799 - row));
+    assert_eq!(raster.height(640, 640), at(640, 640));
+    assert_eq!(tile(&terrain), Some(from_server));
+}
+
+#[test]
+fn a_server_that_is_gone_for_a_while_is_asked_again_and_nothing_becomes_a_hole() {
+    let (_folder, raster, server) = hills();
+    let terrain = terrain(&raster);
+    raster.stop_waiting();
+    server.fail(Fault::Error500, usize::MAX);
+    for _ in 0..100 {
+        assert_eq!(tile(&terrain), None);
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    server.fail(Fault::None, 0);
+    comes(&terrain);
+}
+
+/// A block of many chunks in several places of the file.
+#[test]
+fn all_that_a_touch_needs_is_asked_for_at_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let bytes = in_tiles(64, [2048, 1024], 3, height);
+    std::fs::write(folder.path().join("hills.tif"), bytes).expect("written");
+    let server = Server::of(folder.path());
+    let raster = Raster::open(server.url("hills.tif"), &OpenOptions::default());
+    let raster = raster.expect("opens");
+    raster.stop_waiting();
+    server.hold(true);
+    let before = server.seen().0.len();
+    assert!(raster.height(1500, 500).is_nan());
+    for _ in 0..400 {
+        std::thread::sleep(Duration::from_millis(5));
+        if server.seen().0.len() >= before + 4 {
+            return;
+        }
+    }
+    panic!("{} rows of chunks of four", server.seen().0.len() - before);
+}
+
+#[test]
+fn a_source_of_a_vrt_that_has_not_come_is_no_hole() {
+    let (folder, _, server) = hills();
+    // More than are looked into when it is opened.
+    const SOURCES: u32 = 40;
+    let source = |number: u32| {
+        format!(
+            r#"<SimpleSource><SourceFilename>{}?number={number}</SourceFilename>
+            <SourceBand>1</SourceBand><SourceProperties RasterXSize="2200" RasterYSize="1800"/>
+            <SrcRect xOff="0" yOff="0" xSize="2200" ySize="1800"/>
+            <DstRect xOff="{}" yOff="0" xSize="2200" ySize="1800"/></SimpleSource>"#,
+            server.url("hills.tif"),
+            2200 * number
+        )
+    };
+    let sources: String = (0..SOURCES).map(source).collect();
+    let vrt = format!(
+        r#"<VRTDataset rasterXSize="{}" rasterYSize="1800">
+        <GeoTransform>500000,30,0,4000000,0,-30</GeoTransform>
+        <VRTRasterBand dataType="Float32" band="1">{sources}</VRTRasterBand></VRTDataset>"#,
+        2200 * SOURCES
+    );
+    std::fs::write(folder.path().join("hills.vrt"), vrt).expect("written");
+    let raster = Raster::open(server.url("hills.vrt"), &OpenOptions::default());
+    let raster = raster.expect("opens");
+    raster.stop_waiting();
+    server.hold(true);
+    // Of each a place that was not looked at: some are open, and some are not.
+    let places = (0..SOURCES).map(|number| (2200 * number + 20, 20));
+    let places: Vec<(u32, u32)> = places.collect();
+    for (column, row) in &places {
+        let before = raster.not_yet();
+        assert!(raster.height(*column, *row).is_nan());
+        assert!(raster.not_yet() > before, "no hole");
+    }
+    server.hold(false);
+    for (column, row) in places {
+        let comes = (0..2000).find(|_| {
+            std::thread::sleep(Duration::from_millis(10));
+            !raster.height(column, row).is_nan()
+        });
+        assert!(comes.is_some(), "{column} comes");
+        let expected = f64::from(height(column % 2200, 1799 - row));
+        assert_eq!(raster.height(column, row), expected);
+    }
+}
+
+/// A line to a device from which nothing may come.
+struct Line<'d> {
+    device: &'d mut Native,
+    is_mute: Rc<Cell<bool>>,
+}
+
+impl Transport for Line<'_> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.device.send(bytes)
+    }
+
+    fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
+        match self.is_mute.get() {
+            true => Ok(0),
+            false => self.device.receive(into, wait),
+        }
+    }
+}
+
+#[test]
+fn a_device_gets_its_tiles_when_they_have_come_and_no_holes_before() {
+    let (_folder, raster, server) = hills();
+    let terrain = terrain(&raster);
+    let home = GridPoint::new([640, 640, 100], Vec3::ZERO);
+    let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Points, home);
+    let mut device = Native::for_replay().restless();
+    let is_mute = Rc::default();
+    let line = Line {
+        device: &mut device,
+        is_mute: Rc::clone(&is_mute),
+    };
+    raster.stop_waiting();
+    server.hold(true);
+    let (mut session, _) =
+        Session::open(&terrain, scene, None, Box::new(line), Patience::REAL_TIME)
+            .expect("it does not wait for the server, either");
+    let mut sent = 0;
+    let mut look = |session: &mut Session<'_>| {
+        let mut on = |event: Event<'_>| sent += usize::from(matches!(event, Event::TileSent(_)));
+        session
+            .poll(Duration::from_millis(5), &mut on)
+            .expect("it answers");
+        sent
+    };
+    for _ in 0..100 {
+        assert_eq!(look(&mut session), 0, "what has not come is not sent");
+    }
+    // What was asked for is sent without being asked for again.
+    is_mute.set(true);
+    server.hold(false);
+    let sent_mute = (0..150).find(|_| look(&mut session) > 0);
+    assert!(sent_mute.is_some(), "as soon as it has come");
+    is_mute.set(false);
+    let looks = (0..4000).find(|_| look(&mut session) > 3);
+    assert!(looks.is_some(), "they are sent when they have come");
+    session.say_goodbye(&mut |_| {}).expect("confirmed");
+}
