@@ -18,6 +18,12 @@ const HEIGHT: f32 = 20.0;
 const DEGREE: f32 = 1.1;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    println!("{}", drawn()?);
+    Ok(())
+}
+
+/// The picture.
+pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
     let size = FieldSize::new(SECTION.len() as i32 - 1, 4);
     let mut field = FieldStorage::<1>::from_fn(size, |x, _| SECTION[x as usize])?;
     let window = field.window();
@@ -39,7 +45,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let place =
         |(i, z): (usize, &f32)| format!("{:.0},{:.0} ", i as f32 * CELL, 370.0 - z * HEIGHT);
     let ground: String = SECTION.iter().enumerate().map(place).collect();
-    println!(
+    Ok(format!(
         r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="-10 0 720 390" font-family="sans-serif" font-size="13">
 <rect x="-10" width="720" height="390" fill="#fff"/>
 <path d="M0 120H700" stroke="#bbb"/>
@@ -50,8 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 <polyline points="{ground}" fill="none" stroke="#333" stroke-width="2"/>
 <text x="0" y="386">The ground, in section: a valley, a ridge, and a cliff; heights at two sevenths</text>
 </svg>"##
-    );
-    Ok(())
+    ))
 }
 
 /// A HIP so far above the section, a hundredth of a cell after the other.

@@ -25,6 +25,12 @@ const TEXTURE: Texture = Texture {
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    println!("{}", drawn()?);
+    Ok(())
+}
+
+/// The picture.
+pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
     let grain = Texture {
         pattern: Pattern::Grain,
         ..TEXTURE
@@ -50,7 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         format!("{:.1},{:.1} ", i as f32 * 5.6, 440.0 - 90.0 * share)
     });
     lines += &polyline("#333", &faded.skip(4).collect::<String>());
-    println!(
+    Ok(format!(
         r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="-10 0 720 480" font-family="sans-serif" font-size="13">
 <rect x="-10" width="720" height="480" fill="#fff"/>
 <path d="M0 90H700M0 230H700M0 440H700" stroke="#bbb"/>
@@ -61,8 +67,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 <text x="0" y="325">How much of a texture is felt, by the way of the proxy in a tick</text>
 <text x="238" y="460">1/8 wavelength</text><text x="518" y="460">1/4 wavelength</text>
 {lines}</svg>"##
-    );
-    Ok(())
+    ))
 }
 
 fn polyline(color: &str, points: &str) -> String {

@@ -1,0 +1,59 @@
+//! Whether the pictures on the pages are those that core's examples draw.
+
+use std::error::Error;
+
+use hapterra_tests::repository;
+
+#[path = "../../core/examples/shaded_force.rs"]
+#[expect(dead_code, reason = "the example's own main")]
+mod shaded_force;
+#[path = "../../core/examples/textured_force.rs"]
+#[expect(dead_code, reason = "the example's own main")]
+mod textured_force;
+
+/// Pixels that a line may be off: another machine's tangent rounds to the next tenth.
+const OFF: f64 = 0.11;
+
+fn is_kept(drawn: Result<String, Box<dyn Error>>, example: &str, kept: &str) {
+    let drawn = drawn.expect("it is drawn");
+    let kept_text = std::fs::read_to_string(repository().join("docs").join(kept));
+    let kept_text = kept_text.expect("readable");
+    assert!(
+        is_same(drawn.trim_end(), kept_text.trim_end()),
+        "type: cargo run -p hapterra-core --example {example} > docs/{kept}"
+    );
+}
+
+/// Whether two pictures have the same words, and numbers that are all but the same.
+fn is_same(one: &str, other: &str) -> bool {
+    let words = |text: &str| -> Vec<String> {
+        let words = text.split([' ', ',', '"', '<', '>', '\n']);
+        words.map(str::to_owned).collect()
+    };
+    let (one, other) = (words(one), words(other));
+    let alike = |(one, other): (&String, &String)| match (one.parse::<f64>(), other.parse::<f64>())
+    {
+        (Ok(one), Ok(other)) => (one - other).abs() < OFF,
+        _ => one == other,
+    };
+    one.len() == other.len() && one.iter().zip(&other).all(alike)
+}
+
+#[test]
+fn the_picture_of_shading_is_the_examples() {
+    is_kept(shaded_force::drawn(), "shaded_force", "shading.svg");
+}
+
+#[test]
+fn the_picture_of_texture_is_the_examples() {
+    is_kept(textured_force::drawn(), "textured_force", "texture.svg");
+}
+
+#[test]
+fn a_picture_that_is_off_is_seen() {
+    let line = |points: &str| format!("<polyline points=\"{points}\" stroke=\"#333\"/>");
+    assert!(is_same(&line("0.0,1.2 0.5,1.3"), &line("0.0,1.2 0.5,1.4")));
+    assert!(!is_same(&line("0.0,1.2 0.5,1.3"), &line("0.0,1.2 0.5,1.6")));
+    assert!(!is_same(&line("0.0,1.2 0.5,1.3"), &line("0.0,1.2")));
+    assert!(!is_same("<text>HIP</text>", "<text>proxy</text>"));
+}
