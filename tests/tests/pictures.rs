@@ -7,6 +7,9 @@ use hapterra_tests::repository;
 #[path = "../../core/examples/shaded_force.rs"]
 #[expect(dead_code, reason = "the example's own main")]
 mod shaded_force;
+#[path = "../../core/examples/stick_slip.rs"]
+#[expect(dead_code, reason = "the example's own main")]
+mod stick_slip;
 #[path = "../../core/examples/textured_force.rs"]
 #[expect(dead_code, reason = "the example's own main")]
 mod textured_force;
@@ -37,6 +40,11 @@ fn is_same(one: &str, other: &str) -> bool {
         _ => one == other,
     };
     one.len() == other.len() && one.iter().zip(&other).all(alike)
+}
+
+#[test]
+fn the_picture_of_friction_is_the_examples() {
+    is_kept(stick_slip::drawn(), "stick_slip", "stick-slip.svg");
 }
 
 #[test]
