@@ -92,6 +92,18 @@ impl Grid {
         grid
     }
 
+    /// The middle of it: at most `side` patches along each side.
+    #[must_use]
+    pub fn middle(&self, side: usize) -> Self {
+        let size = [self.columns, self.rows].map(|patches| patches.min(side));
+        let [west, south] = [(self.columns - size[0]) / 2, (self.rows - size[1]) / 2];
+        let height = |x: usize, y: usize| self.post(west + x, south + y);
+        Self {
+            remarks: self.remarks.clone(),
+            ..Self::from_fn(&self.name, size, height)
+        }
+    }
+
     /// The height of a sample.
     #[must_use]
     pub fn post(&self, column: usize, row: usize) -> f32 {

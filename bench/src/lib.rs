@@ -8,6 +8,7 @@
 //! - [`truth`]: the exact closest point in f64, which judges every answer;
 //! - [`compare`]: all variants on one terrain, interleaved;
 //! - [`continuity`]: how much the force changes from one tick to the next;
+//! - [`effects`]: what friction, shading, texture and damping cost, and how exact they are;
 //! - [`solver`]: one patch, and the square root, alone;
 //! - [`state`]: what a tick can be doing, for counting instructions;
 //! - [`report`]: the table, the CSV file, the picture.
@@ -18,6 +19,7 @@ pub mod baseline;
 mod clock;
 pub mod compare;
 pub mod continuity;
+pub mod effects;
 pub mod grid;
 pub mod haptics;
 pub mod path;

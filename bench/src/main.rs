@@ -9,8 +9,9 @@ use clap::{Parser, ValueHint};
 use hapterra::cli::Failure;
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra_bench::compare::{Effort, Row, compare};
+use hapterra_bench::effects::Measured;
 use hapterra_bench::grid::Grid;
-use hapterra_bench::{continuity, report, solver};
+use hapterra_bench::{continuity, effects, report, solver, state};
 use indicatif::ProgressBar;
 
 /// Measure the contact beside other ways to render a height field: time for a
@@ -38,6 +39,11 @@ struct Args {
     #[arg(long, conflicts_with_all = ["files", "quick", "png"])]
     continuity: bool,
 
+    /// Only what friction, shading, texture, damping and the passivity controller cost, and how
+    /// exact they are; --csv then has these figures, which it has not otherwise
+    #[arg(long, conflicts_with_all = ["continuity", "png"])]
+    effects: bool,
+
     /// Write all figures to this CSV file
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     csv: Option<PathBuf>,
@@ -58,8 +64,8 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Failure> {
-    let changes = continuity::measure();
     if args.continuity {
+        let changes = continuity::measure();
         print!("{}", report::continuity(&changes));
         return write(args, &[], &changes);
     }
@@ -72,6 +78,11 @@ fn run(args: &Args) -> Result<(), Failure> {
         Effort::FULL
     };
     let files = read(args)?;
+    let effects = of_effects(args, &files, effort)?;
+    print!("{}", report::effects(&effects));
+    if args.effects {
+        return write_effects(args, &effects);
+    }
     let mut rows = Vec::new();
     for grid in files {
         measure(&grid, effort, &mut rows);
@@ -83,6 +94,7 @@ fn run(args: &Args) -> Result<(), Failure> {
     }
     show(&solver::patches(effort), &mut rows);
     show(&solver::roots(effort), &mut rows);
+    let changes = continuity::measure();
     print!("{}", report::continuity(&changes));
     print!("{}", report::summary(&rows));
     write(args, &rows, &changes)
@@ -99,6 +111,40 @@ fn read(args: &Args) -> Result<Vec<Grid>, Failure> {
     args.files.iter().map(open).collect()
 }
 
+/// The effects on the files, and on one made terrain. A file that is too small or too high for them
+/// has its other figures all the same.
+fn of_effects(args: &Args, files: &[Grid], effort: Effort) -> Result<Measured, Failure> {
+    let made = (!args.files_only).then(state::terrain);
+    let mut all = Measured::default();
+    for grid in files.iter().chain(&made) {
+        // Else with the other figures.
+        if args.effects {
+            remark(grid);
+        }
+        let waiting = spinner();
+        waiting.set_message(format!("{}: effects", grid.name));
+        let measured = effects::measure(grid, effort);
+        waiting.finish_and_clear();
+        match measured {
+            Ok(measured) => all.append(measured),
+            Err(why) => eprintln!("warning: no effects on {}: {why}", grid.name),
+        }
+    }
+    match args.effects && all.errors.is_empty() {
+        true => {
+            let hint = "name a file that is larger, or lower (--steepness)";
+            Err(Failure::new("no terrain has room for the effects").hint(hint))
+        }
+        false => Ok(all),
+    }
+}
+
+fn spinner() -> ProgressBar {
+    let waiting = ProgressBar::new_spinner();
+    waiting.enable_steady_tick(std::time::Duration::from_millis(500));
+    waiting
+}
+
 /// The paper's three sizes, one of them ten times as steep (the paper's own
 /// scale: 10 m posts, 1 m units), and one larger.
 fn made() -> [fn() -> Grid; 5] {
@@ -111,12 +157,15 @@ fn made() -> [fn() -> Grid; 5] {
     ]
 }
 
-fn measure(grid: &Grid, effort: Effort, rows: &mut Vec<Row>) {
+fn remark(grid: &Grid) {
     for remark in &grid.remarks {
         println!("{}: {remark}", grid.name);
     }
-    let waiting = ProgressBar::new_spinner();
-    waiting.enable_steady_tick(std::time::Duration::from_millis(500));
+}
+
+fn measure(grid: &Grid, effort: Effort, rows: &mut Vec<Row>) {
+    remark(grid);
+    let waiting = spinner();
     let measured = compare(grid, effort, |path| {
         waiting.set_message(format!("{}: {path}", grid.name));
     });
@@ -129,17 +178,30 @@ fn show(measured: &[Row], rows: &mut Vec<Row>) {
     rows.extend_from_slice(measured);
 }
 
+const HINT: &str = "check that the folder exists and that you may write there";
+
+fn write_effects(args: &Args, measured: &Measured) -> Result<(), Failure> {
+    let Some(file) = &args.csv else {
+        return Ok(());
+    };
+    report::write_effects(file, measured).map_err(|error| {
+        let text = format!("cannot write {}: {error}", file.display());
+        Failure::new(text).hint(HINT)
+    })?;
+    println!("wrote {}", file.display());
+    Ok(())
+}
+
 fn write(args: &Args, rows: &[Row], changes: &[continuity::Row]) -> Result<(), Failure> {
-    let hint = "check that the folder exists and that you may write there";
     if let Some(file) = &args.csv {
         report::write_csv(file, rows, changes).map_err(|error| {
             let text = format!("cannot write {}: {error}", file.display());
-            Failure::new(text).hint(hint)
+            Failure::new(text).hint(HINT)
         })?;
         println!("wrote {}", file.display());
     }
     if let Some(file) = &args.png {
-        report::draw(rows, file).map_err(|error| Failure::new(error).hint(hint))?;
+        report::draw(rows, file).map_err(|error| Failure::new(error).hint(HINT))?;
         println!("wrote {}", file.display());
     }
     Ok(())

@@ -53,10 +53,16 @@ pub fn all(grid: &Grid, ticks: usize) -> Vec<Path> {
 /// Slides `depth` 0.1 cell below the surface, `step` cells a tick.
 #[must_use]
 pub fn slide(grid: &Grid, name: &'static str, step: f64, ticks: usize) -> Path {
+    slide_at(grid, name, [step, 0.1], ticks)
+}
+
+/// The same at any depth: `[step, depth]`, cells.
+#[must_use]
+pub fn slide_at(grid: &Grid, name: &'static str, [step, depth]: [f64; 2], ticks: usize) -> Path {
     let mut walk = Walk::new(grid, 11);
-    let mut hips = way_in(grid, walk.at, -0.1);
+    let mut hips = way_in(grid, walk.at, -depth);
     let approach = hips.len();
-    hips.extend((0..ticks).map(|_| over(grid, walk.on(grid, step), -0.1)));
+    hips.extend((0..ticks).map(|_| over(grid, walk.on(grid, step), -depth)));
     Path::new(name, hips, approach)
 }
 

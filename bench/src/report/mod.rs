@@ -1,6 +1,7 @@
 //! What was measured, as a table, a CSV file and a picture.
 
 mod continuity;
+mod effects;
 mod file;
 mod labels;
 mod picture;
@@ -8,7 +9,9 @@ mod summary;
 mod table;
 
 pub use continuity::continuity;
+pub use effects::{EFFECTS_HEADER, effects, write_effects};
 pub use file::{HEADER, write_csv};
 pub use picture::draw;
 pub use summary::summary;
+use table::number;
 pub use table::table;

@@ -66,7 +66,7 @@ fn degrees(angle: f64) -> String {
 }
 
 /// Three digits or so.
-fn number(ns: f64) -> String {
+pub(super) fn number(ns: f64) -> String {
     match ns {
         ns if ns < 10.0 => format!("{ns:.2}"),
         ns if ns < 100.0 => format!("{ns:.1}"),

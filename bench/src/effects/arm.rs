@@ -1,0 +1,218 @@
+//! An arm that is armed over the middle of a terrain, and ways of its tip.
+
+use std::fmt;
+
+use hapterra::phantom::{Encoder, PhantomModel, Placement};
+use hapterra_core::force::ForceLaw;
+use hapterra_core::guard::{Mode, Sense};
+use hapterra_core::phantom::{Calibration, Mechanism};
+use hapterra_core::scene::Source;
+use hapterra_core::terrain::Tile;
+use hapterra_core::tick::{Command, Haptics, Outcome};
+
+use super::felt::Felt;
+use super::replay::{self, WINDOW};
+use super::vector::Vector;
+use crate::grid::Grid;
+use crate::haptics::Hip;
+use crate::path::Dice;
+
+/// Why nothing can be measured on a terrain: it is too small, or the arm does not reach it.
+#[derive(Clone, Debug)]
+pub struct NotMeasured(pub(super) String);
+
+impl fmt::Display for NotMeasured {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for NotMeasured {}
+
+/// Farthest from home, mm.
+const REACH: f64 = 40.0;
+/// Cells kept free at the border of the field.
+const MARGIN: f64 = 4.0;
+/// A way begins so far above the surface, mm, and goes down for so many ticks.
+const ABOVE: f64 = 2.0;
+const DOWN: usize = 50;
+/// Ticks in which arming is over.
+const ARMING: usize = 6000;
+
+/// An arm over the middle of a terrain.
+pub(super) struct Arm<'g> {
+    pub(super) grid: &'g Grid,
+    pub(super) model: PhantomModel,
+    pub(super) placement: Placement,
+}
+
+/// The tip's place, mm over the terrain, and what the encoders read there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) tip_mm: Vector,
+    pub(super) counts: [i32; 3],
+}
+
+/// A way of the tip that begins and ends above the same place: over the ground, and back.
+pub(super) struct Way {
+    pub(super) name: &'static str,
+    pub(super) down: Vec<Place>,
+    /// What is looked at.
+    pub(super) there: Vec<Place>,
+}
+
+impl<'g> Arm<'g> {
+    /// With the home pose close to the surface.
+    pub(super) fn over(grid: &'g Grid) -> Self {
+        let [x, y] = [grid.columns, grid.rows].map(|side| 0.5 * side as f64);
+        Self {
+            grid,
+            model: PhantomModel::premium_1_5(),
+            placement: Placement {
+                home_mm: [x, y, grid.height(x, y).floor()],
+            },
+        }
+    }
+
+    /// Slides 0.4 mm deep at 50 mm/s.
+    pub(super) fn slide(&self, ticks: usize) -> Result<Way, NotMeasured> {
+        self.way("arm slides 0.05", 0.05, ticks, |_| -0.4)
+    }
+
+    /// Taps half a millimetre deep every 100 ticks, wandering slowly.
+    pub(super) fn tap(&self, ticks: usize) -> Result<Way, NotMeasured> {
+        let phase = |tick: usize| tick as f64 * (std::f64::consts::TAU / 100.0);
+        self.way("arm taps", 0.02, ticks, |tick| 0.5 * phase(tick).cos())
+    }
+
+    /// Goes `step` mm a tick, so high above the surface, for half of the ticks, and back.
+    fn way(
+        &self,
+        name: &'static str,
+        step: f64,
+        ticks: usize,
+        height: impl Fn(usize) -> f64,
+    ) -> Result<Way, NotMeasured> {
+        let mut dice = Dice(21);
+        let (mut off, mut heading) = ([0.0; 2], 0.3_f64);
+        let sides = [self.grid.columns, self.grid.rows];
+        let reach = sides.map(|side| 0.5 * side as f64 - MARGIN);
+        let reach = reach.into_iter().fold(REACH, f64::min);
+        let mut there = Vec::with_capacity(ticks);
+        for tick in 0..ticks.div_ceil(2) {
+            there.push(self.above(off, height(tick))?);
+            heading += dice.between(-0.05, 0.05);
+            if f64::hypot(off[0], off[1]) > reach - 1.0 {
+                heading = f64::atan2(-off[1], -off[0]);
+            }
+            off = [off[0] + step * heading.cos(), off[1] + step * heading.sin()];
+        }
+        let begin = height(0);
+        let down = (0..DOWN).map(|i| {
+            let part = i as f64 / DOWN as f64;
+            self.above([0.0; 2], ABOVE + part * (begin - ABOVE))
+        });
+        let down = down.collect::<Result<_, _>>()?;
+        there.extend_from_within(..);
+        let half = there.len() / 2;
+        there[half..].reverse();
+        Ok(Way { name, down, there })
+    }
+
+    /// So far above the surface, `off` mm from home.
+    fn above(&self, off: [f64; 2], height: f64) -> Result<Place, NotMeasured> {
+        let home = self.placement.home_mm;
+        let [x, y] = [home[0] + off[0], home[1] + off[1]];
+        let tip_mm = [x, y, self.grid.height(x, y) + height];
+        let angles = self.placement.joints_at(&self.model, tip_mm);
+        let angles = angles.map_err(|why| NotMeasured(why.to_string()))?;
+        let read = |axis: usize| self.encoder(axis).counts(angles[axis]);
+        Ok(Place {
+            tip_mm,
+            counts: [read(0), read(1), read(2)],
+        })
+    }
+
+    pub(super) fn encoder(&self, axis: usize) -> Encoder {
+        Encoder::new(&self.model.drive[axis])
+    }
+
+    /// The loop that the arm is driven by.
+    pub(super) fn open<'t>(
+        &self,
+        law: ForceLaw,
+        tiles: &'t mut [Tile],
+    ) -> Result<Box<Haptics<'t, WINDOW>>, NotMeasured> {
+        let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5);
+        let mechanism = mechanism.map_err(|why| NotMeasured(why.to_string()))?;
+        let home = Hip::at(self.placement.home_mm).grid;
+        let scene = replay::scene(self.grid, law, Source::Encoders, home);
+        let mut haptics = replay::open(self.grid, scene, tiles);
+        haptics.configure(mechanism);
+        for command in [Command::Zero([0; 3]), Command::Arm] {
+            let _ = haptics.accept(command);
+        }
+        Ok(haptics)
+    }
+
+    /// What the way feels like under a law, with what is looked at.
+    pub(super) fn feel(&self, law: ForceLaw, way: &Way) -> Result<Vec<Felt>, NotMeasured> {
+        let mut tiles = replay::tiles();
+        let mut driven = Driven::begin(self, law, way, &mut tiles)?;
+        for place in &way.down {
+            driven.tick(place);
+        }
+        let felt = way.there.iter().map(|place| driven.tick(place));
+        let felt = felt.map(|outcome| Felt::of(&outcome.sample)).collect();
+        driven.is_armed().map(|()| felt)
+    }
+}
+
+/// An arm that is armed at the beginning of a way.
+pub(super) struct Driven<'t> {
+    haptics: Box<Haptics<'t, WINDOW>>,
+}
+
+impl<'t> Driven<'t> {
+    pub(super) fn begin(
+        arm: &Arm<'_>,
+        law: ForceLaw,
+        way: &Way,
+        tiles: &'t mut [Tile],
+    ) -> Result<Self, NotMeasured> {
+        let haptics = arm.open(law, tiles)?;
+        let mut driven = Self { haptics };
+        let counts = way.down.first().map_or([0; 3], |place| place.counts);
+        for tick in 0..ARMING {
+            let sense = Sense {
+                counts,
+                // Pressed after a moment.
+                dead_man: tick > 10,
+                ..Sense::default()
+            };
+            driven.haptics.tick(&sense, true);
+            if driven.haptics.report().mode == Mode::Armed {
+                break;
+            }
+        }
+        driven.is_armed().map(|()| driven)
+    }
+
+    #[inline]
+    pub(super) fn tick(&mut self, place: &Place) -> Outcome {
+        let sense = Sense {
+            counts: place.counts,
+            dead_man: true,
+            ..Sense::default()
+        };
+        self.haptics.tick(&sense, true)
+    }
+
+    pub(super) fn is_armed(&self) -> Result<(), NotMeasured> {
+        let report = self.haptics.report();
+        match report.mode {
+            Mode::Armed => Ok(()),
+            _ => Err(NotMeasured(format!("the arm is not armed: {report:?}"))),
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Damping: the force against the documented formula, with the velocity by FOAW in f64 and with the
+//! tip's own; and whether it ever pulls.
+
+use hapterra::phantom::{Placement, kinematics};
+use hapterra_core::force::ForceLaw;
+
+use super::arm::{Arm, NotMeasured, Place, Way};
+use super::felt::Felt;
+use super::foaw;
+use super::law::Effect;
+use super::row::{self, Error};
+use super::vector::{Vector, dot, length, minus};
+use crate::compare::Effort;
+use crate::grid::Grid;
+
+/// Ticks a second.
+const HZ: f64 = 1000.0;
+/// Readings that FOAW looks at.
+const READINGS: usize = 16;
+/// What rounding may do, mN.
+const ROUNDING: f64 = 0.01;
+
+pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeasured> {
+    let arm = Arm::over(grid);
+    let law = Effect::Damping.law();
+    let mut errors = Vec::new();
+    for way in [arm.slide(effort.ticks)?, arm.tap(effort.ticks)?] {
+        let felt = arm.feel(law, &way)?;
+        let place = row::Place(&grid.name, way.name, Effect::Damping.name());
+        let own = off_mn(&law, &felt, |tick| by_foaw(&arm, &way, tick));
+        let path = off_mn(&law, &felt, |tick| vec![by_path(&way, tick)]);
+        errors.extend(place.error(("force off that by FOAW in f64", "mN"), ROUNDING, own));
+        errors.extend(place.error(("force off that by the path's velocity", "mN"), None, path));
+        errors.extend(place.error(("pull of the surface", "mN"), 0.0, pulls_mn(&felt)));
+    }
+    Ok(errors)
+}
+
+/// How far each force is from the documented one, mN, with the nearest of some velocities.
+fn off_mn(
+    law: &ForceLaw,
+    felt: &[Felt],
+    velocities_mm_s: impl Fn(usize) -> Vec<Vector>,
+) -> Vec<f64> {
+    let felt = felt.iter().enumerate().skip(READINGS);
+    let off = felt.filter(|(_, felt)| felt.whole).map(|(tick, felt)| {
+        let off = velocities_mm_s(tick).into_iter().map(|velocity| {
+            let wanted = damped_n(law, felt.spring(), velocity);
+            1e3 * length(minus(felt.force_n, wanted))
+        });
+        off.fold(f64::INFINITY, f64::min)
+    });
+    off.collect()
+}
+
+/// F' = F − b (v·f) f, where b |v·f| counts at most |F|.
+fn damped_n(law: &ForceLaw, spring_mm: Vector, velocity_mm_s: Vector) -> Vector {
+    let deep = length(spring_mm);
+    if deep == 0.0 {
+        return [0.0; 3];
+    }
+    let along = spring_mm.map(|x| x / deep);
+    let most = f64::from(law.max_force_n);
+    let spring_n = (f64::from(law.stiffness_n_per_mm) * deep).min(most);
+    let damping = 1e-3 * f64::from(law.damping.ns_per_m) * dot(velocity_mm_s, along);
+    let force_n = (spring_n - damping.clamp(-spring_n, spring_n)).min(most);
+    along.map(|x| x * force_n)
+}
+
+/// How much each force pulls at the tip, mN.
+fn pulls_mn(felt: &[Felt]) -> Vec<f64> {
+    let whole = felt.iter().filter(|felt| felt.whole);
+    let pulls = whole.map(|felt| {
+        let along = dot(felt.force_n, felt.spring()) / length(felt.spring()).max(f64::MIN_POSITIVE);
+        (-1e3 * along).max(0.0)
+    });
+    pulls.collect()
+}
+
+/// The tip's velocity in the last tick, mm/s.
+fn by_path(way: &Way, tick: usize) -> Vector {
+    let [from, to] = [tick - 1, tick].map(|tick| way.there[tick].tip_mm);
+    minus(to, from).map(|mm| mm * HZ)
+}
+
+/// The tip's velocity by the encoders alone, mm/s, whichever way ties go.
+fn by_foaw(arm: &Arm<'_>, way: &Way, tick: usize) -> Vec<Vector> {
+    let readings: &[Place] = &way.there[tick + 1 - READINGS..=tick];
+    let counts = readings[READINGS - 1].counts;
+    let angles = [0, 1, 2].map(|axis| arm.encoder(axis).angle_rad(counts[axis]));
+    let jacobian = kinematics::jacobian(&arm.model, angles);
+    let slopes = [0, 1, 2].map(|axis| {
+        let one = arm.encoder(axis).angle_rad(1);
+        let counts: Vec<f64> = readings
+            .iter()
+            .map(|at| f64::from(at.counts[axis]))
+            .collect();
+        foaw::slopes(&counts).map(|counts| counts * one * HZ)
+    });
+    let velocity = |tie: usize| {
+        let rates = [0, 1, 2].map(|axis| slopes[axis][(tie >> axis) & 1]);
+        Placement::turn_to_terrain(jacobian.map(|row| 1e3 * dot(row, rates)))
+    };
+    (0..8).map(velocity).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::state::terrain;
+
+    fn worst(errors: Vec<f64>) -> f64 {
+        errors.into_iter().fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_damper_that_is_off_late_or_pulls_is_seen() {
+        let grid = terrain();
+        let arm = Arm::over(&grid);
+        let way = arm.tap(2000).expect("in reach");
+        let law = Effect::Damping.law();
+        let felt = arm.feel(law, &way).expect("felt");
+        let off = |law: &ForceLaw, felt: &[Felt]| {
+            worst(off_mn(law, felt, |tick| by_foaw(&arm, &way, tick)))
+        };
+        assert!(off(&law, &felt) < ROUNDING && worst(pulls_mn(&felt)) == 0.0);
+        // Five percent more damping.
+        let mut more = law;
+        more.damping.ns_per_m *= 1.05;
+        assert!(off(&more, &felt) > 10.0 * ROUNDING);
+        // The velocity of the tick before.
+        let late = off_mn(&law, &felt, |tick| by_foaw(&arm, &way, tick - 1));
+        assert!(worst(late) > 10.0 * ROUNDING);
+        // A damper whose part is not bounded by the spring's force.
+        let mut pulling = felt.clone();
+        for (tick, felt) in pulling.iter_mut().enumerate().skip(1) {
+            let (spring, deep) = (felt.spring(), length(felt.spring()));
+            let speed = dot(by_path(&way, tick), spring) / deep.max(1e-9);
+            felt.force_n = spring.map(|x| x * (0.5 - 2e-3 * speed / deep.max(1e-9)));
+        }
+        assert!(worst(pulls_mn(&pulling)) > 1.0 && off(&law, &pulling) > 1.0);
+    }
+}

@@ -1,0 +1,176 @@
+//! The passivity controller: what a surface gives to a hand that taps on it, in a closed loop with a
+//! virtual arm.
+
+use hapterra::phantom::{HeldPhantom, PhantomModel, Placement, Script};
+use hapterra::stability::grasp::Grasp;
+use hapterra_core::force::ForceLaw;
+
+use super::arm::{Arm, NotMeasured};
+use super::law::Effect;
+use super::replay;
+use super::row::{Error, Place};
+use super::vector::{Vector, dot, minus};
+use crate::grid::Grid;
+
+/// The stiffness up to which docs/stability.md states what a tap gives, N/mm.
+const STIFFNESS: f32 = 1.5;
+/// Most that a tap may give there, mJ: nothing, but for 0.008 mJ in one of the trials.
+const MOST_MJ: f64 = 0.01;
+/// The hand, mm/s; from so far above the surface to so far below it, mm.
+const SPEEDS: [f64; 3] = [100.0, 200.0, 500.0];
+const ABOVE: f64 = 30.0;
+const BELOW: f64 = 25.0;
+const TAPS: usize = 3;
+/// Between two taps the tip is higher above the surface than this, mm.
+const APART: f64 = 10.0;
+/// The home pose over the surface, mm.
+const HOME: f64 = 4.0;
+/// A tick, and from reading the encoders to the amplifiers, s.
+const TICK_S: f64 = 1e-3;
+const LATE_S: f64 = 0.08e-3;
+
+pub(super) fn measure(grid: &Grid) -> Result<Vec<Error>, NotMeasured> {
+    let mut rows = Vec::new();
+    for (effect, bound) in [(Effect::None, None), (Effect::Controller, Some(MOST_MJ))] {
+        let law = ForceLaw {
+            stiffness_n_per_mm: STIFFNESS,
+            ..effect.law()
+        };
+        let mut given = Vec::new();
+        for speed in SPEEDS {
+            for grasp in Grasp::ALL {
+                given.extend(given_mj(&tapped(grid, law, grasp, speed)?));
+            }
+        }
+        let place = Place(&grid.name, "a hand taps", effect.name());
+        rows.extend(place.error(("energy that a tap gives", "mJ"), bound, given));
+    }
+    Ok(rows)
+}
+
+/// A part of a tick: the surface's force, and how far the tip was above the surface and went.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    force_n: Vector,
+    went_mm: Vector,
+    above_mm: f64,
+}
+
+/// The work of the force, from one moment high above the surface to the next, mJ.
+fn given_mj(parts: &[Part]) -> Vec<f64> {
+    let (mut taps, mut given) = (Vec::new(), 0.0);
+    for part in parts {
+        given += dot(part.force_n, part.went_mm);
+        if part.above_mm > APART && given != 0.0 {
+            taps.push(given);
+            given = 0.0;
+        }
+    }
+    taps
+}
+
+/// A hand that taps on the middle of a terrain.
+fn tapped(
+    grid: &Grid,
+    law: ForceLaw,
+    grasp: Grasp,
+    speed_mm_s: f64,
+) -> Result<Vec<Part>, NotMeasured> {
+    let mut arm = Arm::over(grid);
+    let [x, y, _] = arm.placement.home_mm;
+    let ground = grid.height(x, y);
+    arm.placement = Placement {
+        home_mm: [x, y, ground + HOME],
+    };
+    let mut script = Script::start([x, y, ground + ABOVE]);
+    for _ in 0..TAPS {
+        for above in [-BELOW, ABOVE] {
+            script = script.go([x, y, ground + above], speed_mm_s);
+        }
+    }
+    let held = HeldPhantom::new(
+        PhantomModel::premium_1_5(),
+        grasp.hand(),
+        arm.placement,
+        script.wait(0.2),
+    );
+    let mut held = held.map_err(|why| NotMeasured(why.to_string()))?.arming();
+    let mut tiles = replay::tiles();
+    let mut haptics = arm.open(law, &mut tiles)?;
+    let ticks = ((HeldPhantom::ARMED_S + held.script_s()) / TICK_S) as usize;
+    let tip = |held: &HeldPhantom| {
+        let plant = held.plant();
+        arm.placement.to_terrain_mm(plant.model(), plant.tip_m())
+    };
+    let (mut before, mut parts) = (([0.0; 3], [0.0; 3]), Vec::with_capacity(2 * ticks));
+    for _ in 0..ticks {
+        let outcome = haptics.tick(&held.sense(), true);
+        let wide = |v: hapterra_core::Vec3| v.to_array().map(f64::from);
+        let now = (wide(outcome.drive.currents_a), wide(outcome.sample.force_n));
+        for ((currents_a, force_n), for_s) in [(before, LATE_S), (now, TICK_S - LATE_S)] {
+            let from = tip(&held);
+            held.step(currents_a, for_s);
+            let to = tip(&held);
+            parts.push(Part {
+                force_n,
+                went_mm: minus(to, from),
+                above_mm: to[2] - ground,
+            });
+        }
+        before = now;
+    }
+    match haptics.report().fault {
+        Some(fault) => Err(NotMeasured(format!("the guard switched off: {fault:?}"))),
+        None => Ok(parts),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hapterra_core::force::Controller;
+
+    use crate::state::terrain;
+
+    /// A spring pushed in and out; coming out it pushes by so much more.
+    fn spring(more: f64) -> Vec<Part> {
+        let height = |tick: i32| 12.0 * (f64::from(tick) * 0.01).cos();
+        let part = |tick: i32| {
+            let [from, to] = [height(tick), height(tick + 1)];
+            let stiffness = if to > from { 1.0 + more } else { 1.0 };
+            Part {
+                force_n: [0.0, 0.0, stiffness * (-0.5 * (from + to)).max(0.0)],
+                went_mm: [0.0, 0.0, to - from],
+                above_mm: to,
+            }
+        };
+        (0..700).map(part).collect()
+    }
+
+    #[test]
+    fn a_surface_that_gives_is_seen() {
+        let most = |more: f64| given_mj(&spring(more)).into_iter().fold(f64::MIN, f64::max);
+        assert!(most(0.0).abs() < 0.005, "{}", most(0.0));
+        // 72 mJ go in; a five-thousandth more comes out.
+        assert!(most(0.0005) > MOST_MJ, "{}", most(0.0005));
+        assert!(most(-0.0005) < 0.0);
+    }
+
+    #[test]
+    fn without_the_controller_a_tap_gives() {
+        let law = |controller| {
+            let mut law = Effect::None.law();
+            law.stiffness_n_per_mm = STIFFNESS;
+            law.damping.controller = controller;
+            law
+        };
+        let most = |controller| {
+            let parts = tapped(&terrain(), law(controller), Grasp::Normal, 200.0);
+            let given = given_mj(&parts.expect("in reach"));
+            assert_eq!(given.len(), TAPS);
+            given.into_iter().fold(f64::MIN, f64::max)
+        };
+        assert!(most(Controller::Off) > 10.0 * MOST_MJ);
+        assert!(most(Controller::On) <= MOST_MJ);
+    }
+}

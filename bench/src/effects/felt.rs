@@ -1,0 +1,63 @@
+//! What was felt in one tick, as the tick itself reports it.
+
+use hapterra_core::contact::ContactState;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::guard::Limits;
+use hapterra_core::scene::Sample;
+use hapterra_tests::invariants::surface::Patch;
+
+use super::vector::{Vector, minus};
+use crate::grid::Grid;
+
+/// A tick's report, in f64.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Felt {
+    /// Haptic interface point, cells.
+    pub hip: Vector,
+    /// Proxy, cells.
+    pub proxy: Vector,
+    /// Newtons.
+    pub force_n: Vector,
+    /// The proxy is on the surface, and nothing limits the force that the scene asks for.
+    pub whole: bool,
+}
+
+/// What makes a force another one than the scene asks for.
+const LESS: Limits = Limits::FORCE_CLAMPED
+    .union(Limits::SLEW_LIMITED)
+    .union(Limits::SPEED_LIMITED)
+    .union(Limits::RAMPING)
+    .union(Limits::FADING)
+    .union(Limits::TERRAIN_MISSING)
+    .union(Limits::BOUNDARY_FADING);
+
+impl Felt {
+    pub(super) fn of(sample: &Sample) -> Self {
+        let touches = sample.state == ContactState::Touching;
+        Self {
+            hip: wide(&sample.hip),
+            proxy: wide(&sample.proxy),
+            force_n: sample.force_n.to_array().map(f64::from),
+            whole: touches && !sample.limits.intersects(LESS),
+        }
+    }
+
+    /// From the HIP to the proxy: what the spring stretches by, cells.
+    pub(super) fn spring(&self) -> Vector {
+        minus(self.proxy, self.hip)
+    }
+
+    /// The slopes of the patch that the proxy is inside of; none on its border, where patches meet.
+    pub(super) fn slopes(&self, grid: &Grid) -> Option<[f64; 2]> {
+        const BORDER: f64 = 2e-3;
+        let [x, y, _] = self.proxy;
+        let inside = |c: f64| (BORDER..1.0 - BORDER).contains(&(c - c.floor()));
+        let patch = Patch::at(grid, [x.floor() as i32, y.floor() as i32])?;
+        (inside(x) && inside(y)).then(|| patch.slopes(x, y))
+    }
+}
+
+fn wide(point: &GridPoint) -> Vector {
+    let (cell, frac) = (point.cell(), point.frac().to_array());
+    [0, 1, 2].map(|i| f64::from(cell[i]) + f64::from(frac[i]))
+}

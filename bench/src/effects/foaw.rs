@@ -1,0 +1,64 @@
+//! First-order adaptive windowing with the best-fit slope, in f64, as the paper states it: each
+//! length of the window is tried with all its readings (Janabi-Sharifi, Hayward and Chen 2000).
+
+/// Longest window: readings before the newest.
+const WINDOW: usize = 15;
+/// What two readings are off by together, counts.
+const NOISE: f64 = 1.0;
+/// Whether a slope that is just as far off as allowed still counts is a matter of rounding.
+const TIE: f64 = 1e-5;
+
+/// How fast a count changes, counts a reading, by readings of which the last is the newest: with
+/// ties let in, and not.
+pub(super) fn slopes(readings: &[f64]) -> [f64; 2] {
+    [TIE, -TIE].map(|tie| slope(readings, NOISE + tie))
+}
+
+fn slope(readings: &[f64], noise: f64) -> f64 {
+    let newest = readings.len() - 1;
+    let longest = newest.min(WINDOW);
+    let tried = (1..=longest).map_while(|length| {
+        let window = &readings[newest - length..];
+        let (low, high) = allowed(window, noise);
+        (low <= high).then(|| best_fit(window).clamp(low, high))
+    });
+    tried.last().unwrap_or(0.0)
+}
+
+/// The slopes of straight lines through the newest reading that miss none by more than the noise.
+fn allowed(window: &[f64], noise: f64) -> (f64, f64) {
+    let newest = window[window.len() - 1];
+    let ago = window.iter().rev().enumerate().skip(1);
+    ago.fold((f64::MIN, f64::MAX), |(low, high), (ago, reading)| {
+        let (rise, ago) = (newest - reading, ago as f64);
+        (
+            low.max((rise - noise) / ago),
+            high.min((rise + noise) / ago),
+        )
+    })
+}
+
+/// The slope of the least-squares line.
+fn best_fit(window: &[f64]) -> f64 {
+    let middle = 0.5 * (window.len() - 1) as f64;
+    let mean = window.iter().sum::<f64>() / window.len() as f64;
+    let off = |i: usize| i as f64 - middle;
+    let sum = |of: &dyn Fn(usize) -> f64| (0..window.len()).map(of).sum::<f64>();
+    sum(&|i| off(i) * (window[i] - mean)) / sum(&|i| off(i) * off(i))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_even_motion_is_met_and_a_jerk_shortens_the_window() {
+        let even: Vec<f64> = (0..20).map(|i| (0.3 * f64::from(i)).round()).collect();
+        for slope in slopes(&even) {
+            assert!((slope - 0.3).abs() < 0.11, "{slope}");
+        }
+        let jerk: Vec<f64> = (0..20).map(|i| f64::from((i - 17).max(0) * 10)).collect();
+        assert_eq!(slopes(&jerk).map(f64::round), [10.0; 2]);
+        assert_eq!(slopes(&[4.0]), [0.0; 2]);
+    }
+}

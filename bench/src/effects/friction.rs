@@ -1,0 +1,182 @@
+//! Friction: the tangential over the normal force of a proxy that slides, and whether one that
+//! sticks stays.
+
+use super::felt::Felt;
+use super::law::{Effect, FRICTION};
+use super::replay::feel;
+use super::row::{Error, Place};
+use super::vector::{Vector, dot, length, minus, normal, plus};
+use crate::compare::Effort;
+use crate::grid::Grid;
+use crate::haptics::Hip;
+use crate::path::{self, Dice};
+
+/// Cells a tick, 10 mm/s at 1 kHz, and depth.
+const STEP: f64 = 0.01;
+const DEPTH: f64 = 0.3;
+/// What docs/effects.md states for that speed, percent of the coefficient.
+const MOST_ABOVE: f64 = 3.1;
+const MOST_BELOW: f64 = 5.0;
+/// Places where the tip is held, and ticks at each.
+const PLACES: usize = 40;
+const HELD: usize = 200;
+/// Ticks after which a proxy that has slid sticks: more than 20 ms.
+const SETTLING: usize = 30;
+/// How deep, and how far the HIP trembles along each axis: within the cone of a static coefficient
+/// of 0.5, whose radius is 0.05 there.
+const HELD_DEPTH: f64 = 0.1;
+const TREMBLE: f64 = 0.025;
+
+pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
+    let law = Effect::Friction.law();
+    let slide = path::slide_at(grid, "slide 0.01", [STEP, DEPTH], effort.ticks);
+    let slid = feel(grid, law, &slide.hips);
+    let off = off_percent(
+        grid,
+        f64::from(FRICTION.dynamic_mu),
+        &slid[slide.approach..],
+    );
+    let part = |sign: f64| off.iter().map(|off| (sign * off).max(0.0)).collect();
+    let (hips, from) = held(grid);
+    let stuck = feel(grid, law, &hips);
+    let drifts = from
+        .iter()
+        .filter_map(|from| drift(&stuck[*from..][..HELD]));
+    let sliding = Place(&grid.name, slide.name, Effect::Friction.name());
+    let held = Place(&grid.name, "held", Effect::Friction.name());
+    let rows = [
+        sliding.error(
+            ("force ratio above the dynamic coefficient", "%"),
+            MOST_ABOVE,
+            part(1.0),
+        ),
+        sliding.error(
+            ("force ratio below the dynamic coefficient", "%"),
+            MOST_BELOW,
+            part(-1.0),
+        ),
+        held.error(
+            ("drift of a proxy that sticks", "cell"),
+            0.0,
+            drifts.collect(),
+        ),
+    ];
+    rows.into_iter().flatten().collect()
+}
+
+/// How far the tangential over the normal force is from a coefficient, percent of that, in each
+/// tick in which the proxy slid within a patch.
+fn off_percent(grid: &Grid, mu: f64, felt: &[Felt]) -> Vec<f64> {
+    let slid = felt.windows(2).filter(|pair| {
+        let both = pair[0].whole && pair[1].whole;
+        both && pair[0].proxy != pair[1].proxy
+    });
+    let off = slid.filter_map(|pair| {
+        let normal = normal(pair[1].slopes(grid)?);
+        let force = pair[1].force_n;
+        let presses = dot(force, normal);
+        let pulls = length(plus(force, normal, -presses));
+        Some(100.0 * (pulls / (mu * presses) - 1.0))
+    });
+    off.collect()
+}
+
+/// The farthest that a proxy is from where it was first; none where it was not felt.
+fn drift(felt: &[Felt]) -> Option<f64> {
+    let first = felt.first()?.proxy;
+    let is_felt = felt.iter().all(|felt| felt.whole);
+    let far = felt.iter().map(|felt| length(minus(felt.proxy, first)));
+    is_felt.then(|| far.fold(0.0, f64::max))
+}
+
+/// Down along the normal at places inside of patches, and a HIP that trembles there; and where
+/// each of these begins.
+fn held(grid: &Grid) -> (Vec<Hip>, Vec<usize>) {
+    let mut dice = Dice(23);
+    let sky = f64::from(grid.top()) + 2.0;
+    let (mut hips, mut from) = (Vec::new(), Vec::new());
+    for _ in 0..PLACES {
+        let inside = |dice: &mut Dice, side: usize| {
+            dice.between(4.0, side as f64 - 4.0).floor() + dice.between(0.2, 0.8)
+        };
+        let [x, y] = [
+            inside(&mut dice, grid.columns),
+            inside(&mut dice, grid.rows),
+        ];
+        let (place, up) = on(grid, [x, y]);
+        let above = plus(place, up, 0.5);
+        hips.push(Hip::at([above[0], above[1], sky]));
+        let down = (0..=10).map(|i| plus(above, up, -0.05 * f64::from(i)));
+        hips.extend(down.map(Hip::at));
+        let pressed = Hip::at(plus(place, up, -HELD_DEPTH));
+        hips.extend(std::iter::repeat_n(pressed, SETTLING));
+        from.push(hips.len());
+        let mut tremble = || {
+            let aside = [0, 1, 2].map(|_| dice.between(-TREMBLE, TREMBLE));
+            plus(aside, up, -dot(aside, up) - HELD_DEPTH)
+        };
+        hips.extend((0..HELD).map(|_| Hip::at(plus(place, tremble(), 1.0))));
+        hips.extend([above, [above[0], above[1], sky]].map(Hip::at));
+    }
+    (hips, from)
+}
+
+/// A place of the surface, and its normal.
+fn on(grid: &Grid, [x, y]: [f64; 2]) -> (Vector, Vector) {
+    const STEP: f64 = 1e-3;
+    let slope = |east: f64, north: f64| {
+        let ahead = grid.height(x + east, y + north);
+        (ahead - grid.height(x - east, y - north)) / (2.0 * STEP)
+    };
+    let normal = normal([slope(STEP, 0.0), slope(0.0, STEP)]);
+    ([x, y, grid.height(x, y)], normal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::state::terrain;
+
+    #[test]
+    fn friction_that_is_five_percent_off_is_seen() {
+        let (grid, mut law) = (terrain(), Effect::Friction.law());
+        let slide = path::slide_at(&grid, "", [STEP, DEPTH], 2000);
+        let mut worst = |mu: f32| {
+            law.friction.dynamic_mu = mu;
+            let felt = feel(&grid, law, &slide.hips);
+            let off = off_percent(&grid, 0.3, &felt[slide.approach..]);
+            let above = off.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            (above, -off.iter().copied().fold(f64::INFINITY, f64::min))
+        };
+        let (above, below) = worst(0.3);
+        assert!(above < MOST_ABOVE && below < MOST_BELOW, "{above} {below}");
+        assert!(worst(0.3 * 1.05).0 > MOST_ABOVE);
+        assert!(worst(0.3 * 0.95).1 > MOST_BELOW);
+    }
+
+    #[test]
+    fn a_proxy_that_creeps_is_seen() {
+        let felt = Felt {
+            hip: [0.0; 3],
+            proxy: [0.0, 0.0, 0.1],
+            force_n: [0.0, 0.0, 0.05],
+            whole: true,
+        };
+        let mut crept = felt;
+        crept.proxy[0] = 1e-6;
+        assert_eq!(drift(&[felt; 3]), Some(0.0));
+        assert_eq!(drift(&[felt, felt, crept]), Some(1e-6));
+        crept.whole = false;
+        assert_eq!(drift(&[felt, felt, crept]), None);
+    }
+
+    /// Ice slips where friction holds.
+    #[test]
+    fn a_proxy_on_ice_drifts() {
+        let grid = terrain();
+        let (hips, from) = held(&grid);
+        let felt = feel(&grid, Effect::None.law(), &hips);
+        let drift = drift(&felt[from[0]..][..HELD]);
+        assert!(drift.is_some_and(|drift| drift > 0.01), "{drift:?}");
+    }
+}

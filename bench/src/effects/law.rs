@@ -1,0 +1,108 @@
+//! The effects that are compared, each as the law of a scene.
+
+use hapterra_core::contact::Friction;
+use hapterra_core::force::{Controller, Damping, ForceLaw, Pattern, Shading, Texture};
+
+/// What a surface does besides pushing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effect {
+    /// A surface like ice.
+    None,
+    /// It holds the tip back, more at rest than while it slides.
+    Friction,
+    /// The force turns evenly from patch to patch.
+    Shading,
+    /// A micro-relief at random.
+    Grain,
+    /// A micro-relief of ridges.
+    Grating,
+    /// It takes energy out of a motion against it.
+    Damping,
+    /// Energy that the ticks create is taken back.
+    Controller,
+    /// All at once, with grain.
+    All,
+}
+
+/// The friction that is measured.
+pub(super) const FRICTION: Friction = Friction {
+    static_mu: 0.5,
+    dynamic_mu: 0.3,
+    viscous_s: 0.0,
+};
+/// The damping that is measured, N·s/m.
+pub(super) const DAMPING_NS_PER_M: f32 = 2.0;
+
+/// The texture that is measured.
+pub(super) const fn texture(pattern: Pattern) -> Texture {
+    Texture {
+        pattern,
+        amplitude_mm: 0.1,
+        wavelength_mm: 1.0,
+        direction_deg: 30.0,
+        seed: 7,
+    }
+}
+
+impl Effect {
+    /// All, in the order of the table.
+    pub const ALL: [Self; 8] = [
+        Self::None,
+        Self::Friction,
+        Self::Shading,
+        Self::Grain,
+        Self::Grating,
+        Self::Damping,
+        Self::Controller,
+        Self::All,
+    ];
+
+    /// What it is called in tables.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Friction => "friction",
+            Self::Shading => "shading",
+            Self::Grain => "texture, grain",
+            Self::Grating => "texture, grating",
+            Self::Damping => "damping",
+            Self::Controller => "controller",
+            Self::All => "all",
+        }
+    }
+
+    /// The law of a scene with this effect, and no other. The controller is off where it is
+    /// not asked for.
+    pub(super) fn law(self) -> ForceLaw {
+        let of = |effect| self == effect || self == Self::All;
+        let mut law = ForceLaw::PREMIUM;
+        if of(Self::Friction) {
+            law.friction = FRICTION;
+        }
+        if of(Self::Shading) {
+            law.shading = Shading::Smooth;
+        }
+        if of(Self::Grain) {
+            law.texture = texture(Pattern::Grain);
+        }
+        if self == Self::Grating {
+            law.texture = texture(Pattern::Grating);
+        }
+        let ns_per_m = if of(Self::Damping) {
+            DAMPING_NS_PER_M
+        } else {
+            0.0
+        };
+        let controller = if of(Self::Controller) {
+            Controller::On
+        } else {
+            Controller::Off
+        };
+        law.damping = Damping {
+            ns_per_m,
+            controller,
+        };
+        law
+    }
+}

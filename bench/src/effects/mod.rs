@@ -1,0 +1,98 @@
+//! What each effect of a surface costs, and how exact it is.
+//!
+//! - [`Effect`]: the laws that are compared;
+//! - `time`: the whole tick from encoder counts to currents, all effects in turns;
+//! - `friction`, `shading`, `texture`, `damping`, `energy`, `together`: one judge each, in f64,
+//!   by the formulas of docs/effects.md. No judge calls what it judges;
+//! - `felt`, `replay`, `arm`: what is judged, and where it comes from: points in lock-step, and an
+//!   arm that is armed.
+//!
+//! A cell is a millimetre in the hand here.
+
+mod arm;
+mod damping;
+mod energy;
+mod felt;
+mod foaw;
+mod friction;
+mod law;
+mod relief;
+mod replay;
+mod row;
+mod shading;
+mod texture;
+mod time;
+mod together;
+mod vector;
+
+use crate::compare::Effort;
+use crate::grid::Grid;
+
+pub use arm::NotMeasured;
+pub use law::Effect;
+pub use row::{Error, Measured, Spread, Time};
+
+/// Cells along the side of what is felt of a terrain: what a device's window holds, and more than
+/// the arm reaches.
+pub const SIDE: usize = 256;
+/// Fewest cells along the side of a terrain that has room for the paths.
+pub const LEAST_SIDE: usize = 48;
+
+/// Times and errors on the middle of one terrain.
+///
+/// # Errors
+/// When the terrain is too small, or the arm cannot reach the surface.
+pub fn measure(grid: &Grid, effort: Effort) -> Result<Measured, NotMeasured> {
+    let errors = errors(grid, effort)?;
+    let times = time::measure(&grid.middle(SIDE), effort)?;
+    Ok(Measured { times, errors })
+}
+
+/// Errors alone: the same figures in every run.
+///
+/// # Errors
+/// When the terrain is too small, or the arm cannot reach the surface.
+pub fn errors(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeasured> {
+    let size = [grid.columns, grid.rows];
+    if size.iter().any(|side| *side < LEAST_SIDE) {
+        let [columns, rows] = size;
+        let has = format!("{columns} × {rows} cells; the paths need {LEAST_SIDE} each way");
+        return Err(NotMeasured(has));
+    }
+    let grid = &grid.middle(SIDE);
+    let mut errors = friction::measure(grid, effort);
+    errors.extend(shading::measure(grid, effort));
+    errors.extend(texture::measure(grid, effort));
+    errors.extend(damping::measure(grid, effort)?);
+    errors.extend(energy::measure(grid)?);
+    errors.extend(together::measure(grid, effort)?);
+    Ok(errors)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::state;
+
+    #[test]
+    fn a_terrain_that_is_too_small_or_too_high_is_refused() {
+        let small = Grid::from_fn("small", [200, 47], |_, _| 0.0);
+        let why = errors(&small, Effort::QUICK).expect_err("too small");
+        assert!(why.to_string().starts_with("200 × 47 cells"), "{why}");
+        let wall = |x: usize, _| if x > 90 { 900.0 } else { 0.0 };
+        let high = Grid::from_fn("high", [150, 150], wall);
+        assert!(measure(&high, Effort::QUICK).is_err());
+    }
+
+    #[test]
+    fn every_error_is_below_its_documented_bound() {
+        let errors = errors(&state::terrain(), Effort::QUICK).expect("in reach");
+        assert!(errors.iter().all(|error| error.judged > 0));
+        let is_above = |error: &&Error| error.bound.is_some_and(|most| error.spread.worst > most);
+        let wrong: Vec<_> = errors.iter().filter(is_above).collect();
+        assert!(wrong.is_empty(), "{wrong:#?}");
+        let judged = |effect: &Effect| errors.iter().any(|error| error.effect == effect.name());
+        let all = &Effect::ALL[1..];
+        assert!(all.iter().all(judged));
+    }
+}

@@ -1,0 +1,80 @@
+//! What is felt along a path of points, in lock-step.
+
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::rate::TickRate;
+use hapterra_core::scene::{Point, Scene, Source};
+use hapterra_core::terrain::{FieldSize, TILE_CELLS, Tile, TileKey};
+use hapterra_core::tick::{Command, Haptics};
+
+use super::SIDE;
+use super::felt::Felt;
+use crate::grid::Grid;
+use crate::haptics::Hip;
+use crate::product::{buffers, fill};
+
+/// Tiles along the side of the window.
+pub(super) const WINDOW: usize = SIDE / TILE_CELLS;
+/// Ticks that a point may take: more than any does whose tiles are here.
+const MOST_TICKS: usize = 1000;
+
+/// Buffers for a loop's tiles.
+pub(super) fn tiles() -> Vec<Tile> {
+    buffers::<WINDOW>()
+}
+
+/// A scene over the whole of a grid.
+pub(super) fn scene(grid: &Grid, law: ForceLaw, source: Source, home: GridPoint) -> Scene {
+    Scene {
+        epoch: 1,
+        level: 0,
+        size: FieldSize::new(grid.columns as i32, grid.rows as i32),
+        top: grid.top().floor() as i32 + 1,
+        cell_mm: 1.0,
+        home,
+        law,
+        rule: Rule::Swept,
+        source,
+        hold_clock: false,
+    }
+}
+
+/// A loop that holds all tiles of a scene.
+///
+/// # Panics
+/// When there are fewer buffers than [`tiles`] makes, or the field is larger than the window.
+pub(super) fn open<'t>(
+    grid: &Grid,
+    scene: Scene,
+    tiles: &'t mut [Tile],
+) -> Box<Haptics<'t, WINDOW>> {
+    let mut tiles = tiles.iter_mut();
+    let mut next = || tiles.next().expect("a buffer for every slot");
+    let mut spare = next();
+    let slots = std::array::from_fn(|_| std::array::from_fn(|_| next()));
+    let mut haptics = Box::new(Haptics::new(slots, TickRate::DEFAULT, None));
+    let _ = haptics.accept(Command::Scene(scene));
+    for index in scene.size.tiles() {
+        fill(grid, TileKey { level: 0, index }, spare);
+        spare = haptics
+            .accept(Command::Tile(spare))
+            .expect("the field fits the window");
+    }
+    haptics
+}
+
+/// What each point feels like under a law.
+pub(super) fn feel(grid: &Grid, law: ForceLaw, hips: &[Hip]) -> Vec<Felt> {
+    let mut tiles = tiles();
+    let scene = scene(grid, law, Source::Points, GridPoint::default());
+    let mut haptics = open(grid, scene, &mut tiles);
+    let mut answer = |(seq, hip): (u32, &Hip)| {
+        let point = Point { seq, hip: hip.grid };
+        let _ = haptics.accept(Command::Point(point));
+        let mut ticks = (0..MOST_TICKS).map(|_| haptics.tick(&Default::default(), true));
+        let answered = ticks.find(|outcome| outcome.answers.is_some());
+        answered.map(|outcome| Felt::of(&outcome.sample))
+    };
+    (0..).zip(hips).map_while(&mut answer).collect()
+}

@@ -1,0 +1,104 @@
+//! What is told of an effect: the time of a tick with it, and its errors.
+
+use crate::stats::quantiles;
+
+/// All that was measured on one terrain.
+#[derive(Clone, Debug, Default)]
+pub struct Measured {
+    /// Each path and effect.
+    pub times: Vec<Time>,
+    /// Each effect, by what it promises.
+    pub errors: Vec<Error>,
+}
+
+impl Measured {
+    /// Takes the figures of another terrain.
+    pub fn append(&mut self, other: Self) {
+        self.times.extend(other.times);
+        self.errors.extend(other.errors);
+    }
+}
+
+/// The whole tick with one effect along one path.
+#[derive(Clone, Debug)]
+pub struct Time {
+    /// The terrain's name.
+    pub terrain: String,
+    /// The path's name.
+    pub path: &'static str,
+    /// The effect's name.
+    pub effect: &'static str,
+    /// Nanoseconds a tick: lower quartile, median, upper quartile.
+    pub ns: [f64; 3],
+    /// Median over the rounds of its time over that without an effect.
+    pub ratio: f64,
+}
+
+/// How far something is from what the documented formula says.
+#[derive(Clone, Debug)]
+pub struct Error {
+    /// The terrain's name.
+    pub terrain: String,
+    /// The path's name.
+    pub path: &'static str,
+    /// The effect's name.
+    pub effect: &'static str,
+    /// What is looked at.
+    pub what: &'static str,
+    /// In what it is measured.
+    pub unit: &'static str,
+    /// The errors.
+    pub spread: Spread,
+    /// What the worst may be, where docs/effects.md promises something.
+    pub bound: Option<f64>,
+    /// How many were judged.
+    pub judged: usize,
+}
+
+/// How errors are spread; the larger, the worse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// Half are below.
+    pub median: f64,
+    /// 99 % are below.
+    pub p99: f64,
+    /// The largest.
+    pub worst: f64,
+}
+
+impl Spread {
+    fn of(values: Vec<f64>) -> Option<Self> {
+        if values.is_empty() {
+            return None;
+        }
+        let [median, p99, worst] = quantiles(values, [0.5, 0.99, 1.0]);
+        Some(Self { median, p99, worst })
+    }
+}
+
+/// The place that errors are of: terrain, path and effect.
+#[derive(Clone, Copy)]
+pub(super) struct Place<'a>(pub &'a str, pub &'static str, pub &'static str);
+
+impl Place<'_> {
+    /// A row of these errors; none where nothing could be judged.
+    pub(super) fn error(
+        &self,
+        (what, unit): (&'static str, &'static str),
+        bound: impl Into<Option<f64>>,
+        values: Vec<f64>,
+    ) -> Option<Error> {
+        let judged = values.len();
+        let bound = bound.into();
+        Spread::of(values).map(|spread| Error {
+            terrain: self.0.to_owned(),
+            path: self.1,
+            effect: self.2,
+            what,
+            unit,
+            spread,
+            bound,
+            judged,
+        })
+    }
+}

@@ -1,0 +1,180 @@
+//! Shading: the direction of the force against that of the documented normal, and how far it turns
+//! from one HIP to the next.
+
+use super::felt::Felt;
+use super::law::Effect;
+use super::replay::feel;
+use super::row::{Error, Place};
+use super::vector::{Vector, cross, degrees, length, minus, normal, plus, unit};
+use crate::compare::Effort;
+use crate::grid::Grid;
+use crate::path;
+
+/// Cells from one HIP to the next, and depth.
+const STEP: f64 = 0.01;
+const DEPTH: f64 = 0.02;
+/// What rounding may do to a direction, degrees: that of the soak's judge.
+const ROUNDING: f64 = 0.06;
+/// A shaded force turns by so much at most where an unshaded one turns by 60°, degrees.
+const MOST_TURN: f64 = 6.0;
+/// That holds where the proxy goes no farther than this in a tick, cells.
+const FARTHEST: f64 = 0.05;
+/// A force is turned by at most so much, degrees.
+const TURNED: f64 = 60.0;
+
+pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
+    let slide = path::slide_at(grid, "slide 0.01", [STEP, DEPTH], effort.ticks);
+    let felt = |effect: Effect| feel(grid, effect.law(), &slide.hips).split_off(slide.approach);
+    let (plain, shaded) = (felt(Effect::None), felt(Effect::Shading));
+    let [none, own] =
+        [Effect::None, Effect::Shading].map(|of| Place(&grid.name, slide.name, of.name()));
+    let turn = ("turn of the force from one tick to the next", "°");
+    let rows = [
+        own.error(
+            ("direction off the documented normal", "°"),
+            ROUNDING,
+            off(grid, &shaded),
+        ),
+        own.error(turn, MOST_TURN, turns(&shaded)),
+        none.error(turn, None, turns(&plain)),
+    ];
+    rows.into_iter().flatten().collect()
+}
+
+/// How far each force is from where it should point, degrees.
+fn off(grid: &Grid, felt: &[Felt]) -> Vec<f64> {
+    let off = felt.iter().filter(|felt| felt.whole).filter_map(|felt| {
+        let own = normal(felt.slopes(grid)?);
+        let [x, y, _] = felt.proxy;
+        let wanted = turned(own, normal(smoothed(grid, [x, y])?));
+        Some(degrees(felt.force_n, wanted))
+    });
+    off.collect()
+}
+
+/// Degrees between forces that follow each other while the proxy goes on evenly: shading does not
+/// move a proxy that leaves a ridge.
+fn turns(felt: &[Felt]) -> Vec<f64> {
+    let goes = |pair: &[Felt]| length(minus(pair[1].proxy, pair[0].proxy));
+    let pairs = felt.windows(2);
+    let pairs = pairs.filter(|pair| pair[0].whole && pair[1].whole && goes(pair) <= FARTHEST);
+    let turn = |pair: &[Felt]| degrees(pair[0].force_n, pair[1].force_n);
+    pairs.map(turn).collect()
+}
+
+/// A direction, turned toward another.
+fn turned(from: Vector, to: Vector) -> Vector {
+    if degrees(from, to) <= TURNED {
+        return to;
+    }
+    let axis = unit(cross(from, to));
+    let (sin, cos) = TURNED.to_radians().sin_cos();
+    plus(from.map(|x| x * cos), cross(axis, from), sin)
+}
+
+/// The slopes eastward and northward that change evenly from patch to patch; none at the border of
+/// the field.
+fn smoothed(grid: &Grid, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+    let (column, row) = (x.floor() as usize, y.floor() as usize);
+    let is_inside = column > 0 && row > 0 && column + 2 <= grid.columns && row + 2 <= grid.rows;
+    if !is_inside {
+        return None;
+    }
+    let (u, v) = (x - x.floor(), y - y.floor());
+    let post = |column: usize, row: usize| f64::from(grid.post(column, row));
+    let east = |row: usize| along([0, 1, 2, 3].map(|i| post(column + i - 1, row)), u);
+    let north = |column: usize| along([0, 1, 2, 3].map(|i| post(column, row + i - 1)), v);
+    let mixed = |a: f64, b: f64, share: f64| a * (1.0 - share) + b * share;
+    Some([
+        mixed(east(row), east(row + 1), v),
+        mixed(north(column), north(column + 1), u),
+    ])
+}
+
+/// The smoothed slope at a place s of the edge between the middle two of four samples.
+fn along(posts: [f64; 4], s: f64) -> f64 {
+    let direction = |i: usize| {
+        let rise = posts[i + 1] - posts[i];
+        let length = rise.hypot(1.0);
+        [1.0 / length, rise / length]
+    };
+    let [before, own, after] = [direction(0), direction(1), direction(2)];
+    let share = |beside: [f64; 2], from: f64| {
+        let bend = (own[0] * beside[0] + own[1] * beside[1]).clamp(-1.0, 1.0);
+        0.5 * (1.0 - from / reach(bend)).max(0.0)
+    };
+    let (start, end) = (share(before, s), share(after, 1.0 - s));
+    let [run, rise] =
+        [0, 1].map(|i| own[i] + start * (before[i] - own[i]) + end * (after[i] - own[i]));
+    rise / run
+}
+
+/// The part of an edge along which the direction changes, by the cosine of the bend.
+fn reach(bend: f64) -> f64 {
+    let (gentle, sharp) = (45_f64.to_radians().cos(), 75_f64.to_radians().cos());
+    let even = (bend - sharp) / (gentle - sharp);
+    0.2 + 0.8 * even.clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::vector::dot;
+    use crate::state::terrain;
+
+    #[test]
+    fn a_direction_that_is_a_degree_off_is_seen_and_so_is_none() {
+        let grid = terrain();
+        let slide = path::slide_at(&grid, "", [STEP, DEPTH], 2000);
+        let worst = |felt: &[Felt]| off(&grid, felt).into_iter().fold(0.0, f64::max);
+        let shaded = feel(&grid, Effect::Shading.law(), &slide.hips);
+        assert!(worst(&shaded) < ROUNDING);
+        let (sin, cos) = 1_f64.to_radians().sin_cos();
+        let mut wrong = shaded.clone();
+        for felt in &mut wrong {
+            let [x, y, z] = felt.force_n;
+            felt.force_n = [x * cos + z * sin, y, z * cos - x * sin];
+        }
+        // About the axis of the turn a force does not move.
+        let least = off(&grid, &wrong).into_iter().fold(f64::INFINITY, f64::min);
+        assert!(worst(&wrong) > 0.9 && least > ROUNDING, "{least}");
+        let plain = feel(&grid, Effect::None.law(), &slide.hips);
+        assert!(worst(&plain) > 1.0);
+        assert!(turns(&plain).into_iter().fold(0.0, f64::max) > 1.0);
+    }
+
+    /// Bends of all sizes, and turns of more than 60°.
+    #[test]
+    fn on_rough_ground_the_direction_is_the_documented_one_too() {
+        let mut dice = path::Dice(3);
+        let rough = Grid::from_fn("rough", [64, 64], |_, _| dice.between(0.0, 6.0) as f32);
+        let slide = path::slide_at(&rough, "", [STEP, DEPTH], 8000);
+        let shaded = feel(&rough, Effect::Shading.law(), &slide.hips);
+        let off = off(&rough, &shaded);
+        let worst = off.iter().copied().fold(0.0, f64::max);
+        let most = shaded.iter().filter_map(|felt| {
+            let own = normal(felt.slopes(&rough)?);
+            Some(degrees(own, felt.force_n))
+        });
+        let most = most.fold(0.0, f64::max);
+        assert!(
+            off.len() > 2000 && most > TURNED - 1.0,
+            "{}: {most}",
+            off.len()
+        );
+        assert!(worst < ROUNDING, "{worst}");
+    }
+
+    #[test]
+    fn a_mean_at_a_sample_and_a_cliff_that_stays() {
+        // Directions of 0 and 45° are mixed at the sample to 22.5°.
+        let slope = along([0.0, 0.0, 1.0, 2.0], 0.0);
+        assert!((slope - 22.5_f64.to_radians().tan()).abs() < 1e-12);
+        // A wall of 84°: a fifth from its foot the ground is level.
+        assert!(along([0.0, 0.0, 0.0, 10.0], 0.799).abs() < 1e-12);
+        assert!(along([0.0, 0.0, 0.0, 10.0], 0.9) > 0.0);
+        assert!(length(turned([0.0, 0.0, 1.0], [1.0, 0.0, 0.0])) - 1.0 < 1e-12);
+        let most = turned([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
+        assert!((dot(most, [0.0, 0.0, 1.0]) - 0.5).abs() < 1e-12);
+    }
+}

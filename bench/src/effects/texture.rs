@@ -1,0 +1,181 @@
+//! Texture: the felt height, and the force along the surface, against the documented formulas.
+
+use std::f64::consts::TAU;
+
+use hapterra_core::force::{ForceLaw, Texture};
+
+use super::felt::Felt;
+use super::law::Effect;
+use super::relief::rise;
+use super::replay::feel;
+use super::row::{Error, Place};
+use super::vector::{Vector, dot, length, minus, plus};
+use crate::compare::Effort;
+use crate::grid::Grid;
+use crate::path;
+
+/// Cells a tick: felt in whole, and amid the fade; and a depth at which neither the height nor the
+/// slope is bounded by the depth.
+const STEPS: [(&str, f64); 2] = [("slide 0.05", 0.05), ("slide 0.18", 0.18)];
+const DEPTH: f64 = 0.3;
+/// Percent of the amplitude: the product's sine is off by 0.05, and places are rounded.
+const MOST_HIGH: f64 = 0.06;
+/// Percent of the steepest slope's force: that of the soak's judge.
+const MOST_ALONG: f64 = 1.0;
+/// What a tick of a millisecond leaves of a speed that was above.
+const KEEPS: f64 = 0.9;
+
+pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
+    let mut errors = Vec::new();
+    for (name, step) in STEPS {
+        let slide = path::slide_at(grid, name, [step, DEPTH], effort.ticks);
+        for effect in [Effect::Grain, Effect::Grating] {
+            let law = effect.law();
+            let off = off_percent(&law, &feel(grid, law, &slide.hips));
+            let place = Place(&grid.name, name, effect.name());
+            let [high, along] = [0, 1].map(|i| off.iter().map(|off| off[i]).collect());
+            errors.extend(place.error(("felt height off", "% of A"), MOST_HIGH, high));
+            let what = ("force along the surface off", "% of the steepest");
+            errors.extend(place.error(what, MOST_ALONG, along));
+        }
+    }
+    errors
+}
+
+/// How far what is felt is from the formula, tick by tick: along the force without texture,
+/// percent of the amplitude, and across it, percent of what the steepest slope does.
+fn off_percent(law: &ForceLaw, felt: &[Felt]) -> Vec<[f64; 2]> {
+    let texture = &law.texture;
+    let (amplitude, stiffness) = (
+        f64::from(texture.amplitude_mm),
+        f64::from(law.stiffness_n_per_mm),
+    );
+    let mut fade = Fade::new(f64::from(texture.wavelength_mm));
+    // The proxy has a speed in the air, too.
+    let shares = felt.iter().map(|felt| (felt, fade.share(felt.proxy)));
+    let whole = shares.filter(|(felt, _)| felt.whole);
+    let off = whole.map(|(felt, share)| {
+        let spring = felt.spring();
+        let depth = length(spring);
+        let added = minus(felt.force_n.map(|x| x / stiffness), spring);
+        let off = minus(added, wanted(texture, felt.proxy, spring, share));
+        let normal = spring.map(|x| x / depth);
+        let high = dot(off, normal);
+        let steepest = TAU * amplitude / f64::from(texture.wavelength_mm);
+        let along = length(plus(off, normal, -high)) / (steepest * depth.min(deepest(texture)));
+        [high.abs() / amplitude, along].map(|part| 100.0 * part)
+    });
+    off.collect()
+}
+
+/// The depth from which on the force along the surface grows no more, mm.
+fn deepest(texture: &Texture) -> f64 {
+    f64::from(texture.wavelength_mm).powi(2) / (48.0 * f64::from(texture.amplitude_mm))
+}
+
+/// What a texture adds to the spring's stretch at a proxy, mm.
+fn wanted(texture: &Texture, proxy: Vector, spring: Vector, share: f64) -> Vector {
+    let amplitude = f64::from(texture.amplitude_mm);
+    let (height, [east, north]) = rise(texture, [proxy[0], proxy[1]]);
+    let depth = length(spring);
+    let normal = spring.map(|x| x / depth);
+    let slope = [east * amplitude, north * amplitude, 0.0];
+    let across = plus(slope, normal, -dot(slope, normal));
+    let high = spring.map(|x| x * share * amplitude * height / depth.max(amplitude));
+    plus(high, across, -share * depth.min(deepest(texture)))
+}
+
+/// How much of a texture is felt, by the proxy's way over the map.
+struct Fade {
+    wavelength: f64,
+    /// Wavelengths a tick.
+    speed: f64,
+    before: Option<Vector>,
+}
+
+impl Fade {
+    const fn new(wavelength: f64) -> Self {
+        Self {
+            wavelength,
+            speed: 0.0,
+            before: None,
+        }
+    }
+
+    fn share(&mut self, proxy: Vector) -> f64 {
+        // What was nowhere before is as fast as what jumps.
+        let now = self.before.map_or(1.0, |before| {
+            let way = minus(proxy, before);
+            (way[0].hypot(way[1]) / self.wavelength).min(1.0)
+        });
+        self.before = Some(proxy);
+        self.speed = if now > self.speed {
+            now
+        } else {
+            now + (self.speed - now) * KEEPS
+        };
+        let s = ((0.25 - self.speed) / 0.125).clamp(0.0, 1.0);
+        s * s * (3.0 - 2.0 * s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::state::terrain;
+
+    fn worst(law: &ForceLaw, felt: &[Felt]) -> [f64; 2] {
+        let off = off_percent(law, felt);
+        [0, 1].map(|i| off.iter().map(|off| off[i]).fold(0.0, f64::max))
+    }
+
+    #[test]
+    fn a_texture_that_is_shifted_higher_or_another_is_seen() {
+        let grid = terrain();
+        let slide = path::slide_at(&grid, "", [0.05, DEPTH], 2000);
+        for effect in [Effect::Grain, Effect::Grating] {
+            let law = effect.law();
+            let felt = feel(&grid, law, &slide.hips);
+            let [high, along] = worst(&law, &felt);
+            assert!(high < MOST_HIGH && along < MOST_ALONG, "{high} {along}");
+            let wrong: [fn(&mut Texture); 3] = [
+                |texture| texture.seed += 1,
+                |texture| texture.amplitude_mm *= 1.01,
+                |texture| texture.wavelength_mm *= 1.01,
+            ];
+            for change in wrong {
+                let mut other = law;
+                change(&mut other.texture);
+                let [high, _] = worst(&other, &felt);
+                assert!(high > 10.0 * MOST_HIGH, "{other:?}: {high}");
+            }
+            // A hundredth of a wave to the east.
+            let mut shifted = felt.clone();
+            for felt in &mut shifted {
+                felt.hip[0] += 0.01;
+                felt.proxy[0] += 0.01;
+            }
+            assert!(worst(&law, &shifted)[0] > 10.0 * MOST_HIGH);
+            // Valleys where there should be ridges.
+            let mut inverse = felt.clone();
+            for felt in &mut inverse {
+                felt.force_n = minus(felt.spring(), felt.force_n);
+            }
+            assert!(worst(&law, &inverse)[0] > 100.0);
+        }
+    }
+
+    #[test]
+    fn a_texture_that_does_not_fade_is_seen() {
+        let grid = terrain();
+        let slide = path::slide_at(&grid, "", [0.18, DEPTH], 2000);
+        let law = Effect::Grating.law();
+        let mut felt = feel(&grid, law, &slide.hips);
+        assert!(worst(&law, &felt)[0] < MOST_HIGH);
+        for felt in &mut felt {
+            let added = wanted(&law.texture, felt.proxy, felt.spring(), 1.0);
+            felt.force_n = plus(felt.spring(), added, 1.0).map(|x| x * 0.5);
+        }
+        assert!(worst(&law, &felt)[0] > 10.0);
+    }
+}

@@ -1,0 +1,80 @@
+//! All effects at once: the surface pushes, and no more than its parts may.
+
+use hapterra_core::force::ForceLaw;
+
+use super::arm::{Arm, NotMeasured};
+use super::felt::Felt;
+use super::law::Effect;
+use super::row::{Error, Place};
+use super::vector::{degrees, length};
+use crate::compare::Effort;
+use crate::grid::Grid;
+
+/// Degrees between a force that does not pull and the spring.
+const MOST_TURN: f64 = 90.0;
+/// Percent of the bound.
+const WHOLE: f64 = 100.0;
+
+pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeasured> {
+    let arm = Arm::over(grid);
+    let law = Effect::All.law();
+    let mut errors = Vec::new();
+    for way in [arm.slide(effort.ticks)?, arm.tap(effort.ticks)?] {
+        let felt = arm.feel(law, &way)?;
+        let place = Place(&grid.name, way.name, Effect::All.name());
+        let turn = ("force off the spring's direction", "°");
+        errors.extend(place.error(turn, MOST_TURN, off_degrees(&felt)));
+        let share = ("size of the force", "% of its bound");
+        errors.extend(place.error(share, WHOLE, shares(&law, &felt)));
+    }
+    Ok(errors)
+}
+
+/// Between the force and the way from the HIP to the proxy; no force pulls by less than 90°.
+fn off_degrees(felt: &[Felt]) -> Vec<f64> {
+    let felt = felt.iter().filter(|felt| felt.whole);
+    let felt = felt.filter(|felt| length(felt.force_n) > 0.0);
+    felt.map(|felt| degrees(felt.force_n, felt.spring()))
+        .collect()
+}
+
+/// Each force over the most it may be, percent.
+fn shares(law: &ForceLaw, felt: &[Felt]) -> Vec<f64> {
+    let felt = felt.iter().filter(|felt| felt.whole);
+    let share = felt.map(|felt| length(felt.force_n) / most_n(law, length(felt.spring())));
+    share.map(|share| 100.0 * share).collect()
+}
+
+/// Shading keeps the size; texture adds its height along the force and at most λ/7.6 across it;
+/// damping and controller add as much again.
+fn most_n(law: &ForceLaw, depth_mm: f64) -> f64 {
+    let [amplitude, wavelength] =
+        [law.texture.amplitude_mm, law.texture.wavelength_mm].map(f64::from);
+    let deep = depth_mm + amplitude.min(depth_mm);
+    let textured_n = f64::from(law.stiffness_n_per_mm) * deep.hypot(wavelength / 7.6);
+    (2.0 * textured_n).min(f64::from(law.max_force_n))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_force_that_pulls_or_is_too_large_is_seen() {
+        let law = Effect::All.law();
+        let felt = |force_n| Felt {
+            hip: [0.0; 3],
+            proxy: [0.0, 0.0, 1.0],
+            force_n,
+            whole: true,
+        };
+        let seen = |force_n| {
+            let felt = [felt(force_n)];
+            (off_degrees(&felt)[0], shares(&law, &felt)[0])
+        };
+        let (turn, share) = seen([0.1, 0.0, 0.5]);
+        assert!(turn < MOST_TURN && share < WHOLE);
+        assert!(seen([0.1, 0.0, -0.01]).0 > MOST_TURN);
+        assert!(seen([0.0, 0.0, 1.2]).1 > WHOLE);
+    }
+}
