@@ -452,7 +452,7 @@ fn malformed_vrts_are_refused_at_once() {
         ("empty", String::new(), "no source"),
         (
             "vsi",
-            source("/vsicurl/http://a/b.tif", whole),
+            source("/vsizip/a.zip/b.tif", whole),
             "only GDAL finds",
         ),
         ("mask", "<MaskBand/>".into(), "mask band"),

@@ -204,6 +204,7 @@ impl Decoded {
         }
         self.settle_no_data(no_data);
         self.cell = self.cell.filter(CellSize::is_valid);
+        self.storage.set_order(self.south_up, self.east_first);
         let survey = match &self.storage {
             Storage::Held { .. } => Survey::of_all(self.summarise()?),
             Storage::Blocks(blocks) => {

@@ -151,6 +151,42 @@ impl FileBytes {
         })
     }
 
+    /// The same bytes for somebody who keeps them; `None` where they are in memory.
+    pub(super) fn again(&self) -> Result<Option<Self>, BadRaster> {
+        let data = match &self.data {
+            Data::File(file, path) => {
+                let file = file.try_clone().map_err(BadRaster::Unreadable)?;
+                Data::File(file, path.clone())
+            }
+            Data::Remote(file, url) => Data::Remote(file.clone(), url.clone()),
+            Data::Memory(_) => return Ok(None),
+        };
+        let own = Self::new(&self.name, self.len, data);
+        Ok(Some(Self {
+            elsewhere: self.elsewhere.clone(),
+            ..own
+        }))
+    }
+
+    /// Bytes at a place of the file.
+    pub(super) fn read_at(&self, at: u64, count: u64) -> Result<Vec<u8>, BadRaster> {
+        let end = at.checked_add(count).filter(|end| *end <= self.len);
+        let (Some(end), Ok(room)) = (end, usize::try_from(count)) else {
+            return Err(BadRaster::Truncated("it ends before its samples do".into()));
+        };
+        let read = match &self.data {
+            Data::File(file, _) => {
+                let (mut file, mut bytes) = (file, vec![0; room]);
+                let read = file.seek(SeekFrom::Start(at));
+                read.and_then(|_| file.read_exact(&mut bytes))
+                    .map(|()| bytes)
+            }
+            Data::Memory(bytes) => Ok(bytes[at as usize..end as usize].to_vec()),
+            Data::Remote(file, _) => file.read_at(at, room),
+        };
+        read.map_err(|error| BadRaster::from_io(error, "the samples"))
+    }
+
     /// The first bytes, up to `count` of them.
     pub(super) fn head(&self, count: u64) -> Result<Vec<u8>, BadRaster> {
         let mut head = Vec::new();

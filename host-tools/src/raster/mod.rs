@@ -48,6 +48,7 @@ mod open;
 mod options;
 mod place;
 mod placed;
+mod plain;
 mod read;
 mod samples;
 mod storage;

@@ -13,16 +13,14 @@ const HEAD_BYTES: u64 = 1024;
 /// Decodes a file, which may be packed.
 pub(super) fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
     if let Some(layout) = options.raw {
-        return raw::decode(input, layout);
+        return raw::decode(input, layout, options);
     }
     let head = input.head(HEAD_BYTES)?;
     if archive::is_zip(&head) {
         let mut zip = guarded("ZIP", || Zip::open(input))?;
         if zip.is_numpy(input.extension()) {
             Parts::Variables.check_choice("a NumPy archive", options)?;
-            return guarded("NumPy", || {
-                npy::decode_npz(&mut zip, options.variable.as_deref())
-            });
+            return guarded("NumPy", || npy::decode_npz(&mut zip, options));
         }
         let unpacked = guarded("ZIP", || zip.only_entry(claim_of))?;
         let unpacked = unpacked.in_outline(input.is_outline());

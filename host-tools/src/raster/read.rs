@@ -1,7 +1,5 @@
 //! Samples from bytes, for all formats that store them plainly.
 
-use std::io::Read;
-
 use half::f16;
 
 use super::BadRaster;
@@ -30,14 +28,18 @@ impl Stored {
         }
     }
 
-    /// Room for `count` samples; the caller has checked that the file holds them.
-    pub(super) fn room(self, count: u64) -> Result<Samples, BadRaster> {
-        let held = match self {
+    /// The type in which such samples are held.
+    pub(super) const fn held(self) -> SampleType {
+        match self {
             Self::Held(sample) => sample,
             Self::F16 => SampleType::F32,
             Self::I64 | Self::U64 => SampleType::F64,
-        };
-        let mut samples = held.none();
+        }
+    }
+
+    /// Room for `count` samples; the caller has checked that the file holds them.
+    pub(super) fn room(self, count: u64) -> Result<Samples, BadRaster> {
+        let mut samples = self.held().none();
         let reserved = usize::try_from(count).ok().and_then(
             |count| with_samples!(&mut samples, values => values.try_reserve_exact(count).ok()),
         );
@@ -84,31 +86,4 @@ fn little(bytes: &[u8], endian: Endian) -> [u8; 8] {
         eight.reverse();
     }
     eight
-}
-
-/// Reads `count` samples; the caller has checked that the file holds them.
-///
-/// # Errors
-/// When the reader ends or fails before.
-pub(super) fn read_samples(
-    reader: &mut dyn Read,
-    count: u64,
-    stored: Stored,
-    endian: Endian,
-) -> Result<Samples, BadRaster> {
-    const SAMPLES_AT_ONCE: u64 = 8192;
-    let mut samples = stored.room(count)?;
-    let size = stored.bytes() as usize;
-    let mut buffer = vec![0; size * SAMPLES_AT_ONCE as usize];
-    let mut left = count;
-    while left > 0 {
-        let now = left.min(SAMPLES_AT_ONCE);
-        let bytes = &mut buffer[..now as usize * size];
-        reader
-            .read_exact(bytes)
-            .map_err(|error| BadRaster::from_io(error, "the samples"))?;
-        stored.append(&mut samples, bytes, size, endian);
-        left -= now;
-    }
-    Ok(samples)
 }

@@ -52,6 +52,15 @@ impl Storage {
         }
     }
 
+    /// The file's order, before anything is read.
+    pub(super) fn set_order(&mut self, south_up: bool, east_first: bool) {
+        if let Self::Blocks(blocks) = self
+            && let Some(blocks) = Arc::get_mut(blocks)
+        {
+            blocks.set_order(south_up, east_first);
+        }
+    }
+
     /// Names the file in warnings about what is touched later.
     pub(super) fn set_path(&self, path: &Path) {
         if let Self::Blocks(blocks) = self {

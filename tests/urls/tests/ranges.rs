@@ -100,6 +100,38 @@ fn neighbours_of_a_file_are_found_beside_it_at_its_server() {
 }
 
 #[test]
+fn of_plain_samples_what_is_touched_is_fetched() {
+    const SIZE: [u32; 2] = [5000, 3000];
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes);
+    let heights: Vec<u8> = (0..SIZE[0] * SIZE[1])
+        .flat_map(|index| height(index % SIZE[0], index / SIZE[0]).to_le_bytes())
+        .collect();
+    let header = "ncols 5000\nnrows 3000\nxllcorner 500000\nyllcorner 4000000\ncellsize 30\nbyteorder LSBFIRST\n";
+    write("hills.flt", &heights).expect("written");
+    write("hills.hdr", header.as_bytes()).expect("written");
+    let server = Server::of(folder.path());
+    let (here, there) = (
+        in_blocks(&folder.path().join("hills.flt")),
+        open(server.url("hills.flt")),
+    );
+    for (column, row) in [(0, 0), (4999, 2999), (2500, 777)] {
+        let expected = f64::from(height(column, SIZE[1] - 1 - row));
+        assert_eq!(here.height(column, row), expected);
+        assert_eq!(there.height(column, row), expected);
+    }
+    let (_, fetched) = server.seen();
+    assert!(
+        fetched < heights.len() / 4,
+        "{fetched} of {}",
+        heights.len()
+    );
+    for level in [0, 3] {
+        same_tiles(&here, &there, level);
+    }
+}
+
+#[test]
 fn a_vrt_and_its_files_may_be_elsewhere() {
     let folder = tempfile::tempdir().expect("a folder");
     let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes);

@@ -76,7 +76,8 @@ pub struct ReadingOptions {
     pub png_channel: Option<PngChannel>,
 
     /// A terrain whose samples take more megabytes than this stays in its file and is read
-    /// where it is touched, if its format allows it (TIFF); many files always do
+    /// where it is touched, if its format allows it (TIFF, raw samples, .hgt, .flt, .bil, ENVI, .npy); many files always
+    /// do
     #[arg(long, value_name = "MB", default_value_t = OpenOptions::IN_MEMORY_MB, help_heading = INPUT)]
     pub in_memory_mb: u32,
 }

@@ -59,6 +59,12 @@ pub(super) trait BlockReader: Send + Sync {
     /// What is wrong with that part of the file.
     fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster>;
 
+    /// Is told the file's order before anything is read: coarse levels count their samples
+    /// from the south and west.
+    fn set_order(&mut self, south_up: bool, east_first: bool) {
+        let _ = (south_up, east_first);
+    }
+
     /// Is told which parts are going to be read, one after the other: what is elsewhere is
     /// fetched meanwhile.
     fn want(&self, image: usize, parts: &[Part]) {
@@ -91,6 +97,9 @@ pub(super) struct BlockImage {
     /// It has every so many-th sample of the full image, the first one first. Else its
     /// samples are the middles of its own cells, and its edges those of the full image.
     pub(super) every: Option<u32>,
+    /// Column and row of the full image where its first sample lies, where it has every so
+    /// many-th.
+    pub(super) first: [u32; 2],
 }
 
 /// A rectangle of an image, in the file's order of columns and rows.
@@ -194,6 +203,11 @@ impl Blocks {
         }
     }
 
+    /// The file's order, before anything is read.
+    pub(super) fn set_order(&mut self, south_up: bool, east_first: bool) {
+        self.reader.set_order(south_up, east_first);
+    }
+
     /// Names the file in warnings.
     pub(super) fn set_path(&self, path: &Path) {
         // A second name of the same file is no better.
@@ -246,6 +260,18 @@ impl Blocks {
         images.iter().rposition(serves).unwrap_or(0)
     }
 
+    /// The same among the full image and those with samples of their own: the samples of
+    /// one that has every so many-th sample lie elsewhere than those of a field around it.
+    pub(super) fn overview_of(&self, level: u8) -> usize {
+        let image = self.image_of(level);
+        let every = self
+            .reader
+            .images()
+            .get(image)
+            .and_then(|image| image.every);
+        if every.is_some() { 0 } else { image }
+    }
+
     /// A stored sample at a column and row of an image, in the file's order; `None` in a
     /// hole that no value marks.
     pub(super) fn stored(&self, image: usize, column: u32, row: u32) -> Option<f64> {
@@ -276,8 +302,8 @@ impl Blocks {
             ((at + middle) / times - middle).clamp(0.0, f64::from(count) - 1.0)
         };
         let place = [
-            place(column, times[0], of.columns),
-            place(row, times[1], of.rows),
+            place(column - f64::from(of.first[0]), times[0], of.columns),
+            place(row - f64::from(of.first[1]), times[1], of.rows),
         ];
         bilinear::at(place, |column, row| height(self.stored(image, column, row)))
     }

@@ -32,6 +32,7 @@ fn image(size: [u32; 2]) -> BlockImage {
         rows: size[1],
         block: BLOCK,
         every: None,
+        first: [0; 2],
     }
 }
 

@@ -6,8 +6,11 @@ use crate::raster::format::{Claim, Format, Parts};
 use crate::raster::ground_map::GroundMap;
 use crate::raster::input::FileBytes;
 use crate::raster::placed::GroundUnit;
-use crate::raster::read::{Stored, read_samples};
-use crate::raster::{BadRaster, CellSize, CellUnit, Endian, ReferenceSystem, SampleType};
+use crate::raster::plain::Plain;
+use crate::raster::read::Stored;
+use crate::raster::{
+    BadRaster, CellSize, CellUnit, Endian, OpenOptions, ReferenceSystem, SampleType,
+};
 
 /// SRTM tiles: nothing but their name tells them.
 pub(super) const FORMAT: Format = Format {
@@ -15,25 +18,19 @@ pub(super) const FORMAT: Format = Format {
     begins: |_| false,
     extensions: &[("hgt", Claim::Decides)],
     parts: Parts::One,
-    decode: |input, _| decode(input),
+    decode,
 };
 
 /// What SRTM writes where there is no height.
 const VOID: f64 = -32768.0;
 
 /// A tile covers one degree by one degree and shares its borders with the next.
-fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
+fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
     let (columns, rows) = size(input.len())?;
-    let samples = match input.is_outline() {
-        true => SampleType::I16.none(),
-        false => {
-            let reader = &mut *input.reader()?;
-            let count = u64::from(columns) * u64::from(rows);
-            read_samples(reader, count, Stored::Held(SampleType::I16), Endian::Big)?
-        }
-    };
+    let stored = Stored::Held(SampleType::I16);
+    let plain = Plain::packed((columns, rows), stored, Endian::Big, 0);
     let format = "SRTM height tile, int16".to_owned();
-    let mut decoded = Decoded::new(format, (columns, rows), samples);
+    let mut decoded = Decoded::new(format, (columns, rows), plain.storage(input, options)?);
     decoded.no_data = Some(VOID);
     decoded.metres_per_vertical_unit = Some(1.0);
     // SRTM's heights are above the geoid EGM96, its places on WGS 84.

@@ -1,7 +1,7 @@
 //! NumPy arrays, alone or in an `.npz`. `npyz` reads the header; the samples are
 //! read into their own type.
 
-use std::io::{Cursor, Read, Seek};
+use std::io::{Read, Seek};
 
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar};
 
@@ -10,9 +10,11 @@ use crate::raster::archive::Zip;
 use crate::raster::decoded::{Decoded, sides};
 use crate::raster::format::{Claim, Format, Parts};
 use crate::raster::ground_map::GroundMap;
-use crate::raster::read::{Stored, read_samples};
+use crate::raster::input::FileBytes;
+use crate::raster::plain::Plain;
+use crate::raster::read::Stored;
 use crate::raster::samples::{SampleValue, with_samples};
-use crate::raster::{BadRaster, CellSize, Endian, SampleType, Samples};
+use crate::raster::{BadRaster, CellSize, Endian, OpenOptions, SampleType};
 
 /// A NumPy array in a file of its own.
 pub(super) const FORMAT: Format = Format {
@@ -20,7 +22,7 @@ pub(super) const FORMAT: Format = Format {
     begins: |head| head.starts_with(b"\x93NUMPY"),
     extensions: &[("npy", Claim::Suggests)],
     parts: Parts::One,
-    decode: |input, _| read_array(&mut *input.reader()?, input.len())?.into_heights("NumPy array"),
+    decode: |input, options| Array::in_file(input)?.heights(input, options, "NumPy array"),
 };
 
 /// What people call the array with the heights.
@@ -33,33 +35,34 @@ const LONGEST_HEADER: u64 = 1 << 16;
 /// beside it, where there are such.
 pub(in crate::raster) fn decode_npz(
     zip: &mut Zip<'_>,
-    asked: Option<&str>,
+    options: &OpenOptions,
 ) -> Result<Decoded, BadRaster> {
+    let asked = options.variable.as_deref();
     let mut arrays = Vec::new();
     for name in zip.names.clone() {
         let Some(stem) = name.strip_suffix(".npy") else {
             continue;
         };
-        let bytes = zip.unpack(&name)?;
-        let len = bytes.len() as u64;
+        let bytes = FileBytes::unpacked(&name, zip.unpack(&name)?);
         // Names, dates and other things that are no numbers may lie beside it.
-        if let Ok(array) = read_array(&mut Cursor::new(bytes), len) {
-            arrays.push((stem.to_owned(), array));
+        if let Ok(array) = Array::in_file(&bytes) {
+            arrays.push((stem.to_owned(), bytes, array));
         }
     }
     let scalar = |name: &str| {
-        let (_, array) = arrays
+        let (_, bytes, array) = arrays
             .iter()
-            .find(|(stem, _)| stem.eq_ignore_ascii_case(name))?;
-        array.scalar()
+            .find(|(stem, ..)| stem.eq_ignore_ascii_case(name))?;
+        array.scalar(bytes)
     };
     let (dx, dy) = (scalar("dx"), scalar("dy"));
     let corner = scalar("xmin").zip(scalar("ymin"));
-    arrays.retain(|(_, array)| array.shape.len() == 2);
-    let names: Vec<&str> = arrays.iter().map(|(name, _)| name.as_str()).collect();
+    arrays.retain(|(.., array)| array.shape.len() == 2);
+    let names: Vec<&str> = arrays.iter().map(|(name, ..)| name.as_str()).collect();
     let place = height_name::choose("array", &names, HEIGHT_NAMES, asked)?;
-    let (name, array) = arrays.swap_remove(place);
-    let mut decoded = array.into_heights(&format!("NumPy archive, array {name}"))?;
+    let (name, bytes, array) = arrays.swap_remove(place);
+    let format = format!("NumPy archive, array {name}");
+    let mut decoded = array.heights(&bytes, options, &format)?;
     if let Some((east, north)) = dx.zip(dy) {
         let (east, north) = (east.abs(), north.abs());
         let size = (f64::from(decoded.columns), f64::from(decoded.rows));
@@ -74,39 +77,14 @@ pub(in crate::raster) fn decode_npz(
     Ok(decoded)
 }
 
+/// Where an array's samples are.
 struct Array {
     shape: Vec<u64>,
-    samples: Samples,
+    stored: Stored,
+    endian: Endian,
     column_major: bool,
-}
-
-fn read_array<R: Read + Seek + ?Sized>(reader: &mut R, len: u64) -> Result<Array, BadRaster> {
-    check_header_length(reader)?;
-    let header = NpyHeader::from_reader(&mut *reader)
-        .map_err(|error| BadRaster::from_io(error, "the array's header"))?;
-    let (sample, endian) = sample_type(&header.dtype())?;
-    let shape = header.shape().to_vec();
-    let data_start = reader.stream_position().map_err(BadRaster::Unreadable)?;
-    let data = len.saturating_sub(data_start);
-    let count = shape
-        .iter()
-        .try_fold(1_u64, |count, &side| count.checked_mul(side))
-        .ok_or_else(|| BadRaster::AbsurdSize(format!("an array of {shape:?} samples")))?;
-    if count
-        .checked_mul(sample.bytes())
-        .is_none_or(|bytes| bytes > data)
-    {
-        return Err(BadRaster::Truncated(format!(
-            "an array of {shape:?} samples of {} bytes does not fit into {data} bytes",
-            sample.bytes()
-        )));
-    }
-    let mut source = reader.take(data);
-    Ok(Array {
-        samples: read_samples(&mut source, count, sample, endian)?,
-        shape,
-        column_major: header.order() == Order::Fortran,
-    })
+    /// The first of them, bytes.
+    first: u64,
 }
 
 /// `npyz` makes room for as long a header as the file says.
@@ -159,8 +137,45 @@ fn sample_type(dtype: &DType) -> Result<(Stored, Endian), BadRaster> {
 }
 
 impl Array {
+    /// Reads an array's header; the file holds its samples.
+    fn in_file(input: &FileBytes) -> Result<Self, BadRaster> {
+        let reader = &mut *input.reader()?;
+        check_header_length(reader)?;
+        let header = NpyHeader::from_reader(&mut *reader)
+            .map_err(|error| BadRaster::from_io(error, "the array's header"))?;
+        let (stored, endian) = sample_type(&header.dtype())?;
+        let shape = header.shape().to_vec();
+        let first = reader.stream_position().map_err(BadRaster::Unreadable)?;
+        let data = input.len().saturating_sub(first);
+        let count = shape
+            .iter()
+            .try_fold(1_u64, |count, &side| count.checked_mul(side))
+            .ok_or_else(|| BadRaster::AbsurdSize(format!("an array of {shape:?} samples")))?;
+        if count
+            .checked_mul(stored.bytes())
+            .is_none_or(|bytes| bytes > data)
+        {
+            return Err(BadRaster::Truncated(format!(
+                "an array of {shape:?} samples of {} bytes does not fit into {data} bytes",
+                stored.bytes()
+            )));
+        }
+        Ok(Self {
+            shape,
+            stored,
+            endian,
+            column_major: header.order() == Order::Fortran,
+            first,
+        })
+    }
+
     /// The array as heights, its first row the northernmost.
-    fn into_heights(self, format: &str) -> Result<Decoded, BadRaster> {
+    fn heights(
+        &self,
+        input: &FileBytes,
+        options: &OpenOptions,
+        format: &str,
+    ) -> Result<Decoded, BadRaster> {
         let &[rows, columns] = self.shape.as_slice() else {
             let what = format!(
                 "an array of {} dimensions; heights have two",
@@ -171,40 +186,33 @@ impl Array {
                 _ => BadRaster::NotAHeightField(what),
             });
         };
-        let size = sides(columns, rows)?;
-        let samples = if self.column_major {
-            transposed(&self.samples, rows as usize, columns as usize)
-        } else {
-            self.samples
+        let (columns, rows) = sides(columns, rows)?;
+        let packed = |size| Plain::packed(size, self.stored, self.endian, self.first);
+        let plain = match self.column_major {
+            true => packed((rows, columns)).turned(),
+            false => packed((columns, rows)),
         };
-        let format = format!("{format}, {}", samples.type_name());
-        Ok(Decoded::new(format, size, samples))
+        let format = format!("{format}, {}", self.stored.held().none().type_name());
+        let storage = plain.storage(input, options)?;
+        Ok(Decoded::new(format, (columns, rows), storage))
     }
 
-    fn scalar(&self) -> Option<f64> {
-        with_samples!(&self.samples, values => match values.as_slice() {
-            [value] => Some(value.widen()),
-            _ => None,
+    /// The one sample of an array without sides.
+    fn scalar(&self, input: &FileBytes) -> Option<f64> {
+        let is_one = self.shape.iter().all(|side| *side == 1);
+        let bytes = input.read_at(self.first, self.stored.bytes()).ok()?;
+        let mut samples = self.stored.room(1).ok()?;
+        (self.stored).append(&mut samples, &bytes, bytes.len(), self.endian);
+        with_samples!(&samples, values => {
+            values.first().filter(|_| is_one).map(|value| value.widen())
         })
     }
-}
-
-/// Row-major samples of a column-major array.
-fn transposed(samples: &Samples, rows: usize, columns: usize) -> Samples {
-    fn turned<T: Copy>(values: &[T], rows: usize, columns: usize) -> Vec<T> {
-        let place = |row: usize| (0..columns).map(move |column| column * rows + row);
-        (0..rows)
-            .flat_map(place)
-            .map(|index| values[index])
-            .collect()
-    }
-    with_samples!(samples, values => turned(values, rows, columns).into())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::input::FileBytes;
+    use crate::raster::Samples;
 
     /// A 2 × 3 array as numpy writes it.
     fn npy(descr: &str, samples: &[u8]) -> FileBytes {

@@ -2,8 +2,9 @@
 
 use crate::raster::decoded::Decoded;
 use crate::raster::input::FileBytes;
-use crate::raster::read::{Stored, read_samples};
-use crate::raster::{BadRaster, RawLayout};
+use crate::raster::plain::Plain;
+use crate::raster::read::Stored;
+use crate::raster::{BadRaster, OpenOptions, RawLayout};
 
 /// Extensions of files that are nothing but samples.
 pub(in crate::raster) const EXTENSIONS: [&str; 4] = ["raw", "bin", "r16", "r32"];
@@ -13,6 +14,7 @@ pub(in crate::raster) const EXTENSIONS: [&str; 4] = ["raw", "bin", "r16", "r32"]
 pub(in crate::raster) fn decode(
     input: &FileBytes,
     layout: RawLayout,
+    options: &OpenOptions,
 ) -> Result<Decoded, BadRaster> {
     let (columns, rows) = (layout.columns, layout.rows);
     let (samples, bytes) = (u64::from(columns) * u64::from(rows), layout.sample.bytes());
@@ -31,8 +33,9 @@ pub(in crate::raster) fn decode(
             "the stated size is not its size: {what}"
         )));
     }
-    let reader = &mut *input.reader()?;
-    let samples = read_samples(reader, samples, Stored::Held(layout.sample), layout.endian)?;
-    let format = format!("raw {}", samples.type_name());
-    Ok(Decoded::new(format, (columns, rows), samples))
+    let stored = Stored::Held(layout.sample);
+    let plain = Plain::packed((columns, rows), stored, layout.endian, 0);
+    let format = format!("raw {}", layout.sample.none().type_name());
+    let storage = plain.storage(input, options)?;
+    Ok(Decoded::new(format, (columns, rows), storage))
 }

@@ -47,6 +47,7 @@ impl Mosaic {
                 rows,
                 block: [block; 2],
                 every: Some(1 << k),
+                first: [0; 2],
             }
         };
         let has_cells = |image: &BlockImage| image.columns > 1 && image.rows > 1;

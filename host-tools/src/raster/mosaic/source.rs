@@ -181,7 +181,7 @@ impl Opened {
                 });
                 (value.filter(|_| !hole), true)
             }
-            Storage::Blocks(blocks) => match blocks.image_of(level) {
+            Storage::Blocks(blocks) => match blocks.overview_of(level) {
                 0 => (blocks.stored(0, column, row), true),
                 image => {
                     let place = [f64::from(column), f64::from(row)];

@@ -1,10 +1,8 @@
 //! How samples lie in a file without a header of its own.
 
-use std::io::{Read, Seek, SeekFrom};
-
-use crate::raster::input::FileBytes;
+use crate::raster::plain::Plain;
 use crate::raster::read::Stored;
-use crate::raster::{BadRaster, Endian, Samples};
+use crate::raster::{BadRaster, Endian};
 
 /// How the samples of several bands are interleaved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,28 +127,18 @@ impl Layout {
         })
     }
 
-    /// Reads a band, row by row; the size has been checked.
-    pub(super) fn read(&self, input: &FileBytes, band: u32) -> Result<Samples, BadRaster> {
+    /// Where the samples of a band lie; the size has been checked.
+    pub(super) fn plain(&self, band: u32) -> Result<Plain, BadRaster> {
         let uncounted = || BadRaster::AbsurdSize("its header's sizes".into());
         let steps = self.steps(band).ok_or_else(uncounted)?;
-        let row_end = self.row_end(&steps).ok_or_else(uncounted)?;
-        let count = u64::from(self.columns) * u64::from(self.rows);
-        let mut samples = self.stored.room(count)?;
-        let mut reader = input.reader()?;
-        let seek = SeekFrom::Start(steps.first);
-        reader.seek(seek).map_err(BadRaster::Unreadable)?;
-        let mut row = vec![0; usize::try_from(row_end).map_err(|_| uncounted())?];
-        let between = i64::try_from(steps.row.saturating_sub(row_end)).map_err(|_| uncounted())?;
-        for _ in 0..self.rows {
-            reader
-                .read_exact(&mut row)
-                .map_err(|error| BadRaster::from_io(error, "the samples"))?;
-            let apart = steps.sample as usize;
-            self.stored.append(&mut samples, &row, apart, self.endian);
-            reader
-                .seek_relative(between)
-                .map_err(BadRaster::Unreadable)?;
-        }
-        Ok(samples)
+        Ok(Plain {
+            columns: self.columns,
+            rows: self.rows,
+            stored: self.stored,
+            endian: self.endian,
+            first: steps.first,
+            row: steps.row,
+            sample: steps.sample,
+        })
     }
 }

@@ -61,16 +61,14 @@ pub(in crate::raster) fn decode_by_header(
     let header = header.map_err(|fault| in_header(fault, &name))?;
     FORMAT.check_choice(options)?;
     header.layout.check(band, input.len(), &name)?;
-    let samples = match input.is_outline() {
-        true => header.layout.stored.room(0)?,
-        false => header.layout.read(input, band)?,
-    };
+    let storage = header.layout.plain(band)?.storage(input, options)?;
+    let name_of_type = storage.sample_type().none().type_name();
     let bands = match header.layout.bands {
         1 => String::new(),
         bands => format!(", band {band} of {bands}"),
     };
-    let format = format!("{}, {}{bands}", header.format, samples.type_name());
-    let mut decoded = Decoded::new(format, (header.layout.columns, header.layout.rows), samples);
+    let format = format!("{}, {}{bands}", header.format, name_of_type);
+    let mut decoded = Decoded::new(format, (header.layout.columns, header.layout.rows), storage);
     beside::reference_system(input, &mut decoded)?;
     (header.describe)(&mut decoded).map_err(|fault| in_header(fault, &name))?;
     if header.layout.bands > 1 && options.band.is_none() {

@@ -103,6 +103,7 @@ impl TiffBlocks {
             rows: image.layout.rows,
             block: block(&image.layout),
             every: None,
+            first: [0; 2],
         });
         Ok(Self {
             blocks: blocks.collect(),
