@@ -170,6 +170,7 @@ fn show(
     interrupt::listen();
     let viewer = args.viewing.program()?;
     let shown = viewer.map(|program| ToBeShown::new(program, terrain, view, name));
+    terrain.raster().check_came()?;
     let tour = Tour {
         placed,
         stop_s,

@@ -29,6 +29,7 @@ use crate::link::{
 use crate::output::{Output, keep_apart};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::{Laid, View};
+use crate::remote::without_key;
 use crate::replay::settings::Device;
 use crate::replay::{Column, LoopColumns, Recording, Settings};
 use crate::serving::{Service, told_of_last_end};
@@ -153,6 +154,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         arm: calibration,
         tour,
     };
+    raster.check_came()?;
     let served = (recording, commands);
     let (Some(address), Some(tour)) = (&args.plant, &placed.tour) else {
         return serve(args, &placed, met, served, shown);
@@ -327,7 +329,7 @@ fn described(
     device: &DeviceHello,
 ) -> Option<Recording> {
     if let Some(recording) = &mut recording {
-        let (file, device) = (args.terrain.file.display().to_string(), Device::of(device));
+        let (file, device) = (without_key(&args.terrain.file), Device::of(device));
         let law = (placed.scene.law, placed.scene.rule);
         let home_mm = Some(placed.view.home_mm);
         let settings = Settings::new(&file, placed.terrain, law, home_mm, device);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::options::Encoding;
-use crate::remote::{is_lost, is_on_its_way, is_outage, without_key};
+use crate::remote::{is_lost, is_missing, is_on_its_way, is_outage, without_key};
 
 /// A file that could not be opened as a height field: what is wrong with which file.
 #[derive(Debug, thiserror::Error)]
@@ -142,7 +142,7 @@ pub enum BadRaster {
     #[error("no terrain: {0}")]
     NoTiles(String),
     /// One file of many is at fault.
-    #[error("{fault}; it is in {}", file.display())]
+    #[error("{fault}; it is in {}", without_key(file))]
     InTile {
         /// The file.
         file: PathBuf,
@@ -190,7 +190,6 @@ impl BadRaster {
         }
     }
 
-    /// An input error while decoding: an early end is a truncated file.
     /// What went wrong with a file at a URL.
     pub(super) fn elsewhere(error: std::io::Error) -> Self {
         match is_on_its_way(&error) {
@@ -200,10 +199,16 @@ impl BadRaster {
     }
 
     /// Whether another try may find more: nothing is known of the file's samples.
-    pub(super) const fn is_of_the_line(&self) -> bool {
-        matches!(self, Self::Elsewhere(_) | Self::NotYet)
+    pub(super) fn is_of_the_line(&self) -> bool {
+        match self {
+            Self::Elsewhere(error) => !is_missing(error),
+            Self::InTile { fault, .. } => fault.is_of_the_line(),
+            Self::NotYet => true,
+            _ => false,
+        }
     }
 
+    /// An input error while decoding: an early end is a truncated file.
     pub(super) fn from_io(error: std::io::Error, during: &str) -> Self {
         match error.kind() {
             std::io::ErrorKind::UnexpectedEof => {

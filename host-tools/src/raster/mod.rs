@@ -54,7 +54,7 @@ mod samples;
 mod storage;
 mod tangents;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub use crate::remote::Elsewhere;
 pub use crs::{LonLat, ReferenceSystem};
@@ -85,6 +85,8 @@ pub struct Raster {
     source: Decoded,
     survey: Survey,
     elsewhere: Elsewhere,
+    /// Empty where it was made in memory.
+    path: PathBuf,
 }
 
 impl Raster {
@@ -120,7 +122,9 @@ impl Raster {
                 decoded.storage.set_path(path);
                 Self::checked(decoded, options.no_data)
             })
+            .inspect(|_| options.elsewhere.touch())
             .map(|raster| Self {
+                path: path.to_owned(),
                 elsewhere: options.elsewhere.clone(),
                 ..raster
             })
@@ -166,6 +170,7 @@ impl Raster {
             source,
             survey,
             elsewhere: Elsewhere::default(),
+            path: PathBuf::new(),
         })
     }
 
@@ -182,6 +187,19 @@ impl Raster {
             Storage::Held { .. } => 0,
             Storage::Blocks(blocks) => blocks.not_yet(),
         }
+    }
+
+    /// Whether all that was asked for so far has come: what is planned with holes that are
+    /// none is planned wrongly.
+    ///
+    /// # Errors
+    /// Why something did not come.
+    pub fn check_came(&self) -> Result<(), Error> {
+        let outage = match &self.source.storage {
+            Storage::Held { .. } => None,
+            Storage::Blocks(blocks) => blocks.take_outage(),
+        };
+        outage.map_or(Ok(()), |fault| Err(Error::new(&self.path, fault)))
     }
 
     /// Samples from west to east.

@@ -12,7 +12,7 @@ use tokio::runtime::Runtime;
 use super::file::RemoteFile;
 use super::line::{Line, background, spawn};
 use super::store::Opened;
-use super::url::shown;
+use super::url::in_text;
 use super::{is_outage, store};
 
 /// Files that are known at once: open, missing or on their way.
@@ -90,6 +90,11 @@ impl Elsewhere {
         self.0.line.stop_waiting(stop);
     }
 
+    /// The terrain is open: from now on what goes wrong is told.
+    pub(crate) fn touch(&self) {
+        self.0.line.touch();
+    }
+
     fn files(&self) -> MutexGuard<'_, LruCache<String, Known>> {
         // Nothing that panics runs while this is held.
         self.0.files.lock().unwrap_or_else(PoisonError::into_inner)
@@ -111,7 +116,7 @@ impl Elsewhere {
     fn answered(&self, background: &'static Runtime, url: String, opened: Result<Opened>) {
         let known = match opened {
             Ok(opened) => {
-                let file = RemoteFile::new(shown(&url), &self.0.line, background, opened);
+                let file = RemoteFile::new(&in_text(&url), &self.0.line, background, opened);
                 Known::Open(Arc::new(file))
             }
             Err(error) => Known::Failed(Instant::now(), error.kind(), error.to_string()),

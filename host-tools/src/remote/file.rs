@@ -14,7 +14,7 @@ use super::pages;
 use super::store::{Object, Opened};
 use super::{LOST, OUTAGE, is_outage};
 
-/// After a request that failed the next one is made after so long, where nobody waits.
+/// After a request that failed the next one is made after so long.
 const BETWEEN_TRIES: Duration = Duration::from_secs(1);
 /// Between two looks at whether a page may be asked for, where many are on their way.
 const LOOK: Duration = Duration::from_millis(20);
@@ -85,7 +85,7 @@ impl RemoteFile {
     fn take_missing(&self, ranges: impl Iterator<Item = Range<u64>>) -> Vec<Range<u64>> {
         let mut held = self.line.held();
         let has_to_rest = match held.troubles.get(&self.number) {
-            Some(Trouble::Outage(at, _)) => !self.line.waits() && at.elapsed() < BETWEEN_TRIES,
+            Some(Trouble::Outage(at, _)) => at.elapsed() < BETWEEN_TRIES,
             Some(Trouble::Lost(_)) => true,
             None => false,
         };
@@ -137,7 +137,10 @@ impl RemoteFile {
             }
             match held.troubles.get(&self.number) {
                 Some(Trouble::Lost(why)) => return Err(Error::new(LOST, why.clone())),
-                Some(Trouble::Outage(_, why)) if has_waited && !held.pages.is_coming(key) => {
+                Some(Trouble::Outage(at, why))
+                    if !held.pages.is_coming(key)
+                        && (has_waited || at.elapsed() < BETWEEN_TRIES) =>
+                {
                     return Err(Error::new(OUTAGE, why.clone()));
                 }
                 _ => {}
@@ -163,7 +166,9 @@ impl RemoteFile {
                 held.pages.arrived(self.number, run, &bytes);
                 if let Some(Trouble::Outage(..)) = held.troubles.get(&self.number) {
                     held.troubles.remove(&self.number);
-                    tracing::warn!("{} can be read again", self.name);
+                    if self.line.is_touched() {
+                        tracing::warn!("{} can be read again", self.name);
+                    }
                 }
             }
             Err(why) => {
@@ -175,15 +180,15 @@ impl RemoteFile {
         self.line.arrived.notify_all();
     }
 
-    /// Notes what is wrong, and tells the user where nobody else does: an error that
-    /// somebody waits for is told by him.
+    /// Notes what is wrong, and tells the user where nobody else does: while a
+    /// terrain is opened, whoever opens it does.
     fn note(&self, held: &mut Held, why: &Error) {
         let name = &self.name;
         let trouble = match is_outage(why) {
             true => Trouble::Outage(Instant::now(), why.to_string()),
             false => Trouble::Lost(why.to_string()),
         };
-        let tells = !self.line.waits();
+        let tells = self.line.is_touched();
         match (held.troubles.get(&self.number), &trouble) {
             // Its last word.
             (Some(Trouble::Lost(_)), _) => return,

@@ -19,6 +19,7 @@ const AT_ONCE: usize = 16;
 /// Shared by the files of a terrain.
 pub(super) struct Line {
     has_stopped_waiting: AtomicBool,
+    is_touched: AtomicBool,
     requests: Semaphore,
     files: AtomicU64,
     held: Mutex<Held>,
@@ -45,6 +46,7 @@ impl Default for Line {
     fn default() -> Self {
         Self {
             has_stopped_waiting: AtomicBool::new(false),
+            is_touched: AtomicBool::new(false),
             requests: Semaphore::new(AT_ONCE),
             files: AtomicU64::new(0),
             held: Mutex::default(),
@@ -73,6 +75,16 @@ impl Line {
     /// Whether whoever reads waits for what is not here yet.
     pub(super) fn waits(&self) -> bool {
         !self.has_stopped_waiting.load(Ordering::Acquire)
+    }
+
+    /// The terrain is open: from now on what goes wrong is told.
+    pub(super) fn touch(&self) {
+        self.is_touched.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether the terrain is open.
+    pub(super) fn is_touched(&self) -> bool {
+        self.is_touched.load(Ordering::Relaxed)
     }
 
     /// Waits until there are few enough requests under way.

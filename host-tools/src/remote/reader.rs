@@ -1,6 +1,6 @@
 //! A remote file read from its beginning to its end.
 
-use std::io::{Read, Result, Seek, SeekFrom};
+use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom};
 use std::iter::once;
 use std::sync::Arc;
 
@@ -9,6 +9,10 @@ use super::RemoteFile;
 /// Bytes that are fetched ahead of what is read: what comes in order is waited for once,
 /// not once a page.
 const AHEAD: u64 = 4 << 20;
+
+/// No more than this is read from the beginning on, bytes: what a server says of a file's
+/// size may be wrong.
+const MOST_IN_ORDER: u64 = 1 << 30;
 
 /// Reads a remote file from any place on.
 pub(crate) struct RemoteReader {
@@ -29,6 +33,10 @@ impl Read for RemoteReader {
         let count = left.min(into.len() as u64) as usize;
         if count == 0 {
             return Ok(0);
+        }
+        if self.at >= MOST_IN_ORDER {
+            let why = "it is larger than 1 GB, and its format is read as a whole";
+            return Err(Error::new(ErrorKind::Unsupported, why));
         }
         // The first bytes may be all that is looked at.
         if self.at > 0 {

@@ -4,6 +4,7 @@ use std::io::{Error, ErrorKind, Result};
 use std::ops::Range;
 use std::sync::Once;
 
+use futures_util::StreamExt;
 use object_store::aws::{AmazonS3Builder, AmazonS3ConfigKey};
 use object_store::azure::{AzureConfigKey, MicrosoftAzureBuilder};
 use object_store::client::ClientConfigKey;
@@ -11,14 +12,15 @@ use object_store::gcp::{GoogleCloudStorageBuilder, GoogleConfigKey};
 use object_store::http::HttpBuilder;
 use object_store::path::Path;
 use object_store::{
-    Error as StoreError, GetOptions, GetRange, ObjectMeta, ObjectStore, RetryConfig,
+    Error as StoreError, GetOptions, GetRange, GetResult, ObjectMeta, ObjectStore, RetryConfig,
 };
 
-use super::url::shown;
+use super::url::{in_text, is_url, shown};
 use super::{LOST, OUTAGE, pages};
 
-/// A request without an answer is given up after so long.
-const REQUEST: &str = "10 seconds";
+/// A request is given up after so long, and when nothing comes for so long.
+const REQUEST: &str = "60 seconds";
+const SILENCE: &str = "10 seconds";
 const CONNECT: &str = "5 seconds";
 /// So often, and in all for so long, a request is made again that the server could not
 /// answer.
@@ -55,10 +57,7 @@ pub(super) async fn open(url: &str) -> Result<Opened> {
     match store.get_opts(&path, first).await {
         Ok(got) => {
             let (was, range) = (got.meta.clone(), got.range.clone());
-            let first = got.bytes().await.map_err(|error| told(&error))?.to_vec();
-            if first.len() as u64 != range.end - range.start {
-                return Err(short(first.len(), &range));
-            }
+            let first = body(got, &range).await?;
             let is_all = first.len() as u64 == was.size;
             Ok(Opened {
                 object: Object { store, path, was },
@@ -84,7 +83,7 @@ async fn whole(store: Box<dyn ObjectStore>, path: Path) -> Result<Opened> {
         );
         return Err(Error::new(ErrorKind::Unsupported, why));
     }
-    let first = got.bytes().await.map_err(|error| told(&error))?.to_vec();
+    let first = body(got, &(0..was.size)).await?;
     Ok(Opened {
         object: Object { store, path, was },
         first,
@@ -117,17 +116,34 @@ impl Object {
             let why = "it was changed at its server since it was opened";
             return Err(Error::new(LOST, why));
         }
-        let bytes = got.bytes().await.map_err(|error| told(&error))?;
-        match bytes.len() as u64 == range.end - range.start {
-            true => Ok(bytes.to_vec()),
-            false => Err(short(bytes.len(), &range)),
+        body(got, &range).await
+    }
+}
+
+/// The bytes of an answer: those of the range, however many the server sends.
+async fn body(got: GetResult, range: &Range<u64>) -> Result<Vec<u8>> {
+    let wanted = range.end - range.start;
+    let mut bytes = Vec::new();
+    let mut parts = got.into_stream();
+    while let Some(part) = parts.next().await {
+        bytes.extend_from_slice(&part.map_err(|error| told(&error))?);
+        if bytes.len() as u64 > wanted {
+            let why = format!("more than {wanted} bytes came");
+            return Err(Error::new(OUTAGE, why));
+        }
+    }
+    match bytes.len() as u64 == wanted {
+        true => Ok(bytes),
+        false => {
+            let why = format!("{} bytes of {wanted} came", bytes.len());
+            Err(Error::new(OUTAGE, why))
         }
     }
 }
 
 /// The server of a URL, and the path there.
 fn at(url: &str) -> Result<(Box<dyn ObjectStore>, Path)> {
-    use ClientConfigKey::{AllowHttp, ConnectTimeout, Timeout};
+    use ClientConfigKey::{AllowHttp, ConnectTimeout, ReadTimeout, Timeout};
     static CHOSEN: Once = Once::new();
     CHOSEN.call_once(|| {
         // Somebody else's choice is as good.
@@ -139,6 +155,12 @@ fn at(url: &str) -> Result<(Box<dyn ObjectStore>, Path)> {
         ..RetryConfig::default()
     };
     let (scheme, rest) = url.split_once("://").unwrap_or_default();
+    let scheme = &*scheme.to_ascii_lowercase();
+    let url = &*format!("{scheme}://{rest}");
+    if shown(url).to_ascii_lowercase().contains("%2f") || shown(url).ends_with('/') {
+        let why = "a file's name ends in no slash and has none in it (%2F)";
+        return Err(Error::new(ErrorKind::InvalidInput, why));
+    }
     // Of a URL without what follows its path.
     let in_bucket = || {
         let (_, key) = shown(rest).split_once('/').unwrap_or_default();
@@ -149,6 +171,7 @@ fn at(url: &str) -> Result<(Box<dyn ObjectStore>, Path)> {
             $builder
                 .with_retry(retry)
                 .with_config($key(Timeout), REQUEST)
+                .with_config($key(ReadTimeout), SILENCE)
                 .with_config($key(ConnectTimeout), CONNECT)
                 .build()
                 .map_err(|error| wrong(&error))?
@@ -188,6 +211,7 @@ fn at(url: &str) -> Result<(Box<dyn ObjectStore>, Path)> {
                 .with_retry(retry)
                 .with_config(AllowHttp, "true")
                 .with_config(Timeout, REQUEST)
+                .with_config(ReadTimeout, SILENCE)
                 .with_config(ConnectTimeout, CONNECT)
                 .build()
                 .map_err(|error| wrong(&error))?;
@@ -219,16 +243,18 @@ fn wrong(error: &dyn std::error::Error) -> Error {
     Error::new(ErrorKind::InvalidInput, in_short(&error.to_string()))
 }
 
-fn short(got: usize, range: &Range<u64>) -> Error {
-    let wanted = range.end - range.start;
-    Error::new(OUTAGE, format!("{got} bytes of {wanted} came"))
-}
-
 /// What a server's answer means.
 fn told(error: &StoreError) -> Error {
     let kind = match error {
         StoreError::NotFound { .. } => {
             return Error::new(ErrorKind::NotFound, "there is no such file");
+        }
+        _ if has_status(error, "410") => {
+            return Error::new(ErrorKind::NotFound, "there is no such file any more");
+        }
+        // There is not even a first byte.
+        _ if has_status(error, "416") => {
+            return Error::new(ErrorKind::NotFound, "the file is empty");
         }
         StoreError::PermissionDenied { .. } | StoreError::Unauthenticated { .. } => {
             return Error::new(
@@ -244,10 +270,23 @@ fn told(error: &StoreError) -> Error {
     Error::new(kind, in_short(&error.to_string()))
 }
 
+fn has_status(error: &StoreError, status: &str) -> bool {
+    error
+        .to_string()
+        .contains(&format!("status code: {status}"))
+}
+
 /// On one line, without keys, and not more of it than somebody reads.
 fn in_short(text: &str) -> String {
-    // A key may follow a path.
-    let words: Vec<&str> = text.split_whitespace().map(shown).collect();
+    // What a server says after its status is made for a browser.
+    let status = text.find("status code: ").map_or(0, |at| at + 13);
+    let end = text[status..].find(':').filter(|_| status > 0);
+    let text = end.map_or(text, |end| &text[..status + end]);
+    let word = |word: &str| match is_url(word) {
+        true => in_text(word),
+        false => word.to_owned(),
+    };
+    let words: Vec<String> = text.split_whitespace().map(word).collect();
     let line: String = words.join(" ").chars().take(SHOWN).collect();
     line.chars().filter(|c| !c.is_control()).collect()
 }
@@ -263,6 +302,11 @@ mod tests {
         let told = in_short(&said);
         assert!(told.starts_with("GET https://h/a.tif 500 [2J x"), "{told}");
         assert!(told.len() <= SHOWN);
+        let page = "Server returned status code: 400 Bad Request: <html>?sig=secret";
+        assert_eq!(
+            in_short(page),
+            "Server returned status code: 400 Bad Request"
+        );
     }
 
     #[test]

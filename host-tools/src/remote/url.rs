@@ -15,9 +15,17 @@ pub(crate) fn is_url(name: &str) -> bool {
 pub(crate) fn without_key(path: &Path) -> String {
     let text = path.display().to_string();
     match is_url(&text) {
-        true => shown(&text).to_owned(),
+        true => in_text(&text),
         false => text,
     }
+}
+
+/// The same of a URL: neither what follows its path nor a name and password before the host.
+pub(super) fn in_text(url: &str) -> String {
+    let (scheme, rest) = shown(url).split_once("://").unwrap_or(("", url));
+    let (host, path) = rest.split_at(rest.find('/').unwrap_or(rest.len()));
+    let host = host.rsplit('@').next().unwrap_or_default();
+    format!("{scheme}://{host}{path}")
 }
 
 /// A URL without what follows its path, which may be a key that opens it.
@@ -46,8 +54,30 @@ pub(crate) fn neighbour(url: &str, extension: &str) -> [String; 2] {
 /// The URL of a file of a name in the folder of another.
 pub(crate) fn beside(url: &str, name: &str) -> String {
     let (path, rest) = split(url);
-    let folder = &path[..path.len() - file_name(url).len()];
-    format!("{folder}{name}{rest}")
+    let mut folder = &path[..path.len() - file_name(url).len()];
+    let mut steps = vec![];
+    for step in name.split('/') {
+        match step {
+            "" | "." => {}
+            ".." if steps.pop().is_none() => folder = above(folder),
+            ".." => {}
+            step => steps.push(step),
+        }
+    }
+    let name = steps.join("/");
+    let name = name.replace('%', "%25").replace('#', "%23");
+    format!("{folder}{}{rest}", name.replace('?', "%3F"))
+}
+
+/// The folder in which a folder lies; the host's own where there is none.
+fn above(folder: &str) -> &str {
+    let inner = folder.strip_suffix('/').unwrap_or(folder);
+    let above = inner.rfind('/').map_or(folder, |at| &folder[..=at]);
+    if above.ends_with("://") {
+        folder
+    } else {
+        above
+    }
 }
 
 /// Up to the path's end, and what follows.
@@ -87,6 +117,8 @@ mod tests {
         let url = "https://h/d.e/a.b.tif?sig=x/y.z";
         assert_eq!(without_key(Path::new(url)), "https://h/d.e/a.b.tif");
         assert_eq!(without_key(Path::new("what?.tif")), "what?.tif");
+        let named = Path::new("https://me:secret@h:81/a@b.tif");
+        assert_eq!(without_key(named), "https://h:81/a@b.tif");
         assert_eq!(file_name(url), "a.b.tif");
         assert_eq!(
             neighbour(url, "prj"),
@@ -95,6 +127,14 @@ mod tests {
                 "https://h/d.e/a.b.tif.prj?sig=x/y.z"
             ]
         );
+        for (name, there) in [
+            ("c.tif", "https://h/a/b/c.tif?k"),
+            ("./d/../c.tif", "https://h/a/b/c.tif?k"),
+            ("../c#1.tif", "https://h/a/c%231.tif?k"),
+            ("../../../../c.tif", "https://h/c.tif?k"),
+        ] {
+            assert_eq!(beside("https://h/a/b/x.vrt?k", name), there);
+        }
         assert_eq!(
             neighbour("s3://b.c/dem", "hdr"),
             ["s3://b.c/dem.hdr", "s3://b.c/dem.hdr"]

@@ -41,6 +41,10 @@ pub enum Fault {
     OtherRange,
     /// Fewer bytes come than the answer's head promises.
     Short,
+    /// More bytes come than were asked for, under the head of those that were.
+    Endless,
+    /// A page for a browser comes, as of sites that have one for every name.
+    Page,
     /// Ranges are not known.
     NoRanges,
 }
@@ -168,12 +172,13 @@ async fn between(State(shared): State<Arc<Shared>>, mut request: Request, next: 
     match fault {
         Fault::Error500 => return StatusCode::INTERNAL_SERVER_ERROR.into_response(),
         Fault::Forbidden => return StatusCode::FORBIDDEN.into_response(),
+        Fault::Page => return "<!doctype html><title>Hills</title>".into_response(),
         Fault::NoRanges => drop(request.headers_mut().remove(RANGE)),
         Fault::OtherRange => {
             let other = HeaderValue::from_static("bytes=4096-8191");
             request.headers_mut().insert(RANGE, other);
         }
-        Fault::None | Fault::Cut | Fault::Short => {}
+        Fault::None | Fault::Cut | Fault::Short | Fault::Endless => {}
     }
     let (mut head, body) = next.run(request).await.into_parts();
     let bytes = to_bytes(body, LARGEST).await.unwrap_or_default();
@@ -189,6 +194,10 @@ async fn between(State(shared): State<Arc<Shared>>, mut request: Request, next: 
             assert!(head.headers.contains_key(CONTENT_RANGE), "a range");
             head.headers.insert("content-length", half.len().into());
             Body::from(half)
+        }
+        Fault::Endless => {
+            head.headers.remove("content-length");
+            Body::from([&bytes[..], &[7; 4 << 20]].concat())
         }
         _ => Body::from(bytes),
     };

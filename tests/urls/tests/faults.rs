@@ -71,12 +71,13 @@ fn what_it_never_answers_is_told_with_the_file_and_why() {
 
 #[test]
 fn bytes_that_were_not_asked_for_are_not_taken() {
-    for fault in [Fault::OtherRange, Fault::Short] {
+    for fault in [Fault::OtherRange, Fault::Short, Fault::Endless] {
         let (_folder, server) = hills();
         server.fail(fault, usize::MAX);
         let told = open(&server, "hills.tif").expect_err("from the beginning");
         let why = match fault {
             Fault::Short => "bytes of",
+            Fault::Endless => "more than",
             _ => "Requested",
         };
         assert!(told.contains(why), "{told}");
@@ -112,6 +113,65 @@ fn a_mask_that_cannot_be_asked_for_is_not_taken_for_none() {
     // Who may not list a folder is told of what is not there that it is forbidden.
     server.fail_at(".msk", Fault::Forbidden, usize::MAX);
     open(&server, "hills.tif").expect("no mask");
+}
+
+#[test]
+fn a_page_for_every_name_is_no_neighbour() {
+    let (_folder, server) = hills();
+    let here = open(&server, "hills.tif").expect("opens");
+    for neighbour in [".msk", ".ovr"] {
+        server.fail_at(neighbour, Fault::Page, usize::MAX);
+        let raster = open(&server, "hills.tif").expect("without it");
+        assert_eq!(raster.format(), here.format());
+        assert_eq!(raster.height(1200, 700), expected(1200, 700));
+    }
+}
+
+/// Who plans a way over a terrain that does not come has to know.
+#[test]
+fn what_did_not_come_is_told_before_anything_is_armed() {
+    let (_folder, server) = hills();
+    let raster = open(&server, "hills.tif").expect("opens");
+    assert!(raster.check_came().is_ok());
+    server.fail(Fault::Error500, usize::MAX);
+    let (requests, _) = server.seen();
+    for column in (0..SIZE[0]).step_by(100) {
+        assert!(raster.height(column, 700).is_nan());
+    }
+    let asked = server.seen().0.len() - requests.len();
+    assert!(
+        asked < 40,
+        "{asked} requests to a server that does not answer"
+    );
+    let told = raster.check_came().expect_err("it did not come");
+    assert!(matches!(told.fault(), BadRaster::Elsewhere(_)), "{told}");
+    assert!(raster.check_came().is_ok(), "and nothing since");
+}
+
+#[test]
+fn a_source_of_a_vrt_that_is_not_there_is_a_hole_and_the_others_are_felt() {
+    let (folder, server) = hills();
+    let source = |name: &str, first: u32| {
+        format!(
+            r#"<SimpleSource><SourceFilename relativeToVRT="1">{name}</SourceFilename>
+            <SourceBand>1</SourceBand><SourceProperties RasterXSize="2500" RasterYSize="2100"/>
+            <SrcRect xOff="0" yOff="0" xSize="2500" ySize="2100"/>
+            <DstRect xOff="{first}" yOff="0" xSize="2500" ySize="2100"/></SimpleSource>"#
+        )
+    };
+    let vrt = format!(
+        r#"<VRTDataset rasterXSize="5000" rasterYSize="2100">
+        <GeoTransform>500000,30,0,4000000,0,-30</GeoTransform>
+        <VRTRasterBand dataType="Float32" band="1">{}{}</VRTRasterBand></VRTDataset>"#,
+        source("./hills.tif", 0),
+        source("gone/../valleys.tif", 2500)
+    );
+    std::fs::write(folder.path().join("both.vrt"), vrt).expect("written");
+    let raster = open(&server, "both.vrt").expect("one of two");
+    assert_eq!(raster.height(1200, 700), expected(1200, 700));
+    let before = raster.not_yet();
+    assert!(raster.height(3700, 700).is_nan());
+    assert_eq!(raster.not_yet(), before, "it is known that it is not there");
 }
 
 #[test]

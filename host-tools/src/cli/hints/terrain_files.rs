@@ -119,7 +119,8 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
 /// What to do about a file at a URL.
 fn elsewhere(path: &Path, error: &std::io::Error) -> &'static str {
     const NO_URLS: &str = "build it with them: cargo build --release --features remote (cargo xtask demo URL does); or fetch the file and name that";
-    let scheme = path.to_str().and_then(|url| Some(url.split_once("://")?.0));
+    let url = path.to_str().unwrap_or_default().to_ascii_lowercase();
+    let scheme = url.split_once("://").map(|(scheme, _)| scheme);
     let key = match scheme {
         Some("s3" | "s3a") => {
             "set what the server wants: AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or AWS_SKIP_SIGNATURE=true for a public bucket; AWS_REGION; AWS_ENDPOINT_URL where it is not Amazon's"

@@ -85,10 +85,19 @@ fn elsewhere(
     for url in urls.iter().filter(|url| *url != own) {
         match FileBytes::open(Path::new(url), input.elsewhere()) {
             Err(BadRaster::Elsewhere(error)) if is_missing(&error) => {}
+            Ok(found) if is_page(&found)? => {}
             other => return other.map(Some),
         }
     }
     Ok(None)
+}
+
+/// Whether a file is a page of a web site, or empty: some servers have one for every name.
+/// No neighbour begins like one.
+fn is_page(found: &FileBytes) -> Result<bool, BadRaster> {
+    let head = found.head(64)?;
+    let first = head.iter().find(|byte| !byte.is_ascii_whitespace());
+    Ok(first.is_none_or(|first| *first == b'<'))
 }
 
 /// The names that a file beside `path` may have.

@@ -67,7 +67,7 @@ impl Pool {
                 self.open.push(number, opened.clone());
                 Ok(Some(opened))
             }
-            Err(fault) if fault.is_of_the_line() => Err(fault),
+            Err(fault) if fault.is_of_the_line() => Err(BadRaster::in_tile(&source.path, fault)),
             Err(fault) => {
                 self.failed.insert(number);
                 // That it holds nothing is no fault of a file among others.
