@@ -121,6 +121,15 @@ fn foreign<'b>(browser: &'b Browser, address: &str) -> Vec<&'b String> {
         .collect()
 }
 
+/// Removes a folder in which parts of a killed browser may write for a moment yet.
+fn remove(folder: &Path) {
+    let until = Instant::now() + PATIENCE;
+    while let Err(why) = std::fs::remove_dir_all(folder) {
+        assert!(Instant::now() < until, "{why}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
 #[test]
 fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
     let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -166,7 +175,7 @@ fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
     drop(browser);
     session.go_on(2000);
     assert!(session.viewer.end());
-    std::fs::remove_dir_all(folder).expect("it goes");
+    remove(&folder);
 }
 
 #[test]
@@ -200,7 +209,7 @@ fn a_page_that_has_grown_too_large_begins_anew_and_goes_on() {
     assert!(again - first > 20_000.0, "after {} ms", again - first);
     drop(browser);
     assert!(session.viewer.end());
-    std::fs::remove_dir_all(folder).expect("it goes");
+    remove(&folder);
 }
 
 #[test]
@@ -248,7 +257,7 @@ fn the_page_shows_what_the_emulated_board_feels_while_it_is_touched() {
     }
     assert!(!told.contains("not shown"), "{told}");
     check(&Csv::read(&folder.join("fractal.csv")), &entities(&live));
-    std::fs::remove_dir_all(folder).expect("it goes");
+    remove(&folder);
 }
 
 /// How far pictures may differ of the same, and how far they have to of something else:
@@ -313,7 +322,7 @@ fn pan_and_zoom_under_a_resting_hand_move_the_picture_and_back() {
     }
     drop(browser);
     assert!(viewer.end());
-    std::fs::remove_dir_all(folder).expect("it goes");
+    remove(&folder);
 }
 
 #[test]
@@ -359,7 +368,7 @@ fn commands_of_a_session_zoom_its_page_and_reset_it() {
     assert!(demo.end());
     let told = demo.words();
     assert!(!told.contains("not shown"), "{told}");
-    std::fs::remove_dir_all(folder).expect("it goes");
+    remove(&folder);
 }
 
 /// Who is killed while a page is looked at.
@@ -421,7 +430,7 @@ fn killed(who: Killed, says: &str) {
         assert!(Instant::now() < until, "the viewer does not end");
         std::thread::sleep(Duration::from_millis(50));
     }
-    std::fs::remove_dir_all(folder).expect("it goes");
+    remove(&folder);
 }
 
 #[test]
