@@ -80,6 +80,7 @@ pub(crate) fn main() -> Result<(), BadCalibration> {
         level: 0,
         size: SIZE,
         top: 1,
+        underlay: None,
         cell_mm: 2.0,
         home: GridPoint::new([32, 32, 0], Vec3::Z * (ABOVE_PLANE_MM / 2.0)),
         law: ForceLaw::PREMIUM,

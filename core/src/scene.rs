@@ -10,7 +10,7 @@ use crate::contact::{ContactState, Rule};
 use crate::force::ForceLaw;
 use crate::grid::{GridPoint, MAX_CELL};
 use crate::guard::{Fault, Limits, Mode, Report, Sense};
-use crate::terrain::{FieldSize, TileIndex};
+use crate::terrain::{FieldSize, TileIndex, Underlay};
 
 /// Where the haptic interface point comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -34,6 +34,8 @@ pub struct Scene {
     pub size: FieldSize,
     /// A whole height in cells that no sample exceeds.
     pub top: i32,
+    /// What is felt where a tile has not come; none where ticks wait for their tiles.
+    pub underlay: Option<Underlay>,
     /// Millimetres of the arm's tip a cell.
     pub cell_mm: f32,
     /// The point of the terrain that is at the tip in the home pose.
@@ -55,7 +57,11 @@ impl Scene {
     pub fn is_valid(&self) -> bool {
         let top_ok = self.top.unsigned_abs() <= MAX_CELL.unsigned_abs() + 1;
         let cell_ok = self.cell_mm.is_finite() && self.cell_mm > 0.0;
-        self.size.is_valid() && top_ok && cell_ok && self.law.is_valid()
+        // Points are answered from the tiles alone, so that no answer depends on what came when.
+        let underlay_ok = self.underlay.is_none_or(|underlay| {
+            underlay.is_valid(self.level) && self.source == Source::Encoders
+        });
+        self.size.is_valid() && top_ok && cell_ok && underlay_ok && self.law.is_valid()
     }
 }
 

@@ -18,7 +18,7 @@ use crate::guard::{
 use crate::phantom::{Calibration, Mechanism, Pose, to_device_frame, to_terrain_frame};
 use crate::rate::TickRate;
 use crate::scene::{Health, Point, Sample, Scene, Source, View};
-use crate::terrain::{Tile, TileKey, Window};
+use crate::terrain::{SETTLING_MM_S, Tile, TileKey, Window};
 
 /// What is handed to the loop between ticks.
 pub enum Command<'t> {
@@ -92,6 +92,7 @@ pub struct Outcome {
 ///     level: 0,
 ///     size,
 ///     top: 3,
+///     underlay: None,
 ///     cell_mm: 1.0,
 ///     home: GridPoint::default(),
 ///     law: ForceLaw::PREMIUM,
@@ -170,17 +171,24 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.guard.motors().temperatures()
     }
 
-    /// Takes a command between ticks. Gives back a tile buffer that is free
-    /// again, where the command brought one.
+    /// Takes a command between ticks. Gives back a tile buffer that is free again, if there is
+    /// one: most tiles bring one in the place of another, the underlay stays besides, and its
+    /// buffer comes back with a scene that has none.
     #[must_use]
     pub fn accept(&mut self, command: Command<'t>) -> Option<&'t mut Tile> {
         match command {
-            Command::Scene(scene) => self.take_scene(Some(scene)),
+            Command::Scene(scene) => {
+                self.take_scene(Some(scene));
+                return self.window.take_spare();
+            }
             Command::DropScene => self.take_scene(None),
-            Command::View(view) => self.take_view(&view),
+            Command::View(view) => {
+                self.take_view(&view);
+                return self.window.take_spare();
+            }
             Command::Clutch(hold) => self.clutch.hold(hold),
             Command::ClutchInput(held) => self.clutch.press(held),
-            Command::Tile(tile) => return Some(self.take_tile(tile)),
+            Command::Tile(tile) => return self.take_tile(tile),
             Command::Point(Point { seq, hip }) => {
                 // Whatever bits came over the wire.
                 let hip = hip.normalised();
@@ -245,6 +253,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
         if let Some(scene) = scene {
             self.window.reset(scene.level, scene.size, scene.top);
+            self.window.lay(scene.underlay);
             self.tick = 0;
         }
         self.contact = self.contact_of(scene.as_ref());
@@ -275,6 +284,10 @@ impl<'t, const D: usize> Haptics<'t, D> {
         if !view.keeps_tiles {
             self.window.reset(scene.level, scene.size, scene.top);
         }
+        let has_other_underlay = before.is_none_or(|before| before.underlay != scene.underlay);
+        if has_other_underlay || !view.keeps_tiles {
+            self.window.lay(scene.underlay);
+        }
         // Whatever bits came over the wire.
         let hip = hip.normalised();
         let settings = self.settings_of(Some(&scene));
@@ -301,7 +314,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     }
 
     /// Never lets a tile push out the one under the proxy.
-    fn take_tile(&mut self, tile: &'t mut Tile) -> &'t mut Tile {
+    fn take_tile(&mut self, tile: &'t mut Tile) -> Option<&'t mut Tile> {
         let level = self.window.level();
         let under_proxy = self.contact.patch();
         let under_proxy = under_proxy.map(|cell| TileKey::holding(level, cell));
@@ -309,9 +322,21 @@ impl<'t, const D: usize> Haptics<'t, D> {
             && key != under_proxy
             && self.window.occupant(key) == Some(under_proxy)
         {
-            return tile;
+            return Some(tile);
         }
-        self.window.install(tile)
+        let felt = [self.contact.output().proxy, *self.contact.hip()];
+        self.window.take(tile, felt.map(|point| point.column()))
+    }
+
+    /// Lets the surface of a scene with an underlay move on to the tiles that have come.
+    // Apart, so that the tick of a scene without underlay has nothing of it.
+    #[cold]
+    #[inline(never)]
+    fn settle(&mut self, cell_mm: f32) {
+        let step = SETTLING_MM_S * self.rate.tick_s() / cell_mm;
+        if self.window.settle(step) {
+            self.contact.surface_moved(&self.window);
+        }
     }
 
     /// The energy that the ticks have created and that was not taken back yet, mJ.
@@ -401,6 +426,14 @@ impl<'t, const D: usize> Haptics<'t, D> {
 
     /// The full path: pose, haptic interface point, proxy, force, torques, currents.
     fn tick_arm(&mut self, pose: Option<&Pose>, outcome: &mut Outcome) {
+        if let Some(Scene {
+            underlay: Some(_),
+            cell_mm,
+            ..
+        }) = self.scene
+        {
+            self.settle(cell_mm);
+        }
         let arm = self.mechanism.as_ref().zip(pose);
         outcome.answers = None;
         let sample = &mut outcome.sample;
@@ -528,10 +561,21 @@ impl<'t, const D: usize> Haptics<'t, D> {
         limits.set(Limits::TERRAIN_MISSING, sample.missing_tile.is_some());
         limits.set(Limits::BOUNDARY_FADING, self.contact.boundary_fade() < 1.0);
         limits |= self.clutch.limits();
+        let is_coarse = self.is_over_coarse_ground(sample);
+        limits.set(Limits::TERRAIN_COARSE, is_coarse);
         sample.tick = self.tick;
         sample.view = self.view;
         sample.force_n = force_n;
         (sample.mode, sample.limits, sample.fault) = (mode, limits, fault);
+    }
+
+    /// Whether the proxy is over the underlay, over a tile that has not settled, or over nothing
+    /// where an underlay is on its way.
+    fn is_over_coarse_ground(&self, sample: &Sample) -> bool {
+        let cell = sample.proxy.column();
+        self.scene
+            .is_some_and(|scene| scene.underlay.is_some() && scene.size.has_cell(cell))
+            && !self.window.is_settled(cell)
     }
 }
 

@@ -24,6 +24,7 @@ fn scene(source: Source) -> Scene {
         level: 0,
         size: FieldSize::new(SIZE, SIZE),
         top: 1 << 20,
+        underlay: None,
         cell_mm: 1.0,
         home: GridPoint::new([320, 320, 5], Vec3::ZERO),
         law: ForceLaw::PREMIUM,

@@ -31,6 +31,7 @@ pub(super) fn scene(grid: &Grid, law: ForceLaw, source: Source, home: GridPoint)
         level: 0,
         size: FieldSize::new(grid.columns as i32, grid.rows as i32),
         top: grid.top().floor() as i32 + 1,
+        underlay: None,
         cell_mm: 1.0,
         home,
         law,

@@ -178,6 +178,7 @@ pub(crate) fn scene(grid: &Grid) -> Scene {
         level: 0,
         size: size(grid),
         top: grid.top().floor() as i32 + 1,
+        underlay: None,
         cell_mm: 1.0,
         home: GridPoint::default(),
         law: ForceLaw::PREMIUM,

@@ -170,6 +170,11 @@ impl Contact {
         &self.output
     }
 
+    /// The HIP of the last tick.
+    pub(crate) const fn hip(&self) -> &GridPoint {
+        &self.hip
+    }
+
     /// Whether what the last tick answered is felt: in lock-step only once all is done.
     pub(crate) fn is_felt(&self) -> bool {
         self.output.converged || self.settings.execution == Execution::RealTime
@@ -204,6 +209,19 @@ impl Contact {
             Phase::OnSurface(on) => Some(on.descent.cell()),
             _ => None,
         }
+    }
+
+    /// The surface moves under the contact by a little: the next [`Self::step`] takes nothing that
+    /// was known of it for granted, also where the HIP has not moved. A free HIP that the
+    /// surface has passed touches it from then on, as deep as the surface went beyond it.
+    #[inline(never)]
+    pub fn surface_moved<const D: usize>(&mut self, window: &Window<'_, D>) {
+        self.at_rest = false;
+        if let Some(rubbing) = &mut self.rubbing {
+            return rubbing.surface_moved();
+        }
+        // No work is done before the next step.
+        self.redirect(window, self.hip, None, &mut Budget::new(0));
     }
 
     /// Moves the proxy for a HIP, in at most [`super::WORK_PER_TICK`] units of work.

@@ -72,6 +72,8 @@ bitflags! {
         const CLUTCH_INPUT = 1 << 11;
         /// The ticks have created energy, and damping takes it back.
         const ENERGY_TAKEN_BACK = 1 << 12;
+        /// The ground under the proxy is coarser than the scene's level, or moves from there to it.
+        const TERRAIN_COARSE = 1 << 13;
     }
 }
 
@@ -142,6 +144,7 @@ impl Limits {
             Self::CLUTCH_MOVES => "the force goes out for a change of view, or comes in after one",
             Self::CLUTCH_INPUT => "the board's clutch input is held",
             Self::ENERGY_TAKEN_BACK => "the surface is damped, to take back energy of the ticks",
+            Self::TERRAIN_COARSE => "the ground is felt coarsely until its tile has come",
             _ => "",
         }
     }
@@ -157,7 +160,7 @@ mod tests {
             assert!(!name.is_empty() && !meaning.is_empty(), "{name}");
         }
         assert_eq!(Blockers::all().meanings().count(), 15);
-        assert_eq!(Limits::all().meanings().count(), 13);
+        assert_eq!(Limits::all().meanings().count(), 14);
         assert_eq!(Blockers::empty().meaning(), "");
     }
 }

@@ -40,6 +40,15 @@ impl TileIndex {
         Self::new(cell.x >> TILE_SHIFT, cell.y >> TILE_SHIFT)
     }
 
+    /// The tile so many columns east and rows north.
+    #[must_use]
+    pub(super) const fn offset(self, east: i32, north: i32) -> Self {
+        Self::new(
+            self.col.saturating_add(east),
+            self.row.saturating_add(north),
+        )
+    }
+
     /// The tile's south-west cell.
     #[must_use]
     pub const fn first_cell(self) -> Cell {

@@ -4,19 +4,23 @@ mod extent;
 mod index;
 mod max_pyramid;
 pub mod packed;
+mod settling;
 mod storage;
 #[cfg(test)]
 pub(crate) mod testing;
 mod tile;
 mod tile_requests;
+mod underlay;
 mod window;
 
 pub use extent::{CellBox, FieldSize};
 pub(crate) use index::{BLOCK_SHIFT, Block};
 pub use index::{TILE_CELLS, TILE_SHIFT, TileIndex, TileKey};
+pub use settling::SETTLING_MM_S;
 pub use storage::{BadField, FieldStorage};
 pub use tile::{BadTile, POSTS, Tile};
 pub use tile_requests::{
     HORIZON_TICKS, IN_FLIGHT, MARGIN_CELLS, RETRY_TICKS, TileDemand, TileRequester,
 };
+pub use underlay::Underlay;
 pub use window::{Corners, Ground, Window};

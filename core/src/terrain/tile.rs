@@ -1,7 +1,7 @@
 //! A tile: 32 × 32 patches of terrain, and the maxima that let a sweep skip it.
 
 use super::extent::FieldSize;
-use super::index::{BLOCK_SHIFT, TILE_CELLS, TileKey};
+use super::index::{BLOCK_SHIFT, TILE_CELLS, TileIndex, TileKey};
 use super::packed::Unpacker;
 use crate::grid::{Altitude, Cell, MAX_CELL};
 
@@ -24,10 +24,26 @@ pub enum BadTile {
     Packed,
 }
 
+/// What a buffer holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Content {
+    /// No tile.
+    Nothing,
+    /// A tile that is not the surface, or not yet.
+    Tile,
+    /// A tile that is the surface as it is.
+    Surface,
+}
+
 /// One buffer of the window: 33 × 33 heights and their block maxima.
 #[derive(Clone, Debug)]
 pub struct Tile {
-    key: Option<TileKey>,
+    // Key and content lie side by side: a tick looks at both for each patch.
+    index: TileIndex,
+    level: u8,
+    content: Content,
+    /// No sample is a hole.
+    is_whole: bool,
     base: i32,
     /// Heights above `base` in cells, `[row][column]` from the south-west;
     /// NaN where there is no surface.
@@ -35,28 +51,52 @@ pub struct Tile {
     blocks: [[f32; BLOCKS]; BLOCKS],
     quarters: [[f32; QUARTERS]; QUARTERS],
     highest: f32,
+    lowest: f32,
 }
 
 impl Tile {
     /// A buffer that holds no tile.
     pub const VACANT: Self = Self {
-        key: None,
+        index: TileIndex::new(0, 0),
+        level: 0,
+        content: Content::Nothing,
+        is_whole: false,
         base: 0,
         posts: [[0.0; POSTS]; POSTS],
         blocks: [[0.0; BLOCKS]; BLOCKS],
         quarters: [[0.0; QUARTERS]; QUARTERS],
         highest: 0.0,
+        lowest: 0.0,
     };
 
     /// Which tile this is; `None` for a vacant buffer.
     #[must_use]
     pub const fn key(&self) -> Option<TileKey> {
-        self.key
+        match self.content {
+            Content::Nothing => None,
+            Content::Tile | Content::Surface => Some(TileKey {
+                level: self.level,
+                index: self.index,
+            }),
+        }
     }
 
     /// Forgets the tile; the buffer can be filled again.
     pub const fn vacate(&mut self) {
-        self.key = None;
+        self.content = Content::Nothing;
+    }
+
+    /// Whether it is the surface over the patches of a tile of its level.
+    #[inline]
+    pub(super) fn is_surface_of(&self, index: TileIndex) -> bool {
+        self.index == index && self.content == Content::Surface
+    }
+
+    /// From now on the tile is the surface, as it is.
+    pub(super) fn become_surface(&mut self) {
+        if self.content == Content::Tile {
+            self.content = Content::Surface;
+        }
     }
 
     /// Fills the buffer from heights in cells above `base`, given by column
@@ -112,7 +152,8 @@ impl Tile {
     pub(super) fn close(&mut self, key: TileKey, base: i32) {
         self.base = base;
         self.measure();
-        self.key = Some(key);
+        (self.index, self.level) = (key.index, key.level);
+        self.content = Content::Tile;
     }
 
     /// Fills the buffer from a function of a sample's column and row in the whole
@@ -202,6 +243,25 @@ impl Tile {
         })
     }
 
+    /// The sample in a column and row of `0..33`, cells above the base; NaN beyond.
+    #[must_use]
+    pub(super) fn post(&self, col: usize, row: usize) -> f32 {
+        let post = self.posts.get(row).and_then(|row| row.get(col));
+        post.copied().unwrap_or(f32::NAN)
+    }
+
+    /// Whether no sample is a hole.
+    #[must_use]
+    pub(super) const fn is_whole(&self) -> bool {
+        self.is_whole
+    }
+
+    /// Lowest and highest sample, cells above the base; no range where all are holes.
+    #[must_use]
+    pub(super) fn range(&self) -> Option<[f32; 2]> {
+        (self.lowest <= self.highest).then_some([self.lowest, self.highest])
+    }
+
     /// Lowest whole height, in cells, that no sample of the tile exceeds.
     #[must_use]
     pub(super) fn top(&self) -> i32 {
@@ -228,6 +288,11 @@ impl Tile {
         low.above(self.base) > top
     }
 
+    /// Whether `low` is above every sample.
+    pub(super) fn is_below(&self, low: Altitude) -> bool {
+        low.above(self.base) > self.highest
+    }
+
     fn measure(&mut self) {
         let Self { posts, blocks, .. } = self;
         for (row, blocks) in blocks.iter_mut().enumerate() {
@@ -246,6 +311,9 @@ impl Tile {
             }
         }
         self.highest = highest_of(&self.quarters, 0, 0, QUARTERS);
+        let all = self.posts.as_flattened();
+        self.lowest = all.iter().fold(f32::INFINITY, |low, post| low.min(*post));
+        self.is_whole = !all.iter().any(|post| post.is_nan());
     }
 }
 

@@ -9,6 +9,7 @@ use heapless::Vec;
 
 use super::extent::FieldSize;
 use super::index::{TileIndex, TileKey, wrap};
+use super::underlay::Underlay;
 use crate::grid::Cell;
 
 /// How far ahead in time the HIP's path is looked at, ticks.
@@ -63,6 +64,8 @@ pub struct TileRequester<const D: usize> {
     level: u8,
     size: FieldSize,
     held: [[Option<TileKey>; D]; D],
+    /// The underlay's tile, and whether it is held: it is wanted before all others.
+    underlay: Option<(TileKey, bool)>,
     asked: Vec<(TileKey, u32), IN_FLIGHT>,
 }
 
@@ -80,6 +83,7 @@ impl<const D: usize> TileRequester<D> {
             level: 0,
             size: FieldSize::new(0, 0),
             held: [[None; D]; D],
+            underlay: None,
             asked: Vec::new(),
         }
     }
@@ -89,6 +93,13 @@ impl<const D: usize> TileRequester<D> {
         *self = Self::new();
         self.level = level;
         self.size = size;
+    }
+
+    /// The field has this underlay, which is not held; or none.
+    pub fn lay(&mut self, underlay: Option<Underlay>) {
+        let level = self.level;
+        self.asked.retain(|(asked, _)| asked.level == level);
+        self.underlay = underlay.map(|underlay| (underlay.key(level), false));
     }
 
     /// Forgets what was asked, as after the link was lost; held tiles stay.
@@ -119,12 +130,18 @@ impl<const D: usize> TileRequester<D> {
     /// The tile was handed to the window.
     pub fn received(&mut self, key: TileKey) {
         self.asked.retain(|(asked, _)| *asked != key);
-        *self.slot(key) = Some(key);
+        match &mut self.underlay {
+            Some((underlay, is_held)) if *underlay == key => *is_held = true,
+            _ => *self.slot(key) = Some(key),
+        }
     }
 
     /// The window did not keep the tile after all.
     pub fn lost(&mut self, key: TileKey) {
-        self.slot(key).take_if(|held| *held == key);
+        match &mut self.underlay {
+            Some((underlay, is_held)) if *underlay == key => *is_held = false,
+            _ => drop(self.slot(key).take_if(|held| *held == key)),
+        }
     }
 
     fn slot(&mut self, key: TileKey) -> &mut Option<TileKey> {
@@ -134,21 +151,33 @@ impl<const D: usize> TileRequester<D> {
     /// The next tile to ask for at tick `now`, most urgent first; `None` when
     /// nothing is wanted or enough is under way. Call until `None`.
     pub fn next_request(&mut self, now: u32, demand: &TileDemand) -> Option<TileKey> {
-        let is_overdue = |at: &u32| now.wrapping_sub(*at) >= RETRY_TICKS;
-        let centre = demand.centre();
-        // The proxy went on meanwhile: an answer now would push out a nearer tile.
-        self.asked
-            .retain(|(key, at)| !is_overdue(at) || Self::reaches(centre, key.index));
-        if let Some((key, at)) = self.asked.iter_mut().find(|(_, at)| is_overdue(at)) {
-            *at = now;
-            return Some(*key);
+        if let Some(key) = self.next_repeat(now, demand) {
+            return Some(key);
         }
         if self.asked.is_full() {
             return None;
         }
-        let key = self.most_urgent(demand)?;
+        let underlay = (self.underlay).filter(|(key, is_held)| !is_held && !self.awaits(*key));
+        let key = match underlay {
+            Some((key, _)) => key,
+            None => self.most_urgent(demand)?,
+        };
         self.asked.push((key, now)).ok()?;
         Some(key)
+    }
+
+    /// The same of tiles that were asked for before and have not come: for a device that has no
+    /// room for more.
+    pub fn next_repeat(&mut self, now: u32, demand: &TileDemand) -> Option<TileKey> {
+        let is_overdue = |at: &u32| now.wrapping_sub(*at) >= RETRY_TICKS;
+        let (level, centre) = (self.level, demand.centre());
+        let is_near = |key: &TileKey| key.level != level || Self::reaches(centre, key.index);
+        // The proxy went on meanwhile: an answer now would push out a nearer tile.
+        self.asked
+            .retain(|(key, at)| !is_overdue(at) || is_near(key));
+        let (key, at) = self.asked.iter_mut().find(|(_, at)| is_overdue(at))?;
+        *at = now;
+        Some(*key)
     }
 
     /// The missing tile, tiles around the proxy, around the HIP, along its path.
@@ -236,6 +265,40 @@ mod tests {
         requester.received(TileKey::new(0, 1, 1));
         assert_eq!(drain(&mut requester, 1, &at(48, 48)), []);
         assert_eq!(drain(&mut requester, 2, &at(60, 48)), [(2, 1)]);
+    }
+
+    #[test]
+    fn the_underlay_comes_before_all_others_and_once() {
+        let mut requester = requester();
+        let underlay = Underlay {
+            first: Cell::new(0, 0),
+            shift: 4,
+        };
+        requester.lay(Some(underlay));
+        let key = underlay.key(0);
+        assert_eq!(requester.next_request(0, &at(48, 48)), Some(key));
+        assert_eq!(drain(&mut requester, 0, &at(48, 48)), [(1, 1)]);
+        // It is never too far away to be asked for again.
+        assert_eq!(drain(&mut requester, RETRY_TICKS, &at(400, 48)).len(), 2);
+        assert!(requester.awaits(key));
+        requester.received(key);
+        assert_eq!(
+            drain(&mut requester, 3 * RETRY_TICKS, &at(400, 48)),
+            [(12, 1)]
+        );
+        assert!(!requester.awaits(key));
+        requester.received(TileKey::new(0, 12, 1));
+        requester.lost(key);
+        assert_eq!(
+            requester.next_request(3 * RETRY_TICKS, &at(400, 48)),
+            Some(key)
+        );
+        requester.received(key);
+        // Another one of the same name is another.
+        requester.lay(Some(underlay));
+        assert_eq!(requester.next_request(0, &at(400, 48)), Some(key));
+        requester.lay(None);
+        assert!(!requester.awaits(key));
     }
 
     #[test]

@@ -3,7 +3,9 @@
 use super::extent::{CellBox, FieldSize};
 use super::index::{BLOCK_SHIFT, Block, TILE_SHIFT, TileIndex, TileKey, wrap};
 use super::max_pyramid::MaxPyramid;
+use super::settling::Settling;
 use super::tile::Tile;
+use super::underlay::Underlay;
 use crate::grid::{Altitude, Cell};
 
 /// What lies in a cell.
@@ -74,11 +76,16 @@ impl Corners {
 /// The window owns its buffers as `&mut Tile`. Installing a tile swaps one
 /// reference, so a tick sees the old tile or the new one and nothing is copied.
 pub struct Window<'t, const D: usize> {
-    slots: [[&'t mut Tile; D]; D],
+    pub(super) slots: [[&'t mut Tile; D]; D],
     pyramid: MaxPyramid<D>,
     level: u8,
     size: FieldSize,
     top: i32,
+    /// Where the underlay lies, if the scene has one.
+    pub(super) place: Option<Underlay>,
+    /// The underlay, once it has come; or its buffer.
+    pub(super) underlay: Option<&'t mut Tile>,
+    pub(super) settling: Settling<D>,
 }
 
 impl<'t, const D: usize> Window<'t, D> {
@@ -100,8 +107,12 @@ impl<'t, const D: usize> Window<'t, D> {
             level: 0,
             size,
             top,
+            place: None,
+            underlay: None,
+            settling: Settling::NOTHING,
         };
         for key in size.tiles() {
+            window.slots[wrap::<D>(key.row)][wrap::<D>(key.col)].become_surface();
             if let Some(top) = window.held(key).map(Tile::top) {
                 window.renew_maxima(key, top);
             }
@@ -109,8 +120,8 @@ impl<'t, const D: usize> Window<'t, D> {
         window
     }
 
-    /// Forgets every tile and takes a new field: its level, its size, and a
-    /// whole height in cells no sample exceeds.
+    /// Forgets every tile and takes a new field without underlay ([`Self::lay`]): its level, its
+    /// size, and a whole height in cells no sample exceeds.
     // A call: the loop over the tiles is unrolled wherever it is inlined.
     #[inline(never)]
     pub fn reset(&mut self, level: u8, size: FieldSize, top: i32) {
@@ -121,24 +132,34 @@ impl<'t, const D: usize> Window<'t, D> {
         self.level = level;
         self.size = size;
         self.top = top;
+        self.lay(None);
     }
 
     /// Puts `tile` in its slot and gives back the buffer that was there; gives
     /// back `tile` itself when it is vacant, of another level, or outside.
     ///
+    /// It is the surface at once ([`Self::take`] has the tiles over an underlay).
+    ///
     /// A buffer that comes back with a key is that of a tile that is not held. The same
     /// tile once more therefore gives back a vacant buffer.
     #[must_use]
     pub fn install(&mut self, tile: &'t mut Tile) -> &'t mut Tile {
+        self.put(tile, false)
+    }
+
+    /// The same of a tile that `settles`, where an underlay was felt.
+    pub(super) fn put(&mut self, tile: &'t mut Tile, settles: bool) -> &'t mut Tile {
         let Some(key) = tile.key().filter(|key| self.expects(*key)) else {
             return tile;
         };
         let top = tile.top();
         let slot = &mut self.slots[wrap::<D>(key.index.row)][wrap::<D>(key.index.col)];
         let spent = core::mem::replace(slot, tile);
-        if spent.key() == Some(key) {
+        let was_here = spent.key() == Some(key);
+        if was_here {
             spent.vacate();
         }
+        self.has_come(key.index, settles, was_here);
         self.renew_maxima(key.index, top);
         spent
     }
@@ -175,7 +196,7 @@ impl<'t, const D: usize> Window<'t, D> {
             return Ground::Hole;
         }
         let Some(tile) = self.held(TileIndex::holding(cell)) else {
-            return Ground::Missing;
+            return self.unsettled_ground(cell);
         };
         let heights = tile.corners(cell);
         let [sw, se, nw, ne] = heights;
@@ -195,7 +216,14 @@ impl<'t, const D: usize> Window<'t, D> {
         if !self.has_cell(cell) {
             return Some(Corners::NONE);
         }
-        self.held(TileIndex::holding(cell)).map(|tile| Corners {
+        let Some(tile) = self.held(TileIndex::holding(cell)) else {
+            return match self.unsettled_ground(cell) {
+                Ground::Patch(corners) => Some(corners),
+                Ground::Hole => Some(Corners::NONE),
+                Ground::Missing => None,
+            };
+        };
+        Some(Corners {
             base: tile.base(),
             heights: tile.corners(cell),
         })
@@ -259,8 +287,11 @@ impl<'t, const D: usize> Window<'t, D> {
         }
         let up = TILE_SHIFT - shift;
         let first = Cell::new(col << shift, row << shift);
-        self.held(TileIndex::new(col >> up, row >> up))
-            .is_some_and(|tile| tile.block_is_below(shift, first, low))
+        let index = TileIndex::new(col >> up, row >> up);
+        match self.held(index) {
+            Some(tile) => tile.block_is_below(shift, first, low),
+            None => self.unsettled_is_below(index, low),
+        }
     }
 
     /// Whole height no sample under a node exceeds; `i32::MAX` when unknown.
@@ -279,7 +310,7 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
-    fn renew_maxima(&mut self, tile: TileIndex, top: i32) {
+    pub(super) fn renew_maxima(&mut self, tile: TileIndex, top: i32) {
         self.pyramid.set(0, tile.col, tile.row, top);
         for level in 1..=MaxPyramid::<D>::HEIGHT {
             let (col, row) = (tile.col >> level, tile.row >> level);
@@ -291,12 +322,12 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
+    /// The tile, where it is the surface as it is.
     #[inline]
-    fn held(&self, index: TileIndex) -> Option<&Tile> {
+    pub(super) fn held(&self, index: TileIndex) -> Option<&Tile> {
         let tile = &*self.slots[wrap::<D>(index.row)][wrap::<D>(index.col)];
         // `install` takes tiles of the field's level only.
-        let is_here = |key: TileKey| key.index == index;
-        tile.key().is_some_and(is_here).then_some(tile)
+        tile.is_surface_of(index).then_some(tile)
     }
 
     /// Whether the field has a cell there, be it a hole.

@@ -13,10 +13,10 @@ use super::session::{InSession, LastSession, SampleCount, SessionEnd, SessionNum
 use crate::clutch::ClutchHold;
 use crate::contact::{ContactState, Rule};
 use crate::force::{Controller, Damping, ForceLaw, Pattern, Shading, Texture};
-use crate::grid::GridPoint;
+use crate::grid::{Cell, GridPoint};
 use crate::guard::{Fault, Limits, Mode};
 use crate::scene::{Sample, Scene, Source, View};
-use crate::terrain::{FieldSize, TileIndex, TileKey};
+use crate::terrain::{FieldSize, TileIndex, TileKey, Underlay};
 
 fn bytes<T: Serialize>(message: &T) -> Vec<u8> {
     let mut buffer = [0; 256];
@@ -36,6 +36,10 @@ fn a_scene() {
         level: 2,
         size: FieldSize::new(640, 129),
         top: -3,
+        underlay: Some(Underlay {
+            first: Cell::new(300, -1),
+            shift: 4,
+        }),
         cell_mm: 1.5,
         home: GridPoint::new([320, -7, 5], Vec3::new(0.25, 0.5, 0.0)),
         law: ForceLaw {
@@ -60,6 +64,7 @@ fn a_scene() {
     let wanted = [
         std::vec![1, 0xAC, 0x02, 2],
         std::vec![0x80, 0x0A, 0x82, 0x02, 0x05],
+        std::vec![1, 0xD8, 0x04, 0x01, 4],
         float(1.5),
         std::vec![0x80, 0x05, 0x0D, 0x0A],
         float(0.25),
@@ -132,6 +137,10 @@ fn a_view_and_the_clutch() {
         level: 1,
         size: FieldSize::new(2, 3),
         top: 1,
+        underlay: Some(Underlay {
+            first: Cell::new(300, -1),
+            shift: 4,
+        }),
         cell_mm: 1.5,
         home: GridPoint::default(),
         law: ForceLaw::PREMIUM,
@@ -205,7 +214,7 @@ fn a_hello_in_its_session() {
         }),
     };
     // The session is 300 | 128; then variant, protocol, number, seconds.
-    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 9, 9, 0xB4, 0x01]);
+    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 10, 9, 0xB4, 0x01]);
 }
 
 #[test]
@@ -233,7 +242,7 @@ fn a_device_that_introduces_itself() {
         },
     });
     let wanted = [
-        std::vec![0, 9, 9, 8, 1, b'b'],
+        std::vec![0, 10, 9, 8, 1, b'b'],
         serial.to_vec(),
         std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xAC, 0x02, 1, 7],
         std::vec![0xAC, 0x02, 6, 3, 5, 1],

@@ -44,6 +44,7 @@ fn scene(source: Source) -> Scene {
         level: 0,
         size: FieldSize::new(640, 640),
         top: 3,
+        underlay: None,
         cell_mm: 1.0,
         home: GridPoint::new([100, 100, 10], Vec3::ZERO),
         law: ForceLaw::PREMIUM,

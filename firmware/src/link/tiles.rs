@@ -1,6 +1,6 @@
 //! Tiles on their way: which ones the link requests, and whose buffer is where.
 
-use hapterra_core::terrain::{BadTile, IN_FLIGHT, Tile, TileDemand};
+use hapterra_core::terrain::{BadTile, Tile, TileDemand};
 use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::BadFrame;
 use hapterra_core::wire::message::{Heights, TileMessage, ToHost};
@@ -61,21 +61,19 @@ impl<'t, const D: usize> Link<'t, D> {
         if self.nothing_to_request_at == Some(now) {
             return;
         }
-        while self.tx.has_room() && self.has_buffer_for_another() {
-            let Some(key) = self.requester.next_request(now, &focus) else {
+        while self.tx.has_room() {
+            // A tile that was asked for has its buffer already.
+            let key = match self.spare.len() > self.requester.in_flight() {
+                true => self.requester.next_request(now, &focus),
+                false => self.requester.next_repeat(now, &focus),
+            };
+            let Some(key) = key else {
                 self.nothing_to_request_at = Some(now);
                 return;
             };
             let epoch = scene.epoch;
             self.say(&ToHost::Need { epoch, key });
         }
-    }
-
-    /// Whether another tile may be requested. With the most requests under way the
-    /// tile requester only repeats them.
-    fn has_buffer_for_another(&self) -> bool {
-        let in_flight = self.requester.in_flight();
-        self.spare.len() > in_flight || in_flight == IN_FLIGHT
     }
 }
 

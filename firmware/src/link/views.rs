@@ -87,6 +87,10 @@ impl<const D: usize> Link<'_, D> {
         if !view.keeps_tiles {
             self.requester.reset(scene.level, scene.size);
         }
+        let underlay = self.scene.and_then(|before| before.underlay);
+        if !view.keeps_tiles || underlay != scene.underlay {
+            self.requester.lay(scene.underlay);
+        }
         self.requester.forget_asked();
         self.focus = Some(TileDemand {
             proxy: at,

@@ -64,7 +64,7 @@ pub enum Event<'e> {
         /// Whether it was done; why not.
         result: Result<(), Refusal>,
     },
-    /// A tile was said to the device, which may lose it and ask again.
+    /// A tile of the scene's level was said to the device, which may lose it and ask again.
     TileSent(TileKey),
     /// What was asked for was given up: the device does not answer it, or was
     /// restarted meanwhile. Whether it was done is not known.
@@ -508,7 +508,7 @@ impl<'t> Client<'t> {
         on: &mut dyn FnMut(Event<'_>),
     ) {
         let before = self.terrain.raster().not_yet();
-        let Some(heights) = self.terrain.tile(key, &mut self.tile) else {
+        let Some(heights) = self.terrain.tile_of(&self.scene, key, &mut self.tile) else {
             return self.on_no_tile(now, key);
         };
         if self.terrain.raster().not_yet() != before {
@@ -522,7 +522,12 @@ impl<'t> Client<'t> {
         };
         let before = out.len();
         self.talk.say(&ToDevice::Tile(message), out);
-        self.tally.sent_tile(key, out.len() - before);
+        let bytes = out.len() - before;
+        if key.level != self.scene.level {
+            // Each view has its own underlay, and all have one name.
+            return self.tally.sent_underlay(bytes);
+        }
+        self.tally.sent_tile(key, bytes);
         on(Event::TileSent(key));
     }
 

@@ -127,6 +127,11 @@ impl Tally {
         }
     }
 
+    pub(super) fn sent_underlay(&mut self, bytes: usize) {
+        self.tiles += 1;
+        self.tile_bytes += bytes as u64;
+    }
+
     /// Takes the count of a message; false if it is one that was seen before, or that
     /// was given up as lost.
     pub(super) fn received(&mut self, telemetry: &Telemetry) -> bool {

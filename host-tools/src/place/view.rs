@@ -240,7 +240,8 @@ impl View {
     ) -> Result<Scene, PlaceError> {
         let home = terrain.scale().to_grid(self.home_mm);
         let home = home.ok_or(PlaceError::FarAway(self.home_mm))?;
-        Ok(terrain.scene(law, rule, Source::Encoders, home))
+        let scene = terrain.scene(law, rule, Source::Encoders, home);
+        Ok(terrain.underlaid(scene, self.reach_mm))
     }
 }
 

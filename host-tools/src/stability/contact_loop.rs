@@ -154,6 +154,7 @@ fn scene(felt: &Felt) -> Scene {
         level: 0,
         size: FieldSize::new(CELLS, CELLS),
         top: 64,
+        underlay: None,
         cell_mm: CELL_MM as f32,
         home: GridPoint::new([east as i32, north as i32, up as i32], Vec3::ZERO),
         law: ForceLaw {

@@ -278,9 +278,10 @@ impl<'r> Steering<'r> {
             point.ok_or("that is too far from the first sample")
         };
         let (hip, home) = (on_grid(hip_mm)?, on_grid(laid.view.home_mm)?);
+        let scene = terrain.scene(laid.law, self.rule, Source::Encoders, home);
         let view = View {
             number: self.number.wrapping_add(1),
-            scene: terrain.scene(laid.law, self.rule, Source::Encoders, home),
+            scene: terrain.underlaid(scene, laid.view.reach_mm),
             hip,
             keeps_tiles: terrain.has_tiles_of(&self.terrain),
         };

@@ -309,6 +309,11 @@ impl<'r> FeltGrid<'r> {
         let (Some(column), Some(row)) = (whole(column), whole(row)) else {
             return f64::NAN;
         };
+        self.height_seen(level, [column, row])
+    }
+
+    /// The height at a felt sample, as the file has it at a level of detail.
+    pub(super) fn height_seen(&self, level: u8, [column, row]: [u64; 2]) -> f64 {
         if column >= u64::from(self.columns) || row >= u64::from(self.rows) {
             return f64::NAN;
         }

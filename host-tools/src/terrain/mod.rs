@@ -11,6 +11,7 @@ mod identity;
 mod scale;
 mod steps;
 mod tiler;
+mod underlay;
 
 pub use distortion::Distortion;
 pub use felt_grid::{FeltCells, FeltGrid};

@@ -64,7 +64,7 @@ pub enum TerrainError {
 
 /// Room for one tile's samples, used again for each.
 pub struct TileBuffer {
-    heights: Box<[f64; POSTS * POSTS]>,
+    pub(super) heights: Box<[f64; POSTS * POSTS]>,
     /// Above the tile's base.
     singles: Box<[f32; POSTS * POSTS]>,
     bytes: Box<[u8; TILE_BYTES]>,
@@ -81,6 +81,15 @@ impl Default for TileBuffer {
 }
 
 impl TileBuffer {
+    /// The heights, of which these are the lowest and the highest, as they are shortest on the link.
+    pub(super) fn above(&mut self, low: f64, high: f64, steps: &[Step]) -> Heights<'_> {
+        let base = base(low, high);
+        for (single, height) in self.singles.iter_mut().zip(self.heights.iter()) {
+            *single = relative(*height, base);
+        }
+        self.packed(base, steps)
+    }
+
     /// The tile as it is shortest on the link.
     fn packed(&mut self, base: i32, steps: &[Step]) -> Heights<'_> {
         let room = &mut self.bytes[..MAX_PACKED];
@@ -233,6 +242,7 @@ impl<'r> Terrain<'r> {
             level: self.level,
             size: FieldSize::new(self.size[0], self.size[1]),
             top: self.top,
+            underlay: None,
             cell_mm: self.scale.cell_mm() as f32,
             home,
             law,
@@ -297,19 +307,25 @@ impl<'r> Terrain<'r> {
         let Some((low, high, known)) = range(buffer.heights.as_slice()) else {
             return Some(Heights::Hole);
         };
-        let base = base(low, high);
-        let relative = |height: f64| (height - f64::from(base)) as f32;
         if low == high && known == self.samples_in(key) {
-            return Some(Heights::Flat {
-                base,
-                height: relative(low),
-            });
-        }
-        for (single, height) in buffer.singles.iter_mut().zip(buffer.heights.iter()) {
-            *single = relative(*height);
+            let base = base(low, high);
+            let height = relative(low, base);
+            return Some(Heights::Flat { base, height });
         }
         let steps = steps(unit, self.scale.height_cells(1.0));
-        Some(buffer.packed(base, &Vec::from_iter(steps)))
+        Some(buffer.above(low, high, &Vec::from_iter(steps)))
+    }
+
+    /// The height at a sample of this terrain's level, in cells, as the file has it at a level of
+    /// detail; NaN where there is none that can be felt.
+    pub(super) fn cells_at(&self, level: u8, column: u32, row: u32) -> f64 {
+        let whole = |index: u32| u64::from(index) << self.level.min(31);
+        let height = self.grid.height_seen(level, [whole(column), whole(row)]);
+        let cells = self.scale.height_cells(height);
+        match cells.abs() <= f64::from(MAX_CELL) {
+            true => cells,
+            false => f64::NAN,
+        }
     }
 
     /// Copies the tile's samples, in cells; NaN in holes and off the data. Returns what they
@@ -353,8 +369,13 @@ fn place(cells: f64, patches: i32) -> Option<(u32, f64)> {
     Some((patch as u32, cells - patch))
 }
 
+/// A height above a tile's base, rounded once.
+fn relative(height: f64, base: i32) -> f32 {
+    (height - f64::from(base)) as f32
+}
+
 /// Lowest and highest height, and how many there are; `None` if there is none.
-fn range(heights: &[f64]) -> Option<(f64, f64, usize)> {
+pub(super) fn range(heights: &[f64]) -> Option<(f64, f64, usize)> {
     let known = heights.iter().copied().filter(|h| !h.is_nan());
     known.fold(None, |range, h| {
         let (low, high, count) = range.unwrap_or((h, h, 0));

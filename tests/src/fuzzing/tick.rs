@@ -112,6 +112,7 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
         level: 0,
         size: FieldSize::new(64, 64),
         top: 1 << 20,
+        underlay: None,
         cell_mm: 1.0,
         home: GridPoint::new([30, 30, 2], Vec3::ZERO),
         law: ForceLaw::PREMIUM,

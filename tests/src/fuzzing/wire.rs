@@ -214,6 +214,7 @@ pub fn scene() -> Scene {
         level: 0,
         size: FieldSize::new(64, 64),
         top: 100,
+        underlay: None,
         cell_mm: 1.0,
         home: GridPoint::default(),
         law: ForceLaw::PREMIUM,

@@ -118,6 +118,7 @@ fn host_scene(chance: &mut Chance, epoch: u32) -> Scene {
         level: chance.bits() as u8,
         size: FieldSize::new(word(chance), word(chance)),
         top: word(chance),
+        underlay: None,
         cell_mm: [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-30, 0.5][chance.below(6)],
         home: GridPoint::default(),
         law: ForceLaw {

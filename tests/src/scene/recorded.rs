@@ -60,6 +60,7 @@ impl Recorded {
             level: 0,
             size: FieldSize::new(scene.terrain.size[0], scene.terrain.size[1]),
             top: scene.terrain.top(),
+            underlay: None,
             cell_mm: 1.0,
             home: GridPoint::default(),
             law: ForceLaw {

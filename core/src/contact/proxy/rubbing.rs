@@ -94,6 +94,11 @@ impl Rubbing {
         })
     }
 
+    /// The surface has moved: the proxy is judged again, also for a HIP that has not.
+    pub(super) fn surface_moved(&mut self) {
+        (self.at_rest, self.creeps) = (false, true);
+    }
+
     /// One more tick. A proxy that slid sticks when it has not moved for a while.
     fn counts(&mut self, is_still: bool, rate: TickRate) {
         if self.slides {

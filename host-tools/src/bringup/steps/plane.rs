@@ -34,6 +34,7 @@ pub(super) fn below_tip(record: &Calibration, status: &Status, below_mm: f32) ->
         level: 0,
         size: FieldSize::new(CELLS, CELLS),
         top: 1,
+        underlay: None,
         cell_mm: CELL_MM,
         home: GridPoint::new(
             [middle, middle, 0],

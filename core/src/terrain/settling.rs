@@ -1,0 +1,324 @@
+//! Where the surface is not a tile of the scene's level: before it comes, and while it settles.
+//!
+//! A tile that comes where the underlay was felt does not take its place at once: each sample
+//! moves from the underlay's height to the tile's at a bounded rate. The sample of a tile that may
+//! be `a` cells away from the underlay is felt at
+//!
+//! ```text
+//! c + f − c, brought within ±a        c: the underlay's height there, f: the tile's
+//! ```
+//!
+//! `a` grows from tick to tick ([`Window::settle`]) until the tile is the surface as it is. A
+//! sample that several tiles share is that of the tile which may be farthest from the underlay,
+//! and of the underlay where none of them is here. So no border is open, a tile that has settled
+//! is felt by its own samples alone, and what has not come bends to it along its border.
+//!
+//! In each tick the surface is bilinear in each cell, so the contact is as exact as over any
+//! other field. Where the underlay knows nothing (beyond it, in its holes, or before it comes) a
+//! tile is the surface at once.
+
+use super::index::{TILE_CELLS, TileIndex, wrap};
+use super::tile::Tile;
+use super::underlay::Underlay;
+use super::window::{Corners, Ground, Window};
+use crate::grid::{Altitude, Cell};
+
+/// How fast the surface moves from the underlay to a tile that has come, millimetres of the tip
+/// a second. So a force changes by it at most by this times the stiffness: 25 N/s at 0.5 N/mm, where the
+/// guard lets 1,000 N/s through.
+pub const SETTLING_MM_S: f32 = 50.0;
+
+/// How far the tiles of a window may be from the underlay.
+pub(super) struct Settling<const D: usize> {
+    /// By slot: how far now, and from how far on the tile is the surface as it is; cells.
+    slots: [[Allowance; D]; D],
+    /// How many tiles settle.
+    count: u16,
+    /// Whether the surface may have changed otherwise since the last tick.
+    has_changed: bool,
+}
+
+#[derive(Clone, Copy)]
+struct Allowance {
+    now: f32,
+    far: f32,
+}
+
+impl Allowance {
+    /// Of a slot whose tile does not settle.
+    const NONE: Self = Self {
+        now: f32::INFINITY,
+        far: 0.0,
+    };
+}
+
+impl<const D: usize> Settling<D> {
+    pub(super) const NOTHING: Self = Self {
+        slots: [[Allowance::NONE; D]; D],
+        count: 0,
+        has_changed: false,
+    };
+
+    const fn slot(index: TileIndex) -> (usize, usize) {
+        (wrap::<D>(index.row), wrap::<D>(index.col))
+    }
+
+    /// The tile in the slot of `index` settles from now on, or does not.
+    fn begin(&mut self, index: TileIndex, far: Option<f32>) {
+        let (row, col) = Self::slot(index);
+        let slot = &mut self.slots[row][col];
+        if slot.now < f32::INFINITY {
+            self.count -= 1;
+        }
+        *slot = match far {
+            Some(far) => Allowance { now: 0.0, far },
+            None => Allowance::NONE,
+        };
+        self.count += u16::from(far.is_some());
+    }
+
+    fn allowed(&self, index: TileIndex) -> f32 {
+        let (row, col) = Self::slot(index);
+        self.slots[row][col].now
+    }
+}
+
+/// A height that is felt at a sample, and whether it is a tile's.
+#[derive(Clone, Copy)]
+struct Felt {
+    height: f32,
+    is_of_tile: bool,
+}
+
+impl<'t, const D: usize> Window<'t, D> {
+    /// Lays an underlay under the field, or none; the tiles that are held are the surface as
+    /// they are. The buffer of the underlay before is kept for this one
+    /// ([`Self::take_spare`]).
+    pub fn lay(&mut self, underlay: Option<Underlay>) {
+        self.place = underlay;
+        if let Some(tile) = &mut self.underlay {
+            tile.vacate();
+        }
+        self.settling = Settling::NOTHING;
+        for row in 0..D {
+            for col in 0..D {
+                self.slots[row][col].become_surface();
+                let key = self.slots[row][col].key();
+                if let (Some(key), true) = (key, underlay.is_some()) {
+                    let top = self.slots[row][col].top();
+                    self.renew_maxima(key.index, top);
+                }
+            }
+        }
+    }
+
+    /// Gives back a buffer that held an underlay, where there is to be none any more.
+    #[must_use]
+    pub fn take_spare(&mut self) -> Option<&'t mut Tile> {
+        match self.place {
+            Some(_) => None,
+            None => self.underlay.take(),
+        }
+    }
+
+    /// Takes a tile that was asked for: one of the field, or the underlay. Gives back a buffer, if
+    /// one is left over.
+    ///
+    /// `felt` are the cells of proxy and HIP. A tile of the field settles where what is felt there
+    /// depends on it: it, or one beside it that is not the surface, has one of them. Any other
+    /// is the surface at once, as with [`Self::install`].
+    #[must_use]
+    pub fn take(&mut self, tile: &'t mut Tile, felt: [Cell; 2]) -> Option<&'t mut Tile> {
+        let Some(place) = self.place else {
+            return Some(self.install(tile));
+        };
+        if tile.key() == Some(place.key(self.level())) {
+            self.settling.has_changed = true;
+            let spent = self.underlay.replace(tile)?;
+            spent.vacate();
+            return Some(spent);
+        }
+        let depends = |cell: Cell, index: TileIndex| {
+            let at = TileIndex::holding(cell);
+            let apart = at.col.abs_diff(index.col).max(at.row.abs_diff(index.row));
+            apart == 0 || (apart == 1 && self.held(at).is_none())
+        };
+        let settles = tile
+            .key()
+            .is_some_and(|key| felt.into_iter().any(|cell| depends(cell, key.index)));
+        Some(self.put(tile, settles))
+    }
+
+    /// Whether a patch is that of its tile, and not of the underlay, nor between the two.
+    #[must_use]
+    #[inline]
+    pub fn is_settled(&self, cell: Cell) -> bool {
+        self.held(TileIndex::holding(cell)).is_some()
+    }
+
+    /// Moves the surface on to the tiles that have come, by `step` cells at most. Returns
+    /// whether it may be another than in the tick before.
+    pub fn settle(&mut self, step: f32) -> bool {
+        let has_changed = core::mem::take(&mut self.settling.has_changed);
+        if self.settling.count == 0 {
+            return has_changed;
+        }
+        self.settle_each(step);
+        true
+    }
+
+    #[inline(never)]
+    fn settle_each(&mut self, step: f32) {
+        for row in 0..D {
+            for col in 0..D {
+                let Allowance { now, far } = &mut self.settling.slots[row][col];
+                *now += step;
+                if *now < *far || *now == f32::INFINITY {
+                    continue;
+                }
+                let tile = &mut self.slots[row][col];
+                tile.become_surface();
+                let (key, top) = (tile.key(), tile.top());
+                if let Some(key) = key {
+                    self.settling.begin(key.index, None);
+                    self.renew_maxima(key.index, top);
+                }
+            }
+        }
+    }
+
+    /// A tile has come into the slot of `index`: it settles if it is to, and the underlay was felt
+    /// there. One that was there before goes on as it was.
+    pub(super) fn has_come(&mut self, index: TileIndex, settles: bool, was_here: bool) {
+        let (row, col) = Settling::<D>::slot(index);
+        self.settling.has_changed = self.place.is_some();
+        if was_here && self.settling.allowed(index) < f32::INFINITY {
+            return;
+        }
+        let far = match settles && !was_here {
+            true => self.far(&self.slots[row][col], index),
+            false => None,
+        };
+        self.settling.begin(index, far);
+        if far.is_none() {
+            self.slots[row][col].become_surface();
+        }
+    }
+
+    /// How far the samples of a tile can be from the underlay, cells; `None` where that is not felt.
+    fn far(&self, tile: &Tile, index: TileIndex) -> Option<f32> {
+        let (place, under) = self.laid()?;
+        let [lowest, highest] = tile.range()?;
+        let [low, high] = place.range_over(under, index)?;
+        let up = tile.base().wrapping_sub(under.base()) as f32;
+        let (above, below) = (up + highest - low, high - (up + lowest));
+        let far = if above > below { above } else { below };
+        (far > 0.0).then_some(far)
+    }
+
+    fn laid(&self) -> Option<(&Underlay, &Tile)> {
+        let (place, under) = (self.place.as_ref()?, self.underlay.as_deref()?);
+        under.key()?;
+        Some((place, under))
+    }
+
+    /// What lies in a cell of the field whose tile is not the surface.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn unsettled_ground(&self, cell: Cell) -> Ground {
+        let Some((place, under)) = self.laid() else {
+            return Ground::Missing;
+        };
+        let own = self.tile_here(TileIndex::holding(cell));
+        let base = own.map_or(under.base(), Tile::base);
+        let mut heights = [f32::NAN; 4];
+        for (corner, height) in (0..).zip(&mut heights) {
+            let sample = cell.offset(corner & 1, corner >> 1);
+            let felt = self.felt(place, under, sample, base);
+            if felt.height.is_nan() {
+                // What the underlay does not know may yet come.
+                return match felt.is_of_tile {
+                    true => Ground::Hole,
+                    false => Ground::Missing,
+                };
+            }
+            *height = felt.height;
+        }
+        Ground::Patch(Corners { base, heights })
+    }
+
+    /// The height felt at a sample, in cells above `base`.
+    fn felt(&self, place: &Underlay, under: &Tile, sample: Cell, base: i32) -> Felt {
+        let coarse = place.height(under, sample) + under.base().wrapping_sub(base) as f32;
+        let mut felt = Felt {
+            height: coarse,
+            is_of_tile: false,
+        };
+        let mut most = -1.0;
+        let on_border = |at: i32| i32::from(at & (TILE_CELLS as i32 - 1) == 0);
+        for west in 0..=on_border(sample.x) {
+            for south in 0..=on_border(sample.y) {
+                let index = TileIndex::holding(sample.offset(-west, -south));
+                let Some(tile) = self.tile_here(index) else {
+                    continue;
+                };
+                let allowed = self.settling.allowed(index);
+                if allowed <= most {
+                    continue;
+                }
+                most = allowed;
+                let first = index.first_cell();
+                let (col, row) = (sample.x - first.x, sample.y - first.y);
+                let own =
+                    tile.post(col as usize, row as usize) + tile.base().wrapping_sub(base) as f32;
+                felt = Felt {
+                    height: within(own, coarse, allowed),
+                    is_of_tile: true,
+                };
+            }
+        }
+        felt
+    }
+
+    /// The tile of the field in its slot, whether it is the surface or not.
+    fn tile_here(&self, index: TileIndex) -> Option<&Tile> {
+        let (row, col) = Settling::<D>::slot(index);
+        let tile = &*self.slots[row][col];
+        tile.key()
+            .is_some_and(|key| key.index == index)
+            .then_some(tile)
+    }
+
+    /// Whether what is felt in place of a tile is known to lie below `low`, all over the tile.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn unsettled_is_below(&self, index: TileIndex, low: Altitude) -> bool {
+        let Some((place, under)) = self.laid() else {
+            return false;
+        };
+        // Where neither a tile nor the underlay has heights, anything may be.
+        let is_known = self.tile_here(index).is_some() || (under.is_whole() && place.covers(index));
+        let is_below = |tile: &Tile| tile.is_below(low);
+        // A border that is shared is felt as the neighbour has it.
+        let around = (0..9).map(|place| index.offset(place % 3 - 1, place / 3 - 1));
+        is_known && is_below(under) && around.filter_map(|near| self.tile_here(near)).all(is_below)
+    }
+}
+
+/// A height brought within `allowed` of another; the very height where it is within, and where
+/// the other is none.
+fn within(height: f32, of: f32, allowed: f32) -> f32 {
+    let off = height - of;
+    if off > allowed {
+        of + allowed
+    } else if off < -allowed {
+        of - allowed
+    } else {
+        // Also where either is no number.
+        height
+    }
+}
+
+#[cfg(test)]
+#[path = "settling_tests.rs"]
+mod tests;

@@ -1,0 +1,494 @@
+//! The surface between underlay and tiles, against a model of its own in f64.
+
+use std::boxed::Box;
+use std::collections::BTreeMap;
+use std::vec::Vec;
+
+use glam::Vec3;
+
+use super::*;
+use crate::cases::cases;
+use crate::contact::{Contact, ContactSettings, ContactState, Friction};
+use crate::grid::GridPoint;
+use crate::terrain::index::{BLOCK_SHIFT, Block, TileKey};
+use crate::terrain::testing::buffers;
+use crate::terrain::{CellBox, FieldSize};
+
+const SIZE: FieldSize = FieldSize::new(640, 640);
+/// Under tiles 2 to 9 each way.
+const UNDERLAY: Underlay = Underlay {
+    first: Cell::new(64, 64),
+    shift: 3,
+};
+/// Heights of tiles count from here, those of the underlay from below.
+const BASE: i32 = 10;
+
+/// Hills of some cells with a rough part.
+fn hills(x: i32, y: i32) -> f64 {
+    let hash = (x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_663)) as u32;
+    let rough = f64::from(hash.wrapping_mul(2_654_435_761) >> 20) / 4096.0;
+    let (u, v) = (f64::from(x) / 19.0, f64::from(y) / 23.0);
+    20.0 + 6.0 * (u.sin() + v.cos()) + rough
+}
+
+/// What the underlay has at a sample of the field.
+fn coarse(x: i32, y: i32) -> Option<f64> {
+    let side = f64::from(UNDERLAY.spacing());
+    let along = |at: i32, first: i32| {
+        let place = f64::from(at - first) / side;
+        (0.0..=32.0).contains(&place).then_some(place)
+    };
+    let (u, v) = (along(x, UNDERLAY.first.x)?, along(y, UNDERLAY.first.y)?);
+    let at = |col: f64, row: f64| {
+        let cell = |index: f64, first: i32| first + (index * side) as i32;
+        f64::from(hills(cell(col, UNDERLAY.first.x), cell(row, UNDERLAY.first.y)) as f32)
+    };
+    let (col, row) = (u.floor().min(31.0), v.floor().min(31.0));
+    let (s, t) = (u - col, v - row);
+    let south = at(col, row) * (1.0 - s) + at(col + 1.0, row) * s;
+    let north = at(col, row + 1.0) * (1.0 - s) + at(col + 1.0, row + 1.0) * s;
+    Some(south * (1.0 - t) + north * t)
+}
+
+/// A window over the hills, and how far the model has each tile that came from the underlay.
+struct Bed<'t> {
+    window: Window<'t, 4>,
+    spare: Vec<&'t mut Tile>,
+    allowed: BTreeMap<(i32, i32), f64>,
+}
+
+fn room() -> Vec<Tile> {
+    buffers::<4>()
+}
+
+impl<'t> Bed<'t> {
+    fn new(room: &'t mut [Tile]) -> Self {
+        let mut spare: Vec<_> = room.iter_mut().collect();
+        let mut next = || spare.pop().expect("a buffer for every slot");
+        let slots = core::array::from_fn(|_| core::array::from_fn(|_| next()));
+        let mut window = Window::new(slots);
+        window.reset(0, SIZE, 1 << 28);
+        window.lay(Some(UNDERLAY));
+        Self {
+            window,
+            spare,
+            allowed: BTreeMap::new(),
+        }
+    }
+
+    fn with_underlay(room: &'t mut [Tile]) -> Self {
+        let mut bed = Self::new(room);
+        bed.lays();
+        bed
+    }
+
+    fn lays(&mut self) {
+        let tile = self.spare.pop().expect("a buffer");
+        let side = UNDERLAY.spacing();
+        let height = |col: usize, row: usize| {
+            let (x, y) = (col as i32 * side, row as i32 * side);
+            (hills(UNDERLAY.first.x + x, UNDERLAY.first.y + y) - 3.0) as f32
+        };
+        tile.fill(UNDERLAY.key(0), 3, height).expect("in range");
+        let spent = self.window.take(tile, [Cell::new(0, 0); 2]);
+        self.spare.extend(spent);
+    }
+
+    /// A tile comes while somebody is in that cell.
+    fn comes(&mut self, col: i32, row: i32, felt: Cell) {
+        let key = TileKey::new(0, col, row);
+        let tile = self.spare.pop().expect("a buffer");
+        let height = |x, y| (hills(x, y) - f64::from(BASE)) as f32;
+        tile.fill_from(key, BASE, SIZE, height).expect("in range");
+        if let Some(spent) = self.window.take(tile, [felt; 2]) {
+            if let Some(key) = spent.key() {
+                self.allowed.remove(&(key.index.col, key.index.row));
+            }
+            self.spare.push(spent);
+        }
+        let at = TileIndex::holding(felt);
+        let apart = (at.col - col).abs().max((at.row - row).abs());
+        let beside_one = self.allowed.get(&(at.col, at.row)) != Some(&f64::INFINITY);
+        let settles = apart == 0 || (apart == 1 && beside_one);
+        let before = self.allowed.get(&(col, row)).copied();
+        let now = if settles { 0.0 } else { f64::INFINITY };
+        self.allowed.insert((col, row), before.unwrap_or(now));
+    }
+
+    fn settles(&mut self, step: f32) {
+        self.window.settle(step);
+        for (&(col, row), allowed) in &mut self.allowed {
+            *allowed += f64::from(step);
+            if self.window.is_settled(Cell::new(col * 32, row * 32)) {
+                *allowed = f64::INFINITY;
+            }
+        }
+    }
+
+    /// The model's height at a sample.
+    fn felt(&self, x: i32, y: i32) -> Option<f64> {
+        let sharing =
+            [(0, 0), (-1, 0), (0, -1), (-1, -1)].map(|(i, j)| ((x + i) >> 5, (y + j) >> 5));
+        let allowed = sharing.iter().filter_map(|tile| self.allowed.get(tile));
+        let most = allowed.fold(None, |most: Option<f64>, a| {
+            Some(most.unwrap_or(*a).max(*a))
+        });
+        let fine = f64::from((hills(x, y) - f64::from(BASE)) as f32) + f64::from(BASE);
+        match (most, coarse(x, y)) {
+            (None, coarse) => coarse,
+            (Some(_), None) => Some(fine),
+            (Some(most), Some(coarse)) => Some(coarse + (fine - coarse).clamp(-most, most)),
+        }
+    }
+
+    /// Judges every patch in a box of tiles.
+    fn judge(&self, tiles: core::ops::Range<i32>) -> usize {
+        let mut patches = 0;
+        for x in tiles.start * 32..tiles.end * 32 {
+            for y in tiles.start * 32..tiles.end * 32 {
+                let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
+                let model = corners.map(|(i, j)| self.felt(x + i, y + j));
+                match self.window.ground(Cell::new(x, y)) {
+                    Ground::Patch(Corners { base, heights }) => {
+                        for (height, model) in heights.iter().zip(model) {
+                            let height = f64::from(base) + f64::from(*height);
+                            let model = model.expect("the model has it, too");
+                            assert!((height - model).abs() < 2e-5, "{x} {y}: {height} {model}");
+                        }
+                        patches += 1;
+                    }
+                    Ground::Missing => assert!(model.contains(&None), "{x} {y}"),
+                    Ground::Hole => panic!("{x} {y}: there is none"),
+                }
+            }
+        }
+        patches
+    }
+}
+
+const HERE: Cell = Cell::new(140, 140);
+
+#[test]
+fn it_is_the_model_s_whatever_has_come_and_settled() {
+    let mut room = room();
+    let mut bed = Bed::with_underlay(&mut room);
+    assert_eq!(bed.judge(3..6), 96 * 96, "the underlay alone");
+    let tiles = [
+        (4, 4),
+        (5, 4),
+        (3, 4),
+        (4, 5),
+        (5, 5),
+        (4, 3),
+        (8, 4),
+        (4, 4),
+    ];
+    for (come, (col, row)) in tiles.into_iter().enumerate() {
+        bed.comes(col, row, HERE);
+        for step in [0.0, 0.02, 0.3, if come % 3 == 2 { 40.0 } else { 0.1 }] {
+            bed.settles(step);
+            bed.judge(3..7);
+        }
+    }
+    assert!(bed.window.is_settled(Cell::new(5 * 32, 5 * 32)));
+}
+
+#[test]
+fn no_sample_moves_faster_than_it_may_and_in_the_end_it_is_the_tile_s_to_the_bit() {
+    let mut room = room();
+    let mut bed = Bed::with_underlay(&mut room);
+    let heights = |bed: &Bed<'_>| {
+        let mut all = Vec::new();
+        for x in 126..162 {
+            for y in 126..162 {
+                let Ground::Patch(Corners { base, heights }) = bed.window.ground(Cell::new(x, y))
+                else {
+                    panic!("{x} {y}: no patch");
+                };
+                all.extend(heights.map(|height| f64::from(base) + f64::from(height)));
+            }
+        }
+        all
+    };
+    let mut last = heights(&bed);
+    bed.comes(4, 4, HERE);
+    bed.comes(5, 4, HERE);
+    let mut ticks = 0;
+    while !(bed.window.is_settled(HERE) && bed.window.is_settled(Cell::new(161, 140))) {
+        let now = heights(&bed);
+        for (now, last) in now.iter().zip(&last) {
+            assert!(
+                (now - last).abs() < 0.05 + 2e-5,
+                "tick {ticks}: {last} {now}"
+            );
+        }
+        last = now;
+        bed.settles(0.05);
+        ticks += 1;
+        assert!(ticks < 1000);
+    }
+    assert!(ticks > 20, "{ticks}");
+    for (now, last) in heights(&bed).iter().zip(&last) {
+        assert!((now - last).abs() < 0.05 + 2e-5);
+    }
+    let Ground::Patch(corners) = bed.window.ground(HERE) else {
+        panic!("a patch");
+    };
+    assert_eq!(corners.base, BASE);
+    assert_eq!(
+        corners.heights[0],
+        (hills(140, 140) - f64::from(BASE)) as f32
+    );
+    // What was told of the tile's patches before it settled must not be told any more.
+    let low = Altitude::new(40, 0.0);
+    assert!(
+        bed.window
+            .is_clear(CellBox::around(HERE, HERE.offset(9, 9)), low)
+    );
+}
+
+#[test]
+fn a_tile_that_nobody_feels_is_the_surface_at_once_and_one_beside_bends_to_it() {
+    let mut room = room();
+    let mut bed = Bed::with_underlay(&mut room);
+    bed.comes(6, 4, HERE);
+    assert!(bed.window.is_settled(Cell::new(6 * 32, 140)));
+    // Beside the hand's, which is the underlay still: it would bend at once.
+    bed.comes(5, 4, HERE);
+    assert!(!bed.window.is_settled(Cell::new(5 * 32, 140)));
+    bed.judge(3..7);
+    bed.settles(100.0);
+    bed.comes(4, 4, HERE);
+    bed.settles(100.0);
+    // The hand's is the surface now: nothing bends any more.
+    bed.comes(3, 4, HERE);
+    assert!(bed.window.is_settled(Cell::new(3 * 32, 140)));
+    bed.judge(3..7);
+}
+
+#[test]
+fn without_its_underlay_a_tile_is_the_surface_at_once_and_stays_it() {
+    let mut room = room();
+    let mut bed = Bed::new(&mut room);
+    assert_eq!(bed.window.ground(HERE), Ground::Missing);
+    bed.comes(4, 4, HERE);
+    assert!(bed.window.is_settled(HERE));
+    let before = bed.window.ground(HERE);
+    bed.lays();
+    assert_eq!(bed.window.ground(HERE), before);
+    bed.allowed.insert((4, 4), f64::INFINITY);
+    bed.judge(3..6);
+}
+
+#[test]
+fn holes_of_a_tile_are_holes_at_once_and_those_of_the_underlay_are_not_known() {
+    let mut room = room();
+    let mut bed = Bed::new(&mut room);
+    let tile = bed.spare.pop().expect("a buffer");
+    let height = |col, row| {
+        if (col, row) == (10, 10) {
+            f32::NAN
+        } else {
+            1.0
+        }
+    };
+    tile.fill(UNDERLAY.key(0), 0, height).expect("in range");
+    let _ = bed.window.take(tile, [HERE; 2]);
+    // Sample (10, 10) of the underlay is at (144, 144).
+    let ground = |bed: &Bed<'_>, x, y| bed.window.ground(Cell::new(x, y));
+    assert_eq!(ground(&bed, 140, 140), Ground::Missing);
+    assert!(matches!(ground(&bed, 130, 140), Ground::Patch(_)));
+    let tile = bed.spare.pop().expect("a buffer");
+    let height = |x, y| if (x, y) == (131, 141) { f32::NAN } else { 2.0 };
+    let key = TileKey::new(0, 4, 4);
+    tile.fill_from(key, 0, SIZE, height).expect("in range");
+    let _ = bed.window.take(tile, [HERE; 2]);
+    bed.window.settle(0.25);
+    assert_eq!(ground(&bed, 130, 140), Ground::Hole);
+    let patch = |height| {
+        Ground::Patch(Corners {
+            base: 0,
+            heights: [height; 4],
+        })
+    };
+    assert_eq!(ground(&bed, 135, 150), patch(1.25), "it settles");
+    assert_eq!(ground(&bed, 140, 140), patch(2.0), "nothing was felt there");
+}
+
+#[test]
+fn clear_means_clear_over_what_has_not_settled() {
+    let mut room = room();
+    let mut bed = Bed::with_underlay(&mut room);
+    let mut seen = [0, 0];
+    const EACH: usize = cases(1, 8) as usize;
+    for step in (0..3000_i32).step_by(EACH) {
+        match step % 300 {
+            0 => bed.comes(3 + step / 300 % 4, 3 + step / 1200 % 4, HERE),
+            100 | 200 => bed.settles(0.7),
+            _ => {}
+        }
+        let a = Cell::new(96 + (step * 7) % 128, 96 + (step * 13) % 128);
+        let b = a.offset(step % 41 - 20, step * 3 % 57 - 28);
+        // Also as a path's lower end is told: far up from where the path begins.
+        let up = step % 3 * 17;
+        let low = Altitude::new(25 + step % 12 + up, 0.5).raised(-up as f32);
+        let span = CellBox::around(a, b);
+        let block = Block {
+            col: a.x >> BLOCK_SHIFT,
+            row: a.y >> BLOCK_SHIFT,
+        };
+        let (span, clear) = match step % 2 {
+            0 => {
+                let first = Cell::new(block.col << BLOCK_SHIFT, block.row << BLOCK_SHIFT);
+                let whole = CellBox::around(first, first.offset(7, 7));
+                (whole, bed.window.block_is_clear(block, low))
+            }
+            _ => {
+                let low = Altitude::new(25 + step % 12, 0.5);
+                (span, bed.window.is_clear(span, low))
+            }
+        };
+        seen[usize::from(clear)] += 1;
+        for (x, y) in (span.from.x..=span.to.x + 1)
+            .flat_map(|x| (span.from.y..=span.to.y + 1).map(move |y| (x, y)))
+            .filter(|_| clear)
+        {
+            let felt = bed.felt(x, y);
+            let is_below = felt.is_some_and(|felt| felt < f64::from(25 + step % 12) + 0.5);
+            assert!(is_below, "{span:?} {low:?} {x} {y} {felt:?}");
+        }
+    }
+    assert!(seen[0] > 100 / EACH && seen[1] > 100 / EACH, "{seen:?}");
+}
+
+#[test]
+fn buffers_are_neither_lost_nor_doubled() {
+    let mut room = room();
+    let mut bed = Bed::with_underlay(&mut room);
+    assert_eq!(bed.spare.len(), 3, "the underlay keeps one");
+    bed.lays();
+    bed.comes(4, 4, HERE);
+    bed.comes(8, 4, HERE);
+    bed.comes(8, 4, HERE);
+    assert_eq!(bed.spare.len(), 3);
+    assert!(bed.window.take_spare().is_none(), "it is in use");
+    bed.window.lay(Some(UNDERLAY));
+    assert!(bed.window.take_spare().is_none(), "another is going to be");
+    bed.window.reset(0, SIZE, 50);
+    let spare = bed.window.take_spare().expect("no underlay any more");
+    assert_eq!(spare.key(), None);
+    assert!(bed.window.take_spare().is_none());
+}
+
+/// The sample in the middle of the hand's tile where that is farthest above the underlay, or
+/// farthest below it.
+fn where_it_moves(up: bool) -> (i32, i32) {
+    let rise = |&(x, y): &(i32, i32)| {
+        let rise = hills(x, y) - coarse(x, y).expect("known");
+        if up { rise } else { -rise }
+    };
+    let all = (130..158).flat_map(|x| (130..158).map(move |y| (x, y)));
+    let most = all
+        .max_by(|a, b| rise(a).total_cmp(&rise(b)))
+        .expect("some");
+    assert!(rise(&most) > 0.3, "{}", rise(&most));
+    most
+}
+
+/// Depth and state in each tick of a hand that holds still, `above` the underlay, while the tile
+/// under it comes in tick 50.
+fn held_still(friction: Friction, up: bool, above: f64) -> Vec<(f64, ContactState)> {
+    let mut room = room();
+    let mut bed = Bed::with_underlay(&mut room);
+    let settings = ContactSettings::REAL_TIME.with_friction(friction);
+    let mut contact = Box::new(Contact::new(settings));
+    let (x, y) = where_it_moves(up);
+    let z = (coarse(x, y).expect("known") + above) as f32;
+    let over = |z| GridPoint::new([x, y, 0], Vec3::new(0.01, 0.02, z));
+    contact.step(&bed.window, &over(60.0));
+    (0..300)
+        .map(|tick| {
+            if tick == 50 {
+                bed.comes(4, 4, HERE);
+            }
+            if bed.window.settle(STEP) {
+                contact.surface_moved(&bed.window);
+            }
+            let output = *contact.step(&bed.window, &over(z));
+            if output.state == ContactState::Touching {
+                is_on_the_surface(&bed.window, &output.proxy);
+            }
+            (f64::from(output.displacement.length()), output.state)
+        })
+        .collect()
+}
+
+/// Cells that the surface moves in a tick.
+const STEP: f32 = 0.02;
+
+fn is_on_the_surface(window: &Window<'_, 4>, proxy: &GridPoint) {
+    let Ground::Patch(corners) = window.ground(proxy.column()) else {
+        panic!("no patch under {proxy:?}");
+    };
+    let [sw, se, nw, ne] = corners
+        .heights
+        .map(|h| f64::from(h) + f64::from(corners.base));
+    let (u, v) = (f64::from(proxy.frac().x), f64::from(proxy.frac().y));
+    let height = (sw * (1.0 - u) + se * u) * (1.0 - v) + (nw * (1.0 - u) + ne * u) * v;
+    let z = f64::from(proxy.cell()[2]) + f64::from(proxy.frac().z);
+    assert!((z - height).abs() < 1e-5, "{z} over {height}");
+}
+
+#[test]
+fn a_hand_that_holds_still_feels_the_surface_move_and_no_step() {
+    for (mu, up, above) in [0.0, 0.8].into_iter().flat_map(|mu| {
+        [(true, -0.5), (true, 0.2), (false, -0.2), (false, -0.9)].map(|(up, z)| (mu, up, z))
+    }) {
+        let friction = Friction {
+            static_mu: mu,
+            dynamic_mu: mu,
+            viscous_s: 0.0,
+        };
+        let felt = held_still(friction, up, above);
+        let mut most = 0.0_f64;
+        for (tick, pair) in felt.windows(2).enumerate().skip(2) {
+            let change = pair[1].0 - pair[0].0;
+            let bound = 1.001 * f64::from(STEP) + 1e-5;
+            assert!(change < bound, "{mu} {up} {above} {tick}: {pair:?}");
+            // What friction has held may slide when the ground under it has turned.
+            assert!(mu > 0.0 || change > -bound, "{up} {above} {tick}: {pair:?}");
+            most = most.max(change.abs());
+        }
+        assert!(most > 1e-3, "something was felt: {most}");
+        let touches = |tick: usize| felt[tick].1 == ContactState::Touching;
+        assert_eq!(touches(49), above < 0.0, "{mu} {up} {above}");
+        assert_eq!(
+            touches(299),
+            up || above < -0.5,
+            "{mu} {up} {above} {:?}",
+            felt[299]
+        );
+    }
+}
+
+#[test]
+fn a_hand_that_the_surface_passes_does_not_fall_through_it() {
+    let (x, y) = where_it_moves(true);
+    let mut room = room();
+    let mut bed = Bed::with_underlay(&mut room);
+    let mut contact = Box::new(Contact::new(ContactSettings::REAL_TIME));
+    let z = (coarse(x, y).expect("known") + 0.1) as f32;
+    let hip = GridPoint::new([x, y, 0], Vec3::new(0.01, 0.01, z));
+    contact.step(&bed.window, &GridPoint::new([x, y, 60], Vec3::ZERO));
+    assert_eq!(contact.step(&bed.window, &hip).state, ContactState::Free);
+    bed.comes(4, 4, HERE);
+    for _ in 0..400 {
+        if bed.window.settle(0.02) {
+            contact.surface_moved(&bed.window);
+        }
+        contact.step(&bed.window, &hip);
+    }
+    assert!(bed.window.is_settled(HERE));
+    assert_eq!(contact.output().state, ContactState::Touching);
+    assert!(contact.output().displacement.length() > 0.1);
+}
