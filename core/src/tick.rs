@@ -426,13 +426,10 @@ impl<'t, const D: usize> Haptics<'t, D> {
 
     /// The full path: pose, haptic interface point, proxy, force, torques, currents.
     fn tick_arm(&mut self, pose: Option<&Pose>, outcome: &mut Outcome) {
-        if let Some(Scene {
-            underlay: Some(_),
-            cell_mm,
-            ..
-        }) = self.scene
+        if let Some(scene) = &self.scene
+            && scene.underlay.is_some()
         {
-            self.settle(cell_mm);
+            self.settle(scene.cell_mm);
         }
         let arm = self.mechanism.as_ref().zip(pose);
         outcome.answers = None;

@@ -17,8 +17,9 @@ use crate::monitor::Monitor;
 pub(crate) const SPARES: usize = IN_FLIGHT;
 /// Slots of the command queue, one of which stays empty.
 const COMMANDS: usize = 16;
-/// Slots of the record queue: the link may sleep through this many ticks.
-const RECORDS: usize = 32;
+/// Slots of the record queue: the link may sleep through this many samples. Unpacking the
+/// slowest tile takes it three.
+const RECORDS: usize = 28;
 /// Slots of the settings queue: one set of settings at a time.
 const SETTINGS: usize = 2;
 /// Slots of the health queue: one report at a time.

@@ -20,6 +20,7 @@ pub mod readers;
 pub mod real_ground;
 pub mod rows;
 pub mod scene;
+pub mod slow_line;
 pub mod soak;
 pub mod usb;
 pub mod walk;

@@ -248,6 +248,8 @@ impl<'t, const D: usize> Window<'t, D> {
     }
 
     /// The height felt at a sample, in cells above `base`.
+    // A call: four copies of it would be a kilobyte.
+    #[inline(never)]
     fn felt(&self, place: &Underlay, under: &Tile, sample: Cell, base: i32) -> Felt {
         let coarse = place.height(under, sample) + under.base().wrapping_sub(base) as f32;
         let mut felt = Felt {
@@ -281,6 +283,7 @@ impl<'t, const D: usize> Window<'t, D> {
     }
 
     /// The tile of the field in its slot, whether it is the surface or not.
+    #[inline(never)]
     fn tile_here(&self, index: TileIndex) -> Option<&Tile> {
         let (row, col) = Settling::<D>::slot(index);
         let tile = &*self.slots[row][col];

@@ -311,9 +311,7 @@ impl Tile {
             }
         }
         self.highest = highest_of(&self.quarters, 0, 0, QUARTERS);
-        let all = self.posts.as_flattened();
-        self.lowest = all.iter().fold(f32::INFINITY, |low, post| low.min(*post));
-        self.is_whole = !all.iter().any(|post| post.is_nan());
+        (self.lowest, self.is_whole) = lowest_of(self.posts.as_flattened());
     }
 }
 
@@ -321,6 +319,19 @@ impl Tile {
 #[inline]
 fn within(cell: Cell) -> [usize; 2] {
     [cell.x, cell.y].map(|c| c as usize % TILE_CELLS)
+}
+
+/// Lowest of the numbers, and whether none is NaN, which does not count.
+#[inline(never)]
+fn lowest_of(numbers: &[f32]) -> (f32, bool) {
+    let mut lowest = (f32::INFINITY, true);
+    for number in numbers {
+        if *number < lowest.0 {
+            lowest.0 = *number;
+        }
+        lowest.1 &= !number.is_nan();
+    }
+    lowest
 }
 
 /// Highest of the numbers in a square of them; NaN does not count.

@@ -96,6 +96,7 @@ impl<const D: usize> TileRequester<D> {
     }
 
     /// The field has this underlay, which is not held; or none.
+    #[inline(never)]
     pub fn lay(&mut self, underlay: Option<Underlay>) {
         let level = self.level;
         self.asked.retain(|(asked, _)| asked.level == level);
@@ -168,6 +169,7 @@ impl<const D: usize> TileRequester<D> {
 
     /// The same of tiles that were asked for before and have not come: for a device that has no
     /// room for more.
+    #[inline(never)]
     pub fn next_repeat(&mut self, now: u32, demand: &TileDemand) -> Option<TileKey> {
         let is_overdue = |at: &u32| now.wrapping_sub(*at) >= RETRY_TICKS;
         let (level, centre) = (self.level, demand.centre());

@@ -55,6 +55,7 @@ impl Underlay {
 
     /// The coarse cell that holds a sample of the scene's level, and how far in it the sample
     /// lies, eastward and northward from 0 to 1. `None` beyond the underlay.
+    #[inline(never)]
     fn place(&self, sample: Cell) -> Option<([usize; 2], [f32; 2])> {
         let span = (TILE_CELLS as i32) << self.shift;
         let along = |at: i32, first: i32| {

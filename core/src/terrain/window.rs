@@ -310,6 +310,8 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
+    // A call: tiles come and settle in several places.
+    #[inline(never)]
     pub(super) fn renew_maxima(&mut self, tile: TileIndex, top: i32) {
         self.pyramid.set(0, tile.col, tile.row, top);
         for level in 1..=MaxPyramid::<D>::HEIGHT {

@@ -1,0 +1,273 @@
+//! A hand that is faster than the link: 2,000 cells a second over a line of 200 kB/s. It feels the
+//! underlay where its tiles are late, and no hole.
+
+use std::time::Duration;
+
+use hapterra::link::{
+    Arming, Emulator, Event, Native, Patience, Session, Tally, Transport, move_arm_while,
+};
+use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
+use hapterra::place::Reach;
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::synth::{Kind, Synth};
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::force::ForceLaw;
+use hapterra_core::guard::Limits;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_firmware::native::StoppedClock;
+use hapterra_tests::emulation::emulated_board;
+use hapterra_tests::shared;
+use hapterra_tests::slow_line::SlowLine;
+
+/// Millimetres of the hand a cell: 2,000 cells a second are 200 mm/s.
+const CELL_MM: f64 = 0.1;
+const SPEED_MM_S: f64 = 200.0;
+/// What the line carries: 200 kB/s.
+const BYTES_A_MS: u64 = 200;
+/// From the middle of the slide to either end, mm.
+const AWAY_MM: f64 = 60.0;
+/// The guard changes the force by at most so much in a tick of a millisecond, N.
+const SLEW_N: f32 = 1.0;
+
+/// Where the hand slides: around the middle of a terrain.
+struct Slide<'t> {
+    terrain: &'t Terrain<'t>,
+    home_mm: [f64; 3],
+    ground_mm: [f64; 2],
+    rig: HeldPhantom,
+    ticks: u32,
+}
+
+impl<'t> Slide<'t> {
+    fn over(terrain: &'t Terrain<'t>) -> Self {
+        let surface = |east: f64, north: f64| terrain.height_mm(east, north);
+        let middle = terrain.size_mm().map(|side| 0.5 * side);
+        let [x, y] = middle;
+        let ground = surface(x, y).expect("ground in the middle");
+        let (hand, law) = (HandModel::default(), ForceLaw::PREMIUM);
+        let wall = f64::from(law.stiffness_n_per_mm);
+        let ends = [[x + AWAY_MM, y + 10.0], [x - AWAY_MM, y - 10.0]];
+        let mut touch = Touch::start(&surface, &hand, wall, middle, 10.0).press(1.5, 0.3);
+        for _ in 0..3 {
+            touch = touch.slide(&ends, 1.5, SPEED_MM_S);
+        }
+        let script: Script = touch.lift(10.0).finish().wait(0.2);
+        let ticks = ((HeldPhantom::ARMED_S + script.duration_s()) * 1e3) as u32;
+        let home_mm = [x, y, ground + 15.0];
+        let model = PhantomModel::premium_1_5();
+        let rig = HeldPhantom::new(model, hand, Placement { home_mm }, script).expect("in reach");
+        Self {
+            terrain,
+            home_mm,
+            ground_mm: middle,
+            rig: rig.arming(),
+            ticks,
+        }
+    }
+
+    fn scene(&self, has_underlay: bool) -> Scene {
+        let home = self.terrain.scale().to_grid(self.home_mm);
+        let home = home.expect("addressable");
+        let scene = self
+            .terrain
+            .scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
+        // Its time goes on, as a board's does.
+        let scene = Scene {
+            hold_clock: false,
+            ..scene
+        };
+        let reach = Reach::of(&Calibration::PREMIUM_1_5);
+        match has_underlay {
+            true => self.terrain.underlaid(scene, reach.sides_mm()),
+            false => scene,
+        }
+    }
+
+    fn felt(&self, scene: Scene, line: impl Transport, patience: Patience) -> (Vec<Sample>, Tally) {
+        let line = Box::new(SlowLine::new(line, BYTES_A_MS));
+        let arming = Some(Arming::VIRTUAL);
+        let (mut session, _) =
+            Session::open(self.terrain, scene, arming, line, patience).expect("opened");
+        let mut samples = Vec::new();
+        while samples
+            .last()
+            .is_none_or(|last: &Sample| last.tick < self.ticks)
+        {
+            let mut take = |event: Event<'_>| {
+                if let Event::Sample(sample) = event {
+                    samples.push(*sample);
+                }
+            };
+            session
+                .poll(Duration::from_millis(20), &mut take)
+                .expect("goes on");
+        }
+        session.say_goodbye(&mut |_| {}).expect("disarmed");
+        (samples, session.tally().clone())
+    }
+
+    /// The underlay's own error over all that the hand slides over, mm: at the samples, where the
+    /// two differ most, as both are bilinear between them.
+    fn stated_error_mm(&self, scene: &Scene) -> f64 {
+        let underlay = scene.underlay.expect("an underlay");
+        let size = self.terrain.size();
+        let at = |column: i32, row: i32| {
+            let place = [column.clamp(0, size[0]), row.clamp(0, size[1])];
+            let [east, north] = place.map(|cells| f64::from(cells) * CELL_MM);
+            self.terrain.height_mm(east, north).expect("known")
+        };
+        let side = underlay.spacing();
+        let coarse = |column: i32, row: i32| {
+            let along = |at: i32, first: i32| {
+                let cell = (at - first).div_euclid(side);
+                (
+                    first + cell * side,
+                    f64::from((at - first).rem_euclid(side)) / f64::from(side),
+                )
+            };
+            let ((west, u), (south, v)) = (
+                along(column, underlay.first.x),
+                along(row, underlay.first.y),
+            );
+            let mix = |a: f64, b: f64, t: f64| a * (1.0 - t) + b * t;
+            mix(
+                mix(at(west, south), at(west + side, south), u),
+                mix(at(west, south + side), at(west + side, south + side), u),
+                v,
+            )
+        };
+        let away = [AWAY_MM + 8.0, 18.0].map(|mm| (mm / CELL_MM) as i32);
+        let [x, y] = self.ground_mm.map(|mm| (mm / CELL_MM) as i32);
+        let mut worst = 0.0_f64;
+        for column in x - away[0]..=x + away[0] {
+            for row in y - away[1]..=y + away[1] {
+                worst = worst.max((at(column, row) - coarse(column, row)).abs());
+            }
+        }
+        worst
+    }
+}
+
+/// What was felt of the ground: ticks in contact, those over a hole for want of a tile, those over
+/// coarse ground, and how far the proxy was from the terrain at most, mm.
+#[derive(Debug, Default)]
+struct Ground {
+    touched: u32,
+    lacked: u32,
+    coarse: u32,
+    off_mm: f64,
+    step_n: f32,
+}
+
+fn judged(terrain: &Terrain<'_>, samples: &[Sample]) -> Ground {
+    let mut ground = Ground::default();
+    for sample in samples {
+        ground.lacked += u32::from(sample.limits.contains(Limits::TERRAIN_MISSING));
+        if sample.state != ContactState::Touching {
+            continue;
+        }
+        ground.touched += 1;
+        ground.coarse += u32::from(sample.limits.contains(Limits::TERRAIN_COARSE));
+        let [east, north, up] = terrain.scale().to_mm(&sample.proxy);
+        let height = terrain.height_mm(east, north).expect("over the terrain");
+        ground.off_mm = ground.off_mm.max((up - height).abs());
+    }
+    for pair in samples
+        .windows(2)
+        .filter(|pair| pair[1].tick == pair[0].tick + 1)
+    {
+        let step = (pair[1].force_n - pair[0].force_n).length();
+        ground.step_n = ground.step_n.max(step);
+    }
+    ground
+}
+
+fn holds(name: &str, slide: &Slide<'_>, scene: &Scene, felt: &(Vec<Sample>, Tally)) {
+    let (samples, tally) = felt;
+    assert_eq!(tally.lost + tally.dropped, 0, "{name}");
+    let ground = judged(slide.terrain, samples);
+    let stated = slide.stated_error_mm(scene);
+    eprintln!(
+        "{name}: {ground:?}, underlay off by up to {stated:.3} mm, {} tiles",
+        tally.tiles
+    );
+    // All that is known before the underlay has come is that it has not.
+    let comes = samples
+        .iter()
+        .position(|s| !s.limits.contains(Limits::TERRAIN_MISSING));
+    assert!(comes.is_some_and(|tick| tick < 1000), "{name}: {comes:?}");
+    let ground_then = judged(slide.terrain, &samples[comes.unwrap_or(0)..]);
+    assert_eq!(ground_then.lacked, 0, "{name}");
+    assert!(ground.touched > 1500, "{name}: hardly a touch");
+    assert!(ground.coarse > 100, "{name}: the line was fast enough");
+    assert!(
+        ground.step_n <= SLEW_N * 1.001,
+        "{name}: {} N",
+        ground.step_n
+    );
+    assert!(
+        ground.off_mm <= stated + 1e-4,
+        "{name}: {} mm",
+        ground.off_mm
+    );
+}
+
+fn native(slide: &Slide<'_>, scene: Scene) -> (Vec<Sample>, Tally) {
+    let arm = Some(Box::new(slide.rig.clone()));
+    let device: Native = Native::new(StoppedClock, arm).in_steps_of(1);
+    slide.felt(scene, device, Patience::REAL_TIME)
+}
+
+fn made() -> Raster {
+    Synth::new(Kind::Fractal, 5, 300.0)
+        .raster(3000, 2000)
+        .expect("raster")
+}
+
+#[test]
+fn at_2000_cells_a_second_over_200_kb_a_second_there_is_no_hole() {
+    let raster = made();
+    let scale = Scale::new(CELL_MM, 0.1).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    let slide = Slide::over(&terrain);
+    let without = slide.scene(false);
+    let ground = judged(&terrain, &native(&slide, without).0);
+    assert!(
+        ground.lacked > 100,
+        "without an underlay there are holes: {ground:?}"
+    );
+    let scene = slide.scene(true);
+    holds(
+        "made, in this program",
+        &slide,
+        &scene,
+        &native(&slide, scene),
+    );
+}
+
+#[test]
+fn on_the_emulated_board_over_real_ground_there_is_none_either() {
+    let Some((qemu, image)) = emulated_board() else {
+        return;
+    };
+    let file = shared("dem/large/globe_g10g_10800x6000_i16_cog.tif");
+    let raster = match file {
+        Some(path) => Raster::open(path, &OpenOptions::default()).expect("opens"),
+        None => made(),
+    };
+    // Mountains of thousands of metres in millimetres.
+    let scale = Scale::new(CELL_MM, 0.0005).expect("scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+    let slide = Slide::over(&terrain);
+    let scene = slide.scene(true);
+    let (emulator, mut lines) = Emulator::start(&qemu, &image).expect("starts");
+    let mut arm = slide.rig.clone();
+    let felt = move_arm_while(&mut lines.plant, &mut arm, || {
+        let felt = slide.felt(scene, lines.link, Patience::EMULATED);
+        emulator.finish().expect("ends");
+        felt
+    });
+    holds("real, on the emulated board", &slide, &scene, &felt);
+}
