@@ -135,8 +135,9 @@ const fn waker(caller: &'static [&'static str]) -> Exception {
 }
 
 const H743_MEMORIES: &[Memory] = &[
-    // Plenty; the smaller board is the one that has to be small.
-    memory("flash", 0x0800_0000, 2048 * KIB, 192 * KIB),
+    // A tripwire: there is plenty, and the smaller board is the one that has to be small. The
+    // same program takes 8 % more here than on a Cortex-M4.
+    memory("flash", 0x0800_0000, 2048 * KIB, 208 * KIB),
     memory("AXI RAM", 0x2400_0000, 512 * KIB, 512 * KIB),
     // The stack's own; 32 KiB of it at least.
     memory("DTCM", 0x2000_0000, 128 * KIB, 96 * KIB),

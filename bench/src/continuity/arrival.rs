@@ -1,7 +1,10 @@
 //! The product's contact while the next tile comes late.
 
 use hapterra_core::contact::{Contact, ContactSettings, ContactState};
-use hapterra_core::terrain::{FieldSize, TILE_CELLS, TileDemand, TileKey, TileRequester};
+use hapterra_core::grid::Cell;
+use hapterra_core::terrain::{
+    FieldSize, SETTLING_MM_S, TILE_CELLS, Tile, TileDemand, TileKey, TileRequester, Underlay,
+};
 
 use super::row::{DEPTH, Row, SIDE, STEP};
 use crate::compare::SWEPT;
@@ -12,6 +15,9 @@ use crate::product::{buffers, empty, fill};
 
 /// Where the HIP begins to slide, cells before the next tile.
 const BEFORE: f64 = 1.0;
+/// Cells that the surface moves in a tick from the underlay to a tile that has come: at 1 kHz, a
+/// cell a millimetre.
+const SETTLED_A_TICK: f32 = SETTLING_MM_S / 1_000.0;
 /// Ticks it slides eastward.
 const TICKS: u32 = 400;
 
@@ -19,32 +25,62 @@ const TICKS: u32 = 400;
 /// is so far beyond its border.
 pub(super) fn measure() -> Vec<Row> {
     let late = |beyond: f64| ((BEFORE + beyond) / STEP) as u32;
+    let under = Some(UNDERLAY);
     [
-        ("every tile here", 0),
-        ("tile 0.2 cell late", late(0.2)),
-        ("tile 0.45 cell late", late(0.45)),
-        ("tile 1 cell late", late(1.0)),
+        ("every tile here", 0, None),
+        ("tile 0.2 cell late", late(0.2), None),
+        ("tile 0.45 cell late", late(0.45), None),
+        ("tile 1 cell late", late(1.0), None),
+        ("0.2 cell late over an underlay", late(0.2), under),
+        ("0.45 cell late over an underlay", late(0.45), under),
+        ("1 cell late over an underlay", late(1.0), under),
     ]
-    .map(|(name, due)| Row::of(name, SWEPT, &[&felt(due)]))
+    .map(|(name, due, underlay)| Row::of(name, SWEPT, &[&felt(due, underlay)]))
     .to_vec()
 }
 
+/// Under both tiles.
+const UNDERLAY: Underlay = Underlay {
+    first: Cell::new(0, 0),
+    shift: 3,
+};
+
+/// The underlay's tile; beyond the field it goes on as it ends there.
+fn coarse(grid: &Grid, underlay: &Underlay) -> Tile {
+    let mut tile = Tile::VACANT;
+    let side = underlay.spacing() as usize;
+    let height = |col: usize, row: usize| {
+        grid.post((col * side).min(grid.columns), (row * side).min(grid.rows))
+    };
+    tile.fill(underlay.key(0), 0, height).expect("in range");
+    tile
+}
+
 /// What is felt from where the HIP begins to slide.
-fn felt(due: u32) -> Vec<Answer> {
+fn felt(due: u32, underlay: Option<Underlay>) -> Vec<Answer> {
     let grid = Grid::from_fn("two tiles", [2 * TILE_CELLS, TILE_CELLS], |x, y| {
         (1.5 * (0.2 * x as f64).sin() * (0.17 * y as f64).cos()) as f32
     });
+    let mut under;
     let mut tiles = buffers::<SIDE>();
     let (mut window, mut spare) = empty::<SIDE>(&grid, &mut tiles);
     let size = FieldSize::new(grid.columns as i32, grid.rows as i32);
     let mut requester = TileRequester::<SIDE>::new();
     requester.reset(0, size);
+    window.lay(underlay);
+    under = underlay.map(|underlay| coarse(&grid, &underlay));
+    if let Some(tile) = &mut under {
+        assert!(window.take(tile, [Cell::new(0, 0); 2]).is_none());
+    }
 
     let (hips, approach) = hips(&grid);
     let mut contact = Contact::new(ContactSettings::REAL_TIME);
     let mut coming: Vec<TileKey> = Vec::new();
     let mut answers = Vec::new();
     for (tick, hip) in (0..).zip(&hips) {
+        if window.settle(SETTLED_A_TICK) {
+            contact.surface_moved(&window);
+        }
         let felt = *contact.step(&window, &hip.grid);
         answers.push(Answer {
             touching: felt.state == ContactState::Touching,
@@ -63,7 +99,8 @@ fn felt(due: u32) -> Vec<Answer> {
         for key in coming.extract_if(.., |key| is_here(key)) {
             requester.received(key);
             fill(&grid, key, spare);
-            spare = window.install(spare);
+            let at = [felt.proxy.column(), hip.grid.column()];
+            spare = window.take(spare, at).expect("one comes back for one");
         }
     }
     answers.split_off(approach as usize - 1)

@@ -127,6 +127,10 @@ mod tests {
             ("tile 0.2 cell late", 0.15),
             ("tile 0.45 cell late", 0.05),
             ("tile 1 cell late", 0.012),
+            // What the surface moves in a tick, and the way of the HIP.
+            ("0.2 cell late over an underlay", 0.0531),
+            ("0.45 cell late over an underlay", 0.0531),
+            ("1 cell late over an underlay", 0.0531),
         ];
         for (ground, bound) in bounds {
             assert!(ours(ground) < bound, "{ground}: {}", ours(ground));

@@ -95,12 +95,10 @@ impl<const D: usize> TileRequester<D> {
         self.size = size;
     }
 
-    /// The field has this underlay, which is not held; or none.
-    #[inline(never)]
+    /// The field has this underlay, which is not held; or none. All underlays of a level have one
+    /// name: what was asked for before is to be forgotten ([`Self::forget_asked`]).
     pub fn lay(&mut self, underlay: Option<Underlay>) {
-        let level = self.level;
-        self.asked.retain(|(asked, _)| asked.level == level);
-        self.underlay = underlay.map(|underlay| (underlay.key(level), false));
+        self.underlay = underlay.map(|underlay| (underlay.key(self.level), false));
     }
 
     /// Forgets what was asked, as after the link was lost; held tiles stay.
@@ -300,7 +298,8 @@ mod tests {
         requester.lay(Some(underlay));
         assert_eq!(requester.next_request(0, &at(400, 48)), Some(key));
         requester.lay(None);
-        assert!(!requester.awaits(key));
+        requester.forget_asked();
+        assert_eq!(drain(&mut requester, 0, &at(400, 48)), []);
     }
 
     #[test]

@@ -100,6 +100,8 @@
 //! - What waits for a press of the dead-man switch (an arm command before anything is
 //!   driven, a calibration to be stored) ends after 2 s without a frame of the session:
 //!   its host is not there to see what the press does.
+//! - The underlay of a scene is asked for before its other tiles, and by its own key
+//!   ([`Underlay::key`](crate::terrain::Underlay::key)); each view brings its own.
 //! - A new session keeps the scene and every tile that is held; samples and requests
 //!   are numbered anew. Where the arm was being armed but nothing is driven yet, that
 //!   is ended: the new host has to ask itself. So it is where its host detaches.
