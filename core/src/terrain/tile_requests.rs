@@ -3,7 +3,8 @@
 //! What the device asks for follows from the tile that the loop lacks, from where
 //! the proxy and the haptic interface point (HIP) are, and from how the HIP moves.
 //! A tile that the HIP cannot reach within [`HORIZON_TICKS`] is not asked for, one
-//! that is held is not asked for again. Time is counted in ticks.
+//! that is held is not asked for again, and over an underlay one that the HIP will have left before
+//! it can come is not asked for either. Time is counted in ticks.
 
 use heapless::Vec;
 
@@ -20,6 +21,8 @@ pub const MARGIN_CELLS: i32 = 12;
 pub const RETRY_TICKS: u32 = 250;
 /// Tiles asked for and not yet received, at most.
 pub const IN_FLIGHT: usize = 4;
+/// What an answer counts beside those before it, where it is told how soon answers come.
+const ANSWER_SHARE: f32 = 0.125;
 /// Places along the predicted path around which tiles are wanted.
 const LOOK_AHEAD: i32 = 8;
 
@@ -67,6 +70,10 @@ pub struct TileRequester<const D: usize> {
     /// The underlay's tile, and whether it is held: it is wanted before all others.
     underlay: Option<(TileKey, bool)>,
     asked: Vec<(TileKey, u32), IN_FLIGHT>,
+    /// The tick in which something was last asked for, and in how many ticks the last answers
+    /// came.
+    now: u32,
+    answer_ticks: f32,
 }
 
 impl<const D: usize> Default for TileRequester<D> {
@@ -85,6 +92,8 @@ impl<const D: usize> TileRequester<D> {
             held: [[None; D]; D],
             underlay: None,
             asked: Vec::new(),
+            now: 0,
+            answer_ticks: 0.0,
         }
     }
 
@@ -128,6 +137,10 @@ impl<const D: usize> TileRequester<D> {
 
     /// The tile was handed to the window.
     pub fn received(&mut self, key: TileKey) {
+        if let Some((_, at)) = self.asked.iter().find(|(asked, _)| *asked == key) {
+            let ticks = self.now.wrapping_sub(*at).min(RETRY_TICKS) as f32;
+            self.answer_ticks += (ticks - self.answer_ticks) * ANSWER_SHARE;
+        }
         self.asked.retain(|(asked, _)| *asked != key);
         match &mut self.underlay {
             Some((underlay, is_held)) if *underlay == key => *is_held = true,
@@ -169,6 +182,7 @@ impl<const D: usize> TileRequester<D> {
     /// room for more.
     #[inline(never)]
     pub fn next_repeat(&mut self, now: u32, demand: &TileDemand) -> Option<TileKey> {
+        self.now = now;
         let is_overdue = |at: &u32| now.wrapping_sub(*at) >= RETRY_TICKS;
         let (level, centre) = (self.level, demand.centre());
         let is_near = |key: &TileKey| key.level != level || Self::reaches(centre, key.index);
@@ -186,13 +200,22 @@ impl<const D: usize> TileRequester<D> {
     /// that none can push out a tile that is nearer.
     fn most_urgent(&self, demand: &TileDemand) -> Option<TileKey> {
         let centre = demand.centre();
+        // Over an underlay nothing waits for a tile that the HIP has left when it comes.
+        let first = if self.underlay.is_some() {
+            self.answer_ticks
+        } else {
+            0.0
+        };
+        // The casts saturate, so any velocity gives some cell.
+        let after = |from: Cell, ticks: f32| {
+            let [east, north] = demand.velocity.map(|v| (v * ticks) as i32);
+            from.offset(east, north)
+        };
         let ahead = (0..=LOOK_AHEAD).map(|step| {
             let ticks = (step * HORIZON_TICKS / LOOK_AHEAD) as f32;
-            // The casts saturate, so any velocity gives some cell.
-            let [east, north] = demand.velocity.map(|v| (v * ticks) as i32);
-            demand.hip.offset(east, north)
+            after(demand.hip, first + ticks)
         });
-        let mut places = core::iter::once(demand.proxy).chain(ahead);
+        let mut places = core::iter::once(after(demand.proxy, first)).chain(ahead);
         let missing = demand.missing_tile;
         missing
             .and_then(|tile| self.candidate(tile, centre))
@@ -300,6 +323,36 @@ mod tests {
         requester.lay(None);
         requester.forget_asked();
         assert_eq!(drain(&mut requester, 0, &at(400, 48)), []);
+    }
+
+    #[test]
+    fn over_an_underlay_what_the_hip_has_left_before_it_can_come_is_not_asked_for() {
+        for has_underlay in [false, true] {
+            let mut requester = requester();
+            if has_underlay {
+                let first = Cell::new(0, 0);
+                requester.lay(Some(Underlay { first, shift: 4 }));
+                requester.received(Underlay { first, shift: 4 }.key(0));
+            }
+            // Answers take 60 ticks each.
+            for (tick, col) in (0..40_u32).map(|n| (n * 61, n as i32 % 8)) {
+                let here = at(col * 32 + 16, 48);
+                for (col, row) in drain(&mut requester, tick, &here) {
+                    drain(&mut requester, tick + 60, &here);
+                    requester.received(TileKey::new(0, col, row));
+                }
+            }
+            // One cell a tick: in 60 ticks the HIP is two tiles on.
+            let demand = TileDemand {
+                velocity: [1.0, 0.0],
+                ..at(16 * 32 + 16, 48)
+            };
+            let first = drain(&mut requester, 4000, &demand);
+            assert_eq!(first.contains(&(16, 1)), !has_underlay, "{first:?}");
+            // A HIP that stands still is there when it comes.
+            let first = drain(&mut requester, 4000, &at(16 * 32 + 16, 48));
+            assert_eq!(first.contains(&(16, 1)), has_underlay, "{first:?}");
+        }
     }
 
     #[test]
