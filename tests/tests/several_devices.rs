@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use hapterra::link::Native;
+use hapterra_core::guard::Sense;
 use hapterra_core::wire::session::SessionEnd;
 use hapterra_tests::served::{Served, ended_within, signal, terrain, told};
 use hapterra_tests::{greedy, hapterra_binary};
@@ -80,16 +81,23 @@ impl Pair {
     }
 }
 
+/// Lines that are heard before one that is waited for, at most.
+const MOST_LINES: usize = 60;
+
 /// Reads lines until each of these has begun one.
 fn hear<R: std::io::Read>(from: R, beginnings: &[String]) -> R {
     let mut lines = BufReader::with_capacity(1, from);
     let mut missing: Vec<&String> = beginnings.iter().collect();
-    while !missing.is_empty() {
+    for _ in 0..MOST_LINES {
+        if missing.is_empty() {
+            break;
+        }
         let mut line = String::new();
         let read = lines.read_line(&mut line).expect("text");
         assert!(read > 0, "it ended before {missing:?}");
         missing.retain(|beginning| !line.starts_with(beginning.as_str()));
     }
+    assert!(missing.is_empty(), "no line begins with {missing:?}");
     lines.into_inner()
 }
 
@@ -293,15 +301,15 @@ fn a_device_that_is_not_there_fails_alone_and_is_told_at_once() {
 
 #[test]
 fn a_fault_of_one_arm_is_told_of_it_and_the_other_knows_nothing_of_it() {
-    let jumps = Served::with(|| {
-        let jump = Box::new(
-            |tick: u64, sense: &mut hapterra_core::guard::Sense, _: &_| {
-                sense.counts[0] = 100_000 * i32::from(tick.is_multiple_of(2));
-            },
-        );
-        (Native::for_replay().restless().meddled_with(jump), || {})
+    // A current flows that nobody commanded.
+    let conducts = Served::with(|| {
+        let current = Box::new(|_, sense: &mut Sense, _: &_| {
+            sense.measured_ma = Some([2_000, 0, 0]);
+        });
+        let device = Native::for_replay().restless().meddled_with(current);
+        (device, || {})
     });
-    let pair = Pair::of(jumps);
+    let pair = Pair::of(conducts);
     let mut child = pair.start();
     let fault = format!("{} FAULT ", pair.name(2));
     child.stderr = Some(hear(child.stderr.take().expect("piped"), &[fault]));
@@ -347,6 +355,45 @@ fn a_hostile_device_costs_the_other_nothing() {
     assert!(told.contains(&format!("[1 {greedy}] error: ")), "{told}");
     assert!(!told.contains(&format!("[2 {there}] error: ")), "{told}");
     assert_eq!(served.last_end(), SessionEnd::Goodbye, "{told}");
+}
+
+/// Bytes that a command reads from files in all, as the system counts them.
+#[cfg(target_os = "linux")]
+fn bytes_read(command: &Command) -> u64 {
+    let output = Command::new("sh")
+        .args(["-c", "\"$@\" >&2 && cat /proc/$$/io", "sh"])
+        .arg(command.get_program())
+        .args(command.get_args())
+        .output()
+        .expect("it runs");
+    assert!(output.status.success(), "{}", told(&output));
+    let counts = String::from_utf8_lossy(&output.stdout).into_owned();
+    let read = counts.lines().find_map(|line| line.strip_prefix("rchar: "));
+    read.and_then(|read| read.parse().ok()).expect(&counts)
+}
+
+/// Of a terrain that stays in its file.
+#[cfg(target_os = "linux")]
+#[test]
+fn two_devices_read_no_byte_of_the_terrain_that_one_does_not_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("large.tif");
+    let path = path.to_str().expect("a plain path");
+    let made = Command::new(hapterra_binary())
+        .args(["synth", "fractal", "-o", path, "--size", "2048"])
+        .status();
+    assert!(made.expect("it runs").success());
+    let read_by = |devices: usize| {
+        let mut command = Command::new(hapterra_binary());
+        command.args(["run", path, "--in-memory-mb", "1", "--seconds", "8"]);
+        for _ in 0..devices {
+            command.args(["--device", "native"]);
+        }
+        bytes_read(&command)
+    };
+    let (one, two) = (read_by(1), read_by(2));
+    assert!(one > 1 << 20, "{one} bytes: the terrain is read");
+    assert_eq!(one, two);
 }
 
 #[test]
