@@ -282,6 +282,11 @@ mod tests {
         assert_eq!(due[0], [Steer::Change(ViewChange::Reset)]);
         let mut told = vec![];
         let (mut taken, t_s) = (0, 0.0);
+        // What is not due yet is left where there is a bound.
+        for _ in 0..3 {
+            assert_eq!(second.due(t_s, false, &mut |line| told.push(line)), None);
+            assert_eq!(second.waiting.len(), WAITING);
+        }
         while second.due(t_s, true, &mut |line| told.push(line)).is_some() {
             taken += 1;
         }
