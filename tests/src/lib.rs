@@ -12,6 +12,7 @@ pub mod faulty;
 pub mod field;
 pub mod figures;
 pub mod fuzzing;
+pub mod greedy;
 pub mod invariants;
 pub mod link_campaign;
 pub mod minima;
@@ -21,6 +22,8 @@ pub mod real_ground;
 pub mod rows;
 pub mod scene;
 pub mod slow_line;
+#[cfg(unix)]
+pub mod served;
 pub mod soak;
 pub mod usb;
 pub mod walk;

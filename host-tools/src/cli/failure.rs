@@ -13,6 +13,8 @@ type AnyError = Box<dyn Error + Send + Sync>;
 pub struct Failure {
     error: AnyError,
     hint: Option<String>,
+    /// What the error is about, where that is one thing of several.
+    about: Option<String>,
 }
 
 /// An error that tells by itself what to do next; `?` makes a [`Failure`] of it.
@@ -47,6 +49,7 @@ impl Failure {
         Self {
             error: error.into(),
             hint: None,
+            about: None,
         }
     }
 
@@ -57,9 +60,17 @@ impl Failure {
         self
     }
 
+    /// Names what the error is about, where that has a name.
+    #[must_use]
+    pub(super) fn about(mut self, name: Option<&str>) -> Self {
+        self.about = name.map(str::to_owned);
+        self
+    }
+
     /// The lines shown to the user: the error with its causes, then the hint.
     pub fn text(&self) -> String {
-        let mut text = format!("error: {}", self.error);
+        let about = self.about.as_ref().map(|name| format!("{name} "));
+        let mut text = format!("error: {}{}", about.unwrap_or_default(), self.error);
         let mut cause = self.error.source();
         while let Some(error) = cause {
             // Writing to a String cannot fail.

@@ -1,10 +1,12 @@
 //! Diagnostics on standard error. A device can cause some of them, as often as it
 //! likes and with words of its own: every line goes through [`shown`], and of each kind
-//! of line about the link one a second is written, with the count of those left out.
+//! of line about the link one a second is written, with the count of those left out. Each
+//! device is served by a thread of its own, and the lines of one device leave none of another's out.
 
 use std::collections::HashMap;
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, ThreadId};
 use std::time::Instant;
 
 use tracing::Metadata;
@@ -62,8 +64,8 @@ impl Write for Spoken {
 /// The log, over what `open` gives.
 pub(super) struct Log<W> {
     open: Arc<dyn Fn() -> W + Send + Sync>,
-    /// Of each kind of line that a device can cause.
-    kinds: Arc<Mutex<HashMap<Identifier, Sparing>>>,
+    /// Of each kind of line that a device can cause, and each thread that serves one.
+    kinds: Arc<Mutex<HashMap<(Identifier, ThreadId), Sparing>>>,
 }
 
 impl<W> Clone for Log<W> {
@@ -90,7 +92,8 @@ impl<W: Write> Log<W> {
             return Some(0);
         }
         let mut kinds = self.kinds.lock().unwrap_or_else(PoisonError::into_inner);
-        let kind = kinds.entry(about.callsite()).or_insert(Sparing::new(1));
+        let key = (about.callsite(), thread::current().id());
+        let kind = kinds.entry(key).or_insert(Sparing::new(1));
         kind.admit(now)
     }
 
@@ -206,6 +209,27 @@ mod tests {
             rest.split(' ').next()?.parse::<usize>().ok()
         });
         assert_eq!(said + left_out.sum::<usize>(), 100_000, "{text}");
+    }
+
+    #[test]
+    fn a_device_that_floods_the_log_leaves_no_line_of_another_out() {
+        let text = written(|| {
+            let subscriber = tracing::dispatcher::get_default(Clone::clone);
+            let flood = |device: &'static str, lines: u32| {
+                let subscriber = subscriber.clone();
+                move || {
+                    tracing::dispatcher::with_default(&subscriber, || {
+                        for _ in 0..lines {
+                            tracing::warn!(target: "hapterra::link", device, "odd");
+                        }
+                    });
+                }
+            };
+            for (device, lines) in [("first", 10_000), ("second", 1)] {
+                thread::scope(|scope| drop(scope.spawn(flood(device, lines))));
+            }
+        });
+        assert!(text.contains("second"), "{text}");
     }
 
     #[test]

@@ -4,15 +4,17 @@ use hapterra_core::phantom::{Calibration, Model};
 
 use super::bringup::PATIENCE;
 use super::failure::{Failure, OrHint};
-use super::terminal::voice::tell;
 use crate::link::{DeviceAddress, Dialogue, HostClock, Native};
 
 /// Asks a device for its calibration, and takes nothing from whoever serves it; the preset
-/// of its model where it has none.
+/// of its model where it has none, which is told.
 ///
 /// # Errors
 /// No device, one that does not answer, or a calibration that cannot be used.
-pub(super) fn calibration_of(address: &DeviceAddress) -> Result<Calibration, Failure> {
+pub(super) fn calibration_of(
+    address: &DeviceAddress,
+    tell: &dyn Fn(String),
+) -> Result<Calibration, Failure> {
     let transport = address.connect(|| Native::new(HostClock::default(), None))?;
     let mut dialogue = Dialogue::look(transport, PATIENCE)?;
     let calibration = match dialogue.calibration()? {

@@ -180,12 +180,12 @@ impl Raster {
         self.elsewhere.stop_waiting(true);
     }
 
-    /// How often heights were asked for that were not here yet. Where it grows while heights
-    /// are read, some of their holes are none.
+    /// How often this thread asked for heights that were not here yet. Where it grows while
+    /// the thread reads heights, some of their holes are none.
     pub fn not_yet(&self) -> u64 {
         match &self.source.storage {
             Storage::Held { .. } => 0,
-            Storage::Blocks(blocks) => blocks.not_yet(),
+            Storage::Blocks(_) => blocks::not_yet(),
         }
     }
 

@@ -5,7 +5,8 @@ use crate::place::ViewChange;
 
 /// What is understood, for messages.
 pub const UNDERSTOOD: &str = "pan EAST NORTH (hand mm), pan-m EAST NORTH (ground m), zoom TIMES, \
-     exaggerate TIMES, stiffness TIMES, reset, clutch on, clutch off; `at SECONDS` before any of them";
+     exaggerate TIMES, stiffness TIMES, reset, clutch on, clutch off; `at SECONDS` before any of them, and before that \
+     `on NUMBER` for one device of several";
 
 /// A command, and when it is to be done.
 #[derive(Clone, Copy, Debug, PartialEq)]

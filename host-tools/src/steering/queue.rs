@@ -2,16 +2,21 @@
 
 use std::collections::VecDeque;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
 use super::Steer;
 use super::command::{Command, parse};
 
-/// Lines that wait to be read; a writer waits beyond them.
+/// Commands of a device that wait to be taken or to be done; a writer waits beyond them.
 const WAITING: usize = 256;
+/// The same where several devices are served: a device that is gone holds the others' commands
+/// up as little as its own, so beyond these its own are left out.
+const WAITING_EACH: usize = 1 << 16;
 
 /// Where commands come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,13 +38,17 @@ impl FromStr for Origin {
     }
 }
 
-/// Commands in their order.
+/// Commands for one device, in their order.
 #[derive(Default)]
 pub struct CommandQueue {
-    lines: Option<Receiver<String>>,
-    line: u64,
+    lines: Option<Receiver<Read>>,
     waiting: VecDeque<Command>,
+    /// Commands that there was no room for.
+    left_out: Arc<AtomicU64>,
 }
+
+/// A line as it was read: a command, or what is wrong with it.
+type Read = Result<Command, String>;
 
 impl CommandQueue {
     /// Reads commands from now on, in a thread of its own.
@@ -47,25 +56,54 @@ impl CommandQueue {
     /// # Errors
     /// A file that cannot be opened.
     pub fn of(origin: &Origin) -> io::Result<Self> {
-        let lines = match origin {
-            Origin::StandardInput => lines_of(io::stdin()),
-            Origin::File(path) => lines_of(File::open(path)?),
-        };
+        let (send, lines) = sync_channel(WAITING);
+        read_lines(origin, move |line, number| {
+            let read = for_each(line, number, 1).transpose();
+            read.is_none_or(|read| send.send(read.map(|(_, command)| command)).is_ok())
+        })?;
         Ok(Self {
             lines: Some(lines),
             ..Self::default()
         })
     }
 
+    /// Reads commands for so many devices from now on, in a thread of its own, a queue for
+    /// each: `on 2 zoom 2` is for the second one, and a command without `on` for each. No
+    /// device's commands wait for another device.
+    ///
+    /// # Errors
+    /// A file that cannot be opened.
+    pub fn of_several(origin: &Origin, devices: usize) -> io::Result<Vec<Self>> {
+        let (sends, queues): (Vec<_>, Vec<_>) = (0..devices)
+            .map(|_| {
+                let (send, lines) = sync_channel(WAITING_EACH);
+                let queue = Self {
+                    lines: Some(lines),
+                    ..Self::default()
+                };
+                ((send, Arc::clone(&queue.left_out)), queue)
+            })
+            .unzip();
+        read_lines(origin, move |line, number| hand_out(line, number, &sends))?;
+        Ok(queues)
+    }
+
     /// The next command that is due at a time of the device, s; `is_free` tells whether what came
     /// before is done. What is wrong with a line is told.
     pub fn due(&mut self, t_s: f64, is_free: bool, tell: &mut dyn FnMut(String)) -> Option<Steer> {
-        while let Some(Ok(line)) = self.lines.as_ref().map(Receiver::try_recv) {
-            self.line += 1;
-            match parse(&line) {
-                Ok(command) => self.waiting.extend(command),
-                Err(why) => tell(format!("line {} of the commands: {why}", self.line)),
+        while self.waiting.len() < WAITING
+            && let Some(Ok(read)) = self.lines.as_ref().map(Receiver::try_recv)
+        {
+            match read {
+                Ok(command) => self.waiting.push_back(command),
+                Err(why) => tell(why),
             }
+        }
+        let left_out = self.left_out.swap(0, Ordering::Relaxed);
+        if left_out > 0 {
+            tell(format!(
+                "{left_out} commands were left out: this device was too far behind"
+            ));
         }
         let next = self.waiting.front()?;
         let is_due = is_free && next.at_s.is_none_or(|at_s| t_s >= at_s);
@@ -76,17 +114,86 @@ impl CommandQueue {
     }
 }
 
-/// Reads lines until the input ends, or nobody takes them.
-fn lines_of(input: impl Read + Send + 'static) -> Receiver<String> {
-    let (send, lines) = sync_channel(WAITING);
+/// A way to the queue of a device, and the count of what there was no room for.
+type Way = (SyncSender<Read>, Arc<AtomicU64>);
+
+/// Hands a line out to the devices that it is for; what is wrong with it goes to the first
+/// that is still served. Whether any is.
+fn hand_out(line: &str, number: u64, ways: &[Way]) -> bool {
+    let is_served = |way: &Way, read: Read| match way.0.try_send(read) {
+        Ok(()) => true,
+        Err(TrySendError::Full(_)) => {
+            way.1.fetch_add(1, Ordering::Relaxed);
+            true
+        }
+        Err(TrySendError::Disconnected(_)) => false,
+    };
+    match for_each(line, number, ways.len()) {
+        Ok(None) => true,
+        Ok(Some((Some(device), command))) => {
+            // Others may be served when this one is not any more.
+            let way = ways.get(device - 1);
+            way.map(|way| is_served(way, Ok(command)));
+            true
+        }
+        Ok(Some((None, command))) => {
+            let served = ways.iter().filter(|way| is_served(way, Ok(command)));
+            served.count() > 0
+        }
+        Err(why) => ways.iter().any(|way| is_served(way, Err(why.clone()))),
+    }
+}
+
+/// A line as a command, and the device that it is for, where it names one of so many; none
+/// where there is no command in it.
+///
+/// # Errors
+/// What is wrong with it, with its number.
+fn for_each(
+    line: &str,
+    number: u64,
+    devices: usize,
+) -> Result<Option<(Option<usize>, Command)>, String> {
+    let wrong = |why: String| format!("line {number} of the commands: {why}");
+    let (device, command) = addressed(line, devices).map_err(wrong)?;
+    let command = parse(command).map_err(|why| wrong(why.to_string()))?;
+    Ok(command.map(|command| (device, command)))
+}
+
+/// Takes `on NUMBER` from the beginning of a line.
+fn addressed(line: &str, devices: usize) -> Result<(Option<usize>, &str), String> {
+    let Some(rest) = line.trim_start().strip_prefix("on ") else {
+        return Ok((None, line));
+    };
+    let rest = rest.trim_start();
+    let (word, rest) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
+    match word.parse() {
+        Ok(device) if (1..=devices).contains(&device) => Ok((Some(device), rest)),
+        _ => Err(match devices {
+            1 => "`on` is followed by the number of a device: there is one, 1".into(),
+            _ => format!("`on` is followed by the number of a device, 1 to {devices}"),
+        }),
+    }
+}
+
+/// Hands lines over with their numbers until the input ends, or nobody takes them.
+fn read_lines(
+    origin: &Origin,
+    mut take: impl FnMut(&str, u64) -> bool + Send + 'static,
+) -> io::Result<()> {
+    let input: Box<dyn io::Read + Send> = match origin {
+        Origin::StandardInput => Box::new(io::stdin()),
+        Origin::File(path) => Box::new(File::open(path)?),
+    };
     std::thread::spawn(move || {
-        for line in BufReader::new(input).lines().map_while(Result::ok) {
-            if send.send(line).is_err() {
+        let lines = BufReader::new(input).lines().map_while(Result::ok);
+        for (line, number) in lines.zip(1..) {
+            if !take(&line, number) {
                 return;
             }
         }
     });
-    lines
+    Ok(())
 }
 
 #[cfg(test)]
@@ -123,5 +230,73 @@ mod tests {
         );
         assert!(CommandQueue::of(&Origin::File(folder.path().join("none"))).is_err());
         assert_eq!("-".parse(), Ok(Origin::StandardInput));
+    }
+
+    /// Takes all that is due of some queues until there was so much of each, or for 20 s.
+    fn all_due(queues: &mut [CommandQueue], counts: &[usize]) -> (Vec<Vec<Steer>>, Vec<String>) {
+        let (mut due, mut told) = (vec![vec![]; queues.len()], vec![]);
+        let until = Instant::now() + Duration::from_secs(20);
+        let is_short = |due: &[Vec<Steer>]| due.iter().map(Vec::len).ne(counts.iter().copied());
+        while is_short(&due) && Instant::now() < until {
+            for (queue, due) in queues.iter_mut().zip(&mut due) {
+                due.extend(queue.due(0.0, true, &mut |line| told.push(line)));
+            }
+        }
+        (due, told)
+    }
+
+    #[test]
+    fn a_command_is_for_each_device_or_for_the_one_that_it_names() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("commands");
+        let text =
+            "zoom 2\non 2 zoom 3\non 3 zoom 9\non x reset\non 1 at 0 zoom 4\non 2 nonsense\nzoom 5";
+        std::fs::write(&path, text).expect("written");
+        let mut queues = CommandQueue::of_several(&Origin::File(path), 2).expect("opened");
+        let (due, told) = all_due(&mut queues, &[3, 3]);
+        let zoom = |times| Steer::Change(ViewChange::Zoom(times));
+        assert_eq!(due[0], [2.0, 4.0, 5.0].map(zoom));
+        assert_eq!(due[1], [2.0, 3.0, 5.0].map(zoom));
+        // What is wrong is told once, and not by each device.
+        let [third, fourth, sixth] = &told[..] else {
+            panic!("{told:?}");
+        };
+        assert!(third.starts_with("line 3 of the commands: `on` is followed"));
+        assert!(third.contains("1 to 2"), "{third}");
+        assert!(fourth.starts_with("line 4 "), "{fourth}");
+        assert!(sixth.starts_with("line 6 of the commands: `nonsense`"));
+    }
+
+    #[test]
+    fn a_device_that_takes_no_commands_holds_no_other_up() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("commands");
+        let count = WAITING_EACH + 1000;
+        let text = "on 2 reset\n".repeat(count) + "on 1 reset\nnonsense\n";
+        std::fs::write(&path, text).expect("written");
+        let mut queues = CommandQueue::of_several(&Origin::File(path), 3).expect("opened");
+        let mut second = queues.remove(1);
+        // The third one is not served any more, and the first one has its command.
+        drop(queues.pop());
+        let (due, _) = all_due(&mut queues, &[1]);
+        assert_eq!(due[0], [Steer::Change(ViewChange::Reset)]);
+        let mut told = vec![];
+        let (mut taken, t_s) = (0, 0.0);
+        // What is not due yet is left where there is a bound.
+        for _ in 0..3 {
+            assert_eq!(second.due(t_s, false, &mut |line| told.push(line)), None);
+            assert_eq!(second.waiting.len(), WAITING);
+        }
+        while second.due(t_s, true, &mut |line| told.push(line)).is_some() {
+            taken += 1;
+        }
+        assert_eq!(taken, WAITING_EACH);
+        assert_eq!(
+            told,
+            [format!(
+                "{} commands were left out: this device was too far behind",
+                count - WAITING_EACH
+            )]
+        );
     }
 }

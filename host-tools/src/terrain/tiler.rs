@@ -1,6 +1,6 @@
 //! Tiles made on demand from the one raster.
 
-use std::cell::OnceCell;
+use std::sync::OnceLock;
 
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
@@ -27,7 +27,7 @@ pub struct Terrain<'r> {
     /// Patches of the level, east and north.
     size: [i32; 2],
     top: i32,
-    fingerprint: OnceCell<u64>,
+    fingerprint: OnceLock<u64>,
 }
 
 /// Why a raster cannot be felt at a scale.
@@ -143,7 +143,7 @@ impl<'r> Terrain<'r> {
             level,
             size,
             top: top(grid.raster(), &scale)?,
-            fingerprint: OnceCell::new(),
+            fingerprint: OnceLock::new(),
         })
     }
 

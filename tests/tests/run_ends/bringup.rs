@@ -14,7 +14,7 @@ use hapterra_core::guard::Mode;
 use hapterra_core::phantom::Calibration;
 use hapterra_tests::hapterra_binary;
 
-use super::served::{Served, ended_within, signal, told};
+use hapterra_tests::served::{Served, ended_within, signal, told};
 
 const RECORD: Calibration = Calibration::PREMIUM_1_5;
 /// What the terminal shows of a task, and the tasks after which Enter is pressed.

@@ -4,7 +4,6 @@
 
 mod bringup;
 mod hostile;
-mod served;
 mod terminal;
 
 use std::process::Command;
@@ -13,7 +12,7 @@ use std::time::Duration;
 
 use hapterra_core::wire::session::SessionEnd;
 use hapterra_tests::hapterra_binary;
-use served::{Served, command, signal, start, told};
+use hapterra_tests::served::{Served, command, signal, start, told};
 
 #[test]
 fn a_signal_ends_it_with_a_goodbye_that_the_board_confirms() {

@@ -13,7 +13,7 @@ use rustix::io::{FdFlags, fcntl_setfd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{LocalModes, tcgetattr};
 
-use super::served::{Served, command, ended_within, has_begun, signal, start, told};
+use hapterra_tests::served::{Served, command, ended_within, has_begun, signal, start, told};
 
 /// Longer than it takes until a line is written to what is no terminal any more.
 const A_LINE: Duration = Duration::from_millis(3_000);
@@ -184,5 +184,50 @@ fn a_second_ctrl_c_and_a_signal_put_the_terminal_back_too() {
             }
         }
         assert_eq!(modes(&end), before, "{ends_by}");
+    }
+}
+
+/// Enter and keys go to the device whose number was pressed, and to no other: neither user arms
+/// the other's arm.
+#[test]
+fn enter_and_keys_go_to_the_device_that_was_chosen_and_to_no_other() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let served = [Served::start(), Served::start()];
+    let (mut window, end) = terminal();
+    let before = modes(&end);
+    let of = || Stdio::from(OwnedFd::from(end.try_clone().expect("another")));
+    let child = command(served[0].address, folder.path())
+        .args(["--device", &format!("tcp:{}", served[1].address)])
+        .stdin(of())
+        .stdout(of())
+        .stderr(of())
+        .spawn()
+        .expect("it runs");
+    let name = |number: usize| format!("[{number} tcp:{}] ", served[number - 1].address);
+    let asks = |number| format!("and press {number} and then Enter");
+    // Both are asked for their zero poses, in either order.
+    let mut shown = shows(&mut window, "hold it there and press");
+    while ![1, 2].iter().all(|number| shown.contains(&asks(*number))) {
+        shown += &shows(&mut window, "and then Enter");
+    }
+    // For neither of them.
+    window.write_all(b"\r").expect("typed");
+    shown = shows(&mut window, "Enter alone is for no device");
+    window.write_all(b"2").expect("typed");
+    shown += &shows(&mut window, &format!("keys go to {}", name(2).trim_end()));
+    window.write_all(b"\r").expect("typed");
+    shown += &shows(&mut window, &format!("{}zeroed at", name(2)));
+    window.write_all(b"+").expect("typed");
+    shown += &shows(&mut window, &format!("{}view 1: ", name(2)));
+    assert!(!shown.contains(&format!("{}zeroed", name(1))), "{shown}");
+    assert!(!shown.contains(&format!("{}view 1", name(1))), "{shown}");
+    window.write_all(b"1\r").expect("typed");
+    shows(&mut window, &format!("{}zeroed at", name(1)));
+    window.write_all(&[3]).expect("typed");
+    let output = ended_within(child, AN_END).expect("it ends");
+    assert!(output.status.success(), "{}", output.status);
+    assert_eq!(modes(&end), before, "the terminal is as it was");
+    for served in &served {
+        assert_eq!(served.last_end(), SessionEnd::Goodbye);
     }
 }

@@ -1,6 +1,7 @@
 //! Options and input of views that change while they are touched; shared by `run` and `demo`.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use hapterra_core::contact::Rule;
@@ -8,11 +9,12 @@ use hapterra_core::phantom::Calibration;
 
 use super::placing::{self, scale_in_words, short};
 use crate::cli::failure::{Failure, OrHint};
+use crate::cli::terminal::desk::Seat;
 use crate::cli::terminal::keyboard::keyboard;
 use crate::cli::terminal::raw_keys::RawMode;
 use crate::link::{Ask, Event};
 use crate::place::{Bounds, Laid, Reach};
-use crate::steering::keys::{KEYS, Keys};
+use crate::steering::keys::{KEYS, Key, Keys};
 use crate::steering::{CommandQueue, Origin, Put, Steer, Steering};
 use crate::telemetry::FeltViews;
 use crate::terrain::Terrain;
@@ -41,18 +43,39 @@ impl Commands {
     /// # Errors
     /// A file that cannot be opened.
     pub(in crate::cli) fn open(&self) -> Result<CommandQueue, Failure> {
-        let Some(origin) = &self.commands else {
-            return Ok(CommandQueue::default());
+        let queue = self.commands.as_ref().map(CommandQueue::of);
+        self.opened(queue.transpose())
+            .map(Option::unwrap_or_default)
+    }
+
+    /// The same for so many devices, a queue for each.
+    ///
+    /// # Errors
+    /// A file that cannot be opened.
+    pub(in crate::cli) fn open_for(&self, devices: usize) -> Result<Vec<CommandQueue>, Failure> {
+        if devices == 1 {
+            return self.open().map(|queue| vec![queue]);
+        }
+        let several = |origin| CommandQueue::of_several(origin, devices);
+        let queues = self.commands.as_ref().map(several);
+        let none = || (0..devices).map(|_| CommandQueue::default()).collect();
+        self.opened(queues.transpose())
+            .map(|queues| queues.unwrap_or_else(none))
+    }
+
+    fn opened<T>(&self, opened: std::io::Result<T>) -> Result<T, Failure> {
+        let from = match self.file() {
+            Some(path) => format!(" from {}", path.display()),
+            None => String::new(),
         };
-        let told = |error| match origin {
-            Origin::StandardInput => format!("commands cannot be read: {error}"),
-            Origin::File(path) => {
-                format!("commands cannot be read from {}: {error}", path.display())
-            }
-        };
-        CommandQueue::of(origin)
-            .map_err(told)
+        opened
+            .map_err(|error| format!("commands cannot be read{from}: {error}"))
             .or_hint("name another file with --commands, or `-` for standard input")
+    }
+
+    /// Whether they come from standard input.
+    pub(in crate::cli) fn are_typed(&self) -> bool {
+        self.commands == Some(Origin::StandardInput)
     }
 }
 
@@ -61,9 +84,29 @@ pub(in crate::cli) struct ViewControl<'t> {
     steering: Steering<'t>,
     commands: CommandQueue,
     keys: Keys,
-    /// While keys come one by one.
-    raw: Option<RawMode>,
+    typing: Typing,
     began: Instant,
+}
+
+/// Where keys come from.
+enum Typing {
+    /// Nobody types, or what is typed are lines.
+    Nobody,
+    /// The terminal, in raw mode until this is dropped.
+    Terminal(RawMode),
+    /// The terminal of several devices.
+    Seat(Arc<Seat>),
+}
+
+impl Typing {
+    /// The keys that were pressed since the last look; none where there are no keys.
+    fn keys(&self) -> Option<Vec<Key>> {
+        match self {
+            Self::Nobody => None,
+            Self::Terminal(_) => Some(keyboard().keys()),
+            Self::Seat(seat) => seat.has_keys().then(|| seat.keys()),
+        }
+    }
 }
 
 impl<'t> ViewControl<'t> {
@@ -82,7 +125,7 @@ impl<'t> ViewControl<'t> {
             steering: Steering::new(bounds, rule, terrain.clone()),
             commands,
             keys: Keys::default(),
-            raw: None,
+            typing: Typing::Nobody,
             began: Instant::now(),
         }
     }
@@ -90,11 +133,16 @@ impl<'t> ViewControl<'t> {
     /// Takes keys from the terminal from now on, until this is dropped, where there is one
     /// whose lines are no commands. Returns a line that names them.
     pub(in crate::cli) fn listen(&mut self, options: &Commands) -> Option<String> {
-        if options.commands == Some(Origin::StandardInput) {
+        if options.are_typed() {
             return None;
         }
-        self.raw = RawMode::enter();
-        self.raw.as_ref().map(|_| format!("keys           {KEYS}"))
+        self.typing = Typing::Terminal(RawMode::enter()?);
+        Some(format!("keys           {KEYS}"))
+    }
+
+    /// Takes the keys that are pressed for one of several devices from now on.
+    pub(in crate::cli) fn sit(&mut self, seat: &Arc<Seat>) {
+        self.typing = Typing::Seat(Arc::clone(seat));
     }
 
     /// Takes what the device tells.
@@ -106,8 +154,8 @@ impl<'t> ViewControl<'t> {
     /// told.
     pub(in crate::cli) fn look(&mut self, t_s: f64, tell: &mut dyn FnMut(String)) {
         let now = self.began.elapsed();
-        if self.raw.is_some() {
-            for key in keyboard().keys() {
+        if let Some(keys) = self.typing.keys() {
+            for key in keys {
                 let steer = self.keys.press(key, now);
                 self.take(steer);
             }

@@ -1,15 +1,18 @@
 //! What is seen, shown and recorded of a session while it goes on.
 
 use std::io::IsTerminal;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use hapterra_core::scene::{Sample, View};
 use hapterra_core::wire::hello::DeviceHello;
 
-use super::{Args, Placed};
+use super::Args;
+use super::placed::Placed;
 use crate::cli::options::steering::{self, ViewControl};
 use crate::cli::terminal::arming_prompts::ArmingPrompts;
-use crate::cli::terminal::voice::{status, tell};
+use crate::cli::terminal::desk::Seat;
+use crate::cli::terminal::speaker::Speaker;
 use crate::cli::viewing::Shown;
 use crate::link::{Ask, Event, Tally};
 use crate::output::OutputError;
@@ -36,6 +39,7 @@ pub(super) struct Watch<'t> {
     prompts: ArmingPrompts,
     line_due: Instant,
     shown: Option<Shown<'t>>,
+    speaker: Speaker,
 }
 
 /// What was seen in all.
@@ -52,14 +56,15 @@ pub(super) struct Seen<'t> {
 impl<'t> Watch<'t> {
     pub(super) fn new(
         args: &Args,
-        placed: &Placed<'t>,
+        (placed, speaker): (&Placed<'t>, &Speaker),
         device: &DeviceHello,
         recording: Option<Recording>,
-        control: ViewControl<'t>,
+        (control, seat): (ViewControl<'t>, Option<&Arc<Seat>>),
     ) -> Self {
-        let (script_s, prompts) = match &placed.tour {
-            Some(tour) => (tour.duration_s(), ArmingPrompts::for_a_script()),
-            None => (f64::MAX, ArmingPrompts::at_the_terminal()),
+        let (script_s, prompts) = match (&placed.tour, seat) {
+            (Some(tour), _) => (tour.duration_s(), ArmingPrompts::for_a_script()),
+            (None, Some(seat)) => (f64::MAX, ArmingPrompts::at(seat)),
+            (None, None) => (f64::MAX, ArmingPrompts::at_the_terminal()),
         };
         Self {
             log: SampleLog::new(placed.terrain, device),
@@ -72,6 +77,7 @@ impl<'t> Watch<'t> {
             prompts,
             line_due: Instant::now() + LINE_EVERY,
             shown: None,
+            speaker: speaker.clone(),
         }
     }
 
@@ -82,7 +88,7 @@ impl<'t> Watch<'t> {
 
     /// Ends the recording, and takes the line at the bottom of the terminal away.
     pub(super) fn finish(self) -> Seen<'t> {
-        status(None);
+        self.speaker.status(None);
         let (ticks, figures) = (self.log.ticks(), self.log.figures());
         let kept = match (self.failed, self.recording) {
             (Some(error), _) => Err(error),
@@ -107,7 +113,7 @@ impl<'t> Watch<'t> {
             && let Some(laid) = &felt.laid
         {
             self.described = view;
-            tell(steering::told(view, laid, &felt.terrain));
+            self.speaker.tell(steering::told(view, laid, &felt.terrain));
             if let Some(recording) = &mut self.recording {
                 let number = u32::try_from(view).unwrap_or(u32::MAX);
                 let settings = ViewSettings::new(number, &felt.terrain, laid);
@@ -141,14 +147,16 @@ impl<'t> Onlooker<'t> for Watch<'t> {
     }
 
     fn hear(&mut self, line: &str) {
-        tell(line);
+        self.speaker.tell(line);
     }
 
     fn asks(&mut self) -> Vec<Ask> {
         for line in self.prompts.lines() {
-            tell(line);
+            self.speaker.tell(line);
         }
-        self.control.look(self.log.t_s(), &mut |line| tell(line));
+        let speaker = &self.speaker;
+        self.control
+            .look(self.log.t_s(), &mut |line| speaker.tell(line));
         let mut asks = self.prompts.messages();
         asks.extend(self.control.asks());
         asks
@@ -173,10 +181,10 @@ impl<'t> Onlooker<'t> for Watch<'t> {
             line += &format!("  [{}]", self.control.in_words());
         }
         if std::io::stderr().is_terminal() {
-            status(Some(line));
+            self.speaker.status(Some(line));
         } else if Instant::now() >= self.line_due {
             self.line_due = Instant::now() + LINE_EVERY;
-            tell(line);
+            self.speaker.tell(line);
         }
     }
 

@@ -5,11 +5,13 @@
 //! it is forgotten, and a fault that came after it is shown first.
 
 use std::io::{self, IsTerminal};
+use std::sync::Arc;
 use std::time::Instant;
 
 use hapterra_core::guard::{Blockers, Fault, Mode, Report};
 use hapterra_core::wire::request::{Refusal, Request};
 
+use super::desk::Seat;
 use super::keyboard::keyboard;
 use crate::cli::sparing::Sparing;
 use crate::link::{Ask, Event};
@@ -56,6 +58,17 @@ impl Enter for AtTheTerminal {
     }
 }
 
+/// The user at a terminal of several devices.
+impl Enter for Arc<Seat> {
+    fn forget(&mut self) {
+        Seat::forget(self);
+    }
+
+    fn was_pressed(&mut self) -> bool {
+        self.enters() > 0
+    }
+}
+
 /// Where nobody presses anything.
 struct Nobody;
 
@@ -70,6 +83,8 @@ impl Enter for Nobody {
 /// Leads the user from disarmed to armed.
 pub(in crate::cli) struct ArmingPrompts {
     enter: Box<dyn Enter>,
+    /// What the user does to answer, in the imperative.
+    press_enter: String,
     /// What was asked last and not answered yet.
     question: Option<Question>,
     report: Option<Report>,
@@ -102,9 +117,18 @@ impl ArmingPrompts {
         }
     }
 
+    /// Listens to what is pressed for one of several devices.
+    pub(in crate::cli) fn at(seat: &Arc<Seat>) -> Self {
+        Self {
+            press_enter: seat.press_enter(),
+            ..Self::listening(Arc::clone(seat))
+        }
+    }
+
     fn listening(enter: impl Enter + 'static) -> Self {
         Self {
             enter: Box::new(enter),
+            press_enter: "press Enter".into(),
             question: None,
             report: None,
             is_back: false,
@@ -208,13 +232,14 @@ impl ArmingPrompts {
         }
         let fault = self.report.and_then(|report| report.fault);
         let zeroes = why.contains(Blockers::NOT_ZEROED);
+        let press = &self.press_enter;
         let text = match (zeroes, fault.is_some()) {
-            (true, _) => "put the arm into its zero pose, hold it there and press Enter",
-            (false, true) => "when that is seen to, press Enter to clear it and arm",
-            (false, false) => "when you are ready, press Enter to arm",
+            (true, _) => format!("put the arm into its zero pose, hold it there and {press}"),
+            (false, true) => format!("when that is seen to, {press} to clear it and arm"),
+            (false, false) => format!("when you are ready, {press} to arm"),
         };
         self.lines.push(Line {
-            text: text.into(),
+            text,
             asks: Some(Question { fault, zeroes }),
         });
     }

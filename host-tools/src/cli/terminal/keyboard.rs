@@ -76,6 +76,19 @@ impl Keyboard {
         mem::take(&mut self.keys)
     }
 
+    /// What was pressed since the last look, in its order; a line that holds nothing but a
+    /// digit is that key, and each line ends in Enter. Nothing where nobody types.
+    pub(super) fn pressed(&mut self) -> Vec<Pressed> {
+        let mut pressed: Vec<_> = self.pressed.try_iter().collect();
+        if self.is_typed {
+            for line in self.lines.try_iter() {
+                pressed.extend(digit(&line).map(|digit| Pressed::Key(Key::Char(digit))));
+                pressed.push(Pressed::Enter);
+            }
+        }
+        pressed
+    }
+
     /// Forgets what was typed so far. Keys that change a view are no answer anyway.
     pub(in crate::cli) fn forget_typed(&mut self) {
         self.sort();
@@ -102,6 +115,13 @@ impl Keyboard {
         }
         None
     }
+}
+
+/// The digit that is all of a line.
+fn digit(line: &str) -> Option<char> {
+    let mut chars = line.trim().chars();
+    let digit = chars.next().filter(char::is_ascii_digit);
+    digit.filter(|_| chars.next().is_none())
 }
 
 fn read(typed: &SyncSender<String>, is_typed: bool) {
@@ -154,5 +174,33 @@ mod tests {
         drop(typed);
         assert_eq!(keyboard.line().as_deref(), Some("1"));
         assert_eq!(keyboard.line(), None);
+    }
+
+    #[test]
+    fn keys_and_lines_come_in_their_order() {
+        let (typed, lines) = sync_channel(WAITING);
+        let (press, pressed) = sync_channel(WAITING);
+        let mut keyboard = Keyboard {
+            lines,
+            pressed,
+            keys: vec![],
+            enters: 0,
+            is_typed: true,
+        };
+        let (two, enter) = (Pressed::Key(Key::Char('2')), Pressed::Enter);
+        press.send(two).expect("read");
+        press.send(enter).expect("read");
+        for line in ["2", " 2 ", "22", "", "y"] {
+            typed.send(line.into()).expect("read");
+        }
+        let expected = [two, enter, two, enter, two, enter, enter, enter, enter];
+        assert_eq!(keyboard.pressed(), expected);
+        keyboard.is_typed = false;
+        typed.send("2".into()).expect("read");
+        assert_eq!(
+            keyboard.pressed(),
+            [],
+            "a pipe's lines are for somebody else"
+        );
     }
 }

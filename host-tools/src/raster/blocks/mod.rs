@@ -8,22 +8,27 @@
 //! A block that cannot be read is a hole, with a warning: what is wrong in one place of a
 //! file that is larger than memory is no reason to feel nothing of it. What has not come yet
 //! from elsewhere is not known: it is counted, and asked for again.
+//!
+//! Several threads may share the blocks, as those of several devices on one terrain do. One
+//! block is read at a time, so the bound of the memory is that of one thread, and a block that
+//! one thread has read is not read again for another. Whoever touches blocks in memory does not
+//! wait for one that is being read.
 
 mod cache;
+mod kept;
 mod survey;
 
-use std::collections::HashMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::{Duration, Instant};
 
 use super::guard::guarded;
 use super::samples::{HoleMask, SampleType, SampleValue, Samples, with_samples};
 use super::{BadRaster, bilinear};
 use crate::remote::without_key;
-use cache::{Cache, Key};
+use cache::Key;
+pub(super) use kept::not_yet;
+use kept::{Kept, count_not_yet};
 pub(super) use survey::{Looks, Survey};
 
 /// Blocks of a larger size than this are not read one by one, bytes.
@@ -33,11 +38,6 @@ pub(super) const LARGEST_BLOCK_BYTES: u64 = 32 << 20;
 const AS_COARSE: f64 = 1.01;
 /// After so many warnings of blocks that cannot be read one says that there are more.
 const WARNINGS: u32 = 8;
-/// A block that was not here yet is looked for again after so long.
-const AGAIN: Duration = Duration::from_millis(20);
-/// Blocks that are known to be on their way, at most.
-const MOST_AWAITED: usize = 1024;
-
 /// Reads parts of a file's images.
 pub(super) trait BlockReader: Send + Sync {
     /// Name of the format, in messages.
@@ -166,9 +166,10 @@ impl BlockImage {
 /// The blocks of a file, those touched last in memory.
 pub(super) struct Blocks {
     reader: Box<dyn BlockReader>,
+    /// Is not held while a block is read.
     kept: Mutex<Kept>,
-    /// How often something was asked for that is not here yet.
-    not_yet: AtomicU64,
+    /// Is held by whoever reads a block.
+    reading: Mutex<()>,
     /// The file, for warnings.
     path: OnceLock<PathBuf>,
 }
@@ -176,29 +177,13 @@ pub(super) struct Blocks {
 /// What was asked for is elsewhere.
 struct NotHere;
 
-struct Kept {
-    cache: Cache,
-    /// Blocks that could not be read.
-    unread: u32,
-    /// Blocks that are not here yet, and when they were looked for.
-    awaited: HashMap<Key, Instant>,
-    /// What the line said last.
-    outage: Option<BadRaster>,
-}
-
 impl Blocks {
     /// Nothing is read yet.
     pub(super) fn new(reader: Box<dyn BlockReader>) -> Self {
-        let kept = Kept {
-            cache: Cache::new(cache::MOST_BYTES),
-            unread: 0,
-            awaited: HashMap::new(),
-            outage: None,
-        };
         Self {
             reader,
-            kept: Mutex::new(kept),
-            not_yet: AtomicU64::new(0),
+            kept: Mutex::new(Kept::new(cache::MOST_BYTES)),
+            reading: Mutex::new(()),
             path: OnceLock::new(),
         }
     }
@@ -216,9 +201,7 @@ impl Blocks {
 
     /// Keeps no more than so many bytes of blocks, and counts `unread` blocks as warned of.
     pub(super) fn set_share(&self, most_bytes: usize, unread: u32) {
-        let mut kept = self.kept();
-        kept.cache = Cache::new(most_bytes);
-        kept.unread = unread;
+        *self.kept() = Kept::new(most_bytes).after(unread);
     }
 
     /// Bytes that the blocks in memory take, and how many blocks could not be read.
@@ -227,18 +210,13 @@ impl Blocks {
         (kept.cache.bytes(), kept.unread)
     }
 
-    /// How often something was asked for that is not here yet.
-    pub(super) fn not_yet(&self) -> u64 {
-        self.not_yet.load(Ordering::Relaxed)
-    }
-
     /// What the line said last, where something did not come.
     pub(super) fn take_outage(&self) -> Option<BadRaster> {
         self.kept().outage.take()
     }
 
     fn kept(&self) -> MutexGuard<'_, Kept> {
-        // Nothing that panics runs while this is held but decoders, whose panics are caught.
+        // Nothing that panics runs while this is held.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -322,26 +300,25 @@ impl Blocks {
 
     /// A block, read if it is not in memory; `None` where there is no sample.
     fn block(&self, image: usize, at: [u32; 2]) -> Option<Arc<Block>> {
-        let mut kept = self.kept();
         let key = Key { image, at };
-        if let Some(block) = kept.cache.get(&key) {
-            return block;
+        if let Some(known) = self.kept().known(&key) {
+            return known;
         }
-        let looked = kept.awaited.get(&key);
-        if looked.is_some_and(|looked| looked.elapsed() < AGAIN) {
-            self.not_yet.fetch_add(1, Ordering::Relaxed);
-            return None;
+        // Nothing that panics runs while this is held but decoders, whose panics are caught.
+        let turn = self.reading.lock();
+        let _turn = turn.unwrap_or_else(PoisonError::into_inner);
+        // It may have been read by the one who had the turn before.
+        if let Some(known) = self.kept().known(&key) {
+            return known;
         }
         let part = self.reader.images().get(image)?.part(at);
-        let Ok(block) = self.read(image, &part, &mut kept) else {
-            if kept.awaited.len() >= MOST_AWAITED {
-                kept.awaited.clear();
-            }
-            kept.awaited.insert(key, Instant::now());
+        let read = self.read(image, &part);
+        let mut kept = self.kept();
+        let Ok(block) = read else {
+            kept.wait_for(key);
             return None;
         };
-        kept.awaited.remove(&key);
-        kept.cache.put(key, block.clone());
+        kept.put(key, block.clone());
         block
     }
 
@@ -349,12 +326,7 @@ impl Blocks {
     ///
     /// # Errors
     /// [`NotHere`], which is counted.
-    fn read(
-        &self,
-        image: usize,
-        part: &Part,
-        kept: &mut Kept,
-    ) -> Result<Option<Arc<Block>>, NotHere> {
+    fn read(&self, image: usize, part: &Part) -> Result<Option<Arc<Block>>, NotHere> {
         if !self.reader.is_stored(image, part) {
             return Ok(None);
         }
@@ -362,15 +334,14 @@ impl Blocks {
         match read {
             Ok(block) => Ok(Some(Arc::new(block))),
             Err(fault) if fault.is_of_the_line() => {
-                self.not_yet.fetch_add(1, Ordering::Relaxed);
-                kept.outage = Some(fault);
+                count_not_yet();
+                self.kept().outage = Some(fault);
                 Err(NotHere)
             }
             Err(fault) => {
-                let unread = &mut kept.unread;
-                *unread = unread.saturating_add(1);
+                let unread = self.kept().count_unread();
                 let name = (self.path.get()).map_or("the file".into(), |path| without_key(path));
-                if *unread <= WARNINGS {
+                if unread <= WARNINGS {
                     tracing::warn!(
                         "columns {} to {}, rows {} to {} of {name} cannot be read and are a hole: {fault}",
                         part.column,
@@ -378,7 +349,7 @@ impl Blocks {
                         part.row,
                         part.row + part.rows - 1
                     );
-                } else if *unread == WARNINGS + 1 {
+                } else if unread == WARNINGS + 1 {
                     tracing::warn!("more of {name} cannot be read and are holes");
                 }
                 Ok(None)

@@ -114,7 +114,7 @@ impl Blocks {
     /// The samples of a part that is no block: neither is it kept, nor is read what lies
     /// around it.
     fn look_once(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
-        let read = self.read(image, part, &mut self.kept());
+        let read = self.read(image, part);
         let block = read.ok().flatten();
         for index in 0..part.columns as usize * part.rows as usize {
             add(block.as_ref().and_then(|block| block.stored(index)));

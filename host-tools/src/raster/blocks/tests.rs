@@ -202,6 +202,131 @@ fn the_memory_that_blocks_take_is_bounded() {
     assert_eq!(read.load(Ordering::Relaxed), before);
 }
 
+/// Reads of the same field by several threads at once, each over its own terrain, as several
+/// devices do.
+#[test]
+fn a_block_that_one_thread_read_is_not_read_again_for_another() {
+    let (mut field, read) = Field::new();
+    field.fault = false;
+    let raster = raster(field, true, false);
+    read.store(0, Ordering::Relaxed);
+    let walk = || {
+        for row in (0..SIZE[1]).step_by(7) {
+            for column in (0..SIZE[0]).step_by(5) {
+                let expected = plane(f64::from(column), f64::from(row));
+                assert_eq!(raster.height(column, row), expected);
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(walk);
+        }
+    });
+    let samples = u64::from(SIZE[0]) * u64::from(SIZE[1]);
+    assert_eq!(read.load(Ordering::Relaxed), samples, "each block once");
+    let Storage::Blocks(blocks) = &raster.source.storage else {
+        panic!("it is read in blocks");
+    };
+    // The overview was read when the raster was opened.
+    let overview = samples / 16;
+    let held = blocks.share().0 as u64;
+    assert!(held >= 8 * (samples + overview), "{held}");
+    assert!(held < 9 * (samples + overview), "{held}: kept once");
+}
+
+/// A field of one block a row of them, of which the second is read as slowly as the test
+/// wants.
+struct Slow {
+    images: Vec<BlockImage>,
+    begun: Arc<std::sync::Barrier>,
+    go_on: Arc<std::sync::Barrier>,
+    elsewhere: bool,
+}
+
+impl BlockReader for Slow {
+    fn format(&self) -> &'static str {
+        "test"
+    }
+
+    fn images(&self) -> &[BlockImage] {
+        &self.images
+    }
+
+    fn sample_type(&self) -> SampleType {
+        SampleType::F64
+    }
+
+    fn is_stored(&self, _: usize, _: &Part) -> bool {
+        true
+    }
+
+    fn read(&self, _: usize, part: &Part) -> Result<Block, BadRaster> {
+        if part.column == BLOCK[0] {
+            if self.elsewhere {
+                return Err(BadRaster::NotYet);
+            }
+            self.begun.wait();
+            self.go_on.wait();
+        }
+        let count = (part.columns * part.rows) as usize;
+        Ok(Block {
+            samples: vec![1.0; count].into(),
+            holes: None,
+        })
+    }
+
+    fn index(&self) -> u64 {
+        7
+    }
+}
+
+fn slow(elsewhere: bool) -> Slow {
+    let barrier = || Arc::new(std::sync::Barrier::new(2));
+    Slow {
+        images: vec![image([BLOCK[0] * 2, BLOCK[1]])],
+        begun: barrier(),
+        go_on: barrier(),
+        elsewhere,
+    }
+}
+
+#[test]
+fn whoever_touches_what_is_in_memory_does_not_wait_for_a_block_that_is_being_read() {
+    let field = slow(false);
+    let (begun, go_on) = (field.begun.clone(), field.go_on.clone());
+    let blocks = Blocks::new(Box::new(field));
+    assert_eq!(blocks.stored(0, 0, 0), Some(1.0));
+    std::thread::scope(|scope| {
+        scope.spawn(|| assert_eq!(blocks.stored(0, BLOCK[0], 0), Some(1.0)));
+        begun.wait();
+        // The other thread reads until it is told to go on.
+        let is_free = blocks.kept.try_lock().is_ok();
+        let sample = is_free.then(|| blocks.stored(0, 1, 1));
+        go_on.wait();
+        assert_eq!(sample, Some(Some(1.0)));
+    });
+}
+
+#[test]
+fn what_one_thread_misses_is_not_counted_for_another() {
+    let blocks = Blocks::new(Box::new(slow(true)));
+    std::thread::scope(|scope| {
+        let other = scope.spawn(|| {
+            let before = not_yet();
+            // The second time it is known without a look.
+            for times in 1..=2 {
+                assert_eq!(blocks.stored(0, BLOCK[0], 0), None);
+                assert_eq!(not_yet(), before + times);
+            }
+        });
+        let before = not_yet();
+        other.join().expect("it counts");
+        assert_eq!(blocks.stored(0, 0, 0), Some(1.0));
+        assert_eq!(not_yet(), before);
+    });
+}
+
 #[test]
 fn a_field_without_a_height_anywhere_is_refused() {
     let (mut field, _) = Field::new();

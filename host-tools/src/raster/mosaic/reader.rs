@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use fixedbitset::FixedBitSet;
 use twox_hash::XxHash64;
 
-use super::super::blocks::{Block, BlockImage, BlockReader, Looks, Part};
+use super::super::blocks::{Block, BlockImage, BlockReader, Looks, Part, not_yet};
 use super::super::{BadRaster, OpenOptions, SampleType};
 use super::pool::Pool;
 use super::source::{Opened, Source};
@@ -160,9 +160,9 @@ impl BlockReader for Mosaic {
                 continue;
             }
             if let Some(opened) = pool.get(number, source)? {
-                let before = opened.not_yet();
+                let before = not_yet();
                 filling.fill(image as u8, source, &opened, &places);
-                if opened.not_yet() != before {
+                if not_yet() != before {
                     return Err(BadRaster::NotYet);
                 }
             }

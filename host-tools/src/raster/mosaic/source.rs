@@ -132,14 +132,6 @@ impl Opened {
         }
     }
 
-    /// How often something of it was asked for that is not here yet.
-    pub(super) fn not_yet(&self) -> u64 {
-        match &self.decoded.storage {
-            Storage::Held { .. } => 0,
-            Storage::Blocks(blocks) => blocks.not_yet(),
-        }
-    }
-
     /// The terrain's value at a place of the file for a level of detail: NaN in a hole that
     /// covers what lies below, `None` in one that does not.
     pub(super) fn value(&self, level: u8, column: u32, row: u32) -> Option<f64> {

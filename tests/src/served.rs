@@ -8,27 +8,29 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::hapterra_binary;
 use hapterra::link::{Dialogue, Native, Tcp, Transport};
 use hapterra_core::wire::session::SessionEnd;
 use hapterra_core::wire::status::Status;
-use hapterra_tests::hapterra_binary;
 
 /// A device behind a socket, one host after the other. While it is deaf nothing reaches
 /// it, and what it says still comes.
-pub(crate) struct Served {
-    pub(crate) address: SocketAddr,
-    pub(crate) deaf: Arc<AtomicBool>,
+pub struct Served {
+    /// Where it is.
+    pub address: SocketAddr,
+    /// Whether nothing reaches it.
+    pub deaf: Arc<AtomicBool>,
 }
 
 impl Served {
     /// A device whose arm rests.
-    pub(crate) fn start() -> Self {
+    pub fn start() -> Self {
         Self::with(|| (Native::for_replay().restless(), || {}))
     }
 
     /// The device that `make` makes in its own thread, and what is done there each few
     /// milliseconds of its time.
-    pub(crate) fn with<F: FnMut()>(make: impl FnOnce() -> (Native, F) + Send + 'static) -> Self {
+    pub fn with<F: FnMut()>(make: impl FnOnce() -> (Native, F) + Send + 'static) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let address = listener.local_addr().expect("a port");
         let deaf = Arc::new(AtomicBool::new(false));
@@ -43,12 +45,12 @@ impl Served {
     }
 
     /// How the last session ended, as the next host hears it.
-    pub(crate) fn last_end(&self) -> SessionEnd {
+    pub fn last_end(&self) -> SessionEnd {
         self.dialogue().device().last.end
     }
 
     /// How the device is.
-    pub(crate) fn status(&self) -> Status {
+    pub fn status(&self) -> Status {
         self.dialogue().fresh_status().expect("it answers")
     }
 
@@ -84,7 +86,8 @@ fn serve(device: &mut Native, mut stream: TcpStream, deaf: &AtomicBool, between:
     }
 }
 
-fn terrain(folder: &Path) -> String {
+/// A terrain in a folder; its path.
+pub fn terrain(folder: &Path) -> String {
     let file = folder.join("hills.tif");
     let path = file.to_str().expect("a plain path").to_owned();
     let made = Command::new(hapterra_binary())
@@ -96,7 +99,7 @@ fn terrain(folder: &Path) -> String {
 }
 
 /// The command that serves terrain to the device at this address, and records.
-pub(crate) fn command(address: SocketAddr, folder: &Path) -> Command {
+pub fn command(address: SocketAddr, folder: &Path) -> Command {
     let mut command = Command::new(hapterra_binary());
     command
         .args(["run", &terrain(folder), "--cell-mm", "1"])
@@ -111,7 +114,7 @@ pub(crate) fn command(address: SocketAddr, folder: &Path) -> Command {
 }
 
 /// Starts serving, and waits until samples have come.
-pub(crate) fn start(served: &Served, folder: &Path, more: &[&str]) -> Child {
+pub fn start(served: &Served, folder: &Path, more: &[&str]) -> Child {
     let mut child = command(served.address, folder)
         .args(more)
         .spawn()
@@ -121,12 +124,13 @@ pub(crate) fn start(served: &Served, folder: &Path, more: &[&str]) -> Child {
 }
 
 /// Waits until the command names the terrain, which it does when the session is open.
-pub(crate) fn has_begun(stdout: &mut impl Read) {
+pub fn has_begun(stdout: &mut impl Read) {
     let mut begun = [0; 16];
     stdout.read_exact(&mut begun).expect("a session");
 }
 
-pub(crate) fn signal(child: &Child, name: &str) {
+/// Sends a signal by its name.
+pub fn signal(child: &Child, name: &str) {
     let sent = Command::new("kill")
         .args([format!("-{name}"), child.id().to_string()])
         .status();
@@ -134,7 +138,7 @@ pub(crate) fn signal(child: &Child, name: &str) {
 }
 
 /// Waits for its end; none where it does not end within this time. It is ended then.
-pub(crate) fn ended_within(mut child: Child, time: Duration) -> Option<Output> {
+pub fn ended_within(mut child: Child, time: Duration) -> Option<Output> {
     let began = Instant::now();
     while began.elapsed() < time {
         if child.try_wait().expect("a child").is_some() {
@@ -147,7 +151,8 @@ pub(crate) fn ended_within(mut child: Child, time: Duration) -> Option<Output> {
     None
 }
 
-pub(crate) fn told(output: &Output) -> String {
+/// What it has written, to both.
+pub fn told(output: &Output) -> String {
     let both = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
     String::from_utf8_lossy(&both).into_owned()
 }

@@ -1,0 +1,210 @@
+//! Which devices are served: what each is given, and what cannot be given to several.
+
+use std::net::ToSocketAddrs;
+use std::path::{Path, PathBuf};
+
+use hapterra_core::phantom::Calibration;
+
+use super::Args;
+use crate::cli::failure::Failure;
+use crate::cli::met_device::calibration_of;
+use crate::cli::terminal::desk;
+use crate::cli::terminal::speaker::Speaker;
+use crate::link::DeviceAddress;
+
+/// One of the devices, with what belongs to it alone.
+#[derive(Clone)]
+pub(super) struct OneDevice {
+    pub(super) address: DeviceAddress,
+    /// The plant line of an emulated board.
+    pub(super) plant: Option<String>,
+    /// What is felt on it is written there.
+    pub(super) record: Option<PathBuf>,
+    pub(super) speaker: Speaker,
+}
+
+impl OneDevice {
+    /// Whether the arm is virtual, held by a hand that follows a script.
+    pub(super) fn is_scripted(&self) -> bool {
+        self.plant.is_some() || self.address == DeviceAddress::Native
+    }
+
+    /// The calibration of its arm, as it tells it. Where it does not, why, and that of a
+    /// Premium 1.5: the device is said goodbye to later, because the arm may be armed from before.
+    pub(super) fn meet(&self) -> (Calibration, Result<(), Failure>) {
+        // The virtual Phantom is a Premium 1.5.
+        let preset = Calibration::PREMIUM_1_5;
+        if self.is_scripted() {
+            return (preset, Ok(()));
+        }
+        match calibration_of(&self.address, &|line| self.speaker.tell(line)) {
+            Ok(calibration) => (calibration, Ok(())),
+            Err(failure) => (preset, Err(failure)),
+        }
+    }
+}
+
+/// The devices that are asked for.
+///
+/// # Errors
+/// One device that is named twice, and what several devices cannot be given.
+pub(super) fn of(args: &Args) -> Result<Vec<OneDevice>, Failure> {
+    let addresses = &args.device;
+    let are_several = addresses.len() > 1;
+    if are_several {
+        check(args)?;
+    }
+    let mut plants = args.plant.iter().cloned();
+    let speakers = Speaker::of_each(addresses);
+    let numbered = addresses.iter().zip(speakers).zip(1..);
+    let devices = numbered.map(|((address, speaker), number)| OneDevice {
+        address: address.clone(),
+        // Of one device it is asked for, whatever the device is.
+        plant: match are_several && *address == DeviceAddress::Native {
+            true => None,
+            false => plants.next(),
+        },
+        record: match (&args.record, are_several) {
+            (Some(path), true) => Some(of_device(path, number)),
+            (path, _) => path.clone(),
+        },
+        speaker,
+    });
+    let devices = devices.collect();
+    match plants.next() {
+        None => Ok(devices),
+        Some(more) => Err(too_many_plants(&more)),
+    }
+}
+
+/// What several devices cannot be given.
+fn check(args: &Args) -> Result<(), Failure> {
+    let (addresses, count) = (&args.device, args.device.len());
+    if count > desk::MOST {
+        let error = format!("{count} devices; at most {} can be served", desk::MOST);
+        return Err(Failure::new(error).hint("serve the others by another `hapterra run`"));
+    }
+    apart(addresses)?;
+    plants_apart(args)?;
+    if args.viewing.view {
+        return Err(Failure::new(format!("--view shows one device, and not {count}")).hint(
+            "leave --view out, record with --record, and look at each recording with `hapterra view`",
+        ));
+    }
+    if args.commands.are_typed() && std::io::IsTerminal::is_terminal(&std::io::stdin()) {
+        let error = "with several devices `--commands -` takes no lines from a terminal, whose Enter arms an arm";
+        return Err(Failure::new(error).hint("leave --commands out and use keys, or name a file or send lines through a pipe: `on 2 zoom 2` is for the second device"));
+    }
+    Ok(())
+}
+
+/// Checks that no device is named twice.
+fn apart(addresses: &[DeviceAddress]) -> Result<(), Failure> {
+    for (index, second) in addresses.iter().enumerate() {
+        let firsts = addresses.iter().take(index).zip(1..);
+        for (first, number) in firsts {
+            let numbers = format!("devices {number} and {}", index + 1);
+            if may_be_same_board(first, second) {
+                let error = format!("{numbers}: {first} and {second} may be the same board");
+                return Err(Failure::new(error).hint(
+                    "name each board by its serial number, as `hapterra list` shows it: usb:SERIAL",
+                ));
+            }
+            if is_same(first, second) {
+                let error = match first == second {
+                    true => format!("{numbers} are both {first}"),
+                    false => format!("{numbers} are the same: {first} and {second}"),
+                };
+                return Err(Failure::new(error).hint("name each device once"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether both name a board on USB, and one does not say which.
+fn may_be_same_board(first: &DeviceAddress, second: &DeviceAddress) -> bool {
+    match (first, second) {
+        (DeviceAddress::Usb(first), DeviceAddress::Usb(second)) => {
+            first.is_none() || second.is_none()
+        }
+        _ => false,
+    }
+}
+
+/// Whether both are known to be the same device. Each device in this program's memory is
+/// another one.
+fn is_same(first: &DeviceAddress, second: &DeviceAddress) -> bool {
+    match (first, second) {
+        (DeviceAddress::Native, _) => false,
+        (DeviceAddress::Tcp(first), DeviceAddress::Tcp(second)) => is_same_socket(first, second),
+        _ => first == second,
+    }
+}
+
+/// Whether two `HOST:PORT` are the same socket, also by two names of a host.
+fn is_same_socket(first: &str, second: &str) -> bool {
+    if first == second {
+        return true;
+    }
+    let port = |text: &str| text.rsplit_once(':').map(|(_, port)| port.parse::<u16>());
+    if port(first) != port(second) {
+        return false;
+    }
+    // A name that is not known is told when a line is made.
+    let of = |text: &str| text.to_socket_addrs().map(Vec::from_iter);
+    match (of(first), of(second)) {
+        (Ok(first), Ok(second)) => first.iter().any(|address| second.contains(address)),
+        _ => false,
+    }
+}
+
+/// Checks that each device that is not native has a plant line of its own, or none has one.
+fn plants_apart(args: &Args) -> Result<(), Failure> {
+    let plants = &args.plant;
+    for (index, plant) in plants.iter().enumerate() {
+        if plants
+            .iter()
+            .take(index)
+            .any(|other| is_same_socket(other, plant))
+        {
+            return Err(same_plant(plant));
+        }
+    }
+    let others = args.device.iter().filter(|d| **d != DeviceAddress::Native);
+    let (others, count) = (others.count(), plants.len());
+    if count == 0 || count == others {
+        return Ok(());
+    }
+    let error = format!("--plant is given {count} times for {others} devices that are not native");
+    Err(Failure::new(error).hint("give --plant once for each of them, in their order, and serve real arms by another `hapterra run`"))
+}
+
+fn same_plant(plant: &str) -> Failure {
+    let error = format!("two devices have the plant line tcp:{plant}");
+    Failure::new(error).hint("give each emulated board a plant line of its own")
+}
+
+fn too_many_plants(plant: &str) -> Failure {
+    let error = format!("there is no device for the plant line tcp:{plant}");
+    Failure::new(error).hint("name the board of each --plant with --device")
+}
+
+/// Where the recording of a device goes, as `felt-2.csv` for `felt.csv`.
+fn of_device(path: &Path, number: usize) -> PathBuf {
+    // What stands for standard output, or is a folder, is told as that.
+    let Some(stem) = path.file_stem().filter(|stem| *stem != "-") else {
+        return path.to_owned();
+    };
+    let mut name = stem.to_owned();
+    name.push(format!("-{number}"));
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
+}
+
+#[cfg(test)]
+#[path = "devices_tests.rs"]
+mod tests;

@@ -1,0 +1,119 @@
+//! What may be said of several devices.
+
+use clap::Parser;
+
+use super::*;
+use crate::cli::{Cli, Command};
+
+fn args(more: &str) -> Args {
+    let line = format!("hapterra run hills.tif {more}");
+    match Cli::parse_from(line.split_whitespace()).command {
+        Command::Run(args) => args,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn devices(more: &str) -> Vec<OneDevice> {
+    match of(&args(more)) {
+        Ok(devices) => devices,
+        Err(failure) => panic!("{more}: {}", failure.text()),
+    }
+}
+
+fn refused(more: &str) -> String {
+    match of(&args(more)) {
+        Ok(_) => panic!("{more} was taken"),
+        Err(failure) => failure.text(),
+    }
+}
+
+#[test]
+fn one_device_has_the_files_name_and_its_lines_have_none() {
+    for more in ["", "--device native", "--device usb"] {
+        let [only] = &devices(&format!("{more} --record felt.csv"))[..] else {
+            panic!("{more}");
+        };
+        assert_eq!(only.record.as_deref(), Some(Path::new("felt.csv")));
+        assert_eq!(only.speaker.name(), None);
+    }
+}
+
+#[test]
+fn each_of_several_devices_has_its_number_its_name_and_its_recording() {
+    let devices = devices(
+        "--device native --device usb:7 --device native --device tcp:h:1 --record out/felt.x.csv",
+    );
+    let names: Vec<_> = devices.iter().map(|device| device.speaker.name()).collect();
+    let expected = ["[1 native]", "[2 usb:7]", "[3 native]", "[4 tcp:h:1]"];
+    assert_eq!(names, expected.map(Some));
+    for (device, number) in devices.iter().zip(1..) {
+        let file = PathBuf::from(format!("out/felt.x-{number}.csv"));
+        assert_eq!(device.record, Some(file));
+    }
+    assert_eq!(of_device(Path::new("felt"), 2), Path::new("felt-2"));
+    // What cannot be written to is told by its own name.
+    assert_eq!(of_device(Path::new("-"), 2), Path::new("-"));
+    assert_eq!(of_device(Path::new(".."), 2), Path::new(".."));
+}
+
+#[test]
+fn a_device_that_is_named_twice_is_refused_also_by_two_names() {
+    for (more, says) in [
+        ("--device usb:7 --device usb:7", "are both usb:7"),
+        ("--device usb --device usb:7", "usb:SERIAL"),
+        ("--device usb --device usb", "usb:SERIAL"),
+        (
+            "--device tcp:h:1 --device native --device tcp:h:1",
+            "devices 1 and 3 are both tcp:h:1",
+        ),
+        (
+            "--device tcp:localhost:4000 --device tcp:127.0.0.1:4000",
+            "are the same",
+        ),
+    ] {
+        let told = refused(more);
+        assert!(told.contains(says) && told.contains("hint: "), "{told}");
+    }
+    for more in [
+        "--device native --device native",
+        "--device usb --device native",
+        "--device usb:7 --device usb:8",
+        "--device tcp:localhost:4000 --device tcp:localhost:4001",
+    ] {
+        assert_eq!(devices(more).len(), 2, "{more}");
+    }
+}
+
+#[test]
+fn plants_belong_to_the_devices_that_are_not_native_in_their_order() {
+    let boards = "--device tcp:h:1 --device native --device tcp:h:2";
+    let of = |more: &str| -> Vec<_> {
+        let devices = devices(&format!("{boards} {more}"));
+        devices.into_iter().map(|device| device.plant).collect()
+    };
+    assert_eq!(of(""), [None, None, None]);
+    let plants = of("--plant tcp:h:3 --plant tcp:h:4");
+    assert_eq!(plants, [Some("h:3".into()), None, Some("h:4".into())]);
+    for (plants, says) in [
+        ("--plant tcp:h:3", "--plant is given 1 times for 2 devices"),
+        ("--plant tcp:h:3 --plant tcp:h:3", "two devices have"),
+    ] {
+        let told = refused(&format!("{boards} {plants}"));
+        assert!(told.contains(says) && told.contains("hint: "), "{told}");
+    }
+    let told = refused("--device tcp:h:1 --plant tcp:h:3 --plant tcp:h:4");
+    assert!(
+        told.contains("no device for the plant line tcp:h:4"),
+        "{told}"
+    );
+}
+
+#[test]
+fn what_several_devices_cannot_be_given_is_refused_with_what_to_do() {
+    let told = refused("--device native --device native --view");
+    assert!(told.contains("hint: leave --view out"), "{told}");
+    let ten = " --device native".repeat(10);
+    let told = refused(&ten);
+    assert!(told.contains("10 devices; at most 9"), "{told}");
+    assert_eq!(devices(&" --device native".repeat(9)).len(), 9);
+}

@@ -1,0 +1,67 @@
+//! A terrain as it lies in the reach of a device's arm.
+
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::Scene;
+
+use super::devices::OneDevice;
+use crate::cli::failure::Failure;
+use crate::cli::options::placing::Asked;
+use crate::phantom::PlacedTerrain;
+use crate::place::View;
+use crate::terrain::Terrain;
+
+/// What lies where in front of an arm.
+pub(super) struct InReach<'r> {
+    view: View,
+    terrain: Terrain<'r>,
+    arm: Calibration,
+}
+
+impl<'r> InReach<'r> {
+    /// Lays what is asked for into the reach of an arm.
+    ///
+    /// # Errors
+    /// Heights that the arm does not reach.
+    pub(super) fn of(asked: &Asked<'r>, arm: Calibration) -> Result<Self, Failure> {
+        let view = asked.view(&arm)?;
+        let terrain = view.terrain(asked.grid)?;
+        Ok(Self { view, terrain, arm })
+    }
+}
+
+/// The same, how it feels, and how an arm that is virtual moves over it.
+pub(super) struct Placed<'t> {
+    pub(super) terrain: &'t Terrain<'t>,
+    pub(super) view: View,
+    pub(super) scene: Scene,
+    /// Of the arm that feels it.
+    pub(super) arm: Calibration,
+    pub(super) tour: Option<PlacedTerrain<'t>>,
+}
+
+impl<'t> Placed<'t> {
+    /// With the tour of a virtual arm, where the device has one.
+    ///
+    /// # Errors
+    /// No place that a virtual arm could tour.
+    pub(super) fn new(
+        device: &OneDevice,
+        laid: &'t InReach<'t>,
+        (law, rule): (ForceLaw, Rule),
+    ) -> Result<Self, Failure> {
+        let (view, terrain) = (laid.view, &laid.terrain);
+        let tour = match device.is_scripted() {
+            true => Some(PlacedTerrain::in_view(terrain, view.home_mm, law, rule)?),
+            false => None,
+        };
+        Ok(Self {
+            terrain,
+            view,
+            scene: view.scene(terrain, law, rule)?,
+            arm: laid.arm,
+            tour,
+        })
+    }
+}

@@ -1,0 +1,271 @@
+//! The session with one device, from its opening to its last word.
+
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use hapterra_core::wire::hello::DeviceHello;
+
+use super::devices::OneDevice;
+use super::placed::Placed;
+use super::watch::Watch;
+use super::{Args, OTHER_FILE};
+use crate::cli::bringup::required::{brought_up, drives_no_arm};
+use crate::cli::failure::{Failure, OrHint};
+use crate::cli::options::placing;
+use crate::cli::options::steering::ViewControl;
+use crate::cli::session_summary::{self, SessionSummary};
+use crate::cli::terminal::desk::Seat;
+use crate::cli::terminal::interrupt;
+use crate::cli::viewing::ToBeShown;
+use crate::link::{
+    Arming, DeviceAddress, HostClock, LinkError, Native, Patience, Tcp, Transport, serve_plant,
+};
+use crate::output::Output;
+use crate::phantom::{HeldPhantom, PlacedTerrain};
+use crate::place::Laid;
+use crate::remote::without_key;
+use crate::replay::settings::Device;
+use crate::replay::{Column, LoopColumns, Recording, Settings};
+use crate::serving::{Service, told_of_last_end};
+use crate::stability::limits;
+use crate::steering::CommandQueue;
+
+/// Between two tries to find a device that is gone.
+const RETRY: Duration = Duration::from_millis(500);
+/// For how long the virtual arm stays after the session has ended.
+const LINGER: Duration = Duration::from_secs(2);
+
+/// A device that is to be served, and all that it is given.
+pub(super) struct Serving<'p, 't> {
+    pub(super) args: &'p Args,
+    pub(super) device: &'p OneDevice,
+    pub(super) placed: &'p Placed<'t>,
+    /// Whether the device has told its calibration. If not, it is said goodbye to: the
+    /// arm may be armed from before.
+    pub(super) met: Result<(), Failure>,
+    pub(super) recording: Option<Recording>,
+    pub(super) commands: CommandQueue,
+    /// Its place at a keyboard that several devices share.
+    pub(super) seat: Option<Arc<Seat>>,
+    pub(super) shown: Option<ToBeShown<'t>>,
+}
+
+impl<'t> Serving<'_, 't> {
+    /// Serves the device until its end, and moves its arm where that is virtual and at the
+    /// plant line of an emulated board.
+    ///
+    /// # Errors
+    /// What has ended it, or that the device did not confirm that it is disarmed.
+    pub(super) fn serve(self) -> Result<(), Failure> {
+        let (Some(address), Some(tour)) = (&self.device.plant, &self.placed.tour) else {
+            return self.session();
+        };
+        let arm = tour.held_phantom();
+        let done = OnceLock::new();
+        std::thread::scope(|scope| {
+            scope.spawn(|| move_arm(address, arm, &done));
+            // Also where the session panics: the line is not served for ever.
+            let _ended = AtEnd(|| {
+                let _ = done.set(Instant::now() + LINGER);
+            });
+            // The arm is still there while the board lets its force go out.
+            self.session()
+        })
+    }
+
+    fn session(self) -> Result<(), Failure> {
+        let (args, placed, device) = (self.args, self.placed, self.device);
+        let speaker = &device.speaker;
+        let name = speaker.name().unwrap_or_default();
+        let tell = |line: &str| speaker.tell(line);
+        let service = service(args, (device, placed), &tell);
+        interrupt::device_may_be_armed(name, true);
+        let met = self.met;
+        let opened = service.open(|line| met.and_then(|()| fit_to_serve(args, device, line)));
+        // Where it could not be opened, what has to be told is told.
+        let (served, hello) =
+            opened.inspect_err(|_| interrupt::device_may_be_armed(name, false))?;
+        let how = session_summary::in_words(placed.terrain);
+        speaker.say(format!("terrain        {}: {how}", args.terrain.name()));
+        speaker.show(placing::told(&placed.view, placed.terrain));
+        speaker.say(format!(
+            "device         {}",
+            session_summary::device(&hello)
+        ));
+        if let Some(line) = told_of_last_end(&hello) {
+            speaker.tell(line);
+        }
+        limits::warn(&placed.scene.law, hello.tick_hz);
+        let recording = described(self.recording, args, placed, &hello);
+        let laid = Laid {
+            view: placed.view,
+            law: placed.scene.law,
+        };
+        let mut control = ViewControl::new(
+            (placed.terrain, laid, placed.scene.rule),
+            (&placed.arm, args.rendering.level),
+            self.commands,
+        );
+        // Before anybody else asks the keyboard for anything.
+        match &self.seat {
+            Some(seat) => control.sit(seat),
+            None if speaker.name().is_some() => {}
+            None => {
+                if let Some(line) = control.listen(&args.commands) {
+                    speaker.tell(line);
+                }
+            }
+        }
+        // A viewer that does not start ends nothing.
+        let shown = (self.shown).and_then(|shown| shown.start(&hello, |line| speaker.tell(line)));
+        let control = (control, self.seat.as_ref());
+        let watch = Watch::new(args, (placed, speaker), &hello, recording, control);
+        let mut watch = watch.shown(shown);
+        let end = served.serve(&mut watch);
+        // What was recorded is kept, however it ended, and before anything else is done.
+        let log = watch.finish();
+        let kept = log.kept.or_hint(OTHER_FILE);
+        let ended = told(end.why, end.disarmed, &tell);
+        interrupt::device_may_be_armed(name, false);
+        let summary = SessionSummary {
+            ticks: log.ticks,
+            device: hello,
+            figures: log.figures,
+            tally: end.tally,
+        };
+        speaker.show(summary.text());
+        if let (Ok(()), Some(path)) = (&kept, &device.record) {
+            speaker.say(format!("recording      {}", path.display()));
+        }
+        if let Some(shown) = log.shown {
+            shown.end(|line| speaker.say(line));
+        }
+        ended.and(kept)
+    }
+}
+
+/// Does something when it is dropped.
+struct AtEnd<F: FnMut()>(F);
+
+impl<F: FnMut()> Drop for AtEnd<F> {
+    fn drop(&mut self) {
+        (self.0)();
+    }
+}
+
+/// Moves the virtual Phantom at a board's plant line, which may come and go;
+/// until the line ends after the session has, or the time that `done` names.
+fn move_arm(address: &str, mut arm: HeldPhantom, done: &OnceLock<Instant>) {
+    let stop = || done.get().is_some_and(|by| Instant::now() >= *by);
+    while done.get().is_none() {
+        let ended = Tcp::connect(address)
+            .and_then(|mut line| serve_plant(&mut line, &mut arm, &stop).map_err(LinkError::Gone));
+        if let Err(why) = ended {
+            tracing::info!("the plant's line at {address}: {why:?}");
+            std::thread::sleep(RETRY);
+        }
+    }
+}
+
+/// Whether a device may be served: a real board was brought up, and one that is given a
+/// virtual arm drives no real one.
+fn fit_to_serve(args: &Args, device: &OneDevice, line: &mut dyn Transport) -> Result<(), Failure> {
+    match (&device.plant, &device.address) {
+        (_, DeviceAddress::Native) => Ok(()),
+        // Whatever else is said: its zero pose would be taken for known, and its lines for
+        // an arm that hurts nobody.
+        (Some(_), _) => drives_no_arm(line),
+        (None, _) if args.unchecked => Ok(()),
+        (None, _) => brought_up(line),
+    }
+}
+
+/// What is served, and to which device.
+fn service<'s, 't: 's>(
+    args: &'s Args,
+    (device, placed): (&'s OneDevice, &'s Placed<'t>),
+    tell: &'s dyn Fn(&str),
+) -> Service<'s, 't> {
+    Service {
+        terrain: placed.terrain,
+        scene: placed.scene,
+        // A virtual arm was switched on in its zero pose; where a real one was,
+        // its user has to say.
+        arming: match device.is_scripted() {
+            true => Arming::VIRTUAL,
+            false => Arming::default(),
+        },
+        patience: Patience {
+            silence_s: args.silence_s,
+            ..Patience::REAL_TIME
+        },
+        connect: Box::new(move || connect(args, device, placed)),
+        device: device.address.to_string(),
+        retry: RETRY,
+        goes_on: &|| !interrupt::requested(),
+        tell,
+    }
+}
+
+/// How it ended, as a failure; where two things went wrong, the first is told here.
+fn told(
+    why: Result<(), LinkError>,
+    disarmed: Result<(), LinkError>,
+    tell: &dyn Fn(&str),
+) -> Result<(), Failure> {
+    match (why, disarmed) {
+        (Err(error), Err(not_confirmed)) => {
+            tell(&not_confirmed.to_string());
+            Err(error.into())
+        }
+        (why, disarmed) => Ok(why.and(disarmed)?),
+    }
+}
+
+/// The recording of a device, where one is asked for.
+///
+/// # Errors
+/// A file that cannot be written.
+pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure> {
+    let [state, mode, limits, view] = LoopColumns::COLUMNS;
+    let [tick, work, cost, late] = ["tick", "work", "cost", "late"].map(Column::Count);
+    let columns = [state, tick, work, cost, late, mode, limits, view];
+    let recording = device.record.as_deref().map(|path| {
+        let output = Output::create(path)?;
+        Recording::new(output, &columns)
+    });
+    recording.transpose().or_hint(OTHER_FILE)
+}
+
+/// The recording, with the settings in which the device feels the terrain.
+fn described(
+    mut recording: Option<Recording>,
+    args: &Args,
+    placed: &Placed<'_>,
+    device: &DeviceHello,
+) -> Option<Recording> {
+    if let Some(recording) = &mut recording {
+        let (file, device) = (without_key(&args.terrain.file), Device::of(device));
+        let law = (placed.scene.law, placed.scene.rule);
+        let home_mm = Some(placed.view.home_mm);
+        let settings = Settings::new(&file, placed.terrain, law, home_mm, device);
+        recording.describe(&settings);
+    }
+    recording
+}
+
+fn connect<'t>(
+    args: &Args,
+    device: &OneDevice,
+    placed: &Placed<'t>,
+) -> Result<Box<dyn Transport + 't>, LinkError> {
+    let native = || {
+        let arm = placed.tour.as_ref().map(PlacedTerrain::held_phantom);
+        let device = Native::new(HostClock::default(), arm.map(|arm| Box::new(arm) as _));
+        match args.viewing.view {
+            true => device.in_real_time(),
+            false => device,
+        }
+    };
+    device.address.connect(native)
+}

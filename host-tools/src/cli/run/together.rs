@@ -1,0 +1,94 @@
+//! Several devices at once: each is served in a thread of its own, and none ends another's
+//! session.
+
+use std::thread::{self, ScopedJoinHandle};
+
+use super::session::Serving;
+use crate::cli::failure::Failure;
+
+/// Serves each device until its own end; one device in this thread.
+///
+/// # Errors
+/// That of the one device. Of several, each that failed, by its name; it was told when it
+/// failed, too, because others may go on for long after it.
+pub(super) fn serve_each(mut servings: Vec<Serving<'_, '_>>) -> Result<(), Failure> {
+    if servings.len() == 1
+        && let Some(only) = servings.pop()
+    {
+        return only.serve();
+    }
+    let count = servings.len();
+    let failures = thread::scope(|scope| {
+        let threads: Vec<_> = servings
+            .into_iter()
+            .map(|serving| {
+                let speaker = serving.device.speaker.clone();
+                let name = speaker.name().unwrap_or_default().to_owned();
+                let thread = scope.spawn(move || {
+                    // Names the device in what the link logs of it.
+                    let _named = tracing::error_span!("device", name = speaker.name()).entered();
+                    let ended = serving.serve();
+                    ended.inspect_err(|failure| speaker.tell(failure.text()))
+                });
+                (name, thread)
+            })
+            .collect();
+        threads.into_iter().filter_map(failed).collect::<Vec<_>>()
+    });
+    all_failures(count, failures)
+}
+
+/// How a thread has failed, with the device's name; none where it has not.
+fn failed(
+    (name, thread): (String, ScopedJoinHandle<'_, Result<(), Failure>>),
+) -> Option<(String, Failure)> {
+    // A session that panics has said goodbye, and said so if that was not confirmed.
+    let panicked = |_| {
+        Err(Failure::new(
+            "the program failed while it served this device",
+        ))
+    };
+    let ended = thread.join().unwrap_or_else(panicked);
+    ended.err().map(|failure| (name, failure))
+}
+
+/// The failures of several devices as one.
+fn all_failures(count: usize, failures: Vec<(String, Failure)>) -> Result<(), Failure> {
+    if failures.is_empty() {
+        return Ok(());
+    }
+    let of = match failures.len() == count {
+        true => format!("all {count} devices failed"),
+        false => format!(
+            "{} of {count} devices failed, the others did not",
+            failures.len()
+        ),
+    };
+    let each = failures.iter().map(|(name, failure)| {
+        let text = failure.text();
+        format!("\n{name} {}", text.replace('\n', &format!("\n{name} ")))
+    });
+    Err(Failure::new(of + ":" + &each.collect::<String>()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_device_that_failed_is_named_with_what_to_do() {
+        assert!(all_failures(2, vec![]).is_ok());
+        let lost = || Failure::new("it is gone").hint("plug it in");
+        let told = |count, failures| match all_failures(count, failures) {
+            Ok(()) => panic!("nothing failed"),
+            Err(failure) => failure.text(),
+        };
+        let one = told(2, vec![("[2 usb:7]".into(), lost())]);
+        assert_eq!(
+            one,
+            "error: 1 of 2 devices failed, the others did not:\n[2 usb:7] error: it is gone\n[2 usb:7] hint: plug it in"
+        );
+        let both = ["[1 a]", "[2 b]"].map(|name| (name.to_owned(), lost()));
+        assert!(told(2, both.into()).starts_with("error: all 2 devices failed:\n[1 a] "));
+    }
+}

@@ -1,0 +1,264 @@
+//! One keyboard for several devices. A digit chooses a device, and keys go to the device that was
+//! chosen last. Enter goes to a device whose digit was pressed right before it, and else to none:
+//! nobody arms another user's arm by an Enter for one's own.
+//!
+//! Where the terminal gives whole lines, a line that is the number of a device is that digit and
+//! Enter.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::keyboard::keyboard;
+use super::raw_keys::{Pressed, RawMode};
+use super::speaker::Speaker;
+use super::voice::tell;
+use crate::steering::keys::Key;
+
+/// Devices that can be chosen by one digit.
+pub(in crate::cli) const MOST: usize = 9;
+/// Keys that wait for a device; beyond them, keys are not heeded.
+const WAITING: usize = 64;
+
+/// The keyboard of several devices.
+struct Desk {
+    /// What each device's lines begin with.
+    names: Vec<String>,
+    state: Mutex<State>,
+    /// While keys come one by one.
+    raw: Option<RawMode>,
+}
+
+struct State {
+    /// The device chosen last, counted from zero.
+    chosen: usize,
+    /// The device whose digit was pressed last of all.
+    named: Option<usize>,
+    inboxes: Vec<Inbox>,
+}
+
+/// What was pressed for a device and not taken.
+#[derive(Default)]
+struct Inbox {
+    keys: Vec<Key>,
+    enters: usize,
+    /// The device is not served any more.
+    is_closed: bool,
+}
+
+/// A device's place at the desk.
+pub(in crate::cli) struct Seat {
+    desk: Arc<Desk>,
+    index: usize,
+}
+
+/// Takes what is typed for these devices from now on, and keys one by one where the terminal
+/// gives them so. The first device is chosen.
+pub(in crate::cli) fn seats(speakers: &[Speaker]) -> Vec<Arc<Seat>> {
+    seats_at(speakers, RawMode::enter())
+}
+
+fn seats_at(speakers: &[Speaker], raw: Option<RawMode>) -> Vec<Arc<Seat>> {
+    let names = speakers.iter().map(Speaker::name);
+    let names: Vec<_> = names.map(|name| name.unwrap_or_default().into()).collect();
+    let state = State {
+        chosen: 0,
+        named: None,
+        inboxes: names.iter().map(|_| Inbox::default()).collect(),
+    };
+    let desk = Arc::new(Desk {
+        names,
+        state: Mutex::new(state),
+        raw,
+    });
+    (0..speakers.len())
+        .map(|index| {
+            let desk = Arc::clone(&desk);
+            Arc::new(Seat { desk, index })
+        })
+        .collect()
+}
+
+impl Desk {
+    fn state(&self) -> MutexGuard<'_, State> {
+        // Nothing that panics runs while this is held.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Hands out what was pressed since the last look.
+    fn sort(&self) -> MutexGuard<'_, State> {
+        let mut state = self.state();
+        for pressed in keyboard().pressed() {
+            if let Some(line) = self.take(&mut state, pressed) {
+                tell(line);
+            }
+        }
+        state
+    }
+
+    /// Hands out what was pressed. What is to be told of it, where anything is.
+    fn take(&self, state: &mut State, pressed: Pressed) -> Option<String> {
+        let number = match pressed {
+            Pressed::Key(Key::Char(digit)) => digit.to_digit(10).unwrap_or(0) as usize,
+            _ => 0,
+        };
+        let index = number.checked_sub(1);
+        if let Some((index, name)) = index.and_then(|index| Some((index, self.names.get(index)?))) {
+            state.named = Some(index);
+            let was = std::mem::replace(&mut state.chosen, index);
+            let is_closed = state.inboxes.get(index)?.is_closed;
+            return match is_closed {
+                true => Some(format!("{name} is not served any more")),
+                false if was == index => None,
+                false => Some(format!("keys go to {name}")),
+            };
+        }
+        let named = state.named.take();
+        match (pressed, named) {
+            (Pressed::Enter, Some(named)) => state.inboxes.get_mut(named)?.enters += 1,
+            (Pressed::Enter, None) => {
+                let last = self.names.len();
+                return Some(format!(
+                    "Enter alone is for no device: press the number of one, 1 to {last}, and then Enter"
+                ));
+            }
+            (Pressed::Key(key), _) => {
+                let inbox = state.inboxes.get_mut(state.chosen)?;
+                if inbox.keys.len() < WAITING {
+                    inbox.keys.push(key);
+                }
+            }
+        }
+        None
+    }
+}
+
+impl Seat {
+    /// Whether keys come one by one.
+    pub(in crate::cli) fn has_keys(&self) -> bool {
+        self.desk.raw.is_some()
+    }
+
+    /// What the user presses to answer a question of this device.
+    pub(in crate::cli) fn press_enter(&self) -> String {
+        format!("press {} and then Enter", self.index + 1)
+    }
+
+    /// The keys besides Enter that were pressed for this device since the last look.
+    pub(in crate::cli) fn keys(&self) -> Vec<Key> {
+        let mut state = self.desk.sort();
+        let inbox = state.inboxes.get_mut(self.index);
+        inbox.map_or(vec![], |inbox| std::mem::take(&mut inbox.keys))
+    }
+
+    /// Forgets what was pressed so far to answer a question of this device, also its digit
+    /// without an Enter.
+    pub(in crate::cli) fn forget(&self) {
+        drop(self.desk.sort());
+        self.forget_answers();
+    }
+
+    fn forget_answers(&self) {
+        let mut state = self.desk.state();
+        if let Some(inbox) = state.inboxes.get_mut(self.index) {
+            inbox.enters = 0;
+        }
+        if state.named == Some(self.index) {
+            state.named = None;
+        }
+    }
+
+    /// How often Enter was pressed for this device since the last look.
+    pub(in crate::cli) fn enters(&self) -> usize {
+        let mut state = self.desk.sort();
+        let inbox = state.inboxes.get_mut(self.index);
+        inbox.map_or(0, |inbox| std::mem::take(&mut inbox.enters))
+    }
+}
+
+impl Drop for Seat {
+    fn drop(&mut self) {
+        if let Some(inbox) = self.desk.state().inboxes.get_mut(self.index) {
+            inbox.is_closed = true;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two() -> Vec<Arc<Seat>> {
+        seats_at(&Speaker::of_each(&["native", "usb:7"]), None)
+    }
+
+    fn press(seats: &[Arc<Seat>], pressed: &[Pressed]) -> Vec<String> {
+        let desk = &seats[0].desk;
+        let mut state = desk.state();
+        let told = pressed.iter().map(|key| desk.take(&mut state, *key));
+        told.collect::<Vec<_>>().into_iter().flatten().collect()
+    }
+
+    /// What a device got, without a look at the real keyboard.
+    fn got(seat: &Seat) -> (Vec<Key>, usize) {
+        let mut state = seat.desk.state();
+        let inbox = std::mem::take(&mut state.inboxes[seat.index]);
+        (inbox.keys, inbox.enters)
+    }
+
+    const fn key(key: char) -> Pressed {
+        Pressed::Key(Key::Char(key))
+    }
+
+    #[test]
+    fn enter_goes_to_the_device_whose_number_was_pressed_right_before_it_and_else_to_none() {
+        let seats = two();
+        let no_device = |told: Vec<String>| {
+            let [.., line] = &told[..] else {
+                panic!("{told:?}");
+            };
+            assert!(line.contains("1 to 2, and then Enter"), "{line}");
+        };
+        no_device(press(&seats, &[Pressed::Enter]));
+        assert_eq!(press(&seats, &[key('1'), Pressed::Enter]), [""; 0]);
+        assert_eq!(got(&seats[0]), (vec![], 1));
+        let told = press(&seats, &[key('2'), Pressed::Enter]);
+        assert_eq!(told, ["keys go to [2 usb:7]"]);
+        assert_eq!(got(&seats[1]), (vec![], 1));
+        // The second device is chosen still; this Enter may be the first one's user's.
+        no_device(press(&seats, &[Pressed::Enter]));
+        no_device(press(&seats, &[key('2'), key('+'), Pressed::Enter]));
+        assert_eq!(got(&seats[1]), (vec![Key::Char('+')], 0));
+        // A digit from before a question is no answer to it either, and one for another
+        // device's is.
+        press(&seats, &[key('2')]);
+        seats[1].forget_answers();
+        no_device(press(&seats, &[Pressed::Enter]));
+        press(&seats, &[key('2')]);
+        seats[0].forget_answers();
+        assert_eq!(press(&seats, &[Pressed::Enter]), [""; 0]);
+        assert_eq!(got(&seats[1]), (vec![], 1));
+        assert_eq!(got(&seats[0]), (vec![], 0));
+    }
+
+    #[test]
+    fn keys_go_to_the_device_that_was_chosen_last() {
+        let seats = two();
+        press(&seats, &[key('+'), key('2'), key('-')]);
+        // There is no third device, and 0 is a key like others.
+        press(&seats, &[key('3'), key('0')]);
+        assert_eq!(got(&seats[0]), (vec![Key::Char('+')], 0));
+        let keys = ['-', '3', '0'].map(Key::Char).to_vec();
+        assert_eq!(got(&seats[1]), (keys, 0));
+    }
+
+    #[test]
+    fn a_device_that_is_not_served_any_more_is_told_when_it_is_chosen() {
+        let mut seats = two();
+        drop(seats.pop());
+        let told = press(&seats, &[key('2'), Pressed::Enter]);
+        assert_eq!(told, ["[2 usb:7] is not served any more"]);
+        assert_eq!(got(&seats[0]), (vec![], 0));
+        // However long keys are held for it.
+        press(&seats, &[key('+'); 10 * WAITING]);
+        assert!(seats[0].desk.state().inboxes[1].keys.len() <= WAITING);
+    }
+}

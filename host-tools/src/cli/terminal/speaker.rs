@@ -1,0 +1,135 @@
+//! Who speaks: lines that concern one device name it where several are served.
+
+use std::fmt::Display;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::voice;
+
+/// Says what concerns one device, as [`voice`] does.
+#[derive(Clone, Default)]
+pub(in crate::cli) struct Speaker {
+    /// None where there is one device.
+    several: Option<Several>,
+}
+
+#[derive(Clone)]
+struct Several {
+    /// What a line begins with, as `[2 tcp:localhost:4000]`.
+    name: String,
+    /// Its place among the lines at the bottom.
+    index: usize,
+    bottom: Arc<Mutex<Bottom>>,
+}
+
+/// The lines at the bottom of the terminal, one for each device.
+struct Bottom(Vec<Option<String>>);
+
+impl Bottom {
+    /// The lines of those that have one.
+    fn text(&self) -> Option<String> {
+        let lines: Vec<&str> = self.0.iter().flatten().map(String::as_str).collect();
+        (!lines.is_empty()).then(|| lines.join("\n"))
+    }
+}
+
+impl Speaker {
+    /// One for each of these devices: where there are several, their lines begin with
+    /// their number, counted from one, and their name.
+    pub(in crate::cli) fn of_each(devices: &[impl Display]) -> Vec<Self> {
+        if devices.len() == 1 {
+            return vec![Self::default()];
+        }
+        let bottom = Arc::new(Mutex::new(Bottom(vec![None; devices.len()])));
+        let several = devices.iter().enumerate().map(|(index, device)| Several {
+            name: format!("[{} {device}]", index + 1),
+            index,
+            bottom: Arc::clone(&bottom),
+        });
+        several
+            .map(|several| Self {
+                several: Some(several),
+            })
+            .collect()
+    }
+
+    /// What its lines begin with, where there are several.
+    pub(in crate::cli) fn name(&self) -> Option<&str> {
+        self.several.as_ref().map(|several| several.name.as_str())
+    }
+
+    /// Writes a line to standard output.
+    pub(in crate::cli) fn say(&self, line: impl Display) {
+        voice::say(self.named(&line.to_string()));
+    }
+
+    /// Writes whole lines to standard output.
+    pub(in crate::cli) fn show(&self, text: impl Display) {
+        let text = text.to_string();
+        match self.several {
+            None => voice::show(text),
+            Some(_) => voice::show(self.named(text.trim_end_matches('\n')) + "\n"),
+        }
+    }
+
+    /// Writes lines to standard error.
+    pub(in crate::cli) fn tell(&self, line: impl Display) {
+        voice::tell(self.named(&line.to_string()));
+    }
+
+    /// Replaces this device's line at the bottom of the terminal, or takes it away.
+    pub(in crate::cli) fn status(&self, line: Option<String>) {
+        let Some(several) = &self.several else {
+            return voice::status(line);
+        };
+        // Nothing that panics runs while this is held.
+        let bottom = several.bottom.lock();
+        let mut bottom = bottom.unwrap_or_else(PoisonError::into_inner);
+        if let Some(own) = bottom.0.get_mut(several.index) {
+            *own = line.map(|line| self.named(&line));
+        }
+        voice::status(bottom.text());
+    }
+
+    /// Each line of a text with the name before it.
+    fn named(&self, text: &str) -> String {
+        match self.name() {
+            None => text.to_owned(),
+            Some(name) => {
+                let lines = text.split('\n').map(|line| format!("{name} {line}"));
+                lines.collect::<Vec<_>>().join("\n")
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_device_is_not_named_and_of_several_each_line_is() {
+        let alone = Speaker::of_each(&["usb"]);
+        assert_eq!(alone[0].named("a\nb"), "a\nb");
+        assert_eq!(alone[0].name(), None);
+        let two = Speaker::of_each(&["native", "tcp:h:1"]);
+        assert_eq!(two[0].named("a\nb"), "[1 native] a\n[1 native] b");
+        assert_eq!(two[1].named("a"), "[2 tcp:h:1] a");
+    }
+
+    #[test]
+    fn each_device_has_its_own_line_at_the_bottom() {
+        let two = Speaker::of_each(&["native", "usb:7"]);
+        let bottom = || {
+            let several = two[0].several.as_ref().expect("several");
+            several.bottom.lock().expect("alone").text()
+        };
+        two[1].status(Some("armed".into()));
+        two[0].status(Some("waits".into()));
+        let both = "[1 native] waits\n[2 usb:7] armed";
+        assert_eq!(bottom().as_deref(), Some(both));
+        two[0].status(None);
+        assert_eq!(bottom().as_deref(), Some("[2 usb:7] armed"));
+        two[1].status(None);
+        assert_eq!(bottom(), None);
+    }
+}

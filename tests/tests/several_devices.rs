@@ -1,0 +1,428 @@
+//! `hapterra run` with several devices on one terrain: each feels what it feels alone, and no end
+//! of one ends another.
+#![cfg(unix)]
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use hapterra::link::Native;
+use hapterra_core::guard::Sense;
+use hapterra_core::wire::session::SessionEnd;
+use hapterra_tests::served::{Served, ended_within, signal, terrain, told};
+use hapterra_tests::{greedy, hapterra_binary};
+
+/// Longer than a session and its goodbye take.
+const AN_END: Duration = Duration::from_secs(60);
+
+/// Serves the terrain in a folder to these devices.
+fn command(folder: &Path, devices: &[&str], more: &[&str]) -> Command {
+    let mut command = Command::new(hapterra_binary());
+    command
+        .args(["run", &terrain(folder), "--cell-mm", "1"])
+        .args(["--height-mm-per-unit", "0.1"]);
+    for device in devices {
+        command.args(["--device", device]);
+    }
+    command
+        .args(more)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+fn recorded(folder: &Path, name: &str) -> Vec<String> {
+    let felt = folder.join(name);
+    vec!["--record".into(), felt.to_str().expect("plain").to_owned()]
+}
+
+fn texts(owned: &[String]) -> Vec<&str> {
+    owned.iter().map(String::as_str).collect()
+}
+
+/// Two devices behind sockets, and the names that lines about them begin with.
+struct Pair {
+    folder: tempfile::TempDir,
+    served: [Served; 2],
+}
+
+impl Pair {
+    fn of(second: Served) -> Self {
+        Self {
+            folder: tempfile::tempdir().expect("a folder"),
+            served: [Served::start(), second],
+        }
+    }
+
+    fn name(&self, number: usize) -> String {
+        format!("[{number} tcp:{}]", self.served[number - 1].address)
+    }
+
+    fn felt(&self, number: usize) -> PathBuf {
+        self.folder.path().join(format!("felt-{number}.csv"))
+    }
+
+    /// Serves both, and waits until both sessions are open.
+    fn start(&self) -> Child {
+        let addresses = self.served.each_ref();
+        let devices = addresses.map(|served| format!("tcp:{}", served.address));
+        let record = recorded(self.folder.path(), "felt.csv");
+        let devices = texts(&devices);
+        let mut child = command(self.folder.path(), &devices, &texts(&record))
+            .spawn()
+            .expect("it runs");
+        let named = [self.name(1), self.name(2)].map(|name| format!("{name} device "));
+        child.stdout = Some(hear(child.stdout.take().expect("piped"), &named));
+        child
+    }
+}
+
+/// Lines that are heard before one that is waited for, at most.
+const MOST_LINES: usize = 60;
+
+/// Reads lines until each of these has begun one.
+fn hear<R: std::io::Read>(from: R, beginnings: &[String]) -> R {
+    let mut lines = BufReader::with_capacity(1, from);
+    let mut missing: Vec<&String> = beginnings.iter().collect();
+    for _ in 0..MOST_LINES {
+        if missing.is_empty() {
+            break;
+        }
+        let mut line = String::new();
+        let read = lines.read_line(&mut line).expect("text");
+        assert!(read > 0, "it ended before {missing:?}");
+        missing.retain(|beginning| !line.starts_with(beginning.as_str()));
+    }
+    assert!(missing.is_empty(), "no line begins with {missing:?}");
+    lines.into_inner()
+}
+
+fn end(child: Child) -> Output {
+    ended_within(child, AN_END).expect("it ends")
+}
+
+/// The rows of a recording without what a tick cost, which is the machine's; and its settings.
+fn felt(path: &Path) -> (Vec<Vec<String>>, Vec<String>) {
+    let text = std::fs::read_to_string(path).expect("a recording");
+    let (settings, rows): (Vec<&str>, Vec<&str>) =
+        text.lines().partition(|line| line.starts_with('#'));
+    let names: Vec<&str> = rows[0].split(',').collect();
+    let is_kept = |column: &usize| names.get(*column) != Some(&"cost");
+    let cells = |row: &&str| {
+        let cells = row.split(',').enumerate();
+        let kept = cells.filter(|(column, _)| is_kept(column));
+        kept.map(|(_, cell)| cell.to_owned()).collect()
+    };
+    let settings = settings.into_iter().map(str::to_owned).collect();
+    (rows.iter().map(cells).collect(), settings)
+}
+
+#[test]
+fn two_arms_in_memory_feel_to_the_bit_what_each_feels_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let commands = folder.path().join("commands");
+    let alone = |name: &str, lines: &str| {
+        std::fs::write(&commands, lines).expect("written");
+        let mut more = recorded(folder.path(), name);
+        more.extend([
+            "--commands".into(),
+            commands.to_str().expect("plain").into(),
+        ]);
+        command(folder.path(), &["native"], &texts(&more))
+    };
+    for (name, lines) in [("plain.csv", ""), ("zoomed.csv", "at 5 zoom 1.2\n")] {
+        let output = alone(name, lines).output().expect("it runs");
+        assert!(output.status.success(), "{}", told(&output));
+        assert!(!told(&output).contains("native]"), "{}", told(&output));
+    }
+    let output = alone("felt.csv", "on 2 at 5 zoom 1.2\n")
+        .args(["--device", "native"])
+        .output();
+    let output = output.expect("it runs");
+    let told = told(&output);
+    assert!(output.status.success(), "{told}");
+    for number in [1, 2] {
+        let name = format!("[{number} native] ");
+        let recording = format!("{name}recording      ");
+        assert!(told.contains(&recording), "{told}");
+    }
+    assert!(told.lines().all(|line| line.starts_with('[')), "{told}");
+    assert!(told.contains("[2 native] view 1: "), "{told}");
+    assert!(!told.contains("[1 native] view 1: "), "{told}");
+    assert!(!folder.path().join("felt.csv").exists());
+    for (alone, among_two) in [("plain.csv", "felt-1.csv"), ("zoomed.csv", "felt-2.csv")] {
+        let (alone, among_two) = (
+            felt(&folder.path().join(alone)),
+            felt(&folder.path().join(among_two)),
+        );
+        let touches = alone.0[0].iter().position(|name| name == "contact");
+        let touches = touches.expect("a column");
+        let touched = alone.0.iter().filter(|row| row[touches] == "1").count();
+        assert!(touched > 1_000, "{touched} ticks of contact");
+        assert_eq!(alone.0.len(), among_two.0.len());
+        assert!(alone == among_two, "they differ");
+    }
+}
+
+#[test]
+fn a_signal_ends_each_with_a_goodbye_that_its_board_confirms() {
+    for name in ["INT", "TERM"] {
+        let pair = Pair::of(Served::start());
+        let child = pair.start();
+        signal(&child, name);
+        let output = end(child);
+        let told = told(&output);
+        assert!(output.status.success(), "{name}: {told}");
+        for number in [1, 2] {
+            assert!(pair.felt(number).exists(), "{name}: {told}");
+            let served = &pair.served[number - 1];
+            assert_eq!(served.last_end(), SessionEnd::Goodbye, "{name}");
+        }
+    }
+}
+
+#[test]
+fn where_one_board_does_not_confirm_it_is_named_and_the_other_has_confirmed() {
+    let pair = Pair::of(Served::start());
+    let child = pair.start();
+    pair.served[1].deaf.store(true, Ordering::Relaxed);
+    signal(&child, "INT");
+    let output = end(child);
+    let told = told(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    let says = "did not confirm that it is disarmed: switch the amplifiers off";
+    let of = |number| {
+        let name = pair.name(number);
+        let lines = told.lines().filter(move |line| line.starts_with(&name));
+        lines.filter(|line| line.contains(says)).count()
+    };
+    // When it happened, and at the end.
+    assert_eq!((of(1), of(2)), (0, 2), "{told}");
+    assert!(told.contains("error: 1 of 2 devices failed"), "{told}");
+    assert!(pair.felt(1).exists() && pair.felt(2).exists(), "{told}");
+    assert_eq!(pair.served[0].last_end(), SessionEnd::Goodbye);
+    assert_eq!(pair.served[1].last_end(), SessionEnd::Replaced);
+}
+
+#[test]
+fn the_second_signal_names_the_boards_that_have_not_confirmed() {
+    let pair = Pair::of(Served::start());
+    let child = pair.start();
+    pair.served[1].deaf.store(true, Ordering::Relaxed);
+    signal(&child, "INT");
+    // It answers another host when this one has gone.
+    assert_eq!(pair.served[0].last_end(), SessionEnd::Goodbye);
+    std::thread::sleep(Duration::from_millis(200));
+    signal(&child, "INT");
+    let output = end(child);
+    let told = told(&output);
+    assert_eq!(output.status.code(), Some(130), "{told}");
+    let line = told.lines().find(|line| line.contains("ended at once"));
+    let line = line.expect(&told);
+    assert!(line.contains(&pair.name(2)), "{told}");
+    assert!(!line.contains(&pair.name(1)), "{told}");
+}
+
+#[test]
+fn a_device_that_is_lost_is_waited_for_and_the_other_goes_on() {
+    let gone = Arc::new(AtomicBool::new(false));
+    let is_gone = Arc::clone(&gone);
+    let mortal = Served::with(move || {
+        let die = move || {
+            if is_gone.load(Ordering::Relaxed) {
+                // With its socket, and without a word.
+                std::panic::resume_unwind(Box::new(()));
+            }
+        };
+        (Native::for_replay().restless(), die)
+    });
+    let pair = Pair::of(mortal);
+    let mut child = pair.start();
+    gone.store(true, Ordering::Relaxed);
+    // The line that says so is that of the second device.
+    let (err, name) = (child.stderr.take().expect("piped"), pair.name(2));
+    let mut lines = BufReader::with_capacity(1, err);
+    let mut line = String::new();
+    while !line.contains("waiting for tcp:") {
+        line.clear();
+        assert!(lines.read_line(&mut line).expect("text") > 0, "it ended");
+    }
+    assert!(line.starts_with(&name), "{line}");
+    child.stderr = Some(lines.into_inner());
+    signal(&child, "INT");
+    let output = end(child);
+    let told = told(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("error: 1 of 2 devices failed"), "{told}");
+    assert!(told.contains(&format!("{name} error: ")), "{told}");
+    assert!(
+        !told.contains(&format!("{} error: ", pair.name(1))),
+        "{told}"
+    );
+    assert_eq!(pair.served[0].last_end(), SessionEnd::Goodbye);
+    assert!(pair.felt(1).exists() && pair.felt(2).exists(), "{told}");
+}
+
+#[test]
+fn a_device_that_is_not_there_fails_alone_and_is_told_at_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let served = Served::start();
+    let there = format!("tcp:{}", served.address);
+    // Nobody listens there any more.
+    let absent = {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+        format!("tcp:{}", listener.local_addr().expect("a port"))
+    };
+    let record = recorded(folder.path(), "felt.csv");
+    let devices = [absent.as_str(), there.as_str()];
+    let mut child = command(folder.path(), &devices, &texts(&record))
+        .spawn()
+        .expect("it runs");
+    let failed = format!("[1 {absent}] error: ");
+    child.stderr = Some(hear(child.stderr.take().expect("piped"), &[failed]));
+    let serves = format!("[2 {there}] device ");
+    child.stdout = Some(hear(child.stdout.take().expect("piped"), &[serves]));
+    signal(&child, "INT");
+    let output = end(child);
+    let told = told(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(
+        told.contains("1 of 2 devices failed, the others did not"),
+        "{told}"
+    );
+    assert_eq!(served.last_end(), SessionEnd::Goodbye, "{told}");
+    assert!(folder.path().join("felt-2.csv").exists(), "{told}");
+    assert!(!folder.path().join("felt-1.csv").exists(), "{told}");
+}
+
+#[test]
+fn a_fault_of_one_arm_is_told_of_it_and_the_other_knows_nothing_of_it() {
+    // A current flows that nobody commanded.
+    let conducts = Served::with(|| {
+        let current = Box::new(|_, sense: &mut Sense, _: &_| {
+            sense.measured_ma = Some([2_000, 0, 0]);
+        });
+        let device = Native::for_replay().restless().meddled_with(current);
+        (device, || {})
+    });
+    let pair = Pair::of(conducts);
+    let mut child = pair.start();
+    let fault = format!("{} FAULT ", pair.name(2));
+    child.stderr = Some(hear(child.stderr.take().expect("piped"), &[fault]));
+    signal(&child, "INT");
+    let output = end(child);
+    let told = told(&output);
+    assert!(output.status.success(), "{told}");
+    assert!(!told.contains(&format!("{} FAULT", pair.name(1))), "{told}");
+    for served in &pair.served {
+        assert_eq!(served.last_end(), SessionEnd::Goodbye);
+    }
+    let fault_of = |served: &Served| served.status().health.report.fault;
+    assert_eq!(fault_of(&pair.served[0]), None);
+    assert!(fault_of(&pair.served[1]).is_some());
+}
+
+#[test]
+fn a_hostile_device_costs_the_other_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let served = Served::start();
+    let (there, greedy) = (
+        format!("tcp:{}", served.address),
+        format!("tcp:{}", greedy::start()),
+    );
+    let mut more = recorded(folder.path(), "felt.csv");
+    more.push("--unchecked".into());
+    let devices = [greedy.as_str(), there.as_str()];
+    let mut child = command(folder.path(), &devices, &texts(&more))
+        .spawn()
+        .expect("it runs");
+    let begun = [
+        format!("[1 {greedy}] device "),
+        format!("[2 {there}] device "),
+    ];
+    child.stdout = Some(hear(child.stdout.take().expect("piped"), &begun));
+    // Lines of how it goes come from the one that samples.
+    let goes = format!("[2 {there}] ");
+    child.stderr = Some(hear(child.stderr.take().expect("piped"), &[goes]));
+    signal(&child, "INT");
+    let output = end(child);
+    let told = told(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains(&format!("[1 {greedy}] error: ")), "{told}");
+    assert!(!told.contains(&format!("[2 {there}] error: ")), "{told}");
+    assert_eq!(served.last_end(), SessionEnd::Goodbye, "{told}");
+}
+
+/// Bytes that a command reads from files in all, as the system counts them.
+#[cfg(target_os = "linux")]
+fn bytes_read(command: &Command) -> u64 {
+    let output = Command::new("sh")
+        .args(["-c", "\"$@\" >&2 && cat /proc/$$/io", "sh"])
+        .arg(command.get_program())
+        .args(command.get_args())
+        .output()
+        .expect("it runs");
+    assert!(output.status.success(), "{}", told(&output));
+    let counts = String::from_utf8_lossy(&output.stdout).into_owned();
+    let read = counts.lines().find_map(|line| line.strip_prefix("rchar: "));
+    read.and_then(|read| read.parse().ok()).expect(&counts)
+}
+
+/// Of a terrain that stays in its file.
+#[cfg(target_os = "linux")]
+#[test]
+fn two_devices_read_no_byte_of_the_terrain_that_one_does_not_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("large.tif");
+    let path = path.to_str().expect("a plain path");
+    let made = Command::new(hapterra_binary())
+        .args(["synth", "fractal", "-o", path, "--size", "2048"])
+        .status();
+    assert!(made.expect("it runs").success());
+    let read_by = |devices: usize| {
+        let mut command = Command::new(hapterra_binary());
+        command.args(["run", path, "--in-memory-mb", "1", "--seconds", "8"]);
+        for _ in 0..devices {
+            command.args(["--device", "native"]);
+        }
+        bytes_read(&command)
+    };
+    let (one, two) = (read_by(1), read_by(2));
+    assert!(one > 1 << 20, "{one} bytes: the terrain is read");
+    assert_eq!(one, two);
+}
+
+#[test]
+fn what_several_devices_cannot_be_given_is_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let record = recorded(folder.path(), "felt.csv");
+    for (devices, more, says) in [
+        (["tcp:localhost:4", "tcp:127.0.0.1:4"], None, "are the same"),
+        (
+            ["tcp:h.invalid:4", "tcp:h.invalid:4"],
+            None,
+            "are both tcp:h.invalid:4",
+        ),
+        (
+            ["native", "native"],
+            Some("--view"),
+            "--view shows one device",
+        ),
+    ] {
+        let mut command = command(folder.path(), &devices, &texts(&record));
+        let output = command.args(more).output().expect("it runs");
+        let told = told(&output);
+        assert_eq!(output.status.code(), Some(1), "{told}");
+        assert!(told.contains(says), "{told}");
+        assert!(told.contains("hint: "), "{told}");
+    }
+    let there = std::fs::read_dir(folder.path()).expect("a folder");
+    let names: Vec<_> = there
+        .map(|file| file.expect("a file").file_name())
+        .collect();
+    assert_eq!(names, ["hills.tif"]);
+}
