@@ -53,6 +53,7 @@ mod read;
 mod samples;
 mod storage;
 mod tangents;
+mod thinned;
 
 use std::path::{Path, PathBuf};
 
