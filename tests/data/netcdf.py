@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes one field in the ways in which NetCDF stores a variable, for `tests/tests/netcdf.rs`:
 
-    python3 -m venv venv && venv/bin/pip install numpy==2.4.6 netCDF4==1.7.5.1 h5py==3.16.0 hdf5plugin==6.0.0
+    python3 -m venv venv && venv/bin/pip install numpy==2.4.6 netCDF4==1.7.5.1 h5py==3.16.0 hdf5plugin==7.1.0
     venv/bin/python tests/data/netcdf.py tests/data/netcdf
 
 Row 0 is the northernmost; the height at a column and row is `field` below, and there is none
@@ -58,9 +58,9 @@ def classic_or_4(folder, name, kind, model="NETCDF4", fill=None, dims=("lat", "l
         heights[:] = values
 
 
-def by_h5py(folder, name, maximum, chunks, written=None, **storage):
-    """With the indexes of chunks that newer libraries write."""
-    with h5py.File(os.path.join(folder, name), "w", libver="latest") as file:
+def by_h5py(folder, name, maximum, chunks, written=None, libver="latest", **storage):
+    """With the indexes of chunks that newer libraries write, or an older one."""
+    with h5py.File(os.path.join(folder, name), "w", libver=libver) as file:
         axes = {"lat": 50 - 0.01 * np.arange(ROWS), "lon": 8 + 0.01 * np.arange(COLUMNS)}
         for dim, units in (("lat", "degrees_north"), ("lon", "degrees_east")):
             axis = file.create_dataset(dim, data=axes[dim])
@@ -99,7 +99,7 @@ def main():
     classic_or_4(folder, "time.nc", "i2", fill=-1, dims=("time", "lat", "lon"), unlimited=("time",),
                  chunksizes=(1, *CHUNKS), zlib=True)
     classic_or_4(folder, "growing.nc", "i2", fill=-1, unlimited=("lat",), zlib=True)
-    classic_or_4(folder, "big_endian.nc", "i2", fill=-1, endian="big", chunksizes=CHUNKS, zlib=True)
+    classic_or_4(folder, "big_endian.nc", ">i2", fill=-1, endian="big", chunksizes=CHUNKS, zlib=True)
     classic_or_4(folder, "classic.nc", "i2", model="NETCDF3_CLASSIC", fill=-1, south=True,
                  attributes=dict(scale_factor=0.5, valid_min=np.int16(0)), stored=lambda heights: 2 * heights)
     classic_or_4(folder, "classic_records.nc", "f4", model="NETCDF3_64BIT_OFFSET", fill=-1, unlimited=("lat",), also=True)
@@ -109,6 +109,8 @@ def main():
     by_h5py(folder, "extensible_array.nc", (None, COLUMNS), CHUNKS, compression="gzip")
     by_h5py(folder, "btree_2.nc", (None, None), CHUNKS, compression="gzip")
     by_h5py(folder, "zstd.nc", None, CHUNKS, shuffle=True, fletcher32=True, **hdf5plugin.Zstd())
+    # Without check sums, so that the test can make it lie.
+    by_h5py(folder, "early.nc", None, CHUNKS, libver="earliest", **hdf5plugin.Zstd())
     by_h5py(folder, "single_chunk.nc", None, (ROWS, COLUMNS), compression="gzip")
     by_h5py(folder, "sparse.nc", None, CHUNKS, written=(slice(16, 48), slice(0, 36)))
 
