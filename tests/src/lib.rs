@@ -3,6 +3,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod bounded;
 pub mod campaign;
 pub mod chance;
 pub mod conversation;
@@ -21,6 +22,7 @@ pub mod real_ground;
 pub mod rows;
 pub mod scene;
 pub mod soak;
+pub mod tiffs;
 pub mod usb;
 pub mod walk;
 

@@ -4,10 +4,10 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use hapterra::raster::{BadRaster, OpenOptions, Raster};
-use hapterra_tests::hapterra_binary;
+use hapterra_tests::bounded::{self, zstd_bomb};
 
 const SIZE: (u32, u32) = (90, 70);
 const HOLE: (u32, u32) = (3, 4);
@@ -228,36 +228,9 @@ fn a_damaged_chunk_is_a_hole_and_the_others_are_felt() {
     );
 }
 
-/// Runs `hapterra info` on a file whose samples are to be read where they are touched, in as
-/// much address space as 256 MB of terrain and the program itself need.
+/// Runs `hapterra info` on a file whose samples are to be read where they are touched.
 fn info(path: &Path) -> Output {
-    const MOST_KIB: u32 = 400_000;
-    let mut command = match cfg!(unix) {
-        true => {
-            let mut shell = Command::new("sh");
-            let limited = format!("ulimit -v {MOST_KIB}; exec \"$0\" info --in-memory-mb 0 \"$1\"");
-            shell.arg("-c").arg(limited).arg(hapterra_binary());
-            shell
-        }
-        false => {
-            let mut binary = Command::new(hapterra_binary());
-            binary.args(["info", "--in-memory-mb", "0"]);
-            binary
-        }
-    };
-    command.arg(path).output().expect("it runs")
-}
-
-/// A Zstandard frame of one byte, repeated so many times 128 KiB.
-fn zstd_bomb(blocks: usize) -> Vec<u8> {
-    let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0x00, 0x58];
-    for block in 0..blocks {
-        let is_last = u32::from(block + 1 == blocks);
-        let header = (128 * 1024) << 3 | 1 << 1 | is_last;
-        frame.extend(&header.to_le_bytes()[..3]);
-        frame.push(7);
-    }
-    frame
+    bounded::info(path, &["--in-memory-mb", "0"])
 }
 
 /// The key of the first chunk in the index, a B-tree of HDF5's first version: bytes and mask,

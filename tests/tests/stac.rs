@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use hapterra::raster::{OpenOptions, Raster};
-use hapterra_tests::hapterra_binary;
+use hapterra_tests::tiffs::{DATA, Values, placed, tiff};
+use hapterra_tests::{bounded, hapterra_binary};
 use serde_json::{Value, json};
 
 /// Samples of a tile each way, and the side of a cell, metres.
@@ -14,56 +15,23 @@ const CELL: f64 = 30.0;
 
 /// A GeoTIFF of single floats in a UTM zone, its first sample's outer corner at `corner`.
 fn geotiff(corner: [f64; 2], zone: u16, height: impl Fn(u32, u32) -> f32) -> Vec<u8> {
-    let mut tags: Vec<(u16, u16, u32, Vec<u8>)> = Vec::new();
-    let mut long = |tag, value: u32| tags.push((tag, 4, 1, value.to_le_bytes().to_vec()));
-    for (tag, value) in [
-        (256, SIDE),
-        (257, SIDE),
-        (258, 32),
-        (259, 1),
-        (262, 1),
-        (273, 8),
-    ] {
-        long(tag, value);
-    }
-    for (tag, value) in [(277, 1), (278, SIDE), (279, SIDE * SIDE * 4), (339, 3)] {
-        long(tag, value);
-    }
-    let doubles = |values: &[f64]| values.iter().flat_map(|v| v.to_le_bytes()).collect();
-    let shorts = |values: &[u16]| values.iter().flat_map(|v| v.to_le_bytes()).collect();
-    tags.push((33550, 12, 3, doubles(&[CELL, CELL, 0.0])));
-    tags.push((
-        33922,
-        12,
-        6,
-        doubles(&[0.0, 0.0, 0.0, corner[0], corner[1], 0.0]),
-    ));
-    let keys = [1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, zone];
-    tags.push((34735, 3, 16, shorts(&keys)));
-    let mut bytes = b"II*\0\0\0\0\0".to_vec();
-    for row in 0..SIDE {
-        for column in 0..SIDE {
-            bytes.extend(height(column, row).to_le_bytes());
-        }
-    }
-    let directory = bytes.len();
-    bytes[4..8].copy_from_slice(&(directory as u32).to_le_bytes());
-    let mut beyond = directory + 2 + 12 * tags.len() + 4;
-    let mut values = Vec::new();
-    bytes.extend((tags.len() as u16).to_le_bytes());
-    for (tag, kind, count, value) in tags {
-        bytes.extend([tag.to_le_bytes(), kind.to_le_bytes()].concat());
-        bytes.extend(count.to_le_bytes());
-        if value.len() <= 4 {
-            bytes.extend(value);
-        } else {
-            bytes.extend((beyond as u32).to_le_bytes());
-            beyond += value.len();
-            values.extend(value);
-        }
-    }
-    bytes.extend([0; 4]);
-    [bytes, values].concat()
+    let places = (0..SIDE).flat_map(|row| (0..SIDE).map(move |column| (column, row)));
+    let data = places.flat_map(|(column, row)| height(column, row).to_le_bytes());
+    let one = |tag, value| (tag, Values::Longs(vec![value]));
+    let mut image = vec![
+        one(256, SIDE),
+        one(257, SIDE),
+        one(258, 32),
+        one(259, 1),
+        one(262, 1),
+        one(273, DATA),
+        one(277, 1),
+        one(278, SIDE),
+        one(279, SIDE * SIDE * 4),
+        one(339, 3),
+    ];
+    image.extend(placed(corner, CELL, zone));
+    tiff(&data.collect::<Vec<_>>(), &[image])
 }
 
 /// The corner of the tile at a place of the square of tiles, from the north-west.
@@ -402,7 +370,6 @@ fn an_asset_is_chosen_by_its_name_and_pages_are_told_of() {
 /// A document of any size ends in an error, in as much address space as the program itself needs.
 #[test]
 fn documents_that_are_too_large_or_too_deep_end_in_bounded_memory() {
-    const MOST_KIB: u32 = 400_000;
     let place = folder();
     let write = |name: &str, text: &str| {
         let path = place.path().join(name);
@@ -432,20 +399,7 @@ fn documents_that_are_too_large_or_too_deep_end_in_bounded_memory() {
         (&many, "more than 131072 items"),
         (&long, "a text of"),
     ] {
-        let mut command = match cfg!(unix) {
-            true => {
-                let mut shell = Command::new("sh");
-                let limited = format!("ulimit -v {MOST_KIB}; exec \"$0\" info \"$1\"");
-                shell.arg("-c").arg(limited).arg(hapterra_binary());
-                shell
-            }
-            false => {
-                let mut binary = Command::new(hapterra_binary());
-                binary.arg("info");
-                binary
-            }
-        };
-        let output = command.arg(path).output().expect("it runs");
+        let output = bounded::info(path, &[]);
         let told = told(&output);
         assert_eq!(output.status.code(), Some(1), "{told}");
         assert!(

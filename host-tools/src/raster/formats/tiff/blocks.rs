@@ -4,7 +4,7 @@
 use std::hash::Hasher;
 use std::sync::Arc;
 
-use tiff_reader::{Ifd, TiffFile};
+use tiff_reader::{Ifd, TagValue, TiffFile};
 use twox_hash::XxHash64;
 
 use super::images;
@@ -137,6 +137,49 @@ impl Image {
             && (times[0] / times[1] - 1.0).abs() <= 1.5 * one
             && ours.of_band().is_some()
             && suit(ours)
+            && self.has_place_of(full, times)
+    }
+
+    fn tag(&self, number: u16) -> Option<&TagValue> {
+        self.directory.tag(number).map(|tag| &tag.value)
+    }
+
+    /// Whether it lies where another image lies, as far as it says so: most overviews do not.
+    fn has_place_of(&self, full: &Self, times: [f64; 2]) -> bool {
+        const PIXEL_SCALE: u16 = 33550;
+        const TIE_POINTS: u16 = 33922;
+        const TRANSFORM: u16 = 34264;
+        const GEO_KEYS: u16 = 34735;
+        // Sizes are those of cells; half a cell of the overview is no other place.
+        const OF_A_CELL: f64 = 0.5;
+        let keys = |image: &Self| Some(image.tag(GEO_KEYS)?.as_u16_slice()?.to_vec());
+        if keys(self).is_some_and(|own| keys(full) != Some(own)) {
+            return false;
+        }
+        let numbers = |image: &Self, number: u16| image.tag(number).and_then(TagValue::as_f64_vec);
+        let (Some(cell), Some(tie)) = (numbers(self, PIXEL_SCALE), numbers(self, TIE_POINTS))
+        else {
+            // A transform says what scale and tie points say.
+            return self.tag(TRANSFORM).is_none() || full.tag(TRANSFORM).is_some();
+        };
+        let (Some(full_cell), Some(full_tie)) =
+            (numbers(full, PIXEL_SCALE), numbers(full, TIE_POINTS))
+        else {
+            return false;
+        };
+        (0..2).all(|axis| {
+            let at = |numbers: &[f64], index: usize| numbers.get(index).copied();
+            let (Some(own), Some(of_full)) = (at(&cell, axis), at(&full_cell, axis)) else {
+                return false;
+            };
+            let same_size = (own / of_full / times[axis] - 1.0).abs() <= 0.1;
+            let corner = |tie: &[f64], cell: f64| {
+                let along = if axis == 0 { cell } else { -cell };
+                Some(at(tie, axis + 3)? - at(tie, axis)? * along)
+            };
+            let corners = corner(&tie, own).zip(corner(&full_tie, of_full));
+            same_size && corners.is_some_and(|(a, b)| (a - b).abs() <= OF_A_CELL * own.abs())
+        })
     }
 }
 
