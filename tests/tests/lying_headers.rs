@@ -19,9 +19,12 @@ const OTHER: f32 = 900.0;
 /// Where the data of other images begins.
 const OTHERS: u32 = DATA + TILE_BYTES;
 
+/// As much as the full image would take, of which little is used.
 fn data() -> Vec<u8> {
     let of = |height: f32| height.to_le_bytes().repeat((TILE * TILE) as usize);
-    [of(HEIGHT), of(OTHER)].concat()
+    let mut data = [of(HEIGHT), of(OTHER)].concat();
+    data.resize((SIDE * SIDE * 4) as usize, 0);
+    data
 }
 
 fn one(tag: u16, value: u32) -> (u16, Values) {
@@ -91,13 +94,11 @@ fn ends_well(what: &str, path: &Path, more: &[&str]) -> (bool, String) {
     match output.status.code() {
         Some(0) => {}
         Some(1) => {
-            assert!(
-                told.starts_with("error: ") && told.contains("hint: "),
-                "{what}: {told}"
-            );
+            // Warnings of what is a hole may come before.
+            let error = told.find("error: ").map_or("", |at| &told[at..]);
+            assert!(error.contains("hint: "), "{what}: {told}");
             let name = path.file_name().expect("a name").to_string_lossy();
             assert!(told.contains(name.as_ref()), "{what}: {told}");
-            assert!(!told.contains("decoder failed"), "{what}: {told}");
         }
         code => panic!("{what}: {code:?} {told}"),
     }

@@ -301,7 +301,7 @@ fn lying_headers_are_errors_or_holes_in_bounded_memory() {
         (
             "2^31 x 2^31 samples",
             Box::new(size((1 << 31) - 1, (1 << 31) - 1)),
-            None,
+            Some(""),
         ),
         ("2^40 x 90 samples", Box::new(size(1 << 40, 90)), Some("")),
         (

@@ -54,6 +54,7 @@ mod samples;
 mod storage;
 mod tangents;
 mod thinned;
+mod unread;
 
 use std::path::{Path, PathBuf};
 

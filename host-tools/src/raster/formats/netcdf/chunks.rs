@@ -1,8 +1,6 @@
 //! A variable of a NetCDF-4 file that stays in its file: chunks are read when they are touched.
 
-use std::collections::HashSet;
 use std::hash::Hasher;
-use std::sync::{Mutex, PoisonError};
 
 use hdf5_reader::{Dataset, H5Type, SliceInfo, SliceInfoElem};
 use twox_hash::XxHash64;
@@ -12,6 +10,7 @@ use super::{fault, of_the_other_sign};
 use crate::raster::blocks::{Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part};
 use crate::raster::guard::guarded;
 use crate::raster::samples::{HoleMask, with_samples};
+use crate::raster::unread::Unread;
 use crate::raster::{BadRaster, SampleType, Samples, thinned};
 use crate::remote::RemoteFile;
 
@@ -25,10 +24,6 @@ const WIDE_BLOCK: [u32; 2] = [32_768, 2];
 /// When the file is opened so many places each way are looked at, and more only where the first
 /// of them have no heights.
 const PLACES: u32 = 16;
-/// Chunks that could not be read are not read again while there are no more of them.
-const MOST_UNREAD: usize = 1 << 16;
-/// After so many warnings of chunks one says that there are more.
-const WARNINGS: usize = 8;
 
 /// How a variable's samples are stored.
 #[derive(Clone, Copy, Debug)]
@@ -61,11 +56,8 @@ pub(super) struct Chunks {
     /// Columns and rows of a chunk, or of what is read at once where there are no chunks.
     chunk: [u32; 2],
     images: Vec<BlockImage>,
-    /// The file's name, for warnings.
-    name: String,
     is_remote: bool,
-    /// Columns and rows of chunks that could not be read, counted in chunks.
-    unread: Mutex<HashSet<[u64; 2]>>,
+    unread: Unread,
 }
 
 /// Samples along rows or columns that are of one chunk.
@@ -122,9 +114,8 @@ impl Chunks {
             dataset,
             layout,
             chunk,
-            name: name.to_owned(),
             is_remote,
-            unread: Mutex::default(),
+            unread: Unread::of(name),
         })
     }
 
@@ -215,13 +206,14 @@ impl Chunks {
         let mut holes = None;
         for down in &down {
             for along in &along {
-                let read = match self.is_unread([along.chunk, down.chunk]) {
+                let covers = self.covers([along.chunk, down.chunk]);
+                let read = match self.unread.has(0, [covers.column, covers.row]) {
                     true => None,
                     false => match self.piece(none, &[*along, *down], every.into()) {
                         Ok(read) => Some(read),
                         Err(fault) if fault.is_of_the_line() => return Err(fault),
                         Err(fault) => {
-                            self.warn([along.chunk, down.chunk], &fault);
+                            self.unread.warn(0, &covers, &fault);
                             None
                         }
                     },
@@ -247,33 +239,20 @@ impl Chunks {
         Ok((values, holes))
     }
 
-    fn is_unread(&self, chunk: [u64; 2]) -> bool {
-        let unread = self.unread.lock().unwrap_or_else(PoisonError::into_inner);
-        unread.contains(&chunk)
-    }
-
-    /// Says once of a chunk that it cannot be read.
-    fn warn(&self, chunk: [u64; 2], fault: &BadRaster) {
-        let mut unread = self.unread.lock().unwrap_or_else(PoisonError::into_inner);
-        if unread.len() < MOST_UNREAD {
-            unread.insert(chunk);
-        }
+    /// The samples of a chunk in the full image.
+    fn covers(&self, chunk: [u64; 2]) -> Part {
         let [columns, rows] = [0, 1].map(|axis| {
-            let first = chunk[axis] * u64::from(self.chunk[axis]);
-            let end = first + u64::from(self.chunk[axis]);
-            (first, end.min(self.layout.size[axis].into()) - 1)
+            let side = u64::from(self.chunk[axis]);
+            let count = u64::from(self.layout.size[axis]);
+            // Both fit: they are inside of the image.
+            let first = chunk[axis] * side;
+            (first as u32, side.min(count - first) as u32)
         });
-        if unread.len() <= WARNINGS {
-            tracing::warn!(
-                "columns {} to {}, rows {} to {} of {} cannot be read and are a hole: {fault}",
-                columns.0,
-                columns.1,
-                rows.0,
-                rows.1,
-                self.name
-            );
-        } else if unread.len() == WARNINGS + 1 {
-            tracing::warn!("more of {} cannot be read and are holes", self.name);
+        Part {
+            column: columns.0,
+            row: rows.0,
+            columns: columns.1,
+            rows: rows.1,
         }
     }
 }

@@ -202,11 +202,12 @@ impl Layout {
     }
 }
 
-/// Bytes stored for each chunk. What lies at 0, where the file's header is, is left out,
+/// Bytes stored for each chunk that has a place. What lies at 0, where the file's header is, is left out,
 /// whatever its size.
 fn stored(bytes: Option<Vec<u64>>, places: Option<Vec<u64>>) -> Option<Vec<u64>> {
-    let mut bytes = bytes?;
-    for (bytes, place) in bytes.iter_mut().zip(places?) {
+    let (mut bytes, places) = (bytes?, places?);
+    bytes.truncate(places.len());
+    for (bytes, place) in bytes.iter_mut().zip(places) {
         if place == 0 {
             *bytes = 0;
         }
