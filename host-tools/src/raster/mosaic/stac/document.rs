@@ -191,7 +191,7 @@ impl<'de> Visitor<'de> for Whole<'_> {
                 // Those of a collection are no item's, and any other document may have any.
                 "assets" => document.item.assets = map.next_value()?,
                 "links" => {
-                    document.links = map.next_value::<Option<Links>>()?.unwrap_or_default().0
+                    document.links = map.next_value::<Option<Links>>()?.unwrap_or_default().0;
                 }
                 "features" => {
                     document.has_features = true;
