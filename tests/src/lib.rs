@@ -3,6 +3,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod bounded;
 pub mod campaign;
 pub mod chance;
 pub mod conversation;
@@ -25,6 +26,7 @@ pub mod slow_line;
 #[cfg(unix)]
 pub mod served;
 pub mod soak;
+pub mod tiffs;
 pub mod usb;
 pub mod walk;
 

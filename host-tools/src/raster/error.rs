@@ -141,6 +141,14 @@ pub enum BadRaster {
     /// A folder, pattern or VRT without a file that could be read.
     #[error("no terrain: {0}")]
     NoTiles(String),
+    /// Of a STAC item none or several assets could be the heights; none was chosen.
+    #[error("no terrain: {why} (assets: {})", names.join(", "))]
+    WhichAsset {
+        /// Which item, and what is wrong with it.
+        why: String,
+        /// Names of the assets that it has, or of those that could be it.
+        names: Vec<String>,
+    },
     /// One file of many is at fault.
     #[error("{fault}; it is in {}", without_key(file))]
     InTile {

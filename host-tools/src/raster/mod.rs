@@ -16,7 +16,7 @@
 //! Each format is one file or folder of `formats`, and one line in its table. From a
 //! path to samples: `open` unpacks (`archive`), asks the table, and lets the format
 //! decode (`input`, `read`) into `decoded`; [`Raster`] answers from that. A folder, a pattern
-//! of names and a GDAL VRT are many files as one terrain (`mosaic`).
+//! of names, a GDAL VRT and a STAC are many files as one terrain (`mosaic`).
 //!
 //! **Places.** A format hands over its map from columns and rows to coordinates
 //! (`ground_map`) and its reference system (`crs`); what follows from these is worked out
@@ -53,6 +53,8 @@ mod read;
 mod samples;
 mod storage;
 mod tangents;
+mod thinned;
+mod unread;
 
 use std::path::{Path, PathBuf};
 

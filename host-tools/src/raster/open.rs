@@ -10,14 +10,30 @@ use super::{BadRaster, Decoded, OpenOptions, mosaic};
 /// Decodes a terrain: a file, which may be packed, or many that are one.
 pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
     if let Some(files) = mosaic::named(path)? {
+        check_no_asset(options, "many files")?;
         return mosaic::of_files(files, options);
     }
     let input = FileBytes::open(path, &options.elsewhere)?;
+    if options.raw.is_none() && mosaic::is_json(&input)? {
+        return mosaic::of_stac(&input, path, options);
+    }
+    check_no_asset(options, "a file")?;
     if options.raw.is_none() && mosaic::is_vrt(&input)? {
         let decoded = guarded(mosaic::VRT, || mosaic::of_vrt(&input, path, options));
         return or_by_gdal(decoded, &input, options);
     }
     one_file::decode(&input, options)
+}
+
+/// Checks that no asset is asked for of what has none.
+fn check_no_asset(options: &OpenOptions, of: &str) -> Result<(), BadRaster> {
+    match &options.asset {
+        None => Ok(()),
+        Some(asset) => Err(BadRaster::NoSuchPart {
+            asked: format!("asset {asset}"),
+            there: format!("only a STAC has assets, and this is {of}"),
+        }),
+    }
 }
 
 /// Decodes a file by GDAL alone.

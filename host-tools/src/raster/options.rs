@@ -18,6 +18,9 @@ pub struct OpenOptions {
     /// Which variable of a NetCDF file or array of an `.npz` holds the height. Without
     /// it: the one that is named as heights are, or the only one.
     pub variable: Option<String>,
+    /// Which asset of a STAC's items holds the heights. Without it: the one whose role or
+    /// name says so, or the only raster.
+    pub asset: Option<String>,
     /// Side of a cell on the ground, metres, of a file that does not state it.
     pub ground_cell_m: Option<f64>,
     /// Metres in a unit of the heights; replaces what the file says.
@@ -45,6 +48,7 @@ impl Default for OpenOptions {
             no_data: None,
             band: None,
             variable: None,
+            asset: None,
             ground_cell_m: None,
             vertical_unit_m: None,
             encoding: None,

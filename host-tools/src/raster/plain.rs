@@ -14,7 +14,7 @@ use super::input::FileBytes;
 use super::read::Stored;
 use super::samples::{Endian, SampleType, Samples, with_samples};
 use super::storage::Storage;
-use super::{BadRaster, OpenOptions};
+use super::{BadRaster, OpenOptions, thinned};
 
 /// Samples of a block each way.
 const BLOCK: u32 = 256;
@@ -29,10 +29,8 @@ const FAR: u64 = 4096;
 const AT_ONCE: u64 = 1 << 20;
 /// Samples of a file at a URL that take no more than this are fetched at once.
 const FEW_BYTES: u64 = 1 << 20;
-/// When a file that is not read as a whole is opened, places all over it are looked at: so
-/// many each way, of so many samples each way.
+/// When a file that is not read as a whole is opened, so many places each way are looked at.
 const PLACES: u32 = 6;
-const PLACE: u32 = 64;
 
 /// Where samples lie in a file, in bytes.
 #[derive(Clone, Copy, Debug)]
@@ -216,7 +214,7 @@ fn transposed(samples: &Samples, columns: u32, rows: u32) -> Samples {
 }
 
 /// Plain samples that stay in their file.
-struct PlainBlocks {
+pub(super) struct PlainBlocks {
     plain: Plain,
     /// A reader has one place in a file at a time.
     input: Mutex<FileBytes>,
@@ -225,27 +223,15 @@ struct PlainBlocks {
 }
 
 impl PlainBlocks {
-    fn new(plain: Plain, input: FileBytes) -> Self {
+    /// Samples that are all inside of the file.
+    pub(super) fn new(plain: Plain, input: FileBytes) -> Self {
         let is_remote = input.remote().is_some();
-        let image = |k: u32| {
-            let [columns, rows] =
-                [plain.columns, plain.rows].map(|count| ((count.max(1) - 1) >> k) + 1);
-            let block = match (k, is_remote) {
-                (0, true) => WIDE_BLOCK,
-                _ => [(BLOCK >> k).max(COARSE_BLOCK); 2],
-            };
-            BlockImage {
-                columns,
-                rows,
-                block,
-                every: Some(1 << k),
-                first: [0; 2],
-            }
+        let block = |k: u32| match (k, is_remote) {
+            (0, true) => WIDE_BLOCK,
+            _ => [(BLOCK >> k).max(COARSE_BLOCK); 2],
         };
-        let has_cells = |image: &BlockImage| image.columns > 1 && image.rows > 1;
-        let coarser = (1..31).map(image).take_while(has_cells);
         Self {
-            images: std::iter::once(image(0)).chain(coarser).collect(),
+            images: thinned::images([plain.columns, plain.rows], block),
             plain,
             input: Mutex::new(input),
             is_remote,
@@ -280,15 +266,7 @@ impl BlockReader for PlainBlocks {
     }
 
     fn set_order(&mut self, south_up: bool, east_first: bool) {
-        for (k, image) in self.images.iter_mut().enumerate() {
-            let last = [self.plain.columns, self.plain.rows].map(|count| count.max(1) - 1);
-            let left_over =
-                |last: u32, is_turned: bool| if is_turned { last % (1 << k) } else { 0 };
-            image.first = [
-                left_over(last[0], east_first),
-                left_over(last[1], !south_up),
-            ];
-        }
+        thinned::set_order(&mut self.images, south_up, east_first);
     }
 
     fn want(&self, image: usize, parts: &[Part]) {
@@ -325,27 +303,7 @@ impl BlockReader for PlainBlocks {
     }
 
     fn looks(&self) -> Option<Looks> {
-        let (columns, rows) = (self.plain.columns, self.plain.rows);
-        let along = |count: u32, number: u32| {
-            let size = PLACE.min(count);
-            let last = u64::from(count - size) * u64::from(number) / u64::from(PLACES - 1);
-            (last as u32, size)
-        };
-        let numbers = (0..PLACES).flat_map(|row| (0..PLACES).map(move |column| (column, row)));
-        let parts = numbers.map(|(column, row)| {
-            let (column, columns) = along(columns, column);
-            let (row, rows) = along(rows, row);
-            Part {
-                column,
-                row,
-                columns,
-                rows,
-            }
-        });
-        Some(Looks {
-            image: 0,
-            parts: parts.collect(),
-        })
+        Some(thinned::places(&self.images[0], PLACES))
     }
 
     fn kept_bytes(&self) -> usize {

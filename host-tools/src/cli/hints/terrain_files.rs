@@ -30,7 +30,9 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
         } => return unpacked_netcdf(path),
         BadRaster::Unsupported { .. } => return converted(path, PLAIN),
         BadRaster::InTile { file, fault } => return hint(file, fault),
-        BadRaster::TilesDiffer { file, .. } => return brought_together(path, file),
+        BadRaster::TilesDiffer { file, other, .. } => {
+            return brought_together(path, file, other);
+        }
         BadRaster::NoPlace(_) => {
             return format!(
                 "leave it out with a pattern of names in quotes, as 'tiles/*.tif'; or bring it onto rows and columns of its map: gdalwarp -r bilinear {} {}",
@@ -39,7 +41,13 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
             );
         }
         BadRaster::NoTiles(_) => {
-            "name a folder with terrain files, or a pattern in quotes, as 'tiles/*.tif' or 'tiles/**/*.tif'"
+            "name a folder with terrain files, a pattern in quotes, as 'tiles/*.tif' or 'tiles/**/*.tif', or a STAC item collection"
+        }
+        BadRaster::WhichAsset { names, .. } if names.is_empty() => {
+            "take a STAC whose items have assets with heights"
+        }
+        BadRaster::WhichAsset { names, .. } => {
+            return format!("name the one with the heights: --asset {}", names.join("|"));
         }
         // Palettes and single bits do not outlive another type of samples.
         BadRaster::NotAHeightField(_) => {
@@ -219,19 +227,27 @@ fn cut(path: &Path, (width, height): (u64, u64)) -> String {
 }
 
 /// The command that lays files of different grids onto one.
-fn brought_together(path: &Path, file: &Path) -> String {
-    let files = match path.is_dir() {
-        true => format!(
-            "{}/*.{}",
-            quoted(&path.display().to_string()),
-            extension(file)
-        ),
-        false => path.display().to_string().replace(' ', "\\ "),
-    };
+fn brought_together(path: &Path, file: &Path, other: &Path) -> String {
+    const ONTO_ONE: &str = "gdalwarp -r bilinear -ot Float32 -dstnodata -9999 -co TILED=YES \
+                            -co COMPRESS=DEFLATE -co BIGTIFF=IF_SAFER";
+    let name = path.display().to_string();
+    if path.is_dir() {
+        let files = format!("{}/*.{}", quoted(&name), extension(file));
+        return format!(
+            "leave it out with a pattern of names in quotes, as 'tiles/*.tif'; or lay all of them onto one grid: {ONTO_ONE} {files} one.tif"
+        );
+    }
+    if !name.contains(['*', '?', '[']) || is_url(&name) {
+        // A STAC: each item is a file somewhere.
+        let files = [other, file].map(|file| names(file).0).join(" ");
+        return format!(
+            "leave that item out of the document; or lay its files and those of the others onto one grid: {ONTO_ONE} {files} one.tif"
+        );
+    }
+    let files = name.replace(' ', "\\ ");
     format!(
         "leave it out with a pattern of names in quotes, as 'tiles/*.tif'; or lay all of them onto one grid: \
-         gdalwarp -r bilinear -ot Float32 -dstnodata -9999 -co TILED=YES -co COMPRESS=DEFLATE \
-         -co BIGTIFF=IF_SAFER {files} one.tif"
+         {ONTO_ONE} {files} one.tif"
     )
 }
 

@@ -22,7 +22,7 @@ const INPUT: &str = "Input";
 pub struct TerrainFile {
     /// Terrain file: GeoTIFF, .hgt, .asc, PNG, NetCDF, USGS .dem, DTED, .flt, .bil, ENVI,
     /// .npy/.npz, or raw samples; or many as one: a folder, a quoted pattern ('tiles/*.tif'), a
-    /// GDAL .vrt; or one of these at a URL (https, s3, gs, az), in builds with them
+    /// GDAL .vrt, a STAC's .json; or one of these at a URL (https, s3, gs, az), in builds with them
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
 
@@ -58,6 +58,10 @@ pub struct ReadingOptions {
     #[arg(long, value_name = "NAME", help_heading = INPUT)]
     pub variable: Option<String>,
 
+    /// Asset of a STAC's items that holds the height
+    #[arg(long, value_name = "NAME", help_heading = INPUT)]
+    pub asset: Option<String>,
+
     /// Side of a cell on the ground in metres, for files that do not state it
     #[arg(long, value_name = "M", value_parser = parse_side, help_heading = INPUT)]
     pub ground_cell_m: Option<f64>,
@@ -76,7 +80,7 @@ pub struct ReadingOptions {
     pub png_channel: Option<PngChannel>,
 
     /// A terrain whose samples take more megabytes than this stays in its file and is read
-    /// where it is touched, if its format allows it (TIFF, raw samples, .hgt, .flt, .bil, ENVI, .npy); many files always
+    /// where it is touched, if its format allows it (TIFF, NetCDF, raw samples, .hgt, .flt, .bil, ENVI, .npy); many files always
     /// do
     #[arg(long, value_name = "MB", default_value_t = OpenOptions::IN_MEMORY_MB, help_heading = INPUT)]
     pub in_memory_mb: u32,
@@ -131,6 +135,7 @@ impl ReadingOptions {
             no_data: self.no_data,
             band: self.band,
             variable: self.variable.clone(),
+            asset: self.asset.clone(),
             ground_cell_m: self.ground_cell_m,
             vertical_unit_m: self.vertical_unit,
             encoding: self.encoding,

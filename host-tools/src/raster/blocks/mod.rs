@@ -142,6 +142,22 @@ impl Part {
             rows,
         }
     }
+
+    /// What of it is within another part, of which it has something.
+    pub(super) fn within(&self, other: &Self) -> Self {
+        let cut = |first: u32, count: u32, from: u32, most: u32| {
+            let begin = first.max(from);
+            (begin, (first + count).min(from + most) - begin)
+        };
+        let (column, columns) = cut(self.column, self.columns, other.column, other.columns);
+        let (row, rows) = cut(self.row, self.rows, other.row, other.rows);
+        Self {
+            column,
+            row,
+            columns,
+            rows,
+        }
+    }
 }
 
 impl BlockImage {

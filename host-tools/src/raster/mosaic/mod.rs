@@ -1,7 +1,7 @@
-//! Many files as one terrain: a folder, a pattern of names, or a GDAL VRT.
+//! Many files as one terrain: a folder, a pattern of names, a GDAL VRT, or items of a STAC.
 //!
 //! Of a folder or pattern (`names`) the header of each file is read (`index`), and the files
-//! have to share a grid (`grid`). A VRT is an index itself (`vrt`). Either gives a list of
+//! have to share a grid (`grid`). A STAC (`stac`) says what the headers would. A VRT is an index itself (`vrt`). Each gives a list of
 //! sources (`source`): which samples of the terrain a file has, and how they follow from its
 //! own. A block of the terrain (`reader`, behind [`super::blocks`]) is filled from the last source to the
 //! first. Files are opened when they are touched, and few at once (`pool`).
@@ -18,6 +18,7 @@ mod names;
 mod pool;
 mod reader;
 mod source;
+mod stac;
 #[cfg(test)]
 mod tests;
 mod tile_file;
@@ -29,6 +30,7 @@ use super::input::FileBytes;
 use super::{BadRaster, Decoded, OpenOptions, beside};
 use crate::remote::{Elsewhere, is_url};
 pub(super) use names::named;
+pub(super) use stac::{decode as of_stac, is_json};
 pub(super) use vrt::decode as of_vrt;
 pub(super) use vrt::xml::is_vrt;
 
@@ -43,11 +45,11 @@ pub(super) fn of_files(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Dec
                 .into(),
         ));
     }
-    index::decoded(files, options)
+    index::decoded(files.into_iter().map(index::File::from).collect(), options)
 }
 
 /// The files of a terrain, and those beside them, that are read: a file, all files of a folder
-/// or pattern, or a VRT and its sources.
+/// or pattern, a VRT and its sources, or a STAC and its items.
 #[must_use]
 pub fn files_read_with(path: &Path) -> Vec<PathBuf> {
     let with_neighbours = |files: Vec<PathBuf>| {
@@ -62,9 +64,10 @@ pub fn files_read_with(path: &Path) -> Vec<PathBuf> {
         return with_neighbours(files);
     }
     let input = FileBytes::open(path, &Elsewhere::default());
-    let sources = input.and_then(|input| match is_vrt(&input)? {
-        true => vrt::sources(&input, path),
-        false => Ok(Vec::new()),
+    let sources = input.and_then(|input| match () {
+        () if is_vrt(&input)? => vrt::sources(&input, path),
+        () if is_json(&input)? => stac::sources(&input, path),
+        () => Ok(Vec::new()),
     });
     let mut files = beside::files_read_with(path);
     files.extend(with_neighbours(sources.unwrap_or_default()));

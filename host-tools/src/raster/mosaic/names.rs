@@ -76,7 +76,7 @@ fn matching(pattern: &str) -> Result<Vec<PathBuf>, BadRaster> {
 
 /// Whether a name is that of a file that holds a terrain and its place, perhaps packed. A
 /// picture seldom does, and lies beside tiles to show them.
-fn is_tile(path: &Path) -> bool {
+pub(super) fn is_tile(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let lower = name.to_lowercase();
     let unpacked = lower.strip_suffix(".zip").or(lower.strip_suffix(".gz"));

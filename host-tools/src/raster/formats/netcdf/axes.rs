@@ -1,7 +1,7 @@
 //! Cell size and orientation of a grid, from its coordinate variables.
 
 use netcdf_reader::cf::{CfAxisType, identify_axis};
-use netcdf_reader::{NcFile, NcVariable};
+use netcdf_reader::{NcFile, NcSliceInfo, NcSliceInfoElem, NcVariable};
 
 use super::attributes::text;
 use crate::raster::decoded::Decoded;
@@ -90,24 +90,33 @@ struct Axis {
     unit: Option<String>,
 }
 
+/// Coordinates that are read at once.
+const AT_ONCE: u64 = 1 << 16;
+/// Of more coordinates than this only so many in a row, all over the axis, are looked at.
+const ALL: u64 = 1 << 22;
+
 fn axis(file: &NcFile, name: &str, samples: u32) -> Option<Axis> {
     let variable = file.variable(name).ok()?;
-    if variable.shape() != [u64::from(samples)] {
+    let count = u64::from(samples);
+    if variable.shape() != [count] {
         return None;
     }
-    let values = file
-        .read_variable_as_f64(name)
-        .ok()?
-        .into_raw_vec_and_offset()
-        .0;
-    let (&first, &last) = (values.first()?, values.last()?);
+    let (first, last) = (
+        values(file, name, 0, 1)?[0],
+        values(file, name, count - 1, 1)?[0],
+    );
     let step = (last - first) / f64::from(samples.max(2) - 1);
     if !step.is_finite() || step == 0.0 {
         return None;
     }
-    let uneven = values
-        .windows(2)
-        .any(|pair| ((pair[1] - pair[0]) / step - 1.0).abs() > 0.01);
+    let apart = AT_ONCE * count.div_ceil(ALL);
+    let mut uneven = false;
+    for start in (0..count).step_by(usize::try_from(apart).ok()?) {
+        // One more: the step from the last to the next.
+        let some = values(file, name, start, (AT_ONCE + 1).min(count - start))?;
+        let is_off = |pair: &[f64]| ((pair[1] - pair[0]) / step - 1.0).abs() > 0.01;
+        uneven |= some.windows(2).any(is_off);
+    }
     Some(Axis {
         name: name.to_owned(),
         step,
@@ -115,4 +124,16 @@ fn axis(file: &NcFile, name: &str, samples: u32) -> Option<Axis> {
         uneven,
         unit: text(variable, "units"),
     })
+}
+
+/// So many coordinates from a place of an axis on, which is no longer than it says.
+fn values(file: &NcFile, name: &str, start: u64, count: u64) -> Option<Vec<f64>> {
+    let selections = vec![NcSliceInfoElem::Slice {
+        start,
+        end: start + count,
+        step: 1,
+    }];
+    let read = file.read_variable_slice_as_f64(name, &NcSliceInfo { selections });
+    let (values, _) = read.ok()?.into_raw_vec_and_offset();
+    (values.len() as u64 == count).then_some(values)
 }

@@ -1,27 +1,32 @@
 //! NetCDF grids, classic and NetCDF-4, as GMT and the climate conventions (COARDS,
-//! CF) write them.
+//! CF) write them, in memory or, where they are large, read when they are touched: chunk by
+//! chunk (`chunks`), or where samples lie plainly (`classic`).
 
+mod access;
 mod attributes;
 mod axes;
+mod chunks;
+mod classic;
 mod filters;
 mod grid_mapping;
+mod missing;
 
-use std::sync::Arc;
-
-use netcdf_reader::masked::MaskParams;
 use netcdf_reader::unpack::SignParams;
-use netcdf_reader::{
-    BytesStorage, DynStorage, FileStorage, NcFile, NcOpenOptions, NcReadable, NcType, NcVariable,
-};
+use netcdf_reader::{NcFile, NcReadable, NcType, NcVariable};
 
 use super::height_name;
 use crate::raster::decoded::{Decoded, sides};
 use crate::raster::format::{Claim, Format, Parts, starts_with_any};
 use crate::raster::geometry::metres_in;
-use crate::raster::input::{Data, FileBytes};
-use crate::raster::samples::{HoleMask, SampleValue, with_samples};
-use crate::raster::{BadRaster, ReferenceSystem, SampleType, Samples};
+use crate::raster::input::FileBytes;
+use crate::raster::plain::PlainBlocks;
+use crate::raster::samples::with_samples;
+use crate::raster::storage::Storage;
+use crate::raster::{BadRaster, OpenOptions, ReferenceSystem, SampleType, Samples};
+use access::Access;
 use attributes::{number, text};
+use chunks::{Chunks, Layout};
+use missing::{Missing, WithHoles};
 
 /// NetCDF 3 (three variants) and NetCDF-4, which is HDF5.
 pub(super) const FORMAT: Format = Format {
@@ -32,54 +37,180 @@ pub(super) const FORMAT: Format = Format {
     },
     extensions: &[("nc", Claim::Promises), ("grd", Claim::Suggests)],
     parts: Parts::Variables,
-    decode: |input, options| decode(input, options.variable.as_deref()),
+    decode,
 };
 
 /// What people call the variable with the heights.
 const HEIGHT_NAMES: &str = "z elevation elev topo topography height altitude dem relief bedrock \
                             surface band1";
 
-/// Reads the grid's height variable.
-fn decode(input: &FileBytes, asked: Option<&str>) -> Result<Decoded, BadRaster> {
-    let options = NcOpenOptions {
-        filter_registry: Some(filters::with_zstd()),
-        ..NcOpenOptions::default()
-    };
-    let file = NcFile::from_storage_with_options(storage(input)?, options)
-        .map_err(|error| fault(&error))?;
-    let variables = file.variables().map_err(|error| fault(&error))?;
-    let heights = choose(variables, asked)?;
-    let mut size = size(heights)?;
-    let sample = sample_type(heights)
-        .ok_or_else(|| BadRaster::NotAHeightField(format!("{} is no number", heights.name())))?;
-    input.check_holds(size.0, size.1, sample.bytes())?;
-    let mut samples: Samples = with_samples!(sample.none(), none => {
-        read_values(none, &file, heights)?.into()
+/// A file at a URL whose samples take no more than this is fetched as a whole.
+const FEW_BYTES: u64 = 1 << 20;
+/// More samples than this are not held in memory, however well the file packs them.
+const MOST_BYTES: u64 = 16 << 30;
+/// No grid has more samples each way.
+const LARGEST_SIDE: u32 = i32::MAX as u32;
+
+/// Reads the grid's height variable, or lets it stay in the file.
+fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+    let access = Access::in_parts(input)?;
+    let decoded = access.file().and_then(|file| {
+        let heights = Heights::find(&file, options.variable.as_deref())?;
+        heights.decode(input, options)
     });
-    if SignParams::from_variable(heights).is_some() {
-        samples = of_the_other_sign(samples);
+    // What did not come looks like what is damaged or not there.
+    access.check_came()?;
+    decoded
+}
+
+/// The height variable of a file.
+struct Heights<'f> {
+    file: &'f NcFile,
+    variable: &'f NcVariable,
+    axes: axes::Names,
+    layout: Layout,
+}
+
+impl<'f> Heights<'f> {
+    fn find(file: &'f NcFile, asked: Option<&str>) -> Result<Self, BadRaster> {
+        let variables = file.variables().map_err(|error| fault(&error))?;
+        let variable = choose(variables, asked)?;
+        let axes = axes::names(file, variable)?;
+        let (columns, rows) = size(variable)?;
+        if columns.max(rows) > LARGEST_SIDE {
+            return Err(BadRaster::AbsurdSize(format!("{columns} × {rows} samples")));
+        }
+        let stored = sample_type(variable).ok_or_else(|| {
+            BadRaster::NotAHeightField(format!("{} is no number", variable.name()))
+        })?;
+        let layout = Layout {
+            size: match axes.x_first {
+                true => [rows, columns],
+                false => [columns, rows],
+            },
+            stored,
+            other_sign: SignParams::from_variable(variable).is_some(),
+            x_first: axes.x_first,
+        };
+        Ok(Self {
+            file,
+            variable,
+            axes,
+            layout,
+        })
     }
-    let axes = axes::names(&file, heights)?;
-    if axes.x_first {
-        samples = with_samples!(&samples, values => transposed(values, size.0).into());
-        size = (size.1, size.0);
+
+    /// What the file says, with all samples or a way to them.
+    fn decode(&self, input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+        let heights = self.variable;
+        let sample = self.layout.held();
+        let missing = Missing::of(heights, sample);
+        let storage = match self.in_file(input, options, &missing)? {
+            Some(storage) => storage,
+            None => {
+                let [columns, rows] = self.layout.size;
+                check_memory(columns, rows, sample)?;
+                input.check_holds(columns, rows, sample.bytes())?;
+                match input.is_outline() {
+                    true => sample.none().into(),
+                    false => self.whole(input, &missing)?,
+                }
+            }
+        };
+        let format = format!(
+            "NetCDF, variable {}, {}",
+            heights.name(),
+            sample.none().type_name()
+        );
+        let [columns, rows] = self.layout.size;
+        let mut decoded = Decoded::new(format, (columns, rows), storage);
+        decoded.no_data = missing.no_data;
+        decoded.scale = number(heights, "scale_factor").unwrap_or(1.0);
+        decoded.offset = number(heights, "add_offset").unwrap_or(0.0);
+        decoded.metres_per_vertical_unit = text(heights, "units").and_then(|unit| metres_in(&unit));
+        if text(heights, "positive").is_some_and(|way| way.eq_ignore_ascii_case("down")) {
+            decoded.turn_depths_into_heights("positive = down");
+        }
+        reference_system(self.file, heights, &self.axes, &mut decoded);
+        axes::place(self.file, &self.axes, &mut decoded);
+        Ok(decoded)
     }
-    let format = format!(
-        "NetCDF, variable {}, {}",
-        heights.name(),
-        samples.type_name()
-    );
-    let mut decoded = Decoded::new(format, size, samples);
-    mark_missing(&mut decoded, heights);
-    decoded.scale = number(heights, "scale_factor").unwrap_or(1.0);
-    decoded.offset = number(heights, "add_offset").unwrap_or(0.0);
-    decoded.metres_per_vertical_unit = text(heights, "units").and_then(|unit| metres_in(&unit));
-    if text(heights, "positive").is_some_and(|way| way.eq_ignore_ascii_case("down")) {
-        decoded.turn_depths_into_heights("positive = down");
+
+    /// A way to the samples, where they are too many to be held and can be read in parts.
+    fn in_file(
+        &self,
+        input: &FileBytes,
+        options: &OpenOptions,
+        missing: &Missing,
+    ) -> Result<Option<Storage>, BadRaster> {
+        let layout = self.layout;
+        let [columns, rows] = layout.size.map(u64::from);
+        let most = match input.remote() {
+            // What is not touched is not fetched, either.
+            Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
+            None => options.most_in_memory_bytes,
+        };
+        let bytes = (columns * rows).saturating_mul(layout.stored.bytes());
+        let Some(own) = input.again()?.filter(|_| bytes > most) else {
+            return Ok(None);
+        };
+        let missing = missing.clone();
+        if self.file.as_classic().is_some() {
+            let size = size(self.variable)?;
+            let plain = classic::plain(self.file, self.variable, layout.held(), size, own.len())?;
+            let plain = match layout.x_first {
+                true => plain.turned(),
+                false => plain,
+            };
+            let reader = PlainBlocks::new(plain, own);
+            return Ok(Some(WithHoles { reader, missing }.into()));
+        }
+        let access = Access::in_parts(&own)?;
+        let dataset = access.dataset(self.variable.name(), &self.variable.shape());
+        access.check_came()?;
+        let place = (own.name(), own.remote().is_some());
+        let Some(reader) = Chunks::new(access, dataset?, layout, place) else {
+            return Ok(None);
+        };
+        if !input.is_outline() {
+            reader.check()?;
+        }
+        Ok(Some(WithHoles { reader, missing }.into()))
     }
-    reference_system(&file, heights, &axes, &mut decoded);
-    axes::place(&file, &axes, &mut decoded);
-    Ok(decoded)
+
+    /// All samples.
+    fn whole(&self, input: &FileBytes, missing: &Missing) -> Result<Storage, BadRaster> {
+        let layout = self.layout;
+        let file = Access::whole(input)?.file()?;
+        let mut samples: Samples = with_samples!(layout.stored.none(), none => {
+            read_values(none, &file, self.variable)?.into()
+        });
+        if layout.other_sign {
+            samples = of_the_other_sign(samples);
+        }
+        if layout.x_first {
+            // Stored columns are as long as the raster has rows.
+            let along = layout.size[1];
+            samples = with_samples!(&samples, values => transposed(values, along).into());
+        }
+        let holes = missing.holes(&samples);
+        let mut storage = Storage::from(samples);
+        storage.set_holes(Some(holes));
+        Ok(storage)
+    }
+}
+
+/// Checks that a machine can hold all samples.
+fn check_memory(columns: u32, rows: u32, sample: SampleType) -> Result<(), BadRaster> {
+    let (columns, rows) = (u64::from(columns), u64::from(rows));
+    match (columns * rows).saturating_mul(sample.bytes()) {
+        bytes if bytes > MOST_BYTES => Err(BadRaster::TooLarge {
+            columns,
+            rows,
+            gigabytes: bytes.div_ceil(1_000_000_000),
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// The reference system of the grid mapping: by its text, else by its attributes.
@@ -105,19 +236,6 @@ fn reference_system(
         let stated = decoded.metres_per_vertical_unit;
         decoded.set_vertical(vertical, stated);
     }
-}
-
-/// The bytes as a store that can be read anywhere.
-fn storage(input: &FileBytes) -> Result<DynStorage, BadRaster> {
-    Ok(match input.data() {
-        Data::File(file, _) => {
-            let file = file.try_clone().map_err(BadRaster::Unreadable)?;
-            let storage = FileStorage::from_file(file);
-            Arc::new(storage.map_err(|error| BadRaster::Unreadable(std::io::Error::other(error)))?)
-        }
-        Data::Memory(bytes) => Arc::new(BytesStorage::from_owner(bytes.clone())),
-        Data::Remote(..) => Arc::new(BytesStorage::from_owner(input.all()?)),
-    })
 }
 
 /// The height variable: two-dimensional but for leading dimensions of length
@@ -203,41 +321,6 @@ fn transposed<T: Copy>(values: &[T], along: u32) -> Vec<T> {
     let along = along as usize;
     let column = |first: usize| values.iter().skip(first).step_by(along);
     (0..along).flat_map(column).copied().collect()
-}
-
-/// `_FillValue`, else `missing_value`, else what the format writes where nothing was
-/// written, is no data; so is every other missing value, and what is out of the valid
-/// range.
-fn mark_missing(decoded: &mut Decoded, variable: &NcVariable) {
-    let default = match decoded.storage.sample_type() {
-        SampleType::I16 => Some(-32767.0),
-        SampleType::I32 => Some(-2_147_483_647.0),
-        SampleType::F32 | SampleType::F64 => Some(9.969_209_968_386_869e36),
-        _ => None,
-    };
-    let Some(stated) = MaskParams::from_variable(variable) else {
-        decoded.no_data = default;
-        return;
-    };
-    let missing = stated.missing_values.first().copied();
-    decoded.no_data = stated.fill_value.or(missing).or(default);
-    let Some(samples) = decoded.storage.held() else {
-        return;
-    };
-    let others = stated.missing_values.iter();
-    let others = others.filter_map(|value| samples.comparable_no_data(*value));
-    let others: Vec<f64> = others.collect();
-    let valid = stated.valid_min.unwrap_or(f64::MIN)..=stated.valid_max.unwrap_or(f64::MAX);
-    let mut mask = HoleMask::with_capacity(samples.len());
-    with_samples!(samples, values => {
-        for (index, value) in values.iter().enumerate() {
-            let value = value.widen();
-            if others.contains(&value) || !(value.is_nan() || valid.contains(&value)) {
-                mask.insert(index);
-            }
-        }
-    });
-    decoded.storage.set_holes(Some(mask));
 }
 
 fn fault(error: &netcdf_reader::Error) -> BadRaster {

@@ -1,6 +1,7 @@
 //! What the conventions say about a variable: sign, range, direction, order of axes.
 
 use super::decode;
+use crate::raster::OpenOptions;
 use crate::raster::Raster;
 use crate::raster::input::FileBytes;
 
@@ -136,7 +137,7 @@ fn file(variables: &[Variable]) -> FileBytes {
 fn with_axes(z: Variable) -> Raster {
     let lat = coordinate("lat", 0, "degrees_north", &[50.0, 50.1]);
     let lon = coordinate("lon", 1, "degrees_east", &[8.0, 8.1, 8.2]);
-    let decoded = decode(&file(&[lat, lon, z]), None).expect("a grid");
+    let decoded = decode(&file(&[lat, lon, z]), &OpenOptions::default()).expect("a grid");
     Raster::checked(decoded, None).expect("heights")
 }
 

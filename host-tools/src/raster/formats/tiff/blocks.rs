@@ -4,13 +4,16 @@
 use std::hash::Hasher;
 use std::sync::Arc;
 
-use tiff_reader::{Ifd, TiffFile};
+use tiff_reader::{Ifd, TagValue, TiffFile};
 use twox_hash::XxHash64;
 
 use super::images;
 use super::layout::Layout;
 use super::samples::{holes, read, sample_type};
 use crate::raster::blocks::{Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Part};
+use crate::raster::guard::guarded;
+use crate::raster::samples::{HoleMask, SampleValue, with_samples};
+use crate::raster::unread::Unread;
 use crate::raster::{BadRaster, SampleType};
 use crate::remote::RemoteFile;
 
@@ -43,6 +46,7 @@ pub(super) struct TiffBlocks {
     /// Those of the files that are elsewhere.
     remote: Vec<Option<Arc<RemoteFile>>>,
     mask: Option<TiffFile>,
+    unread: Unread,
     /// The full image and its overviews.
     images: Vec<Image>,
     /// The same as the rest of the program knows them.
@@ -63,12 +67,12 @@ struct Image {
 
 impl TiffBlocks {
     /// The full image of a file and the overviews in it and in one beside it that are of the
-    /// same kind; `asked` is the band that the user chose.
+    /// same kind; `asked` is the band that the user chose, and `name` the file's in warnings.
     pub(super) fn new(
         (file, remote): Opened,
         mask: Option<TiffFile>,
         overviews: Option<Opened>,
-        asked: Option<u32>,
+        (name, asked): (&str, Option<u32>),
     ) -> Result<Self, BadRaster> {
         let full = images::full(&file)?.clone();
         let full = Image {
@@ -110,7 +114,65 @@ impl TiffBlocks {
             files,
             remote,
             mask,
+            unread: Unread::of(name),
             images: found,
+        })
+    }
+
+    /// A part of an image.
+    fn block(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        let image = &self.images[image];
+        let (file, directory, layout) = (&self.files[image.file], &image.directory, &image.layout);
+        let mask = self.mask_of(image);
+        Ok(Block {
+            samples: read(file, directory, layout, layout.band, part)?,
+            holes: holes(file, directory, layout, mask, part)?,
+        })
+    }
+
+    /// A part of an image of which something cannot be read: strips and tiles that cannot are
+    /// holes, with a warning, and the others are not.
+    fn by_chunks(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        let layout = &self.images[image].layout;
+        let columns = part.columns as usize;
+        let count = columns * part.rows as usize;
+        let mut samples = sample_type(&self.images[MAIN].layout).none();
+        with_samples!(&mut samples, values => values.resize(count, SampleValue::nearest(0.0)));
+        let mut all = HoleMask::with_capacity(count);
+        all.insert_range(..);
+        for chunk in layout.chunks_in(part) {
+            let covers = chunk.covers;
+            let first = [covers.column, covers.row];
+            if chunk.bytes == 0 || self.unread.has(image, first) {
+                continue;
+            }
+            let inside = covers.within(part);
+            let read = guarded(super::FORMAT.name, || self.block(image, &inside));
+            let block = match read {
+                Ok(block) => block,
+                Err(fault) if fault.is_of_the_line() => return Err(fault),
+                Err(fault) => {
+                    self.unread.warn(image, &covers, &fault);
+                    continue;
+                }
+            };
+            for index in 0..inside.columns as usize * inside.rows as usize {
+                let Some(value) = block.stored(index) else {
+                    continue;
+                };
+                let (row, column) = (
+                    index / inside.columns as usize,
+                    index % inside.columns as usize,
+                );
+                let row = (inside.row - part.row) as usize + row;
+                let to = row * columns + (inside.column - part.column) as usize + column;
+                with_samples!(&mut samples, values => values[to] = SampleValue::nearest(value));
+                all.remove(to);
+            }
+        }
+        Ok(Block {
+            samples,
+            holes: Some(all),
         })
     }
 
@@ -137,6 +199,49 @@ impl Image {
             && (times[0] / times[1] - 1.0).abs() <= 1.5 * one
             && ours.of_band().is_some()
             && suit(ours)
+            && self.has_place_of(full, times)
+    }
+
+    fn tag(&self, number: u16) -> Option<&TagValue> {
+        self.directory.tag(number).map(|tag| &tag.value)
+    }
+
+    /// Whether it lies where another image lies, as far as it says so: most overviews do not.
+    fn has_place_of(&self, full: &Self, times: [f64; 2]) -> bool {
+        const PIXEL_SCALE: u16 = 33550;
+        const TIE_POINTS: u16 = 33922;
+        const TRANSFORM: u16 = 34264;
+        const GEO_KEYS: u16 = 34735;
+        // Sizes are those of cells; half a cell of the overview is no other place.
+        const OF_A_CELL: f64 = 0.5;
+        let keys = |image: &Self| Some(image.tag(GEO_KEYS)?.as_u16_slice()?.to_vec());
+        if keys(self).is_some_and(|own| keys(full) != Some(own)) {
+            return false;
+        }
+        let numbers = |image: &Self, number: u16| image.tag(number).and_then(TagValue::as_f64_vec);
+        let (Some(cell), Some(tie)) = (numbers(self, PIXEL_SCALE), numbers(self, TIE_POINTS))
+        else {
+            // A transform says what scale and tie points say.
+            return self.tag(TRANSFORM).is_none() || full.tag(TRANSFORM).is_some();
+        };
+        let (Some(full_cell), Some(full_tie)) =
+            (numbers(full, PIXEL_SCALE), numbers(full, TIE_POINTS))
+        else {
+            return false;
+        };
+        (0..2).all(|axis| {
+            let at = |numbers: &[f64], index: usize| numbers.get(index).copied();
+            let (Some(own), Some(of_full)) = (at(&cell, axis), at(&full_cell, axis)) else {
+                return false;
+            };
+            let same_size = (own / of_full / times[axis] - 1.0).abs() <= 0.1;
+            let corner = |tie: &[f64], cell: f64| {
+                let along = if axis == 0 { cell } else { -cell };
+                Some(at(tie, axis + 3)? - at(tie, axis)? * along)
+            };
+            let corners = corner(&tie, own).zip(corner(&full_tie, of_full));
+            same_size && corners.is_some_and(|(a, b)| (a - b).abs() <= OF_A_CELL * own.abs())
+        })
     }
 }
 
@@ -180,13 +285,10 @@ impl BlockReader for TiffBlocks {
     fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
         // The decoder asks for one chunk after the other.
         self.want(image, std::slice::from_ref(part));
-        let image = &self.images[image];
-        let (file, directory, layout) = (&self.files[image.file], &image.directory, &image.layout);
-        let mask = self.mask_of(image);
-        Ok(Block {
-            samples: read(file, directory, layout, layout.band, part)?,
-            holes: holes(file, directory, layout, mask, part)?,
-        })
+        match self.block(image, part) {
+            Err(fault) if !fault.is_of_the_line() => self.by_chunks(image, part),
+            block => block,
+        }
     }
 
     fn kept_bytes(&self) -> usize {

@@ -84,10 +84,18 @@ impl Layout {
         refuse_colour(image, bands, asked.is_some())?;
         let band = chosen_band(asked, bands)?;
         let (tiled, chunk, chunk_bytes) = match (image.tile_width(), image.tile_height()) {
-            (Some(width), Some(height)) => (true, (width, height), image.tile_byte_counts()),
+            (Some(width), Some(height)) => {
+                let bytes = image.tile_byte_counts();
+                (true, (width, height), stored(bytes, image.tile_offsets()))
+            }
             _ => {
                 let height = image.rows_per_strip().min(rows);
-                (false, (columns, height), image.strip_byte_counts())
+                let bytes = image.strip_byte_counts();
+                (
+                    false,
+                    (columns, height),
+                    stored(bytes, image.strip_offsets()),
+                )
             }
         };
         if chunk.0 == 0 || chunk.1 == 0 {
@@ -192,6 +200,19 @@ impl Layout {
         };
         format!("TIFF, {sample}{bits}, {compression}, {chunks}{order}")
     }
+}
+
+/// Bytes stored for each chunk that has a place. What lies at 0, where the file's header is, is left out,
+/// whatever its size.
+fn stored(bytes: Option<Vec<u64>>, places: Option<Vec<u64>>) -> Option<Vec<u64>> {
+    let (mut bytes, places) = (bytes?, places?);
+    bytes.truncate(places.len());
+    for (bytes, place) in bytes.iter_mut().zip(places) {
+        if place == 0 {
+            *bytes = 0;
+        }
+    }
+    Some(bytes)
 }
 
 /// The band that its tag calls alpha, associated or not.

@@ -77,7 +77,12 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
                 None => None,
             };
             let file = (file, input.remote());
-            Storage::from(TiffBlocks::new(file, mask, overviews, asked)?)
+            Storage::from(TiffBlocks::new(
+                file,
+                mask,
+                overviews,
+                (input.name(), asked),
+            )?)
         }
         false => {
             let all = Part::whole(layout.columns, layout.rows);

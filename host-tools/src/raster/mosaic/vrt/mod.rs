@@ -25,6 +25,7 @@ use super::reader::Mosaic;
 use super::source::Source;
 use crate::remote::is_url;
 use sources::Taking;
+pub(super) use sources::url as gdal_url;
 use xml::{Element, Xml};
 
 /// No VRT is larger, bytes: one of 26,000 files has 20 MB.

@@ -129,7 +129,7 @@ impl Taking<'_> {
 }
 
 /// The URL that a name is, be it in GDAL's way.
-fn url(name: &str) -> Option<String> {
+pub(in super::super) fn url(name: &str) -> Option<String> {
     const GDALS: [(&str, &str); 4] = [
         ("/vsicurl/", ""),
         ("/vsis3/", "s3://"),

@@ -1,0 +1,43 @@
+//! The program in bounded memory, and what would take more.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use crate::hapterra_binary;
+
+/// Address space of a child that holds 256 MB of terrain, KiB: the program itself takes some 100 MB
+/// of it.
+pub const MOST_KIB: u32 = 400_000;
+
+/// Runs `hapterra info` on a file in [`MOST_KIB`] of address space, with these options.
+///
+/// # Panics
+/// When it does not start.
+pub fn info(path: &Path, options: &[&str]) -> Output {
+    let mut command = match cfg!(unix) {
+        true => {
+            let mut shell = Command::new("sh");
+            let limited = format!("ulimit -v {MOST_KIB}; exec \"$0\" info \"$@\"");
+            shell.arg("-c").arg(limited).arg(hapterra_binary());
+            shell
+        }
+        false => {
+            let mut binary = Command::new(hapterra_binary());
+            binary.arg("info");
+            binary
+        }
+    };
+    command.args(options).arg(path).output().expect("it runs")
+}
+
+/// A Zstandard frame of one byte, which is repeated so many times 128 KiB.
+pub fn zstd_bomb(blocks: usize) -> Vec<u8> {
+    let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0x00, 0x58];
+    for block in 0..blocks {
+        let is_last = u32::from(block + 1 == blocks);
+        let header = ((128 * 1024) << 3) | (1 << 1) | is_last;
+        frame.extend(&header.to_le_bytes()[..3]);
+        frame.push(7);
+    }
+    frame
+}

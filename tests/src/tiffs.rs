@@ -1,0 +1,76 @@
+//! Little-endian TIFFs, tag by tag, so that they may say anything.
+
+/// The values of a tag.
+#[derive(Clone, Debug)]
+pub enum Values {
+    /// Of 16 bits.
+    Shorts(Vec<u16>),
+    /// Of 32 bits.
+    Longs(Vec<u32>),
+    /// Floats of 64 bits.
+    Doubles(Vec<f64>),
+}
+
+/// Tags of an image, in rising order of their numbers.
+pub type Directory = Vec<(u16, Values)>;
+
+/// Where the data of a file begins.
+pub const DATA: u32 = 8;
+
+/// A file of some data and of images.
+pub fn tiff(data: &[u8], images: &[Directory]) -> Vec<u8> {
+    let mut bytes = b"II*\0".to_vec();
+    bytes.extend((DATA + data.len() as u32).to_le_bytes());
+    bytes.extend(data);
+    for (number, image) in images.iter().enumerate() {
+        let mut beyond = bytes.len() + 2 + 12 * image.len() + 4;
+        let mut far = Vec::new();
+        bytes.extend((image.len() as u16).to_le_bytes());
+        for (tag, values) in image {
+            let (kind, count, value) = stored(values);
+            bytes.extend([tag.to_le_bytes(), u16::to_le_bytes(kind)].concat());
+            bytes.extend((count as u32).to_le_bytes());
+            if value.len() <= 4 {
+                bytes.extend(value.iter().chain(&[0; 4]).take(4));
+            } else {
+                bytes.extend((beyond as u32).to_le_bytes());
+                beyond += value.len();
+                far.extend(value);
+            }
+        }
+        let next = if number + 1 < images.len() { beyond } else { 0 };
+        bytes.extend((next as u32).to_le_bytes());
+        bytes.extend(far);
+    }
+    bytes
+}
+
+fn stored(values: &Values) -> (u16, usize, Vec<u8>) {
+    match values {
+        Values::Shorts(all) => {
+            let bytes = all.iter().flat_map(|value| value.to_le_bytes());
+            (3, all.len(), bytes.collect())
+        }
+        Values::Longs(all) => {
+            let bytes = all.iter().flat_map(|value| value.to_le_bytes());
+            (4, all.len(), bytes.collect())
+        }
+        Values::Doubles(all) => {
+            let bytes = all.iter().flat_map(|value| value.to_le_bytes());
+            (12, all.len(), bytes.collect())
+        }
+    }
+}
+
+/// The tags that place an image in a zone of UTM, its first sample's outer corner at `corner`.
+pub fn placed(corner: [f64; 2], cell: f64, zone: u16) -> Directory {
+    let keys = vec![1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, zone];
+    vec![
+        (33550, Values::Doubles(vec![cell, cell, 0.0])),
+        (
+            33922,
+            Values::Doubles(vec![0.0, 0.0, 0.0, corner[0], corner[1], 0.0]),
+        ),
+        (34735, Values::Shorts(keys)),
+    ]
+}
