@@ -113,24 +113,26 @@ pub struct Outcome {
 /// // One millimetre deep: half a newton up.
 /// assert_eq!((sample.state, sample.force_n), (ContactState::Touching, Vec3::Z * 0.5));
 /// ```
+// The window is the last: what lies behind a large one is out of reach of a tick's loads.
+#[repr(C)]
 pub struct Haptics<'t, const D: usize> {
-    rate: TickRate,
-    window: Window<'t, D>,
     contact: Contact,
     guard: Guard,
+    scene: Option<Scene>,
+    clutch: Clutch,
     mechanism: Option<Mechanism>,
     /// Counts in the zero pose, once they are known.
     zero: Option<[i32; 3]>,
-    scene: Option<Scene>,
-    point: Option<Point>,
     tick: u32,
-    clutch: Clutch,
+    rate: TickRate,
     /// Number of the view that is felt.
     view: u8,
-    /// What the scene adds to the spring's force, if anything.
-    effects: Option<Effects>,
+    point: Option<Point>,
     /// Where the point before was, in a scene fed by points.
     before: Option<GridPoint>,
+    /// What the scene adds to the spring's force, if anything.
+    effects: Option<Effects>,
+    window: Window<'t, D>,
 }
 
 impl<'t, const D: usize> Haptics<'t, D> {

@@ -22,9 +22,9 @@ pub mod readers;
 pub mod real_ground;
 pub mod rows;
 pub mod scene;
-pub mod slow_line;
 #[cfg(unix)]
 pub mod served;
+pub mod slow_line;
 pub mod soak;
 pub mod tiffs;
 pub mod usb;

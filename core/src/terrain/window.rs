@@ -75,12 +75,15 @@ impl Corners {
 ///
 /// The window owns its buffers as `&mut Tile`. Installing a tile swaps one
 /// reference, so a tick sees the old tile or the new one and nothing is copied.
+// In this order: what each tick reads first lies within reach of its loads, which the maxima and
+// the allowances of a large window are not.
+#[repr(C)]
 pub struct Window<'t, const D: usize> {
-    pub(super) slots: [[&'t mut Tile; D]; D],
-    pyramid: MaxPyramid<D>,
-    level: u8,
     size: FieldSize,
     top: i32,
+    level: u8,
+    pub(super) slots: [[&'t mut Tile; D]; D],
+    pyramid: MaxPyramid<D>,
     /// Where the underlay lies, if the scene has one.
     pub(super) place: Option<Underlay>,
     /// The underlay, once it has come; or its buffer.
