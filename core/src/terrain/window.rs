@@ -199,10 +199,7 @@ impl<'t, const D: usize> Window<'t, D> {
             return Ground::Hole;
         }
         let Some(tile) = self.held(TileIndex::holding(cell)) else {
-            return match self.place {
-                None => Ground::Missing,
-                Some(_) => self.unsettled_ground(cell),
-            };
+            return self.unsettled_ground(cell);
         };
         let heights = tile.corners(cell);
         let [sw, se, nw, ne] = heights;
@@ -296,8 +293,7 @@ impl<'t, const D: usize> Window<'t, D> {
         let index = TileIndex::new(col >> up, row >> up);
         match self.held(index) {
             Some(tile) => tile.block_is_below(shift, first, low),
-            // Asked here, too: a path beyond the field goes over many blocks that nobody holds.
-            None => self.place.is_some() && self.unsettled_is_below(index, low),
+            None => self.unsettled_is_below(index, low),
         }
     }
 
