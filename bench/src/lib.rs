@@ -11,7 +11,6 @@
 //! - [`effects`]: what friction, shading, texture and damping cost, and how exact they are;
 //! - [`solver`]: one patch, and the square root, alone;
 //! - [`state`]: what a tick can be doing, for counting instructions;
-//! - [`streaming`]: terrain larger than memory and farther than the disk;
 //! - [`report`]: the table, the CSV file, the picture.
 
 #![forbid(unsafe_code)]
@@ -29,5 +28,4 @@ pub mod report;
 pub mod solver;
 pub mod state;
 mod stats;
-pub mod streaming;
 pub mod truth;
