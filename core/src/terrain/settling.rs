@@ -196,7 +196,7 @@ impl<'t, const D: usize> Window<'t, D> {
             return;
         }
         let far = match settles && !was_here {
-            true => self.far(&self.slots[row][col], index),
+            true => self.far(self.slots[row][col], index),
             false => None,
         };
         self.settling.begin(index, far);
