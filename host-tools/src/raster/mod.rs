@@ -118,8 +118,9 @@ impl Raster {
         decode(path, options)
             .and_then(|decoded| decoded.with_ground_cell(options.ground_cell_m))
             .map(|decoded| decoded.with_vertical_unit(options.vertical_unit_m))
-            .and_then(|decoded| {
+            .and_then(|mut decoded| {
                 decoded.storage.set_path(path);
+                decoded.storage.set_disk_cache(&options.disk_cache);
                 Self::checked(decoded, options.no_data)
             })
             .inspect(|_| options.elsewhere.touch())
@@ -174,10 +175,22 @@ impl Raster {
         })
     }
 
-    /// From now on nothing waits for what is fetched from elsewhere: what is not here yet is
-    /// a hole for the moment, and [`Raster::not_yet`] counts it.
+    /// From now on nothing waits for what is fetched from elsewhere, nor for coarse levels that
+    /// are made of many blocks of the file: what is not here yet is a hole for the moment, and
+    /// [`Raster::not_yet`] counts it.
     pub fn stop_waiting(&self) {
         self.elsewhere.stop_waiting(true);
+        if let Storage::Blocks(blocks) = &self.source.storage {
+            blocks.stop_waiting();
+        }
+    }
+
+    /// Blocks that were read from the file so far; none where all samples are in memory.
+    pub fn blocks_read(&self) -> u64 {
+        match &self.source.storage {
+            Storage::Held { .. } => 0,
+            Storage::Blocks(blocks) => blocks.blocks_read(),
+        }
     }
 
     /// How often heights were asked for that were not here yet. Where it grows while heights
@@ -221,7 +234,7 @@ impl Raster {
     /// Copies heights of a row from `first_column` eastwards, one for each place in
     /// `heights`: the same values as [`Raster::height`].
     ///
-    /// Level *L* is the field with every 2ᴸ-th sample, or what an overview has there
+    /// Level *L* is the field with every 2ᴸ-th sample, or what an overview in the file has there
     /// ([`Raster::surface`]); row and column count in it.
     pub fn copy_row(&self, level: u8, row: u32, first_column: u32, heights: &mut [f64]) {
         heights.fill(f64::NAN);
@@ -248,7 +261,8 @@ impl Raster {
     /// counts has no height.
     ///
     /// A raster in memory has one image for all levels. One that stays in its file has the
-    /// heights of level *L* from the coarsest overview that is no coarser than it.
+    /// heights of level *L* from the coarsest overview that is no coarser than it; of a file
+    /// without overviews, where *L* is at least 3, from every 8th, 64th or 512th sample.
     pub fn surface(&self, level: u8, place: [f64; 2]) -> f64 {
         self.surface_of(self.image_of(level), place)
     }

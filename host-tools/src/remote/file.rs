@@ -13,6 +13,7 @@ use super::line::{Held, Line, Trouble, spawn};
 use super::pages;
 use super::store::{Object, Opened};
 use super::{LOST, OUTAGE, is_outage};
+use crate::disk_cache::FileStamp;
 
 /// After a request that failed the next one is made after so long.
 const BETWEEN_TRIES: Duration = Duration::from_secs(1);
@@ -64,6 +65,12 @@ impl RemoteFile {
             Some(all) => all.len() as u64,
             None => self.object.len(),
         }
+    }
+
+    /// What tells the file in the state in which it was opened from others; `None` where its
+    /// server tells neither tag nor time.
+    pub(crate) fn stamp(&self) -> Option<FileStamp> {
+        self.object.stamp().map(FileStamp::of_text)
     }
 
     /// Has bytes fetched that are going to be read; waits for nothing.

@@ -83,6 +83,7 @@ impl BlockReader for Field {
         Ok(Block {
             samples: samples.into(),
             holes: None,
+            is_lacking: false,
         })
     }
 
