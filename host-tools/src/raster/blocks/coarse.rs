@@ -201,7 +201,7 @@ impl Coarse {
     /// The same, and copies of those that stay.
     pub(super) fn take_new(&mut self) -> Vec<(Key, Piece)> {
         let mut taken = self.take_outgoing();
-        for (key, held) in self.pieces.iter_mut() {
+        for (key, held) in &mut self.pieces {
             if std::mem::take(&mut held.is_new) {
                 taken.push((*key, held.piece.clone()));
             }

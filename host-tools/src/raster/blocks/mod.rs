@@ -32,6 +32,7 @@ use std::time::{Duration, Instant};
 use super::samples::SampleType;
 use super::{BadRaster, bilinear};
 use crate::disk_cache::DiskCache;
+use crate::remote::without_key;
 use background::{Job, Queue};
 use cache::{Cache, Key};
 use coarse::{Coarse, Found};
@@ -174,8 +175,10 @@ impl Drop for Blocks {
         }
         let new = self.coarse().take_new();
         self.keep(new);
-        let (read, path) = (self.blocks_read(), self.path.get());
-        tracing::debug!(read, ?path, "blocks");
+        if let Some(path) = self.path.get() {
+            let (read, name) = (self.blocks_read(), without_key(path));
+            tracing::debug!("{read} blocks of {name} were read");
+        }
     }
 }
 
