@@ -115,6 +115,7 @@ impl Raster {
         options: &OpenOptions,
         decode: impl Fn(&Path, &OpenOptions) -> Result<Decoded, BadRaster>,
     ) -> Result<Self, Error> {
+        options.elsewhere.set_disk_cache(&options.disk_cache);
         decode(path, options)
             .and_then(|decoded| decoded.with_ground_cell(options.ground_cell_m))
             .map(|decoded| decoded.with_vertical_unit(options.vertical_unit_m))
@@ -183,6 +184,24 @@ impl Raster {
         if let Storage::Blocks(blocks) = &self.source.storage {
             blocks.stop_waiting();
         }
+    }
+
+    /// Has what is not here yet of a level read, where that is not waited for any more
+    /// ([`Raster::stop_waiting`]): between two columns and between two rows of level 0, all of
+    /// them included. Waits for nothing, and asks for 16 blocks at most.
+    pub fn prefetch(&self, level: u8, columns: [u32; 2], rows: [u32; 2]) {
+        let Storage::Blocks(blocks) = &self.source.storage else {
+            return;
+        };
+        let inside = |[first, last]: [u32; 2], count: u32, turned: bool| {
+            let (first, last) = (first.min(count - 1), last.min(count - 1));
+            let at = |index: u32| if turned { count - 1 - index } else { index };
+            let (one, other) = (at(first), at(last));
+            [one.min(other), one.max(other)]
+        };
+        let columns = inside(columns, self.columns(), self.source.east_first);
+        let rows = inside(rows, self.rows(), !self.source.south_up);
+        blocks.prefetch_full(level, columns, rows);
     }
 
     /// Blocks that were read from the file so far; none where all samples are in memory.

@@ -4,7 +4,7 @@ use std::io::{Error, ErrorKind, Result};
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::disk_cache::FileStamp;
+use crate::disk_cache::{DiskCache, FileStamp};
 
 /// No file at a URL.
 #[derive(Clone, Debug, Default)]
@@ -22,6 +22,9 @@ impl Elsewhere {
             "this program was built without URLs",
         ))
     }
+
+    /// Nothing is fetched.
+    pub(crate) fn set_disk_cache(&self, _: &DiskCache) {}
 
     /// Nothing goes wrong.
     pub(crate) fn touch(&self) {}

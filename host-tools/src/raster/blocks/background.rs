@@ -42,6 +42,16 @@ impl Queue {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Has something done before what was wanted already.
+    pub(super) fn want_first(&self, job: Job) {
+        let mut state = self.state();
+        if !state.is_over && state.waiting.len() < MOST && state.known.insert(job) {
+            state.waiting.push_front(job);
+            drop(state);
+            self.wake.notify_all();
+        }
+    }
+
     /// Has something done, after what was wanted before.
     pub(super) fn want(&self, job: Job) {
         let mut state = self.state();
@@ -118,6 +128,9 @@ mod tests {
         // What was left out may be wanted again.
         queue.want(Job::Pass([0, 0]));
         assert_eq!(queue.coming(2), [[2, 0], [3, 0]]);
+        assert!(queue.next().is_some());
+        queue.want_first(Job::Pass([5000, 0]));
+        assert_eq!(queue.next(), Some(Job::Pass([5000, 0])));
         let mut last = None;
         while let Some(job) = queue.next() {
             last = Some(job);

@@ -412,3 +412,42 @@ fn the_memory_of_coarse_samples_is_bounded_and_what_gives_way_is_kept_on_disk() 
     }
     assert_eq!(seen.reads(), 0);
 }
+
+#[test]
+fn what_lies_ahead_is_read_in_the_background_and_too_much_is_not() {
+    for order in [[true, false], [false, true]] {
+        let seen = Seen::new("");
+        let raster = raster(&seen, &DiskCache::off(), order);
+        seen.threads.lock().expect("alone").clear();
+        raster.prefetch(0, [1000, 1100], [600, 650]);
+        raster.stop_waiting();
+        assert_eq!(seen.reads(), 0, "who may wait reads nothing ahead");
+        raster.prefetch(0, [0, 2100], [0, 1249]);
+        raster.prefetch(0, [1000, 1100], [600, 650]);
+        let there = |raster: &Raster| {
+            let mut heights = [0.0; 101];
+            let is_all = |row: u32, heights: &mut [f64; 101]| {
+                raster.copy_row(0, row, 1000, heights);
+                (1000..).zip(&*heights).all(|(column, found)| {
+                    let expected = height(column, row, order);
+                    found.to_bits() == expected.to_bits() || found.is_nan() && expected.is_nan()
+                })
+            };
+            [600, 625, 650].iter().all(|row| is_all(*row, &mut heights))
+        };
+        let Storage::Blocks(blocks) = &raster.source.storage else {
+            panic!("it stays in its file");
+        };
+        let keys = [12, 13].map(|row| [15, 16, 17].map(|column| [column, row]));
+        let has = |at: &[u32; 2]| blocks.kept().cache.has(&Key { image: 0, at: *at });
+        let comes = (0..4000).any(|_| {
+            thread::sleep(Duration::from_millis(5));
+            keys.as_flattened().iter().all(has)
+        });
+        assert!(comes);
+        assert!(there(&raster));
+        assert_eq!(seen.reads(), 6);
+        let this = thread::current().id();
+        assert!(!seen.threads.lock().expect("alone").contains(&this));
+    }
+}

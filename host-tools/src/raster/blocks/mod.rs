@@ -345,6 +345,35 @@ impl Shared {
         bilinear::at(place, |column, row| height(self.stored(image, column, row)))
     }
 
+    /// [`Shared::prefetch`] of the image that serves a level, between two columns and two rows
+    /// of the full one.
+    pub(super) fn prefetch_full(&self, level: u8, columns: [u32; 2], rows: [u32; 2]) {
+        let image = self.image_of(level);
+        let Some(of) = self.images.get(image) else {
+            return;
+        };
+        let times = self.coarseness(of);
+        // What lies between two samples follows from both.
+        let along = |[first, last]: [u32; 2], axis: usize, count: u32| {
+            let at = |full: u32| (f64::from(full) - f64::from(of.first[axis])) / times[axis];
+            let begin = (at(first).floor() - 1.0).clamp(0.0, f64::from(count) - 1.0);
+            let end = (at(last).ceil() + 1.0).clamp(begin, f64::from(count) - 1.0);
+            (begin as u32, (end - begin) as u32 + 1)
+        };
+        let exact = |[first, last]: [u32; 2]| (first, last - first + 1);
+        let (columns, rows) = match image {
+            0 => (exact(columns), exact(rows)),
+            _ => (along(columns, 0, of.columns), along(rows, 1, of.rows)),
+        };
+        let part = Part {
+            column: columns.0,
+            row: rows.0,
+            columns: columns.1,
+            rows: rows.1,
+        };
+        self.prefetch(image, &part);
+    }
+
     /// Samples of the full image in one of another, along rows and columns.
     fn coarseness(&self, image: &BlockImage) -> [f64; 2] {
         if let Some(every) = image.every {

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::super::guard::guarded;
 use super::background::Job;
@@ -16,6 +16,12 @@ use crate::remote::without_key;
 const WARNINGS: u32 = 8;
 /// Blocks that are fetched from elsewhere while one is decoded in the background.
 const AHEAD: usize = 16;
+
+/// Blocks that are read ahead of the hand at once, at most.
+const MOST_PREFETCHED: usize = 16;
+
+/// Between two times at which all that is known is kept: pieces grow block by block.
+const BETWEEN_KEEPING: Duration = Duration::from_secs(5);
 
 /// What came of reading a part of an image.
 pub(super) struct Read {
@@ -48,12 +54,17 @@ impl Shared {
             return block;
         }
         self.not_yet.fetch_add(1, Ordering::Relaxed);
+        self.note_awaited(key);
+        None
+    }
+
+    /// Notes that a block is not here yet.
+    fn note_awaited(&self, key: Key) {
         let mut kept = self.kept();
         if kept.awaited.len() >= MOST_AWAITED {
             kept.awaited.clear();
         }
         kept.awaited.insert(key, Instant::now());
-        None
     }
 
     /// Reads a block and keeps it.
@@ -89,6 +100,40 @@ impl Shared {
         kept.awaited.remove(&key);
         kept.cache.put(key, block.clone());
         Ok(block)
+    }
+
+    /// Has the blocks of a part of an image read that are not in memory. Waits for
+    /// nothing, and does nothing before nobody waits any more, nor for a part of more than
+    /// [`MOST_PREFETCHED`] blocks.
+    pub(super) fn prefetch(&self, image: usize, part: &Part) {
+        let Some(of) = self.images.get(image).filter(|_| !self.waits()) else {
+            return;
+        };
+        if image >= self.reader.images().len() || part.columns == 0 || part.rows == 0 {
+            return;
+        }
+        let [across, down] = of.block;
+        let columns = part.column / across..(part.column + (part.columns - 1)) / across + 1;
+        let rows = part.row / down..(part.row + (part.rows - 1)) / down + 1;
+        // Of a part that is too large nothing comes in time.
+        if columns.len() * rows.len() > MOST_PREFETCHED {
+            return;
+        }
+        let mut wanted = vec![];
+        let kept = self.kept();
+        for row in rows {
+            for at in columns.clone().map(|column| [column, row]) {
+                if !kept.cache.has(&Key { image, at }) {
+                    wanted.push(at);
+                }
+            }
+        }
+        drop(kept);
+        let parts: Vec<Part> = wanted.iter().map(|at| of.part(*at)).collect();
+        self.reader.want(image, &parts);
+        for at in wanted {
+            self.queue.want_first(Job::Fetch(Key { image, at }));
+        }
     }
 
     /// Takes the coarse samples of a block of the full image.
@@ -151,21 +196,30 @@ impl Shared {
 
     /// Does what is wanted in the background until that ends.
     pub(super) fn work(&self) {
+        let mut kept = Instant::now();
         loop {
             while let Some(job) = self.queue.next() {
                 match job {
                     Job::Seek(key) => self.seek(key),
                     Job::Pass(at) => self.pass(at),
                     // What is not here yet is wanted again.
-                    Job::Fetch(key) => drop(self.fetch(key)),
+                    Job::Fetch(key) => {
+                        if self.fetch(key).is_err() {
+                            self.note_awaited(key);
+                        }
+                    }
                 }
                 self.queue.done(&job);
                 let outgoing = self.coarse().take_outgoing();
                 self.keep(outgoing);
             }
-            // Nothing else to do: then what is known is kept for another time.
-            let new = self.coarse().take_new();
-            self.keep(new);
+            // Nothing else to do: then what is known is kept for another time. At the end it
+            // is kept anyway.
+            if kept.elapsed() >= BETWEEN_KEEPING {
+                let new = self.coarse().take_new();
+                self.keep(new);
+                kept = Instant::now();
+            }
             if !self.queue.wait() {
                 return;
             }
