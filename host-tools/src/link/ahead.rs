@@ -61,19 +61,16 @@ impl Ahead {
 /// First and last tile, east and north, from the one under the HIP to where it will be after
 /// `times` as long as it took from `was`; `None` where it is too fast.
 fn tiles(was: &GridPoint, is: &GridPoint, times: f64) -> Option<[[i32; 2]; 2]> {
-    let mut tiles = [[0; 2]; 2];
-    for axis in 0..2 {
+    let along = |axis: usize| {
         let at = |point: &GridPoint| f64::from(point.cell()[axis]) + f64::from(point.frac()[axis]);
         let (from, moved) = (at(is), at(is) - at(was));
-        let to = from + moved * times;
         let tile = |cells: f64| (cells / f64::from(TILE_CELLS as u32)).floor() as i32;
-        let (from, to) = (tile(from), tile(to));
-        if (to.saturating_sub(from)).saturating_abs() > MOST_TILES {
-            return None;
-        }
-        (tiles[0][axis], tiles[1][axis]) = (from.min(to), from.max(to));
-    }
-    Some(tiles)
+        let (from, to) = (tile(from), tile(from + moved * times));
+        let is_near = to.saturating_sub(from).saturating_abs() <= MOST_TILES;
+        is_near.then_some([from.min(to), from.max(to)])
+    };
+    let (east, north) = (along(0)?, along(1)?);
+    Some([[east[0], north[0]], [east[1], north[1]]])
 }
 
 #[cfg(test)]
