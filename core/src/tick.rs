@@ -113,8 +113,6 @@ pub struct Outcome {
 /// // One millimetre deep: half a newton up.
 /// assert_eq!((sample.state, sample.force_n), (ContactState::Touching, Vec3::Z * 0.5));
 /// ```
-// The window is the last: what lies behind a large one is out of reach of a tick's loads.
-#[repr(C)]
 pub struct Haptics<'t, const D: usize> {
     contact: Contact,
     guard: Guard,

@@ -229,6 +229,10 @@ impl Image {
         else {
             return false;
         };
+        if (&cell, &tie) == (&full_cell, &full_tie) {
+            // Copied with the other tags of the full image: nothing is said of the overview.
+            return true;
+        }
         (0..2).all(|axis| {
             let at = |numbers: &[f64], index: usize| numbers.get(index).copied();
             let (Some(own), Some(of_full)) = (at(&cell, axis), at(&full_cell, axis)) else {
