@@ -128,8 +128,14 @@ fn an_overview_that_shows_something_else_is_not_felt() {
         ),
         (
             "of cells of another size",
-            elsewhere(here, 30.0, 32611),
+            elsewhere(here, 45.0, 32611),
             false,
+        ),
+        // Writers copy tags; GDAL looks at none of an overview's.
+        (
+            "with the full image's place and cells",
+            elsewhere(here, 30.0, 32611),
+            true,
         ),
         (
             "larger than the file",
