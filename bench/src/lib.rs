@@ -11,6 +11,7 @@
 //! - [`effects`]: what friction, shading, texture and damping cost, and how exact they are;
 //! - [`solver`]: one patch, and the square root, alone;
 //! - [`state`]: what a tick can be doing, for counting instructions;
+//! - [`streaming`]: terrain larger than memory and farther than the disk;
 //! - [`report`]: the table, the CSV file, the picture.
 
 #![forbid(unsafe_code)]
@@ -28,4 +29,5 @@ pub mod report;
 pub mod solver;
 pub mod state;
 mod stats;
+pub mod streaming;
 pub mod truth;

@@ -11,6 +11,7 @@ use hapterra::raster::{OpenOptions, Raster};
 use hapterra_bench::compare::{Effort, Row, compare};
 use hapterra_bench::effects::Measured;
 use hapterra_bench::grid::Grid;
+use hapterra_bench::streaming::{self, Plan};
 use hapterra_bench::{continuity, effects, report, solver, state};
 use indicatif::ProgressBar;
 
@@ -44,6 +45,26 @@ struct Args {
     #[arg(long, conflicts_with_all = ["continuity", "png"])]
     effects: bool,
 
+    /// Only what opening, memory, tiles and the speed of the hand cost against the size of a terrain and
+    /// the latency of its server, in made terrains of 10^6 to 10^10 samples and in the files
+    #[arg(long, conflicts_with_all = ["continuity", "effects", "steepness"])]
+    streaming: bool,
+
+    /// With --streaming: the made terrains' sizes as powers of ten, from 6 to 10
+    #[arg(long, value_name = "LIST", requires = "streaming", value_delimiter = ',',
+          default_values_t = [6, 7, 8, 9, 10], value_parser = clap::value_parser!(u32).range(6..=10))]
+    sizes: Vec<u32>,
+
+    /// With --streaming: what a web server waits before it answers, ms; 0 is a file on disk, others need
+    /// a build with the feature remote. Default: 0,20,50,100,200, or 0 without that feature
+    #[arg(long, value_name = "LIST", requires = "streaming", value_delimiter = ',',
+          value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    latencies: Vec<u32>,
+
+    /// What a process of --streaming measures
+    #[arg(long, hide = true, requires = "streaming")]
+    streaming_case: Option<String>,
+
     /// Write all figures to this CSV file
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     csv: Option<PathBuf>,
@@ -64,14 +85,19 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Failure> {
+    if let Some(case) = &args.streaming_case {
+        return streaming::measure_case(case).map_err(Failure::new);
+    }
+    if args.streaming {
+        optimised();
+        return stream(args);
+    }
     if args.continuity {
         let changes = continuity::measure();
         print!("{}", report::continuity(&changes));
         return write(args, &[], &changes);
     }
-    if cfg!(debug_assertions) {
-        eprintln!("note: built without full optimisation; for figures: cargo build --release");
-    }
+    optimised();
     let effort = if args.quick {
         Effort::QUICK
     } else {
@@ -98,6 +124,71 @@ fn run(args: &Args) -> Result<(), Failure> {
     print!("{}", report::continuity(&changes));
     print!("{}", report::summary(&rows));
     write(args, &rows, &changes)
+}
+
+fn optimised() {
+    if cfg!(debug_assertions) {
+        eprintln!("note: built without full optimisation; for figures: cargo build --release");
+    }
+}
+
+/// Terrain that is streamed: a line for each row as soon as it is measured.
+fn stream(args: &Args) -> Result<(), Failure> {
+    let plan = plan(args)?;
+    let waiting = spinner();
+    let mut rows: Vec<streaming::Row> = vec![];
+    waiting.suspend(|| println!("{}", report::streaming_head()));
+    let measured = streaming::measure(
+        &plan,
+        &args.files,
+        &mut |what| waiting.set_message(what.to_owned()),
+        &mut |why| waiting.suspend(|| eprintln!("warning: not measured: {why}")),
+        &mut |row| {
+            waiting.suspend(|| println!("{}", report::streaming(&row)));
+            rows.push(row);
+        },
+    );
+    waiting.finish_and_clear();
+    let room = "free some room where temporary files are, or name another place in TMPDIR";
+    measured.map_err(|why| Failure::new(why).hint(room))?;
+    if rows.is_empty() {
+        let hint = "the warnings above say why; name other files, or leave --files-only out";
+        return Err(Failure::new("nothing was measured").hint(hint));
+    }
+    if let Some(file) = &args.csv {
+        report::write_streaming(file, &rows).map_err(|error| {
+            let text = format!("cannot write {}: {error}", file.display());
+            Failure::new(text).hint(HINT)
+        })?;
+        println!("wrote {}", file.display());
+    }
+    if let Some(file) = &args.png {
+        report::draw_streaming(&rows, file).map_err(|error| Failure::new(error).hint(HINT))?;
+        println!("wrote {}", file.display());
+    }
+    Ok(())
+}
+
+fn plan(args: &Args) -> Result<Plan, Failure> {
+    let has_server = cfg!(feature = "remote");
+    let latencies_ms = match (args.latencies.is_empty(), has_server) {
+        (false, _) => args.latencies.clone(),
+        (true, true) => streaming::LATENCIES_MS.to_vec(),
+        (true, false) => vec![0],
+    };
+    if !has_server && latencies_ms.iter().any(|latency| *latency > 0) {
+        let text = "this build has no web server, so latencies cannot be measured";
+        let hint = "cargo run --release -p hapterra-bench --features remote -- --streaming";
+        return Err(Failure::new(text).hint(hint));
+    }
+    Ok(Plan {
+        exponents: match args.files_only {
+            true => vec![],
+            false => args.sizes.clone(),
+        },
+        latencies_ms,
+        halvings: if args.quick { 4 } else { 6 },
+    })
 }
 
 /// Opens every file before anything is measured.

@@ -19,7 +19,7 @@ use crate::path::Dice;
 
 /// Why nothing can be measured on a terrain: it is too small, or the arm does not reach it.
 #[derive(Clone, Debug)]
-pub struct NotMeasured(pub(super) String);
+pub struct NotMeasured(pub(crate) String);
 
 impl fmt::Display for NotMeasured {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -31,7 +31,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             let mut command = Command::new(cargo);
             let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("../Cargo.toml");
             command.args(["run", "--release", "--package", PROGRAM, "--bin", PROGRAM]);
-            command.arg("--manifest-path").arg(manifest).arg("--");
+            command.arg("--manifest-path").arg(manifest);
+            if cfg!(feature = "remote") {
+                // A build with URLs measures them, too.
+                command.args(["--features", "remote"]);
+            }
+            command.arg("--");
             command
         }
         (None, None) if asks_for_help(&args.arguments) => {
@@ -58,7 +63,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 /// What is told of the program where it is missing.
 const ABOUT: &str = "Measure the contact beside other ways to render a height field: time for a \
-                     tick, error against the exact closest point, largest jump of the force\n";
+                     tick, error against the exact closest point, largest jump of the force; or what \
+                     streaming costs (--streaming)\n";
 
 fn asks_for_help(arguments: &[OsString]) -> bool {
     let ways = ["--help", "-h", "help"];

@@ -1,0 +1,276 @@
+//! One terrain, read one way, over one latency: what a process of its own measures, so that its
+//! memory is that of this case alone.
+
+use std::path::Path;
+use std::time::Instant;
+
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use serde::{Deserialize, Serialize};
+
+use super::chain::{Chain, Pace, SentTile, board};
+use super::felt::Felt;
+use super::hand::Hand;
+use super::meter::{Meter, Traffic, peak_bytes};
+use super::row::{Reading, Row};
+use super::run::{self, fastest};
+use super::way::{Way, Ways};
+use super::{CELL_MM, NotMeasured, RATES, SPEEDS, USUAL};
+
+/// What to measure.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Case {
+    /// Name of the terrain.
+    pub(super) terrain: String,
+    /// The file: a path, or a URL.
+    pub(super) source: String,
+    /// Where the ways of the HIP are written down.
+    pub(super) ways: String,
+    /// How the file is read.
+    pub(super) reading: Reading,
+    /// What the server waits, ms.
+    pub(super) latency_ms: u32,
+    /// Halvings in the search for the fastest speed.
+    pub(super) halvings: u32,
+}
+
+impl Case {
+    /// How a terrain is opened.
+    pub(super) fn options(reading: Reading) -> OpenOptions {
+        OpenOptions {
+            most_in_memory_bytes: match reading {
+                Reading::Blocks => 0,
+                Reading::Whole => u64::MAX,
+            },
+            ..OpenOptions::default()
+        }
+    }
+
+    fn is_remote(&self) -> bool {
+        self.source.contains("://")
+    }
+
+    fn open(&self) -> Result<Raster, NotMeasured> {
+        if !self.is_remote() {
+            forget(Path::new(&self.source));
+        }
+        let options = Self::options(self.reading);
+        Raster::open(&self.source, &options).map_err(|error| NotMeasured(error.to_string()))
+    }
+
+    /// Measures everything, and hands out a row for each link.
+    ///
+    /// # Errors
+    /// When the file cannot be read, the arm does not reach the ways, or a session ends.
+    pub(super) fn measure(&self, mut done: impl FnMut(Row)) -> Result<(), NotMeasured> {
+        let ways = Ways::read(Path::new(&self.ways))?;
+        let hand = Hand::over(&ways);
+        let benches = RATES.map(|kb_per_s| Bench {
+            case: self,
+            ways: &ways,
+            hand: &hand,
+            kb_per_s,
+        });
+        // Before the many devices of the motions, which are kept to the program's end.
+        let rows: Vec<Row> = benches.iter().map(Bench::first).collect::<Result<_, _>>()?;
+        for (bench, mut row) in benches.iter().zip(rows) {
+            if self.reading == Reading::Blocks {
+                bench.motions(&mut row)?;
+            }
+            done(row);
+        }
+        Ok(())
+    }
+}
+
+/// A raster as a terrain true to scale, at the size in the hand that is measured.
+///
+/// # Errors
+/// When it cannot be felt so.
+pub(super) fn terrain(raster: &Raster) -> Result<Terrain<'_>, NotMeasured> {
+    let grid = FeltGrid::new(raster, FeltCells::default());
+    let scale = Scale::true_to(&grid, CELL_MM).map_err(|error| NotMeasured(error.to_string()))?;
+    Terrain::over(grid, scale, 0).map_err(|error| NotMeasured(error.to_string()))
+}
+
+/// One link's measurements of a case.
+struct Bench<'c> {
+    case: &'c Case,
+    ways: &'c Ways,
+    hand: &'c Hand,
+    kb_per_s: u32,
+}
+
+/// A session from the opening of the file to the end of a motion.
+struct Motion {
+    felt: Felt,
+    tiles: Vec<SentTile>,
+    /// The ticks in which the motion began and ended.
+    moved: [u64; 2],
+    host_ms: Vec<f64>,
+}
+
+impl Bench<'_> {
+    /// Opens the file, touches it in real time, and where it is read in blocks moves over the straight
+    /// way once: what the row says of times, memory and traffic.
+    fn first(&self) -> Result<Row, NotMeasured> {
+        let case = self.case;
+        let meter = match case.is_remote() {
+            true => Meter::Server,
+            false => Meter::System,
+        };
+        let board = board();
+        let before = meter.traffic()?;
+        let began = Instant::now();
+        let raster = case.open()?;
+        let open_ms = ms_since(began);
+        let opened = meter.traffic()?;
+        let began = Instant::now();
+        let terrain = terrain(&raster)?;
+        let home_mm = self.hand.home_mm();
+        let bytes_a_tick = self.kb_per_s as usize;
+        let mut chain = Chain::new(&terrain, board, home_mm, bytes_a_tick, Pace::Real)?;
+        run::touch(&mut chain, self.hand, &self.ways.straight)?;
+        let first_force_ms = ms_since(began);
+        let mut row = Row::of_opening(case, self.kb_per_s, &terrain, [open_ms, first_force_ms]);
+        if case.reading == Reading::Blocks {
+            chain.set_pace(Pace::Virtual);
+            let (way, speed) = (&self.ways.straight, f64::from(USUAL));
+            let (felt, moved) = run::travel(&mut chain, self.hand, way, speed, false)?;
+            row.set_tiles(&Motion::of(chain, felt, moved));
+        }
+        row.peak_mb = peak_bytes().map(|bytes| round(bytes as f64 / 1e6));
+        row.set_traffic(before, opened, meter.traffic()?);
+        Ok(row)
+    }
+
+    /// What is held, and what is missing.
+    fn motions(&self, row: &mut Row) -> Result<(), NotMeasured> {
+        let Ways { straight, turning } = self.ways;
+        row.straight_cells = Some(straight.cells() as u32);
+        row.turning_cells = Some(turning.cells() as u32);
+        let top = self.motion(straight, run::SPEEDS[1], false)?;
+        let moved = top.moved;
+        let inside = |tile: &&SentTile| (moved[0]..moved[1]).contains(&tile.tick);
+        let tiles = top.tiles.iter().filter(inside).count() as f64;
+        row.tiles_per_s = Some(round(1e3 * tiles / (moved[1] - moved[0]) as f64));
+        let missing = |way, speed: u32| {
+            let motion = self.motion(way, speed.into(), false)?;
+            Ok::<_, NotMeasured>(Some(motion.felt.missing))
+        };
+        row.missing_straight_500 = missing(straight, SPEEDS[0])?;
+        row.missing_straight_2000 = missing(straight, SPEEDS[1])?;
+        row.missing_straight_5000 = missing(straight, SPEEDS[2])?;
+        row.missing_turning_500 = missing(turning, SPEEDS[0])?;
+        row.missing_turning_2000 = missing(turning, SPEEDS[1])?;
+        row.missing_turning_5000 = missing(turning, SPEEDS[2])?;
+        let held = |way| {
+            let holds = |speed| Ok(self.motion(way, speed, true)?.felt.missing == 0);
+            Ok::<_, NotMeasured>(Some(fastest(self.case.halvings, holds)?.round()))
+        };
+        row.held_straight = held(straight)?;
+        row.held_turning = held(turning)?;
+        Ok(())
+    }
+
+    /// A session of its own, with nothing known of the file before.
+    fn motion(&self, way: &Way, speed: f64, to_a_hole: bool) -> Result<Motion, NotMeasured> {
+        let raster = self.case.open()?;
+        let terrain = terrain(&raster)?;
+        let home_mm = self.hand.home_mm();
+        let bytes_a_tick = self.kb_per_s as usize;
+        let mut chain = Chain::new(&terrain, board(), home_mm, bytes_a_tick, Pace::Virtual)?;
+        run::touch(&mut chain, self.hand, way)?;
+        let (felt, moved) = run::travel(&mut chain, self.hand, way, speed, to_a_hole)?;
+        Ok(Motion::of(chain, felt, moved))
+    }
+}
+
+impl Motion {
+    fn of(chain: Chain<'_>, felt: Felt, moved: [u64; 2]) -> Self {
+        let host = chain.host.iter().map(|spent| 1e3 * spent.as_secs_f64());
+        Self {
+            felt,
+            moved,
+            host_ms: host.collect(),
+            tiles: chain.tiles,
+        }
+    }
+}
+
+impl Row {
+    /// A row of which only the opening is known.
+    fn of_opening(
+        case: &Case,
+        kb_per_s: u32,
+        terrain: &Terrain<'_>,
+        [open_ms, first_force_ms]: [f64; 2],
+    ) -> Self {
+        let raster = terrain.raster();
+        Self {
+            terrain: case.terrain.clone(),
+            // Some formats are read as a whole whatever is asked for.
+            reading: match raster.is_known_whole() {
+                true => Reading::Whole,
+                false => case.reading,
+            },
+            latency_ms: case.latency_ms,
+            link_kb_per_s: kb_per_s,
+            samples: u64::from(raster.columns()) * u64::from(raster.rows()),
+            open_ms: round(open_ms),
+            first_force_ms: round(first_force_ms),
+            ..Self::default()
+        }
+    }
+
+    fn set_traffic(
+        &mut self,
+        before: Option<Traffic>,
+        opened: Option<Traffic>,
+        after: Option<Traffic>,
+    ) {
+        let between = |from: Option<Traffic>, to: Option<Traffic>| {
+            let (from, to) = (from?, to?);
+            Some((to.requests - from.requests, to.bytes - from.bytes))
+        };
+        (self.open_requests, self.open_bytes) = between(before, opened).unzip();
+        (self.way_requests, self.way_bytes) = between(opened, after).unzip();
+    }
+
+    fn set_tiles(&mut self, motion: &Motion) {
+        let mut bytes: Vec<usize> = motion.tiles.iter().map(|tile| tile.bytes).collect();
+        bytes.sort_unstable();
+        let count = bytes.len().max(1) as f64;
+        let sum = bytes.iter().sum::<usize>() as f64;
+        self.tiles = Some(bytes.len() as u64);
+        self.tile_bytes_mean = Some(round(sum / count));
+        let p99 = bytes.get((0.99 * (count - 1.0)).round() as usize);
+        self.tile_bytes_p99 = p99.map(|bytes| *bytes as u64);
+        let host = &motion.host_ms;
+        let mean = host.iter().sum::<f64>() / host.len().max(1) as f64;
+        self.host_ms_mean = Some(round(mean));
+        self.host_ms_worst = host.iter().copied().reduce(f64::max).map(round);
+    }
+}
+
+fn ms_since(began: Instant) -> f64 {
+    1e3 * began.elapsed().as_secs_f64()
+}
+
+/// To a hundredth.
+fn round(value: f64) -> f64 {
+    (100.0 * value).round() / 100.0
+}
+
+/// Asks the system to forget what it keeps of a file in memory, so that it is read from the disk.
+/// Where the system does not, the file is read from its memory.
+#[cfg(unix)]
+fn forget(path: &Path) {
+    use rustix::fs::{Advice, fadvise};
+    if let Ok(file) = std::fs::File::open(path) {
+        let _ = fadvise(&file, 0, None, Advice::DontNeed);
+    }
+}
+
+#[cfg(not(unix))]
+fn forget(_: &Path) {}

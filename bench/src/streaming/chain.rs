@@ -1,0 +1,217 @@
+//! The chain that is measured: terrain, client, a line of some rate, and the device's application.
+//!
+//! Time is the number of ticks, of a millisecond each. What the host does takes none of it, as if
+//! it were done beside the device; how long it takes is measured apart. Where something is on its
+//! way from elsewhere, a tick takes no less than a millisecond of this machine's time.
+
+use std::time::{Duration, Instant};
+
+use hapterra::link::{Client, Event, Patience, Tally};
+use hapterra::terrain::Terrain;
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::guard::Sense;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode};
+use hapterra_core::wire::message::ToDevice;
+use hapterra_core::wire::session::InSession;
+use hapterra_core::wire::status::BootReport;
+use hapterra_firmware::app::{TileBuffers, WorkingMemory};
+use hapterra_firmware::native::{Device, StoppedClock};
+use hapterra_firmware::store::Stored;
+
+use super::NotMeasured;
+use super::line::Line;
+
+/// Tiles along the side of the device's window, as on the emulated board.
+const WINDOW: usize = 16;
+/// A tick.
+const TICK: Duration = Duration::from_millis(1);
+
+/// A device in this program's memory, which it keeps to its end.
+pub(super) type Board = Device<StoppedClock, WINDOW>;
+
+/// A device with the calibration of a Premium 1.5, whose arm is not armed: the contact is worked
+/// out and told, and no current flows.
+pub(super) fn board() -> Board {
+    Device::new(
+        Box::leak(Box::new(TileBuffers::VACANT)),
+        Box::leak(Box::new(WorkingMemory::new())),
+        StoppedClock,
+        Stored::Found(Calibration::PREMIUM_1_5),
+        BootReport::default(),
+    )
+}
+
+/// A tile that was sent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SentTile {
+    /// The tick in which the host put it onto the line.
+    pub(super) tick: u64,
+    /// Bytes of its frame.
+    pub(super) bytes: usize,
+}
+
+/// How fast ticks follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Pace {
+    /// No faster than a thousand a second.
+    Real,
+    /// As fast as this machine goes, but while something is on its way from elsewhere.
+    Virtual,
+}
+
+/// The host, its line to a device, and the device.
+pub(super) struct Chain<'t> {
+    client: Client<'t>,
+    terrain: &'t Terrain<'t>,
+    board: Board,
+    line: Line,
+    pace: Pace,
+    now: u64,
+    not_yet: u64,
+    began: Instant,
+    reader: Box<FrameReader<MAX_FRAME>>,
+    /// Tiles so far.
+    pub(super) tiles: Vec<SentTile>,
+    /// What the host spent on answering receptions that asked for tiles.
+    pub(super) host: Vec<Duration>,
+}
+
+impl<'t> Chain<'t> {
+    /// A session about a terrain that begins with the next tick, over a line that carries so many
+    /// bytes a tick each way.
+    ///
+    /// # Errors
+    /// When the home is farther than positions reach.
+    pub(super) fn new(
+        terrain: &'t Terrain<'t>,
+        board: Board,
+        home_mm: [f64; 3],
+        bytes_a_tick: usize,
+        pace: Pace,
+    ) -> Result<Self, NotMeasured> {
+        let home = terrain.scale().to_grid(home_mm);
+        let home = home.ok_or_else(|| NotMeasured("it is farther than positions reach".into()))?;
+        let scene = Scene {
+            hold_clock: false,
+            ..terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home)
+        };
+        // Whoever holds the arm waits for no server.
+        terrain.raster().stop_waiting();
+        let mut client = Client::numbered(terrain, scene, None, Patience::REAL_TIME, 1);
+        let (mut line, mut out) = (Line::new(bytes_a_tick), vec![]);
+        client.greet(Duration::ZERO, &mut out);
+        line.send(&out);
+        Ok(Self {
+            client,
+            terrain,
+            board,
+            line,
+            pace,
+            now: 0,
+            not_yet: terrain.raster().not_yet(),
+            began: Instant::now(),
+            reader: Box::default(),
+            tiles: vec![],
+            host: vec![],
+        })
+    }
+
+    /// How fast ticks follow each other from now on.
+    pub(super) const fn set_pace(&mut self, pace: Pace) {
+        self.pace = pace;
+    }
+
+    /// Ticks so far.
+    pub(super) const fn now(&self) -> u64 {
+        self.now
+    }
+
+    /// What went over the link so far.
+    pub(super) const fn tally(&self) -> &Tally {
+        self.client.tally()
+    }
+
+    /// Runs a tick with what the encoders read, and tells what samples the host has got.
+    ///
+    /// # Errors
+    /// When host and device do not understand each other.
+    pub(super) fn tick(
+        &mut self,
+        sense: Sense,
+        take: &mut dyn FnMut(&Sample),
+    ) -> Result<(), NotMeasured> {
+        self.now += 1;
+        let board = &mut self.board;
+        self.line.carry(|bytes| board.receive(bytes));
+        board.tick(sense);
+        let heard = self.hear();
+        let (now, mut out) = (TICK * self.now as u32, vec![]);
+        let began = Instant::now();
+        let mut on = |event: Event<'_>| {
+            if let Event::Sample(sample) = event {
+                take(sample);
+            }
+        };
+        let answered = self.client.receive(now, &heard, &mut out, &mut on);
+        let spent = began.elapsed();
+        answered
+            .and_then(|()| self.client.due(now, &mut out, &mut on))
+            .map_err(|error| NotMeasured(format!("the session ended: {error}")))?;
+        if self.count_tiles(&out) > 0 {
+            self.host.push(spent);
+        }
+        self.line.send(&out);
+        self.wait();
+        Ok(())
+    }
+
+    /// What the device says in a tick.
+    fn hear(&mut self) -> Vec<u8> {
+        let mut heard = vec![0; self.line.bytes_a_tick()];
+        let mut length = 0;
+        while length < heard.len() {
+            let said = self.board.link.transmit(&mut heard[length..]);
+            if said == 0 {
+                break;
+            }
+            length += said;
+        }
+        heard.truncate(length);
+        heard
+    }
+
+    /// Finds the tiles among what the host says; returns how many there are.
+    fn count_tiles(&mut self, mut bytes: &[u8]) -> usize {
+        let before = self.tiles.len();
+        while !bytes.is_empty() {
+            let (taken, frame) = self.reader.push(bytes);
+            let content = frame.and_then(Result::ok);
+            let message = content.map(decode::<InSession<ToDevice<'_>>>);
+            if let Some(Ok(InSession {
+                message: ToDevice::Tile(_),
+                ..
+            })) = message
+            {
+                self.tiles.push(SentTile {
+                    tick: self.now,
+                    bytes: taken,
+                });
+            }
+            bytes = &bytes[taken..];
+        }
+        self.tiles.len() - before
+    }
+
+    /// Lets a tick last a millisecond, where it has to.
+    fn wait(&mut self) {
+        let not_yet = self.terrain.raster().not_yet();
+        let awaits = std::mem::replace(&mut self.not_yet, not_yet) != not_yet;
+        if awaits || self.pace == Pace::Real {
+            std::thread::sleep(TICK.saturating_sub(self.began.elapsed()));
+        }
+        self.began = Instant::now();
+    }
+}

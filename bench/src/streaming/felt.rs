@@ -1,0 +1,61 @@
+//! What the samples of a run say of the ground under the hand.
+
+use hapterra_core::contact::ContactState;
+use hapterra_core::guard::Limits;
+use hapterra_core::scene::Sample;
+
+/// Counts of ticks. Every tick that the device tells of is counted once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Felt {
+    /// Ticks of the hand's motion, in all of which the HIP is below the surface.
+    pub(super) ticks: u32,
+    /// Ticks whose terrain was not on the device yet.
+    pub(super) missing: u32,
+    /// Ticks without a contact, though nothing was missing.
+    pub(super) free: u32,
+}
+
+impl Felt {
+    /// Counts a tick.
+    pub(super) fn add(&mut self, sample: &Sample) {
+        self.ticks += 1;
+        let is_missing = lacks_terrain(sample);
+        self.missing += u32::from(is_missing);
+        self.free += u32::from(!is_missing && sample.state == ContactState::Free);
+    }
+}
+
+/// Whether terrain that might be felt was not on the device: a hole in what is felt.
+pub(super) fn lacks_terrain(sample: &Sample) -> bool {
+    sample.limits.contains(Limits::TERRAIN_MISSING)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tick_is_missing_its_terrain_or_felt_or_free() {
+        let sample = |limits, state| Sample {
+            limits,
+            state,
+            ..Sample::default()
+        };
+        let mut felt = Felt::default();
+        let fading = Limits::BOUNDARY_FADING;
+        felt.add(&sample(Limits::empty(), ContactState::Touching));
+        felt.add(&sample(fading, ContactState::Touching));
+        felt.add(&sample(
+            fading | Limits::TERRAIN_MISSING,
+            ContactState::Touching,
+        ));
+        felt.add(&sample(Limits::TERRAIN_MISSING, ContactState::Free));
+        felt.add(&sample(Limits::empty(), ContactState::Free));
+        let expected = Felt {
+            ticks: 5,
+            missing: 2,
+            free: 1,
+        };
+        assert_eq!(felt, expected);
+    }
+}

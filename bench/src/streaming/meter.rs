@@ -1,0 +1,100 @@
+//! What a process takes: memory, and bytes that it reads.
+
+use std::io::{self, BufRead as _, Write as _};
+
+use super::NotMeasured;
+
+/// Requests or reads, and bytes that they brought.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Traffic {
+    /// How many.
+    pub(super) requests: u64,
+    /// What came.
+    pub(super) bytes: u64,
+}
+
+/// What is asked on standard output, and answered on standard input.
+pub(super) const QUESTION: &str = "seen?";
+
+/// Who counts what is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Meter {
+    /// The system: what this process has read.
+    System,
+    /// The server, which the process that started this one asks.
+    Server,
+}
+
+impl Meter {
+    /// What was read so far; `None` where nobody tells.
+    ///
+    /// # Errors
+    /// When the process that started this one does not answer.
+    pub(super) fn traffic(self) -> Result<Option<Traffic>, NotMeasured> {
+        match self {
+            Self::System => Ok(read_by_this_process()),
+            Self::Server => asked().map(Some),
+        }
+    }
+}
+
+fn asked() -> Result<Traffic, NotMeasured> {
+    let ask = || -> io::Result<String> {
+        let mut out = io::stdout().lock();
+        writeln!(out, "{QUESTION}")?;
+        out.flush()?;
+        let mut line = String::new();
+        io::stdin().lock().read_line(&mut line)?;
+        Ok(line)
+    };
+    let line = ask().map_err(|error| NotMeasured(format!("nobody counts: {error}")))?;
+    let mut numbers = line.split_whitespace().map(str::parse);
+    match (numbers.next(), numbers.next()) {
+        (Some(Ok(requests)), Some(Ok(bytes))) => Ok(Traffic { requests, bytes }),
+        _ => Err(NotMeasured(format!("nobody counts: {line:?} was answered"))),
+    }
+}
+
+/// Calls of `read` and its like, and their bytes, from any file; Linux tells.
+fn read_by_this_process() -> Option<Traffic> {
+    let text = std::fs::read_to_string("/proc/self/io").ok()?;
+    Some(Traffic {
+        requests: number_behind(&text, "syscr:")?,
+        bytes: number_behind(&text, "rchar:")?,
+    })
+}
+
+/// Most memory that this process has had, bytes; Linux tells.
+pub(super) fn peak_bytes() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/self/status").ok()?;
+    Some(1024 * number_behind(&text, "VmHWM:")?)
+}
+
+fn number_behind(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    line.split_whitespace().next()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_systems_tables_are_read() {
+        let text = "Name:\tbench\nVmPeak:\t  900 kB\nVmHWM:\t   123456 kB\n";
+        assert_eq!(number_behind(text, "VmHWM:"), Some(123_456));
+        assert_eq!(number_behind(text, "VmSwap:"), None);
+        assert_eq!(number_behind("VmHWM:", "VmHWM:"), None);
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn what_is_read_is_counted() {
+        let before = read_by_this_process().expect("Linux tells");
+        let read = std::fs::read(std::env::current_exe().expect("a path")).expect("readable");
+        let after = read_by_this_process().expect("Linux tells");
+        assert!(after.bytes - before.bytes >= read.len() as u64);
+        assert!(after.requests > before.requests);
+        assert!(peak_bytes() > Some(1 << 20));
+    }
+}

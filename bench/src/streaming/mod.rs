@@ -1,0 +1,56 @@
+//! Terrain larger than memory and farther than the disk: what opening, memory, tiles and the speed
+//! of the hand cost against the size of the file and the latency of its server.
+//!
+//! - `relief`, `cog`: terrains of 10⁶ to 10¹⁰ samples, whose blocks repeat;
+//! - `way`, `hand`: where the HIP goes, and what the encoders read there;
+//! - `chain`, `line`: the host's own code, a link of a stated rate in virtual time, and the device's
+//!   own application;
+//! - `felt`: what its samples say of the ground;
+//! - `run`, `case`: what is measured of one terrain, in a process of its own;
+//! - `server`: a web server with latency, with the feature `remote`;
+//! - `meter`, `parent`: memory and bytes, and all cases one after the other.
+
+mod case;
+mod chain;
+mod cog;
+mod felt;
+mod hand;
+mod line;
+mod meter;
+mod parent;
+mod relief;
+mod row;
+mod run;
+#[cfg(feature = "remote")]
+mod server;
+mod way;
+
+pub use crate::effects::NotMeasured;
+pub use parent::{measure, measure_case};
+pub use row::{Reading, Row};
+
+/// Side of a cell in the hand, millimetres: a way of 2,800 cells is 140 mm long, which the arm
+/// reaches, and 20,000 cells a second are 1 m/s.
+const CELL_MM: f64 = 0.05;
+/// Sides of the made terrains, samples: 10⁶, 10⁷, 10⁸, 10⁹ and 10¹⁰ of them to a part in twenty, in
+/// whole tiles.
+pub const SIDES: [u32; 5] = [1024, 3168, 10_016, 31_648, 100_000];
+/// What a web server waits before it answers, ms; 0 is a file on disk.
+pub const LATENCIES_MS: [u32; 5] = [0, 20, 50, 100, 200];
+/// Links, 1,000 bytes a second each way: full-speed USB, and a slow serial line.
+pub const RATES: [u32; 2] = [1000, 200];
+/// Speeds at which missing ticks are counted, cells a second.
+pub const SPEEDS: [u32; 3] = [500, 2_000, 5_000];
+/// The speed of the run in which tiles and bytes are counted, cells a second.
+pub const USUAL: u32 = SPEEDS[1];
+
+/// What is measured.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// Sizes of the made terrains, as powers of ten, 6 to 10.
+    pub exponents: Vec<u32>,
+    /// Latencies, ms.
+    pub latencies_ms: Vec<u32>,
+    /// Halvings in the search for the fastest speed: six tell it to 9 %, four to 40 %.
+    pub halvings: u32,
+}

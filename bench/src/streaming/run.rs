@@ -1,0 +1,178 @@
+//! Runs along a way: the first contact, a motion at one speed, and the fastest that is held.
+
+use hapterra_core::contact::ContactState;
+
+use super::NotMeasured;
+use super::chain::Chain;
+use super::felt::{Felt, lacks_terrain};
+use super::hand::Hand;
+use super::way::Way;
+
+/// Ticks after which nothing more is expected: a server has had its 10 s of silence by then.
+const LONGEST: u64 = 30_000;
+/// Ticks for which the hand rests before it moves, so that all within the margin is there.
+const REST: u32 = 400;
+/// Ticks in which the hand comes up to its speed, evenly.
+const START: f64 = 100.0;
+/// Ticks after the motion in which its last samples arrive.
+const AFTER: u32 = 300;
+/// Slowest and fastest speed that is tried, cells a second. At the fastest the tip moves at
+/// 1 m/s, beyond which the guard lets less force through.
+pub(super) const SPEEDS: [f64; 2] = [100.0, 20_000.0];
+
+/// Taps on the beginning of a way until there is a contact.
+///
+/// # Errors
+/// When there is none, or the session ends.
+pub(super) fn touch(chain: &mut Chain<'_>, hand: &Hand, way: &Way) -> Result<(), NotMeasured> {
+    let (above, below) = (hand.above(way.at(0.0))?, hand.below(way.at(0.0))?);
+    let mut is_touching = false;
+    while !is_touching {
+        // A contact begins where the HIP comes down onto ground that is there.
+        let sense = if chain.now().is_multiple_of(2) {
+            above
+        } else {
+            below
+        };
+        chain.tick(sense, &mut |sample| {
+            is_touching |= sample.state == ContactState::Touching;
+        })?;
+        if chain.now() > LONGEST {
+            let why = format!("nothing was felt for {LONGEST} ticks");
+            return Err(NotMeasured(why));
+        }
+    }
+    Ok(())
+}
+
+/// Moves along a way at so many cells a second, after a touch and a rest, and up to that speed
+/// within a tenth of a second. Where `to_a_hole`, the
+/// motion ends at the first tick that lacks its terrain. Returns what was felt and the ticks
+/// in which the motion began and ended.
+///
+/// # Errors
+/// When the session ends, or samples get lost.
+pub(super) fn travel(
+    chain: &mut Chain<'_>,
+    hand: &Hand,
+    way: &Way,
+    speed: f64,
+    to_a_hole: bool,
+) -> Result<(Felt, [u64; 2]), NotMeasured> {
+    let start = hand.below(way.at(0.0))?;
+    let mut at_rest = None;
+    for _ in 0..REST {
+        chain.tick(start, &mut |sample| at_rest = Some(sample.hip))?;
+    }
+    let ticks = duration(way.cells(), 1e-3 * speed).ceil() as u32;
+    let (mut felt, mut moves) = (Felt::default(), false);
+    let began = chain.now();
+    let mut ended = began + u64::from(ticks);
+    for tick in 1..=ticks + AFTER {
+        let sense = hand.below(way.at(covered(tick.into(), 1e-3 * speed)))?;
+        let mut is_hole = false;
+        chain.tick(sense, &mut |sample| {
+            moves |= Some(sample.hip) != at_rest;
+            if moves && felt.ticks < ticks {
+                felt.add(sample);
+                is_hole |= lacks_terrain(sample);
+            }
+        })?;
+        if felt.ticks == ticks || to_a_hole && is_hole {
+            ended = ended.min(chain.now());
+            break;
+        }
+    }
+    let tally = chain.tally();
+    if tally.lost + tally.dropped > 0 {
+        let lost = tally.lost + tally.dropped;
+        let why = format!("{lost} samples were lost, so holes cannot be counted");
+        return Err(NotMeasured(why));
+    }
+    Ok((felt, [began, ended]))
+}
+
+/// Cells that are covered so many ticks after the hand began to move, at a speed in cells a tick.
+fn covered(ticks: f64, speed: f64) -> f64 {
+    match ticks < START {
+        true => 0.5 * speed * ticks * ticks / START,
+        false => speed * (ticks - 0.5 * START),
+    }
+}
+
+/// Ticks that the hand takes for so many cells: the other way round.
+fn duration(cells: f64, speed: f64) -> f64 {
+    let start = covered(START, speed);
+    match cells < start {
+        true => (2.0 * cells * START / speed).sqrt(),
+        false => START + (cells - start) / speed,
+    }
+}
+
+/// The fastest speed that `holds`, by halving between the slowest and the fastest `steps` times, in
+/// ratios. Zero where not even the slowest does.
+///
+/// Halving finds one border between speeds that hold and speeds that do not; where a faster
+/// one holds again by chance, it may be missed.
+///
+/// # Errors
+/// Those of `holds`.
+pub(super) fn fastest<E>(
+    steps: u32,
+    mut holds: impl FnMut(f64) -> Result<bool, E>,
+) -> Result<f64, E> {
+    let [mut low, mut high] = SPEEDS;
+    if holds(high)? {
+        return Ok(high);
+    }
+    if !holds(low)? {
+        return Ok(0.0);
+    }
+    for _ in 0..steps {
+        let middle = (low * high).sqrt();
+        match holds(middle)? {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    Ok(low)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hand_comes_up_to_its_speed_and_arrives_in_time() {
+        for speed in [0.1, 2.0, 20.0] {
+            for cells in [1.0, 90.0, 2800.0] {
+                let ticks = duration(cells, speed);
+                assert!((covered(ticks, speed) - cells).abs() < 1e-9 * cells.max(1.0));
+            }
+            let at = |ticks| covered(ticks, speed);
+            for ticks in [START, START + 1.0, START + 500.0] {
+                let step = at(ticks) - at(ticks - 1.0);
+                assert!((step / speed - 1.0).abs() < 0.01, "{ticks}: {step}");
+            }
+            assert!((at(1.0) - at(0.0)) < 0.01 * speed);
+        }
+    }
+
+    #[test]
+    fn halving_finds_the_border_from_below() {
+        let found = |border: f64| {
+            let mut tried = 0;
+            let speed = fastest(8, |speed| {
+                tried += 1;
+                Ok::<_, ()>(speed <= border)
+            });
+            assert!(tried <= 10);
+            speed.expect("no error")
+        };
+        for border in [120.0, 2_000.0, 19_000.0] {
+            let speed = found(border);
+            assert!(speed <= border && border / speed < 1.0211, "{speed}");
+        }
+        assert_eq!((found(99.0), found(20_000.0)), (0.0, 20_000.0));
+    }
+}

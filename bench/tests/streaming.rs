@@ -1,0 +1,168 @@
+//! What `--streaming` finds, where it does not depend on a clock, and the kept figures.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use hapterra_bench::report::{self, STREAMING_HEADER};
+use hapterra_bench::streaming::{LATENCIES_MS, RATES, Reading, Row, SIDES};
+
+/// Bytes that the host may take for any terrain, 10⁶: the device in the same process is one of
+/// these megabytes.
+const MOST_MB: f64 = 256.0;
+
+fn rows(path: &Path) -> Vec<Row> {
+    let mut table = csv::Reader::from_path(path).expect("it is there");
+    assert_eq!(table.headers().expect("a header"), &STREAMING_HEADER[..]);
+    table.deserialize().map(|row| row.expect("a row")).collect()
+}
+
+fn kept() -> Vec<Row> {
+    rows(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/streaming.csv"))
+}
+
+/// The program's exit, what it says on both outputs, and the table that it writes.
+fn streamed(name: &str, arguments: &[&str]) -> (bool, String, PathBuf) {
+    let csv = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let output = Command::new(env!("CARGO_BIN_EXE_hapterra-bench"))
+        .args(["--streaming", "--quick", "--latencies", "0", "--csv"])
+        .arg(&csv)
+        .args(arguments)
+        .output()
+        .expect("it runs");
+    let said =
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    (output.status.success(), said.concat(), csv)
+}
+
+#[test]
+fn what_streaming_takes_does_not_grow_with_the_terrain() {
+    let (done, said, csv) = streamed("flat.csv", &["--sizes", "7,10"]);
+    assert!(done, "{said}");
+    let rows = rows(&csv);
+    let of = |samples: u64, link: u32| {
+        let is = |row: &&Row| {
+            let shown = (row.samples, row.link_kb_per_s, row.reading);
+            shown == (samples, link, Reading::Blocks)
+        };
+        rows.iter().find(is).expect("measured")
+    };
+    let [small, large] = [SIDES[1], SIDES[4]].map(|side| u64::from(side) * u64::from(side));
+    for link in RATES {
+        let (small, large) = (of(small, link), of(large, link));
+        // The same way over the same samples: tiles differ by what their numbers take.
+        assert_eq!(small.tiles, large.tiles);
+        let [a, b] = [small, large].map(|row| row.tile_bytes_mean.expect("tiles"));
+        assert!(
+            (a - b).abs() < 4.0 && (900.0..1300.0).contains(&a),
+            "{a} {b}"
+        );
+        assert!(large.tile_bytes_p99 < Some(1300), "{large:?}");
+        // Nothing is felt of a hand of 500 cells a second but the ground.
+        for row in [small, large] {
+            let [[straight, ..], [turning, ..]] = row.missing();
+            assert_eq!([straight, turning], [Some(0); 2], "{row:?}");
+        }
+        let held = |row: &Row| [row.held_straight, row.held_turning];
+        assert_eq!(held(small), held(large));
+        assert!(
+            held(small).iter().all(|speed| *speed > Some(500.0)),
+            "{small:?}"
+        );
+        assert!(small.tiles_per_s > Some(f64::from(link) / 3.0), "{small:?}");
+        // Of the file: the same blocks, in as many reads. The index grows, by 8 bytes a block.
+        if let [Some(a), Some(b)] = [small, large].map(|row| row.way_bytes) {
+            assert!(a.abs_diff(b) < a / 100, "{a} {b}");
+            assert_eq!(small.way_requests, large.way_requests);
+            assert!(large.open_bytes < Some(2_000_000), "{large:?}");
+        }
+        for row in [small, large] {
+            assert!(row.peak_mb.is_none_or(|peak| peak < MOST_MB), "{row:?}");
+        }
+    }
+}
+
+#[test]
+fn a_file_is_measured_where_it_lies_and_one_that_cannot_be_is_told_of() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [hills, small] = ["hills.asc", "small.asc"].map(|name| folder.path().join(name));
+    let field = |side: usize, path: &Path| {
+        let row = |y: usize| {
+            let heights = (0..side).map(|x| format!("{}", (x * 7 + y * 3) % 13));
+            heights.collect::<Vec<_>>().join(" ")
+        };
+        let rows: Vec<String> = (0..side).map(row).collect();
+        let head = format!("ncols {side}\nnrows {side}\nxllcorner 0\nyllcorner 0\ncellsize 10\n");
+        std::fs::write(path, head + &rows.join("\n") + "\n").expect("written");
+    };
+    field(480, &hills);
+    field(90, &small);
+    let png = folder.path().join("streaming.png");
+    let names = [&hills, &small, &png].map(|path| path.to_str().expect("text"));
+    let (done, said, csv) = streamed(
+        "files.csv",
+        &["--files-only", names[0], names[1], "--png", names[2]],
+    );
+    assert!(done, "{said}");
+    assert!(
+        said.contains("small.asc: 90 × 90 samples; the ways need 460"),
+        "{said}"
+    );
+    let rows = rows(&csv);
+    assert_eq!(rows.len(), RATES.len());
+    for row in rows {
+        // Of text there are no blocks.
+        assert_eq!((&*row.terrain, row.reading), ("hills", Reading::Whole));
+        assert_eq!(row.missing()[0][0], Some(0), "{row:?}");
+    }
+    let picture = std::fs::read(&png).expect("drawn");
+    assert!(picture.starts_with(b"\x89PNG") && picture.len() > 10_000);
+    let (done, said, _) = streamed("none.csv", &["--files-only", names[1]]);
+    assert!(!done && said.contains("nothing was measured"), "{said}");
+}
+
+#[test]
+#[cfg(not(feature = "remote"))]
+fn latencies_without_a_server_are_refused_with_the_build_that_has_one() {
+    let output = Command::new(env!("CARGO_BIN_EXE_hapterra-bench"))
+        .args(["--streaming", "--latencies", "0,50"])
+        .output()
+        .expect("it runs");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        !output.status.success() && said.contains("--features remote"),
+        "{said}"
+    );
+}
+
+#[test]
+fn the_kept_figures_are_of_all_sizes_and_latencies_and_within_their_bounds() {
+    let rows = kept();
+    for side in SIDES {
+        for latency in LATENCIES_MS {
+            for link in RATES {
+                let samples = u64::from(side) * u64::from(side);
+                let is = |row: &&Row| {
+                    let place = (row.samples, row.latency_ms, row.link_kb_per_s);
+                    place == (samples, latency, link) && row.reading == Reading::Blocks
+                };
+                let found: Vec<&Row> = rows.iter().filter(is).collect();
+                let [row] = found[..] else {
+                    panic!("{side} {latency} {link}: {} rows", found.len());
+                };
+                assert!(row.peak_mb < Some(MOST_MB), "{row:?}");
+                assert!(row.held_straight.is_some() && row.missing()[1][2].is_some());
+            }
+        }
+    }
+    let whole = rows.iter().filter(|row| row.reading == Reading::Whole);
+    let sides: Vec<u64> = whole.map(|row| row.samples).collect();
+    assert_eq!(sides.len(), 3 * RATES.len(), "10⁶ to 10⁸ as a whole");
+}
+
+#[test]
+fn the_picture_is_drawn_from_the_kept_figures() {
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("streaming.png");
+    report::draw_streaming(&kept(), &file).expect("it is drawn");
+    let written = std::fs::read(file).expect("it is there");
+    assert!(written.starts_with(b"\x89PNG") && written.len() > 20_000);
+}
