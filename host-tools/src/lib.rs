@@ -5,6 +5,7 @@
 //!
 //! - [`raster`]: files of every supported format become one [`raster::Raster`];
 //! - `remote`: files at URLs, of which what is touched is fetched;
+//! - [`disk_cache`]: what was worked out before, in a folder that may be deleted;
 //! - [`synth`]: terrains made by formula, for trying and testing;
 //! - [`terrain`]: a raster at a scale, cut into tiles;
 //! - [`link`]: the terrain served to a device, tile by tile;
@@ -33,6 +34,7 @@ pub mod board;
 pub mod bringup;
 pub mod calibrate;
 pub mod cli;
+pub mod disk_cache;
 pub mod link;
 pub mod output;
 pub mod phantom;

@@ -14,6 +14,7 @@ use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_core::wire::session::{LastSession, SessionNumber};
 use hapterra_core::wire::status::Status;
 
+use super::ahead::Ahead;
 use super::ask::Ask;
 use super::conversation::{Conversation, News, State};
 use super::error::LinkError;
@@ -127,6 +128,8 @@ pub struct Client<'t> {
     sent: Vec<TileKey>,
     /// Tiles whose heights have not come yet from elsewhere, and when they were asked for.
     awaited: Vec<(TileKey, Duration)>,
+    /// What lies before the HIP.
+    ahead: Ahead,
     zeroing: bool,
     /// The point of a replay that is to be felt, and when it was said.
     point: Option<(Point, Duration)>,
@@ -188,6 +191,7 @@ impl<'t> Client<'t> {
             withheld: vec![],
             sent: vec![],
             awaited: vec![],
+            ahead: Ahead::default(),
             zeroing: false,
             point: None,
             tally: Tally::default(),
@@ -232,6 +236,7 @@ impl<'t> Client<'t> {
         self.is_new = true;
         self.withheld.clear();
         self.awaited.clear();
+        self.ahead.forget();
         self.zeroing = false;
         if self.talk.greet(now, out) {
             self.tally.drawn();
@@ -268,6 +273,7 @@ impl<'t> Client<'t> {
             if taken {
                 self.scene = view.scene;
                 self.awaited.clear();
+                self.ahead.forget();
                 self.terrain = Lent::View(Box::new(terrain));
             }
             on(Event::Viewed { view: &view, taken });
@@ -472,6 +478,11 @@ impl<'t> Client<'t> {
                 self.samples_since_sign = self.samples_since_sign.saturating_add(samples);
                 // Until the scene is taken they are of another, or of none.
                 if self.tally.received(&telemetry) && !self.is_new {
+                    if let (Some(device), Some(last)) = (&self.device, telemetry.samples.last()) {
+                        let tick_hz = f64::from(device.tick_hz);
+                        self.ahead
+                            .follow(&self.terrain, last.tick, &last.hip, tick_hz);
+                    }
                     telemetry.samples.iter().for_each(|s| on(Event::Sample(s)));
                 }
             }

@@ -19,6 +19,7 @@
 //! - [`Emulator`] runs the emulated board; [`serve_plant`] moves the virtual
 //!   Phantom at its second line.
 
+mod ahead;
 mod ask;
 mod asking;
 mod bulk;

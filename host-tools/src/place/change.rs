@@ -256,9 +256,21 @@ fn hip_after(
     };
     // Over a hole the height stays what it is.
     let risen = ground_before
-        .zip(after.height_mm(east, north))
+        .zip(ground_of(after, [east, north], at))
         .map_or(0.0, |(before, after)| after - before);
     [east + beside(0), north + beside(1), hand.hip_mm[2] + risen]
+}
+
+/// The ground at a place, in millimetres and in felt cells of level 0. Where the terrain's level
+/// is coarse and not here yet it is that of the finest level.
+fn ground_of(terrain: &Terrain<'_>, [east, north]: [f64; 2], at: [f64; 2]) -> Option<f64> {
+    let before = terrain.raster().not_yet();
+    let ground = terrain.height_mm(east, north);
+    if ground.is_some() || terrain.raster().not_yet() == before {
+        return ground;
+    }
+    let height = terrain.grid().surface(at)?;
+    Some(height * terrain.scale().height_mm_per_unit())
 }
 
 fn factor_of(factor: f64) -> Result<f64, ChangeError> {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::BadRaster;
+use crate::disk_cache::FileStamp;
 use crate::remote::{Elsewhere, RemoteFile, RemoteReader, file_name, is_url};
 
 /// Deflate packs at most this many bytes into one.
@@ -168,6 +169,24 @@ impl FileBytes {
         }))
     }
 
+    /// What tells the file in its present state from others; `None` where that is not known.
+    pub(super) fn stamp(&self) -> Option<FileStamp> {
+        match &self.data {
+            Data::File(file, path) => Some(FileStamp::of(path, &file.metadata().ok()?)),
+            Data::Remote(file, _) => file.stamp(),
+            Data::Memory(_) => None,
+        }
+    }
+
+    /// Whether the file at its path is still this one, in its present state.
+    pub(super) fn is_at_its_path(&self) -> bool {
+        match &self.data {
+            Data::File(_, path) => FileStamp::at(path) == self.stamp(),
+            Data::Remote(..) => true,
+            Data::Memory(_) => false,
+        }
+    }
+
     /// Bytes at a place of the file.
     pub(super) fn read_at(&self, at: u64, count: u64) -> Result<Vec<u8>, BadRaster> {
         let end = at.checked_add(count).filter(|end| *end <= self.len);
@@ -176,10 +195,8 @@ impl FileBytes {
         };
         let read = match &self.data {
             Data::File(file, _) => {
-                let (mut file, mut bytes) = (file, vec![0; room]);
-                let read = file.seek(SeekFrom::Start(at));
-                read.and_then(|_| file.read_exact(&mut bytes))
-                    .map(|()| bytes)
+                let mut bytes = vec![0; room];
+                read_exact_at(file, &mut bytes, at).map(|()| bytes)
             }
             Data::Memory(bytes) => Ok(bytes[at as usize..end as usize].to_vec()),
             Data::Remote(file, _) => file.read_at(at, room),
@@ -225,4 +242,25 @@ impl FileBytes {
             ))),
         }
     }
+}
+
+/// Reads bytes at a place, whatever others read of the same file meanwhile.
+#[cfg(unix)]
+fn read_exact_at(file: &File, into: &mut [u8], at: u64) -> std::io::Result<()> {
+    std::os::unix::fs::FileExt::read_exact_at(file, into, at)
+}
+
+/// Reads bytes at a place, whatever others read of the same file meanwhile.
+#[cfg(windows)]
+fn read_exact_at(file: &File, mut into: &mut [u8], mut at: u64) -> std::io::Result<()> {
+    while !into.is_empty() {
+        match std::os::windows::fs::FileExt::seek_read(file, into, at)? {
+            0 => return Err(ErrorKind::UnexpectedEof.into()),
+            count => {
+                into = &mut into[count..];
+                at += count as u64;
+            }
+        }
+    }
+    Ok(())
 }

@@ -117,11 +117,13 @@ impl Raster {
         options: &OpenOptions,
         decode: impl Fn(&Path, &OpenOptions) -> Result<Decoded, BadRaster>,
     ) -> Result<Self, Error> {
+        options.elsewhere.set_disk_cache(&options.disk_cache);
         decode(path, options)
             .and_then(|decoded| decoded.with_ground_cell(options.ground_cell_m))
             .map(|decoded| decoded.with_vertical_unit(options.vertical_unit_m))
-            .and_then(|decoded| {
+            .and_then(|mut decoded| {
                 decoded.storage.set_path(path);
+                decoded.storage.set_disk_cache(&options.disk_cache);
                 Self::checked(decoded, options.no_data)
             })
             .inspect(|_| options.elsewhere.touch())
@@ -176,10 +178,40 @@ impl Raster {
         })
     }
 
-    /// From now on nothing waits for what is fetched from elsewhere: what is not here yet is
-    /// a hole for the moment, and [`Raster::not_yet`] counts it.
+    /// From now on nothing waits for what is fetched from elsewhere, nor for coarse levels that
+    /// are made of many blocks of the file: what is not here yet is a hole for the moment, and
+    /// [`Raster::not_yet`] counts it.
     pub fn stop_waiting(&self) {
         self.elsewhere.stop_waiting(true);
+        if let Storage::Blocks(blocks) = &self.source.storage {
+            blocks.stop_waiting();
+        }
+    }
+
+    /// Has what is not here yet of a level read, where that is not waited for any more
+    /// ([`Raster::stop_waiting`]): between two columns and between two rows of level 0, all of
+    /// them included. Waits for nothing, and asks for 16 blocks at most.
+    pub fn prefetch(&self, level: u8, columns: [u32; 2], rows: [u32; 2]) {
+        let Storage::Blocks(blocks) = &self.source.storage else {
+            return;
+        };
+        let inside = |[first, last]: [u32; 2], count: u32, turned: bool| {
+            let (first, last) = (first.min(count - 1), last.min(count - 1));
+            let at = |index: u32| if turned { count - 1 - index } else { index };
+            let (one, other) = (at(first), at(last));
+            [one.min(other), one.max(other)]
+        };
+        let columns = inside(columns, self.columns(), self.source.east_first);
+        let rows = inside(rows, self.rows(), !self.source.south_up);
+        blocks.prefetch_full(level, columns, rows);
+    }
+
+    /// Blocks that were read from the file so far; none where all samples are in memory.
+    pub fn blocks_read(&self) -> u64 {
+        match &self.source.storage {
+            Storage::Held { .. } => 0,
+            Storage::Blocks(blocks) => blocks.blocks_read(),
+        }
     }
 
     /// How often this thread asked for heights that were not here yet. Where it grows while
@@ -223,7 +255,7 @@ impl Raster {
     /// Copies heights of a row from `first_column` eastwards, one for each place in
     /// `heights`: the same values as [`Raster::height`].
     ///
-    /// Level *L* is the field with every 2ᴸ-th sample, or what an overview has there
+    /// Level *L* is the field with every 2ᴸ-th sample, or what an overview in the file has there
     /// ([`Raster::surface`]); row and column count in it.
     pub fn copy_row(&self, level: u8, row: u32, first_column: u32, heights: &mut [f64]) {
         heights.fill(f64::NAN);
@@ -250,7 +282,8 @@ impl Raster {
     /// counts has no height.
     ///
     /// A raster in memory has one image for all levels. One that stays in its file has the
-    /// heights of level *L* from the coarsest overview that is no coarser than it.
+    /// heights of level *L* from the coarsest overview that is no coarser than it; of a file
+    /// without overviews, where *L* is at least 3, from every 8th, 64th or 512th sample.
     pub fn surface(&self, level: u8, place: [f64; 2]) -> f64 {
         self.surface_of(self.image_of(level), place)
     }

@@ -1,6 +1,7 @@
 //! What the user may say about a file that the file does not say itself.
 
 use super::samples::{Endian, SampleType};
+use crate::disk_cache::DiskCache;
 use crate::remote::Elsewhere;
 
 /// How to open a file. The default believes the file.
@@ -32,6 +33,9 @@ pub struct OpenOptions {
     pub most_in_memory_bytes: u64,
     /// The files at URLs that are read with these options.
     pub elsewhere: Elsewhere,
+    /// Where coarse samples are kept that are made of a terrain in its file. The default
+    /// keeps nothing.
+    pub disk_cache: DiskCache,
 }
 
 impl OpenOptions {
@@ -54,6 +58,7 @@ impl Default for OpenOptions {
             encoding: None,
             most_in_memory_bytes: u64::from(Self::IN_MEMORY_MB) << 20,
             elsewhere: Elsewhere::default(),
+            disk_cache: DiskCache::off(),
         }
     }
 }

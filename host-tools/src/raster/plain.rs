@@ -5,7 +5,6 @@
 //! where it is touched; coarse levels have every 2ᵏ-th sample.
 
 use std::hash::Hasher;
-use std::sync::{Mutex, PoisonError};
 
 use twox_hash::XxHash64;
 
@@ -15,6 +14,7 @@ use super::read::Stored;
 use super::samples::{Endian, SampleType, Samples, with_samples};
 use super::storage::Storage;
 use super::{BadRaster, OpenOptions, thinned};
+use crate::disk_cache::FileStamp;
 
 /// Samples of a block each way.
 const BLOCK: u32 = 256;
@@ -216,8 +216,9 @@ fn transposed(samples: &Samples, columns: u32, rows: u32) -> Samples {
 /// Plain samples that stay in their file.
 pub(super) struct PlainBlocks {
     plain: Plain,
-    /// A reader has one place in a file at a time.
-    input: Mutex<FileBytes>,
+    input: FileBytes,
+    /// The file's state when it was opened.
+    stamp: Option<FileStamp>,
     is_remote: bool,
     images: Vec<BlockImage>,
 }
@@ -233,7 +234,8 @@ impl PlainBlocks {
         Self {
             images: thinned::images([plain.columns, plain.rows], block),
             plain,
-            input: Mutex::new(input),
+            stamp: input.stamp(),
+            input,
             is_remote,
         }
     }
@@ -270,8 +272,7 @@ impl BlockReader for PlainBlocks {
     }
 
     fn want(&self, image: usize, parts: &[Part]) {
-        let input = self.input.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(remote) = input.remote() {
+        if let Some(remote) = self.input.remote() {
             let grain = self.grain(image);
             remote.want(parts.iter().flat_map(|part| self.plain.ranges(part, grain)));
         }
@@ -279,10 +280,10 @@ impl BlockReader for PlainBlocks {
 
     fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
         self.want(image, std::slice::from_ref(part));
-        let input = self.input.lock().unwrap_or_else(PoisonError::into_inner);
         Ok(Block {
-            samples: self.plain.read(&input, part, self.grain(image))?,
+            samples: self.plain.read(&self.input, part, self.grain(image))?,
             holes: None,
+            is_lacking: false,
         })
     }
 
@@ -300,6 +301,13 @@ impl BlockReader for PlainBlocks {
             hasher.write_u64(number);
         }
         hasher.finish()
+    }
+
+    fn stamp(&self, _: usize, _: &Part) -> Option<String> {
+        let stamp = self.stamp.as_ref()?;
+        let is_same = self.input.stamp().as_ref() == Some(stamp);
+        let settled = stamp.settled().filter(|_| is_same)?;
+        Some(format!("{settled} {:?}", self.plain))
     }
 
     fn looks(&self) -> Option<Looks> {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::blocks::{BlockReader, Blocks};
 use super::samples::{HoleMask, SampleType, Samples};
+use crate::disk_cache::DiskCache;
 
 /// The samples of a raster, in the file's order and type.
 #[derive(Clone, Debug)]
@@ -58,6 +59,15 @@ impl Storage {
             && let Some(blocks) = Arc::get_mut(blocks)
         {
             blocks.set_order(south_up, east_first);
+        }
+    }
+
+    /// Where coarse samples are kept, before anything is read.
+    pub(super) fn set_disk_cache(&mut self, disk: &DiskCache) {
+        if let Self::Blocks(blocks) = self
+            && let Some(blocks) = Arc::get_mut(blocks)
+        {
+            blocks.set_disk_cache(disk);
         }
     }
 

@@ -14,6 +14,7 @@ use super::line::{Line, background, spawn};
 use super::store::Opened;
 use super::url::in_text;
 use super::{is_outage, store};
+use crate::disk_cache::DiskCache;
 
 /// Files that are known at once: open, missing or on their way.
 const MOST_FILES: NonZeroUsize = NonZeroUsize::new(256).unwrap();
@@ -88,6 +89,11 @@ impl Elsewhere {
     /// From now on nobody waits, or everybody does again.
     pub(crate) fn stop_waiting(&self, stop: bool) {
         self.0.line.stop_waiting(stop);
+    }
+
+    /// Has pages of files kept for another run; the first folder that is named counts.
+    pub(crate) fn set_disk_cache(&self, disk: &DiskCache) {
+        self.0.line.set_disk_cache(disk);
     }
 
     /// The terrain is open: from now on what goes wrong is told.

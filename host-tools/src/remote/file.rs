@@ -9,10 +9,12 @@ use std::time::{Duration, Instant};
 
 use tokio::runtime::Runtime;
 
+use super::kept::{KeptPages, joined, missing};
 use super::line::{Held, Line, Trouble, spawn};
 use super::pages;
 use super::store::{Object, Opened};
 use super::{LOST, OUTAGE, is_outage};
+use crate::disk_cache::FileStamp;
 
 /// After a request that failed the next one is made after so long.
 const BETWEEN_TRIES: Duration = Duration::from_secs(1);
@@ -28,6 +30,8 @@ pub(crate) struct RemoteFile {
     object: Object,
     /// All of it, where it is short or its server knows no ranges.
     all: Option<Vec<u8>>,
+    /// Its pages on disk, where they can be kept.
+    kept: Option<KeptPages>,
 }
 
 impl RemoteFile {
@@ -43,7 +47,10 @@ impl RemoteFile {
         if !all {
             line.held().pages.arrived(number, 0..1, &opened.first);
         }
+        let kept = line.disk().zip(opened.object.stamp());
+        let kept = kept.map(|(disk, stamp)| KeptPages::new(disk, stamp, opened.object.len()));
         Self {
+            kept: kept.filter(|_| !all),
             name: name.to_owned(),
             number,
             line: line.clone(),
@@ -66,20 +73,53 @@ impl RemoteFile {
         }
     }
 
+    /// What tells the file in the state in which it was opened from others; `None` where its
+    /// server tells neither tag nor time.
+    pub(crate) fn stamp(&self) -> Option<FileStamp> {
+        self.object.stamp().map(FileStamp::of_text)
+    }
+
     /// Has bytes fetched that are going to be read; waits for nothing.
     pub(crate) fn want(self: &Arc<Self>, ranges: impl Iterator<Item = Range<u64>>) {
         if self.all.is_some() {
             return;
         }
         for run in self.take_missing(ranges) {
-            let (file, range) = (self.clone(), pages::bytes(&run, self.len()));
-            let work = async move {
-                let _turn = file.line.turn().await;
-                file.object.get(range).await
-            };
+            let (file, wanted) = (self.clone(), run.clone());
+            let work = async move { file.brought(wanted).await };
             let file = self.clone();
             spawn(self.background, work, move |got| file.arrived(run, got));
         }
+    }
+
+    /// The pages of a run, from disk as far as they were kept there.
+    async fn brought(&self, run: Range<u64>) -> Result<Vec<u8>> {
+        let Some(kept) = &self.kept else {
+            return self.fetched(run).await;
+        };
+        let (disk, wanted) = (kept.clone(), run.clone());
+        let found = self.background.spawn_blocking(move || disk.get(wanted));
+        let found = found.await.unwrap_or_default();
+        if found.is_empty() {
+            return self.fetched(run).await;
+        }
+        let Some(gap) = missing(&found) else {
+            return Ok(joined(&found, &(0..0), &[]));
+        };
+        let pages = run.start + gap.start..run.start + gap.end;
+        let bytes = self.fetched(pages.clone()).await?;
+        let run = joined(&found, &gap, &bytes);
+        let disk = kept.clone();
+        // Nobody waits for that.
+        self.background
+            .spawn_blocking(move || disk.put(pages, &bytes));
+        Ok(run)
+    }
+
+    /// The pages of a run from the server.
+    async fn fetched(&self, run: Range<u64>) -> Result<Vec<u8>> {
+        let _turn = self.line.turn().await;
+        self.object.get(pages::bytes(&run, self.len())).await
     }
 
     fn take_missing(&self, ranges: impl Iterator<Item = Range<u64>>) -> Vec<Range<u64>> {

@@ -12,6 +12,7 @@ use tokio::sync::{Semaphore, SemaphorePermit};
 
 use super::OUTAGE;
 use super::pages::Pages;
+use crate::disk_cache::DiskCache;
 
 /// Requests under way at once.
 const AT_ONCE: usize = 16;
@@ -23,6 +24,8 @@ pub(super) struct Line {
     requests: Semaphore,
     files: AtomicU64,
     held: Mutex<Held>,
+    /// Where pages are kept for another run.
+    disk: OnceLock<DiskCache>,
     pub(super) arrived: Condvar,
 }
 
@@ -50,6 +53,7 @@ impl Default for Line {
             requests: Semaphore::new(AT_ONCE),
             files: AtomicU64::new(0),
             held: Mutex::default(),
+            disk: OnceLock::new(),
             arrived: Condvar::new(),
         }
     }
@@ -65,6 +69,16 @@ impl Line {
     pub(super) fn held(&self) -> MutexGuard<'_, Held> {
         // Nothing that panics runs while this is held.
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Has pages kept for another run; the first folder that is named counts.
+    pub(super) fn set_disk_cache(&self, disk: &DiskCache) {
+        let _ = self.disk.set(disk.clone());
+    }
+
+    /// Where pages are kept for another run, where they are.
+    pub(super) fn disk(&self) -> Option<&DiskCache> {
+        self.disk.get().filter(|disk| disk.is_on())
     }
 
     /// From now on nobody waits, or everybody does again.

@@ -9,6 +9,9 @@
 //! waits for them, until somebody is served who must not ([`Elsewhere::stop_waiting`]):
 //! then what is not here yet is [`std::io::ErrorKind::WouldBlock`], and comes later.
 //!
+//! Pages are kept on disk for another run (`kept`), where the server says by a tag or a time
+//! which state of the file they are of.
+//!
 //! A file that was changed at its server is not read on: what was fetched of it and what
 //! would come do not belong together.
 //!
@@ -21,6 +24,8 @@ mod absent;
 mod elsewhere;
 #[cfg(feature = "remote")]
 mod file;
+#[cfg(feature = "remote")]
+mod kept;
 #[cfg(feature = "remote")]
 mod line;
 #[cfg(feature = "remote")]

@@ -32,6 +32,7 @@ const SHOWN: usize = 300;
 /// A file at a server, in the state in which it was opened.
 #[derive(Debug)]
 pub(super) struct Object {
+    url: String,
     store: Box<dyn ObjectStore>,
     path: Path,
     /// As it was when it was opened.
@@ -60,18 +61,23 @@ pub(super) async fn open(url: &str) -> Result<Opened> {
             let first = body(got, &range).await?;
             let is_all = first.len() as u64 == was.size;
             Ok(Opened {
-                object: Object { store, path, was },
+                object: Object {
+                    url: url.to_owned(),
+                    store,
+                    path,
+                    was,
+                },
                 first,
                 is_all,
             })
         }
-        Err(error) if is_without_ranges(&error) => whole(store, path).await,
+        Err(error) if is_without_ranges(&error) => whole(url, store, path).await,
         Err(error) => Err(told(&error)),
     }
 }
 
 /// A server that knows no ranges hands over all of a file, which then is held in memory.
-async fn whole(store: Box<dyn ObjectStore>, path: Path) -> Result<Opened> {
+async fn whole(url: &str, store: Box<dyn ObjectStore>, path: Path) -> Result<Opened> {
     const LARGEST: u64 = 256 << 20;
     let got = store.get_opts(&path, GetOptions::default()).await;
     let got = got.map_err(|error| told(&error))?;
@@ -85,7 +91,12 @@ async fn whole(store: Box<dyn ObjectStore>, path: Path) -> Result<Opened> {
     }
     let first = body(got, &(0..was.size)).await?;
     Ok(Opened {
-        object: Object { store, path, was },
+        object: Object {
+            url: url.to_owned(),
+            store,
+            path,
+            was,
+        },
         first,
         is_all: true,
     })
@@ -95,6 +106,15 @@ impl Object {
     /// Bytes of the file.
     pub(super) const fn len(&self) -> u64 {
         self.was.size
+    }
+
+    /// What tells the file in the state in which it was opened from others; `None` where the
+    /// server tells neither tag nor time.
+    pub(super) fn stamp(&self) -> Option<String> {
+        let was = &self.was;
+        let tells = was.e_tag.is_some() || was.last_modified.timestamp() > 0;
+        let time = was.last_modified.timestamp_micros();
+        tells.then(|| format!("{:?} {} {:?} {time}", self.url, was.size, was.e_tag))
     }
 
     /// Some of its bytes, all of them inside the file.

@@ -326,6 +326,27 @@ impl<'r> FeltGrid<'r> {
         self.raster.surface(level, place)
     }
 
+    /// Has the samples between two places of level *L* read that are not here yet, both
+    /// included and in cells of that level: [`Raster::prefetch`].
+    pub fn prefetch(&self, level: u8, from: [i32; 2], to: [i32; 2]) {
+        let step = f64::from(level).exp2();
+        let corners = [from, [to[0], from[1]], [from[0], to[1]], to].map(|[column, row]| {
+            let (u, v) = (f64::from(column) * step, f64::from(row) * step);
+            match &self.resampling {
+                None => [u, v],
+                Some(places) => places.in_file(u, v),
+            }
+        });
+        let along = |axis: usize| {
+            let places = || corners.iter().map(|corner| corner[axis]);
+            let first = places().fold(f64::INFINITY, f64::min).floor();
+            let last = places().fold(f64::NEG_INFINITY, f64::max).ceil();
+            // Below zero there is no sample, and the raster ends where it does.
+            [first as u32, last as u32]
+        };
+        self.raster.prefetch(level, along(0), along(1));
+    }
+
     /// Copies heights of a row from `first_column` eastwards, one for each place in
     /// `heights`: the same values as [`FeltGrid::height_of_level`].
     pub fn copy_row(&self, level: u8, row: u32, first_column: u32, heights: &mut [f64]) {

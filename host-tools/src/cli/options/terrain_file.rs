@@ -8,6 +8,7 @@ use clap::ValueHint;
 use indicatif::ProgressBar;
 
 use crate::cli::failure::Failure;
+use crate::disk_cache::DiskCache;
 use crate::raster::{
     CellUnit, Certainty, Encoding, Endian, OpenOptions, PngChannel, Raster, RawLayout, SampleType,
     files_read_with, metres_in,
@@ -84,6 +85,15 @@ pub struct ReadingOptions {
     /// do
     #[arg(long, value_name = "MB", default_value_t = OpenOptions::IN_MEMORY_MB, help_heading = INPUT)]
     pub in_memory_mb: u32,
+
+    /// Folder for coarse samples and pages of URLs that were read before; it may be deleted at
+    /// any time. Without it: hapterra in the user's folder for caches, as ~/.cache
+    #[arg(long, value_name = "DIR", env = "HAPTERRA_CACHE_DIR", value_hint = ValueHint::DirPath, hide_env_values = true, help_heading = INPUT)]
+    pub cache_dir: Option<PathBuf>,
+
+    /// Megabytes that this folder takes at most; 0 keeps nothing there
+    #[arg(long, value_name = "MB", env = "HAPTERRA_CACHE_MB", default_value_t = DiskCache::MOST_MB, hide_env_values = true, help_heading = INPUT)]
+    pub cache_mb: u32,
 }
 
 impl TerrainFile {
@@ -123,6 +133,14 @@ impl TerrainFile {
 }
 
 impl ReadingOptions {
+    /// Where there is no home folder nothing is kept.
+    fn disk_cache(&self) -> DiskCache {
+        let folder = self.cache_dir.clone().or_else(DiskCache::usual_folder);
+        folder.map_or(DiskCache::off(), |folder| {
+            DiskCache::at(&folder, u64::from(self.cache_mb) << 20)
+        })
+    }
+
     fn options(&self) -> OpenOptions {
         OpenOptions {
             raw: self.raw_size.map(|(columns, rows)| RawLayout {
@@ -140,6 +158,7 @@ impl ReadingOptions {
             vertical_unit_m: self.vertical_unit,
             encoding: self.encoding,
             most_in_memory_bytes: u64::from(self.in_memory_mb) << 20,
+            disk_cache: self.disk_cache(),
             ..OpenOptions::default()
         }
     }

@@ -43,6 +43,11 @@ impl Cache {
         self.blocks.get(key).cloned()
     }
 
+    /// Whether a block is kept.
+    pub(super) fn has(&self, key: &Key) -> bool {
+        self.blocks.contains(key)
+    }
+
     /// Bytes that all kept blocks take.
     pub(super) const fn bytes(&self) -> usize {
         self.bytes

@@ -5,7 +5,7 @@ use std::hash::Hasher;
 use twox_hash::XxHash64;
 
 use super::super::HeightSummary;
-use super::{Blocks, Part};
+use super::{Part, Shared};
 
 /// Of an image with at most so many samples all are looked at.
 const FEW_SAMPLES: u64 = 1 << 20;
@@ -57,7 +57,7 @@ impl Seen {
     }
 }
 
-impl Blocks {
+impl Shared {
     /// Looks at what the reader chooses, or at the coarsest image, all of it where it is
     /// small. `height` makes a height of a stored sample. The summary's range is empty where
     /// there is no height in the whole file.
@@ -114,8 +114,7 @@ impl Blocks {
     /// The samples of a part that is no block: neither is it kept, nor is read what lies
     /// around it.
     fn look_once(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
-        let read = self.read(image, part);
-        let block = read.ok().flatten();
+        let block = self.read(image, part).ok().and_then(|read| read.block);
         for index in 0..part.columns as usize * part.rows as usize {
             add(block.as_ref().and_then(|block| block.stored(index)));
         }
@@ -130,7 +129,7 @@ impl Blocks {
     }
 
     fn samples(&self, image: usize) -> u64 {
-        let of = self.reader.images().get(image);
+        let of = self.images.get(image);
         of.map_or(0, |of| u64::from(of.columns) * u64::from(of.rows))
     }
 

@@ -83,6 +83,7 @@ impl BlockReader for Field {
         Ok(Block {
             samples: samples.into(),
             holes: None,
+            is_lacking: false,
         })
     }
 
@@ -273,6 +274,7 @@ impl BlockReader for Slow {
         Ok(Block {
             samples: vec![1.0; count].into(),
             holes: None,
+            is_lacking: false,
         })
     }
 

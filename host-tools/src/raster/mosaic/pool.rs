@@ -80,9 +80,15 @@ impl Pool {
         }
     }
 
+    /// A file that is open already.
+    pub(super) fn peek(&self, number: usize) -> Option<&Opened> {
+        self.open.peek(&number).map(|opened| &**opened)
+    }
+
     fn opened(&mut self, number: usize, source: &Source) -> Result<Opened, BadRaster> {
         let mut options = self.options.clone();
         options.band = source.band.or(options.band);
+        let stamps = source.stamps();
         let whole = whole_bytes(&outline(source, &options)?)?;
         self.make_room(usize::try_from(whole).unwrap_or(usize::MAX));
         let mut decoded = guarded("terrain", || tile_file::decode(&source.path, &options))?;
@@ -102,7 +108,7 @@ impl Pool {
             let unread = self.unread.get(&number).copied().unwrap_or_default();
             blocks.set_share(SHARE_BYTES, unread);
         }
-        Ok(Opened::new(decoded, source.values))
+        Ok(Opened::new(decoded, source.values, stamps))
     }
 
     /// Closes files until those that stay, and `more` bytes, are within bounds. The last one

@@ -1,7 +1,7 @@
 //! Reads samples of a terrain of many files, from those files that have them.
 
 use std::hash::Hasher;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use fixedbitset::FixedBitSet;
 use twox_hash::XxHash64;
@@ -28,6 +28,8 @@ pub(super) struct Mosaic {
     images: Vec<BlockImage>,
     sample: SampleType,
     pool: Mutex<Pool>,
+    /// What the user says of the files that changes their samples.
+    options: String,
 }
 
 impl Mosaic {
@@ -57,16 +59,28 @@ impl Mosaic {
             sources,
             sample,
             pool: Mutex::new(Pool::new(options)),
+            options: format!(
+                "{:?}",
+                (
+                    options.no_data,
+                    options.band,
+                    &options.variable,
+                    options.encoding,
+                    options.png_channel
+                )
+            ),
         }
+    }
+
+    fn pool(&self) -> MutexGuard<'_, Pool> {
+        // What panics while this is held is a decoder, whose panics are caught.
+        self.pool.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Number of open files.
     #[cfg(test)]
     pub(super) fn open_files(&self) -> usize {
-        self.pool
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .len()
+        self.pool().len()
     }
 }
 
@@ -147,7 +161,7 @@ impl BlockReader for Mosaic {
 
     fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
         let mut filling = Filling::new(part);
-        let mut pool = self.pool.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut is_lacking = false;
         for (number, source) in self.sources.iter().enumerate().rev() {
             if filling.left == 0 {
                 break;
@@ -159,14 +173,17 @@ impl BlockReader for Mosaic {
             if places.is_empty() {
                 continue;
             }
-            if let Some(opened) = pool.get(number, source)? {
+            // Only while it is opened: whoever else reads does not wait for all of this.
+            let opened = self.pool().get(number, source)?;
+            if let Some(opened) = &opened {
                 let before = not_yet();
-                filling.fill(image as u8, source, &opened, &places);
+                filling.fill(image as u8, source, opened, &places);
                 if not_yet() != before {
                     return Err(BadRaster::NotYet);
                 }
             }
-            pool.make_room(0);
+            is_lacking |= opened.is_none_or(|opened| opened.share().1 > 0);
+            self.pool().make_room(0);
         }
         let values = filling.values;
         Ok(Block {
@@ -179,7 +196,29 @@ impl BlockReader for Mosaic {
                 _ => values.into(),
             },
             holes: None,
+            is_lacking,
         })
+    }
+
+    fn stamp(&self, image: usize, part: &Part) -> Option<String> {
+        let mut text = self.options.clone();
+        for (number, source) in self.sources.iter().enumerate() {
+            if source.overlap(image as u32, part).is_none() {
+                continue;
+            }
+            let stamps = source.stamps()?;
+            // A file that is open stays what it was when another takes its name.
+            if let Some(opened) = self.pool().peek(number)
+                && opened.stamps() != Some(&stamps)
+            {
+                return None;
+            }
+            text += &format!(" {number} {source:?}");
+            for stamp in &stamps {
+                text += stamp.settled()?;
+            }
+        }
+        Some(text)
     }
 
     fn index(&self) -> u64 {

@@ -2,10 +2,13 @@
 
 use std::path::PathBuf;
 
+use super::super::beside;
 use super::super::blocks::Part;
 use super::super::decoded::Decoded;
 use super::super::samples::{SampleType, with_samples};
 use super::super::storage::Storage;
+use crate::disk_cache::FileStamp;
+use crate::remote::is_url;
 
 /// A file and its part of the terrain.
 #[derive(Clone, Debug)]
@@ -74,6 +77,16 @@ pub(super) enum Values {
 }
 
 impl Source {
+    /// The present state of the file and of those beside it; none where it is at a URL, or
+    /// gone.
+    pub(super) fn stamps(&self) -> Option<Vec<FileStamp>> {
+        if self.path.to_str().is_some_and(is_url) {
+            return None;
+        }
+        let files = beside::files_read_with(&self.path);
+        files.iter().map(|file| FileStamp::at(file)).collect()
+    }
+
     /// The part of `part` of the samples with every 2ᵏ-th of the terrain that the file has.
     pub(super) fn overlap(&self, k: u32, part: &Part) -> Option<Part> {
         let cut = |first: u32, count: u32, from: u32, most: u32| {
@@ -97,13 +110,15 @@ impl Source {
 /// A file that was opened.
 pub(super) struct Opened {
     decoded: Decoded,
+    /// [`Source::stamps`] before it was opened.
+    stamps: Option<Vec<FileStamp>>,
     values: Values,
     /// [`Values::Stored::no_data`] as the file's samples can hold it.
     no_data: Option<f64>,
 }
 
 impl Opened {
-    pub(super) fn new(decoded: Decoded, values: Values) -> Self {
+    pub(super) fn new(decoded: Decoded, values: Values, stamps: Option<Vec<FileStamp>>) -> Self {
         let asked = match values {
             Values::Heights => None,
             Values::Stored { no_data, .. } => no_data,
@@ -113,12 +128,18 @@ impl Opened {
             no_data: asked.and_then(|value| none.comparable_no_data(value)),
             values,
             decoded,
+            stamps,
         }
     }
 
     /// Samples a row and rows, in the file's order.
     pub(super) const fn size(&self) -> [u32; 2] {
         [self.decoded.columns, self.decoded.rows]
+    }
+
+    /// [`Source::stamps`] before it was opened.
+    pub(super) fn stamps(&self) -> Option<&Vec<FileStamp>> {
+        self.stamps.as_ref()
     }
 
     /// Bytes that it takes in memory now, and blocks of it that could not be read.

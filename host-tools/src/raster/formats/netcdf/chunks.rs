@@ -325,6 +325,8 @@ impl BlockReader for Chunks {
                 true => of_the_other_sign(samples),
                 false => samples,
             },
+            // No chunk that can be read has a hole that no value marks.
+            is_lacking: holes.is_some(),
             holes,
         })
     }

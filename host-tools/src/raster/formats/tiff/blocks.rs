@@ -2,7 +2,7 @@
 //! strips or tiles.
 
 use std::hash::Hasher;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use tiff_reader::{Ifd, TagValue, TiffFile};
 use twox_hash::XxHash64;
@@ -10,8 +10,10 @@ use twox_hash::XxHash64;
 use super::images;
 use super::layout::Layout;
 use super::samples::{holes, read, sample_type};
+use crate::disk_cache::FileStamp;
 use crate::raster::blocks::{Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Part};
 use crate::raster::guard::guarded;
+use crate::raster::input::FileBytes;
 use crate::raster::samples::{HoleMask, SampleValue, with_samples};
 use crate::raster::unread::Unread;
 use crate::raster::{BadRaster, SampleType};
@@ -47,6 +49,11 @@ pub(super) struct TiffBlocks {
     remote: Vec<Option<Arc<RemoteFile>>>,
     mask: Option<TiffFile>,
     unread: Unread,
+    /// The main file and the mask's, each with its state when it was opened; `None` where one
+    /// was changed meanwhile.
+    inputs: Option<Vec<(FileBytes, FileStamp)>>,
+    /// [`BlockReader::index`], once it was asked for.
+    index: OnceLock<u64>,
     /// The full image and its overviews.
     images: Vec<Image>,
     /// The same as the rest of the program knows them.
@@ -73,6 +80,7 @@ impl TiffBlocks {
         mask: Option<TiffFile>,
         overviews: Option<Opened>,
         (name, asked): (&str, Option<u32>),
+        inputs: &[&FileBytes],
     ) -> Result<Self, BadRaster> {
         let full = images::full(&file)?.clone();
         let full = Image {
@@ -115,6 +123,8 @@ impl TiffBlocks {
             remote,
             mask,
             unread: Unread::of(name),
+            inputs: stamped(inputs)?,
+            index: OnceLock::new(),
             images: found,
         })
     }
@@ -127,6 +137,7 @@ impl TiffBlocks {
         Ok(Block {
             samples: read(file, directory, layout, layout.band, part)?,
             holes: holes(file, directory, layout, mask, part)?,
+            is_lacking: false,
         })
     }
 
@@ -173,6 +184,7 @@ impl TiffBlocks {
         Ok(Block {
             samples,
             holes: Some(all),
+            is_lacking: true,
         })
     }
 
@@ -181,6 +193,20 @@ impl TiffBlocks {
         let mask = self.mask.as_ref()?;
         images::of_same_size(mask, &image.directory).and(Some(mask))
     }
+}
+
+/// Files that were opened, to be asked for their state again.
+fn stamped(inputs: &[&FileBytes]) -> Result<Option<Vec<(FileBytes, FileStamp)>>, BadRaster> {
+    let mut all = vec![];
+    for input in inputs {
+        // The decoder has opened the file at the path by itself.
+        let stamp = input.stamp().filter(|_| input.is_at_its_path());
+        match (input.again()?, stamp) {
+            (Some(own), Some(stamp)) => all.push((own, stamp)),
+            _ => return Ok(None),
+        }
+    }
+    Ok(Some(all))
 }
 
 impl Image {
@@ -295,6 +321,16 @@ impl BlockReader for TiffBlocks {
         }
     }
 
+    fn stamp(&self, image: usize, _: &Part) -> Option<String> {
+        let mut text = format!("{:x} band {}", self.index(), self.images[image].layout.band);
+        for (input, stamp) in self.inputs.as_ref()? {
+            let is_same = input.stamp().as_ref() == Some(stamp);
+            text += " ";
+            text += stamp.settled().filter(|_| is_same)?;
+        }
+        Some(text)
+    }
+
     fn kept_bytes(&self) -> usize {
         match self.remote.iter().any(Option::is_some) {
             true => RemoteFile::kept_bytes(),
@@ -303,6 +339,12 @@ impl BlockReader for TiffBlocks {
     }
 
     fn index(&self) -> u64 {
+        *self.index.get_or_init(|| self.hash_of_index())
+    }
+}
+
+impl TiffBlocks {
+    fn hash_of_index(&self) -> u64 {
         let mut hasher = XxHash64::with_seed(0);
         for image in &self.images {
             hasher.write_u32(image.layout.columns);

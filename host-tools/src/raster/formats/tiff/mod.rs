@@ -67,8 +67,8 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     budget::check(&layout, input.len())?;
     let format = layout.described(file.byte_order());
     let size = (layout.columns, layout.rows);
-    let mask = find_appended(input, "msk")?;
-    let mask = mask.as_ref().map(open).transpose()?;
+    let mask_file = find_appended(input, "msk")?;
+    let mask = mask_file.as_ref().map(open).transpose()?;
     let storage = match stays {
         false if input.is_outline() => Storage::from(samples::sample_type(&layout).none()),
         true => {
@@ -77,12 +77,9 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
                 None => None,
             };
             let file = (file, input.remote());
-            Storage::from(TiffBlocks::new(
-                file,
-                mask,
-                overviews,
-                (input.name(), asked),
-            )?)
+            let inputs: Vec<_> = once(input).chain(&mask_file).collect();
+            let named = (input.name(), asked);
+            Storage::from(TiffBlocks::new(file, mask, overviews, named, &inputs)?)
         }
         false => {
             let all = Part::whole(layout.columns, layout.rows);

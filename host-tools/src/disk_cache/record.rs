@@ -1,0 +1,34 @@
+//! A record, byte by byte: 8 bytes that say what it is, its name (16), the number of bytes
+//! that it holds (8), their XXH64 (8), all numbers little-endian, and the bytes.
+
+use std::hash::Hasher;
+
+use twox_hash::XxHash64;
+
+use super::Name;
+
+const BEGINS: &[u8; 8] = b"hapterr1";
+/// Bytes before what a record holds.
+pub(super) const HEAD: usize = 8 + 16 + 8 + 8;
+
+fn sum(bytes: &[u8]) -> u64 {
+    let mut hasher = XxHash64::with_seed(0);
+    hasher.write(bytes);
+    hasher.finish()
+}
+
+/// A record that holds some bytes.
+pub(super) fn made(name: &Name, bytes: &[u8]) -> Vec<u8> {
+    let length = (bytes.len() as u64).to_le_bytes();
+    let sum = sum(bytes).to_le_bytes();
+    [BEGINS, &name.bytes()[..], &length, &sum, bytes].concat()
+}
+
+/// What a record of that name holds; `None` where it is another or is not whole.
+pub(super) fn held(name: &Name, mut record: Vec<u8>) -> Option<Vec<u8>> {
+    let head = record.get(..HEAD)?;
+    let length = (record.len() - HEAD) as u64;
+    let expected = [BEGINS, &name.bytes()[..], &length.to_le_bytes()].concat();
+    let is_whole = head[..32] == expected && head[32..] == sum(&record[HEAD..]).to_le_bytes();
+    is_whole.then(|| record.split_off(HEAD))
+}

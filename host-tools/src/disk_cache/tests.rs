@@ -1,0 +1,209 @@
+//! A folder of records: whole or absent, within its bound, and never in the way.
+
+use std::path::PathBuf;
+use std::time::{Duration, SystemTime};
+
+use super::*;
+
+fn name(number: usize) -> Name {
+    Name::of(&["test", &number.to_string()])
+}
+
+fn bytes(number: usize) -> Vec<u8> {
+    (0..5000)
+        .map(|index| (index * 7 + number * 13) as u8)
+        .collect()
+}
+
+fn cache(most_bytes: u64) -> (tempfile::TempDir, DiskCache) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let cache = DiskCache::at(folder.path(), most_bytes);
+    (folder, cache)
+}
+
+/// The file of a record.
+fn path(folder: &tempfile::TempDir, number: usize) -> PathBuf {
+    folder.path().join(FORM).join(name(number).path())
+}
+
+/// Bytes of all files.
+fn used(folder: &Path) -> u64 {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let each = entries.map(|entry| match entry.path().is_dir() {
+        true => used(&entry.path()),
+        false => entry.metadata().map_or(0, |metadata| metadata.len()),
+    });
+    each.sum()
+}
+
+#[test]
+fn a_record_is_found_again_by_its_name_alone() {
+    let (folder, cache) = cache(1 << 20);
+    assert_eq!(cache.get(&name(1)), None);
+    cache.put(&name(1), &bytes(1));
+    cache.put(&name(2), &[]);
+    let other = DiskCache::at(folder.path(), 1 << 20);
+    assert_eq!(other.get(&name(1)), Some(bytes(1)));
+    assert_eq!(other.get(&name(2)), Some(vec![]));
+    assert_eq!(other.get(&name(3)), None);
+    other.put(&name(1), &bytes(9));
+    assert_eq!(cache.get(&name(1)), Some(bytes(9)));
+    // Texts that are one when they are joined have two names.
+    assert_ne!(Name::of(&["ab", "c"]), Name::of(&["a", "bc"]));
+}
+
+#[test]
+fn a_record_that_is_not_whole_or_another_is_as_if_absent() {
+    let (folder, cache) = cache(1 << 20);
+    cache.put(&name(1), &bytes(1));
+    cache.put(&name(2), &bytes(2));
+    let (whole, other) = (path(&folder, 1), path(&folder, 2));
+    let record = fs::read(&whole).expect("there");
+    for length in [0, 1, 8, 39, 40, 41, record.len() - 1] {
+        fs::write(&whole, &record[..length]).expect("written");
+        assert_eq!(cache.get(&name(1)), None, "{length}");
+    }
+    for place in (0..record.len()).step_by(37).chain(0..48) {
+        let mut damaged = record.clone();
+        damaged[place] ^= 0x10;
+        fs::write(&whole, damaged).expect("written");
+        assert_eq!(cache.get(&name(1)), None, "{place}");
+    }
+    fs::copy(&other, &whole).expect("copied");
+    assert_eq!(cache.get(&name(1)), None, "it is of another name");
+    fs::write(&whole, vec![0; 2 << 20]).expect("written");
+    assert_eq!(cache.get(&name(1)), None, "it is too large");
+    fs::remove_file(&whole).expect("removed");
+    fs::create_dir(&whole).expect("made");
+    assert_eq!(cache.get(&name(1)), None, "it is a folder");
+    cache.put(&name(1), &bytes(1));
+    assert_eq!(cache.get(&name(1)), None);
+    fs::write(&other, &record).expect("written");
+    assert_eq!(cache.get(&name(2)), None);
+}
+
+#[test]
+fn the_records_used_longest_ago_go_first_and_nothing_else() {
+    const MOST: u64 = 400 << 10;
+    let (folder, cache) = cache(MOST);
+    let foreign = folder.path().join(FORM).join("ab").join("mine.txt");
+    fs::create_dir_all(foreign.parent().expect("it has one")).expect("made");
+    fs::write(&foreign, [1; 100]).expect("written");
+    let beside = folder.path().join("other");
+    fs::write(&beside, [1; 100]).expect("written");
+    for number in 0..300 {
+        cache.put(&name(number), &bytes(number));
+        let aged = fs::File::options().append(true).open(path(&folder, number));
+        // Each is some hours older than the next.
+        let time = SystemTime::now() - Duration::from_secs(3600 * (1000 - number as u64));
+        aged.and_then(|file| file.set_modified(time)).expect("aged");
+        // This one is used again and again.
+        assert_eq!(cache.get(&name(0)), Some(bytes(0)), "{number}");
+        assert!(used(folder.path()) <= MOST + 200, "{}", used(folder.path()));
+    }
+    assert!(cache.get(&name(299)).is_some() && cache.get(&name(280)).is_some());
+    assert!((1..200).all(|number| cache.get(&name(number)).is_none()));
+    assert!(foreign.exists() && beside.exists());
+}
+
+#[test]
+fn what_other_programs_write_counts_too() {
+    const MOST: u64 = 1 << 20;
+    let (folder, one) = cache(MOST);
+    let other = DiskCache::at(folder.path(), MOST);
+    for number in 0..600 {
+        let cache = if number % 2 == 0 { &one } else { &other };
+        cache.put(&name(number), &bytes(number));
+        assert!(used(folder.path()) <= MOST + MOST / 4, "{number}");
+    }
+}
+
+#[test]
+fn two_that_write_and_read_the_same_records_at_once_see_whole_ones() {
+    let (folder, _) = cache(0);
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| {
+                // As programs of their own.
+                let cache = DiskCache::at(folder.path(), 100 << 10);
+                for round in 0..300 {
+                    let number = round % 40;
+                    cache.put(&name(number), &bytes(number));
+                    if let Some(found) = cache.get(&name((round + 20) % 40)) {
+                        assert_eq!(found, bytes((round + 20) % 40));
+                    }
+                    if round % 100 == 99 {
+                        // Somebody deletes it meanwhile.
+                        let _ = fs::remove_dir_all(folder.path().join(FORM));
+                    }
+                }
+            });
+        }
+    });
+}
+
+#[test]
+fn a_folder_that_is_off_or_cannot_be_made_keeps_nothing_and_says_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("file");
+    fs::write(&file, b"mine").expect("written");
+    for cache in [
+        DiskCache::off(),
+        DiskCache::at(&folder.path().join("off"), 0),
+        DiskCache::at(&file, 1 << 20),
+    ] {
+        cache.put(&name(1), &bytes(1));
+        assert_eq!(cache.get(&name(1)), None);
+    }
+    assert_eq!(fs::read(&file).expect("there"), b"mine");
+    assert!(!folder.path().join("off").exists());
+    // More than the largest record.
+    let cache = DiskCache::at(folder.path(), 1 << 30);
+    cache.put(&name(1), &vec![0; LARGEST_RECORD + 1]);
+    assert_eq!(cache.get(&name(1)), None);
+}
+
+#[test]
+fn what_a_killed_program_has_left_goes() {
+    let (folder, cache) = cache(64 << 10);
+    let inner = folder.path().join(FORM).join("00");
+    fs::create_dir_all(&inner).expect("made");
+    let left = inner.join(".new-killed");
+    fs::write(&left, [0; 50]).expect("written");
+    let time = SystemTime::now() - Duration::from_secs(7200);
+    let aged = fs::File::options().append(true).open(&left);
+    aged.and_then(|file| file.set_modified(time)).expect("aged");
+    cache.put(&name(1), &bytes(1));
+    assert!(!left.exists());
+}
+
+#[test]
+fn a_stamp_tells_a_file_from_others_and_from_itself_after_a_change() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
+    fs::write(&a, [1; 9]).expect("written");
+    let first = FileStamp::at(&a).expect("there");
+    assert_eq!(first.settled(), None, "it was written a moment ago");
+    let age = |path: &Path| {
+        let time = SystemTime::now() - Duration::from_secs(100);
+        let file = fs::File::options().append(true).open(path);
+        file.and_then(|file| file.set_modified(time)).expect("aged");
+    };
+    age(&a);
+    let aged = FileStamp::at(&a).expect("there");
+    assert!(aged.settled().is_some() && aged != first);
+    assert_eq!(FileStamp::at(&a).as_ref(), Some(&aged));
+    fs::copy(&a, &b).expect("copied");
+    assert_ne!(FileStamp::at(&b).as_ref(), Some(&aged));
+    // Other bytes of the same number and time.
+    let modified = fs::metadata(&a).and_then(|metadata| metadata.modified());
+    fs::write(&a, [2; 9]).expect("written");
+    let file = fs::File::options().append(true).open(&a).expect("opens");
+    file.set_modified(modified.expect("known")).expect("set");
+    if cfg!(unix) {
+        assert_ne!(FileStamp::at(&a).as_ref(), Some(&aged));
+    }
+    fs::rename(&b, &a).expect("renamed");
+    assert_ne!(FileStamp::at(&a).as_ref(), Some(&aged));
+    assert_eq!(FileStamp::at(&b), None);
+}

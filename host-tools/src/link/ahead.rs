@@ -1,0 +1,104 @@
+//! Where the HIP is going to be, and what of the terrain has to be there by then.
+
+use hapterra_core::grid::GridPoint;
+use hapterra_core::terrain::TILE_CELLS;
+
+use crate::terrain::Terrain;
+
+/// So far ahead is looked, seconds: longer than a server at a distance takes to answer.
+const AHEAD_S: f64 = 0.5;
+/// Between two looks, seconds: of what moves, positions of one tick tell little of the speed.
+const BETWEEN_S: f64 = 0.05;
+/// Tiles each way beyond the one under the HIP, at most. A HIP that is faster is not
+/// caught up with: what it has passed when it comes is not asked for.
+const MOST_TILES: i32 = 8;
+
+/// Follows the HIP, and has what lies before it read.
+#[derive(Debug, Default)]
+pub(super) struct Ahead {
+    /// A tick, and where the HIP was.
+    was: Option<(u32, GridPoint)>,
+    /// First and last tile of what was asked for, east and north.
+    asked: Option<[[i32; 2]; 2]>,
+}
+
+impl Ahead {
+    /// The scene is another, or the device is.
+    pub(super) fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Takes where the HIP is at a tick, of which there are so many a second.
+    pub(super) fn follow(
+        &mut self,
+        terrain: &Terrain<'_>,
+        tick: u32,
+        hip: &GridPoint,
+        tick_hz: f64,
+    ) {
+        let Some((then, was)) = self.was else {
+            self.was = Some((tick, *hip));
+            return;
+        };
+        let since = f64::from(tick.wrapping_sub(then)) / tick_hz;
+        if since < BETWEEN_S {
+            return;
+        }
+        self.was = Some((tick, *hip));
+        let Some(tiles) = tiles(&was, hip, AHEAD_S / since) else {
+            return;
+        };
+        if self.asked.replace(tiles) != Some(tiles) {
+            let cells = |tile: i32| tile.saturating_mul(TILE_CELLS as i32);
+            let [from, to] = tiles;
+            let to = to.map(|tile| cells(tile.saturating_add(1)));
+            let grid = terrain.grid();
+            grid.prefetch(terrain.level(), from.map(cells), to);
+        }
+    }
+}
+
+/// First and last tile, east and north, from the one under the HIP to where it will be after
+/// `times` as long as it took from `was`; `None` where it is too fast.
+fn tiles(was: &GridPoint, is: &GridPoint, times: f64) -> Option<[[i32; 2]; 2]> {
+    let along = |axis: usize| {
+        let at = |point: &GridPoint| f64::from(point.cell()[axis]) + f64::from(point.frac()[axis]);
+        let (from, moved) = (at(is), at(is) - at(was));
+        let tile = |cells: f64| (cells / f64::from(TILE_CELLS as u32)).floor() as i32;
+        let (from, to) = (tile(from), tile(from + moved * times));
+        let is_near = to.saturating_sub(from).saturating_abs() <= MOST_TILES;
+        is_near.then_some([from.min(to), from.max(to)])
+    };
+    let (east, north) = (along(0)?, along(1)?);
+    Some([[east[0], north[0]], [east[1], north[1]]])
+}
+
+#[cfg(test)]
+mod tests {
+    use hapterra_core::Vec3;
+
+    use super::*;
+
+    fn at(east: i32, north: i32) -> GridPoint {
+        GridPoint::new([east, north, 0], Vec3::new(0.5, 0.5, 0.5))
+    }
+
+    #[test]
+    fn what_lies_between_the_hip_and_where_it_goes_is_wanted() {
+        assert_eq!(
+            tiles(&at(40, 40), &at(40, 40), 10.0),
+            Some([[1, 1], [1, 1]])
+        );
+        // A cell in a twentieth of a second: ten in half a second.
+        assert_eq!(
+            tiles(&at(56, 40), &at(57, 40), 10.0),
+            Some([[1, 1], [2, 1]])
+        );
+        assert_eq!(
+            tiles(&at(41, 70), &at(40, 66), 10.0),
+            Some([[0, 0], [1, 2]])
+        );
+        assert_eq!(tiles(&at(0, 0), &at(0, 30), 10.0), None, "it is too fast");
+        assert_eq!(tiles(&at(i32::MIN, 0), &at(i32::MAX, 0), 1e9), None);
+    }
+}

@@ -1,0 +1,143 @@
+//! What is made or read ahead while somebody is served who must not wait: one thread, and
+//! a queue of what is wanted.
+
+use std::collections::{HashSet, VecDeque};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+
+use super::cache::Key;
+
+/// Jobs that wait, at most: more than the blocks that a coarse tile touches (33 × 33). The
+/// one that waits longest goes, and is wanted again by whoever still needs it.
+const MOST: usize = 2048;
+
+/// Something to be done in the background.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Job {
+    /// Look for a piece of a made image on disk.
+    Seek(Key),
+    /// Decode a block of the full image for its coarse samples.
+    Pass([u32; 2]),
+    /// Read a block, which is kept.
+    Fetch(Key),
+}
+
+/// Jobs, each once.
+#[derive(Default)]
+pub(super) struct Queue {
+    state: Mutex<State>,
+    wake: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    waiting: VecDeque<Job>,
+    /// Those that wait, and the one that is being done.
+    known: HashSet<Job>,
+    is_over: bool,
+}
+
+impl Queue {
+    fn state(&self) -> MutexGuard<'_, State> {
+        // Nothing that panics runs while this is held.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Has something done before what was wanted already.
+    pub(super) fn want_first(&self, job: Job) {
+        let mut state = self.state();
+        if !state.is_over && state.waiting.len() < MOST && state.known.insert(job) {
+            state.waiting.push_front(job);
+            drop(state);
+            self.wake.notify_all();
+        }
+    }
+
+    /// Has something done, after what was wanted before.
+    pub(super) fn want(&self, job: Job) {
+        let mut state = self.state();
+        if state.is_over || !state.known.insert(job) {
+            return;
+        }
+        if state.waiting.len() >= MOST
+            && let Some(left_out) = state.waiting.pop_front()
+        {
+            state.known.remove(&left_out);
+        }
+        state.waiting.push_back(job);
+        drop(state);
+        self.wake.notify_all();
+    }
+
+    /// The next job; `None` where none waits.
+    pub(super) fn next(&self) -> Option<Job> {
+        let mut state = self.state();
+        match state.is_over {
+            true => None,
+            false => state.waiting.pop_front(),
+        }
+    }
+
+    /// Blocks of the full image that are going to be decoded, some of them.
+    pub(super) fn coming(&self, most: usize) -> Vec<[u32; 2]> {
+        let state = self.state();
+        let blocks = state.waiting.iter().filter_map(|job| match job {
+            Job::Pass(at) => Some(*at),
+            _ => None,
+        });
+        blocks.take(most).collect()
+    }
+
+    /// A job is done.
+    pub(super) fn done(&self, job: &Job) {
+        self.state().known.remove(job);
+    }
+
+    /// Waits for a job; `false` where none will come any more.
+    pub(super) fn wait(&self) -> bool {
+        let state = self.state();
+        let is_idle = |state: &mut State| state.waiting.is_empty() && !state.is_over;
+        let state = self.wake.wait_while(state, is_idle);
+        !state.unwrap_or_else(PoisonError::into_inner).is_over
+    }
+
+    /// Ends it: no job is begun any more.
+    pub(super) fn end(&self) {
+        self.state().is_over = true;
+        self.wake.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_job_is_done_once_and_the_oldest_of_too_many_is_left_out() {
+        let queue = Queue::default();
+        queue.want(Job::Pass([0, 0]));
+        queue.want(Job::Pass([0, 0]));
+        let first = queue.next().expect("one");
+        assert_eq!(queue.next(), None);
+        queue.want(first);
+        assert_eq!(queue.next(), None, "it is being done");
+        queue.done(&first);
+        for number in 0..=MOST as u32 {
+            queue.want(Job::Pass([number, 0]));
+        }
+        assert_eq!(queue.next(), Some(Job::Pass([1, 0])));
+        // What was left out may be wanted again.
+        queue.want(Job::Pass([0, 0]));
+        assert_eq!(queue.coming(2), [[2, 0], [3, 0]]);
+        assert!(queue.next().is_some());
+        queue.want_first(Job::Pass([5000, 0]));
+        assert_eq!(queue.next(), Some(Job::Pass([5000, 0])));
+        let mut last = None;
+        while let Some(job) = queue.next() {
+            last = Some(job);
+        }
+        assert_eq!(last, Some(Job::Pass([0, 0])));
+        queue.end();
+        queue.want(Job::Pass([9, 9]));
+        assert!(queue.next().is_none() && !queue.wait());
+    }
+}

@@ -1,0 +1,240 @@
+//! Coarse images of a file that has none: every 8th, 64th and 512th sample of its full
+//! image, as far as they are known.
+//!
+//! A block that is decoded, whatever for, leaves its coarse samples behind. Each step is
+//! eight times the one before: so a tile of any level lies in 25 pieces at most, and all
+//! three images together hold a sixtieth of the samples.
+
+use fixedbitset::FixedBitSet;
+use lru::LruCache;
+
+use super::cache::Key;
+use super::{Block, BlockImage, Part};
+
+/// Samples of the full image from one to the next, of each image. They are whole powers of
+/// two, so that levels have samples of their own in them.
+pub(super) const STEPS: [u32; 3] = [8, 64, 512];
+/// Samples of a piece each way.
+const PIECE: u32 = 64;
+const SAMPLES: usize = (PIECE * PIECE) as usize;
+/// Pieces in memory, at most: 17 MB.
+const MOST_PIECES: usize = 512;
+/// Bytes that they take at most.
+pub(super) const MOST_BYTES: usize = MOST_PIECES * SAMPLES * (size_of::<f64>() + 1);
+
+/// Some samples of a coarse image, row after row; those beyond its edges are not known.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Piece {
+    /// Stored values; NaN in holes.
+    pub(super) values: Vec<f64>,
+    /// Which of them are known.
+    pub(super) known: FixedBitSet,
+}
+
+impl Piece {
+    /// Nothing is known of so many samples.
+    pub(super) fn unknown(samples: usize) -> Self {
+        Self {
+            values: vec![f64::NAN; samples],
+            known: FixedBitSet::with_capacity(samples),
+        }
+    }
+
+    /// Takes what another knows of the same samples and this one does not.
+    pub(super) fn join(&mut self, other: &Self) {
+        for index in other.known.difference(&self.known) {
+            self.values[index] = other.values[index];
+        }
+        self.known.union_with(&other.known);
+    }
+
+    fn set(&mut self, index: usize, value: f64) {
+        self.values[index] = value;
+        self.known.insert(index);
+    }
+}
+
+/// A piece in memory.
+struct Held {
+    piece: Piece,
+    /// Samples that count as holes for now, because their block cannot be read.
+    lacking: FixedBitSet,
+    /// Whether it was looked for on disk.
+    was_sought: bool,
+    /// Whether it knows more than the disk.
+    is_new: bool,
+}
+
+impl Held {
+    fn nothing() -> Self {
+        Self {
+            piece: Piece::unknown(SAMPLES),
+            lacking: FixedBitSet::with_capacity(SAMPLES),
+            was_sought: false,
+            is_new: false,
+        }
+    }
+}
+
+/// What is known of a coarse sample.
+#[derive(Debug, PartialEq)]
+pub(super) enum Found {
+    /// Its stored value; NaN in a hole.
+    Value(f64),
+    /// Nothing yet; whether its piece was looked for on disk.
+    Nothing { was_sought: bool },
+}
+
+/// The coarse images that are made of one full image.
+pub(super) struct Coarse {
+    /// The number of the first among the file's images.
+    first: usize,
+    images: Vec<BlockImage>,
+    pieces: LruCache<Key, Held>,
+    /// Pieces that gave way to others, and know more than the disk.
+    outgoing: Vec<(Key, Piece)>,
+}
+
+impl Coarse {
+    /// None.
+    pub(super) fn none() -> Self {
+        Self {
+            first: 0,
+            images: vec![],
+            pieces: LruCache::unbounded(),
+            outgoing: vec![],
+        }
+    }
+
+    /// Those of an image that is the file's only one, which begins in the south or the east
+    /// or not: levels count their samples from the south and west.
+    pub(super) fn of(full: &BlockImage, south_up: bool, east_first: bool) -> Self {
+        let image = |every: u32| {
+            let last = [full.columns, full.rows].map(|count| count.max(1) - 1);
+            let left_over = |last: u32, turned: bool| if turned { last % every } else { 0 };
+            BlockImage {
+                columns: last[0] / every + 1,
+                rows: last[1] / every + 1,
+                block: [PIECE; 2],
+                every: Some(every),
+                first: [
+                    left_over(last[0], east_first),
+                    left_over(last[1], !south_up),
+                ],
+            }
+        };
+        let has_cells = |image: &BlockImage| image.columns > 1 && image.rows > 1;
+        Self {
+            first: 1,
+            images: STEPS.map(image).into_iter().filter(has_cells).collect(),
+            ..Self::none()
+        }
+    }
+
+    /// The images, each coarser than the one before.
+    pub(super) fn images(&self) -> &[BlockImage] {
+        &self.images
+    }
+
+    /// What is known of a sample of an image.
+    pub(super) fn sample(&mut self, image: usize, [column, row]: [u32; 2]) -> Found {
+        let (key, index) = place(image, [column, row]);
+        match self.pieces.get(&key) {
+            Some(held) if held.piece.known.contains(index) => {
+                Found::Value(held.piece.values[index])
+            }
+            Some(held) if held.lacking.contains(index) => Found::Value(f64::NAN),
+            Some(held) => Found::Nothing {
+                was_sought: held.was_sought,
+            },
+            None => Found::Nothing { was_sought: false },
+        }
+    }
+
+    /// Takes the coarse samples of a block of the full image; `None` where the file stores
+    /// none.
+    pub(super) fn leave(&mut self, part: &Part, block: Option<&Block>, is_lacking: bool) {
+        let last = [part.column + (part.columns - 1), part.row + (part.rows - 1)];
+        for number in 0..self.images.len() {
+            let image = self.images[number];
+            let every = image.every.unwrap_or(1);
+            // Columns and rows of the image in the part.
+            let along = |axis: usize, from: u32, to: u32| {
+                let first = image.first[axis];
+                let begin = from.saturating_sub(first).div_ceil(every);
+                let end = to.checked_sub(first).map_or(0, |to| to / every + 1);
+                begin..end
+            };
+            for row in along(1, part.row, last[1]) {
+                for column in along(0, part.column, last[0]) {
+                    let at = |axis: usize, index: u32| image.first[axis] + index * every;
+                    let inner = (at(1, row) - part.row) as usize * part.columns as usize
+                        + (at(0, column) - part.column) as usize;
+                    let value = block.and_then(|block| block.stored(inner));
+                    let (key, index) = place(self.first + number, [column, row]);
+                    let held = self.held(key);
+                    if is_lacking {
+                        held.lacking.insert(index);
+                    } else if !held.piece.known.contains(index) {
+                        held.piece.set(index, value.unwrap_or(f64::NAN));
+                        held.is_new = true;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Takes what the disk has of a piece, or that it has nothing.
+    pub(super) fn sought(&mut self, key: Key, found: Option<&Piece>) {
+        let held = self.held(key);
+        held.was_sought = true;
+        if let Some(found) = found.filter(|found| found.values.len() == SAMPLES) {
+            held.piece.join(found);
+        }
+    }
+
+    /// The pieces that gave way to others, and know more than the disk.
+    pub(super) fn take_outgoing(&mut self) -> Vec<(Key, Piece)> {
+        std::mem::take(&mut self.outgoing)
+    }
+
+    /// The same, and copies of those that stay.
+    pub(super) fn take_new(&mut self) -> Vec<(Key, Piece)> {
+        let mut taken = self.take_outgoing();
+        for (key, held) in &mut self.pieces {
+            if std::mem::take(&mut held.is_new) {
+                taken.push((*key, held.piece.clone()));
+            }
+        }
+        taken
+    }
+
+    /// Number of pieces in memory.
+    #[cfg(test)]
+    pub(super) fn pieces(&self) -> usize {
+        self.pieces.len()
+    }
+
+    fn held(&mut self, key: Key) -> &mut Held {
+        if !self.pieces.contains(&key) && self.pieces.len() >= MOST_PIECES {
+            let gone = self.pieces.pop_lru();
+            if let Some((key, held)) = gone.filter(|(_, held)| held.is_new) {
+                // A disk that is too slow for them gets those that come.
+                if self.outgoing.len() >= MOST_PIECES / 2 {
+                    self.outgoing.clear();
+                }
+                self.outgoing.push((key, held.piece));
+            }
+        }
+        self.pieces.get_or_insert_mut(key, Held::nothing)
+    }
+}
+
+/// The piece that has a sample of an image, and its place there.
+pub(super) fn place(image: usize, [column, row]: [u32; 2]) -> (Key, usize) {
+    let key = Key {
+        image,
+        at: [column / PIECE, row / PIECE],
+    };
+    (key, (row % PIECE * PIECE + column % PIECE) as usize)
+}

@@ -1,0 +1,156 @@
+//! What a format hands over that can read a part of an image without the rest.
+
+use super::super::BadRaster;
+use super::super::samples::{HoleMask, SampleType, SampleValue, Samples, with_samples};
+use super::survey::Looks;
+
+/// Reads parts of a file's images.
+pub(in crate::raster) trait BlockReader: Send + Sync {
+    /// Name of the format, in messages.
+    fn format(&self) -> &'static str;
+
+    /// The full image, and after it others of the same field, each coarser than the one
+    /// before.
+    fn images(&self) -> &[BlockImage];
+
+    /// Type in which samples are held.
+    fn sample_type(&self) -> SampleType;
+
+    /// Whether the file stores samples there; where it does not, there is a hole.
+    fn is_stored(&self, image: usize, part: &Part) -> bool;
+
+    /// The samples of a part of an image, row after row.
+    ///
+    /// # Errors
+    /// What is wrong with that part of the file.
+    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster>;
+
+    /// Is told the file's order before anything is read: coarse levels count their samples
+    /// from the south and west.
+    fn set_order(&mut self, south_up: bool, east_first: bool) {
+        let _ = (south_up, east_first);
+    }
+
+    /// Is told which parts are going to be read, one after the other: what is elsewhere is
+    /// fetched meanwhile.
+    fn want(&self, image: usize, parts: &[Part]) {
+        let _ = (image, parts);
+    }
+
+    /// A hash of the file's index: where each block is stored and in how many bytes.
+    fn index(&self) -> u64;
+
+    /// What is looked at when the raster is opened; `None` for its coarsest image.
+    fn looks(&self) -> Option<Looks> {
+        None
+    }
+
+    /// What tells the samples of a part from those of every other file, and of the same file
+    /// in another state: what is kept on disk is named by it. `None` where that is not known,
+    /// or the file was written a moment ago; nothing is kept then.
+    fn stamp(&self, image: usize, part: &Part) -> Option<String> {
+        let _ = (image, part);
+        None
+    }
+
+    /// Bytes that the reader itself keeps at most, besides the blocks that it hands over.
+    fn kept_bytes(&self) -> usize {
+        0
+    }
+}
+
+/// An image that is read in blocks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::raster) struct BlockImage {
+    /// Samples a row.
+    pub(in crate::raster) columns: u32,
+    /// Rows.
+    pub(in crate::raster) rows: u32,
+    /// Columns and rows of a block; those at the east and south end are cut.
+    pub(in crate::raster) block: [u32; 2],
+    /// It has every so many-th sample of the full image, the first one first. Else its
+    /// samples are the middles of its own cells, and its edges those of the full image.
+    pub(in crate::raster) every: Option<u32>,
+    /// Column and row of the full image where its first sample lies, where it has every so
+    /// many-th.
+    pub(in crate::raster) first: [u32; 2],
+}
+
+/// A rectangle of an image, in the file's order of columns and rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::raster) struct Part {
+    /// Its first column.
+    pub(in crate::raster) column: u32,
+    /// Its first row.
+    pub(in crate::raster) row: u32,
+    /// Samples a row.
+    pub(in crate::raster) columns: u32,
+    /// Rows.
+    pub(in crate::raster) rows: u32,
+}
+
+/// Samples of a part of an image.
+#[derive(Debug)]
+pub(in crate::raster) struct Block {
+    /// Row after row.
+    pub(in crate::raster) samples: Samples,
+    /// Holes that no value marks.
+    pub(in crate::raster) holes: Option<HoleMask>,
+    /// Whether some of its holes are there only because a part of the file could not be read.
+    pub(in crate::raster) is_lacking: bool,
+}
+
+impl Block {
+    /// A sample by its place in the block; `None` in a hole that no value marks.
+    pub(in crate::raster) fn stored(&self, index: usize) -> Option<f64> {
+        let hole = (self.holes.as_ref()).is_some_and(|mask| mask.contains(index));
+        (!hole).then(|| with_samples!(&self.samples, values => values[index].widen()))
+    }
+}
+
+impl Part {
+    /// All of an image.
+    pub(in crate::raster) const fn whole(columns: u32, rows: u32) -> Self {
+        Self {
+            column: 0,
+            row: 0,
+            columns,
+            rows,
+        }
+    }
+
+    /// What of it is within another part, of which it has something.
+    pub(in crate::raster) fn within(&self, other: &Self) -> Self {
+        let cut = |first: u32, count: u32, from: u32, most: u32| {
+            let begin = first.max(from);
+            (begin, (first + count).min(from + most) - begin)
+        };
+        let (column, columns) = cut(self.column, self.columns, other.column, other.columns);
+        let (row, rows) = cut(self.row, self.rows, other.row, other.rows);
+        Self {
+            column,
+            row,
+            columns,
+            rows,
+        }
+    }
+}
+
+impl BlockImage {
+    /// Blocks from west to east and down.
+    pub(super) fn counts(&self) -> [u32; 2] {
+        let [across, down] = self.block;
+        [self.columns.div_ceil(across), self.rows.div_ceil(down)]
+    }
+
+    /// What a block covers.
+    pub(super) fn part(&self, [across, down]: [u32; 2]) -> Part {
+        let [column, row] = [across * self.block[0], down * self.block[1]];
+        Part {
+            column,
+            row,
+            columns: self.block[0].min(self.columns - column),
+            rows: self.block[1].min(self.rows - row),
+        }
+    }
+}

@@ -1,0 +1,245 @@
+//! Reads blocks from the file or from what was kept of it on disk, and what the thread in
+//! the background does.
+
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::super::guard::guarded;
+use super::background::Job;
+use super::cache::Key;
+use super::coarse::Piece;
+use super::kept::count_not_yet;
+use super::{Block, NotHere, Part, Shared, lasting};
+use crate::remote::without_key;
+
+/// After so many warnings of blocks that cannot be read one says that there are more.
+const WARNINGS: u32 = 8;
+/// Blocks that are fetched from elsewhere while one is decoded in the background.
+const AHEAD: usize = 16;
+
+/// Blocks that are read ahead of the hand at once, at most.
+const MOST_PREFETCHED: usize = 16;
+
+/// Between two times at which all that is known is kept: pieces grow block by block.
+const BETWEEN_KEEPING: Duration = Duration::from_secs(5);
+
+/// What came of reading a part of an image.
+pub(super) struct Read {
+    /// `None` where there is no sample.
+    pub(super) block: Option<Arc<Block>>,
+    /// Whether some of its holes are there only because something could not be read.
+    is_lacking: bool,
+}
+
+impl Shared {
+    /// A block, read if it is not in memory; `None` where there is no sample.
+    pub(super) fn block(&self, image: usize, at: [u32; 2]) -> Option<Arc<Block>> {
+        let key = Key { image, at };
+        if let Some(known) = self.kept().known(&key) {
+            return known;
+        }
+        if !self.waits() && lasting::is_coarse(self.images.get(image)?) {
+            self.later(Job::Fetch(key));
+            return None;
+        }
+        // Nothing that panics runs while this is held but decoders, whose panics are caught.
+        let turn = self.turn.lock();
+        let _turn = turn.unwrap_or_else(PoisonError::into_inner);
+        // It may have been read by the one who had the turn before.
+        if let Some(known) = self.kept().known(&key) {
+            return known;
+        }
+        if let Ok(block) = self.fetch(key) {
+            return block;
+        }
+        count_not_yet();
+        self.kept().wait_for(key);
+        None
+    }
+
+    /// Reads a block and keeps it.
+    fn fetch(&self, key: Key) -> Result<Option<Arc<Block>>, NotHere> {
+        let Some(image) = self.images.get(key.image) else {
+            return Ok(None);
+        };
+        let part = image.part(key.at);
+        let samples = part.columns as usize * part.rows as usize;
+        let name = || match self.disk.is_on() && lasting::is_coarse(image) {
+            true => lasting::name(&*self.reader, image, &key),
+            false => None,
+        };
+        let before = name();
+        let found = (before.as_ref()).and_then(|name| lasting::load(&self.disk, name, samples));
+        let block = if let Some(block) = found.and_then(lasting::block_of) {
+            Some(Arc::new(block))
+        } else {
+            let read = self.read(key.image, &part)?;
+            // A file that changed meanwhile may have given either.
+            if let Some(kept_as) = before.filter(|_| !read.is_lacking)
+                && name() == Some(kept_as)
+            {
+                let piece = lasting::piece_of(read.block.as_deref(), samples);
+                lasting::keep(&self.disk, &kept_as, piece);
+            }
+            if key.image == 0 {
+                self.leave(&part, &read);
+            }
+            read.block
+        };
+        self.kept().put(key, block.clone());
+        Ok(block)
+    }
+
+    /// Has the blocks of a part of an image read that are not in memory. Waits for
+    /// nothing, and does nothing before nobody waits any more, nor for a part of more than
+    /// [`MOST_PREFETCHED`] blocks.
+    pub(super) fn prefetch(&self, image: usize, part: &Part) {
+        let Some(of) = self.images.get(image).filter(|_| !self.waits()) else {
+            return;
+        };
+        if image >= self.reader.images().len() || part.columns == 0 || part.rows == 0 {
+            return;
+        }
+        let [across, down] = of.block;
+        let columns = part.column / across..(part.column + (part.columns - 1)) / across + 1;
+        let rows = part.row / down..(part.row + (part.rows - 1)) / down + 1;
+        // Of a part that is too large nothing comes in time.
+        if columns.len() * rows.len() > MOST_PREFETCHED {
+            return;
+        }
+        let mut wanted = vec![];
+        let kept = self.kept();
+        for row in rows {
+            for at in columns.clone().map(|column| [column, row]) {
+                if !kept.cache.has(&Key { image, at }) {
+                    wanted.push(at);
+                }
+            }
+        }
+        drop(kept);
+        let parts: Vec<Part> = wanted.iter().map(|at| of.part(*at)).collect();
+        self.reader.want(image, &parts);
+        for at in wanted {
+            self.queue.want_first(Job::Fetch(Key { image, at }));
+        }
+    }
+
+    /// Takes the coarse samples of a block of the full image.
+    fn leave(&self, part: &Part, read: &Read) {
+        let mut coarse = self.coarse();
+        coarse.leave(part, read.block.as_deref(), read.is_lacking);
+        if self.waits() {
+            let outgoing = coarse.take_outgoing();
+            drop(coarse);
+            self.keep(outgoing);
+        }
+    }
+
+    /// A part of an image; `None` where there is no sample.
+    ///
+    /// # Errors
+    /// [`NotHere`], of which the line's word is kept.
+    pub(super) fn read(&self, image: usize, part: &Part) -> Result<Read, NotHere> {
+        if !self.reader.is_stored(image, part) {
+            return Ok(Read {
+                block: None,
+                is_lacking: false,
+            });
+        }
+        self.read.fetch_add(1, Ordering::Relaxed);
+        let read = guarded(self.reader.format(), || self.reader.read(image, part));
+        match read {
+            Ok(block) => Ok(Read {
+                is_lacking: block.is_lacking,
+                block: Some(Arc::new(block)),
+            }),
+            Err(fault) if fault.is_of_the_line() => {
+                self.kept().outage = Some(fault);
+                Err(NotHere)
+            }
+            Err(fault) => {
+                let unread = self.kept().count_unread();
+                let name = (self.path.get()).map_or("the file".into(), |path| without_key(path));
+                if unread <= WARNINGS {
+                    tracing::warn!(
+                        "columns {} to {}, rows {} to {} of {name} cannot be read and are a hole: {fault}",
+                        part.column,
+                        part.column + part.columns - 1,
+                        part.row,
+                        part.row + part.rows - 1
+                    );
+                } else if unread == WARNINGS + 1 {
+                    tracing::warn!("more of {name} cannot be read and are holes");
+                }
+                Ok(Read {
+                    block: None,
+                    is_lacking: true,
+                })
+            }
+        }
+    }
+
+    /// Does what is wanted in the background until that ends.
+    pub(super) fn work(&self) {
+        let mut kept = Instant::now();
+        loop {
+            while let Some(job) = self.queue.next() {
+                match job {
+                    Job::Seek(key) => self.seek(key),
+                    Job::Pass(at) => self.pass(at),
+                    // What is not here yet is wanted again.
+                    Job::Fetch(key) => {
+                        if self.fetch(key).is_err() {
+                            self.kept().wait_for(key);
+                        }
+                    }
+                }
+                self.queue.done(&job);
+                let outgoing = self.coarse().take_outgoing();
+                self.keep(outgoing);
+            }
+            // Nothing else to do: then what is known is kept for another time. At the end it
+            // is kept anyway.
+            if kept.elapsed() >= BETWEEN_KEEPING {
+                let new = self.coarse().take_new();
+                self.keep(new);
+                kept = Instant::now();
+            }
+            if !self.queue.wait() {
+                return;
+            }
+        }
+    }
+
+    /// Looks for a piece of a made image on disk.
+    pub(super) fn seek(&self, key: Key) {
+        let name = lasting::name(&*self.reader, &self.images[key.image], &key);
+        let block = self.images[key.image].block;
+        let samples = block[0] as usize * block[1] as usize;
+        let found = name.and_then(|name| lasting::load(&self.disk, &name, samples));
+        self.coarse().sought(key, found.as_ref());
+    }
+
+    /// Decodes a block of the full image for its coarse samples, and lets it go: a coarse
+    /// tile touches more blocks than memory keeps.
+    fn pass(&self, at: [u32; 2]) {
+        let full = &self.images[0];
+        let coming = self.queue.coming(AHEAD);
+        let coming: Vec<Part> = coming.into_iter().map(|at| full.part(at)).collect();
+        self.reader.want(0, &coming);
+        let part = full.part(at);
+        if let Ok(read) = self.read(0, &part) {
+            self.leave(&part, &read);
+        }
+    }
+
+    /// Keeps pieces on disk, if the file is what it was.
+    pub(super) fn keep(&self, pieces: Vec<(Key, Piece)>) {
+        for (key, piece) in pieces.into_iter().filter(|_| self.disk.is_on()) {
+            if let Some(name) = lasting::name(&*self.reader, &self.images[key.image], &key) {
+                lasting::keep(&self.disk, &name, piece);
+            }
+        }
+    }
+}

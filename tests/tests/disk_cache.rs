@@ -1,0 +1,341 @@
+//! What is kept on disk of a terrain that stays in its file: another run reads next to
+//! nothing, and no state of the folder or of the file ever changes a height.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{Duration, SystemTime};
+
+use hapterra::disk_cache::DiskCache;
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra_tests::hapterra_binary;
+
+/// A level whose samples lie in many blocks.
+const LEVEL: u8 = 6;
+
+/// A TIFF without overviews of that seed, old enough to be known by its time.
+fn hills(path: &Path, seed: &str) {
+    let status = Command::new(hapterra_binary())
+        .args(["synth", "fractal", "--size", "1500", "--seed", seed, "-o"])
+        .arg(path)
+        .output()
+        .expect("it runs");
+    assert!(status.status.success(), "{status:?}");
+    age(path, 1000);
+}
+
+fn age(path: &Path, seconds: u64) {
+    let time = SystemTime::now() - Duration::from_secs(seconds);
+    let file = fs::File::options().append(true).open(path).expect("opens");
+    file.set_modified(time).expect("aged");
+}
+
+fn open(path: &Path, disk_cache: &DiskCache) -> Raster {
+    let options = OpenOptions {
+        most_in_memory_bytes: 0,
+        disk_cache: disk_cache.clone(),
+        ..OpenOptions::default()
+    };
+    Raster::open(path, &options).expect("opens")
+}
+
+/// All heights of a level, as bits; holes are alike.
+fn heights(raster: &Raster, level: u8) -> Vec<u64> {
+    let [columns, rows] = [raster.columns(), raster.rows()].map(|count| ((count - 1) >> level) + 1);
+    let mut row_of = vec![0.0; columns as usize];
+    let mut all = vec![];
+    for row in 0..rows {
+        raster.copy_row(level, row, 0, &mut row_of);
+        let bits = |height: &f64| if height.is_nan() { 0 } else { height.to_bits() };
+        all.extend(row_of.iter().map(bits));
+    }
+    all
+}
+
+/// Heights with what is kept, and how many blocks they took beyond opening the file.
+fn look(path: &Path, cache: &DiskCache) -> (Vec<u64>, u64) {
+    let raster = open(path, cache);
+    let before = raster.blocks_read();
+    (heights(&raster, LEVEL), raster.blocks_read() - before)
+}
+
+fn truth(path: &Path) -> Vec<u64> {
+    let raster = Raster::open(path, &OpenOptions::default()).expect("opens");
+    assert!(raster.samples().is_some());
+    heights(&raster, LEVEL)
+}
+
+struct Bed {
+    folder: tempfile::TempDir,
+    file: PathBuf,
+    cache: DiskCache,
+}
+
+fn bed() -> Bed {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("hills.tif");
+    hills(&file, "1");
+    let cache = DiskCache::at(&folder.path().join("cache"), 64 << 20);
+    Bed {
+        file,
+        cache,
+        folder,
+    }
+}
+
+impl Bed {
+    /// All records.
+    fn records(&self) -> Vec<PathBuf> {
+        let pattern = self.folder.path().join("cache/v1/*/*");
+        files(&pattern)
+    }
+}
+
+fn files(folder_of_folders: &Path) -> Vec<PathBuf> {
+    let top = folder_of_folders.ancestors().nth(2).expect("a folder");
+    let entries = |path: &Path| fs::read_dir(path).into_iter().flatten().flatten();
+    let inner = entries(top).flat_map(|entry| entries(&entry.path()).collect::<Vec<_>>());
+    inner.map(|entry| entry.path()).collect()
+}
+
+#[test]
+fn another_run_reads_no_block_for_what_is_coarse_and_has_the_same_bits() {
+    let bed = bed();
+    let truth = truth(&bed.file);
+    let (first, read) = look(&bed.file, &bed.cache);
+    assert!(first == truth && read > 0, "{read}");
+    assert!(!bed.records().is_empty());
+    let (second, read) = look(&bed.file, &bed.cache);
+    assert!(second == truth && read == 0, "{read}");
+    // Nothing lies beside the user's file.
+    assert_eq!(fs::read_dir(bed.folder.path()).expect("there").count(), 2);
+    fs::remove_dir_all(bed.folder.path().join("cache")).expect("deleted");
+    let (third, read) = look(&bed.file, &bed.cache);
+    assert!(third == truth && read > 0, "{read}");
+    assert_eq!(look(&bed.file, &bed.cache), (truth, 0));
+}
+
+#[test]
+fn a_file_that_is_another_now_has_its_own_heights() {
+    let bed = bed();
+    look(&bed.file, &bed.cache);
+    // Of the same size, in the same place, with the same time.
+    let modified = fs::metadata(&bed.file).and_then(|metadata| metadata.modified());
+    let other = bed.folder.path().join("other.tif");
+    hills(&other, "2");
+    let bytes = fs::read(&other).expect("there");
+    assert_eq!(
+        bytes.len() as u64,
+        fs::metadata(&bed.file).expect("there").len()
+    );
+    fs::write(&bed.file, bytes).expect("written");
+    let file = fs::File::options()
+        .append(true)
+        .open(&bed.file)
+        .expect("opens");
+    file.set_modified(modified.expect("known")).expect("set");
+    if cfg!(unix) {
+        let (found, read) = look(&bed.file, &bed.cache);
+        assert!(found == truth(&other) && read > 0, "{read}");
+    }
+    // Renamed over it.
+    let third = bed.folder.path().join("third.tif");
+    hills(&third, "3");
+    fs::rename(&third, &bed.file).expect("renamed");
+    let (found, _) = look(&bed.file, &bed.cache);
+    assert_eq!(found, truth(&bed.file));
+    // A mask that comes to lie beside it, which says that all is a hole.
+    let mask = bed.folder.path().join("hills.tif.msk");
+    let (_, read) = look(&bed.file, &bed.cache);
+    assert_eq!(read, 0);
+    fs::write(&mask, b"no mask at all").expect("written");
+    age(&mask, 500);
+    let options = OpenOptions {
+        most_in_memory_bytes: 0,
+        disk_cache: bed.cache.clone(),
+        ..OpenOptions::default()
+    };
+    Raster::open(&bed.file, &options).expect_err("its mask cannot be read");
+}
+
+#[test]
+fn what_is_changed_while_it_is_read_is_not_taken_for_what_it_was() {
+    let bed = bed();
+    let other = bed.folder.path().join("other.tif");
+    hills(&other, "2");
+    let raster = open(&bed.file, &bed.cache);
+    heights(&raster, 9);
+    fs::write(&bed.file, fs::read(&other).expect("there")).expect("written");
+    age(&bed.file, 300);
+    heights(&raster, LEVEL);
+    drop(raster);
+    let (found, read) = look(&bed.file, &bed.cache);
+    assert!(found == truth(&other) && read > 0, "{read}");
+}
+
+#[test]
+fn a_file_that_was_written_a_moment_ago_is_not_kept() {
+    let bed = bed();
+    age(&bed.file, 0);
+    look(&bed.file, &bed.cache);
+    assert!(bed.records().is_empty());
+}
+
+#[test]
+fn whatever_becomes_of_the_folder_the_heights_are_right() {
+    let bed = bed();
+    let truth = truth(&bed.file);
+    look(&bed.file, &bed.cache);
+    let whole: Vec<_> = (bed.records().into_iter())
+        .map(|path| (path.clone(), fs::read(path).expect("there")))
+        .collect();
+    assert!(!whole.is_empty());
+    type Harm = fn(&[u8]) -> Vec<u8>;
+    let harms: [Harm; 6] = [
+        |_| vec![],
+        |bytes| bytes[..bytes.len() / 2].to_vec(),
+        |bytes| [bytes, &[0; 9]].concat(),
+        |bytes| bytes.iter().map(|byte| byte ^ 1).collect(),
+        |bytes| {
+            let mut bytes = bytes.to_vec();
+            let last = bytes.len() - 1;
+            bytes[last] ^= 0x80;
+            bytes
+        },
+        |_| b"a note of somebody else's".to_vec(),
+    ];
+    for (number, harm) in harms.into_iter().enumerate() {
+        for (path, bytes) in &whole {
+            fs::write(path, harm(bytes)).expect("written");
+        }
+        let (found, read) = look(&bed.file, &bed.cache);
+        assert!(found == truth && read > 0, "{number}: {read}");
+        // It was written again, and is whole.
+        assert_eq!(look(&bed.file, &bed.cache), (truth.clone(), 0), "{number}");
+    }
+    for (path, _) in &whole {
+        fs::remove_file(path).expect("removed");
+        fs::create_dir(path).expect("made");
+    }
+    let (found, read) = look(&bed.file, &bed.cache);
+    assert!(found == truth && read > 0, "{read}");
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_or_has_no_room_is_as_if_absent() {
+    let bed = bed();
+    let truth = truth(&bed.file);
+    let blocked = bed.folder.path().join("blocked");
+    fs::write(&blocked, b"a file").expect("written");
+    let tiny = bed.folder.path().join("tiny");
+    let mut caches = vec![
+        DiskCache::at(&blocked, 64 << 20),
+        DiskCache::at(&tiny, 1),
+        DiskCache::off(),
+    ];
+    // A device that is full.
+    if Path::new("/dev/full").exists() {
+        caches.push(DiskCache::at(Path::new("/dev/full"), 64 << 20));
+    }
+    for cache in caches {
+        for _ in 0..2 {
+            let (found, read) = look(&bed.file, &cache);
+            assert!(found == truth && read > 0, "{cache:?}: {read}");
+        }
+    }
+    assert_eq!(fs::read(&blocked).expect("there"), b"a file");
+}
+
+#[test]
+fn several_at_once_on_one_file_have_the_same_heights() {
+    let bed = bed();
+    let truth = truth(&bed.file);
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| {
+                // As programs of their own.
+                let cache = DiskCache::at(&bed.folder.path().join("cache"), 1 << 20);
+                for _ in 0..3 {
+                    assert_eq!(look(&bed.file, &cache).0, truth);
+                }
+            });
+        }
+    });
+    assert_eq!(look(&bed.file, &bed.cache), (truth, 0));
+}
+
+/// SRTM's tiles: a folder of them is one terrain.
+fn tiles(folder: &Path) {
+    for (column, name) in (0..).zip(["N00E000.hgt", "N00E001.hgt"]) {
+        let places =
+            (0..1201).flat_map(|row| (0..1201).map(move |east| (column * 1200 + east, row)));
+        let height = |(east, row): (u32, u32)| ((east * 7 + row * 3) % 3000) as i16;
+        let bytes: Vec<u8> = places
+            .flat_map(|place| height(place).to_be_bytes())
+            .collect();
+        let path = folder.join(name);
+        fs::write(&path, bytes).expect("written");
+        age(&path, 1000);
+    }
+}
+
+#[test]
+fn of_many_files_those_that_are_touched_tell_whether_they_are_the_same() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let srtm = folder.path().join("srtm");
+    fs::create_dir(&srtm).expect("made");
+    tiles(&srtm);
+    let cache = DiskCache::at(&folder.path().join("cache"), 64 << 20);
+    let (truth, read) = look(&srtm, &DiskCache::off());
+    assert!(read > 0 && truth.iter().any(|bits| *bits != 0));
+    assert_eq!(look(&srtm, &cache), (truth.clone(), read));
+    assert_eq!(look(&srtm, &cache), (truth.clone(), 0));
+    // One of the two is another now.
+    let west = srtm.join("N00E000.hgt");
+    let mut bytes = fs::read(&west).expect("there");
+    bytes
+        .chunks_exact_mut(2)
+        .for_each(|sample| sample.swap(0, 1));
+    for byte in &mut bytes {
+        *byte &= 0x0f;
+    }
+    fs::write(&west, bytes).expect("written");
+    age(&west, 1000);
+    let now = look(&srtm, &DiskCache::off()).0;
+    assert_ne!(now, truth);
+    let (found, again) = look(&srtm, &cache);
+    assert!(found == now && again > 0 && again <= read, "{again}");
+}
+
+/// Blocks that a run at a coarse level reads, as it says with `-vv`.
+fn blocks_of_run(file: &Path, cache: &Path, megabytes: &str) -> u64 {
+    let output = Command::new(hapterra_binary())
+        .args(["-vv", "run", "--device", "native", "--seconds", "0.2"])
+        .args(["--in-memory-mb", "0", "--level", "4"])
+        .arg(file)
+        .env("HAPTERRA_CACHE_DIR", cache)
+        .env("HAPTERRA_CACHE_MB", megabytes)
+        .output()
+        .expect("it runs");
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{told}");
+    let line = told.lines().find(|line| line.contains(" blocks of "));
+    let words = line.map(|line| line.split_whitespace().collect::<Vec<_>>());
+    let words = words.unwrap_or_else(|| panic!("{told}"));
+    let at = words.iter().position(|word| *word == "blocks");
+    let number = words[at.expect("found") - 1].parse();
+    number.unwrap_or_else(|_| panic!("{told}"))
+}
+
+#[test]
+fn the_command_keeps_what_is_coarse_where_it_is_told_to_and_not_where_it_is_told_not_to() {
+    let bed = bed();
+    let opening = open(&bed.file, &DiskCache::off()).blocks_read();
+    let there = bed.folder.path().join("there");
+    for _ in 0..2 {
+        assert!(blocks_of_run(&bed.file, &there, "0") > opening);
+    }
+    assert!(!there.exists());
+    assert!(blocks_of_run(&bed.file, &there, "8") > opening);
+    assert_eq!(blocks_of_run(&bed.file, &there, "8"), opening);
+}

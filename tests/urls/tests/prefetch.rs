@@ -1,0 +1,115 @@
+//! What lies before the hand is asked for before its tiles are.
+
+use std::time::Duration;
+
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::terrain::{Scale, Terrain, TileBuffer};
+use hapterra_core::terrain::TileKey;
+use hapterra_url_tests::cog::cog;
+use hapterra_url_tests::http::Server;
+
+fn height(column: u32, row: u32) -> f32 {
+    (column % 100) as f32 + 0.5 * (row % 64) as f32
+}
+
+fn hills() -> (tempfile::TempDir, Raster, Server) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("hills.tif");
+    std::fs::write(&path, cog(4200, 1800, 3, height)).expect("written");
+    let server = Server::of(folder.path());
+    let raster = Raster::open(server.url("hills.tif"), &OpenOptions::default());
+    (folder, raster.expect("opens"), server)
+}
+
+/// Whether all of a tile is here.
+fn is_here(terrain: &Terrain<'_>, key: TileKey) -> bool {
+    let before = terrain.raster().not_yet();
+    let mut buffer = TileBuffer::default();
+    assert!(terrain.tile(key, &mut buffer).is_some());
+    terrain.raster().not_yet() == before
+}
+
+fn terrain(raster: &Raster) -> Terrain<'_> {
+    let scale = Scale::new(1.0, 0.05).expect("a scale");
+    Terrain::new(raster, scale, 0).expect("a terrain")
+}
+
+fn settled(server: &Server) -> usize {
+    let mut requests = server.seen().0.len();
+    for _ in 0..200 {
+        std::thread::sleep(Duration::from_millis(20));
+        let now = server.seen().0.len();
+        if now == requests {
+            return now;
+        }
+        requests = now;
+    }
+    requests
+}
+
+#[test]
+fn a_tile_that_was_read_ahead_takes_no_request_and_too_many_are_not_asked_for() {
+    let (_folder, raster, server) = hills();
+    let terrain = terrain(&raster);
+    let keys = [TileKey::new(0, 60, 20), TileKey::new(0, 61, 20)];
+    // As long as whoever reads waits, nothing is read ahead.
+    let opened = settled(&server);
+    terrain.grid().prefetch(0, [1920, 640], [1984, 672]);
+    assert_eq!(settled(&server), opened);
+    raster.stop_waiting();
+    // It waits for nothing: the server holds its answers back for ever.
+    server.hold(true);
+    terrain.grid().prefetch(0, [1920, 640], [1984, 672]);
+    let ahead = settled(&server);
+    assert!(ahead > opened);
+    server.hold(false);
+    for key in keys {
+        let comes = (0..2000).any(|_| {
+            std::thread::sleep(Duration::from_millis(5));
+            is_here(&terrain, key)
+        });
+        assert!(comes, "{key:?}");
+    }
+    assert_eq!(
+        server.seen().0.len(),
+        ahead,
+        "the tiles asked for nothing more"
+    );
+    // All of it, or what lies outside, is not read ahead.
+    terrain.grid().prefetch(0, [0, 0], [4200, 1800]);
+    assert_eq!(settled(&server), ahead);
+    terrain.grid().prefetch(0, [-900, -900], [-800, -800]);
+    terrain.grid().prefetch(0, [i32::MIN; 2], [i32::MAX; 2]);
+    terrain.grid().prefetch(40, [i32::MAX; 2], [i32::MIN; 2]);
+}
+
+/// `cargo test -p hapterra-url-tests --test prefetch -- --ignored --nocapture`: looks, one every
+/// 10 ms along 3000 cells, at which the tile under the HIP was not here; with answers 100 ms late.
+#[test]
+#[ignore = "it prints figures, and takes as long as the hand"]
+fn looks_without_a_tile_at_100_ms() {
+    println!("cells/s  without  ahead  of looks");
+    for speed in [200, 500, 1000, 2000] {
+        let counts = [false, true].map(|reads_ahead| {
+            let (_folder, raster, server) = hills();
+            let terrain = terrain(&raster);
+            server.set_latency(Duration::from_millis(100));
+            raster.stop_waiting();
+            let looks = 3000 * 100 / speed;
+            let cells = |look: i32| 40 + look * speed / 100;
+            let missing = (0..looks).filter(|look| {
+                std::thread::sleep(Duration::from_millis(10));
+                let (at, ahead) = (cells(*look), cells(*look + 50));
+                if reads_ahead {
+                    let edge = |cell: i32| cell / 32 * 32;
+                    let to = [edge(ahead) + 32, 672];
+                    terrain.grid().prefetch(0, [edge(at), 640], to);
+                }
+                !is_here(&terrain, TileKey::new(0, at / 32, 20))
+            });
+            (missing.count(), looks)
+        });
+        let [(without, looks), (ahead, _)] = counts;
+        println!("{speed:7}  {without:7}  {ahead:5}  {looks:8}");
+    }
+}

@@ -1,0 +1,134 @@
+//! Pages of a file at a URL that are kept on disk for another run.
+
+use std::path::Path;
+use std::time::Duration;
+
+use hapterra::disk_cache::DiskCache;
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra_url_tests::cog::cog;
+use hapterra_url_tests::http::Server;
+
+fn height(column: u32, row: u32) -> f32 {
+    (column * 7 % 1000) as f32 + 0.25 * (row % 400) as f32
+}
+
+fn other(column: u32, row: u32) -> f32 {
+    height(column, row) + 5000.0
+}
+
+struct Bed {
+    folder: tempfile::TempDir,
+    kept: tempfile::TempDir,
+    server: Server,
+}
+
+fn bed() -> Bed {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("hills.tif");
+    std::fs::write(path, cog(2200, 1800, 2, height)).expect("written");
+    Bed {
+        server: Server::of(folder.path()),
+        kept: tempfile::tempdir().expect("a folder"),
+        folder,
+    }
+}
+
+impl Bed {
+    /// Looks at places of fine and coarse levels; the heights, and the requests for it.
+    fn look(&self, name: &str) -> (Vec<f64>, usize) {
+        // Another program: only the folder on disk is the same.
+        let options = OpenOptions {
+            disk_cache: DiskCache::at(self.kept.path(), 256 << 20),
+            ..OpenOptions::default()
+        };
+        let before = self.server.seen().0.len();
+        let raster = Raster::open(self.server.url(name), &options).expect("opens");
+        let mut heights = vec![0.0; 500];
+        for (number, heights) in heights.chunks_exact_mut(50).enumerate() {
+            let number = number as u32;
+            raster.copy_row((number % 3) as u8, 31 * number, 17 * number, heights);
+        }
+        (heights, self.server.seen().0.len() - before)
+    }
+
+    /// Waits until what came was written.
+    fn settle(&self) {
+        let mut was = 0;
+        for _ in 0..400 {
+            std::thread::sleep(Duration::from_millis(50));
+            let now = files(self.kept.path()).len();
+            if now == was && now > 0 {
+                return;
+            }
+            was = now;
+        }
+    }
+}
+
+/// All files in a folder and its folders.
+fn files(folder: &Path) -> Vec<std::path::PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let each = entries.flat_map(|entry| match entry.path().is_dir() {
+        true => files(&entry.path()),
+        false => vec![entry.path()],
+    });
+    each.collect()
+}
+
+#[test]
+fn a_second_run_asks_only_whether_the_file_is_the_same() {
+    let bed = bed();
+    let (first, requests) = bed.look("hills.tif");
+    assert!(requests > 10, "{requests}");
+    bed.settle();
+    // The file's beginning, and the four files that may lie beside it.
+    let (second, again) = bed.look("hills.tif");
+    assert_eq!(second, first);
+    assert!(again <= 5, "{again} after {requests}");
+    // Damaged pages are fetched again.
+    for file in files(bed.kept.path()) {
+        let mut bytes = std::fs::read(&file).expect("there");
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        std::fs::write(file, bytes).expect("written");
+    }
+    let (third, after_damage) = bed.look("hills.tif");
+    assert_eq!(third, first);
+    assert!(after_damage > again);
+}
+
+#[test]
+fn pages_of_a_file_that_was_changed_at_its_server_are_not_used() {
+    let bed = bed();
+    let (first, requests) = bed.look("hills.tif");
+    bed.settle();
+    // The same size, another tag.
+    let path = bed.folder.path().join("hills.tif");
+    std::fs::write(path, cog(2200, 1800, 2, other)).expect("written");
+    bed.server.change();
+    let (second, again) = bed.look("hills.tif");
+    assert!(again + 5 >= requests, "{again} {requests}");
+    for (one, other) in first.iter().zip(&second) {
+        assert!((other - one - 5000.0).abs() < 0.01, "{one} {other}");
+    }
+}
+
+#[test]
+fn a_key_in_a_url_is_nowhere_to_be_seen_in_the_folder() {
+    let bed = bed();
+    bed.look("hills.tif?sig=VerySecretKey");
+    bed.settle();
+    let all = files(bed.kept.path());
+    assert!(!all.is_empty());
+    let holds = |bytes: &[u8], word: &[u8]| bytes.windows(word.len()).any(|some| some == word);
+    for file in all {
+        let name = file.as_os_str().as_encoded_bytes();
+        let bytes = std::fs::read(&file).expect("there");
+        for word in [&b"VerySecretKey"[..], b"hills.tif", b"127.0.0.1"] {
+            assert!(!holds(name, word) && !holds(&bytes, word));
+        }
+    }
+    // With another key it may be another file.
+    let (_, requests) = bed.look("hills.tif?sig=Other");
+    assert!(requests > 10, "{requests}");
+}
