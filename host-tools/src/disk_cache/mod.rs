@@ -1,7 +1,7 @@
 //! What was worked out or fetched before, kept in a folder on disk that has a bound and may
 //! be deleted at any time.
 //!
-//! A record is one file. Its name is a hash of what it is about ([`Name`]): the file it was
+//! A record is one file. Its name is a hash of what it is about (`Name`): the file it was
 //! made of and the state of that file, so what belongs to a file that was changed since is
 //! never found. `record` says what is in it and checks it; `room` deletes the records used
 //! longest ago when all take more than the bound.
