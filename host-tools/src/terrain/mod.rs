@@ -16,4 +16,4 @@ mod underlay;
 pub use distortion::Distortion;
 pub use felt_grid::{FeltCells, FeltGrid};
 pub use scale::{BadScale, Scale};
-pub use tiler::{Terrain, TerrainError, TileBuffer};
+pub use tiler::{INTERPOLATED_STEP, Terrain, TerrainError, TileBuffer};

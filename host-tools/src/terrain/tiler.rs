@@ -14,6 +14,11 @@ use super::steps::{BinaryUnit, steps};
 use super::{BadScale, FeltCells, FeltGrid, Scale, identity};
 use crate::raster::Raster;
 
+/// Heights that the file does not hold but are interpolated are rounded to multiples of this, cells.
+/// Single precision is as coarse 64 cells above a tile's base, and the floats of what is not
+/// rounded have no bits that a tile could do without on the link.
+pub const INTERPOLATED_STEP: f64 = 1.0 / (1 << 17) as f64;
+
 /// Bytes of a tile's samples.
 const TILE_BYTES: usize = 4 * POSTS * POSTS;
 
@@ -312,8 +317,11 @@ impl<'r> Terrain<'r> {
             let height = relative(low, base);
             return Some(Heights::Flat { base, height });
         }
-        let steps = steps(unit, self.scale.height_cells(1.0));
-        Some(buffer.above(low, high, &Vec::from_iter(steps)))
+        let steps = match self.grid.is_resampled() {
+            true => vec![Step::Cells(INTERPOLATED_STEP)],
+            false => steps(unit, self.scale.height_cells(1.0)).collect(),
+        };
+        Some(buffer.above(low, high, &steps))
     }
 
     /// The height at a sample of this terrain's level, in cells, as the file has it at a level of
@@ -328,7 +336,7 @@ impl<'r> Terrain<'r> {
         }
     }
 
-    /// Copies the tile's samples, in cells; NaN in holes and off the data. Returns what they
+    /// Copies the tile's samples, in cells; NaN in holes and off the data. Returns what the heights
     /// are multiples of in the file's vertical unit.
     fn read(&self, key: TileKey, heights: &mut [f64; POSTS * POSTS]) -> BinaryUnit {
         let first = |index: i32| index as u32 * TILE_CELLS as u32;
@@ -341,12 +349,20 @@ impl<'r> Terrain<'r> {
                 let cells = self.scale.height_cells(*height);
                 // Where not all heights were read before, one may leave what can be said.
                 *height = match cells.abs() <= f64::from(MAX_CELL) {
-                    true => cells,
+                    true => self.rounded(cells),
                     false => f64::NAN,
                 };
             }
         }
         unit
+    }
+
+    /// A height in cells, as it goes to the device.
+    fn rounded(&self, cells: f64) -> f64 {
+        match self.grid.is_resampled() {
+            true => (cells / INTERPOLATED_STEP).round() * INTERPOLATED_STEP,
+            false => cells,
+        }
     }
 
     /// How many samples of the tile lie in the field.
