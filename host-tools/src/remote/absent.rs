@@ -23,6 +23,9 @@ impl Elsewhere {
         ))
     }
 
+    /// There is none.
+    pub(crate) fn look_for(&self, _: &[String]) {}
+
     /// Nothing is fetched.
     pub(crate) fn set_disk_cache(&self, _: &DiskCache) {}
 

@@ -86,6 +86,21 @@ impl Elsewhere {
         }
     }
 
+    /// Asks for files at URLs that nothing is known of, all at once: [`Self::open`] of each then
+    /// waits for what is on its way already.
+    pub(crate) fn look_for(&self, urls: &[String]) {
+        // Where there is no background, opening says why.
+        let Ok(background) = background() else {
+            return;
+        };
+        let mut files = self.files();
+        for url in urls {
+            if !files.contains(url) {
+                self.ask(background, &mut files, url);
+            }
+        }
+    }
+
     /// From now on nobody waits, or everybody does again.
     pub(crate) fn stop_waiting(&self, stop: bool) {
         self.0.line.stop_waiting(stop);

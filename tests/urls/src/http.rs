@@ -69,6 +69,8 @@ struct Faults {
     version: u32,
     requests: Vec<String>,
     bytes: usize,
+    /// Requests that wait for their answers, now and at most.
+    at_once: [usize; 2],
 }
 
 impl Server {
@@ -134,6 +136,12 @@ impl Server {
         self.shared.state().version += 1;
     }
 
+    /// How many requests were waiting for their answers at once, at most.
+    #[must_use]
+    pub fn most_at_once(&self) -> usize {
+        self.shared.state().at_once[1]
+    }
+
     /// Requests so far, their methods and paths, and bytes of the answers.
     #[must_use]
     pub fn seen(&self) -> (Vec<String>, usize) {
@@ -152,6 +160,9 @@ impl Shared {
         let mut state = self.state();
         let line = format!("{} {}", request.method(), request.uri());
         state.requests.push(line);
+        let [now, most] = &mut state.at_once;
+        *now += 1;
+        *most = (*most).max(*now);
         let mut fault = Fault::None;
         let range = request.headers().get(RANGE);
         let begins = range.is_none_or(|range| range.as_bytes().starts_with(b"bytes=0-"));
@@ -169,6 +180,7 @@ async fn between(State(shared): State<Arc<Shared>>, mut request: Request, next: 
     tokio::time::sleep(latency).await;
     let mut gate = shared.is_open.subscribe();
     let _ = gate.wait_for(|is_open| *is_open).await;
+    shared.state().at_once[0] -= 1;
     match fault {
         Fault::Error500 => return StatusCode::INTERNAL_SERVER_ERROR.into_response(),
         Fault::Forbidden => return StatusCode::FORBIDDEN.into_response(),

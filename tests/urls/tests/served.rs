@@ -111,6 +111,44 @@ fn all_that_a_touch_needs_is_asked_for_at_once() {
     panic!("{} rows of chunks of four", server.seen().0.len() - before);
 }
 
+/// The names that a world file may have, of a picture that says nothing of its place.
+#[test]
+fn all_neighbours_that_may_be_are_looked_for_at_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (side, first) = (40_u32, 8 + 2 + 12 * 9 + 4);
+    let mut bytes = [
+        b"II*\0".as_slice(),
+        &8_u32.to_le_bytes(),
+        &9_u16.to_le_bytes(),
+    ]
+    .concat();
+    let bits = 8;
+    for (tag, value) in [
+        (256, side),
+        (257, side),
+        (258, bits),
+        (259, 1),
+        (262, 1),
+        (273, first),
+        (277, 1),
+        (278, side),
+        (279, side * side),
+    ] {
+        bytes.extend([u16::to_le_bytes(tag), 4_u16.to_le_bytes()].concat());
+        bytes.extend([1_u32.to_le_bytes(), value.to_le_bytes()].concat());
+    }
+    bytes.extend(0_u32.to_le_bytes());
+    bytes.extend((0..side * side).map(|sample| (sample % 200) as u8));
+    std::fs::write(folder.path().join("plain.tif"), bytes).expect("written");
+    let server = Server::of(folder.path());
+    // Long enough for all of them to be under way.
+    server.set_latency(Duration::from_millis(100));
+    Raster::open(server.url("plain.tif"), &OpenOptions::default()).expect("opens");
+    let (requests, _) = server.seen();
+    assert!(requests.iter().any(|line| line.contains("plain.tfw")));
+    assert!(server.most_at_once() >= 6, "{requests:?}");
+}
+
 #[test]
 fn a_source_of_a_vrt_that_has_not_come_is_no_hole() {
     let (folder, _, server) = hills();

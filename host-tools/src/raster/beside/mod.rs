@@ -34,6 +34,14 @@ pub(super) fn files_read_with(path: &Path) -> Vec<PathBuf> {
     std::iter::once(path.to_owned()).chain(there).collect()
 }
 
+/// Files with these extensions are about to be asked for: at a server, all at once.
+fn look_for(input: &FileBytes, extensions: impl Iterator<Item = &'static str>) {
+    if let Data::Remote(_, url) = input.data() {
+        let urls: Vec<String> = extensions.flat_map(|end| neighbour(url, end)).collect();
+        input.elsewhere().look_for(&urls);
+    }
+}
+
 /// The file beside `input` whose extension is `extension`, in lower or upper case:
 /// `hills.hdr` beside `hills.flt`, or `hills.flt.hdr`.
 fn find(input: &FileBytes, extension: &str) -> Result<Option<FileBytes>, BadRaster> {

@@ -13,10 +13,12 @@ use crate::raster::input::FileBytes;
 /// and y of the centre of the first sample.
 pub(in crate::raster) fn lay_out_by_world_file(
     input: &FileBytes,
-    own: &[&str],
+    own: &[&'static str],
     decoded: &mut Decoded,
 ) -> Result<(), BadRaster> {
-    for extension in own.iter().chain(&["wld"]) {
+    let extensions = || own.iter().copied().chain(["wld"]);
+    super::look_for(input, extensions());
+    for extension in extensions() {
         let Some((text, name)) = text(input, extension)? else {
             continue;
         };
