@@ -49,8 +49,10 @@ fn what_streaming_takes_does_not_grow_with_the_terrain() {
     let [small, large] = [SIDES[1], SIDES[4]].map(|side| u64::from(side) * u64::from(side));
     for link in RATES {
         let (small, large) = (of(small, link), of(large, link));
-        // The same way over the same samples: tiles differ by what their numbers take.
-        assert_eq!(small.tiles, large.tiles);
+        // The same way over the same samples: tiles differ by what their numbers take, and by the
+        // ticks that the underlay takes on the link, whose heights are others.
+        let [a, b] = [small, large].map(|row| row.tiles.expect("tiles"));
+        assert!(a.abs_diff(b) <= 3, "{a} {b}");
         let [a, b] = [small, large].map(|row| row.tile_bytes_mean.expect("tiles"));
         assert!(
             (a - b).abs() < 4.0 && (900.0..1300.0).contains(&a),
@@ -61,6 +63,12 @@ fn what_streaming_takes_does_not_grow_with_the_terrain() {
         for row in [small, large] {
             let [[straight, ..], [turning, ..]] = row.missing();
             assert_eq!([straight, turning], [Some(0); 2], "{row:?}");
+        }
+        // An underlay leaves no hole at any speed, and a slow hand does not feel it.
+        for row in [small, large] {
+            let [[straight, ..], [turning, ..]] = row.coarse();
+            let seen = [straight, turning, row.holes_underlaid];
+            assert_eq!(seen, [Some(0); 3], "{row:?}");
         }
         let held = |row: &Row| [row.held_straight, row.held_turning];
         assert_eq!(held(small), held(large));

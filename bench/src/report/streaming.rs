@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::streaming::{Row, SPEEDS};
 
 /// The columns of the CSV file: the fields of a [`Row`].
-pub const STREAMING_HEADER: [&str; 28] = [
+pub const STREAMING_HEADER: [&str; 35] = [
     "terrain",
     "reading",
     "latency_ms",
@@ -34,6 +34,13 @@ pub const STREAMING_HEADER: [&str; 28] = [
     "missing_turning_500",
     "missing_turning_2000",
     "missing_turning_5000",
+    "coarse_straight_500",
+    "coarse_straight_2000",
+    "coarse_straight_5000",
+    "coarse_turning_500",
+    "coarse_turning_2000",
+    "coarse_turning_5000",
+    "holes_underlaid",
 ];
 
 /// Writes all rows.
@@ -70,17 +77,19 @@ pub fn streaming_head() -> String {
             "held",
             "turning",
             "missing ticks",
+            "coarse ticks",
+            "holes",
         ]
         .map(str::to_owned),
     );
     format!(
         "held: the fastest hand, cells/s, straight and turning; missing: ticks without their terrain at {slow}, {usual} \
-         and {fast} cells/s, straight / turning\n{names}"
+         and {fast} cells/s, straight / turning; coarse: the same ticks over an underlay; holes: ticks that it leaves without\n{names}"
     )
 }
 
 /// Columns of the table, side by side.
-fn line(columns: [String; 16]) -> String {
+fn line(columns: [String; 18]) -> String {
     let [
         terrain,
         read,
@@ -98,10 +107,13 @@ fn line(columns: [String; 16]) -> String {
         held,
         turning,
         missing,
+        coarse,
+        holes,
     ] = columns;
     format!(
         "  {terrain:<18} {read:<6} {late:>7} {link:>9} | {open:>8} {first:>9} | {peak:>7} | {requests:>8} {kb:>7} \
-         | {mean:>6} {p99:>5} {tiles:>7} {host:>7} | {held:>6} {turning:>7} | {missing}"
+         | {mean:>6} {p99:>5} {tiles:>7} {host:>7} | {held:>6} {turning:>7} \
+         | {missing:<29} | {coarse:<29} {holes:>5}"
     )
 }
 
@@ -110,10 +122,10 @@ fn line(columns: [String; 16]) -> String {
 pub fn streaming(row: &Row) -> String {
     let sum = |a: Option<u64>, b: Option<u64>| Some(a? + b.unwrap_or(0));
     let kb = sum(row.open_bytes, row.way_bytes).map(|bytes| bytes as f64 / 1e3);
-    let missing = row.missing().map(|way| {
-        let counts = way.map(|count| shown(count, 0));
-        counts.join(" ")
-    });
+    let counts = |ways: [[Option<u32>; 3]; 2]| {
+        let counts = ways.map(|way| way.map(|count| shown(count, 0)).join(" "));
+        counts.join(" / ")
+    };
     line([
         row.terrain.clone(),
         row.reading.name().to_owned(),
@@ -130,7 +142,9 @@ pub fn streaming(row: &Row) -> String {
         shown(row.host_ms_mean, 2),
         shown(row.held_straight, 0),
         shown(row.held_turning, 0),
-        missing.join(" / "),
+        counts(row.missing()),
+        counts(row.coarse()),
+        shown(row.holes_underlaid, 0),
     ])
 }
 

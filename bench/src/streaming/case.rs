@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, Pace, SentTile, board};
 use super::felt::Felt;
-use super::hand::Hand;
+use super::hand::{Hand, Late};
 use super::meter::{Meter, Traffic, peak_bytes};
 use super::row::{Reading, Row};
 use super::run::{self, fastest};
@@ -127,9 +127,8 @@ impl Bench<'_> {
         let opened = meter.traffic()?;
         let began = Instant::now();
         let terrain = terrain(&raster)?;
-        let home_mm = self.hand.home_mm();
-        let bytes_a_tick = self.kb_per_s as usize;
-        let mut chain = Chain::new(&terrain, board, home_mm, bytes_a_tick, Pace::Real)?;
+        let scene = self.hand.scene(&terrain, Late::Underlay)?;
+        let mut chain = Chain::new(&terrain, scene, board, self.bytes_a_tick(), Pace::Real);
         run::touch(&mut chain, self.hand, &self.ways.straight)?;
         let first_force_ms = ms_since(began);
         let mut row = Row::of_opening(case, self.kb_per_s, &terrain, [open_ms, first_force_ms]);
@@ -149,13 +148,13 @@ impl Bench<'_> {
         let Ways { straight, turning } = self.ways;
         row.straight_cells = Some(straight.cells() as u32);
         row.turning_cells = Some(turning.cells() as u32);
-        let top = self.motion(straight, run::SPEEDS[1], false)?;
+        let top = self.motion(straight, run::SPEEDS[1], Late::Hole, false)?;
         let moved = top.moved;
         let inside = |tile: &&SentTile| (moved[0]..moved[1]).contains(&tile.tick);
         let tiles = top.tiles.iter().filter(inside).count() as f64;
         row.tiles_per_s = Some(round(1e3 * tiles / (moved[1] - moved[0]) as f64));
         let missing = |way, speed: u32| {
-            let motion = self.motion(way, speed.into(), false)?;
+            let motion = self.motion(way, speed.into(), Late::Hole, false)?;
             Ok::<_, NotMeasured>(Some(motion.felt.missing))
         };
         row.missing_straight_500 = missing(straight, SPEEDS[0])?;
@@ -165,21 +164,51 @@ impl Bench<'_> {
         row.missing_turning_2000 = missing(turning, SPEEDS[1])?;
         row.missing_turning_5000 = missing(turning, SPEEDS[2])?;
         let held = |way| {
-            let holds = |speed| Ok(self.motion(way, speed, true)?.felt.missing == 0);
+            let holds = |speed| Ok(self.motion(way, speed, Late::Hole, true)?.felt.missing == 0);
             Ok::<_, NotMeasured>(Some(fastest(self.case.halvings, holds)?.round()))
         };
         row.held_straight = held(straight)?;
         row.held_turning = held(turning)?;
+        self.underlaid(row)
+    }
+
+    /// What is coarse over an underlay, and whether it leaves a hole.
+    fn underlaid(&self, row: &mut Row) -> Result<(), NotMeasured> {
+        let Ways { straight, turning } = self.ways;
+        let fastest = self.motion(straight, run::SPEEDS[1], Late::Underlay, false)?;
+        let mut holes = fastest.felt.missing;
+        let mut coarse = |way, speed: u32| {
+            let felt = self.motion(way, speed.into(), Late::Underlay, false)?.felt;
+            holes += felt.missing;
+            Ok::<_, NotMeasured>(Some(felt.coarse))
+        };
+        row.coarse_straight_500 = coarse(straight, SPEEDS[0])?;
+        row.coarse_straight_2000 = coarse(straight, SPEEDS[1])?;
+        row.coarse_straight_5000 = coarse(straight, SPEEDS[2])?;
+        row.coarse_turning_500 = coarse(turning, SPEEDS[0])?;
+        row.coarse_turning_2000 = coarse(turning, SPEEDS[1])?;
+        row.coarse_turning_5000 = coarse(turning, SPEEDS[2])?;
+        row.holes_underlaid = Some(holes);
         Ok(())
     }
 
+    /// What the link carries in a tick of a millisecond.
+    const fn bytes_a_tick(&self) -> usize {
+        self.kb_per_s as usize
+    }
+
     /// A session of its own, with nothing known of the file before.
-    fn motion(&self, way: &Way, speed: f64, to_a_hole: bool) -> Result<Motion, NotMeasured> {
+    fn motion(
+        &self,
+        way: &Way,
+        speed: f64,
+        late: Late,
+        to_a_hole: bool,
+    ) -> Result<Motion, NotMeasured> {
         let raster = self.case.open()?;
         let terrain = terrain(&raster)?;
-        let home_mm = self.hand.home_mm();
-        let bytes_a_tick = self.kb_per_s as usize;
-        let mut chain = Chain::new(&terrain, board(), home_mm, bytes_a_tick, Pace::Virtual)?;
+        let scene = self.hand.scene(&terrain, late)?;
+        let mut chain = Chain::new(&terrain, scene, board(), self.bytes_a_tick(), Pace::Virtual);
         run::touch(&mut chain, self.hand, way)?;
         let (felt, moved) = run::travel(&mut chain, self.hand, way, speed, to_a_hole)?;
         Ok(Motion::of(chain, felt, moved))

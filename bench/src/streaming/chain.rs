@@ -8,11 +8,9 @@ use std::time::{Duration, Instant};
 
 use hapterra::link::{Client, Event, Patience, Tally};
 use hapterra::terrain::Terrain;
-use hapterra_core::contact::Rule;
-use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Sense;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::scene::{Sample, Scene};
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode};
 use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::session::InSession;
@@ -44,7 +42,7 @@ pub(super) fn board() -> Board {
     )
 }
 
-/// A tile that was sent.
+/// A tile of the field that was sent; the one of its underlay does not count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SentTile {
     /// The tick in which the host put it onto the line.
@@ -80,31 +78,22 @@ pub(super) struct Chain<'t> {
 }
 
 impl<'t> Chain<'t> {
-    /// A session about a terrain that begins with the next tick, over a line that carries so many
-    /// bytes a tick each way.
-    ///
-    /// # Errors
-    /// When the home is farther than positions reach.
+    /// A session about a scene of a terrain that begins with the next tick, over a line that
+    /// carries so many bytes a tick each way.
     pub(super) fn new(
         terrain: &'t Terrain<'t>,
+        scene: Scene,
         board: Board,
-        home_mm: [f64; 3],
         bytes_a_tick: usize,
         pace: Pace,
-    ) -> Result<Self, NotMeasured> {
-        let home = terrain.scale().to_grid(home_mm);
-        let home = home.ok_or_else(|| NotMeasured("it is farther than positions reach".into()))?;
-        let scene = Scene {
-            hold_clock: false,
-            ..terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home)
-        };
+    ) -> Self {
         // Whoever holds the arm waits for no server.
         terrain.raster().stop_waiting();
         let mut client = Client::numbered(terrain, scene, None, Patience::REAL_TIME, 1);
         let (mut line, mut out) = (Line::new(bytes_a_tick), vec![]);
         client.greet(Duration::ZERO, &mut out);
         line.send(&out);
-        Ok(Self {
+        Self {
             client,
             terrain,
             board,
@@ -116,7 +105,7 @@ impl<'t> Chain<'t> {
             reader: Box::default(),
             tiles: vec![],
             host: vec![],
-        })
+        }
     }
 
     /// How fast ticks follow each other from now on.
@@ -183,7 +172,7 @@ impl<'t> Chain<'t> {
         heard
     }
 
-    /// Finds the tiles among what the host says; returns how many there are.
+    /// Finds the tiles of the field among what the host says; returns how many there are.
     fn count_tiles(&mut self, mut bytes: &[u8]) -> usize {
         let before = self.tiles.len();
         while !bytes.is_empty() {
@@ -191,9 +180,10 @@ impl<'t> Chain<'t> {
             let content = frame.and_then(Result::ok);
             let message = content.map(decode::<InSession<ToDevice<'_>>>);
             if let Some(Ok(InSession {
-                message: ToDevice::Tile(_),
+                message: ToDevice::Tile(tile),
                 ..
             })) = message
+                && tile.key.level == self.terrain.level()
             {
                 self.tiles.push(SentTile {
                     tick: self.now,

@@ -9,8 +9,10 @@ use hapterra_core::scene::Sample;
 pub(super) struct Felt {
     /// Ticks of the hand's motion, in all of which the HIP is below the surface.
     pub(super) ticks: u32,
-    /// Ticks whose terrain was not on the device yet.
+    /// Ticks whose terrain was not on the device yet, and nothing coarser either.
     pub(super) missing: u32,
+    /// Ticks over an underlay, or over a tile that settles from it.
+    pub(super) coarse: u32,
     /// Ticks without a contact, though nothing was missing.
     pub(super) free: u32,
 }
@@ -21,6 +23,8 @@ impl Felt {
         self.ticks += 1;
         let is_missing = lacks_terrain(sample);
         self.missing += u32::from(is_missing);
+        let is_coarse = sample.limits.contains(Limits::TERRAIN_COARSE);
+        self.coarse += u32::from(!is_missing && is_coarse);
         self.free += u32::from(!is_missing && sample.state == ContactState::Free);
     }
 }
@@ -35,7 +39,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tick_is_missing_its_terrain_or_felt_or_free() {
+    fn a_tick_is_missing_its_terrain_or_felt_or_coarse_or_free() {
         let sample = |limits, state| Sample {
             limits,
             state,
@@ -45,6 +49,7 @@ mod tests {
         let fading = Limits::BOUNDARY_FADING;
         felt.add(&sample(Limits::empty(), ContactState::Touching));
         felt.add(&sample(fading, ContactState::Touching));
+        felt.add(&sample(Limits::TERRAIN_COARSE, ContactState::Touching));
         felt.add(&sample(
             fading | Limits::TERRAIN_MISSING,
             ContactState::Touching,
@@ -52,8 +57,9 @@ mod tests {
         felt.add(&sample(Limits::TERRAIN_MISSING, ContactState::Free));
         felt.add(&sample(Limits::empty(), ContactState::Free));
         let expected = Felt {
-            ticks: 5,
+            ticks: 6,
             missing: 2,
+            coarse: 1,
             free: 1,
         };
         assert_eq!(felt, expected);

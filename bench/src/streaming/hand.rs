@@ -1,7 +1,13 @@
 //! The arm that is moved along a way: encoder counts for places of the HIP.
 
 use hapterra::phantom::{Encoder, PhantomModel, Placement};
+use hapterra::place::Reach;
+use hapterra::terrain::Terrain;
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Sense;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::{Scene, Source};
 
 use super::way::Ways;
 use super::{CELL_MM, NotMeasured};
@@ -10,6 +16,15 @@ use super::{CELL_MM, NotMeasured};
 const DEPTH: f64 = 10.0;
 /// Height of the HIP above the surface before the first contact, cells.
 const ABOVE: f64 = 30.0;
+
+/// What is felt where a tile is late.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Late {
+    /// Nothing: there is a hole.
+    Hole,
+    /// The underlay of all that the arm reaches.
+    Underlay,
+}
 
 /// A Premium 1.5 whose tip is led exactly where it is to be.
 pub(super) struct Hand {
@@ -32,9 +47,24 @@ impl Hand {
         }
     }
 
-    /// Where the tip is in the home pose, mm of the terrain.
-    pub(super) const fn home_mm(&self) -> [f64; 3] {
-        self.placement.home_mm
+    /// The scene of a terrain under this arm.
+    ///
+    /// # Errors
+    /// When the home is farther than positions reach.
+    pub(super) fn scene(&self, terrain: &Terrain<'_>, late: Late) -> Result<Scene, NotMeasured> {
+        let home = terrain.scale().to_grid(self.placement.home_mm);
+        let home = home.ok_or_else(|| NotMeasured("it is farther than positions reach".into()))?;
+        let scene = Scene {
+            hold_clock: false,
+            ..terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home)
+        };
+        Ok(match late {
+            Late::Hole => scene,
+            Late::Underlay => {
+                let reach = Reach::of(&Calibration::PREMIUM_1_5);
+                terrain.underlaid(scene, reach.sides_mm())
+            }
+        })
     }
 
     /// What the encoders read with the HIP below a place on the surface.

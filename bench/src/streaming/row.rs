@@ -53,7 +53,7 @@ pub struct Row {
     pub held_straight: Option<f64>,
     /// The same on the turning way.
     pub held_turning: Option<f64>,
-    /// Ticks whose terrain was missing, of the straight way at 500 cells a second.
+    /// Without an underlay: ticks whose terrain was missing, of the straight way at 500 cells a second.
     pub missing_straight_500: Option<u32>,
     /// At 2,000 cells a second.
     pub missing_straight_2000: Option<u32>,
@@ -65,9 +65,42 @@ pub struct Row {
     pub missing_turning_2000: Option<u32>,
     /// At 5,000 cells a second.
     pub missing_turning_5000: Option<u32>,
+    /// With an underlay: ticks that felt it, or a tile that settled from it, of the straight way at
+    /// 500 cells a second.
+    pub coarse_straight_500: Option<u32>,
+    /// At 2,000 cells a second.
+    pub coarse_straight_2000: Option<u32>,
+    /// At 5,000 cells a second.
+    pub coarse_straight_5000: Option<u32>,
+    /// Of the turning way at 500 cells a second.
+    pub coarse_turning_500: Option<u32>,
+    /// At 2,000 cells a second.
+    pub coarse_turning_2000: Option<u32>,
+    /// At 5,000 cells a second.
+    pub coarse_turning_5000: Option<u32>,
+    /// With an underlay: ticks that had nothing to feel, in these six motions and one of 20,000 cells a
+    /// second.
+    pub holes_underlaid: Option<u32>,
 }
 
 impl Row {
+    /// Ticks over an underlay, as [`Row::missing`] has them without one.
+    #[must_use]
+    pub const fn coarse(&self) -> [[Option<u32>; 3]; 2] {
+        [
+            [
+                self.coarse_straight_500,
+                self.coarse_straight_2000,
+                self.coarse_straight_5000,
+            ],
+            [
+                self.coarse_turning_500,
+                self.coarse_turning_2000,
+                self.coarse_turning_5000,
+            ],
+        ]
+    }
+
     /// Missing ticks of the straight way and of the turning one, at the speeds of
     /// [`SPEEDS`](super::SPEEDS).
     #[must_use]
