@@ -570,8 +570,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// where an underlay is on its way.
     fn is_over_coarse_ground(&self, sample: &Sample) -> bool {
         let cell = sample.proxy.column();
-        self.scene
-            .is_some_and(|scene| scene.underlay.is_some() && scene.size.has_cell(cell))
+        let scene = self.scene.as_ref();
+        scene.is_some_and(|scene| scene.underlay.is_some() && scene.size.has_cell(cell))
             && !self.window.is_settled(cell)
     }
 }
