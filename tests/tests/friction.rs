@@ -68,10 +68,10 @@ fn ratio(terrain: &Terrain<'_>, sample: &Sample) -> Option<f64> {
 }
 
 #[test]
-fn on_real_ground_it_slides_within_five_parts_in_a_hundred_unless_it_flies() {
+fn on_real_ground_it_slides_within_five_parts_in_a_hundred_however_fast() {
     for (_, raster) in &real_ground::files() {
         let terrain = terrain(raster);
-        for (speed, most_wrong) in [(0.01, 0.0), (0.1, 0.015), (0.5, 0.2)] {
+        for speed in [0.01, 0.1, 0.5, 1.0] {
             let felt = slide(&terrain, slippery(), 0.3, speed);
             // The proxy that has just come out of the air has not slid yet.
             let moves = felt.windows(2).filter(|pair| {
@@ -86,9 +86,7 @@ fn on_real_ground_it_slides_within_five_parts_in_a_hundred_unless_it_flies() {
             println!("{speed} mm a tick: {wrong} of {all} slides off, {least:.4} to {most:.4}");
             assert!(all > 1_000, "{all} slides");
             assert!(most < MU * 1.031, "{most}");
-            // Where a crease turns the ground toward the HIP, a tick may bring the proxy
-            // farther than friction would: half a cell a tick is five creases in ten ticks.
-            assert!(wrong as f64 <= most_wrong * all as f64, "{wrong} of {all}");
+            assert_eq!(wrong, 0, "of {all}");
         }
     }
 }

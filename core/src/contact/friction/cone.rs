@@ -19,7 +19,9 @@ pub(in crate::contact) struct Pull {
     along: Vec3,
     /// Its length squared, cells².
     pulls: f32,
-    /// The length of the rest squared, cells².
+    /// The rest, cells.
+    rest: Vec3,
+    /// Its length squared, cells².
     presses: f32,
 }
 
@@ -106,10 +108,12 @@ impl Pull {
         let (p, q) = view.in_patch(at.cell);
         let way = Vec3::new(p - at.u, q - at.v, -patch.height(at.u, at.v));
         let along = steepest(patch.slope_u(at.v), patch.slope_v(at.u), border, way);
+        let rest = way - along;
         Self {
             along,
             pulls: along.length_squared(),
-            presses: (way - along).length_squared(),
+            rest,
+            presses: rest.length_squared(),
         }
     }
 
@@ -135,6 +139,21 @@ impl Pull {
             self.along * ((coulomb + drag) / (1.0 + drag))
         } else {
             self.along
+        }
+    }
+
+    /// The same for a proxy that has come `way` cells, if all of its way were in the tangent plane here:
+    /// from the foot of the HIP in that plane back to where it came from, as far as friction
+    /// holds it. For a point inside of a patch.
+    pub(in crate::contact) fn held_back_on_plane(&self, way: Vec3, mu: f32, drag: f32) -> Vec3 {
+        let whole = way + self.along;
+        let whole = whole - self.rest * (whole.dot(self.rest) / self.presses);
+        let length = whole.length();
+        let held = (mu * libm::sqrtf(self.presses) + drag * length) / (1.0 + drag);
+        match held < length {
+            true => whole * (held / length),
+            // Also where one of them is no number.
+            false => whole,
         }
     }
 }

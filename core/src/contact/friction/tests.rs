@@ -60,6 +60,34 @@ fn on_a_plane_of_any_slope_it_slides_at_its_coefficient() {
     }
 }
 
+/// A tick that crosses a crease ends where friction would have ended it, beyond the crease or on it.
+#[test]
+fn a_crease_in_the_middle_of_a_tick_lets_it_go_no_farther() {
+    const MU: f32 = 0.4;
+    for bend in [-0.8, -0.3, 0.2, 0.5_f32] {
+        let roof = move |x: i32, _: i32| bend * (x - 24).max(0) as f32;
+        for phase in 0..40 {
+            let path = (0..30).map(|tick| {
+                let x = 0.0125 * phase as f32 + 0.5 * tick as f32 - 2.0;
+                let depth = (0.2 * tick as f32 - 0.3).min(0.5);
+                [x, 0.5, bend * (x - 4.0).max(0.0) - depth]
+            });
+            for (hip, felt) in &feel(Friction::coulomb(MU), roof, path)[8..] {
+                let [cell, _, _] = felt.proxy.cell();
+                let x = cell as f32 + felt.proxy.frac().x;
+                if (x - 24.0).abs() < 1e-3 {
+                    continue; // on the crease, where there are two planes
+                }
+                let is = ratio(felt, [if x < 24.0 { 0.0 } else { bend }, 0.0]);
+                assert!(
+                    (is / MU - 1.0).abs() < 0.031,
+                    "{bend} {phase}: {is} at {hip:?}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn stuck_is_stuck_to_the_bit() {
     let twisted = |x: i32, y: i32| 0.1 * ((x * 7 + y * 13) % 5) as f32;

@@ -8,7 +8,7 @@ use crate::contact::closest_point::{Leave, position_on};
 use crate::contact::friction::{Friction, Pull, Pulled};
 use crate::contact::output::ContactState;
 use crate::contact::settings::Execution;
-use crate::contact::surface::{HipView, SurfacePoint};
+use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::contact::tolerance::RESOLUTION;
 use crate::grid::GridPoint;
 use crate::rate::TickRate;
@@ -45,6 +45,8 @@ pub(super) struct Rubbing {
     times: u32,
     /// Where the proxy stood when the HIP came to where it is, until it has gone away.
     stood: Option<Stood>,
+    /// Where it has come to, while it goes back from there, and how far it was held back there, cells.
+    came_to: Option<(SurfacePoint, Vec3)>,
     /// The boundary fade before the tick: a tick changes it once, however often the proxy
     /// slides.
     fade: f32,
@@ -86,6 +88,7 @@ impl Rubbing {
             back: Vec3::ZERO,
             times: 0,
             stood: None,
+            came_to: None,
             fade: 1.0,
             slides: false,
             creeps: false,
@@ -107,34 +110,55 @@ impl Rubbing {
         }
     }
 
-    /// What becomes of a proxy that the HIP pulls like this.
-    fn judges(&mut self, pull: &Pull, rate: TickRate, here: Option<GridPoint>) -> Verdict {
+    /// What becomes of a proxy at a point that the HIP pulls like this; `here` works out where that
+    /// is.
+    fn judges(
+        &mut self,
+        pull: &Pull,
+        rate: TickRate,
+        point: &SurfacePoint,
+        here: impl Fn() -> Option<GridPoint>,
+    ) -> Verdict {
         let Friction {
             static_mu,
-            dynamic_mu,
+            dynamic_mu: mu,
             viscous_s,
         } = self.friction;
         let drag = viscous_s * rate.hz() as f32;
-        let gone = match (self.stood, here) {
-            (Some(stood), Some(here)) if drag > 0.0 => stood.proxy.to(&here).length(),
-            _ => 0.0,
+        let came = || match (self.stood, here()) {
+            (Some(stood), Some(here)) => stood.proxy.to(&here),
+            _ => Vec3::ZERO,
         };
-        // The way is known to the last places of both its ends.
-        let trail = drag * (gone + 8.0 * RESOLUTION);
+        let is_inside = point.border() == Side::NONE;
+        self.came_to = None;
         let is_held = match self.times {
-            0 if self.slides => pull.is_within(dynamic_mu),
+            0 if self.slides => pull.is_within(mu),
             0 => pull.is_within(static_mu),
-            _ => pull.is_within_trailing(dynamic_mu * (1.0 + SLACK), trail),
+            times => {
+                // The way is known to the last places of both its ends.
+                let trail = match drag > 0.0 {
+                    true => drag * (came().length() + 8.0 * RESOLUTION),
+                    false => 0.0,
+                };
+                let is_within = |mu| pull.is_within_trailing(mu, trail);
+                let is_held = is_within(mu * (1.0 + SLACK));
+                let goes_back = is_inside && times < SLIDES && is_within(mu * (1.0 - SLACK));
+                self.came_to = (is_held && goes_back).then_some((*point, self.back));
+                is_held && !goes_back
+            }
         };
         if is_held {
             return Verdict::Held;
         }
+        let back = match self.times > 0 && is_inside {
+            true => pull.held_back_on_plane(came(), mu, drag),
+            false => pull.held_back(mu, drag),
+        };
         self.slides = true;
         self.times += 1;
         if self.times > SLIDES {
             return Verdict::Goes(self.hip);
         }
-        let back = pull.held_back(dynamic_mu, drag);
         Verdict::Goes(GridPoint::new(self.hip.cell(), self.hip.frac() - back))
     }
 }
@@ -197,15 +221,28 @@ impl Contact {
                 nearest.map(|(point, _)| point)
             }
         };
-        if let Some(point) = point
-            && let Some(proxy) = position_on(window, &point)
-        {
+        let place = point.and_then(|point| {
+            let proxy = position_on(window, &point)?;
+            Some(Stood { point, proxy })
+        });
+        // In the middle of a tick it may be farther away than where it ends.
+        let view = HipView::new(rubbing.hip);
+        let place = match (place, rubbing.stood) {
+            (Some(place), Some(stood))
+                if !has_ended && view.is_nearer(&stood.proxy, &place.proxy) =>
+            {
+                Some(stood)
+            }
+            (place, _) => place,
+        };
+        if let Some(place) = place {
+            let proxy = place.proxy;
             self.output.proxy = proxy;
             self.output.displacement = rubbing.hip.to(&proxy) * on.fade;
             if has_ended {
                 rubbing.aim = None;
             } else if self.settings.execution == Execution::RealTime {
-                rubbing.stood = Some(Stood { point, proxy });
+                (rubbing.stood, rubbing.came_to) = (Some(place), None);
             }
         }
     }
@@ -240,6 +277,7 @@ impl Contact {
             _ => None,
         };
         (rubbing.hip, rubbing.aim, rubbing.times, rubbing.stood) = (hip, None, 0, stood);
+        rubbing.came_to = None;
     }
 
     /// One step of a tick. In the air the HIP itself is the aim.
@@ -327,9 +365,8 @@ impl Contact {
         let point = on.descent.entry();
         match Pull::at(window, &view, &point) {
             Pulled::By(pull) => {
-                let trails = rubbing.times > 0 && rubbing.friction.viscous_s > 0.0;
-                let here = trails.then(|| position_on(window, &point)).flatten();
-                rubbing.judges(&pull, self.settings.rate, here)
+                let here = || position_on(window, &point);
+                rubbing.judges(&pull, self.settings.rate, &point, here)
             }
             Pulled::Unknown(tile) if waits => Verdict::Waits(Some(tile)),
             // Without a patch there is no friction. Before a missing tile the proxy is held
@@ -404,7 +441,8 @@ impl Contact {
     }
 
     /// Over rough ground an aim may lead astray, farther from the HIP than the proxy stood:
-    /// then it begins there again, and goes for the HIP itself.
+    /// then it begins there again, and goes for the HIP itself. One that was going back stays where it
+    /// had come to.
     fn has_gone_astray(&mut self, hip: GridPoint, to: GridPoint) -> bool {
         let Some(rubbing) = &mut self.rubbing else {
             return false;
@@ -414,9 +452,18 @@ impl Contact {
             Some(stood)
                 if rubbing.times <= SLIDES && HipView::new(hip).is_nearer(&stood.proxy, &to) =>
             {
-                (rubbing.aim, rubbing.times) = (Some(hip), SLIDES + 1);
-                rubbing.back = Vec3::ZERO;
-                self.phase = Phase::OnSurface(OnSurface::at(stood.point, rubbing.fade));
+                let from = match rubbing.came_to.take() {
+                    Some((point, back)) => {
+                        (rubbing.aim, rubbing.times, rubbing.back) = (None, SLIDES, back);
+                        point
+                    }
+                    None => {
+                        (rubbing.aim, rubbing.times) = (Some(hip), SLIDES + 1);
+                        rubbing.back = Vec3::ZERO;
+                        stood.point
+                    }
+                };
+                self.phase = Phase::OnSurface(OnSurface::at(from, rubbing.fade));
                 true
             }
             _ => false,
