@@ -6,6 +6,7 @@ pub mod passivity;
 mod relief;
 mod shading;
 mod texture;
+mod yielding;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -15,6 +16,7 @@ use crate::rate::TickRate;
 pub(crate) use damping::Damper;
 pub use damping::{Controller, Damping};
 pub(crate) use effects::Effects;
+pub(crate) use passivity::Moment;
 pub use shading::{Shader, Shading};
 pub use texture::{Pattern, Texture, Texturer};
 
