@@ -253,7 +253,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// What a scene adds to the spring's force.
     fn effects_of(&self, scene: &Scene) -> Option<Effects> {
         let with_arm = scene.source == Source::Encoders;
-        Effects::of(&scene.law, scene.cell_mm, self.rate, with_arm)
+        let (rate, latency_s) = (self.rate, self.latency_s);
+        Effects::of(&scene.law, scene.cell_mm, rate, latency_s, with_arm)
     }
 
     /// Takes a scene, or drops the one there is: force that was there goes out.

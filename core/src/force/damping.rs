@@ -23,7 +23,7 @@ pub struct Damping {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[serde(rename_all = "lowercase")]
 pub enum Controller {
-    /// Where the stiffness is above what the device's rate allows without it
+    /// Where the stiffness is above what the device's rate and latency allow without it
     /// ([`stiffest_n_per_mm`](super::passivity::stiffest_n_per_mm)).
     #[default]
     Auto,
@@ -65,8 +65,13 @@ pub(crate) struct Damper {
 impl Damper {
     /// Of a scene that is felt with an arm, or with points: those have no hand that energy
     /// could be given to.
-    pub(crate) fn of(law: &ForceLaw, rate: TickRate, with_arm: bool) -> Option<Self> {
-        let is_controlled = with_arm && law.is_controlled(rate);
+    pub(crate) fn of(
+        law: &ForceLaw,
+        rate: TickRate,
+        latency_s: f32,
+        with_arm: bool,
+    ) -> Option<Self> {
+        let is_controlled = with_arm && law.is_controlled(rate, latency_s);
         let controller = is_controlled.then(|| Passivity::new(law, rate));
         (controller.is_some() || law.damping.ns_per_m > 0.0).then_some(Self {
             law: *law,

@@ -10,7 +10,7 @@ use super::*;
 /// A scene's damper with an arm.
 fn damper(law: &ForceLaw, hz: u32) -> Option<Damper> {
     let rate = TickRate::new(hz).expect("a rate");
-    Damper::of(law, rate, true)
+    Damper::of(law, rate, 0.1e-3, true)
 }
 
 fn law(stiffness_n_per_mm: f32, ns_per_m: f32, controller: Controller) -> ForceLaw {
@@ -64,10 +64,24 @@ fn the_controller_acts_where_the_stiffness_is_above_what_the_rate_allows() {
         assert!(acts(stiffness, hz, Controller::On));
         assert!(!acts(stiffness, hz, Controller::Off));
     }
+    // A force that comes late: 0.5 N·s/m over 0.5 ms and 0.93 ms.
+    for (stiffness, latency_s, by_itself) in [
+        (1.0, 0.2e-3, false),
+        (0.34, 1.13e-3, false),
+        (0.36, 1.13e-3, true),
+    ] {
+        let law = law(stiffness, 0.0, Controller::Auto);
+        assert_eq!(law.is_controlled(TickRate::DEFAULT, latency_s), by_itself);
+    }
     // Nothing is asked for, and nothing is there.
     assert!(damper(&ForceLaw::PREMIUM, 1000).is_none());
     // Points have no hand.
-    let points = Damper::of(&law(4.0, 0.0, Controller::On), TickRate::DEFAULT, false);
+    let points = Damper::of(
+        &law(4.0, 0.0, Controller::On),
+        TickRate::DEFAULT,
+        0.0,
+        false,
+    );
     assert!(points.is_none());
 }
 
@@ -177,6 +191,21 @@ fn what_a_force_gives_that_comes_later_than_it_is_said_to_is_not_all_taken_back(
     for ((known, unknown), without) in known.iter().zip(&unknown).zip(&without) {
         assert!(*known < 0.0, "{known} mJ");
         assert!(*unknown > 0.2 * without, "{unknown} mJ, {without} without");
+    }
+}
+
+#[test]
+fn a_force_that_comes_earlier_than_it_is_said_to_gives_nothing_either() {
+    // A duty cycle is read 0.5 to 1 ms after it was set.
+    for hz in [1000, 2000, 4000] {
+        for late_s in [0.63e-3, 0.88e-3] {
+            let taps = Taps {
+                told_s: 1.13e-3,
+                ..Taps::new(hz, late_s)
+            };
+            let with = taps.given_mj(&law(1.0, 0.0, Controller::On));
+            assert!(with.iter().all(|mj| *mj < 0.0), "{hz} Hz: {with:?} mJ");
+        }
     }
 }
 

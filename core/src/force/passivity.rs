@@ -22,6 +22,9 @@ const HAND_NS_PER_MM: f32 = 0.5e-3;
 /// What the friction of the arm takes up of the energy that encoder counts create, as
 /// a stiffness, N/mm: 2 f_c / Δ (Abbott and Okamura 2005) of a Phantom Premium 1.5.
 const FRICTION_N_PER_MM: f32 = 3.3;
+/// Latency of a board with converters, s: so much of it is borne by the arm's friction in the
+/// map of docs/stability.md.
+const CONVERTERS_S: f32 = 0.2e-3;
 /// More than this is forgotten, mJ.
 const MOST_MJ: f32 = 2.0;
 /// Most damping, as ticks of the stiffness, besides the latency. What the velocity is off by,
@@ -34,11 +37,13 @@ const FULL: f32 = i16::MAX as f32;
 /// Those on their way, the one that acts and the one before it.
 const KEPT: usize = MOST_LATE + 2;
 
-/// Stiffness up to which a surface needs no controller at a rate, N/mm: 2 b / T (Colgate
-/// and Schenkel 1997) for the hand that damps least, and no more than the arm's friction allows.
+/// Stiffness up to which a surface needs no controller at a rate, N/mm: b / (T / 2 + L) for the hand
+/// that damps least, and no more than the arm's friction allows. L is what the latency is longer than
+/// that of a board with converters; without it, it is the 2 b / T of Colgate and Schenkel (1997).
 #[must_use]
-pub fn stiffest_n_per_mm(rate: TickRate) -> f32 {
-    let by_damping = 2.0 * HAND_NS_PER_MM * rate.hz() as f32;
+pub fn stiffest_n_per_mm(rate: TickRate, latency_s: f32) -> f32 {
+    let late_s = (latency_s - CONVERTERS_S).max(0.0);
+    let by_damping = HAND_NS_PER_MM / (0.5 * rate.tick_s() + late_s);
     by_damping.min(FRICTION_N_PER_MM)
 }
 
