@@ -137,7 +137,7 @@ impl Passivity {
     /// credit.
     pub(super) fn observe(&mut self, law: &ForceLaw, now: &Moment) {
         self.yielding.observe(law, now, self.tick_s);
-        self.latency_s = now.latency_s.clamp(0.0, MOST_LATE as f32 * self.tick_s);
+        self.latency_s = now.latency_s.max(0.0).min(MOST_LATE as f32 * self.tick_s);
         self.asked.copy_within(..KEPT - 1, 1);
         let counts = (now.asked_n / self.count_n).round();
         // The casts saturate.

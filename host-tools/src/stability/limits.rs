@@ -20,8 +20,8 @@ pub(super) const STILL_N_PER_MM: StillUpTo = [
 pub(super) const STILL_LATE_N_PER_MM: StillUpTo = [
     (1_000, 1.0, 3.0),
     (2_000, 1.0, 3.0),
-    (4_000, 1.0, 3.0),
-    (10_000, 1.0, 3.0),
+    (4_000, 1.5, 3.0),
+    (10_000, 1.5, 3.0),
 ];
 
 /// Latency up to which the first of the two holds, µs: 0.08 ms, and the lag of the amplifiers'
