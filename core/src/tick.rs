@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use crate::clutch::{Clutch, ClutchHold};
 use crate::contact::{Contact, ContactOutput, ContactSettings, Execution, Friction};
-use crate::force::{Damper, Effects};
+use crate::force::{Damper, Effects, Moment};
 use crate::grid::GridPoint;
 use crate::guard::thermal::Temperatures;
 use crate::guard::{
@@ -19,6 +19,9 @@ use crate::phantom::{Calibration, Mechanism, Pose, to_device_frame, to_terrain_f
 use crate::rate::TickRate;
 use crate::scene::{Health, Point, Sample, Scene, Source, View};
 use crate::terrain::{SETTLING_MM_S, Tile, TileKey, Window};
+
+/// From the beginning of a tick until its force acts, s, where a board says nothing else.
+pub const LATENCY_S: f32 = 0.1e-3;
 
 /// What is handed to the loop between ticks.
 pub enum Command<'t> {
@@ -123,6 +126,8 @@ pub struct Haptics<'t, const D: usize> {
     zero: Option<[i32; 3]>,
     tick: u32,
     rate: TickRate,
+    /// From the beginning of a tick until its force acts, s.
+    latency_s: f32,
     /// Number of the view that is felt.
     view: u8,
     point: Option<Point>,
@@ -144,6 +149,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     ) -> Self {
         Self {
             rate,
+            latency_s: LATENCY_S,
             window: Window::new(tiles),
             contact: Contact::new(ContactSettings::REAL_TIME.at_rate(rate)),
             guard: Guard::new(rate, found_at_boot),
@@ -163,6 +169,12 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// the air.
     pub fn begin_at(&mut self, temperatures: Temperatures) {
         self.guard.begin_at(temperatures);
+    }
+
+    /// States how long after the beginning of a tick its force acts, s: what the board and its
+    /// amplifiers take. [`Haptics::new`] takes it to be [`LATENCY_S`].
+    pub const fn acts_after(&mut self, latency_s: f32) {
+        self.latency_s = latency_s;
     }
 
     /// How warm the motors are: what a board keeps over a reset.
@@ -241,7 +253,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// What a scene adds to the spring's force.
     fn effects_of(&self, scene: &Scene) -> Option<Effects> {
         let with_arm = scene.source == Source::Encoders;
-        Effects::of(&scene.law, scene.cell_mm, self.rate, with_arm)
+        let (rate, latency_s) = (self.rate, self.latency_s);
+        Effects::of(&scene.law, scene.cell_mm, rate, latency_s, with_arm)
     }
 
     /// Takes a scene, or drops the one there is: force that was there goes out.
@@ -494,13 +507,18 @@ impl<'t, const D: usize> Haptics<'t, D> {
             damper.rest();
             return spring_n;
         }
-        let tip_mm = scene.home.to(&sample.hip) * scene.cell_mm;
-        let (asked_n, most_n) = (self.guard.force_n(), self.guard.most_force_n());
-        damper.observe(displacement_mm, tip_mm, asked_n, most_n);
+        let velocity_mm_s = to_terrain_frame(self.guard.tip_velocity_mm_s(mechanism, pose));
+        damper.observe(&Moment {
+            displacement_mm,
+            tip_mm: scene.home.to(&sample.hip) * scene.cell_mm,
+            velocity_mm_s,
+            asked_n: self.guard.force_n(),
+            most_n: self.guard.most_force_n(),
+            latency_s: self.latency_s,
+        });
         if damper.created_mj() > 0.0 {
             self.guard.says(Limits::ENERGY_TAKEN_BACK);
         }
-        let velocity_mm_s = to_terrain_frame(self.guard.tip_velocity_mm_s(mechanism, pose));
         damper.force_n(spring_n, velocity_mm_s)
     }
 

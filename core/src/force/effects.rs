@@ -18,10 +18,16 @@ pub(crate) struct Effects {
 impl Effects {
     /// Of a scene with cells of such a size that is felt with an arm, or with points.
     #[inline(never)]
-    pub(crate) fn of(law: &ForceLaw, cell_mm: f32, rate: TickRate, with_arm: bool) -> Option<Self> {
+    pub(crate) fn of(
+        law: &ForceLaw,
+        cell_mm: f32,
+        rate: TickRate,
+        latency_s: f32,
+        with_arm: bool,
+    ) -> Option<Self> {
         let shader = Shader::of(law.shading);
         let texturer = Texturer::of(&law.texture, cell_mm, rate);
-        let damper = Damper::of(law, rate, with_arm);
+        let damper = Damper::of(law, rate, latency_s, with_arm);
         let is_there = shader.is_some() || texturer.is_some() || damper.is_some();
         is_there.then_some(Self {
             shader,

@@ -6,6 +6,7 @@ pub mod passivity;
 mod relief;
 mod shading;
 mod texture;
+mod yielding;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -15,6 +16,7 @@ use crate::rate::TickRate;
 pub(crate) use damping::Damper;
 pub use damping::{Controller, Damping};
 pub(crate) use effects::Effects;
+pub(crate) use passivity::Moment;
 pub use shading::{Shader, Shading};
 pub use texture::{Pattern, Texture, Texturer};
 
@@ -80,11 +82,13 @@ impl ForceLaw {
         clamp_length(displacement_mm * self.stiffness_n_per_mm, self.max_force_n)
     }
 
-    /// Whether the passivity controller acts on an arm at a rate.
+    /// Whether the passivity controller acts on an arm at a rate, where a force acts so long after
+    /// its tick began, s.
     #[must_use]
-    pub fn is_controlled(&self, rate: TickRate) -> bool {
+    pub fn is_controlled(&self, rate: TickRate, latency_s: f32) -> bool {
+        let stiffest = passivity::stiffest_n_per_mm(rate, latency_s);
         match self.damping.controller {
-            Controller::Auto => self.stiffness_n_per_mm > passivity::stiffest_n_per_mm(rate),
+            Controller::Auto => self.stiffness_n_per_mm > stiffest,
             Controller::On => true,
             Controller::Off => false,
         }

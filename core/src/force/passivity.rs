@@ -2,15 +2,19 @@
 //! (Hannaford and Ryu 2002).
 //!
 //! A spring gives no more than it was given. One that is felt in ticks does: its force is that of
-//! the tick's beginning, too small on the way in and too large on the way out, and gives
-//! ½ K Δx² a tick. The observer adds up the work of the force that did act, and compares it
-//! with what a spring would hold at this depth; what is more was created. So it is known while
-//! the tip goes in, and not only when it has left. The controller adds the damping that takes
-//! it back within a tick: K T / 2 in an even motion, Colgate and Schenkel's bound.
+//! the tick's beginning and acts a latency L later, too small on the way in and too large on the
+//! way out, and gives K (T / 2 + L) v a metre. The observer adds up the work of the forces that did
+//! act, each at the time when it acted, and compares it with what a spring would hold at this depth;
+//! what is more was created. So it is known while the tip goes in, and not only when it has left.
+//!
+//! What the controller asks for acts a latency later, too. So it looks ahead by that time: the
+//! forces on their way are known, and the tip is taken to go on as it does. It adds the damping that
+//! takes back what will have been created by then: K (T / 2 + L) in an even motion.
 
 use glam::Vec3;
 
 use super::ForceLaw;
+use super::yielding::Yielding;
 use crate::rate::TickRate;
 
 /// Least damping of a hand that holds the tip, N·s/mm.
@@ -18,20 +22,28 @@ const HAND_NS_PER_MM: f32 = 0.5e-3;
 /// What the friction of the arm takes up of the energy that encoder counts create, as
 /// a stiffness, N/mm: 2 f_c / Δ (Abbott and Okamura 2005) of a Phantom Premium 1.5.
 const FRICTION_N_PER_MM: f32 = 3.3;
-/// From the encoders to the amplifiers, s: so much later a tick's force is taken to act. The
-/// slowest board that has converters takes 0.08 ms (docs/hardware.md).
-const LATENCY_S: f32 = 0.1e-3;
+/// Latency of a board with converters, s: so much of it is borne by the arm's friction in the
+/// map of docs/stability.md.
+const CONVERTERS_S: f32 = 0.2e-3;
 /// More than this is forgotten, mJ.
 const MOST_MJ: f32 = 2.0;
-/// Most damping, as ticks of the stiffness. What the velocity is off by, some 0.1 of a
-/// count a tick, makes a force of so many times the spring's for 0.1 of a count.
+/// Most damping, as ticks of the stiffness, besides the latency. What the velocity is off by,
+/// some 0.1 of a count a tick, makes a force of so many times the spring's for 0.1 of a count.
 const MOST_TICKS: f32 = 2.0;
+/// Most ticks that a force may come late: what is later is taken to come then.
+const MOST_LATE: usize = 12;
+/// What a force of the law's limit is kept as.
+const FULL: f32 = i16::MAX as f32;
+/// Those on their way, the one that acts and the one before it.
+const KEPT: usize = MOST_LATE + 2;
 
-/// Stiffness up to which a surface needs no controller at a rate, N/mm: 2 b / T (Colgate
-/// and Schenkel 1997) for the hand that damps least, and no more than the arm's friction allows.
+/// Stiffness up to which a surface needs no controller at a rate, N/mm: b / (T / 2 + L) for the hand
+/// that damps least, and no more than the arm's friction allows. L is what the latency is longer than
+/// that of a board with converters; without it, it is the 2 b / T of Colgate and Schenkel (1997).
 #[must_use]
-pub fn stiffest_n_per_mm(rate: TickRate) -> f32 {
-    let by_damping = 2.0 * HAND_NS_PER_MM * rate.hz() as f32;
+pub fn stiffest_n_per_mm(rate: TickRate, latency_s: f32) -> f32 {
+    let late_s = (latency_s - CONVERTERS_S).max(0.0);
+    let by_damping = HAND_NS_PER_MM / (0.5 * rate.tick_s() + late_s);
     by_damping.min(FRICTION_N_PER_MM)
 }
 
@@ -40,10 +52,17 @@ pub fn stiffest_n_per_mm(rate: TickRate) -> f32 {
 pub(super) struct Passivity {
     stiffness_n_per_mm: f32,
     tick_s: f32,
-    /// The part of a tick in which the force of the tick before still acts.
-    late: f32,
+    /// From the beginning of a tick until its force acts, s.
+    latency_s: f32,
+    yielding: Yielding,
+    /// Newtons for a count of what is kept of a force.
+    count_n: f32,
     created_mj: f32,
+    /// The same when this tick's force has acted for a tick, all but the work of that force.
+    coming_mj: f32,
     before: Option<Before>,
+    /// The forces that the guard let through, the last one first, in counts: RAM is short.
+    asked: [[i16; 3]; KEPT],
 }
 
 /// What the tick before left.
@@ -51,8 +70,37 @@ pub(super) struct Passivity {
 struct Before {
     tip_mm: Vec3,
     stored_mj: f32,
-    /// The force that the tick before that had asked for.
-    asked_n: Vec3,
+}
+
+/// What a tick begins with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moment {
+    /// From the HIP to the proxy.
+    pub(crate) displacement_mm: Vec3,
+    /// Where the tip is, in a frame that stays.
+    pub(crate) tip_mm: Vec3,
+    /// How fast the tip moves.
+    pub(crate) velocity_mm_s: Vec3,
+    /// The force that the guard let through in the tick before.
+    pub(crate) asked_n: Vec3,
+    /// The most that it lets through.
+    pub(crate) most_n: f32,
+    /// From the beginning of a tick until its force acts, s.
+    pub(crate) latency_s: f32,
+}
+
+impl Moment {
+    /// What is left of the displacement after a time at this velocity, towards the proxy or away
+    /// from it. Beyond the surface there is none.
+    fn displacement_after_mm(&self, seconds: f32) -> Vec3 {
+        let along = self.velocity_mm_s.dot(self.displacement_mm);
+        let share = along * seconds / self.displacement_mm.length_squared();
+        // No number where nothing is displaced.
+        match share < 1.0 {
+            true => self.displacement_mm * (1.0 - share),
+            false => Vec3::ZERO,
+        }
+    }
 }
 
 impl Passivity {
@@ -60,10 +108,19 @@ impl Passivity {
         Self {
             stiffness_n_per_mm: law.stiffness_n_per_mm,
             tick_s: rate.tick_s(),
-            late: (LATENCY_S * rate.hz() as f32).min(1.0),
+            latency_s: 0.0,
+            yielding: Yielding::NONE,
+            count_n: law.max_force_n / FULL,
             created_mj: 0.0,
+            coming_mj: 0.0,
             before: None,
+            asked: [[0; 3]; KEPT],
         }
+    }
+
+    /// The share of the spring's force that is felt.
+    pub(super) const fn share(&self) -> f32 {
+        self.yielding.share()
     }
 
     pub(super) const fn created_mj(&self) -> f32 {
@@ -71,15 +128,28 @@ impl Passivity {
     }
 
     pub(super) fn rest(&mut self) {
-        (self.created_mj, self.before) = (0.0, None);
+        (self.created_mj, self.coming_mj, self.before) = (0.0, 0.0, None);
+        (self.yielding, self.asked) = (Yielding::NONE, [[0; 3]; KEPT]);
     }
 
-    /// Books what happened since the tick before, when `asked_n` was asked for. The spring holds
-    /// `stored_mj` now. Energy that was lost gives no credit.
-    pub(super) fn observe(&mut self, stored_mj: f32, tip_mm: Vec3, asked_n: Vec3) {
+    /// Books what happened since the tick before, and what is going to happen until this tick's
+    /// force has acted for a tick, all but the work of that force. Energy that was lost gives no
+    /// credit.
+    pub(super) fn observe(&mut self, law: &ForceLaw, now: &Moment) {
+        self.yielding.observe(law, now, self.tick_s);
+        self.latency_s = now.latency_s.max(0.0).min(MOST_LATE as f32 * self.tick_s);
+        self.asked.copy_within(..KEPT - 1, 1);
+        let counts = (now.asked_n / self.count_n).round();
+        // The casts saturate.
+        self.asked[0] = counts.to_array().map(|counts| counts as i16);
+        let late = self.latency_s / self.tick_s;
+        let whole = late as usize;
+        let part = late - whole as f32;
+        let (acting_n, before_n) = (self.asked_n(whole), self.asked_n(whole + 1));
+        let stored_mj = self.stored_mj(law, now, 0.0);
         if let Some(before) = self.before {
-            let acted_n = asked_n + (before.asked_n - asked_n) * self.late;
-            let given_mj = acted_n.dot(tip_mm - before.tip_mm);
+            let acted_n = acting_n + (before_n - acting_n) * part;
+            let given_mj = acted_n.dot(now.tip_mm - before.tip_mm);
             let created = self.created_mj + given_mj + stored_mj - before.stored_mj;
             self.created_mj = match created > 0.0 {
                 true => created.min(MOST_MJ),
@@ -87,17 +157,37 @@ impl Passivity {
             };
         }
         self.before = Some(Before {
-            tip_mm,
+            tip_mm: now.tip_mm,
             stored_mj,
-            asked_n,
         });
+        // At most `MOST_LATE` ticks.
+        let on_their_way = (0..whole).map(|ticks| self.asked_n(ticks));
+        let sum_n = on_their_way.fold(acting_n * part, |sum_n, asked_n| sum_n + asked_n);
+        let gives_mj = sum_n.dot(now.velocity_mm_s) * self.tick_s;
+        let holds_mj = self.stored_mj(law, now, self.latency_s + self.tick_s);
+        self.coming_mj = self.created_mj + gives_mj + holds_mj - stored_mj;
     }
 
-    /// The damping that takes back what was created within a tick at a speed along the force,
-    /// given in (mm/s)², N·s/mm.
-    pub(super) fn damping_ns_per_mm(&self, speed_squared: f32) -> f32 {
-        let most = MOST_TICKS * self.tick_s * self.stiffness_n_per_mm;
-        let takes_back = self.created_mj / (speed_squared * self.tick_s);
+    /// What the spring holds, mJ, after a time in which the tip goes on as it does, s.
+    fn stored_mj(&self, law: &ForceLaw, now: &Moment, after_s: f32) -> f32 {
+        let share = self.yielding.share();
+        // Where less of the force is felt, it gets to its limit later.
+        share * law.stored_mj(now.displacement_after_mm(after_s), now.most_n / share)
+    }
+
+    /// A force that was asked for so many ticks ago.
+    fn asked_n(&self, ticks: usize) -> Vec3 {
+        let counts = self.asked.get(ticks).copied().unwrap_or_default();
+        Vec3::from_array(counts.map(f32::from)) * self.count_n
+    }
+
+    /// The damping that takes back what was created, and what a spring's force will have created
+    /// when it has acted for a tick, N·s/mm. `along` is that force times the velocity, `squared` the
+    /// square of the force.
+    pub(super) fn damping_ns_per_mm(&self, along: f32, squared: f32) -> f32 {
+        let most = (MOST_TICKS * self.tick_s + self.latency_s) * self.stiffness_n_per_mm;
+        let created_mj = (self.coming_mj + along * self.tick_s).clamp(0.0, MOST_MJ);
+        let takes_back = created_mj * squared / (along * along * self.tick_s);
         // No number where nothing moves: then there is nothing to take from.
         match takes_back < most {
             true => takes_back,

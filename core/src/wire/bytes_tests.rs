@@ -214,7 +214,7 @@ fn a_hello_in_its_session() {
         }),
     };
     // The session is 300 | 128; then variant, protocol, number, seconds.
-    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 10, 9, 0xB4, 0x01]);
+    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 11, 9, 0xB4, 0x01]);
 }
 
 #[test]
@@ -229,6 +229,7 @@ fn a_device_that_introduces_itself() {
         version: "v1".try_into().expect("fits"),
         window: 4,
         tick_hz: 1000,
+        latency_us: 190,
         clock_hz: 300,
         epoch: Some(7),
         last: LastSession {
@@ -242,9 +243,9 @@ fn a_device_that_introduces_itself() {
         },
     });
     let wanted = [
-        std::vec![0, 10, 9, 8, 1, b'b'],
+        std::vec![0, 11, 9, 8, 1, b'b'],
         serial.to_vec(),
-        std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xAC, 0x02, 1, 7],
+        std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xBE, 0x01, 0xAC, 0x02, 1, 7],
         std::vec![0xAC, 0x02, 6, 3, 5, 1],
     ];
     assert_eq!(bytes(&hello), wanted.concat());

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::session::LastSession;
 
 /// Version of the table of messages.
-pub const PROTOCOL: u16 = 10;
+pub const PROTOCOL: u16 = 11;
 /// Length limit of names in a hello, bytes.
 pub const NAME: usize = 32;
 
@@ -72,6 +72,8 @@ pub struct DeviceHello {
     pub window: u8,
     /// Ticks a second.
     pub tick_hz: u32,
+    /// From the beginning of a tick until the motors have its current, at most, µs.
+    pub latency_us: u16,
     /// Ticks of the clock in which tick costs are given, a second.
     pub clock_hz: u32,
     /// Epoch of the scene that the device still holds, if any.

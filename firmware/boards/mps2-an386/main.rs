@@ -43,6 +43,7 @@ use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::hello::SerialNumber;
 use hapterra_core::wire::status::BootReport;
+use hapterra_firmware::amplifier::CURRENT_LOOP_US;
 use hapterra_firmware::app::Hardware;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::{LinkBoard, run};
@@ -198,6 +199,7 @@ fn set_up() {
         amplifiers: VirtualAmplifiersOff,
         clock: time::start(),
         full_scale_a: FULL_SCALE_A,
+        latency_us: CURRENT_LOOP_US,
         // There is no memory; the virtual Phantom is a Premium 1.5.
         calibration: Stored::Found(Calibration::PREMIUM_1_5),
         // They come into being with the board.

@@ -4,10 +4,13 @@ use embassy_stm32::pac::dac::Dac;
 use embassy_stm32::pac::dac::vals::Mode;
 use embassy_stm32::peripherals::{DAC1, DAC2, PA4, PA5, PA6};
 use embassy_stm32::{Peri, pac, rcc};
-use hapterra_firmware::amplifier::{CurrentOutputs, offset_code};
+use hapterra_firmware::amplifier::{CURRENT_LOOP_US, CurrentOutputs, offset_code};
 
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-g474re";
+/// From the beginning of a tick until the motors have its current, at most, µs: 80 to the
+/// outputs (docs/hardware.md), and the amplifiers' own time.
+pub(crate) const LATENCY_US: u16 = 80 + CURRENT_LOOP_US;
 
 /// Three converters, buffered, each behind an offset stage: the middle of the range is no
 /// current.

@@ -6,10 +6,14 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm, SimplePwmChannels};
 use embassy_stm32::{Peri, pac};
-use hapterra_firmware::amplifier::{CurrentOutputs, DUTY_HZ, duty_code};
+use hapterra_firmware::amplifier::{CURRENT_LOOP_US, CurrentOutputs, DUTY_HZ, duty_code};
 
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-h743zi2";
+/// From the beginning of a tick until the motors have its current, at most, µs: 20 to the
+/// outputs (docs/hardware.md), two periods until an amplifier has read a duty cycle that waits
+/// for the next one, and the amplifiers' own time.
+pub(crate) const LATENCY_US: u16 = 20 + (2_000_000 / DUTY_HZ) as u16 + CURRENT_LOOP_US;
 
 /// Three duty cycles: 15 % and 85 % are the ends of the range, 50 % is no current.
 pub(crate) struct Outputs {

@@ -34,6 +34,8 @@ pub(crate) struct KnownArm {
     pub(crate) source: CalibrationSource,
     /// The current at the ends of the amplifiers' range, A.
     pub(crate) full_scale_a: f32,
+    /// From the beginning of a tick until the motors have its current, µs.
+    pub(crate) latency_us: u16,
 }
 
 /// What the link knows of the device.
@@ -78,6 +80,7 @@ impl DeviceState {
                 version: cut(env!("CARGO_PKG_VERSION")),
                 window: u8::try_from(D).unwrap_or(u8::MAX),
                 tick_hz: C::RATE.hz(),
+                latency_us: arm.latency_us,
                 clock_hz: C::HZ,
                 epoch: None,
                 last: LastSession::default(),

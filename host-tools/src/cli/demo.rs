@@ -314,7 +314,7 @@ impl<'t> Tour<'_, 't> {
         let (mut session, device) = Session::open(terrain, scene, arming, transport, patience)?;
         let line = format!("device         {}\n", session_summary::device(&device));
         voice::put(std::io::stdout(), &line);
-        crate::stability::limits::warn(&scene.law, device.tick_hz);
+        crate::stability::limits::warn(&scene.law, &device);
         let tell = |line: String| voice::put(std::io::stderr(), &(line + "\n"));
         let mut shown = self.shown.and_then(|shown| shown.start(&device, tell));
         let stop_tick = (self.stop_s * f64::from(device.tick_hz)).ceil() as u64;

@@ -225,7 +225,7 @@ fn replay<'t>(
 ) -> Result<Summary, Failure> {
     let progress = progress::bar(None, "{spinner} {human_pos} rows, {per_sec}");
     interrupt::listen();
-    crate::stability::limits::warn(&felt.law.0, replayer.device().tick_hz);
+    crate::stability::limits::warn(&felt.law.0, replayer.device());
     let device = Device::of(replayer.device());
     let mut settings = Settings::new(&felt.file, felt.terrain, felt.law, None, device);
     settings.views.clone_from(&felt.views);

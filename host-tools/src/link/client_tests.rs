@@ -22,6 +22,7 @@ pub(crate) fn hello() -> DeviceHello {
         version: "1".try_into().expect("fits"),
         window: 4,
         tick_hz: 1000,
+        latency_us: 110,
         clock_hz: 1_000_000,
         epoch: None,
         last: LastSession::default(),

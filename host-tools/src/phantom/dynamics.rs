@@ -98,7 +98,7 @@ mod tests {
 
     impl Dynamics {
         /// Kinetic plus potential energy, J. The stops' springs are not included.
-        pub(in crate::phantom) fn energy_j(&self, q_rad: [f64; 3], rate_rad_s: [f64; 3]) -> f64 {
+        pub(crate) fn energy_j(&self, q_rad: [f64; 3], rate_rad_s: [f64; 3]) -> f64 {
             let pose = Pose::new(DVec3::from(q_rad));
             let rate = DVec3::from(rate_rad_s);
             let lumped = &self.model.lumped;

@@ -12,7 +12,8 @@ use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_core::terrain::{FieldSize, Tile, TileDemand, TileKey, TileRequester};
 use hapterra_core::tick::{Command, Haptics};
 
-use crate::phantom::{HeldPhantom, Placement};
+use super::surface_work::SurfaceWork;
+use crate::phantom::{HeldPhantom, PhantomModel, Placement};
 
 /// Tiles to a side of the loop's window, and cells of the plane, of 4 mm.
 const WINDOW: usize = 4;
@@ -32,8 +33,8 @@ pub(super) struct Step {
     pub(super) sample: Sample,
     /// True place of the tip after it, east, north and up, mm.
     pub(super) tip_mm: [f64; 3],
-    /// What the surface gave to the tip meanwhile, mJ: the upward force that the amplifiers
-    /// were asked for, times the tip's displacement.
+    /// What the surface gave to the arm meanwhile, mJ: the work of its part of the motors'
+    /// torques.
     pub(super) given_mj: f64,
 }
 
@@ -56,10 +57,14 @@ pub(super) fn run(felt: &Felt, arm: HeldPhantom, look: &mut dyn FnMut(f64, &Step
         std::array::from_fn(|_| spare.pop().unwrap_or_else(|| unreachable!("a tile a slot")))
     });
     let mut haptics = Haptics::<WINDOW>::new(slots, felt.rate, None);
-    if let Ok(mechanism) = Mechanism::new(&Calibration::PREMIUM_1_5) {
+    let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5).ok();
+    if let Some(mechanism) = mechanism {
         haptics.configure(mechanism);
     }
     let scene = scene(felt);
+    // What the plant's amplifiers take comes on top.
+    let lag_s = arm.plant().model().drive[0].motor.current_lag_s;
+    haptics.acts_after((felt.delay_s + lag_s) as f32);
     for command in [Command::Scene(scene), Command::Zero([0; 3]), Command::Arm] {
         let _ = haptics.accept(command);
     }
@@ -68,10 +73,11 @@ pub(super) fn run(felt: &Felt, arm: HeldPhantom, look: &mut dyn FnMut(f64, &Step
 
     let mut arm = arm.arming();
     let tick_s = 1.0 / f64::from(felt.rate.hz());
-    let mut wire = Wire::new(felt.delay_s, tick_s);
+    let mut wire = Wire::new(felt.delay_s, tick_s, arm.plant().model());
     let ticks = ((HeldPhantom::ARMED_S + arm.script_s()) / tick_s) as u32;
     for tick in 0..ticks {
-        let outcome = haptics.tick(&arm.sense(), true);
+        let sense = arm.sense();
+        let outcome = haptics.tick(&sense, true);
         let sample = outcome.sample;
         let demand = TileDemand {
             missing_tile: sample.missing_tile,
@@ -85,9 +91,17 @@ pub(super) fn run(felt: &Felt, arm: HeldPhantom, look: &mut dyn FnMut(f64, &Step
             requester.received(key);
             spare.extend(haptics.accept(Command::Tile(tile)));
         }
+        let weight_a = mechanism.map_or(Vec3::ZERO, |mechanism| {
+            let pose = mechanism.pose(sense.counts, [0; 3]);
+            mechanism.currents_a(mechanism.gravity_nm(&pose))
+        });
+        let currents_a = outcome.drive.currents_a;
         let sent = Sent {
-            currents_a: outcome.drive.currents_a.to_array().map(f64::from),
-            up_n: f64::from(sample.force_n.z),
+            currents_a: currents_a.to_array().map(f64::from),
+            of_surface_a: match sample.force_n == Vec3::ZERO {
+                true => [0.0; 3],
+                false => (currents_a - weight_a).to_array().map(f64::from),
+            },
         };
         let given_mj = wire.carry(sent, &mut arm);
         let step = Step {
@@ -101,12 +115,12 @@ pub(super) fn run(felt: &Felt, arm: HeldPhantom, look: &mut dyn FnMut(f64, &Step
     }
 }
 
-/// What a tick sends to the motors.
+/// What a tick sends to the motors, A.
 #[derive(Clone, Copy, Default)]
 struct Sent {
     currents_a: [f64; 3],
-    /// The surface's part of it at the tip, N.
-    up_n: f64,
+    /// The surface's part of it; the rest holds the arm's weight.
+    of_surface_a: [f64; 3],
 }
 
 /// The time that a board takes from its encoders to its amplifiers.
@@ -116,34 +130,34 @@ struct Wire {
     /// For so much of a tick the motors still have what they had before, s.
     late_s: f64,
     tick_s: f64,
+    work: SurfaceWork,
 }
 
 impl Wire {
-    fn new(delay_s: f64, tick_s: f64) -> Self {
+    fn new(delay_s: f64, tick_s: f64, model: &PhantomModel) -> Self {
         let whole = (delay_s / tick_s).floor();
         Self {
             sent: VecDeque::from(vec![Sent::default(); whole as usize + 1]),
             late_s: delay_s - whole * tick_s,
             tick_s,
+            work: SurfaceWork::new(model),
         }
     }
 
     /// Takes what a tick sends, and moves the arm for as long as it lasts; gives what the
-    /// surface gave to the tip meanwhile, mJ.
+    /// surface gave to the arm meanwhile, mJ.
     fn carry(&mut self, sent: Sent, arm: &mut HeldPhantom) -> f64 {
         self.sent.push_back(sent);
         let before = self.sent.pop_front().unwrap_or(sent);
         let now = self.sent.front().copied().unwrap_or(sent);
         let parts = [(before, self.late_s), (now, self.tick_s - self.late_s)];
-        let mut given_mj = 0.0;
-        for (Sent { currents_a, up_n }, for_s) in parts {
-            if for_s > 0.0 {
-                let [.., from_mm] = tip_mm(arm);
-                arm.step(currents_a, for_s);
-                given_mj += up_n * (tip_mm(arm)[2] - from_mm);
-            }
-        }
-        given_mj
+        let given_mj = parts.map(|(sent, for_s)| match for_s > 0.0 {
+            true => self
+                .work
+                .step(sent.currents_a, sent.of_surface_a, for_s, arm),
+            false => 0.0,
+        });
+        given_mj.iter().sum()
     }
 }
 

@@ -2,23 +2,39 @@
 
 use hapterra_core::force::{ForceLaw, Texture, passivity};
 use hapterra_core::rate::TickRate;
+use hapterra_core::wire::hello::DeviceHello;
 
 /// Stiffness up to which a press is still in a limp hand, N/mm: ticks a second, without and
-/// with the passivity controller. Tried again in the tests.
-pub(super) const STILL_N_PER_MM: [(u32, f32, f32); 4] = [
-    (1_000, 3.0, 6.0),
+/// with the passivity controller.
+pub(super) type StillUpTo = [(u32, f32, f32); 4];
+
+/// Where 0.08 ms pass from the encoders to the amplifiers. Tried again in the tests.
+pub(super) const STILL_N_PER_MM: StillUpTo = [
+    (1_000, 2.5, 6.0),
     (2_000, 4.0, 8.0),
     (4_000, 6.0, 8.0),
     (10_000, 8.0, 8.0),
 ];
 
+/// Where a millisecond passes, as with amplifiers that are commanded by duty cycles.
+pub(super) const STILL_LATE_N_PER_MM: StillUpTo = [
+    (1_000, 1.0, 3.0),
+    (2_000, 1.0, 3.0),
+    (4_000, 1.5, 3.0),
+    (10_000, 1.5, 3.0),
+];
+
+/// Latency up to which the first of the two holds, µs: 0.08 ms, and the lag of the amplifiers'
+/// current loops.
+const SHORT_US: u16 = 200;
+
 /// What is left of that on a textured surface: its steepest slopes rock a limp hand, too.
 pub(super) const LEFT_WITH_TEXTURE: f32 = 0.5;
 
-/// Warns of a surface that is too stiff for a device of so many ticks a second.
-pub fn warn(law: &ForceLaw, tick_hz: u32) {
-    let rate = TickRate::new(tick_hz);
-    let warnings = rate.map(|rate| [warning(law, rate), too_fine(&law.texture, rate)]);
+/// Warns of a surface that is too stiff for a device's tick rate and latency.
+pub fn warn(law: &ForceLaw, device: &DeviceHello) {
+    let (rate, latency_us) = (TickRate::new(device.tick_hz), device.latency_us);
+    let warnings = rate.map(|rate| [warning(law, rate, latency_us), too_fine(&law.texture, rate)]);
     for warning in warnings.into_iter().flatten().flatten() {
         tracing::warn!("{warning}");
     }
@@ -36,24 +52,29 @@ fn too_fine(texture: &Texture, rate: TickRate) -> Option<String> {
     })
 }
 
-/// What has to be said of a surface at a device's rate; `None` where every hand on the
+/// What has to be said of a surface at a device's rate and latency; `None` where every hand on the
 /// virtual arm holds it still, and theory does not speak against it.
 #[must_use]
-fn warning(law: &ForceLaw, rate: TickRate) -> Option<String> {
+fn warning(law: &ForceLaw, rate: TickRate, latency_us: u16) -> Option<String> {
     let (stiffness, hz) = (law.stiffness_n_per_mm, rate.hz());
-    let is_controlled = law.is_controlled(rate);
+    let latency_s = 1e-6 * f32::from(latency_us);
+    let is_controlled = law.is_controlled(rate, latency_s);
     let with = if is_controlled { "with" } else { "without" };
     let (still, passive) = (
-        still_n_per_mm(rate, is_controlled, &law.texture),
-        passivity::stiffest_n_per_mm(rate),
+        still_n_per_mm(rate, latency_us, is_controlled, &law.texture),
+        passivity::stiffest_n_per_mm(rate, latency_s),
     );
+    let late = match latency_us > SHORT_US {
+        true => format!(" and {:.2} ms to the motors", 1e3 * latency_s),
+        false => String::new(),
+    };
     if stiffness > still {
         let shakes = match law.texture.is_none() {
             true => "shakes",
             false => "may shake on a texture",
         };
         return Some(format!(
-            "a stiffness of {stiffness} N/mm: on the virtual arm a limp hand {shakes} above {still} N/mm at {hz} ticks a second, {with} the passivity controller (hapterra stability)"
+            "a stiffness of {stiffness} N/mm: on the virtual arm a limp hand {shakes} above {still} N/mm at {hz} ticks a second{late}, {with} the passivity controller (hapterra stability)"
         ));
     }
     let controller = match is_controlled {
@@ -62,18 +83,25 @@ fn warning(law: &ForceLaw, rate: TickRate) -> Option<String> {
     };
     (stiffness > passive).then(|| {
         format!(
-            "a stiffness of {stiffness} N/mm: people hold 0.4 to 0.8 N/mm on a Phantom Premium 1.5; above {passive} N/mm at {hz} ticks a second a limp hand alone does not hold it, and an arm may buzz or kick; {controller}"
+            "a stiffness of {stiffness} N/mm: people hold 0.4 to 0.8 N/mm on a Phantom Premium 1.5; above {passive:.2} N/mm at {hz} ticks a second{late} a limp hand alone does not hold it, and an arm may buzz or kick; {controller}"
         )
     })
 }
 
-/// Of the rates that were tried, the fastest that is no faster counts.
-pub(super) fn still_n_per_mm(rate: TickRate, is_controlled: bool, texture: &Texture) -> f32 {
-    let slower = STILL_N_PER_MM
-        .iter()
-        .rev()
-        .find(|(hz, ..)| *hz <= rate.hz());
-    let (_, without, with) = slower.unwrap_or(&STILL_N_PER_MM[0]);
+/// Of the rates that were tried, the fastest that is no faster counts; of the latencies, the one
+/// that is not shorter.
+pub(super) fn still_n_per_mm(
+    rate: TickRate,
+    latency_us: u16,
+    is_controlled: bool,
+    texture: &Texture,
+) -> f32 {
+    let tried = match latency_us > SHORT_US {
+        true => STILL_LATE_N_PER_MM,
+        false => STILL_N_PER_MM,
+    };
+    let slower = tried.iter().rev().find(|(hz, ..)| *hz <= rate.hz());
+    let (_, without, with) = slower.unwrap_or(&tried[0]);
     let even = if is_controlled { *with } else { *without };
     match texture.is_none() {
         true => even,
@@ -88,6 +116,15 @@ mod tests {
     use super::*;
 
     fn told(stiffness_n_per_mm: f32, hz: u32, controller: Controller) -> String {
+        told_late(stiffness_n_per_mm, hz, 190, controller)
+    }
+
+    fn told_late(
+        stiffness_n_per_mm: f32,
+        hz: u32,
+        latency_us: u16,
+        controller: Controller,
+    ) -> String {
         let law = ForceLaw {
             stiffness_n_per_mm,
             damping: Damping {
@@ -97,7 +134,7 @@ mod tests {
             ..ForceLaw::PREMIUM
         };
         let rate = TickRate::new(hz).expect("a rate");
-        warning(&law, rate).unwrap_or_default()
+        warning(&law, rate, latency_us).unwrap_or_default()
     }
 
     #[test]
@@ -136,7 +173,7 @@ mod tests {
                 ..ForceLaw::PREMIUM
             };
             // Above 1 N/mm the controller is on by itself.
-            warning(&law, TickRate::DEFAULT).unwrap_or_default()
+            warning(&law, TickRate::DEFAULT, 190).unwrap_or_default()
         };
         assert_eq!(told(1.0), "");
         let shakes = told(3.1);
@@ -165,5 +202,29 @@ mod tests {
         assert!(shakes(3.5, 1000, Controller::Off) && !shakes(3.5, 1000, Controller::Auto));
         assert!(shakes(6.5, 1000, Controller::Auto) && !shakes(6.5, 3000, Controller::Auto));
         assert!(shakes(5.0, 3000, Controller::Off) && !shakes(5.0, 4000, Controller::Off));
+    }
+
+    #[test]
+    fn a_surface_is_warned_of_by_the_latency() {
+        // A nucleo-h743zi2 with duty cycles: the controller is on from 0.35 N/mm.
+        let told = |stiffness, controller| told_late(stiffness, 1000, 1130, controller);
+        assert_eq!(told(0.3, Controller::Auto), "");
+        let half = told(0.5, Controller::Off);
+        assert!(
+            half.contains("above 0.35 N/mm at 1000 ticks a second and 1.13 ms to the motors"),
+            "{half}"
+        );
+        let half = told(0.5, Controller::Auto);
+        assert!(
+            half.contains("the passivity controller takes back"),
+            "{half}"
+        );
+        let shakes = |stiffness, controller| {
+            told(stiffness, controller).contains("a limp hand shakes above")
+        };
+        assert!(shakes(1.5, Controller::Off) && !shakes(1.5, Controller::Auto));
+        assert!(shakes(4.0, Controller::Auto) && !shakes(3.0, Controller::Auto));
+        // What would be still without the latency.
+        assert!(!told_late(4.0, 1000, 190, Controller::Auto).contains("shakes"));
     }
 }

@@ -9,7 +9,8 @@ use hapterra_core::rate::TickRate;
 
 use super::bounds::AtTip;
 use super::grasp::Grasp;
-use super::trial::{Press, Setting, TAP_SPEEDS_M_S, Trial, Verdict};
+use super::tap::{TAP_SPEEDS_M_S, Taps};
+use super::trial::{Press, Setting, Trial, Verdict};
 use crate::phantom::{OutOfReach, PhantomModel};
 
 /// Trials of every stiffness in every grasp with every damping at every rate.
@@ -163,7 +164,11 @@ impl Map {
     /// # Errors
     /// Of the writer.
     pub fn write_csv(&self, to: &mut dyn Write) -> io::Result<()> {
-        let taps = TAP_SPEEDS_M_S.map(|speed| format!("given_mj_at_{speed}_m_s"));
+        let taps = TAP_SPEEDS_M_S.map(|speed| {
+            format!(
+                "given_mj_at_{speed}_m_s,slowest_touch_at_{speed}_m_s,fastest_touch_at_{speed}_m_s"
+            )
+        });
         writeln!(
             to,
             "tick_hz,damping_ns_per_m,controller,grasp,stiffness_n_per_mm,delay_us,texture,amplitude_mm,wavelength_mm,press,swing_mm,swings_hz,fault,{}",
@@ -186,9 +191,14 @@ impl Map {
                 } => format!("{swing_mm:.6},{swings_hz:.1},"),
                 Press::Tripped(fault) => format!(",,{fault:?}"),
             };
-            let given = trial
-                .given_mj
-                .map(|given| given.map_or_else(String::new, |mj| format!("{mj:.6}")));
+            let taps = trial.taps.map(|taps| {
+                let row =
+                    |Taps {
+                         given_mj,
+                         touched_m_s: [slowest, fastest],
+                     }| { format!("{given_mj:.6},{slowest:.4},{fastest:.4}") };
+                taps.map_or_else(|| ",,".to_owned(), row)
+            });
             writeln!(
                 to,
                 "{},{:.1},{},{},{stiffness_n_per_mm},{:.0},{},{},{},{verdict},{press},{}",
@@ -200,7 +210,7 @@ impl Map {
                 pattern(texture),
                 texture.amplitude_mm,
                 texture.wavelength_mm,
-                given.join(",")
+                taps.join(",")
             )?;
         }
         Ok(())

@@ -4,6 +4,8 @@
 //!
 //! - [`grasp`]: how the hand holds the tip;
 //! - `contact_loop`: the tick and the arm, step by step;
+//! - `surface_work`: the energy that the surface gives;
+//! - [`tap`]: taps at a stated speed;
 //! - [`trial`]: what a press and taps show: hum, and energy that the surface gave;
 //! - [`bounds`]: stiffness that theory says is passive;
 //! - [`map`]: many trials, and the table of them;
@@ -18,6 +20,8 @@ pub mod grasp;
 pub mod limits;
 pub mod map;
 pub mod picture;
+mod surface_work;
+pub mod tap;
 pub mod trial;
 
 #[cfg(test)]

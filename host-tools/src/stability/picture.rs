@@ -12,7 +12,8 @@ use hapterra_core::rate::TickRate;
 
 use super::grasp::Grasp;
 use super::map::{self, Map};
-use super::trial::{TAP_SPEEDS_M_S, Trial, Verdict};
+use super::tap::TAP_SPEEDS_M_S;
+use super::trial::{Trial, Verdict};
 use crate::picture::axes::{self, Area, Titles};
 use crate::picture::style::{self, INK, SERIES, SOFT_INK, px, stroke};
 use crate::picture::{Canvas, PictureError, line};
@@ -134,7 +135,7 @@ fn chart(
 
 /// A trial in the chart; where the guard switched the force off, at the top.
 fn place(trial: &Trial) -> (f64, f64) {
-    let given_mj = trial.given_mj[DRAWN].unwrap_or(GIVEN_MJ.end);
+    let given_mj = trial.taps[DRAWN].map_or(GIVEN_MJ.end, |taps| taps.given_mj);
     let given_mj = given_mj.clamp(GIVEN_MJ.start, GIVEN_MJ.end);
     (trial.setting.stiffness_n_per_mm, given_mj)
 }

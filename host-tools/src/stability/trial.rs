@@ -1,4 +1,4 @@
-//! One stiffness in one hand at one tick rate: a press, and taps.
+//! One stiffness in one hand at one tick rate: a press, and [taps](super::tap).
 
 use hapterra_core::force::{Damping, Texture};
 use hapterra_core::guard::Fault;
@@ -6,25 +6,15 @@ use hapterra_core::rate::TickRate;
 
 use super::contact_loop::{self, Felt, HOME, PLANE_MM};
 use super::grasp::Grasp;
+use super::tap::{TAP_SPEEDS_M_S, Taps};
 use crate::phantom::{HeldPhantom, OutOfReach, PhantomModel, Script, Touch};
 
 /// The press, N, and how long it is held; what is looked at is its last second.
 const PRESS_N: f64 = 1.0;
 const HELD_S: f64 = 2.5;
 const LOOKED_AT_S: f64 = 1.0;
-/// The hand begins so far above the surface, mm.
-const ABOVE_MM: f64 = 30.0;
-/// A tap aims so far below it, mm.
-const BELOW_MM: f64 = 25.0;
-/// Between two taps the tip is higher above it than this, mm.
-const APART_MM: f64 = 10.0;
-/// Taps of each speed.
-const TAPS: usize = 3;
 /// The tip swings by more than this, mm: no hand holds it.
 const UNSTABLE_MM: f64 = 1.0;
-
-/// Speeds of the tapping hand, m/s.
-pub const TAP_SPEEDS_M_S: [f64; 3] = [0.1, 0.2, 0.5];
 
 /// What is tried.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,10 +55,8 @@ pub struct Trial {
     pub setting: Setting,
     /// The press.
     pub press: Press,
-    /// What the surface gave to the hand in one tap at most, mJ, for each of
-    /// [`TAP_SPEEDS_M_S`]; none where the guard switched the force off. A passive surface
-    /// gives nothing.
-    pub given_mj: [Option<f64>; 3],
+    /// Taps at each of [`TAP_SPEEDS_M_S`]; none where the guard switched the force off.
+    pub taps: [Option<Taps>; 3],
 }
 
 /// What the hand feels of a press.
@@ -113,18 +101,18 @@ impl Setting {
     /// [`OutOfReach`] where the hand would have to leave the arm's reach.
     pub fn tried(self) -> Result<Trial, OutOfReach> {
         let press = self.press()?;
-        let mut given_mj = [None; 3];
-        for (given, speed_m_s) in given_mj.iter_mut().zip(TAP_SPEEDS_M_S) {
-            *given = self.taps(speed_m_s)?;
+        let mut taps = [None; 3];
+        for (taps, speed_m_s) in taps.iter_mut().zip(TAP_SPEEDS_M_S) {
+            *taps = self.taps(speed_m_s)?;
         }
         Ok(Trial {
             setting: self,
             press,
-            given_mj,
+            taps,
         })
     }
 
-    fn press(self) -> Result<Press, OutOfReach> {
+    pub(super) fn press(self) -> Result<Press, OutOfReach> {
         let (hand, wall) = (self.grasp.hand(), self.stiffness_n_per_mm);
         let [east, north, _] = HOME.home_mm;
         let above = Touch::start(&|_, _| Some(PLANE_MM), &hand, wall, [east, north], 10.0);
@@ -144,36 +132,15 @@ impl Setting {
         })
     }
 
-    /// What the surface gave in one tap at most, mJ.
-    fn taps(self, speed_m_s: f64) -> Result<Option<f64>, OutOfReach> {
-        let [east, north, _] = HOME.home_mm;
-        let (above, below) = (PLANE_MM + ABOVE_MM, PLANE_MM - BELOW_MM);
-        let mut script = Script::start([east, north, above]);
-        for _ in 0..TAPS {
-            for up_mm in [below, above] {
-                script = script.go([east, north, up_mm], 1e3 * speed_m_s);
-            }
-        }
-        let arm = self.arm(script.wait(0.2))?;
-        let (mut given_mj, mut most_mj, mut is_tripped) = (0.0, f64::NEG_INFINITY, false);
-        self.run(arm, &mut |_, step| {
-            given_mj += step.given_mj;
-            // Whatever is still on its way to the motors belongs to the tap.
-            if step.tip_mm[2] > PLANE_MM + APART_MM && given_mj != 0.0 {
-                most_mj = given_mj.max(most_mj);
-                given_mj = 0.0;
-            }
-            is_tripped = step.sample.fault.is_some();
-            !is_tripped
-        });
-        Ok((!is_tripped).then_some(most_mj.max(given_mj)))
-    }
-
-    fn arm(self, script: Script) -> Result<HeldPhantom, OutOfReach> {
+    pub(super) fn arm(self, script: Script) -> Result<HeldPhantom, OutOfReach> {
         HeldPhantom::new(PhantomModel::premium_1_5(), self.grasp.hand(), HOME, script)
     }
 
-    fn run(self, arm: HeldPhantom, look: &mut dyn FnMut(f64, &contact_loop::Step) -> bool) {
+    pub(super) fn run(
+        self,
+        arm: HeldPhantom,
+        look: &mut dyn FnMut(f64, &contact_loop::Step) -> bool,
+    ) {
         let felt = Felt {
             rate: self.rate,
             stiffness_n_per_mm: self.stiffness_n_per_mm,

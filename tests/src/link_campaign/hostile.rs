@@ -272,6 +272,7 @@ pub fn hello(number: u8) -> DeviceHello {
         version: "\r\n\u{202e}".try_into().unwrap_or_default(),
         window: 0,
         tick_hz: 0,
+        latency_us: 0,
         clock_hz: 0,
         epoch: None,
         opened_by: number,

@@ -15,6 +15,7 @@ use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::hello::SerialNumber;
 use hapterra_core::wire::status::BootReport;
+use hapterra_firmware::amplifier::CURRENT_LOOP_US;
 use hapterra_firmware::app::{Application, Hardware, TileBuffers, WorkingMemory, assemble};
 use hapterra_firmware::board::Sense;
 use hapterra_firmware::haptic_loop::HapticLoop;
@@ -78,6 +79,7 @@ impl Board {
             amplifiers: VirtualAmplifiersOff,
             clock: StoppedClock,
             full_scale_a: FULL_SCALE_A,
+            latency_us: CURRENT_LOOP_US,
             calibration: Stored::Found(Calibration::PREMIUM_1_5),
             motors: Temperatures::AIR,
             serial: SerialNumber::NONE,

@@ -16,7 +16,7 @@ use super::calibration_memory::CalibrationMemory;
 use super::{clock, failure, heartbeat, motor_memory, priorities, stack_guard, supply, tasks};
 use crate::application::{self, Loop, TICK_DONE};
 use crate::chip::{self, Clock};
-use crate::outputs::BOARD;
+use crate::outputs::{BOARD, LATENCY_US};
 
 /// Current in amperes that the ends of an output's range stand for.
 pub(crate) const FULL_SCALE_A: f32 = 5.5;
@@ -73,6 +73,7 @@ async fn main(spawner: Spawner) {
         amplifiers: parts.amplifiers,
         clock: Clock::new(parts.timer),
         full_scale_a: FULL_SCALE_A,
+        latency_us: LATENCY_US,
         calibration,
         motors: motor_memory::begin(boot.cause),
         serial: SerialNumber::new(embassy_stm32::uid::uid()),

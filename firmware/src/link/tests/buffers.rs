@@ -27,6 +27,7 @@ fn link() -> (Link<'static, D>, LoopEnds<'static>) {
         calibration: None,
         source: CalibrationSource::None,
         full_scale_a: FULL_SCALE_A,
+        latency_us: 190,
     };
     let device = DeviceState::new::<StoppedClock, D>(
         ("test", SerialNumber::NONE),

@@ -95,7 +95,7 @@ impl<'t> Serving<'_, 't> {
         if let Some(line) = told_of_last_end(&hello) {
             speaker.tell(line);
         }
-        limits::warn(&placed.scene.law, hello.tick_hz);
+        limits::warn(&placed.scene.law, &hello);
         let recording = described(self.recording, args, placed, &hello);
         let laid = Laid {
             view: placed.view,
