@@ -11,6 +11,8 @@ use crate::guard::{Blockers, Mode};
 use crate::terrain::testing::buffers;
 use crate::terrain::{FieldSize, TileDemand, TileRequester};
 
+#[path = "tick_tests/materials.rs"]
+mod materials;
 #[path = "tick_tests/textured.rs"]
 mod textured;
 #[path = "tick_tests/views.rs"]
@@ -31,6 +33,7 @@ fn scene(source: Source) -> Scene {
         rule: Rule::Swept,
         source,
         hold_clock: false,
+        materials: None,
     }
 }
 

@@ -96,6 +96,7 @@ impl<'t> Chain<'t> {
         let home = home.ok_or_else(|| NotMeasured("it is farther than positions reach".into()))?;
         let scene = Scene {
             hold_clock: false,
+            materials: None,
             ..terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home)
         };
         // Whoever holds the arm waits for no server.

@@ -249,6 +249,7 @@ impl<'r> Terrain<'r> {
             rule,
             source,
             hold_clock: true,
+            materials: None,
         };
         scene.epoch = identity::epoch(self.fingerprint(), &self.grid, &self.scale, &scene);
         scene

@@ -141,6 +141,7 @@ fn host_scene(chance: &mut Chance, epoch: u32) -> Scene {
         rule: Rule::Swept,
         source: [Source::Encoders, Source::Points][chance.below(2)],
         hold_clock: chance.below(2) == 0,
+        materials: None,
     }
 }
 
