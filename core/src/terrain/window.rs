@@ -418,8 +418,9 @@ mod tests {
                     field.give_back(key);
                 }
             }
-            let b = a.offset(step % 41 - 20, step * 3 % 57 - 28);
-            let low = Altitude::new(step % 68, 0.5);
+            // Also over all three tiles.
+            let b = a.offset(step % 181 - 90, step * 3 % 157 - 78);
+            let low = Altitude::new(step % 80, 0.5);
             let span = CellBox::around(a, b);
             let clear = field.window.is_clear(span, low);
             seen[usize::from(clear)] += 1;

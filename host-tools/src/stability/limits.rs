@@ -1,6 +1,6 @@
 //! What the map says to who is about to feel a surface.
 
-use hapterra_core::force::{ForceLaw, Texture, passivity};
+use hapterra_core::force::{Controller, ForceLaw, MaterialTable, Texture, passivity};
 use hapterra_core::rate::TickRate;
 
 /// Stiffness up to which a press is still in a limp hand, N/mm: ticks a second, without and
@@ -22,6 +22,39 @@ pub fn warn(law: &ForceLaw, tick_hz: u32) {
     for warning in warnings.into_iter().flatten().flatten() {
         tracing::warn!("{warning}");
     }
+}
+
+/// The same of a surface of several materials, once for each warning. The device takes the
+/// controller for the stiffest of them.
+pub fn warn_of(law: &ForceLaw, materials: Option<&MaterialTable>, tick_hz: u32) {
+    let Some(table) = materials else {
+        return warn(law, tick_hz);
+    };
+    for warning in warnings_of(law, table, tick_hz) {
+        tracing::warn!("{warning}");
+    }
+}
+
+fn warnings_of(law: &ForceLaw, table: &MaterialTable, tick_hz: u32) -> Vec<String> {
+    let mut told = Vec::new();
+    let Some(rate) = TickRate::new(tick_hz) else {
+        return told;
+    };
+    let is_controlled = table.hardest(law).is_controlled(rate);
+    let scale = table.stiffness_scale(law);
+    for material in table.materials() {
+        let mut law = material.law(law);
+        law.stiffness_n_per_mm *= scale;
+        law.damping.controller = match is_controlled {
+            true => Controller::On,
+            false => Controller::Off,
+        };
+        let warnings = [warning(&law, rate), too_fine(&law.texture, rate)];
+        told.extend(warnings.into_iter().flatten());
+    }
+    told.sort();
+    told.dedup();
+    told
 }
 
 /// What has to be said of a texture so fine that a slow hand does not feel it in whole.
@@ -83,7 +116,7 @@ pub(super) fn still_n_per_mm(rate: TickRate, is_controlled: bool, texture: &Text
 
 #[cfg(test)]
 mod tests {
-    use hapterra_core::force::{Controller, Damping, Pattern};
+    use hapterra_core::force::{Damping, Material, Pattern};
 
     use super::*;
 
@@ -98,6 +131,39 @@ mod tests {
         };
         let rate = TickRate::new(hz).expect("a rate");
         warning(&law, rate).unwrap_or_default()
+    }
+
+    #[test]
+    fn the_stiffest_and_the_finest_of_several_materials_are_warned_of() {
+        let soft = Material::of(&ForceLaw::PREMIUM);
+        let stiff = Material {
+            stiffness_n_per_mm: 2.0,
+            ..soft
+        };
+        let fine = Material {
+            texture: Texture {
+                pattern: Pattern::Grain,
+                amplitude_mm: 0.03,
+                wavelength_mm: 0.3,
+                ..Texture::NONE
+            },
+            ..soft
+        };
+        let told = |materials: &[Material], law: &ForceLaw| {
+            let table = MaterialTable::new(materials).expect("some");
+            warnings_of(law, &table, 1000).join("; ")
+        };
+        let law = ForceLaw::PREMIUM;
+        assert_eq!(told(&[soft, soft], &law), "");
+        let both = told(&[soft, stiff, fine, stiff], &law);
+        assert_eq!(both.matches("a stiffness of 2 N/mm").count(), 1, "{both}");
+        assert!(both.contains("controller takes back") && both.contains("wavelength of 0.3 mm"));
+        // A scene that is twice as stiff is so on each of them.
+        let twice = ForceLaw {
+            stiffness_n_per_mm: 1.0,
+            ..law
+        };
+        assert!(told(&[soft, stiff], &twice).contains("a stiffness of 4 N/mm"));
     }
 
     #[test]
