@@ -9,7 +9,7 @@ use crate::force::ForceLaw;
 use crate::grid::MAX_CELL;
 use crate::guard::{Blockers, Mode};
 use crate::terrain::testing::buffers;
-use crate::terrain::{FieldSize, TileDemand, TileRequester};
+use crate::terrain::{FieldSize, POSTS, TileDemand, TileRequester};
 
 #[path = "tick_tests/materials.rs"]
 mod materials;
@@ -43,6 +43,8 @@ struct Device<'t, const D: usize> {
     requester: TileRequester<D>,
     spare: Vec<&'t mut Tile>,
     height: fn(i32, i32) -> f32,
+    /// The material of a sample, in a scene that has some; `None` for tiles that come without.
+    material: fn(TileKey, [i32; 2]) -> Option<u8>,
     size: FieldSize,
     demand: TileDemand,
     served: usize,
@@ -66,6 +68,7 @@ impl<'t, const D: usize> Device<'t, D> {
             requester,
             spare,
             height,
+            material: |_, _| None,
             size: scene.size,
             demand: TileDemand::default(),
             served: 0,
@@ -123,6 +126,14 @@ impl<'t, const D: usize> Device<'t, D> {
     fn serve(&mut self, key: TileKey) {
         let tile = self.spare.pop().expect("as many spares as requests");
         tile.fill_from(key, 0, self.size, self.height).unwrap();
+        let first = key.index.first_cell();
+        let materials = (0..POSTS * POSTS).map(|i| {
+            let (col, row) = ((i % POSTS) as i32, (i / POSTS) as i32);
+            (self.material)(key, [first.x + col, first.y + row])
+        });
+        if let Some(materials) = materials.collect::<Option<Vec<_>>>() {
+            tile.set_materials(4, materials).expect("of the table");
+        }
         self.requester.received(key);
         let spent = self.haptics.accept(Command::Tile(tile)).unwrap();
         assert_ne!(

@@ -419,7 +419,10 @@ mod tests {
                 }
             }
             // Also over all three tiles.
-            let b = a.offset(step % 181 - 90, step * 3 % 157 - 78);
+            let b = match step % 2 {
+                0 => a.offset(step % 41 - 20, step * 3 % 57 - 28),
+                _ => a.offset(step % 181 - 90, step * 3 % 157 - 78),
+            };
             let low = Altitude::new(step % 80, 0.5);
             let span = CellBox::around(a, b);
             let clear = field.window.is_clear(span, low);

@@ -5,7 +5,7 @@ use std::vec::Vec;
 use super::*;
 use crate::contact::Friction;
 use crate::force::{MATERIAL_CHANGE_S, Material, MaterialTable, Pattern, Shading, Texture};
-use crate::terrain::{POSTS, TileIndex};
+use crate::terrain::TileIndex;
 
 /// Ticks of a whole change.
 const CHANGE: u32 = (1e3 * MATERIAL_CHANGE_S) as u32;
@@ -308,26 +308,94 @@ fn a_tick_that_is_repeated_for_a_tile_leaves_no_trace() {
     }
 }
 
-#[test]
-fn without_the_tile_the_material_stays() {
-    let mut tiles = std::vec![Tile::VACANT; 20];
-    let mut device = Device::<4>::armed(&mut tiles, |_, _| 2.0);
-    // The scene once more with materials; its tiles come without, as over an underlay.
-    let table = MaterialTable::new(&[HARD, SOFT]).expect("some");
+/// A replay of a table over a field, whose tiles come when they are asked for.
+fn replayed<'t, const D: usize>(
+    tiles: &'t mut [Tile],
+    table: &[Material],
+    height: fn(i32, i32) -> f32,
+    material: fn(TileKey, [i32; 2]) -> Option<u8>,
+) -> Device<'t, D> {
+    let mut device = Device::<D>::new(tiles, Source::Points, height);
+    let table = MaterialTable::new(table).expect("some");
     let mut scene = Scene {
         materials: Some(table.check_sum()),
-        ..scene(Source::Encoders)
+        ..scene(Source::Points)
     };
-    scene.law.stiffness_n_per_mm = 2.0;
+    scene.law.stiffness_n_per_mm = table.materials()[0].stiffness_n_per_mm;
+    scene.law.shading = Shading::Smooth;
     device.haptics.take_materials(&table);
     device.say(Command::Scene(scene));
-    let effects = device.haptics.effects.as_ref().expect("materials");
-    // Twice as stiff as the table's default, and so is each material.
-    assert_eq!(effects.law(&scene.law).stiffness_n_per_mm, 2.0);
     device.requester.reset(0, scene.size);
-    device.arm([0; 3]);
-    let effects = device.haptics.effects.as_ref().expect("materials");
-    assert_eq!(effects.law(&scene.law).stiffness_n_per_mm, 2.0);
+    device.material = material;
+    device
+}
+
+#[test]
+fn where_the_tile_has_no_materials_the_one_before_stays() {
+    let mut tiles = buffers::<4>();
+    let east_alone = |key: TileKey, _| (key.index.col >= 10).then_some(1);
+    let mut device = replayed::<4>(&mut tiles, &[SOFT, HARD], |_, _| 0.0, east_alone);
+    let mut seq = 0;
+    let mut at = |x: f32, z: f32| {
+        seq += 1;
+        let hip = GridPoint::new([300, 300, 0], Vec3::new(x, 0.5, z));
+        device.feel(seq, hip).force_n.z
+    };
+    at(5.0, 1.0);
+    assert_eq!(at(5.0, -1.0), 0.4, "the default");
+    at(25.0, 1.0);
+    assert_eq!(at(25.0, -1.0), 1.0);
+    for x in 0..200 {
+        assert_eq!(at(25.0 - 0.1 * x as f32, -1.0), 1.0, "{x}");
+    }
+    at(5.0, 1.0);
+    assert_eq!(at(5.0, -1.0), 1.0, "out of the air, too");
+}
+
+#[test]
+fn small_windows_that_wait_for_tiles_give_the_bits_of_a_large_one() {
+    fn felt<const D: usize>() -> Vec<(GridPoint, Vec3)> {
+        let rough = Material {
+            friction: Friction::coulomb(0.4),
+            texture: GRATING,
+            ..HARD
+        };
+        let damped = Material {
+            damping_ns_per_m: 5.0,
+            texture: Texture {
+                pattern: Pattern::Grain,
+                ..GRATING
+            },
+            ..SOFT
+        };
+        let mut tiles = buffers::<D>();
+        let patches = |_: TileKey, [x, y]: [i32; 2]| Some(((x / 6 + y / 4) % 4) as u8);
+        let table = [SOFT, rough, damped, HARD];
+        let mut device = replayed::<D>(&mut tiles, &table, hills, patches);
+        let mut way = (0..cases(3_000, 40)).map(|i| {
+            let (t, down) = (f64::from(i), i % 500 > 3);
+            let x = 300.0 + 40.0 * libm::sin(t * 0.011) + 20.0 * libm::sin(t * 0.0017);
+            let y = 310.0 + 35.0 * libm::cos(t * 0.007);
+            let ground = hills(x as i32, y as i32) as f64;
+            let z = ground + if down { -0.7 } else { 6.0 };
+            let place = |c: f64| (c.floor() as i32, (c - c.floor()) as f32);
+            let ((x, u), (y, v), (z, w)) = (place(x), place(y), place(z));
+            let sample = device.feel(i, GridPoint::new([x, y, z], Vec3::new(u, v, w)));
+            (sample.proxy, sample.force_n)
+        });
+        way.by_ref().collect()
+    }
+    let large = felt::<8>();
+    assert!(
+        large
+            .iter()
+            .filter(|(_, force)| *force != Vec3::ZERO)
+            .count()
+            > cases(2_000, 10) as usize
+    );
+    assert_eq!(felt::<2>(), large);
+    assert_eq!(felt::<3>(), large);
+    assert_eq!(felt::<4>(), large);
 }
 
 #[test]

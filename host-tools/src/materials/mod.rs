@@ -9,14 +9,16 @@ mod ground;
 mod pixels;
 pub mod table;
 
+use std::hash::Hasher as _;
 use std::sync::OnceLock;
 
 use hapterra_core::force::{ForceLaw, Material, MaterialTable};
 use hapterra_core::terrain::{POSTS, TileKey};
 use hapterra_core::wire::materials::{MOST_TILE_BYTES, TileMaterials};
 use serde::{Deserialize, Serialize};
+use twox_hash::XxHash64;
 
-use crate::raster::Raster;
+use crate::raster::{Raster, ReferenceSystem};
 use crate::terrain::{FeltGrid, fingerprint};
 pub use ground::BadGround;
 use pixels::Pixels;
@@ -120,10 +122,23 @@ impl Materials {
         &self.table
     }
 
-    /// Hash of all classes, as [`crate::terrain::Terrain::fingerprint`] is of heights.
+    /// Hash of all classes, as [`crate::terrain::Terrain::fingerprint`] is of heights, and of where
+    /// they lie.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
-        *self.fingerprint.get_or_init(|| fingerprint(self.classes()))
+        *self.fingerprint.get_or_init(|| {
+            let (classes, mut hasher) = (self.classes(), XxHash64::with_seed(0));
+            hasher.write(&fingerprint(classes).to_le_bytes());
+            let on = classes.georeference();
+            let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+            let places = corners.map(|corner| on.transform().to_ground(corner));
+            for number in places.as_flattened() {
+                hasher.write(&number.to_le_bytes());
+            }
+            let system = on.reference().map_or("", ReferenceSystem::name);
+            hasher.write(system.as_bytes());
+            hasher.finish()
+        })
     }
 
     /// A law over the default material: that of a scene with these materials.

@@ -224,7 +224,7 @@ pub struct Force {
 pub struct MaterialSettings {
     /// The file of classes, as it was named.
     pub file: String,
-    /// Hash of its classes.
+    /// Hash of its classes and of where they lie.
     pub fingerprint: String,
     /// What the classes feel like.
     #[serde(flatten)]
