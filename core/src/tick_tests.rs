@@ -199,6 +199,41 @@ fn pressed_on_a_plane_the_motors_push_back() {
 }
 
 #[test]
+fn a_tile_that_comes_too_late_pushes_out_none_beside_the_proxy() {
+    let mut tiles = buffers::<3>();
+    let mut device = Device::<3>::armed(&mut tiles, plane);
+    for counts in dip() {
+        let _ = device.tick(counts);
+    }
+    let size = device.size;
+    let fill = |tile: &mut Tile, key| {
+        tile.fill_from(key, 0, size, plane).expect("in range");
+    };
+    // The proxy is in the tile 10, 10; that to the west is here, too.
+    let beside = TileKey::new(0, 9, 10);
+    assert_eq!(device.haptics.window.occupant(beside), Some(beside));
+    let late = TileKey::new(0, 12, 10);
+    assert_eq!(device.haptics.window.occupant(late), Some(beside));
+    let tile = device.spare.pop().expect("a spare one");
+    fill(tile, late);
+    let back = device.haptics.accept(Command::Tile(tile)).expect("refused");
+    assert_eq!(back.key(), Some(late));
+    device.spare.push(back);
+    // The same tile again is taken, and so is one that pushes out what is far away.
+    for key in [beside, TileKey::new(0, 11, 10)] {
+        let tile = device.spare.pop().expect("a spare one");
+        fill(tile, key);
+        let back = device
+            .haptics
+            .accept(Command::Tile(tile))
+            .expect("a buffer");
+        assert_ne!(back.key(), Some(key));
+        assert_eq!(device.haptics.window.occupant(key), Some(key));
+        device.spare.push(back);
+    }
+}
+
+#[test]
 fn disarmed_the_same_is_felt_by_nobody() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::new(&mut tiles, Source::Encoders, plane);

@@ -376,7 +376,7 @@ fn small_windows_that_wait_for_tiles_give_the_bits_of_a_large_one() {
             let (t, down) = (f64::from(i), i % 500 > 3);
             let x = 300.0 + 40.0 * libm::sin(t * 0.011) + 20.0 * libm::sin(t * 0.0017);
             let y = 310.0 + 35.0 * libm::cos(t * 0.007);
-            let ground = hills(x as i32, y as i32) as f64;
+            let ground = f64::from(hills(x as i32, y as i32));
             let z = ground + if down { -0.7 } else { 6.0 };
             let place = |c: f64| (c.floor() as i32, (c - c.floor()) as f32);
             let ((x, u), (y, v), (z, w)) = (place(x), place(y), place(z));
