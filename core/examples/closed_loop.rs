@@ -87,6 +87,7 @@ pub(crate) fn main() -> Result<(), BadCalibration> {
         rule: Rule::Swept,
         source: Source::Encoders,
         hold_clock: false,
+        materials: None,
     };
     let _ = haptics.accept(Command::Scene(scene));
     // The whole field fits the window, so its tiles are given once.

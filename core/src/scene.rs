@@ -49,6 +49,11 @@ pub struct Scene {
     /// On an emulated board: let its clock stand still while the host owes a
     /// tile, so that a slow host machine makes no difference to the contact.
     pub hold_clock: bool,
+    /// The check sum of the table of its materials
+    /// ([`MaterialTable::check_sum`](crate::force::MaterialTable::check_sum)); none where all
+    /// of it is of one material, that of the law. Tiles of a scene with materials carry a
+    /// material for each sample, but for its underlay.
+    pub materials: Option<u32>,
 }
 
 impl Scene {

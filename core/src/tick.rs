@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use crate::clutch::{Clutch, ClutchHold};
 use crate::contact::{Contact, ContactOutput, ContactSettings, Execution, Friction};
-use crate::force::{Damper, Effects, Moment};
+use crate::force::{Damper, Effects, MaterialTable, Moment};
 use crate::grid::GridPoint;
 use crate::guard::thermal::Temperatures;
 use crate::guard::{
@@ -102,6 +102,7 @@ pub struct Outcome {
 ///     rule: Rule::Swept,
 ///     source: Source::Points,
 ///     hold_clock: false,
+///     materials: None,
 /// };
 /// assert!(haptics.accept(Command::Scene(scene)).is_none());
 /// assert!(haptics.accept(Command::Tile(&mut tile)).is_some());
@@ -136,6 +137,9 @@ pub struct Haptics<'t, const D: usize> {
     /// What the scene adds to the spring's force, if anything.
     effects: Option<Effects>,
     window: Window<'t, D>,
+    /// The materials of the next scene that has some, and their check sum.
+    materials: MaterialTable,
+    materials_sum: u32,
 }
 
 impl<'t, const D: usize> Haptics<'t, D> {
@@ -162,6 +166,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
             view: 0,
             effects: None,
             before: None,
+            materials: MaterialTable::EMPTY,
+            materials_sum: MaterialTable::EMPTY.check_sum(),
         }
     }
 
@@ -229,9 +235,31 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.contact = self.contact_of(self.scene.as_ref());
     }
 
+    /// Takes a table of materials, already checked ([`MaterialTable::is_valid`]): that of the
+    /// scene which follows with [`Haptics::accept`] before another tick.
+    pub fn take_materials(&mut self, table: &MaterialTable) {
+        self.materials_sum = table.check_sum();
+        self.materials.clone_from(table);
+    }
+
+    /// Whether a scene can be felt: by its numbers, and because its materials are here.
+    fn can_take(&self, scene: &Scene) -> bool {
+        let is_here = |sum: u32| sum == self.materials_sum && self.materials.is_valid();
+        scene.is_valid() && scene.materials.is_none_or(is_here)
+    }
+
     /// A contact that has felt nothing yet, as a scene wants it.
     fn contact_of(&self, scene: Option<&Scene>) -> Contact {
-        Contact::new(self.settings_of(scene))
+        let mut contact = Contact::new(self.settings_of(scene));
+        self.rub(&mut contact);
+        contact
+    }
+
+    /// Lets the contact of a scene with materials feel the one in force.
+    fn rub(&self, contact: &mut Contact) {
+        if let Some(friction) = self.effects.as_ref().and_then(Effects::friction) {
+            contact.feels_friction(friction);
+        }
     }
 
     /// How a scene is felt: points in lock-step, an arm in real time.
@@ -245,7 +273,14 @@ impl<'t, const D: usize> Haptics<'t, D> {
             } else {
                 Execution::RealTime
             },
-            friction: scene.map_or(Friction::NONE, |scene| scene.law.friction),
+            friction: match scene {
+                // A contact that was made without friction would never know any.
+                Some(Scene {
+                    materials: Some(_), ..
+                }) => self.materials.some_friction(),
+                Some(scene) => scene.law.friction,
+                None => Friction::NONE,
+            },
             ..ContactSettings::REAL_TIME.at_rate(self.rate)
         }
     }
@@ -253,14 +288,20 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// What a scene adds to the spring's force.
     fn effects_of(&self, scene: &Scene) -> Option<Effects> {
         let with_arm = scene.source == Source::Encoders;
+        let (law, cell_mm) = (&scene.law, scene.cell_mm);
         let (rate, latency_s) = (self.rate, self.latency_s);
-        Effects::of(&scene.law, scene.cell_mm, rate, latency_s, with_arm)
+        match scene.materials {
+            Some(_) => {
+                Effects::with_materials(&self.materials, law, cell_mm, rate, latency_s, with_arm)
+            }
+            None => Effects::of(law, cell_mm, rate, latency_s, with_arm),
+        }
     }
 
     /// Takes a scene, or drops the one there is: force that was there goes out.
     fn take_scene(&mut self, scene: Option<Scene>) {
         match scene {
-            Some(scene) if !scene.is_valid() => return,
+            Some(scene) if !self.can_take(&scene) => return,
             Some(scene) if scene.source == Source::Points => self.guard.stop(),
             _ => self.guard.disarm(),
         }
@@ -269,8 +310,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
             self.window.lay(scene.underlay);
             self.tick = 0;
         }
-        self.contact = self.contact_of(scene.as_ref());
         self.effects = scene.and_then(|scene| self.effects_of(&scene));
+        self.contact = self.contact_of(scene.as_ref());
         self.scene = scene;
         (self.point, self.before) = (None, None);
         let of_arm = scene.is_some_and(|scene| scene.source == Source::Encoders);
@@ -291,7 +332,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         let stretch = before
             .zip(self.contact.stretch())
             .map(|(before, stretch)| stretch * (before.cell_mm / scene.cell_mm));
-        if !may_change || !scene.is_valid() {
+        if !may_change || !self.can_take(&scene) {
             return self.take_scene(Some(scene));
         }
         if !view.keeps_tiles {
@@ -304,15 +345,17 @@ impl<'t, const D: usize> Haptics<'t, D> {
         // Whatever bits came over the wire.
         let hip = hip.normalised();
         let settings = self.settings_of(Some(&scene));
-        self.contact = match stretch {
+        self.effects = self.effects_of(&scene);
+        let mut contact = match stretch {
             Some(stretch) => {
                 let at = GridPoint::new(hip.cell(), hip.frac() + stretch);
                 Contact::landing(settings, at, stretch)
             }
             None => Contact::new(settings),
         };
+        self.rub(&mut contact);
+        self.contact = contact;
         self.clutch.put(hip);
-        self.effects = self.effects_of(&scene);
         self.scene = Some(scene);
         (self.point, self.before) = (None, None);
         self.view = view.number;
@@ -326,14 +369,19 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.zero = Some(counts);
     }
 
-    /// Never lets a tile push out the one under the proxy.
+    /// Never lets a tile push out the one under the proxy, nor, where an arm is felt, one beside
+    /// that: it comes too late then, for a place that the proxy has left.
     fn take_tile(&mut self, tile: &'t mut Tile) -> Option<&'t mut Tile> {
         let level = self.window.level();
         let under_proxy = self.contact.patch();
         let under_proxy = under_proxy.map(|cell| TileKey::holding(level, cell));
         if let (Some(under_proxy), Some(key)) = (under_proxy, tile.key())
             && key != under_proxy
-            && self.window.occupant(key) == Some(under_proxy)
+            && let Some(occupant) = self.window.occupant(key)
+            && (occupant == under_proxy
+                || (!self.contact.is_in_lock_step()
+                    && occupant.index.is_beside(under_proxy.index)
+                    && !key.index.is_beside(under_proxy.index)))
         {
             return Some(tile);
         }
@@ -497,9 +545,13 @@ impl<'t, const D: usize> Haptics<'t, D> {
         else {
             return Vec3::ZERO;
         };
-        let displacement_mm = effects.displacement(&self.window, &self.contact) * scene.cell_mm;
+        let displacement = effects.displacement(&self.window, &self.contact, &self.materials);
+        let displacement_mm = displacement * scene.cell_mm;
         sample.missing_tile = sample.missing_tile.or(effects.missing());
-        let spring_n = scene.law.force_n(displacement_mm) * self.clutch.share();
+        let spring_n = effects.law(&scene.law).force_n(displacement_mm) * self.clutch.share();
+        if let Some(friction) = effects.friction() {
+            self.contact.feels_friction(friction);
+        }
         let Some(damper) = &mut effects.damper else {
             return spring_n;
         };
@@ -541,13 +593,20 @@ impl<'t, const D: usize> Haptics<'t, D> {
             }
             write_output(point.hip, contact.output(), sample);
             let mut displacement = contact.output().displacement;
-            let mut missing = None;
+            let (mut law, mut missing) = (&scene.law, None);
             if let Some(effects) = &mut self.effects {
-                displacement = effects.displacement(&self.window, contact);
+                displacement = effects.displacement(&self.window, contact, &self.materials);
                 missing = effects.missing();
                 sample.missing_tile = sample.missing_tile.or(missing);
+                law = effects.law(law);
+                if let Some(friction) = effects.friction()
+                    && contact.output().converged
+                    && missing.is_none()
+                {
+                    contact.feels_friction(friction);
+                }
             }
-            force_n = scene.law.force_n(displacement * scene.cell_mm);
+            force_n = law.force_n(displacement * scene.cell_mm);
             if let Some(damper) = self.effects.as_ref().and_then(|e| e.damper.as_ref()) {
                 let from = self.before.unwrap_or(point.hip);
                 let velocity_mm_s = from.to(&point.hip) * (scene.cell_mm * self.rate.hz() as f32);

@@ -9,8 +9,10 @@ use crate::force::ForceLaw;
 use crate::grid::MAX_CELL;
 use crate::guard::{Blockers, Mode};
 use crate::terrain::testing::buffers;
-use crate::terrain::{FieldSize, TileDemand, TileRequester};
+use crate::terrain::{FieldSize, POSTS, TileDemand, TileRequester};
 
+#[path = "tick_tests/materials.rs"]
+mod materials;
 #[path = "tick_tests/textured.rs"]
 mod textured;
 #[path = "tick_tests/views.rs"]
@@ -31,6 +33,7 @@ fn scene(source: Source) -> Scene {
         rule: Rule::Swept,
         source,
         hold_clock: false,
+        materials: None,
     }
 }
 
@@ -40,6 +43,8 @@ struct Device<'t, const D: usize> {
     requester: TileRequester<D>,
     spare: Vec<&'t mut Tile>,
     height: fn(i32, i32) -> f32,
+    /// The material of a sample, in a scene that has some; `None` for tiles that come without.
+    material: fn(TileKey, [i32; 2]) -> Option<u8>,
     size: FieldSize,
     demand: TileDemand,
     served: usize,
@@ -63,6 +68,7 @@ impl<'t, const D: usize> Device<'t, D> {
             requester,
             spare,
             height,
+            material: |_, _| None,
             size: scene.size,
             demand: TileDemand::default(),
             served: 0,
@@ -120,6 +126,14 @@ impl<'t, const D: usize> Device<'t, D> {
     fn serve(&mut self, key: TileKey) {
         let tile = self.spare.pop().expect("as many spares as requests");
         tile.fill_from(key, 0, self.size, self.height).unwrap();
+        let first = key.index.first_cell();
+        let materials = (0..POSTS * POSTS).map(|i| {
+            let (col, row) = ((i % POSTS) as i32, (i / POSTS) as i32);
+            (self.material)(key, [first.x + col, first.y + row])
+        });
+        if let Some(materials) = materials.collect::<Option<Vec<_>>>() {
+            tile.set_materials(4, materials).expect("of the table");
+        }
         self.requester.received(key);
         let spent = self.haptics.accept(Command::Tile(tile)).unwrap();
         assert_ne!(
@@ -182,6 +196,41 @@ fn pressed_on_a_plane_the_motors_push_back() {
     let currents = last.drive.currents_a;
     assert!((currents - Vec3::Y * (pushed_a + weight_a)).length() < 1e-3);
     assert!(last.drive.enabled);
+}
+
+#[test]
+fn a_tile_that_comes_too_late_pushes_out_none_beside_the_proxy() {
+    let mut tiles = buffers::<3>();
+    let mut device = Device::<3>::armed(&mut tiles, plane);
+    for counts in dip() {
+        let _ = device.tick(counts);
+    }
+    let size = device.size;
+    let fill = |tile: &mut Tile, key| {
+        tile.fill_from(key, 0, size, plane).expect("in range");
+    };
+    // The proxy is in the tile 10, 10; that to the west is here, too.
+    let beside = TileKey::new(0, 9, 10);
+    assert_eq!(device.haptics.window.occupant(beside), Some(beside));
+    let late = TileKey::new(0, 12, 10);
+    assert_eq!(device.haptics.window.occupant(late), Some(beside));
+    let tile = device.spare.pop().expect("a spare one");
+    fill(tile, late);
+    let back = device.haptics.accept(Command::Tile(tile)).expect("refused");
+    assert_eq!(back.key(), Some(late));
+    device.spare.push(back);
+    // The same tile again is taken, and so is one that pushes out what is far away.
+    for key in [beside, TileKey::new(0, 11, 10)] {
+        let tile = device.spare.pop().expect("a spare one");
+        fill(tile, key);
+        let back = device
+            .haptics
+            .accept(Command::Tile(tile))
+            .expect("a buffer");
+        assert_ne!(back.key(), Some(key));
+        assert_eq!(device.haptics.window.occupant(key), Some(key));
+        device.spare.push(back);
+    }
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! queues and the counters of [`Monitor`] are all that they share: neither half
 //! ever waits for a lock, and no tile is reachable from both halves at once.
 
+use hapterra_core::force::MaterialTable;
 use hapterra_core::phantom::Mechanism;
 use hapterra_core::scene::Health;
 use hapterra_core::scene::Sample;
@@ -22,6 +23,8 @@ const COMMANDS: usize = 16;
 const RECORDS: usize = 28;
 /// Slots of the settings queue: one set of settings at a time.
 const SETTINGS: usize = 2;
+/// Slots of the queue of material tables: one table at a time.
+const MATERIALS: usize = 2;
 /// Slots of the health queue: one report at a time.
 const HEALTH: usize = 2;
 
@@ -41,6 +44,7 @@ pub(crate) struct Queues<'t> {
     spent: Queue<&'t mut Tile, { SPARES + 1 }>,
     records: Queue<TickRecord, RECORDS>,
     settings: Queue<Mechanism, SETTINGS>,
+    materials: Queue<MaterialTable, MATERIALS>,
     health: Queue<Health, HEALTH>,
     monitor: Monitor,
 }
@@ -51,6 +55,7 @@ pub(crate) struct LoopEnds<'t> {
     pub(crate) spent: Producer<'t, &'t mut Tile>,
     pub(crate) records: Producer<'t, TickRecord>,
     pub(crate) settings: Consumer<'t, Mechanism>,
+    pub(crate) materials: Consumer<'t, MaterialTable>,
     pub(crate) health: Producer<'t, Health>,
     pub(crate) monitor: &'t Monitor,
 }
@@ -61,6 +66,7 @@ pub(crate) struct LinkEnds<'t> {
     pub(crate) spent: Consumer<'t, &'t mut Tile>,
     pub(crate) records: Consumer<'t, TickRecord>,
     pub(crate) settings: Producer<'t, Mechanism>,
+    pub(crate) materials: Producer<'t, MaterialTable>,
     pub(crate) health: Consumer<'t, Health>,
     pub(crate) monitor: &'t Monitor,
 }
@@ -73,6 +79,7 @@ impl<'t> Queues<'t> {
             spent: Queue::new(),
             records: Queue::new(),
             settings: Queue::new(),
+            materials: Queue::new(),
             health: Queue::new(),
             monitor: Monitor::new(),
         }
@@ -84,6 +91,7 @@ impl<'t> Queues<'t> {
         let spent = self.spent.split();
         let records = self.records.split();
         let settings = self.settings.split();
+        let materials = self.materials.split();
         let health = self.health.split();
         let monitor = &self.monitor;
         let loop_ends = LoopEnds {
@@ -91,6 +99,7 @@ impl<'t> Queues<'t> {
             spent: spent.0,
             records: records.0,
             settings: settings.1,
+            materials: materials.1,
             health: health.0,
             monitor,
         };
@@ -99,6 +108,7 @@ impl<'t> Queues<'t> {
             spent: spent.1,
             records: records.1,
             settings: settings.0,
+            materials: materials.0,
             health: health.1,
             monitor,
         };

@@ -8,6 +8,7 @@
 //! - [`disk_cache`]: what was worked out before, in a folder that may be deleted;
 //! - [`synth`]: terrains made by formula, for trying and testing;
 //! - [`terrain`]: a raster at a scale, cut into tiles;
+//! - [`materials`]: classes of ground over a terrain, and what they feel like;
 //! - [`link`]: the terrain served to a device, tile by tile;
 //! - [`serving`]: that session from its first line to an end that is known;
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
@@ -36,6 +37,7 @@ pub mod calibrate;
 pub mod cli;
 pub mod disk_cache;
 pub mod link;
+pub mod materials;
 pub mod output;
 pub mod phantom;
 pub mod picture;

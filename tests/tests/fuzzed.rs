@@ -5,12 +5,15 @@ use std::panic::catch_unwind;
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::WORK_PER_TICK;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::{ForceLaw, Material, MaterialTable};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Point, Source};
 use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
 use hapterra_core::terrain::{POSTS, TileKey};
 use hapterra_core::tick::Outcome;
+use hapterra_core::wire::materials::{
+    MOST_TABLE_BYTES, MaterialScene, MaterialTile, TileMaterials, table_bytes,
+};
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::request::Request;
 use hapterra_tests::chance::Chance;
@@ -97,6 +100,9 @@ fn a_tick_that_may_not_be_is_refused() {
 /// Whole messages on the line, cut into the target's chunks.
 fn sensible_talk(chance: &mut Chance) -> Vec<u8> {
     let samples = [0.5f32.to_le_bytes(); 33 * 33].concat();
+    let material = Material::of(&ForceLaw::PREMIUM);
+    let table = MaterialTable::new(&[material; 2]).expect("two");
+    let mut room = [0; MOST_TABLE_BYTES];
     let mut line = Vec::new();
     for seq in 0..1 + chance.below(6) as u32 {
         let key = TileKey::new(0, chance.below(3) as i32, 0);
@@ -113,11 +119,30 @@ fn sensible_talk(chance: &mut Chance) -> Vec<u8> {
         };
         let depth = chance.between(-2.0, 3.0) as f32;
         let hip = GridPoint::new([10, 10, 0], Vec3::new(0.3, 0.4, depth));
-        let said = match chance.below(5) {
-            0 => ToDevice::Tile(TileMessage {
-                epoch: 7,
-                key,
-                heights,
+        let tile = TileMessage {
+            epoch: 7,
+            key,
+            heights,
+        };
+        let said = match chance.below(7) {
+            0 => ToDevice::Tile(tile),
+            5 => ToDevice::MaterialScene(MaterialScene {
+                scene: hapterra_core::scene::Scene {
+                    // With another table than its own now and then.
+                    materials: Some(table.check_sum() ^ u32::from(chance.below(4) == 0)),
+                    ..wire::scene()
+                },
+                table: table_bytes(&table, &mut room),
+            }),
+            6 => ToDevice::MaterialTile(MaterialTile {
+                tile,
+                materials: match chance.below(3) {
+                    0 => TileMaterials::One(chance.below(3) as u8),
+                    1 => TileMaterials::Runs(
+                        &[1, 255, 1, 255, 1, 255, 1, 255, 1, 64][..chance.below(11)],
+                    ),
+                    _ => TileMaterials::Each(&[0x10; 600][..540 + chance.below(10)]),
+                },
             }),
             1 => ToDevice::Scene(hapterra_core::scene::Scene {
                 epoch: seq,

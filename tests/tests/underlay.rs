@@ -76,6 +76,7 @@ impl<'t> Slide<'t> {
         // Its time goes on, as a board's does.
         let scene = Scene {
             hold_clock: false,
+            materials: None,
             ..scene
         };
         let reach = Reach::of(&Calibration::PREMIUM_1_5);

@@ -38,6 +38,7 @@ pub(super) fn scene(grid: &Grid, law: ForceLaw, source: Source, home: GridPoint)
         rule: Rule::Swept,
         source,
         hold_clock: false,
+        materials: None,
     }
 }
 

@@ -56,6 +56,7 @@ impl Hand {
         let home = home.ok_or_else(|| NotMeasured("it is farther than positions reach".into()))?;
         let scene = Scene {
             hold_clock: false,
+            materials: None,
             ..terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home)
         };
         Ok(match late {

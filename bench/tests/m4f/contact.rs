@@ -185,5 +185,6 @@ pub(crate) fn scene(grid: &Grid) -> Scene {
         rule: Rule::Swept,
         source: Source::Points,
         hold_clock: false,
+        materials: None,
     }
 }

@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::boundary_fade::{self, approach};
 use super::budget::{Budget, SHORTCUT};
 use super::closest_point::{Descent, Ended, Leave, Place, position_on};
+use super::friction::Friction;
 use super::output::{ContactOutput, ContactState};
 use super::paper::{self, Candidate, Candidates};
 use super::settings::{ContactSettings, Execution, Rule};
@@ -222,6 +223,16 @@ impl Contact {
         }
         // No work is done before the next step.
         self.redirect(window, self.hip, None, &mut Budget::new(0));
+    }
+
+    /// How rough the surface is from the next step on, of a contact that knows friction: one
+    /// that was made with some. A proxy that was held is judged again.
+    pub(crate) fn feels_friction(&mut self, friction: Friction) {
+        if let Some(rubbing) = &mut self.rubbing
+            && rubbing.takes(friction)
+        {
+            self.at_rest = false;
+        }
     }
 
     /// Moves the proxy for a HIP, in at most [`super::WORK_PER_TICK`] units of work.

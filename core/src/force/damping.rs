@@ -79,6 +79,14 @@ impl Damper {
         })
     }
 
+    /// The surface is another one from this tick on, of the same controller.
+    pub(crate) fn feels(&mut self, law: &ForceLaw) {
+        self.law = *law;
+        if let Some(controller) = &mut self.controller {
+            controller.feels(law);
+        }
+    }
+
     /// The energy that was created and not taken back yet, mJ, where it is watched.
     pub(crate) fn created_mj(&self) -> f32 {
         self.controller.as_ref().map_or(0.0, Passivity::created_mj)

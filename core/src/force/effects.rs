@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
-use super::{Damper, ForceLaw, Shader, Texturer};
-use crate::contact::Contact;
+use super::in_force::MaterialInForce;
+use super::{Damper, ForceLaw, MaterialTable, Shader, Texturer};
+use crate::contact::{Contact, Friction};
 use crate::rate::TickRate;
 use crate::terrain::{TileIndex, Window};
 
@@ -13,6 +14,7 @@ pub(crate) struct Effects {
     shader: Option<Shader>,
     texturer: Option<Texturer>,
     pub(crate) damper: Option<Damper>,
+    material: Option<MaterialInForce>,
 }
 
 impl Effects {
@@ -33,6 +35,30 @@ impl Effects {
             shader,
             texturer,
             damper,
+            material: None,
+        })
+    }
+
+    /// The same of a scene with materials.
+    #[inline(never)]
+    pub(crate) fn with_materials(
+        table: &MaterialTable,
+        law: &ForceLaw,
+        cell_mm: f32,
+        rate: TickRate,
+        latency_s: f32,
+        with_arm: bool,
+    ) -> Option<Self> {
+        let material = MaterialInForce::of(table, law, cell_mm, rate)?;
+        let mut damper = Damper::of(&table.hardest(law), rate, latency_s, with_arm);
+        if let Some(damper) = &mut damper {
+            damper.feels(material.law());
+        }
+        Some(Self {
+            shader: Shader::of(law.shading),
+            texturer: material.texturer(),
+            damper,
+            material: Some(material),
         })
     }
 
@@ -41,6 +67,7 @@ impl Effects {
         &mut self,
         window: &Window<'_, D>,
         contact: &Contact,
+        table: &MaterialTable,
     ) -> Vec3 {
         let displacement = match &mut self.shader {
             Some(shader) => shader.shade(window, contact),
@@ -48,12 +75,55 @@ impl Effects {
         };
         // A tick that is repeated for the same point is no tick of the proxy's way.
         let goes_on = contact.is_in_lock_step() && self.missing().is_some();
-        match &mut self.texturer {
-            Some(texturer) if contact.is_felt() && !goes_on => {
-                texturer.add(displacement, &contact.output().proxy)
-            }
-            _ => displacement,
+        if !contact.is_felt() || goes_on {
+            return displacement;
         }
+        if self.material.is_some() {
+            return self.on_material(window, contact, table, displacement);
+        }
+        match &mut self.texturer {
+            Some(texturer) => texturer.add(displacement, &contact.output().proxy),
+            None => displacement,
+        }
+    }
+
+    /// The same on a material: it may be another one than in the tick before.
+    // Apart, so that scenes without materials have nothing of it.
+    #[cold]
+    #[inline(never)]
+    fn on_material<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        contact: &Contact,
+        table: &MaterialTable,
+        displacement: Vec3,
+    ) -> Vec3 {
+        let Some(material) = &mut self.material else {
+            return displacement;
+        };
+        if material.advance(table, window, contact) {
+            self.texturer = material.texturer();
+        }
+        if let Some(damper) = &mut self.damper {
+            damper.feels(material.law());
+        }
+        let (proxy, share) = (&contact.output().proxy, material.texture_share());
+        match &mut self.texturer {
+            Some(texturer) => texturer.add_part(displacement, proxy, share),
+            None => displacement,
+        }
+    }
+
+    /// The law that is felt, where it is another than the scene's.
+    pub(crate) fn law<'l>(&'l self, of_scene: &'l ForceLaw) -> &'l ForceLaw {
+        self.material
+            .as_ref()
+            .map_or(of_scene, MaterialInForce::law)
+    }
+
+    /// What holds the proxy back from the next tick on, in a scene with materials.
+    pub(crate) fn friction(&self) -> Option<Friction> {
+        self.material.as_ref().map(MaterialInForce::friction)
     }
 
     /// A tile without which the last displacement is not that of the whole terrain.

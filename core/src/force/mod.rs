@@ -2,6 +2,8 @@
 
 mod damping;
 mod effects;
+mod in_force;
+mod material;
 pub mod passivity;
 mod relief;
 mod shading;
@@ -16,6 +18,7 @@ use crate::rate::TickRate;
 pub(crate) use damping::Damper;
 pub use damping::{Controller, Damping};
 pub(crate) use effects::Effects;
+pub use material::{MATERIAL_CHANGE_S, Material, MaterialTable};
 pub(crate) use passivity::Moment;
 pub use shading::{Shader, Shading};
 pub use texture::{Pattern, Texture, Texturer};

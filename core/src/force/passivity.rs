@@ -123,6 +123,12 @@ impl Passivity {
         self.yielding.share()
     }
 
+    /// The surface is another one from this tick on. What a spring that becomes stiffer holds
+    /// more is energy that the ticks create.
+    pub(super) const fn feels(&mut self, law: &ForceLaw) {
+        self.stiffness_n_per_mm = law.stiffness_n_per_mm;
+    }
+
     pub(super) const fn created_mj(&self) -> f32 {
         self.created_mj
     }

@@ -173,6 +173,20 @@ impl Texturer {
     /// ```
     pub fn add(&mut self, displacement: Vec3, proxy: &GridPoint) -> Vec3 {
         let share = self.share_at(proxy);
+        self.with_share(displacement, proxy, share)
+    }
+
+    /// The same with a part of the texture only, from 0 to 1.
+    // Apart, so that a texture that is felt whole costs no more.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn add_part(&mut self, displacement: Vec3, proxy: &GridPoint, part: f32) -> Vec3 {
+        let share = self.share_at(proxy);
+        self.with_share(displacement, proxy, share * part)
+    }
+
+    #[inline]
+    fn with_share(&self, displacement: Vec3, proxy: &GridPoint, share: f32) -> Vec3 {
         let squared = displacement.length_squared();
         // Nothing is felt, or the texture is too fast.
         if !squared.is_normal() || share == 0.0 {

@@ -49,6 +49,15 @@ impl TileIndex {
         )
     }
 
+    /// Whether it is another tile's neighbour, along a side or at a corner, or that tile itself.
+    #[must_use]
+    pub(crate) fn is_beside(self, other: Self) -> bool {
+        self.col
+            .abs_diff(other.col)
+            .max(self.row.abs_diff(other.row))
+            <= 1
+    }
+
     /// The tile's south-west cell.
     #[must_use]
     pub const fn first_cell(self) -> Cell {

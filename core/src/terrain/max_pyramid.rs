@@ -13,10 +13,11 @@ use super::index::{TILE_SHIFT, wrap};
 pub(super) struct MaxPyramid<const D: usize>([[[i32; D]; D]; 2]);
 
 impl<const D: usize> MaxPyramid<D> {
-    /// log₂ D; a torus that is not a power of two does not compile.
-    pub(super) const HEIGHT: u32 = {
-        assert!(D.is_power_of_two(), "a window's side is a power of two");
-        D.trailing_zeros()
+    /// log₂ D. A torus that is not a power of two has the maxima of its tiles alone: the tiles
+    /// under a node would not go round together.
+    pub(super) const HEIGHT: u32 = match D.is_power_of_two() {
+        true => D.trailing_zeros(),
+        false => 0,
     };
     /// Side of the largest block there is a maximum of, as a power of two.
     pub(super) const TOP_SHIFT: u32 = TILE_SHIFT + Self::HEIGHT;

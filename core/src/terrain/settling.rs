@@ -21,7 +21,7 @@ use super::index::{TILE_CELLS, TileIndex, wrap};
 use super::tile::Tile;
 use super::underlay::Underlay;
 use super::window::{Corners, Ground, Window};
-use crate::grid::{Altitude, Cell};
+use crate::grid::{Altitude, Cell, GridPoint};
 
 /// How fast the surface moves from the underlay to a tile that has come, millimetres of the tip
 /// a second. So a force changes by it at most by this times the stiffness: 25 N/s at 0.5 N/mm, where the
@@ -290,6 +290,20 @@ impl<'t, const D: usize> Window<'t, D> {
         tile.key()
             .is_some_and(|key| key.index == index)
             .then_some(tile)
+    }
+
+    /// Which material of the scene's table the sample nearest to a place on a patch has; `None`
+    /// where the patch's tile is not here, or came without materials.
+    pub(crate) fn material_near(&self, patch: Cell, place: &GridPoint) -> Option<u8> {
+        let [x, y, _] = place.cell();
+        let frac = place.frac();
+        // A place on the far border of its patch may be counted from the next one.
+        let is_far = |at: i32, frac: f32, patch: i32| {
+            usize::from(at.wrapping_sub(patch) as f32 + frac >= 0.5)
+        };
+        let far = [is_far(x, frac.x, patch.x), is_far(y, frac.y, patch.y)];
+        self.tile_here(TileIndex::holding(patch))?
+            .material(patch, far)
     }
 
     /// Whether what is felt in place of a tile is known to lie below `low`, all over the tile.

@@ -6,7 +6,7 @@ use super::tile::Tile;
 use super::window::Window;
 use crate::grid::MAX_CELL;
 
-/// Memory of a window of `D × D` tiles, 4.5 kB each; may hold a whole field.
+/// Memory of a window of `D × D` tiles, 5.5 kB each; may hold a whole field.
 ///
 /// Without an allocator it lives wherever its owner puts it. On a desktop, put
 /// large ones on the heap: `Box::new(FieldStorage::<16>::new())`, then

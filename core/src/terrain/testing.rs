@@ -102,6 +102,12 @@ impl<'t, const D: usize> Field<'t, D> {
         }
     }
 
+    /// Installs a tile; the buffer that comes back goes round.
+    pub(crate) fn give_back(&mut self, key: TileKey) {
+        let spent = self.install(key);
+        self.spare.push(spent);
+    }
+
     /// Fills a buffer with the tile and installs it.
     pub(crate) fn install(&mut self, key: TileKey) -> &'t mut Tile {
         let tile = self.spare.pop().expect("a spare buffer");

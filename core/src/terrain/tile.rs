@@ -22,6 +22,8 @@ pub enum BadTile {
     Base,
     /// No packed heights of 33 × 33 samples, or more than these.
     Packed,
+    /// Not 33 × 33 materials of the scene's table.
+    Materials,
 }
 
 /// What a buffer holds.
@@ -35,7 +37,8 @@ enum Content {
     Surface,
 }
 
-/// One buffer of the window: 33 × 33 heights and their block maxima.
+/// One buffer of the window: 33 × 33 heights and their block maxima, and room for the materials
+/// of as many samples.
 #[derive(Clone, Debug)]
 pub struct Tile {
     // Key and content lie side by side: a tick looks at both for each patch.
@@ -52,6 +55,11 @@ pub struct Tile {
     quarters: [[f32; QUARTERS]; QUARTERS],
     highest: f32,
     lowest: f32,
+    /// The tile came with materials.
+    has_materials: bool,
+    /// Which material of the scene's table each sample has, as `posts`; not looked at
+    /// unless the tile came with them.
+    materials: [[u8; POSTS]; POSTS],
 }
 
 impl Tile {
@@ -67,6 +75,8 @@ impl Tile {
         quarters: [[0.0; QUARTERS]; QUARTERS],
         highest: 0.0,
         lowest: 0.0,
+        has_materials: false,
+        materials: [[0; POSTS]; POSTS],
     };
 
     /// Which tile this is; `None` for a vacant buffer.
@@ -84,6 +94,51 @@ impl Tile {
     /// Forgets the tile; the buffer can be filled again.
     pub const fn vacate(&mut self) {
         self.content = Content::Nothing;
+        self.has_materials = false;
+    }
+
+    /// Says which material of the scene's table each sample of a filled tile has, by rows from
+    /// the south.
+    ///
+    /// # Errors
+    /// [`BadTile::Materials`] unless there are exactly 33 × 33 of them, each below `count`. The
+    /// buffer is left vacant, as where it was vacant before.
+    pub fn set_materials(
+        &mut self,
+        count: usize,
+        materials: impl IntoIterator<Item = u8>,
+    ) -> Result<(), BadTile> {
+        self.set_materials_from(count, &mut materials.into_iter())
+    }
+
+    /// The same, once in an image.
+    #[inline(never)]
+    fn set_materials_from(
+        &mut self,
+        count: usize,
+        materials: &mut dyn Iterator<Item = u8>,
+    ) -> Result<(), BadTile> {
+        let mut is_right = self.content != Content::Nothing;
+        for place in self.materials.as_flattened_mut() {
+            // One that is missing is beyond every table.
+            *place = materials.next().unwrap_or(u8::MAX);
+            is_right &= usize::from(*place) < count;
+        }
+        if !is_right || materials.next().is_some() {
+            self.vacate();
+            return Err(BadTile::Materials);
+        }
+        self.has_materials = true;
+        Ok(())
+    }
+
+    /// Which material of the scene's table the sample has that is so many east and north of the
+    /// south-west one of a patch, 0 or 1 each; `None` where the tile came without materials.
+    pub(crate) fn material(&self, patch: Cell, [east, north]: [usize; 2]) -> Option<u8> {
+        let [u, v] = within(patch);
+        let row = self.materials.get(v + north)?;
+        let material = row.get(u + east)?;
+        self.has_materials.then_some(*material)
     }
 
     /// Whether it is the surface over the patches of a tile of its level.
@@ -392,6 +447,31 @@ mod tests {
         assert_eq!(tile.load(KEY, i32::MAX, &bytes), Err(BadTile::Base));
         assert_eq!(tile.load(KEY, 0, &bytes), Ok(()));
         assert_eq!(tile.key(), Some(KEY));
+    }
+
+    #[test]
+    fn materials_are_those_of_the_table_and_as_many_as_samples() {
+        const ALL: usize = POSTS * POSTS;
+        let mut tile = filled(|_, _| 0.0);
+        let kinds = |count: usize| (0..count).map(|i| (i % 5) as u8);
+        assert_eq!(tile.material(Cell::new(0, 0), [0, 0]), None, "it has none");
+        assert_eq!(tile.set_materials(5, kinds(ALL)), Ok(()));
+        let at = |col: usize, row: usize| ((row * POSTS + col) % 5) as u8;
+        assert_eq!(tile.material(Cell::new(31, 2), [1, 1]), Some(at(32, 3)));
+        assert_eq!(tile.material(Cell::new(-1, 34), [0, 0]), Some(at(31, 2)));
+        for (count, of) in [(4, ALL), (5, ALL - 1), (5, ALL + 1), (0, ALL)] {
+            let mut tile = filled(|_, _| 0.0);
+            assert_eq!(
+                tile.set_materials(count, kinds(of)),
+                Err(BadTile::Materials)
+            );
+            assert_eq!(tile.key(), None);
+        }
+        // Heights of another tile have no materials of this one.
+        tile.fill(KEY, 0, |_, _| 1.0).unwrap();
+        assert_eq!(tile.material(Cell::new(0, 0), [0, 0]), None);
+        tile.vacate();
+        assert_eq!(tile.set_materials(5, kinds(ALL)), Err(BadTile::Materials));
     }
 
     #[test]

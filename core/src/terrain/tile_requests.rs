@@ -249,9 +249,10 @@ impl<const D: usize> TileRequester<D> {
         (wanted && self.size.has_tile(index)).then_some(key)
     }
 
-    /// Whether a tile is nearer to the centre than half the torus.
+    /// Whether a tile is among those around the centre that all have their own place in the
+    /// torus: nearer than half of it.
     fn reaches(centre: TileIndex, TileIndex { col, row }: TileIndex) -> bool {
-        let reach = (D as i32 / 2 - 1).max(0);
+        let reach = (D as i32 - 1) / 2;
         col.abs_diff(centre.col).max(row.abs_diff(centre.row)) <= reach.unsigned_abs()
     }
 }
@@ -373,6 +374,29 @@ mod tests {
             ..at(48, 48)
         };
         assert_eq!(drain(&mut requester, 0, &demand), [(1, 1), (2, 1)]);
+    }
+
+    #[test]
+    fn a_window_of_three_reaches_as_far_as_one_of_four() {
+        fn asked<const D: usize>() -> Vec<TileKey> {
+            let mut requester = TileRequester::<D>::new();
+            requester.reset(0, FieldSize::new(640, 640));
+            let mut asked = Vec::new();
+            for (x, y) in [(33, 33), (62, 62), (62, 33), (33, 62), (300, 300), (33, 33)] {
+                while let Some(key) = requester.next_request(0, &at(x, y)) {
+                    requester.received(key);
+                    asked.push(key);
+                }
+            }
+            asked
+        }
+        let (three, four) = (asked::<3>(), asked::<4>());
+        let around: Vec<_> = three.iter().take(9).collect();
+        assert!(four.iter().take(9).eq(around), "{three:?}");
+        // The tile far away has the place of one of them, which is asked for again.
+        assert_eq!(three.get(10), Some(&TileKey::new(0, 0, 0)));
+        assert_eq!(four.get(10), Some(&TileKey::new(0, 1, 1)));
+        assert_eq!((three.len(), four.len()), (11, 11));
     }
 
     #[test]

@@ -44,7 +44,7 @@ impl Corners {
 }
 
 /// `D × D` tiles; tile `(col, row)` always lives in slot `(col mod D, row mod D)`.
-/// `D` is a power of two.
+/// Where `D` is no power of two, nothing above single tiles is known to be clear.
 ///
 /// ```
 /// use hapterra_core::grid::{Altitude, Cell};
@@ -410,6 +410,42 @@ mod tests {
         }
         assert!(
             seen[0] > 100 / EACH && seen[1] > cases(10, 0),
+            "both answers occur: {seen:?}"
+        );
+    }
+
+    #[test]
+    fn a_window_of_three_tiles_knows_what_is_clear_and_what_is_not() {
+        let mut buffers = buffers::<3>();
+        let mut field = Field::<3>::over(&mut buffers, FieldSize::new(640, 640), rough);
+        let mut seen = [0, 0];
+        for step in 0..cases(4000, 500) as i32 {
+            let a = Cell::new((step * 7) % 640, (step * 13) % 640);
+            if step % 3 == 0 {
+                let key = TileKey::holding(0, a.offset(step % 65 - 32, step % 33));
+                if field.window.expects(key) && field.window.occupant(key) != Some(key) {
+                    field.give_back(key);
+                }
+            }
+            // Also over all three tiles.
+            let b = match step % 2 {
+                0 => a.offset(step % 41 - 20, step * 3 % 57 - 28),
+                _ => a.offset(step % 181 - 90, step * 3 % 157 - 78),
+            };
+            let low = Altitude::new(step % 80, 0.5);
+            let span = CellBox::around(a, b);
+            let clear = field.window.is_clear(span, low);
+            seen[usize::from(clear)] += 1;
+            if clear {
+                for y in span.from.y.max(0)..=span.to.y.min(639) {
+                    for x in span.from.x.max(0)..=span.to.x.min(639) {
+                        assert!(rough(x, y) < low.cell() as f32 + 0.5, "{span:?} {low:?}");
+                    }
+                }
+            }
+        }
+        assert!(
+            seen[0] > 100 && seen[1] > 20,
             "both answers occur: {seen:?}"
         );
     }

@@ -7,12 +7,15 @@ use glam::Vec3;
 use serde::Serialize;
 
 use super::hello::{DeviceHello, HostHello, PROTOCOL, SerialNumber};
+use super::materials::{MOST_TABLE_BYTES, MaterialTile, TileMaterials, table_bytes};
 use super::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
 use super::request::{Answer, Refusal, Request};
 use super::session::{InSession, LastSession, SampleCount, SessionEnd, SessionNumber};
 use crate::clutch::ClutchHold;
-use crate::contact::{ContactState, Rule};
-use crate::force::{Controller, Damping, ForceLaw, Pattern, Shading, Texture};
+use crate::contact::{ContactState, Friction, Rule};
+use crate::force::{
+    Controller, Damping, ForceLaw, Material, MaterialTable, Pattern, Shading, Texture,
+};
 use crate::grid::{Cell, GridPoint};
 use crate::guard::{Fault, Limits, Mode};
 use crate::scene::{Sample, Scene, Source, View};
@@ -60,6 +63,7 @@ fn a_scene() {
         rule: Rule::Paper,
         source: Source::Points,
         hold_clock: true,
+        materials: Some(300),
     };
     let wanted = [
         std::vec![1, 0xAC, 0x02, 2],
@@ -82,6 +86,8 @@ fn a_scene() {
         float(-45.0),
         std::vec![0xAC, 0x02],
         std::vec![1, 1, 1],
+        // Its materials.
+        std::vec![1, 0xAC, 0x02],
     ];
     assert_eq!(bytes(&ToDevice::Scene(scene)), wanted.concat());
 }
@@ -147,6 +153,7 @@ fn a_view_and_the_clutch() {
         rule: Rule::Swept,
         source: Source::Encoders,
         hold_clock: false,
+        materials: None,
     };
     let view = View {
         number: 200,
@@ -201,6 +208,56 @@ fn a_tile_and_the_request_for_it() {
     });
     let wanted = [2, 7, 1, 3, 0xC8, 0x01, 3, 5, 3, 9, 0, 7];
     assert_eq!(bytes(&tile), wanted);
+}
+
+#[test]
+fn a_tile_with_materials_and_their_table() {
+    let tile = TileMessage {
+        epoch: 7,
+        key: TileKey::new(1, -2, 100),
+        heights: Heights::Hole,
+    };
+    let plain = bytes(&ToDevice::Tile(tile)).split_off(1);
+    for (materials, wanted) in [
+        (TileMaterials::One(3), std::vec![0, 3]),
+        (TileMaterials::Runs(&[3, 255]), std::vec![1, 2, 3, 255]),
+        (TileMaterials::Each(&[0x21]), std::vec![2, 1, 0x21]),
+    ] {
+        let tile = ToDevice::MaterialTile(MaterialTile { tile, materials });
+        assert_eq!(
+            bytes(&tile),
+            [std::vec![13], plain.clone(), wanted].concat()
+        );
+    }
+    let material = Material {
+        stiffness_n_per_mm: 0.5,
+        friction: Friction {
+            static_mu: 0.75,
+            dynamic_mu: 0.5,
+            viscous_s: 0.25,
+        },
+        damping_ns_per_m: 2.0,
+        texture: Texture {
+            pattern: Pattern::Grain,
+            amplitude_mm: 0.125,
+            wavelength_mm: 1.0,
+            direction_deg: 0.0,
+            seed: 300,
+        },
+    };
+    let table = MaterialTable::new(&[material]).expect("one");
+    let numbers = [0.5, 0.75, 0.5, 0.25, 2.0].map(float).concat();
+    let texture = [0.125, 1.0, 0.0].map(float).concat();
+    let wanted = [
+        std::vec![1],
+        numbers,
+        std::vec![1],
+        texture,
+        std::vec![0xAC, 0x02],
+    ]
+    .concat();
+    let mut room = [0; MOST_TABLE_BYTES];
+    assert_eq!(table_bytes(&table, &mut room), wanted);
 }
 
 #[test]

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::crc::{self, CRC};
 
-/// Longest frame in bytes, its zero included: a tile and what is around it.
-pub const MAX_FRAME: usize = 4608;
+/// Longest frame in bytes, its zero included: a tile with materials and what is around it.
+pub const MAX_FRAME: usize = 5120;
 
 /// Why a frame was not understood. It is dropped; the link goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,6 +7,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::hello::{DeviceHello, HostHello};
+use super::materials::{MaterialScene, MaterialTile};
 use super::request::{Answer, Request};
 use super::session::{SampleCount, SessionEnd};
 use super::status::Status;
@@ -64,6 +65,12 @@ pub enum ToDevice<'a> {
     /// ([`Request::Clutch`]): the arm stays armed. Answered by [`ToHost::SceneTaken`] with
     /// the epoch of the view's scene.
     View(View),
+    /// As [`Self::Scene`], of a scene with materials.
+    #[serde(borrow)]
+    MaterialScene(MaterialScene<'a>),
+    /// As [`Self::Tile`], of a scene with materials.
+    #[serde(borrow)]
+    MaterialTile(MaterialTile<'a>),
 }
 
 /// Device to host.

@@ -102,6 +102,11 @@
 //!   its host is not there to see what the press does.
 //! - The underlay of a scene is asked for before its other tiles, and by its own key
 //!   ([`Underlay::key`](crate::terrain::Underlay::key)); each view brings its own.
+//! - A scene with materials comes with their table
+//!   ([`ToDevice::MaterialScene`](message::ToDevice::MaterialScene)), and is refused where the table is not the one
+//!   that the scene names, or is none that can be felt. Each of its tiles comes with materials
+//!   ([`ToDevice::MaterialTile`](message::ToDevice::MaterialTile)), and its underlay without; any other is a bad frame. Its
+//!   views keep the table, or have none.
 //! - A new session keeps the scene and every tile that is held; samples and requests
 //!   are numbered anew. Where the arm was being armed but nothing is driven yet, that
 //!   is ended: the new host has to ask itself. So it is where its host detaches.
@@ -124,6 +129,7 @@
 
 pub mod frame;
 pub mod hello;
+pub mod materials;
 pub mod message;
 pub mod plant;
 pub mod request;

@@ -24,7 +24,7 @@ use crate::stm32::start::FULL_SCALE_A;
 use crate::stm32::{failure, parts, usb_interrupt};
 
 /// Tiles along the side of the window.
-pub(crate) const WINDOW: usize = 4;
+pub(crate) const WINDOW: usize = 3;
 /// Calibration areas: the last two pages of bank 2, which `memory/nucleo-g474re.x` leaves
 /// out, counted from the beginning of flash.
 pub(crate) const CALIBRATIONS: [u32; 2] = [0x7_F000, 0x7_F800];

@@ -14,7 +14,7 @@ use core::mem;
 use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::guard::{Drive, Fault, Sense};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::Source;
+use hapterra_core::scene::{Scene, Source};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, TickClock};
@@ -153,6 +153,7 @@ where
             };
             match &command {
                 Command::Scene(scene) => {
+                    take_materials(&mut self.haptics, &mut self.ends, scene);
                     self.hip_source = match scene.source {
                         Source::Encoders => HipSource::Encoders,
                         Source::Points => HipSource::Points { pending: false },
@@ -272,6 +273,22 @@ where
         // An assignment would drop what is there, which is nothing; but with it
         // the drivers' destructors, which can panic, would be part of the tick.
         mem::forget(mem::replace(&mut self.power, power));
+    }
+}
+
+/// Hands the loop the table of a scene with materials, if it comes with one: a later scene's may
+/// wait behind a scene that goes on with the table before.
+fn take_materials<const D: usize>(
+    haptics: &mut Haptics<'_, D>,
+    ends: &mut LoopEnds<'_>,
+    scene: &Scene,
+) {
+    if let (Some(sum), Some(table)) = (scene.materials, ends.materials.peek())
+        && table.check_sum() == sum
+    {
+        haptics.take_materials(table);
+        // It stays in its place until it was copied.
+        drop(ends.materials.dequeue());
     }
 }
 

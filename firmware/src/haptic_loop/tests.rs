@@ -51,6 +51,7 @@ fn scene(source: Source) -> Scene {
         rule: Rule::Swept,
         source,
         hold_clock: false,
+        materials: None,
     }
 }
 

@@ -73,7 +73,11 @@ impl<const D: usize> Link<'_, D> {
             (_, SessionState::Leaving) => {}
             (ToDevice::Scene(scene), _) => self.take_scene(scene),
             (ToDevice::View(view), _) => self.take_view(view),
-            (ToDevice::Tile(tile), _) => self.take_tile(&tile),
+            (ToDevice::Tile(tile), _) => self.take_tile(&tile, None),
+            (ToDevice::MaterialScene(scene), _) => self.take_material_scene(&scene),
+            (ToDevice::MaterialTile(message), _) => {
+                self.take_tile(&message.tile, Some(message.materials));
+            }
             (ToDevice::Point(point), _) => self.take_point(point),
             (ToDevice::Request { number, request }, _) => self.take_request(number, &request),
             (ToDevice::Hello(_) | ToDevice::Close, _) => {}
@@ -254,8 +258,8 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    fn take_scene(&mut self, scene: Scene) {
-        let accepted = scene.is_valid();
+    pub(super) fn take_scene(&mut self, scene: Scene) {
+        let accepted = scene.is_valid() && self.has_materials_of(&scene);
         // The very scene in force goes on: its host came back.
         if accepted && self.scene != Some(scene) {
             self.drop_what_was_felt();

@@ -25,6 +25,7 @@ mod conversation;
 mod device_state;
 mod loader;
 mod log;
+mod materials;
 mod messages;
 mod poll;
 mod requests;
@@ -51,6 +52,7 @@ use crate::queues::{LinkEnds, SPARES, TickRecord};
 use conversation::{Conversation, SessionState};
 pub(crate) use device_state::{DeviceState, KnownArm};
 use loader::LoaderEntry;
+use materials::KnownTable;
 pub use tiles::fill_tile;
 use tx_queue::TxQueue;
 use views::ClutchOfHost;
@@ -104,6 +106,8 @@ pub struct Link<'t, const D: usize> {
     /// The way into the loader in the chip's ROM.
     loader: LoaderEntry,
     scene: Option<Scene>,
+    /// The table of materials that the loop was given last.
+    materials: Option<KnownTable>,
     /// Number of the view that was put in last; samples of another are older.
     view: u8,
     clutch: ClutchOfHost,
@@ -144,6 +148,7 @@ impl<'t, const D: usize> Link<'t, D> {
             device,
             loader: LoaderEntry::default(),
             scene: None,
+            materials: None,
             view: 0,
             clutch: ClutchOfHost::default(),
             requester: TileRequester::new(),
@@ -185,9 +190,9 @@ impl<'t, const D: usize> Link<'t, D> {
         taken
     }
 
-    /// Whether a message can be acted on: it may need one command and one answer.
+    /// Whether a message can be acted on: it may need one command, one table and one answer.
     fn has_room(&self) -> bool {
-        self.ends.commands.ready() && self.tx.has_room()
+        self.ends.commands.ready() && self.ends.materials.ready() && self.tx.has_room()
     }
 
     /// The transport was interrupted: what was under way is lost.

@@ -4,6 +4,7 @@ mod buffers;
 mod device_state;
 mod faults;
 mod loader;
+mod materials;
 mod rig;
 mod session;
 mod task;

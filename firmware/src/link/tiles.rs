@@ -3,6 +3,7 @@
 use hapterra_core::terrain::{BadTile, Tile, TileDemand};
 use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::BadFrame;
+use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::{Heights, TileMessage, ToHost};
 
 use super::Link;
@@ -28,7 +29,11 @@ impl<'t, const D: usize> Link<'t, D> {
     }
 
     /// Checks a tile in a spare buffer and hands it to the loop.
-    pub(super) fn take_tile(&mut self, message: &TileMessage<'_>) {
+    pub(super) fn take_tile(
+        &mut self,
+        message: &TileMessage<'_>,
+        materials: Option<TileMaterials<'_>>,
+    ) {
         let ours = self.scene.is_some_and(|s| s.epoch == message.epoch);
         if !ours || !self.requester.awaits(message.key) {
             return;
@@ -38,7 +43,9 @@ impl<'t, const D: usize> Link<'t, D> {
             return;
         };
         let key = message.key;
-        if fill_tile(tile, message).is_err() {
+        let filled = fill_tile(tile, message);
+        let filled = filled.and_then(|()| self.fill_materials(tile, key, materials));
+        if filled.is_err() {
             tile.vacate();
             self.give_back(tile);
             return self.on_bad_frame(BadFrame::Content);

@@ -59,7 +59,8 @@ impl<const D: usize> Link<'_, D> {
         if !is_again && !(1..NEWER).contains(&ahead) {
             return;
         }
-        let accepted = is_again || (view.scene.is_valid() && self.may_change_view(&view.scene));
+        let may_come = || self.has_materials_of(&view.scene) && self.may_change_view(&view.scene);
+        let accepted = is_again || (view.scene.is_valid() && may_come());
         if accepted && !is_again {
             self.put_in(view);
         }

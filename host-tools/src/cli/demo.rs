@@ -19,6 +19,7 @@ use super::viewing::{Shown, ToBeShown, Viewing};
 use crate::link::{
     Arming, Event, HostClock, LinkError, Native, Patience, Session, Transport, move_arm_while,
 };
+use crate::materials::Materials;
 use crate::output::{Output, OutputError, OutputFolder, keep_apart};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::{Laid, View};
@@ -26,6 +27,7 @@ use crate::raster::{Raster, files_read_with};
 use crate::remote::without_key;
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{LoopColumns, Record, Recording, Settings};
+use crate::stability::limits;
 use crate::synth::{Kind, Synth};
 use crate::telemetry::{FeltViews, SampleLog};
 
@@ -93,11 +95,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let (raster, name) = terrain_of(args)?;
     let outputs = Outputs::new(&args.out, &name);
     outputs.keep_apart(args)?;
-    let asked = args.placing.of(&args.rendering, &raster)?;
+    let of_ground = (&args.rendering, &args.reading);
+    let materials = (args.rendering.materials).over((&name, &raster), of_ground, None)?;
+    let mut asked = args.placing.of(&args.rendering, &raster)?;
+    asked.grid = asked.grid.with_materials(materials.as_ref());
     // The virtual Phantom is one.
     let view = asked.view(&Calibration::PREMIUM_1_5)?;
     let terrain = view.terrain(asked.grid)?;
-    let (law, rule) = (args.rendering.law()?, args.rendering.rule());
+    let law = args.rendering.law()?;
+    let law = args.rendering.materials.law(materials.as_ref(), law);
+    let rule = args.rendering.rule();
     let placed = PlacedTerrain::in_view(&terrain, view.home_mm, law, rule)?;
     let placed = placed.repeated(args.rounds);
     show(args, (&placed, &view), &name, &outputs)
@@ -141,6 +148,7 @@ impl Outputs {
     fn keep_apart(&self, args: &Args) -> Result<(), Failure> {
         let mut inputs = args.file.as_deref().map_or(vec![], files_read_with);
         inputs.extend(args.commands.file());
+        inputs.extend(args.rendering.materials.inputs());
         keep_apart(&[&self.recording, &self.picture], &inputs).or_hint(OTHER_FOLDER)
     }
 }
@@ -160,6 +168,9 @@ fn show(
         session_summary::in_words(terrain)
     );
     print!("{}", placing::told(view, terrain));
+    if let Some(line) = session_summary::materials(terrain) {
+        println!("{line}");
+    }
     left_behind::tell([outputs.recording.as_path(), &outputs.picture]);
     let (runs_on, mut control) = (device(args), control(args, placed, view)?);
     if let Some(line) = control.listen(&args.commands) {
@@ -170,7 +181,7 @@ fn show(
     interrupt::listen();
     let viewer = args.viewing.program()?;
     let shown = viewer.map(|program| ToBeShown::new(program, terrain, view, name));
-    terrain.raster().check_came()?;
+    terrain.check_came()?;
     let tour = Tour {
         placed,
         stop_s,
@@ -314,7 +325,8 @@ impl<'t> Tour<'_, 't> {
         let (mut session, device) = Session::open(terrain, scene, arming, transport, patience)?;
         let line = format!("device         {}\n", session_summary::device(&device));
         voice::put(std::io::stdout(), &line);
-        crate::stability::limits::warn(&scene.law, &device);
+        let materials = terrain.grid().materials();
+        limits::warn_of(&scene.law, materials.map(Materials::table), &device);
         let tell = |line: String| voice::put(std::io::stderr(), &(line + "\n"));
         let mut shown = self.shown.and_then(|shown| shown.start(&device, tell));
         let stop_tick = (self.stop_s * f64::from(device.tick_hz)).ceil() as u64;

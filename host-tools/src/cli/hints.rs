@@ -10,6 +10,8 @@ use crate::board::update::{UpdateError, UpdateFailure};
 use crate::calibrate::file::BadFile;
 use crate::calibrate::{FitError, WalkError};
 use crate::link::{EmulatorError, LinkError};
+use crate::materials::BadGround;
+use crate::materials::table::BadTable;
 use crate::phantom::PlacingError;
 use crate::place::PlaceError;
 use crate::replay::ReplayError;
@@ -30,6 +32,36 @@ impl Hint for TerrainError {
             }
         };
         hint.into()
+    }
+}
+
+impl Hint for BadTable {
+    fn hint(&self) -> String {
+        match self {
+            Self::Unreadable { .. } => "name a table of materials with --material-table",
+            Self::NoTable { .. } | Self::Class { .. } => {
+                "compare it with docs/worldcover.toml: what a class feels like stands under [class.NUMBER]"
+            }
+        }
+        .into()
+    }
+}
+
+impl Hint for BadGround {
+    fn hint(&self) -> String {
+        match self {
+            Self::NoSystem { unplaced, .. } => {
+                format!("give it one: gdal_translate -a_srs EPSG:CODE {unplaced} OUT.tif")
+            }
+            Self::NoWay { .. } => {
+                "bring the classes into the terrain's reference system: gdalwarp -t_srs EPSG:CODE -r near IN OUT.tif"
+                    .into()
+            }
+            Self::Apart { .. } => "name the classes of this ground with --materials".into(),
+            Self::TooMany(_) => {
+                "leave those out of the table that may feel as the default".into()
+            }
+        }
     }
 }
 

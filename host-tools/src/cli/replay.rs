@@ -12,14 +12,17 @@ use super::failure::{Failure, OrHint};
 use super::options::emulated_board::{EmulatedBoard, RunsOn};
 use super::options::rendering::Rendering;
 use super::options::terrain_file::TerrainFile;
+use super::session_summary;
 use super::terminal::{interrupt, left_behind, progress};
 use super::viewing::{self, Viewing};
 use crate::link::{Patience, Transport};
+use crate::materials::Materials;
 use crate::output::{Output, keep_apart};
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{
     Record, ReplayError, Replayer, Settings, Summary, Trajectory, on_native, replay_trajectory,
 };
+use crate::stability::limits;
 use crate::terrain::Terrain;
 use crate::view_feed::{Picture, Program, ViewFeed};
 
@@ -74,6 +77,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let mut inputs = args.terrain.inputs();
     inputs.push(args.trajectory.clone());
+    inputs.extend(args.rendering.materials.inputs());
     keep_apart(&[&args.output], &inputs).or_hint("name another file with --output")?;
     left_behind::tell([args.output.as_path()]);
     let viewer = args.viewing.program()?;
@@ -85,16 +89,26 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let rendering = rendering(args, recorded.as_ref())?;
     let raster = args.terrain.open()?;
     let measured_at = recorded.as_ref().and_then(|it| it.felt.measured_at);
+    let name = args.terrain.name();
+    let of_ground = (&rendering, &args.terrain.reading);
+    let of_recording = recorded.as_ref().and_then(|it| it.materials.as_ref());
+    let materials = (rendering.materials).over((&name, &raster), of_ground, of_recording)?;
     let grid = rendering.grid(&raster, measured_at);
+    let grid = grid.with_materials(materials.as_ref());
     let scale = rendering.scale(&grid)?;
     let terrain = rendering.terrain(grid, scale)?;
     let file = args.terrain.file.display().to_string();
     if let Some(recorded) = &recorded {
         recorded.check_terrain(&file, &terrain)?;
     }
+    let law = rendering.law()?;
+    let law = rendering.materials.law(materials.as_ref(), law);
+    if let Some(line) = session_summary::materials(&terrain) {
+        eprintln!("{line}");
+    }
     let felt = Felt {
         terrain: &terrain,
-        law: (rendering.law()?, rendering.rule()),
+        law: (law, rendering.rule()),
         file,
         title: args.terrain.name(),
         home_mm: recorded.as_ref().and_then(|it| it.felt.home_mm),
@@ -225,7 +239,9 @@ fn replay<'t>(
 ) -> Result<Summary, Failure> {
     let progress = progress::bar(None, "{spinner} {human_pos} rows, {per_sec}");
     interrupt::listen();
-    crate::stability::limits::warn(&felt.law.0, replayer.device());
+    let materials = felt.terrain.grid().materials();
+    let table = materials.map(Materials::table);
+    limits::warn_of(&felt.law.0, table, replayer.device());
     let device = Device::of(replayer.device());
     let mut settings = Settings::new(&felt.file, felt.terrain, felt.law, None, device);
     settings.views.clone_from(&felt.views);

@@ -131,12 +131,19 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let outputs: Vec<_> = devices.iter().filter_map(|d| d.record.clone()).collect();
     let mut inputs = args.terrain.inputs();
     inputs.extend(args.commands.file());
+    inputs.extend(args.rendering.materials.inputs());
     keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
     left_behind::tell(outputs.iter().map(PathBuf::as_path));
     let viewer = args.viewing.program()?;
     let raster = args.terrain.open()?;
-    let asked = args.placing.of(&args.rendering, &raster)?;
-    let law = (args.rendering.law()?, args.rendering.rule());
+    let of_ground = (&args.rendering, &args.terrain.reading);
+    let name = args.terrain.name();
+    let materials = (args.rendering.materials).over((&name, &raster), of_ground, None)?;
+    let mut asked = args.placing.of(&args.rendering, &raster)?;
+    asked.grid = asked.grid.with_materials(materials.as_ref());
+    let law = args.rendering.law()?;
+    let law = args.rendering.materials.law(materials.as_ref(), law);
+    let law = (law, args.rendering.rule());
     // What cannot be recorded is known before anything is armed.
     let recordings = of_each(&devices, recording)?;
     let commands = args.commands.open_for(devices.len())?;
@@ -154,6 +161,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         .zip(placed.first())
         .map(|(program, of)| ToBeShown::new(program, of.terrain, &of.view, &title));
     raster.check_came()?;
+    materials
+        .as_ref()
+        .map_or(Ok(()), |it| it.classes().check_came())?;
     let mut seats = seats_for(args, &devices).into_iter();
     let each = devices.iter().zip(&placed).zip(met);
     let servings = each.zip(recordings.into_iter().zip(commands));

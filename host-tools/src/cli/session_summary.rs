@@ -185,6 +185,13 @@ fn kind_of_device(hello: &DeviceHello) -> String {
     format!("{board} {version}, window of {w} × {w} tiles, {hz} ticks a second")
 }
 
+/// What the ground is made of, where that is not the same everywhere.
+pub(super) fn materials(terrain: &Terrain<'_>) -> Option<String> {
+    let grid = terrain.grid();
+    let materials = grid.materials()?;
+    Some(format!("materials      {}", materials.told(grid)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,6 +9,7 @@ use hapterra_core::scene::{Point, Sample, Scene, View};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
 use hapterra_core::wire::hello::DeviceHello;
+use hapterra_core::wire::materials::MaterialTile;
 use hapterra_core::wire::message::{TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_core::wire::session::{LastSession, SessionNumber};
@@ -21,6 +22,7 @@ use super::error::LinkError;
 use super::messages::{FromDevice, from_device, next_frame};
 use super::patience::Patience;
 use super::tally::Tally;
+use crate::materials::{MaterialBuffer, Materials};
 use crate::terrain::{Terrain, TileBuffer};
 
 /// A message from the device, as it concerns whoever uses the session.
@@ -115,6 +117,7 @@ pub struct Client<'t> {
     talk: Conversation,
     reader: Box<FrameReader<MAX_FRAME>>,
     tile: TileBuffer,
+    materials: MaterialBuffer,
     /// The device of the present session.
     device: Option<DeviceHello>,
     /// The scene was not taken yet in this session.
@@ -182,9 +185,11 @@ impl<'t> Client<'t> {
             next: None,
             scene,
             arming,
-            talk: Conversation::new(Some(scene), patience, fastrand::Rng::with_seed(seed)),
+            talk: Conversation::new(Some(scene), patience, fastrand::Rng::with_seed(seed))
+                .with_materials(terrain.grid().materials().map(Materials::table)),
             reader: Box::default(),
             tile: TileBuffer::default(),
+            materials: MaterialBuffer::default(),
             device: None,
             is_new: true,
             has_armed: false,
@@ -518,21 +523,30 @@ impl<'t> Client<'t> {
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
     ) {
-        let before = self.terrain.raster().not_yet();
+        let before = self.terrain.not_yet();
         let Some(heights) = self.terrain.tile_of(&self.scene, key, &mut self.tile) else {
             return self.on_no_tile(now, key);
         };
-        if self.terrain.raster().not_yet() != before {
+        // The underlay comes without.
+        let materials = match key.level == self.scene.level {
+            true => self.terrain.materials_of(key, &mut self.materials),
+            false => None,
+        };
+        if self.terrain.not_yet() != before {
             // Some of its holes are none.
             return self.wait_for(now, key);
         }
-        let message = TileMessage {
+        let tile = TileMessage {
             epoch: self.scene.epoch,
             key,
             heights,
         };
+        let message = match materials {
+            Some(materials) => ToDevice::MaterialTile(MaterialTile { tile, materials }),
+            None => ToDevice::Tile(tile),
+        };
         let before = out.len();
-        self.talk.say(&ToDevice::Tile(message), out);
+        self.talk.say(&message, out);
         let bytes = out.len() - before;
         if key.level != self.scene.level {
             // Each view has its own underlay, and all have one name.

@@ -3,8 +3,10 @@
 
 use std::time::Duration;
 
+use hapterra_core::force::MaterialTable;
 use hapterra_core::scene::{Scene, View};
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
+use hapterra_core::wire::materials::{MOST_TABLE_BYTES, MaterialScene, table_bytes};
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::request::Answer;
 use hapterra_core::wire::session::{InSession, SessionEnd, SessionNumber};
@@ -66,6 +68,8 @@ pub(super) struct Conversation {
     /// The device has answered in this session.
     confirmed: bool,
     scene: Option<Scene>,
+    /// The table of its materials, where it has some.
+    materials: Option<MaterialTable>,
     /// Another view of it that was said and is not answered: since when, and when last.
     view: Option<(View, Duration, Duration)>,
     patience: Patience,
@@ -99,6 +103,7 @@ impl Conversation {
             previous: None,
             confirmed: false,
             scene,
+            materials: None,
             view: None,
             patience,
             state: State::Closed,
@@ -111,6 +116,15 @@ impl Conversation {
             hello: 0,
             hello_answered: true,
             asking: Asking::default(),
+        }
+    }
+
+    /// The same about a scene with materials.
+    #[must_use]
+    pub(super) fn with_materials(self, table: Option<&MaterialTable>) -> Self {
+        Self {
+            materials: table.cloned(),
+            ..self
         }
     }
 
@@ -312,7 +326,7 @@ impl Conversation {
             }
             State::SceneSent => {
                 if let Some(scene) = self.scene {
-                    self.say(&ToDevice::Scene(scene), out);
+                    self.say_scene(scene, out);
                 }
                 if now.saturating_sub(self.heard) >= self.patience.greet_again {
                     self.say_hello(out);
@@ -330,6 +344,23 @@ impl Conversation {
                 self.say(&ToDevice::Detach, out);
             }
         }
+    }
+
+    /// Says a scene, with its materials where it has some.
+    fn say_scene(&self, scene: Scene, out: &mut Vec<u8>) {
+        let Some(table) = self
+            .materials
+            .as_ref()
+            .filter(|_| scene.materials.is_some())
+        else {
+            return self.say(&ToDevice::Scene(scene), out);
+        };
+        let mut room = [0; MOST_TABLE_BYTES];
+        let table = table_bytes(table, &mut room);
+        self.say(
+            &ToDevice::MaterialScene(MaterialScene { scene, table }),
+            out,
+        );
     }
 
     fn say_hello(&mut self, out: &mut Vec<u8>) {

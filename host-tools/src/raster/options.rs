@@ -28,6 +28,8 @@ pub struct OpenOptions {
     pub vertical_unit_m: Option<f64>,
     /// How a picture's colours encode heights, if they do.
     pub encoding: Option<Encoding>,
+    /// The numbers are classes and no heights: those of a palette are taken as they are.
+    pub classes: bool,
     /// Samples that take more bytes than this stay in the file, where its format allows it,
     /// and are read in blocks when they are touched.
     pub most_in_memory_bytes: u64,
@@ -56,6 +58,7 @@ impl Default for OpenOptions {
             ground_cell_m: None,
             vertical_unit_m: None,
             encoding: None,
+            classes: false,
             most_in_memory_bytes: u64::from(Self::IN_MEMORY_MB) << 20,
             elsewhere: Elsewhere::default(),
             disk_cache: DiskCache::off(),

@@ -132,7 +132,8 @@ pub fn terrain_of<'t>(
     view: &ViewSettings,
 ) -> Result<Terrain<'t>, ReplayError> {
     let grid = match view.measured_at {
-        Some(ground) => FeltGrid::at(first.raster(), first.grid().cells(), ground),
+        Some(ground) => FeltGrid::at(first.raster(), first.grid().cells(), ground)
+            .with_materials(first.grid().materials()),
         None => *first.grid(),
     };
     let number = view.number;

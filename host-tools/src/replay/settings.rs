@@ -10,6 +10,7 @@ use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use serde::{Deserialize, Serialize};
 
 use crate::link::shown;
+use crate::materials::{Looks, Materials};
 use crate::place::Laid;
 use crate::raster::ReferenceSystem;
 use crate::terrain::{BadScale, FeltCells, FeltGrid, Scale, Terrain};
@@ -39,6 +40,10 @@ pub struct Settings {
     pub felt: Felt,
     /// The force law and the contact rule.
     pub force: Force,
+    /// What the ground was made of, where that was not the same everywhere; the law is then
+    /// that of the default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub materials: Option<MaterialSettings>,
     /// The device.
     pub device: Device,
     /// The views that were put in while it was felt, in their order; the one of the
@@ -214,6 +219,30 @@ pub struct Force {
     pub texture: Texture,
 }
 
+/// What the ground was made of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MaterialSettings {
+    /// The file of classes, as it was named.
+    pub file: String,
+    /// Hash of its classes and of where they lie.
+    pub fingerprint: String,
+    /// What the classes feel like.
+    #[serde(flatten)]
+    pub looks: Looks,
+}
+
+impl MaterialSettings {
+    /// Of a terrain with materials.
+    #[must_use]
+    pub fn of(materials: &Materials) -> Self {
+        Self {
+            file: materials.file().to_owned(),
+            fingerprint: format!("{:016x}", materials.fingerprint()),
+            looks: materials.looks().clone(),
+        }
+    }
+}
+
 /// The device that felt it, as it described itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Device {
@@ -297,6 +326,7 @@ impl Settings {
                 friction: law.friction,
                 damping: law.damping,
             },
+            materials: grid.materials().map(MaterialSettings::of),
             device,
             views: vec![],
         }
@@ -375,6 +405,8 @@ impl Settings {
             }
         } else if let Some(difference) = self.felt.difference(terrain.grid()) {
             difference
+        } else if self.has_other_classes(terrain.grid()) {
+            "the classes of its materials are others".to_owned()
         } else {
             return Ok(());
         };
@@ -383,6 +415,15 @@ impl Settings {
             found: file.to_owned(),
             difference,
         })
+    }
+}
+
+impl Settings {
+    /// Whether a terrain has other classes than those of the recording.
+    fn has_other_classes(&self, grid: &FeltGrid<'_>) -> bool {
+        let now = grid.materials().map(MaterialSettings::of);
+        let print = |settings: &MaterialSettings| settings.fingerprint.clone();
+        self.materials.is_some() && self.materials.as_ref().map(print) != now.as_ref().map(print)
     }
 }
 

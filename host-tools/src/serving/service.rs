@@ -80,7 +80,7 @@ impl<'s, 't> Service<'s, 't> {
         check: impl FnOnce(&mut dyn Transport) -> Result<(), E>,
     ) -> Result<(Served<'s, 't>, DeviceHello), E> {
         // Whoever holds the arm waits for no server.
-        self.terrain.raster().stop_waiting();
+        self.terrain.stop_waiting();
         let mut line = (self.connect)()?;
         let checked = check(&mut *line);
         let (scene, arming) = (self.scene, Some(self.arming));

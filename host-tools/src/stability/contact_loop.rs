@@ -181,6 +181,7 @@ fn scene(felt: &Felt) -> Scene {
         rule: Rule::Swept,
         source: Source::Encoders,
         hold_clock: false,
+        materials: None,
     }
 }
 

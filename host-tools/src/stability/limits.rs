@@ -1,6 +1,6 @@
 //! What the map says to who is about to feel a surface.
 
-use hapterra_core::force::{ForceLaw, Texture, passivity};
+use hapterra_core::force::{Controller, ForceLaw, MaterialTable, Texture, passivity};
 use hapterra_core::rate::TickRate;
 use hapterra_core::wire::hello::DeviceHello;
 
@@ -38,6 +38,48 @@ pub fn warn(law: &ForceLaw, device: &DeviceHello) {
     for warning in warnings.into_iter().flatten().flatten() {
         tracing::warn!("{warning}");
     }
+}
+
+/// The same of a surface of several materials, once for each warning. The device takes the
+/// controller for the stiffest of them.
+pub fn warn_of(law: &ForceLaw, materials: Option<&MaterialTable>, device: &DeviceHello) {
+    let Some(table) = materials else {
+        return warn(law, device);
+    };
+    for warning in warnings_of(law, table, device.tick_hz, device.latency_us) {
+        tracing::warn!("{warning}");
+    }
+}
+
+fn warnings_of(
+    law: &ForceLaw,
+    table: &MaterialTable,
+    tick_hz: u32,
+    latency_us: u16,
+) -> Vec<String> {
+    let mut told = Vec::new();
+    let Some(rate) = TickRate::new(tick_hz) else {
+        return told;
+    };
+    let latency_s = 1e-6 * f32::from(latency_us);
+    let is_controlled = table.hardest(law).is_controlled(rate, latency_s);
+    let scale = table.stiffness_scale(law);
+    for material in table.materials() {
+        let mut law = material.law(law);
+        law.stiffness_n_per_mm *= scale;
+        law.damping.controller = match is_controlled {
+            true => Controller::On,
+            false => Controller::Off,
+        };
+        let warnings = [
+            warning(&law, rate, latency_us),
+            too_fine(&law.texture, rate),
+        ];
+        told.extend(warnings.into_iter().flatten());
+    }
+    told.sort();
+    told.dedup();
+    told
 }
 
 /// What has to be said of a texture so fine that a slow hand does not feel it in whole.
@@ -111,7 +153,7 @@ pub(super) fn still_n_per_mm(
 
 #[cfg(test)]
 mod tests {
-    use hapterra_core::force::{Controller, Damping, Pattern};
+    use hapterra_core::force::{Damping, Material, Pattern};
 
     use super::*;
 
@@ -135,6 +177,39 @@ mod tests {
         };
         let rate = TickRate::new(hz).expect("a rate");
         warning(&law, rate, latency_us).unwrap_or_default()
+    }
+
+    #[test]
+    fn the_stiffest_and_the_finest_of_several_materials_are_warned_of() {
+        let soft = Material::of(&ForceLaw::PREMIUM);
+        let stiff = Material {
+            stiffness_n_per_mm: 2.0,
+            ..soft
+        };
+        let fine = Material {
+            texture: Texture {
+                pattern: Pattern::Grain,
+                amplitude_mm: 0.03,
+                wavelength_mm: 0.3,
+                ..Texture::NONE
+            },
+            ..soft
+        };
+        let told = |materials: &[Material], law: &ForceLaw| {
+            let table = MaterialTable::new(materials).expect("some");
+            warnings_of(law, &table, 1000, 190).join("; ")
+        };
+        let law = ForceLaw::PREMIUM;
+        assert_eq!(told(&[soft, soft], &law), "");
+        let both = told(&[soft, stiff, fine, stiff], &law);
+        assert_eq!(both.matches("a stiffness of 2 N/mm").count(), 1, "{both}");
+        assert!(both.contains("controller takes back") && both.contains("wavelength of 0.3 mm"));
+        // A scene that is twice as stiff is so on each of them.
+        let twice = ForceLaw {
+            stiffness_n_per_mm: 1.0,
+            ..law
+        };
+        assert!(told(&[soft, stiff], &twice).contains("a stiffness of 4 N/mm"));
     }
 
     #[test]

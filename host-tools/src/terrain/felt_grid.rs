@@ -6,6 +6,7 @@
 
 use std::hash::{Hash, Hasher};
 
+use crate::materials::Materials;
 use crate::raster::{CellSize, Raster, Sides, around, bilinear};
 
 /// Cells whose sides differ by less than this share count as square, and keep
@@ -54,6 +55,8 @@ pub struct FeltGrid<'r> {
     side_m: Option<f64>,
     /// Where the samples lie in the file; `None` where they are the file's own.
     resampling: Option<Resampling>,
+    /// What the ground is made of, where that is not the same everywhere.
+    materials: Option<&'r Materials>,
 }
 
 /// Place of felt sample (u, v) in the file: column `first + u · column_step + v · lean`,
@@ -84,6 +87,18 @@ impl<'r> FeltGrid<'r> {
         }
     }
 
+    /// The same ground, made of these materials, or of one.
+    #[must_use]
+    pub const fn with_materials(self, materials: Option<&'r Materials>) -> Self {
+        Self { materials, ..self }
+    }
+
+    /// What the ground is made of, where that is not the same everywhere.
+    #[must_use]
+    pub const fn materials(&self) -> Option<&'r Materials> {
+        self.materials
+    }
+
     /// The grid of cells as they are at a place in felt cells, where that is another grid: a
     /// cell there is larger, smaller or of another shape than it is felt, by more than a
     /// quarter of 0.1 %. A place beside the field counts as the next one in it.
@@ -99,7 +114,7 @@ impl<'r> FeltGrid<'r> {
         if is_alike(&now, &there) {
             return None;
         }
-        let anew = Self::at(self.raster, self.cells, ground);
+        let anew = Self::at(self.raster, self.cells, ground).with_materials(self.materials);
         (self.cells == FeltCells::Stored || !anew.is_distorted()).then_some(anew)
     }
 
@@ -144,6 +159,7 @@ impl<'r> FeltGrid<'r> {
             rows: raster.rows(),
             side_m: cell.map(|cell| cell.square_metres()),
             resampling: None,
+            materials: None,
         };
         match (cells, cell) {
             (FeltCells::Square, Some(cell)) if is_square(&cell) => {
@@ -363,6 +379,9 @@ impl FeltGrid<'_> {
     /// What the grid is besides the samples of its raster.
     pub(super) fn hash_shape<H: Hasher>(&self, hasher: &mut H) {
         (self.columns, self.rows).hash(hasher);
+        if let Some(materials) = self.materials {
+            materials.fingerprint().hash(hasher);
+        }
         if let Some(places) = &self.resampling {
             let numbers = [
                 places.first,

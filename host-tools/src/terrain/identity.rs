@@ -18,7 +18,7 @@ use crate::raster::Raster;
 ///
 /// Of a raster that stays in its file it is the hash of the file's index and of the heights
 /// that were looked at when it was opened.
-pub(super) fn fingerprint(raster: &Raster) -> u64 {
+pub(crate) fn fingerprint(raster: &Raster) -> u64 {
     if let Some(print) = raster.print_in_file() {
         return print;
     }

@@ -15,5 +15,6 @@ mod underlay;
 
 pub use distortion::Distortion;
 pub use felt_grid::{FeltCells, FeltGrid};
+pub(crate) use identity::fingerprint;
 pub use scale::{BadScale, Scale};
 pub use tiler::{INTERPOLATED_STEP, Terrain, TerrainError, TileBuffer};

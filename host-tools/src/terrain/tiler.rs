@@ -8,10 +8,12 @@ use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
 use hapterra_core::terrain::{FieldSize, POSTS, TILE_CELLS, TileKey};
+use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::Heights;
 
 use super::steps::{BinaryUnit, steps};
 use super::{BadScale, FeltCells, FeltGrid, Scale, identity};
+use crate::materials::MaterialBuffer;
 use crate::raster::Raster;
 
 /// Heights that the file does not hold but are interpolated are rounded to multiples of this, cells.
@@ -254,6 +256,7 @@ impl<'r> Terrain<'r> {
             rule,
             source,
             hold_clock: true,
+            materials: (self.grid.materials()).map(|materials| materials.table().check_sum()),
         };
         scene.epoch = identity::epoch(self.fingerprint(), &self.grid, &self.scale, &scene);
         scene
@@ -322,6 +325,45 @@ impl<'r> Terrain<'r> {
             false => steps(unit, self.scale.height_cells(1.0)).collect(),
         };
         Some(buffer.above(low, high, &steps))
+    }
+
+    /// The materials of a tile of a terrain that has some, as they go on the link; `None` where
+    /// there is no such tile, or it comes without.
+    #[must_use]
+    pub fn materials_of<'b>(
+        &self,
+        key: TileKey,
+        buffer: &'b mut MaterialBuffer,
+    ) -> Option<TileMaterials<'b>> {
+        let materials = self.grid.materials().filter(|_| self.has(key))?;
+        Some(materials.tile((&self.grid, self.size), key, buffer))
+    }
+
+    /// How often this thread asked for heights or classes that were not here yet
+    /// ([`Raster::not_yet`]).
+    #[must_use]
+    pub fn not_yet(&self) -> u64 {
+        let of_classes = (self.grid.materials()).map_or(0, |classes| classes.classes().not_yet());
+        // Each counts all that this thread asked for.
+        self.raster().not_yet().max(of_classes)
+    }
+
+    /// From now on nothing waits for what is elsewhere ([`Raster::stop_waiting`]).
+    pub fn stop_waiting(&self) {
+        self.raster().stop_waiting();
+        if let Some(materials) = self.grid.materials() {
+            materials.classes().stop_waiting();
+        }
+    }
+
+    /// Whether all that was asked for so far has come ([`Raster::check_came`]).
+    ///
+    /// # Errors
+    /// Why something did not come.
+    pub fn check_came(&self) -> Result<(), crate::raster::Error> {
+        self.raster().check_came()?;
+        let of_classes = self.grid.materials().map(|materials| materials.classes());
+        of_classes.map_or(Ok(()), Raster::check_came)
     }
 
     /// The height at a sample of this terrain's level, in cells, as the file has it at a level of

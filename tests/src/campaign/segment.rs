@@ -455,6 +455,7 @@ fn scene(terrain: &Terrain<'_>, arm: &Arm<'_>, chance: &mut Chance) -> Scene {
     Scene {
         // Real time: nothing waits for the host.
         hold_clock: false,
+        materials: None,
         ..terrain.scene(law, RULE, Source::Encoders, home)
     }
 }

@@ -121,6 +121,7 @@ pub fn check(plan: &Plan) -> Result<Report, Wrong> {
     let home = scale.to_grid([16.3, 16.4, 10.0]).expect("addressable");
     let scene = Scene {
         hold_clock: false,
+        materials: None,
         ..terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home)
     };
     World::new(&terrain, scene, plan).play(plan)

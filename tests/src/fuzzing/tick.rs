@@ -127,6 +127,7 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
             Source::Encoders
         },
         hold_clock: false,
+        materials: None,
     };
     if kind & 4 != 0 {
         scene.size = FieldSize::new(bytes.int(), bytes.int());

@@ -221,5 +221,6 @@ pub fn scene() -> Scene {
         rule: Rule::Swept,
         source: Source::Points,
         hold_clock: false,
+        materials: None,
     }
 }

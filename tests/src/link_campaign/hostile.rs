@@ -9,6 +9,7 @@ use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Point, Sample, Scene, Source, View};
 use hapterra_core::terrain::{FieldSize, TileKey};
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL, SerialNumber};
+use hapterra_core::wire::materials::{MaterialScene, MaterialTile, TileMaterials};
 use hapterra_core::wire::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{LastSession, SampleCount, SessionNumber};
@@ -74,8 +75,22 @@ fn host_message<'b>(chance: &mut Chance) -> ToDevice<'b> {
             number: chance.bits() as u8,
             silence_s: chance.bits() as u16,
         }),
-        2 => ToDevice::Scene(host_scene(chance, epoch)),
-        3 | 4 => ToDevice::Tile(TileMessage {
+        2 => match chance.below(2) {
+            0 => ToDevice::Scene(host_scene(chance, epoch)),
+            _ => ToDevice::MaterialScene(MaterialScene {
+                scene: host_scene(chance, epoch),
+                table: [&[][..], &[1], &[0xFF; 40]][chance.below(3)],
+            }),
+        },
+        3 => ToDevice::MaterialTile(MaterialTile {
+            tile: TileMessage {
+                epoch,
+                key: TileKey::new(chance.bits() as u8, word(chance), word(chance)),
+                heights: Heights::Hole,
+            },
+            materials: TileMaterials::Runs(&[200, 255, 0, 0][..chance.below(5)]),
+        }),
+        4 => ToDevice::Tile(TileMessage {
             epoch,
             key: TileKey::new(chance.bits() as u8, word(chance), word(chance)),
             heights: Heights::Flat {
@@ -141,6 +156,7 @@ fn host_scene(chance: &mut Chance, epoch: u32) -> Scene {
         rule: Rule::Swept,
         source: [Source::Encoders, Source::Points][chance.below(2)],
         hold_clock: chance.below(2) == 0,
+        materials: [None, Some(chance.bits() as u32)][chance.below(2)],
     }
 }
 

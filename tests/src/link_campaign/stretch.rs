@@ -313,6 +313,7 @@ fn scene(terrain: &Terrain<'_>, board: &Board<'_>, chance: &mut Chance) -> Scene
     let home = terrain.scale().to_grid(board.home_mm()).expect("in range");
     Scene {
         hold_clock: board.lock_step,
+        materials: None,
         ..terrain.scene(law, Rule::Swept, Source::Encoders, home)
     }
 }

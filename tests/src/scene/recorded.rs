@@ -72,6 +72,7 @@ impl Recorded {
             rule: scene.rule,
             source: Source::Points,
             hold_clock: false,
+            materials: None,
         };
         Self {
             scene,

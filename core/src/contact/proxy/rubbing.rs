@@ -102,6 +102,16 @@ impl Rubbing {
         (self.at_rest, self.creeps) = (false, true);
     }
 
+    /// Takes other coefficients. Returns whether they are others.
+    pub(super) fn takes(&mut self, friction: Friction) -> bool {
+        let is_other = self.friction != friction;
+        if is_other {
+            self.friction = friction;
+            self.surface_moved();
+        }
+        is_other
+    }
+
     /// One more tick. A proxy that slid sticks when it has not moved for a while.
     fn counts(&mut self, is_still: bool, rate: TickRate) {
         if self.slides {

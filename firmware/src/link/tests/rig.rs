@@ -61,6 +61,7 @@ pub(super) fn scene(source: Source) -> Scene {
         rule: Rule::Swept,
         source,
         hold_clock: false,
+        materials: None,
     }
 }
 

@@ -44,6 +44,7 @@ pub(super) fn below_tip(record: &Calibration, status: &Status, below_mm: f32) ->
         rule: Rule::default(),
         source: Source::Encoders,
         hold_clock: false,
+        materials: None,
     }
 }
 

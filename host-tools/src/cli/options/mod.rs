@@ -4,6 +4,7 @@
 pub mod device;
 pub mod emulated_board;
 pub mod exaggeration;
+pub mod materials;
 pub mod placing;
 pub mod recorded;
 pub mod rendering;

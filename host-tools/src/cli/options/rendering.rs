@@ -4,6 +4,7 @@ use hapterra_core::contact::{Friction, Rule};
 use hapterra_core::force::{Controller, Damping, ForceLaw, Shading};
 
 use super::exaggeration::Exaggeration;
+use super::materials::SurfaceMaterials;
 use super::texture::SurfaceTexture;
 use crate::cli::failure::{Failure, OrHint};
 use crate::place::{Heights, suited_height};
@@ -78,6 +79,10 @@ pub struct Rendering {
     /// The micro-relief.
     #[command(flatten)]
     pub texture: SurfaceTexture,
+
+    /// The materials.
+    #[command(flatten)]
+    pub materials: SurfaceMaterials,
 
     /// Contact rule [default: swept]
     #[arg(long, value_enum)]

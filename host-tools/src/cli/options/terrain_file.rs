@@ -141,6 +141,17 @@ impl ReadingOptions {
         })
     }
 
+    /// How a raster of classes is opened that lies over the terrain: it says all by itself, and
+    /// shares the bounds of memory and disk.
+    pub(in crate::cli) fn of_classes(&self) -> OpenOptions {
+        OpenOptions {
+            classes: true,
+            most_in_memory_bytes: u64::from(self.in_memory_mb) << 20,
+            disk_cache: self.disk_cache(),
+            ..OpenOptions::default()
+        }
+    }
+
     fn options(&self) -> OpenOptions {
         OpenOptions {
             raw: self.raw_size.map(|(columns, rows)| RawLayout {

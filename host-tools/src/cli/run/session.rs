@@ -20,6 +20,7 @@ use crate::cli::viewing::ToBeShown;
 use crate::link::{
     Arming, DeviceAddress, HostClock, LinkError, Native, Patience, Tcp, Transport, serve_plant,
 };
+use crate::materials::Materials;
 use crate::output::Output;
 use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::Laid;
@@ -88,6 +89,9 @@ impl<'t> Serving<'_, 't> {
         let how = session_summary::in_words(placed.terrain);
         speaker.say(format!("terrain        {}: {how}", args.terrain.name()));
         speaker.show(placing::told(&placed.view, placed.terrain));
+        if let Some(line) = session_summary::materials(placed.terrain) {
+            speaker.say(line);
+        }
         speaker.say(format!(
             "device         {}",
             session_summary::device(&hello)
@@ -95,7 +99,9 @@ impl<'t> Serving<'_, 't> {
         if let Some(line) = told_of_last_end(&hello) {
             speaker.tell(line);
         }
-        limits::warn(&placed.scene.law, &hello);
+        let materials = placed.terrain.grid().materials();
+        let table = materials.map(Materials::table);
+        limits::warn_of(&placed.scene.law, table, &hello);
         let recording = described(self.recording, args, placed, &hello);
         let laid = Laid {
             view: placed.view,

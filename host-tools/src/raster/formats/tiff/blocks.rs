@@ -79,13 +79,13 @@ impl TiffBlocks {
         (file, remote): Opened,
         mask: Option<TiffFile>,
         overviews: Option<Opened>,
-        (name, asked): (&str, Option<u32>),
+        (name, asked, classes): (&str, Option<u32>, bool),
         inputs: &[&FileBytes],
     ) -> Result<Self, BadRaster> {
         let full = images::full(&file)?.clone();
         let full = Image {
             file: MAIN,
-            layout: Layout::read(&full, asked)?,
+            layout: Layout::read(&full, asked, classes)?,
             directory: full,
         };
         let (also, also_remote) = overviews.unzip();
@@ -95,7 +95,7 @@ impl TiffBlocks {
         for (index, file) in files.iter().enumerate() {
             for directory in images::overviews(file) {
                 // An overview that cannot be used is no reason not to feel the field.
-                let Ok(layout) = Layout::read(directory, asked) else {
+                let Ok(layout) = Layout::read(directory, asked, classes) else {
                     continue;
                 };
                 let image = Image {

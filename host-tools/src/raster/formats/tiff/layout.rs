@@ -72,8 +72,9 @@ fn compression(code: u16) -> Result<(&'static str, u64), BadRaster> {
 
 impl Layout {
     /// Reads and checks the layout of an image; `asked` is the band that the user chose,
-    /// the first being 1.
-    pub(super) fn read(image: &Ifd, asked: Option<u32>) -> Result<Self, BadRaster> {
+    /// the first being 1; a palette is taken for what it is where the numbers are
+    /// `classes`.
+    pub(super) fn read(image: &Ifd, asked: Option<u32>, classes: bool) -> Result<Self, BadRaster> {
         let (columns, rows) = (image.width(), image.height());
         if columns == 0 || rows == 0 {
             return Err(BadRaster::damaged(format!(
@@ -81,7 +82,9 @@ impl Layout {
             )));
         }
         let bands = image.samples_per_pixel();
-        refuse_colour(image, bands, asked.is_some())?;
+        if !(classes && is_palette(image)) {
+            refuse_colour(image, bands, asked.is_some())?;
+        }
         let band = chosen_band(asked, bands)?;
         let (tiled, chunk, chunk_bytes) = match (image.tile_width(), image.tile_height()) {
             (Some(width), Some(height)) => {
@@ -237,6 +240,10 @@ fn chosen_band(asked: Option<u32>, bands: u16) -> Result<usize, BadRaster> {
         return Err(BadRaster::NoSuchPart { asked, there });
     }
     Ok(band as usize - 1)
+}
+
+fn is_palette(image: &Ifd) -> bool {
+    image.photometric_interpretation_enum() == Some(PhotometricInterpretation::Palette)
 }
 
 /// Colours are no heights, however many bands they have, unless the user has `chosen`

@@ -54,7 +54,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     let asked = options.band;
     let file = open(input)?;
     let image = images::full(&file)?.clone();
-    let layout = Layout::read(&image, asked)?;
+    let layout = Layout::read(&image, asked, options.classes)?;
     let most = match input.remote() {
         // What is not touched is not fetched, either.
         Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
@@ -78,7 +78,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
             };
             let file = (file, input.remote());
             let inputs: Vec<_> = once(input).chain(&mask_file).collect();
-            let named = (input.name(), asked);
+            let named = (input.name(), asked, options.classes);
             Storage::from(TiffBlocks::new(file, mask, overviews, named, &inputs)?)
         }
         false => {

@@ -89,6 +89,45 @@ fn the_mask_beside_an_image_makes_holes() {
     assert_eq!(raster.height(2, 1), 3.0);
 }
 
+/// One image of indices of a palette.
+fn with_palette() -> Vec<u8> {
+    let mut bytes = Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new(&mut bytes).expect("a file");
+    let mut image = encoder
+        .new_image::<colortype::Gray8>(3, 2)
+        .expect("an image");
+    let colours = [0_u16; 3 * 256];
+    let tags = image.encoder();
+    tags.write_tag(Tag::PhotometricInterpretation, 3_u16)
+        .expect("a palette");
+    tags.write_tag(Tag::ColorMap, &colours[..])
+        .expect("its colours");
+    image
+        .write_data(&[10, 20, 30, 80, 90, 95])
+        .expect("samples");
+    bytes.into_inner()
+}
+
+#[test]
+fn the_numbers_of_a_palette_are_classes_and_no_heights() {
+    assert!(matches!(
+        open(with_palette()),
+        Err(BadRaster::NotAHeightField(what)) if what.contains("palette")
+    ));
+    for most_in_memory_bytes in [0, 1 << 20] {
+        let options = OpenOptions {
+            classes: true,
+            most_in_memory_bytes,
+            ..OpenOptions::default()
+        };
+        let input = FileBytes::unpacked("test.tif", with_palette());
+        let classes = decode(&input, &options).and_then(|image| Raster::checked(image, None));
+        let classes = classes.expect("an image of classes");
+        let row = |row| [0, 1, 2].map(|column| classes.height(column, row));
+        assert_eq!((row(1), row(0)), ([10.0, 20.0, 30.0], [80.0, 90.0, 95.0]));
+    }
+}
+
 /// Left in the file, whatever its size.
 fn in_blocks() -> OpenOptions {
     OpenOptions {

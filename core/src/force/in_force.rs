@@ -1,0 +1,191 @@
+//! Which material is felt, and how the surface goes from one to the next.
+//!
+//! The material of the sample nearest to the proxy is wanted. What acts on the force moves there
+//! evenly within [`MATERIAL_CHANGE_S`]: stiffness, damping and friction by as much in each tick,
+//! and a texture by its share: the old one goes out in the first half, and the new one comes
+//! in from then on. A proxy that comes out of the air finds its material as it is, because
+//! nothing was felt before.
+
+use super::material::{MATERIAL_CHANGE_S, Material, MaterialTable};
+use super::{ForceLaw, Texture, Texturer};
+use crate::contact::{Contact, ContactState, Friction};
+use crate::rate::TickRate;
+use crate::terrain::Window;
+
+/// The material that is felt.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MaterialInForce {
+    /// The one that is wanted.
+    index: u8,
+    /// What was felt when it began to be wanted, and which part of the change is done.
+    from: Material,
+    done: f32,
+    /// The part of a change in a tick.
+    step: f32,
+    /// What multiplies the stiffness.
+    scale: f32,
+    /// The law as it is felt. Its texture is the one whose share is felt.
+    law: ForceLaw,
+    /// How much of that texture is felt.
+    texture_share: f32,
+    cell_mm: f32,
+    rate: TickRate,
+    /// The proxy touched in the tick before.
+    was_felt: bool,
+}
+
+impl MaterialInForce {
+    /// Before anything is felt: the default.
+    pub(crate) fn of(
+        table: &MaterialTable,
+        law: &ForceLaw,
+        cell_mm: f32,
+        rate: TickRate,
+    ) -> Option<Self> {
+        let scale = table.stiffness_scale(law);
+        let default = scaled(table.at(0)?, scale);
+        let mut material = Self {
+            index: 0,
+            from: default,
+            done: 1.0,
+            step: rate.tick_s() / MATERIAL_CHANGE_S,
+            scale,
+            law: *law,
+            texture_share: 1.0,
+            cell_mm,
+            rate,
+            was_felt: false,
+        };
+        material.feels(&default);
+        material.law.texture = default.texture;
+        Some(material)
+    }
+
+    /// The law that is felt.
+    pub(crate) const fn law(&self) -> &ForceLaw {
+        &self.law
+    }
+
+    /// What holds the proxy back, from the next tick on.
+    pub(crate) const fn friction(&self) -> Friction {
+        self.law.friction
+    }
+
+    /// How much of the texture is felt.
+    pub(crate) const fn texture_share(&self) -> f32 {
+        self.texture_share
+    }
+
+    /// The texture that is felt, as a scene of its own would have it.
+    pub(crate) fn texturer(&self) -> Option<Texturer> {
+        Texturer::of(&self.law.texture, self.cell_mm, self.rate)
+    }
+
+    /// One more tick of a contact, which is done with its HIP. Returns whether another texture
+    /// is felt from now on.
+    ///
+    /// Where the tile of the proxy is not here, the material stays.
+    pub(crate) fn advance<const D: usize>(
+        &mut self,
+        table: &MaterialTable,
+        window: &Window<'_, D>,
+        contact: &Contact,
+    ) -> bool {
+        match contact.output().state {
+            ContactState::Touching => {}
+            // What fades out does so as it was.
+            ContactState::Fading => return false,
+            ContactState::Waiting | ContactState::Free => {
+                self.was_felt = false;
+                return false;
+            }
+        }
+        let there = contact
+            .patch()
+            .and_then(|patch| window.material_near(patch, &contact.output().proxy));
+        if let Some(index) = there
+            && index != self.index
+        {
+            (self.from, self.done, self.index) = (Material::of(&self.law), 0.0, index);
+        }
+        let Some(wanted) = table.at(self.index) else {
+            return false;
+        };
+        let wanted = &scaled(wanted, self.scale);
+        if core::mem::replace(&mut self.was_felt, true) {
+            self.moves_to(wanted)
+        } else {
+            self.done = 1.0;
+            self.feels(wanted);
+            self.texture_share = 1.0;
+            self.takes_texture(&wanted.texture)
+        }
+    }
+
+    fn moves_to(&mut self, wanted: &Material) -> bool {
+        if self.done < 1.0 {
+            self.done += self.step;
+            if self.done < 1.0 {
+                self.feels(&self.on_the_way_to(wanted));
+            } else {
+                self.done = 1.0;
+                self.feels(wanted);
+            }
+        }
+        // Out in half of the time, and in in the other half.
+        let step = 2.0 * self.step;
+        if self.law.texture == wanted.texture {
+            self.texture_share = (self.texture_share + step).min(1.0);
+            return false;
+        }
+        // An even surface has nothing that could go out.
+        let share = self.texture_share - step;
+        if share > 0.0 && !self.law.texture.is_none() {
+            self.texture_share = share;
+            return false;
+        }
+        self.texture_share = 0.0;
+        self.takes_texture(&wanted.texture)
+    }
+
+    /// Between what was felt before the change and what is wanted.
+    fn on_the_way_to(&self, wanted: &Material) -> Material {
+        let mix = |from: f32, to: f32| from + (to - from) * self.done;
+        let (from, to) = (&self.from, wanted);
+        let dynamic_mu = mix(from.friction.dynamic_mu, to.friction.dynamic_mu);
+        let static_mu = mix(from.friction.static_mu, to.friction.static_mu);
+        Material {
+            stiffness_n_per_mm: mix(from.stiffness_n_per_mm, to.stiffness_n_per_mm),
+            friction: Friction {
+                // By the last places, it might be below.
+                static_mu: static_mu.max(dynamic_mu),
+                dynamic_mu,
+                viscous_s: mix(from.friction.viscous_s, to.friction.viscous_s),
+            },
+            damping_ns_per_m: mix(from.damping_ns_per_m, to.damping_ns_per_m),
+            texture: to.texture,
+        }
+    }
+
+    /// Puts all of a material in force but its texture.
+    fn feels(&mut self, material: &Material) {
+        self.law = ForceLaw {
+            texture: self.law.texture,
+            ..material.law(&self.law)
+        };
+    }
+
+    fn takes_texture(&mut self, texture: &Texture) -> bool {
+        let is_other = self.law.texture != *texture;
+        self.law.texture = *texture;
+        is_other
+    }
+}
+
+/// A material of the table as stiff as the scene has it.
+fn scaled(material: &Material, scale: f32) -> Material {
+    Material {
+        stiffness_n_per_mm: material.stiffness_n_per_mm * scale,
+        ..*material
+    }
+}

@@ -1,0 +1,183 @@
+//! Materials: what a class of ground feels like, and the table of them that a scene has.
+//!
+//! The host sorts the ground into classes, and tells the device which material of the table
+//! each sample has; so the device knows nothing of a file's own classes.
+//! `in_force.rs` beside this file has how one material follows another.
+
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+use super::{ForceLaw, Texture};
+use crate::contact::Friction;
+use crate::crc::CRC;
+use crate::force::Damping;
+
+/// How long the surface takes from one material to the next, seconds. So a border of
+/// classes changes a force by at most ten times a second what the two materials differ by.
+pub const MATERIAL_CHANGE_S: f32 = 0.1;
+
+/// What one class of ground feels like.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Material {
+    /// Newtons for a millimetre between the HIP and the proxy.
+    pub stiffness_n_per_mm: f32,
+    /// How rough it is.
+    pub friction: Friction,
+    /// Damping along the force, N·s/m, as [`Damping::ns_per_m`].
+    pub damping_ns_per_m: f32,
+    /// Its micro-relief.
+    pub texture: Texture,
+}
+
+impl Material {
+    /// What a scene's law says of its surface.
+    #[must_use]
+    pub const fn of(law: &ForceLaw) -> Self {
+        Self {
+            stiffness_n_per_mm: law.stiffness_n_per_mm,
+            friction: law.friction,
+            damping_ns_per_m: law.damping.ns_per_m,
+            texture: law.texture,
+        }
+    }
+
+    /// A law over this material; what is no surface's (the limit, the controller, the normals)
+    /// stays.
+    #[must_use]
+    pub const fn law(&self, law: &ForceLaw) -> ForceLaw {
+        ForceLaw {
+            stiffness_n_per_mm: self.stiffness_n_per_mm,
+            friction: self.friction,
+            damping: Damping {
+                ns_per_m: self.damping_ns_per_m,
+                ..law.damping
+            },
+            texture: self.texture,
+            ..*law
+        }
+    }
+
+    /// Whether its numbers are such that a loop can work with.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        self.law(&ForceLaw::PREMIUM).is_valid()
+    }
+}
+
+/// Most materials, the default among them: an index is half a byte.
+const MOST_MATERIALS: usize = 16;
+
+/// The materials of a scene. The first is the default: what is felt where the ground has no
+/// class, or one that the table does not name.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MaterialTable {
+    materials: Vec<Material, MOST_MATERIALS>,
+}
+
+impl MaterialTable {
+    /// Most materials, the default among them.
+    pub const MOST: usize = MOST_MATERIALS;
+    /// A table without any, which no scene can have.
+    pub const EMPTY: Self = Self {
+        materials: Vec::new(),
+    };
+
+    /// A table of these materials, the default first; `None` where there are none, or more
+    /// than [`Self::MOST`].
+    #[must_use]
+    pub fn new(materials: &[Material]) -> Option<Self> {
+        let materials = Vec::from_slice(materials).ok()?;
+        (!materials.is_empty()).then_some(Self { materials })
+    }
+
+    /// The materials, the default first.
+    #[must_use]
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+
+    /// Whether there is a default with a stiffness, and all numbers are such that a loop can
+    /// work with.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        let is_stiff = |default: &Material| default.stiffness_n_per_mm > 0.0;
+        self.materials.first().is_some_and(is_stiff)
+            && self.materials.iter().all(Material::is_valid)
+    }
+
+    /// Tells tables apart ([`Scene::materials`](crate::scene::Scene::materials)): a check sum of
+    /// all numbers, CRC-32 over their little-endian bytes in the order of the fields.
+    #[must_use]
+    pub fn check_sum(&self) -> u32 {
+        let mut digest = CRC.digest();
+        for material in &self.materials {
+            let Material {
+                stiffness_n_per_mm,
+                friction,
+                damping_ns_per_m,
+                texture,
+            } = material;
+            let numbers = [
+                *stiffness_n_per_mm,
+                friction.static_mu,
+                friction.dynamic_mu,
+                friction.viscous_s,
+                *damping_ns_per_m,
+                texture.amplitude_mm,
+                texture.wavelength_mm,
+                texture.direction_deg,
+            ];
+            for number in numbers {
+                digest.update(&number.to_le_bytes());
+            }
+            digest.update(&texture.seed.to_le_bytes());
+            digest.update(&[texture.pattern as u8]);
+        }
+        digest.finalize()
+    }
+
+    /// The material of an index; the default's where there is no such one.
+    #[must_use]
+    pub fn at(&self, index: u8) -> Option<&Material> {
+        let named = self.materials.get(usize::from(index));
+        named.or_else(|| self.materials.first())
+    }
+
+    /// By how much a law multiplies the stiffness of all materials: its own stiffness, over the
+    /// default's. A view that is twice as stiff is so on each material.
+    #[must_use]
+    pub fn stiffness_scale(&self, law: &ForceLaw) -> f32 {
+        let default = self.at(0).map_or(0.0, |default| default.stiffness_n_per_mm);
+        match default > 0.0 {
+            true => law.stiffness_n_per_mm / default,
+            false => 1.0,
+        }
+    }
+
+    /// A law as stiff as the stiffest material under it, and as damped as the most damped: what
+    /// a rule of stability has to hold for.
+    #[must_use]
+    pub fn hardest(&self, law: &ForceLaw) -> ForceLaw {
+        let most = |of: fn(&Material) -> f32| {
+            let all = self.materials.iter().map(of);
+            all.fold(0.0, |most: f32, one| most.max(one))
+        };
+        ForceLaw {
+            stiffness_n_per_mm: most(|m| m.stiffness_n_per_mm) * self.stiffness_scale(law),
+            damping: Damping {
+                ns_per_m: most(|m| m.damping_ns_per_m),
+                ..law.damping
+            },
+            ..*law
+        }
+    }
+
+    /// A friction that one of the materials has; none where all are like ice.
+    #[must_use]
+    pub(crate) fn some_friction(&self) -> Friction {
+        let mut all = self.materials.iter().map(|material| material.friction);
+        all.find(|friction| !friction.is_none())
+            .unwrap_or(Friction::NONE)
+    }
+}

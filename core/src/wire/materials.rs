@@ -1,0 +1,259 @@
+//! Materials on the link: the table that comes with a scene, and the materials of a tile.
+
+use serde::{Deserialize, Serialize};
+
+use crate::force::MaterialTable;
+use crate::scene::Scene;
+use crate::terrain::{BadTile, POSTS, Tile};
+
+use super::message::TileMessage;
+
+/// Samples of a tile.
+const SAMPLES: usize = POSTS * POSTS;
+/// Bytes of a tile's materials at most: two samples a byte.
+pub const MOST_TILE_BYTES: usize = SAMPLES.div_ceil(2);
+/// Bytes of a table at most.
+pub const MOST_TABLE_BYTES: usize = 640;
+
+/// A scene with materials, and their table: so neither comes without the other.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MaterialScene<'a> {
+    /// The scene, which names the table by its check sum ([`Scene::materials`]).
+    pub scene: Scene,
+    /// The table as postcard writes it ([`table_bytes`]), at most [`MOST_TABLE_BYTES`].
+    #[serde(borrow)]
+    pub table: &'a [u8],
+}
+
+impl MaterialScene<'_> {
+    /// The table, where it is one that can be felt and the one that the scene names.
+    #[must_use]
+    pub fn table(&self) -> Option<MaterialTable> {
+        let (table, rest) = postcard::take_from_bytes::<MaterialTable>(self.table).ok()?;
+        let is_right = rest.is_empty() && table.is_valid();
+        (is_right && self.scene.materials == Some(table.check_sum())).then_some(table)
+    }
+}
+
+/// Writes a table as it travels; every table fits.
+#[must_use]
+pub fn table_bytes<'b>(table: &MaterialTable, room: &'b mut [u8; MOST_TABLE_BYTES]) -> &'b [u8] {
+    match postcard::to_slice(table, room) {
+        Ok(bytes) => bytes,
+        Err(_) => &[],
+    }
+}
+
+/// A tile of a scene with materials.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MaterialTile<'a> {
+    /// Its heights.
+    #[serde(borrow)]
+    pub tile: TileMessage<'a>,
+    /// Its materials.
+    #[serde(borrow)]
+    pub materials: TileMaterials<'a>,
+}
+
+/// Which material of the scene's table each sample of a tile has, by rows from the south.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum TileMaterials<'a> {
+    /// All samples have this one.
+    One(u8),
+    /// Pairs of bytes: a material, and how many samples more than one in turn have it.
+    Runs(#[serde(borrow)] &'a [u8]),
+    /// Two samples a byte, the first in the lower half: [`MOST_TILE_BYTES`] bytes, the last
+    /// half of which is zero.
+    Each(#[serde(borrow)] &'a [u8]),
+}
+
+impl<'a> TileMaterials<'a> {
+    /// The materials of a tile's samples, below 16 each, in the form that takes fewest bytes.
+    #[must_use]
+    pub fn pack(materials: &[u8; SAMPLES], room: &'a mut [u8; MOST_TILE_BYTES]) -> Self {
+        if materials.iter().all(|material| *material == materials[0]) {
+            return Self::One(materials[0]);
+        }
+        match runs(materials, room) {
+            Some(length) => Self::Runs(room.get(..length).unwrap_or(&[])),
+            None => {
+                let pairs = materials.chunks(2);
+                for (byte, pair) in room.iter_mut().zip(pairs) {
+                    let half = |i: usize| pair.get(i).map_or(0, |material| material & 15);
+                    *byte = half(0) | half(1) << 4;
+                }
+                Self::Each(room.as_slice())
+            }
+        }
+    }
+
+    /// Gives a filled tile these materials of a table of `count`.
+    ///
+    /// # Errors
+    /// [`BadTile::Materials`] unless they are those of 33 × 33 samples, and of the table. The
+    /// buffer is left vacant.
+    pub fn fill(&self, tile: &mut Tile, count: usize) -> Result<(), BadTile> {
+        match *self {
+            Self::One(material) => {
+                tile.set_materials(count, core::iter::repeat_n(material, SAMPLES))
+            }
+            Self::Runs(bytes) => {
+                let (runs, rest) = bytes.as_chunks::<2>();
+                let samples = runs
+                    .iter()
+                    .flat_map(|[material, more]| {
+                        core::iter::repeat_n(*material, usize::from(*more) + 1)
+                    })
+                    // Half a run is beyond every table.
+                    .chain(rest.iter().map(|_| u8::MAX));
+                tile.set_materials(count, samples)
+            }
+            Self::Each(bytes) => {
+                let halves = bytes.iter().flat_map(|byte| [byte & 15, byte >> 4]);
+                let is_ended = bytes.last().is_some_and(|last| last >> 4 == 0);
+                match bytes.len() == MOST_TILE_BYTES && is_ended {
+                    true => tile.set_materials(count, halves.take(SAMPLES)),
+                    false => tile.set_materials(count, core::iter::empty()),
+                }
+            }
+        }
+    }
+}
+
+/// Writes runs; how many bytes they take, where that is less than two samples a byte.
+fn runs(materials: &[u8; SAMPLES], room: &mut [u8; MOST_TILE_BYTES]) -> Option<usize> {
+    let mut length = 0;
+    let alike = materials.chunk_by(|one, next| one == next);
+    // A byte counts 256 samples.
+    for run in alike.flat_map(|run| run.chunks(256)) {
+        let pair = room.get_mut(length..length + 2)?;
+        let more = u8::try_from(run.len() - 1).ok()?;
+        pair.copy_from_slice(&[*run.first()?, more]);
+        length += 2;
+    }
+    Some(length)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::force::{ForceLaw, Material};
+    use crate::grid::Cell;
+    use crate::terrain::TileKey;
+    use std::boxed::Box;
+    use std::vec::Vec;
+
+    const KEY: TileKey = TileKey::new(0, 0, 0);
+
+    fn filled() -> Box<Tile> {
+        let mut tile = Box::new(Tile::VACANT);
+        tile.fill(KEY, 0, |_, _| 0.0).unwrap();
+        tile
+    }
+
+    fn materials(of: impl Fn(usize, usize) -> u8) -> [u8; SAMPLES] {
+        core::array::from_fn(|i| of(i % POSTS, i / POSTS))
+    }
+
+    /// What a tile has after it was filled.
+    fn read(tile: &Tile) -> Vec<u8> {
+        let at = |i: usize| {
+            let (col, row) = (i % POSTS, i / POSTS);
+            let (x, y) = (col.min(31), row.min(31));
+            tile.material(Cell::new(x as i32, y as i32), [col - x, row - y])
+        };
+        (0..SAMPLES).map(|i| at(i).expect("set")).collect()
+    }
+
+    #[test]
+    fn they_come_back_from_the_shortest_form() {
+        let noise = |col: usize, row: usize| ((col * 7919 + row * 104_729) % 61 % 16) as u8;
+        let mut room = [0xAA; MOST_TILE_BYTES];
+        let border = |col: usize, row: usize| u8::from(col + row / 3 > 20) * 9;
+        for (all, most) in [
+            (materials(|_, _| 15), 1),
+            (materials(|_, row| u8::from(row > 16)), 12),
+            (materials(border), 2 * 2 * POSTS),
+            (materials(noise), MOST_TILE_BYTES),
+        ] {
+            let packed = TileMaterials::pack(&all, &mut room);
+            let length = match packed {
+                TileMaterials::One(_) => 1,
+                TileMaterials::Runs(bytes) | TileMaterials::Each(bytes) => bytes.len(),
+            };
+            assert!(length <= most, "{length} of {most}");
+            let mut tile = filled();
+            assert_eq!(packed.fill(&mut tile, 16), Ok(()));
+            assert_eq!(read(&tile), all);
+            // And the table has to have them all.
+            let largest = usize::from(*all.iter().max().expect("some"));
+            assert_eq!(packed.fill(&mut filled(), largest), Err(BadTile::Materials));
+        }
+    }
+
+    #[test]
+    fn bytes_that_are_no_materials_are_refused_and_leave_the_buffer_vacant() {
+        let whole = [[3, 255]; 4].as_flattened().to_vec();
+        let with = |more: &[u8]| [&whole[..], more].concat();
+        let runs = [
+            with(&[3, 63]),
+            with(&[3, 65]),
+            with(&[3, 64, 0]),
+            with(&[16, 64]),
+        ];
+        for bytes in &runs {
+            let mut tile = filled();
+            let filled = TileMaterials::Runs(bytes).fill(&mut tile, 16);
+            assert_eq!(filled, Err(BadTile::Materials), "{bytes:?}");
+            assert_eq!(tile.key(), None);
+        }
+        let right = with(&[3, 64]);
+        assert_eq!(TileMaterials::Runs(&right).fill(&mut filled(), 16), Ok(()));
+        let each = [0x11; MOST_TILE_BYTES + 1];
+        for length in [0, MOST_TILE_BYTES - 1, MOST_TILE_BYTES, MOST_TILE_BYTES + 1] {
+            let mut tile = filled();
+            let filled = TileMaterials::Each(&each[..length]).fill(&mut tile, 16);
+            assert_eq!(filled, Err(BadTile::Materials), "{length}");
+            assert_eq!(tile.key(), None);
+        }
+        assert!(TileMaterials::One(2).fill(&mut filled(), 2).is_err());
+    }
+
+    #[test]
+    fn the_largest_table_fits_and_a_scene_has_its_own() {
+        let mut material = Material::of(&ForceLaw::PREMIUM);
+        material.texture.seed = u32::MAX;
+        let table = MaterialTable::new(&[material; MaterialTable::MOST]).expect("fits");
+        let mut room = [0; MOST_TABLE_BYTES];
+        let bytes = table_bytes(&table, &mut room).to_vec();
+        assert!(bytes.len() > 600, "{}", bytes.len());
+        let scene = |materials| Scene {
+            epoch: 1,
+            level: 0,
+            size: crate::terrain::FieldSize::new(3, 3),
+            top: 1,
+            underlay: None,
+            cell_mm: 1.0,
+            home: crate::grid::GridPoint::default(),
+            law: ForceLaw::PREMIUM,
+            rule: crate::contact::Rule::Swept,
+            source: crate::scene::Source::Points,
+            hold_clock: false,
+            materials,
+        };
+        let with = |sum, table: &[u8]| {
+            MaterialScene {
+                scene: scene(sum),
+                table,
+            }
+            .table()
+        };
+        let sum = Some(table.check_sum());
+        assert_eq!(with(sum, &bytes), Some(table));
+        assert_eq!(with(None, &bytes), None);
+        assert_eq!(with(Some(7), &bytes), None);
+        assert_eq!(with(sum, &[&bytes[..], &[0]].concat()), None);
+        assert_eq!(with(sum, &bytes[..bytes.len() - 1]), None);
+        assert_eq!(with(sum, &[]), None);
+    }
+}

@@ -1,0 +1,66 @@
+//! Scenes with materials: their tables, and the materials of their tiles.
+
+use hapterra_core::force::MaterialTable;
+use hapterra_core::scene::Scene;
+use hapterra_core::terrain::{BadTile, Tile, TileKey};
+use hapterra_core::wire::materials::{MaterialScene, TileMaterials};
+
+use super::Link;
+
+/// What is remembered of a table that the loop was given.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct KnownTable {
+    sum: u32,
+    /// How many materials it has.
+    count: usize,
+}
+
+impl<const D: usize> Link<'_, D> {
+    /// Whether the loop has the materials of a scene, or the scene has none.
+    pub(super) fn has_materials_of(&self, scene: &Scene) -> bool {
+        let is_known = |sum: u32| self.materials.is_some_and(|known| known.sum == sum);
+        scene.materials.is_none_or(is_known)
+    }
+
+    /// Takes a scene with its table.
+    pub(super) fn take_material_scene(&mut self, message: &MaterialScene<'_>) {
+        let scene = message.scene;
+        if let Some(table) = message.table()
+            && scene.is_valid()
+            && !self.has_materials_of(&scene)
+        {
+            self.give_materials(table);
+        }
+        self.take_scene(scene);
+    }
+
+    fn give_materials(&mut self, table: MaterialTable) {
+        self.materials = Some(KnownTable {
+            sum: table.check_sum(),
+            count: table.materials().len(),
+        });
+        // Whoever leads here has asked `has_room`.
+        let _ = self.ends.materials.enqueue(table);
+    }
+
+    /// Fills in the materials of a tile, which comes with them or not.
+    ///
+    /// # Errors
+    /// When they are not those of the table, or the tile came with some and has none, or the
+    /// other way round.
+    pub(super) fn fill_materials(
+        &self,
+        tile: &mut Tile,
+        key: TileKey,
+        materials: Option<TileMaterials<'_>>,
+    ) -> Result<(), BadTile> {
+        let scene = self.scene.filter(|scene| scene.materials.is_some());
+        // The underlay is of another level, and has none.
+        let wanted = scene.is_some_and(|scene| scene.level == key.level);
+        match (wanted, materials, self.materials) {
+            (false, None, _) => Ok(()),
+            (true, Some(materials), Some(known)) => materials.fill(tile, known.count),
+            _ => Err(BadTile::Materials),
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! Scenes with materials: their tables, and tiles with materials and without.
+
+use std::vec::Vec;
+
+use hapterra_core::Vec3;
+use hapterra_core::force::{ForceLaw, Material, MaterialTable};
+use hapterra_core::grid::{Cell, GridPoint};
+use hapterra_core::scene::{Point, Scene, Source};
+use hapterra_core::terrain::{TileKey, Underlay};
+use hapterra_core::wire::materials::{
+    MOST_TABLE_BYTES, MaterialScene, MaterialTile, TileMaterials, table_bytes,
+};
+use hapterra_core::wire::message::{Heights, TileMessage, ToDevice, ToHost};
+
+use super::rig::{HELLO, Rig, scene};
+
+/// Materials of these stiffnesses.
+fn table(stiffnesses: &[f32]) -> MaterialTable {
+    let material = |stiffness_n_per_mm: &f32| Material {
+        stiffness_n_per_mm: *stiffness_n_per_mm,
+        ..Material::of(&ForceLaw::PREMIUM)
+    };
+    let materials: Vec<_> = stiffnesses.iter().map(material).collect();
+    MaterialTable::new(&materials).expect("some")
+}
+
+fn scene_of(table: &MaterialTable, epoch: u32) -> Scene {
+    Scene {
+        epoch,
+        materials: Some(table.check_sum()),
+        ..scene(Source::Points)
+    }
+}
+
+/// Sends a scene with its table; whether that was taken.
+fn sends(rig: &mut Rig, scene: Scene, table: &MaterialTable) -> bool {
+    let mut room = [0; MOST_TABLE_BYTES];
+    let table = table_bytes(table, &mut room);
+    rig.say(&ToDevice::MaterialScene(MaterialScene { scene, table }));
+    rig.run(1);
+    is_taken(rig, scene.epoch)
+}
+
+/// The last answer to a scene.
+fn is_taken(rig: &Rig, epoch: u32) -> bool {
+    let answer = |message: &ToHost| match message {
+        ToHost::SceneTaken { epoch, accepted } => Some((*epoch, *accepted)),
+        _ => None,
+    };
+    let answers: Vec<_> = rig.heard.iter().filter_map(answer).collect();
+    assert_eq!(answers.last().map(|answer| answer.0), Some(epoch));
+    answers.last().is_some_and(|answer| answer.1)
+}
+
+fn greeted() -> Rig {
+    let mut rig = Rig::new();
+    rig.answers_tiles = false;
+    rig.say(&ToDevice::Hello(HELLO));
+    rig.run(1);
+    rig
+}
+
+/// A flat tile at height 1.5.
+fn flat<'t>(epoch: u32, key: TileKey) -> TileMessage<'t> {
+    TileMessage {
+        epoch,
+        key,
+        heights: Heights::Flat {
+            base: 1,
+            height: 0.5,
+        },
+    }
+}
+
+fn answers(rig: &mut Rig, epoch: u32, materials: TileMaterials<'_>) {
+    for key in rig.needs() {
+        let tile = flat(epoch, key);
+        rig.say(&ToDevice::MaterialTile(MaterialTile { tile, materials }));
+    }
+    rig.run(4);
+}
+
+/// The force in N, half a cell deep in the plane: half of the stiffness.
+fn felt(rig: &mut Rig) -> f32 {
+    let from = rig.felt().last().map_or(0, |(seq, _)| seq + 1);
+    for (seq, z) in [(from, 2.0), (from + 1, 1.0)] {
+        let hip = GridPoint::new([100, 100, 0], Vec3::new(0.5, 0.5, z));
+        rig.say(&ToDevice::Point(Point { seq, hip }));
+        rig.run(4);
+    }
+    let felt = rig.felt();
+    let (seq, sample) = felt.last().expect("felt");
+    assert_eq!(*seq, from + 1);
+    sample.force_n.z
+}
+
+#[test]
+fn a_tile_is_felt_by_the_material_that_came_with_it() {
+    let mut rig = greeted();
+    let table = table(&[0.4, 1.0, 0.8]);
+    assert!(sends(&mut rig, scene_of(&table, 9), &table));
+    answers(&mut rig, 9, TileMaterials::One(2));
+    assert_eq!(rig.status().bad_frames, 0);
+    // The scene is a quarter stiffer than the table's default, and so is all of it.
+    let force = felt(&mut rig);
+    assert!((force - 0.5 * 0.8 * 0.5 / 0.4).abs() < 1e-6, "{force}");
+    // Said again, because the answer was lost: what is held stays.
+    rig.heard.clear();
+    assert!(sends(&mut rig, scene_of(&table, 9), &table));
+    rig.run(300);
+    assert_eq!(rig.needs(), []);
+}
+
+#[test]
+fn tiles_whose_materials_are_missing_or_wrong_are_bad_frames() {
+    let mut rig = greeted();
+    let table = table(&[0.5, 1.0]);
+    assert!(sends(&mut rig, scene_of(&table, 9), &table));
+    let key = rig.needs()[0];
+    rig.say(&ToDevice::Tile(flat(9, key)));
+    for materials in [
+        TileMaterials::One(2),
+        TileMaterials::Runs(&[0, 255]),
+        TileMaterials::Each(&[0; 7]),
+    ] {
+        let tile = flat(9, key);
+        rig.say(&ToDevice::MaterialTile(MaterialTile { tile, materials }));
+    }
+    rig.run(4);
+    assert_eq!(rig.status().bad_frames, 4);
+    // Each buffer is there again.
+    answers(&mut rig, 9, TileMaterials::One(1));
+    assert_eq!(felt(&mut rig), 0.5);
+    // And without materials a tile has none.
+    let plain = scene(Source::Points);
+    rig.heard.clear();
+    rig.say(&ToDevice::Scene(plain));
+    rig.run(4);
+    assert!(is_taken(&rig, plain.epoch));
+    answers(&mut rig, plain.epoch, TileMaterials::One(0));
+    assert!(rig.status().bad_frames > 4);
+}
+
+#[test]
+fn a_scene_is_refused_whose_table_did_not_come_or_is_none() {
+    let mut rig = greeted();
+    let (known, other) = (table(&[0.5, 1.0]), table(&[0.5, 2.0]));
+    let alone = scene_of(&known, 9);
+    rig.say(&ToDevice::Scene(alone));
+    rig.run(1);
+    assert!(!is_taken(&rig, 9), "without a table");
+    assert!(!sends(&mut rig, alone, &other), "with another table");
+    let broken = table(&[0.0, 1.0]);
+    assert!(!sends(&mut rig, scene_of(&broken, 9), &broken));
+    let broken = table(&[0.5, f32::NAN]);
+    assert!(!sends(&mut rig, scene_of(&broken, 9), &broken));
+    for bytes in [&[][..], &[1], &[200; 600]] {
+        rig.say(&ToDevice::MaterialScene(MaterialScene {
+            scene: alone,
+            table: bytes,
+        }));
+        rig.run(1);
+        assert!(!is_taken(&rig, 9));
+    }
+    assert_eq!(rig.status().device.epoch, None);
+    assert!(sends(&mut rig, alone, &known));
+    // Its table is here by now.
+    rig.say(&ToDevice::Scene(scene_of(&known, 10)));
+    rig.run(1);
+    assert!(is_taken(&rig, 10));
+    assert_eq!(rig.status().device.epoch, Some(10));
+}
+
+#[test]
+fn scenes_that_follow_each_other_at_once_have_each_their_own_table() {
+    let mut rig = greeted();
+    let (soft, hard) = (table(&[0.5]), table(&[1.0]));
+    let mut room = [0; MOST_TABLE_BYTES];
+    for (epoch, table) in [(1, &soft), (2, &hard), (3, &soft), (4, &soft), (5, &hard)] {
+        let scene = Scene {
+            law: ForceLaw {
+                stiffness_n_per_mm: table.materials()[0].stiffness_n_per_mm,
+                ..ForceLaw::PREMIUM
+            },
+            ..scene_of(table, epoch)
+        };
+        let table = table_bytes(table, &mut room);
+        rig.say(&ToDevice::MaterialScene(MaterialScene { scene, table }));
+        rig.say(&ToDevice::Scene(scene));
+    }
+    rig.run(20);
+    assert!(is_taken(&rig, 5));
+    answers(&mut rig, 5, TileMaterials::One(0));
+    assert_eq!(felt(&mut rig), 0.5);
+}
+
+#[test]
+fn the_underlay_comes_without_materials() {
+    let mut rig = greeted();
+    let table = table(&[0.5, 1.0]);
+    let underlay = Underlay {
+        first: Cell::new(0, 0),
+        shift: 4,
+    };
+    let scene = Scene {
+        underlay: Some(underlay),
+        source: Source::Encoders,
+        ..scene_of(&table, 9)
+    };
+    assert!(sends(&mut rig, scene, &table));
+    let key = underlay.key(0);
+    assert!(rig.needs().contains(&key));
+    let (tile, materials) = (flat(9, key), TileMaterials::One(0));
+    rig.say(&ToDevice::MaterialTile(MaterialTile { tile, materials }));
+    rig.run(2);
+    assert_eq!(rig.status().bad_frames, 1);
+    rig.say(&ToDevice::Tile(tile));
+    rig.run(2);
+    assert_eq!(rig.status().bad_frames, 1);
+}

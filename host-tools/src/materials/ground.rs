@@ -1,0 +1,57 @@
+//! Why classes cannot be laid over a terrain.
+
+use crate::raster::{Raster, Sides, System};
+
+/// Why classes cannot be laid over a terrain.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BadGround {
+    /// One of the two says where it lies, and the other does not.
+    #[error(
+        "{unplaced} does not state its reference system, and {placed} does: which class lies where cannot be told"
+    )]
+    NoSystem {
+        /// The file that says nothing.
+        unplaced: String,
+        /// The other.
+        placed: String,
+    },
+    /// Their reference systems differ, and there is no way from one to the other.
+    #[error(
+        "{file} is in a reference system whose longitudes and latitudes cannot be worked out, and not in that of {other}"
+    )]
+    NoWay {
+        /// The file in that system.
+        file: String,
+        /// The other.
+        other: String,
+    },
+    /// They lie apart.
+    #[error("{classes} lies elsewhere than {terrain}: {there}, and the terrain {here}")]
+    Apart {
+        /// The file of classes.
+        classes: String,
+        /// The terrain.
+        terrain: String,
+        /// Where the classes lie.
+        there: String,
+        /// Where the terrain lies.
+        here: String,
+    },
+    /// More materials than a device has room for.
+    #[error("{0} classes; a scene has at most 15, and the default")]
+    TooMany(usize),
+}
+
+/// Where a raster lies, in longitude and latitude where these are known.
+pub(super) fn place_of(raster: &Raster) -> String {
+    if let Some(bounds) = raster.bounds_lonlat() {
+        let (west, south, east, north) = (bounds.west, bounds.south, bounds.east, bounds.north);
+        return format!("longitude {west:.4}° to {east:.4}°, latitude {south:.4}° to {north:.4}°");
+    }
+    let on = raster.georeference();
+    let [west, south, east, north]: Sides = on.bounds();
+    match on.system() {
+        System::Cells => format!("columns {west} to {east}, rows {south} to {north}"),
+        _ => format!("x {west} to {east}, y {south} to {north}"),
+    }
+}

@@ -1,0 +1,227 @@
+//! Materials: a raster of classes over a terrain, and what each class feels like.
+//!
+//! The raster has a grid and a reference system of its own. Each felt sample of the terrain takes
+//! the class of the pixel in which it lies; [`table`] reads what a class feels like. The device gets
+//! the table of the materials ([`MaterialTable`]) and an index of it for each sample, so it knows
+//! nothing of the file's numbers.
+
+mod ground;
+mod pixels;
+pub mod table;
+
+use std::hash::Hasher as _;
+use std::sync::OnceLock;
+
+use hapterra_core::force::{ForceLaw, Material, MaterialTable};
+use hapterra_core::terrain::{POSTS, TileKey};
+use hapterra_core::wire::materials::{MOST_TILE_BYTES, TileMaterials};
+use serde::{Deserialize, Serialize};
+use twox_hash::XxHash64;
+
+use crate::raster::{Raster, ReferenceSystem};
+use crate::terrain::{FeltGrid, fingerprint};
+pub use ground::BadGround;
+use pixels::Pixels;
+
+/// Samples of a tile.
+const SAMPLES: usize = POSTS * POSTS;
+/// Places along each side of a terrain that are looked at to tell which classes it has.
+const LOOKED_AT: u32 = 24;
+
+/// What a class of the file feels like.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ClassMaterial {
+    /// The number of the class in the file.
+    pub class: i64,
+    /// What the user calls it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// What it feels like.
+    pub material: Material,
+}
+
+/// The materials of a scene, as a file of classes and a table say.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Looks {
+    /// Where the file knows no class, or one that is not named.
+    pub default: Material,
+    /// The classes that are named, at most 15.
+    #[serde(default)]
+    pub class: Vec<ClassMaterial>,
+}
+
+impl Looks {
+    /// The table that the device gets.
+    fn table(&self) -> Option<MaterialTable> {
+        let named = self.class.iter().map(|class| class.material);
+        let all: Vec<_> = std::iter::once(self.default).chain(named).collect();
+        MaterialTable::new(&all)
+    }
+
+    /// The index in that table of what the file has at a place; NaN where it has nothing.
+    fn index(&self, value: f64) -> u8 {
+        let is_it = |class: &ClassMaterial| class.class as f64 == value;
+        let place = self.class.iter().position(is_it);
+        place.and_then(|i| u8::try_from(i + 1).ok()).unwrap_or(0)
+    }
+}
+
+/// A raster of classes over a terrain, and what they feel like.
+#[derive(Debug)]
+pub struct Materials {
+    file: String,
+    pixels: Pixels,
+    looks: Looks,
+    table: MaterialTable,
+    fingerprint: OnceLock<u64>,
+}
+
+impl Materials {
+    /// Lays the classes of a file over a terrain.
+    ///
+    /// # Errors
+    /// [`BadGround`] where it cannot be told which class lies where, or none lies on the
+    /// terrain.
+    pub fn over(
+        terrain: (&str, &Raster),
+        (file, classes): (&str, Raster),
+        looks: Looks,
+    ) -> Result<Self, BadGround> {
+        let pixels = Pixels::over(terrain, (file, classes))?;
+        let table = looks.table().ok_or(BadGround::TooMany(looks.class.len()))?;
+        Ok(Self {
+            file: file.to_owned(),
+            pixels,
+            looks,
+            table,
+            fingerprint: OnceLock::new(),
+        })
+    }
+
+    /// The file of classes, as it was named.
+    #[must_use]
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// The raster of classes.
+    #[must_use]
+    pub const fn classes(&self) -> &Raster {
+        self.pixels.raster()
+    }
+
+    /// What the classes feel like.
+    #[must_use]
+    pub const fn looks(&self) -> &Looks {
+        &self.looks
+    }
+
+    /// The table that the device gets.
+    #[must_use]
+    pub const fn table(&self) -> &MaterialTable {
+        &self.table
+    }
+
+    /// Hash of all classes, as [`crate::terrain::Terrain::fingerprint`] is of heights, and of where
+    /// they lie.
+    #[must_use]
+    pub fn fingerprint(&self) -> u64 {
+        *self.fingerprint.get_or_init(|| {
+            let (classes, mut hasher) = (self.classes(), XxHash64::with_seed(0));
+            hasher.write(&fingerprint(classes).to_le_bytes());
+            let on = classes.georeference();
+            let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+            let places = corners.map(|corner| on.transform().to_ground(corner));
+            for number in places.as_flattened() {
+                hasher.write(&number.to_le_bytes());
+            }
+            let system = on.reference().map_or("", ReferenceSystem::name);
+            hasher.write(system.as_bytes());
+            hasher.finish()
+        })
+    }
+
+    /// A law over the default material: that of a scene with these materials.
+    #[must_use]
+    pub const fn law(&self, law: &ForceLaw) -> ForceLaw {
+        self.looks.default.law(law)
+    }
+
+    /// The index in the table of the material at a place in the coordinates of the terrain's
+    /// file.
+    #[must_use]
+    pub fn index_at(&self, terrain: &Raster, ground: [f64; 2]) -> u8 {
+        self.looks.index(self.pixels.at(terrain, ground))
+    }
+
+    /// The materials of a tile of a grid's level, as they go on the link. Beyond the field they go
+    /// on as it ends there.
+    pub(crate) fn tile<'b>(
+        &self,
+        (grid, last): (&FeltGrid<'_>, [i32; 2]),
+        key: TileKey,
+        buffer: &'b mut MaterialBuffer,
+    ) -> TileMaterials<'b> {
+        let (first, terrain) = (key.index.first_cell(), grid.raster());
+        let place = |first: i32, i: usize, last: i32| {
+            let sample = first.saturating_add(i as i32).clamp(0, last);
+            f64::from(sample) * f64::from(key.level).exp2()
+        };
+        let on_terrain = terrain.georeference();
+        let from_terrain = self.pixels.from(&on_terrain);
+        for (i, index) in buffer.indices.iter_mut().enumerate() {
+            let column = place(first.x, i % POSTS, last[0]);
+            let row = place(first.y, i / POSTS, last[1]);
+            let ground = grid.to_ground([column, row]);
+            *index = self.looks.index(from_terrain.value(ground));
+        }
+        TileMaterials::pack(&buffer.indices, &mut buffer.bytes)
+    }
+
+    /// What the ground of a terrain is made of, for a line to be read: the materials that were found at
+    /// some hundred places, and how many of these have the default.
+    #[must_use]
+    pub fn told(&self, grid: &FeltGrid<'_>) -> String {
+        let mut found = [0_u32; MaterialTable::MOST];
+        let place =
+            |i: u32, count: u32| (f64::from(i) + 0.5) / f64::from(LOOKED_AT) * f64::from(count - 1);
+        for i in 0..LOOKED_AT * LOOKED_AT {
+            let (column, row) = (i % LOOKED_AT, i / LOOKED_AT);
+            let ground = grid.to_ground([place(column, grid.columns()), place(row, grid.rows())]);
+            let index = self.index_at(grid.raster(), ground);
+            found[usize::from(index)] += 1;
+        }
+        let named = self.looks.class.iter().zip(&found[1..]);
+        let mut named: Vec<_> = named.filter(|(_, count)| **count > 0).collect();
+        named.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
+        let names = named.iter().map(|(class, _)| match &class.name {
+            Some(name) => name.clone(),
+            None => format!("class {}", class.class),
+        });
+        let names = names.collect::<Vec<_>>().join(", ");
+        let percent = 100.0 * f64::from(found[0]) / f64::from(LOOKED_AT * LOOKED_AT);
+        match (names.is_empty(), found[0]) {
+            (true, _) => "the default everywhere: no class of the table was found".to_owned(),
+            (false, 0) => names,
+            (false, _) => format!("{names}; the default on {percent:.0} %"),
+        }
+    }
+}
+
+/// Room for one tile's materials, used again for each.
+pub struct MaterialBuffer {
+    indices: Box<[u8; SAMPLES]>,
+    bytes: Box<[u8; MOST_TILE_BYTES]>,
+}
+
+impl Default for MaterialBuffer {
+    fn default() -> Self {
+        Self {
+            indices: Box::new([0; SAMPLES]),
+            bytes: Box::new([0; MOST_TILE_BYTES]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,158 @@
+//! The pixel of a raster of classes in which a place of a terrain lies.
+
+use super::ground::{BadGround, place_of};
+use crate::raster::{Georeference, Raster};
+
+/// Places along each side of a raster that are tried to find whether two overlap.
+const TRIED: u32 = 33;
+
+/// A raster of classes, and how places of a terrain come to its coordinates.
+#[derive(Debug)]
+pub(super) struct Pixels {
+    raster: Raster,
+    way: Way,
+}
+
+/// From the coordinates of one raster to those of another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    /// They are the same.
+    Same,
+    /// By longitude and latitude.
+    LonLat,
+}
+
+impl Way {
+    fn between(
+        (terrain, on_terrain): (&str, &Georeference<'_>),
+        (classes, on_classes): (&str, &Georeference<'_>),
+    ) -> Result<Self, BadGround> {
+        if on_terrain.reference() == on_classes.reference()
+            && on_terrain.system() == on_classes.system()
+        {
+            return Ok(Self::Same);
+        }
+        let middle = |on: &Georeference<'_>| {
+            let [west, south, east, north] = on.bounds();
+            [0.5 * (west + east), 0.5 * (south + north)]
+        };
+        let has_lonlat = |on: &Georeference<'_>| {
+            let lonlat = on.to_lonlat(middle(on));
+            lonlat.and_then(|lonlat| on.of_lonlat(lonlat)).is_some()
+        };
+        let sides = [
+            (terrain, on_terrain, classes),
+            (classes, on_classes, terrain),
+        ];
+        for (file, on, other) in sides {
+            if has_lonlat(on) {
+                continue;
+            }
+            let (file, other) = (file.to_owned(), other.to_owned());
+            return Err(match on.reference() {
+                None => BadGround::NoSystem {
+                    unplaced: file,
+                    placed: other,
+                },
+                Some(_) => BadGround::NoWay { file, other },
+            });
+        }
+        Ok(Self::LonLat)
+    }
+
+    fn lead(
+        self,
+        from: &Georeference<'_>,
+        to: &Georeference<'_>,
+        ground: [f64; 2],
+    ) -> Option<[f64; 2]> {
+        match self {
+            Self::Same => Some(to.nearest_turn(ground)),
+            Self::LonLat => from.to_lonlat(ground).and_then(|at| to.of_lonlat(at)),
+        }
+    }
+}
+
+/// A raster of classes, seen from a terrain.
+pub(super) struct From<'p> {
+    pixels: &'p Pixels,
+    terrain: &'p Georeference<'p>,
+    classes: Georeference<'p>,
+}
+
+impl From<'_> {
+    /// What the file has in the pixel of a place in the terrain's coordinates; NaN in a hole and
+    /// beyond the file.
+    pub(super) fn value(&self, ground: [f64; 2]) -> f64 {
+        let there = self.pixels.way.lead(self.terrain, &self.classes, ground);
+        let place = there.map(|at| self.classes.transform().to_samples(at));
+        match place.and_then(|place| pixel(&self.pixels.raster, place)) {
+            Some([column, row]) => self.pixels.raster.height(column, row),
+            None => f64::NAN,
+        }
+    }
+}
+
+impl Pixels {
+    pub(super) fn over(
+        (terrain, ground): (&str, &Raster),
+        (file, raster): (&str, Raster),
+    ) -> Result<Self, BadGround> {
+        let (on_terrain, on_classes) = (ground.georeference(), raster.georeference());
+        let way = Way::between((terrain, &on_terrain), (file, &on_classes))?;
+        // Either may be much larger than the other.
+        let overlap = has_place_on(way, (&on_terrain, ground), (&on_classes, &raster))
+            || has_place_on(way, (&on_classes, &raster), (&on_terrain, ground));
+        match overlap {
+            true => Ok(Self { raster, way }),
+            false => Err(BadGround::Apart {
+                classes: file.to_owned(),
+                terrain: terrain.to_owned(),
+                there: place_of(&raster),
+                here: place_of(ground),
+            }),
+        }
+    }
+
+    pub(super) const fn raster(&self) -> &Raster {
+        &self.raster
+    }
+
+    pub(super) fn from<'p>(&'p self, terrain: &'p Georeference<'p>) -> From<'p> {
+        From {
+            pixels: self,
+            terrain,
+            classes: self.raster.georeference(),
+        }
+    }
+
+    pub(super) fn at(&self, terrain: &Raster, ground: [f64; 2]) -> f64 {
+        self.from(&terrain.georeference()).value(ground)
+    }
+}
+
+/// Whether one of many places of a raster lies on another.
+fn has_place_on(
+    way: Way,
+    (from, of): (&Georeference<'_>, &Raster),
+    (to, on): (&Georeference<'_>, &Raster),
+) -> bool {
+    let place = |i: u32, count: u32| f64::from(i) / f64::from(TRIED - 1) * f64::from(count - 1);
+    (0..TRIED * TRIED).any(|i| {
+        let sample = [place(i % TRIED, of.columns()), place(i / TRIED, of.rows())];
+        let there = way.lead(from, to, from.transform().to_ground(sample));
+        let there = there.map(|at| to.transform().to_samples(at));
+        there.is_some_and(|there| pixel(on, there).is_some())
+    })
+}
+
+/// The pixel whose middle is nearest to a place in columns and rows; none beyond the field.
+fn pixel(raster: &Raster, [column, row]: [f64; 2]) -> Option<[u32; 2]> {
+    let along = |place: f64, count: u32| {
+        let nearest = (place + 0.5).floor();
+        (0.0..f64::from(count))
+            .contains(&nearest)
+            .then_some(nearest as u32)
+    };
+    Some([along(column, raster.columns())?, along(row, raster.rows())?])
+}

@@ -1,0 +1,189 @@
+//! Classes over a terrain: which lies where.
+
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::scene::Source;
+use hapterra_core::terrain::Tile;
+
+use super::*;
+use crate::raster::GroundTransform;
+use crate::terrain::{FeltCells, Scale, Terrain};
+
+/// A raster whose south-west sample is at `origin`, in steps of so much, in the system of a code.
+fn raster(
+    (columns, rows): (u32, u32),
+    origin: [f64; 2],
+    step: f64,
+    epsg: Option<u16>,
+    value: impl Fn(u32, u32) -> f32,
+) -> Raster {
+    let raster = Raster::from_fn(columns, rows, value).expect("raster");
+    let ground = GroundTransform::new(origin, [step, 0.0], [0.0, step]).expect("a map");
+    raster.with_ground(ground, epsg)
+}
+
+fn looks(classes: &[i64]) -> Looks {
+    let default = Material::of(&ForceLaw::PREMIUM);
+    let class = |class: &i64| ClassMaterial {
+        class: *class,
+        name: (*class == 10).then(|| "trees".to_owned()),
+        material: default,
+    };
+    Looks {
+        default,
+        class: classes.iter().map(class).collect(),
+    }
+}
+
+fn over(terrain: &Raster, classes: Raster, looks: Looks) -> Result<Materials, BadGround> {
+    Materials::over(("t.tif", terrain), ("c.tif", classes), looks)
+}
+
+#[test]
+fn a_place_has_the_class_of_the_pixel_that_it_lies_in() {
+    let utm = Some(32632);
+    let terrain = raster((61, 61), [500_000.0, 5_000_000.0], 10.0, utm, |_, _| 1.0);
+    // Pixels of 37 m whose first middle lies 3 m west and 5 m south of the terrain.
+    let class = |column, row| if (column + row) % 2 == 0 { 10.0 } else { 20.0 };
+    let classes = raster((9, 9), [499_997.0, 4_999_995.0], 37.0, utm, class);
+    let materials = over(&terrain, classes, looks(&[20, 10])).expect("they overlap");
+    for (x, y) in [
+        (0.0, 0.0),
+        (15.0, 4.0),
+        (15.6, 13.4),
+        (140.0, 201.0),
+        (310.0, 310.0),
+    ] {
+        let pixel = |off: f64| ((off / 37.0 + 0.5).floor()) as u32;
+        let (column, row) = (pixel(x + 3.0), pixel(y + 5.0));
+        let wanted = if column < 9 && row < 9 {
+            if (column + row) % 2 == 0 { 2 } else { 1 }
+        } else {
+            0
+        };
+        let index = materials.index_at(&terrain, [500_000.0 + x, 5_000_000.0 + y]);
+        assert_eq!(index, wanted, "{x} {y}");
+    }
+    // Beyond the pixels, and where nothing is known, is the default.
+    assert_eq!(materials.index_at(&terrain, [500_400.0, 5_000_100.0]), 0);
+    let holes = raster((9, 9), [500_000.0, 5_000_000.0], 37.0, utm, |column, _| {
+        if column == 4 { f32::NAN } else { 30.0 }
+    });
+    let materials = over(&terrain, holes, looks(&[10, 30])).expect("they overlap");
+    let at = |x: f64| materials.index_at(&terrain, [500_000.0 + x, 5_000_100.0]);
+    assert_eq!([at(100.0), at(148.0), at(190.0)], [2, 0, 2]);
+}
+
+#[test]
+fn classes_in_another_system_lie_where_they_are_on_the_globe() {
+    // A meridian is the border: 9° east is the middle of zone 32.
+    let terrain = raster(
+        (101, 101),
+        [499_500.0, 5_000_000.0],
+        10.0,
+        Some(32632),
+        |_, _| 0.0,
+    );
+    // Pixels of 0.0001°, 7.9 m, with a border between two of them at 9°.
+    let origin = [8.990_05, 45.145];
+    let classes = raster((200, 200), origin, 1e-4, Some(4326), |column, _| {
+        if column < 100 { 10.0 } else { 20.0 }
+    });
+    let materials = over(&terrain, classes, looks(&[10, 20])).expect("they overlap");
+    let at = |x: f64| materials.index_at(&terrain, [x, 5_000_400.0]);
+    assert_eq!([at(499_999.0), at(500_001.0)], [1, 2]);
+    assert_eq!([at(499_900.0), at(500_100.0)], [1, 2]);
+    let grid = FeltGrid::new(&terrain, FeltCells::Square).with_materials(Some(&materials));
+    let told = materials.told(&grid);
+    assert!(
+        told.contains("trees") && told.contains("class 20"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_tile_has_the_classes_of_its_level() {
+    let terrain = raster((101, 71), [0.0; 2], 1.0, None, |x, y| (x * y) as f32);
+    let classes = raster((101, 71), [0.0; 2], 1.0, None, |x, y| {
+        ((x / 7 + y / 5) % 3) as f32
+    });
+    let materials = over(&terrain, classes, looks(&[1, 2])).expect("they overlap");
+    let mut buffer = MaterialBuffer::default();
+    for level in [0, 1] {
+        let grid = FeltGrid::new(&terrain, FeltCells::Stored).with_materials(Some(&materials));
+        let scale = Scale::new(1.0, 1.0).expect("valid");
+        let felt = Terrain::over(grid, scale, level).expect("terrain");
+        let key = TileKey::new(level, 1, 0);
+        let packed = felt.materials_of(key, &mut buffer).expect("it has some");
+        let mut tile = Box::new(Tile::VACANT);
+        tile.fill(key, 0, |_, _| 0.0).expect("in range");
+        packed.fill(&mut tile, 3).expect("of the table");
+        let class = |x: u32, y: u32| ((x / 7 + y / 5) % 3) as u8;
+        let size = felt.size();
+        let wanted: Vec<u8> = (0..SAMPLES)
+            .map(|i| {
+                let at = |first: i32, i: usize, last: i32| (first + i as i32).min(last) as u32;
+                let (column, row) = (at(32, i % POSTS, size[0]), at(0, i / POSTS, size[1]));
+                class(column << level, row << level)
+            })
+            .collect();
+        assert_eq!(buffer.indices.as_slice(), wanted, "level {level}");
+        assert!(
+            felt.materials_of(TileKey::new(level, 9, 0), &mut buffer)
+                .is_none()
+        );
+    }
+}
+
+#[test]
+fn the_scene_names_the_table_and_another_file_of_classes_makes_another_scene() {
+    let terrain = raster((41, 41), [0.0; 2], 1.0, None, |x, _| x as f32);
+    let scene = |materials: Option<&Materials>| {
+        let grid = FeltGrid::new(&terrain, FeltCells::Stored).with_materials(materials);
+        let felt = Terrain::over(grid, Scale::new(1.0, 1.0).expect("valid"), 0).expect("terrain");
+        felt.scene(
+            ForceLaw::PREMIUM,
+            Rule::Swept,
+            Source::Points,
+            GridPoint::default(),
+        )
+    };
+    let classes = |value| raster((41, 41), [0.0; 2], 1.0, None, move |_, _| value);
+    let one = over(&terrain, classes(1.0), looks(&[1])).expect("overlap");
+    let other = over(&terrain, classes(2.0), looks(&[1])).expect("overlap");
+    let [none, one, other] = [scene(None), scene(Some(&one)), scene(Some(&other))];
+    assert_eq!((none.materials, one.materials.is_some()), (None, true));
+    assert_eq!(one.materials, other.materials);
+    assert!(none.epoch != one.epoch && one.epoch != other.epoch);
+}
+
+#[test]
+fn what_cannot_be_laid_over_a_terrain_is_told() {
+    let utm = |origin| raster((9, 9), origin, 10.0, Some(32632), |_, _| 1.0);
+    let terrain = utm([500_000.0, 5_000_000.0]);
+    let unplaced = Raster::from_fn(9, 9, |_, _| 1.0).expect("raster");
+    let no_system = BadGround::NoSystem {
+        unplaced: "c.tif".into(),
+        placed: "t.tif".into(),
+    };
+    let bad = over(&terrain, unplaced.clone(), looks(&[1])).expect_err("no system");
+    assert_eq!(bad, no_system);
+    let bad = over(&unplaced, utm([0.0; 2]), looks(&[1])).expect_err("no system");
+    assert!(matches!(bad, BadGround::NoSystem { unplaced, .. } if unplaced == "t.tif"));
+    let elsewhere = over(&terrain, utm([510_000.0, 5_000_000.0]), looks(&[1]));
+    let told = elsewhere.expect_err("apart").to_string();
+    assert!(
+        told.contains("longitude 9.127") && told.contains("longitude 8.999"),
+        "{told}"
+    );
+    // One that is small and lies between the places that are tried first.
+    let large = raster((4_001, 3), [0.0; 2], 1.0, None, |_, _| 1.0);
+    let small = raster((2, 2), [61.0, 0.2], 0.1, None, |_, _| 1.0);
+    assert!(over(&large, small, looks(&[1])).is_ok());
+    // Neither says anything: both count in their own columns and rows.
+    assert!(over(&unplaced, unplaced.clone(), looks(&[1])).is_ok());
+    let many: Vec<i64> = (0..16).collect();
+    let bad = over(&unplaced, unplaced.clone(), looks(&many));
+    assert!(matches!(bad, Err(BadGround::TooMany(16))));
+}

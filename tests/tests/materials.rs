@@ -1,0 +1,407 @@
+//! Materials, from the command line and on the emulated board.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use hapterra::link::{Emulator, Patience};
+use hapterra::materials::table::TableFile;
+use hapterra::materials::{ClassMaterial, Looks, Materials};
+use hapterra::raster::Raster;
+use hapterra::replay::{Replayer, on_native};
+use hapterra::synth::{Kind, Synth};
+use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra_core::contact::{ContactState, Friction, Rule};
+use hapterra_core::force::{ForceLaw, Material, Pattern, Shading, Texture};
+use hapterra_tests::emulation::emulated_board;
+use hapterra_tests::hapterra_binary;
+use hapterra_tests::walk::wander;
+
+const UTM_32: &str = r#"PROJCS["WGS_1984_UTM_Zone_32N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",9.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]]"#;
+const LONLAT: &str = r#"GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]]"#;
+/// Where the terrain's first column is, east of its zone's origin, m: 9° east lies between two
+/// columns.
+const FIRST_COLUMN: f64 = 499_503.0;
+/// Metres from column to column; a column is a millimetre in the hand.
+const COLUMN: f64 = 10.0;
+/// Rows of the trajectory a millimetre.
+const ROWS_PER_MM: u32 = 100;
+
+/// A folder with a terrain, classes and a way over their border.
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        let folder = Self(tempfile::tempdir().expect("a folder"));
+        folder.grid(
+            "level.asc",
+            (101, 81),
+            [FIRST_COLUMN, 5_000_000.0],
+            COLUMN,
+            UTM_32,
+            |_| 0,
+        );
+        folder.classes("classes.asc", 8.99);
+        folder.write(
+            "table.toml",
+            "[class.10]\nname = \"meadow\"\nstiffness_n_per_mm = 0.4\n\n[class.80]\nname = \"rock\"\nstiffness_n_per_mm = 1.0\n",
+        );
+        let mut way = "t_s,x_mm,y_mm,z_mm\n0,45,40.3,2\n".to_owned();
+        for row in 0..10 * ROWS_PER_MM {
+            let x = 45.0 + f64::from(row) / f64::from(ROWS_PER_MM);
+            writeln!(way, "{},{x},40.3,-2", f64::from(row + 1) * 1e-3).expect("written");
+        }
+        folder.write("way.csv", &way);
+        folder
+    }
+
+    /// Classes in degrees, of pixels that are 15.7 m wide and 22 m high, with a border in the 51st
+    /// column's western edge.
+    fn classes(&self, name: &str, west: f64) {
+        let class = |column| if column < 50 { 10 } else { 80 };
+        self.grid(name, (100, 100), [west + 1e-4, 45.14], 2e-4, LONLAT, class);
+    }
+
+    /// A grid by the middle of its south-west cell.
+    fn grid(
+        &self,
+        name: &str,
+        (columns, rows): (u32, u32),
+        [x, y]: [f64; 2],
+        step: f64,
+        system: &str,
+        value: impl Fn(u32) -> i32,
+    ) {
+        let mut text = format!(
+            "ncols {columns}\nnrows {rows}\nxllcenter {x}\nyllcenter {y}\ncellsize {step}\nNODATA_value -9\n"
+        );
+        for _ in 0..rows {
+            let row: Vec<_> = (0..columns)
+                .map(|column| value(column).to_string())
+                .collect();
+            text += &(row.join(" ") + "\n");
+        }
+        self.write(name, &text);
+        self.write(&name.replace(".asc", ".prj"), system);
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.0.path().join(name), text).expect("written");
+    }
+
+    fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.0.path().join(name)).expect("there")
+    }
+
+    /// Whether the command went well, and what it said.
+    fn hapterra(&self, args: &[&str]) -> (bool, String) {
+        let run = Command::new(hapterra_binary())
+            .current_dir(self.0.path())
+            .args(args)
+            .output()
+            .expect("started");
+        let [said, complained] = [&run.stdout, &run.stderr].map(|out| String::from_utf8_lossy(out));
+        (run.status.success(), format!("{said}{complained}"))
+    }
+}
+
+const REPLAY: [&str; 4] = ["replay", "level.asc", "way.csv", "--output"];
+const MATERIALS: [&str; 4] = [
+    "--materials",
+    "classes.asc",
+    "--material-table",
+    "table.toml",
+];
+
+/// Place and upward force of each row of a recording in contact.
+fn felt(recording: &str) -> Vec<(f64, f64)> {
+    let rows = recording.lines().filter(|line| !line.starts_with('#'));
+    let mut rows = rows.map(|row| row.split(',').collect::<Vec<_>>());
+    let header = rows.next().expect("a header");
+    let place = |name| {
+        header
+            .iter()
+            .position(|column| *column == name)
+            .expect(name)
+    };
+    let (x, force, contact) = (place("x_mm"), place("force_z_n"), place("contact"));
+    let number = |cell: &str| cell.parse().expect("a number");
+    rows.filter(|row| row[contact] == "1")
+        .map(|row| (number(row[x]), number(row[force])))
+        .collect()
+}
+
+#[test]
+fn classes_in_another_system_and_resolution_are_felt_where_they_lie() {
+    let folder = Folder::new();
+    let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &["a.csv"], &MATERIALS].concat());
+    assert!(felt_it, "{said}");
+    assert!(said.contains("materials      "), "{said}");
+    assert!(said.contains("rock") && said.contains("meadow"), "{said}");
+    let felt = felt(&folder.read("a.csv"));
+    assert_eq!(felt.len(), 10 * ROWS_PER_MM as usize);
+    // 9° east is at 49.7 mm, between the columns 49 and 50: half a cell and half a pixel is the
+    // most that a border can be off.
+    let border = (500_000.0 - FIRST_COLUMN) / COLUMN;
+    let (first, last) = (0.4 * 2.0, 1.0 * 2.0);
+    let changed = felt
+        .iter()
+        .position(|(_, force)| (force - first).abs() > 1e-6);
+    let (at, _) = felt[changed.expect("it changes")];
+    assert!(
+        (at - border).abs() < 0.5 + 0.5 * 15.7 / COLUMN,
+        "{at}, not {border}"
+    );
+    // By the samples themselves it is half way between 49 and 50.
+    assert!((at - 49.5).abs() < 0.011, "{at}");
+    let (_, end) = felt[felt.len() - 1];
+    assert!((end - last).abs() < 1e-6, "{end}");
+    // 100 ms, evenly.
+    let steps = felt.windows(2).map(|pair| pair[1].1 - pair[0].1);
+    let most = steps.fold(0.0, f64::max);
+    assert!(
+        (most - (last - first) / 100.0).abs() < 1e-5,
+        "{most} N in a tick"
+    );
+    let rows = felt
+        .iter()
+        .filter(|(_, force)| *force > first + 1e-6 && *force < last - 1e-6);
+    assert_eq!(rows.count(), 99);
+}
+
+#[test]
+fn a_recording_keeps_its_materials_and_is_felt_with_them_again() {
+    let folder = Folder::new();
+    let replay = |more: &[&str], output: &str| {
+        folder.hapterra(
+            &[
+                &["replay", "level.asc", "a.csv", "--output", output][..],
+                more,
+            ]
+            .concat(),
+        )
+    };
+    let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &["a.csv"], &MATERIALS].concat());
+    assert!(felt_it, "{said}");
+    let recorded = folder.read("a.csv");
+    assert!(
+        recorded.contains("# [materials]\n# file = \"classes.asc\"\n"),
+        "{recorded:.2000}"
+    );
+    assert!(recorded.contains("name = \"rock\""));
+    // The table is in the recording; the classes are read again.
+    std::fs::remove_file(folder.0.path().join("table.toml")).expect("removed");
+    let (again, said) = replay(&[], "b.csv");
+    assert!(again && said.contains("rock"), "{said}");
+    assert_eq!(felt(&folder.read("b.csv")), felt(&recorded));
+    let (again, said) = replay(&["--stiffness-n-per-mm", "1"], "c.csv");
+    assert!(again, "{said}");
+    // Each material is twice as stiff as it was beside the 0.5 N/mm of the recording.
+    for ((_, twice), (_, once)) in felt(&folder.read("c.csv")).iter().zip(felt(&recorded)) {
+        assert!((twice - 2.0 * once).abs() < 1e-5, "{twice} {once}");
+    }
+    // The path alone has no materials.
+    let (again, said) = replay(&["--ignore-settings"], "d.csv");
+    assert!(again && !said.contains("rock"), "{said}");
+    assert!(
+        felt(&folder.read("d.csv"))
+            .iter()
+            .all(|(_, force)| (force - 1.0).abs() < 1e-6)
+    );
+    // The same classes elsewhere are others.
+    folder.classes("classes.asc", 8.9902);
+    let (again, said) = replay(&[], "e.csv");
+    assert!(
+        !again && said.contains("classes of its materials are others"),
+        "{said}"
+    );
+}
+
+#[test]
+fn the_demo_and_run_feel_materials_too() {
+    let folder = Folder::new();
+    let demo = ["demo", "level.asc", "--device", "native", "--seconds", "3"];
+    let (felt_it, said) = folder.hapterra(&[&demo[..], &MATERIALS].concat());
+    assert!(felt_it && said.contains("materials      "), "{said}");
+    assert!(folder.read("demo/level.csv").contains("# [materials]\n"));
+    let run = [
+        "run",
+        "level.asc",
+        "--device",
+        "native",
+        "--seconds",
+        "3",
+        "--record",
+        "r.csv",
+    ];
+    let (felt_it, said) = folder.hapterra(&[&run[..], &MATERIALS].concat());
+    assert!(felt_it && said.contains("materials      "), "{said}");
+    assert!(folder.read("r.csv").contains("# [materials]\n"));
+}
+
+#[test]
+fn what_cannot_be_laid_over_the_terrain_is_told_with_what_to_do() {
+    let folder = Folder::new();
+    let fails = |materials: &str, table: &str, wanted: &[&str]| {
+        let options = ["x.csv", "--materials", materials, "--material-table", table];
+        let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &options].concat());
+        assert!(!felt_it && said.contains("hint: "), "{said}");
+        for part in wanted {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+    };
+    folder.classes("elsewhere.asc", 12.0);
+    fails(
+        "elsewhere.asc",
+        "table.toml",
+        &["longitude 12.0", "longitude 8.99"],
+    );
+    std::fs::copy(
+        folder.0.path().join("classes.asc"),
+        folder.0.path().join("bare.asc"),
+    )
+    .expect("copied");
+    fails("no.asc", "table.toml", &["no.asc"]);
+    folder.write("odd.toml", "[class.10]\nfrictoin = 0.3\n");
+    fails("classes.asc", "odd.toml", &["line 2", "frictoin"]);
+    folder.write("wild.toml", "[default]\n[class.10]\nfriction = 30\n");
+    fails(
+        "classes.asc",
+        "wild.toml",
+        &["wild.toml, line 2, class 10", "friction of 30"],
+    );
+    let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &["x.csv"], &MATERIALS[..2]].concat());
+    assert!(!felt_it && said.contains("--material-table"), "{said}");
+    // No output may be one of them.
+    let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &["table.toml"], &MATERIALS].concat());
+    assert!(
+        !felt_it && folder.read("table.toml").contains("rock"),
+        "{said}"
+    );
+}
+
+/// The example of the documentation.
+fn worldcover() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/worldcover.toml")
+}
+
+#[test]
+fn the_table_for_worldcover_names_all_of_its_classes_and_can_be_felt() {
+    let table = TableFile::open(&worldcover()).expect("a table");
+    let classes: Vec<_> = table.classes.iter().map(|(class, ..)| *class).collect();
+    assert_eq!(classes, [10, 20, 30, 40, 50, 60, 70, 80, 90, 95, 100]);
+    assert!(table.classes.iter().all(|(_, _, look)| look.name.is_some()));
+    let folder = Folder::new();
+    let file = worldcover();
+    let options = ["w.csv", "--materials", "classes.asc", "--material-table"];
+    let replay = [&REPLAY[..], &options, &[file.to_str().expect("text")]].concat();
+    let (felt_it, said) = folder.hapterra(&replay);
+    assert!(felt_it, "{said}");
+    assert!(
+        said.contains("permanent water bodies") && !said.contains("warn"),
+        "{said}"
+    );
+}
+
+/// Materials of all kinds in patches of some cells, over a terrain.
+fn patchwork(raster: &Raster) -> Materials {
+    let plain = Material::of(&ForceLaw::PREMIUM);
+    let texture = |pattern, wavelength_mm| Texture {
+        pattern,
+        amplitude_mm: 0.1,
+        wavelength_mm,
+        direction_deg: 20.0,
+        seed: 5,
+    };
+    let friction = Friction {
+        static_mu: 0.6,
+        dynamic_mu: 0.4,
+        viscous_s: 0.003,
+    };
+    let materials = [
+        Material {
+            stiffness_n_per_mm: 0.9,
+            friction,
+            ..plain
+        },
+        Material {
+            texture: texture(Pattern::Grain, 1.3),
+            damping_ns_per_m: 3.0,
+            ..plain
+        },
+        Material {
+            texture: texture(Pattern::Grating, 2.1),
+            friction: Friction::coulomb(0.2),
+            ..plain
+        },
+    ];
+    let classes = Raster::from_fn(raster.columns(), raster.rows(), |x, y| {
+        ((x / 5 + y / 7) % 4) as f32
+    });
+    let class = |(i, material): (i64, &Material)| ClassMaterial {
+        class: i,
+        name: None,
+        material: *material,
+    };
+    let looks = Looks {
+        default: plain,
+        class: (1..).zip(&materials).map(class).collect(),
+    };
+    let classes = ("classes", classes.expect("raster"));
+    Materials::over(("terrain", raster), classes, looks).expect("they overlap")
+}
+
+fn walk(replayer: &mut Replayer<'_>, path: &[[f64; 3]]) -> Vec<(ContactState, [u32; 9])> {
+    let scale = *replayer.terrain().scale();
+    let feel = |mm: &[f64; 3]| {
+        let hip = scale.to_grid(*mm).expect("addressable");
+        let sample = replayer.feel(hip).expect("felt");
+        let [x, y, z] = sample.proxy.cell().map(|cell| cell as u32);
+        let [u, v, w] = sample.proxy.frac().to_array().map(f32::to_bits);
+        let [fx, fy, fz] = sample.force_n.to_array().map(f32::to_bits);
+        (sample.state, [x, y, z, u, v, w, fx, fy, fz])
+    };
+    path.iter().map(feel).collect()
+}
+
+#[test]
+fn a_replay_with_materials_gives_the_same_bits_on_the_emulated_board() {
+    let raster = Synth::new(Kind::Fractal, 3, 25.0).raster(150, 140);
+    let raster = raster.expect("raster");
+    let materials = patchwork(&raster);
+    let grid = FeltGrid::new(&raster, FeltCells::Stored);
+    let scale = Scale::new(0.8, 0.9).expect("scale");
+    let one = Terrain::over(grid, scale, 0).expect("terrain");
+    let several = grid.with_materials(Some(&materials));
+    let several = Terrain::over(several, scale, 0).expect("terrain");
+    let path = wander(&one, 17, 400, -1.0);
+    let law = ForceLaw {
+        shading: Shading::Smooth,
+        ..ForceLaw::PREMIUM
+    };
+    let mut native = on_native(&several, law, Rule::Swept).expect("opened");
+    let expected = walk(&mut native, &path);
+    let mut plain = on_native(&one, law, Rule::Swept).expect("opened");
+    let plain = walk(&mut plain, &path);
+    let touching = |felt: &&(ContactState, [u32; 9])| felt.0 == ContactState::Touching;
+    assert!(expected.iter().filter(touching).count() > 80);
+    let differ = expected
+        .iter()
+        .zip(&plain)
+        .filter(|(one, other)| one != other);
+    assert!(differ.count() > 50, "the materials are felt");
+    let Some((qemu, image)) = emulated_board() else {
+        return;
+    };
+    let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
+    let _plant = lines.plant;
+    let link = Box::new(lines.link);
+    let mut board =
+        Replayer::open(&several, law, Rule::Swept, link, Patience::EMULATED).expect("opened");
+    let got = walk(&mut board, &path);
+    for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
+        assert_eq!(expected, got, "row {i} at {:?}", path[i]);
+    }
+    board.say_goodbye().expect("said");
+    emulator.finish().expect("the board ended well");
+}
