@@ -146,13 +146,12 @@ impl Rubbing {
             0 => pull.is_within(static_mu),
             times => {
                 // The way is known to the last places of both its ends.
-                let trail = match drag > 0.0 {
-                    true => drag * (came().length() + 8.0 * RESOLUTION),
-                    false => 0.0,
-                };
-                let is_within = |mu| pull.is_within_trailing(mu, trail);
-                let is_held = is_within(mu * (1.0 + SLACK));
-                let goes_back = is_inside && times < SLIDES && is_within(mu * (1.0 - SLACK));
+                let places = 8.0 * RESOLUTION;
+                let gone = if drag > 0.0 { came().length() } else { 0.0 };
+                let (most, least) = (drag * (gone + places), drag * (gone - places));
+                let is_held = pull.is_within_trailing(mu * (1.0 + SLACK), most);
+                let is_short = pull.is_within_trailing(mu * (1.0 - SLACK), least);
+                let goes_back = is_inside && times < SLIDES && is_short;
                 self.came_to = (is_held && goes_back).then_some((*point, self.back));
                 is_held && !goes_back
             }
