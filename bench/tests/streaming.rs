@@ -159,6 +159,7 @@ fn the_kept_figures_are_of_all_sizes_and_latencies_and_within_their_bounds() {
                 };
                 assert!(row.peak_mb < Some(MOST_MB), "{row:?}");
                 assert!(row.held_straight.is_some() && row.missing()[1][2].is_some());
+                assert_eq!(row.holes_underlaid, Some(0), "{row:?}");
             }
         }
     }

@@ -112,6 +112,17 @@ impl Rubbing {
         is_other
     }
 
+    /// In the middle of a tick a proxy may be farther from the HIP than where the tick ends: it is
+    /// where it stood, then.
+    #[inline(never)]
+    fn not_farther(&self, here: Stood) -> Stood {
+        let view = HipView::new(self.hip);
+        let stood = self
+            .stood
+            .filter(|stood| view.is_nearer(&stood.proxy, &here.proxy));
+        stood.unwrap_or(here)
+    }
+
     /// One more tick. A proxy that slid sticks when it has not moved for a while.
     fn counts(&mut self, is_still: bool, rate: TickRate) {
         if self.slides {
@@ -120,55 +131,62 @@ impl Rubbing {
         }
     }
 
-    /// What becomes of a proxy at a point that the HIP pulls like this; `here` works out where that
-    /// is.
-    fn judges(
+    /// What becomes of a proxy that the HIP pulls like this, before it has slid for it.
+    fn judges(&mut self, pull: &Pull, rate: TickRate) -> Verdict {
+        let Friction {
+            static_mu,
+            dynamic_mu,
+            ..
+        } = self.friction;
+        if pull.is_within(if self.slides { dynamic_mu } else { static_mu }) {
+            return Verdict::Held;
+        }
+        self.goes(pull.held_back(dynamic_mu, self.drag(rate)))
+    }
+
+    /// The same of one that has slid to a point; `came` works out the way from where it stood.
+    #[inline(never)]
+    fn judges_again(
         &mut self,
         pull: &Pull,
         rate: TickRate,
         point: &SurfacePoint,
-        here: impl Fn() -> Option<GridPoint>,
+        came: impl Fn(Option<Stood>) -> Vec3,
     ) -> Verdict {
-        let Friction {
-            static_mu,
-            dynamic_mu: mu,
-            viscous_s,
-        } = self.friction;
-        let drag = viscous_s * rate.hz() as f32;
-        let came = || match (self.stood, here()) {
-            (Some(stood), Some(here)) => stood.proxy.to(&here),
-            _ => Vec3::ZERO,
-        };
+        let (mu, drag) = (self.friction.dynamic_mu, self.drag(rate));
+        let came = || came(self.stood);
+        // The way is known to the last places of both its ends.
+        let places = 8.0 * RESOLUTION;
+        let gone = if drag > 0.0 { came().length() } else { 0.0 };
+        let (most, least) = (drag * (gone + places), drag * (gone - places));
+        let is_held = pull.is_within_trailing(mu * (1.0 + SLACK), most);
         let is_inside = point.border() == Side::NONE;
-        self.came_to = None;
-        let is_held = match self.times {
-            0 if self.slides => pull.is_within(mu),
-            0 => pull.is_within(static_mu),
-            times => {
-                // The way is known to the last places of both its ends.
-                let places = 8.0 * RESOLUTION;
-                let gone = if drag > 0.0 { came().length() } else { 0.0 };
-                let (most, least) = (drag * (gone + places), drag * (gone - places));
-                let is_held = pull.is_within_trailing(mu * (1.0 + SLACK), most);
-                let is_short = pull.is_within_trailing(mu * (1.0 - SLACK), least);
-                let goes_back = is_inside && times < SLIDES && is_short;
-                self.came_to = (is_held && goes_back).then_some((*point, self.back));
-                is_held && !goes_back
-            }
-        };
-        if is_held {
+        let has_passed = is_inside && pull.is_within_trailing(mu * (1.0 - SLACK), least);
+        if is_held && !(has_passed && self.times < SLIDES) {
+            self.came_to = None;
             return Verdict::Held;
         }
-        let back = match self.times > 0 && is_inside {
+        let back = match is_held {
             true => pull.held_back_on_plane(came(), mu, drag),
             false => pull.held_back(mu, drag),
         };
+        self.came_to = is_held.then_some((*point, self.back));
+        self.goes(back)
+    }
+
+    /// It slides for the HIP, held back by so much.
+    fn goes(&mut self, back: Vec3) -> Verdict {
         self.slides = true;
         self.times += 1;
         if self.times > SLIDES {
             return Verdict::Goes(self.hip);
         }
         Verdict::Goes(GridPoint::new(self.hip.cell(), self.hip.frac() - back))
+    }
+
+    /// By how many times its way in a tick the proxy trails.
+    fn drag(&self, rate: TickRate) -> f32 {
+        self.friction.viscous_s * rate.hz() as f32
     }
 }
 
@@ -230,29 +248,21 @@ impl Contact {
                 nearest.map(|(point, _)| point)
             }
         };
-        let place = point.and_then(|point| {
-            let proxy = position_on(window, &point)?;
-            Some(Stood { point, proxy })
-        });
-        // In the middle of a tick it may be farther away than where it ends.
-        let view = HipView::new(rubbing.hip);
-        let place = match (place, rubbing.stood) {
-            (Some(place), Some(stood))
-                if !has_ended && view.is_nearer(&stood.proxy, &place.proxy) =>
-            {
-                Some(stood)
-            }
-            (place, _) => place,
-        };
-        if let Some(place) = place {
-            let proxy = place.proxy;
-            self.output.proxy = proxy;
-            self.output.displacement = rubbing.hip.to(&proxy) * on.fade;
+        if let Some(point) = point
+            && let Some(mut proxy) = position_on(window, &point)
+        {
             if has_ended {
                 rubbing.aim = None;
-            } else if self.settings.execution == Execution::RealTime {
-                (rubbing.stood, rubbing.came_to) = (Some(place), None);
+            } else {
+                let here = Stood { point, proxy };
+                let place = rubbing.not_farther(here);
+                proxy = place.proxy;
+                if self.settings.execution == Execution::RealTime {
+                    (rubbing.stood, rubbing.came_to) = (Some(place), None);
+                }
             }
+            self.output.proxy = proxy;
+            self.output.displacement = rubbing.hip.to(&proxy) * on.fade;
         }
     }
 
@@ -374,8 +384,15 @@ impl Contact {
         let point = on.descent.entry();
         match Pull::at(window, &view, &point) {
             Pulled::By(pull) => {
-                let here = || position_on(window, &point);
-                rubbing.judges(&pull, self.settings.rate, &point, here)
+                let rate = self.settings.rate;
+                if rubbing.times == 0 {
+                    return rubbing.judges(&pull, rate);
+                }
+                let came = |stood: Option<Stood>| {
+                    let way = stood.zip(position_on(window, &point));
+                    way.map_or(Vec3::ZERO, |(stood, here)| stood.proxy.to(&here))
+                };
+                rubbing.judges_again(&pull, rate, &point, came)
             }
             Pulled::Unknown(tile) if waits => Verdict::Waits(Some(tile)),
             // Without a patch there is no friction. Before a missing tile the proxy is held
