@@ -58,6 +58,17 @@ impl Ahead {
     }
 }
 
+/// Has the tiles around a HIP read that is about to be there.
+pub(super) fn read_around(terrain: &Terrain<'_>, hip: &GridPoint) {
+    let [east, north, _] = hip.cell();
+    let tile = TILE_CELLS as i32;
+    let (from, to) = (
+        [east, north].map(|cell| cell.saturating_sub(tile)),
+        [east, north].map(|cell| cell.saturating_add(tile)),
+    );
+    terrain.grid().prefetch(terrain.level(), from, to);
+}
+
 /// First and last tile, east and north, from the one under the HIP to where it will be after
 /// `times` as long as it took from `was`; `None` where it is too fast.
 fn tiles(was: &GridPoint, is: &GridPoint, times: f64) -> Option<[[i32; 2]; 2]> {

@@ -15,7 +15,7 @@ use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_core::wire::session::{LastSession, SessionNumber};
 use hapterra_core::wire::status::Status;
 
-use super::ahead::Ahead;
+use super::ahead::{self, Ahead};
 use super::ask::Ask;
 use super::conversation::{Conversation, News, State};
 use super::error::LinkError;
@@ -261,8 +261,9 @@ impl<'t> Client<'t> {
 
     /// Puts another view of the scene in, of this terrain: says it until it is answered
     /// ([`Event::Viewed`]). The clutch has to be open
-    /// ([`Request::Clutch`]).
+    /// ([`Request::Clutch`]). What lies around the HIP there is read meanwhile.
     pub fn put_view(&mut self, now: Duration, view: View, terrain: Terrain<'t>, out: &mut Vec<u8>) {
+        ahead::read_around(&terrain, &view.hip);
         self.next = Some((view, terrain));
         self.talk.put_view(view, now, out);
     }

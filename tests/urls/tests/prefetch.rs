@@ -2,8 +2,14 @@
 
 use std::time::Duration;
 
+use hapterra::link::{Client, Patience};
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{Scale, Terrain, TileBuffer};
+use hapterra_core::Vec3;
+use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::scene::{Source, View};
 use hapterra_core::terrain::TileKey;
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::Server;
@@ -81,6 +87,29 @@ fn a_tile_that_was_read_ahead_takes_no_request_and_too_many_are_not_asked_for() 
     terrain.grid().prefetch(0, [-900, -900], [-800, -800]);
     terrain.grid().prefetch(0, [i32::MIN; 2], [i32::MAX; 2]);
     terrain.grid().prefetch(40, [i32::MAX; 2], [i32::MIN; 2]);
+}
+
+/// While the clutch is open, what the next view needs is fetched before the device asks for it.
+#[test]
+fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
+    let (_folder, raster, server) = hills();
+    let terrain = terrain(&raster);
+    let at = |east| GridPoint::new([east, 640, 100], Vec3::ZERO);
+    let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, at(640));
+    let mut client = Client::numbered(&terrain, scene, None, Patience::REAL_TIME, 1);
+    raster.stop_waiting();
+    let before = settled(&server);
+    let view = View {
+        number: 1,
+        scene,
+        hip: at(3500),
+        keeps_tiles: true,
+    };
+    client.put_view(Duration::ZERO, view, terrain.clone(), &mut vec![]);
+    let after = settled(&server);
+    assert!(after > before, "{after} requests");
+    assert!(is_here(&terrain, TileKey::new(0, 3500 / 32, 20)));
+    assert_eq!(settled(&server), after, "the tile asks for nothing more");
 }
 
 /// `cargo test -p hapterra-url-tests --test prefetch -- --ignored --nocapture`: looks, one every
