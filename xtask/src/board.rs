@@ -181,8 +181,8 @@ pub(crate) static BOARDS: [Board; 4] = [
         known_calls: G474_CALLS,
         memories: &[
             memory("flash", 0x0800_0000, 512 * KIB, 192 * KIB),
-            // 16 KiB stay for the stack.
-            memory("RAM", 0x2000_0000, 128 * KIB, 112 * KIB),
+            // 24 KiB stay for the stack.
+            memory("RAM", 0x2000_0000, 128 * KIB, 104 * KIB),
         ],
     },
     Board {
