@@ -264,16 +264,7 @@ impl<'t, const D: usize> Window<'t, D> {
     #[inline]
     pub(crate) fn block_is_clear(&self, block: Block, low: Altitude) -> bool {
         let Block { col, row } = block;
-        let up = TILE_SHIFT - BLOCK_SHIFT;
-        let index = TileIndex::new(col >> up, row >> up);
-        match self.held(index) {
-            Some(tile) => {
-                let first = Cell::new(col << BLOCK_SHIFT, row << BLOCK_SHIFT);
-                tile.block_is_below(BLOCK_SHIFT, first, low)
-                    || !self.size.has(col, row, BLOCK_SHIFT)
-            }
-            None => !self.size.has(col, row, BLOCK_SHIFT) || self.unsettled_is_below(index, low),
-        }
+        self.node_is_below(BLOCK_SHIFT, col, row, low) || !self.size.has(col, row, BLOCK_SHIFT)
     }
 
     fn box_is_clear(&self, span: CellBox, low: Altitude) -> bool {
