@@ -77,6 +77,7 @@ pub mod grid;
 pub mod guard;
 pub mod phantom;
 pub mod rate;
+mod scalar;
 pub mod scene;
 pub mod terrain;
 pub mod tick;

@@ -8,8 +8,9 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::surface::{Slopes, SlopesAt, one_over_root};
+use crate::contact::surface::{Slopes, SlopesAt};
 use crate::contact::{Contact, ContactState};
+use crate::scalar::one_over_root;
 use crate::terrain::{TileIndex, Window};
 
 /// Which normals the force follows.

@@ -9,9 +9,9 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::relief::Relief;
-use crate::contact::surface::one_over_root;
 use crate::grid::GridPoint;
 use crate::rate::TickRate;
+use crate::scalar::{larger, one_over_root, smaller};
 
 /// What a texture looks like.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -226,14 +226,6 @@ impl Texturer {
         let left = left.clamp(0.0, 1.0);
         left * left * (3.0 - 2.0 * left)
     }
-}
-
-fn larger(x: f32, y: f32) -> f32 {
-    if x > y { x } else { y }
-}
-
-fn smaller(x: f32, y: f32) -> f32 {
-    if x < y { x } else { y }
 }
 
 #[cfg(test)]

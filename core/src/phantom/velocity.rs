@@ -15,6 +15,8 @@
 
 use glam::Vec3;
 
+use crate::scalar::{larger, smaller};
+
 /// Longest window: readings before the newest.
 pub const WINDOW: usize = 15;
 /// What two readings can be off by together, counts: half a count each.
@@ -22,25 +24,33 @@ const NOISE: f32 = 1.0;
 /// Readings kept, a power of two.
 const KEPT: usize = WINDOW + 1;
 
-/// 1/i, and 6/(n(n+1)(n+2)), the factor of the best-fit slope.
-const RECIPROCAL: [f32; KEPT] = table(1.0, 0, 0);
-const FIT: [f32; KEPT] = table(6.0, 1, 2);
-
-const fn table(over: f32, a: usize, b: usize) -> [f32; KEPT] {
+/// 1/i for the reading i ticks ago, from 1 on.
+const RECIPROCAL: [f32; WINDOW] = {
+    let mut values = [0.0; WINDOW];
+    let mut i = 0;
+    while i < WINDOW {
+        values[i] = 1.0 / (i + 1) as f32;
+        i += 1;
+    }
+    values
+};
+/// 6/(n(n+1)(n+2)) for a window of n, the factor of the best-fit slope.
+const FIT: [f32; KEPT] = {
     let mut values = [0.0; KEPT];
     let mut n = 1;
     while n < KEPT {
-        let rest = if b == 0 { 1 } else { (n + a) * (n + b) };
-        values[n] = over / (n * rest) as f32;
+        values[n] = 6.0 / (n * (n + 1) * (n + 2)) as f32;
         n += 1;
     }
     values
-}
+};
 
 /// The last readings of the three encoders, evenly spaced in time.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Readings {
-    counts: [[i32; 3]; KEPT],
+    /// From `newest` on, the newest first. All are there twice, so that from wherever the newest
+    /// is they lie in a row.
+    counts: [[i32; 3]; 2 * KEPT],
     newest: usize,
     /// Readings before the newest, at most [`WINDOW`].
     before: usize,
@@ -49,10 +59,9 @@ pub struct Readings {
 impl Readings {
     /// Takes the next reading.
     pub fn take(&mut self, counts: [i32; 3]) {
-        self.newest = (self.newest + 1) % KEPT;
-        if let Some(place) = self.counts.get_mut(self.newest) {
-            *place = counts;
-        }
+        self.newest = self.newest.wrapping_sub(1) % KEPT;
+        self.counts[self.newest % KEPT] = counts;
+        self.counts[self.newest % KEPT + KEPT] = counts;
         self.before = (self.before + 1).min(WINDOW);
     }
 
@@ -68,7 +77,9 @@ impl Readings {
         if self.before == 0 {
             return [0; 3];
         }
-        core::array::from_fn(|axis| self.ago(0, axis).wrapping_sub(self.ago(1, axis)))
+        let newest = self.newest % KEPT;
+        let (newest, before) = (&self.counts[newest], &self.counts[newest + 1]);
+        core::array::from_fn(|axis| newest[axis].wrapping_sub(before[axis]))
     }
 
     /// Velocity of each axis, counts from one reading to the next.
@@ -77,50 +88,47 @@ impl Readings {
     /// in (swept in the tests); raw differences are off by up to 1.
     #[must_use]
     pub fn velocity(&self) -> Vec3 {
-        Vec3::new(self.slope(0), self.slope(1), self.slope(2))
+        let newest = self.newest % KEPT;
+        let kept = newest..newest + 1 + self.before.min(WINDOW);
+        let readings = self.counts.get(kept).unwrap_or_default();
+        Vec3::new(
+            slope(readings, |counts| counts[0]),
+            slope(readings, |counts| counts[1]),
+            slope(readings, |counts| counts[2]),
+        )
     }
+}
 
-    fn ago(&self, readings: usize, axis: usize) -> i32 {
-        let place = self.newest.wrapping_sub(readings) % KEPT;
-        self.counts
-            .get(place)
-            .and_then(|counts| counts.get(axis))
-            .copied()
-            .unwrap_or(0)
+/// The slope of an axis in these readings, the newest first.
+#[inline(never)]
+fn slope(readings: &[[i32; 3]], axis: impl Fn(&[i32; 3]) -> i32) -> f32 {
+    let Some((newest, before)) = readings.split_first() else {
+        return 0.0;
+    };
+    let (mut low, mut high) = (f32::MIN, f32::MAX);
+    let (mut window, mut sum, mut sums) = (0, 0.0, 0.0);
+    for (counts, reciprocal) in before.iter().zip(&RECIPROCAL) {
+        let fallen = axis(newest).wrapping_sub(axis(counts)) as f32;
+        let lower = larger((fallen - NOISE) * reciprocal, low);
+        let upper = smaller((fallen + NOISE) * reciprocal, high);
+        if lower > upper {
+            break;
+        }
+        (low, high) = (lower, upper);
+        window += 1;
+        sum += fallen;
+        sums += sum;
     }
-
-    fn slope(&self, axis: usize) -> f32 {
-        let newest = self.ago(0, axis);
-        let (mut low, mut high) = (f32::MIN, f32::MAX);
-        let (mut sum, mut moment) = (0.0, 0.0);
-        let mut window = 0;
-        for i in 1..=self.before.min(WINDOW) {
-            let reciprocal = RECIPROCAL.get(i).copied().unwrap_or(0.0);
-            let fallen = newest.wrapping_sub(self.ago(i, axis)) as f32;
-            // Compared here: `max` and `min` are calls on this processor.
-            let lower = (fallen - NOISE) * reciprocal;
-            let lower = if lower > low { lower } else { low };
-            let upper = (fallen + NOISE) * reciprocal;
-            let upper = if upper < high { upper } else { high };
-            if lower > upper {
-                break;
-            }
-            (low, high) = (lower, upper);
-            sum += fallen;
-            moment += i as f32 * fallen;
-            window = i;
-        }
-        // The least-squares line of the window's readings, kept to the slopes
-        // for which the window was chosen.
-        let fit = FIT.get(window).copied().unwrap_or(0.0);
-        let slope = (2.0 * moment - window as f32 * sum) * fit;
-        if slope < low {
-            low
-        } else if slope > high {
-            high
-        } else {
-            slope
-        }
+    // The least-squares line of the window's readings, kept to the slopes for which the window
+    // was chosen. The reading i ticks ago is in all but i - 1 of the `sums`.
+    let fit = FIT.get(window).copied().unwrap_or(0.0);
+    let slope = ((window + 2) as f32 * sum - 2.0 * sums) * fit;
+    if slope < low {
+        low
+    } else if slope > high {
+        high
+    } else {
+        slope
     }
 }
 

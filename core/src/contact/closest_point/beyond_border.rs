@@ -5,13 +5,14 @@
 //! that is the mirrored patch. What a neighbour is said to offer is searched for
 //! before the way goes there.
 
-use super::on_patch::{Nearest, PatchSearch, finest_resolution, resolution, smaller};
+use super::on_patch::{Nearest, PatchSearch, finest_resolution, resolution};
 use crate::contact::budget::{Budget, SLOPE};
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::contact::tolerance::{
     BESIDE, COARSEST_RESOLUTION, EQUALLY_STEEP, LEAST_WAY, RESOLUTION, SLOPE_NOISE,
 };
+use crate::scalar::{larger, smaller};
 use crate::terrain::{Ground, TileIndex, Window};
 
 /// Where downhill goes on from the closest point of a patch.
@@ -243,12 +244,6 @@ impl Asking {
         }
         Ok(())
     }
-}
-
-/// Not `f32::max`, for the reason of [`smaller`]; `b` where `a` is not a number.
-#[inline]
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
 
 /// How steeply the distance falls from a point of a patch's border into the

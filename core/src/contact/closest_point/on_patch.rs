@@ -23,6 +23,7 @@ use super::ruling_search::RulingSearch;
 use crate::contact::budget::{Budget, CONVEX, RULING};
 use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{COARSEST_RESOLUTION, RESOLUTION};
+use crate::scalar::smaller;
 
 /// Searches by rulings at most: one, and one more each time the other variable
 /// turns out to be the better one to eliminate.
@@ -246,12 +247,6 @@ pub(super) fn resolution(hip: f32) -> f32 {
 #[inline]
 pub(super) fn finest_resolution(hip: f32) -> f32 {
     RESOLUTION * (1.0 + 2.0 * hip.abs())
-}
-
-/// Not `f32::min`, which is a call where the processor has no instruction for it.
-#[inline]
-pub(super) fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
 }
 
 /// A coordinate, put on the border where it is as near to it as can be told for

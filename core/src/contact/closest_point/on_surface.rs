@@ -1,8 +1,6 @@
 //! The closest point of the surface to the HIP: downhill in the distance, from
 //! patch to patch (paper §4.3.2, made exact at edges and vertices).
 
-use glam::Vec3;
-
 use super::beyond_border::{Asking, Onward, Start, to_steepest_patch};
 use super::on_convex_patch::Place;
 use super::on_patch::{Nearest, PatchSearch};
@@ -424,11 +422,7 @@ pub(in crate::contact) fn position_on<const D: usize>(
     let patch = Patch::new(corners.heights);
     let up = corners.base.saturating_add(patch.height(at.u, at.v) as i32);
     let near = patch.seen_from(Altitude::new(up, 0.0), corners.base);
-    let height = near.height(at.u, at.v);
-    Some(GridPoint::new(
-        [at.cell.x, at.cell.y, up],
-        Vec3::new(at.u, at.v, height),
-    ))
+    Some(at.position(up, near.height(at.u, at.v)))
 }
 
 /// Counts how often in a row a position is no nearer to the HIP than the nearest

@@ -10,6 +10,7 @@ use glam::Vec3;
 use crate::contact::closest_point::passes_over;
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
+use crate::scalar::root;
 use crate::terrain::{Ground, TileIndex, Window};
 
 /// The way from a proxy to the HIP, in two parts at right angles to each other.
@@ -126,7 +127,7 @@ impl Pull {
     pub(in crate::contact) fn is_within_trailing(&self, mu: f32, trail: f32) -> bool {
         self.is_within(mu)
             || (trail > 0.0 && {
-                let left = libm::sqrtf(self.pulls) - trail;
+                let left = root(self.pulls) - trail;
                 left <= 0.0 || left * left < mu * mu * self.presses
             })
     }
@@ -134,7 +135,7 @@ impl Pull {
     /// By how much of the pull a proxy that slides is held back, by dynamic friction and by
     /// a viscous part of `drag` ticks: from 0 to the whole.
     pub(in crate::contact) fn held_back(&self, mu: f32, drag: f32) -> Vec3 {
-        let coulomb = mu * libm::sqrtf(self.presses / self.pulls);
+        let coulomb = mu * root(self.presses / self.pulls);
         if coulomb < 1.0 {
             self.along * ((coulomb + drag) / (1.0 + drag))
         } else {
@@ -148,8 +149,8 @@ impl Pull {
     pub(in crate::contact) fn held_back_on_plane(&self, way: Vec3, mu: f32, drag: f32) -> Vec3 {
         let whole = way + self.along;
         let whole = whole - self.rest * (whole.dot(self.rest) / self.presses);
-        let length = whole.length();
-        let held = (mu * libm::sqrtf(self.presses) + drag * length) / (1.0 + drag);
+        let length = root(whole.length_squared());
+        let held = (mu * root(self.presses) + drag * length) / (1.0 + drag);
         match held < length {
             true => whole * (held / length),
             // Also where one of them is no number.

@@ -12,6 +12,7 @@ use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::contact::tolerance::RESOLUTION;
 use crate::grid::GridPoint;
 use crate::rate::TickRate;
+use crate::scalar::root;
 use crate::terrain::{TileIndex, Window};
 
 /// Units of work for asking whether friction holds the proxy: what arriving on a border
@@ -157,7 +158,11 @@ impl Rubbing {
         let came = || came(self.stood);
         // The way is known to the last places of both its ends.
         let places = 8.0 * RESOLUTION;
-        let gone = if drag > 0.0 { came().length() } else { 0.0 };
+        let gone = if drag > 0.0 {
+            root(came().length_squared())
+        } else {
+            0.0
+        };
         let (most, least) = (drag * (gone + places), drag * (gone - places));
         let is_held = pull.is_within_trailing(mu * (1.0 + SLACK), most);
         let is_inside = point.border() == Side::NONE;

@@ -82,13 +82,7 @@ impl HipView {
     /// The position of a point of the surface, `z` cells above the HIP.
     #[inline]
     pub(in crate::contact) fn position(&self, point: &SurfacePoint, z: f32) -> GridPoint {
-        let cell = [point.cell.x, point.cell.y, self.hip.cell()[2]];
-        let height = self.hip.frac().z + z;
-        if point.is_well_inside() {
-            // Only the height may carry: fewer instructions for the same bits.
-            return GridPoint::over(cell, [point.u, point.v], height);
-        }
-        GridPoint::new(cell, Vec3::new(point.u, point.v, height))
+        point.position(self.hip.cell()[2], self.hip.frac().z + z)
     }
 
     /// From the HIP to a point of the surface, `z` cells above it.

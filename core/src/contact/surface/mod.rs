@@ -9,4 +9,4 @@ mod smoothed;
 pub(super) use hip_view::HipView;
 pub(super) use point::is_well_inside;
 pub use point::{Side, SurfacePoint};
-pub(crate) use smoothed::{Slopes, SlopesAt, one_over_root};
+pub(crate) use smoothed::{Slopes, SlopesAt};

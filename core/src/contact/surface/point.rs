@@ -146,6 +146,17 @@ impl SurfacePoint {
     pub(in crate::contact) fn is_well_inside(&self) -> bool {
         is_well_inside(self.u) && is_well_inside(self.v)
     }
+
+    /// Its position, `height` cells above the floor of the cells `up`.
+    #[inline]
+    pub(in crate::contact) fn position(&self, up: i32, height: f32) -> GridPoint {
+        let cell = [self.cell.x, self.cell.y, up];
+        if self.is_well_inside() {
+            // Only the height may carry: fewer instructions for the same bits.
+            return GridPoint::over(cell, [self.u, self.v], height);
+        }
+        GridPoint::new(cell, Vec3::new(self.u, self.v, height))
+    }
 }
 
 /// Whether a coordinate is farther from its patch's border than any rounding.

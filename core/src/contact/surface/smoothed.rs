@@ -11,6 +11,7 @@
 use super::hip_view::HipView;
 use super::patch::mix;
 use crate::grid::GridPoint;
+use crate::scalar::one_over_root;
 use crate::terrain::{Corners, Ground, TileIndex, Window};
 
 /// Cosine of the bend up to which the direction changes along a whole edge: 45°.
@@ -122,16 +123,6 @@ fn bent(own: [f32; 2], beside: f32, place: f32) -> [f32; 2] {
 fn direction(slope: f32) -> [f32; 2] {
     let along = one_over_root(1.0 + slope * slope);
     [along, slope * along]
-}
-
-/// 1/√x of a normal x, to 3e-7 of it: by three of Newton's steps from the exponent halved. A
-/// shaded tick takes 540 instructions less than with roots to the last bit.
-pub(crate) fn one_over_root(x: f32) -> f32 {
-    let mut y = f32::from_bits(0x5F37_5A86 - (x.to_bits() >> 1));
-    for _ in 0..3 {
-        y *= 1.5 - 0.5 * x * y * y;
-    }
-    y
 }
 
 /// The smoothed slope across a patch between two rows or columns of edges.

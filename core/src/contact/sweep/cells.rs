@@ -4,6 +4,7 @@ use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{Side, SurfacePoint};
 use crate::contact::tolerance::{RUNS_ALONG, TINY_STEP};
 use crate::grid::{Cell, GridPoint};
+use crate::scalar::larger;
 use crate::terrain::{Ground, Window};
 
 /// The part of a path over one cell.
@@ -255,7 +256,7 @@ impl Axis {
         if self.left > 0 {
             let t = (self.floor + self.ahead() - self.start) * self.per_way;
             // A path that ends on its border may have nothing left: 0·∞.
-            self.t = if t <= 1.0 { at_least_0(t) } else { 1.0 };
+            self.t = if t <= 1.0 { larger(t, 0.0) } else { 1.0 };
         }
     }
 
@@ -276,9 +277,4 @@ impl Axis {
     fn ends(&self) -> f32 {
         (self.end - self.floor).clamp(0.0, 1.0)
     }
-}
-
-/// Not `f32::max`, which is a call where the processor has no instruction for it.
-fn at_least_0(x: f32) -> f32 {
-    if x > 0.0 { x } else { 0.0 }
 }

@@ -7,6 +7,7 @@ use crate::contact::budget::{BLOCK, BLOCK_CELLS, Budget, CELL, GAP};
 use crate::contact::surface::HipView;
 use crate::contact::tolerance::PATH_NOISE;
 use crate::grid::GridPoint;
+use crate::scalar::larger;
 use crate::terrain::{BLOCK_SHIFT, Block, Ground, Window};
 
 /// Cells along a block's side.
@@ -206,11 +207,9 @@ fn clear_part([start, middle, end]: [f32; 3], limit: f32) -> Result<(), f32> {
 
 /// The highest of four numbers, and the largest up or down.
 fn extremes(numbers: &[f32; 4]) -> [f32; 2] {
-    // Not `f32::max`, which is a call where the processor has no instruction for it.
-    let larger = |a: f32, b: f32| if b > a { b } else { a };
     numbers
         .iter()
         .fold([f32::MIN, 0.0], |[highest, largest], x| {
-            [larger(highest, *x), larger(largest, x.abs())]
+            [larger(*x, highest), larger(x.abs(), largest)]
         })
 }
