@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use crate::clutch::{Clutch, ClutchHold};
 use crate::contact::{Contact, ContactOutput, ContactSettings, Execution, Friction};
-use crate::force::{Damper, Effects, MaterialTable, Moment};
+use crate::force::{Damper, Effects, FeltWith, MaterialTable, Moment};
 use crate::grid::GridPoint;
 use crate::guard::thermal::Temperatures;
 use crate::guard::{
@@ -287,14 +287,15 @@ impl<'t, const D: usize> Haptics<'t, D> {
 
     /// What a scene adds to the spring's force.
     fn effects_of(&self, scene: &Scene) -> Option<Effects> {
-        let with_arm = scene.source == Source::Encoders;
-        let (law, cell_mm) = (&scene.law, scene.cell_mm);
-        let (rate, latency_s) = (self.rate, self.latency_s);
+        let felt = FeltWith {
+            cell_mm: scene.cell_mm,
+            rate: self.rate,
+            latency_s: self.latency_s,
+            arm: scene.source == Source::Encoders,
+        };
         match scene.materials {
-            Some(_) => {
-                Effects::with_materials(&self.materials, law, cell_mm, rate, latency_s, with_arm)
-            }
-            None => Effects::of(law, cell_mm, rate, latency_s, with_arm),
+            Some(_) => Effects::with_materials(&self.materials, &scene.law, &felt),
+            None => Effects::of(&scene.law, &felt),
         }
     }
 
@@ -566,7 +567,6 @@ impl<'t, const D: usize> Haptics<'t, D> {
             velocity_mm_s,
             asked_n: self.guard.force_n(),
             most_n: self.guard.most_force_n(),
-            latency_s: self.latency_s,
         });
         if damper.created_mj() > 0.0 {
             self.guard.says(Limits::ENERGY_TAKEN_BACK);

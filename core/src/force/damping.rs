@@ -4,8 +4,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::passivity::{Moment, Passivity};
-use super::{ForceLaw, clamp_length};
-use crate::rate::TickRate;
+use super::{FeltWith, ForceLaw, clamp_length};
 
 /// How a surface takes energy out of a motion against it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -63,16 +62,10 @@ pub(crate) struct Damper {
 }
 
 impl Damper {
-    /// Of a scene that is felt with an arm, or with points: those have no hand that energy
-    /// could be given to.
-    pub(crate) fn of(
-        law: &ForceLaw,
-        rate: TickRate,
-        latency_s: f32,
-        with_arm: bool,
-    ) -> Option<Self> {
-        let is_controlled = with_arm && law.is_controlled(rate, latency_s);
-        let controller = is_controlled.then(|| Passivity::new(law, rate));
+    /// Of a scene. Points have no hand that energy could be given to.
+    pub(crate) fn of(law: &ForceLaw, felt: &FeltWith) -> Option<Self> {
+        let is_controlled = felt.arm && law.is_controlled(felt.rate, felt.latency_s);
+        let controller = is_controlled.then(|| Passivity::new(law, felt));
         (controller.is_some() || law.damping.ns_per_m > 0.0).then_some(Self {
             law: *law,
             controller,

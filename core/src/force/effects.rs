@@ -17,19 +17,24 @@ pub(crate) struct Effects {
     material: Option<MaterialInForce>,
 }
 
+/// What a scene is felt with, besides its law.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FeltWith {
+    pub(crate) cell_mm: f32,
+    pub(crate) rate: TickRate,
+    /// From the beginning of a tick until its force acts, s.
+    pub(crate) latency_s: f32,
+    /// An arm follows it, not points.
+    pub(crate) arm: bool,
+}
+
 impl Effects {
-    /// Of a scene with cells of such a size that is felt with an arm, or with points.
+    /// Of a scene without materials.
     #[inline(never)]
-    pub(crate) fn of(
-        law: &ForceLaw,
-        cell_mm: f32,
-        rate: TickRate,
-        latency_s: f32,
-        with_arm: bool,
-    ) -> Option<Self> {
+    pub(crate) fn of(law: &ForceLaw, felt: &FeltWith) -> Option<Self> {
         let shader = Shader::of(law.shading);
-        let texturer = Texturer::of(&law.texture, cell_mm, rate);
-        let damper = Damper::of(law, rate, latency_s, with_arm);
+        let texturer = Texturer::of(&law.texture, felt.cell_mm, felt.rate);
+        let damper = Damper::of(law, felt);
         let is_there = shader.is_some() || texturer.is_some() || damper.is_some();
         is_there.then_some(Self {
             shader,
@@ -39,18 +44,15 @@ impl Effects {
         })
     }
 
-    /// The same of a scene with materials.
+    /// Of a scene with materials.
     #[inline(never)]
     pub(crate) fn with_materials(
         table: &MaterialTable,
         law: &ForceLaw,
-        cell_mm: f32,
-        rate: TickRate,
-        latency_s: f32,
-        with_arm: bool,
+        felt: &FeltWith,
     ) -> Option<Self> {
-        let material = MaterialInForce::of(table, law, cell_mm, rate)?;
-        let mut damper = Damper::of(&table.hardest(law), rate, latency_s, with_arm);
+        let material = MaterialInForce::of(table, law, felt.cell_mm, felt.rate)?;
+        let mut damper = Damper::of(&table.hardest(law), felt);
         if let Some(damper) = &mut damper {
             damper.feels(material.law());
         }

@@ -15,9 +15,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::Friction;
 use crate::rate::TickRate;
+use crate::scalar::smaller;
 pub(crate) use damping::Damper;
 pub use damping::{Controller, Damping};
-pub(crate) use effects::Effects;
+pub(crate) use effects::{Effects, FeltWith};
 pub use material::{MATERIAL_CHANGE_S, Material, MaterialTable};
 pub(crate) use passivity::Moment;
 pub use shading::{Shader, Shading};
@@ -97,11 +98,10 @@ impl ForceLaw {
         }
     }
 
-    /// What the spring holds, mJ, for a proxy `displacement_mm` away from the HIP, where it may
-    /// make up to `most_n`.
-    fn stored_mj(&self, displacement_mm: Vec3, most_n: f32) -> f32 {
-        let stretched_n = displacement_mm.length() * self.stiffness_n_per_mm;
-        let at_limit_n = stretched_n.min(self.max_force_n).min(most_n);
+    /// What the spring holds, mJ, for a HIP so deep, where it may make up to `most_n`.
+    fn stored_mj(&self, depth_mm: f32, most_n: f32) -> f32 {
+        let stretched_n = depth_mm * self.stiffness_n_per_mm;
+        let at_limit_n = smaller(stretched_n, smaller(self.max_force_n, most_n));
         // Beyond the limit the force stays as it is: F (d - d_m) more than at the limit.
         at_limit_n * (stretched_n - 0.5 * at_limit_n) / self.stiffness_n_per_mm
     }

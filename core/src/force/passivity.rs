@@ -13,9 +13,10 @@
 
 use glam::Vec3;
 
-use super::ForceLaw;
 use super::yielding::Yielding;
+use super::{FeltWith, ForceLaw};
 use crate::rate::TickRate;
+use crate::scalar::{larger, root, smaller};
 
 /// Least damping of a hand that holds the tip, N·s/mm.
 const HAND_NS_PER_MM: f32 = 0.5e-3;
@@ -30,12 +31,10 @@ const MOST_MJ: f32 = 2.0;
 /// Most damping, as ticks of the stiffness, besides the latency. What the velocity is off by,
 /// some 0.1 of a count a tick, makes a force of so many times the spring's for 0.1 of a count.
 const MOST_TICKS: f32 = 2.0;
+/// Forces kept: those on their way, the one that acts and the one before it. A power of two.
+const KEPT: usize = 16;
 /// Most ticks that a force may come late: what is later is taken to come then.
-const MOST_LATE: usize = 12;
-/// What a force of the law's limit is kept as.
-const FULL: f32 = i16::MAX as f32;
-/// Those on their way, the one that acts and the one before it.
-const KEPT: usize = MOST_LATE + 2;
+const MOST_LATE: usize = KEPT - 2;
 
 /// Stiffness up to which a surface needs no controller at a rate, N/mm: b / (T / 2 + L) for the hand
 /// that damps least, and no more than the arm's friction allows. L is what the latency is longer than
@@ -52,17 +51,15 @@ pub fn stiffest_n_per_mm(rate: TickRate, latency_s: f32) -> f32 {
 pub(super) struct Passivity {
     stiffness_n_per_mm: f32,
     tick_s: f32,
-    /// From the beginning of a tick until its force acts, s.
+    /// From the beginning of a tick until its force acts, s: so many ticks, and a part of one.
     latency_s: f32,
+    late: (usize, f32),
     yielding: Yielding,
-    /// Newtons for a count of what is kept of a force.
-    count_n: f32,
     created_mj: f32,
     /// The same when this tick's force has acted for a tick, all but the work of that force.
     coming_mj: f32,
     before: Option<Before>,
-    /// The forces that the guard let through, the last one first, in counts: RAM is short.
-    asked: [[i16; 3]; KEPT],
+    asked: Asked,
 }
 
 /// What the tick before left.
@@ -70,6 +67,30 @@ pub(super) struct Passivity {
 struct Before {
     tip_mm: Vec3,
     stored_mj: f32,
+}
+
+/// The forces that the guard let through, N.
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    forces_n: [Vec3; KEPT],
+    newest: usize,
+}
+
+impl Asked {
+    const NONE: Self = Self {
+        forces_n: [Vec3::ZERO; KEPT],
+        newest: 0,
+    };
+
+    fn add(&mut self, force_n: Vec3) {
+        self.newest = (self.newest + 1) % KEPT;
+        self.forces_n[self.newest % KEPT] = force_n;
+    }
+
+    /// The one of so many ticks ago.
+    const fn ago(&self, ticks: usize) -> Vec3 {
+        self.forces_n[self.newest.wrapping_sub(ticks) % KEPT]
+    }
 }
 
 /// What a tick begins with.
@@ -85,36 +106,47 @@ pub(crate) struct Moment {
     pub(crate) asked_n: Vec3,
     /// The most that it lets through.
     pub(crate) most_n: f32,
-    /// From the beginning of a tick until its force acts, s.
-    pub(crate) latency_s: f32,
 }
 
-impl Moment {
-    /// What is left of the displacement after a time at this velocity, towards the proxy or away
-    /// from it. Beyond the surface there is none.
-    fn displacement_after_mm(&self, seconds: f32) -> Vec3 {
-        let along = self.velocity_mm_s.dot(self.displacement_mm);
-        let share = along * seconds / self.displacement_mm.length_squared();
-        // No number where nothing is displaced.
-        match share < 1.0 {
-            true => self.displacement_mm * (1.0 - share),
-            false => Vec3::ZERO,
-        }
+/// How deep a tip is, and how it moves along the force.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Depth {
+    pub(super) mm: f32,
+    /// How fast the depth becomes less.
+    pub(super) leaves_mm_s: f32,
+}
+
+impl Depth {
+    fn of(now: &Moment) -> Self {
+        let mm = root(now.displacement_mm.length_squared());
+        let along = now.velocity_mm_s.dot(now.displacement_mm);
+        let leaves_mm_s = if mm > 0.0 { along / mm } else { 0.0 };
+        Self { mm, leaves_mm_s }
+    }
+
+    /// What is left of it after a time in which the tip goes on as it does. Beyond the surface
+    /// there is none.
+    fn after_mm(&self, seconds: f32) -> f32 {
+        larger(self.mm - self.leaves_mm_s * seconds, 0.0)
     }
 }
 
 impl Passivity {
-    pub(super) fn new(law: &ForceLaw, rate: TickRate) -> Self {
+    pub(super) fn new(law: &ForceLaw, felt: &FeltWith) -> Self {
+        let tick_s = felt.rate.tick_s();
+        let latency_s = felt.latency_s.max(0.0).min(MOST_LATE as f32 * tick_s);
+        let late = latency_s / tick_s;
+        let whole = late as usize;
         Self {
             stiffness_n_per_mm: law.stiffness_n_per_mm,
-            tick_s: rate.tick_s(),
-            latency_s: 0.0,
+            tick_s,
+            latency_s,
+            late: (whole, late - whole as f32),
             yielding: Yielding::NONE,
-            count_n: law.max_force_n / FULL,
             created_mj: 0.0,
             coming_mj: 0.0,
             before: None,
-            asked: [[0; 3]; KEPT],
+            asked: Asked::NONE,
         }
     }
 
@@ -133,58 +165,40 @@ impl Passivity {
         self.created_mj
     }
 
-    pub(super) fn rest(&mut self) {
+    pub(super) const fn rest(&mut self) {
         (self.created_mj, self.coming_mj, self.before) = (0.0, 0.0, None);
-        (self.yielding, self.asked) = (Yielding::NONE, [[0; 3]; KEPT]);
+        (self.yielding, self.asked) = (Yielding::NONE, Asked::NONE);
     }
 
     /// Books what happened since the tick before, and what is going to happen until this tick's
     /// force has acted for a tick, all but the work of that force. Energy that was lost gives no
     /// credit.
     pub(super) fn observe(&mut self, law: &ForceLaw, now: &Moment) {
-        self.yielding.observe(law, now, self.tick_s);
-        self.latency_s = now.latency_s.max(0.0).min(MOST_LATE as f32 * self.tick_s);
-        self.asked.copy_within(..KEPT - 1, 1);
-        let counts = (now.asked_n / self.count_n).round();
-        // The casts saturate.
-        self.asked[0] = counts.to_array().map(|counts| counts as i16);
-        let late = self.latency_s / self.tick_s;
-        let whole = late as usize;
-        let part = late - whole as f32;
-        let (acting_n, before_n) = (self.asked_n(whole), self.asked_n(whole + 1));
-        let stored_mj = self.stored_mj(law, now, 0.0);
+        let depth = Depth::of(now);
+        self.yielding.observe(law, &depth, now.most_n, self.tick_s);
+        self.asked.add(now.asked_n);
+        let (whole, part) = self.late;
+        let (acting_n, before_n) = (self.asked.ago(whole), self.asked.ago(whole + 1));
+        let share = self.yielding.share();
+        // Where less of the force is felt, it gets to its limit later.
+        let most_n = now.most_n / share;
+        let stored_mj = share * law.stored_mj(depth.mm, most_n);
         if let Some(before) = self.before {
             let acted_n = acting_n + (before_n - acting_n) * part;
             let given_mj = acted_n.dot(now.tip_mm - before.tip_mm);
-            let created = self.created_mj + given_mj + stored_mj - before.stored_mj;
-            self.created_mj = match created > 0.0 {
-                true => created.min(MOST_MJ),
-                false => 0.0,
-            };
+            self.created_mj = within(self.created_mj + given_mj + stored_mj - before.stored_mj);
         }
         self.before = Some(Before {
             tip_mm: now.tip_mm,
             stored_mj,
         });
         // At most `MOST_LATE` ticks.
-        let on_their_way = (0..whole).map(|ticks| self.asked_n(ticks));
+        let on_their_way = (0..whole).map(|ticks| self.asked.ago(ticks));
         let sum_n = on_their_way.fold(acting_n * part, |sum_n, asked_n| sum_n + asked_n);
         let gives_mj = sum_n.dot(now.velocity_mm_s) * self.tick_s;
-        let holds_mj = self.stored_mj(law, now, self.latency_s + self.tick_s);
+        let depth_mm = depth.after_mm(self.latency_s + self.tick_s);
+        let holds_mj = share * law.stored_mj(depth_mm, most_n);
         self.coming_mj = self.created_mj + gives_mj + holds_mj - stored_mj;
-    }
-
-    /// What the spring holds, mJ, after a time in which the tip goes on as it does, s.
-    fn stored_mj(&self, law: &ForceLaw, now: &Moment, after_s: f32) -> f32 {
-        let share = self.yielding.share();
-        // Where less of the force is felt, it gets to its limit later.
-        share * law.stored_mj(now.displacement_after_mm(after_s), now.most_n / share)
-    }
-
-    /// A force that was asked for so many ticks ago.
-    fn asked_n(&self, ticks: usize) -> Vec3 {
-        let counts = self.asked.get(ticks).copied().unwrap_or_default();
-        Vec3::from_array(counts.map(f32::from)) * self.count_n
     }
 
     /// The damping that takes back what was created, and what a spring's force will have created
@@ -192,7 +206,7 @@ impl Passivity {
     /// square of the force.
     pub(super) fn damping_ns_per_mm(&self, along: f32, squared: f32) -> f32 {
         let most = (MOST_TICKS * self.tick_s + self.latency_s) * self.stiffness_n_per_mm;
-        let created_mj = (self.coming_mj + along * self.tick_s).clamp(0.0, MOST_MJ);
+        let created_mj = within(self.coming_mj + along * self.tick_s);
         let takes_back = created_mj * squared / (along * along * self.tick_s);
         // No number where nothing moves: then there is nothing to take from.
         match takes_back < most {
@@ -200,4 +214,9 @@ impl Passivity {
             false => most,
         }
     }
+}
+
+/// What is kept of an energy, mJ: what is no number counts as none.
+fn within(mj: f32) -> f32 {
+    smaller(larger(mj, 0.0), MOST_MJ)
 }

@@ -7,8 +7,10 @@
 //! felt as softer from the first touch on asks for no more than the guard allows, and gives
 //! back what it got.
 
-use super::{ForceLaw, Moment};
+use super::ForceLaw;
+use super::passivity::Depth;
 use crate::guard::MAX_SLEW_N_PER_S;
+use crate::scalar::smaller;
 
 /// The spring's part of what the force may change by; the rest is for damping.
 const SPRING_PART: f32 = 0.5;
@@ -40,26 +42,25 @@ impl Yielding {
         self.share
     }
 
-    /// Takes a moment of a tick of `tick_s`: yields to a motion that is too fast for the whole
-    /// stiffness, and recovers in the air at once, and under a tip that
-    /// rests slowly.
-    pub(super) fn observe(&mut self, law: &ForceLaw, now: &Moment, tick_s: f32) {
-        let depth_mm = now.displacement_mm.length();
-        if depth_mm <= 0.0 {
+    /// Takes the depth of a tick of `tick_s`, at which the guard lets `most_n` through: yields to
+    /// a motion that is too fast for the whole stiffness, and recovers in the air at once, and
+    /// under a tip that rests slowly.
+    pub(super) fn observe(&mut self, law: &ForceLaw, depth: &Depth, most_n: f32, tick_s: f32) {
+        if depth.mm <= 0.0 {
             return *self = Self::NONE;
         }
-        let speed_mm_s = now.velocity_mm_s.dot(now.displacement_mm).abs() / depth_mm;
-        let changes_n_per_s = law.stiffness_n_per_mm * speed_mm_s;
-        let most = SPRING_PART * MAX_SLEW_N_PER_S / changes_n_per_s;
-        self.rested_s = match speed_mm_s < RESTS_MM_S {
-            true => (self.rested_s + tick_s).min(RESTED_S),
-            false => 0.0,
-        };
-        let recovered = match self.rested_s < RESTED_S {
-            true => 0.0,
-            false => RECOVERS_MJ_PER_S * tick_s / law.stored_mj(now.displacement_mm, now.most_n),
-        };
-        // No number, or one without end, where nothing moves or nothing is held.
-        self.share = (self.share + recovered).min(most).min(1.0);
+        let speed_mm_s = depth.leaves_mm_s.abs();
+        if speed_mm_s >= RESTS_MM_S {
+            self.rested_s = 0.0;
+        } else if self.rested_s < RESTED_S {
+            self.rested_s += tick_s;
+        }
+        if self.share < 1.0 && self.rested_s >= RESTED_S {
+            let recovered = RECOVERS_MJ_PER_S * tick_s / law.stored_mj(depth.mm, most_n);
+            self.share = smaller(self.share + recovered, 1.0);
+        }
+        // Without end where nothing moves.
+        let most = SPRING_PART * MAX_SLEW_N_PER_S / (law.stiffness_n_per_mm * speed_mm_s);
+        self.share = smaller(most, self.share);
     }
 }
