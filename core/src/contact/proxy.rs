@@ -1,31 +1,28 @@
 //! The proxy: what a tick does, and what is remembered from tick to tick.
 
+mod departures;
+mod in_air;
 mod landing;
+mod on_ground;
+mod paper_rule;
 mod rubbing;
 
 use glam::Vec3;
 
-use super::boundary_fade::{self, approach};
 use super::budget::{Budget, SHORTCUT};
-use super::closest_point::{Descent, Ended, Leave, Place, position_on};
+use super::closest_point::{Descent, Leave, Place};
 use super::friction::Friction;
 use super::output::{ContactOutput, ContactState};
-use super::paper::{self, Candidate, Candidates};
+use super::paper::Candidates;
 use super::settings::{ContactSettings, Execution, Rule};
 use super::shortcut::{self, Follow, Followed};
 use super::surface::{HipView, SurfacePoint};
-use super::sweep::{Path, Swept};
+use super::sweep::Path;
 use crate::grid::{Cell, GridPoint};
-use crate::terrain::{Ground, TileIndex, Window};
+use crate::terrain::Window;
+use departures::Departures;
 use landing::Landing;
 use rubbing::Rubbing;
-
-/// After so many departures without getting nearer to the HIP the proxy may leave the
-/// surface no more: it only moves to and fro by rounding.
-const DEPARTURES: u32 = 32;
-/// The same after so many that each come nearer by next to nothing: it creeps along what
-/// is all but vertical, and would for hours.
-const CREEPING: u32 = 2_048;
 
 /// What the proxy does, with what has to be remembered while it does so.
 // The path is most of a contact's state, and there is no heap to put it on.
@@ -88,20 +85,6 @@ enum Shortcut {
 enum Turn {
     GoesOn,
     Ends,
-}
-
-/// The departures from the surface since the HIP last found the proxy on it, if there was
-/// one.
-type Departures = Option<Departed>;
-
-#[derive(Clone, Copy, Debug)]
-struct Departed {
-    /// The place nearest to the HIP from which the proxy has left.
-    nearest: GridPoint,
-    /// Departures since from where it was no nearer.
-    in_vain: u32,
-    /// Departures in a row from where it was not clearly nearer.
-    creeping: u32,
 }
 
 impl OnSurface {
@@ -407,368 +390,10 @@ impl Contact {
         }
     }
 
-    /// Waiting ends when the HIP is above the patch it is over, or above everything.
-    #[inline(never)]
-    fn looks_around<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Turn {
-        if let Some(landing) = &self.landing {
-            let waits = landing.waits();
-            return self.answers(waits);
-        }
-        let view = HipView::new(hip);
-        let (cell, ground) = view.ground(window);
-        let is_above = view.altitude().cell() >= window.top()
-            || matches!(&ground, Ground::Patch(corners) if view.is_above(cell, corners));
-        if is_above {
-            return self.becomes_free(hip);
-        }
-        self.phase = Phase::Waiting;
-        let is_missing = ground == Ground::Missing;
-        self.answers(ContactOutput {
-            proxy: hip,
-            converged: !is_missing,
-            missing_tile: is_missing.then(|| TileIndex::holding(cell)),
-            ..ContactOutput::default()
-        })
-    }
-
     /// The tick ends with this answer.
     #[inline]
     fn answers(&mut self, output: ContactOutput) -> Turn {
         self.output = output;
         Turn::Ends
-    }
-
-    /// A free proxy has to wait: it is as far as its path is known to be free.
-    fn waits_at(&mut self, proxy: GridPoint, missing_tile: Option<TileIndex>) -> Turn {
-        self.answers(ContactOutput {
-            state: ContactState::Free,
-            proxy,
-            missing_tile,
-            ..ContactOutput::default()
-        })
-    }
-
-    /// The proxy is free, at the HIP; the tick ends.
-    fn becomes_free(&mut self, hip: GridPoint) -> Turn {
-        self.phase = Phase::Free;
-        self.answers(ContactOutput {
-            state: ContactState::Free,
-            proxy: hip,
-            converged: true,
-            ..ContactOutput::default()
-        })
-    }
-
-    /// In free space the proxy is the HIP, if it still is.
-    ///
-    /// Most paths end within the tick; those are not worth storing.
-    #[inline(never)]
-    fn flies<const D: usize>(
-        &mut self,
-        window: &Window<'_, D>,
-        hip: GridPoint,
-        budget: &mut Budget,
-    ) -> Turn {
-        let mut sweeping = Sweeping {
-            path: Path::through_air(self.hip, hip),
-            was_late: false,
-            fade: 1.0,
-            departures: None,
-        };
-        let swept = sweeping.path.advance(window, budget);
-        if matches!(swept, Swept::Missing(_) | Swept::Suspended) {
-            sweeping.was_late = self.settings.execution == Execution::RealTime;
-            let at = sweeping.path.at();
-            self.phase = Phase::Sweeping(sweeping);
-            return self.waits_at(at, swept.missing_tile());
-        }
-        self.arrives(window, hip, swept, Departures::None, 1.0)
-    }
-
-    /// Goes on with a path from an earlier tick, or off the surface.
-    #[inline(never)]
-    fn sweeps<const D: usize>(
-        &mut self,
-        window: &Window<'_, D>,
-        hip: GridPoint,
-        budget: &mut Budget,
-    ) -> Turn {
-        let Phase::Sweeping(sweeping) = &mut self.phase else {
-            return Turn::Ends;
-        };
-        let swept = sweeping.path.advance(window, budget);
-        if matches!(swept, Swept::Missing(_) | Swept::Suspended) {
-            sweeping.was_late |= self.settings.execution == Execution::RealTime;
-            let at = sweeping.path.at();
-            return self.waits_at(at, swept.missing_tile());
-        }
-        let fade = if sweeping.was_late {
-            0.0
-        } else {
-            sweeping.fade
-        };
-        let departures = sweeping.departures;
-        self.arrives(window, hip, swept, departures, fade)
-    }
-
-    /// What a path that ended comes to: on the surface the tick goes on.
-    fn arrives<const D: usize>(
-        &mut self,
-        window: &Window<'_, D>,
-        hip: GridPoint,
-        swept: Swept,
-        departures: Departures,
-        fade: f32,
-    ) -> Turn {
-        match swept {
-            Swept::Hit(point) => {
-                self.phase = Phase::OnSurface(OnSurface {
-                    leave: may_leave(window, &HipView::new(hip), point, &departures),
-                    departures,
-                    ..OnSurface::at(point, fade)
-                });
-                Turn::GoesOn
-            }
-            Swept::Under => self.loses_contact(window, hip),
-            Swept::Clear | Swept::Missing(_) | Swept::Suspended => self.becomes_free(hip),
-        }
-    }
-
-    /// On the surface: downhill to the closest point.
-    #[inline]
-    fn descends<const D: usize>(
-        &mut self,
-        window: &Window<'_, D>,
-        hip: GridPoint,
-        budget: &mut Budget,
-    ) -> Turn {
-        let Phase::OnSurface(on) = &mut self.phase else {
-            return Turn::Ends;
-        };
-        let view = HipView::new(hip);
-        let is_paper = self.settings.rule == Rule::Paper;
-        let leave = if is_paper { &Leave::Nowhere } else { &on.leave };
-        let waits = self.settings.execution == Execution::LockStep;
-        match on.descent.advance(window, &view, leave, waits, budget) {
-            Ended::Rests if is_paper => self.decides(window, &view, hip),
-            Ended::Rests => self.touches(window, hip, true, None),
-            Ended::Missing(tile) => self.touches(window, hip, false, Some(tile)),
-            Ended::Suspended => self.touches(window, hip, false, None),
-            Ended::Leaves => self.leaves(window, &view, hip),
-            Ended::Lost(_) if is_paper => self.becomes_free(hip),
-            Ended::Lost(tile) => {
-                let turn = self.loses_contact(window, hip);
-                self.output.missing_tile = self.output.missing_tile.or(tile);
-                turn
-            }
-        }
-    }
-
-    /// From the surface into the air, straight to the HIP. The path begins at the
-    /// nearest point that is known: that of the patch which was entered, if the proxy
-    /// leaves on the border of it.
-    #[inline(never)]
-    fn leaves<const D: usize>(
-        &mut self,
-        window: &Window<'_, D>,
-        view: &HipView,
-        hip: GridPoint,
-    ) -> Turn {
-        let Phase::OnSurface(on) = &mut self.phase else {
-            return Turn::Ends;
-        };
-        // The descent has just stood on a patch there.
-        let nearest = on.descent.nearest(window, view);
-        let from = nearest.and_then(|(point, _)| position_on(window, &point));
-        let from = from.unwrap_or(self.output.proxy);
-        let mut departures = on.departures;
-        count_departure(&mut departures, from, view);
-        self.phase = Phase::Sweeping(Sweeping {
-            path: Path::off_surface(from, hip),
-            was_late: false,
-            fade: on.fade,
-            departures,
-        });
-        Turn::GoesOn
-    }
-
-    /// The answer in contact, faded where the surface ends.
-    fn touches<const D: usize>(
-        &mut self,
-        window: &Window<'_, D>,
-        hip: GridPoint,
-        mut converged: bool,
-        mut missing_tile: Option<TileIndex>,
-    ) -> Turn {
-        let is_real_time = self.settings.execution == Execution::RealTime;
-        let most = boundary_fade::RATE_PER_S * self.settings.rate.tick_s();
-        let view = HipView::new(hip);
-        let Phase::OnSurface(on) = &mut self.phase else {
-            return Turn::Ends;
-        };
-        let Some((point, z)) = on.descent.nearest(window, &view) else {
-            return Turn::Ends;
-        };
-        let mut may_follow = self.settings.shortcuts && self.settings.rule == Rule::Swept;
-        if converged || is_real_time {
-            let over = self.rubbing.as_ref().map_or(&hip, |rubbing| &rubbing.hip);
-            let target = boundary_fade::target(window, over, point.cell);
-            may_follow &= target.over_patch;
-            if let (Some(tile), false) = (target.missing, is_real_time) {
-                (converged, missing_tile) = (false, Some(tile));
-            } else {
-                on.fade = approach(on.fade, target.fade, most);
-                if on.fade == 0.0 && target.fade == 0.0 {
-                    // The HIP may be above the surface already; to look now and not in
-                    // the next tick is what makes a missing tile leave no trace.
-                    return self.looks_around(window, hip);
-                }
-            }
-        }
-        let displacement = view.displacement(&point, z) * on.fade;
-        // A proxy that has stayed in its patch is likely to stay for another tick.
-        let [x, y, _] = self.output.proxy.cell();
-        let stayed = point.cell == Cell::new(x, y);
-        if converged
-            && on.fade == 1.0
-            && stayed
-            && may_follow
-            && let Some(follow) = Follow::from(window, point, hip.column())
-        {
-            on.follow = Some(follow);
-        }
-        // Field by field: a whole answer would be made elsewhere first, and copied.
-        self.output.state = ContactState::Touching;
-        self.output.proxy = view.position(&point, z);
-        self.output.displacement = displacement;
-        self.output.converged = converged;
-        self.output.missing_tile = missing_tile;
-        Turn::Ends
-    }
-
-    /// The contact is lost: what was felt fades away where it was.
-    fn loses_contact<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Turn {
-        let Some((proxy, displacement)) = self.felt else {
-            return self.looks_around(window, hip);
-        };
-        self.phase = Phase::Fading {
-            proxy,
-            displacement,
-            fade: 1.0,
-        };
-        self.fades_out(window, hip)
-    }
-
-    /// A tick of fading out.
-    fn fades_out<const D: usize>(&mut self, window: &Window<'_, D>, hip: GridPoint) -> Turn {
-        let most = boundary_fade::RATE_PER_S * self.settings.rate.tick_s();
-        if let Phase::Fading {
-            proxy,
-            displacement,
-            fade,
-        } = &mut self.phase
-        {
-            *fade = approach(*fade, 0.0, most);
-            if *fade > 0.0 {
-                self.output = ContactOutput {
-                    state: ContactState::Fading,
-                    proxy: *proxy,
-                    displacement: *displacement * *fade,
-                    converged: true,
-                    ..ContactOutput::default()
-                };
-                return Turn::Ends;
-            }
-        }
-        self.looks_around(window, hip)
-    }
-
-    /// By the paper's rule: the first candidate under the segment.
-    #[inline(never)]
-    fn seeks<const D: usize>(
-        &mut self,
-        window: &Window<'_, D>,
-        hip: GridPoint,
-        budget: &mut Budget,
-    ) -> Turn {
-        let Phase::Seeking { cells, was_late } = &mut self.phase else {
-            return Turn::Ends;
-        };
-        let missing_tile = match cells.find(window, budget) {
-            Candidate::At(point) => {
-                let fade = if *was_late { 0.0 } else { 1.0 };
-                self.phase = Phase::OnSurface(OnSurface::at(point, fade));
-                return Turn::GoesOn;
-            }
-            Candidate::None if cells.to == hip => return self.becomes_free(hip),
-            Candidate::None => {
-                // The HIP has moved on meanwhile.
-                *cells = Candidates::between(cells.to, hip);
-                return Turn::GoesOn;
-            }
-            Candidate::Missing(tile) => Some(tile),
-            Candidate::Suspended => None,
-        };
-        *was_late |= self.settings.execution == Execution::RealTime;
-        let from = cells.from;
-        self.waits_at(from, missing_tile)
-    }
-
-    /// By the paper's rule: the closest point decides about contact.
-    fn decides<const D: usize>(
-        &mut self,
-        window: &Window<'_, D>,
-        view: &HipView,
-        hip: GridPoint,
-    ) -> Turn {
-        let Phase::OnSurface(on) = &self.phase else {
-            return Turn::Ends;
-        };
-        match on.descent.nearest(window, view) {
-            Some((point, z)) if paper::is_inside(window, view, &point, z) => {
-                self.touches(window, hip, true, None)
-            }
-            _ => self.becomes_free(hip),
-        }
-    }
-}
-
-/// Counts a departure, and how it compares with the nearest one before.
-fn count_departure(departures: &mut Departures, from: GridPoint, view: &HipView) {
-    let Some(before) = departures else {
-        *departures = Some(Departed {
-            nearest: from,
-            in_vain: 0,
-            creeping: 0,
-        });
-        return;
-    };
-    before.creeping = match view.is_clearly_nearer(&from, &before.nearest) {
-        true => 0,
-        false => before.creeping + 1,
-    };
-    if view.is_nearer(&from, &before.nearest) {
-        (before.nearest, before.in_vain) = (from, 0);
-    } else {
-        before.in_vain += 1;
-    }
-}
-
-/// Where a proxy that has hit the surface may leave it again.
-fn may_leave<const D: usize>(
-    window: &Window<'_, D>,
-    view: &HipView,
-    hit: SurfacePoint,
-    departures: &Departures,
-) -> Leave {
-    let is_nearer = |before: &GridPoint| {
-        position_on(window, &hit).is_some_and(|position| view.is_nearer(&position, before))
-    };
-    match departures {
-        Some(before) if before.in_vain >= DEPARTURES || before.creeping >= CREEPING => {
-            Leave::NoMore(hit)
-        }
-        Some(before) if !is_nearer(&before.nearest) => Leave::ButAt(hit),
-        _ => Leave::Anywhere,
     }
 }
