@@ -200,6 +200,15 @@ fn a_recording_keeps_its_materials_and_is_felt_with_them_again() {
     for ((_, twice), (_, once)) in felt(&folder.read("c.csv")).iter().zip(felt(&recorded)) {
         assert!((twice - 2.0 * once).abs() < 1e-5, "{twice} {once}");
     }
+    // What each material has its own of cannot be stated beside them.
+    for option in [["--friction", "0.4"], ["--texture", "grain"]] {
+        let (again, said) = replay(&option, "no.csv");
+        let named = said.contains(&format!("{}: each of the recorded materials", option[0]));
+        assert!(
+            !again && named && said.contains("--material-table"),
+            "{said}"
+        );
+    }
     // The path alone has no materials.
     let (again, said) = replay(&["--ignore-settings"], "d.csv");
     assert!(again && !said.contains("rock"), "{said}");

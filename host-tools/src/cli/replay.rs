@@ -196,6 +196,17 @@ fn rendering(args: &Args, recorded: Option<&Settings>) -> Result<Rendering, Fail
     let Some(recorded) = recorded else {
         return Ok(args.rendering.clone());
     };
+    let other_table = args.rendering.materials.material_table.is_some();
+    if let (Some(option), Some(_), false) = (
+        args.rendering.stated_of_ground(),
+        &recorded.materials,
+        other_table,
+    ) {
+        return Err(format!(
+            "{option}: each of the recorded materials has its own"
+        ))
+        .or_hint("leave it out, or name a table that states it with --material-table");
+    }
     let (rendering, told) = args.rendering.or_recorded(recorded);
     if let (Some(line), false) = (told.first(), recorded.views.is_empty()) {
         let views = 1 + recorded.views.len();

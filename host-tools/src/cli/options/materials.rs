@@ -86,6 +86,26 @@ impl SurfaceMaterials {
     }
 }
 
+impl Rendering {
+    /// The first option given that a table of materials states for each of them.
+    pub(in crate::cli) fn stated_of_ground(&self) -> Option<&'static str> {
+        let texture = &self.texture;
+        [
+            ("--friction", self.friction.is_some()),
+            ("--static-friction", self.static_friction.is_some()),
+            ("--viscous-friction", self.viscous_friction.is_some()),
+            ("--damping-ns-per-m", self.damping_ns_per_m.is_some()),
+            ("--texture", texture.texture.is_some()),
+            ("--texture-amplitude", texture.texture_amplitude.is_some()),
+            ("--texture-wavelength", texture.texture_wavelength.is_some()),
+            ("--texture-direction", texture.texture_direction.is_some()),
+            ("--texture-seed", texture.texture_seed.is_some()),
+        ]
+        .into_iter()
+        .find_map(|(option, is_given)| is_given.then_some(option))
+    }
+}
+
 /// What a table says, with what the options say besides.
 fn looks(file: &Path, rendering: &Rendering) -> Result<Looks, Failure> {
     let table = TableFile::open(file)?;
