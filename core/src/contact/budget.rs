@@ -30,6 +30,8 @@ pub(super) const BLOCK: u32 = 2;
 pub(super) const BLOCK_CELLS: u32 = 3;
 /// Units for a cell that a path is looked along over.
 pub(super) const CELL: u32 = 2;
+/// Units for the cells beside one of a hole.
+pub(super) const BESIDE: u32 = 1;
 /// Units for the height of a path over a cell.
 pub(super) const GAP: u32 = 1;
 /// Units for a cell whose patch is intersected with a path.

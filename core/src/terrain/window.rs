@@ -264,7 +264,7 @@ impl<'t, const D: usize> Window<'t, D> {
     #[inline]
     pub(crate) fn block_is_clear(&self, block: Block, low: Altitude) -> bool {
         let Block { col, row } = block;
-        self.node_is_below(BLOCK_SHIFT, col, row, low) || !self.size.has(col, row, BLOCK_SHIFT)
+        self.part_is_below(BLOCK_SHIFT, col, row, low) || !self.size.has(col, row, BLOCK_SHIFT)
     }
 
     fn box_is_clear(&self, span: CellBox, low: Altitude) -> bool {
@@ -288,6 +288,12 @@ impl<'t, const D: usize> Window<'t, D> {
         if shift >= TILE_SHIFT {
             return low.cell() >= self.node_top(shift - TILE_SHIFT, col, row);
         }
+        self.part_is_below(shift, col, row, low)
+    }
+
+    /// The same of a node that is a part of one tile.
+    #[inline]
+    fn part_is_below(&self, shift: u32, col: i32, row: i32, low: Altitude) -> bool {
         let up = TILE_SHIFT - shift;
         let first = Cell::new(col << shift, row << shift);
         let index = TileIndex::new(col >> up, row >> up);

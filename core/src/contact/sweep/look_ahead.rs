@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::cells::{Axis, Step, Steps, beside};
-use crate::contact::budget::{BLOCK, BLOCK_CELLS, Budget, CELL, GAP};
+use crate::contact::budget::{BESIDE, BLOCK, BLOCK_CELLS, Budget, CELL, GAP};
 use crate::contact::surface::HipView;
 use crate::contact::tolerance::PATH_NOISE;
 use crate::grid::GridPoint;
@@ -152,6 +152,10 @@ fn is_clear<const D: usize>(
     budget.spend(CELL);
     let mut ground = window.ground(step.cell);
     if may_touch && ground == Ground::Hole {
+        if !budget.has(BESIDE) {
+            return Err(0.0);
+        }
+        budget.spend(BESIDE);
         (step, ground) = beside(window, step);
     }
     let corners = match ground {
