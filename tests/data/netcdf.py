@@ -7,6 +7,7 @@
 Row 0 is the northernmost; the height at a column and row is `field` below, and there is none
 at HOLE, nor in a chunk that was never written.
 """
+import gzip
 import os
 import sys
 
@@ -78,6 +79,25 @@ def by_h5py(folder, name, maximum, chunks, written=None, libver="latest", **stor
             heights.dims[index].attach_scale(file[dim])
 
 
+def long(folder, name):
+    """A strip of 40 chunks, for `tests/urls/tests/netcdf.rs`. They lie farther apart than what a
+    server is asked for at once, with nothing between them, so the file is kept packed."""
+    rows, columns, chunk = 40, 20_000, 500
+    with h5py.File(os.path.join(folder, name), "w", alignment_threshold=4096, alignment_interval=65536) as file:
+        axes = {"lat": 50 - 0.01 * np.arange(rows), "lon": 8 + np.arange(columns) / 1024}
+        for dim, units in (("lat", "degrees_north"), ("lon", "degrees_east")):
+            axis = file.create_dataset(dim, data=axes[dim], compression="gzip", shuffle=True)
+            axis.make_scale(dim)
+            axis.attrs["units"] = np.bytes_(units)
+        row, column = np.mgrid[0:rows, 0:columns]
+        heights = file.create_dataset("z", data=(column // 50 + 3 * row).astype("i2"), chunks=(rows, chunk))
+        for index, dim in enumerate(("lat", "lon")):
+            heights.dims[index].attach_scale(file[dim])
+    with open(os.path.join(folder, name), "rb") as file, open(os.path.join(folder, name + ".gz"), "wb") as packed:
+        packed.write(gzip.compress(file.read(), mtime=0))
+    os.remove(os.path.join(folder, name))
+
+
 def main():
     folder = sys.argv[1]
     os.makedirs(folder, exist_ok=True)
@@ -113,6 +133,7 @@ def main():
     by_h5py(folder, "early.nc", None, CHUNKS, libver="earliest", **hdf5plugin.Zstd())
     by_h5py(folder, "single_chunk.nc", None, (ROWS, COLUMNS), compression="gzip")
     by_h5py(folder, "sparse.nc", None, CHUNKS, written=(slice(16, 48), slice(0, 36)))
+    long(folder, "long.nc")
 
 
 main()

@@ -56,24 +56,125 @@ fn every_storage_is_the_same_from_a_server() {
     assert!(compared >= 20, "{compared} files");
 }
 
-/// What a server does not hand over for a while comes later, and is no hole that stays.
-#[test]
-fn a_chunk_that_has_not_come_is_no_hole() {
-    let server = Server::of(&data());
-    let here = Raster::open(data().join("fixed_array.nc"), &OpenOptions::default());
-    let there = Raster::open(server.url("fixed_array.nc"), &windows());
-    let (here, there) = (here.expect("opens"), there.expect("opens"));
-    there.stop_waiting();
+/// Samples of a large variable each way.
+const SIDE: u32 = 1500;
+
+/// A file of the classic format with one variable of floats, row by row from the north. Its header
+/// is the one of the format's specification: dimensions, no attributes, three variables.
+fn classic(height: impl Fn(u32, u32) -> f32) -> Vec<u8> {
+    let [dimension_tag, variable_tag, attribute_tag] = [10, 11, 12];
+    let [char, float, double] = [2, 5, 6];
+    let words = |bytes: &mut Vec<u8>, words: &[u32]| {
+        bytes.extend(words.iter().flat_map(|word| word.to_be_bytes()));
+    };
+    // Of four letters at most, filled up to four.
+    let name = |bytes: &mut Vec<u8>, name: &str| {
+        words(bytes, &[name.len() as u32]);
+        bytes.extend(name.bytes().chain([0; 4]).take(4));
+    };
+    let header = |begins: [u32; 3]| {
+        let mut bytes = b"CDF\x01".to_vec();
+        words(&mut bytes, &[0, dimension_tag, 2]);
+        for dimension in ["lat", "lon"] {
+            name(&mut bytes, dimension);
+            words(&mut bytes, &[SIDE]);
+        }
+        words(&mut bytes, &[0, 0, variable_tag, 3]);
+        for (axis, units, begin) in [
+            ("lat", "degrees_north", begins[0]),
+            ("lon", "degrees_east", begins[1]),
+        ] {
+            name(&mut bytes, axis);
+            words(
+                &mut bytes,
+                &[1, u32::from(axis == "lon"), attribute_tag, 1, 5],
+            );
+            bytes.extend(b"units\0\0\0");
+            words(&mut bytes, &[char, units.len() as u32]);
+            bytes.extend(
+                units
+                    .bytes()
+                    .chain([0; 3])
+                    .take(units.len().next_multiple_of(4)),
+            );
+            words(&mut bytes, &[double, 8 * SIDE, begin]);
+        }
+        name(&mut bytes, "z");
+        words(
+            &mut bytes,
+            &[2, 0, 1, 0, 0, float, 4 * SIDE * SIDE, begins[2]],
+        );
+        bytes
+    };
+    let first = header([0; 3]).len() as u32;
+    let mut bytes = header([first, first + 8 * SIDE, first + 16 * SIDE]);
+    let axis = |from: f64, step: f64| (0..SIDE).map(move |i| from + step * f64::from(i));
+    let axes = axis(50.0, -0.001).chain(axis(8.0, 0.001));
+    bytes.extend(axes.flat_map(f64::to_be_bytes));
+    let places = (0..SIDE).flat_map(|row| (0..SIDE).map(move |column| (column, row)));
+    bytes.extend(places.flat_map(|(column, row)| height(column, row).to_be_bytes()));
+    bytes
+}
+
+/// What is touched at places that opening the file has not looked at, while the server has
+/// failed and afterwards.
+fn comes_late(
+    server: &Server,
+    raster: &Raster,
+    places: &[(u32, u32)],
+    wanted: impl Fn(u32, u32) -> f64,
+) {
+    let has_come = || {
+        places
+            .iter()
+            .all(|(column, row)| raster.height(*column, *row) == wanted(*column, *row))
+    };
+    raster.stop_waiting();
     server.fail(Fault::Error500, usize::MAX);
-    let (column, row) = (here.columns() - 1, here.rows() - 1);
-    let before = there.not_yet();
-    let first = there.height(column, row);
-    // The file is small: what opening it fetched may hold the chunk.
-    assert!(there.not_yet() > before || first == here.height(column, row));
+    let before = raster.not_yet();
+    assert!(!has_come(), "opening the file fetched none of it");
+    assert!(raster.not_yet() > before);
     server.fail(Fault::None, 0);
     let comes = (0..2000).find(|_| {
         std::thread::sleep(std::time::Duration::from_millis(5));
-        there.height(column, row) == here.height(column, row)
+        has_come()
     });
-    assert!(comes.is_some(), "it comes");
+    assert!(comes.is_some(), "it is no hole that stays");
+}
+
+#[test]
+fn of_a_large_classic_variable_what_is_touched_is_fetched() {
+    let height = |column: u32, row: u32| (column * 7 % 1000) as f32 + 0.25 * (row % 400) as f32;
+    let folder = tempfile::tempdir().expect("a folder");
+    let bytes = classic(height);
+    std::fs::write(folder.path().join("large.nc"), &bytes).expect("written");
+    let server = Server::of(folder.path());
+    let raster = Raster::open(server.url("large.nc"), &windows()).expect("opens");
+    assert!(3 * server.seen().1 < bytes.len(), "{:?}", server.seen());
+    let wanted = |column: u32, row: u32| f64::from(height(column, SIDE - 1 - row));
+    for place in [(0, 0), (700, 777), (SIDE - 1, SIDE - 1)] {
+        assert_eq!(raster.height(place.0, place.1), wanted(place.0, place.1));
+    }
+    let places = [57, 68, 797, 808, 1470].map(|row| (SIDE - 1, row));
+    comes_late(&server, &raster, &places, wanted);
+}
+
+#[test]
+fn of_many_chunks_those_that_are_touched_are_fetched() {
+    const COLUMNS: u32 = 20_000;
+    const ROWS: u32 = 40;
+    let folder = tempfile::tempdir().expect("a folder");
+    let packed = std::fs::File::open(data().join("long.nc.gz")).expect("there");
+    let mut file = std::fs::File::create(folder.path().join("long.nc")).expect("made");
+    let size = std::io::copy(&mut flate2::read::GzDecoder::new(packed), &mut file);
+    let server = Server::of(folder.path());
+    let raster = Raster::open(server.url("long.nc"), &windows()).expect("opens");
+    let size = size.expect("unpacked") as usize;
+    assert!(3 * server.seen().1 < 2 * size, "{:?}", server.seen());
+    let wanted = |column: u32, row: u32| f64::from(column / 50 + 3 * (ROWS - 1 - row));
+    let every_chunk: Vec<_> = (0..COLUMNS)
+        .step_by(500)
+        .map(|column| (column, 7))
+        .collect();
+    comes_late(&server, &raster, &every_chunk, wanted);
 }
