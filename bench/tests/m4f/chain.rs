@@ -223,7 +223,7 @@ impl<'g> Arm<'g> {
             self.counts_at([x, y, z + above])
         });
         let all: Vec<_> = down.chain(counts.iter().copied()).collect();
-        let ticks = board.chain(&scene, &GridSamples(self.grid), &all);
+        let ticks = board.chain(&scene, (&GridSamples(self.grid), None), &all);
         assert_eq!(ticks.len(), all.len());
         let ticks = ticks.iter().enumerate().skip(APPROACH);
         let there = ticks.filter(|(_, tick)| tick.state == state as u32 && tick.converged);

@@ -7,12 +7,13 @@ use hapterra_core::guard::Sense;
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::{Point, Sample, Scene as SceneMessage, Source};
 use hapterra_core::terrain::{FieldSize, POSTS, Tile, TileDemand, TileKey, TileRequester};
-use hapterra_core::tick::{Command, Haptics};
+use hapterra_core::tick::{Command, Haptics, Outcome};
 
 use super::materials::Materials;
 use super::run::{Scene, shifted};
 use super::supply::{Buffers, Supply};
 use super::terrain::Terrain;
+use crate::counting::{Counted, Event, WINDOW};
 use crate::field::position;
 use crate::invariants::{Invariant, Violation};
 
@@ -50,6 +51,9 @@ struct Device<'t, 'g, const D: usize> {
     coming: Vec<(u32, TileKey)>,
     now: u32,
     seq: u32,
+    /// Tiles and points in the order they came, and what each tick told.
+    events: Vec<Event>,
+    ticks: Vec<Counted>,
 }
 
 /// Replays the path of a scene on materials in a window of `D × D` tiles, and lets `look` see what
@@ -89,6 +93,27 @@ pub fn replay<const D: usize>(
     Ok(all)
 }
 
+/// Replays the path of a scene on materials in a window as large as the counting board's: the scene
+/// as the device is told of it, tiles and points in the order they came, and what each tick told.
+///
+/// # Panics
+/// As [`replay`], and when a point is never answered.
+#[must_use]
+pub fn noted(scene: &Scene, materials: &Materials) -> (SceneMessage, Vec<Event>, Vec<Counted>) {
+    let mut buffers = Buffers::new(WINDOW);
+    let how = Replay {
+        shift: [0; 3],
+        supply: scene.supply,
+    };
+    let mut device = Device::<WINDOW>::new(scene, materials, &mut buffers, how);
+    for hip in &scene.path {
+        let answer = device.feel(shifted(*hip, how.shift));
+        assert!(answer.is_some(), "{hip:?} is never answered");
+    }
+    let message = message(scene, materials, how.shift);
+    (message, device.events, device.ticks)
+}
+
 impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
     fn new(
         scene: &'g Scene,
@@ -115,6 +140,8 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
             coming: Vec::new(),
             now: 0,
             seq: 0,
+            events: Vec::new(),
+            ticks: Vec::new(),
         };
         if replay.supply == Supply::Held {
             device.hold_all();
@@ -153,6 +180,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         let classes = (0..POSTS * POSTS).map(class);
         tile.set_materials(self.materials.table.len(), classes)
             .expect("of the table");
+        self.events.push(Event::Tile(key));
         let spent = self.haptics.accept(Command::Tile(tile));
         let is_taken = spent.as_ref().is_none_or(|spent| spent.key() != Some(key));
         self.spare.extend(spent);
@@ -167,6 +195,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         let mut work = 0;
         for _ in 0..PATIENCE {
             let outcome = self.haptics.tick(&Sense::default(), true);
+            self.note(hip, &outcome);
             work = outcome.sample.work.max(work);
             self.now += 1;
             self.supply(&outcome.sample);
@@ -178,6 +207,25 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
             }
         }
         None
+    }
+
+    fn note(&mut self, hip: GridPoint, outcome: &Outcome) {
+        let Sample {
+            state,
+            work,
+            force_n,
+            proxy,
+            ..
+        } = outcome.sample;
+        self.events.push(Event::Hip(hip));
+        self.ticks.push(Counted {
+            instructions: 0,
+            state: state as u32,
+            converged: outcome.answers.is_some(),
+            work,
+            vector: force_n,
+            proxy,
+        });
     }
 
     /// Asks for what the tick showed to be wanted, and takes what has come.
