@@ -15,11 +15,15 @@ use hapterra_core::guard::Sense;
 use hapterra_core::scene::{Point, Scene};
 use hapterra_core::terrain::{FieldSize, POSTS, TileKey};
 use hapterra_core::wire::frame::{MAX_FRAME, encode};
+use hapterra_core::wire::materials::{
+    MOST_TABLE_BYTES, MOST_TILE_BYTES, MaterialScene, MaterialTile, TileMaterials, table_bytes,
+};
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::plant::Sensed;
 use serde::Serialize;
 
 use crate::emulation::{named, qemu};
+use crate::scene::materials::Materials;
 
 /// Environment variable that names the image.
 pub const IMAGE_VARIABLE: &str = "HAPTERRA_MPS2_COUNTS_ELF";
@@ -54,7 +58,8 @@ pub trait Samples {
     fn sample(&self, column: i32, row: i32) -> f32;
 }
 
-/// A scene for the contact alone: tiles and HIPs in the order they come.
+/// A scene for the contact alone, or for the loop on materials: tiles and HIPs in the order they
+/// come.
 #[derive(Clone, Copy)]
 pub struct Replay<'a> {
     /// As the device is told of it.
@@ -63,6 +68,8 @@ pub struct Replay<'a> {
     pub field: &'a dyn Samples,
     /// What happens.
     pub events: &'a [Event],
+    /// What the ground is made of: then each HIP is a tick of the whole loop.
+    pub materials: Option<&'a Materials>,
 }
 
 /// What one tick cost and answered.
@@ -72,12 +79,12 @@ pub struct Counted {
     pub instructions: u32,
     /// The number of its [`hapterra_core::contact::ContactState`].
     pub state: u32,
-    /// Whether all there was to do was done; fed by encoders, whether the
-    /// amplifiers are on.
+    /// Whether all there was to do was done; on materials, whether the point is answered; fed by
+    /// encoders, whether the amplifiers are on.
     pub converged: bool,
     /// Units of work.
     pub work: u32,
-    /// Stretch in cells; fed by encoders, force in newtons.
+    /// Stretch in cells; fed by encoders or on materials, force in newtons.
     pub vector: Vec3,
     /// The proxy.
     pub proxy: GridPoint,
@@ -96,7 +103,7 @@ impl CountingBoard {
     }
 
     /// Steps the contact alone, in real time, through one replay after the other;
-    /// gives the ticks of each.
+    /// gives the ticks of each. Either all of them are on materials, or none.
     ///
     /// # Panics
     /// When the emulated program fails.
@@ -105,8 +112,10 @@ impl CountingBoard {
         let folder = tempfile::tempdir().expect("a folder");
         write_replays(folder.path(), replays);
         let mut ticks = self.run(folder.path()).into_iter();
-        let tiles = records(folder.path(), "tiles.bin");
-        assert!(tiles.iter().all(|tile| tile.converged), "a tile is refused");
+        if replays.iter().all(|replay| replay.materials.is_none()) {
+            let tiles = records(folder.path(), "tiles.bin");
+            assert!(tiles.iter().all(|tile| tile.converged), "a tile is refused");
+        }
         let is_tick = |event: &&Event| matches!(event, Event::Hip(_));
         let lengths = replays
             .iter()
@@ -128,13 +137,19 @@ impl CountingBoard {
     /// # Panics
     /// When the emulated program fails.
     #[must_use]
-    pub fn chain(&self, scene: &Scene, field: &dyn Samples, counts: &[[i32; 3]]) -> Vec<Counted> {
+    pub fn chain(
+        &self,
+        scene: &Scene,
+        (field, materials): (&dyn Samples, Option<&Materials>),
+        counts: &[[i32; 3]],
+    ) -> Vec<Counted> {
         let folder = tempfile::tempdir().expect("a folder");
         let tiles: Vec<Event> = tiles(scene.size).map(Event::Tile).collect();
         let held = Replay {
             scene,
             field,
             events: &tiles,
+            materials,
         };
         write_replays(folder.path(), &[held]);
         let mut frames = Frames::create(&folder.path().join("counts.frames"));
@@ -223,7 +238,7 @@ fn counted(words: &[u32]) -> Counted {
 fn write_replays(folder: &Path, replays: &[Replay<'_>]) {
     let mut frames = Frames::create(&folder.join("replay.frames"));
     for replay in replays {
-        frames.add(&ToDevice::Scene(*replay.scene));
+        frames.add_scene(replay.scene, replay.materials);
         for (seq, event) in (0..).zip(replay.events) {
             match event {
                 Event::Hip(hip) => frames.add(&ToDevice::Point(Point { seq, hip: *hip })),
@@ -233,11 +248,12 @@ fn write_replays(folder: &Path, replays: &[Replay<'_>]) {
                         base: 0,
                         bytes: &bytes,
                     };
-                    frames.add(&ToDevice::Tile(TileMessage {
+                    let tile = TileMessage {
                         epoch: replay.scene.epoch,
                         key: *key,
                         heights,
-                    }));
+                    };
+                    frames.add_tile(tile, replay.materials);
                 }
             }
         }
@@ -277,6 +293,31 @@ impl Frames {
         let mut buffer = [0; MAX_FRAME];
         let frame = encode(message, &mut buffer).expect("fits a frame");
         self.file.write_all(frame).expect("written");
+    }
+
+    fn add_scene(&mut self, scene: &Scene, materials: Option<&Materials>) {
+        let Some(materials) = materials else {
+            return self.add(&ToDevice::Scene(*scene));
+        };
+        let mut room = [0; MOST_TABLE_BYTES];
+        self.add(&ToDevice::MaterialScene(MaterialScene {
+            scene: *scene,
+            table: table_bytes(&materials.told(), &mut room),
+        }));
+    }
+
+    fn add_tile(&mut self, tile: TileMessage<'_>, materials: Option<&Materials>) {
+        let Some(materials) = materials else {
+            return self.add(&ToDevice::Tile(tile));
+        };
+        let first = tile.key.index.first_cell();
+        let class = |i: usize| {
+            let (col, row) = (i % POSTS, i / POSTS);
+            materials.class(first.x + col as i32, first.y + row as i32)
+        };
+        let mut room = [0; MOST_TILE_BYTES];
+        let materials = TileMaterials::pack(&std::array::from_fn(class), &mut room);
+        self.add(&ToDevice::MaterialTile(MaterialTile { tile, materials }));
     }
 
     fn close(mut self) {

@@ -68,11 +68,56 @@ fn sensible_ticks(chance: &mut Chance) -> Vec<u8> {
     bytes
 }
 
+/// A table and a scene of it, fed by points, a tile with materials of it, and points that go down
+/// into it and along.
+fn sensible_materials(chance: &mut Chance) -> Vec<u8> {
+    let count = chance.below(4) as u8;
+    // One in four of another table than it says.
+    let kind = [247, 247, 247, 246][chance.below(4)];
+    let mut bytes = vec![kind, count];
+    for _ in 0..=count {
+        let kind = chance.below(250) as u8;
+        bytes.extend([kind, 40, 20, 30 + chance.below(200) as u8]);
+        bytes.extend([chance.below(100) as u8, kind, 100]);
+    }
+    // The scene, the sum that it says, and the counts of its tick.
+    bytes.push([0, 64][chance.below(2)]);
+    bytes.extend(vec![7; 4 * usize::from(kind == 246)]);
+    bytes.extend([0; 6]);
+    bytes.extend([9, 0, 1, 1, 0]);
+    bytes.extend((0..7).map(|_| 120 + chance.below(20) as u8));
+    // Classes of the table, or up to 16.
+    bytes.extend([[17, 17, 0, 1][chance.below(4)], 0, 1, 2, 3, 14]);
+    bytes.extend([0; 6]);
+    for step in 0..chance.below(60) as u8 {
+        bytes.extend([
+            5,
+            0,
+            10,
+            10,
+            6_u8.saturating_sub(step / 6),
+            4 * step,
+            step,
+            0,
+        ]);
+        bytes.extend([step, 0, 0, 0, step, step]);
+    }
+    bytes
+}
+
 #[test]
 fn no_bytes_break_the_tick() {
     let mut chance = Chance::new(11);
     for round in 0..20_000 {
         tick::run(&input(&mut chance, round, 400, sensible_ticks));
+    }
+}
+
+#[test]
+fn no_bytes_break_the_tick_on_materials() {
+    let mut chance = Chance::new(13);
+    for round in 0..20_000 {
+        tick::run(&input(&mut chance, round, 600, sensible_materials));
     }
 }
 

@@ -4,10 +4,12 @@
 use std::collections::BTreeMap;
 
 use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::force::{Material, MaterialTable};
 use hapterra_tests::invariants::judge::Judge;
 use hapterra_tests::invariants::seen::Seen;
 use hapterra_tests::invariants::surface::distance;
-use hapterra_tests::scene::run::Scene;
+use hapterra_tests::scene::materials::LAYOUTS;
+use hapterra_tests::scene::run::{Scene, Surface};
 use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::terrain::{KINDS, Terrain};
 
@@ -160,4 +162,62 @@ fn all_that_is_promised_is_felt_and_judged() {
         assert!(count >= least, "{name}: {count}");
     }
     assert_eq!(settings.len(), 5, "{settings:?}");
+}
+
+/// Which materials the scenes of a soak are of, by all the names that fit.
+#[test]
+fn all_that_is_promised_of_materials_is_drawn() {
+    let mut counts = Counts::new();
+    let scenes = (0..800).map(|number| Scene::random(SEED, number).with_surface(Surface::Rough));
+    for materials in scenes.filter_map(|scene| scene.materials) {
+        let mut is = |name, true_of: bool| *counts.entry(name).or_default() += u64::from(true_of);
+        is("a scene with materials", true);
+        for (layout, name) in LAYOUTS.into_iter().zip([
+            "all of one",
+            "halves",
+            "checker of samples",
+            "stripes",
+            "each sample by itself",
+            "blobs",
+        ]) {
+            is(name, materials.layout == layout);
+        }
+        let table = &materials.table;
+        let any = |of: fn(&Material) -> bool| table.iter().any(of);
+        is("one material alone", table.len() == 1);
+        is(
+            "as many materials as there may be",
+            table.len() == MaterialTable::MOST,
+        );
+        is("some like ice, some with friction", {
+            any(|m| m.friction.is_none()) && any(|m| !m.friction.is_none())
+        });
+        is("even ones and textured ones", {
+            any(|m| m.texture.is_none()) && any(|m| !m.texture.is_none())
+        });
+        is("damped ones", any(|m| m.damping_ns_per_m > 0.0));
+        is(
+            "one without stiffness",
+            any(|m| m.stiffness_n_per_mm == 0.0),
+        );
+        let stiffest = table.iter().map(|m| m.stiffness_n_per_mm);
+        let most = stiffest.clone().fold(0.0, f32::max);
+        let least = stiffest.fold(f32::MAX, f32::min);
+        is(
+            "one a hundred times as stiff as another",
+            most > 100.0 * least,
+        );
+        let own = materials.law.stiffness_n_per_mm;
+        is(
+            "a scene softer or stiffer than its default",
+            own != table[0].stiffness_n_per_mm,
+        );
+        is("cells of other than a millimetre", materials.cell_mm != 1.0);
+    }
+    println!("{counts:#?}");
+    assert!(
+        (150..250).contains(&counts["a scene with materials"]),
+        "one in four"
+    );
+    assert!(counts.values().all(|count| *count >= 5), "{counts:?}");
 }

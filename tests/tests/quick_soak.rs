@@ -9,10 +9,11 @@ const SEED: u64 = 2026;
 fn thousand(surface: Surface) -> Tally {
     let tally = soak(SEED, surface, 0, Until::Scenes(1000), 2, |_| {});
     println!("{tally}");
-    let [waiting, free, touching, _] = tally.total().states;
+    let total = tally.total();
+    let [waiting, free, touching, _] = total.states;
     assert!(waiting > 10_000 && free > 50_000 && touching > 50_000);
     // Repeated, shifted, in another window, mirrored or turned.
-    let twins = tally.total().twins;
+    let twins = total.twins;
     assert!(
         twins
             .iter()
@@ -20,6 +21,14 @@ fn thousand(surface: Surface) -> Tally {
             .all(|(n, least)| *n >= least),
         "{twins:?}"
     );
+    // In another window, shifted, mirrored or turned.
+    let (judged, twins) = (total.on_materials, total.twins_on_materials);
+    assert!(
+        judged.in_whole > 20_000 && judged.changing > 10_000,
+        "{judged:?}"
+    );
+    assert!(100 * judged.open < judged.in_whole, "{judged:?}");
+    assert!(twins.iter().all(|n| *n >= 20), "{twins:?}");
     tally
 }
 
@@ -46,7 +55,13 @@ fn everything_holds_in_a_thousand_random_scenes() {
 
 #[test]
 fn everything_holds_with_friction_too() {
-    none(Surface::Rough, thousand(Surface::Rough).broken.iter());
+    let tally = thousand(Surface::Rough);
+    let judged = tally.total().on_materials;
+    assert!(
+        judged.rubbed > 20_000 && judged.sliding > 1_000,
+        "{judged:?}"
+    );
+    none(Surface::Rough, tally.broken.iter());
 }
 
 /// A HIP at the foot of a needle of 10⁶: each hop off the needle's side came nearer by

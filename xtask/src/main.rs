@@ -46,7 +46,7 @@ cargo xtask COMMAND
                          targets and the kept table; --write: keep these
   soak MINUTES [--seed N] [--rough]  random scenes on all cores, every tick judged in f64
   soak --seed N --scene K [--rough]  one of them again
-  campaign [--seconds N] [--seed S] [--segment K]
+  campaign [--seconds N] [--seed S] [--segment K [--effects]]
                          the closed loop with everything going wrong at random, 10,000 s of
                          arm time unless told otherwise; writes docs/campaign.md
   campaign --link [--seconds N] [--seed S] [--segment K]

@@ -6,9 +6,10 @@ use hapterra_bench::grid::Grid;
 use hapterra_bench::path::Dice;
 use hapterra_bench::state::{TICKS, terrain};
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::{Controller, Damping, ForceLaw, Pattern, Shading, Texture};
+use hapterra_core::force::{Controller, Damping, ForceLaw, Material, Pattern, Shading, Texture};
 use hapterra_core::scene::{Scene, Source};
 use hapterra_tests::counting::CountingBoard;
+use hapterra_tests::scene::materials::Materials;
 
 use super::contact::{GridSamples, rough, scene, with_law};
 use super::table::{Row, Target, Tick};
@@ -99,6 +100,25 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
         law
     };
     let all = with_law(all, coarse);
+    let hard = |law| ForceLaw {
+        stiffness_n_per_mm: 0.8,
+        ..law
+    };
+    let two = arm.classes(&[arm.scene().law, hard(arm.scene().law)]);
+    let other = |law: ForceLaw| {
+        let mut law = hard(law);
+        law.texture.pattern = Pattern::Grating;
+        law.friction.dynamic_mu = 0.1;
+        law.damping.ns_per_m = 1.0;
+        law
+    };
+    let each = arm.classes(&[all.law, other(all.law), arm.scene().law]);
+    let on = |scene: Scene, materials: &Materials| Scene {
+        materials: Some(materials.told().check_sum()),
+        ..scene
+    };
+    let on_two = (&sliding[..], on(arm.scene(), &two), Some(&two));
+    let on_each = (&fast[..], on(all, &each), Some(&each));
     let all = (&fast[..], all);
     vec![
         row("chain, free", in_the_air, &free, ContactState::Free),
@@ -156,6 +176,20 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
             all,
             ContactState::Touching,
         ),
+        arm.row_on(
+            board,
+            "chain, sliding, materials",
+            in_the_air,
+            on_two,
+            ContactState::Touching,
+        ),
+        arm.row_on(
+            board,
+            "chain, sliding fast, all effects and materials",
+            in_the_air,
+            on_each,
+            ContactState::Touching,
+        ),
         row(
             "chain, resting",
             in_contact,
@@ -175,6 +209,15 @@ impl<'g> Arm<'g> {
                 home_mm: [x, y, grid.height(x, y).floor()],
             },
         }
+    }
+
+    /// The materials of these laws, in squares of five samples: sliding, one is nearly always on
+    /// its way in.
+    fn classes(&self, laws: &[ForceLaw]) -> Materials {
+        let table: Vec<Material> = laws.iter().map(Material::of).collect();
+        let size = [self.grid.columns as i32, self.grid.rows as i32];
+        let count = table.len() as i32;
+        Materials::from_fn(&table, size, |x, y| ((x / 5 + y / 5) % count) as u8)
     }
 
     /// What the encoders read with the tip `above` mm over the surface, `off` mm
@@ -212,6 +255,18 @@ impl<'g> Arm<'g> {
         (counts, scene): (&[[i32; 3]], Scene),
         state: ContactState,
     ) -> Row {
+        self.row_on(board, name, target, (counts, scene, None), state)
+    }
+
+    /// The same on materials, where there are some.
+    fn row_on(
+        &self,
+        board: &CountingBoard,
+        name: &str,
+        target: Target,
+        (counts, scene, materials): (&[[i32; 3]], Scene, Option<&Materials>),
+        state: ContactState,
+    ) -> Row {
         let pose = |counts: &[i32; 3]| {
             let angle = |axis: usize| Encoder::new(&self.model.drive[axis]).angle_rad(counts[axis]);
             let tip = kinematics::tip(&self.model, [angle(0), angle(1), angle(2)]);
@@ -223,7 +278,8 @@ impl<'g> Arm<'g> {
             self.counts_at([x, y, z + above])
         });
         let all: Vec<_> = down.chain(counts.iter().copied()).collect();
-        let ticks = board.chain(&scene, &GridSamples(self.grid), &all);
+        let ground = (&GridSamples(self.grid) as _, materials);
+        let ticks = board.chain(&scene, ground, &all);
         assert_eq!(ticks.len(), all.len());
         let ticks = ticks.iter().enumerate().skip(APPROACH);
         let there = ticks.filter(|(_, tick)| tick.state == state as u32 && tick.converged);

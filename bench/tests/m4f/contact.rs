@@ -103,6 +103,7 @@ fn row(
         scene: &scene,
         field: &GridSamples(grid),
         events: &events,
+        materials: None,
     };
     let ticks = board.contact(&[replay]).concat();
     let counted = steps.iter().zip(ticks.iter().enumerate());

@@ -17,7 +17,8 @@
 //! In its working folder it finds, through semihosting:
 //! - `replay.frames`: [`ToDevice`] frames as on the link: a scene, then tiles and
 //!   points in the order they come. Fed by points, each point is one
-//!   [`Contact::step`] in real time, and another scene may follow.
+//!   [`Contact::step`] in real time, and another scene may follow. Fed by points on materials, each
+//!   point is one [`Haptics::tick`], and one that is not answered comes again.
 //! - `counts.frames`, for a scene fed by encoders: [`Sensed`] frames, each one
 //!   [`Haptics::tick`], count to current, once the arm was armed where the
 //!   first of them is.
@@ -41,6 +42,7 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use hapterra_core::Vec3;
 use hapterra_core::contact::{Contact, ContactOutput, ContactSettings};
+use hapterra_core::force::MaterialTable;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Sense;
 use hapterra_core::phantom::{Calibration, Mechanism};
@@ -48,6 +50,7 @@ use hapterra_core::rate::TickRate;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::terrain::{Tile, Window};
 use hapterra_core::tick::{Command, Haptics, Outcome};
+use hapterra_core::wire::materials::MaterialTile;
 use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::plant::Sensed;
 use hapterra_firmware::link::fill_tile;
@@ -69,13 +72,16 @@ static SPARE: ConstStaticCell<Tile> = ConstStaticCell::new(Tile::VACANT);
 #[entry]
 fn main() -> ! {
     let mut frames = Frames::open(c"replay.frames");
-    let Some(ToDevice::Scene(scene)) = frames.next() else {
-        panic!("the replay does not begin with a scene");
+    let (scene, table) = match frames.next() {
+        Some(ToDevice::Scene(scene)) => (scene, None),
+        Some(ToDevice::MaterialScene(both)) => (both.scene, both.table()),
+        _ => panic!("the replay does not begin with a scene"),
     };
     let mut records = Records::create(c"ticks.bin");
-    match scene.source {
-        Source::Points => contact(scene, &mut frames, &mut records),
-        Source::Encoders => chain(&scene, &mut frames, &mut records),
+    match (scene.source, table) {
+        (Source::Points, None) => contact(scene, &mut frames, &mut records),
+        (Source::Points, Some(table)) => points(&scene, &table, &mut frames, &mut records),
+        (Source::Encoders, table) => chain(&scene, table.as_ref(), &mut frames, &mut records),
     }
     semihosting::process::exit(0)
 }
@@ -123,6 +129,57 @@ fn contact(mut scene: Scene, frames: &mut Frames, records: &mut Records) {
     }
 }
 
+/// Points on materials, scene after scene: each of them is one tick of the whole loop, in lock-step.
+fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &mut Records) {
+    let tiles = TILES.take().each_mut().map(|row| row.each_mut());
+    let mut haptics = Haptics::new(tiles, TickRate::DEFAULT, None);
+    let mut count = take_scene(&mut haptics, scene, table);
+    let mut spare = Some(SPARE.take());
+    let mut outcome = Outcome::default();
+    let stopwatch = Stopwatch::start();
+    while let Some(message) = frames.next() {
+        match message {
+            ToDevice::MaterialScene(both) => {
+                let table = both.table().expect("the host made it well");
+                count = take_scene(&mut haptics, &both.scene, &table);
+            }
+            ToDevice::MaterialTile(tile) => {
+                let buffer = spare.take().expect("every tile gives a buffer back");
+                fill_material_tile(buffer, &tile, count);
+                spare = haptics.accept(Command::Tile(buffer));
+            }
+            ToDevice::Point(point) => {
+                let _ = haptics.accept(Command::Point(black_box(point)));
+                let sense = black_box(Sense::default());
+                let (cost, ()) = stopwatch.counted(|| tick(&mut haptics, &sense, &mut outcome));
+                let is_answered = u32::from(outcome.answers.is_some());
+                let sample = &outcome.sample;
+                let first = [cost, sample.state as u32, is_answered, sample.work];
+                records.add(first, sample.force_n, &sample.proxy);
+            }
+            _ => panic!("a replay on materials has scenes, tiles and points only"),
+        }
+    }
+}
+
+/// Takes a scene with its table; gives how many materials that has.
+fn take_scene(
+    haptics: &mut Haptics<'static, WINDOW>,
+    scene: &Scene,
+    table: &MaterialTable,
+) -> usize {
+    haptics.take_materials(table);
+    let _ = haptics.accept(Command::Scene(*scene));
+    table.materials().len()
+}
+
+/// Fills a buffer with a tile and its materials, of a table of so many.
+fn fill_material_tile(buffer: &mut Tile, message: &MaterialTile<'_>, count: usize) {
+    fill_tile(buffer, &message.tile).expect("the host made it well");
+    let filled = message.materials.fill(buffer, count);
+    filled.expect("the host made it well");
+}
+
 /// A contact that has felt nothing yet.
 fn contact_of(scene: &Scene) -> Contact {
     let settings = ContactSettings::REAL_TIME.with_rule(scene.rule);
@@ -141,15 +198,25 @@ fn step<'c>(
 }
 
 /// The whole tick, from encoder counts to motor currents.
-fn chain(scene: &Scene, frames: &mut Frames, records: &mut Records) {
+fn chain(scene: &Scene, table: Option<&MaterialTable>, frames: &mut Frames, records: &mut Records) {
     let tiles = TILES.take().each_mut().map(|row| row.each_mut());
     let mut haptics = Haptics::new(tiles, TickRate::DEFAULT, None);
     haptics.configure(Mechanism::new(&Calibration::PREMIUM_1_5).expect("valid"));
-    let _ = haptics.accept(Command::Scene(*scene));
+    let count = match table {
+        Some(table) => take_scene(&mut haptics, scene, table),
+        None => {
+            let _ = haptics.accept(Command::Scene(*scene));
+            0
+        }
+    };
     let mut spare = Some(SPARE.take());
-    while let Some(ToDevice::Tile(tile)) = frames.next() {
+    while let Some(message) = frames.next() {
         let buffer = spare.take().expect("every tile gives a buffer back");
-        fill_tile(buffer, &tile).expect("the host made it well");
+        match message {
+            ToDevice::Tile(tile) => fill_tile(buffer, &tile).expect("the host made it well"),
+            ToDevice::MaterialTile(tile) => fill_material_tile(buffer, &tile, count),
+            _ => panic!("before the counts there are tiles only"),
+        }
         spare = haptics.accept(Command::Tile(buffer));
     }
     let mut sensed = Frames::open(c"counts.frames");

@@ -1,5 +1,5 @@
 //! Runs the closed-loop campaign: `hapterra-campaign --seconds N --seed S`, or
-//! one segment of it with `--segment K`; with `--link` the campaign of link faults.
+//! one segment of it with `--segment K [--effects]`; with `--link` the campaign of link faults.
 //! `cargo xtask campaign` builds it with full optimisation and puts the report into
 //! `docs/campaign.md` or `docs/link-campaign.md`.
 
@@ -8,13 +8,15 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use hapterra_tests::campaign::{self, Violation};
+use hapterra_tests::campaign::{self, Ground, Violation};
 use hapterra_tests::link_campaign;
 
 /// What the user asked for.
 struct Request {
     /// The campaign of link faults, not that of the closed loop.
     link: bool,
+    /// With one segment: its ground has effects.
+    ground: Ground,
     seconds: Option<u64>,
     seed: Option<u64>,
     segment: Option<u64>,
@@ -29,7 +31,7 @@ fn main() -> ExitCode {
         Err(wrong) => {
             eprintln!("error: {wrong}");
             eprintln!(
-                "hint: hapterra-campaign [--link] [--seconds N] [--seed S] [--segment K] [--report FILE] [--commit C]"
+                "hint: hapterra-campaign [--link] [--seconds N] [--seed S] [--segment K [--effects]] [--report FILE] [--commit C]"
             );
             return ExitCode::from(2);
         }
@@ -51,20 +53,25 @@ fn main() -> ExitCode {
 fn tell(request: &Request, violation: &Violation) {
     let Violation {
         segment,
+        ground,
         tick,
         what,
     } = violation;
+    let ground = ground.option();
     let (link, seed) = match request.link {
         true => ("--link ", request.seed.unwrap_or(link_campaign::SEED)),
         false => ("", request.seed.unwrap_or(campaign::SEED)),
     };
     eprintln!("error: segment {segment}, tick {tick}: {what}");
-    eprintln!("hint: repeat it with: cargo xtask campaign {link}--seed {seed} --segment {segment}");
+    eprintln!(
+        "hint: repeat it with: cargo xtask campaign {link}--seed {seed} --segment {segment}{ground}"
+    );
 }
 
 fn request(mut words: impl Iterator<Item = String>) -> Result<Request, String> {
     let mut request = Request {
         link: false,
+        ground: Ground::Ice,
         seconds: None,
         seed: None,
         segment: None,
@@ -74,6 +81,10 @@ fn request(mut words: impl Iterator<Item = String>) -> Result<Request, String> {
     while let Some(word) = words.next() {
         if word == "--link" {
             request.link = true;
+            continue;
+        }
+        if word == "--effects" {
+            request.ground = Ground::Drawn;
             continue;
         }
         let value = words.next().ok_or(format!("{word} wants a value"))?;
@@ -99,7 +110,7 @@ fn run(request: &Request) -> Result<Option<String>, Violation> {
     let seed = request.seed.unwrap_or(campaign::SEED);
     if let Some(number) = request.segment {
         let mut tally = campaign::Tally::default();
-        campaign::segment::run(seed, number, &mut tally)?;
+        campaign::segment::run(seed, number, request.ground, &mut tally)?;
         print!("{}", tally.table());
         println!("{:#?}", tally.extremes);
         return Ok(None);

@@ -35,6 +35,12 @@ pub struct Extremes {
     pub slew_n: f64,
     /// Temperature of a winding of the virtual arm, °C.
     pub winding_c: f64,
+    /// Energy that the device said its ticks have created, mJ.
+    pub created_mj: f32,
+    /// The most that a contact had given to the tip with the controller on, mJ.
+    pub given_mj: f32,
+    /// Ticks in which that was worked out.
+    pub watched_ticks: u64,
     /// Ticks with the amplifiers on and an encoder off by more than [`OFF_COUNTS`].
     pub misled_ticks: u64,
     /// Ticks with the amplifiers on near a singular pose, where the force at the tip
@@ -54,6 +60,9 @@ impl Extremes {
             current_a: self.current_a.max(other.current_a),
             slew_n: self.slew_n.max(other.slew_n),
             winding_c: self.winding_c.max(other.winding_c),
+            created_mj: self.created_mj.max(other.created_mj),
+            given_mj: self.given_mj.max(other.given_mj),
+            watched_ticks: self.watched_ticks + other.watched_ticks,
             misled_ticks: self.misled_ticks + other.misled_ticks,
             singular_ticks: self.singular_ticks + other.singular_ticks,
         }

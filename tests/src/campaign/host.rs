@@ -8,6 +8,7 @@ use hapterra_core::guard::Fault;
 use hapterra_core::scene::{Sample, Scene};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
+use hapterra_core::wire::materials::{MOST_TILE_BYTES, MaterialTile, TileMaterials};
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{InSession, SessionNumber};
@@ -192,7 +193,12 @@ impl<'t> Host<'t> {
             };
             if let ToHost::Need { epoch, key } = framed.message {
                 if poison {
-                    out.extend(poisoned(self.client.session(), epoch, key, chance));
+                    let session = self.client.session();
+                    let has_materials = self.terrain.grid().materials().is_some();
+                    out.extend(match has_materials && chance.below(4) > 0 {
+                        true => of_poisoned_materials(session, epoch, key, chance),
+                        false => poisoned(session, epoch, key, chance),
+                    });
                 }
             } else {
                 let mut frame = [0; MAX_FRAME];
@@ -212,6 +218,37 @@ fn framed(session: SessionNumber, message: &ToDevice<'_>) -> Vec<u8> {
     let mut frame = [0; MAX_FRAME];
     let framed = InSession { session, message };
     encode(&framed, &mut frame).unwrap_or(&[]).to_vec()
+}
+
+/// A tile of even ground with materials that are none, or are those of other ground.
+fn of_poisoned_materials(
+    session: SessionNumber,
+    epoch: u32,
+    key: TileKey,
+    chance: &mut Chance,
+) -> Vec<u8> {
+    let bytes = [chance.bits() as u8; MOST_TILE_BYTES];
+    let materials = match chance.below(4) {
+        0 => TileMaterials::One(chance.bits() as u8),
+        1 => TileMaterials::Runs(&bytes[..chance.below(12)]),
+        2 => TileMaterials::Each(&bytes[..MOST_TILE_BYTES - chance.below(2)]),
+        // Of the table, whatever it is.
+        _ => TileMaterials::One(0),
+    };
+    let heights = match chance.below(2) {
+        0 => Heights::Hole,
+        _ => Heights::Flat {
+            base: chance.below(40) as i32 - 10,
+            height: 0.5,
+        },
+    };
+    let tile = TileMessage {
+        epoch,
+        key,
+        heights,
+    };
+    let message = ToDevice::MaterialTile(MaterialTile { tile, materials });
+    framed(session, &message)
 }
 
 /// A well-formed tile of heights that no terrain has.

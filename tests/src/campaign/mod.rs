@@ -16,6 +16,8 @@ pub mod board;
 pub mod clock;
 pub mod effect;
 pub mod extremes;
+pub mod felt;
+pub mod ground;
 pub mod host;
 pub mod hostile;
 pub mod kind;
@@ -26,13 +28,14 @@ pub mod segment;
 pub mod tally;
 pub mod watch;
 
+pub use ground::Ground;
 pub use segment::Violation;
 pub use tally::Tally;
 
 /// The seed that is used without being told another.
 pub const SEED: u64 = 4;
 
-/// Runs segments, from the first on, until the amplifiers were on for so many
+/// Runs segments, from the first on, each on ice and with effects, until the amplifiers were on for so many
 /// seconds. `done` is told each segment's number and the tally so far.
 ///
 /// # Errors
@@ -41,7 +44,9 @@ pub fn run(seed: u64, seconds: u64, done: &mut dyn FnMut(u64, &Tally)) -> Result
     let mut tally = Tally::default();
     let mut number = 0;
     while tally.armed < seconds * 1_000 {
-        segment::run(seed, number, &mut tally)?;
+        for ground in [Ground::Ice, Ground::Drawn] {
+            segment::run(seed, number, ground, &mut tally)?;
+        }
         done(number, &tally);
         number += 1;
     }

@@ -16,7 +16,9 @@ pub fn page(commit: Option<&str>, seed: u64, seconds: u64, tally: &Tally) -> Str
 Written by `cargo xtask campaign --seconds {seconds} --seed {seed}`{commit}; the same source repeats it to the last figure.
 
 A virtual Phantom Premium 1.5 in a wandering hand, and the application of the boards compiled for the desktop, tick by
-tick (`tests/src/campaign`). The amplifiers were on for {} s of {} s. {} times something went wrong, each kind of the
+tick (`tests/src/campaign`). Each segment is run twice: on ground like ice, and with effects at random
+(`tests/src/campaign/ground.rs`: friction, shading, texture, damping, the passivity controller by itself or always, up to 2.6 N/mm,
+and in every second of them up to 16 materials). The amplifiers were on for {} s of {} s. {} times something went wrong, each kind of the
 table as often as the others, in random order, place and strength. The mishaps are described in
 `tests/src/campaign/kind.rs` beside what is expected of each; anything else ends the campaign.
 
@@ -33,6 +35,10 @@ Held in every tick, by `tests/src/campaign/watch.rs`:
 - the virtual motors' windings below 112 °C, and no winding more than 1 K warmer than the device takes it to be, whatever reset
   came between;
 - no calibration in force above the ceilings of a Premium 1.5, and none stored that nobody agreed to;
+- no force against the way from the HIP to the proxy (`tests/src/campaign/felt.rs`), but where both shading and texture turn it, and none
+  larger than the stiffest material, the highest texture and all of the damping make of the depth;
+- with the controller on, while nothing has gone wrong, no contact with ground of one stiffness and without shading has given the tip more than
+  0.05 mJ and 2 k A times its depth; and the device keeps no more than 2 mJ to be taken back;
 - while the core stands still with its command on, all of this but what needs an encoder that is read.
 
 Both forces are the least that explain the currents with any share of the arm's weight held. They are not worked out within
@@ -46,6 +52,8 @@ Both forces are the least that explain the currents with any share of the arm's 
 | current of a motor | {:.4} A | 5.5 A |
 | change of the force in a tick | {:.4} N | 1 N |
 | temperature of a winding | {:.1} °C | 112 °C |
+| energy that a contact had given with the controller on, in {:.0} s of contacts | {:.4} mJ | 0.05 mJ and 2 k A d |
+| energy that the device keeps to be taken back | {:.3} mJ | 2 mJ |
 
 **What is not bounded.** An encoder that creeps within the joint's limits cannot be told from a hand that moves, and while one is
 off by more than {OFF_COUNTS} counts nobody knows the arm's true levers. That was so in {:.1} s of this run; the largest
@@ -66,6 +74,9 @@ pose were {:.1} s.
         at.current_a,
         at.slew_n,
         at.winding_c,
+        1e-3 * at.watched_ticks as f64,
+        at.given_mj,
+        at.created_mj,
         1e-3 * at.misled_ticks as f64,
         at.misled.force_n,
         at.misled.off_counts,

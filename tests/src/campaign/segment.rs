@@ -1,10 +1,11 @@
 //! A stretch of the campaign: one device, one arm, every kind of mishap once, in
 //! an order of its own. Nothing but the seed decides what happens.
 
+use hapterra::materials::Materials;
 use hapterra::phantom::PhantomModel;
 use hapterra::raster::Raster;
 use hapterra::synth::{Kind as Look, Synth};
-use hapterra::terrain::{Scale, Terrain};
+use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
 use hapterra_core::Vec3;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
@@ -19,6 +20,8 @@ use super::arm::{Arm, Mood};
 use super::board::{self, Board};
 use super::clock::{Reading, SetClock};
 use super::effect::{Core, Mishap, RULE};
+use super::felt::FeltWatch;
+use super::ground::{Effects, Felt, Ground};
 use super::host::{Host, Tiles};
 use super::hostile;
 use super::kind::Kind;
@@ -49,6 +52,8 @@ const PRESS: u64 = 200;
 pub struct Violation {
     /// The segment.
     pub segment: u64,
+    /// What its ground feels like.
+    pub ground: Ground,
     /// The tick in it.
     pub tick: u64,
     /// What.
@@ -59,16 +64,26 @@ pub struct Violation {
 ///
 /// # Errors
 /// The first [`Violation`].
-pub fn run(seed: u64, segment: u64, tally: &mut Tally) -> Result<(), Violation> {
+pub fn run(seed: u64, segment: u64, ground: Ground, tally: &mut Tally) -> Result<(), Violation> {
     let mut chance = Chance::new(seed ^ segment.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     let raster = terrain(&mut chance);
     let scale = Scale::new(CELL_MM, 1.0).expect("a scale");
-    let terrain = Terrain::new(&raster, scale, 0).expect("a terrain");
-    let mut stretch = Stretch::new(&terrain, chance);
+    // By dice of their own, so that a segment on ice stays what it was.
+    let effects = (ground == Ground::Drawn).then(|| Effects::drawn(seed, segment));
+    let materials = effects
+        .as_ref()
+        .and_then(|effects| effects.materials(&raster, SAMPLES));
+    let grid = FeltGrid::new(&raster, FeltCells::default()).with_materials(materials.as_ref());
+    let terrain = Terrain::over(grid, scale, 0).expect("a terrain");
+    let mut stretch = Stretch::new(&terrain, effects, chance);
     let played = stretch.play(tally);
+    let felt = &stretch.felt;
+    stretch.watch.extremes.given_mj = felt.most_given_mj;
+    stretch.watch.extremes.watched_ticks = felt.watched_ticks;
     tally.add(stretch.now, stretch.armed, &stretch.watch.extremes);
     played.map_err(|what| Violation {
         segment,
+        ground,
         tick: stretch.now,
         what,
     })
@@ -92,6 +107,11 @@ fn terrain(chance: &mut Chance) -> Raster {
 
 struct Stretch<'t> {
     terrain: &'t Terrain<'t>,
+    /// What is felt besides the spring.
+    effects: Option<Effects>,
+    felt: FeltWatch,
+    /// From this tick on nothing is wrong.
+    calm_from: u64,
     chance: Chance,
     clock: SetClock,
     device: Board,
@@ -113,15 +133,19 @@ struct Stretch<'t> {
 }
 
 impl<'t> Stretch<'t> {
-    fn new(terrain: &'t Terrain<'t>, mut chance: Chance) -> Self {
+    fn new(terrain: &'t Terrain<'t>, effects: Option<Effects>, mut chance: Chance) -> Self {
         let record = Calibration::PREMIUM_1_5;
         let clock = SetClock::default();
         let device = board::new(clock.clone());
         let arm = Arm::new(terrain, &mut chance);
-        let scene = scene(terrain, &arm, &mut chance);
+        let scene = scene(terrain, &arm, effects.as_ref(), &mut chance);
+        let felt = FeltWatch::new(felt(terrain, &scene), scene.cell_mm);
         let host = Host::new(terrain, scene, chance.bits());
         Self {
             terrain,
+            effects,
+            felt,
+            calm_from: 0,
             chance,
             clock,
             device,
@@ -173,7 +197,8 @@ impl<'t> Stretch<'t> {
         match kind {
             Kind::Goodbye => self.host.leave(self.now, &mut self.chance),
             Kind::HostRestarted => {
-                self.scene = scene(self.terrain, &self.arm, &mut self.chance);
+                let effects = self.effects.as_ref();
+                self.scene = scene(self.terrain, &self.arm, effects, &mut self.chance);
                 self.bring(self.scene);
             }
             Kind::ReplayThenRun => self.bring(Scene {
@@ -266,6 +291,7 @@ impl<'t> Stretch<'t> {
     fn bring(&mut self, scene: Scene) {
         self.host.restart(scene, self.now, &mut self.chance);
         self.watch.forget();
+        self.felt.feels(felt(self.terrain, &scene));
     }
 
     /// The device comes out of a reset. Its encoders count from where the arm is now.
@@ -287,6 +313,7 @@ impl<'t> Stretch<'t> {
             }
             self.tick(None)?;
             if let Some(status) = self.host.status.take() {
+                self.watch.created(status.health.created_mj)?;
                 return Ok(status);
             }
         }
@@ -369,6 +396,7 @@ impl<'t> Stretch<'t> {
         let (mut reading, mut stalls) = (Reading::default(), false);
         let mut core = Core::Runs;
         if let Some(mishap) = mishap {
+            self.calm_from = mishap.ticks.end + SETTLE;
             mishap.meddle(&mut sense, &mut self.lost, self.now, &mut self.chance);
             (unkind, tiles) = (mishap.unkind(), mishap.tiles());
             (reading, stalls) = (mishap.reading(), mishap.stalls());
@@ -440,22 +468,38 @@ impl<'t> Stretch<'t> {
         }
         for sample in std::mem::take(&mut self.host.samples) {
             self.watch.sample(&sample, self.scene.law.max_force_n)?;
+            self.felt.look(&sample, self.now >= self.calm_from)?;
         }
         Ok(())
     }
 }
 
-fn scene(terrain: &Terrain<'_>, arm: &Arm<'_>, chance: &mut Chance) -> Scene {
-    let law = ForceLaw {
-        stiffness_n_per_mm: chance.between(0.3, 0.8) as f32,
-        max_force_n: 8.5,
-        ..ForceLaw::PREMIUM
+/// What may be felt of a scene.
+fn felt(terrain: &Terrain<'_>, scene: &Scene) -> Felt {
+    let materials = terrain.grid().materials();
+    Felt::of(&scene.law, materials.map(Materials::table))
+}
+
+fn scene(
+    terrain: &Terrain<'_>,
+    arm: &Arm<'_>,
+    effects: Option<&Effects>,
+    chance: &mut Chance,
+) -> Scene {
+    let stiffness_n_per_mm = chance.between(0.3, 0.8) as f32;
+    let law = match effects {
+        // Another scene each time.
+        Some(effects) => effects.law(0.5 + stiffness_n_per_mm),
+        None => ForceLaw {
+            stiffness_n_per_mm,
+            max_force_n: 8.5,
+            ..ForceLaw::PREMIUM
+        },
     };
     let home = terrain.scale().to_grid(arm.home_mm()).expect("in range");
     Scene {
         // Real time: nothing waits for the host.
         hold_clock: false,
-        materials: None,
         ..terrain.scene(law, RULE, Source::Encoders, home)
     }
 }

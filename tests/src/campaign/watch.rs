@@ -24,6 +24,8 @@ const HOTTEST_C: f64 = 112.0;
 /// A winding may be warmer than the device takes it to be by this, K: the arm's motors
 /// and the device's model are not the same formula.
 const COLDER_K: f64 = 1.0;
+/// What is created beyond this is forgotten, mJ (docs/effects.md).
+const MOST_CREATED_MJ: f32 = 2.0;
 /// Room for rounding in comparisons of f32.
 const ROUNDING: f32 = 1e-4;
 
@@ -232,6 +234,18 @@ impl Watch {
             false => Err(format!(
                 "the force changed by {slew} N in a tick: {sample:?}"
             )),
+        }
+    }
+
+    /// Looks at the energy that the device says its ticks have created.
+    ///
+    /// # Errors
+    /// Where it is none, or more than is kept.
+    pub fn created(&mut self, mj: f32) -> Result<(), String> {
+        self.extremes.created_mj = self.extremes.created_mj.max(mj);
+        match (0.0..=MOST_CREATED_MJ).contains(&mj) {
+            true => Ok(()),
+            false => Err(format!("{mj} mJ are to be taken back")),
         }
     }
 

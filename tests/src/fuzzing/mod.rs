@@ -2,6 +2,7 @@
 //! which a plain test drives, too (`tests/fuzzed.rs`).
 
 mod bytes;
+mod materials;
 pub mod tick;
 pub mod tile;
 pub mod wire;

@@ -3,7 +3,9 @@
 use hapterra_core::Vec3;
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::{Friction, Rule, WORK_PER_TICK};
-use hapterra_core::force::{Controller, Damping, ForceLaw, Pattern, Shading, Texture};
+use hapterra_core::force::{
+    Controller, Damping, ForceLaw, MaterialTable, Pattern, Shading, Texture,
+};
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::guard::{Fault, Sense};
 use hapterra_core::phantom::{Calibration, Mechanism};
@@ -13,6 +15,7 @@ use hapterra_core::terrain::{FieldSize, Tile, TileKey};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 
 use super::bytes::Bytes;
+use super::materials;
 
 /// Tiles along the side of the window.
 const SIDE: usize = 2;
@@ -31,21 +34,45 @@ pub fn run(data: &[u8]) {
     let mut haptics = Haptics::<SIDE>::new(window, TickRate::DEFAULT, None);
     haptics.configure(Mechanism::new(&Calibration::PREMIUM_1_5).expect("a preset"));
     let mut law = ForceLaw::PREMIUM;
+    let mut table = MaterialTable::EMPTY;
+    // Ticks since the scene was taken, where that is known.
+    let mut ticks = Some(0);
     while !bytes.is_empty() {
         let kind = bytes.byte();
         match kind % 8 {
             _ if kind >= 252 => {
-                let scene = scene(&mut bytes);
+                let mut scene = scene(&mut bytes);
+                if kind == 255 {
+                    scene.materials = Some(table.check_sum());
+                }
                 let view = View {
                     number: kind,
                     scene,
                     hip: position(&mut bytes),
                     keeps_tiles: kind.is_multiple_of(2),
                 };
-                if scene.is_valid() {
+                if is_taken(&scene, &table) {
                     law = scene.law;
                 }
                 let _ = haptics.accept(Command::View(view));
+                ticks = None;
+            }
+            // A table, and a scene of it or of another.
+            _ if kind == 247 || kind == 246 => {
+                let (told, mut scene) = (materials::table(&mut bytes), scene(&mut bytes));
+                // As the link does: what cannot be felt is refused before.
+                if told.is_valid() && scene.is_valid() {
+                    haptics.take_materials(&told);
+                    table = told;
+                }
+                scene.materials = Some(match kind {
+                    247 => table.check_sum(),
+                    _ => bytes.int().cast_unsigned(),
+                });
+                if is_taken(&scene, &table) {
+                    (law, ticks) = (scene.law, Some(0));
+                }
+                let _ = haptics.accept(Command::Scene(scene));
             }
             _ if kind == 251 => {
                 let held = bytes.byte().is_multiple_of(2);
@@ -59,13 +86,16 @@ pub fn run(data: &[u8]) {
             0 => {
                 let scene = scene(&mut bytes);
                 if scene.is_valid() {
-                    law = scene.law;
+                    (law, ticks) = (scene.law, Some(0));
                 }
                 let _ = haptics.accept(Command::Scene(scene));
             }
             1 | 2 => {
                 let tile = spare.take().expect("every tile gives a buffer back");
                 fill(tile, &mut bytes);
+                if kind % 16 >= 8 {
+                    materials::lay(tile, &table, &mut bytes);
+                }
                 spare = haptics.accept(Command::Tile(tile));
             }
             3 => {
@@ -101,8 +131,18 @@ pub fn run(data: &[u8]) {
             measured_ma: (counts[2] > 128).then_some([counts[0] as i16, 0, 0]),
             clutch: false,
         };
-        look(&haptics.tick(&sense, true), &law);
+        let outcome = haptics.tick(&sense, true);
+        let is_next = ticks.is_none_or(|ticks: u32| outcome.sample.tick == ticks + 1);
+        assert!(is_next, "{ticks:?}, then {outcome:?}");
+        ticks = Some(outcome.sample.tick);
+        look(&outcome, &law);
     }
+}
+
+/// Whether the loop takes a scene, with the table that it has.
+fn is_taken(scene: &Scene, table: &MaterialTable) -> bool {
+    let is_here = |sum: u32| sum == table.check_sum() && table.is_valid();
+    scene.is_valid() && scene.materials.is_none_or(is_here)
 }
 
 fn scene(bytes: &mut Bytes<'_>) -> Scene {
@@ -167,7 +207,7 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
 }
 
 /// A texture that a scene may have, or any numbers.
-fn texture(bytes: &mut Bytes<'_>) -> Texture {
+pub(super) fn texture(bytes: &mut Bytes<'_>) -> Texture {
     let (kind, share) = (bytes.byte(), f32::from(bytes.byte()) / 255.0);
     let pattern = [Pattern::Grain, Pattern::Grating][usize::from(kind % 2)];
     if kind >= 250 {

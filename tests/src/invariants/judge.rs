@@ -6,6 +6,7 @@
 use hapterra_core::contact::{Friction, Rule};
 use hapterra_core::force::Texture;
 
+use super::material::Judged;
 use super::seen::Seen;
 use super::texture::TextureJudge;
 use super::{Invariant, Violation};
@@ -39,6 +40,10 @@ pub struct Measured {
     /// Twins compared to the end: repeated, shifted, in another window, mirrored
     /// or turned.
     pub twins: [u64; 4],
+    /// On materials.
+    pub on_materials: Judged,
+    /// Twins on materials compared to the end: in another window, shifted, mirrored or turned.
+    pub twins_on_materials: [u64; 3],
 }
 
 impl Measured {
@@ -50,6 +55,11 @@ impl Measured {
         for (own, other) in self.twins.iter_mut().zip(other.twins) {
             *own += other;
         }
+        let twins = self.twins_on_materials.iter_mut();
+        for (own, other) in twins.zip(other.twins_on_materials) {
+            *own += other;
+        }
+        self.on_materials.add(&other.on_materials);
         self.unconverged += other.unconverged;
         self.work = self.work.max(other.work);
         self.off_surface = self.off_surface.max(other.off_surface);
@@ -127,6 +137,60 @@ impl<'g> Judge<'g> {
     /// The first invariant that it breaks.
     pub fn look(&mut self, seen: &Seen) -> Verdict {
         self.all(seen).into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Judges where the proxy of the next tick lies and how it came there, and nothing of its
+    /// force; what friction holds of it, where it `is_rubbed`, is judged by
+    /// [`Self::is_held_by`] before.
+    ///
+    /// # Errors
+    /// The first invariant that it breaks.
+    pub fn look_at_place(&mut self, seen: &Seen, is_rubbed: bool) -> Verdict {
+        self.is_finite(seen)?;
+        self.is_within_work(seen)?;
+        if seen.is_touching() {
+            self.is_on_surface(seen)?;
+            if !is_rubbed {
+                self.is_local_minimum(seen)?;
+            }
+            self.is_hip_below(seen)?;
+        }
+        if seen.is_free() {
+            self.is_above(seen, self.before.as_ref())?;
+        }
+        if let Some(before) = self.before {
+            self.was_seen_above(&before, seen)?;
+            self.descends(&before, seen)?;
+            if before.is_free() {
+                self.first_crossing(&before, seen)?;
+            }
+            self.passes_no_wall(&before, seen)?;
+        }
+        let moved = self
+            .before
+            .is_none_or(|before| before.felt.proxy != seen.felt.proxy);
+        self.still = if moved { 0 } else { self.still + 1 };
+        self.before = Some(*seen);
+        self.tick += 1;
+        Ok(())
+    }
+
+    /// Judges whether the proxy of the next tick is where a friction lets it be.
+    ///
+    /// # Errors
+    /// [`Invariant::Cone`] and [`Invariant::Stuck`].
+    pub fn is_held_by(&mut self, friction: Friction, seen: &Seen) -> Verdict {
+        self.friction = friction;
+        if seen.is_touching() {
+            self.is_in_cone(seen)?;
+        }
+        let still = self.still;
+        let verdict = match self.before {
+            Some(before) => self.sticks(&before, seen),
+            None => Ok(()),
+        };
+        self.still = still;
+        verdict
     }
 
     /// Judges the texture of the next tick, and nothing else.

@@ -1,7 +1,8 @@
 //! What must hold in every tick, on any terrain, for any path of the HIP. It is judged
 //! in f64, by methods that are none of the product's.
 //!
-//! [`judge`] lists the invariants in the order they are judged. [`seen`] is one tick as
+//! [`judge`] lists the invariants in the order they are judged; [`material`] judges what a loop
+//! feels of a scene with materials. [`seen`] is one tick as
 //! the judge sees it; [`surface`], [`crossing`] and [`descent`] are what the judge
 //! knows about the terrain. All lengths are in cells.
 
@@ -11,6 +12,7 @@ pub mod crossing;
 pub mod descent;
 mod friction;
 pub mod judge;
+pub mod material;
 mod place;
 pub mod seen;
 mod shading;
@@ -68,6 +70,12 @@ pub enum Invariant {
     Shading,
     /// With texture: the force is the one without and what the relief adds; it never pulls.
     Texture,
+    /// On materials: the force is that of the material in force, which goes evenly to that of the
+    /// sample nearest to the proxy.
+    Material,
+    /// On materials: a proxy that slides over a plane trails the HIP by what the friction of the
+    /// place before holds.
+    Slides,
     /// The same input gives the same bits.
     Repeatable,
     /// A scene shifted by whole cells gives the same bits.

@@ -32,6 +32,26 @@ pub struct TextureJudge {
     speed: f64,
 }
 
+/// What a texture adds.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Added {
+    /// To the displacement, cells.
+    pub(super) wanted: DVec3,
+    /// By so much the displacement may be off, cells.
+    pub(super) allowed: f64,
+}
+
+/// A texture as it is felt, cells.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Felt {
+    /// How far it reaches above and below the surface.
+    pub(super) amplitude: f64,
+    /// What it adds to the depth.
+    pub(super) rise: f64,
+    /// Most that it adds along the surface.
+    pub(super) along: f64,
+}
+
 /// What is wrong with a textured force.
 type Verdict = Result<(), String>;
 
@@ -66,22 +86,7 @@ impl TextureJudge {
         held(textured.dot(normal) >= -PULL * depth, || {
             format!("{textured} pulls, of {plain}")
         })?;
-        let (amplitude, wavelength) = self.sizes();
-        let (height, slopes) = height_and_slopes(&self.texture, &seen.felt.proxy);
-        let slopes = slopes - normal * slopes.dot(normal);
-        let deepest = wavelength * wavelength / (48.0 * amplitude);
-        let felt = depth.min(deepest);
-        let wanted = normal * (amplitude * height * (depth / amplitude).min(1.0)) - slopes * felt;
-        let (high, steep) = match self.texture.pattern {
-            Pattern::Grain => (GRAIN, GRAIN),
-            _ => (SINE, SLOPE),
-        };
-        let misplaced = std::f64::consts::TAU / wavelength * self.misplaced(&seen.felt.proxy);
-        let steepest = std::f64::consts::TAU * amplitude / wavelength;
-        let allowed = amplitude.min(depth) * (high + misplaced)
-            + felt * steepest * (steep + 8.0 * misplaced)
-            + SHARE * (amplitude.min(depth) + felt * steepest) * f64::from(u8::from(share < 1.0))
-            + ROUNDING * depth;
+        let Added { wanted, allowed } = self.adds(plain, &seen.felt.proxy, share);
         let off = (textured - plain - wanted * share).length();
         let told = || {
             format!(
@@ -91,6 +96,47 @@ impl TextureJudge {
         // To the bit, where the proxy is too fast.
         let is_gone = (2.0 - 8.0 * self.speed) < -1e-5;
         held(off <= allowed && (!is_gone || textured == plain), told)
+    }
+
+    /// What the whole texture adds to a displacement at a place, cells, where a share of it is
+    /// felt.
+    pub(super) fn adds(&self, plain: DVec3, proxy: &GridPoint, share: f64) -> Added {
+        let depth = plain.length();
+        let normal = plain / depth;
+        let (amplitude, wavelength) = self.sizes();
+        let (height, slopes) = height_and_slopes(&self.texture, proxy);
+        let slopes = slopes - normal * slopes.dot(normal);
+        let deepest = wavelength * wavelength / (48.0 * amplitude);
+        let felt = depth.min(deepest);
+        let wanted = normal * (amplitude * height * (depth / amplitude).min(1.0)) - slopes * felt;
+        let (high, steep) = match self.texture.pattern {
+            Pattern::Grain => (GRAIN, GRAIN),
+            _ => (SINE, SLOPE),
+        };
+        let misplaced = std::f64::consts::TAU / wavelength * self.misplaced(proxy);
+        let steepest = std::f64::consts::TAU * amplitude / wavelength;
+        let allowed = amplitude.min(depth) * (high + misplaced)
+            + felt * steepest * (steep + 8.0 * misplaced)
+            + SHARE * (amplitude.min(depth) + felt * steepest) * f64::from(u8::from(share < 1.0))
+            + ROUNDING * depth;
+        Added { wanted, allowed }
+    }
+
+    /// How high and how steep the whole texture is at a place, under so much depth, cells.
+    pub(super) fn relief(&self, proxy: &GridPoint, depth: f64) -> Felt {
+        let (amplitude, wavelength) = self.sizes();
+        let (height, slopes) = height_and_slopes(&self.texture, proxy);
+        let deepest = wavelength * wavelength / (48.0 * amplitude);
+        Felt {
+            amplitude,
+            rise: amplitude * height * (depth / amplitude).min(1.0),
+            along: slopes.length() * depth.min(deepest),
+        }
+    }
+
+    /// Wavelengths a tick.
+    pub(super) const fn speed(&self) -> f64 {
+        self.speed
     }
 
     /// How far a place is known, cells: to 2⁻²³; along a way of any direction, which is rounded, to
@@ -110,7 +156,7 @@ impl TextureJudge {
     }
 
     /// How much is felt of a texture at a proxy: a speed that falls does so by a tenth a tick.
-    fn share(&mut self, proxy: &GridPoint) -> f64 {
+    pub(super) fn share(&mut self, proxy: &GridPoint) -> f64 {
         let now = self.before.map_or(1.0, |before| {
             let way = before.to(proxy).as_dvec3();
             (way.x.hypot(way.y) / self.sizes().1).min(1.0)

@@ -86,6 +86,7 @@ pub fn segment(seed: u64, number: u64, tally: &mut Tally) -> Result<(), Violatio
     let (board, off) = (&stretch.board, stretch.off_surface);
     tally.add(board.ticks, stretch.touching, off, &board.watch.extremes);
     played.map_err(|(kind, what)| Violation {
+        ground: crate::campaign::Ground::Ice,
         segment: number,
         tick: stretch.now,
         what: format!("{kind:?}: {what}"),

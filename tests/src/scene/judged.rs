@@ -1,6 +1,7 @@
 //! The run of a scene with every check: each tick under the judge, and the whole
 //! beside its twins.
 
+use super::on_materials;
 use super::run::{Scene, Twins};
 use super::supply::Buffers;
 use super::twin;
@@ -34,6 +35,9 @@ impl Scene {
             twins[3] = twin::turned(self, buffers, &mut chance)?;
         }
         judge.measured.twins = twins.map(u64::from);
+        if let Some(materials) = &self.materials {
+            on_materials::run(self, materials, buffers, &mut judge.measured)?;
+        }
         Ok(judge.measured)
     }
 }

@@ -2,7 +2,10 @@
 
 pub mod hip_path;
 pub mod judged;
+pub mod materials;
+pub mod on_materials;
 pub mod recorded;
+pub mod replayed;
 pub mod run;
 pub mod supply;
 pub mod symmetry;

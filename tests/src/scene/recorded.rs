@@ -1,5 +1,5 @@
 //! A scene of the soak as the emulated board can replay it: the tiles and HIPs in
-//! the order they came here, and what the contact answered here.
+//! the order they came here, and what the contact answered here, or the loop on materials.
 //!
 //! The board's window has room for 16 × 16 tiles, as many as this one, so every
 //! scene can be replayed: also those whose tiles are pulled, late and in parts.
@@ -10,6 +10,7 @@ use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Scene as SceneMessage, Source};
 use hapterra_core::terrain::FieldSize;
 
+use super::replayed::noted;
 use super::run::{Player, Scene, Surface};
 use super::supply::Buffers;
 use super::terrain::Terrain;
@@ -20,6 +21,8 @@ use crate::field::point;
 pub struct Recorded {
     /// Its settings.
     pub scene: Scene,
+    /// It was felt on its materials, by the whole loop.
+    is_on_materials: bool,
     /// As the device is told of it.
     message: SceneMessage,
     /// Tiles and HIPs, in the order they came.
@@ -75,11 +78,28 @@ impl Recorded {
             materials: None,
         };
         Self {
+            is_on_materials: false,
             scene,
             message,
             events,
             answers,
         }
+    }
+
+    /// Replays a scene of a seed on its materials, in lock-step as the board does, and notes it down;
+    /// `None` where it has none.
+    #[must_use]
+    pub fn on_materials(seed: u64, number: u64, surface: Surface) -> Option<Self> {
+        let scene = Scene::random(seed, number).with_surface(surface);
+        let materials = scene.materials.as_ref()?;
+        let (message, events, answers) = noted(&scene, materials);
+        Some(Self {
+            is_on_materials: true,
+            scene,
+            message,
+            events,
+            answers,
+        })
     }
 
     /// As the counting board takes it.
@@ -89,6 +109,11 @@ impl Recorded {
             scene: &self.message,
             field: &self.scene.terrain,
             events: &self.events,
+            materials: self
+                .scene
+                .materials
+                .as_ref()
+                .filter(|_| self.is_on_materials),
         }
     }
 

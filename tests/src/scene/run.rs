@@ -8,6 +8,7 @@ use hapterra_core::rate::TickRate;
 use hapterra_core::terrain::TileIndex;
 
 use super::hip_path;
+use super::materials::Materials;
 use super::supply::{Buffers, SIDE, SuppliedWindow, Supply};
 use super::terrain::{KINDS, Terrain};
 use crate::chance::Chance;
@@ -39,6 +40,8 @@ pub struct Scene {
     pub shading: Shading,
     /// Its micro-relief, of cells of a millimetre.
     pub texture: Texture,
+    /// What its ground is made of, in a scene that is replayed on materials besides.
+    pub materials: Option<Materials>,
     /// Whether the contact takes its shortcuts.
     pub shortcuts: bool,
     /// Which of the twins are run beside it.
@@ -76,8 +79,33 @@ const GRATING: Texture = Texture {
     ..Texture::NONE
 };
 
+/// Whether a texture feels the same a multiple of 32 cells away: it lies fast on the terrain's
+/// cells, of so many millimetres.
+pub(super) fn is_alike(texture: &Texture, cell_mm: f32) -> bool {
+    // So many waves can be told without rounding.
+    let fits = [0.25, 0.5, 1.0, 8.0, 32.0].contains(&texture.wavelength_mm)
+        && (32.0 * cell_mm / texture.wavelength_mm).fract() == 0.0;
+    match texture.pattern {
+        Pattern::None => true,
+        Pattern::Grain => false,
+        Pattern::Grating => fits && texture.direction_deg == 0.0,
+    }
+}
+
+/// A friction.
+pub(super) fn friction(chance: &mut Chance) -> Friction {
+    let dynamic_mu = [0.05, 0.3, 0.7, 2.0][chance.below(4)];
+    let static_mu = dynamic_mu * [1.0, 1.0, 1.3, 2.0][chance.below(4)];
+    let viscous_s = [0.0, 0.0, 0.003, 0.05][chance.below(4)];
+    Friction {
+        static_mu,
+        dynamic_mu,
+        viscous_s,
+    }
+}
+
 /// The texture of a scene, if any.
-fn texture(mixed: u64) -> Texture {
+pub(super) fn texture(mixed: u64) -> Texture {
     // Its own dice, so that all else of a scene stays what it was.
     let mut chance = Chance::new(mixed ^ 0x7e87_0e5e);
     let pattern = [Pattern::None, Pattern::Grain, Pattern::Grating][chance.below(3)];
@@ -129,6 +157,7 @@ impl Scene {
             0 => hip_path::deep(&terrain, &mut chance, ticks),
             _ => hip_path::random(&terrain, &mut chance, ticks),
         };
+        let materials = Materials::drawn(mixed, &terrain);
         // The paper's rule wants the whole way at once, and its ticks do not go on.
         let paper = chance.below(12) == 0 && supply == Supply::Held;
         let rule = if paper { Rule::Paper } else { Rule::Swept };
@@ -147,6 +176,7 @@ impl Scene {
             // By number, as the path.
             shading: [Shading::None, Shading::Smooth][(number / 2 % 2) as usize],
             texture: texture(mixed),
+            materials,
             shortcuts: true,
             twins: Twins::One(if paper { 0 } else { chance.below(6) }),
             seed: chance.bits(),
@@ -159,18 +189,10 @@ impl Scene {
         if surface == Surface::Smooth {
             return self;
         }
-        let mut chance = Chance::new(self.seed ^ 0xf71c_7104);
-        let dynamic_mu = [0.05, 0.3, 0.7, 2.0][chance.below(4)];
-        let static_mu = dynamic_mu * [1.0, 1.0, 1.3, 2.0][chance.below(4)];
-        let viscous_s = [0.0, 0.0, 0.003, 0.05][chance.below(4)];
-        let friction = Friction {
-            static_mu,
-            dynamic_mu,
-            viscous_s,
-        };
         Self {
             rule: Rule::Swept,
-            friction,
+            friction: friction(&mut Chance::new(self.seed ^ 0xf71c_7104)),
+            materials: self.materials.map(Materials::roughened),
             ..self
         }
     }
@@ -193,6 +215,7 @@ impl Scene {
             friction: Friction::NONE,
             shading: Shading::Smooth,
             texture: GRATING,
+            materials: None,
             shortcuts: true,
             twins: Twins::All,
             seed: 1,
@@ -252,22 +275,10 @@ impl Scene {
         Ok(all)
     }
 
-    /// Whether it feels the same a multiple of 32 cells away: a texture lies fast on the
-    /// terrain's cells.
+    /// Whether it feels the same a multiple of 32 cells away.
     #[must_use]
     pub fn is_textured_alike(&self) -> bool {
-        let Texture {
-            pattern,
-            wavelength_mm,
-            direction_deg,
-            ..
-        } = self.texture;
-        let fits = [0.25, 0.5, 1.0, 8.0, 32.0].contains(&wavelength_mm);
-        match pattern {
-            Pattern::None => true,
-            Pattern::Grain => false,
-            Pattern::Grating => fits && direction_deg == 0.0,
-        }
+        is_alike(&self.texture, 1.0)
     }
 
     /// The same settings over another terrain, with another path of the HIP.
@@ -276,6 +287,7 @@ impl Scene {
         Self {
             terrain,
             path,
+            materials: self.materials.clone(),
             ..*self
         }
     }
@@ -378,7 +390,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
 }
 
 /// A position in cells, shifted by whole ones.
-fn shifted(hip: [f64; 3], shift: [i32; 3]) -> GridPoint {
+pub(super) fn shifted(hip: [f64; 3], shift: [i32; 3]) -> GridPoint {
     let here = point(hip);
     let cell = here.cell();
     GridPoint::new([0, 1, 2].map(|i| cell[i] + shift[i]), here.frac())

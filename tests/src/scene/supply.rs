@@ -21,6 +21,11 @@ impl Buffers {
     pub fn new(side: usize) -> Self {
         Self(vec![Tile::VACANT; side * side + IN_FLIGHT])
     }
+
+    /// All of it.
+    pub(super) fn tiles(&mut self) -> &mut [Tile] {
+        &mut self.0
+    }
 }
 
 impl Default for Buffers {

@@ -6,6 +6,7 @@ use std::fmt;
 use hapterra_core::contact::WORK_PER_TICK;
 
 use crate::invariants::judge::Measured;
+use crate::invariants::material::Judged;
 use crate::scene::terrain::{KINDS, Kind};
 
 /// What came of one scene.
@@ -123,11 +124,29 @@ impl fmt::Display for Tally {
             f,
             "twins compared: {again} repeated, {shifted} shifted, {window} in another window, {turned} mirrored or turned"
         )?;
+        on_materials(f, &self.total())?;
         for (invariant, scenes) in &self.by_invariant {
             writeln!(f, "    {invariant}: {scenes} scenes")?;
         }
         Ok(())
     }
+}
+
+fn on_materials(f: &mut fmt::Formatter<'_>, m: &Measured) -> fmt::Result {
+    let Judged {
+        in_whole,
+        by_size,
+        open,
+        changing,
+        sliding,
+        rubbed,
+    } = m.on_materials;
+    let [window, shifted, turned] = m.twins_on_materials;
+    writeln!(
+        f,
+        "on materials: force judged in whole at {in_whole} points and by its size at {by_size}, {changing} of them while one changed, {rubbed} rubbed, {sliding} slid over a plane, {open} not judged\n\
+         twins on materials: {window} in another window, {shifted} shifted, {turned} mirrored or turned"
+    )
 }
 
 fn row(f: &mut fmt::Formatter<'_>, name: &str, m: &Measured) -> fmt::Result {

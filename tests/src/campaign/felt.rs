@@ -1,0 +1,163 @@
+//! What has to hold of the force that is told, whatever effects it is made with.
+
+use hapterra_core::Vec3;
+use hapterra_core::contact::ContactState;
+use hapterra_core::guard::{Limits, Mode};
+use hapterra_core::scene::Sample;
+
+use super::ground::Felt;
+
+/// From the beginning of a tick until its force acts, as a part of it
+/// ([`hapterra_firmware::amplifier::CURRENT_LOOP_US`]).
+const LATE: f32 = 0.11;
+/// Length of a tick, s.
+const TICK_S: f32 = 1e-3;
+/// What a contact may have given with the controller on, mJ: a hundredth of what a tap gives without
+/// (docs/effects.md).
+const GIVEN_MJ: f32 = 0.05;
+/// Rounding, as a part of a force, and N.
+const ROUNDING: f32 = 1e-4;
+/// Limits under which a force is another than the scene asks for.
+const NOT_AS_ASKED: Limits = Limits::SLEW_LIMITED
+    .union(Limits::SPEED_LIMITED)
+    .union(Limits::RAMPING)
+    .union(Limits::FADING)
+    .union(Limits::CLUTCH_OPEN)
+    .union(Limits::CLUTCH_MOVES);
+/// Limits under which a surface is no spring.
+const NO_SPRING: Limits = Limits::RAMPING
+    .union(Limits::FADING)
+    .union(Limits::SPEED_LIMITED)
+    .union(Limits::TERRAIN_MISSING)
+    .union(Limits::BOUNDARY_FADING);
+
+/// Watches what one scene feels like.
+pub struct FeltWatch {
+    felt: Felt,
+    cell_mm: f32,
+    last: Option<Sample>,
+    /// The force of the tick before that.
+    before_n: Vec3,
+    /// The contact under way, where all of it is known.
+    contact: Option<Touched>,
+    /// The most that a contact had given to the tip with the controller on, mJ.
+    pub most_given_mj: f32,
+    /// Ticks of such contacts.
+    pub watched_ticks: u64,
+}
+
+/// What a contact did so far.
+#[derive(Clone, Copy, Debug, Default)]
+struct Touched {
+    /// The work of its force at the tip, mJ.
+    given_mj: f32,
+    deepest_mm: f32,
+}
+
+impl FeltWatch {
+    /// Of a scene.
+    #[must_use]
+    pub fn new(felt: Felt, cell_mm: f32) -> Self {
+        Self {
+            felt,
+            cell_mm,
+            last: None,
+            before_n: Vec3::ZERO,
+            contact: None,
+            most_given_mj: 0.0,
+            watched_ticks: 0,
+        }
+    }
+
+    /// Another scene is felt from now on.
+    pub fn feels(&mut self, felt: Felt) {
+        self.felt = felt;
+        (self.last, self.contact) = (None, None);
+    }
+
+    /// Looks at a sample; `is_calm` where nothing has gone wrong for a while.
+    ///
+    /// # Errors
+    /// What must not be.
+    pub fn look(&mut self, sample: &Sample, is_calm: bool) -> Result<(), String> {
+        let is_asked = sample.mode == Mode::Armed && !sample.limits.intersects(NOT_AS_ASKED);
+        if is_asked && sample.state == ContactState::Touching {
+            let way_mm = sample.hip.to(&sample.proxy) * self.cell_mm;
+            self.is_small(sample, way_mm)?;
+            self.never_pulls(sample, way_mm)?;
+        }
+        self.gives_nothing(sample, is_calm)
+    }
+
+    /// No force is larger than the stiffest material makes of the depth.
+    fn is_small(&self, sample: &Sample, way_mm: Vec3) -> Result<(), String> {
+        let depth_mm = way_mm.length();
+        let [high_mm, steep] = self.felt.relief();
+        let stretch_mm = (depth_mm + high_mm.min(depth_mm)).hypot(steep * depth_mm);
+        let spring_n = self.felt.stiffest_n_per_mm() * stretch_mm;
+        let is_damped = self.felt.is_damped() || self.felt.is_controlled(LATE * TICK_S);
+        let most_n = if is_damped { 2.0 * spring_n } else { spring_n };
+        let force_n = sample.force_n.length();
+        match force_n <= most_n * (1.0 + ROUNDING) + ROUNDING {
+            true => Ok(()),
+            false => Err(format!(
+                "{force_n} N at {depth_mm} mm, at most {most_n}: {sample:?}"
+            )),
+        }
+    }
+
+    /// No force is against the way to the proxy: friction holds, and does not push. What shading
+    /// turns is turned by 60° at most.
+    fn never_pulls(&self, sample: &Sample, way_mm: Vec3) -> Result<(), String> {
+        let [high_mm, _] = self.felt.relief();
+        if high_mm > 0.0 && self.felt.is_shaded() {
+            return Ok(());
+        }
+        let along = sample.force_n.dot(way_mm);
+        let least = -ROUNDING * (way_mm.length() + 1e-3) * (sample.force_n.length() + 1e-3);
+        match along >= least {
+            true => Ok(()),
+            false => Err(format!("the force pulls along {way_mm}: {sample:?}")),
+        }
+    }
+
+    /// With the controller on no contact has given more than it got, at any time; but for what
+    /// a texture may.
+    fn gives_nothing(&mut self, sample: &Sample, is_calm: bool) -> Result<(), String> {
+        let last = self.last.replace(*sample);
+        let before_n =
+            std::mem::replace(&mut self.before_n, last.map_or(Vec3::ZERO, |s| s.force_n));
+        let last = last.filter(|last| last.tick.wrapping_add(1) == sample.tick);
+        let is_spring =
+            |sample: &Sample| sample.mode == Mode::Armed && !sample.limits.intersects(NO_SPRING);
+        let is_told = self.felt.is_spring() && self.felt.is_controlled(LATE * TICK_S) && is_calm;
+        let Some(last) = last.filter(|last| is_told && is_spring(last) && is_spring(sample)) else {
+            self.contact = None;
+            return Ok(());
+        };
+        let acted_n = last.force_n + (before_n - last.force_n) * LATE;
+        let work_mj = acted_n.dot(last.hip.to(&sample.hip)) * self.cell_mm;
+        let depth_mm = sample.hip.to(&sample.proxy).length() * self.cell_mm;
+        // A force that the guard lets go by and by belongs to the contact before.
+        let begins = last.state == ContactState::Free && last.force_n == Vec3::ZERO;
+        self.contact = match begins {
+            true => Some(Touched::default()),
+            false => self.contact,
+        }
+        .map(|so_far| Touched {
+            given_mj: so_far.given_mj + work_mj,
+            deepest_mm: so_far.deepest_mm.max(depth_mm),
+        });
+        let Some(contact) = self.contact else {
+            return Ok(());
+        };
+        self.watched_ticks += 1;
+        self.most_given_mj = self.most_given_mj.max(contact.given_mj);
+        let [high_mm, _] = self.felt.relief();
+        let textures = 2.0 * self.felt.stiffest_n_per_mm() * high_mm * contact.deepest_mm;
+        match contact.given_mj <= GIVEN_MJ + textures {
+            true => Ok(()),
+            false => Err(format!("the ground gave {contact:?}: {sample:?}")),
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! What the ground of a segment feels like: ice, or effects and materials drawn at random.
+
+use hapterra::materials::{ClassMaterial, Looks, Materials};
+use hapterra::raster::Raster;
+use hapterra_core::contact::Friction;
+use hapterra_core::force::{
+    Controller, Damping, ForceLaw, Material, MaterialTable, Pattern, Shading, Texture,
+};
+use hapterra_core::rate::TickRate;
+
+use crate::chance::Chance;
+
+/// Which ground a segment has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Ground {
+    /// The spring alone.
+    #[default]
+    Ice,
+    /// What the segment's number draws: friction, shading, texture, damping, the controller,
+    /// materials.
+    Drawn,
+}
+
+impl Ground {
+    /// What `cargo xtask campaign` has to be told for it, after a space.
+    #[must_use]
+    pub const fn option(self) -> &'static str {
+        match self {
+            Self::Ice => "",
+            Self::Drawn => " --effects",
+        }
+    }
+}
+
+/// The effects of a segment.
+#[derive(Clone, Debug)]
+pub struct Effects {
+    law: ForceLaw,
+    classes: Vec<Material>,
+    /// Samples of the terrain to a pixel of the classes.
+    pixel: u32,
+}
+
+impl Effects {
+    /// Those of a segment, by dice of its own.
+    #[must_use]
+    pub fn drawn(seed: u64, segment: u64) -> Self {
+        let mut chance = Chance::new(!seed ^ segment.wrapping_mul(0xd134_2543_de82_ef95));
+        let chance = &mut chance;
+        let controller = [Controller::Auto, Controller::On][chance.below(2)];
+        let stiffness_n_per_mm = match chance.below(2) {
+            0 => chance.between(0.3, 0.9),
+            // The controller is on, also by itself.
+            _ => chance.between(1.0, 2.0),
+        };
+        let default = material(chance, stiffness_n_per_mm as f32);
+        let law = ForceLaw {
+            max_force_n: [8.5, 8.5, 3.0][chance.below(3)],
+            shading: [Shading::None, Shading::None, Shading::Smooth][chance.below(3)],
+            ..default.law(&ForceLaw {
+                damping: Damping {
+                    controller,
+                    ..Damping::NONE
+                },
+                ..ForceLaw::PREMIUM
+            })
+        };
+        let classes = match chance.below(2) {
+            0 => 0,
+            _ => 1 + chance.below(MaterialTable::MOST - 1),
+        };
+        // Of one stiffness the ground is a spring, as far as energy goes.
+        let is_even = chance.below(2) == 0;
+        let mut class = |_| {
+            let times = match is_even {
+                true => 1.0,
+                false => [0.0, 0.2, 0.6, 1.0, 1.7][chance.below(5)],
+            };
+            material(chance, (stiffness_n_per_mm * times) as f32)
+        };
+        let classes = (0..classes).map(&mut class).collect();
+        let pixel = [1, 3, 10, 60][chance.below(4)];
+        Self {
+            law,
+            classes,
+            pixel,
+        }
+    }
+
+    /// The materials over a terrain, where there are some.
+    ///
+    /// # Panics
+    /// When the terrain has no samples.
+    #[must_use]
+    pub fn materials(&self, terrain: &Raster, samples: u32) -> Option<Materials> {
+        let count = self.classes.len() as u64;
+        if count == 0 {
+            return None;
+        }
+        let classes = Raster::from_fn(samples, samples, |column, row| {
+            let place = u64::from(column / self.pixel) << 32 | u64::from(row / self.pixel);
+            // One of them is none of the table's: the default.
+            (Chance::new(place).bits() % (count + 1)) as f32
+        });
+        let class = |(class, material): (i64, &Material)| ClassMaterial {
+            class,
+            name: None,
+            material: *material,
+        };
+        let looks = Looks {
+            default: Material::of(&self.law),
+            class: (1..).zip(&self.classes).map(class).collect(),
+        };
+        let over = ("terrain", terrain);
+        Materials::over(over, ("classes", classes.expect("classes")), looks).ok()
+    }
+
+    /// The law of a scene that is so many times as stiff.
+    #[must_use]
+    pub const fn law(&self, times: f32) -> ForceLaw {
+        ForceLaw {
+            stiffness_n_per_mm: self.law.stiffness_n_per_mm * times,
+            ..self.law
+        }
+    }
+}
+
+/// A material of such a stiffness.
+fn material(chance: &mut Chance, stiffness_n_per_mm: f32) -> Material {
+    let dynamic_mu = [0.0, 0.0, 0.2, 0.6, 1.5][chance.below(5)];
+    let friction = Friction {
+        dynamic_mu,
+        static_mu: dynamic_mu * [1.0, 1.0, 1.5][chance.below(3)],
+        viscous_s: [0.0, 0.0, 0.004][chance.below(3)],
+    };
+    let pattern = [
+        Pattern::None,
+        Pattern::None,
+        Pattern::Grain,
+        Pattern::Grating,
+    ];
+    let pattern = pattern[chance.below(4)];
+    let wavelength_mm = [0.5, 1.0, 2.5][chance.below(3)];
+    let texture = Texture {
+        pattern,
+        amplitude_mm: wavelength_mm * [0.02, 0.1][chance.below(2)],
+        wavelength_mm,
+        direction_deg: chance.between(-180.0, 180.0) as f32,
+        seed: chance.bits() as u32,
+    };
+    Material {
+        stiffness_n_per_mm,
+        friction,
+        damping_ns_per_m: [0.0, 0.0, 1.0, 4.0][chance.below(4)],
+        texture: match pattern {
+            Pattern::None => Texture::NONE,
+            _ => texture,
+        },
+    }
+}
+
+/// All that may be felt of a scene: a law of each of its materials.
+#[derive(Clone, Debug)]
+pub struct Felt {
+    laws: Vec<ForceLaw>,
+    hardest: ForceLaw,
+}
+
+impl Felt {
+    /// Of a law, and of a table where there is one.
+    #[must_use]
+    pub fn of(law: &ForceLaw, table: Option<&MaterialTable>) -> Self {
+        let Some(table) = table else {
+            let (laws, hardest) = (vec![*law], *law);
+            return Self { laws, hardest };
+        };
+        let default = table
+            .materials()
+            .first()
+            .map_or(law.stiffness_n_per_mm, |default| default.stiffness_n_per_mm);
+        let times = law.stiffness_n_per_mm / default;
+        let of = |one: &Material| ForceLaw {
+            stiffness_n_per_mm: one.stiffness_n_per_mm * times,
+            ..one.law(law)
+        };
+        Self {
+            laws: table.materials().iter().map(of).collect(),
+            hardest: table.hardest(law),
+        }
+    }
+
+    /// The stiffest of them, N/mm.
+    #[must_use]
+    pub fn stiffest_n_per_mm(&self) -> f32 {
+        self.laws
+            .iter()
+            .fold(0.0, |most, law| law.stiffness_n_per_mm.max(most))
+    }
+
+    /// Whether energy that the ticks create is taken back, on a device so late.
+    #[must_use]
+    pub fn is_controlled(&self, latency_s: f32) -> bool {
+        self.hardest.is_controlled(TickRate::DEFAULT, latency_s)
+    }
+
+    /// Whether its force is that of one spring: no shading turns it, which gives energy where
+    /// friction holds the proxy, and no material follows a softer one.
+    #[must_use]
+    pub fn is_spring(&self) -> bool {
+        let stiff = |law: &ForceLaw| law.stiffness_n_per_mm;
+        let is_one = self
+            .laws
+            .windows(2)
+            .all(|pair| stiff(&pair[0]) == stiff(&pair[1]));
+        is_one && !self.is_shaded()
+    }
+
+    /// Whether some of it is damped.
+    #[must_use]
+    pub fn is_damped(&self) -> bool {
+        self.laws.iter().any(|law| law.damping.ns_per_m > 0.0)
+    }
+
+    /// The highest texture, mm, and the steepest.
+    #[must_use]
+    pub fn relief(&self) -> [f32; 2] {
+        let relief = |most: [f32; 2], law: &ForceLaw| {
+            let texture = &law.texture;
+            if texture.is_none() {
+                return most;
+            }
+            let steep = std::f32::consts::TAU * texture.amplitude_mm / texture.wavelength_mm;
+            [most[0].max(texture.amplitude_mm), most[1].max(steep)]
+        };
+        self.laws.iter().fold([0.0; 2], relief)
+    }
+
+    /// Whether the force is turned by as much as shading turns it.
+    #[must_use]
+    pub fn is_shaded(&self) -> bool {
+        self.hardest.shading != Shading::None
+    }
+}

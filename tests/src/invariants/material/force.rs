@@ -1,0 +1,121 @@
+//! The force of a material in force, by docs/effects.md, in f64.
+
+use glam::DVec3;
+use hapterra_core::grid::GridPoint;
+
+use super::in_force::InForce;
+
+/// Rounding, as a part of a force.
+const ROUNDING: f64 = 1e-5;
+/// Forces below this, N, are not told from none.
+const LEAST_N: f64 = 1e-12;
+
+/// What a tick is felt with.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Felt<'p> {
+    /// From the HIP to the proxy, cells.
+    pub(super) way: DVec3,
+    /// By so much it may be off, cells.
+    pub(super) allowed: f64,
+    /// The proxy, where the textures are.
+    pub(super) proxy: &'p GridPoint,
+    /// The HIP's velocity, mm/s.
+    pub(super) velocity_mm_s: DVec3,
+    /// The scene's largest force, N.
+    pub(super) most_n: f64,
+    /// Millimetres a cell.
+    pub(super) cell_mm: f64,
+}
+
+/// A force, and by how much it may be off, N.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wanted {
+    /// The force.
+    pub(super) force_n: DVec3,
+    /// Its error.
+    pub(super) allowed_n: f64,
+}
+
+impl Felt<'_> {
+    /// The force where neither shading turns it nor a border fades it.
+    pub(super) fn force(&self, material: &InForce) -> Wanted {
+        let (mut stretch, mut allowed) = (self.way, self.allowed + ROUNDING * self.way.length());
+        if self.way.length() > LEAST_N
+            && let Some((judge, share)) = material.texture()
+        {
+            let added = judge.adds(self.way, self.proxy, share);
+            stretch += added.wanted * share;
+            // The relief turns with the way, and is at most twice as steep as that.
+            allowed += added.allowed + 2.0 * self.allowed;
+        }
+        let newtons = material.stiffness() * self.cell_mm;
+        let spring = shortened(stretch * newtons, self.most_n);
+        let unsure = material.unsure_stiffness() * self.cell_mm * stretch.length();
+        let allowed = 2.0 * allowed * newtons + unsure;
+        self.damped(material, spring, allowed)
+    }
+
+    /// The spring's force, damped along itself.
+    fn damped(&self, material: &InForce, spring: DVec3, allowed: f64) -> Wanted {
+        let (size, damping) = (spring.length(), 1e-3 * material.damping());
+        let rounding = allowed + ROUNDING * size + LEAST_N;
+        if damping == 0.0 || size <= LEAST_N {
+            let (force_n, allowed_n) = (spring, rounding.min(2.0 * self.most_n));
+            return Wanted { force_n, allowed_n };
+        }
+        let along = spring / size;
+        let against = (damping * self.velocity_mm_s.dot(along)).clamp(-size, size);
+        let force = shortened(spring - along * against, self.most_n);
+        // What is off of the spring's direction is off of the speed along it, and of the force.
+        let fast = damping * self.velocity_mm_s.length();
+        let turned = (rounding / size).min(2.0);
+        let allowed = (rounding + 2.0 * fast * (turned + ROUNDING)).min(3.0 * (size + rounding));
+        Wanted {
+            force_n: force,
+            allowed_n: (rounding + allowed).min(2.0 * self.most_n),
+        }
+    }
+
+    /// The least and the largest size of a force whose direction shading has turned; also of one
+    /// that fades, of which the least is nothing.
+    pub(super) fn sizes(&self, material: &InForce, fades: bool) -> [f64; 2] {
+        let depth = self.way.length();
+        let off = self.allowed + ROUNDING * depth;
+        let (mut least, mut most) = (depth - off, depth + off);
+        if depth > LEAST_N
+            && let Some((judge, share)) = material.texture()
+        {
+            let added = judge.adds(self.way, self.proxy, share);
+            let relief = judge.relief(self.proxy, depth);
+            let (rise, slope) = (share * relief.rise, share * relief.along);
+            let allowed = added.allowed + off;
+            least += rise - allowed;
+            most = (depth + rise.max(if fades { relief.amplitude } else { rise })).hypot(slope)
+                + off
+                + allowed;
+        }
+        let newtons = material.stiffness() * self.cell_mm;
+        let unsure = material.unsure_stiffness() * self.cell_mm;
+        let spring = |stretch: f64, newtons: f64| (stretch.max(0.0) * newtons).min(self.most_n);
+        let (least, most) = (
+            spring(least, newtons - unsure),
+            spring(most, newtons + unsure),
+        );
+        let fast = 1e-3 * material.damping() * self.velocity_mm_s.length();
+        let least = if fades { 0.0 } else { (least - fast).max(0.0) };
+        let most = (most + fast.min(most)).min(self.most_n);
+        [
+            least * (1.0 - ROUNDING) - LEAST_N,
+            most * (1.0 + ROUNDING) + LEAST_N,
+        ]
+    }
+}
+
+/// A vector, shortened where it is longer than this.
+fn shortened(vector: DVec3, most: f64) -> DVec3 {
+    let length = vector.length();
+    match length > most {
+        true => vector * (most / length),
+        false => vector,
+    }
+}

@@ -1,0 +1,220 @@
+//! Which material is in force, by docs/materials.md: the wanted one, and the even way to it.
+
+use hapterra_core::contact::{ContactState, Friction};
+use hapterra_core::force::Texture;
+use hapterra_core::grid::GridPoint;
+
+use crate::invariants::texture::TextureJudge;
+use crate::scene::materials::Materials;
+
+/// Ticks of a whole change: 0.1 s.
+const CHANGE: u32 = 100;
+/// Ticks after which nothing is left of a change: by the last places of a share that grows by a
+/// hundredth in each tick, next to nothing may be left of it after all of them.
+const OVER: u32 = CHANGE + 2;
+/// That part of it.
+const LEFT: f64 = 5e-6;
+/// Ticks in which a texture goes out, or comes in: half of that.
+const FADE: u32 = CHANGE / 2;
+
+/// What goes evenly from one material to the next: stiffness, static, dynamic and viscous
+/// friction, damping.
+type Numbers = [f64; 5];
+
+/// What may be in force.
+#[derive(Clone, Debug)]
+pub(super) struct InForce {
+    /// The class of the wanted one.
+    wanted: u8,
+    from: Numbers,
+    /// Ticks of the change so far.
+    done: u32,
+    numbers: Numbers,
+    /// The texture of which a share is felt, and so many of [`FADE`] parts of it.
+    texture: Texture,
+    parts: u32,
+    /// How fast the proxy goes over it.
+    judge: Option<TextureJudge>,
+    /// The share that this speed leaves.
+    speed_share: f64,
+    was_felt: bool,
+}
+
+impl InForce {
+    /// Before anything is felt: the default.
+    pub(super) fn default(materials: &Materials) -> Self {
+        let numbers = numbers(materials, 0);
+        let texture = materials.table[0].texture;
+        Self {
+            wanted: 0,
+            from: numbers,
+            done: OVER,
+            numbers,
+            texture,
+            parts: FADE,
+            judge: judge(&texture, materials.cell_mm),
+            speed_share: 0.0,
+            was_felt: false,
+        }
+    }
+
+    /// The class of the material that is wanted.
+    pub(super) const fn wanted(&self) -> u8 {
+        self.wanted
+    }
+
+    /// Newtons a millimetre.
+    pub(super) const fn stiffness(&self) -> f64 {
+        self.numbers[0]
+    }
+
+    /// By so much that may be off.
+    pub(super) fn unsure_stiffness(&self) -> f64 {
+        match self.done < OVER {
+            true => LEFT * (self.from[0] + self.numbers[0]),
+            false => 0.0,
+        }
+    }
+
+    /// N·s/m.
+    pub(super) const fn damping(&self) -> f64 {
+        self.numbers[4]
+    }
+
+    /// What holds the proxy in the next tick.
+    pub(super) fn friction(&self) -> Friction {
+        let [_, static_mu, dynamic_mu, viscous_s, _] = self.numbers.map(|number| number as f32);
+        Friction {
+            static_mu: static_mu.max(dynamic_mu),
+            dynamic_mu,
+            viscous_s,
+        }
+    }
+
+    /// The texture, if any, and how much of it is felt.
+    pub(super) fn texture(&self) -> Option<(&TextureJudge, f64)> {
+        let share = self.speed_share * f64::from(self.parts) / f64::from(FADE);
+        self.judge.as_ref().map(|judge| (judge, share))
+    }
+
+    /// Whether nothing more will change on this material.
+    pub(super) fn is_settled(&self) -> bool {
+        self.done >= OVER && self.parts == FADE
+    }
+
+    /// Whether it cannot be told from another one from now on.
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        let told = |one: &Self| (one.wanted, one.done, one.parts, one.was_felt);
+        let speed = |one: &Self| one.judge.as_ref().map_or(0.0, TextureJudge::speed);
+        let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * (1.0 + a.abs());
+        let pairs = |of: fn(&Self) -> &Numbers| of(self).iter().zip(of(other)).all(is_near);
+        told(self) == told(other)
+            && self.texture == other.texture
+            && (speed(self) - speed(other)).abs() < 1e-9
+            && pairs(|one| &one.numbers)
+            && (self.done >= OVER || pairs(|one| &one.from))
+    }
+
+    /// One more tick of a contact whose proxy has these classes nearest: what may be in force
+    /// after it. Two are nearest on the line half way between two samples.
+    pub(super) fn after(
+        &self,
+        materials: &Materials,
+        state: ContactState,
+        nearest: &[u8],
+        proxy: &GridPoint,
+    ) -> Vec<Self> {
+        let mut after = match state {
+            ContactState::Touching => {
+                let each = nearest.iter().flat_map(|class| self.on(*class, materials));
+                each.collect()
+            }
+            // What fades out does so as it was.
+            ContactState::Fading => vec![self.clone()],
+            ContactState::Waiting | ContactState::Free => vec![Self {
+                was_felt: false,
+                ..self.clone()
+            }],
+        };
+        for one in &mut after {
+            if let Some(judge) = &mut one.judge {
+                one.speed_share = judge.share(proxy);
+            }
+        }
+        after
+    }
+
+    /// A tick in which the proxy touches the ground of a class.
+    fn on(&self, class: u8, materials: &Materials) -> Vec<Self> {
+        let mut next = self.clone();
+        if class != self.wanted {
+            (next.wanted, next.from, next.done) = (class, self.numbers, 0);
+        }
+        let wanted = numbers(materials, class);
+        let texture = materials.table[usize::from(class)].texture;
+        if !self.was_felt {
+            (next.done, next.numbers, next.was_felt) = (OVER, wanted, true);
+            next.takes(&texture, materials.cell_mm, FADE);
+            return vec![next];
+        }
+        next.done = (next.done + 1).min(OVER);
+        let share = f64::from(next.done.min(CHANGE)) / f64::from(CHANGE);
+        next.numbers = std::array::from_fn(|i| next.from[i] + (wanted[i] - next.from[i]) * share);
+        next.fades(&texture, materials.cell_mm)
+    }
+
+    /// The old texture goes out, then the new one comes in.
+    fn fades(mut self, wanted: &Texture, cell_mm: f32) -> Vec<Self> {
+        if self.texture == *wanted {
+            self.parts = (self.parts + 1).min(FADE);
+            return vec![self];
+        }
+        let is_even = self.texture.pattern == Texture::NONE.pattern;
+        let left = self.parts.saturating_sub(1);
+        if left > 0 && !is_even {
+            self.parts = left;
+            return vec![self];
+        }
+        let mut other = self.clone();
+        other.takes(wanted, cell_mm, 0);
+        if is_even || self.parts == 0 {
+            return vec![other];
+        }
+        // By the last places of its share, the old one may have another tick, of nothing.
+        self.parts = 0;
+        vec![other, self]
+    }
+
+    fn takes(&mut self, texture: &Texture, cell_mm: f32, parts: u32) {
+        if self.texture != *texture {
+            self.judge = judge(texture, cell_mm);
+        }
+        (self.texture, self.parts) = (*texture, parts);
+    }
+}
+
+/// The numbers of a material, as stiff as the scene has it.
+fn numbers(materials: &Materials, class: u8) -> Numbers {
+    let table = &materials.table;
+    let scale = f64::from(materials.law.stiffness_n_per_mm / table[0].stiffness_n_per_mm);
+    let one = &table[usize::from(class)];
+    [
+        f64::from(one.stiffness_n_per_mm) * scale,
+        f64::from(one.friction.static_mu),
+        f64::from(one.friction.dynamic_mu),
+        f64::from(one.friction.viscous_s),
+        f64::from(one.damping_ns_per_m),
+    ]
+}
+
+/// A judge of a texture in cells.
+fn judge(texture: &Texture, cell_mm: f32) -> Option<TextureJudge> {
+    let is_some = texture.pattern != Texture::NONE.pattern;
+    is_some.then(|| {
+        TextureJudge::new(Texture {
+            amplitude_mm: texture.amplitude_mm / cell_mm,
+            wavelength_mm: texture.wavelength_mm / cell_mm,
+            ..*texture
+        })
+    })
+}

@@ -1,0 +1,310 @@
+//! What a loop feels of a scene with materials, judged by docs/materials.md and docs/effects.md.
+//!
+//! The judge knows the class of each sample itself, and follows in f64 what may be in force. Where
+//! a proxy lies on the line half way between two samples either class is right: then it follows
+//! both, until the force tells which one it is.
+
+mod force;
+mod in_force;
+mod slides;
+
+use glam::DVec3;
+use hapterra_core::Vec3;
+use hapterra_core::contact::{ContactOutput, ContactState, Rule};
+use hapterra_core::force::Shading;
+use hapterra_core::guard::Limits;
+use hapterra_core::scene::Sample;
+
+use super::judge::{Judge, Verdict};
+use super::seen::Seen;
+use super::{Invariant, Violation};
+use crate::scene::materials::Materials;
+use crate::scene::replayed::Replied;
+use crate::scene::run::Scene;
+use crate::scene::terrain::Kind;
+use force::Felt;
+use in_force::InForce;
+
+/// A place so near to the line half way between two samples has either class, cells.
+const HALF_WAY: f64 = 1e-6;
+/// So many different courses are followed at most.
+const FOLLOWED: usize = 256;
+/// Points a second: ticks.
+const RATE_HZ: f64 = 1e3;
+
+/// What a judge learned.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Judged {
+    /// Points in contact whose force was judged: in whole, and by its size.
+    pub in_whole: u64,
+    /// The same by its size alone: shading had turned it, or it faded.
+    pub by_size: u64,
+    /// Points in contact after too many courses were possible: those are not judged.
+    pub open: u64,
+    /// Points in contact at which another material was on its way in.
+    pub changing: u64,
+    /// Points at which a proxy slid over a plane.
+    pub sliding: u64,
+    /// Points in contact with friction.
+    pub rubbed: u64,
+}
+
+impl Judged {
+    /// Adds what another judge learned.
+    pub fn add(&mut self, other: &Self) {
+        self.in_whole += other.in_whole;
+        self.by_size += other.by_size;
+        self.open += other.open;
+        self.changing += other.changing;
+        self.sliding += other.sliding;
+        self.rubbed += other.rubbed;
+    }
+}
+
+/// Judges the points of one scene in turn.
+pub struct MaterialJudge<'g> {
+    place: Judge<'g>,
+    materials: &'g Materials,
+    kind: Kind,
+    shading: Shading,
+    shift: [i32; 3],
+    /// What may be in force; none where nobody knows.
+    courses: Vec<InForce>,
+    before: Option<Replied>,
+    point: usize,
+    /// What was learned.
+    pub judged: Judged,
+}
+
+impl<'g> MaterialJudge<'g> {
+    /// A judge of a scene that lies so many cells away.
+    #[must_use]
+    pub fn new(scene: &'g Scene, materials: &'g Materials, shift: [i32; 3]) -> Self {
+        Self {
+            place: Judge::new(&scene.terrain, Rule::Swept),
+            materials,
+            kind: scene.terrain.kind,
+            shading: scene.shading,
+            shift,
+            courses: vec![InForce::default(materials)],
+            before: None,
+            point: 0,
+            judged: Judged::default(),
+        }
+    }
+
+    /// Judges what was felt of the next point.
+    ///
+    /// # Errors
+    /// The first invariant that it breaks.
+    pub fn look(&mut self, replied: &Replied) -> Verdict {
+        let seen = seen(replied, self.shift);
+        self.is_bounded(replied)?;
+        self.place_is_right(&seen)?;
+        self.force_is_right(replied, &seen)?;
+        self.before = Some(*replied);
+        self.point += 1;
+        Ok(())
+    }
+
+    /// What holds of every force: its limit, and none without a contact.
+    fn is_bounded(&self, replied: &Replied) -> Verdict {
+        let (force, state) = (replied.sample.force_n.as_dvec3(), replied.sample.state);
+        let most = f64::from(self.materials.law.max_force_n);
+        let is_bounded = force.length() <= most * (1.0 + 1e-6);
+        let may_press = matches!(state, ContactState::Touching | ContactState::Fading);
+        if !is_bounded || !(may_press || force == DVec3::ZERO) {
+            return self.fail(
+                Invariant::Material,
+                format!("{force} N, {most} at most: {replied:?}"),
+            );
+        }
+        Ok(())
+    }
+
+    /// The proxy is where a friction of the place before lets it be.
+    fn place_is_right(&mut self, seen: &Seen) -> Verdict {
+        let touches = seen.felt.state == ContactState::Touching;
+        let is_open = self.courses.is_empty();
+        let mut is_rubbed = is_open;
+        let mut wrong = None;
+        let mut courses = std::mem::take(&mut self.courses);
+        courses.retain(|course| {
+            let friction = course.friction();
+            is_rubbed |= !friction.is_none();
+            let verdict = match friction.is_none() {
+                true => Ok(()),
+                false => self
+                    .place
+                    .is_held_by(friction, seen)
+                    .and_then(|()| self.slides(friction, seen)),
+            };
+            verdict.map_err(|violation| wrong = Some(violation)).is_ok()
+        });
+        self.judged.rubbed += u64::from(touches && is_rubbed && !is_open);
+        if let (true, Some(violation)) = (courses.is_empty(), wrong) {
+            return Err(violation);
+        }
+        self.courses = courses;
+        self.place.look_at_place(seen, is_rubbed)
+    }
+
+    /// The force is that of a course which is possible.
+    fn force_is_right(&mut self, replied: &Replied, seen: &Seen) -> Verdict {
+        let Sample { state, proxy, .. } = replied.sample;
+        let touches = state == ContactState::Touching;
+        // A place has one class, whichever of two that are equally near it is.
+        let stays = self
+            .before
+            .is_some_and(|before| before.sample.proxy == proxy);
+        let touched = self.is_touched_before();
+        let nearest = self.nearest(replied.proxy);
+        let mut next: Vec<InForce> = Vec::new();
+        let courses = std::mem::take(&mut self.courses);
+        let was_open = courses.is_empty();
+        for course in courses {
+            let own = [course.wanted()];
+            let is_own = stays && touched && nearest.contains(&own[0]);
+            let nearest = if is_own { &own[..] } else { &nearest };
+            for after in course.after(self.materials, state, nearest, &proxy) {
+                if !next.iter().any(|one| one.is_same(&after)) {
+                    next.push(after);
+                }
+            }
+        }
+        if touches {
+            self.keep_what_is_felt(&mut next, was_open, replied, seen)?;
+        }
+        if next.len() > FOLLOWED {
+            next.clear();
+        }
+        self.courses = next;
+        Ok(())
+    }
+
+    fn is_touched_before(&self) -> bool {
+        let state = self.before.map(|before| before.sample.state);
+        state == Some(ContactState::Touching)
+    }
+
+    /// Drops the courses with another force.
+    fn keep_what_is_felt(
+        &mut self,
+        courses: &mut Vec<InForce>,
+        was_open: bool,
+        replied: &Replied,
+        seen: &Seen,
+    ) -> Verdict {
+        self.judged.open += u64::from(was_open);
+        if was_open {
+            return Ok(());
+        }
+        let felt = self.felt(replied, seen);
+        let force = replied.sample.force_n.as_dvec3();
+        let fades = replied.sample.limits.contains(Limits::BOUNDARY_FADING);
+        let is_whole = !fades && self.shading == Shading::None;
+        let mut told = String::new();
+        let changing = courses.iter().any(|course| !course.is_settled());
+        courses.retain(|course| {
+            let (is_felt, wanted) = match is_whole {
+                true => {
+                    let wanted = felt.force(course);
+                    let is_felt = (force - wanted.force_n).length() <= wanted.allowed_n;
+                    (is_felt, format!("{wanted:?}"))
+                }
+                false => {
+                    let [least, most] = felt.sizes(course, fades);
+                    let is_felt = (least..=most).contains(&force.length());
+                    (is_felt, format!("{least} to {most} N"))
+                }
+            };
+            if !is_felt {
+                told = format!("{force} N of {}, {wanted} by {course:?}", force.length());
+            }
+            is_felt
+        });
+        if courses.is_empty() {
+            return self.fail(Invariant::Material, format!("{told}: {replied:?}"));
+        }
+        self.never_pulls(&felt, force, replied)?;
+        self.judged.changing += u64::from(changing);
+        self.judged.in_whole += u64::from(is_whole);
+        self.judged.by_size += u64::from(!is_whole);
+        Ok(())
+    }
+
+    /// Along the spring no force is against it. Shading turns it by 60° at most.
+    fn never_pulls(&self, felt: &Felt<'_>, force: DVec3, replied: &Replied) -> Verdict {
+        let (depth, size) = (felt.way.length(), force.length());
+        let is_even = self.materials.table.iter().all(|one| one.texture.is_none());
+        let least = match self.shading {
+            Shading::None => 0.0,
+            Shading::Smooth if is_even => 0.5,
+            Shading::Smooth => return Ok(()),
+        };
+        let off = (felt.allowed / depth).min(1.0) + 1e-4;
+        if depth > 0.0 && force.dot(felt.way) < (least - 2.0 * off) * depth * size {
+            let detail = format!("{force} N pulls along {}: {replied:?}", felt.way);
+            return self.fail(Invariant::Material, detail);
+        }
+        Ok(())
+    }
+
+    fn felt<'p>(&self, replied: &'p Replied, seen: &Seen) -> Felt<'p> {
+        let cell_mm = f64::from(self.materials.cell_mm);
+        let [hip, proxy] = [replied.hip, replied.proxy].map(DVec3::from_array);
+        let from = self.before.map_or(replied.hip, |before| before.hip);
+        Felt {
+            way: proxy - hip,
+            allowed: seen.allowed_in_space(self.place.terrain),
+            proxy: &replied.sample.proxy,
+            velocity_mm_s: (hip - DVec3::from_array(from)) * (cell_mm * RATE_HZ),
+            most_n: f64::from(self.materials.law.max_force_n),
+            cell_mm,
+        }
+    }
+
+    /// The classes of the samples that are nearest to a place, each once.
+    fn nearest(&self, [x, y, _]: [f64; 3]) -> Vec<u8> {
+        let along = |at: f64| {
+            let [low, high] = [-HALF_WAY, HALF_WAY].map(|off| (at + off + 0.5).floor() as i32);
+            low..=high
+        };
+        let mut classes: Vec<u8> = along(x)
+            .flat_map(|x| along(y).map(move |y| (x, y)))
+            .map(|(x, y)| self.materials.class(x, y))
+            .collect();
+        classes.sort_unstable();
+        classes.dedup();
+        classes
+    }
+
+    fn fail(&self, invariant: Invariant, detail: String) -> Verdict {
+        Err(Violation {
+            invariant,
+            tick: self.point,
+            detail,
+        })
+    }
+}
+
+/// The contact of a point, as other judges see it. Where all of the spring is felt, the
+/// displacement is the way to the proxy.
+fn seen(replied: &Replied, shift: [i32; 3]) -> Seen {
+    let Sample {
+        state, proxy, work, ..
+    } = replied.sample;
+    let way = DVec3::from_array(replied.proxy) - DVec3::from_array(replied.hip);
+    let felt = ContactOutput {
+        state,
+        proxy,
+        displacement: match state {
+            ContactState::Touching => way.as_vec3(),
+            _ => Vec3::ZERO,
+        },
+        converged: true,
+        missing_tile: None,
+        work,
+    };
+    Seen::new(replied.hip, felt, shift)
+}

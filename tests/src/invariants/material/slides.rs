@@ -1,0 +1,73 @@
+//! A proxy that slides over a plane, by docs/effects.md.
+
+use glam::DVec3;
+use hapterra_core::contact::{ContactState, Friction};
+use hapterra_core::guard::Limits;
+use hapterra_core::scene::Sample;
+
+use super::{MaterialJudge, RATE_HZ};
+use crate::invariants::Invariant;
+use crate::invariants::judge::Verdict;
+use crate::invariants::seen::Seen;
+use crate::invariants::surface::{Patch, distance};
+use crate::scene::terrain::Kind;
+
+/// Ways of a proxy in a tick by which its friction is told, and distances from the HIP, cells:
+/// friction over half a cell a tick is less exact (docs/effects.md).
+const SLIDES: std::ops::Range<f64> = 1e-4..0.5;
+const PRESSES: std::ops::Range<f64> = 1e-3..100.0;
+/// Part by which a proxy that trails by its speed may trail by more or less.
+const SLACK: f64 = 0.031;
+
+impl MaterialJudge<'_> {
+    /// On a plane a proxy that slides, not too fast, ends where as much pulls as friction holds.
+    pub(super) fn slides(&mut self, friction: Friction, seen: &Seen) -> Verdict {
+        let Some(before) = self.before else {
+            return Ok(());
+        };
+        let touches = |state| state == ContactState::Touching;
+        let moved = distance(before.proxy, seen.proxy);
+        let inside = |p: [f64; 3]| {
+            let size = self.place.terrain.size.map(f64::from);
+            (0..2).all(|axis| (1.0..size[axis] - 1.0).contains(&p[axis]))
+        };
+        let is_plane = matches!(self.kind, Kind::Flat | Kind::Slope);
+        let is_whole = |sample: &Sample| !sample.limits.contains(Limits::BOUNDARY_FADING);
+        let is_told = is_plane
+            && touches(before.sample.state)
+            && touches(seen.felt.state)
+            && is_whole(&before.sample)
+            && [before.proxy, seen.proxy, seen.hip].into_iter().all(inside)
+            && SLIDES.contains(&moved)
+            && PRESSES.contains(&distance(seen.proxy, seen.hip));
+        if !is_told {
+            return Ok(());
+        }
+        let [x, y, _] = seen.proxy;
+        let Some(patch) = Patch::at(self.place.terrain, [x.floor() as i32, y.floor() as i32])
+        else {
+            return Ok(());
+        };
+        let [east, north] = patch.slopes(x, y);
+        let normal = DVec3::new(-east, -north, 1.0).normalize();
+        let way = DVec3::from_array(seen.hip) - DVec3::from_array(seen.proxy);
+        let presses = -way.dot(normal);
+        // A HIP in the surface does not press, and friction does not act.
+        if presses < PRESSES.start {
+            return Ok(());
+        }
+        let pulls = (way - normal * way.dot(normal)).length();
+        let trails = f64::from(friction.viscous_s) * RATE_HZ * moved;
+        let held = f64::from(friction.dynamic_mu) * presses + trails;
+        self.judged.sliding += 1;
+        // The heights of a slope are rounded; places are, too.
+        let times = 1.0 + f64::from(friction.dynamic_mu + friction.viscous_s * RATE_HZ as f32);
+        let place = seen.allowed_in_space(self.place.terrain) * (1.0 + east.hypot(north));
+        let allowed = 1e-3 * held + SLACK * trails + 3e-4 * way.length() + 8.0 * times * place;
+        if (pulls - held).abs() > allowed {
+            let detail = format!("pulled by {pulls}, {held} is held by {friction:?}: {seen:?}");
+            return self.fail(Invariant::Slides, detail);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,272 @@
+//! Materials of a scene, drawn at random: a table, and the class of each sample.
+
+use hapterra_core::contact::Friction;
+use hapterra_core::force::{Damping, ForceLaw, Material, MaterialTable, Texture};
+
+use super::run::{friction, texture};
+use super::symmetry::Symmetry;
+use super::terrain::Terrain;
+use crate::chance::Chance;
+
+/// One scene in so many has materials.
+const EVERY: usize = 4;
+
+/// How the classes lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// All samples are of one.
+    One,
+    /// One in the west or south, another in the rest; often at a tile's border.
+    Halves,
+    /// Two in turns, from sample to sample.
+    Checker,
+    /// All of them in stripes.
+    Stripes,
+    /// Each sample by itself.
+    Each,
+    /// Patches of some samples.
+    Blobs,
+}
+
+/// All layouts.
+pub const LAYOUTS: [Layout; 6] = [
+    Layout::One,
+    Layout::Halves,
+    Layout::Checker,
+    Layout::Stripes,
+    Layout::Each,
+    Layout::Blobs,
+];
+
+/// What the ground of a scene is made of.
+#[derive(Clone, Debug)]
+pub struct Materials {
+    /// The materials, the default first.
+    pub table: Vec<Material>,
+    /// How the classes lie.
+    pub layout: Layout,
+    /// The scene's own law: a limit, and a stiffness that is the default's or a multiple.
+    pub law: ForceLaw,
+    /// Millimetres a cell: a power of two, so that lengths in cells are exact.
+    pub cell_mm: f32,
+    /// Samples each way.
+    size: [i32; 2],
+    /// The class of each sample, by rows from the south.
+    classes: Vec<u8>,
+    seed: u64,
+}
+
+impl Materials {
+    /// The materials of a scene, if it has some: one in four has.
+    pub(super) fn drawn(mixed: u64, terrain: &Terrain) -> Option<Self> {
+        // Their own dice, so that all else of a scene stays what it was.
+        let mut chance = Chance::new(mixed ^ 0x3a7e_71a1);
+        (chance.below(EVERY) == 0).then(|| Self::random(&mut chance, terrain))
+    }
+
+    fn random(chance: &mut Chance, terrain: &Terrain) -> Self {
+        let count = match chance.below(8) {
+            0 => 1,
+            1 | 2 => 2,
+            3 | 4 => MaterialTable::MOST,
+            _ => 1 + chance.below(MaterialTable::MOST),
+        };
+        let mut table: Vec<Material> = Vec::new();
+        for index in 0..count {
+            let material = material(chance, table.last());
+            table.push(match index {
+                // A default without stiffness is refused.
+                0 if material.stiffness_n_per_mm == 0.0 => Material {
+                    stiffness_n_per_mm: 0.5,
+                    ..material
+                },
+                _ => material,
+            });
+        }
+        let layout = LAYOUTS[chance.below(LAYOUTS.len())];
+        let scale = [1.0, 1.0, 0.5, 3.0][chance.below(4)];
+        let law = ForceLaw {
+            stiffness_n_per_mm: table[0].stiffness_n_per_mm * scale,
+            max_force_n: [8.5, 8.5, 1.0, 1e4][chance.below(4)],
+            ..ForceLaw::PREMIUM
+        };
+        let mut materials = Self {
+            table,
+            layout,
+            law,
+            cell_mm: [1.0, 1.0, 0.25, 4.0][chance.below(4)],
+            size: terrain.size.map(|patches| patches + 1),
+            classes: Vec::new(),
+            seed: chance.bits(),
+        };
+        let class_of = classes(layout, count, terrain.size, chance);
+        materials.lay(class_of);
+        materials
+    }
+
+    /// Materials whose classes follow from the sample.
+    #[must_use]
+    pub fn from_fn(table: &[Material], size: [i32; 2], class: impl Fn(i32, i32) -> u8) -> Self {
+        let mut materials = Self {
+            table: table.to_vec(),
+            layout: Layout::Each,
+            law: ForceLaw {
+                stiffness_n_per_mm: table[0].stiffness_n_per_mm,
+                ..ForceLaw::PREMIUM
+            },
+            cell_mm: 1.0,
+            size: size.map(|patches| patches + 1),
+            classes: Vec::new(),
+            seed: 1,
+        };
+        materials.lay(class);
+        materials
+    }
+
+    fn lay(&mut self, class: impl Fn(i32, i32) -> u8) {
+        let [columns, rows] = self.size;
+        let samples = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
+        self.classes = samples.map(|(x, y)| class(x, y)).collect();
+    }
+
+    /// The class of a sample: the place of its material in the table. Beyond the field it is the
+    /// default's.
+    #[must_use]
+    pub fn class(&self, x: i32, y: i32) -> u8 {
+        let [columns, rows] = self.size;
+        if !(0..columns).contains(&x) || !(0..rows).contains(&y) {
+            return 0;
+        }
+        self.classes[(y * columns + x) as usize]
+    }
+
+    /// The same ground with friction, which follows from the scene; some of it stays like ice.
+    #[must_use]
+    pub fn roughened(mut self) -> Self {
+        let mut chance = Chance::new(self.seed ^ 0xf71c_7104);
+        for material in &mut self.table {
+            material.friction = match chance.below(4) {
+                0 => Friction::NONE,
+                _ => friction(&mut chance),
+            };
+        }
+        self
+    }
+
+    /// The table as the device is told of it.
+    ///
+    /// # Panics
+    /// When it has none, or too many.
+    #[must_use]
+    pub fn told(&self) -> MaterialTable {
+        MaterialTable::new(&self.table).expect("as many as fit")
+    }
+
+    /// Whether no material knows friction.
+    #[must_use]
+    pub fn is_like_ice(&self) -> bool {
+        self.table.iter().all(|one| one.friction.is_none())
+    }
+
+    /// The ground seen from another side.
+    #[must_use]
+    pub fn seen_by(&self, symmetry: Symmetry) -> Self {
+        let [columns, rows] = self.size;
+        let mut turned = Self {
+            size: match symmetry.transpose {
+                true => [rows, columns],
+                false => self.size,
+            },
+            ..self.clone()
+        };
+        turned.lay(|x, y| {
+            let (x, y) = if symmetry.transpose { (y, x) } else { (x, y) };
+            let x = if symmetry.mirror_x {
+                columns - 1 - x
+            } else {
+                x
+            };
+            let y = if symmetry.mirror_y { rows - 1 - y } else { y };
+            self.class(x, y)
+        });
+        turned
+    }
+}
+
+/// A material; now and then with the texture of the one before.
+fn material(chance: &mut Chance, before: Option<&Material>) -> Material {
+    let own = texture(chance.bits());
+    let shared = before.map_or(Texture::NONE, |before| before.texture);
+    Material {
+        stiffness_n_per_mm: match chance.below(16) {
+            0 => 0.0,
+            1..8 => [0.02, 0.5, 0.5, 0.6, 1.0, 5.0][chance.below(6)],
+            _ => 10_f64.powf(chance.between(-2.0, 0.7)) as f32,
+        },
+        friction: Friction::NONE,
+        damping_ns_per_m: [0.0, 0.0, 0.0, 1.0, 5.0, Damping::MOST_NS_PER_M][chance.below(6)],
+        texture: [own, own, own, shared][chance.below(4)],
+    }
+}
+
+/// Which class a sample has, in a field of so many patches.
+fn classes(
+    layout: Layout,
+    count: usize,
+    size: [i32; 2],
+    chance: &mut Chance,
+) -> Box<dyn Fn(i32, i32) -> u8> {
+    let mut any = || chance.below(count) as u8;
+    let (one, other) = (any(), any());
+    let east = chance.below(2) == 0;
+    let along = move |x: i32, y: i32| if east { x } else { y };
+    match layout {
+        Layout::One => Box::new(move |_, _| one),
+        Layout::Halves => {
+            let patches = along(size[0], size[1]);
+            let border = match chance.below(2) {
+                0 => patches / 64 * 32 + [0, 1][chance.below(2)],
+                _ => chance.below(patches as usize) as i32,
+            };
+            Box::new(move |x, y| if along(x, y) < border { one } else { other })
+        }
+        Layout::Checker => Box::new(move |x, y| if (x + y) & 1 == 0 { one } else { other }),
+        Layout::Stripes => {
+            let width = [1, 2, 5, 16, 32][chance.below(5)];
+            let count = count as i32;
+            Box::new(move |x, y| (along(x, y) / width % count) as u8)
+        }
+        Layout::Each => {
+            let seed = chance.bits();
+            Box::new(move |x, y| dice(seed, x, y).below(count) as u8)
+        }
+        Layout::Blobs => {
+            let (seed, side) = (chance.bits(), [3, 8, 20][chance.below(3)]);
+            Box::new(move |x, y| blob(seed, side, [x, y]).below(count) as u8)
+        }
+    }
+}
+
+/// The dice of a place.
+fn dice(seed: u64, x: i32, y: i32) -> Chance {
+    let place = u64::from(x.cast_unsigned()) << 32 | u64::from(y.cast_unsigned());
+    Chance::new(seed ^ place.wrapping_mul(0x9e37_79b9_7f4a_7c15))
+}
+
+/// The dice of the blob in which a sample lies: each square of so many samples has a middle
+/// somewhere, and a sample belongs to the nearest one.
+fn blob(seed: u64, side: i32, [x, y]: [i32; 2]) -> Chance {
+    let (col, row) = (x.div_euclid(side), y.div_euclid(side));
+    let squares = (-1..=1).flat_map(|north| (-1..=1).map(move |east| (col + east, row + north)));
+    let nearest = squares.min_by(|a, b| {
+        let far = |(col, row): &(i32, i32)| {
+            let mut chance = dice(seed, *col, *row);
+            let mut middle = |at: i32| f64::from(side) * (f64::from(at) + chance.between(0.0, 1.0));
+            let (east, north) = (middle(*col), middle(*row));
+            (east - f64::from(x)).hypot(north - f64::from(y))
+        };
+        far(a).total_cmp(&far(b))
+    });
+    let (col, row) = nearest.unwrap_or((col, row));
+    dice(!seed, col, row)
+}
