@@ -249,6 +249,26 @@ fn the_demo_and_run_feel_materials_too() {
 }
 
 #[test]
+fn no_view_makes_one_of_the_materials_stiffer_than_a_view_may_be() {
+    // The default has 0.5 N/mm and rock 1.0.
+    let folder = Folder::new();
+    let run = ["run", "level.asc", "--device", "native", "--seconds", "3"];
+    let said = |factor: &str| {
+        folder.write("steps.txt", &format!("at 1 stiffness {factor}\n"));
+        let (_, said) =
+            folder.hapterra(&[&run[..], &["--commands", "steps.txt"], &MATERIALS].concat());
+        said
+    };
+    let refused = said("1.5");
+    assert!(
+        refused.contains("the stiffest of the materials would have 1.500 N/mm"),
+        "{refused}"
+    );
+    let softer = said("0.8");
+    assert!(!softer.contains("would have"), "{softer}");
+}
+
+#[test]
 fn what_cannot_be_laid_over_the_terrain_is_told_with_what_to_do() {
     let folder = Folder::new();
     let fails = |materials: &str, table: &str, wanted: &[&str]| {

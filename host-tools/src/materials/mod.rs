@@ -10,6 +10,7 @@ mod pixels;
 pub mod table;
 
 use std::hash::Hasher as _;
+use std::path::Path;
 use std::sync::OnceLock;
 
 use hapterra_core::force::{ForceLaw, Material, MaterialTable};
@@ -19,6 +20,7 @@ use serde::{Deserialize, Serialize};
 use twox_hash::XxHash64;
 
 use crate::raster::{Raster, ReferenceSystem};
+use crate::remote::{is_url, without_key};
 use crate::terrain::{FeltGrid, fingerprint};
 pub use ground::BadGround;
 use pixels::Pixels;
@@ -87,10 +89,12 @@ impl Materials {
         (file, classes): (&str, Raster),
         looks: Looks,
     ) -> Result<Self, BadGround> {
-        let pixels = Pixels::over(terrain, (file, classes))?;
+        // Recordings and messages have the name.
+        let file = without_key(Path::new(file));
+        let pixels = Pixels::over(terrain, (&file, classes))?;
         let table = looks.table().ok_or(BadGround::TooMany(looks.class.len()))?;
         Ok(Self {
-            file: file.to_owned(),
+            file,
             pixels,
             looks,
             table,
@@ -98,7 +102,7 @@ impl Materials {
         })
     }
 
-    /// The file of classes, as it was named.
+    /// The file of classes, as it was named, but for the key of a URL.
     #[must_use]
     pub fn file(&self) -> &str {
         &self.file
@@ -179,9 +183,14 @@ impl Materials {
     }
 
     /// What the ground of a terrain is made of, for a line to be read: the materials that were found at
-    /// some hundred places, and how many of these have the default.
+    /// some hundred places, and how many of these have the default. Of a file at a URL nothing is
+    /// fetched for it.
     #[must_use]
     pub fn told(&self, grid: &FeltGrid<'_>) -> String {
+        if is_url(&self.file) {
+            let count = self.looks.class.len();
+            return format!("{count} classes in the table; the file is read where it is touched");
+        }
         let mut found = [0_u32; MaterialTable::MOST];
         let place =
             |i: u32, count: u32| (f64::from(i) + 0.5) / f64::from(LOOKED_AT) * f64::from(count - 1);
@@ -199,9 +208,12 @@ impl Materials {
             None => format!("class {}", class.class),
         });
         let names = names.collect::<Vec<_>>().join(", ");
-        let percent = 100.0 * f64::from(found[0]) / f64::from(LOOKED_AT * LOOKED_AT);
+        let places = LOOKED_AT * LOOKED_AT;
+        let percent = 100.0 * f64::from(found[0]) / f64::from(places);
         match (names.is_empty(), found[0]) {
-            (true, _) => "the default everywhere: no class of the table was found".to_owned(),
+            (true, _) => {
+                format!("the default: no class of the table was found at {places} places looked at")
+            }
             (false, 0) => names,
             (false, _) => format!("{names}; the default on {percent:.0} %"),
         }

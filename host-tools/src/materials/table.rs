@@ -14,6 +14,7 @@
 //! what the default does not state is as the options say.
 
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -22,6 +23,8 @@ use toml::Spanned;
 /// Most classes that a table names: with the default, as many materials as a device has room
 /// for.
 pub const MOST_CLASSES: usize = 15;
+/// A longer file is no table, bytes.
+const LARGEST: u64 = 1 << 20;
 
 /// What a table says of one material; nothing where it says nothing.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -119,10 +122,21 @@ impl TableFile {
     /// # Errors
     /// [`BadTable`], with the line.
     pub fn open(file: &Path) -> Result<Self, BadTable> {
-        let text = std::fs::read_to_string(file).map_err(|why| BadTable::Unreadable {
+        let unreadable = |why| BadTable::Unreadable {
             file: file.to_owned(),
             why,
-        })?;
+        };
+        let opened = std::fs::File::open(file).map_err(unreadable)?;
+        let mut text = String::new();
+        // A file of another kind is not read whole before it is refused.
+        let mut bounded = opened.take(LARGEST + 1);
+        bounded.read_to_string(&mut text).map_err(unreadable)?;
+        if text.len() as u64 > LARGEST {
+            return Err(BadTable::NoTable {
+                file: file.to_owned(),
+                why: format!("a table of 16 materials has no more than {LARGEST} bytes"),
+            });
+        }
         Self::read(file, &text)
     }
 
@@ -195,6 +209,18 @@ mod tests {
         assert_eq!((classes, lines), (vec![-3, 10], vec![9, 5]));
         assert_eq!(table.classes[1].2.texture, Some(TextureName::Grain));
         assert_eq!(read("").expect("nothing is said"), TableFile::default());
+    }
+
+    #[test]
+    fn a_file_that_is_no_table_is_not_read_to_its_end() {
+        let file = tempfile::NamedTempFile::new().expect("a file");
+        // All holes: it takes no room.
+        file.as_file().set_len(1 << 40).expect("sparse");
+        let why = TableFile::open(file.path()).expect_err("a terabyte");
+        assert!(
+            why.to_string().contains("no more than 1048576 bytes"),
+            "{why}"
+        );
     }
 
     #[test]

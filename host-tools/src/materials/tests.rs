@@ -187,3 +187,21 @@ fn what_cannot_be_laid_over_a_terrain_is_told() {
     let bad = over(&unplaced, unplaced.clone(), looks(&many));
     assert!(matches!(bad, Err(BadGround::TooMany(16))));
 }
+
+#[test]
+fn the_key_of_a_url_is_in_no_recording_and_in_no_message() {
+    let utm = Some(32632);
+    let terrain = raster((61, 61), [500_000.0, 5_000_000.0], 10.0, utm, |_, _| 1.0);
+    let at = |x: f64| {
+        let classes = raster((9, 9), [x, 5_000_000.0], 37.0, utm, |_, _| 10.0);
+        let url = "https://me:PASS@host/c.tif?sig=KEY";
+        Materials::over(("t.tif", &terrain), (url, classes), looks(&[10]))
+    };
+    let materials = at(500_000.0).expect("they overlap");
+    assert_eq!(materials.file(), "https://host/c.tif");
+    // Nothing is fetched to tell what is where.
+    let grid = FeltGrid::new(&terrain, FeltCells::Stored);
+    assert!(materials.told(&grid).contains("read where it is touched"));
+    let apart = at(900_000.0).expect_err("elsewhere").to_string();
+    assert!(apart.contains("https://host/c.tif lies"), "{apart}");
+}

@@ -76,6 +76,11 @@ pub enum ChangeError {
         "a stiffness of {0:.3} N/mm: from {SOFTEST_N_PER_MM} to {STIFFEST_N_PER_MM} N/mm can be had"
     )]
     Stiffness(f32),
+    /// The same of a material of the scene.
+    #[error(
+        "the stiffest of the materials would have {0:.3} N/mm: up to {STIFFEST_N_PER_MM} N/mm can be had"
+    )]
+    Material(f32),
     /// Numbers that no terrain can be felt at.
     #[error(transparent)]
     Terrain(#[from] TerrainError),
@@ -225,6 +230,14 @@ impl Bounds {
                     return Err(ChangeError::Stiffness(stiffness));
                 }
                 law.stiffness_n_per_mm = stiffness;
+                // Other materials of the scene become as much stiffer.
+                if let Some(materials) = grid.materials() {
+                    let stiffest = |law| materials.table().hardest(law).stiffness_n_per_mm;
+                    let (now, first) = (stiffest(law), stiffest(&self.first.law));
+                    if now > STIFFEST_N_PER_MM.max(first) {
+                        return Err(ChangeError::Material(now));
+                    }
+                }
             }
             ViewChange::Reset => {
                 let first = &self.first.view;

@@ -3,6 +3,8 @@
 
 use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 
+use super::bounded::Bounded;
+
 /// Bytes of comments that are looked at, at most: settings take less than two thousand.
 const LONGEST: usize = 1 << 16;
 /// A mark that some editors put before the first byte.
@@ -12,13 +14,13 @@ const MARK: &[u8] = b"\xef\xbb\xbf";
 /// its beginning.
 pub(super) struct Again<R> {
     head: Cursor<Vec<u8>>,
-    rest: BufReader<R>,
+    rest: BufReader<Bounded<R>>,
 }
 
 /// Reads the comments before the first line that is none. Returns them without their `#`
 /// and a space after it, and the stream as if nothing had been read.
 pub(super) fn split<R: Read>(stream: R) -> io::Result<(String, Again<R>)> {
-    let mut rest = BufReader::with_capacity(1 << 16, stream);
+    let mut rest = BufReader::with_capacity(1 << 16, Bounded::new(stream));
     let (mut head, mut comments) = (Vec::new(), String::new());
     while head.len() < LONGEST {
         let from = head.len();
@@ -63,7 +65,10 @@ const MOST: usize = 1 << 24;
 /// after it; other remarks are passed over, and so is one that no row follows: whoever wrote it
 /// may have been killed in the middle.
 pub(super) fn views(stream: impl Read) -> io::Result<String> {
-    let (mut reader, mut line) = (BufReader::with_capacity(1 << 16, stream), Vec::new());
+    let (mut reader, mut line) = (
+        BufReader::with_capacity(1 << 16, Bounded::new(stream)),
+        Vec::new(),
+    );
     let (mut found, mut block) = (String::new(), String::new());
     let (mut is_view, mut was_comment) = (false, true);
     while found.len() < MOST {

@@ -3,6 +3,7 @@
 //! Lengths are millimetres of the arm's tip over the felt terrain: x east, y north, z up,
 //! origin at the south-west sample at height zero.
 
+mod bounded;
 mod comments;
 mod csv;
 mod fault;

@@ -1,0 +1,61 @@
+//! A stream of lines none of which is endless: a file of another kind, or a device, has no line
+//! that ends.
+
+use std::io::{self, Read, Seek, SeekFrom};
+
+/// A line of more bytes is none; rows take some hundred.
+const LONGEST: usize = 1 << 20;
+
+/// A stream that fails where a line goes on and on.
+pub(super) struct Bounded<R> {
+    stream: R,
+    /// Bytes since the last line ended.
+    open: usize,
+}
+
+impl<R> Bounded<R> {
+    pub(super) const fn new(stream: R) -> Self {
+        Self { stream, open: 0 }
+    }
+}
+
+impl<R: Read> Read for Bounded<R> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let read = self.stream.read(into)?;
+        let bytes = into.get(..read).unwrap_or_default();
+        self.open = match bytes.iter().rposition(|byte| *byte == b'\n') {
+            Some(end) => read - end - 1,
+            None => self.open + read,
+        };
+        if self.open > LONGEST {
+            let why = format!("a line of more than {LONGEST} bytes: this is no CSV");
+            return Err(io::Error::new(io::ErrorKind::InvalidData, why));
+        }
+        Ok(read)
+    }
+}
+
+impl<R: Seek> Seek for Bounded<R> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.open = 0;
+        self.stream.seek(to)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_pass_and_an_endless_one_does_not() {
+        let line = [&[b'1'; LONGEST][..], b"\n"].concat();
+        let mut whole = Vec::new();
+        let mut lines = Bounded::new(io::Cursor::new(line.repeat(3)));
+        assert_eq!(
+            lines.read_to_end(&mut whole).expect("lines"),
+            3 * line.len()
+        );
+        let error = Bounded::new(io::repeat(0)).read_to_end(&mut whole);
+        assert!(error.expect_err("endless").to_string().contains("no CSV"));
+    }
+}
