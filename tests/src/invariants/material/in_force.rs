@@ -30,6 +30,8 @@ pub(super) struct InForce {
     /// Ticks of the change so far.
     done: u32,
     numbers: Numbers,
+    /// By so much the stiffness may have been off when the change began, N/mm.
+    unsure: f64,
     /// The texture of which a share is felt, and so many of [`FADE`] parts of it.
     texture: Texture,
     parts: u32,
@@ -50,6 +52,7 @@ impl InForce {
             from: numbers,
             done: OVER,
             numbers,
+            unsure: 0.0,
             texture,
             parts: FADE,
             judge: judge(&texture, materials.cell_mm),
@@ -71,9 +74,17 @@ impl InForce {
     /// By so much that may be off.
     pub(super) fn unsure_stiffness(&self) -> f64 {
         match self.done < OVER {
-            true => LEFT * (self.from[0] + self.numbers[0]),
+            true => self.unsure + LEFT * (self.from[0] + self.numbers[0]),
             false => 0.0,
         }
+    }
+
+    /// Whether friction may hold the proxy in the next tick: it does as long as something is left of
+    /// a change from it.
+    pub(super) fn may_rub(&self) -> bool {
+        let [_, was_static, was_dynamic, was_viscous, _] = self.from;
+        let was_rough = was_static + was_dynamic + was_viscous > 0.0;
+        !self.friction().is_none() || (self.done < OVER && was_rough)
     }
 
     /// N·s/m.
@@ -148,6 +159,7 @@ impl InForce {
     fn on(&self, class: u8, materials: &Materials) -> Vec<Self> {
         let mut next = self.clone();
         if class != self.wanted {
+            next.unsure = self.unsure_stiffness();
             (next.wanted, next.from, next.done) = (class, self.numbers, 0);
         }
         let wanted = numbers(materials, class);
