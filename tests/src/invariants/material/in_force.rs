@@ -30,8 +30,8 @@ pub(super) struct InForce {
     /// Ticks of the change so far.
     done: u32,
     numbers: Numbers,
-    /// By so much the stiffness may have been off when the change began, N/mm.
-    unsure: f64,
+    /// By so much the numbers may have been off when the change began.
+    unsure: Numbers,
     /// The texture of which a share is felt, and so many of [`FADE`] parts of it.
     texture: Texture,
     parts: u32,
@@ -52,7 +52,7 @@ impl InForce {
             from: numbers,
             done: OVER,
             numbers,
-            unsure: 0.0,
+            unsure: [0.0; 5],
             texture,
             parts: FADE,
             judge: judge(&texture, materials.cell_mm),
@@ -73,9 +73,15 @@ impl InForce {
 
     /// By so much that may be off.
     pub(super) fn unsure_stiffness(&self) -> f64 {
+        self.unsure_numbers()[0]
+    }
+
+    fn unsure_numbers(&self) -> Numbers {
         match self.done < OVER {
-            true => self.unsure + LEFT * (self.from[0] + self.numbers[0]),
-            false => 0.0,
+            true => {
+                std::array::from_fn(|i| self.unsure[i] + LEFT * (self.from[i] + self.numbers[i]))
+            }
+            false => [0.0; 5],
         }
     }
 
@@ -90,6 +96,11 @@ impl InForce {
     /// N·s/m.
     pub(super) const fn damping(&self) -> f64 {
         self.numbers[4]
+    }
+
+    /// By so much that may be off.
+    pub(super) fn unsure_damping(&self) -> f64 {
+        self.unsure_numbers()[4]
     }
 
     /// What holds the proxy in the next tick.
@@ -159,7 +170,7 @@ impl InForce {
     fn on(&self, class: u8, materials: &Materials) -> Vec<Self> {
         let mut next = self.clone();
         if class != self.wanted {
-            next.unsure = self.unsure_stiffness();
+            next.unsure = self.unsure_numbers();
             (next.wanted, next.from, next.done) = (class, self.numbers, 0);
         }
         let wanted = numbers(materials, class);
