@@ -229,13 +229,17 @@ pub fn same_way(
 /// Whether a shaded force points the same way. A place that is off by as much as rounding
 /// allows turns it by less than this, rad, on ground that mirrored scenes are compared on.
 const TURNED: f32 = 0.01;
+/// A force of a HIP that is farther away is not compared, cells.
+const FAR: f32 = 1e4;
 
 fn is_shaded_likewise(scene: &Scene, symmetry: Symmetry, a: &Seen, b: &Seen) -> bool {
     let (Some(one), Some(other)) = (a.shaded, b.shaded) else {
         return true;
     };
-    let short = a.felt.displacement.length() < 0.1;
-    if short || !scene.friction.is_none() || a.felt.state != b.felt.state {
+    // So far away all that is near the proxy is equally near, and each place has its own normal.
+    let length = a.felt.displacement.length();
+    let is_told = (0.1..FAR).contains(&length);
+    if !is_told || !scene.friction.is_none() || a.felt.state != b.felt.state {
         return true;
     }
     let tip = one.displacement.as_dvec3().to_array();

@@ -58,7 +58,9 @@ impl Felt<'_> {
     /// The spring's force, damped along itself.
     fn damped(&self, material: &InForce, spring: DVec3, allowed: f64) -> Wanted {
         let (size, damping) = (spring.length(), 1e-3 * material.damping());
-        let rounding = allowed + ROUNDING * size + LEAST_N;
+        let fast_mm_s = self.velocity_mm_s.length();
+        let unsure = (1e-3 * material.unsure_damping() * fast_mm_s).min(size);
+        let rounding = allowed + ROUNDING * size + unsure + LEAST_N;
         if damping == 0.0 || size <= LEAST_N {
             let (force_n, allowed_n) = (spring, rounding.min(2.0 * self.most_n));
             return Wanted { force_n, allowed_n };
@@ -67,7 +69,7 @@ impl Felt<'_> {
         let against = (damping * self.velocity_mm_s.dot(along)).clamp(-size, size);
         let force = shortened(spring - along * against, self.most_n);
         // What is off of the spring's direction is off of the speed along it, and of the force.
-        let fast = damping * self.velocity_mm_s.length();
+        let fast = damping * fast_mm_s;
         let turned = (rounding / size).min(2.0);
         let allowed = (rounding + 2.0 * fast * (turned + ROUNDING)).min(3.0 * (size + rounding));
         Wanted {
@@ -101,7 +103,8 @@ impl Felt<'_> {
             spring(least, newtons - unsure),
             spring(most, newtons + unsure),
         );
-        let fast = 1e-3 * material.damping() * self.velocity_mm_s.length();
+        let damping = material.damping() + material.unsure_damping();
+        let fast = 1e-3 * damping * self.velocity_mm_s.length();
         let least = if fades { 0.0 } else { (least - fast).max(0.0) };
         let most = (most + fast.min(most)).min(self.most_n);
         [

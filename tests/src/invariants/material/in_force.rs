@@ -30,6 +30,8 @@ pub(super) struct InForce {
     /// Ticks of the change so far.
     done: u32,
     numbers: Numbers,
+    /// By so much the numbers may have been off when the change began.
+    unsure: Numbers,
     /// The texture of which a share is felt, and so many of [`FADE`] parts of it.
     texture: Texture,
     parts: u32,
@@ -50,6 +52,7 @@ impl InForce {
             from: numbers,
             done: OVER,
             numbers,
+            unsure: [0.0; 5],
             texture,
             parts: FADE,
             judge: judge(&texture, materials.cell_mm),
@@ -70,15 +73,34 @@ impl InForce {
 
     /// By so much that may be off.
     pub(super) fn unsure_stiffness(&self) -> f64 {
+        self.unsure_numbers()[0]
+    }
+
+    fn unsure_numbers(&self) -> Numbers {
         match self.done < OVER {
-            true => LEFT * (self.from[0] + self.numbers[0]),
-            false => 0.0,
+            true => {
+                std::array::from_fn(|i| self.unsure[i] + LEFT * (self.from[i] + self.numbers[i]))
+            }
+            false => [0.0; 5],
         }
+    }
+
+    /// Whether friction may hold the proxy in the next tick: it does as long as something is left of
+    /// a change from it.
+    pub(super) fn may_rub(&self) -> bool {
+        let [_, was_static, was_dynamic, was_viscous, _] = self.from;
+        let was_rough = was_static + was_dynamic + was_viscous > 0.0;
+        !self.friction().is_none() || (self.done < OVER && was_rough)
     }
 
     /// N·s/m.
     pub(super) const fn damping(&self) -> f64 {
         self.numbers[4]
+    }
+
+    /// By so much that may be off.
+    pub(super) fn unsure_damping(&self) -> f64 {
+        self.unsure_numbers()[4]
     }
 
     /// What holds the proxy in the next tick.
@@ -148,6 +170,7 @@ impl InForce {
     fn on(&self, class: u8, materials: &Materials) -> Vec<Self> {
         let mut next = self.clone();
         if class != self.wanted {
+            next.unsure = self.unsure_numbers();
             (next.wanted, next.from, next.done) = (class, self.numbers, 0);
         }
         let wanted = numbers(materials, class);

@@ -131,7 +131,7 @@ impl<'g> MaterialJudge<'g> {
         let mut courses = std::mem::take(&mut self.courses);
         courses.retain(|course| {
             let friction = course.friction();
-            is_rubbed |= !friction.is_none();
+            is_rubbed |= course.may_rub();
             let verdict = match friction.is_none() {
                 true => Ok(()),
                 false => self
