@@ -9,7 +9,7 @@ use hapterra_core::force::{ForceLaw, Material};
 use super::rendering::Rendering;
 use super::terrain_file::ReadingOptions;
 use super::texture::{SurfacePattern, SurfaceTexture};
-use crate::cli::failure::{Failure, OrHint};
+use crate::cli::failure::{Failure, Hint, OrHint};
 use crate::materials::table::{Look, TableFile, TextureName};
 use crate::materials::{ClassMaterial, Looks, Materials};
 use crate::raster::{Raster, files_read_with};
@@ -64,7 +64,7 @@ impl SurfaceMaterials {
                     .or_hint("name a table with --material-table; docs/worldcover.toml is one");
             }
         };
-        let classes = Raster::open(&file, &reading.of_classes())?;
+        let classes = Raster::open(&file, &reading.of_classes()).map_err(of_classes)?;
         let name = file.display().to_string();
         Ok(Some(Materials::over(terrain, (&name, classes), looks)?))
     }
@@ -104,6 +104,15 @@ impl Rendering {
         .into_iter()
         .find_map(|(option, is_given)| is_given.then_some(option))
     }
+}
+
+/// What went wrong with a file of classes: hints for heights work out numbers between those of the
+/// file, and of classes there are none.
+fn of_classes(error: crate::raster::Error) -> Failure {
+    let hint = error.hint().replace("-r bilinear", "-r near");
+    let hint = hint.replace("-r average", "-r mode");
+    let hint = hint.replace(" -ot Float32", "");
+    Failure::new(error).hint(hint)
 }
 
 /// What a table says, with what the options say besides.
@@ -250,6 +259,19 @@ mod tests {
             ..usual
         };
         assert!(read("[class.1]\nfriction = 0.3", &paper).is_err());
+    }
+
+    #[test]
+    fn no_hint_makes_classes_of_those_between_them() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, cell) in [("a.asc", 10.0), ("b.asc", 17.0)] {
+            let header = format!("ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize {cell}\n");
+            let text = header + "10 80 10\n80 10 80\n";
+            std::fs::write(folder.path().join(name), text).expect("written");
+        }
+        let error = Raster::open(folder.path(), &Default::default()).expect_err("two grids");
+        let told = of_classes(error).text();
+        assert!(told.contains("gdalwarp -r near -dstnodata"), "{told}");
     }
 
     #[test]
