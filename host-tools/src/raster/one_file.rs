@@ -64,7 +64,9 @@ fn decode_plain(
         return or_by_gdal(decode_as(format, input, options), input, options);
     }
     // A header beside a file tells more than the file's extension.
-    if let Some(decoded) = guarded("raw", || headered::decode_by_header(input, options))? {
+    if !headered::is_of_another_kind(head)
+        && let Some(decoded) = guarded("raw", || headered::decode_by_header(input, options))?
+    {
         return Ok(decoded);
     }
     let format = by_extension(input.extension());

@@ -31,6 +31,23 @@ pub(super) const FORMAT: Format = Format {
     },
 };
 
+/// Whether a file begins as one of a kind that has no plain samples: a header of the same name
+/// beside it is that of another file.
+pub(in crate::raster) fn is_of_another_kind(head: &[u8]) -> bool {
+    const BEGINNINGS: [&[u8]; 7] = [
+        b"SQLite format 3\0",
+        b"EHFA_HEADER_TAG",
+        b"PK\x03\x04",
+        b"%PDF-",
+        b"\xff\xd8\xff\xe0",
+        b"\xff\xd8\xff\xe1",
+        b"\x1f\x8b\x08",
+    ];
+    BEGINNINGS
+        .iter()
+        .any(|beginning| head.starts_with(beginning))
+}
+
 /// Sets what a header says besides the layout of the samples.
 type Describe = Box<dyn FnOnce(&mut Decoded) -> Result<(), BadRaster>>;
 

@@ -147,6 +147,22 @@ fn envi_data_has_any_name() {
     }
 }
 
+/// A folder may have a database or a picture of the name that a header has.
+#[test]
+fn a_file_of_another_kind_has_no_samples_by_a_header_beside_it() {
+    let header = "ENVI\nsamples = 2\nlines = 2\nbands = 1\ndata type = 1\n";
+    for (data, bytes) in [
+        ("f.gpkg", &b"SQLite format 3\0 and more"[..]),
+        ("f.img", b"EHFA_HEADER_TAG\0 and more"),
+        ("f.jpg", b"\xff\xd8\xff\xe0\0\x10JFIF"),
+    ] {
+        let opened = Pair::new(data, bytes, "f.hdr", header).open(None);
+        assert!(opened.is_err(), "{data}");
+        let named_so = Pair::new("f.bil", bytes, "f.hdr", header).open(None);
+        assert!(named_so.is_ok(), "by its name it is samples");
+    }
+}
+
 /// GTOPO30's `.DEM` is such an image, though USGS' models have the same extension.
 #[test]
 fn a_header_beside_wins_over_the_extension() {
