@@ -175,15 +175,17 @@ impl<'g> Judge<'g> {
         Ok(())
     }
 
-    /// Judges whether the proxy of the next tick is where a friction lets it be.
+    /// Judges whether the proxy of the next tick is where a friction lets it be that is known to lie
+    /// between two.
     ///
     /// # Errors
     /// [`Invariant::Cone`] and [`Invariant::Stuck`].
-    pub fn is_held_by(&mut self, friction: Friction, seen: &Seen) -> Verdict {
-        self.friction = friction;
+    pub fn is_held_by(&mut self, [least, most]: [Friction; 2], seen: &Seen) -> Verdict {
+        self.friction = most;
         if seen.is_touching() {
             self.is_in_cone(seen)?;
         }
+        self.friction = least;
         let still = self.still;
         let verdict = match self.before {
             Some(before) => self.sticks(&before, seen),

@@ -105,7 +105,17 @@ impl InForce {
 
     /// What holds the proxy in the next tick.
     pub(super) fn friction(&self) -> Friction {
-        let [_, static_mu, dynamic_mu, viscous_s, _] = self.numbers.map(|number| number as f32);
+        self.friction_of(|i| self.numbers[i])
+    }
+
+    /// The least and the most that it may be.
+    pub(super) fn frictions(&self) -> [Friction; 2] {
+        let unsure = self.unsure_numbers();
+        [-1.0, 1.0].map(|sign| self.friction_of(|i| (self.numbers[i] + sign * unsure[i]).max(0.0)))
+    }
+
+    fn friction_of(&self, number: impl Fn(usize) -> f64) -> Friction {
+        let [static_mu, dynamic_mu, viscous_s] = [1, 2, 3].map(|i| number(i) as f32);
         Friction {
             static_mu: static_mu.max(dynamic_mu),
             dynamic_mu,

@@ -136,8 +136,8 @@ impl<'g> MaterialJudge<'g> {
                 true => Ok(()),
                 false => self
                     .place
-                    .is_held_by(friction, seen)
-                    .and_then(|()| self.slides(friction, seen)),
+                    .is_held_by(course.frictions(), seen)
+                    .and_then(|()| self.slides(course, seen)),
             };
             verdict.map_err(|violation| wrong = Some(violation)).is_ok()
         });

@@ -1,10 +1,11 @@
 //! A proxy that slides over a plane, by docs/effects.md.
 
 use glam::DVec3;
-use hapterra_core::contact::{ContactState, Friction};
+use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::Sample;
 
+use super::in_force::InForce;
 use super::{MaterialJudge, RATE_HZ};
 use crate::invariants::Invariant;
 use crate::invariants::judge::Verdict;
@@ -21,7 +22,8 @@ const SLACK: f64 = 0.031;
 
 impl MaterialJudge<'_> {
     /// On a plane a proxy that slides, not too fast, ends where as much pulls as friction holds.
-    pub(super) fn slides(&mut self, friction: Friction, seen: &Seen) -> Verdict {
+    pub(super) fn slides(&mut self, course: &InForce, seen: &Seen) -> Verdict {
+        let (friction, [_, most]) = (course.friction(), course.frictions());
         let Some(before) = self.before else {
             return Ok(());
         };
@@ -63,7 +65,9 @@ impl MaterialJudge<'_> {
         // The heights of a slope are rounded; places are, too.
         let times = 1.0 + f64::from(friction.dynamic_mu + friction.viscous_s * RATE_HZ as f32);
         let place = seen.allowed_in_space(self.place.terrain) * (1.0 + east.hypot(north));
-        let allowed = 1e-3 * held + SLACK * trails + 3e-4 * way.length() + 8.0 * times * place;
+        let left = f64::from(most.viscous_s - friction.viscous_s) * RATE_HZ * moved;
+        let allowed =
+            left + 1e-3 * held + SLACK * trails + 3e-4 * way.length() + 8.0 * times * place;
         if (pulls - held).abs() > allowed {
             let detail = format!("pulled by {pulls}, {held} is held by {friction:?}: {seen:?}");
             return self.fail(Invariant::Slides, detail);
