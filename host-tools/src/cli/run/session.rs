@@ -131,7 +131,7 @@ impl<'t> Serving<'_, 't> {
         // What was recorded is kept, however it ended, and before anything else is done.
         let log = watch.finish();
         let kept = log.kept.or_hint(OTHER_FILE);
-        let ended = told(end.why, end.disarmed, &tell);
+        let ended = told(end.why, end.disarmed, &tell).and(came(log.stood_still));
         interrupt::device_may_be_armed(name, false);
         let summary = SessionSummary {
             ticks: log.ticks,
@@ -147,6 +147,16 @@ impl<'t> Serving<'_, 't> {
             shown.end(|line| speaker.say(line));
         }
         ended.and(kept)
+    }
+}
+
+/// Terrain that does not come ends a virtual arm's session; a real arm feels what is held.
+fn came(stood_still: bool) -> Result<(), Failure> {
+    match stood_still {
+        false => Ok(()),
+        true => Err("the virtual arm has waited a minute for terrain that did not come").or_hint(
+            "try again when its server answers; what went wrong with the file is said above",
+        ),
     }
 }
 

@@ -22,6 +22,9 @@ use crate::serving::Onlooker;
 use crate::telemetry::{Figures, SampleLog};
 use crate::terrain::Terrain;
 
+/// The clock of a virtual arm waits for terrain that the host owes. After so long without a tick
+/// that terrain does not come any more.
+const STANDS_STILL: Duration = Duration::from_secs(60);
 /// Between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(2);
 
@@ -29,6 +32,8 @@ const LINE_EVERY: Duration = Duration::from_secs(2);
 pub(super) struct Watch<'t> {
     log: SampleLog<'t>,
     stop_s: f64,
+    /// When the last tick of a virtual arm was told of.
+    ticked: Option<Instant>,
     /// The latest sample and its row.
     latest: Option<(Sample, Record)>,
     recording: Option<Recording>,
@@ -47,6 +52,8 @@ pub(super) struct Seen<'t> {
     /// Ticks run since the scene was taken.
     pub(super) ticks: u64,
     pub(super) figures: Figures,
+    /// The clock of the virtual arm stood still at the end.
+    pub(super) stood_still: bool,
     /// The way to the viewer, where there is one.
     pub(super) shown: Option<Shown<'t>>,
     /// Whether the recording, where there is one, is complete and in its place.
@@ -69,6 +76,7 @@ impl<'t> Watch<'t> {
         Self {
             log: SampleLog::new(placed.terrain, device),
             stop_s: args.seconds.unwrap_or(f64::MAX).min(script_s),
+            ticked: placed.tour.as_ref().map(|_| Instant::now()),
             latest: None,
             recording,
             failed: None,
@@ -90,6 +98,7 @@ impl<'t> Watch<'t> {
     pub(super) fn finish(self) -> Seen<'t> {
         self.speaker.status(None);
         let (ticks, figures) = (self.log.ticks(), self.log.figures());
+        let stood_still = self.stands_still();
         let kept = match (self.failed, self.recording) {
             (Some(error), _) => Err(error),
             (None, Some(recording)) => recording.finish(),
@@ -99,8 +108,14 @@ impl<'t> Watch<'t> {
             shown: self.shown,
             ticks,
             figures,
+            stood_still,
             kept,
         }
+    }
+
+    fn stands_still(&self) -> bool {
+        self.ticked
+            .is_some_and(|ticked| ticked.elapsed() >= STANDS_STILL)
     }
 
     fn record(&mut self, sample: &Sample) -> Record {
@@ -142,6 +157,10 @@ impl<'t> Onlooker<'t> for Watch<'t> {
             shown.on_event(&event);
         }
         if let Event::Sample(sample) = event {
+            // The last ticks, in which the arm is disarmed, are not what it waited for.
+            if !self.stands_still() {
+                self.ticked = self.ticked.map(|_| Instant::now());
+            }
             self.latest = Some((*sample, self.record(sample)));
         }
     }
@@ -189,7 +208,7 @@ impl<'t> Onlooker<'t> for Watch<'t> {
     }
 
     fn is_over(&self) -> bool {
-        self.failed.is_some() || self.log.t_s() >= self.stop_s
+        self.failed.is_some() || self.log.t_s() >= self.stop_s || self.stands_still()
     }
 }
 
