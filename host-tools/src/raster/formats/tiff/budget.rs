@@ -26,8 +26,9 @@ pub(super) fn check_memory(layout: &Layout) -> Result<(), BadRaster> {
     }
 }
 
-/// Checks the promised size against the bytes that are stored for it.
-pub(super) fn check(layout: &Layout, file_bytes: u64) -> Result<(), BadRaster> {
+/// Checks the promised size against the bytes that are stored for it. Where samples stay in the
+/// file no room is made for its holes.
+pub(super) fn check(layout: &Layout, file_bytes: u64, stays: bool) -> Result<(), BadRaster> {
     let (columns, rows) = (u64::from(layout.columns), u64::from(layout.rows));
     let absurd = |why: &str| BadRaster::AbsurdSize(format!("{columns} × {rows} samples {why}"));
     let stored = layout
@@ -48,12 +49,12 @@ pub(super) fn check(layout: &Layout, file_bytes: u64) -> Result<(), BadRaster> {
         return Err(absurd("in rows longer than the file could hold"));
     }
     let missing = stored.iter().filter(|&&bytes| bytes == 0).count();
-    let holes = if missing == 0 {
-        0
-    } else {
-        let chunk = u128::from(layout.chunk.0) * u128::from(layout.chunk.1) * texel;
-        let room = promised.min(in_file) * u128::from(SPARSE_RATIO);
-        (missing as u128 * chunk).min(room.max(u128::from(SPARSE_FLOOR)))
+    let chunk = u128::from(layout.chunk.0) * u128::from(layout.chunk.1) * texel;
+    let left_out = missing as u128 * chunk;
+    let room = promised.min(in_file) * u128::from(SPARSE_RATIO);
+    let holes = match stays {
+        true => left_out,
+        false => left_out.min(room.max(u128::from(SPARSE_FLOOR))),
     };
     if image > promised.saturating_add(holes) {
         return Err(absurd("are more than the bytes in its index can hold"));

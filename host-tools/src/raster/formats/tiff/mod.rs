@@ -64,7 +64,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     if !stays {
         budget::check_memory(&layout)?;
     }
-    budget::check(&layout, input.len())?;
+    budget::check(&layout, input.len(), stays)?;
     let format = layout.described(file.byte_order());
     let size = (layout.columns, layout.rows);
     let mask_file = find_appended(input, "msk")?;
