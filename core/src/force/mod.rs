@@ -1,6 +1,7 @@
 //! From proxy and haptic interface point to newtons.
 
 mod damping;
+mod depth;
 mod effects;
 mod in_force;
 mod material;
@@ -8,6 +9,7 @@ pub mod passivity;
 mod relief;
 mod shading;
 mod texture;
+mod texturer;
 mod yielding;
 
 use glam::Vec3;
@@ -22,7 +24,8 @@ pub(crate) use effects::{Effects, FeltWith};
 pub use material::{MATERIAL_CHANGE_S, Material, MaterialTable};
 pub(crate) use passivity::Moment;
 pub use shading::{Shader, Shading};
-pub use texture::{Pattern, Texture, Texturer};
+pub use texture::{Pattern, Texture};
+pub use texturer::Texturer;
 
 /// The spring between the haptic interface point (HIP) and the proxy (paper
 /// §4.3.4), the limit of what it may ask for, and what holds the proxy back. Immutable while a tick runs.

@@ -13,10 +13,11 @@
 
 use glam::Vec3;
 
+use super::depth::Depth;
 use super::yielding::Yielding;
 use super::{FeltWith, ForceLaw};
 use crate::rate::TickRate;
-use crate::scalar::{larger, root, smaller};
+use crate::scalar::{larger, smaller};
 
 /// Least damping of a hand that holds the tip, N·s/mm.
 const HAND_NS_PER_MM: f32 = 0.5e-3;
@@ -108,29 +109,6 @@ pub(crate) struct Moment {
     pub(crate) most_n: f32,
 }
 
-/// How deep a tip is, and how it moves along the force.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Depth {
-    pub(super) mm: f32,
-    /// How fast the depth becomes less.
-    pub(super) leaves_mm_s: f32,
-}
-
-impl Depth {
-    fn of(now: &Moment) -> Self {
-        let mm = root(now.displacement_mm.length_squared());
-        let along = now.velocity_mm_s.dot(now.displacement_mm);
-        let leaves_mm_s = if mm > 0.0 { along / mm } else { 0.0 };
-        Self { mm, leaves_mm_s }
-    }
-
-    /// What is left of it after a time in which the tip goes on as it does. Beyond the surface
-    /// there is none.
-    fn after_mm(&self, seconds: f32) -> f32 {
-        larger(self.mm - self.leaves_mm_s * seconds, 0.0)
-    }
-}
-
 impl Passivity {
     pub(super) fn new(law: &ForceLaw, felt: &FeltWith) -> Self {
         let tick_s = felt.rate.tick_s();
@@ -174,7 +152,7 @@ impl Passivity {
     /// force has acted for a tick, all but the work of that force. Energy that was lost gives no
     /// credit.
     pub(super) fn observe(&mut self, law: &ForceLaw, now: &Moment) {
-        let depth = Depth::of(now);
+        let depth = Depth::of(now.displacement_mm, now.velocity_mm_s);
         self.yielding.observe(law, &depth, now.most_n, self.tick_s);
         self.asked.add(now.asked_n);
         let (whole, part) = self.late;

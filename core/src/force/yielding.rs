@@ -8,7 +8,7 @@
 //! back what it got.
 
 use super::ForceLaw;
-use super::passivity::Depth;
+use super::depth::Depth;
 use crate::guard::MAX_SLEW_N_PER_S;
 use crate::scalar::smaller;
 

@@ -5,6 +5,7 @@ use std::vec::Vec;
 use super::*;
 use crate::cases::cases;
 use crate::contact::{Contact, ContactSettings};
+use crate::force::Pattern;
 use crate::terrain::{FieldSize, FieldStorage};
 
 const RATE: TickRate = TickRate::DEFAULT;

@@ -1,0 +1,29 @@
+//! How deep a tip is.
+
+use glam::Vec3;
+
+use crate::scalar::{larger, root};
+
+/// How deep a tip is, and how it moves along the force.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Depth {
+    pub(super) mm: f32,
+    /// How fast the depth becomes less.
+    pub(super) leaves_mm_s: f32,
+}
+
+impl Depth {
+    /// Of a tip that is displaced from its proxy, at a velocity.
+    pub(super) fn of(displacement_mm: Vec3, velocity_mm_s: Vec3) -> Self {
+        let mm = root(displacement_mm.length_squared());
+        let along = velocity_mm_s.dot(displacement_mm);
+        let leaves_mm_s = if mm > 0.0 { along / mm } else { 0.0 };
+        Self { mm, leaves_mm_s }
+    }
+
+    /// What is left of it after a time in which the tip goes on as it does. Beyond the surface
+    /// there is none.
+    pub(super) fn after_mm(&self, seconds: f32) -> f32 {
+        larger(self.mm - self.leaves_mm_s * seconds, 0.0)
+    }
+}

@@ -1,0 +1,145 @@
+//! Texture: a micro-relief on the surface, felt by the force while the proxy stays where it is
+//! (Minsky 1990; Ho, Basdogan and Srinivasan 1999).
+//!
+//! The force is scaled by as much as the relief adds to the depth, and the relief's slope adds
+//! a part along the surface. Where the surface is read less than four times a wave, that would
+//! be another wave than the one that is asked for: the texture fades before.
+
+use glam::Vec3;
+
+use super::relief::Relief;
+use super::texture::{Texture, WHOLE};
+use crate::grid::GridPoint;
+use crate::rate::TickRate;
+use crate::scalar::{larger, one_over_root, smaller};
+
+/// Part of a wavelength in a tick from which on nothing of the texture is felt.
+const GONE: f32 = 0.25;
+/// The depth, times the amplitude, in squares of the wavelength, beyond which the part along the
+/// surface grows no more. So its stiffness is at most that of the surface: heights bend by
+/// at most 48 amplitudes a wavelength squared.
+const DEEPEST: f32 = 1.0 / 48.0;
+/// Speed of a proxy that was elsewhere before, or nowhere, wavelengths a tick.
+const JUMP: f32 = 1.0;
+/// How fast the speed falls, 1/s: encoders tell a slow hand's speed in jumps.
+const FORGETS_PER_S: f32 = 100.0;
+
+/// The texture of one scene at one rate.
+#[derive(Clone, Copy, Debug)]
+pub struct Texturer {
+    relief: Relief,
+    /// Cells.
+    amplitude: f32,
+    /// Cells.
+    deepest: f32,
+    waves_per_cell: f32,
+    /// What a tick leaves of the speed that was above.
+    keeps: f32,
+    /// The proxy's speed, wavelengths a tick.
+    speed: f32,
+    before: Option<GridPoint>,
+}
+
+impl Texturer {
+    /// Of a scene with cells of such a size; one without texture has none, and one with cells
+    /// that cannot carry it neither.
+    #[must_use]
+    pub fn of(texture: &Texture, cell_mm: f32, rate: TickRate) -> Option<Self> {
+        if texture.is_none() || !texture.fits(cell_mm) {
+            return None;
+        }
+        let waves_per_cell = cell_mm / texture.wavelength_mm;
+        let deepest_mm =
+            DEEPEST * texture.wavelength_mm * (texture.wavelength_mm / texture.amplitude_mm);
+        Some(Self {
+            relief: Relief::of(texture, waves_per_cell),
+            amplitude: texture.amplitude_mm / cell_mm,
+            deepest: deepest_mm / cell_mm,
+            waves_per_cell,
+            keeps: 1.0 - FORGETS_PER_S * rate.tick_s(),
+            speed: 0.0,
+            before: None,
+        })
+    }
+
+    /// The displacement of a tick in cells, which is also what the spring stretches by, with the
+    /// texture at the proxy. Never pulls: along `displacement` the result is not negative.
+    ///
+    /// ```
+    /// use hapterra_core::Vec3;
+    /// use hapterra_core::force::{Pattern, Texture, Texturer};
+    /// use hapterra_core::grid::GridPoint;
+    /// use hapterra_core::rate::TickRate;
+    ///
+    /// let grating = Texture {
+    ///     pattern: Pattern::Grating,
+    ///     amplitude_mm: 0.1,
+    ///     wavelength_mm: 2.0,
+    ///     ..Texture::NONE
+    /// };
+    /// let mut texturer = Texturer::of(&grating, 1.0, TickRate::DEFAULT).expect("textured");
+    /// // A millimetre deep on a crest, a quarter of a wave from the origin.
+    /// let crest = GridPoint::new([0; 3], Vec3::X * 0.5);
+    /// let felt = (0..200).map(|_| texturer.add(Vec3::Z, &crest)).last().expect("ticks");
+    /// assert!((felt - Vec3::Z * 1.1).length() < 1e-6);
+    /// ```
+    pub fn add(&mut self, displacement: Vec3, proxy: &GridPoint) -> Vec3 {
+        let share = self.share_at(proxy);
+        self.with_share(displacement, proxy, share)
+    }
+
+    /// The same with a part of the texture only, from 0 to 1.
+    // Apart, so that a texture that is felt whole costs no more.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn add_part(&mut self, displacement: Vec3, proxy: &GridPoint, part: f32) -> Vec3 {
+        let share = self.share_at(proxy);
+        self.with_share(displacement, proxy, share * part)
+    }
+
+    #[inline]
+    fn with_share(&self, displacement: Vec3, proxy: &GridPoint, share: f32) -> Vec3 {
+        let squared = displacement.length_squared();
+        // Nothing is felt, or the texture is too fast.
+        if !squared.is_normal() || share == 0.0 {
+            return displacement;
+        }
+        let one_over_depth = one_over_root(squared);
+        let (depth, normal) = (squared * one_over_depth, displacement * one_over_depth);
+        let amplitude = share * self.amplitude;
+        let rise = self.relief.at(proxy);
+        let [east, north] = rise.slopes;
+        let slopes = Vec3::new(east, north, 0.0) * amplitude;
+        let along = slopes - normal * slopes.dot(normal);
+        let times = 1.0 + amplitude * rise.height / larger(depth, self.amplitude);
+        // By the last places, it might be below.
+        let times = larger(times, 0.0);
+        displacement * times - along * smaller(depth, self.deepest)
+    }
+
+    /// Takes the proxy's place in a tick; how much of the texture is felt there.
+    fn share_at(&mut self, proxy: &GridPoint) -> f32 {
+        let now = match &self.before {
+            Some(before) => {
+                let way = before.to(proxy) * self.waves_per_cell;
+                let squared = way.x * way.x + way.y * way.y;
+                match squared.is_normal() {
+                    // A jump is no speed: it is forgotten as soon as any that is too fast.
+                    true => smaller(squared * one_over_root(squared), JUMP),
+                    false => 0.0,
+                }
+            }
+            None => JUMP,
+        };
+        self.before = Some(*proxy);
+        // At once where it rises; where it falls, by and by.
+        self.speed = now + larger(0.0, self.speed - now) * self.keeps;
+        let left = (GONE - self.speed) / (GONE - WHOLE);
+        let left = left.clamp(0.0, 1.0);
+        left * left * (3.0 - 2.0 * left)
+    }
+}
+
+#[cfg(test)]
+#[path = "texturer_tests.rs"]
+mod tests;
