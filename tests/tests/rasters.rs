@@ -390,6 +390,30 @@ fn every_tiff_reads_the_same_in_blocks_as_at_once() {
     assert!(files > 20, "{files}");
 }
 
+/// Whoever runs out of memory is to know why, and what to do.
+#[test]
+fn a_large_file_that_is_read_as_a_whole_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("grid.asc");
+    let rows = "1 2 3 4 5 6 7 8\n".repeat(1000);
+    let header = "ncols 8\nnrows 1000\nxllcorner 0\nyllcorner 0\ncellsize 1\n";
+    std::fs::write(&path, format!("{header}{rows}")).expect("written");
+    let remarks = |most_in_memory_bytes| {
+        let options = OpenOptions {
+            most_in_memory_bytes,
+            ..OpenOptions::default()
+        };
+        let raster = Raster::open(&path, &options).expect("opens");
+        raster.remarks().join("; ")
+    };
+    assert_eq!(remarks(1 << 20), "");
+    let told = remarks(1 << 10);
+    assert!(
+        told.contains("as a whole") && told.contains("-co TILED=YES"),
+        "{told}"
+    );
+}
+
 #[test]
 fn files_too_small_for_a_surface_are_refused() {
     let Some(folder) = shared("dem/variants") else {

@@ -130,6 +130,21 @@ impl Decoded {
         self
     }
 
+    /// Says so where more samples are held in memory than would be of a file that can be read in
+    /// windows.
+    pub(super) fn tell_if_whole(&mut self, most_bytes: u64) {
+        if let Storage::Held { samples, .. } = &self.storage
+            && samples.bytes() as u64 > most_bytes
+        {
+            let megabytes = samples.bytes() / 1_000_000;
+            let remark = format!(
+                "it is read as a whole, {megabytes} MB: its format has no windows, or too large ones. As this it stays on the disk: gdal_translate -co TILED=YES -co COMPRESS=DEFLATE IN OUT.tif"
+            );
+            tracing::warn!("{remark}");
+            self.remarks.push(remark);
+        }
+    }
+
     /// Turns numbers that grow downwards into heights, and says so.
     pub(super) fn turn_depths_into_heights(&mut self, why: &str) {
         self.scale = -self.scale;

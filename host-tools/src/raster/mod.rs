@@ -124,6 +124,7 @@ impl Raster {
             .and_then(|mut decoded| {
                 decoded.storage.set_path(path);
                 decoded.storage.set_disk_cache(&options.disk_cache);
+                decoded.tell_if_whole(options.most_in_memory_bytes);
                 Self::checked(decoded, options.no_data)
             })
             .inspect(|_| options.elsewhere.touch())
