@@ -73,7 +73,7 @@ fn a_tick_in_contact_stays_within_its_budget_and_the_stack_too() {
         "stack: {} of {} bytes used at most",
         stack.high_water, stack.size
     );
-    assert_eq!(stack.size, 48 * 1024);
+    assert_eq!(stack.size, 56 * 1024);
     assert!(stack.high_water > 500, "{stack:?}");
     assert!(3 * stack.high_water <= 2 * stack.size, "{stack:?}");
     let mut costs: [(&str, Mean); 4] =
