@@ -420,11 +420,8 @@ fn a_band_of_a_colour_image_is_a_height_when_it_is_named() {
     assert!(fault.to_string().contains("bands 1 to 3"), "{fault}");
 }
 
-/// One stored tile in six thousand, without compression: nothing is wrong with it.
-#[test]
-fn a_file_with_few_of_its_tiles_is_whole_where_it_stays_on_disk() {
-    let (side, tile) = (20_000_u32, 256_u32);
-    let count = side.div_ceil(tile).pow(2) as usize;
+/// The tags of a grey square in tiles, with their offsets and sizes.
+fn in_tiles(side: u32, tile: u32, [offsets, sizes]: [&[u32]; 2]) -> Vec<(u16, u16, u32, Vec<u8>)> {
     let long = |tag: u16, values: &[u32]| {
         let bytes = values.iter().flat_map(|value| value.to_le_bytes());
         (tag, 4, values.len() as u32, bytes.collect::<Vec<u8>>())
@@ -433,15 +430,25 @@ fn a_file_with_few_of_its_tiles_is_whole_where_it_stays_on_disk() {
     tags[0] = long(256, &[side]);
     tags[1] = long(257, &[side]);
     tags.retain(|tag| ![273, 278, 279].contains(&tag.0));
+    tags.push(long(322, &[tile]));
+    tags.push(long(323, &[tile]));
+    tags.push(long(324, offsets));
+    tags.push(long(325, sizes));
+    tags
+}
+
+/// One stored tile in six thousand, without compression: nothing is wrong with it.
+#[test]
+fn a_file_with_few_of_its_tiles_is_whole_where_it_stays_on_disk() {
+    let (side, tile) = (20_000_u32, 256_u32);
+    let count = side.div_ceil(tile).pow(2) as usize;
     let at_the_last = |value: u32| {
         let mut values = vec![0; count];
         values[count - 1] = value;
         values
     };
-    tags.push(long(322, &[tile]));
-    tags.push(long(323, &[tile]));
-    tags.push(long(324, &at_the_last(8)));
-    tags.push(long(325, &at_the_last(tile * tile)));
+    let places = [at_the_last(8), at_the_last(tile * tile)];
+    let tags = in_tiles(side, tile, places.each_ref().map(Vec::as_slice));
     let bytes = by_hand(&tags, &vec![7; (tile * tile) as usize]);
     let raster = open(bytes).expect("nothing is wrong with it");
     assert_eq!(raster.height(side - 1, 0), 7.0);
@@ -451,20 +458,8 @@ fn a_file_with_few_of_its_tiles_is_whole_where_it_stays_on_disk() {
 /// A sparse file says that it is large, not that it is damaged.
 #[test]
 fn what_memory_cannot_hold_is_no_damage() {
-    let mut tags = grey([16, 16], 1);
-    let long = |tag: u16, values: &[u32]| {
-        let bytes = values.iter().flat_map(|value| value.to_le_bytes());
-        (tag, 4, values.len() as u32, bytes.collect::<Vec<u8>>())
-    };
     // 200,000 × 200,000 in four tiles, the last of which is stored.
-    let side = 200_000;
-    tags[0] = long(256, &[side]);
-    tags[1] = long(257, &[side]);
-    tags.retain(|tag| ![273, 278, 279].contains(&tag.0));
-    tags.push(long(322, &[100_000]));
-    tags.push(long(323, &[100_000]));
-    tags.push(long(324, &[0, 0, 0, 8]));
-    tags.push(long(325, &[0, 0, 0, 64]));
+    let tags = in_tiles(200_000, 100_000, [&[0, 0, 0, 8], &[0, 0, 0, 64]]);
     let fault = open(by_hand(&tags, &[1; 64])).expect_err("too large");
     assert!(
         matches!(fault, BadRaster::TooLarge { gigabytes: 40, .. }),
