@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::scalar::{larger, root};
+use crate::scalar::larger;
 
 /// How deep a tip is, and how it moves along the force.
 #[derive(Clone, Copy, Debug)]
@@ -15,7 +15,7 @@ pub(super) struct Depth {
 impl Depth {
     /// Of a tip that is displaced from its proxy, at a velocity.
     pub(super) fn of(displacement_mm: Vec3, velocity_mm_s: Vec3) -> Self {
-        let mm = root(displacement_mm.length_squared());
+        let mm = displacement_mm.length();
         let along = velocity_mm_s.dot(displacement_mm);
         let leaves_mm_s = if mm > 0.0 { along / mm } else { 0.0 };
         Self { mm, leaves_mm_s }
