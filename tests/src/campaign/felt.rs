@@ -15,6 +15,8 @@ const TICK_S: f32 = 1e-3;
 /// What a contact may have given with the controller on, mJ: a hundredth of what a tap gives without
 /// (docs/effects.md).
 const GIVEN_MJ: f32 = 0.05;
+/// The same of shaded ground: the force is turned less and less until so much was given.
+const SHADED_MJ: f32 = 0.1;
 /// Rounding, as a part of a force, and N.
 const ROUNDING: f32 = 1e-4;
 /// Limits under which a force is another than the scene asks for.
@@ -122,7 +124,7 @@ impl FeltWatch {
     }
 
     /// With the controller on no contact has given more than it got, at any time; but for what
-    /// a texture may.
+    /// shading and a texture may.
     fn gives_nothing(&mut self, sample: &Sample, is_calm: bool) -> Result<(), String> {
         let last = self.last.replace(*sample);
         let before_n =
@@ -155,7 +157,12 @@ impl FeltWatch {
         self.most_given_mj = self.most_given_mj.max(contact.given_mj);
         let [high_mm, _] = self.felt.relief();
         let textures = 2.0 * self.felt.stiffest_n_per_mm() * high_mm * contact.deepest_mm;
-        match contact.given_mj <= GIVEN_MJ + textures {
+        let shading = if self.felt.is_shaded() {
+            SHADED_MJ
+        } else {
+            0.0
+        };
+        match contact.given_mj <= GIVEN_MJ + shading + textures {
             true => Ok(()),
             false => Err(format!("the ground gave {contact:?}: {sample:?}")),
         }

@@ -203,16 +203,12 @@ impl Felt {
         self.hardest.is_controlled(TickRate::DEFAULT, latency_s)
     }
 
-    /// Whether its force is that of one spring: no shading turns it, which gives energy where
-    /// friction holds the proxy, and no material follows a softer one.
+    /// Whether its force is that of one spring: no material follows a softer one.
     #[must_use]
     pub fn is_spring(&self) -> bool {
         let stiff = |law: &ForceLaw| law.stiffness_n_per_mm;
-        let is_one = self
-            .laws
-            .windows(2)
-            .all(|pair| stiff(&pair[0]) == stiff(&pair[1]));
-        is_one && !self.is_shaded()
+        let mut pairs = self.laws.windows(2);
+        pairs.all(|pair| stiff(&pair[0]) == stiff(&pair[1]))
     }
 
     /// Whether some of it is damped.

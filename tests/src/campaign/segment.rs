@@ -112,6 +112,8 @@ struct Stretch<'t> {
     felt: FeltWatch,
     /// From this tick on nothing is wrong.
     calm_from: u64,
+    /// The device may hold tiles that are not the terrain's, whose borders are open.
+    poisoned: bool,
     chance: Chance,
     clock: SetClock,
     device: Board,
@@ -146,6 +148,7 @@ impl<'t> Stretch<'t> {
             effects,
             felt,
             calm_from: 0,
+            poisoned: false,
             chance,
             clock,
             device,
@@ -292,6 +295,7 @@ impl<'t> Stretch<'t> {
         self.host.restart(scene, self.now, &mut self.chance);
         self.watch.forget();
         self.felt.feels(felt(self.terrain, &scene));
+        self.poisoned = false;
     }
 
     /// The device comes out of a reset. Its encoders count from where the arm is now.
@@ -400,6 +404,7 @@ impl<'t> Stretch<'t> {
             mishap.meddle(&mut sense, &mut self.lost, self.now, &mut self.chance);
             (unkind, tiles) = (mishap.unkind(), mishap.tiles());
             (reading, stalls) = (mishap.reading(), mishap.stalls());
+            self.poisoned |= tiles == Tiles::Poisoned;
             core = mishap.core(self.now);
             if mishap.unplugs(self.now) || mishap.halts_endpoint(&mut self.chance) {
                 self.device.link.interrupted();
@@ -468,7 +473,8 @@ impl<'t> Stretch<'t> {
         }
         for sample in std::mem::take(&mut self.host.samples) {
             self.watch.sample(&sample, self.scene.law.max_force_n)?;
-            self.felt.look(&sample, self.now >= self.calm_from)?;
+            let is_calm = self.now >= self.calm_from && !self.poisoned;
+            self.felt.look(&sample, is_calm)?;
         }
         Ok(())
     }
