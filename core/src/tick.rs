@@ -190,20 +190,14 @@ impl<'t, const D: usize> Haptics<'t, D> {
     }
 
     /// Takes a command between ticks. Gives back a tile buffer that is free again, if there is
-    /// one: most tiles bring one in the place of another, the underlay stays besides, and its
-    /// buffer comes back with a scene that has none.
+    /// one: most tiles bring one in the place of another, those of an underlay stay besides, and
+    /// their buffers come back one by one under a scene that has none.
     #[must_use]
     pub fn accept(&mut self, command: Command<'t>) -> Option<&'t mut Tile> {
         match command {
-            Command::Scene(scene) => {
-                self.take_scene(Some(scene));
-                return self.window.take_spare();
-            }
+            Command::Scene(scene) => self.take_scene(Some(scene)),
             Command::DropScene => self.take_scene(None),
-            Command::View(view) => {
-                self.take_view(&view);
-                return self.window.take_spare();
-            }
+            Command::View(view) => self.take_view(&view),
             Command::Clutch(hold) => self.clutch.hold(hold),
             Command::ClutchInput(held) => self.clutch.press(held),
             Command::Tile(tile) => return self.take_tile(tile),
@@ -223,7 +217,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             Command::Trip(fault) => self.guard.trip(fault),
             Command::HoldOutputs(shares) => self.guard.hold(shares),
         }
-        None
+        self.window.take_spare()
     }
 
     /// Swaps the arm's settings between ticks. Whoever hands them over sees to

@@ -16,6 +16,7 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Limits;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::terrain::CoarseTile;
 use hapterra_firmware::native::StoppedClock;
 use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::shared;
@@ -119,25 +120,16 @@ impl<'t> Slide<'t> {
             let [east, north] = place.map(|cells| f64::from(cells) * CELL_MM);
             self.terrain.height_mm(east, north).expect("known")
         };
-        let side = underlay.spacing();
-        let coarse = |column: i32, row: i32| {
-            let along = |at: i32, first: i32| {
-                let cell = (at - first).div_euclid(side);
-                (
-                    first + cell * side,
-                    f64::from((at - first).rem_euclid(side)) / f64::from(side),
-                )
-            };
-            let ((west, u), (south, v)) = (
-                along(column, underlay.first.x),
-                along(row, underlay.first.y),
-            );
-            let mix = |a: f64, b: f64, t: f64| a * (1.0 - t) + b * t;
-            mix(
-                mix(at(west, south), at(west + side, south), u),
-                mix(at(west, south + side), at(west + side, south + side), u),
-                v,
-            )
+        let near = underlay.near.expect("a finer tile where the hand is");
+        // On its border the near tile has the heights of the wide one.
+        let wide = |column: i32, row: i32| between(&underlay.wide, &at, column, row);
+        let of_near = |column: i32, row: i32| match is_on_border(&near, column, row) {
+            true => wide(column, row),
+            false => at(column, row),
+        };
+        let coarse = |column: i32, row: i32| match is_in(&near, column, row) {
+            true => between(&near, &of_near, column, row),
+            false => wide(column, row),
         };
         let away = [AWAY_MM + 8.0, 18.0].map(|mm| (mm / CELL_MM) as i32);
         let [x, y] = self.ground_mm.map(|mm| (mm / CELL_MM) as i32);
@@ -149,6 +141,38 @@ impl<'t> Slide<'t> {
         }
         worst
     }
+}
+
+/// The height of a coarse tile at a sample of the level, by its own samples.
+fn between(tile: &CoarseTile, sample: &dyn Fn(i32, i32) -> f64, column: i32, row: i32) -> f64 {
+    let side = tile.spacing();
+    let along = |at: i32, first: i32| {
+        let cell = (at - first).div_euclid(side);
+        let share = f64::from((at - first).rem_euclid(side)) / f64::from(side);
+        (first + cell * side, share)
+    };
+    let (west, u) = along(column, tile.first.x);
+    let (south, v) = along(row, tile.first.y);
+    let mix = |a: f64, b: f64, t: f64| match t > 0.0 {
+        true => a * (1.0 - t) + b * t,
+        false => a,
+    };
+    let eastward = |row: i32| {
+        let next = if u > 0.0 { west + side } else { west };
+        mix(sample(west, row), sample(next, row), u)
+    };
+    let next = if v > 0.0 { south + side } else { south };
+    mix(eastward(south), eastward(next), v)
+}
+
+fn is_in(tile: &CoarseTile, column: i32, row: i32) -> bool {
+    let side = 32 * tile.spacing();
+    (0..=side).contains(&(column - tile.first.x)) && (0..=side).contains(&(row - tile.first.y))
+}
+
+fn is_on_border(tile: &CoarseTile, column: i32, row: i32) -> bool {
+    let side = 32 * tile.spacing();
+    [0, side].contains(&(column - tile.first.x)) || [0, side].contains(&(row - tile.first.y))
 }
 
 /// What was felt of the ground: ticks in contact, those over a hole for want of a tile, those over

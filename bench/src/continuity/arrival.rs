@@ -3,7 +3,8 @@
 use hapterra_core::contact::{Contact, ContactSettings, ContactState};
 use hapterra_core::grid::Cell;
 use hapterra_core::terrain::{
-    FieldSize, SETTLING_MM_S, TILE_CELLS, Tile, TileDemand, TileKey, TileRequester, Underlay,
+    CoarseTile, FieldSize, SETTLING_MM_S, TILE_CELLS, Tile, TileDemand, TileKey, TileRequester,
+    Underlay,
 };
 
 use super::row::{DEPTH, Row, SIDE, STEP};
@@ -41,18 +42,22 @@ pub(super) fn measure() -> Vec<Row> {
 
 /// Under both tiles.
 const UNDERLAY: Underlay = Underlay {
-    first: Cell::new(0, 0),
-    shift: 3,
+    wide: CoarseTile {
+        first: Cell::new(0, 0),
+        shift: 3,
+    },
+    near: None,
 };
 
 /// The underlay's tile; beyond the field it goes on as it ends there.
 fn coarse(grid: &Grid, underlay: &Underlay) -> Tile {
     let mut tile = Tile::VACANT;
-    let side = underlay.spacing() as usize;
+    let side = underlay.wide.spacing() as usize;
     let height = |col: usize, row: usize| {
         grid.post((col * side).min(grid.columns), (row * side).min(grid.rows))
     };
-    tile.fill(underlay.key(0), 0, height).expect("in range");
+    tile.fill(underlay.wide.key(0), 0, height)
+        .expect("in range");
     tile
 }
 

@@ -1,5 +1,6 @@
 //! What the device holds of the height field, and how it asks for more.
 
+mod coarse_tile;
 mod extent;
 mod index;
 mod max_pyramid;
@@ -13,6 +14,7 @@ mod tile_requests;
 mod underlay;
 mod window;
 
+pub use coarse_tile::CoarseTile;
 pub use extent::{CellBox, FieldSize};
 pub(crate) use index::{BLOCK_SHIFT, Block};
 pub use index::{TILE_CELLS, TILE_SHIFT, TileIndex, TileKey};

@@ -19,9 +19,10 @@
 
 use super::index::{TILE_CELLS, TileIndex, wrap};
 use super::tile::Tile;
-use super::underlay::Underlay;
+use super::underlay::{Coarse, Underlay};
 use super::window::{Corners, Ground, Window};
 use crate::grid::{Altitude, Cell, GridPoint};
+use crate::scalar::larger;
 
 /// How fast the surface moves from the underlay to a tile that has come, millimetres of the tip
 /// a second. So a force changes by it at most by this times the stiffness: 25 N/s at 0.5 N/mm, where the
@@ -92,13 +93,10 @@ struct Felt {
 
 impl<'t, const D: usize> Window<'t, D> {
     /// Lays an underlay under the field, or none; the tiles that are held are the surface as
-    /// they are. The buffer of the underlay before is kept for this one
+    /// they are. The buffers of the underlay before are kept for this one
     /// ([`Self::take_spare`]).
     pub fn lay(&mut self, underlay: Option<Underlay>) {
-        self.place = underlay;
-        if let Some(tile) = &mut self.underlay {
-            tile.vacate();
-        }
+        self.underlay.lay(underlay);
         self.settling = Settling::NOTHING;
         for row in 0..D {
             for col in 0..D {
@@ -112,31 +110,27 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
-    /// Gives back a buffer that held an underlay, where there is to be none any more.
+    /// Gives back a buffer that held a tile of an underlay, where there is to be none any more.
+    /// There may be another.
     #[must_use]
     pub fn take_spare(&mut self) -> Option<&'t mut Tile> {
-        match self.place {
-            Some(_) => None,
-            None => self.underlay.take(),
-        }
+        self.underlay.take_spare()
     }
 
-    /// Takes a tile that was asked for: one of the field, or the underlay. Gives back a buffer, if
-    /// one is left over.
+    /// Takes a tile that was asked for: one of the field, or of the underlay. Gives back a buffer,
+    /// if one is left over.
     ///
     /// `felt` are the cells of proxy and HIP. A tile of the field settles where what is felt there
     /// depends on it: it, or one beside it that is not the surface, has one of them. Any other
     /// is the surface at once, as with [`Self::install`].
     #[must_use]
     pub fn take(&mut self, tile: &'t mut Tile, felt: [Cell; 2]) -> Option<&'t mut Tile> {
-        let Some(place) = self.place else {
+        if !self.underlay.is_wanted() {
             return Some(self.install(tile));
-        };
-        if tile.key() == Some(place.key(self.level())) {
+        }
+        if let Some(part) = self.underlay.part(tile.key(), self.level()) {
             self.settling.has_changed = true;
-            let spent = self.underlay.replace(tile)?;
-            spent.vacate();
-            return Some(spent);
+            return self.underlay.put(part, tile);
         }
         let depends = |cell: Cell, index: TileIndex| {
             let at = TileIndex::holding(cell);
@@ -191,7 +185,7 @@ impl<'t, const D: usize> Window<'t, D> {
     /// there. One that was there before goes on as it was.
     pub(super) fn has_come(&mut self, index: TileIndex, settles: bool, was_here: bool) {
         let (row, col) = Settling::<D>::slot(index);
-        self.settling.has_changed = self.place.is_some();
+        self.settling.has_changed = self.underlay.is_wanted();
         if was_here && self.settling.allowed(index) < f32::INFINITY {
             return;
         }
@@ -207,26 +201,17 @@ impl<'t, const D: usize> Window<'t, D> {
 
     /// How far the samples of a tile can be from the underlay, cells; `None` where that is not felt.
     fn far(&self, tile: &Tile, index: TileIndex) -> Option<f32> {
-        let (place, under) = self.laid()?;
         let [lowest, highest] = tile.range()?;
-        let [low, high] = place.range_over(under, index)?;
-        let up = tile.base().wrapping_sub(under.base()) as f32;
-        let (above, below) = (up + highest - low, high - (up + lowest));
-        let far = if above > below { above } else { below };
+        let [low, high] = self.underlay.felt()?.range_over(index, tile.base())?;
+        let far = larger(highest - low, high - lowest);
         (far > 0.0).then_some(far)
-    }
-
-    fn laid(&self) -> Option<(&Underlay, &Tile)> {
-        let (place, under) = (self.place.as_ref()?, self.underlay.as_deref()?);
-        under.key()?;
-        Some((place, under))
     }
 
     /// What lies in a cell of the field whose tile is not the surface.
     #[cold]
     #[inline(never)]
     pub(super) fn unsettled_ground(&self, cell: Cell) -> Ground {
-        let Some((place, under)) = self.laid() else {
+        let Some(under) = self.underlay.felt() else {
             return Ground::Missing;
         };
         let own = self.tile_here(TileIndex::holding(cell));
@@ -234,7 +219,7 @@ impl<'t, const D: usize> Window<'t, D> {
         let mut heights = [f32::NAN; 4];
         for (corner, height) in (0..).zip(&mut heights) {
             let sample = cell.offset(corner & 1, corner >> 1);
-            let felt = self.felt(place, under, sample, base);
+            let felt = self.felt(&under, sample, base);
             if felt.height.is_nan() {
                 // What the underlay does not know may yet come.
                 return match felt.is_of_tile {
@@ -250,8 +235,8 @@ impl<'t, const D: usize> Window<'t, D> {
     /// The height felt at a sample, in cells above `base`.
     // A call: four copies of it would be a kilobyte.
     #[inline(never)]
-    fn felt(&self, place: &Underlay, under: &Tile, sample: Cell, base: i32) -> Felt {
-        let coarse = place.height(under, sample) + under.base().wrapping_sub(base) as f32;
+    fn felt(&self, under: &Coarse<'_>, sample: Cell, base: i32) -> Felt {
+        let coarse = under.height(sample, base);
         let mut felt = Felt {
             height: coarse,
             is_of_tile: false,
@@ -310,15 +295,15 @@ impl<'t, const D: usize> Window<'t, D> {
     #[cold]
     #[inline(never)]
     pub(super) fn unsettled_is_below(&self, index: TileIndex, low: Altitude) -> bool {
-        let Some((place, under)) = self.laid() else {
+        let Some(under) = self.underlay.felt() else {
             return false;
         };
         // Where neither a tile nor the underlay has heights, anything may be.
-        let is_known = self.tile_here(index).is_some() || (under.is_whole() && place.covers(index));
-        let is_below = |tile: &Tile| tile.is_below(low);
+        let is_known = self.tile_here(index).is_some() || under.covers(index);
         // A border that is shared is felt as the neighbour has it.
         let around = (0..9).map(|place| index.offset(place % 3 - 1, place / 3 - 1));
-        is_known && is_below(under) && around.filter_map(|near| self.tile_here(near)).all(is_below)
+        let mut here = around.filter_map(|near| self.tile_here(near));
+        is_known && under.is_below(low) && here.all(|tile| tile.is_below(low))
     }
 }
 

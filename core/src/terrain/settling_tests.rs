@@ -12,13 +12,22 @@ use crate::contact::{Contact, ContactSettings, ContactState, Friction};
 use crate::grid::GridPoint;
 use crate::terrain::index::{BLOCK_SHIFT, Block, TileKey};
 use crate::terrain::testing::buffers;
-use crate::terrain::{CellBox, FieldSize};
+use crate::terrain::{CellBox, CoarseTile, FieldSize};
 
 const SIZE: FieldSize = FieldSize::new(640, 640);
 /// Under tiles 2 to 9 each way.
-const UNDERLAY: Underlay = Underlay {
+const WIDE: CoarseTile = CoarseTile {
     first: Cell::new(64, 64),
     shift: 3,
+};
+/// Its border goes through tiles.
+const NEAR: CoarseTile = CoarseTile {
+    first: Cell::new(112, 104),
+    shift: 2,
+};
+const UNDERLAY: Underlay = Underlay {
+    wide: WIDE,
+    near: Some(NEAR),
 };
 /// Heights of tiles count from here, those of the underlay from below.
 const BASE: i32 = 10;
@@ -33,15 +42,30 @@ fn hills(x: i32, y: i32) -> f64 {
 
 /// What the underlay has at a sample of the field.
 fn coarse(x: i32, y: i32) -> Option<f64> {
-    let side = f64::from(UNDERLAY.spacing());
+    let hills = |x, y| f64::from(hills(x, y) as f32);
+    through(NEAR, x, y, &near_sample).or_else(|| through(WIDE, x, y, &hills))
+}
+
+/// The samples of the near tile: on its border those of the wide one.
+fn near_sample(x: i32, y: i32) -> f64 {
+    let last = NEAR.first.offset(32 * NEAR.spacing(), 32 * NEAR.spacing());
+    match [NEAR.first.x, last.x].contains(&x) || [NEAR.first.y, last.y].contains(&y) {
+        true => through(WIDE, x, y, &hills).expect("within it"),
+        false => hills(x, y),
+    }
+}
+
+/// What a coarse tile has at a sample of the field.
+fn through(tile: CoarseTile, x: i32, y: i32, sample: &dyn Fn(i32, i32) -> f64) -> Option<f64> {
+    let side = f64::from(tile.spacing());
     let along = |at: i32, first: i32| {
         let place = f64::from(at - first) / side;
         (0.0..=32.0).contains(&place).then_some(place)
     };
-    let (u, v) = (along(x, UNDERLAY.first.x)?, along(y, UNDERLAY.first.y)?);
+    let (u, v) = (along(x, tile.first.x)?, along(y, tile.first.y)?);
     let at = |col: f64, row: f64| {
         let cell = |index: f64, first: i32| first + (index * side) as i32;
-        f64::from(hills(cell(col, UNDERLAY.first.x), cell(row, UNDERLAY.first.y)) as f32)
+        sample(cell(col, tile.first.x), cell(row, tile.first.y))
     };
     let (col, row) = (u.floor().min(31.0), v.floor().min(31.0));
     let (s, t) = (u - col, v - row);
@@ -83,13 +107,18 @@ impl<'t> Bed<'t> {
     }
 
     fn lays(&mut self) {
+        self.lays_part(WIDE, 3, &hills);
+        self.lays_part(NEAR, -2, &near_sample);
+    }
+
+    fn lays_part(&mut self, part: CoarseTile, base: i32, sample: &dyn Fn(i32, i32) -> f64) {
         let tile = self.spare.pop().expect("a buffer");
-        let side = UNDERLAY.spacing();
+        let side = part.spacing();
         let height = |col: usize, row: usize| {
             let (x, y) = (col as i32 * side, row as i32 * side);
-            (hills(UNDERLAY.first.x + x, UNDERLAY.first.y + y) - 3.0) as f32
+            (sample(part.first.x + x, part.first.y + y) - f64::from(base)) as f32
         };
-        tile.fill(UNDERLAY.key(0), 3, height).expect("in range");
+        tile.fill(part.key(0), base, height).expect("in range");
         let spent = self.window.take(tile, [Cell::new(0, 0); 2]);
         self.spare.extend(spent);
     }
@@ -284,17 +313,12 @@ fn without_its_underlay_a_tile_is_the_surface_at_once_and_stays_it() {
 fn holes_of_a_tile_are_holes_at_once_and_those_of_the_underlay_are_not_known() {
     let mut room = room();
     let mut bed = Bed::new(&mut room);
-    let tile = bed.spare.pop().expect("a buffer");
-    let height = |col, row| {
-        if (col, row) == (10, 10) {
-            f32::NAN
-        } else {
-            1.0
-        }
-    };
-    tile.fill(UNDERLAY.key(0), 0, height).expect("in range");
-    let _ = bed.window.take(tile, [HERE; 2]);
-    // Sample (10, 10) of the underlay is at (144, 144).
+    bed.window.lay(Some(Underlay {
+        wide: WIDE,
+        near: None,
+    }));
+    let one = |x, y| if (x, y) == (144, 144) { f64::NAN } else { 1.0 };
+    bed.lays_part(WIDE, 0, &one);
     let ground = |bed: &Bed<'_>, x, y| bed.window.ground(Cell::new(x, y));
     assert_eq!(ground(&bed, 140, 140), Ground::Missing);
     assert!(matches!(ground(&bed, 130, 140), Ground::Patch(_)));
@@ -313,6 +337,74 @@ fn holes_of_a_tile_are_holes_at_once_and_those_of_the_underlay_are_not_known() {
     };
     assert_eq!(ground(&bed, 135, 150), patch(1.25), "it settles");
     assert_eq!(ground(&bed, 140, 140), patch(2.0), "nothing was felt there");
+}
+
+#[test]
+fn it_is_felt_when_all_of_it_has_come() {
+    for near_first in [false, true] {
+        let mut room = room();
+        let mut bed = Bed::new(&mut room);
+        let lays = |bed: &mut Bed<'_>, near: bool| match near {
+            true => bed.lays_part(NEAR, -2, &near_sample),
+            false => bed.lays_part(WIDE, 3, &hills),
+        };
+        lays(&mut bed, near_first);
+        assert_eq!(bed.window.ground(HERE), Ground::Missing);
+        assert!(!bed.window.settle(0.0) || bed.window.ground(HERE) == Ground::Missing);
+        lays(&mut bed, !near_first);
+        assert!(bed.window.settle(0.0), "another surface");
+        assert_eq!(bed.judge(2..9), 224 * 224);
+    }
+}
+
+#[test]
+fn a_hole_of_the_near_tile_is_not_known_where_the_wide_one_has_none() {
+    let mut room = room();
+    let mut bed = Bed::new(&mut room);
+    bed.lays_part(WIDE, 3, &hills);
+    let holed = |x, y| match (x, y) == (144, 144) {
+        true => f64::NAN,
+        false => near_sample(x, y),
+    };
+    bed.lays_part(NEAR, -2, &holed);
+    assert_eq!(bed.window.ground(Cell::new(141, 146)), Ground::Missing);
+    let low = Altitude::new(60, 0.0);
+    let block = |at: i32| Block {
+        col: at >> BLOCK_SHIFT,
+        row: at >> BLOCK_SHIFT,
+    };
+    assert!(!bed.window.block_is_clear(block(144), low));
+    assert!(matches!(
+        bed.window.ground(Cell::new(100, 100)),
+        Ground::Patch(_)
+    ));
+}
+
+#[test]
+fn what_the_near_tile_alone_has_counts_for_what_is_clear_and_for_how_far_a_tile_moves() {
+    let mut room = room();
+    let mut bed = Bed::new(&mut room);
+    bed.lays_part(WIDE, 0, &|_, _| 0.0);
+    let bump = |x, y| if (x, y) == (144, 144) { 10.0 } else { 0.0 };
+    bed.lays_part(NEAR, 0, &bump);
+    let block = Block {
+        col: 144 >> BLOCK_SHIFT,
+        row: 144 >> BLOCK_SHIFT,
+    };
+    assert!(!bed.window.block_is_clear(block, Altitude::new(5, 0.0)));
+    assert!(bed.window.block_is_clear(block, Altitude::new(11, 0.0)));
+    let tile = bed.spare.pop().expect("a buffer");
+    let key = TileKey::new(0, 4, 4);
+    tile.fill(key, 0, |_, _| 0.0).expect("in range");
+    assert!(bed.window.take(tile, [HERE; 2]).is_some());
+    assert!(!bed.window.is_settled(HERE));
+    for _ in 0..9 {
+        bed.window.settle(1.0);
+    }
+    let Ground::Patch(corners) = bed.window.ground(Cell::new(144, 144)) else {
+        panic!("a patch");
+    };
+    assert_eq!(corners.heights[0], 1.0, "a cell above the tile after nine of ten");
 }
 
 #[test]
@@ -365,18 +457,25 @@ fn clear_means_clear_over_what_has_not_settled() {
 fn buffers_are_neither_lost_nor_doubled() {
     let mut room = room();
     let mut bed = Bed::with_underlay(&mut room);
-    assert_eq!(bed.spare.len(), 3, "the underlay keeps one");
+    assert_eq!(bed.spare.len(), 2, "the underlay keeps two");
     bed.lays();
     bed.comes(4, 4, HERE);
     bed.comes(8, 4, HERE);
     bed.comes(8, 4, HERE);
-    assert_eq!(bed.spare.len(), 3);
-    assert!(bed.window.take_spare().is_none(), "it is in use");
+    assert_eq!(bed.spare.len(), 2);
+    assert!(bed.window.take_spare().is_none(), "they are in use");
     bed.window.lay(Some(UNDERLAY));
-    assert!(bed.window.take_spare().is_none(), "another is going to be");
-    bed.window.reset(0, SIZE, 50);
-    let spare = bed.window.take_spare().expect("no underlay any more");
+    assert!(bed.window.take_spare().is_none(), "others are going to be");
+    let without_near = Underlay {
+        near: None,
+        ..UNDERLAY
+    };
+    bed.window.lay(Some(without_near));
+    let spare = bed.window.take_spare().expect("no near one any more");
     assert_eq!(spare.key(), None);
+    assert!(bed.window.take_spare().is_none(), "the wide one is to be");
+    bed.window.reset(0, SIZE, 50);
+    assert!(bed.window.take_spare().is_some(), "no underlay any more");
     assert!(bed.window.take_spare().is_none());
 }
 

@@ -10,7 +10,7 @@ use heapless::Vec;
 
 use super::extent::FieldSize;
 use super::index::{TileIndex, TileKey, wrap};
-use super::underlay::Underlay;
+use super::underlay::{PARTS, Underlay};
 use crate::grid::Cell;
 
 /// How far ahead in time the HIP's path is looked at, ticks.
@@ -67,8 +67,8 @@ pub struct TileRequester<const D: usize> {
     level: u8,
     size: FieldSize,
     held: [[Option<TileKey>; D]; D],
-    /// The underlay's tile, and whether it is held: it is wanted before all others.
-    underlay: Option<(TileKey, bool)>,
+    /// The underlay's tiles, and whether each is held: they are wanted before all others.
+    underlay: [Option<(TileKey, bool)>; PARTS],
     asked: Vec<(TileKey, u32), IN_FLIGHT>,
     /// The tick in which something was last asked for, and in how many ticks the last answers
     /// came.
@@ -90,7 +90,7 @@ impl<const D: usize> TileRequester<D> {
             level: 0,
             size: FieldSize::new(0, 0),
             held: [[None; D]; D],
-            underlay: None,
+            underlay: [None; PARTS],
             asked: Vec::new(),
             now: 0,
             answer_ticks: 0.0,
@@ -107,7 +107,8 @@ impl<const D: usize> TileRequester<D> {
     /// The field has this underlay, which is not held; or none. All underlays of a level have one
     /// name: what was asked for before is to be forgotten ([`Self::forget_asked`]).
     pub fn lay(&mut self, underlay: Option<Underlay>) {
-        self.underlay = underlay.map(|underlay| (underlay.key(self.level), false));
+        let keys = underlay.map_or([None; PARTS], |underlay| underlay.keys(self.level));
+        self.underlay = keys.map(|key| key.map(|key| (key, false)));
     }
 
     /// Forgets what was asked, as after the link was lost; held tiles stay.
@@ -142,18 +143,24 @@ impl<const D: usize> TileRequester<D> {
             self.answer_ticks += (ticks - self.answer_ticks) * ANSWER_SHARE;
         }
         self.asked.retain(|(asked, _)| *asked != key);
-        match &mut self.underlay {
-            Some((underlay, is_held)) if *underlay == key => *is_held = true,
-            _ => *self.slot(key) = Some(key),
+        match self.part_is_held(key) {
+            Some(is_held) => *is_held = true,
+            None => *self.slot(key) = Some(key),
         }
     }
 
     /// The window did not keep the tile after all.
     pub fn lost(&mut self, key: TileKey) {
-        match &mut self.underlay {
-            Some((underlay, is_held)) if *underlay == key => *is_held = false,
-            _ => drop(self.slot(key).take_if(|held| *held == key)),
+        match self.part_is_held(key) {
+            Some(is_held) => *is_held = false,
+            None => drop(self.slot(key).take_if(|held| *held == key)),
         }
+    }
+
+    /// Whether a tile of the underlay is held.
+    fn part_is_held(&mut self, key: TileKey) -> Option<&mut bool> {
+        let mut parts = self.underlay.iter_mut().flatten();
+        parts.find_map(|(part, is_held)| (*part == key).then_some(is_held))
     }
 
     fn slot(&mut self, key: TileKey) -> &mut Option<TileKey> {
@@ -169,9 +176,9 @@ impl<const D: usize> TileRequester<D> {
         if self.asked.is_full() {
             return None;
         }
-        let underlay = (self.underlay).filter(|(key, is_held)| !is_held && !self.awaits(*key));
-        let key = match underlay {
-            Some((key, _)) => key,
+        let mut underlay = self.underlay.iter().flatten();
+        let key = match underlay.find(|(key, is_held)| !is_held && !self.awaits(*key)) {
+            Some((key, _)) => *key,
             None => self.most_urgent(demand)?,
         };
         self.asked.push((key, now)).ok()?;
@@ -201,7 +208,7 @@ impl<const D: usize> TileRequester<D> {
     fn most_urgent(&self, demand: &TileDemand) -> Option<TileKey> {
         let centre = demand.centre();
         // Over an underlay nothing waits for a tile that the HIP has left when it comes.
-        let first = if self.underlay.is_some() {
+        let first = if self.underlay[0].is_some() {
             self.answer_ticks
         } else {
             0.0
@@ -260,12 +267,24 @@ impl<const D: usize> TileRequester<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::terrain::CoarseTile;
     use std::vec::Vec;
 
     fn drain(requester: &mut TileRequester<4>, now: u32, demand: &TileDemand) -> Vec<(i32, i32)> {
         core::iter::from_fn(|| requester.next_request(now, demand))
             .map(|k| (k.index.col, k.index.row))
             .collect()
+    }
+
+    fn underlay(near: Option<u8>) -> Underlay {
+        let of = |shift| CoarseTile {
+            first: Cell::new(0, 0),
+            shift,
+        };
+        Underlay {
+            wide: of(4),
+            near: near.map(of),
+        }
     }
 
     fn requester() -> TileRequester<4> {
@@ -294,13 +313,13 @@ mod tests {
     #[test]
     fn the_underlay_comes_before_all_others_and_once() {
         let mut requester = requester();
-        let underlay = Underlay {
-            first: Cell::new(0, 0),
-            shift: 4,
-        };
+        let underlay = underlay(Some(2));
         requester.lay(Some(underlay));
-        let key = underlay.key(0);
+        let near = underlay.near.expect("near").key(0);
+        let key = underlay.wide.key(0);
         assert_eq!(requester.next_request(0, &at(48, 48)), Some(key));
+        assert_eq!(requester.next_request(0, &at(48, 48)), Some(near));
+        requester.received(near);
         assert_eq!(drain(&mut requester, 0, &at(48, 48)), [(1, 1)]);
         // It is never too far away to be asked for again.
         assert_eq!(drain(&mut requester, RETRY_TICKS, &at(400, 48)).len(), 2);
@@ -321,6 +340,7 @@ mod tests {
         // Another one of the same name is another.
         requester.lay(Some(underlay));
         assert_eq!(requester.next_request(0, &at(400, 48)), Some(key));
+        assert_eq!(requester.next_request(0, &at(400, 48)), Some(near));
         requester.lay(None);
         requester.forget_asked();
         assert_eq!(drain(&mut requester, 0, &at(400, 48)), []);
@@ -331,9 +351,8 @@ mod tests {
         for has_underlay in [false, true] {
             let mut requester = requester();
             if has_underlay {
-                let first = Cell::new(0, 0);
-                requester.lay(Some(Underlay { first, shift: 4 }));
-                requester.received(Underlay { first, shift: 4 }.key(0));
+                requester.lay(Some(underlay(None)));
+                requester.received(underlay(None).wide.key(0));
             }
             // Answers take 60 ticks each.
             for (tick, col) in (0..40_u32).map(|n| (n * 61, n as i32 % 8)) {

@@ -1,216 +1,174 @@
 //! The underlay: a coarse image of all that the arm reaches, felt where a tile has not come.
 //!
-//! It is one tile of 33 × 33 samples that lie [`Underlay::spacing`] cells of the scene's
-//! level apart, linear between them along rows and columns. Between coarse samples that is
-//! a bilinear patch again, also seen through the finer cells of the level. So where the
-//! underlay is felt, contact is as exact as anywhere.
+//! It is a wide tile under all of the reach and, within it, a near one of finer samples around the
+//! home pose, where the hand is most of the time. Where both are, the near one is felt. The host
+//! makes the samples on its border those of the wide one, so there is no step between them.
 
 use serde::{Deserialize, Serialize};
 
-use super::index::{TILE_CELLS, TileIndex, TileKey};
+use super::coarse_tile::CoarseTile;
+use super::index::{TileIndex, TileKey};
 use super::tile::Tile;
-use crate::grid::{Cell, MAX_CELL};
+use crate::grid::{Altitude, Cell};
+use crate::scalar::{larger, smaller};
 
-/// Where the underlay of a scene lies, and how coarse it is.
+/// Where the tiles of an underlay lie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Underlay {
-    /// The cell of the scene's level whose south-west sample is the first of the underlay.
-    pub first: Cell,
-    /// Cells between two samples of the underlay, as a power of two.
-    pub shift: u8,
+    /// Under all that the arm reaches.
+    pub wide: CoarseTile,
+    /// The finer one around the home pose, if there is one.
+    pub near: Option<CoarseTile>,
 }
 
-impl Underlay {
-    /// The finest underlay, as a power of two: of a finer one more samples would be looked at
-    /// when a tile comes than a tick has time for.
-    pub const LEAST_SHIFT: u8 = 2;
-    /// The coarsest, as a power of two: all that positions can count.
-    pub const MOST_SHIFT: u8 = 24;
+/// Tiles of an underlay, at most.
+pub(super) const PARTS: usize = 2;
 
+impl Underlay {
     /// Whether it is one that the loop can work with, in a scene of this level.
     #[must_use]
     pub fn is_valid(&self, level: u8) -> bool {
-        let Cell { x, y } = self.first;
-        (Self::LEAST_SHIFT..=Self::MOST_SHIFT).contains(&self.shift)
-            && level.checked_add(self.shift).is_some()
-            && x.unsigned_abs().max(y.unsigned_abs()) <= MAX_CELL.unsigned_abs()
+        // Otherwise two tiles would have one name.
+        let is_finer = |near: CoarseTile| near.shift < self.wide.shift;
+        let mut parts = self.parts().into_iter().flatten();
+        self.near.is_none_or(is_finer) && parts.all(|part| part.is_valid(level))
     }
 
-    /// Cells of the scene's level from sample to sample.
+    const fn parts(&self) -> [Option<CoarseTile>; PARTS] {
+        [Some(self.wide), self.near]
+    }
+
+    /// The names of its tiles on the link, in a scene of this level.
     #[must_use]
-    pub const fn spacing(&self) -> i32 {
-        1 << self.shift
-    }
-
-    /// The name of its tile on the link, in a scene of this level: coarser by
-    /// [`Self::shift`], the first of its own grid.
-    #[must_use]
-    pub const fn key(&self, level: u8) -> TileKey {
-        TileKey {
-            level: level.saturating_add(self.shift),
-            index: TileIndex::new(0, 0),
-        }
-    }
-
-    /// The coarse cell that holds a sample of the scene's level, and how far in it the sample
-    /// lies, eastward and northward from 0 to 1. `None` beyond the underlay.
-    #[inline(never)]
-    fn place(&self, sample: Cell) -> Option<([usize; 2], [f32; 2])> {
-        let span = (TILE_CELLS as i32) << self.shift;
-        let along = |at: i32, first: i32| {
-            let off = at
-                .checked_sub(first)
-                .filter(|off| (0..=span).contains(off))?;
-            // The last sample belongs to the last cell.
-            let cell = (off >> self.shift).min(TILE_CELLS as i32 - 1);
-            let share = (off - (cell << self.shift)) as f32 / self.spacing() as f32;
-            Some((cell as usize, share))
-        };
-        let (col, east) = along(sample.x, self.first.x)?;
-        let (row, north) = along(sample.y, self.first.y)?;
-        Some(([col, row], [east, north]))
-    }
-
-    /// Whether it reaches under all of a tile of the scene's level.
-    pub(super) fn covers(&self, index: TileIndex) -> bool {
-        let first = index.first_cell();
-        let last = first.offset(TILE_CELLS as i32, TILE_CELLS as i32);
-        self.place(first).is_some() && self.place(last).is_some()
-    }
-
-    /// The height of `tile`, which is this underlay, at a sample of the scene's level, in cells
-    /// above the tile's base; NaN beyond it and where a corner that counts is a hole.
-    ///
-    /// The result depends on the sample alone, so two patches that share it agree to the bit.
-    pub(super) fn height(&self, tile: &Tile, sample: Cell) -> f32 {
-        let Some((cell, [east, north])) = self.place(sample) else {
-            return f32::NAN;
-        };
-        let [sw, se, nw, ne] = tile.corners(Cell::new(cell[0] as i32, cell[1] as i32));
-        let mix = |a: f32, b: f32, share: f32| {
-            // A corner without weight does not count.
-            if share == 0.0 {
-                a
-            } else if share == 1.0 {
-                b
-            } else {
-                a + (b - a) * share
-            }
-        };
-        mix(mix(sw, se, east), mix(nw, ne, east), north)
-    }
-
-    /// Lowest and highest of `tile`, which is this underlay, over a tile of the scene's level, in
-    /// cells above the base of `tile`; `None` where it knows nothing there.
-    pub(super) fn range_over(&self, tile: &Tile, index: TileIndex) -> Option<[f32; 2]> {
-        let first = index.first_cell();
-        let along = |first: i32, own: i32| {
-            let off = first.saturating_sub(own);
-            let from = (off >> self.shift).max(0);
-            let to = (off.saturating_add(TILE_CELLS as i32 - 1) >> self.shift)
-                .saturating_add(1)
-                .min(TILE_CELLS as i32);
-            from..=to
-        };
-        let (columns, rows) = (along(first.x, self.first.x), along(first.y, self.first.y));
-        let mut range = [f32::INFINITY, f32::NEG_INFINITY];
-        for row in rows {
-            for col in columns.clone() {
-                let height = tile.post(col as usize, row as usize);
-                // Comparisons with NaN are false.
-                if height < range[0] {
-                    range[0] = height;
-                }
-                if height > range[1] {
-                    range[1] = height;
-                }
-            }
-        }
-        (range[0] <= range[1]).then_some(range)
+    pub fn keys(&self, level: u8) -> [Option<TileKey>; PARTS] {
+        self.parts().map(|part| part.map(|part| part.key(level)))
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::boxed::Box;
+/// The underlay of a window: where it lies, and the tiles of it that have come.
+pub(super) struct Laid<'t> {
+    /// Where it lies, if the scene has one.
+    place: Option<Underlay>,
+    /// The tiles, once they have come; or their buffers.
+    tiles: [Option<&'t mut Tile>; PARTS],
+}
 
-    const UNDERLAY: Underlay = Underlay {
-        first: Cell::new(-7, 100),
-        shift: 3,
+impl<'t> Laid<'t> {
+    pub(super) const NOTHING: Self = Self {
+        place: None,
+        tiles: [const { None }; PARTS],
     };
 
-    fn tile(height: impl FnMut(usize, usize) -> f32) -> Box<Tile> {
-        let mut tile = Box::new(Tile::VACANT);
-        tile.fill(UNDERLAY.key(1), 40, height).expect("in range");
-        tile
-    }
-
-    #[test]
-    fn a_bilinear_field_is_the_same_through_it_everywhere() {
-        let field = |x: f32, y: f32| 3.0 + 0.5 * x - 0.25 * y + 0.125 * x * y;
-        let coarse = tile(|col, row| field(col as f32, row as f32));
-        for x in (-7..=249).step_by(5) {
-            for y in (100..=356).step_by(3) {
-                let (u, v) = ((x + 7) as f32 / 8.0, (y - 100) as f32 / 8.0);
-                let height = UNDERLAY.height(&coarse, Cell::new(x, y));
-                assert!((height - field(u, v)).abs() < 1e-4, "{x} {y}: {height}");
-            }
+    /// Takes another place. The buffers of the tiles before are kept for those of this one.
+    pub(super) fn lay(&mut self, place: Option<Underlay>) {
+        self.place = place;
+        for tile in self.tiles.iter_mut().flatten() {
+            tile.vacate();
         }
     }
 
-    #[test]
-    fn it_ends_where_it_ends_and_its_holes_are_its_own() {
-        let coarse = tile(|col, row| if (col, row) == (2, 2) { f32::NAN } else { 1.0 });
-        let height = |x, y| UNDERLAY.height(&coarse, Cell::new(x, y));
-        assert!(height(-8, 200).is_nan() && height(250, 200).is_nan());
-        assert!(height(100, 99).is_nan() && height(100, 357).is_nan());
-        assert_eq!((height(-7, 100), height(249, 356)), (1.0, 1.0));
-        assert!(height(i32::MIN, 100).is_nan() && height(i32::MAX, 100).is_nan());
-        // On the rim of the hole's cells nothing of it counts.
-        assert_eq!((height(1, 116), height(17, 116)), (1.0, 1.0));
-        assert!(height(2, 116).is_nan() && height(9, 116).is_nan());
+    pub(super) const fn is_wanted(&self) -> bool {
+        self.place.is_some()
     }
 
-    #[test]
-    fn its_range_over_a_tile_bounds_every_height_there() {
-        let hash = |col: usize, row: usize| ((col * 7919 + row * 104_729) % 101) as f32;
-        let coarse = tile(hash);
-        for shift in [2, 3, 5, 8] {
-            let underlay = Underlay { shift, ..UNDERLAY };
-            for index in [
-                TileIndex::new(0, 3),
-                TileIndex::new(-1, 4),
-                TileIndex::new(2, 9),
-            ] {
-                let range = underlay.range_over(&coarse, index);
-                let first = index.first_cell();
-                let mut known = 0;
-                for sample in 0..33 * 33 {
-                    let height = underlay.height(&coarse, first.offset(sample % 33, sample / 33));
-                    if height.is_nan() {
-                        continue;
-                    }
-                    known += 1;
-                    let [low, high] = range.expect("some height");
-                    assert!((low..=high).contains(&height), "{shift} {index:?} {height}");
-                }
-                assert!(
-                    known > 0 || range.is_none() || shift == 2,
-                    "{shift} {index:?}"
-                );
-            }
-        }
+    /// Gives back a buffer of a tile that there is not to be any more.
+    pub(super) fn take_spare(&mut self) -> Option<&'t mut Tile> {
+        let parts = self.place.map_or([None; PARTS], |place| place.parts());
+        let mut kept = parts.iter().zip(&mut self.tiles);
+        kept.find_map(|(part, tile)| match part {
+            Some(_) => None,
+            None => tile.take(),
+        })
     }
 
-    #[test]
-    fn what_cannot_be_worked_with_is_refused() {
-        let with = |first, shift| Underlay { first, shift };
-        assert!(UNDERLAY.is_valid(0) && UNDERLAY.is_valid(252));
-        assert!(!UNDERLAY.is_valid(253));
-        assert!(!with(Cell::new(0, 0), 1).is_valid(0) && !with(Cell::new(0, 0), 25).is_valid(0));
-        assert!(!with(Cell::new(i32::MIN, 0), 3).is_valid(0));
-        assert_ne!(UNDERLAY.key(4).level, 4);
+    /// Where in it a tile of this name belongs, in a scene of this level.
+    pub(super) fn part(&self, key: Option<TileKey>, level: u8) -> Option<usize> {
+        let keys = self.place?.keys(level);
+        key.and_then(|_| keys.into_iter().position(|part| part == key))
+    }
+
+    /// Puts a tile where it belongs, and gives back the buffer that was there.
+    pub(super) fn put(&mut self, part: usize, tile: &'t mut Tile) -> Option<&'t mut Tile> {
+        let Some(kept) = self.tiles.get_mut(part) else {
+            return Some(tile);
+        };
+        let spent = kept.replace(tile)?;
+        spent.vacate();
+        Some(spent)
+    }
+
+    /// The underlay, once all of it has come. A part alone is not felt: the surface would
+    /// move at once when the other comes.
+    pub(super) fn felt(&self) -> Option<Coarse<'_>> {
+        let place = self.place?;
+        let [wide, near] = &self.tiles;
+        let near = match place.near {
+            Some(part) => Some((part, come(near)?)),
+            None => None,
+        };
+        Some(Coarse {
+            wide: (place.wide, come(wide)?),
+            near,
+        })
+    }
+}
+
+/// The tile in a buffer, where there is one.
+fn come<'w>(buffer: &'w Option<&mut Tile>) -> Option<&'w Tile> {
+    buffer.as_deref().filter(|tile| tile.key().is_some())
+}
+
+/// An underlay that has come.
+pub(super) struct Coarse<'w> {
+    wide: (CoarseTile, &'w Tile),
+    near: Option<(CoarseTile, &'w Tile)>,
+}
+
+impl Coarse<'_> {
+    /// A whole height in cells that its heights are near.
+    pub(super) fn base(&self) -> i32 {
+        self.wide.1.base()
+    }
+
+    /// The height at a sample of the scene's level, in cells above `base`; NaN beyond it and where
+    /// a corner that counts is a hole.
+    pub(super) fn height(&self, sample: Cell, base: i32) -> f32 {
+        let of = |(place, tile): &(CoarseTile, &Tile)| {
+            let height = place.height(tile, sample)?;
+            Some(height + tile.base().wrapping_sub(base) as f32)
+        };
+        let near = self.near.as_ref().and_then(of);
+        near.or_else(|| of(&self.wide)).unwrap_or(f32::NAN)
+    }
+
+    /// Lowest and highest over a tile of the scene's level, in cells above `base`; `None`
+    /// where nothing is known there.
+    pub(super) fn range_over(&self, index: TileIndex, base: i32) -> Option<[f32; 2]> {
+        let of = |(place, tile): &(CoarseTile, &Tile)| {
+            let up = tile.base().wrapping_sub(base) as f32;
+            let range = place.range_over(tile, index)?;
+            Some(range.map(|height| height + up))
+        };
+        let wide = of(&self.wide);
+        let Some(near) = self.near.as_ref().and_then(of) else {
+            return wide;
+        };
+        let [low, high] = wide.unwrap_or(near);
+        Some([smaller(low, near[0]), larger(high, near[1])])
+    }
+
+    /// Whether all of it is known to lie below `low`.
+    pub(super) fn is_below(&self, low: Altitude) -> bool {
+        self.tiles().all(|tile| tile.is_below(low))
+    }
+
+    /// Whether it has heights all over a tile of the scene's level.
+    pub(super) fn covers(&self, index: TileIndex) -> bool {
+        self.wide.0.covers(index) && self.tiles().all(Tile::is_whole)
+    }
+
+    fn tiles(&self) -> impl Iterator<Item = &Tile> {
+        core::iter::once(self.wide.1).chain(self.near.map(|(_, tile)| tile))
     }
 }

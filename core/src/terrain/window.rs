@@ -5,7 +5,7 @@ use super::index::{BLOCK_SHIFT, Block, TILE_SHIFT, TileIndex, TileKey, wrap};
 use super::max_pyramid::MaxPyramid;
 use super::settling::Settling;
 use super::tile::Tile;
-use super::underlay::Underlay;
+use super::underlay::Laid;
 use crate::grid::{Altitude, Cell};
 
 /// What lies in a cell.
@@ -84,10 +84,7 @@ pub struct Window<'t, const D: usize> {
     level: u8,
     pub(super) slots: [[&'t mut Tile; D]; D],
     pyramid: MaxPyramid<D>,
-    /// Where the underlay lies, if the scene has one.
-    pub(super) place: Option<Underlay>,
-    /// The underlay, once it has come; or its buffer.
-    pub(super) underlay: Option<&'t mut Tile>,
+    pub(super) underlay: Laid<'t>,
     pub(super) settling: Settling<D>,
 }
 
@@ -110,8 +107,7 @@ impl<'t, const D: usize> Window<'t, D> {
             level: 0,
             size,
             top,
-            place: None,
-            underlay: None,
+            underlay: Laid::NOTHING,
             settling: Settling::NOTHING,
         };
         for key in size.tiles() {

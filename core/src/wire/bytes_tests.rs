@@ -19,7 +19,7 @@ use crate::force::{
 use crate::grid::{Cell, GridPoint};
 use crate::guard::{Fault, Limits, Mode};
 use crate::scene::{Sample, Scene, Source, View};
-use crate::terrain::{FieldSize, TileIndex, TileKey, Underlay};
+use crate::terrain::{CoarseTile, FieldSize, TileIndex, TileKey, Underlay};
 
 fn bytes<T: Serialize>(message: &T) -> Vec<u8> {
     let mut buffer = [0; 256];
@@ -40,8 +40,14 @@ fn a_scene() {
         size: FieldSize::new(640, 129),
         top: -3,
         underlay: Some(Underlay {
-            first: Cell::new(300, -1),
-            shift: 4,
+            wide: CoarseTile {
+                first: Cell::new(300, -1),
+                shift: 4,
+            },
+            near: Some(CoarseTile {
+                first: Cell::new(2, 3),
+                shift: 2,
+            }),
         }),
         cell_mm: 1.5,
         home: GridPoint::new([320, -7, 5], Vec3::new(0.25, 0.5, 0.0)),
@@ -69,6 +75,7 @@ fn a_scene() {
         std::vec![1, 0xAC, 0x02, 2],
         std::vec![0x80, 0x0A, 0x82, 0x02, 0x05],
         std::vec![1, 0xD8, 0x04, 0x01, 4],
+        std::vec![1, 0x04, 0x06, 2],
         float(1.5),
         std::vec![0x80, 0x05, 0x0D, 0x0A],
         float(0.25),
@@ -144,8 +151,14 @@ fn a_view_and_the_clutch() {
         size: FieldSize::new(2, 3),
         top: 1,
         underlay: Some(Underlay {
-            first: Cell::new(300, -1),
-            shift: 4,
+            wide: CoarseTile {
+                first: Cell::new(300, -1),
+                shift: 4,
+            },
+            near: Some(CoarseTile {
+                first: Cell::new(2, 3),
+                shift: 2,
+            }),
         }),
         cell_mm: 1.5,
         home: GridPoint::default(),
@@ -271,7 +284,7 @@ fn a_hello_in_its_session() {
         }),
     };
     // The session is 300 | 128; then variant, protocol, number, seconds.
-    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 11, 9, 0xB4, 0x01]);
+    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 12, 9, 0xB4, 0x01]);
 }
 
 #[test]
@@ -300,7 +313,7 @@ fn a_device_that_introduces_itself() {
         },
     });
     let wanted = [
-        std::vec![0, 11, 9, 8, 1, b'b'],
+        std::vec![0, 12, 9, 8, 1, b'b'],
         serial.to_vec(),
         std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xBE, 0x01, 0xAC, 0x02, 1, 7],
         std::vec![0xAC, 0x02, 6, 3, 5, 1],

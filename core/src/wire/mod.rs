@@ -100,8 +100,8 @@
 //! - What waits for a press of the dead-man switch (an arm command before anything is
 //!   driven, a calibration to be stored) ends after 2 s without a frame of the session:
 //!   its host is not there to see what the press does.
-//! - The underlay of a scene is asked for before its other tiles, and by its own key
-//!   ([`Underlay::key`](crate::terrain::Underlay::key)); each view brings its own.
+//! - The tiles of a scene's underlay are asked for before the others, and by keys of their own
+//!   ([`Underlay::keys`](crate::terrain::Underlay::keys)); each view brings its own.
 //! - A scene with materials comes with their table
 //!   ([`ToDevice::MaterialScene`](message::ToDevice::MaterialScene)), and is refused where the table is not the one
 //!   that the scene names, or is none that can be felt. Each of its tiles comes with materials

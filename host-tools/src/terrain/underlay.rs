@@ -1,4 +1,4 @@
-//! The underlay of a scene: the coarse image under all that the arm reaches, and its one tile.
+//! The underlay of a scene: coarse tiles under all that the arm reaches.
 //!
 //! A device feels it where a tile has not come yet. Its samples are those of the terrain at
 //! every so many-th sample of the scene's level, or what the file's overviews have there; they
@@ -6,11 +6,14 @@
 
 use hapterra_core::grid::Cell;
 use hapterra_core::scene::Scene;
-use hapterra_core::terrain::{POSTS, TILE_CELLS, TileKey, Underlay};
+use hapterra_core::terrain::{CoarseTile, POSTS, TILE_CELLS, TileKey, Underlay};
 use hapterra_core::wire::message::Heights;
 
 use super::tiler::range;
 use super::{Terrain, TileBuffer, identity};
+
+/// How much finer the near tile is, as a power of two: it reaches a quarter as far as the wide one.
+const NEAR_IS_FINER: u8 = 2;
 
 impl Terrain<'_> {
     /// A scene of this terrain with an underlay under all that an arm reaches. `reach_mm` is the
@@ -30,11 +33,20 @@ impl Terrain<'_> {
     }
 
     fn under(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<Underlay> {
-        let home = self.scale().to_mm(&scene.home);
         let size = self.size();
         if size.iter().all(|cells| *cells <= 2 * TILE_CELLS as i32) {
             return None;
         }
+        let wide = self.wide(scene, reach_mm)?;
+        let near = near(&wide, scene.home.column());
+        let underlay = Underlay { wide, near };
+        underlay.is_valid(self.level()).then_some(underlay)
+    }
+
+    /// The finest tile that spans the rectangle.
+    fn wide(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<CoarseTile> {
+        let home = self.scale().to_mm(&scene.home);
+        let size = self.size();
         let along = |axis: usize| {
             let side = |mm: f64| (home[axis] + mm) / self.scale().cell_mm();
             let last = f64::from(size[axis]);
@@ -48,13 +60,12 @@ impl Terrain<'_> {
         let (east, north) = (along(0)?, along(1)?);
         let cells = (east[1] - east[0]).max(north[1] - north[0]);
         let spans = |shift: &u8| (TILE_CELLS as f64) * f64::from(*shift).exp2() >= cells;
-        let shift = (Underlay::LEAST_SHIFT..=Underlay::MOST_SHIFT).find(spans)?;
-        let underlay = Underlay {
+        let shift = (CoarseTile::LEAST_SHIFT..=CoarseTile::MOST_SHIFT).find(spans)?;
+        Some(CoarseTile {
             // Whole numbers of cells inside of the field.
             first: Cell::new(east[0] as i32, north[0] as i32),
             shift,
-        };
-        underlay.is_valid(self.level()).then_some(underlay)
+        })
     }
 
     /// The heights of a tile that a device with this scene asks for, as they go on the link: of the
@@ -66,31 +77,100 @@ impl Terrain<'_> {
         key: TileKey,
         buffer: &'b mut TileBuffer,
     ) -> Option<Heights<'b>> {
-        match &scene.underlay {
-            Some(underlay) if key == underlay.key(scene.level) => {
-                Some(self.underlay_tile(underlay, buffer))
+        let Some(Underlay { wide, near }) = &scene.underlay else {
+            return self.tile(key, buffer);
+        };
+        let coarse = |tile: &CoarseTile| key == tile.key(scene.level);
+        match near.as_ref().filter(|near| coarse(near)) {
+            Some(near) => {
+                let sample = |col, row| self.near_sample(wide, near, [col, row]);
+                Some(coarse_tile(buffer, sample))
             }
-            _ => self.tile(key, buffer),
+            None if coarse(wide) => {
+                let sample = |col, row| self.coarse_sample(wide, [col, row]);
+                Some(coarse_tile(buffer, sample))
+            }
+            None => self.tile(key, buffer),
         }
     }
 
-    /// The samples of an underlay. Beyond the field it goes on as it ends there.
-    fn underlay_tile<'b>(&self, underlay: &Underlay, buffer: &'b mut TileBuffer) -> Heights<'b> {
-        let last = self.size();
+    /// The height of a coarse tile's sample, in cells. Beyond the field it goes on as it ends there.
+    fn coarse_sample(&self, tile: &CoarseTile, place: [usize; 2]) -> f64 {
+        let size = self.size();
         let sample = |first: i32, place: usize, last: i32| {
-            let at = i64::from(first) + ((place as i64) << underlay.shift);
+            let at = i64::from(first) + ((place as i64) << tile.shift);
             at.clamp(0, i64::from(last)) as u32
         };
-        let level = self.level().saturating_add(underlay.shift);
-        for (index, height) in buffer.heights.iter_mut().enumerate() {
-            let column = sample(underlay.first.x, index % POSTS, last[0]);
-            let row = sample(underlay.first.y, index / POSTS, last[1]);
-            *height = self.cells_at(level, column, row);
-        }
-        match range(buffer.heights.as_slice()) {
-            None => Heights::Hole,
-            // Nothing is known of what its samples are multiples of.
-            Some((low, high, _)) => buffer.above(low, high, &[]),
+        let level = self.level().saturating_add(tile.shift);
+        let column = sample(tile.first.x, place[0], size[0]);
+        let row = sample(tile.first.y, place[1], size[1]);
+        self.cells_at(level, column, row)
+    }
+
+    /// A sample of the near tile: on its border the height that the wide one has there, so that the
+    /// surface goes on evenly. Where that has none, its own.
+    fn near_sample(&self, wide: &CoarseTile, near: &CoarseTile, place: [usize; 2]) -> f64 {
+        let is_on_border = place.iter().any(|at| [0, TILE_CELLS].contains(at));
+        let between = is_on_border.then(|| self.between_samples(wide, near, place));
+        match between {
+            Some(height) if !height.is_nan() => height,
+            _ => self.coarse_sample(near, place),
         }
     }
+
+    /// The height of the wide tile at a sample of the near one, in cells; NaN at a hole.
+    fn between_samples(&self, wide: &CoarseTile, near: &CoarseTile, place: [usize; 2]) -> f64 {
+        let from = |wide_first: i32, near_first: i32, place: usize| {
+            let off = near_first - wide_first + place as i32 * near.spacing();
+            let cell = (off / wide.spacing()).clamp(0, TILE_CELLS as i32 - 1);
+            let share = f64::from(off - cell * wide.spacing()) / f64::from(wide.spacing());
+            (cell as usize, share)
+        };
+        let (col, east) = from(wide.first.x, near.first.x, place[0]);
+        let (row, north) = from(wide.first.y, near.first.y, place[1]);
+        let weighed = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(right, up)| {
+            let along = |share: f64, next: usize| if next == 1 { share } else { 1.0 - share };
+            let weight = along(east, right) * along(north, up);
+            // A corner without weight does not count, also where it is a hole.
+            match weight > 0.0 {
+                true => weight * self.coarse_sample(wide, [col + right, row + up]),
+                false => 0.0,
+            }
+        });
+        weighed.iter().sum()
+    }
 }
+
+/// The finer tile within a wide one, around a cell as far as it can be; none where it would be no
+/// finer. Every border of the wide one's cells goes through its samples.
+fn near(wide: &CoarseTile, home: Cell) -> Option<CoarseTile> {
+    let shift = wide.shift.saturating_sub(NEAR_IS_FINER);
+    let near = CoarseTile {
+        shift: shift.max(CoarseTile::LEAST_SHIFT),
+        ..*wide
+    };
+    let side = |tile: &CoarseTile| (TILE_CELLS as i32) << tile.shift;
+    let from = |home: i32, first: i32| {
+        let middle = home.saturating_sub(first).saturating_sub(side(&near) / 2);
+        let off = middle.clamp(0, side(wide) - side(&near));
+        first + off / near.spacing() * near.spacing()
+    };
+    let first = Cell::new(from(home.x, wide.first.x), from(home.y, wide.first.y));
+    (near.shift < wide.shift).then_some(CoarseTile { first, ..near })
+}
+
+/// The heights of a coarse tile, by those of its samples.
+fn coarse_tile(buffer: &mut TileBuffer, sample: impl Fn(usize, usize) -> f64) -> Heights<'_> {
+    for (index, height) in buffer.heights.iter_mut().enumerate() {
+        *height = sample(index % POSTS, index / POSTS);
+    }
+    match range(buffer.heights.as_slice()) {
+        None => Heights::Hole,
+        // Nothing is known of what its samples are multiples of.
+        Some((low, high, _)) => buffer.above(low, high, &[]),
+    }
+}
+
+#[cfg(test)]
+#[path = "underlay_tests.rs"]
+mod tests;

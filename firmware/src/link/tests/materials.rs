@@ -6,7 +6,7 @@ use hapterra_core::Vec3;
 use hapterra_core::force::{ForceLaw, Material, MaterialTable};
 use hapterra_core::grid::{Cell, GridPoint};
 use hapterra_core::scene::{Point, Scene, Source};
-use hapterra_core::terrain::{TileKey, Underlay};
+use hapterra_core::terrain::{CoarseTile, TileKey, Underlay};
 use hapterra_core::wire::materials::{
     MOST_TABLE_BYTES, MaterialScene, MaterialTile, TileMaterials, table_bytes,
 };
@@ -198,17 +198,18 @@ fn scenes_that_follow_each_other_at_once_have_each_their_own_table() {
 fn the_underlay_comes_without_materials() {
     let mut rig = greeted();
     let table = table(&[0.5, 1.0]);
-    let underlay = Underlay {
+    let wide = CoarseTile {
         first: Cell::new(0, 0),
         shift: 4,
     };
+    let underlay = Underlay { wide, near: None };
     let scene = Scene {
         underlay: Some(underlay),
         source: Source::Encoders,
         ..scene_of(&table, 9)
     };
     assert!(sends(&mut rig, scene, &table));
-    let key = underlay.key(0);
+    let key = wide.key(0);
     assert!(rig.needs().contains(&key));
     let (tile, materials) = (flat(9, key), TileMaterials::One(0));
     rig.say(&ToDevice::MaterialTile(MaterialTile { tile, materials }));

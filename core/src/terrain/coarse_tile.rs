@@ -1,0 +1,216 @@
+//! A tile of coarser samples than the scene's level, as an underlay has them.
+//!
+//! Its 33 × 33 samples lie [`CoarseTile::spacing`] cells of the scene's level apart, linear
+//! between them along rows and columns. Between coarse samples that is a bilinear patch again, also
+//! seen through the finer cells of the level. So where it is felt, contact is as exact as anywhere.
+
+use serde::{Deserialize, Serialize};
+
+use super::index::{TILE_CELLS, TileIndex, TileKey};
+use super::tile::Tile;
+use crate::grid::{Cell, MAX_CELL};
+
+/// Where a coarse tile lies, and how coarse it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct CoarseTile {
+    /// The cell of the scene's level whose south-west sample is the first of the tile.
+    pub first: Cell,
+    /// Cells between two samples, as a power of two.
+    pub shift: u8,
+}
+
+impl CoarseTile {
+    /// The finest, as a power of two: of a finer one more samples would be looked at when a tile
+    /// comes than a tick has time for.
+    pub const LEAST_SHIFT: u8 = 2;
+    /// The coarsest, as a power of two: all that positions can count.
+    pub const MOST_SHIFT: u8 = 24;
+
+    /// Whether it is one that the loop can work with, in a scene of this level.
+    #[must_use]
+    pub fn is_valid(&self, level: u8) -> bool {
+        let Cell { x, y } = self.first;
+        (Self::LEAST_SHIFT..=Self::MOST_SHIFT).contains(&self.shift)
+            && level.checked_add(self.shift).is_some()
+            && x.unsigned_abs().max(y.unsigned_abs()) <= MAX_CELL.unsigned_abs()
+    }
+
+    /// Cells of the scene's level from sample to sample.
+    #[must_use]
+    pub const fn spacing(&self) -> i32 {
+        1 << self.shift
+    }
+
+    /// The name of its tile on the link, in a scene of this level: coarser by
+    /// [`Self::shift`], the first of its own grid.
+    #[must_use]
+    pub const fn key(&self, level: u8) -> TileKey {
+        TileKey {
+            level: level.saturating_add(self.shift),
+            index: TileIndex::new(0, 0),
+        }
+    }
+
+    /// The coarse cell that holds a sample of the scene's level, and how far in it the sample
+    /// lies, eastward and northward from 0 to 1. `None` beyond the tile.
+    #[inline(never)]
+    fn place(&self, sample: Cell) -> Option<([usize; 2], [f32; 2])> {
+        let span = (TILE_CELLS as i32) << self.shift;
+        let along = |at: i32, first: i32| {
+            let off = at
+                .checked_sub(first)
+                .filter(|off| (0..=span).contains(off))?;
+            // The last sample belongs to the last cell.
+            let cell = (off >> self.shift).min(TILE_CELLS as i32 - 1);
+            let share = (off - (cell << self.shift)) as f32 / self.spacing() as f32;
+            Some((cell as usize, share))
+        };
+        let (col, east) = along(sample.x, self.first.x)?;
+        let (row, north) = along(sample.y, self.first.y)?;
+        Some(([col, row], [east, north]))
+    }
+
+    /// Whether it reaches under all of a tile of the scene's level.
+    pub(super) fn covers(&self, index: TileIndex) -> bool {
+        let first = index.first_cell();
+        let last = first.offset(TILE_CELLS as i32, TILE_CELLS as i32);
+        self.place(first).is_some() && self.place(last).is_some()
+    }
+
+    /// The height of `tile`, which is this one, at a sample of the scene's level, in cells above
+    /// the tile's base; NaN where a corner that counts is a hole, `None` beyond it.
+    ///
+    /// The result depends on the sample alone, so two patches that share it agree to the bit.
+    pub(super) fn height(&self, tile: &Tile, sample: Cell) -> Option<f32> {
+        let (cell, [east, north]) = self.place(sample)?;
+        let [sw, se, nw, ne] = tile.corners(Cell::new(cell[0] as i32, cell[1] as i32));
+        let mix = |a: f32, b: f32, share: f32| {
+            // A corner without weight does not count.
+            if share == 0.0 {
+                a
+            } else if share == 1.0 {
+                b
+            } else {
+                a + (b - a) * share
+            }
+        };
+        Some(mix(mix(sw, se, east), mix(nw, ne, east), north))
+    }
+
+    /// Lowest and highest of `tile`, which is this one, over a tile of the scene's level, in cells
+    /// above the base of `tile`; `None` where it knows nothing there.
+    pub(super) fn range_over(&self, tile: &Tile, index: TileIndex) -> Option<[f32; 2]> {
+        let first = index.first_cell();
+        let along = |first: i32, own: i32| {
+            let off = first.saturating_sub(own);
+            let from = (off >> self.shift).max(0);
+            let to = (off.saturating_add(TILE_CELLS as i32 - 1) >> self.shift)
+                .saturating_add(1)
+                .min(TILE_CELLS as i32);
+            from..=to
+        };
+        let (columns, rows) = (along(first.x, self.first.x), along(first.y, self.first.y));
+        let mut range = [f32::INFINITY, f32::NEG_INFINITY];
+        for row in rows {
+            for col in columns.clone() {
+                let height = tile.post(col as usize, row as usize);
+                // Comparisons with NaN are false.
+                if height < range[0] {
+                    range[0] = height;
+                }
+                if height > range[1] {
+                    range[1] = height;
+                }
+            }
+        }
+        (range[0] <= range[1]).then_some(range)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::boxed::Box;
+
+    const COARSE: CoarseTile = CoarseTile {
+        first: Cell::new(-7, 100),
+        shift: 3,
+    };
+
+    fn tile(height: impl FnMut(usize, usize) -> f32) -> Box<Tile> {
+        let mut tile = Box::new(Tile::VACANT);
+        tile.fill(COARSE.key(1), 40, height).expect("in range");
+        tile
+    }
+
+    #[test]
+    fn a_bilinear_field_is_the_same_through_it_everywhere() {
+        let field = |x: f32, y: f32| 3.0 + 0.5 * x - 0.25 * y + 0.125 * x * y;
+        let coarse = tile(|col, row| field(col as f32, row as f32));
+        for x in (-7..=249).step_by(5) {
+            for y in (100..=356).step_by(3) {
+                let (u, v) = ((x + 7) as f32 / 8.0, (y - 100) as f32 / 8.0);
+                let height = COARSE.height(&coarse, Cell::new(x, y)).expect("there");
+                assert!((height - field(u, v)).abs() < 1e-4, "{x} {y}: {height}");
+            }
+        }
+    }
+
+    #[test]
+    fn it_ends_where_it_ends_and_its_holes_are_its_own() {
+        let coarse = tile(|col, row| if (col, row) == (2, 2) { f32::NAN } else { 1.0 });
+        let height = |x, y| COARSE.height(&coarse, Cell::new(x, y));
+        for beyond in [(-8, 200), (250, 200), (100, 99), (100, 357)] {
+            assert_eq!(height(beyond.0, beyond.1), None);
+        }
+        assert_eq!((height(-7, 100), height(249, 356)), (Some(1.0), Some(1.0)));
+        assert_eq!((height(i32::MIN, 100), height(i32::MAX, 100)), (None, None));
+        // On the rim of the hole's cells nothing of it counts.
+        assert_eq!((height(1, 116), height(17, 116)), (Some(1.0), Some(1.0)));
+        let is_hole = |x, y| height(x, y).is_some_and(f32::is_nan);
+        assert!(is_hole(2, 116) && is_hole(9, 116));
+    }
+
+    #[test]
+    fn its_range_over_a_tile_bounds_every_height_there() {
+        let hash = |col: usize, row: usize| ((col * 7919 + row * 104_729) % 101) as f32;
+        let coarse = tile(hash);
+        for shift in [2, 3, 5, 8] {
+            let place = CoarseTile { shift, ..COARSE };
+            for index in [
+                TileIndex::new(0, 3),
+                TileIndex::new(-1, 4),
+                TileIndex::new(2, 9),
+            ] {
+                let range = place.range_over(&coarse, index);
+                let first = index.first_cell();
+                let mut known = 0;
+                for sample in 0..33 * 33 {
+                    let sample = first.offset(sample % 33, sample / 33);
+                    let height = place.height(&coarse, sample).unwrap_or(f32::NAN);
+                    if height.is_nan() {
+                        continue;
+                    }
+                    known += 1;
+                    let [low, high] = range.expect("some height");
+                    assert!((low..=high).contains(&height), "{shift} {index:?} {height}");
+                }
+                assert!(
+                    known > 0 || range.is_none() || shift == 2,
+                    "{shift} {index:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_worked_with_is_refused() {
+        let with = |first, shift| CoarseTile { first, shift };
+        assert!(COARSE.is_valid(0) && COARSE.is_valid(252));
+        assert!(!COARSE.is_valid(253));
+        assert!(!with(Cell::new(0, 0), 1).is_valid(0) && !with(Cell::new(0, 0), 25).is_valid(0));
+        assert!(!with(Cell::new(i32::MIN, 0), 3).is_valid(0));
+        assert_ne!(COARSE.key(4).level, 4);
+    }
+}
