@@ -57,7 +57,9 @@ impl Hint for BadGround {
                 "bring the classes into the terrain's reference system: gdalwarp -t_srs EPSG:CODE -r near IN OUT.tif"
                     .into()
             }
-            Self::Apart { .. } => "name the classes of this ground with --materials".into(),
+            Self::Apart { .. } | Self::OtherBody { .. } => {
+                "name the classes of this ground with --materials".into()
+            }
             Self::TooMany(_) => {
                 "leave those out of the table that may feel as the default".into()
             }

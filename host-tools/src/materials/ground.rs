@@ -25,6 +25,14 @@ pub enum BadGround {
         /// The other.
         other: String,
     },
+    /// They are of different bodies.
+    #[error("{classes} is on another body than {terrain}")]
+    OtherBody {
+        /// The file of classes.
+        classes: String,
+        /// The terrain.
+        terrain: String,
+    },
     /// They lie apart.
     #[error("{classes} lies elsewhere than {terrain}: {there}, and the terrain {here}")]
     Apart {

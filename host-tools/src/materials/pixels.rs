@@ -1,7 +1,7 @@
 //! The pixel of a raster of classes in which a place of a terrain lies.
 
 use super::ground::{BadGround, place_of};
-use crate::raster::{Georeference, Raster};
+use crate::raster::{Georeference, LonLat, Raster};
 
 /// Places along each side of a raster that are tried to find whether two overlap.
 const TRIED: u32 = 33;
@@ -57,7 +57,13 @@ impl Way {
                 Some(_) => BadGround::NoWay { file, other },
             });
         }
-        Ok(Self::LonLat)
+        match radius_m(on_terrain) == radius_m(on_classes) {
+            true => Ok(Self::LonLat),
+            false => Err(BadGround::OtherBody {
+                classes: classes.to_owned(),
+                terrain: terrain.to_owned(),
+            }),
+        }
     }
 
     fn lead(
@@ -70,6 +76,14 @@ impl Way {
             Self::Same => Some(to.nearest_turn(ground)),
             Self::LonLat => from.to_lonlat(ground).and_then(|at| to.of_lonlat(at)),
         }
+    }
+}
+
+/// The radius of the body that longitudes and latitudes are of; none is the Earth's.
+fn radius_m(on: &Georeference<'_>) -> Option<f64> {
+    match on.lonlat() {
+        LonLat::OfBody { radius_m, .. } => Some(radius_m),
+        _ => None,
     }
 }
 

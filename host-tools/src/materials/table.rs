@@ -182,6 +182,17 @@ impl TableFile {
         let default = written.default.map_or_else(Default::default, |look| {
             (line_of(look.span().start), look.into_inner())
         });
+        let has_control = |look: &Look| {
+            let name = look.name.as_deref().unwrap_or_default();
+            name.chars().any(char::is_control)
+        };
+        let of_classes = classes.iter().map(|(_, line, look)| (*line, look));
+        let mut all = std::iter::once((default.0, &default.1)).chain(of_classes);
+        if let Some((line, _)) = all.find(|(_, look)| has_control(look)) {
+            let why =
+                "its name has a control character, and names are printed as they are; leave it out";
+            return Err(bad(line, why.to_owned()));
+        }
         Ok(Self { default, classes })
     }
 }
@@ -233,6 +244,14 @@ mod tests {
             ("[class.1]\ntexture = \"wood\"\n", ["line 2", "wood"]),
             ("[class.1]\nfriction = \"much\"\n", ["line 2", "f32"]),
             ("classes = 3\n", ["line 1", "classes"]),
+            (
+                "[class.1]\n[class.2]\nname = \"\\u001b[2J\"\n",
+                ["line 2", "control character"],
+            ),
+            (
+                "[default]\nname = \"a\\nb\"\n",
+                ["line 1", "control character"],
+            ),
         ] {
             let why = read(text).expect_err(text);
             assert!(

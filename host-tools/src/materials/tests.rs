@@ -7,7 +7,7 @@ use hapterra_core::scene::Source;
 use hapterra_core::terrain::Tile;
 
 use super::*;
-use crate::raster::GroundTransform;
+use crate::raster::{GroundTransform, OpenOptions};
 use crate::terrain::{FeltCells, Scale, Terrain};
 
 /// A raster whose south-west sample is at `origin`, in steps of so much, in the system of a code.
@@ -186,6 +186,45 @@ fn what_cannot_be_laid_over_a_terrain_is_told() {
     let many: Vec<i64> = (0..16).collect();
     let bad = over(&unplaced, unplaced.clone(), looks(&many));
     assert!(matches!(bad, Err(BadGround::TooMany(16))));
+}
+
+/// A raster around the meridian and the equator of the body of a geographic system.
+fn of_body(wkt: &str) -> Raster {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("body.asc");
+    let grid = "ncols 3\nnrows 3\nxllcorner -1\nyllcorner -1\ncellsize 1\n1 1 1\n1 1 1\n1 1 1\n";
+    std::fs::write(&file, grid).expect("written");
+    std::fs::write(folder.path().join("body.prj"), wkt).expect("written");
+    Raster::open(&file, &OpenOptions::default()).expect("a raster")
+}
+
+#[test]
+fn classes_of_another_body_are_not_laid_over_a_terrain() {
+    let system = |name: &str, spheroid: &str, unit: f64| {
+        let (meridian, unit) = ("PRIMEM[\"Reference_Meridian\",0.0]", unit.to_radians());
+        format!(
+            "GEOGCS[\"{name}\",DATUM[\"D_{name}\",SPHEROID[{spheroid}]],{meridian},UNIT[\"of so many radians\",{unit}]]"
+        )
+    };
+    let moon = of_body(&system("Moon_2000", "\"Moon\",1737400.0,0.0", 1.0));
+    let earth = of_body(&system(
+        "WGS_1984",
+        "\"WGS_1984\",6378137.0,298.257223563",
+        1.0,
+    ));
+    let other = BadGround::OtherBody {
+        classes: "c.tif".into(),
+        terrain: "t.tif".into(),
+    };
+    let bad = over(&earth, moon.clone(), looks(&[1])).expect_err("the Moon's");
+    assert_eq!(bad, other);
+    let bad = over(&moon, earth.clone(), looks(&[1])).expect_err("the Earth's");
+    assert_eq!(bad, other);
+    assert!(over(&moon, moon.clone(), looks(&[1])).is_ok());
+    // The same body in another system, of degrees that are half as large.
+    let halves = of_body(&system("Moon_2000", "\"Moon\",1737400.0,0.0", 0.5));
+    assert!(over(&moon, halves, looks(&[1])).is_ok());
+    assert!(over(&earth, earth.clone(), looks(&[1])).is_ok());
 }
 
 #[test]
