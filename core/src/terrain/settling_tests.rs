@@ -404,7 +404,10 @@ fn what_the_near_tile_alone_has_counts_for_what_is_clear_and_for_how_far_a_tile_
     let Ground::Patch(corners) = bed.window.ground(Cell::new(144, 144)) else {
         panic!("a patch");
     };
-    assert_eq!(corners.heights[0], 1.0, "a cell above the tile after nine of ten");
+    assert_eq!(
+        corners.heights[0], 1.0,
+        "a cell above the tile after nine of ten"
+    );
 }
 
 #[test]
