@@ -194,13 +194,14 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// their buffers come back one by one under a scene that has none.
     #[must_use]
     pub fn accept(&mut self, command: Command<'t>) -> Option<&'t mut Tile> {
+        let mut back = None;
         match command {
             Command::Scene(scene) => self.take_scene(Some(scene)),
             Command::DropScene => self.take_scene(None),
             Command::View(view) => self.take_view(&view),
             Command::Clutch(hold) => self.clutch.hold(hold),
             Command::ClutchInput(held) => self.clutch.press(held),
-            Command::Tile(tile) => return self.take_tile(tile),
+            Command::Tile(tile) => back = self.take_tile(tile),
             Command::Point(Point { seq, hip }) => {
                 // Whatever bits came over the wire.
                 let hip = hip.normalised();
@@ -217,7 +218,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             Command::Trip(fault) => self.guard.trip(fault),
             Command::HoldOutputs(shares) => self.guard.hold(shares),
         }
-        self.window.take_spare()
+        back.or_else(|| self.window.take_spare())
     }
 
     /// Swaps the arm's settings between ticks. Whoever hands them over sees to
@@ -364,14 +365,15 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.zero = Some(counts);
     }
 
-    /// Never lets a tile push out the one under the proxy, nor, where an arm is felt, one beside
-    /// that: it comes too late then, for a place that the proxy has left.
+    /// Never lets a tile of the field push out the one under the proxy, nor, where an arm is felt, one
+    /// beside that: it comes too late then, for a place that the proxy has left.
     fn take_tile(&mut self, tile: &'t mut Tile) -> Option<&'t mut Tile> {
         let level = self.window.level();
         let under_proxy = self.contact.patch();
         let under_proxy = under_proxy.map(|cell| TileKey::holding(level, cell));
         if let (Some(under_proxy), Some(key)) = (under_proxy, tile.key())
             && key != under_proxy
+            && self.window.expects(key)
             && let Some(occupant) = self.window.occupant(key)
             && (occupant == under_proxy
                 || (!self.contact.is_in_lock_step()

@@ -6,10 +6,10 @@ use super::*;
 use crate::cases::cases;
 use crate::contact::{ContactState, Rule};
 use crate::force::ForceLaw;
-use crate::grid::MAX_CELL;
+use crate::grid::{Cell, MAX_CELL};
 use crate::guard::{Blockers, Mode};
 use crate::terrain::testing::buffers;
-use crate::terrain::{FieldSize, POSTS, TileDemand, TileRequester};
+use crate::terrain::{CoarseTile, FieldSize, POSTS, TileDemand, TileRequester, Underlay};
 
 #[path = "tick_tests/materials.rs"]
 mod materials;
@@ -231,6 +231,40 @@ fn a_tile_that_comes_too_late_pushes_out_none_beside_the_proxy() {
         assert_eq!(device.haptics.window.occupant(key), Some(key));
         device.spare.push(back);
     }
+}
+
+#[test]
+fn an_underlay_that_comes_last_is_kept_whatever_the_proxy_touches() {
+    let mut tiles = buffers::<3>();
+    let mut device = Device::<3>::armed(&mut tiles, plane);
+    for counts in dip() {
+        let _ = device.tick(counts);
+    }
+    let of = |shift| CoarseTile {
+        first: Cell::new(256, 256),
+        shift,
+    };
+    let underlay = Underlay {
+        wide: of(4),
+        near: Some(of(2)),
+    };
+    // Its tiles are named as if they belonged where this one is, beside the proxy's.
+    let beside = TileKey::new(0, 9, 9);
+    assert_eq!(
+        device.haptics.window.occupant(TileKey::new(0, 0, 0)),
+        Some(beside)
+    );
+    device.haptics.window.lay(Some(underlay));
+    for key in underlay.keys(0).into_iter().flatten() {
+        let tile = device.spare.pop().expect("a spare one");
+        tile.fill(key, 0, |_, _| 0.0).expect("in range");
+        assert!(device.haptics.accept(Command::Tile(tile)).is_none());
+    }
+    assert_eq!(
+        device.haptics.window.occupant(TileKey::new(0, 0, 0)),
+        Some(beside)
+    );
+    assert!(device.haptics.window.is_settled(Cell::new(290, 290)));
 }
 
 #[test]

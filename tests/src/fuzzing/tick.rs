@@ -6,12 +6,12 @@ use hapterra_core::contact::{Friction, Rule, WORK_PER_TICK};
 use hapterra_core::force::{
     Controller, Damping, ForceLaw, MaterialTable, Pattern, Shading, Texture,
 };
-use hapterra_core::grid::{GridPoint, MAX_CELL};
+use hapterra_core::grid::{Cell, GridPoint, MAX_CELL};
 use hapterra_core::guard::{Fault, Sense};
 use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::{Point, Scene, Source, View};
-use hapterra_core::terrain::{FieldSize, Tile, TileKey};
+use hapterra_core::terrain::{CoarseTile, FieldSize, Tile, TileKey, Underlay};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 
 use super::bytes::Bytes;
@@ -19,6 +19,8 @@ use super::materials;
 
 /// Tiles along the side of the window.
 const SIDE: usize = 2;
+/// Buffers besides: one that comes and goes, and those that an underlay keeps.
+const SPARES: usize = 3;
 
 /// Does what the bytes say, and looks at every tick.
 ///
@@ -26,11 +28,11 @@ const SIDE: usize = 2;
 /// When a tick gives what no tick may give.
 pub fn run(data: &[u8]) {
     let mut bytes = Bytes(data);
-    let mut tiles = vec![Tile::VACANT; SIDE * SIDE + 1];
+    let mut tiles = vec![Tile::VACANT; SIDE * SIDE + SPARES];
     let mut slots = tiles.iter_mut();
-    let mut next = || slots.next().expect("one for each slot, and one");
+    let mut next = || slots.next().expect("one for each slot, and spare ones");
     let window = std::array::from_fn(|_| std::array::from_fn(|_| next()));
-    let mut spare = Some(next());
+    let mut spare: Vec<&mut Tile> = (0..SPARES).map(|_| next()).collect();
     let mut haptics = Haptics::<SIDE>::new(window, TickRate::DEFAULT, None);
     haptics.configure(Mechanism::new(&Calibration::PREMIUM_1_5).expect("a preset"));
     let mut law = ForceLaw::PREMIUM;
@@ -54,7 +56,7 @@ pub fn run(data: &[u8]) {
                 if is_taken(&scene, &table) {
                     law = scene.law;
                 }
-                let _ = haptics.accept(Command::View(view));
+                spare.extend(haptics.accept(Command::View(view)));
                 ticks = None;
             }
             // A table, and a scene of it or of another.
@@ -72,48 +74,48 @@ pub fn run(data: &[u8]) {
                 if is_taken(&scene, &table) {
                     (law, ticks) = (scene.law, Some(0));
                 }
-                let _ = haptics.accept(Command::Scene(scene));
+                spare.extend(haptics.accept(Command::Scene(scene)));
             }
             _ if kind == 251 => {
                 let held = bytes.byte().is_multiple_of(2);
-                let _ = haptics.accept(Command::ClutchInput(held));
+                spare.extend(haptics.accept(Command::ClutchInput(held)));
             }
             _ if kind >= 248 => {
                 let holds = [ClutchHold::LetGo, ClutchHold::WithHand, ClutchHold::InPlace];
                 let hold = holds[usize::from(kind - 248)];
-                let _ = haptics.accept(Command::Clutch(hold));
+                spare.extend(haptics.accept(Command::Clutch(hold)));
             }
             0 => {
                 let scene = scene(&mut bytes);
                 if scene.is_valid() {
                     (law, ticks) = (scene.law, Some(0));
                 }
-                let _ = haptics.accept(Command::Scene(scene));
+                spare.extend(haptics.accept(Command::Scene(scene)));
             }
             1 | 2 => {
-                let tile = spare.take().expect("every tile gives a buffer back");
+                let tile = spare.pop().expect("an underlay keeps two at most");
                 fill(tile, &mut bytes);
                 if kind % 16 >= 8 {
                     materials::lay(tile, &table, &mut bytes);
                 }
-                spare = haptics.accept(Command::Tile(tile));
+                spare.extend(haptics.accept(Command::Tile(tile)));
             }
             3 => {
                 let seen = haptics.report().fault;
-                let _ = haptics.accept(Command::ClearFault(seen));
+                spare.extend(haptics.accept(Command::ClearFault(seen)));
             }
             4 => {
-                let _ = haptics.accept(Command::Trip(Fault::Hardware));
+                spare.extend(haptics.accept(Command::Trip(Fault::Hardware)));
             }
             5 => {
                 let hip = position(&mut bytes);
-                let _ = haptics.accept(Command::Point(Point { seq: 1, hip }));
+                spare.extend(haptics.accept(Command::Point(Point { seq: 1, hip })));
             }
             6 => {
-                let _ = haptics.accept(Command::Arm);
+                spare.extend(haptics.accept(Command::Arm));
             }
             _ => {
-                let _ = haptics.accept(Command::Zero([0; 3]));
+                spare.extend(haptics.accept(Command::Zero([0; 3])));
             }
         }
         let counts = [
@@ -173,6 +175,9 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
         scene.size = FieldSize::new(bytes.int(), bytes.int());
         scene.top = bytes.int();
     }
+    if kind & 6 == 2 {
+        scene.underlay = underlay(bytes);
+    }
     if kind & 8 != 0 {
         scene.cell_mm = bytes.float();
         scene.home = position(bytes);
@@ -206,6 +211,24 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
     scene
 }
 
+/// An underlay that a scene may have, or any numbers; or none.
+fn underlay(bytes: &mut Bytes<'_>) -> Option<Underlay> {
+    let kind = bytes.byte();
+    let mut part = |shift: u8| match kind >= 250 {
+        true => CoarseTile {
+            first: Cell::new(bytes.int(), bytes.int()),
+            shift: bytes.byte(),
+        },
+        false => CoarseTile {
+            first: Cell::new(i32::from(kind % 32) - 16, i32::from(kind / 32)),
+            shift,
+        },
+    };
+    let (near, wide) = (part(2), part(3));
+    let near = kind.is_multiple_of(2).then_some(near);
+    (!kind.is_multiple_of(3)).then_some(Underlay { wide, near })
+}
+
 /// A texture that a scene may have, or any numbers.
 pub(super) fn texture(bytes: &mut Bytes<'_>) -> Texture {
     let (kind, share) = (bytes.byte(), f32::from(bytes.byte()) / 255.0);
@@ -231,8 +254,10 @@ pub(super) fn texture(bytes: &mut Bytes<'_>) -> Texture {
 }
 
 fn fill(tile: &mut Tile, bytes: &mut Bytes<'_>) {
+    // Of the field, of an underlay, or of another level.
+    let level = [0, 0, 2, 3, 1][usize::from(bytes.byte() / 60)];
     let key = TileKey::new(
-        bytes.byte() / 128,
+        level,
         i32::from(bytes.byte() % 4) - 1,
         i32::from(bytes.byte() % 4) - 1,
     );
