@@ -3,8 +3,17 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::passivity::{Moment, Passivity};
+use super::passivity::{MOST_MJ, Moment, Passivity};
 use super::{FeltWith, ForceLaw, clamp_length};
+use crate::scalar::{larger, smaller};
+
+/// What a shaded force gives on the way to an edge, and takes beyond it, as a part of its size
+/// times a cell and the depth: a quarter of the part of a cell on which it turns, times the
+/// angle, is no more than this at any bend ([`super::shading`]); and a tip that is deep goes so much
+/// farther while the proxy stays at an edge.
+const EDGE_GIVES: f32 = 0.1;
+/// So much more may have been created before it is turned less, mJ.
+const LEAST_MJ: f32 = 0.1;
 
 /// How a surface takes energy out of a motion against it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -83,6 +92,22 @@ impl Damper {
     /// The energy that was created and not taken back yet, mJ, where it is watched.
     pub(crate) fn created_mj(&self) -> f32 {
         self.controller.as_ref().map_or(0.0, Passivity::created_mj)
+    }
+
+    /// The share that is left of the turn of a shaded force, so deep.
+    ///
+    /// Such a force is not that of a spring: round a closed way it gives energy, and no damping
+    /// along it takes back what comes across. Towards an edge it gives what it takes beyond, so
+    /// all of the turn is left while no more was created than an edge gives.
+    pub(crate) fn turn_left(&self, depth_mm: f32, cell_mm: f32) -> f32 {
+        let spring_n = smaller(depth_mm * self.law.stiffness_n_per_mm, self.law.max_force_n);
+        // None of the turn is left at twice as much, and more than the book holds is forgotten.
+        let gives_mj = smaller(
+            EDGE_GIVES * spring_n * (cell_mm + depth_mm) + LEAST_MJ,
+            0.5 * MOST_MJ,
+        );
+        let over = self.created_mj() / gives_mj - 1.0;
+        smaller(larger(1.0 - over, 0.0), 1.0)
     }
 
     /// Nothing is felt, or less than the spring's force: what was created before is forgotten.

@@ -6,12 +6,8 @@ use super::in_force::MaterialInForce;
 use super::{Damper, ForceLaw, MaterialTable, Shader, Texturer};
 use crate::contact::{Contact, Friction};
 use crate::rate::TickRate;
-use crate::scalar::{larger, root};
+use crate::scalar::root;
 use crate::terrain::{TileIndex, Window};
-
-/// With so much in the controller's book a force is not turned at all, mJ: a fiftieth of what a
-/// tap gives without the controller.
-const UNSHADED_MJ: f32 = 0.1;
 
 /// The effects of a scene that has some.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +16,7 @@ pub(crate) struct Effects {
     texturer: Option<Texturer>,
     pub(crate) damper: Option<Damper>,
     material: Option<MaterialInForce>,
+    cell_mm: f32,
 }
 
 /// What a scene is felt with, besides its law.
@@ -46,6 +43,7 @@ impl Effects {
             texturer,
             damper,
             material: None,
+            cell_mm: felt.cell_mm,
         })
     }
 
@@ -66,6 +64,7 @@ impl Effects {
             texturer: material.texturer(),
             damper,
             material: Some(material),
+            cell_mm: felt.cell_mm,
         })
     }
 
@@ -91,24 +90,23 @@ impl Effects {
         }
     }
 
-    /// What shading leaves of the contact's displacement.
-    ///
-    /// A force that is turned is not that of a spring: round a closed way it gives energy, and no
-    /// damping along it takes back what comes across. So the more of that is in the controller's book,
-    /// the less it is turned.
+    /// The contact's displacement, turned by shading, as far as the controller lets it.
     fn shaded<const D: usize>(&mut self, window: &Window<'_, D>, contact: &Contact) -> Vec3 {
         let plain = contact.output().displacement;
         let Some(shader) = &mut self.shader else {
             return plain;
         };
         let shaded = shader.shade(window, contact);
-        let created_mj = self.damper.as_ref().map_or(0.0, Damper::created_mj);
-        if created_mj <= 0.0 {
+        let Some(damper) = self.damper.as_ref().filter(|it| it.created_mj() > 0.0) else {
+            return shaded;
+        };
+        let size = plain.length_squared();
+        let left = damper.turn_left(root(size) * self.cell_mm, self.cell_mm);
+        if left >= 1.0 {
             return shaded;
         }
-        let turned = larger(1.0 - created_mj / UNSHADED_MJ, 0.0);
-        let between = plain + (shaded - plain) * turned;
-        let (size, squared) = (plain.length_squared(), between.length_squared());
+        let between = plain + (shaded - plain) * left;
+        let squared = between.length_squared();
         // At most 60° lie between the two, so it is no less than half as long.
         if squared.is_normal() {
             between * root(size / squared)

@@ -15,6 +15,30 @@ const LAW: ForceLaw = ForceLaw {
     ..ForceLaw::PREMIUM
 };
 
+fn felt() -> FeltWith {
+    FeltWith {
+        cell_mm: 1.0,
+        rate: TickRate::DEFAULT,
+        latency_s: 0.0,
+        arm: true,
+    }
+}
+
+/// At one depth the force does so much work.
+fn created(effects: &mut Effects, created_mj: f32) {
+    if let Some(damper) = &mut effects.damper {
+        for tip_mm in [Vec3::ZERO, Vec3::Z] {
+            damper.observe(&Moment {
+                displacement_mm: Vec3::Z,
+                tip_mm,
+                velocity_mm_s: Vec3::ZERO,
+                asked_n: Vec3::Z * created_mj,
+                most_n: 8.5,
+            });
+        }
+    }
+}
+
 /// The displacement beside a ridge, without shading and with it, where the book has so much in it.
 fn beside_a_ridge(law: &ForceLaw, created_mj: f32) -> [Vec3; 2] {
     let size = FieldSize::new(40, 40);
@@ -28,25 +52,8 @@ fn beside_a_ridge(law: &ForceLaw, created_mj: f32) -> [Vec3; 2] {
             &GridPoint::new([20, 20, 0], Vec3::new(0.2, 0.5, height)),
         );
     }
-    let felt = FeltWith {
-        cell_mm: 1.0,
-        rate: TickRate::DEFAULT,
-        latency_s: 0.0,
-        arm: true,
-    };
-    let mut effects = Effects::of(law, &felt).expect("shaded");
-    if let Some(damper) = &mut effects.damper {
-        // At one depth the force does so much work.
-        for tip_mm in [Vec3::ZERO, Vec3::Z] {
-            damper.observe(&Moment {
-                displacement_mm: Vec3::Z,
-                tip_mm,
-                velocity_mm_s: Vec3::ZERO,
-                asked_n: Vec3::Z * created_mj,
-                most_n: 8.5,
-            });
-        }
-    }
+    let mut effects = Effects::of(law, &felt()).expect("shaded");
+    created(&mut effects, created_mj);
     let table = MaterialTable::EMPTY;
     let plain = contact.output().displacement;
     [plain, effects.displacement(&window, &contact, &table)]
@@ -57,20 +64,129 @@ fn the_more_the_controller_has_to_take_back_the_less_the_force_is_turned() {
     let [plain, shaded] = beside_a_ridge(&LAW, 0.0);
     let angle = plain.angle_between(shaded);
     assert!(angle > 0.1, "{angle}");
+    // What an edge gives at this depth, and a tenth of a millijoule.
+    let deep_mm = plain.length();
+    let gives_mj = 0.1 * 0.5 * deep_mm * (1.0 + deep_mm) + 0.1;
+    for share in [0.3, 0.99] {
+        assert_eq!(beside_a_ridge(&LAW, share * gives_mj)[1], shaded);
+    }
     let mut last = angle;
-    for created_mj in [0.01, 0.03, 0.06, 0.09] {
-        let [_, less] = beside_a_ridge(&LAW, created_mj);
+    for share in [0.1, 0.4, 0.7, 0.9] {
+        let [_, less] = beside_a_ridge(&LAW, (1.0 + share) * gives_mj);
         assert!((less.length() - plain.length()).abs() < 1e-5 * plain.length());
         let turned = plain.angle_between(less);
-        let wanted = angle * (1.0 - created_mj / 0.1);
+        let wanted = angle * (1.0 - share);
         assert!((turned - wanted).abs() < 0.1 * angle, "{turned} {wanted}");
         assert!(turned < last);
         last = turned;
     }
-    for created_mj in [0.1, 0.5, 3.0] {
+    for created_mj in [2.001 * gives_mj, 1.0, 3.0] {
         let [_, unturned] = beside_a_ridge(&LAW, created_mj);
         assert!((unturned - plain).length() < 1e-6, "{created_mj}");
     }
+}
+
+#[test]
+fn what_the_book_holds_at_most_is_enough_to_turn_no_force() {
+    // A cell of a metre: an edge gives more than the book holds.
+    let damper = |created_mj: f32| {
+        let mut effects = Effects::of(&LAW, &felt()).expect("shaded");
+        created(&mut effects, created_mj);
+        effects.damper.expect("controlled")
+    };
+    assert_eq!(damper(1.0).turn_left(100.0, 1e3), 1.0);
+    assert_eq!(damper(9.0).turn_left(100.0, 1e3), 0.0);
+}
+
+/// Slides 20 mm over facets of two cells, so deep, and compares each tick with the same without the
+/// controller: the largest step of the force of both, N, and the share of the turn that was left.
+fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] {
+    let law = ForceLaw {
+        stiffness_n_per_mm,
+        ..LAW
+    };
+    let uncontrolled = ForceLaw {
+        damping: Damping {
+            controller: Controller::Off,
+            ..Damping::NONE
+        },
+        ..law
+    };
+    let height = |x: f32| slope * (x.rem_euclid(4.0) - 2.0).abs();
+    let size = FieldSize::new(60, 60);
+    let mut field = FieldStorage::<2>::from_fn(size, |x, _| height(x as f32)).expect("it fits");
+    let window = field.window();
+    let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    let mut controlled = Effects::of(&law, &felt()).expect("shaded");
+    let mut free = Effects::of(&uncontrolled, &felt()).expect("shaded");
+    let table = MaterialTable::EMPTY;
+    let step = mm_s * TickRate::DEFAULT.tick_s();
+    let (mut last, mut asked_n) = (None, Vec3::ZERO);
+    let (mut steps, mut turned) = ([0.0_f32; 2], [0.0_f32; 2]);
+    // Down to its depth, and on from there.
+    let (down, on) = (100, (20.0 / step) as usize);
+    for tick in 0..down + on {
+        let x = 20.3 + step * tick.saturating_sub(down) as f32;
+        let above = (1.0 - (tick as f32 / down as f32)).max(0.0) * (depth + 0.1) - depth;
+        let hip = GridPoint::new([0, 20, 0], Vec3::new(x, 0.4, height(x) + above));
+        contact.step(&window, &hip.normalised());
+        let plain = contact.output().displacement;
+        let felt = [&mut controlled, &mut free]
+            .map(|effects| effects.displacement(&window, &contact, &table));
+        if let Some(damper) = &mut controlled.damper {
+            let tip_mm = Vec3::new(x, 0.4, height(x) + above);
+            let velocity_mm_s = last.map_or(Vec3::ZERO, |(before, _): (Vec3, _)| {
+                (tip_mm - before) * TickRate::DEFAULT.hz() as f32
+            });
+            damper.observe(&Moment {
+                displacement_mm: felt[0],
+                tip_mm,
+                velocity_mm_s,
+                asked_n,
+                most_n: 8.5,
+            });
+            asked_n = damper.force_n(law.force_n(felt[0]), velocity_mm_s);
+            let forces = felt.map(|displacement| law.force_n(displacement));
+            if let Some((_, before)) = last.replace((tip_mm, forces))
+                && tick > down
+            {
+                for (worst, (now, before)) in steps.iter_mut().zip(forces.iter().zip(before)) {
+                    *worst = worst.max((*now - before).length());
+                }
+                for (sum, displacement) in turned.iter_mut().zip(felt) {
+                    *sum += plain.angle_between(displacement);
+                }
+            }
+        }
+    }
+    let [with, without] = steps;
+    [with, without, turned[0] / turned[1]]
+}
+
+#[test]
+fn a_slide_over_facets_is_as_smooth_with_the_controller_as_without() {
+    for (stiffness, slope, depth, mm_s) in [
+        (2.0, 0.2, 2.0, 100.0),
+        (2.0, 0.2, 2.0, 30.0),
+        (1.5, 0.2, 1.0, 100.0),
+        (2.0, 0.05, 1.0, 100.0),
+        (1.0, 0.3, 2.0, 300.0),
+        (4.0, 0.1, 1.0, 200.0),
+        (1.0, 0.5, 1.0, 100.0),
+        (0.5, 0.5, 3.0, 100.0),
+        (2.0, 0.8, 1.0, 100.0),
+    ] {
+        let [with, without, left] = slid(stiffness, slope, depth, mm_s);
+        let what = std::format!("{stiffness} N/mm, {slope}, {depth} mm, {mm_s} mm/s");
+        assert!(
+            with < 1.1 * without + 1e-3,
+            "{what}: {with} N, {without} without"
+        );
+        assert!(left > 0.99, "{what}: {left} of the turn");
+    }
+    // Where an edge gives more than a millijoule, some of it is felt.
+    let [_, _, left] = slid(2.0, 0.3, 3.0, 50.0);
+    assert!((0.75..0.9).contains(&left), "{left} of the turn");
 }
 
 #[test]

@@ -28,7 +28,7 @@ const FRICTION_N_PER_MM: f32 = 3.3;
 /// map of docs/stability.md.
 const CONVERTERS_S: f32 = 0.2e-3;
 /// More than this is forgotten, mJ.
-const MOST_MJ: f32 = 2.0;
+pub(super) const MOST_MJ: f32 = 2.0;
 /// Most damping, as ticks of the stiffness, besides the latency. What the velocity is off by,
 /// some 0.1 of a count a tick, makes a force of so many times the spring's for 0.1 of a count.
 const MOST_TICKS: f32 = 2.0;

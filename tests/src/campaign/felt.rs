@@ -15,8 +15,12 @@ const TICK_S: f32 = 1e-3;
 /// What a contact may have given with the controller on, mJ: a hundredth of what a tap gives without
 /// (docs/effects.md).
 const GIVEN_MJ: f32 = 0.05;
-/// The same of shaded ground: the force is turned less and less until so much was given.
-const SHADED_MJ: f32 = 0.1;
+/// What shaded ground may have given more, whose force is turned less and less until then
+/// (docs/effects.md): so much, and so large a part of the largest force times a cell and the depth,
+/// and no more than the most; mJ.
+const SHADED_MJ: f32 = 0.2;
+const SHADED_PART: f32 = 0.2;
+const SHADED_MOST_MJ: f32 = 2.0;
 /// Rounding, as a part of a force, and N.
 const ROUNDING: f32 = 1e-4;
 /// Limits under which a force is another than the scene asks for.
@@ -123,6 +127,12 @@ impl FeltWatch {
         }
     }
 
+    fn shading_mj(&self, deepest_mm: f32) -> f32 {
+        let way_mm = self.cell_mm + deepest_mm;
+        let gives_mj = SHADED_MJ + SHADED_PART * self.felt.most_n(deepest_mm) * way_mm;
+        gives_mj.min(SHADED_MOST_MJ)
+    }
+
     /// With the controller on no contact has given more than it got, at any time; but for what
     /// shading and a texture may.
     fn gives_nothing(&mut self, sample: &Sample, is_calm: bool) -> Result<(), String> {
@@ -157,10 +167,9 @@ impl FeltWatch {
         self.most_given_mj = self.most_given_mj.max(contact.given_mj);
         let [high_mm, _] = self.felt.relief();
         let textures = 2.0 * self.felt.stiffest_n_per_mm() * high_mm * contact.deepest_mm;
-        let shading = if self.felt.is_shaded() {
-            SHADED_MJ
-        } else {
-            0.0
+        let shading = match self.felt.is_shaded() {
+            true => self.shading_mj(contact.deepest_mm),
+            false => 0.0,
         };
         match contact.given_mj <= GIVEN_MJ + shading + textures {
             true => Ok(()),

@@ -197,6 +197,13 @@ impl Felt {
             .fold(0.0, |most, law| law.stiffness_n_per_mm.max(most))
     }
 
+    /// The largest force of a spring so deep, N.
+    #[must_use]
+    pub fn most_n(&self, depth_mm: f32) -> f32 {
+        let spring_n = self.stiffest_n_per_mm() * depth_mm;
+        spring_n.min(self.hardest.max_force_n)
+    }
+
     /// Whether energy that the ticks create is taken back, on a device so late.
     #[must_use]
     pub fn is_controlled(&self, latency_s: f32) -> bool {

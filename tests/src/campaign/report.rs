@@ -38,7 +38,7 @@ Held in every tick, by `tests/src/campaign/watch.rs`:
 - no force against the way from the HIP to the proxy (`tests/src/campaign/felt.rs`), but where both shading and texture turn it, and none
   larger than the stiffest material, the highest texture and all of the damping make of the depth;
 - with the controller on, while nothing has gone wrong, no contact with ground of one stiffness has given the tip more than
-  0.05 mJ, with shading 0.15 mJ, and 2 k A times its depth; and the device keeps no more than 2 mJ to be taken back;
+  0.05 mJ, 2 k A times its depth, and with shading 2 E ([effects](effects.md)) more; and the device keeps no more than 2 mJ to be taken back;
 - while the core stands still with its command on, all of this but what needs an encoder that is read.
 
 Both forces are the least that explain the currents with any share of the arm's weight held. They are not worked out within
@@ -52,7 +52,7 @@ Both forces are the least that explain the currents with any share of the arm's 
 | current of a motor | {:.4} A | 5.5 A |
 | change of the force in a tick | {:.4} N | 1 N |
 | temperature of a winding | {:.1} °C | 112 °C |
-| energy that a contact had given with the controller on, in {:.0} s of contacts | {:.4} mJ | 0.05 mJ, with shading 0.15, and 2 k A d |
+| energy that a contact had given with the controller on, in {:.0} s of contacts | {:.4} mJ | 0.05 mJ and 2 k A d, with shading 2 E |
 | energy that the device keeps to be taken back | {:.3} mJ | 2 mJ |
 
 **What is not bounded.** An encoder that creeps within the joint's limits cannot be told from a hand that moves, and while one is
