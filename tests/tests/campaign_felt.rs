@@ -111,8 +111,8 @@ fn taps(law: &ForceLaw, more: f32, is_calm: bool, times: usize) -> (bool, f32) {
     let mut watch = watch(law, None);
     let into = (0..20).map(|i| (0.5 - 0.1 * i as f32, 1.0));
     let dip = (0..30).map(|i: i32| match i < 15 {
-        true => (-1.5 + 0.1 * i as f32, 1.0 + more),
-        false => (-1.5 + 0.1 * (30 - i) as f32, 1.0),
+        true => (-1.5 + 0.08 * i as f32, 1.0 + more),
+        false => (-1.5 + 0.08 * (30 - i) as f32, 1.0),
     });
     let out = (0..20).map(|i| (-1.5 + 0.1 * i as f32, 1.0 + more));
     let dips = dip.cycle().take(30 * (times - 1));
