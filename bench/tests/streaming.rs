@@ -80,7 +80,10 @@ fn what_streaming_takes_does_not_grow_with_the_terrain() {
         // Of the file: the same blocks, in as many reads. The index grows, by 8 bytes a block.
         if let [Some(a), Some(b)] = [small, large].map(|row| row.way_bytes) {
             assert!(a.abs_diff(b) < a / 100, "{a} {b}");
-            assert_eq!(small.way_requests, large.way_requests);
+            // The near tile of the underlay lies so many of its cells from the corner of the wide
+            // one, which is elsewhere in each terrain: its border may reach a block farther.
+            let [a, b] = [small, large].map(|row| row.way_requests.expect("of the file"));
+            assert!(a.abs_diff(b) <= 1, "{a} {b}");
             assert!(large.open_bytes < Some(2_000_000), "{large:?}");
         }
         for row in [small, large] {
