@@ -7,10 +7,10 @@ use super::passivity::{MOST_MJ, Moment, Passivity};
 use super::{FeltWith, ForceLaw, clamp_length};
 use crate::scalar::{larger, smaller};
 
-/// What a shaded force gives on the way to an edge, and takes beyond it, as a part of its size
-/// times a cell and the depth: a quarter of the part of a cell on which it turns, times the
-/// angle, is no more than this at any bend ([`super::shading`]); and a tip that is deep goes so much
-/// farther while the proxy stays at an edge.
+/// What a shaded force may give on the way to an edge, and take beyond it, before it is turned
+/// less, as a part of its size times a cell and the depth. An edge gives a quarter of its bend
+/// times the part of a cell on which the force turns ([`super::shading`]): this much at 23°,
+/// twice as much at 45°, the most.
 const EDGE_GIVES: f32 = 0.1;
 /// So much more may have been created before it is turned less, mJ.
 const LEAST_MJ: f32 = 0.1;
@@ -63,7 +63,8 @@ impl Damping {
     }
 }
 
-/// The damping of one scene at one rate; a scene without any has none.
+/// The damping of one scene at one rate, and what else its controller has a say in; a scene without
+/// any has none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Damper {
     law: ForceLaw,

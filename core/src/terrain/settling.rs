@@ -5,7 +5,7 @@
 //! be `a` cells away from the underlay is felt at
 //!
 //! ```text
-//! c + f − c, brought within ±a        c: the underlay's height there, f: the tile's
+//! c + (f − c brought within ±a)        c: the underlay's height there, f: the tile's
 //! ```
 //!
 //! `a` grows from tick to tick ([`Window::settle`]) until the tile is the surface as it is. A
@@ -46,8 +46,8 @@ struct Allowance {
 }
 
 impl Allowance {
-    /// Of a slot whose tile does not settle.
-    const NONE: Self = Self {
+    /// Of a slot whose tile does not settle: any.
+    const ANY: Self = Self {
         now: f32::INFINITY,
         far: 0.0,
     };
@@ -55,7 +55,7 @@ impl Allowance {
 
 impl<const D: usize> Settling<D> {
     pub(super) const NOTHING: Self = Self {
-        slots: [[Allowance::NONE; D]; D],
+        slots: [[Allowance::ANY; D]; D],
         count: 0,
         has_changed: false,
     };
@@ -73,7 +73,7 @@ impl<const D: usize> Settling<D> {
         }
         *slot = match far {
             Some(far) => Allowance { now: 0.0, far },
-            None => Allowance::NONE,
+            None => Allowance::ANY,
         };
         self.count += u16::from(far.is_some());
     }

@@ -2,9 +2,10 @@
 //!
 //! What the device asks for follows from the tile that the loop lacks, from where
 //! the proxy and the haptic interface point (HIP) are, and from how the HIP moves.
-//! A tile that the HIP cannot reach within [`HORIZON_TICKS`] is not asked for, one
-//! that is held is not asked for again, and over an underlay one that the HIP will have left before
-//! it can come is not asked for either. Time is counted in ticks.
+//! A tile that the HIP cannot reach within [`HORIZON_TICKS`] is not asked for, and one
+//! that is held is not asked for again. Over an underlay that time begins when an answer can
+//! come, so what the HIP will have left by then is not asked for either. Time is counted in ticks
+//! of a millisecond, whatever the rate of the loop.
 
 use heapless::Vec;
 
@@ -104,8 +105,8 @@ impl<const D: usize> TileRequester<D> {
         self.size = size;
     }
 
-    /// The field has this underlay, which is not held; or none. All underlays of a level have one
-    /// name: what was asked for before is to be forgotten ([`Self::forget_asked`]).
+    /// The field has this underlay, which is not held; or none. Underlays that are as coarse have
+    /// the same names: what was asked for before is to be forgotten ([`Self::forget_asked`]).
     pub fn lay(&mut self, underlay: Option<Underlay>) {
         let keys = underlay.map_or([None; PARTS], |underlay| underlay.keys(self.level));
         self.underlay = keys.map(|key| key.map(|key| (key, false)));

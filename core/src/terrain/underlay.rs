@@ -2,7 +2,8 @@
 //!
 //! It is a wide tile under all of the reach and, within it, a near one of finer samples around the
 //! home pose, where the hand is most of the time. Where both are, the near one is felt. The host
-//! makes the samples on its border those of the wide one, so there is no step between them.
+//! makes the samples on its border those of the wide one, where that has some, so there is no
+//! step between them.
 
 use serde::{Deserialize, Serialize};
 

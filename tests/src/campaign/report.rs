@@ -18,7 +18,7 @@ Written by `cargo xtask campaign --seconds {seconds} --seed {seed}`{commit}; the
 A virtual Phantom Premium 1.5 in a wandering hand, and the application of the boards compiled for the desktop, tick by
 tick (`tests/src/campaign`). Each segment is run twice: on ground like ice, and with effects at random
 (`tests/src/campaign/ground.rs`: friction, shading, texture, damping, the passivity controller by itself or always, up to 2.6 N/mm,
-and in every second of them up to 16 materials). The amplifiers were on for {} s of {} s. {} times something went wrong, each kind of the
+and in every second of them up to 16 materials of up to 1.7 times that). The amplifiers were on for {} s of {} s. {} times something went wrong, each kind of the
 table as often as the others, in random order, place and strength. The mishaps are described in
 `tests/src/campaign/kind.rs` beside what is expected of each; anything else ends the campaign.
 
