@@ -198,18 +198,24 @@ fn pressed_on_a_plane_the_motors_push_back() {
     assert!(last.drive.enabled);
 }
 
-#[test]
-fn a_tile_that_comes_too_late_pushes_out_none_beside_the_proxy() {
-    let mut tiles = buffers::<3>();
-    let mut device = Device::<3>::armed(&mut tiles, plane);
+/// A device whose proxy is on the plane, in the tile 10, 10.
+fn dipped(tiles: &mut [Tile]) -> Device<'_, 3> {
+    let mut device = Device::<3>::armed(tiles, plane);
     for counts in dip() {
         let _ = device.tick(counts);
     }
+    device
+}
+
+#[test]
+fn a_tile_that_comes_too_late_pushes_out_none_beside_the_proxy() {
+    let mut tiles = buffers::<3>();
+    let mut device = dipped(&mut tiles);
     let size = device.size;
     let fill = |tile: &mut Tile, key| {
         tile.fill_from(key, 0, size, plane).expect("in range");
     };
-    // The proxy is in the tile 10, 10; that to the west is here, too.
+    // The tile to the west of the proxy's is here, too.
     let beside = TileKey::new(0, 9, 10);
     assert_eq!(device.haptics.window.occupant(beside), Some(beside));
     let late = TileKey::new(0, 12, 10);
@@ -236,10 +242,7 @@ fn a_tile_that_comes_too_late_pushes_out_none_beside_the_proxy() {
 #[test]
 fn an_underlay_that_comes_last_is_kept_whatever_the_proxy_touches() {
     let mut tiles = buffers::<3>();
-    let mut device = Device::<3>::armed(&mut tiles, plane);
-    for counts in dip() {
-        let _ = device.tick(counts);
-    }
+    let mut device = dipped(&mut tiles);
     let of = |shift| CoarseTile {
         first: Cell::new(256, 256),
         shift,

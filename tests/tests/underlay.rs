@@ -153,16 +153,9 @@ fn between(tile: &CoarseTile, sample: &dyn Fn(i32, i32) -> f64, column: i32, row
     };
     let (west, u) = along(column, tile.first.x);
     let (south, v) = along(row, tile.first.y);
-    let mix = |a: f64, b: f64, t: f64| match t > 0.0 {
-        true => a * (1.0 - t) + b * t,
-        false => a,
-    };
-    let eastward = |row: i32| {
-        let next = if u > 0.0 { west + side } else { west };
-        mix(sample(west, row), sample(next, row), u)
-    };
-    let next = if v > 0.0 { south + side } else { south };
-    mix(eastward(south), eastward(next), v)
+    let mix = |a: f64, b: f64, t: f64| a * (1.0 - t) + b * t;
+    let eastward = |row: i32| mix(sample(west, row), sample(west + side, row), u);
+    mix(eastward(south), eastward(south + side), v)
 }
 
 fn is_in(tile: &CoarseTile, column: i32, row: i32) -> bool {

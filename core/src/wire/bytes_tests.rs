@@ -32,6 +32,17 @@ fn float(x: f32) -> Vec<u8> {
     x.to_le_bytes().to_vec()
 }
 
+const UNDERLAY: Underlay = Underlay {
+    wide: CoarseTile {
+        first: Cell::new(300, -1),
+        shift: 4,
+    },
+    near: Some(CoarseTile {
+        first: Cell::new(2, 3),
+        shift: 2,
+    }),
+};
+
 #[test]
 fn a_scene() {
     let scene = Scene {
@@ -39,16 +50,7 @@ fn a_scene() {
         level: 2,
         size: FieldSize::new(640, 129),
         top: -3,
-        underlay: Some(Underlay {
-            wide: CoarseTile {
-                first: Cell::new(300, -1),
-                shift: 4,
-            },
-            near: Some(CoarseTile {
-                first: Cell::new(2, 3),
-                shift: 2,
-            }),
-        }),
+        underlay: Some(UNDERLAY),
         cell_mm: 1.5,
         home: GridPoint::new([320, -7, 5], Vec3::new(0.25, 0.5, 0.0)),
         law: ForceLaw {
@@ -150,16 +152,7 @@ fn a_view_and_the_clutch() {
         level: 1,
         size: FieldSize::new(2, 3),
         top: 1,
-        underlay: Some(Underlay {
-            wide: CoarseTile {
-                first: Cell::new(300, -1),
-                shift: 4,
-            },
-            near: Some(CoarseTile {
-                first: Cell::new(2, 3),
-                shift: 2,
-            }),
-        }),
+        underlay: Some(UNDERLAY),
         cell_mm: 1.5,
         home: GridPoint::default(),
         law: ForceLaw::PREMIUM,

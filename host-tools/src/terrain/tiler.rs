@@ -475,4 +475,4 @@ fn top(raster: &Raster, scale: &Scale) -> Result<i32, TerrainError> {
 
 #[cfg(test)]
 #[path = "tiler_tests.rs"]
-mod tests;
+pub(super) mod tests;

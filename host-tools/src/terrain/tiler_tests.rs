@@ -19,6 +19,11 @@ fn unit() -> Scale {
 fn samples(terrain: &Terrain<'_>, key: TileKey) -> Vec<f64> {
     let mut buffer = TileBuffer::default();
     let heights = terrain.tile(key, &mut buffer).expect("a tile");
+    sent(key, heights)
+}
+
+/// The samples of a tile that is sent, as the device would hold them, in cells.
+pub(in crate::terrain) fn sent(key: TileKey, heights: Heights<'_>) -> Vec<f64> {
     let mut tile = Box::new(Tile::VACANT);
     let message = TileMessage {
         epoch: 0,

@@ -4,13 +4,11 @@ use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
-use hapterra_core::terrain::Tile;
-use hapterra_core::wire::message::TileMessage;
-use hapterra_firmware::link::fill_tile;
 
 use super::*;
 use crate::raster::Raster;
 use crate::terrain::Scale;
+use crate::terrain::tiler::tests::sent;
 
 /// 2000 × 1500 cells of a millimetre, with a hole.
 fn hills() -> Raster {
@@ -40,22 +38,7 @@ impl Felt {
         let key = place.key(scene.level);
         let mut buffer = TileBuffer::default();
         let heights = terrain.tile_of(scene, key, &mut buffer).expect("a tile");
-        let mut tile = Box::new(Tile::VACANT);
-        let (epoch, base) = (scene.epoch, |tile: &Tile| f64::from(tile.base()));
-        let message = TileMessage {
-            epoch,
-            key,
-            heights,
-        };
-        fill_tile(&mut tile, &message).expect("heights of a tile");
-        let at = |index: usize| {
-            let (col, row) = (index % POSTS, index / POSTS);
-            // The last row and column are corners of the patches before them.
-            let (u, v) = (col.min(TILE_CELLS - 1), row.min(TILE_CELLS - 1));
-            let corners = tile.corners(Cell::new(u as i32, v as i32));
-            base(&tile) + f64::from(corners[(col - u) + 2 * (row - v)])
-        };
-        Self(place, (0..POSTS * POSTS).map(at).collect())
+        Self(place, sent(key, heights))
     }
 
     fn at(&self, x: i32, y: i32) -> f64 {
