@@ -6,6 +6,7 @@ use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{Scale, Terrain, TileBuffer};
 use hapterra_core::terrain::TileKey;
 use hapterra_tests::shared;
+use hapterra_tests::tiffs::{DATA, Values, placed, tiff};
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::{Fault, Server};
 
@@ -126,6 +127,41 @@ fn of_plain_samples_what_is_touched_is_fetched() {
         "{fetched} of {}",
         heights.len()
     );
+    for level in [0, 3] {
+        same_tiles(&here, &there, level);
+    }
+}
+
+#[test]
+fn of_a_strip_that_has_all_samples_the_rows_that_are_touched_are_fetched() {
+    const SIZE: [u32; 2] = [5000, 3000];
+    let heights: Vec<u8> = (0..SIZE[0] * SIZE[1])
+        .flat_map(|index| height(index % SIZE[0], index / SIZE[0]).to_le_bytes())
+        .collect();
+    let one = |tag: u16, value: u32| (tag, Values::Longs(vec![value]));
+    let mut image = vec![
+        one(256, SIZE[0]),
+        one(257, SIZE[1]),
+        one(258, 32),
+        one(259, 1),
+        one(262, 1),
+        one(273, DATA),
+        one(277, 1),
+        one(278, SIZE[1]),
+        one(279, heights.len() as u32),
+        one(339, 3),
+    ];
+    image.extend(placed([500_000.0, 4_000_000.0], 30.0, 32611));
+    let bytes = tiff(&heights, &[image]);
+    let (_folder, path, server) = served("strip.tif", &bytes);
+    let (here, there) = (in_blocks(&path), open(server.url("strip.tif")));
+    for (column, row) in [(0, 0), (4999, 2999), (2500, 777)] {
+        let expected = f64::from(height(column, SIZE[1] - 1 - row));
+        assert_eq!(here.height(column, row), expected);
+        assert_eq!(there.height(column, row), expected);
+    }
+    let (_, fetched) = server.seen();
+    assert!(fetched < bytes.len() / 4, "{fetched} of {}", bytes.len());
     for level in [0, 3] {
         same_tiles(&here, &there, level);
     }

@@ -2,14 +2,16 @@
 //! strips or tiles.
 
 use std::hash::Hasher;
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use tiff_reader::{Ifd, TagValue, TiffFile};
 use twox_hash::XxHash64;
 
-use super::images;
 use super::layout::Layout;
-use super::samples::{holes, read, sample_type};
+use super::samples::{holes, read};
+use super::uncompressed::rows;
+use super::{budget, images};
 use crate::disk_cache::FileStamp;
 use crate::raster::blocks::{Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Part};
 use crate::raster::guard::guarded;
@@ -21,6 +23,8 @@ use crate::remote::RemoteFile;
 
 /// Small strips and tiles are read several at once, samples each way.
 const USUAL_BLOCK: u32 = 256;
+/// Of longer rows of plain samples parts are read.
+const LONGEST_ROW: u32 = 32_768;
 
 /// Whether single blocks of an image can be read: a strip or tile is not too large.
 pub(super) fn suit(layout: &Layout) -> bool {
@@ -29,9 +33,25 @@ pub(super) fn suit(layout: &Layout) -> bool {
     samples.saturating_mul(layout.texel_bytes().max(8)) <= LARGEST_BLOCK_BYTES
 }
 
-/// Columns and rows of a block: as few whole strips or tiles as make a usual one.
+/// Whether parts of an image's masks can be read: none of their strips and tiles is too large.
+pub(super) fn masks_suit(file: &TiffFile, beside: Option<&TiffFile>, image: &Ifd) -> bool {
+    let mut masks = images::masks(file, beside, image);
+    masks.all(|(_, mask)| {
+        let columns = mask.tile_width().unwrap_or(mask.width());
+        let strip = mask.rows_per_strip().min(mask.height());
+        let rows = mask.tile_height().unwrap_or(strip);
+        u64::from(columns) * u64::from(rows) <= LARGEST_BLOCK_BYTES
+    })
+}
+
+/// Columns and rows of a block: as few whole strips or tiles as make a usual one, or few rows
+/// of a large one that can be read so.
 fn block(layout: &Layout) -> [u32; 2] {
     let (columns, rows) = layout.chunk;
+    if layout.is_plain {
+        let columns = columns.min(LONGEST_ROW);
+        return [columns, USUAL_BLOCK * USUAL_BLOCK / columns];
+    }
     let several = |chunk: u32| chunk.saturating_mul(USUAL_BLOCK.div_ceil(chunk));
     // A strip is as wide as the image: of wide ones few are read at once.
     let usual = USUAL_BLOCK * USUAL_BLOCK / columns.clamp(1, USUAL_BLOCK * USUAL_BLOCK);
@@ -40,6 +60,18 @@ fn block(layout: &Layout) -> [u32; 2] {
         false => several(rows),
     };
     [several(columns), down]
+}
+
+/// Where the bytes of a part lie in the file.
+fn ranges(layout: &Layout, part: &Part) -> Vec<Range<u64>> {
+    let mut ranges = vec![];
+    for chunk in layout.chunks_in(part).filter(|chunk| chunk.bytes > 0) {
+        match layout.is_plain {
+            true => ranges.extend(rows(layout, &chunk, part)),
+            false => ranges.push(chunk.place..chunk.place.saturating_add(chunk.bytes)),
+        }
+    }
+    ranges
 }
 
 /// A TIFF on disk.
@@ -103,7 +135,9 @@ impl TiffBlocks {
                     directory: directory.clone(),
                     layout,
                 };
-                if image.is_overview_of(&found[MAIN]) {
+                let suits = masks_suit(file, mask.as_ref(), directory)
+                    && budget::check(&image.layout, file.source().len(), true).is_ok();
+                if suits && image.is_overview_of(&found[MAIN]) {
                     found.push(image);
                 }
             }
@@ -133,10 +167,9 @@ impl TiffBlocks {
     fn block(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
         let image = &self.images[image];
         let (file, directory, layout) = (&self.files[image.file], &image.directory, &image.layout);
-        let mask = self.mask_of(image);
         Ok(Block {
             samples: read(file, directory, layout, layout.band, part)?,
-            holes: holes(file, directory, layout, mask, part)?,
+            holes: holes(file, directory, layout, self.mask.as_ref(), part)?,
             is_lacking: false,
         })
     }
@@ -147,23 +180,28 @@ impl TiffBlocks {
         let layout = &self.images[image].layout;
         let columns = part.columns as usize;
         let count = columns * part.rows as usize;
-        let mut samples = sample_type(&self.images[MAIN].layout).none();
+        let mut samples = self.images[MAIN].layout.sample().held().none();
         with_samples!(&mut samples, values => values.resize(count, SampleValue::nearest(0.0)));
         let mut all = HoleMask::with_capacity(count);
         all.insert_range(..);
         for chunk in layout.chunks_in(part) {
-            let covers = chunk.covers;
-            let first = [covers.column, covers.row];
+            let inside = chunk.covers.within(part);
+            // The rest of plain samples may well be read.
+            let read_at_once = if layout.is_plain {
+                inside
+            } else {
+                chunk.covers
+            };
+            let first = [read_at_once.column, read_at_once.row];
             if chunk.bytes == 0 || self.unread.has(image, first) {
                 continue;
             }
-            let inside = covers.within(part);
             let read = guarded(super::FORMAT.name, || self.block(image, &inside));
             let block = match read {
                 Ok(block) => block,
                 Err(fault) if fault.is_of_the_line() => return Err(fault),
                 Err(fault) => {
-                    self.unread.warn(image, &covers, &fault);
+                    self.unread.warn(image, &read_at_once, &fault);
                     continue;
                 }
             };
@@ -186,12 +224,6 @@ impl TiffBlocks {
             holes: Some(all),
             is_lacking: true,
         })
-    }
-
-    /// The mask beside the file, of this image.
-    fn mask_of(&self, image: &Image) -> Option<&TiffFile> {
-        let mask = self.mask.as_ref()?;
-        images::of_same_size(mask, &image.directory).and(Some(mask))
     }
 }
 
@@ -285,7 +317,7 @@ impl BlockReader for TiffBlocks {
     }
 
     fn sample_type(&self) -> SampleType {
-        sample_type(&self.images[MAIN].layout)
+        self.images[MAIN].layout.sample().held()
     }
 
     fn is_stored(&self, image: usize, part: &Part) -> bool {
@@ -294,22 +326,10 @@ impl BlockReader for TiffBlocks {
     }
 
     fn want(&self, image: usize, parts: &[Part]) {
-        let Image {
-            file,
-            directory,
-            layout,
-        } = &self.images[image];
-        let Some(remote) = &self.remote[*file] else {
-            return;
-        };
-        let places = directory.tile_offsets().or(directory.strip_offsets());
-        let places = places.unwrap_or_default();
-        let chunks = parts.iter().flat_map(|part| layout.chunks_in(part));
-        let ranges = chunks.filter_map(|chunk| {
-            let from = *places.get(chunk.number)?;
-            Some(from..from.saturating_add(chunk.bytes))
-        });
-        remote.want(ranges);
+        let Image { file, layout, .. } = &self.images[image];
+        if let Some(remote) = &self.remote[*file] {
+            remote.want(parts.iter().flat_map(|part| ranges(layout, part)));
+        }
     }
 
     fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
@@ -349,10 +369,8 @@ impl TiffBlocks {
         for image in &self.images {
             hasher.write_u32(image.layout.columns);
             hasher.write_u32(image.layout.rows);
-            let directory = &image.directory;
-            let places = directory.tile_offsets().or(directory.strip_offsets());
             let bytes = image.layout.of_band().unwrap_or_default();
-            for number in places.unwrap_or_default().iter().chain(bytes) {
+            for number in image.layout.places().iter().chain(bytes) {
                 hasher.write_u64(*number);
             }
         }

@@ -17,17 +17,22 @@ pub(super) fn full(file: &TiffFile) -> Result<&Ifd, BadRaster> {
         .ok_or_else(|| BadRaster::damaged("TIFF: it has no image"))
 }
 
-/// The mask that GDAL keeps beside an image or overview of the same size: 0 for no data.
-pub(super) fn mask_of<'f>(file: &'f TiffFile, image: &Ifd) -> Option<&'f Ifd> {
+/// The masks of an image or overview, each with its file: the one that GDAL keeps in the same
+/// file, and the one in a file `beside`; they are of its size. 0 is no data.
+pub(super) fn masks<'f>(
+    file: &'f TiffFile,
+    beside: Option<&'f TiffFile>,
+    image: &Ifd,
+) -> impl Iterator<Item = (&'f TiffFile, &'f Ifd)> {
     let size = |image: &Ifd| (image.width(), image.height());
+    let wanted = size(image);
     let mut others = file.ifds().iter().skip(1);
-    others.find(|other| kind(other) & MASK != 0 && size(other) == size(image))
-}
-
-/// The first image that is as large as another.
-pub(super) fn of_same_size<'f>(file: &'f TiffFile, image: &Ifd) -> Option<&'f Ifd> {
-    let size = |image: &Ifd| (image.width(), image.height());
-    file.ifds().iter().find(|other| size(other) == size(image))
+    let inside = others.find(|other| kind(other) & MASK != 0 && size(other) == wanted);
+    let outside = beside.and_then(|beside| {
+        let mask = beside.ifds().iter().find(|other| size(other) == wanted);
+        mask.map(|mask| (beside, mask))
+    });
+    inside.map(|mask| (file, mask)).into_iter().chain(outside)
 }
 
 /// The overviews in a file, the finest first.

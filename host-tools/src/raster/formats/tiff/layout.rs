@@ -3,9 +3,12 @@
 use tiff_reader::{ByteOrder, Ifd, PhotometricInterpretation};
 
 use super::fault::{fault, unsupported};
-use super::samples::sample_type;
-use crate::raster::BadRaster;
 use crate::raster::blocks::Part;
+use crate::raster::read::Stored;
+use crate::raster::{BadRaster, SampleType};
+
+/// Larger uncompressed chunks are not decoded as a whole, bytes.
+const LARGEST_DECODED: u64 = 1 << 20;
 
 /// How an image's samples are stored.
 #[derive(Debug)]
@@ -26,17 +29,22 @@ pub(super) struct Layout {
     tiled: bool,
     /// Columns and rows of a strip or tile.
     pub(super) chunk: (u32, u32),
+    /// Where each chunk lies in the file.
+    chunk_places: Vec<u64>,
     /// Bytes stored for each chunk; 0 for one that a sparse file leaves out.
     chunk_bytes: Vec<u64>,
+    /// Bytes are samples, in an order without surprises, and chunks are so large that they are
+    /// read row by row.
+    pub(super) is_plain: bool,
 }
 
 /// A strip or tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Chunk {
+    /// Where it lies in the file.
+    pub(super) place: u64,
     /// Bytes stored for it; 0 for one that a sparse file leaves out.
     pub(super) bytes: u64,
-    /// Its number among those of all bands.
-    pub(super) number: usize,
     /// Its samples.
     pub(super) covers: Part,
 }
@@ -86,25 +94,24 @@ impl Layout {
             refuse_colour(image, bands, asked.is_some())?;
         }
         let band = chosen_band(asked, bands)?;
-        let (tiled, chunk, chunk_bytes) = match (image.tile_width(), image.tile_height()) {
+        let (tiled, chunk, index) = match (image.tile_width(), image.tile_height()) {
             (Some(width), Some(height)) => {
-                let bytes = image.tile_byte_counts();
-                (true, (width, height), stored(bytes, image.tile_offsets()))
+                let index = image.tile_offsets().zip(image.tile_byte_counts());
+                (true, (width, height), index)
             }
             _ => {
                 let height = image.rows_per_strip().min(rows);
-                let bytes = image.strip_byte_counts();
-                (
-                    false,
-                    (columns, height),
-                    stored(bytes, image.strip_offsets()),
-                )
+                let index = image.strip_offsets().zip(image.strip_byte_counts());
+                (false, (columns, height), index)
             }
         };
         if chunk.0 == 0 || chunk.1 == 0 {
             return Err(BadRaster::damaged("TIFF: strips or tiles without samples"));
         }
-        Ok(Self {
+        let (chunk_places, chunk_bytes) = index
+            .map(stored)
+            .ok_or_else(|| BadRaster::damaged("TIFF: it does not say where its samples are"))?;
+        let layout = Self {
             columns,
             rows,
             stored: stored_type(image)?,
@@ -115,9 +122,40 @@ impl Layout {
             planar: image.planar_configuration() == 2,
             tiled,
             chunk,
-            chunk_bytes: chunk_bytes
-                .ok_or_else(|| BadRaster::damaged("TIFF: it does not say where its samples are"))?,
+            chunk_places,
+            chunk_bytes,
+            is_plain: false,
+        };
+        Ok(Self {
+            is_plain: layout.chunk_size() > LARGEST_DECODED && has_plain_samples(image),
+            ..layout
         })
+    }
+
+    /// Bytes of the samples of a chunk.
+    fn chunk_size(&self) -> u64 {
+        let (columns, rows) = (u64::from(self.chunk.0), u64::from(self.chunk.1));
+        columns
+            .saturating_mul(rows)
+            .saturating_mul(self.texel_bytes())
+    }
+
+    /// How a sample lies in the file, and in which type it is held.
+    pub(super) const fn sample(&self) -> Stored {
+        use SampleFormat::{Float, Signed, Unsigned};
+        match self.stored {
+            (Unsigned, 8) => Stored::Held(SampleType::U8),
+            (Signed, 8) => Stored::Held(SampleType::I8),
+            (Unsigned, 16) => Stored::Held(SampleType::U16),
+            (Signed, 16) => Stored::Held(SampleType::I16),
+            (Float, 16) => Stored::F16,
+            (Unsigned, 32) => Stored::Held(SampleType::U32),
+            (Signed, 32) => Stored::Held(SampleType::I32),
+            (Float, 32) => Stored::Held(SampleType::F32),
+            (Unsigned, _) => Stored::U64,
+            (Signed, _) => Stored::I64,
+            (Float, _) => Stored::Held(SampleType::F64),
+        }
     }
 
     /// Chunks from west to east.
@@ -128,15 +166,19 @@ impl Layout {
     /// The chunks that have samples of a part of the band that is the height. Those that the
     /// index has too few of are left out.
     pub(super) fn chunks_in(&self, part: &Part) -> impl Iterator<Item = Chunk> {
+        self.chunks_of(self.band, part)
+    }
+
+    /// The same of another band.
+    pub(super) fn chunks_of(&self, band: usize, part: &Part) -> impl Iterator<Item = Chunk> {
         let (width, height) = self.chunk;
         let across = part.column / width..(part.column + part.columns).div_ceil(width);
         let down = part.row / height..(part.row + part.rows).div_ceil(height);
         let places = down.flat_map(move |row| across.clone().map(move |column| (column, row)));
+        let first = self.first_of(band);
         places.filter_map(move |(column, row)| {
             let index = u64::from(row) * u64::from(self.chunks_across()) + u64::from(column);
-            let number = usize::try_from(index).ok()?;
-            let bytes = *self.of_band()?.get(number)?;
-            let number = number.checked_add(self.first_of_band()?)?;
+            let number = usize::try_from(index).ok()?.checked_add(first?)?;
             let (column, row) = (column * width, row * height);
             let covers = Part {
                 column,
@@ -145,8 +187,8 @@ impl Layout {
                 rows: height.min(self.rows - row),
             };
             Some(Chunk {
-                bytes,
-                number,
+                place: *self.chunk_places.get(number)?,
+                bytes: *self.chunk_bytes.get(number)?,
                 covers,
             })
         })
@@ -155,7 +197,7 @@ impl Layout {
     /// Bytes that all samples take in memory.
     pub(super) fn bytes(&self) -> u64 {
         let samples = u64::from(self.columns) * u64::from(self.rows);
-        samples.saturating_mul(sample_type(self).bytes())
+        samples.saturating_mul(self.sample().held().bytes())
     }
 
     /// Bytes stored for each chunk with samples of the band that is the height; `None`
@@ -164,18 +206,29 @@ impl Layout {
         let down = self.rows.div_ceil(self.chunk.1);
         let chunks = u64::from(self.chunks_across()) * u64::from(down);
         let chunks = usize::try_from(chunks).ok()?;
-        let first = self.first_of_band()?;
+        let first = self.first_of(self.band)?;
         self.chunk_bytes.get(first..first.checked_add(chunks)?)
     }
 
-    /// Number of the band's first chunk among those of all bands.
-    fn first_of_band(&self) -> Option<usize> {
+    /// Where all chunks lie, those of all bands.
+    pub(super) fn places(&self) -> &[u64] {
+        &self.chunk_places
+    }
+
+    /// Number of a band's first chunk among those of all bands.
+    fn first_of(&self, band: usize) -> Option<usize> {
         let down = self.rows.div_ceil(self.chunk.1);
         let chunks = usize::try_from(u64::from(self.chunks_across()) * u64::from(down)).ok()?;
         match self.planar {
-            true => chunks.checked_mul(self.band),
+            true => chunks.checked_mul(band),
             false => Some(0),
         }
+    }
+
+    /// Bytes of a texel that come before a band's sample.
+    pub(super) fn bytes_before(&self, band: usize) -> usize {
+        let band = if self.planar { 0 } else { band };
+        usize::from(self.stored.1 / 8) * band
     }
 
     /// Bytes of the samples that are stored together: one of each band, or of one
@@ -205,17 +258,22 @@ impl Layout {
     }
 }
 
-/// Bytes stored for each chunk that has a place. What lies at 0, where the file's header is, is left out,
-/// whatever its size.
-fn stored(bytes: Option<Vec<u64>>, places: Option<Vec<u64>>) -> Option<Vec<u64>> {
-    let (mut bytes, places) = (bytes?, places?);
+/// Places of chunks, and bytes stored for each. What lies at 0, where the file's header is, is
+/// left out, whatever its size.
+fn stored((mut places, mut bytes): (Vec<u64>, Vec<u64>)) -> (Vec<u64>, Vec<u64>) {
     bytes.truncate(places.len());
-    for (bytes, place) in bytes.iter_mut().zip(places) {
-        if place == 0 {
+    places.truncate(bytes.len());
+    for (bytes, place) in bytes.iter_mut().zip(&places) {
+        if *place == 0 {
             *bytes = 0;
         }
     }
-    Some(bytes)
+    (places, bytes)
+}
+
+/// Whether bytes are samples: neither packed, nor differences, nor with their bits turned.
+fn has_plain_samples(image: &Ifd) -> bool {
+    (image.compression(), image.predictor(), image.fill_order()) == (1, 1, 1)
 }
 
 /// The band that its tag calls alpha, associated or not.

@@ -12,6 +12,7 @@ mod layout;
 mod metadata;
 mod remote_source;
 mod samples;
+mod uncompressed;
 mod user_defined;
 
 use std::iter::once;
@@ -60,17 +61,18 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
         Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
         None => options.most_in_memory_bytes,
     };
-    let stays = layout.bytes() > most && blocks::suit(&layout);
+    let mask_file = find_appended(input, "msk")?;
+    let mask = mask_file.as_ref().map(open).transpose()?;
+    let suits = blocks::suit(&layout) && blocks::masks_suit(&file, mask.as_ref(), &image);
+    let stays = layout.bytes() > most && suits;
     if !stays {
         budget::check_memory(&layout)?;
     }
     budget::check(&layout, input.len(), stays)?;
     let format = layout.described(file.byte_order());
     let size = (layout.columns, layout.rows);
-    let mask_file = find_appended(input, "msk")?;
-    let mask = mask_file.as_ref().map(open).transpose()?;
     let storage = match stays {
-        false if input.is_outline() => Storage::from(samples::sample_type(&layout).none()),
+        false if input.is_outline() => Storage::from(layout.sample().held().none()),
         true => {
             let overviews = match find_appended(input, "ovr")? {
                 Some(beside) => Some((open(&beside)?, beside.remote())),

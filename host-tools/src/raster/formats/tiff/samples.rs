@@ -5,11 +5,12 @@ use half::f16;
 use tiff_reader::{Ifd, TiffFile, TiffSample};
 
 use super::fault::fault;
-use super::images::{mask_of, of_same_size};
+use super::images::masks;
 use super::layout::{Layout, SampleFormat};
+use super::uncompressed;
 use crate::raster::blocks::Part;
 use crate::raster::samples::{HoleMask, SampleValue, with_samples};
-use crate::raster::{BadRaster, SampleType, Samples};
+use crate::raster::{BadRaster, Samples};
 
 /// Reads a part of a band, the first being 0.
 pub(super) fn read(
@@ -20,6 +21,9 @@ pub(super) fn read(
     part: &Part,
 ) -> Result<Samples, BadRaster> {
     use SampleFormat::{Float, Signed, Unsigned};
+    if layout.is_plain {
+        return uncompressed::read(file, layout, band, part);
+    }
     let band = Band { file, image, band };
     Ok(match layout.stored {
         (Unsigned, 8) => band.read(part, |value: u8| value)?.into(),
@@ -34,21 +38,6 @@ pub(super) fn read(
         (Signed, _) => band.read(part, |value: i64| value as f64)?.into(),
         (Float, _) => band.read(part, |value: f64| value)?.into(),
     })
-}
-
-/// The type in which [`read`] hands samples over.
-pub(super) fn sample_type(layout: &Layout) -> SampleType {
-    use SampleFormat::{Float, Signed, Unsigned};
-    match layout.stored {
-        (Unsigned, 8) => SampleType::U8,
-        (Signed, 8) => SampleType::I8,
-        (Unsigned, 16) => SampleType::U16,
-        (Signed, 16) => SampleType::I16,
-        (Unsigned, 32) => SampleType::U32,
-        (Signed, 32) => SampleType::I32,
-        (Float, 16 | 32) => SampleType::F32,
-        _ => SampleType::F64,
-    }
 }
 
 /// A band of an image.
@@ -122,9 +111,7 @@ pub(super) fn holes(
             (west..east).for_each(|column| set(start + column as usize));
         }
     }
-    let inside = mask_of(file, image).map(|mask| (file, mask));
-    let outside = beside.and_then(|beside| Some((beside, of_same_size(beside, image)?)));
-    for (file, image) in inside.into_iter().chain(outside) {
+    for (file, image) in masks(file, beside, image) {
         let mask = Band {
             file,
             image,

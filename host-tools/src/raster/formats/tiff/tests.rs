@@ -458,8 +458,9 @@ fn a_file_with_few_of_its_tiles_is_whole_where_it_stays_on_disk() {
 /// A sparse file says that it is large, not that it is damaged.
 #[test]
 fn what_memory_cannot_hold_is_no_damage() {
-    // 200,000 × 200,000 in four tiles, the last of which is stored.
-    let tags = in_tiles(200_000, 100_000, [&[0, 0, 0, 8], &[0, 0, 0, 64]]);
+    // 200,000 × 200,000 in four deflated tiles, the last of which is stored.
+    let mut tags = in_tiles(200_000, 100_000, [&[0, 0, 0, 8], &[0, 0, 0, 64]]);
+    tags[3] = shorts(259, &[8]);
     let fault = open(by_hand(&tags, &[1; 64])).expect_err("too large");
     assert!(
         matches!(fault, BadRaster::TooLarge { gigabytes: 40, .. }),
