@@ -15,13 +15,15 @@
 //! A file that was changed at its server is not read on: what was fetched of it and what
 //! would come do not belong together.
 //!
-//! `object_store` makes the requests; it is named in `store` only. Without the feature
+//! `object_store` makes the requests; it is named in `store` and `errors` only. Without the feature
 //! `remote` there is no such file (`absent`).
 
 #[cfg(not(feature = "remote"))]
 mod absent;
 #[cfg(feature = "remote")]
 mod elsewhere;
+#[cfg(feature = "remote")]
+mod errors;
 #[cfg(feature = "remote")]
 mod file;
 #[cfg(feature = "remote")]
@@ -46,7 +48,7 @@ pub use elsewhere::Elsewhere;
 #[cfg(feature = "remote")]
 pub(crate) use file::RemoteFile;
 pub(crate) use reader::RemoteReader;
-pub(crate) use url::{beside, file_name, is_url, neighbour, without_key};
+pub(crate) use url::{beside, escaped, file_name, is_url, neighbour, without_key};
 
 /// A failure of the line or the server: another try may go well.
 const OUTAGE: ErrorKind = ErrorKind::ConnectionAborted;

@@ -1,4 +1,4 @@
-//! Requests to a server: `object_store` is named here only.
+//! Requests to a server: `object_store` is named here and in `errors` only.
 
 use std::io::{Error, ErrorKind, Result};
 use std::ops::Range;
@@ -11,11 +11,10 @@ use object_store::client::ClientConfigKey;
 use object_store::gcp::{GoogleCloudStorageBuilder, GoogleConfigKey};
 use object_store::http::HttpBuilder;
 use object_store::path::Path;
-use object_store::{
-    Error as StoreError, GetOptions, GetRange, GetResult, ObjectMeta, ObjectStore, RetryConfig,
-};
+use object_store::{GetOptions, GetRange, GetResult, ObjectMeta, ObjectStore, RetryConfig};
 
-use super::url::{in_text, is_url, shown};
+use super::errors::{at_opening, is_without_ranges, told, wrong};
+use super::url::shown;
 use super::{LOST, OUTAGE, pages};
 
 /// A request is given up after so long, and when nothing comes for so long.
@@ -26,8 +25,6 @@ const CONNECT: &str = "5 seconds";
 /// answer.
 const RETRIES: usize = 3;
 const RETRIES_SECONDS: u64 = 15;
-/// No answer of a server is shown at more length than this, characters.
-const SHOWN: usize = 300;
 
 /// A file at a server, in the state in which it was opened.
 #[derive(Debug)]
@@ -72,7 +69,7 @@ pub(super) async fn open(url: &str) -> Result<Opened> {
             })
         }
         Err(error) if is_without_ranges(&error) => whole(url, store, path).await,
-        Err(error) => Err(told(&error)),
+        Err(error) => Err(at_opening(&error)),
     }
 }
 
@@ -213,7 +210,7 @@ fn at(url: &str) -> Result<(Box<dyn ObjectStore>, Path)> {
             )
         }
         "az" | "azure" | "abfs" | "abfss" | "adl" => {
-            let builder = MicrosoftAzureBuilder::from_env().with_url(shown(url));
+            let builder = microsofts().with_url(shown(url));
             (
                 Box::new(store!(builder, AzureConfigKey::Client)),
                 in_bucket()?,
@@ -246,88 +243,25 @@ fn at(url: &str) -> Result<(Box<dyn ObjectStore>, Path)> {
     })
 }
 
-/// A server that answers a request for a range with all of the file.
-fn is_without_ranges(error: &StoreError) -> bool {
-    // What the library finds is in its text alone.
-    let text = match error {
-        StoreError::NotSupported { source } | StoreError::Generic { source, .. } => {
-            source.to_string()
+/// What the environment says of Microsoft's servers, also by the names that only
+/// Microsoft's own command knows.
+fn microsofts() -> MicrosoftAzureBuilder {
+    let names = [
+        ("AZURE_STORAGE_ACCOUNT", AzureConfigKey::AccountName),
+        ("AZURE_STORAGE_KEY", AzureConfigKey::AccessKey),
+    ];
+    let known = MicrosoftAzureBuilder::from_env();
+    names.into_iter().fold(known, |known, (name, key)| {
+        match (known.get_config_value(&key), std::env::var(name)) {
+            (None, Ok(value)) => known.with_config(key, value),
+            _ => known,
         }
-        _ => return false,
-    };
-    text.contains("Range request not supported") || text.contains("non-partial response")
-}
-
-/// What is wrong with a URL or with what the environment says.
-fn wrong(error: &dyn std::error::Error) -> Error {
-    Error::new(ErrorKind::InvalidInput, in_short(&error.to_string()))
-}
-
-/// What a server's answer means.
-fn told(error: &StoreError) -> Error {
-    let kind = match error {
-        StoreError::NotFound { .. } => {
-            return Error::new(ErrorKind::NotFound, "there is no such file");
-        }
-        _ if has_status(error, "410") => {
-            return Error::new(ErrorKind::NotFound, "there is no such file any more");
-        }
-        // There is not even a first byte.
-        _ if has_status(error, "416") => {
-            return Error::new(ErrorKind::NotFound, "the file is empty");
-        }
-        StoreError::PermissionDenied { .. } | StoreError::Unauthenticated { .. } => {
-            return Error::new(
-                ErrorKind::PermissionDenied,
-                "it may not be read without a key",
-            );
-        }
-        StoreError::InvalidPath { .. } | StoreError::UnknownConfigurationKey { .. } => {
-            ErrorKind::InvalidInput
-        }
-        _ => OUTAGE,
-    };
-    Error::new(kind, in_short(&error.to_string()))
-}
-
-fn has_status(error: &StoreError, status: &str) -> bool {
-    error
-        .to_string()
-        .contains(&format!("status code: {status}"))
-}
-
-/// On one line, without keys, and not more of it than somebody reads.
-fn in_short(text: &str) -> String {
-    // What a server says after its status is made for a browser.
-    let status = text.find("status code: ").map_or(0, |at| at + 13);
-    let end = text[status..].find(':').filter(|_| status > 0);
-    let text = end.map_or(text, |end| &text[..status + end]);
-    let word = |word: &str| match is_url(word) {
-        true => in_text(word),
-        false => word.to_owned(),
-    };
-    let words: Vec<String> = text.split_whitespace().map(word).collect();
-    let line: String = words.join(" ").chars().take(SHOWN).collect();
-    line.chars().filter(|c| !c.is_control()).collect()
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_a_server_says_is_short_on_one_line_and_holds_no_key() {
-        let said =
-            "GET https://h/a.tif?sig=secret:\n\t500 \u{1b}[2J".to_owned() + &" x".repeat(900);
-        let told = in_short(&said);
-        assert!(told.starts_with("GET https://h/a.tif 500 [2J x"), "{told}");
-        assert!(told.len() <= SHOWN);
-        let page = "Server returned status code: 400 Bad Request: <html>?sig=secret";
-        assert_eq!(
-            in_short(page),
-            "Server returned status code: 400 Bad Request"
-        );
-    }
 
     #[test]
     fn a_path_and_its_key_go_to_the_server_as_they_are() {

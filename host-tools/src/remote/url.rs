@@ -64,9 +64,13 @@ pub(crate) fn beside(url: &str, name: &str) -> String {
             step => steps.push(step),
         }
     }
-    let name = steps.join("/");
+    format!("{folder}{}{rest}", escaped(&steps.join("/")))
+}
+
+/// A name with escapes for what would mean something in a URL.
+pub(crate) fn escaped(name: &str) -> String {
     let name = name.replace('%', "%25").replace('#', "%23");
-    format!("{folder}{}{rest}", name.replace('?', "%3F"))
+    name.replace('?', "%3F")
 }
 
 /// The folder in which a folder lies; the host's own where there is none.

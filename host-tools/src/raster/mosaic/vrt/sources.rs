@@ -10,7 +10,7 @@ use super::super::tile_file;
 use super::rectangles::Rectangle;
 use super::unsupported;
 use super::xml::{Element, number};
-use crate::remote::{beside, is_url};
+use crate::remote::{beside, escaped, is_url};
 
 /// What sources are of.
 #[derive(Clone, Copy)]
@@ -138,7 +138,11 @@ pub(in super::super) fn url(name: &str) -> Option<String> {
     ];
     let gdals = GDALS.iter().find_map(|(prefix, scheme)| {
         let rest = name.strip_prefix(prefix)?;
-        Some(format!("{scheme}{rest}"))
+        // Behind `/vsicurl/` stands a URL, and behind the others a key as it is.
+        Some(match scheme.is_empty() {
+            true => rest.to_owned(),
+            false => format!("{scheme}{}", escaped(rest)),
+        })
     });
     Some(gdals.unwrap_or_else(|| name.to_owned())).filter(|name| is_url(name))
 }

@@ -1,0 +1,227 @@
+//! What an error of `object_store`'s means, in a line that a user can act on.
+
+use std::io::{Error, ErrorKind};
+
+use object_store::Error as StoreError;
+
+use super::OUTAGE;
+use super::url::{in_text, is_url};
+
+/// No answer of a server is shown at more length than this, characters.
+const SHOWN: usize = 300;
+
+/// Where a computer of Amazon's, Google's or Microsoft's asks for a key of its own: parts of
+/// URLs. There is nobody on other computers.
+const KEYS_OF_COMPUTERS: [&str; 4] = [
+    "/latest/api/token",
+    "/latest/meta-data/",
+    "/computeMetadata/",
+    "/metadata/identity/",
+];
+
+/// A server that answers a request for a range with all of the file.
+pub(super) fn is_without_ranges(error: &StoreError) -> bool {
+    // What the library finds is in its text alone.
+    let text = match error {
+        StoreError::NotSupported { source } | StoreError::Generic { source, .. } => {
+            source.to_string()
+        }
+        _ => return false,
+    };
+    text.contains("Range request not supported") || text.contains("non-partial response")
+}
+
+/// What is wrong with a URL or with what the environment says.
+pub(super) fn wrong(error: &dyn std::error::Error) -> Error {
+    let text = error.to_string();
+    let why = match text.contains("Account must be specified") {
+        true => "the environment names no storage account".into(),
+        false => in_short(&text),
+    };
+    Error::new(ErrorKind::InvalidInput, why)
+}
+
+/// What a server's answer means where a file is opened: what the environment lacks shows
+/// here first.
+pub(super) fn at_opening(error: &StoreError) -> Error {
+    let wrong = |why: String| Error::new(ErrorKind::InvalidInput, why);
+    let text = match error {
+        StoreError::Generic { store, .. } if *store != "HTTP" => error.to_string(),
+        _ => return told(error),
+    };
+    if KEYS_OF_COMPUTERS.iter().any(|part| text.contains(part)) {
+        return wrong("the environment holds no key, and this computer has none of its own".into());
+    }
+    if text.contains("token request") && text.contains("status code: 4") {
+        return wrong(format!(
+            "the key of the environment was refused: {}",
+            in_short(&text)
+        ));
+    }
+    if text.contains("builder error") {
+        return wrong(in_short(&with_cause(error)));
+    }
+    if text.contains("incorrectly configured region") {
+        return wrong("the bucket is in another region".into());
+    }
+    told(error)
+}
+
+/// What a server's answer means.
+pub(super) fn told(error: &StoreError) -> Error {
+    let kind = match error {
+        StoreError::NotFound { .. } => {
+            return Error::new(ErrorKind::NotFound, "there is no such file");
+        }
+        _ if has_status(error, "410") => {
+            return Error::new(ErrorKind::NotFound, "there is no such file any more");
+        }
+        // There is not even a first byte.
+        _ if has_status(error, "416") => {
+            return Error::new(ErrorKind::NotFound, "the file is empty");
+        }
+        StoreError::PermissionDenied { .. } | StoreError::Unauthenticated { .. } => {
+            return forbidden(error);
+        }
+        // So Microsoft's servers forbid it where nothing of an account is public.
+        _ if code(&error.to_string()) == Some("PublicAccessNotPermitted") => {
+            return forbidden(error);
+        }
+        // And so they refuse what is in their archive. The library takes it for a file that
+        // was to be written.
+        StoreError::AlreadyExists { .. } => {
+            let why = "its server does not hand it out";
+            return Error::new(ErrorKind::Unsupported, with_code(why, error));
+        }
+        _ if has_status(error, "400") && code(&error.to_string()).is_some() => {
+            let why = "the server does not take what the environment says";
+            return Error::new(ErrorKind::InvalidInput, with_code(why, error));
+        }
+        StoreError::InvalidPath { .. } | StoreError::UnknownConfigurationKey { .. } => {
+            ErrorKind::InvalidInput
+        }
+        _ => OUTAGE,
+    };
+    Error::new(kind, in_short(&with_cause(error)))
+}
+
+fn forbidden(error: &StoreError) -> Error {
+    let why = "it may not be read without a key that opens it";
+    Error::new(ErrorKind::PermissionDenied, with_code(why, error))
+}
+
+fn has_status(error: &StoreError, status: &str) -> bool {
+    error
+        .to_string()
+        .contains(&format!("status code: {status}"))
+}
+
+fn with_code(why: &str, error: &StoreError) -> String {
+    match code(&error.to_string()) {
+        Some(code) => format!("{why}: the server says {code}"),
+        None => why.into(),
+    }
+}
+
+/// The word for an error in the answer of a server that speaks as Amazon's, Google's and
+/// Microsoft's do.
+fn code(text: &str) -> Option<&str> {
+    let (_, rest) = text.split_once("<Code>")?;
+    let (code, _) = rest.split_once("</Code>")?;
+    let is_word = code.len() < 80 && code.chars().all(|c| c.is_ascii_alphanumeric());
+    is_word.then_some(code)
+}
+
+/// The text of an error, and what caused it where the text leaves that out.
+fn with_cause(error: &StoreError) -> String {
+    let text = error.to_string();
+    let mut last: &dyn std::error::Error = error;
+    while let Some(cause) = last.source() {
+        last = cause;
+    }
+    let cause = last.to_string();
+    match text.contains(&cause) {
+        true => text,
+        false => format!("{text}: {cause}"),
+    }
+}
+
+/// On one line, without keys, and not more of it than somebody reads.
+fn in_short(text: &str) -> String {
+    // The library's name for a server, of which the user has a URL.
+    let named = text.strip_prefix("Generic ");
+    let named = named.and_then(|text| text.split_once(" error: "));
+    let text = named.map_or(text, |(_, text)| text);
+    // What a server says after its status is made for a browser.
+    let status = text.find("status code: ").map_or(0, |at| at + 13);
+    let end = text[status..].find(':').filter(|_| status > 0);
+    let text = end.map_or(text, |end| &text[..status + end]);
+    let word = |word: &str| match is_url(word) {
+        true => in_text(word),
+        false => word.to_owned(),
+    };
+    let words: Vec<String> = text.split_whitespace().map(word).collect();
+    let line: String = words.join(" ").chars().take(SHOWN).collect();
+    line.chars().filter(|c| !c.is_control()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_server_says_is_short_on_one_line_and_holds_no_key() {
+        let said =
+            "GET https://h/a.tif?sig=secret:\n\t500 \u{1b}[2J".to_owned() + &" x".repeat(900);
+        let told = in_short(&said);
+        assert!(told.starts_with("GET https://h/a.tif 500 [2J x"), "{told}");
+        assert!(told.len() <= SHOWN);
+        let page = "Server returned status code: 400 Bad Request: <html>?sig=secret";
+        assert_eq!(
+            in_short(page),
+            "Server returned status code: 400 Bad Request"
+        );
+    }
+
+    fn generic(text: &str) -> StoreError {
+        StoreError::Generic {
+            store: "S3",
+            source: text.into(),
+        }
+    }
+
+    #[test]
+    fn what_the_environment_lacks_is_told_where_a_file_is_opened() {
+        for (text, why) in [
+            (
+                "Error performing PUT http://169.254.169.254/latest/api/token in 1s",
+                "holds no key",
+            ),
+            (
+                "Received redirect without LOCATION, this normally indicates an incorrectly configured region",
+                "another region",
+            ),
+        ] {
+            let error = at_opening(&generic(text));
+            assert_eq!(error.kind(), ErrorKind::InvalidInput);
+            assert!(error.to_string().contains(why), "{error}");
+            // Of a file that is open, another try may go well.
+            assert_eq!(told(&generic(text)).kind(), OUTAGE);
+        }
+    }
+
+    #[test]
+    fn the_word_of_a_server_is_told_where_it_is_one() {
+        let said = |body: &str| {
+            let text = format!("Server returned non-2xx status code: 400 Bad Request: {body}");
+            told(&generic(&text)).to_string()
+        };
+        let expired = said("<Error><Code>ExpiredToken</Code></Error>");
+        assert!(
+            expired.ends_with("the server says ExpiredToken"),
+            "{expired}"
+        );
+        let page = said("<Code>see https://h?sig=secret</Code>");
+        assert!(page.ends_with("400 Bad Request"), "{page}");
+    }
+}
