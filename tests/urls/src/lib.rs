@@ -3,7 +3,10 @@
 //! A package of its own: servers, and what the program needs to reach them, take minutes
 //! to build, and no other test wants them.
 
+pub mod azure;
+pub mod bucket;
 pub mod cog;
+pub mod gcs;
 pub mod http;
 pub mod s3;
 

@@ -1,0 +1,51 @@
+//! A service principal: a program that Microsoft knows by a name, and that changes its secret
+//! for a token, by the rule of
+//! <https://learn.microsoft.com/entra/identity-platform/v2-oauth2-client-creds-grant-flow>.
+
+use axum::http::StatusCode;
+
+use super::shared_key::decoded;
+use crate::bucket::{Answer, Refusal, refusal, token};
+
+/// The tenant, the name and the secret of the one that is known.
+pub const PRINCIPAL: [&str; 3] = ["hills-tenant", "surveying", "under the stone"];
+
+/// The token that it gets, as `az account get-access-token` prints one.
+pub const TOKEN: &str = "eyJ0.of-the-surveying.program";
+
+/// Where the secret is changed.
+pub(super) const PATH: &str = "/hills-tenant/oauth2/v2.0/token";
+
+/// # Errors
+/// When name or secret are not right.
+pub(super) fn token_for(body: &str) -> Result<Answer, Refusal> {
+    let said = |name: &str| {
+        let mut pairs = body.split('&').filter_map(|pair| pair.split_once('='));
+        let pair = pairs.find(|(other, _)| *other == name);
+        decoded(&pair.map_or("", |(_, value)| value).replace('+', " "))
+    };
+    let [_, name, secret] = PRINCIPAL;
+    let is_known = said("client_id") == name
+        && said("client_secret") == secret
+        && said("grant_type") == "client_credentials"
+        && said("scope") == "https://storage.azure.com/.default";
+    let why = "AADSTS7000215: Invalid client secret provided.";
+    match is_known {
+        true => Ok(token(TOKEN)),
+        false => Err(refusal(StatusCode::UNAUTHORIZED, "invalid_client", why)),
+    }
+}
+
+/// # Errors
+/// When it is not the token of the one that is known.
+pub(super) fn check(said: &str) -> Result<(), Refusal> {
+    let why = "Server failed to authenticate the request.";
+    match said.strip_prefix("Bearer ") == Some(TOKEN) {
+        true => Ok(()),
+        false => Err(refusal(
+            StatusCode::UNAUTHORIZED,
+            "InvalidAuthenticationInfo",
+            why,
+        )),
+    }
+}

@@ -1,0 +1,199 @@
+//! A server of buckets that asks for a key. Whose service it plays, Google's or Microsoft's,
+//! says how it asks and refuses.
+
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use axum::body::{Body, to_bytes};
+use axum::extract::{Request, State};
+use axum::http::header::{CONTENT_LENGTH, ETAG};
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::Response;
+use axum::{Router, serve};
+use tokio::runtime::Runtime;
+use tower_http::services::ServeDir;
+
+/// More than any file here has, bytes.
+const LARGEST: usize = 1 << 30;
+
+/// The bucket that everybody may read.
+pub const PUBLIC: &str = "open";
+
+/// A server on this machine.
+pub struct Server {
+    url: String,
+    seen: Arc<Mutex<Seen>>,
+    _runtime: Runtime,
+}
+
+/// What was asked of a server, and what it answered.
+#[derive(Clone, Debug, Default)]
+pub struct Seen {
+    /// Methods, paths and statuses of the answers.
+    pub requests: Vec<String>,
+    /// Bytes of files that were sent.
+    pub bytes: usize,
+}
+
+/// Why a server does not answer with a file.
+pub(crate) struct Refusal {
+    pub(crate) status: StatusCode,
+    /// What programs know it by.
+    pub(crate) code: &'static str,
+    /// What people are told.
+    pub(crate) message: String,
+}
+
+/// What is answered to somebody who may ask.
+pub(crate) enum Answer {
+    /// The file at a path of the folder that is served.
+    File(String),
+    /// What a program asked for besides files, as JSON.
+    Words(String),
+}
+
+/// Whose service is played.
+pub(crate) trait Service: Send + Sync + 'static {
+    /// # Errors
+    /// When the key of a request does not open what it asks for.
+    fn answer(&self, request: &Parts, body: &str) -> Result<Answer, Refusal>;
+
+    /// What is said of a file that is not there.
+    fn missing(&self) -> Refusal;
+
+    /// What stands in the body of a refusal, and in its head.
+    fn words(&self, refusal: &Refusal) -> (String, HeaderMap);
+
+    /// The head that an answer with a file has besides a web server's.
+    fn head(&self) -> HeaderMap;
+}
+
+struct Shared<S> {
+    service: S,
+    seen: Arc<Mutex<Seen>>,
+}
+
+impl Server {
+    /// Serves the folders of a folder as buckets.
+    ///
+    /// # Panics
+    /// When there is no port.
+    pub(crate) fn of(folder: &Path, service: impl Service) -> Self {
+        let seen = Arc::<Mutex<Seen>>::default();
+        let shared = Arc::new(Shared {
+            service,
+            seen: seen.clone(),
+        });
+        let files = Router::new().fallback_service(ServeDir::new(folder));
+        let router = files.layer(from_fn_with_state(shared, answered));
+        let (port, runtime) = crate::listening(async move |listener| {
+            serve(listener, router).await.expect("it serves");
+        });
+        Self {
+            url: format!("http://127.0.0.1:{port}"),
+            seen,
+            _runtime: runtime,
+        }
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn endpoint(&self) -> &str {
+        &self.url
+    }
+
+    /// What was asked of it since this was called last.
+    #[must_use]
+    pub fn take_seen(&self) -> Seen {
+        std::mem::take(&mut lock(&self.seen))
+    }
+}
+
+fn lock(seen: &Mutex<Seen>) -> MutexGuard<'_, Seen> {
+    seen.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+async fn answered<S: Service>(
+    State(shared): State<Arc<Shared<S>>>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let asked = format!("{} {}", request.method(), request.uri().path());
+    let (parts, body) = request.into_parts();
+    let body = to_bytes(body, LARGEST).await.unwrap_or_default();
+    let answer = shared
+        .service
+        .answer(&parts, &String::from_utf8_lossy(&body));
+    let (response, bytes) = match answer {
+        Ok(Answer::File(path)) => served(&shared.service, path, parts, next).await,
+        Ok(Answer::Words(text)) => (Response::new(Body::from(text)), 0),
+        Err(refusal) => (refused(&shared.service, &refusal), 0),
+    };
+    let mut seen = lock(&shared.seen);
+    seen.requests.push(format!("{asked} {}", response.status()));
+    seen.bytes += bytes;
+    response
+}
+
+/// The file at a path of the folder, and how many bytes of it.
+async fn served(
+    service: &impl Service,
+    path: String,
+    mut parts: Parts,
+    next: Next,
+) -> (Response, usize) {
+    parts.uri = path.parse().expect("part of a URL");
+    let response = next.run(Request::from_parts(parts, Body::empty())).await;
+    if response.status() == StatusCode::NOT_FOUND {
+        return (refused(service, &service.missing()), 0);
+    }
+    let (mut head, body) = response.into_parts();
+    head.headers.extend(service.head());
+    let tag = HeaderValue::from_static("\"0x8DC0FFEE0000001\"");
+    head.headers.insert(ETAG, tag);
+    let bytes = to_bytes(body, LARGEST).await.unwrap_or_default();
+    let count = bytes.len();
+    (Response::from_parts(head, Body::from(bytes)), count)
+}
+
+fn refused(service: &impl Service, refusal: &Refusal) -> Response {
+    let (text, head) = service.words(refusal);
+    let length = text.len();
+    let mut response = Response::new(Body::from(text));
+    *response.status_mut() = refusal.status;
+    response.headers_mut().extend(head);
+    response.headers_mut().insert(CONTENT_LENGTH, length.into());
+    response
+}
+
+/// The bucket of a path.
+pub(crate) fn bucket(path: &str) -> &str {
+    path.split('/').nth(1).unwrap_or_default()
+}
+
+/// A refusal in words of its own.
+pub(crate) fn refusal(status: StatusCode, code: &'static str, message: &str) -> Refusal {
+    Refusal {
+        status,
+        code,
+        message: message.to_owned(),
+    }
+}
+
+/// Headers of an answer.
+pub(crate) fn headers<const N: usize>(of: [(&'static str, &'static str); N]) -> HeaderMap {
+    let entry = |(name, value)| {
+        let name = HeaderName::from_static(name);
+        (name, HeaderValue::from_static(value))
+    };
+    of.map(entry).into_iter().collect()
+}
+
+/// What a server answers to somebody whose key it takes for a token.
+pub(crate) fn token(token: &str) -> Answer {
+    Answer::Words(format!(
+        r#"{{"access_token":"{token}","expires_in":3599,"token_type":"Bearer"}}"#
+    ))
+}

@@ -1,0 +1,146 @@
+//! `gs://`
+
+use hapterra_url_tests::bucket::{PUBLIC, Server};
+use hapterra_url_tests::gcs::{STRANGER, SURVEYOR, TOKEN, served};
+
+use crate::opened::{Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, said};
+
+/// What to do, as a user is told.
+const HINT: &str = "hint: set what the server wants: GOOGLE_APPLICATION_CREDENTIALS";
+
+/// A server of buckets, and a file for a key.
+struct Google {
+    hills: Hills,
+    server: Server,
+    key: String,
+}
+
+impl Google {
+    fn start() -> Self {
+        let hills = hills(&["hills", PUBLIC]);
+        let server = served(hills.folder.path());
+        let key = hills.folder.path().join("key.json").display().to_string();
+        std::fs::write(&key, SURVEYOR.file()).expect("written");
+        Self { hills, server, key }
+    }
+
+    fn said(&self, name: &str, environment: &[(&str, &str)]) -> String {
+        let server = [("GOOGLE_BASE_URL", self.server.endpoint())];
+        said(name, &[&server, environment].concat())
+    }
+
+    fn said_with_key(&self, name: &str, key: &str) -> String {
+        std::fs::write(&self.key, key).expect("written");
+        self.said(name, &[("GOOGLE_APPLICATION_CREDENTIALS", &self.key)])
+    }
+}
+
+fn url() -> String {
+    format!("gs://hills/{NAME}")
+}
+
+#[test]
+fn a_file_opens_with_the_key_of_an_account_and_is_fetched_in_parts() {
+    let google = Google::start();
+    let felt = google.said_with_key(&url(), &SURVEYOR.file());
+    assert!(felt.contains("felt GeoTIFF"), "{felt}");
+    assert_fetched_in_parts(&google.server.take_seen(), google.hills.bytes);
+}
+
+/// As `gcloud auth print-access-token` prints it, and as a computer of Google's is given one.
+#[test]
+fn a_file_opens_with_a_token() {
+    let google = Google::start();
+    let address = google.server.endpoint().trim_start_matches("http://");
+    for given in [
+        ("GOOGLE_BEARER_TOKEN", TOKEN),
+        ("GCE_METADATA_HOST", address),
+    ] {
+        let felt = google.said(&url(), &[given]);
+        assert!(felt.contains("felt GeoTIFF"), "{given:?}: {felt}");
+    }
+    let other = google.said(&url(), &[("GOOGLE_BEARER_TOKEN", "ya29.other")]);
+    assert_refused(&other, "AuthenticationRequired", HINT);
+}
+
+#[test]
+fn a_file_of_a_public_bucket_opens_without_a_key_and_no_other_does() {
+    let google = Google::start();
+    let nobody = [("GOOGLE_SKIP_SIGNATURE", "true")];
+    let felt = google.said(&format!("gs://{PUBLIC}/{NAME}"), &nobody);
+    assert!(felt.contains("felt GeoTIFF"), "{felt}");
+    assert_refused(&google.said(&url(), &nobody), "AccessDenied", HINT);
+}
+
+#[test]
+fn a_file_that_is_not_there_is_told_so() {
+    let google = Google::start();
+    let missing = google.said_with_key("gs://hills/south.tif", &SURVEYOR.file());
+    assert!(
+        missing.contains("there is no such file (gs://hills/south.tif)"),
+        "{missing}"
+    );
+}
+
+#[test]
+fn a_key_that_does_not_open_it_is_told_so() {
+    let google = Google::start();
+    let stranger = google.said_with_key(&url(), &STRANGER.file());
+    assert_refused(&stranger, "AccessDenied", HINT);
+    let forged = SURVEYOR.file_with_key_of(&STRANGER);
+    let forged = google.said_with_key(&url(), &forged);
+    assert_refused(&forged, "AuthenticationRequired", HINT);
+    let seen = google.server.take_seen();
+    assert_eq!(seen.bytes, 0, "{seen:?}");
+}
+
+#[test]
+fn what_is_wrong_with_the_environment_is_told_with_what_to_set() {
+    let google = Google::start();
+    let none = google.said(&url(), &[]);
+    let no_file = google.said(
+        &url(),
+        &[("GOOGLE_APPLICATION_CREDENTIALS", "/nowhere/key.json")],
+    );
+    let no_key = google.said_with_key(&url(), r#"{"type":"service_account"}"#);
+    for (told, why) in [
+        (
+            none,
+            "the environment holds no key, and this computer has none of its own (gs://hills",
+        ),
+        (
+            no_file,
+            "error: cannot read what is there: Unable to open service account file from /nowhere/key.json",
+        ),
+        (no_key, "missing field `private_key`"),
+    ] {
+        assert!(told.contains(why), "{told}");
+        assert!(told.contains(HINT), "{told}");
+    }
+    assert!(google.server.take_seen().requests.is_empty());
+}
+
+#[test]
+fn a_server_that_is_not_there_is_told_with_the_cause_and_where_to_look() {
+    let nowhere = [
+        ("GOOGLE_BASE_URL", "http://127.0.0.1:1"),
+        ("GOOGLE_BEARER_TOKEN", TOKEN),
+    ];
+    let told = said(&url(), &nowhere);
+    assert!(told.contains("Connection refused"), "{told}");
+    assert!(
+        told.contains("hint: check the line, and GOOGLE_BASE_URL"),
+        "{told}"
+    );
+}
+
+/// The names in a mosaic are GDAL's, which are keys as they are.
+#[test]
+fn the_files_of_a_mosaic_lie_in_buckets() {
+    let google = Google::start();
+    let public = format!("/vsigs/{PUBLIC}/50% #2.tif");
+    let files = ["/vsigs/hills/north ridge/hills-1.tif", &public];
+    let mosaic = mosaic(google.hills.folder.path(), files);
+    let felt = google.said_with_key(&mosaic, &SURVEYOR.file());
+    assert!(felt.contains("4000 x 1200"), "{felt}");
+}

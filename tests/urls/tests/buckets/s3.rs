@@ -1,0 +1,28 @@
+//! `s3://`
+
+use hapterra_url_tests::s3::{KEY, Server};
+
+use crate::opened::{NAME, hills, said};
+
+fn said_with(server: &Server, url: &str, key: [&str; 2]) -> String {
+    let environment = [
+        ("AWS_ENDPOINT_URL", server.endpoint()),
+        ("AWS_ALLOW_HTTP", "true"),
+        ("AWS_ACCESS_KEY_ID", key[0]),
+        ("AWS_SECRET_ACCESS_KEY", key[1]),
+    ];
+    said(url, &environment)
+}
+
+#[test]
+fn a_file_in_a_bucket_opens_with_its_key_and_with_no_other() {
+    let hills = hills(&["hills"]);
+    let server = Server::of(hills.folder.path());
+    let url = format!("s3://hills/{NAME}");
+    let felt = said_with(&server, &url, KEY);
+    assert!(felt.contains("felt GeoTIFF"), "{felt}");
+    let missing = said_with(&server, "s3://hills/south.tif", KEY);
+    assert!(missing.contains("there is no such file"), "{missing}");
+    let forbidden = said_with(&server, &url, [KEY[0], "sand"]);
+    assert!(forbidden.contains("without a key"), "{forbidden}");
+}
