@@ -15,8 +15,8 @@
 //! A file that was changed at its server is not read on: what was fetched of it and what
 //! would come do not belong together.
 //!
-//! `object_store` makes the requests; it is named in `store` and `errors` only. Without the feature
-//! `remote` there is no such file (`absent`).
+//! `object_store` makes the requests; it is named in `store`, `servers` and `errors` only.
+//! Without the feature `remote` there is no such file (`absent`).
 
 #[cfg(not(feature = "remote"))]
 mod absent;
@@ -33,6 +33,8 @@ mod line;
 #[cfg(feature = "remote")]
 mod pages;
 mod reader;
+#[cfg(feature = "remote")]
+mod servers;
 #[cfg(feature = "remote")]
 mod store;
 mod url;

@@ -1,36 +1,22 @@
-//! Requests to a server: `object_store` is named here and in `errors` only.
+//! Requests to a server.
 
 use std::io::{Error, ErrorKind, Result};
 use std::ops::Range;
-use std::sync::Once;
+use std::sync::Arc;
 
 use futures_util::StreamExt;
-use object_store::aws::{AmazonS3Builder, AmazonS3ConfigKey};
-use object_store::azure::{AzureConfigKey, MicrosoftAzureBuilder};
-use object_store::client::ClientConfigKey;
-use object_store::gcp::{GoogleCloudStorageBuilder, GoogleConfigKey};
-use object_store::http::HttpBuilder;
 use object_store::path::Path;
-use object_store::{GetOptions, GetRange, GetResult, ObjectMeta, ObjectStore, RetryConfig};
+use object_store::{GetOptions, GetRange, GetResult, ObjectMeta, ObjectStore};
 
-use super::errors::{at_opening, is_without_ranges, told, wrong};
-use super::url::shown;
+use super::errors::{at_opening, is_without_ranges, told};
+use super::servers::at;
 use super::{LOST, OUTAGE, pages};
-
-/// A request is given up after so long, and when nothing comes for so long.
-const REQUEST: &str = "60 seconds";
-const SILENCE: &str = "10 seconds";
-const CONNECT: &str = "5 seconds";
-/// So often, and in all for so long, a request is made again that the server could not
-/// answer.
-const RETRIES: usize = 3;
-const RETRIES_SECONDS: u64 = 15;
 
 /// A file at a server, in the state in which it was opened.
 #[derive(Debug)]
 pub(super) struct Object {
     url: String,
-    store: Box<dyn ObjectStore>,
+    store: Arc<dyn ObjectStore>,
     path: Path,
     /// As it was when it was opened.
     was: ObjectMeta,
@@ -74,7 +60,7 @@ pub(super) async fn open(url: &str) -> Result<Opened> {
 }
 
 /// A server that knows no ranges hands over all of a file, which then is held in memory.
-async fn whole(url: &str, store: Box<dyn ObjectStore>, path: Path) -> Result<Opened> {
+async fn whole(url: &str, store: Arc<dyn ObjectStore>, path: Path) -> Result<Opened> {
     const LARGEST: u64 = 256 << 20;
     let got = store.get_opts(&path, GetOptions::default()).await;
     let got = got.map_err(|error| told(&error))?;
@@ -155,121 +141,5 @@ async fn body(got: GetResult, range: &Range<u64>) -> Result<Vec<u8>> {
             let why = format!("{} bytes of {wanted} came", bytes.len());
             Err(Error::new(OUTAGE, why))
         }
-    }
-}
-
-/// The server of a URL, and the path there.
-fn at(url: &str) -> Result<(Box<dyn ObjectStore>, Path)> {
-    use ClientConfigKey::{AllowHttp, ConnectTimeout, ReadTimeout, Timeout};
-    static CHOSEN: Once = Once::new();
-    CHOSEN.call_once(|| {
-        // Somebody else's choice is as good.
-        let _ = rustls::crypto::ring::default_provider().install_default();
-    });
-    let retry = RetryConfig {
-        max_retries: RETRIES,
-        retry_timeout: std::time::Duration::from_secs(RETRIES_SECONDS),
-        ..RetryConfig::default()
-    };
-    let (scheme, rest) = url.split_once("://").unwrap_or_default();
-    let scheme = &*scheme.to_ascii_lowercase();
-    let url = &*format!("{scheme}://{rest}");
-    if shown(url).to_ascii_lowercase().contains("%2f") || shown(url).ends_with('/') {
-        let why = "a file's name ends in no slash and has none in it (%2F)";
-        return Err(Error::new(ErrorKind::InvalidInput, why));
-    }
-    // Of a URL without what follows its path.
-    let in_bucket = || {
-        let (_, key) = shown(rest).split_once('/').unwrap_or_default();
-        Path::from_url_path(key).map_err(|error| wrong(&error))
-    };
-    macro_rules! store {
-        ($builder:expr, $key:path) => {
-            $builder
-                .with_retry(retry)
-                .with_config($key(Timeout), REQUEST)
-                .with_config($key(ReadTimeout), SILENCE)
-                .with_config($key(ConnectTimeout), CONNECT)
-                .build()
-                .map_err(|error| wrong(&error))?
-        };
-    }
-    Ok(match scheme {
-        "s3" | "s3a" => {
-            let builder = AmazonS3Builder::from_env().with_url(shown(url));
-            (
-                Box::new(store!(builder, AmazonS3ConfigKey::Client)),
-                in_bucket()?,
-            )
-        }
-        "gs" => {
-            let builder = GoogleCloudStorageBuilder::from_env().with_url(shown(url));
-            (
-                Box::new(store!(builder, GoogleConfigKey::Client)),
-                in_bucket()?,
-            )
-        }
-        "az" | "azure" | "abfs" | "abfss" | "adl" => {
-            let builder = microsofts().with_url(shown(url));
-            (
-                Box::new(store!(builder, AzureConfigKey::Client)),
-                in_bucket()?,
-            )
-        }
-        "http" | "https" => {
-            let path = shown(rest).find('/').map_or("", |at| &shown(rest)[at..]);
-            let (host, query) = (
-                &rest[..shown(rest).len() - path.len()],
-                &rest[shown(rest).len()..],
-            );
-            let query = query.split('#').next().unwrap_or_default();
-            let store = HttpBuilder::new()
-                .with_url(format!("{scheme}://{host}/{query}"))
-                .with_retry(retry)
-                .with_config(AllowHttp, "true")
-                .with_config(Timeout, REQUEST)
-                .with_config(ReadTimeout, SILENCE)
-                .with_config(ConnectTimeout, CONNECT)
-                .build()
-                .map_err(|error| wrong(&error))?;
-            let path = Path::from_url_path(path).map_err(|error| wrong(&error))?;
-            (Box::new(store), path)
-        }
-        other => {
-            let why =
-                format!("no files are read by {other}://: https, http, s3, gs and az are known");
-            return Err(Error::new(ErrorKind::Unsupported, why));
-        }
-    })
-}
-
-/// What the environment says of Microsoft's servers, also by the names that only
-/// Microsoft's own command knows.
-fn microsofts() -> MicrosoftAzureBuilder {
-    let names = [
-        ("AZURE_STORAGE_ACCOUNT", AzureConfigKey::AccountName),
-        ("AZURE_STORAGE_KEY", AzureConfigKey::AccessKey),
-    ];
-    let known = MicrosoftAzureBuilder::from_env();
-    names.into_iter().fold(known, |known, (name, key)| {
-        match (known.get_config_value(&key), std::env::var(name)) {
-            (None, Ok(value)) => known.with_config(key, value),
-            _ => known,
-        }
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_path_and_its_key_go_to_the_server_as_they_are() {
-        let (_, path) = at("https://h:81/a%20b/c.tif?sig=x%2Fy#part").expect("a URL");
-        assert_eq!(path.as_ref(), "a b/c.tif");
-        let (_, path) = at("s3://bucket/a/b.tif").expect("a URL");
-        assert_eq!(path.as_ref(), "a/b.tif");
-        assert!(at("ftp://h/a.tif").is_err());
-        assert!(at("https:///a.tif").is_err());
     }
 }

@@ -1,7 +1,7 @@
 //! `az://`
 
 use hapterra_url_tests::azure::{Account, EMULATOR, PRINCIPAL, SURVEYORS, TOKEN, served};
-use hapterra_url_tests::bucket::{PUBLIC, Server};
+use hapterra_url_tests::bucket::{PUBLIC, Seen, Server};
 
 use crate::opened::{Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, said};
 
@@ -114,8 +114,13 @@ fn a_file_opens_with_a_token_and_with_the_secret_of_a_program() {
         ];
         microsoft.said(&url(), &environment)
     };
+    let _ = microsoft.server.take_seen();
     let felt = with_secret(secret);
     assert!(felt.contains("felt GeoTIFF"), "{felt}");
+    // The file and those that it may have beside it share a token.
+    let Seen { requests, .. } = microsoft.server.take_seen();
+    let changes = requests.iter().filter(|line| line.starts_with("POST"));
+    assert_eq!(changes.count(), 1, "{requests:?}");
     let told = with_secret("in the hut");
     assert!(
         told.contains("the key of the environment was refused"),

@@ -1,0 +1,154 @@
+//! The servers of URLs: how each is asked, and with which key of the environment.
+
+use std::io::{Error, ErrorKind, Result};
+use std::num::NonZeroUsize;
+use std::sync::{Arc, LazyLock, Mutex, Once, PoisonError};
+
+use lru::LruCache;
+use object_store::aws::{AmazonS3Builder, AmazonS3ConfigKey};
+use object_store::azure::{AzureConfigKey, MicrosoftAzureBuilder};
+use object_store::client::ClientConfigKey;
+use object_store::gcp::{GoogleCloudStorageBuilder, GoogleConfigKey};
+use object_store::http::HttpBuilder;
+use object_store::path::Path;
+use object_store::{ObjectStore, RetryConfig};
+
+use super::errors::wrong;
+use super::url::shown;
+
+/// A request is given up after so long, and when nothing comes for so long.
+const REQUEST: &str = "60 seconds";
+const SILENCE: &str = "10 seconds";
+const CONNECT: &str = "5 seconds";
+/// So often, and in all for so long, a request is made again that the server could not
+/// answer.
+const RETRIES: usize = 3;
+const RETRIES_SECONDS: u64 = 15;
+
+/// Servers that are kept at once.
+const MOST_SERVERS: NonZeroUsize = NonZeroUsize::new(64).unwrap();
+
+/// A server, or a bucket of one.
+type Server = Arc<dyn ObjectStore>;
+
+/// The server of a URL, and the path there. All files of a server share it, with the lines to
+/// it that are open and the token that it gave for a key: each file would ask for its own.
+pub(super) fn at(url: &str) -> Result<(Server, Path)> {
+    static KNOWN: LazyLock<Mutex<LruCache<String, Server>>> =
+        LazyLock::new(|| Mutex::new(LruCache::new(MOST_SERVERS)));
+    let (server, path) = parts(url)?;
+    // A panic of the library's leaves it as it was.
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(server) = known.get(&server) {
+        return Ok((server.clone(), path));
+    }
+    let made = made(&server)?;
+    known.put(server, made.clone());
+    Ok((made, path))
+}
+
+/// What of a URL is the server's, with the key that stands behind the path, and the path.
+fn parts(url: &str) -> Result<(String, Path)> {
+    let (scheme, rest) = url.split_once("://").unwrap_or_default();
+    let scheme = scheme.to_ascii_lowercase();
+    let named = shown(rest);
+    if named.to_ascii_lowercase().contains("%2f") || named.ends_with('/') {
+        let why = "a file's name ends in no slash and has none in it (%2F)";
+        return Err(Error::new(ErrorKind::InvalidInput, why));
+    }
+    let (host, path) = named.split_at(named.find('/').unwrap_or(named.len()));
+    let path = Path::from_url_path(path).map_err(|error| wrong(&error))?;
+    let query = rest[named.len()..].split('#').next().unwrap_or_default();
+    // Of a bucket the key is in the environment.
+    let query = if scheme.starts_with("http") {
+        query
+    } else {
+        ""
+    };
+    Ok((format!("{scheme}://{host}/{query}"), path))
+}
+
+fn made(url: &str) -> Result<Server> {
+    use ClientConfigKey::{AllowHttp, ConnectTimeout, ReadTimeout, Timeout};
+    static CHOSEN: Once = Once::new();
+    CHOSEN.call_once(|| {
+        // Somebody else's choice is as good.
+        let _ = rustls::crypto::ring::default_provider().install_default();
+    });
+    let retry = RetryConfig {
+        max_retries: RETRIES,
+        retry_timeout: std::time::Duration::from_secs(RETRIES_SECONDS),
+        ..RetryConfig::default()
+    };
+    macro_rules! server {
+        ($builder:expr, $key:path) => {
+            Arc::new(
+                $builder
+                    .with_url(url)
+                    .with_retry(retry)
+                    .with_config($key(Timeout), REQUEST)
+                    .with_config($key(ReadTimeout), SILENCE)
+                    .with_config($key(ConnectTimeout), CONNECT)
+                    .build()
+                    .map_err(|error| wrong(&error))?,
+            )
+        };
+    }
+    let scheme = url.split("://").next().unwrap_or_default();
+    Ok(match scheme {
+        "s3" | "s3a" => server!(AmazonS3Builder::from_env(), AmazonS3ConfigKey::Client),
+        "gs" => server!(
+            GoogleCloudStorageBuilder::from_env(),
+            GoogleConfigKey::Client
+        ),
+        "az" | "azure" | "abfs" | "abfss" | "adl" => {
+            server!(microsofts(), AzureConfigKey::Client)
+        }
+        "http" | "https" => server!(
+            HttpBuilder::new().with_config(AllowHttp, "true"),
+            std::convert::identity
+        ),
+        other => {
+            let why =
+                format!("no files are read by {other}://: https, http, s3, gs and az are known");
+            return Err(Error::new(ErrorKind::Unsupported, why));
+        }
+    })
+}
+
+/// What the environment says of Microsoft's servers, also by the names that only
+/// Microsoft's own command knows.
+fn microsofts() -> MicrosoftAzureBuilder {
+    let names = [
+        ("AZURE_STORAGE_ACCOUNT", AzureConfigKey::AccountName),
+        ("AZURE_STORAGE_KEY", AzureConfigKey::AccessKey),
+    ];
+    let known = MicrosoftAzureBuilder::from_env();
+    names.into_iter().fold(known, |known, (name, key)| {
+        match (known.get_config_value(&key), std::env::var(name)) {
+            (None, Ok(value)) => known.with_config(key, value),
+            _ => known,
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_and_its_key_go_to_the_server_as_they_are() {
+        let (_, path) = at("https://h:81/a%20b/c.tif?sig=x%2Fy#part").expect("a URL");
+        assert_eq!(path.as_ref(), "a b/c.tif");
+        let (_, path) = at("s3://bucket/a/b.tif").expect("a URL");
+        assert_eq!(path.as_ref(), "a/b.tif");
+        let parts = |url| parts(url).expect("a URL").0;
+        assert_eq!(
+            parts("HTTPS://h:81/a/b.tif?sig=x%2Fy#part"),
+            "https://h:81/?sig=x%2Fy"
+        );
+        assert_eq!(parts("az://a@b/c.tif?sig=x"), "az://a@b/");
+        assert!(at("ftp://h/a.tif").is_err());
+        assert!(at("https:///a.tif").is_err());
+    }
+}
