@@ -489,11 +489,14 @@ impl<'t, const D: usize> Haptics<'t, D> {
         {
             self.settle(scene.cell_mm);
         }
-        let arm = self.mechanism.as_ref().zip(pose);
         outcome.answers = None;
+        // Looked at once: each number of the pose would be, where it is used.
+        let Some(pose) = pose else {
+            return self.tick_without_arm(outcome);
+        };
         let sample = &mut outcome.sample;
         let mut wanted = Vec3::ZERO;
-        if let (Some((mechanism, pose)), Some(scene)) = (arm, &mut self.scene) {
+        if let (Some(mechanism), Some(scene)) = (&self.mechanism, &mut self.scene) {
             let mut hip = place(mechanism, scene, pose);
             let contact = &mut self.contact;
             if !self.clutch.is_closed() {
@@ -510,13 +513,9 @@ impl<'t, const D: usize> Haptics<'t, D> {
         } else {
             write_output(GridPoint::default(), &ContactOutput::default(), sample);
         }
-        let arm = self.mechanism.as_ref().zip(pose);
-        let force_n = match arm {
-            Some(_) => self.guard.limit_force(wanted),
-            None => Vec3::ZERO,
-        };
-        outcome.drive = match arm {
-            Some((mechanism, pose)) if self.guard.mode().drives() => {
+        let force_n = self.guard.limit_force(wanted);
+        outcome.drive = match &self.mechanism {
+            Some(mechanism) if self.guard.mode().drives() => {
                 let wanted_a = self.guard.jog_currents_a().unwrap_or_else(|| {
                     let weight = mechanism.gravity_nm(pose) * self.guard.gain();
                     let torques = pose.torques_nm(to_device_frame(force_n)) + weight;
@@ -530,6 +529,19 @@ impl<'t, const D: usize> Haptics<'t, D> {
             outcome.drive.held = self.guard.held();
         }
         self.write_state(force_n, &mut outcome.sample);
+    }
+
+    /// The same without a calibration: nothing is felt, and nothing driven.
+    #[cold]
+    #[inline(never)]
+    fn tick_without_arm(&mut self, outcome: &mut Outcome) {
+        let sample = &mut outcome.sample;
+        write_output(GridPoint::default(), &ContactOutput::default(), sample);
+        outcome.drive = Drive {
+            held: self.guard.held(),
+            ..Drive::default()
+        };
+        self.write_state(Vec3::ZERO, sample);
     }
 
     /// The force of a scene with effects, after the contact's tick.

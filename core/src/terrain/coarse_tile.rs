@@ -78,24 +78,52 @@ impl CoarseTile {
         self.place(first).is_some() && self.place(last).is_some()
     }
 
+    /// Whether it reaches under a cell of the scene's level, and whether under one of its corners
+    /// at least.
+    pub(super) fn reaches(&self, cell: Cell) -> [bool; 2] {
+        let span = (TILE_CELLS as i32) << self.shift;
+        let off = [(cell.x, self.first.x), (cell.y, self.first.y)];
+        let off = off.map(|(at, first)| at.wrapping_sub(first));
+        [
+            off.iter().all(|off| (0..span).contains(off)),
+            off.iter().all(|off| (-1..=span).contains(off)),
+        ]
+    }
+
+    /// The heights of `tile`, which is this one, at the corners of a cell of the scene's level that
+    /// it [reaches](Self::reaches) under, in the order of [`Tile::corners`] and as
+    /// [`Self::height`] has each of them, to the bit. `None` beside a hole of it.
+    pub(super) fn corners(&self, tile: &Tile, cell: Cell) -> Option<[f32; 4]> {
+        let off = [cell.x - self.first.x, cell.y - self.first.y];
+        let [col, row] = off.map(|off| off >> self.shift);
+        let [sw, se, nw, ne] = tile.corners(Cell::new(col, row));
+        if (sw + se + nw + ne).is_nan() {
+            return None;
+        }
+        // West and east of the cell, south and north of it, in the coarse one.
+        let ([west, east], [south, north]) = (self.shares(off[0]), self.shares(off[1]));
+        let [south_west, south_east] = between(sw, se, west, east);
+        let [north_west, north_east] = between(nw, ne, west, east);
+        let [west_south, west_north] = between(south_west, north_west, south, north);
+        let [east_south, east_north] = between(south_east, north_east, south, north);
+        Some([west_south, east_south, west_north, east_north])
+    }
+
+    /// How far in its coarse cell a cell begins and ends, from 0 to 1.
+    fn shares(&self, off: i32) -> [f32; 2] {
+        let rest = off & (self.spacing() - 1);
+        let per_cell = 1.0 / self.spacing() as f32;
+        [rest, rest + 1].map(|rest| rest as f32 * per_cell)
+    }
+
     /// The height of `tile`, which is this one, at a sample of the scene's level, in cells above
     /// the tile's base; NaN where a corner that counts is a hole, `None` beyond it.
     ///
     /// The result depends on the sample alone, so two patches that share it agree to the bit.
     pub(super) fn height(&self, tile: &Tile, sample: Cell) -> Option<f32> {
         let (cell, [east, north]) = self.place(sample)?;
-        let [sw, se, nw, ne] = tile.corners(Cell::new(cell[0] as i32, cell[1] as i32));
-        let mix = |a: f32, b: f32, share: f32| {
-            // A corner without weight does not count.
-            if share == 0.0 {
-                a
-            } else if share == 1.0 {
-                b
-            } else {
-                a + (b - a) * share
-            }
-        };
-        Some(mix(mix(sw, se, east), mix(nw, ne, east), north))
+        let posts = tile.corners(Cell::new(cell[0] as i32, cell[1] as i32));
+        Some(mix(along(&posts, east), north))
     }
 
     /// Lowest and highest of `tile`, which is this one, over a tile of the scene's level, in cells
@@ -125,6 +153,30 @@ impl CoarseTile {
             }
         }
         (range[0] <= range[1]).then_some(range)
+    }
+}
+
+/// Between the corners of a patch, so far east: south and north.
+fn along([sw, se, nw, ne]: &[f32; 4], east: f32) -> [f32; 2] {
+    [mix([*sw, *se], east), mix([*nw, *ne], east)]
+}
+
+/// Between two heights that are none of a hole, at a place before the last and at one that may
+/// be it: what [`mix`] gives.
+fn between(from: f32, to: f32, at: f32, or_at: f32) -> [f32; 2] {
+    let up = to - from;
+    let last = if or_at == 1.0 { to } else { from + up * or_at };
+    [from + up * at, last]
+}
+
+/// Between two heights. One without weight does not count.
+fn mix([from, to]: [f32; 2], share: f32) -> f32 {
+    if share == 0.0 {
+        from
+    } else if share == 1.0 {
+        to
+    } else {
+        from + (to - from) * share
     }
 }
 
@@ -170,6 +222,46 @@ mod tests {
         assert_eq!((height(1, 116), height(17, 116)), (Some(1.0), Some(1.0)));
         let is_hole = |x, y| height(x, y).is_some_and(f32::is_nan);
         assert!(is_hole(2, 116) && is_hole(9, 116));
+    }
+
+    #[test]
+    fn the_corners_of_a_cell_are_its_samples_to_the_bit_but_beside_holes() {
+        let rough = |col: usize, row: usize| ((col * 7919 + row * 104_729) % 997) as f32 / 7.0;
+        let is_hole = |col: usize, row: usize| (col, row) == (9, 4);
+        let coarse = tile(|col, row| {
+            if is_hole(col, row) {
+                f32::NAN
+            } else {
+                rough(col, row)
+            }
+        });
+        for shift in [2, 3, 7] {
+            let place = CoarseTile { shift, ..COARSE };
+            let span = 32 << shift;
+            let mut beside_hole = 0;
+            for at in 0..span * span {
+                let cell = place.first.offset(at % span, at / span);
+                assert_eq!(place.reaches(cell), [true; 2]);
+                let Some(corners) = place.corners(&coarse, cell) else {
+                    beside_hole += 1;
+                    continue;
+                };
+                for (corner, height) in (0..).zip(corners) {
+                    let sample = cell.offset(corner & 1, corner >> 1);
+                    let expected = place.height(&coarse, sample).expect("there");
+                    assert_eq!(height.to_bits(), expected.to_bits(), "{cell:?} {corner}");
+                }
+            }
+            assert_eq!(beside_hole, 4 << (2 * shift));
+            let reaches = |east, north| place.reaches(place.first.offset(east, north));
+            assert_eq!(reaches(-1, span), [false, true]);
+            assert_eq!(
+                (reaches(-2, 0), reaches(0, span + 1)),
+                ([false; 2], [false; 2])
+            );
+        }
+        let far = Cell::new(i32::MIN, i32::MAX);
+        assert_eq!(COARSE.reaches(far), [false; 2]);
     }
 
     #[test]

@@ -19,7 +19,7 @@
 
 use super::index::{TILE_CELLS, TileIndex, wrap};
 use super::tile::Tile;
-use super::underlay::{Coarse, Underlay};
+use super::underlay::Underlay;
 use super::window::{Corners, Ground, Window};
 use crate::grid::{Altitude, Cell, GridPoint};
 use crate::scalar::larger;
@@ -163,13 +163,15 @@ impl<'t, const D: usize> Window<'t, D> {
 
     #[inline(never)]
     fn settle_each(&mut self, step: f32) {
-        for row in 0..D {
-            for col in 0..D {
-                let Allowance { now, far } = &mut self.settling.slots[row][col];
-                *now += step;
-                if *now < *far || *now == f32::INFINITY {
-                    continue;
-                }
+        let mut left = self.settling.count;
+        for slot in 0..D * D {
+            let (row, col) = (slot / D, slot % D);
+            let Allowance { now, far } = &mut self.settling.slots[row][col];
+            if *now == f32::INFINITY {
+                continue;
+            }
+            *now += step;
+            if *now >= *far {
                 let tile = &mut self.slots[row][col];
                 tile.become_surface();
                 let (key, top) = (tile.key(), tile.top());
@@ -177,6 +179,10 @@ impl<'t, const D: usize> Window<'t, D> {
                     self.settling.begin(key.index, None);
                     self.renew_maxima(key.index, top);
                 }
+            }
+            left -= 1;
+            if left == 0 {
+                return;
             }
         }
     }
@@ -214,45 +220,83 @@ impl<'t, const D: usize> Window<'t, D> {
         let Some(under) = self.underlay.felt() else {
             return Ground::Missing;
         };
-        let own = self.tile_here(TileIndex::holding(cell));
+        let index = TileIndex::holding(cell);
+        let own = self.tile_here(index);
         let base = own.map_or(under.base(), Tile::base);
-        let mut heights = [f32::NAN; 4];
-        for (corner, height) in (0..).zip(&mut heights) {
-            let sample = cell.offset(corner & 1, corner >> 1);
-            let felt = self.felt(&under, sample, base);
-            if felt.height.is_nan() {
-                // What the underlay does not know may yet come.
-                return match felt.is_of_tile {
-                    true => Ground::Hole,
-                    false => Ground::Missing,
-                };
+        let coarse = under.corners(cell, base);
+        // As far as no other tile has the same samples.
+        let alone = match own {
+            Some(tile) => {
+                let (own, allowed) = (tile.corners(cell), self.settling.allowed(index));
+                let felt = |corner: usize| within(own[corner], coarse[corner], allowed);
+                [felt(0), felt(1), felt(2), felt(3)]
             }
-            *height = felt.height;
+            None => coarse,
+        };
+        let heights = match is_inside(cell) {
+            true => alone,
+            false => match self.felt_beside_border(cell, (own.is_some(), alone), coarse, base) {
+                Ok(heights) => heights,
+                Err(ground) => return ground,
+            },
+        };
+        let [sw, se, nw, ne] = heights;
+        match (sw + se + nw + ne).is_nan() {
+            false => Ground::Patch(Corners { base, heights }),
+            true if own.is_some() => Ground::Hole,
+            // What the underlay does not know may yet come.
+            true => Ground::Missing,
         }
-        Ground::Patch(Corners { base, heights })
     }
 
-    /// The height felt at a sample, in cells above `base`.
+    /// The heights felt at the corners of a cell at the border of its tile, or what lies there;
+    /// `alone`, whether the tile is here and what it has.
+    #[inline(never)]
+    fn felt_beside_border(
+        &self,
+        cell: Cell,
+        alone: (bool, [f32; 4]),
+        coarse: [f32; 4],
+        base: i32,
+    ) -> Result<[f32; 4], Ground> {
+        let (is_of_tile, mut heights) = alone;
+        for (corner, height) in (0..).zip(&mut heights) {
+            let sample = cell.offset(corner & 1, corner >> 1);
+            let felt = match is_on_border(sample.x) || is_on_border(sample.y) {
+                true => self.felt(sample, coarse[corner as usize], base),
+                false => Felt {
+                    height: *height,
+                    is_of_tile,
+                },
+            };
+            match (felt.height.is_nan(), felt.is_of_tile) {
+                (false, _) => *height = felt.height,
+                (true, true) => return Err(Ground::Hole),
+                (true, false) => return Err(Ground::Missing),
+            }
+        }
+        Ok(heights)
+    }
+
+    /// The height felt at a sample that several tiles may share, in cells above `base`.
     // A call: four copies of it would be a kilobyte.
     #[inline(never)]
-    fn felt(&self, under: &Coarse<'_>, sample: Cell, base: i32) -> Felt {
-        let coarse = under.height(sample, base);
+    fn felt(&self, sample: Cell, coarse: f32, base: i32) -> Felt {
         let mut felt = Felt {
             height: coarse,
             is_of_tile: false,
         };
         let mut most = -1.0;
-        let on_border = |at: i32| i32::from(at & (TILE_CELLS as i32 - 1) == 0);
-        for west in 0..=on_border(sample.x) {
-            for south in 0..=on_border(sample.y) {
+        for west in 0..=i32::from(is_on_border(sample.x)) {
+            for south in 0..=i32::from(is_on_border(sample.y)) {
                 let index = TileIndex::holding(sample.offset(-west, -south));
-                let Some(tile) = self.tile_here(index) else {
-                    continue;
-                };
                 let allowed = self.settling.allowed(index);
                 if allowed <= most {
                     continue;
                 }
+                let Some(tile) = self.tile_here(index) else {
+                    continue;
+                };
                 most = allowed;
                 let first = index.first_cell();
                 let (col, row) = (sample.x - first.x, sample.y - first.y);
@@ -305,6 +349,17 @@ impl<'t, const D: usize> Window<'t, D> {
         let mut here = around.filter_map(|near| self.tile_here(near));
         is_known && under.is_below(low) && here.all(|tile| tile.is_below(low))
     }
+}
+
+/// Whether a column or row of samples is the border of two tiles.
+const fn is_on_border(at: i32) -> bool {
+    at & (TILE_CELLS as i32 - 1) == 0
+}
+
+/// Whether no corner of a cell is on the border of its tile.
+fn is_inside(cell: Cell) -> bool {
+    let on_border = |at: i32| is_on_border(at) || is_on_border(at + 1);
+    !(on_border(cell.x) || on_border(cell.y))
 }
 
 /// A height brought within `allowed` of another; the very height where it is within, and where

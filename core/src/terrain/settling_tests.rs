@@ -222,6 +222,25 @@ fn it_is_the_model_s_whatever_has_come_and_settled() {
     assert!(bed.window.is_settled(Cell::new(5 * 32, 5 * 32)));
 }
 
+/// Cells on either side of the near tile's border, too.
+#[test]
+fn cells_that_share_samples_of_the_underlay_agree_to_the_bit() {
+    let mut room = room();
+    let bed = Bed::with_underlay(&mut room);
+    let heights = |x: i32, y: i32| match bed.window.ground(Cell::new(x, y)) {
+        Ground::Patch(corners) => corners.heights.map(f32::to_bits),
+        ground => panic!("{x} {y}: {ground:?}"),
+    };
+    for x in 64..319 {
+        for y in 64..319 {
+            let ([_, se, nw, ne], east, north) =
+                (heights(x, y), heights(x + 1, y), heights(x, y + 1));
+            assert_eq!([se, ne], [east[0], east[2]], "{x} {y}");
+            assert_eq!([nw, ne], [north[0], north[1]], "{x} {y}");
+        }
+    }
+}
+
 #[test]
 fn no_sample_moves_faster_than_it_may_and_in_the_end_it_is_the_tile_s_to_the_bit() {
     let mut room = room();

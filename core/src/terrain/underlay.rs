@@ -143,6 +143,34 @@ impl Coarse<'_> {
         near.or_else(|| of(&self.wide)).unwrap_or(f32::NAN)
     }
 
+    /// The same at the corners of a cell, in the order of [`Tile::corners`].
+    pub(super) fn corners(&self, cell: Cell, base: i32) -> [f32; 4] {
+        let [is_over_near, touches_near] = match &self.near {
+            Some((near, _)) => near.reaches(cell),
+            None => [false; 2],
+        };
+        let under = match &self.near {
+            Some(near) if is_over_near => Some(near),
+            _ if !touches_near && self.wide.0.reaches(cell)[0] => Some(&self.wide),
+            _ => None,
+        };
+        if let Some((place, tile)) = under
+            && let Some(heights) = place.corners(tile, cell)
+        {
+            let up = tile.base().wrapping_sub(base) as f32;
+            return heights.map(|height| height + up);
+        }
+        self.corners_by_samples(cell, base)
+    }
+
+    /// The same on borders and beside holes.
+    #[cold]
+    #[inline(never)]
+    fn corners_by_samples(&self, cell: Cell, base: i32) -> [f32; 4] {
+        let sample = |corner: i32| cell.offset(corner & 1, corner >> 1);
+        [0, 1, 2, 3].map(|corner| self.height(sample(corner), base))
+    }
+
     /// Lowest and highest over a tile of the scene's level, in cells above `base`; `None`
     /// where nothing is known there.
     pub(super) fn range_over(&self, index: TileIndex, base: i32) -> Option<[f32; 2]> {
