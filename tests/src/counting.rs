@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use hapterra_core::Vec3;
-use hapterra_core::grid::GridPoint;
+use hapterra_core::grid::{Cell, GridPoint};
 use hapterra_core::guard::Sense;
 use hapterra_core::scene::{Point, Scene};
-use hapterra_core::terrain::{FieldSize, POSTS, TileKey};
+use hapterra_core::terrain::{CoarseTile, FieldSize, POSTS, TileKey};
 use hapterra_core::wire::frame::{MAX_FRAME, encode};
 use hapterra_core::wire::materials::{
     MOST_TABLE_BYTES, MOST_TILE_BYTES, MaterialScene, MaterialTile, TileMaterials, table_bytes,
@@ -47,8 +47,12 @@ pub struct CountingBoard {
 pub enum Event {
     /// A tile arrives.
     Tile(TileKey),
+    /// A tile of the underlay arrives.
+    Coarse(CoarseTile),
     /// A tick with the HIP here.
     Hip(GridPoint),
+    /// Fed by encoders: what follows comes before the tick of this number.
+    Before(u32),
 }
 
 /// A field that the host cuts into tiles.
@@ -56,6 +60,11 @@ pub trait Samples {
     /// The height of a sample of the field in cells, by column and row; NaN is a
     /// hole.
     fn sample(&self, column: i32, row: i32) -> f32;
+
+    /// The height that the underlay has there.
+    fn under(&self, column: i32, row: i32) -> f32 {
+        self.sample(column, row)
+    }
 }
 
 /// A scene for the contact alone, or for the loop on materials: tiles and HIPs in the order they
@@ -143,12 +152,47 @@ impl CountingBoard {
         (field, materials): (&dyn Samples, Option<&Materials>),
         counts: &[[i32; 3]],
     ) -> Vec<Counted> {
+        let events: Vec<Event> = tiles(scene.size).map(Event::Tile).collect();
+        self.ticks_of(scene, (field, materials), (&events, counts))
+    }
+
+    /// The same, but the scene's underlay is held before the first tick, and the tiles come
+    /// before the tick of a number; `None` for never.
+    ///
+    /// # Panics
+    /// When the emulated program fails, and where the scene has no underlay.
+    #[must_use]
+    pub fn chain_over_underlay(
+        &self,
+        scene: &Scene,
+        field: &dyn Samples,
+        (late, counts): (Option<u32>, &[[i32; 3]]),
+    ) -> Vec<Counted> {
+        let underlay = scene.underlay.expect("an underlay");
+        let mut events: Vec<Event> = [Some(underlay.wide), underlay.near]
+            .into_iter()
+            .flatten()
+            .map(Event::Coarse)
+            .collect();
+        if let Some(late) = late {
+            events.push(Event::Before(late));
+            events.extend(tiles(scene.size).map(Event::Tile));
+        }
+        self.ticks_of(scene, (field, None), (&events, counts))
+    }
+
+    /// Whole ticks at these counts, with events before the first of them or before some.
+    fn ticks_of(
+        &self,
+        scene: &Scene,
+        (field, materials): (&dyn Samples, Option<&Materials>),
+        (events, counts): (&[Event], &[[i32; 3]]),
+    ) -> Vec<Counted> {
         let folder = tempfile::tempdir().expect("a folder");
-        let tiles: Vec<Event> = tiles(scene.size).map(Event::Tile).collect();
         let held = Replay {
             scene,
             field,
-            events: &tiles,
+            events,
             materials,
         };
         write_replays(folder.path(), &[held]);
@@ -242,18 +286,18 @@ fn write_replays(folder: &Path, replays: &[Replay<'_>]) {
         for (seq, event) in (0..).zip(replay.events) {
             match event {
                 Event::Hip(hip) => frames.add(&ToDevice::Point(Point { seq, hip: *hip })),
+                Event::Before(seq) => frames.add(&ToDevice::Point(Point {
+                    seq: *seq,
+                    hip: GridPoint::default(),
+                })),
                 Event::Tile(key) => {
                     let bytes = tile_bytes(replay.scene.size, *key, replay.field);
-                    let heights = Heights::Samples {
-                        base: 0,
-                        bytes: &bytes,
-                    };
-                    let tile = TileMessage {
-                        epoch: replay.scene.epoch,
-                        key: *key,
-                        heights,
-                    };
-                    frames.add_tile(tile, replay.materials);
+                    frames.add_tile(tile(replay.scene, *key, &bytes), replay.materials);
+                }
+                Event::Coarse(place) => {
+                    let bytes = coarse_bytes(replay.scene.size, *place, replay.field);
+                    let key = place.key(replay.scene.level);
+                    frames.add_tile(tile(replay.scene, key, &bytes), replay.materials);
                 }
             }
         }
@@ -261,19 +305,36 @@ fn write_replays(folder: &Path, replays: &[Replay<'_>]) {
     frames.close();
 }
 
+fn tile<'b>(scene: &Scene, key: TileKey, bytes: &'b [u8]) -> TileMessage<'b> {
+    TileMessage {
+        epoch: scene.epoch,
+        key,
+        heights: Heights::Samples { base: 0, bytes },
+    }
+}
+
 fn tile_bytes(size: FieldSize, key: TileKey, field: &dyn Samples) -> Vec<u8> {
-    let first = key.index.first_cell();
+    bytes_of(size, key.index.first_cell(), 1, |x, y| field.sample(x, y))
+}
+
+fn coarse_bytes(size: FieldSize, place: CoarseTile, field: &dyn Samples) -> Vec<u8> {
+    bytes_of(size, place.first, place.spacing(), |x, y| field.under(x, y))
+}
+
+/// The samples of a tile whose first one lies there, so many cells apart.
+fn bytes_of(size: FieldSize, first: Cell, apart: i32, height: impl Fn(i32, i32) -> f32) -> Vec<u8> {
     let post = |i: usize| {
-        let (x, y) = (first.x + (i % POSTS) as i32, first.y + (i / POSTS) as i32);
-        if x > size.columns || y > size.rows {
-            f32::NAN
-        } else {
-            field.sample(x, y)
+        let [x, y] = [
+            first.x + (i % POSTS) as i32 * apart,
+            first.y + (i / POSTS) as i32 * apart,
+        ];
+        match size.columns < x || size.rows < y || x < 0 || y < 0 {
+            true => f32::NAN,
+            false => height(x, y),
         }
     };
-    (0..POSTS * POSTS)
-        .flat_map(|i| post(i).to_le_bytes())
-        .collect()
+    let posts = (0..POSTS * POSTS).map(post);
+    posts.flat_map(f32::to_le_bytes).collect()
 }
 
 /// A file of frames.

@@ -7,8 +7,10 @@ use hapterra_bench::path::Dice;
 use hapterra_bench::state::{TICKS, terrain};
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::{Controller, Damping, ForceLaw, Material, Pattern, Shading, Texture};
+use hapterra_core::grid::Cell;
 use hapterra_core::scene::{Scene, Source};
-use hapterra_tests::counting::CountingBoard;
+use hapterra_core::terrain::{CoarseTile, Underlay};
+use hapterra_tests::counting::{CountingBoard, Samples};
 use hapterra_tests::scene::materials::Materials;
 
 use super::contact::{GridSamples, rough, scene, with_law};
@@ -16,6 +18,29 @@ use super::table::{Row, Target, Tick};
 
 /// Ticks on the way down, which do not count.
 const APPROACH: usize = 50;
+
+/// Tiles that settle come before this tick.
+const LATE: Option<usize> = Some(APPROACH);
+/// How far the underlay is above the tiles, by how much a tick moves the surface, and how
+/// long tiles settle, ticks.
+const UNDER_MM: f64 = 3.0;
+const STEP_MM: f64 = 0.05;
+const SETTLES: usize = 60;
+/// Times that they do.
+const RUNS: u32 = 20;
+
+/// A field, and an underlay that is off.
+struct Under<'g>(GridSamples<'g>);
+
+impl Samples for Under<'_> {
+    fn sample(&self, column: i32, row: i32) -> f32 {
+        self.0.sample(column, row)
+    }
+
+    fn under(&self, column: i32, row: i32) -> f32 {
+        self.sample(column, row) + UNDER_MM as f32
+    }
+}
 
 /// An arm over the middle of the terrain.
 struct Arm<'g> {
@@ -190,6 +215,24 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
             on_each,
             ContactState::Touching,
         ),
+        arm.settling(
+            board,
+            "chain, sliding, underlay",
+            in_the_air,
+            (arm.scene(), None),
+        ),
+        arm.settling(
+            board,
+            "chain, sliding, settling",
+            in_the_air,
+            (arm.scene(), LATE),
+        ),
+        arm.settling(
+            board,
+            "chain, sliding, settling, all effects",
+            in_the_air,
+            (all.1, LATE),
+        ),
         row(
             "chain, resting",
             in_contact,
@@ -245,6 +288,62 @@ impl<'g> Arm<'g> {
         }
     }
 
+    /// Slides over the underlay, which is [`UNDER_MM`] off, at half a cell a tick, once in each
+    /// of several directions, and counts the ticks from the one in which tiles come until they
+    /// have settled; all of them where none comes.
+    fn settling(
+        &self,
+        board: &CountingBoard,
+        name: &str,
+        target: Target,
+        (scene, late): (Scene, Option<usize>),
+    ) -> Row {
+        let spacing = |shift: u8| CoarseTile {
+            first: Cell::new(0, 0),
+            shift,
+        };
+        let near = CoarseTile {
+            first: Cell::new(64, 64),
+            ..spacing(2)
+        };
+        let scene = Scene {
+            underlay: Some(Underlay {
+                wide: spacing(3),
+                near: Some(near),
+            }),
+            ..scene
+        };
+        let field = Under(GridSamples(self.grid));
+        let counted = APPROACH..APPROACH + SETTLES;
+        let runs = (0..RUNS).flat_map(|run| {
+            let heading = f64::from(run) * 0.7;
+            let along = |tick: usize| 0.5 * (tick as f64 - 0.5 * counted.end as f64);
+            let surface = |tick: usize| match late {
+                Some(late) => UNDER_MM - STEP_MM * tick.saturating_sub(late) as f64,
+                None => UNDER_MM,
+            };
+            let above = |tick: usize| 2.0 * (1.0 - tick as f64 / APPROACH as f64) - 0.4;
+            let counts: Vec<_> = (0..counted.end)
+                .map(|tick| {
+                    let off = [heading.cos(), heading.sin()].map(|part| part * along(tick));
+                    self.counts(off, surface(tick) + above(tick).max(-0.4))
+                })
+                .collect();
+            let late = late.map(|late| late as u32);
+            let ticks = board.chain_over_underlay(&scene, &field, (late, &counts));
+            ticks.into_iter().enumerate().skip(counted.start)
+        });
+        let touching = ContactState::Touching as u32;
+        let there = runs.filter(|(_, tick)| tick.state == touching && tick.converged);
+        let there: Vec<Tick> = there.map(|(index, tick)| Tick::of(&tick, index)).collect();
+        assert!(
+            there.len() > RUNS as usize * SETTLES * 9 / 10,
+            "{name}: {}",
+            there.len()
+        );
+        Row::new(name, target, there)
+    }
+
     /// Runs the counts, a way down to the first of them before, and counts the
     /// ticks in which the proxy is in `state`: nearly all of them.
     fn row(
@@ -283,13 +382,7 @@ impl<'g> Arm<'g> {
         assert_eq!(ticks.len(), all.len());
         let ticks = ticks.iter().enumerate().skip(APPROACH);
         let there = ticks.filter(|(_, tick)| tick.state == state as u32 && tick.converged);
-        let there = there.map(|(index, tick)| Tick {
-            instructions: tick.instructions,
-            units: 0,
-            scene: None,
-            index,
-        });
-        let there: Vec<Tick> = there.collect();
+        let there: Vec<Tick> = there.map(|(index, tick)| Tick::of(tick, index)).collect();
         assert!(
             there.len() > counts.len() * 9 / 10,
             "{name}: {}",

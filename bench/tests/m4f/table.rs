@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use hapterra_tests::counting::Counted;
+
 /// The kept table.
 const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/instructions-m4f.csv");
 /// More than this share above the kept count is a regression, and more than
@@ -68,6 +70,16 @@ pub(crate) struct Row {
 }
 
 impl Tick {
+    /// One of the whole chain, by its place among the ticks of its run.
+    pub(crate) fn of(counted: &Counted, index: usize) -> Self {
+        Self {
+            instructions: counted.instructions,
+            units: 0,
+            scene: None,
+            index,
+        }
+    }
+
     fn per_unit(&self) -> f64 {
         f64::from(self.instructions) / f64::from(self.units)
     }

@@ -21,7 +21,7 @@
 //!   point is one [`Haptics::tick`], and one that is not answered comes again.
 //! - `counts.frames`, for a scene fed by encoders: [`Sensed`] frames, each one
 //!   [`Haptics::tick`], count to current, once the arm was armed where the
-//!   first of them is.
+//!   first of them is. Tiles behind a point come before the tick that has its number.
 //!
 //! and leaves `ticks.bin`: [`RECORD`] little-endian words a tick; of a scene fed by points
 //! `tiles.bin`, too: as many for each tile, which count filling a buffer with it.
@@ -67,6 +67,8 @@ pub(crate) const RECORD: usize = 13;
 
 static TILES: ConstStaticCell<[[Tile; WINDOW]; WINDOW]> =
     ConstStaticCell::new([const { [const { Tile::VACANT }; WINDOW] }; WINDOW]);
+/// An underlay keeps two.
+static SPARES: ConstStaticCell<[Tile; 3]> = ConstStaticCell::new([const { Tile::VACANT }; 3]);
 static SPARE: ConstStaticCell<Tile> = ConstStaticCell::new(Tile::VACANT);
 
 #[entry]
@@ -211,24 +213,19 @@ fn chain(scene: &Scene, table: Option<&MaterialTable>, frames: &mut Frames, reco
             0
         }
     };
-    let mut spare = Some(SPARE.take());
-    while let Some(message) = frames.next() {
-        let buffer = spare.take().expect("every tile gives a buffer back");
-        match message {
-            ToDevice::Tile(tile) => fill_tile(buffer, &tile).expect("the host made it well"),
-            ToDevice::MaterialTile(tile) => fill_material_tile(buffer, &tile, count),
-            _ => panic!("before the counts there are tiles only"),
-        }
-        spare = haptics.accept(Command::Tile(buffer));
-    }
+    let mut spares = SPARES.take().each_mut().map(Some);
+    let mut next = take_tiles(&mut haptics, &mut spares, frames, count);
     let mut sensed = Frames::open(c"counts.frames");
     let stopwatch = Stopwatch::start();
     let mut armed = false;
     let mut outcome = Outcome::default();
-    while let Some(Sensed { sense, .. }) = sensed.next() {
+    while let Some(Sensed { sense, tick: at }) = sensed.next() {
         if !armed {
             arm(&mut haptics, sense, &mut outcome);
             armed = true;
+        }
+        if next == Some(at) {
+            next = take_tiles(&mut haptics, &mut spares, frames, count);
         }
         let sense = black_box(Sense {
             dead_man: true,
@@ -247,6 +244,32 @@ fn chain(scene: &Scene, table: Option<&MaterialTable>, frames: &mut Frames, reco
             &sample.proxy,
         );
     }
+}
+
+/// Hands over the tiles up to the next point. Gives the number of the tick before which those after
+/// it come.
+fn take_tiles(
+    haptics: &mut Haptics<'static, WINDOW>,
+    spares: &mut [Option<&'static mut Tile>],
+    frames: &mut Frames,
+    count: usize,
+) -> Option<u32> {
+    while let Some(message) = frames.next() {
+        let spare = spares.iter_mut().find(|spare| spare.is_some());
+        let spare = spare.expect("what is not kept comes back");
+        let buffer = spare.take().expect("found");
+        match message {
+            ToDevice::Tile(tile) => fill_tile(buffer, &tile).expect("the host made it well"),
+            ToDevice::MaterialTile(tile) => fill_material_tile(buffer, &tile, count),
+            ToDevice::Point(point) => {
+                *spare = Some(buffer);
+                return Some(point.seq);
+            }
+            _ => panic!("a replay of counts has tiles and points only"),
+        }
+        *spare = haptics.accept(Command::Tile(buffer));
+    }
+    None
 }
 
 /// Arms as a user does, force fully in.
