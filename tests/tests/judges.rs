@@ -177,6 +177,50 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     );
 }
 
+/// How far a proxy slid in a tick tells what the viscous part holds. It is not told of one that
+/// was free with work left over: it met the ground on its way to an earlier HIP, who knows where.
+#[test]
+fn a_proxy_that_trails_by_more_than_it_slid_is_found() {
+    let friction = Friction {
+        viscous_s: 0.003,
+        ..Friction::coulomb(0.05)
+    };
+    let flat = flat();
+    let found = |ticks: &[Seen]| -> Vec<Invariant> {
+        let judge = Judge::new(&flat, Rule::Swept).with_friction(friction);
+        let told = reports_of(judge, ticks);
+        told.iter().map(|violation| violation.invariant).collect()
+    };
+    // From (12, 10.5), where it met the ground or stood, by 2 cells: that holds 6.
+    let slid = touching([20.03, 10.5, 1.0], [14.0, 10.5, 2.0]);
+    let from = |x: f64| touching([x, 10.5, 1.9], [x, 10.5, 2.0]);
+    assert_eq!(found(&[from(12.0), slid]), []);
+    assert_eq!(found(&[from(13.0), slid]), [Invariant::Cone]);
+    let mut over = free([13.0, 10.5, 2.0 + 1.0 / 8192.0]);
+    assert_eq!(found(&[over, slid]), [Invariant::Cone]);
+    over.felt.converged = false;
+    assert_eq!(found(&[over, slid]), []);
+}
+
+/// A height is known to the last place of the corners that it is mixed from, and so is the pull.
+#[test]
+fn a_pull_in_the_last_place_of_a_patchs_corners_is_not_judged() {
+    // Level in the middle of the patch (10, 10), whatever its corners are.
+    let found = |corner: f32| -> Vec<Invariant> {
+        let saddle = Terrain::from_fn(Kind::Rough, SIZE, |x, y| match (x, y) {
+            (10, 10) | (11, 11) => 2.0 + corner,
+            (11, 10) | (10, 11) => 2.0 - corner,
+            _ => 2.0,
+        });
+        let judge = Judge::new(&saddle, Rule::Swept).with_friction(Friction::coulomb(0.5));
+        let pulled = touching([10.51, 10.5, 1.99], [10.5, 10.5, 2.0]);
+        let told = reports_of(judge, &[pulled]);
+        told.iter().map(|violation| violation.invariant).collect()
+    };
+    assert_eq!(found(1.0), [Invariant::Cone]);
+    assert_eq!(found(3e5), []);
+}
+
 /// With shading the force is as long as without, and along the smoothed normal.
 #[test]
 fn a_force_that_is_shaded_otherwise_is_found() {

@@ -26,6 +26,9 @@ struct Pull {
     rest: f64,
     /// How steep the ground is there.
     slope: f64,
+    /// What the height may be off by: the place is rounded, and of a patch with a needle at a
+    /// corner the heights that are mixed are.
+    rounding: f64,
 }
 
 impl Judge<'_> {
@@ -35,18 +38,20 @@ impl Judge<'_> {
             return Ok(());
         };
         let mu = f64::from(self.friction.static_mu);
-        // What the viscous part holds is told by how far the proxy went in the tick.
+        // What the viscous part holds is told by how far the proxy went in the tick. A free one
+        // that has work left over goes first through a piece of its way to the last HIP: where
+        // it meets the surface, and slides from, is not told.
         let viscous = f64::from(self.friction.viscous_s) * 1e3;
         let gone = self
             .before
+            .filter(|before| before.felt.converged || before.is_touching())
             .map_or(f64::INFINITY, |before| distance(before.proxy, seen.proxy));
         let trail = if viscous > 0.0 {
             viscous * (gone + 4.0 * seen.allowed() * (1.0 + least.slope))
         } else {
             0.0
         };
-        // The height of a rounded place is off by the slope's share.
-        let place = seen.allowed() + f64::from(f32::EPSILON) * least.slope;
+        let place = seen.allowed() + least.rounding;
         let most = mu * least.rest * (1.0 + SLACK) + trail + 4.0 * place * (1.0 + mu);
         if least.along > most {
             let detail = format!("{least:?} where {most:.3e} is held: {seen:?}");
@@ -72,7 +77,7 @@ impl Judge<'_> {
             true => self.friction.static_mu,
             false => self.friction.dynamic_mu,
         };
-        let place = seen.allowed() + f64::from(f32::EPSILON) * most.slope;
+        let place = seen.allowed() + most.rounding;
         let held = f64::from(mu) * most.rest * (1.0 - 1e-3) - 4.0 * place;
         if most.along < held {
             let detail = format!("{most:?} of {held:.3e}: {before:?} then {seen:?}");
@@ -100,7 +105,13 @@ impl Judge<'_> {
             let whole: f64 = way.iter().map(|c| c * c).sum();
             let rest = (whole - along * along).max(0.0).sqrt();
             let slope = patch.slope(start[0], start[1]);
-            let pull = Pull { along, rest, slope };
+            let heights = patch.mixed_size(start[0], start[1], hip[2]);
+            let pull = Pull {
+                along,
+                rest,
+                slope,
+                rounding: f64::from(f32::EPSILON) * (slope + 4.0 * heights),
+            };
             match places.iter_mut().find(|(at, _)| *at == start) {
                 Some((_, most)) if along > most.along => *most = pull,
                 Some(_) => {}
