@@ -71,3 +71,24 @@ fn a_proxy_does_not_creep_down_a_needle_for_ever() {
     let found = run(20261201, 15872, Surface::Smooth, &mut Buffers::default());
     assert!(matches!(found, Found::Held(..)), "{found:?}");
 }
+
+/// Scenes with friction that were wrong. In the first three a proxy came from the air to an edge,
+/// in one of two mirrored scenes 10⁻⁸ cell beside it, and was pulled as if there were no edge. In
+/// the others the judge took for known how far a proxy slid that had met the ground within the
+/// tick, and the height of a proxy whose patch has corners 3·10⁵ cells away.
+#[test]
+fn friction_holds_in_scenes_where_it_was_wrong() {
+    let scenes = [
+        (21, 990),
+        (102, 4146),
+        (270, 1049),
+        (270, 4661),
+        (270, 10551),
+    ];
+    for (seed, number) in scenes {
+        let found = run(seed, number, Surface::Rough, &mut Buffers::default());
+        let Found::Held(..) = found else {
+            panic!("seed {seed}, scene {number}: {found:?}");
+        };
+    }
+}

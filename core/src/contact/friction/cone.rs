@@ -10,6 +10,7 @@ use glam::Vec3;
 use crate::contact::closest_point::passes_over;
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
+use crate::contact::tolerance::{BESIDE, RESOLUTION};
 use crate::scalar::root;
 use crate::terrain::{Ground, TileIndex, Window};
 
@@ -49,11 +50,11 @@ impl Pull {
             Ground::Hole => return Pulled::Off,
             Ground::Missing => return Pulled::Unknown(TileIndex::holding(point.cell)),
         };
-        let border = point.border();
+        let border = border(point);
         let pull = Self::in_patch(&patch, view, point, border);
         let is_above = passes_over_at(&patch, view, point);
         if border != Side::NONE {
-            return Self::on_border(window, view, point, pull, is_above);
+            return Self::on_border(window, view, point, border, pull, is_above);
         }
         if is_above {
             Pulled::Off
@@ -69,10 +70,10 @@ impl Pull {
         window: &Window<'_, D>,
         view: &HipView,
         point: &SurfacePoint,
+        border: Side,
         pull: Self,
         is_above: bool,
     ) -> Pulled {
-        let border = point.border();
         let into = border.toward(view.in_patch(point.cell), (point.u, point.v));
         let mut steepest = pull;
         let (mut leads_off, mut all_above) = (is_above && into == Side::NONE, is_above);
@@ -157,6 +158,12 @@ impl Pull {
             false => whole,
         }
     }
+}
+
+/// The border that a point lies on, or as near to as rounding may have put a point of it: where
+/// a way from the air meets the surface in a crease, the last bits of the place differ.
+pub(in crate::contact) fn border(point: &SurfacePoint) -> Side {
+    point.border_within([BESIDE * RESOLUTION; 2])
 }
 
 /// Whether the HIP is above the tangent plane of a patch at a point of it.

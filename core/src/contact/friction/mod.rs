@@ -11,7 +11,7 @@ mod cone;
 
 use serde::{Deserialize, Serialize};
 
-pub(super) use cone::{Pull, Pulled};
+pub(super) use cone::{Pull, Pulled, border};
 
 /// How rough a surface is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -4,9 +4,10 @@ use std::vec::Vec;
 
 use glam::Vec3;
 
-use crate::contact::friction::Friction;
+use crate::contact::friction::{Friction, Pull, Pulled};
+use crate::contact::surface::{HipView, SurfacePoint};
 use crate::contact::{Contact, ContactOutput, ContactSettings, ContactState};
-use crate::grid::GridPoint;
+use crate::grid::{Cell, GridPoint};
 use crate::terrain::FieldSize;
 use crate::terrain::testing::{Field, buffers};
 
@@ -85,6 +86,30 @@ fn a_crease_in_the_middle_of_a_tick_lets_it_go_no_farther() {
                 );
             }
         }
+    }
+}
+
+/// A way from the air met a valley's bottom within 10⁻⁸ cell of the edge, and in the mirrored
+/// scene on it: the side that the place was in pulled the proxy through the bottom.
+#[test]
+fn a_valley_holds_a_proxy_that_rounding_has_put_beside_its_bottom() {
+    let mut tiles = buffers::<2>();
+    let valley = |x: i32, _| (x - 20).abs() as f32;
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), valley);
+    let view = HipView::new(at([0.0, 0.5, -1.0]));
+    let pulls_by = |x: i32, u: f32| {
+        let cell = Cell::new(x, 20);
+        let point = SurfacePoint { cell, u, v: 0.5 };
+        match Pull::at(&field.window, &view, &point) {
+            Pulled::By(pull) => !pull.is_within(0.01),
+            _ => panic!("the HIP is below"),
+        }
+    };
+    for (x, u) in [(20, 0.0), (20, 6e-9), (19, 1.0), (19, 1.0 - 6e-8)] {
+        assert!(!pulls_by(x, u), "{x} {u}");
+    }
+    for (x, u) in [(20, 1e-6), (19, 1.0 - 1e-6)] {
+        assert!(pulls_by(x, u), "{x} {u}");
     }
 }
 

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{Contact, OnSurface, Phase, Turn};
 use crate::contact::budget::{Budget, LARGEST_PIECE};
 use crate::contact::closest_point::{Leave, position_on};
-use crate::contact::friction::{Friction, Pull, Pulled};
+use crate::contact::friction::{Friction, Pull, Pulled, border};
 use crate::contact::output::ContactState;
 use crate::contact::settings::Execution;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
@@ -165,7 +165,7 @@ impl Rubbing {
         };
         let (most, least) = (drag * (gone + places), drag * (gone - places));
         let is_held = pull.is_within_trailing(mu * (1.0 + SLACK), most);
-        let is_inside = point.border() == Side::NONE;
+        let is_inside = border(point) == Side::NONE;
         let has_passed = is_inside && pull.is_within_trailing(mu * (1.0 - SLACK), least);
         if is_held && !(has_passed && self.times < SLIDES) {
             self.came_to = None;
