@@ -234,3 +234,44 @@ fn what_is_no_friction_is_not_taken() {
         assert!(!friction.is_valid(), "{friction:?}");
     }
 }
+
+/// A proxy that had come to where friction holds it, and went back from there because it had come
+/// too far, was let go for the HIP itself where the ground turned its way back: one slide in seven.
+#[test]
+fn friction_does_not_let_go_where_the_ground_turns_a_way_back() {
+    let checkerboard = |x: i32, y: i32| ((x + y) % 2) as f32;
+    let friction = Friction {
+        viscous_s: 0.003,
+        ..Friction::coulomb(0.05)
+    };
+    let settings = ContactSettings::LOCK_STEP.with_friction(friction);
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), checkerboard);
+    let (mut slides, mut let_go) = (0, 0);
+    for phase in 0..200 {
+        let mut contact = Contact::new(settings);
+        for tick in 0..30 {
+            let x = 0.005 * phase as f32 + 0.13 * tick as f32;
+            let z = if tick == 0 { 1.5 } else { 0.2 };
+            let hip = at([x, 0.46 * tick as f32, z]);
+            while !contact.step(&field.window, &hip).converged {}
+            let felt = contact.output();
+            let ([x, y, _], place) = (felt.proxy.cell(), felt.proxy.frac());
+            let is_inside = |c: f32| (0.01..0.99).contains(&c);
+            if felt.displacement.length() < 0.1 || !(is_inside(place.x) && is_inside(place.y)) {
+                continue;
+            }
+            let point = SurfacePoint {
+                cell: Cell::new(x, y),
+                u: place.x,
+                v: place.y,
+            };
+            if let Pulled::By(pull) = Pull::at(&field.window, &HipView::new(hip), &point) {
+                slides += 1;
+                let_go += i32::from(pull.is_within(0.02));
+            }
+        }
+    }
+    assert!(slides > 3_000, "{slides}");
+    assert!(let_go < 10, "{let_go} of {slides}");
+}

@@ -27,8 +27,8 @@ const STILL: f32 = 1e-3;
 /// may have turned the surface under it. By this part it may slide on less far than it
 /// would.
 const SLACK: f32 = 0.03;
-/// Times that a proxy slides in a tick; then it goes for the HIP itself, which is inside
-/// of every cone.
+/// Times that a proxy slides in a tick. Then it returns to the last place where friction held it,
+/// or, if there is none, goes for the HIP itself, which is inside of every cone.
 const SLIDES: u32 = 3;
 
 /// What a contact with friction remembers.
@@ -46,7 +46,8 @@ pub(super) struct Rubbing {
     times: u32,
     /// Where the proxy stood when the HIP came to where it is, until it has gone away.
     stood: Option<Stood>,
-    /// Where it has come to, while it goes back from there, and how far it was held back there, cells.
+    /// The last place where friction held it and which it has gone back from, and how far it was held
+    /// back there, cells.
     came_to: Option<(SurfacePoint, Vec3)>,
     /// The boundary fade before the tick: a tick changes it once, however often the proxy
     /// slides.
@@ -75,6 +76,8 @@ enum Verdict {
     Held,
     /// It goes for this point.
     Goes(GridPoint),
+    /// It returns to this point, where it was held before.
+    Returns(SurfacePoint),
     /// It cannot be told in this tick; a tile that is missing, if that is why.
     Waits(Option<TileIndex>),
 }
@@ -155,7 +158,8 @@ impl Rubbing {
         came: impl Fn(Option<Stood>) -> Vec3,
     ) -> Verdict {
         let (mu, drag) = (self.friction.dynamic_mu, self.drag(rate));
-        let came = || came(self.stood);
+        let stood = self.stood;
+        let came = || came(stood);
         // The way is known to the last places of both its ends.
         let places = 8.0 * RESOLUTION;
         let gone = if drag > 0.0 {
@@ -171,12 +175,25 @@ impl Rubbing {
             self.came_to = None;
             return Verdict::Held;
         }
+        let has_slid_enough = !is_held && self.times >= SLIDES;
+        if has_slid_enough && let Some(point) = self.returns() {
+            return Verdict::Returns(point);
+        }
         let back = match is_held {
             true => pull.held_back_on_plane(came(), mu, drag),
             false => pull.held_back(mu, drag),
         };
-        self.came_to = is_held.then_some((*point, self.back));
+        if is_held {
+            self.came_to = Some((*point, self.back));
+        }
         self.goes(back)
+    }
+
+    /// Returns to where it went back from, if it did.
+    fn returns(&mut self) -> Option<SurfacePoint> {
+        let (point, back) = self.came_to.take()?;
+        (self.aim, self.times, self.back) = (None, SLIDES, back);
+        Some(point)
     }
 
     /// It slides for the HIP, held back by so much.
@@ -356,9 +373,23 @@ impl Contact {
     ) -> Turn {
         match self.judges(window, hip, budget) {
             Verdict::Held => self.touches(window, hip, true, None),
-            Verdict::Waits(tile) => self.touches(window, hip, false, tile),
+            Verdict::Waits(tile) => {
+                // Also where the patch that it is on is in the tile that is missing.
+                (self.output.converged, self.output.missing_tile) = (false, tile);
+                self.touches(window, hip, false, tile)
+            }
             Verdict::Goes(aim) => self.aims_at(aim),
+            Verdict::Returns(point) => self.returns_to(point),
         }
+    }
+
+    /// It is judged there once more, by what it was judged by before unless it has been in the air
+    /// since.
+    fn returns_to(&mut self, point: SurfacePoint) -> Turn {
+        if let Some(rubbing) = &self.rubbing {
+            self.phase = Phase::OnSurface(OnSurface::at(point, rubbing.fade));
+        }
+        Turn::GoesOn
     }
 
     fn aims_at(&mut self, aim: GridPoint) -> Turn {
@@ -453,6 +484,7 @@ impl Contact {
         match self.judges(window, hip, budget) {
             Verdict::Held => Turn::Ends,
             Verdict::Goes(aim) => self.aims_at(aim),
+            Verdict::Returns(point) => self.returns_to(point),
             Verdict::Waits(tile) => {
                 self.waits_to_be_judged();
                 (self.output.converged, self.output.missing_tile) = (false, tile);
@@ -483,11 +515,8 @@ impl Contact {
             Some(stood)
                 if rubbing.times <= SLIDES && HipView::new(hip).is_nearer(&stood.proxy, &to) =>
             {
-                let from = match rubbing.came_to.take() {
-                    Some((point, back)) => {
-                        (rubbing.aim, rubbing.times, rubbing.back) = (None, SLIDES, back);
-                        point
-                    }
+                let from = match rubbing.returns() {
+                    Some(point) => point,
                     None => {
                         (rubbing.aim, rubbing.times) = (Some(hip), SLIDES + 1);
                         rubbing.back = Vec3::ZERO;
