@@ -275,3 +275,25 @@ fn friction_does_not_let_go_where_the_ground_turns_a_way_back() {
     assert!(slides > 3_000, "{slides}");
     assert!(let_go < 10, "{let_go} of {slides}");
 }
+
+/// How far friction held a proxy back is known to the last place of that way. Times the ticks that
+/// the proxy trails by it was more than the friction that the proxy was judged by, and one of
+/// seven went for the HIP itself.
+#[test]
+fn a_proxy_that_trails_a_far_hip_does_not_go_for_it() {
+    let friction = Friction {
+        viscous_s: 0.05,
+        ..Friction::coulomb(0.05)
+    };
+    let plane = |x: i32, y: i32| -0.57 * (x - 20) as f32 + 0.07 * (y - 20) as f32;
+    for depth in [0.001, 0.005, 0.02, 0.1, 0.4] {
+        let on = |x: f32, depth: f32| [x, 0.5, 0.035 - 0.57 * x - depth];
+        for phase in 0..50 {
+            let from = 0.01 * phase as f32;
+            let path = [on(from, -1.0), on(from, depth), on(36.0, depth)];
+            let felt = feel(friction, plane, path);
+            let trails = felt[2].1.displacement.length();
+            assert!(trails > 39.0, "{depth} {from}: {trails} of 41");
+        }
+    }
+}

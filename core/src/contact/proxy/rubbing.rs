@@ -160,8 +160,9 @@ impl Rubbing {
         let (mu, drag) = (self.friction.dynamic_mu, self.drag(rate));
         let stood = self.stood;
         let came = || came(stood);
-        // The way is known to the last places of both its ends.
-        let places = 8.0 * RESOLUTION;
+        // The way is known to the last places of both its ends, and the proxy came here by an aim
+        // that is known to the last place of how far it was held back.
+        let places = RESOLUTION * (8.0 + 4.0 * self.back.abs().element_sum());
         let gone = if drag > 0.0 {
             root(came().length_squared())
         } else {
