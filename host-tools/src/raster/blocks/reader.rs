@@ -138,7 +138,7 @@ impl Part {
 
 impl BlockImage {
     /// Blocks from west to east and down.
-    pub(super) fn counts(&self) -> [u32; 2] {
+    pub(in crate::raster) fn counts(&self) -> [u32; 2] {
         let [across, down] = self.block;
         [self.columns.div_ceil(across), self.rows.div_ceil(down)]
     }

@@ -13,22 +13,31 @@ use super::samples::{holes, read};
 use super::uncompressed::rows;
 use super::{budget, images};
 use crate::disk_cache::FileStamp;
-use crate::raster::blocks::{Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Part};
+use crate::raster::blocks::{Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part};
 use crate::raster::guard::guarded;
 use crate::raster::input::FileBytes;
-use crate::raster::samples::{HoleMask, SampleValue, with_samples};
+use crate::raster::samples::{HoleMask, SampleValue, Samples, with_samples};
+use crate::raster::thinned;
 use crate::raster::unread::Unread;
 use crate::raster::{BadRaster, SampleType};
 use crate::remote::RemoteFile;
 
 /// Small strips and tiles are read several at once, samples each way.
 const USUAL_BLOCK: u32 = 256;
+/// Of more blocks not all are told, to be looked at when the file is opened, but so many places
+/// each way: a list of them would take more memory than a terrain.
+const MOST_LISTED: u64 = 1 << 20;
+const PLACES: u32 = 32;
 /// Of longer rows of plain samples parts are read.
 const LONGEST_ROW: u32 = 32_768;
 
 /// Whether single blocks of an image can be read: a strip or tile is not too large.
 pub(super) fn suit(layout: &Layout) -> bool {
-    let [columns, rows] = block(layout).map(u64::from);
+    let [columns, rows] = block(layout, false).map(u64::from);
+    if layout.is_plain {
+        // One row is read at once.
+        return columns.saturating_mul(layout.texel_bytes()) <= LARGEST_BLOCK_BYTES;
+    }
     let samples = columns.saturating_mul(rows);
     samples.saturating_mul(layout.texel_bytes().max(8)) <= LARGEST_BLOCK_BYTES
 }
@@ -44,12 +53,17 @@ pub(super) fn masks_suit(file: &TiffFile, beside: Option<&TiffFile>, image: &Ifd
     })
 }
 
-/// Columns and rows of a block: as few whole strips or tiles as make a usual one, or few rows
-/// of a large one that can be read so.
-fn block(layout: &Layout) -> [u32; 2] {
+/// Columns and rows of a block: as few whole strips or tiles as make a usual one, or a part of a
+/// large one that can be read so; of a file elsewhere a wide one, because what lies together comes
+/// together.
+fn block(layout: &Layout, is_elsewhere: bool) -> [u32; 2] {
     let (columns, rows) = layout.chunk;
     if layout.is_plain {
-        let columns = columns.min(LONGEST_ROW);
+        let columns = columns.min(if is_elsewhere {
+            LONGEST_ROW
+        } else {
+            USUAL_BLOCK
+        });
         return [columns, USUAL_BLOCK * USUAL_BLOCK / columns];
     }
     let several = |chunk: u32| chunk.saturating_mul(USUAL_BLOCK.div_ceil(chunk));
@@ -65,7 +79,9 @@ fn block(layout: &Layout) -> [u32; 2] {
 /// Where the bytes of a part lie in the file.
 fn ranges(layout: &Layout, part: &Part) -> Vec<Range<u64>> {
     let mut ranges = vec![];
-    for chunk in layout.chunks_in(part).filter(|chunk| chunk.bytes > 0) {
+    let bands = layout.bands_read();
+    let chunks = bands.flat_map(|band| layout.chunks_of(band, part));
+    for chunk in chunks.filter(|chunk| chunk.bytes > 0) {
         match layout.is_plain {
             true => ranges.extend(rows(layout, &chunk, part)),
             false => ranges.push(chunk.place..chunk.place.saturating_add(chunk.bytes)),
@@ -122,7 +138,7 @@ impl TiffBlocks {
         };
         let (also, also_remote) = overviews.unzip();
         let files: Vec<_> = [file].into_iter().chain(also).collect();
-        let remote = [remote].into_iter().chain(also_remote).collect();
+        let remote: Vec<_> = [remote].into_iter().chain(also_remote).collect();
         let mut found = vec![full];
         for (index, file) in files.iter().enumerate() {
             for directory in images::overviews(file) {
@@ -135,8 +151,9 @@ impl TiffBlocks {
                     directory: directory.clone(),
                     layout,
                 };
+                let bytes = file.source().len();
                 let suits = masks_suit(file, mask.as_ref(), directory)
-                    && budget::check(&image.layout, file.source().len(), true).is_ok();
+                    && budget::check(&image.layout, bytes, true).is_ok();
                 if suits && image.is_overview_of(&found[MAIN]) {
                     found.push(image);
                 }
@@ -144,10 +161,11 @@ impl TiffBlocks {
         }
         found.sort_by_key(|image| std::cmp::Reverse(image.layout.columns));
         found.dedup_by_key(|image| image.layout.columns);
+        let is_elsewhere = remote.iter().any(Option::is_some);
         let blocks = found.iter().map(|image| BlockImage {
             columns: image.layout.columns,
             rows: image.layout.rows,
-            block: block(&image.layout),
+            block: block(&image.layout, is_elsewhere),
             every: None,
             first: [0; 2],
         });
@@ -184,39 +202,17 @@ impl TiffBlocks {
         with_samples!(&mut samples, values => values.resize(count, SampleValue::nearest(0.0)));
         let mut all = HoleMask::with_capacity(count);
         all.insert_range(..);
-        for chunk in layout.chunks_in(part) {
-            let inside = chunk.covers.within(part);
-            // The rest of plain samples may well be read.
-            let read_at_once = if layout.is_plain {
-                inside
-            } else {
-                chunk.covers
-            };
-            let first = [read_at_once.column, read_at_once.row];
-            if chunk.bytes == 0 || self.unread.has(image, first) {
+        let stored = layout.chunks_in(part).filter(|chunk| chunk.bytes > 0);
+        for piece in stored.flat_map(|chunk| pieces(layout, &chunk.covers, part)) {
+            let first = [piece.column, piece.row];
+            if self.unread.has(image, first) {
                 continue;
             }
-            let read = guarded(super::FORMAT.name, || self.block(image, &inside));
-            let block = match read {
-                Ok(block) => block,
+            let inside = piece.within(part);
+            match guarded(super::FORMAT.name, || self.block(image, &inside)) {
+                Ok(block) => copy(&block, &inside, (&mut samples, &mut all), part),
                 Err(fault) if fault.is_of_the_line() => return Err(fault),
-                Err(fault) => {
-                    self.unread.warn(image, &read_at_once, &fault);
-                    continue;
-                }
-            };
-            for index in 0..inside.columns as usize * inside.rows as usize {
-                let Some(value) = block.stored(index) else {
-                    continue;
-                };
-                let (row, column) = (
-                    index / inside.columns as usize,
-                    index % inside.columns as usize,
-                );
-                let row = (inside.row - part.row) as usize + row;
-                let to = row * columns + (inside.column - part.column) as usize + column;
-                with_samples!(&mut samples, values => values[to] = SampleValue::nearest(value));
-                all.remove(to);
+                Err(fault) => self.unread.warn(image, &piece, &fault),
             }
         }
         Ok(Block {
@@ -224,6 +220,36 @@ impl TiffBlocks {
             holes: Some(all),
             is_lacking: true,
         })
+    }
+}
+
+/// What of a chunk can be read without the rest: each row that is in the part where samples are
+/// plain; else all of it.
+fn pieces(layout: &Layout, covers: &Part, part: &Part) -> Vec<Part> {
+    if !layout.is_plain {
+        return vec![*covers];
+    }
+    let inside = covers.within(part);
+    let rows = inside.row..inside.row + inside.rows;
+    let row = |row| Part {
+        row,
+        rows: 1,
+        ..inside
+    };
+    rows.map(row).collect()
+}
+
+/// Copies a piece of a part to its place there. What is no hole of the piece is none of the part.
+fn copy(block: &Block, piece: &Part, (samples, holes): (&mut Samples, &mut HoleMask), part: &Part) {
+    let (columns, width) = (piece.columns as usize, part.columns as usize);
+    for index in 0..columns * piece.rows as usize {
+        let Some(value) = block.stored(index) else {
+            continue;
+        };
+        let row = (piece.row - part.row) as usize + index / columns;
+        let to = row * width + (piece.column - part.column) as usize + index % columns;
+        with_samples!(&mut *samples, values => values[to] = SampleValue::nearest(value));
+        holes.remove(to);
     }
 }
 
@@ -356,6 +382,14 @@ impl BlockReader for TiffBlocks {
             true => RemoteFile::kept_bytes(),
             false => 0,
         }
+    }
+
+    fn looks(&self) -> Option<Looks> {
+        let coarsest = self.blocks.len() - 1;
+        let [across, down] = self.blocks[coarsest].counts();
+        let blocks = u64::from(across) * u64::from(down);
+        (coarsest == MAIN && blocks > MOST_LISTED)
+            .then(|| thinned::places(&self.blocks[MAIN], PLACES))
     }
 
     fn index(&self) -> u64 {

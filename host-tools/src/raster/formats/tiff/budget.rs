@@ -11,12 +11,15 @@ const SPARSE_RATIO: u64 = 1024;
 /// More samples than this are not held in memory, however well the file packs them:
 /// 16 GB of them would leave a usual machine no room.
 const MOST_BYTES: u64 = 16 << 30;
+/// Larger strips and tiles are not decoded.
+const LARGEST_CHUNK: u64 = 1 << 30;
 
 /// Checks that a machine can hold all samples. A sparse or well packed file may hold more:
 /// that is no damage.
 pub(super) fn check_memory(layout: &Layout) -> Result<(), BadRaster> {
     let (columns, rows, bytes) = (layout.columns.into(), layout.rows.into(), layout.bytes());
-    match bytes > MOST_BYTES && layout.of_band().is_some() {
+    let is_large = bytes > MOST_BYTES || (layout.chunk_size() > LARGEST_CHUNK && !layout.is_plain);
+    match is_large && layout.of_band().is_some() {
         true => Err(BadRaster::TooLarge {
             columns,
             rows,
@@ -38,6 +41,13 @@ pub(super) fn check(layout: &Layout, file_bytes: u64, stays: bool) -> Result<(),
         return Err(BadRaster::AllNoData {
             samples: columns * rows,
         });
+    }
+    if layout
+        .stored_of_band()
+        .all(|chunk| chunk.start >= file_bytes)
+    {
+        let what = "the samples are said to lie behind its end".into();
+        return Err(BadRaster::Truncated(what));
     }
     // Both sides of a product are at most 2^32 and a texel at most 2^19 bytes.
     let ratio = u128::from(layout.compression.1);

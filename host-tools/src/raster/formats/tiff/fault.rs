@@ -23,6 +23,9 @@ pub(super) fn fault(error: TiffError) -> BadRaster {
         | E::UnsupportedSampleFormat(_)
         | E::UnsupportedBitsPerSample(_)
         | E::UnsupportedCompression(_) => unsupported(format!("this variant ({error})")),
+        E::InvalidImageLayout(ref what) if what.contains("not supported") => {
+            unsupported(format!("this variant ({error})"))
+        }
         error => BadRaster::Damaged(format!("TIFF: {error}")),
     }
 }

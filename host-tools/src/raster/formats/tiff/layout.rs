@@ -1,5 +1,7 @@
 //! How an image's samples are stored, and whether they can be heights.
 
+use std::ops::Range;
+
 use tiff_reader::{ByteOrder, Ifd, PhotometricInterpretation};
 
 use super::fault::{fault, unsupported};
@@ -126,6 +128,8 @@ impl Layout {
             chunk_bytes,
             is_plain: false,
         };
+        // What the decoder refuses is refused here, too, where it does not come to decode.
+        image.raster_layout().map_err(fault)?;
         Ok(Self {
             is_plain: layout.chunk_size() > LARGEST_DECODED && has_plain_samples(image),
             ..layout
@@ -133,7 +137,7 @@ impl Layout {
     }
 
     /// Bytes of the samples of a chunk.
-    fn chunk_size(&self) -> u64 {
+    pub(super) fn chunk_size(&self) -> u64 {
         let (columns, rows) = (u64::from(self.chunk.0), u64::from(self.chunk.1));
         columns
             .saturating_mul(rows)
@@ -210,6 +214,15 @@ impl Layout {
         self.chunk_bytes.get(first..first.checked_add(chunks)?)
     }
 
+    /// The chunks that are stored of the band that is the height: where each begins and ends.
+    pub(super) fn stored_of_band(&self) -> impl Iterator<Item = Range<u64>> {
+        let first = self.first_of(self.band).unwrap_or(0);
+        let places = self.chunk_places.iter().skip(first);
+        let each = places.zip(self.of_band().unwrap_or_default());
+        let stored = each.filter(|(_, bytes)| **bytes > 0);
+        stored.map(|(place, bytes)| *place..place.saturating_add(*bytes))
+    }
+
     /// Where all chunks lie, those of all bands.
     pub(super) fn places(&self) -> &[u64] {
         &self.chunk_places
@@ -223,6 +236,12 @@ impl Layout {
             true => chunks.checked_mul(band),
             false => Some(0),
         }
+    }
+
+    /// The bands of which chunks are read for heights: with them lies what is transparent.
+    pub(super) fn bands_read(&self) -> impl Iterator<Item = usize> + use<> {
+        let apart = self.alpha.filter(|_| self.planar);
+        std::iter::once(self.band).chain(apart)
     }
 
     /// Bytes of a texel that come before a band's sample.

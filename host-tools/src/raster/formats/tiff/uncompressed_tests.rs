@@ -274,7 +274,7 @@ fn rows_that_a_strip_does_not_have_are_holes_and_the_others_are_felt() {
     };
     let raster = open(&made, 0).expect("most of it is there");
     let height = |row| raster.height(7, SIZE[1] - 1 - row);
-    for row in [0, 300, 480, 640, 641, SIZE[1] - 1] {
+    for row in (0..500).chain(640..SIZE[1]) {
         assert_eq!(height(row), value([7, row], 0) as f64, "{row}");
     }
     assert!((500..640).all(|row| height(row).is_nan()));
@@ -305,4 +305,33 @@ fn bits_in_another_order_and_differences_are_left_to_the_decoder() {
     let raster = open(&differences, 0).expect("a field");
     let sum: i64 = (0..=3).map(|column| value([column, 4], 0)).sum();
     assert_eq!(raster.height(3, SIZE[1] - 5), sum as f64);
+}
+
+/// Decoded, they are refused; read as they lie, they were heights of other bands.
+#[test]
+fn bands_of_several_types_and_orders_that_nobody_knows_are_refused() {
+    for (tag, values, why) in [
+        (258, &[32, 16, 32][..], "mixed BitsPerSample"),
+        (339, &[3, 1, 3][..], "mixed SampleFormat"),
+        (284, &[3][..], "planar configuration"),
+    ] {
+        let made = Made {
+            bands: BANDS,
+            other: Some((tag, values)),
+            ..ONE_STRIP
+        };
+        let fault = open(&made, 0).expect_err(why);
+        let is_told = matches!(&fault, BadRaster::Unsupported { .. });
+        assert!(is_told && fault.to_string().contains(why), "{fault}");
+    }
+}
+
+#[test]
+fn a_strip_behind_the_end_is_told_before_anything_is_read() {
+    let made = Made {
+        other: Some((273, &[u32::MAX - 7])),
+        ..ONE_STRIP
+    };
+    let fault = open(&made, 0).expect_err("nothing is there");
+    assert!(matches!(fault, BadRaster::Truncated(_)), "{fault}");
 }
