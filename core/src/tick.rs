@@ -511,7 +511,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
                 wanted = self.force_with_effects(pose, sample);
             }
         } else {
-            write_output(GridPoint::default(), &ContactOutput::default(), sample);
+            write_nothing(sample);
         }
         let force_n = self.guard.limit_force(wanted);
         outcome.drive = match &self.mechanism {
@@ -536,7 +536,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     #[inline(never)]
     fn tick_without_arm(&mut self, outcome: &mut Outcome) {
         let sample = &mut outcome.sample;
-        write_output(GridPoint::default(), &ContactOutput::default(), sample);
+        write_nothing(sample);
         outcome.drive = Drive {
             held: self.guard.held(),
             ..Drive::default()
@@ -626,7 +626,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
                 self.point = None;
             }
         } else {
-            write_output(GridPoint::default(), &ContactOutput::default(), sample);
+            write_nothing(sample);
         }
         self.write_state(force_n, sample);
     }
@@ -662,12 +662,21 @@ impl<'t, const D: usize> Haptics<'t, D> {
 }
 
 /// Writes the contact's output into the sample.
+// A call: it is needed in four places.
+#[inline(never)]
 fn write_output(hip: GridPoint, output: &ContactOutput, sample: &mut Sample) {
     sample.hip = hip;
     sample.proxy = output.proxy;
     sample.state = output.state;
     sample.missing_tile = output.missing_tile;
     sample.work = output.work;
+}
+
+/// Nothing is felt.
+#[cold]
+#[inline(never)]
+fn write_nothing(sample: &mut Sample) {
+    write_output(GridPoint::default(), &ContactOutput::default(), sample);
 }
 
 /// Where the tip is over the terrain.

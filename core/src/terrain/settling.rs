@@ -233,34 +233,33 @@ impl<'t, const D: usize> Window<'t, D> {
             }
             None => coarse,
         };
-        let heights = match is_inside(cell) {
-            true => alone,
-            false => match self.felt_beside_border(cell, (own.is_some(), alone), coarse, base) {
-                Ok(heights) => heights,
-                Err(ground) => return ground,
-            },
-        };
+        let (mut heights, mut are_of_tiles) = (alone, own.is_some());
+        if !is_inside(cell) {
+            are_of_tiles = self.felt_on_border(cell, (&mut heights, are_of_tiles), coarse, base);
+        }
         let [sw, se, nw, ne] = heights;
         match (sw + se + nw + ne).is_nan() {
             false => Ground::Patch(Corners { base, heights }),
-            true if own.is_some() => Ground::Hole,
+            true if are_of_tiles => Ground::Hole,
             // What the underlay does not know may yet come.
             true => Ground::Missing,
         }
     }
 
-    /// The heights felt at the corners of a cell at the border of its tile, or what lies there;
-    /// `alone`, whether the tile is here and what it has.
+    /// Puts the heights that are felt at the corners of a cell which are on its tile's border in the
+    /// place of those that `alone` has, with or without its tile. Returns whether every corner without
+    /// a height is one of a tile.
     #[inline(never)]
-    fn felt_beside_border(
+    fn felt_on_border(
         &self,
         cell: Cell,
-        alone: (bool, [f32; 4]),
+        alone: (&mut [f32; 4], bool),
         coarse: [f32; 4],
         base: i32,
-    ) -> Result<[f32; 4], Ground> {
-        let (is_of_tile, mut heights) = alone;
-        for (corner, height) in (0..).zip(&mut heights) {
+    ) -> bool {
+        let (heights, is_of_tile) = alone;
+        let mut are_of_tiles = true;
+        for (corner, height) in (0..).zip(heights) {
             let sample = cell.offset(corner & 1, corner >> 1);
             let felt = match is_on_border(sample.x) || is_on_border(sample.y) {
                 true => self.felt(sample, coarse[corner as usize], base),
@@ -269,13 +268,10 @@ impl<'t, const D: usize> Window<'t, D> {
                     is_of_tile,
                 },
             };
-            match (felt.height.is_nan(), felt.is_of_tile) {
-                (false, _) => *height = felt.height,
-                (true, true) => return Err(Ground::Hole),
-                (true, false) => return Err(Ground::Missing),
-            }
+            *height = felt.height;
+            are_of_tiles &= felt.is_of_tile || !felt.height.is_nan();
         }
-        Ok(heights)
+        are_of_tiles
     }
 
     /// The height felt at a sample that several tiles may share, in cells above `base`.
@@ -344,10 +340,14 @@ impl<'t, const D: usize> Window<'t, D> {
         };
         // Where neither a tile nor the underlay has heights, anything may be.
         let is_known = self.tile_here(index).is_some() || under.covers(index);
+        if !(is_known && under.is_below(low)) {
+            return false;
+        }
         // A border that is shared is felt as the neighbour has it.
-        let around = (0..9).map(|place| index.offset(place % 3 - 1, place / 3 - 1));
-        let mut here = around.filter_map(|near| self.tile_here(near));
-        is_known && under.is_below(low) && here.all(|tile| tile.is_below(low))
+        (0..9).all(|place| {
+            let near = self.tile_here(index.offset(place % 3 - 1, place / 3 - 1));
+            near.is_none_or(|tile| tile.is_below(low))
+        })
     }
 }
 

@@ -134,7 +134,8 @@ impl Coarse<'_> {
 
     /// The height at a sample of the scene's level, in cells above `base`; NaN beyond it and where
     /// a corner that counts is a hole.
-    pub(super) fn height(&self, sample: Cell, base: i32) -> f32 {
+    #[inline(never)]
+    fn height(&self, sample: Cell, base: i32) -> f32 {
         let of = |(place, tile): &(CoarseTile, &Tile)| {
             let height = place.height(tile, sample)?;
             Some(height + tile.base().wrapping_sub(base) as f32)
@@ -167,8 +168,11 @@ impl Coarse<'_> {
     #[cold]
     #[inline(never)]
     fn corners_by_samples(&self, cell: Cell, base: i32) -> [f32; 4] {
-        let sample = |corner: i32| cell.offset(corner & 1, corner >> 1);
-        [0, 1, 2, 3].map(|corner| self.height(sample(corner), base))
+        let mut heights = [f32::NAN; 4];
+        for (corner, height) in (0..).zip(&mut heights) {
+            *height = self.height(cell.offset(corner & 1, corner >> 1), base);
+        }
+        heights
     }
 
     /// Lowest and highest over a tile of the scene's level, in cells above `base`; `None`
