@@ -103,6 +103,48 @@ fn a_file_whose_mask_is_one_large_strip_is_read_as_a_whole() {
     assert!(raster.height(0, WIDE - 1).is_nan());
 }
 
+/// A file that was cut: its overview, which is all that is looked at when it opens, ends early.
+#[test]
+fn of_an_overview_that_ends_early_the_rows_that_are_there_are_felt() {
+    const WIDE: u32 = 4000;
+    const HALF: u32 = WIDE / 2;
+    const THERE: u32 = 600;
+    let one = |tag: u16, value: u32| (tag, Values::Longs(vec![value]));
+    let image = |kind: u32, side: u32, place: u32| {
+        vec![
+            one(254, kind),
+            one(256, side),
+            one(257, side),
+            one(258, 8),
+            one(259, 1),
+            one(262, 1),
+            one(273, place),
+            one(277, 1),
+            one(278, side),
+            one(279, side * side),
+        ]
+    };
+    // The directories come before the samples, as in a file that may be cut.
+    const SAMPLES: u32 = 4096;
+    let coarse = SAMPLES + WIDE * WIDE;
+    let mut bytes = tiff(&[], &[image(0, WIDE, SAMPLES), image(1, HALF, coarse)]);
+    bytes.resize(SAMPLES as usize, 0);
+    bytes.resize(coarse as usize, 7);
+    bytes.resize((coarse + HALF * THERE) as usize, 9);
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("cut.tif");
+    std::fs::write(&path, bytes).expect("written");
+    let options = raster::OpenOptions {
+        most_in_memory_bytes: 0,
+        ..raster::OpenOptions::default()
+    };
+    let raster = Raster::open(&path, &options).expect("all of the full image is there");
+    assert_eq!([raster.height(0, 0), raster.height(3999, 3999)], [7.0; 2]);
+    let coarse = |row: f64| raster.surface(1, [2000.0, f64::from(WIDE) - row]);
+    assert_eq!(coarse(2.0 * f64::from(THERE) - 4.0), 9.0);
+    assert!(coarse(2.0 * f64::from(THERE) + 4.0).is_nan());
+}
+
 #[test]
 fn a_strip_of_4_gb_is_felt_in_the_memory_of_a_terrain() {
     let (_folder, path) = file();

@@ -105,6 +105,8 @@ const TIMER_QUEUE: Exception = Exception {
 const WAKERS: &[Exception] = &[
     waker(&["TIM6_DAC"]),
     waker(&["TIM5"]),
+    // What the clock's interrupt does, where it is compiled as a function.
+    waker(&["embassy_time_queue_utils", "next_expiration"]),
     waker(&["USB_LP"]),
     waker(&["OTG_FS"]),
 ];

@@ -1,5 +1,5 @@
 //! A TIFF that stays on disk: full image, overviews and masks, read in blocks of whole
-//! strips or tiles.
+//! strips or tiles, or of parts of large ones that are plain samples.
 
 use std::hash::Hasher;
 use std::ops::Range;
@@ -33,11 +33,10 @@ const LONGEST_ROW: u32 = 32_768;
 
 /// Whether single blocks of an image can be read: a strip or tile is not too large.
 pub(super) fn suit(layout: &Layout) -> bool {
-    let [columns, rows] = block(layout, false).map(u64::from);
     if layout.is_plain {
-        // One row is read at once.
-        return columns.saturating_mul(layout.texel_bytes()) <= LARGEST_BLOCK_BYTES;
+        return true;
     }
+    let [columns, rows] = block(layout, false).map(u64::from);
     let samples = columns.saturating_mul(rows);
     samples.saturating_mul(layout.texel_bytes().max(8)) <= LARGEST_BLOCK_BYTES
 }
@@ -59,11 +58,14 @@ pub(super) fn masks_suit(file: &TiffFile, beside: Option<&TiffFile>, image: &Ifd
 fn block(layout: &Layout, is_elsewhere: bool) -> [u32; 2] {
     let (columns, rows) = layout.chunk;
     if layout.is_plain {
-        let columns = columns.min(if is_elsewhere {
+        let usual = if is_elsewhere {
             LONGEST_ROW
         } else {
             USUAL_BLOCK
-        });
+        };
+        // A row is read with all of its bands.
+        let most = (LARGEST_BLOCK_BYTES / layout.texel_bytes()).clamp(1, usual.into());
+        let columns = columns.min(most as u32);
         return [columns, USUAL_BLOCK * USUAL_BLOCK / columns];
     }
     let several = |chunk: u32| chunk.saturating_mul(USUAL_BLOCK.div_ceil(chunk));
