@@ -17,6 +17,7 @@ use crate::guard::{
 };
 use crate::phantom::{Calibration, Mechanism, Pose, to_device_frame, to_terrain_frame};
 use crate::rate::TickRate;
+use crate::scalar::smaller;
 use crate::scene::{Health, Point, Sample, Scene, Source, View};
 use crate::terrain::{SETTLING_MM_S, Tile, TileKey, Window};
 
@@ -391,7 +392,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
     #[cold]
     #[inline(never)]
     fn settle(&mut self, cell_mm: f32) {
-        let step = SETTLING_MM_S * self.rate.tick_s() / cell_mm;
+        // An infinite step would leave no trace of which tiles settle.
+        let step = smaller(SETTLING_MM_S * self.rate.tick_s() / cell_mm, f32::MAX);
         if self.window.settle(step) {
             self.contact.surface_moved(&self.window);
         }
@@ -490,7 +492,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             self.settle(scene.cell_mm);
         }
         outcome.answers = None;
-        // Looked at once: each number of the pose would be, where it is used.
+        // The option is tested once: otherwise the compiler tests it where each number is used.
         let Some(pose) = pose else {
             return self.tick_without_arm(outcome);
         };
@@ -662,7 +664,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
 }
 
 /// Writes the contact's output into the sample.
-// A call: it is needed in four places.
+// A call: it is needed in several places.
 #[inline(never)]
 fn write_output(hip: GridPoint, output: &ContactOutput, sample: &mut Sample) {
     sample.hip = hip;

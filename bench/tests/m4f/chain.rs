@@ -29,7 +29,7 @@ const SETTLES: usize = 60;
 /// Times that they do.
 const RUNS: u32 = 20;
 
-/// A field, and an underlay that is off.
+/// A field in cells of a millimetre, and an underlay that is off.
 struct Under<'g>(GridSamples<'g>);
 
 impl Samples for Under<'_> {
@@ -290,7 +290,7 @@ impl<'g> Arm<'g> {
 
     /// Slides over the underlay, which is [`UNDER_MM`] off, at half a cell a tick, once in each
     /// of several directions, and counts the ticks from the one in which tiles come until they
-    /// have settled; all of them where none comes.
+    /// have settled; as many where none comes.
     fn settling(
         &self,
         board: &CountingBoard,

@@ -92,7 +92,8 @@ impl CoarseTile {
 
     /// The heights of `tile`, which is this one, at the corners of a cell of the scene's level that
     /// it [reaches](Self::reaches) under, in the order of [`Tile::corners`] and as
-    /// [`Self::height`] has each of them, to the bit. `None` beside a hole of it.
+    /// [`Self::height`] has each of them, to the bit but for the sign of zero. `None` beside a hole of
+    /// it.
     pub(super) fn corners(&self, tile: &Tile, cell: Cell) -> Option<[f32; 4]> {
         let off = [cell.x - self.first.x, cell.y - self.first.y];
         let [col, row] = off.map(|off| off >> self.shift);

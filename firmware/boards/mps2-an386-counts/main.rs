@@ -21,7 +21,8 @@
 //!   point is one [`Haptics::tick`], and one that is not answered comes again.
 //! - `counts.frames`, for a scene fed by encoders: [`Sensed`] frames, each one
 //!   [`Haptics::tick`], count to current, once the arm was armed where the
-//!   first of them is. Tiles behind a point come before the tick that has its number.
+//!   first of them is. In `replay.frames` of such a scene a point is a mark: the tiles behind it come
+//!   before the tick that has its number.
 //!
 //! and leaves `ticks.bin`: [`RECORD`] little-endian words a tick; of a scene fed by points
 //! `tiles.bin`, too: as many for each tile, which count filling a buffer with it.

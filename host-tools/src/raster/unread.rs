@@ -1,5 +1,5 @@
-//! Tiles, strips and chunks of a file that could not be read: each is warned of once, and is a
-//! hole.
+//! Tiles, strips, chunks and rows of a file that could not be read: each is warned of once, and is
+//! a hole.
 
 use std::collections::HashSet;
 use std::sync::{Mutex, PoisonError};

@@ -52,7 +52,10 @@ pub(super) fn at_opening(error: &StoreError) -> Error {
     if KEYS_OF_COMPUTERS.iter().any(|part| text.contains(part)) {
         return wrong("the environment holds no key, and this computer has none of its own".into());
     }
-    if text.contains("token request") && text.contains("status code: 4") {
+    let is_refused = ["400", "401", "403"]
+        .iter()
+        .any(|status| has_status(error, status));
+    if text.contains("token request") && is_refused {
         return wrong(format!(
             "the key of the environment was refused: {}",
             in_short(&text)
@@ -87,14 +90,17 @@ pub(super) fn told(error: &StoreError) -> Error {
         _ if code(&error.to_string()) == Some("PublicAccessNotPermitted") => {
             return forbidden(error);
         }
-        // And so they refuse what is in their archive. The library takes it for a file that
-        // was to be written.
+        // And so they refuse what is in their archive, and others what is being changed. The
+        // library takes it for a file that was to be written.
         StoreError::AlreadyExists { .. } => {
             let why = "its server does not hand it out";
             return Error::new(ErrorKind::Unsupported, with_code(why, error));
         }
         _ if has_status(error, "400") && code(&error.to_string()).is_some() => {
-            let why = "the server does not take what the environment says";
+            let why = match error {
+                StoreError::Generic { store: "HTTP", .. } => "the server does not take the URL",
+                _ => "the server does not take what the environment says",
+            };
             return Error::new(ErrorKind::InvalidInput, with_code(why, error));
         }
         StoreError::InvalidPath { .. } | StoreError::UnknownConfigurationKey { .. } => {

@@ -261,6 +261,9 @@ impl Contact {
         rubbing.creeps = has_ended && rubbing.times > 0 && rubbing.friction.viscous_s > 0.0;
         let Phase::OnSurface(on) = &self.phase else {
             rubbing.at_rest &= !matches!(self.phase, Phase::Fading { .. });
+            if self.settings.execution == Execution::RealTime {
+                rubbing.came_to = None;
+            }
             return;
         };
         rubbing.at_rest &= on.fade == 1.0;
@@ -384,8 +387,8 @@ impl Contact {
         }
     }
 
-    /// It is judged there once more, by what it was judged by before unless it has been in the air
-    /// since.
+    /// It is judged there once more, to the precision of before. Where it was in the air meanwhile,
+    /// the way that it slid is another, and it may go for the HIP after all.
     fn returns_to(&mut self, point: SurfacePoint) -> Turn {
         if let Some(rubbing) = &self.rubbing {
             self.phase = Phase::OnSurface(OnSurface::at(point, rubbing.fade));

@@ -43,7 +43,7 @@ use coarse::{Coarse, Found};
 pub(super) use kept::not_yet;
 use kept::{Kept, count_not_yet};
 pub(super) use reader::{Block, BlockImage, BlockReader, Part};
-pub(super) use survey::{Looks, Survey};
+pub(super) use survey::{Looks, Survey, stored_parts};
 
 /// Blocks of a larger size than this are not read one by one, bytes.
 pub(super) const LARGEST_BLOCK_BYTES: u64 = 32 << 20;

@@ -5,12 +5,15 @@ use std::hash::Hasher;
 use twox_hash::XxHash64;
 
 use super::super::HeightSummary;
-use super::{Part, Shared};
+use super::{BlockImage, Part, Shared};
 
 /// Of an image with at most so many samples all are looked at.
 const FEW_SAMPLES: u64 = 1 << 20;
 /// Of a larger one so many blocks that hold samples, spread evenly.
 const LOOKS: usize = 32;
+/// Of more blocks that hold samples not all are listed, but so many, spread evenly: a list of
+/// them all would take more memory than a terrain.
+const MOST_LISTED: usize = 1 << 20;
 
 /// Heights looked at when the file was opened.
 #[derive(Clone, Copy, Debug)]
@@ -122,9 +125,14 @@ impl Shared {
 
     fn coarsest(&self) -> Looks {
         let image = self.reader.images().len().saturating_sub(1);
+        let images = self.reader.images();
+        let parts = images.get(image).map(|of| {
+            let is_stored = |part: &Part| self.reader.is_stored(image, part);
+            stored_parts(of, is_stored)
+        });
         Looks {
             image,
-            parts: self.stored_parts(image),
+            parts: parts.unwrap_or_default(),
         }
     }
 
@@ -132,17 +140,19 @@ impl Shared {
         let of = self.images.get(image);
         of.map_or(0, |of| u64::from(of.columns) * u64::from(of.rows))
     }
+}
 
-    /// The blocks of an image that hold samples.
-    fn stored_parts(&self, image: usize) -> Vec<Part> {
-        let Some(of) = self.reader.images().get(image) else {
-            return Vec::new();
-        };
-        let [across, down] = of.counts();
-        let every = (0..down).flat_map(|row| (0..across).map(move |column| [column, row]));
-        let parts = every.map(|at| of.part(at));
-        parts
-            .filter(|part| self.reader.is_stored(image, part))
-            .collect()
-    }
+/// The blocks of an image that hold samples, or some of them where there are very many.
+pub(in crate::raster) fn stored_parts(
+    of: &BlockImage,
+    is_stored: impl Fn(&Part) -> bool,
+) -> Vec<Part> {
+    let [across, down] = of.counts();
+    let every = || (0..down).flat_map(|row| (0..across).map(move |column| [column, row]));
+    let stored = || every().map(|at| of.part(at)).filter(&is_stored);
+    let step = match u64::from(across) * u64::from(down) > MOST_LISTED as u64 {
+        true => stored().count().div_ceil(MOST_LISTED).max(1),
+        false => 1,
+    };
+    stored().step_by(step).collect()
 }

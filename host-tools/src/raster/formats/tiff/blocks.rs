@@ -13,35 +13,35 @@ use super::samples::{holes, read};
 use super::uncompressed::rows;
 use super::{budget, images};
 use crate::disk_cache::FileStamp;
-use crate::raster::blocks::{Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part};
+use crate::raster::blocks::{
+    Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part, stored_parts,
+};
 use crate::raster::guard::guarded;
 use crate::raster::input::FileBytes;
-use crate::raster::samples::{HoleMask, SampleValue, Samples, with_samples};
-use crate::raster::thinned;
+use crate::raster::samples::{HoleMask, SampleValue, with_samples};
 use crate::raster::unread::Unread;
 use crate::raster::{BadRaster, SampleType};
 use crate::remote::RemoteFile;
 
 /// Small strips and tiles are read several at once, samples each way.
 const USUAL_BLOCK: u32 = 256;
-/// Of more blocks not all are told, to be looked at when the file is opened, but so many places
-/// each way: a list of them would take more memory than a terrain.
-const MOST_LISTED: u64 = 1 << 20;
-const PLACES: u32 = 32;
 /// Of longer rows of plain samples parts are read.
 const LONGEST_ROW: u32 = 32_768;
 
-/// Whether single blocks of an image can be read: a strip or tile is not too large.
+/// Whether single blocks of an image can be read: its samples are plain, or a strip or tile is
+/// not too large.
 pub(super) fn suit(layout: &Layout) -> bool {
-    if layout.is_plain {
-        return true;
-    }
-    let [columns, rows] = block(layout, false).map(u64::from);
+    layout.is_plain || is_small(layout, chunks(layout))
+}
+
+/// Whether a block of so many columns and rows is not too large to be decoded.
+fn is_small(layout: &Layout, block: [u32; 2]) -> bool {
+    let [columns, rows] = block.map(u64::from);
     let samples = columns.saturating_mul(rows);
     samples.saturating_mul(layout.texel_bytes().max(8)) <= LARGEST_BLOCK_BYTES
 }
 
-/// Whether parts of an image's masks can be read: none of their strips and tiles is too large.
+/// Whether an image's masks can be read with a block: none of their strips and tiles is too large.
 pub(super) fn masks_suit(file: &TiffFile, beside: Option<&TiffFile>, image: &Ifd) -> bool {
     let mut masks = images::masks(file, beside, image);
     masks.all(|(_, mask)| {
@@ -52,22 +52,26 @@ pub(super) fn masks_suit(file: &TiffFile, beside: Option<&TiffFile>, image: &Ifd
     })
 }
 
-/// Columns and rows of a block: as few whole strips or tiles as make a usual one, or a part of a
-/// large one that can be read so; of a file elsewhere a wide one, because what lies together comes
-/// together.
+/// Columns and rows of a block. Of plain samples it is a square, or of a file elsewhere a wide one,
+/// because what lies together comes together; with all of its bands it is not too large.
 fn block(layout: &Layout, is_elsewhere: bool) -> [u32; 2] {
-    let (columns, rows) = layout.chunk;
-    if layout.is_plain {
-        let usual = if is_elsewhere {
-            LONGEST_ROW
-        } else {
-            USUAL_BLOCK
-        };
-        // A row is read with all of its bands.
-        let most = (LARGEST_BLOCK_BYTES / layout.texel_bytes()).clamp(1, usual.into());
-        let columns = columns.min(most as u32);
-        return [columns, USUAL_BLOCK * USUAL_BLOCK / columns];
+    if !layout.is_plain {
+        return chunks(layout);
     }
+    let usual = if is_elsewhere {
+        LONGEST_ROW
+    } else {
+        USUAL_BLOCK
+    };
+    let texels = (LARGEST_BLOCK_BYTES / layout.texel_bytes()).min(u32::MAX.into()) as u32;
+    let columns = layout.chunk.0.min(usual).min(texels).max(1);
+    let rows = USUAL_BLOCK * USUAL_BLOCK / columns;
+    [columns, rows.min(texels / columns).max(1)]
+}
+
+/// As few whole strips or tiles as make a usual block.
+fn chunks(layout: &Layout) -> [u32; 2] {
+    let (columns, rows) = layout.chunk;
     let several = |chunk: u32| chunk.saturating_mul(USUAL_BLOCK.div_ceil(chunk));
     // A strip is as wide as the image: of wide ones few are read at once.
     let usual = USUAL_BLOCK * USUAL_BLOCK / columns.clamp(1, USUAL_BLOCK * USUAL_BLOCK);
@@ -197,61 +201,108 @@ impl TiffBlocks {
     /// A part of an image of which something cannot be read: strips and tiles that cannot are
     /// holes, with a warning, and the others are not.
     fn by_chunks(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
-        let layout = &self.images[image].layout;
-        let columns = part.columns as usize;
-        let count = columns * part.rows as usize;
-        let mut samples = self.images[MAIN].layout.sample().held().none();
-        with_samples!(&mut samples, values => values.resize(count, SampleValue::nearest(0.0)));
-        let mut all = HoleMask::with_capacity(count);
-        all.insert_range(..);
-        let stored = layout.chunks_in(part).filter(|chunk| chunk.bytes > 0);
-        for piece in stored.flat_map(|chunk| pieces(layout, &chunk.covers, part)) {
-            let first = [piece.column, piece.row];
-            if self.unread.has(image, first) {
-                continue;
-            }
-            let inside = piece.within(part);
-            match guarded(super::FORMAT.name, || self.block(image, &inside)) {
-                Ok(block) => copy(&block, &inside, (&mut samples, &mut all), part),
-                Err(fault) if fault.is_of_the_line() => return Err(fault),
-                Err(fault) => self.unread.warn(image, &piece, &fault),
+        let mut all = self.nothing_of(part);
+        let stored = self.images[image].layout.chunks_in(part);
+        for chunk in stored.filter(|chunk| chunk.bytes > 0) {
+            let inside = chunk.covers.within(part);
+            let read = || self.block(image, &inside);
+            if let Some(block) = self.try_read(image, &chunk.covers, read)? {
+                copy(&block, &inside, &mut all, part);
             }
         }
-        Ok(Block {
-            samples,
-            holes: Some(all),
-            is_lacking: true,
-        })
+        Ok(all)
     }
-}
 
-/// What of a chunk can be read without the rest: each row that is in the part where samples are
-/// plain; else all of it.
-fn pieces(layout: &Layout, covers: &Part, part: &Part) -> Vec<Part> {
-    if !layout.is_plain {
-        return vec![*covers];
+    /// The same of plain samples, of which any row may be read without the others. What masks
+    /// them is decoded once.
+    fn by_rows(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        let Image {
+            file,
+            directory,
+            layout,
+        } = &self.images[image];
+        let file = &self.files[*file];
+        let mut all = self.nothing_of(part);
+        let masked = || holes(file, directory, layout, self.mask.as_ref(), part);
+        let masked = match guarded(super::FORMAT.name, masked) {
+            Ok(masked) => masked,
+            Err(fault) if fault.is_of_the_line() => return Err(fault),
+            Err(fault) => {
+                self.unread.warn(image, part, &fault);
+                return Ok(all);
+            }
+        };
+        for row in part.row..part.row + part.rows {
+            let row = Part {
+                row,
+                rows: 1,
+                ..*part
+            };
+            let read = || read(file, directory, layout, layout.band, &row);
+            if let Some(samples) = self.try_read(image, &row, read)? {
+                let block = Block {
+                    samples,
+                    holes: None,
+                    is_lacking: false,
+                };
+                copy(&block, &row, &mut all, part);
+            }
+        }
+        if let (Some(holes), Some(masked)) = (&mut all.holes, masked) {
+            holes.union_with(&masked);
+        }
+        Ok(all)
     }
-    let inside = covers.within(part);
-    let rows = inside.row..inside.row + inside.rows;
-    let row = |row| Part {
-        row,
-        rows: 1,
-        ..inside
-    };
-    rows.map(row).collect()
+
+    /// What can be read of a piece; `None`, with a warning the first time, where it cannot.
+    fn try_read<T>(
+        &self,
+        image: usize,
+        piece: &Part,
+        read: impl FnOnce() -> Result<T, BadRaster>,
+    ) -> Result<Option<T>, BadRaster> {
+        let first = [piece.column, piece.row];
+        if self.unread.has(image, first) {
+            return Ok(None);
+        }
+        match guarded(super::FORMAT.name, read) {
+            Ok(read) => Ok(Some(read)),
+            Err(fault) if fault.is_of_the_line() => Err(fault),
+            Err(fault) => {
+                self.unread.warn(image, piece, &fault);
+                Ok(None)
+            }
+        }
+    }
+
+    /// A part in which everything is a hole as yet.
+    fn nothing_of(&self, part: &Part) -> Block {
+        let count = part.columns as usize * part.rows as usize;
+        let mut samples = self.images[MAIN].layout.sample().held().none();
+        with_samples!(&mut samples, values => values.resize(count, SampleValue::nearest(0.0)));
+        let mut holes = HoleMask::with_capacity(count);
+        holes.insert_range(..);
+        Block {
+            samples,
+            holes: Some(holes),
+            is_lacking: true,
+        }
+    }
 }
 
 /// Copies a piece of a part to its place there. What is no hole of the piece is none of the part.
-fn copy(block: &Block, piece: &Part, (samples, holes): (&mut Samples, &mut HoleMask), part: &Part) {
+fn copy(block: &Block, piece: &Part, to: &mut Block, part: &Part) {
     let (columns, width) = (piece.columns as usize, part.columns as usize);
     for index in 0..columns * piece.rows as usize {
         let Some(value) = block.stored(index) else {
             continue;
         };
         let row = (piece.row - part.row) as usize + index / columns;
-        let to = row * width + (piece.column - part.column) as usize + index % columns;
-        with_samples!(&mut *samples, values => values[to] = SampleValue::nearest(value));
-        holes.remove(to);
+        let at = row * width + (piece.column - part.column) as usize + index % columns;
+        with_samples!(&mut to.samples, values => values[at] = SampleValue::nearest(value));
+        if let Some(holes) = &mut to.holes {
+            holes.remove(at);
+        }
     }
 }
 
@@ -364,7 +415,10 @@ impl BlockReader for TiffBlocks {
         // The decoder asks for one chunk after the other.
         self.want(image, std::slice::from_ref(part));
         match self.block(image, part) {
-            Err(fault) if !fault.is_of_the_line() => self.by_chunks(image, part),
+            Err(fault) if !fault.is_of_the_line() => match self.images[image].layout.is_plain {
+                true => self.by_rows(image, part),
+                false => self.by_chunks(image, part),
+            },
             block => block,
         }
     }
@@ -387,11 +441,23 @@ impl BlockReader for TiffBlocks {
     }
 
     fn looks(&self) -> Option<Looks> {
-        let coarsest = self.blocks.len() - 1;
-        let [across, down] = self.blocks[coarsest].counts();
-        let blocks = u64::from(across) * u64::from(down);
-        (coarsest == MAIN && blocks > MOST_LISTED)
-            .then(|| thinned::places(&self.blocks[MAIN], PLACES))
+        let image = self.images.len() - 1;
+        let layout = &self.images[image].layout;
+        // The same file is looked at in the same places whether it is here or elsewhere, and in
+        // whole strips or tiles where these are small, as in versions that decoded them.
+        let decoded = chunks(layout);
+        let looked_at = BlockImage {
+            block: match is_small(layout, decoded) {
+                true => decoded,
+                false => block(layout, true),
+            },
+            ..self.blocks[image]
+        };
+        let is_stored = |part: &Part| self.is_stored(image, part);
+        layout.is_plain.then(|| Looks {
+            image,
+            parts: stored_parts(&looked_at, is_stored),
+        })
     }
 
     fn index(&self) -> u64 {

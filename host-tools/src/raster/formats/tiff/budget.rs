@@ -11,7 +11,7 @@ const SPARSE_RATIO: u64 = 1024;
 /// More samples than this are not held in memory, however well the file packs them:
 /// 16 GB of them would leave a usual machine no room.
 const MOST_BYTES: u64 = 16 << 30;
-/// Larger strips and tiles are not decoded.
+/// Larger strips and tiles are not decoded: as `tiff-reader` has it.
 const LARGEST_CHUNK: u64 = 1 << 30;
 
 /// Checks that a machine can hold all samples. A sparse or well packed file may hold more:
@@ -19,6 +19,7 @@ const LARGEST_CHUNK: u64 = 1 << 30;
 pub(super) fn check_memory(layout: &Layout) -> Result<(), BadRaster> {
     let (columns, rows, bytes) = (layout.columns.into(), layout.rows.into(), layout.bytes());
     let is_large = bytes > MOST_BYTES || (layout.chunk_size() > LARGEST_CHUNK && !layout.is_plain);
+    let bytes = bytes.max(layout.chunk_size());
     match is_large && layout.of_band().is_some() {
         true => Err(BadRaster::TooLarge {
             columns,

@@ -44,7 +44,9 @@ pub(super) fn read(
     let has_all = with_samples!(&samples, values => values.len() as u64 == count);
     match has_all {
         true => Ok(samples),
-        false => Err(BadRaster::damaged("TIFF: its index has too few strips")),
+        false => Err(BadRaster::damaged(
+            "TIFF: its index has too few strips or tiles",
+        )),
     }
 }
 
