@@ -156,3 +156,28 @@ pub(in crate::raster) fn stored_parts(
     };
     stored().step_by(step).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_very_many_blocks_those_that_are_listed_are_stored() {
+        let of = BlockImage {
+            columns: 2048,
+            rows: 2048,
+            block: [1, 1],
+            every: None,
+            first: [0; 2],
+        };
+        let one = stored_parts(&of, |part| (part.column, part.row) == (1999, 7));
+        assert_eq!(one.len(), 1);
+        assert_eq!((one[0].column, one[0].row), (1999, 7));
+        let all = stored_parts(&of, |_| true);
+        assert_eq!(all.len(), MOST_LISTED);
+        assert!(all.last().is_some_and(|part| part.row == 2047));
+        let third = stored_parts(&of, |part| part.row.is_multiple_of(3));
+        assert!((MOST_LISTED / 2..=MOST_LISTED).contains(&third.len()));
+        assert!(third.iter().all(|part| part.row % 3 == 0));
+    }
+}
