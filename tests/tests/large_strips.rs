@@ -1,4 +1,5 @@
-//! A TIFF whose samples are all in one strip, larger than the memory of a terrain.
+//! TIFFs whose samples are all in one strip, larger than the memory of a terrain, or in millions of
+//! tiles.
 
 use std::fs::OpenOptions;
 use std::io::{Seek, SeekFrom, Write};
@@ -6,7 +7,7 @@ use std::path::PathBuf;
 
 use hapterra::raster::{self, Raster};
 use hapterra_tests::bounded;
-use hapterra_tests::tiffs::{DATA, Values, placed, tiff};
+use hapterra_tests::tiffs::{DATA, Directory, Values, placed, tiff};
 
 /// Samples each way: 4.1 GB of single floats.
 const SIDE: u32 = 32_000;
@@ -159,4 +160,46 @@ fn a_strip_of_4_gb_is_felt_in_the_memory_of_a_terrain() {
             assert_eq!(found, f64::from(height(column, row)), "{column} {row}");
         }
     }
+}
+
+#[test]
+fn four_million_tiles_are_felt_in_the_memory_of_a_terrain() {
+    const TILE: u32 = 64;
+    const ACROSS: u32 = 2025;
+    let one = |tag: u16, value: u32| (tag, Values::Longs(vec![value]));
+    let tiles = (ACROSS * ACROSS) as usize;
+    let image = |kind: u32| {
+        vec![
+            one(254, kind),
+            one(256, ACROSS * TILE),
+            one(257, ACROSS * TILE),
+            one(258, 8),
+            one(259, 1),
+            one(262, 1),
+            one(277, 1),
+            one(322, TILE),
+            one(323, TILE),
+            (324, Values::Longs(vec![DATA; tiles])),
+            (325, Values::Longs(vec![TILE * TILE; tiles])),
+        ]
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("tiles.tif");
+    let data = vec![7; (TILE * TILE) as usize];
+    let info = |images: &[Directory]| {
+        std::fs::write(&path, tiff(&data, images)).expect("written");
+        // All tiles are the same one; the file is as long as if they were not.
+        let file = OpenOptions::new().write(true).open(&path).expect("there");
+        file.set_len(u64::from(ACROSS * TILE).pow(2))
+            .expect("a sparse file");
+        let output = bounded::info(&path, &[]);
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), told)
+    };
+    let (code, told) = info(&[image(0)]);
+    assert_eq!(code, Some(0), "{told}");
+    // Five such lists are more than is kept: that is no damage.
+    let (code, told) = info(&[0, 1, 1, 1, 1].map(image));
+    assert_eq!(code, Some(1), "{told}");
+    assert!(told.contains("very many small tiles"), "{told}");
 }

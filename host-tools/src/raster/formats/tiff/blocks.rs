@@ -5,9 +5,10 @@ use std::hash::Hasher;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use tiff_reader::{Ifd, TagValue, TiffFile};
+use tiff_reader::{TagValue, TiffFile};
 use twox_hash::XxHash64;
 
+use super::images::Directory;
 use super::layout::Layout;
 use super::samples::{holes, read};
 use super::uncompressed::rows;
@@ -42,8 +43,8 @@ fn is_small(layout: &Layout, block: [u32; 2]) -> bool {
 }
 
 /// Whether an image's masks can be read with a block: none of their strips and tiles is too large.
-pub(super) fn masks_suit(file: &TiffFile, beside: Option<&TiffFile>, image: &Ifd) -> bool {
-    let mut masks = images::masks(file, beside, image);
+pub(super) fn masks_suit(image: &Directory, beside: Option<&TiffFile>) -> bool {
+    let mut masks = images::masks(image, beside);
     masks.all(|(_, mask)| {
         let columns = mask.tile_width().unwrap_or(mask.width());
         let strip = mask.rows_per_strip().min(mask.height());
@@ -98,8 +99,7 @@ fn ranges(layout: &Layout, part: &Part) -> Vec<Range<u64>> {
 
 /// A TIFF on disk.
 pub(super) struct TiffBlocks {
-    files: Vec<TiffFile>,
-    /// Those of the files that are elsewhere.
+    /// The main file and the one of overviews beside it, where they are elsewhere.
     remote: Vec<Option<Arc<RemoteFile>>>,
     mask: Option<TiffFile>,
     unread: Unread,
@@ -115,14 +115,13 @@ pub(super) struct TiffBlocks {
 }
 
 /// A file, and the same as it is elsewhere.
-pub(super) type Opened = (TiffFile, Option<Arc<RemoteFile>>);
+pub(super) type Opened = (Arc<TiffFile>, Option<Arc<RemoteFile>>);
 
 /// The main file, and one of overviews beside it.
 const MAIN: usize = 0;
 
 struct Image {
     file: usize,
-    directory: Ifd,
     layout: Layout,
 }
 
@@ -136,11 +135,9 @@ impl TiffBlocks {
         (name, asked, classes): (&str, Option<u32>, bool),
         inputs: &[&FileBytes],
     ) -> Result<Self, BadRaster> {
-        let full = images::full(&file)?.clone();
         let full = Image {
             file: MAIN,
-            layout: Layout::read(&full, asked, classes)?,
-            directory: full,
+            layout: Layout::read(&images::full(&file)?, asked, classes)?,
         };
         let (also, also_remote) = overviews.unzip();
         let files: Vec<_> = [file].into_iter().chain(also).collect();
@@ -149,16 +146,15 @@ impl TiffBlocks {
         for (index, file) in files.iter().enumerate() {
             for directory in images::overviews(file) {
                 // An overview that cannot be used is no reason not to feel the field.
-                let Ok(layout) = Layout::read(directory, asked, classes) else {
+                let Ok(layout) = Layout::read(&directory, asked, classes) else {
                     continue;
                 };
                 let image = Image {
                     file: index,
-                    directory: directory.clone(),
                     layout,
                 };
                 let bytes = file.source().len();
-                let suits = masks_suit(file, mask.as_ref(), directory)
+                let suits = masks_suit(&directory, mask.as_ref())
                     && budget::check(&image.layout, bytes, true).is_ok();
                 if suits && image.is_overview_of(&found[MAIN]) {
                     found.push(image);
@@ -177,7 +173,6 @@ impl TiffBlocks {
         });
         Ok(Self {
             blocks: blocks.collect(),
-            files,
             remote,
             mask,
             unread: Unread::of(name),
@@ -190,10 +185,10 @@ impl TiffBlocks {
     /// A part of an image.
     fn block(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
         let image = &self.images[image];
-        let (file, directory, layout) = (&self.files[image.file], &image.directory, &image.layout);
+        let layout = &image.layout;
         Ok(Block {
-            samples: read(file, directory, layout, layout.band, part)?,
-            holes: holes(file, directory, layout, self.mask.as_ref(), part)?,
+            samples: read(layout, layout.band, part)?,
+            holes: holes(layout, self.mask.as_ref(), part)?,
             is_lacking: false,
         })
     }
@@ -216,14 +211,9 @@ impl TiffBlocks {
     /// The same of plain samples, of which any row may be read without the others. What masks
     /// them is decoded once.
     fn by_rows(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
-        let Image {
-            file,
-            directory,
-            layout,
-        } = &self.images[image];
-        let file = &self.files[*file];
+        let layout = &self.images[image].layout;
         let mut all = self.nothing_of(part);
-        let masked = || holes(file, directory, layout, self.mask.as_ref(), part);
+        let masked = || holes(layout, self.mask.as_ref(), part);
         let masked = match guarded(super::FORMAT.name, masked) {
             Ok(masked) => masked,
             Err(fault) if fault.is_of_the_line() => return Err(fault),
@@ -238,7 +228,7 @@ impl TiffBlocks {
                 rows: 1,
                 ..*part
             };
-            let read = || read(file, directory, layout, layout.band, &row);
+            let read = || read(layout, layout.band, &row);
             if let Some(samples) = self.try_read(image, &row, read)? {
                 let block = Block {
                     samples,
@@ -340,7 +330,11 @@ impl Image {
     }
 
     fn tag(&self, number: u16) -> Option<&TagValue> {
-        self.directory.tag(number).map(|tag| &tag.value)
+        self.layout
+            .directory
+            .ifd()
+            .tag(number)
+            .map(|tag| &tag.value)
     }
 
     /// Whether it lies where another image lies, as far as it says so: most overviews do not.
@@ -434,10 +428,12 @@ impl BlockReader for TiffBlocks {
     }
 
     fn kept_bytes(&self) -> usize {
-        match self.remote.iter().any(Option::is_some) {
+        let pages = match self.remote.iter().any(Option::is_some) {
             true => RemoteFile::kept_bytes(),
             false => 0,
-        }
+        };
+        let lists = self.images.iter().map(|image| image.layout.index_bytes());
+        pages + lists.sum::<usize>()
     }
 
     fn looks(&self) -> Option<Looks> {
@@ -471,9 +467,9 @@ impl TiffBlocks {
         for image in &self.images {
             hasher.write_u32(image.layout.columns);
             hasher.write_u32(image.layout.rows);
-            let bytes = image.layout.of_band().unwrap_or_default();
-            for number in image.layout.places().iter().chain(bytes) {
-                hasher.write_u64(*number);
+            let bytes = image.layout.of_band().into_iter().flatten();
+            for number in image.layout.places().chain(bytes.map(|(_, bytes)| bytes)) {
+                hasher.write_u64(number);
             }
         }
         hasher.finish()

@@ -35,18 +35,20 @@ pub(super) fn check_memory(layout: &Layout) -> Result<(), BadRaster> {
 pub(super) fn check(layout: &Layout, file_bytes: u64, stays: bool) -> Result<(), BadRaster> {
     let (columns, rows) = (u64::from(layout.columns), u64::from(layout.rows));
     let absurd = |why: &str| BadRaster::AbsurdSize(format!("{columns} × {rows} samples {why}"));
-    let stored = layout
-        .of_band()
-        .ok_or_else(|| absurd("have no place in its index"))?;
-    if stored.iter().all(|&bytes| bytes == 0) {
+    let has_no_place = || absurd("have no place in its index");
+    let (mut missing, mut all, mut inside, mut stored) = (0_u64, 0_u64, 0_u64, 0_u128);
+    for (place, bytes) in layout.of_band().ok_or_else(has_no_place)? {
+        all += 1;
+        missing += u64::from(bytes == 0);
+        inside += u64::from(bytes > 0 && place < file_bytes);
+        stored += u128::from(bytes);
+    }
+    if missing == all {
         return Err(BadRaster::AllNoData {
             samples: columns * rows,
         });
     }
-    if layout
-        .stored_of_band()
-        .all(|chunk| chunk.start >= file_bytes)
-    {
+    if inside == 0 {
         let what = "the samples are said to lie behind its end".into();
         return Err(BadRaster::Truncated(what));
     }
@@ -54,14 +56,13 @@ pub(super) fn check(layout: &Layout, file_bytes: u64, stays: bool) -> Result<(),
     let ratio = u128::from(layout.compression.1);
     let texel = u128::from(layout.texel_bytes());
     let image = u128::from(columns) * u128::from(rows) * texel;
-    let promised = stored.iter().map(|&bytes| u128::from(bytes)).sum::<u128>() * ratio;
+    let promised = stored.saturating_mul(ratio);
     let in_file = u128::from(file_bytes) * ratio;
     if u128::from(layout.chunk.0) * texel > in_file {
         return Err(absurd("in rows longer than the file could hold"));
     }
-    let missing = stored.iter().filter(|&&bytes| bytes == 0).count();
     let chunk = u128::from(layout.chunk.0) * u128::from(layout.chunk.1) * texel;
-    let left_out = missing as u128 * chunk;
+    let left_out = u128::from(missing) * chunk;
     let room = promised.min(in_file) * u128::from(SPARSE_RATIO);
     let holes = match stays {
         true => left_out,

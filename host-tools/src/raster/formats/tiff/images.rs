@@ -1,5 +1,7 @@
 //! What each image of a file is.
 
+use std::sync::Arc;
+
 use tiff_reader::{Ifd, TiffFile};
 
 use crate::raster::BadRaster;
@@ -9,23 +11,46 @@ const NEW_SUBFILE_TYPE: u16 = 254;
 const REDUCED: u32 = 1;
 const MASK: u32 = 4;
 
+/// An image of a file. Its lists of places may be long: nobody has a copy of them.
+#[derive(Clone)]
+pub(super) struct Directory {
+    file: Arc<TiffFile>,
+    number: usize,
+}
+
+impl Directory {
+    /// The file that it is in.
+    pub(super) fn file(&self) -> &TiffFile {
+        &self.file
+    }
+
+    /// What the file says of it.
+    pub(super) fn ifd(&self) -> &Ifd {
+        &self.file.ifds()[self.number]
+    }
+}
+
 /// The first image that is neither an overview nor a mask; else the last.
-pub(super) fn full(file: &TiffFile) -> Result<&Ifd, BadRaster> {
+pub(super) fn full(file: &Arc<TiffFile>) -> Result<Directory, BadRaster> {
     let images = file.ifds();
-    let full = images.iter().find(|image| kind(image) == 0);
-    full.or(images.last())
-        .ok_or_else(|| BadRaster::damaged("TIFF: it has no image"))
+    let full = images.iter().position(|image| kind(image) == 0);
+    let number = full
+        .or(images.len().checked_sub(1))
+        .ok_or_else(|| BadRaster::damaged("TIFF: it has no image"))?;
+    Ok(Directory {
+        file: file.clone(),
+        number,
+    })
 }
 
 /// The masks of an image or overview, each with its file: the one that GDAL keeps in the same
 /// file, and the one in a file `beside`; they are of its size. 0 is no data.
 pub(super) fn masks<'f>(
-    file: &'f TiffFile,
+    image: &'f Directory,
     beside: Option<&'f TiffFile>,
-    image: &Ifd,
 ) -> impl Iterator<Item = (&'f TiffFile, &'f Ifd)> {
     let size = |image: &Ifd| (image.width(), image.height());
-    let wanted = size(image);
+    let (file, wanted) = (image.file(), size(image.ifd()));
     let mut others = file.ifds().iter().skip(1);
     let inside = others.find(|other| kind(other) & MASK != 0 && size(other) == wanted);
     let outside = beside.and_then(|beside| {
@@ -36,10 +61,15 @@ pub(super) fn masks<'f>(
 }
 
 /// The overviews in a file, the finest first.
-pub(super) fn overviews(file: &TiffFile) -> Vec<&Ifd> {
-    let reduced = file.ifds().iter().filter(|image| kind(image) == REDUCED);
-    let mut reduced: Vec<_> = reduced.collect();
-    reduced.sort_by_key(|image| std::cmp::Reverse((image.width(), image.height())));
+pub(super) fn overviews(file: &Arc<TiffFile>) -> Vec<Directory> {
+    let reduced = (0..file.ifds().len()).filter(|number| kind(&file.ifds()[*number]) == REDUCED);
+    let mut reduced: Vec<_> = reduced
+        .map(|number| Directory {
+            file: file.clone(),
+            number,
+        })
+        .collect();
+    reduced.sort_by_key(|image| std::cmp::Reverse((image.ifd().width(), image.ifd().height())));
     reduced
 }
 

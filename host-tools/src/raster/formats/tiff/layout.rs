@@ -1,10 +1,10 @@
 //! How an image's samples are stored, and whether they can be heights.
 
-use std::ops::Range;
-
 use tiff_reader::{ByteOrder, Ifd, PhotometricInterpretation};
 
 use super::fault::{fault, unsupported};
+use super::images::Directory;
+use super::index::Index;
 use crate::raster::blocks::Part;
 use crate::raster::read::Stored;
 use crate::raster::{BadRaster, SampleType};
@@ -13,8 +13,9 @@ use crate::raster::{BadRaster, SampleType};
 const LARGEST_DECODED: u64 = 1 << 20;
 
 /// How an image's samples are stored.
-#[derive(Debug)]
 pub(super) struct Layout {
+    /// The image.
+    pub(super) directory: Directory,
     pub(super) columns: u32,
     pub(super) rows: u32,
     /// Type of a sample.
@@ -31,10 +32,6 @@ pub(super) struct Layout {
     tiled: bool,
     /// Columns and rows of a strip or tile.
     pub(super) chunk: (u32, u32),
-    /// Where each chunk lies in the file.
-    chunk_places: Vec<u64>,
-    /// Bytes stored for each chunk; 0 for one that a sparse file leaves out.
-    chunk_bytes: Vec<u64>,
     /// Bytes are samples, in an order without surprises, and chunks are so large that they are
     /// read row by row.
     pub(super) is_plain: bool,
@@ -84,7 +81,12 @@ impl Layout {
     /// Reads and checks the layout of an image; `asked` is the band that the user chose,
     /// the first being 1; a palette is taken for what it is where the numbers are
     /// `classes`.
-    pub(super) fn read(image: &Ifd, asked: Option<u32>, classes: bool) -> Result<Self, BadRaster> {
+    pub(super) fn read(
+        directory: &Directory,
+        asked: Option<u32>,
+        classes: bool,
+    ) -> Result<Self, BadRaster> {
+        let image = directory.ifd();
         let (columns, rows) = (image.width(), image.height());
         if columns == 0 || rows == 0 {
             return Err(BadRaster::damaged(format!(
@@ -96,24 +98,19 @@ impl Layout {
             refuse_colour(image, bands, asked.is_some())?;
         }
         let band = chosen_band(asked, bands)?;
-        let (tiled, chunk, index) = match (image.tile_width(), image.tile_height()) {
-            (Some(width), Some(height)) => {
-                let index = image.tile_offsets().zip(image.tile_byte_counts());
-                (true, (width, height), index)
-            }
-            _ => {
-                let height = image.rows_per_strip().min(rows);
-                let index = image.strip_offsets().zip(image.strip_byte_counts());
-                (false, (columns, height), index)
-            }
+        let (tiled, chunk) = match (image.tile_width(), image.tile_height()) {
+            (Some(width), Some(height)) => (true, (width, height)),
+            _ => (false, (columns, image.rows_per_strip().min(rows))),
         };
         if chunk.0 == 0 || chunk.1 == 0 {
             return Err(BadRaster::damaged("TIFF: strips or tiles without samples"));
         }
-        let (chunk_places, chunk_bytes) = index
-            .map(stored)
-            .ok_or_else(|| BadRaster::damaged("TIFF: it does not say where its samples are"))?;
+        if Index::of(image, tiled).is_none() {
+            let what = "TIFF: it does not say where its samples are";
+            return Err(BadRaster::damaged(what));
+        }
         let layout = Self {
+            directory: directory.clone(),
             columns,
             rows,
             stored: stored_type(image)?,
@@ -124,8 +121,6 @@ impl Layout {
             planar: image.planar_configuration() == 2,
             tiled,
             chunk,
-            chunk_places,
-            chunk_bytes,
             is_plain: false,
         };
         // What the decoder refuses is refused here, too, where it does not come to decode.
@@ -179,10 +174,11 @@ impl Layout {
         let across = part.column / width..(part.column + part.columns).div_ceil(width);
         let down = part.row / height..(part.row + part.rows).div_ceil(height);
         let places = down.flat_map(move |row| across.clone().map(move |column| (column, row)));
-        let first = self.first_of(band);
+        let (first, index) = (self.first_of(band), self.index());
         places.filter_map(move |(column, row)| {
-            let index = u64::from(row) * u64::from(self.chunks_across()) + u64::from(column);
-            let number = usize::try_from(index).ok()?.checked_add(first?)?;
+            let number = u64::from(row) * u64::from(self.chunks_across()) + u64::from(column);
+            let number = usize::try_from(number).ok()?.checked_add(first?)?;
+            let (place, bytes) = index.as_ref()?.at(number)?;
             let (column, row) = (column * width, row * height);
             let covers = Part {
                 column,
@@ -191,8 +187,8 @@ impl Layout {
                 rows: height.min(self.rows - row),
             };
             Some(Chunk {
-                place: *self.chunk_places.get(number)?,
-                bytes: *self.chunk_bytes.get(number)?,
+                place,
+                bytes,
                 covers,
             })
         })
@@ -204,28 +200,30 @@ impl Layout {
         samples.saturating_mul(self.sample().held().bytes())
     }
 
-    /// Bytes stored for each chunk with samples of the band that is the height; `None`
-    /// when the index has too few.
-    pub(super) fn of_band(&self) -> Option<&[u64]> {
+    /// Place and bytes of each chunk with samples of the band that is the height; `None` when the
+    /// index has too few. A chunk that a sparse file leaves out has 0 bytes.
+    pub(super) fn of_band(&self) -> Option<impl Iterator<Item = (u64, u64)>> {
+        let (index, first) = (self.index()?, self.first_of(self.band)?);
         let down = self.rows.div_ceil(self.chunk.1);
         let chunks = u64::from(self.chunks_across()) * u64::from(down);
-        let chunks = usize::try_from(chunks).ok()?;
-        let first = self.first_of(self.band)?;
-        self.chunk_bytes.get(first..first.checked_add(chunks)?)
-    }
-
-    /// The chunks that are stored of the band that is the height: where each begins and ends.
-    pub(super) fn stored_of_band(&self) -> impl Iterator<Item = Range<u64>> {
-        let first = self.first_of(self.band).unwrap_or(0);
-        let places = self.chunk_places.iter().skip(first);
-        let each = places.zip(self.of_band().unwrap_or_default());
-        let stored = each.filter(|(_, bytes)| **bytes > 0);
-        stored.map(|(place, bytes)| *place..place.saturating_add(*bytes))
+        let end = first.checked_add(usize::try_from(chunks).ok()?)?;
+        index.at(end.checked_sub(1)?)?;
+        Some((first..end).map_while(move |number| index.at(number)))
     }
 
     /// Where all chunks lie, those of all bands.
-    pub(super) fn places(&self) -> &[u64] {
-        &self.chunk_places
+    pub(super) fn places(&self) -> impl Iterator<Item = u64> {
+        let index = self.index();
+        (0..).map_while(move |number| index.as_ref()?.place(number))
+    }
+
+    /// What its lists take in memory.
+    pub(super) fn index_bytes(&self) -> usize {
+        self.index().map_or(0, |index| index.held_bytes())
+    }
+
+    fn index(&self) -> Option<Index<'_>> {
+        Index::of(self.directory.ifd(), self.tiled)
     }
 
     /// Number of a band's first chunk among those of all bands.
@@ -275,19 +273,6 @@ impl Layout {
         };
         format!("TIFF, {sample}{bits}, {compression}, {chunks}{order}")
     }
-}
-
-/// Places of chunks, and bytes stored for each. What lies at 0, where the file's header is, is
-/// left out, whatever its size.
-fn stored((mut places, mut bytes): (Vec<u64>, Vec<u64>)) -> (Vec<u64>, Vec<u64>) {
-    bytes.truncate(places.len());
-    places.truncate(bytes.len());
-    for (bytes, place) in bytes.iter_mut().zip(&places) {
-        if *place == 0 {
-            *bytes = 0;
-        }
-    }
-    (places, bytes)
 }
 
 /// Whether bytes are samples: neither packed, nor differences, nor with their bits turned.

@@ -8,6 +8,7 @@ mod budget;
 mod fault;
 mod georef;
 mod images;
+mod index;
 mod layout;
 mod metadata;
 mod remote_source;
@@ -19,7 +20,7 @@ use std::iter::once;
 use std::sync::Arc;
 
 use tiff_reader::source::{BytesSource, FileSource, SharedSource};
-use tiff_reader::{ParseBudgets, TiffFile};
+use tiff_reader::{ParseBudgets, TiffError, TiffFile};
 
 use crate::raster::beside::{find_appended, lay_out_by_world_file};
 use crate::raster::blocks::Part;
@@ -46,6 +47,11 @@ pub(super) const FORMAT: Format = Format {
 /// A file at a URL whose samples take no more than this is fetched as a whole.
 const FEW_BYTES: u64 = 1 << 20;
 
+/// The longest list of a directory, and all lists of all of them, bytes: a whole earth of cells of
+/// a second in tiles of 256 × 256 samples has an index of 100 MB.
+const LONGEST_LIST: usize = 72 << 20;
+const ALL_LISTS: usize = 128 << 20;
+
 /// Extensions of a TIFF's world files.
 const WORLD_FILES: [&str; 4] = ["tfw", "tifw", "tiffw", "tfwx"];
 
@@ -53,9 +59,9 @@ const WORLD_FILES: [&str; 4] = ["tfw", "tifw", "tiffw", "tfwx"];
 /// the first, of several images the first that is neither an overview nor a mask.
 fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
     let asked = options.band;
-    let file = open(input)?;
-    let image = images::full(&file)?.clone();
-    let layout = Layout::read(&image, asked, options.classes)?;
+    let file = Arc::new(open(input)?);
+    let full = images::full(&file)?;
+    let layout = Layout::read(&full, asked, options.classes)?;
     let most = match input.remote() {
         // What is not touched is not fetched, either.
         Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
@@ -63,7 +69,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     };
     let mask_file = find_appended(input, "msk")?;
     let mask = mask_file.as_ref().map(open).transpose()?;
-    let suits = blocks::suit(&layout) && blocks::masks_suit(&file, mask.as_ref(), &image);
+    let suits = blocks::suit(&layout) && blocks::masks_suit(&full, mask.as_ref());
     let stays = layout.bytes() > most && suits;
     if !stays {
         budget::check_memory(&layout)?;
@@ -75,10 +81,10 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
         false if input.is_outline() => Storage::from(layout.sample().held().none()),
         true => {
             let overviews = match find_appended(input, "ovr")? {
-                Some(beside) => Some((open(&beside)?, beside.remote())),
+                Some(beside) => Some((Arc::new(open(&beside)?), beside.remote())),
                 None => None,
             };
-            let file = (file, input.remote());
+            let file = (file.clone(), input.remote());
             let inputs: Vec<_> = once(input).chain(&mask_file).collect();
             let named = (input.name(), asked, options.classes);
             Storage::from(TiffBlocks::new(file, mask, overviews, named, &inputs)?)
@@ -88,9 +94,9 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
             if let Some(remote) = input.remote() {
                 remote.want(once(0..input.len()));
             }
-            let samples = samples::read(&file, &image, &layout, layout.band, &all)?;
+            let samples = samples::read(&layout, layout.band, &all)?;
             let mut storage = Storage::from(samples);
-            storage.set_holes(samples::holes(&file, &image, &layout, mask.as_ref(), &all)?);
+            storage.set_holes(samples::holes(&layout, mask.as_ref(), &all)?);
             storage
         }
     };
@@ -104,11 +110,11 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
             layout.bands
         ));
     }
-    let metadata = Metadata::read(&image, layout.band)?;
+    let metadata = Metadata::read(full.ifd(), layout.band)?;
     decoded.no_data = metadata.no_data;
     decoded.scale = metadata.scale.unwrap_or(1.0);
     decoded.offset = metadata.offset.unwrap_or(0.0);
-    georef::apply(&image, &mut decoded, metadata.metres_per_vertical_unit);
+    georef::apply(full.ifd(), &mut decoded, metadata.metres_per_vertical_unit);
     if decoded.place.is_none() {
         lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?;
     }
@@ -117,7 +123,6 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
 
 /// Opens the file. No list in its directories may be longer than the file is.
 fn open(input: &FileBytes) -> Result<TiffFile, BadRaster> {
-    const LONGEST_LIST: usize = 32 << 20;
     let bytes = usize::try_from(input.len()).unwrap_or(usize::MAX);
     let options = tiff_reader::OpenOptions {
         // Blocks are kept where all formats keep theirs.
@@ -125,6 +130,7 @@ fn open(input: &FileBytes) -> Result<TiffFile, BadRaster> {
         parse_budgets: ParseBudgets {
             max_ifds: 64,
             max_tag_value_bytes: bytes.min(LONGEST_LIST),
+            max_metadata_value_bytes: ALL_LISTS,
             ..ParseBudgets::default()
         },
         ..tiff_reader::OpenOptions::default()
@@ -134,7 +140,22 @@ fn open(input: &FileBytes) -> Result<TiffFile, BadRaster> {
         Data::Memory(bytes) => Arc::new(BytesSource::new(bytes.clone())),
         Data::Remote(file, _) => Arc::new(RemoteSource(file.clone())),
     };
-    TiffFile::from_source_with_options(source, options).map_err(fault)
+    TiffFile::from_source_with_options(source, options).map_err(|error| match &error {
+        TiffError::InvalidTagValue { reason, .. } if is_long(reason) => {
+            fault::unsupported(format!(
+                "an index of more than {} MB, as of very many small tiles,",
+                LONGEST_LIST >> 20
+            ))
+        }
+        _ => fault(error),
+    })
+}
+
+/// Whether a list is not read because it is too long, however long the file is.
+fn is_long(reason: &str) -> bool {
+    [LONGEST_LIST, ALL_LISTS]
+        .iter()
+        .any(|most| reason.ends_with(&format!("parse budget {most}")))
 }
 
 #[cfg(test)]

@@ -13,17 +13,12 @@ use crate::raster::samples::{HoleMask, SampleValue, with_samples};
 use crate::raster::{BadRaster, Samples};
 
 /// Reads a part of a band, the first being 0.
-pub(super) fn read(
-    file: &TiffFile,
-    image: &Ifd,
-    layout: &Layout,
-    band: usize,
-    part: &Part,
-) -> Result<Samples, BadRaster> {
+pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, BadRaster> {
     use SampleFormat::{Float, Signed, Unsigned};
     if layout.is_plain {
-        return uncompressed::read(file, layout, band, part);
+        return uncompressed::read(layout, band, part);
     }
+    let (file, image) = (layout.directory.file(), layout.directory.ifd());
     let band = Band { file, image, band };
     Ok(match layout.stored {
         (Unsigned, 8) => band.read(part, |value: u8| value)?.into(),
@@ -87,8 +82,6 @@ impl Band<'_> {
 /// The samples of a part in chunks that a sparse file leaves out, those that a mask in the
 /// file or `beside` it calls no data, and those whose alpha is zero.
 pub(super) fn holes(
-    file: &TiffFile,
-    image: &Ifd,
     layout: &Layout,
     beside: Option<&TiffFile>,
     part: &Part,
@@ -111,7 +104,7 @@ pub(super) fn holes(
             (west..east).for_each(|column| set(start + column as usize));
         }
     }
-    for (file, image) in masks(file, beside, image) {
+    for (file, image) in masks(&layout.directory, beside) {
         let mask = Band {
             file,
             image,
@@ -122,7 +115,7 @@ pub(super) fn holes(
         missing.for_each(|(index, _)| set(index));
     }
     if let Some(band) = layout.alpha {
-        with_samples!(read(file, image, layout, band, part)?, alpha => {
+        with_samples!(read(layout, band, part)?, alpha => {
             let clear = alpha.iter().enumerate().filter(|(_, alpha)| alpha.widen() == 0.0);
             clear.for_each(|(index, _)| set(index));
         });

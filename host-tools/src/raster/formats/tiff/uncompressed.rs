@@ -13,12 +13,8 @@ use crate::raster::samples::{Endian, with_samples};
 use crate::raster::{BadRaster, Samples};
 
 /// Reads a part of a band, the first being 0, of a layout that [is plain](Layout::is_plain).
-pub(super) fn read(
-    file: &TiffFile,
-    layout: &Layout,
-    band: usize,
-    part: &Part,
-) -> Result<Samples, BadRaster> {
+pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, BadRaster> {
+    let file = layout.directory.file();
     let stored = layout.sample();
     let endian = match file.byte_order() {
         ByteOrder::LittleEndian => Endian::Little,

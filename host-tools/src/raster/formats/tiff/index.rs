@@ -1,0 +1,63 @@
+//! Where the strips or tiles of an image lie: the lists of its directory, as the decoder has them.
+
+use tiff_reader::{Ifd, TagValue};
+
+const STRIP_OFFSETS: u16 = 273;
+const STRIP_BYTE_COUNTS: u16 = 279;
+const TILE_OFFSETS: u16 = 324;
+const TILE_BYTE_COUNTS: u16 = 325;
+
+/// The places and sizes of strips or tiles.
+pub(super) struct Index<'f> {
+    places: &'f TagValue,
+    bytes: &'f TagValue,
+}
+
+impl<'f> Index<'f> {
+    /// Of an image of tiles or of strips; `None` where it has none.
+    pub(super) fn of(image: &'f Ifd, tiled: bool) -> Option<Self> {
+        let tags = match tiled {
+            true => [TILE_OFFSETS, TILE_BYTE_COUNTS],
+            false => [STRIP_OFFSETS, STRIP_BYTE_COUNTS],
+        };
+        let [places, bytes] = tags.map(|tag| image.tag(tag).map(|tag| &tag.value));
+        let (places, bytes) = places.zip(bytes)?;
+        number(places, 0).and(number(bytes, 0))?;
+        Some(Self { places, bytes })
+    }
+
+    /// Place and bytes of a strip or tile. What lies at 0, where the file's header is, is left
+    /// out, whatever its size: it has 0 bytes.
+    pub(super) fn at(&self, index: usize) -> Option<(u64, u64)> {
+        let (place, bytes) = number(self.places, index).zip(number(self.bytes, index))?;
+        Some((place, if place == 0 { 0 } else { bytes }))
+    }
+
+    /// Where a strip or tile lies, also one that has no size.
+    pub(super) fn place(&self, index: usize) -> Option<u64> {
+        number(self.places, index)
+    }
+
+    /// What the lists take in memory.
+    pub(super) fn held_bytes(&self) -> usize {
+        let held = |list: &TagValue| match list {
+            TagValue::Byte(all) => all.len(),
+            TagValue::Short(all) => size_of_val(&all[..]),
+            TagValue::Long(all) => size_of_val(&all[..]),
+            TagValue::Long8(all) => size_of_val(&all[..]),
+            _ => 0,
+        };
+        held(self.places) + held(self.bytes)
+    }
+}
+
+/// A number of a list of whole ones.
+fn number(list: &TagValue, index: usize) -> Option<u64> {
+    match list {
+        TagValue::Byte(all) => all.get(index).copied().map(u64::from),
+        TagValue::Short(all) => all.get(index).copied().map(u64::from),
+        TagValue::Long(all) => all.get(index).copied().map(u64::from),
+        TagValue::Long8(all) => all.get(index).copied(),
+        _ => None,
+    }
+}
