@@ -62,6 +62,23 @@ fn stored(values: &Values) -> (u16, usize, Vec<u8>) {
     }
 }
 
+/// An image of single floats in one strip without compression, which begins at `place`.
+pub fn floats_in_a_strip([columns, rows]: [u32; 2], place: u32) -> Directory {
+    let one = |tag: u16, value: u32| (tag, Values::Longs(vec![value]));
+    vec![
+        one(256, columns),
+        one(257, rows),
+        one(258, 32),
+        one(259, 1),
+        one(262, 1),
+        one(273, place),
+        one(277, 1),
+        one(278, rows),
+        one(279, columns * rows * 4),
+        one(339, 3),
+    ]
+}
+
 /// The tags that place an image in a zone of UTM, its first sample's outer corner at `corner`.
 pub fn placed(corner: [f64; 2], cell: f64, zone: u16) -> Directory {
     let keys = vec![1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, zone];

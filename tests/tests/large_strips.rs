@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use hapterra::raster::{self, Raster};
 use hapterra_tests::bounded;
-use hapterra_tests::tiffs::{DATA, Directory, Values, placed, tiff};
+use hapterra_tests::tiffs::{DATA, Directory, Values, floats_in_a_strip, placed, tiff};
 
 /// Samples each way: 4.1 GB of single floats.
 const SIDE: u32 = 32_000;
@@ -24,19 +24,7 @@ fn height(column: u32, row: u32) -> f32 {
 }
 
 fn file() -> (tempfile::TempDir, PathBuf) {
-    let one = |tag: u16, value: u32| (tag, Values::Longs(vec![value]));
-    let mut image = vec![
-        one(256, SIDE),
-        one(257, SIDE),
-        one(258, 32),
-        one(259, 1),
-        one(262, 1),
-        one(273, FIRST),
-        one(277, 1),
-        one(278, SIDE),
-        one(279, SIDE * SIDE * 4),
-        one(339, 3),
-    ];
+    let mut image = floats_in_a_strip([SIDE; 2], FIRST);
     image.extend(placed([400_000.0, 3_800_000.0], 1.0, 32611));
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("strip.tif");

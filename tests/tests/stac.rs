@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use hapterra::raster::{OpenOptions, Raster};
-use hapterra_tests::tiffs::{DATA, Values, placed, tiff};
+use hapterra_tests::tiffs::{DATA, floats_in_a_strip, placed, tiff};
 use hapterra_tests::{bounded, hapterra_binary};
 use serde_json::{Value, json};
 
@@ -17,19 +17,7 @@ const CELL: f64 = 30.0;
 fn geotiff(corner: [f64; 2], zone: u16, height: impl Fn(u32, u32) -> f32) -> Vec<u8> {
     let places = (0..SIDE).flat_map(|row| (0..SIDE).map(move |column| (column, row)));
     let data = places.flat_map(|(column, row)| height(column, row).to_le_bytes());
-    let one = |tag, value| (tag, Values::Longs(vec![value]));
-    let mut image = vec![
-        one(256, SIDE),
-        one(257, SIDE),
-        one(258, 32),
-        one(259, 1),
-        one(262, 1),
-        one(273, DATA),
-        one(277, 1),
-        one(278, SIDE),
-        one(279, SIDE * SIDE * 4),
-        one(339, 3),
-    ];
+    let mut image = floats_in_a_strip([SIDE; 2], DATA);
     image.extend(placed(corner, CELL, zone));
     tiff(&data.collect::<Vec<_>>(), &[image])
 }

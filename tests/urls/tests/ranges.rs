@@ -6,7 +6,7 @@ use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{Scale, Terrain, TileBuffer};
 use hapterra_core::terrain::TileKey;
 use hapterra_tests::shared;
-use hapterra_tests::tiffs::{DATA, Values, placed, tiff};
+use hapterra_tests::tiffs::{DATA, floats_in_a_strip, placed, tiff};
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::{Fault, Server};
 
@@ -138,19 +138,7 @@ fn of_a_strip_that_has_all_samples_the_rows_that_are_touched_are_fetched() {
     let heights: Vec<u8> = (0..SIZE[0] * SIZE[1])
         .flat_map(|index| height(index % SIZE[0], index / SIZE[0]).to_le_bytes())
         .collect();
-    let one = |tag: u16, value: u32| (tag, Values::Longs(vec![value]));
-    let mut image = vec![
-        one(256, SIZE[0]),
-        one(257, SIZE[1]),
-        one(258, 32),
-        one(259, 1),
-        one(262, 1),
-        one(273, DATA),
-        one(277, 1),
-        one(278, SIZE[1]),
-        one(279, heights.len() as u32),
-        one(339, 3),
-    ];
+    let mut image = floats_in_a_strip(SIZE, DATA);
     image.extend(placed([500_000.0, 4_000_000.0], 30.0, 32611));
     let bytes = tiff(&heights, &[image]);
     let (_folder, path, server) = served("strip.tif", &bytes);
