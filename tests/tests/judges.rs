@@ -424,6 +424,28 @@ fn a_contact_that_pulls_is_found() {
     }
 }
 
+/// North of the proxy is a hole, and beyond its corner the HIP is above the ground: the way to
+/// it leads over the hole first, as long as the proxy is before the corner.
+#[test]
+fn friction_at_a_holes_edge_may_hold_a_hip_above_the_ground_beyond_it() {
+    let hole = Terrain::from_fn(Kind::Holes, SIZE, |x, y| match (x, y) {
+        (19, 21) => f32::NAN,
+        _ => 0.0_f32.max((20 - x) as f32),
+    });
+    let found = |x: f64| -> Vec<Invariant> {
+        let judge = Judge::new(&hole, Rule::Swept).with_friction(Friction::coulomb(2.0));
+        let seen = touching([22.0, 20.1, 0.1], [x, 20.0, 0.0_f64.max(20.0 - x)]);
+        let told = reports_of(judge, &[seen]);
+        told.iter().map(|violation| violation.invariant).collect()
+    };
+    for before in [1e-2, 1e-5, 5e-7] {
+        assert_eq!(found(20.0 - before), [], "{before}");
+    }
+    for beyond in [1e-5, 1e-2] {
+        assert_eq!(found(20.0 + beyond), [Invariant::HipBelow], "{beyond}");
+    }
+}
+
 /// What a patch's corners cost in single precision is allowed where they are
 /// mixed, and not at the foot of one.
 #[test]

@@ -86,6 +86,7 @@ fn friction_holds_in_scenes_where_it_was_wrong() {
         (270, 4661),
         (270, 10551),
         (31, 777),
+        (9501, 278),
     ];
     for (seed, number) in scenes {
         let found = run(seed, number, Surface::Rough, &mut Buffers::default());

@@ -70,14 +70,28 @@ impl Judge<'_> {
         Ok(())
     }
 
-    /// A contact that pulls holds a HIP which is free to go: the straight way to
-    /// it starts above the ground, that is above the tangent plane of the patch it
-    /// leads into.
+    /// A contact that pulls holds a HIP which is free to go: from each place that the
+    /// proxy may be at, the straight way to it starts above the ground.
     pub(super) fn is_hip_below(&self, seen: &Seen) -> Verdict {
+        let above = starts(seen.proxy).map(|start| self.height_of_way(seen, start));
+        let above = above.fold(f64::INFINITY, |least, above| {
+            // Over a hole there is no ground: the proxy is held at its edge.
+            least.min(above.unwrap_or(f64::NEG_INFINITY))
+        });
+        if above > 4.0 * seen.allowed() {
+            return self.fail(Invariant::HipBelow, format!("by {above:.3e}: {seen:?}"));
+        }
+        Ok(())
+    }
+
+    /// How far the HIP is above the tangent plane of the patch that the straight way to it
+    /// leads into from a place; `None` where it leads into none.
+    fn height_of_way(&self, seen: &Seen, start: [f64; 2]) -> Option<f64> {
         let way = [0, 1, 2].map(|i| seen.hip[i] - seen.proxy[i]);
         let level = way[0].hypot(way[1]);
-        let into = |(start, patch): &([f64; 2], Patch)| leads_into(*start, way, patch);
-        let above = self.nearby(seen.proxy).filter(into).map(|(start, patch)| {
+        let patches = patches_at(self.terrain, start[0], start[1]);
+        let above = patches.filter(|patch| leads_into(start, way, patch));
+        let above = above.map(|patch| {
             let [east, north] = patch.slopes(start[0], start[1]);
             // Of the heights that are mixed, and of a rounded place the slope's.
             let heights = patch.mixed_size(start[0], start[1], seen.hip[2]);
@@ -86,22 +100,13 @@ impl Judge<'_> {
             let above = way[2] - east * way[0] - north * way[1];
             (above - unsure) / east.hypot(north).hypot(1.0)
         });
-        // Over a hole there is no ground: the proxy is held at the edge.
-        let above = above.fold(f64::INFINITY, f64::min);
-        if above.is_finite() && above > 4.0 * seen.allowed() {
-            return self.fail(Invariant::HipBelow, format!("by {above:.3e}: {seen:?}"));
-        }
-        Ok(())
+        above.reduce(f64::min)
     }
 
     /// The patches that single precision cannot tell the proxy's place from, and
     /// where in them it is.
     pub(super) fn nearby(&self, proxy: [f64; 3]) -> impl Iterator<Item = ([f64; 2], Patch)> + '_ {
-        let [xs, ys] = [sides(proxy[0]), sides(proxy[1])];
-        let starts = xs
-            .into_iter()
-            .flat_map(move |x| ys.clone().into_iter().map(move |y| [x, y]));
-        starts.flat_map(|start| {
+        starts(proxy).flat_map(|start| {
             patches_at(self.terrain, start[0], start[1]).map(move |patch| (start, patch))
         })
     }
@@ -144,6 +149,13 @@ fn leads_into(start: [f64; 2], way: [f64; 3], patch: &Patch) -> bool {
 /// Distance in the plane.
 fn level(a: [f64; 3], b: [f64; 3]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// The places that single precision cannot tell a proxy's from.
+fn starts(proxy: [f64; 3]) -> impl Iterator<Item = [f64; 2]> {
+    let [xs, ys] = [sides(proxy[0]), sides(proxy[1])];
+    xs.into_iter()
+        .flat_map(move |x| ys.clone().into_iter().map(move |y| [x, y]))
 }
 
 /// A coordinate, and the border of a patch that single precision cannot tell it
