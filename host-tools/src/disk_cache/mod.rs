@@ -9,6 +9,8 @@
 //! A record appears when it is complete (it is renamed to its name), so that programs that
 //! use the folder at once only ever see whole ones. Whatever is wrong with the folder is a
 //! line in the log and no error: without it everything is worked out again.
+//!
+//! `unnamed` has files for one program's own use, which are no records.
 
 mod name;
 mod record;
@@ -16,11 +18,13 @@ mod room;
 mod stamp;
 #[cfg(test)]
 mod tests;
+mod unnamed;
 
 use std::fmt;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
@@ -29,6 +33,7 @@ use etcetera::{BaseStrategy, choose_base_strategy};
 pub(crate) use name::Name;
 use room::Room;
 pub(crate) use stamp::FileStamp;
+pub(crate) use unnamed::Unnamed;
 
 /// Records of another form are in another folder.
 const FORM: &str = "v1";
@@ -43,6 +48,9 @@ pub struct DiskCache(Option<Arc<Folder>>);
 
 struct Folder {
     path: PathBuf,
+    most_bytes: u64,
+    /// Bytes that files without a name may take.
+    unnamed: AtomicU64,
     /// How much it holds; `None` once it could not be written.
     room: Mutex<Option<Room>>,
 }
@@ -66,7 +74,12 @@ impl DiskCache {
         }
         let path = folder.join(FORM);
         let room = Mutex::new(Some(Room::new(most_bytes)));
-        Self(Some(Arc::new(Folder { path, room })))
+        Self(Some(Arc::new(Folder {
+            path,
+            most_bytes,
+            unnamed: AtomicU64::new(0),
+            room,
+        })))
     }
 
     /// The folder where programs of this user keep what may be deleted, as
