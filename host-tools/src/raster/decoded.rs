@@ -48,6 +48,8 @@ pub(super) struct Decoded {
     pub(super) vertical_unit_from: Certainty,
     /// What the heights count from, where the file says so.
     pub(super) vertical_datum: Option<VerticalDatum>,
+    /// Why all samples are in memory, where the format could have left them in the file.
+    pub(super) why_whole: Option<String>,
     /// What the user should know.
     pub(super) remarks: Vec<String>,
 }
@@ -87,6 +89,7 @@ impl Decoded {
             metres_per_vertical_unit: None,
             vertical_unit_from: Certainty::Stated,
             vertical_datum: None,
+            why_whole: None,
             remarks: Vec::new(),
         }
     }
@@ -137,8 +140,10 @@ impl Decoded {
             && samples.bytes() as u64 > most_bytes
         {
             let megabytes = samples.bytes() / 1_000_000;
+            let why = self.why_whole.as_deref();
+            let why = why.unwrap_or("its format has no windows, or too large ones");
             let remark = format!(
-                "it is read as a whole, {megabytes} MB: its format has no windows, or too large ones. As this it stays on the disk: gdal_translate -co TILED=YES -co COMPRESS=DEFLATE IN OUT.tif"
+                "it is read as a whole, {megabytes} MB: {why}. As this it stays on the disk: gdal_translate -co TILED=YES -co COMPRESS=DEFLATE IN OUT.tif"
             );
             tracing::warn!("{remark}");
             self.remarks.push(remark);
@@ -232,7 +237,8 @@ impl Decoded {
         };
         match survey.summary.has_none() {
             true => Err(BadRaster::AllNoData {
-                samples: survey.summary.holes,
+                // Some were looked at twice.
+                samples: survey.summary.holes.min(columns * rows),
             }),
             false => Ok(survey),
         }

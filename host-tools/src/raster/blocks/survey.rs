@@ -6,6 +6,7 @@ use twox_hash::XxHash64;
 
 use super::super::HeightSummary;
 use super::{BlockImage, Part, Shared};
+use crate::remote::without_key;
 
 /// Of an image with at most so many samples all are looked at.
 const FEW_SAMPLES: u64 = 1 << 20;
@@ -75,8 +76,11 @@ impl Shared {
             Some(looks) => (true, looks),
             None => (false, self.coarsest()),
         };
+        let look_once = |part: &Part, seen: &mut Seen| {
+            self.look_once(image, part, |stored| seen.add(height(stored)));
+        };
         let look = |part: &Part, seen: &mut Seen| match is_chosen {
-            true => self.look_once(image, part, |stored| seen.add(height(stored))),
+            true => look_once(part, seen),
             false => self.look_at_block(image, part, |stored| seen.add(height(stored))),
         };
         let is_small = !is_chosen && self.samples(image) <= FEW_SAMPLES;
@@ -90,19 +94,28 @@ impl Shared {
         for part in &chosen {
             look(part, &mut seen);
         }
-        if looks < parts.len() {
+        if looks < parts.len() && seen.summary.has_none() {
+            self.tell_of_search(looks, parts.len());
             // Most of it may hold nothing: then the first height anywhere will do.
             for part in &parts {
+                look_once(part, &mut seen);
                 if !seen.summary.has_none() {
                     break;
                 }
-                look(part, &mut seen);
             }
         }
         Survey {
             summary: seen.summary,
             print: Some(seen.hasher.finish()),
         }
+    }
+
+    /// Says why it may take long to open the file.
+    fn tell_of_search(&self, looks: usize, parts: usize) {
+        let name = (self.path.get()).map_or("the file".into(), |path| without_key(path));
+        tracing::warn!(
+            "{looks} places of {name} have no height: all {parts} are looked at until one has, which may take a while"
+        );
     }
 
     /// The samples of a block, which is kept.
