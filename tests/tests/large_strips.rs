@@ -5,8 +5,9 @@ use std::fs::OpenOptions;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::PathBuf;
 
+use hapterra::disk_cache::DiskCache;
 use hapterra::raster::{self, Raster};
-use hapterra_tests::bounded;
+use hapterra_tests::bounded::{self, zstd_bomb};
 use hapterra_tests::tiffs::{DATA, Directory, Values, floats_in_a_strip, placed, tiff};
 
 /// Samples each way: 4.1 GB of single floats.
@@ -42,25 +43,28 @@ fn file() -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
-/// A mask cannot be read in parts where it is one large strip: then all is in memory, and it says so.
-#[test]
-fn a_file_whose_mask_is_one_large_strip_is_read_as_a_whole() {
-    const WIDE: u32 = 6000;
+/// Samples each way of a mask that is in one strip and too large to be decoded with each block.
+const MASKED: u32 = 6000;
+
+fn one(tag: u16, value: u32) -> (u16, Values) {
+    (tag, Values::Longs(vec![value]))
+}
+
+/// Tiles of bytes that are 7, but for the first, and a mask of the same bytes in one strip.
+fn masked(compression: u32, mask: &[u8]) -> (tempfile::TempDir, PathBuf) {
     const TILE: u32 = 3000;
-    let one = |tag: u16, value: u32| (tag, Values::Longs(vec![value]));
-    let image = |kind: u32, meaning: u32, chunk: Vec<(u16, Values)>| {
+    let image = |kind: u32, compression: u32, meaning: u32, chunk: Vec<(u16, Values)>| {
         let mut image = vec![
             one(254, kind),
-            one(256, WIDE),
-            one(257, WIDE),
+            one(256, MASKED),
+            one(257, MASKED),
             one(258, 8),
-            one(259, 1),
+            one(259, compression),
             one(262, meaning),
         ];
         image.extend(chunk);
         image
     };
-    let bytes = WIDE * WIDE;
     let tiles = vec![
         one(277, 1),
         one(322, TILE),
@@ -68,28 +72,124 @@ fn a_file_whose_mask_is_one_large_strip_is_read_as_a_whole() {
         (324, Values::Longs(vec![DATA; 4])),
         (325, Values::Longs(vec![TILE * TILE; 4])),
     ];
-    let strip = vec![one(273, DATA), one(277, 1), one(278, WIDE), one(279, bytes)];
-    // Tiles and mask have the same bytes: 7 is a height, and no hole.
-    let mut data = vec![7; bytes as usize];
-    data[0] = 0;
+    let bytes = mask.len() as u32;
+    let place = DATA + TILE * TILE;
+    let strip = vec![
+        one(273, place),
+        one(277, 1),
+        one(278, MASKED),
+        one(279, bytes),
+    ];
+    let mut data = vec![7; (TILE * TILE) as usize];
+    data.extend(mask);
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("masked.tif");
-    let images = [image(0, 1, tiles), image(4, 4, strip)];
+    let images = [image(0, 1, 1, tiles), image(4, compression, 4, strip)];
     std::fs::write(&path, tiff(&data, &images)).expect("written");
-    let options = raster::OpenOptions {
+    // All tiles are the same one; the file is as long as if they were not.
+    let file = OpenOptions::new().write(true).open(&path).expect("there");
+    let length = file.metadata().expect("told").len();
+    file.set_len(length.max(u64::from(MASKED * MASKED)))
+        .expect("a sparse file");
+    (folder, path)
+}
+
+/// Options with which all stays in the file, and what may be unpacked is in a folder.
+fn in_file(disk: DiskCache) -> raster::OpenOptions {
+    raster::OpenOptions {
         most_in_memory_bytes: 0,
+        disk_cache: disk,
         ..raster::OpenOptions::default()
+    }
+}
+
+#[test]
+fn a_mask_in_one_large_strip_is_read_row_by_row() {
+    let mut mask = vec![7; (MASKED * MASKED) as usize];
+    for hole in [0, MASKED + 1, 3500 * MASKED + 4000] {
+        mask[hole as usize] = 0;
+    }
+    let (_folder, path) = masked(1, &mask);
+    let raster = Raster::open(&path, &in_file(DiskCache::off())).expect("opens");
+    assert!(raster.samples().is_none(), "it is in memory");
+    assert_eq!(raster.remarks(), [""; 0]);
+    for [column, row] in [[0, 0], [1, 1], [4000, 3500]] {
+        assert!(raster.height(column, MASKED - 1 - row).is_nan());
+        assert_eq!(raster.height(column + 1, MASKED - 1 - row), 7.0);
+    }
+}
+
+/// Where there is no place to unpack it, all is in memory, and it is said why.
+#[test]
+fn a_packed_mask_in_one_large_strip_is_unpacked_on_disk_or_it_is_named() {
+    let mask = zstd_bomb((MASKED * MASKED).div_ceil(128 * 1024) as usize);
+    let (folder, path) = masked(50000, &mask);
+    let has_remark = |raster: &Raster, words: [&str; 2]| {
+        let all = |remark: &String| words.iter().all(|word| remark.contains(word));
+        assert!(raster.remarks().iter().any(all), "{:?}", raster.remarks());
     };
-    let raster = Raster::open(&path, &options).expect("opens");
-    assert!(raster.samples().is_some(), "it is in memory");
-    assert!(
-        raster
-            .remarks()
-            .iter()
-            .any(|remark| remark.contains("as a whole"))
-    );
-    assert_eq!(raster.summary().holes, 1);
-    assert!(raster.height(0, WIDE - 1).is_nan());
+    let disk = DiskCache::at(&folder.path().join("cache"), 1 << 20);
+    let raster = Raster::open(&path, &in_file(disk)).expect("opens");
+    assert!(raster.samples().is_none(), "it is in memory");
+    has_remark(&raster, ["its mask are too large", "up to 36 MB"]);
+    assert_eq!(raster.height(5999, 0), 7.0);
+    let raster = Raster::open(&path, &in_file(DiskCache::off())).expect("opens");
+    assert!(raster.samples().is_some(), "it is left in the file");
+    has_remark(&raster, ["as a whole", "its mask are too large"]);
+    assert_eq!(raster.summary().holes, 0);
+}
+
+/// 576 MB of bytes in one packed strip.
+#[test]
+fn a_packed_strip_is_felt_in_the_memory_of_a_terrain() {
+    const WIDE: u32 = 24_000;
+    let image = |bytes: usize| {
+        vec![
+            one(256, WIDE),
+            one(257, WIDE),
+            one(258, 8),
+            one(259, 50000),
+            one(262, 1),
+            one(273, DATA),
+            one(277, 1),
+            one(278, WIDE),
+            one(279, bytes as u32),
+        ]
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("packed.tif");
+    let cache = folder.path().join("cache");
+    let cache = cache.to_str().expect("a plain name");
+    let write = |packed: &[u8]| {
+        std::fs::write(&path, tiff(packed, &[image(packed.len())])).expect("written");
+    };
+    let info = |options: &[&str]| {
+        let output = bounded::info(&path, options);
+        let told = [output.stdout, output.stderr].concat();
+        (
+            output.status.code(),
+            String::from_utf8_lossy(&told).into_owned(),
+        )
+    };
+    let packed = zstd_bomb((WIDE * WIDE).div_ceil(128 * 1024) as usize);
+    write(&packed);
+    let (code, told) = info(&["--cache-dir", cache]);
+    assert_eq!(code, Some(0), "{told}");
+    assert!(told.contains("unpacked on disk"), "{told}");
+    // Without a place on disk it needs the memory, and there is too little.
+    let (code, told) = info(&["--cache-mb", "0"]);
+    assert_eq!(code, Some(1), "{told}");
+    assert!(told.contains("more than memory can hold"), "{told}");
+    // A strip that is cut: the rows before are felt.
+    write(&packed[..packed.len() / 10 * 9]);
+    let (code, told) = info(&["--cache-dir", cache]);
+    assert_eq!(code, Some(0), "{told}");
+    assert!(told.contains("cannot be read and are a hole"), "{told}");
+    write(&packed[..3]);
+    let (code, told) = info(&["--cache-dir", cache]);
+    assert_eq!(code, Some(1), "{told}");
+    let is_refused = told.contains("packed.tif") && !told.contains("panicked");
+    assert!(is_refused, "{told}");
 }
 
 /// A file that was cut: its overview, which is all that is looked at when it opens, ends early.
@@ -98,7 +198,6 @@ fn of_an_overview_that_ends_early_the_rows_that_are_there_are_felt() {
     const WIDE: u32 = 4000;
     const HALF: u32 = WIDE / 2;
     const THERE: u32 = 600;
-    let one = |tag: u16, value: u32| (tag, Values::Longs(vec![value]));
     let image = |kind: u32, side: u32, place: u32| {
         vec![
             one(254, kind),
@@ -150,11 +249,34 @@ fn a_strip_of_4_gb_is_felt_in_the_memory_of_a_terrain() {
     }
 }
 
+/// All of it is looked at for a height: that takes no memory, and it is said, because it takes long.
+#[test]
+fn a_file_of_nothing_is_looked_through_and_it_says_so() {
+    const WIDE: u32 = 12_000;
+    let image = floats_in_a_strip([WIDE; 2], FIRST);
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("nothing.tif");
+    std::fs::write(&path, tiff(&[], &[image])).expect("written");
+    let file = OpenOptions::new().write(true).open(&path).expect("there");
+    file.set_len(u64::from(FIRST) + u64::from(WIDE * WIDE) * 4)
+        .expect("a sparse file");
+    let output = bounded::info(&path, &["--no-data", "0"]);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    let search = told.find("32 places of").expect("it says that it searches");
+    let end = told.find("no surface").expect("it says what came of it");
+    assert!(search < end, "{told}");
+    assert!(told.contains("all 144000000 samples"), "{told}");
+    // Where zeros are heights, the first places have some.
+    let output = bounded::info(&path, &[]);
+    assert!(output.status.success());
+    assert!(output.stderr.is_empty(), "nothing is to be searched for");
+}
+
 #[test]
 fn four_million_tiles_are_felt_in_the_memory_of_a_terrain() {
     const TILE: u32 = 64;
     const ACROSS: u32 = 2025;
-    let one = |tag: u16, value: u32| (tag, Values::Longs(vec![value]));
     let tiles = (ACROSS * ACROSS) as usize;
     let image = |kind: u32| {
         vec![

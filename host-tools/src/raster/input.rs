@@ -246,13 +246,13 @@ impl FileBytes {
 
 /// Reads bytes at a place, whatever others read of the same file meanwhile.
 #[cfg(unix)]
-fn read_exact_at(file: &File, into: &mut [u8], at: u64) -> std::io::Result<()> {
+pub(super) fn read_exact_at(file: &File, into: &mut [u8], at: u64) -> std::io::Result<()> {
     std::os::unix::fs::FileExt::read_exact_at(file, into, at)
 }
 
 /// Reads bytes at a place, whatever others read of the same file meanwhile.
 #[cfg(windows)]
-fn read_exact_at(file: &File, mut into: &mut [u8], mut at: u64) -> std::io::Result<()> {
+pub(super) fn read_exact_at(file: &File, mut into: &mut [u8], mut at: u64) -> std::io::Result<()> {
     while !into.is_empty() {
         match std::os::windows::fs::FileExt::seek_read(file, into, at)? {
             0 => return Err(ErrorKind::UnexpectedEof.into()),

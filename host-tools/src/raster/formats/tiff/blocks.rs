@@ -10,10 +10,11 @@ use twox_hash::XxHash64;
 
 use super::images::Directory;
 use super::layout::Layout;
+use super::masks::Mask;
 use super::samples::{holes, read};
 use super::uncompressed::rows;
 use super::{budget, images};
-use crate::disk_cache::FileStamp;
+use crate::disk_cache::{DiskCache, FileStamp};
 use crate::raster::blocks::{
     Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part, stored_parts,
 };
@@ -29,10 +30,10 @@ const USUAL_BLOCK: u32 = 256;
 /// Of longer rows of plain samples parts are read.
 const LONGEST_ROW: u32 = 32_768;
 
-/// Whether single blocks of an image can be read: its samples are plain, or a strip or tile is
-/// not too large.
-pub(super) fn suit(layout: &Layout) -> bool {
-    layout.is_plain || is_small(layout, chunks(layout))
+/// Whether single blocks of an image can be read: its rows can, or a strip or tile is not too
+/// large.
+fn suit(layout: &Layout) -> bool {
+    layout.is_read_by_rows() || is_small(layout, chunks(layout))
 }
 
 /// Whether a block of so many columns and rows is not too large to be decoded.
@@ -42,21 +43,10 @@ fn is_small(layout: &Layout, block: [u32; 2]) -> bool {
     samples.saturating_mul(layout.texel_bytes().max(8)) <= LARGEST_BLOCK_BYTES
 }
 
-/// Whether an image's masks can be read with a block: none of their strips and tiles is too large.
-pub(super) fn masks_suit(image: &Directory, beside: Option<&TiffFile>) -> bool {
-    let mut masks = images::masks(image, beside);
-    masks.all(|(_, mask)| {
-        let columns = mask.tile_width().unwrap_or(mask.width());
-        let strip = mask.rows_per_strip().min(mask.height());
-        let rows = mask.tile_height().unwrap_or(strip);
-        u64::from(columns) * u64::from(rows) <= LARGEST_BLOCK_BYTES
-    })
-}
-
 /// Columns and rows of a block. Of plain samples it is a square, or of a file elsewhere a wide one,
 /// because what lies together comes together; with all of its bands it is not too large.
 fn block(layout: &Layout, is_elsewhere: bool) -> [u32; 2] {
-    if !layout.is_plain {
+    if !layout.is_read_by_rows() {
         return chunks(layout);
     }
     let usual = if is_elsewhere {
@@ -90,7 +80,10 @@ fn ranges(layout: &Layout, part: &Part) -> Vec<Range<u64>> {
     let chunks = bands.flat_map(|band| layout.chunks_of(band, part));
     for chunk in chunks.filter(|chunk| chunk.bytes > 0) {
         match layout.is_plain {
-            true => ranges.extend(rows(layout, &chunk, part)),
+            true => ranges.extend(rows(layout, &chunk, part).map(|range| {
+                let at = |offset: u64| chunk.place.saturating_add(offset);
+                at(range.start)..at(range.end)
+            })),
             false => ranges.push(chunk.place..chunk.place.saturating_add(chunk.bytes)),
         }
     }
@@ -101,7 +94,6 @@ fn ranges(layout: &Layout, part: &Part) -> Vec<Range<u64>> {
 pub(super) struct TiffBlocks {
     /// The main file and the one of overviews beside it, where they are elsewhere.
     remote: Vec<Option<Arc<RemoteFile>>>,
-    mask: Option<TiffFile>,
     unread: Unread,
     /// The main file and the mask's, each with its state when it was opened; `None` where one
     /// was changed meanwhile.
@@ -120,25 +112,85 @@ pub(super) type Opened = (Arc<TiffFile>, Option<Arc<RemoteFile>>);
 /// The main file, and one of overviews beside it.
 const MAIN: usize = 0;
 
-struct Image {
+/// What is known of a file before its blocks are read.
+#[derive(Clone, Copy)]
+pub(super) struct Known<'k> {
+    /// Its name in warnings.
+    pub(super) name: &'k str,
+    /// The band that the user chose, the first being 1.
+    pub(super) asked: Option<u32>,
+    /// Its numbers are classes.
+    pub(super) classes: bool,
+    /// The file of a mask beside it.
+    pub(super) mask: Option<&'k Arc<TiffFile>>,
+    /// Where large strips and tiles may be unpacked, or why they may not.
+    pub(super) disk: Result<&'k DiskCache, &'k str>,
+}
+
+/// An image with its masks.
+pub(super) struct Image {
+    /// Number of the file that it is in.
     file: usize,
-    layout: Layout,
+    pub(super) layout: Layout,
+    pub(super) masks: Vec<Mask>,
+}
+
+impl Image {
+    /// An image of the main file.
+    pub(super) fn of(directory: &Directory, known: &Known<'_>) -> Result<Self, BadRaster> {
+        Ok(Self {
+            file: MAIN,
+            layout: Layout::read(directory, known.asked, known.classes)?,
+            masks: Mask::all(directory, known.mask),
+        })
+    }
+
+    /// Whether parts of it can be read, and nothing has to be unpacked for that.
+    pub(super) fn has_parts(&self) -> bool {
+        suit(&self.layout)
+    }
+
+    /// Makes it an image of which blocks are read.
+    ///
+    /// # Errors
+    /// Why that cannot be.
+    pub(super) fn leave_in_file(&mut self, disk: Result<&DiskCache, &str>) -> Result<(), String> {
+        let chunks = self.layout.chunks_name();
+        if !suit(&self.layout) {
+            let unpacked = match disk {
+                Ok(disk) => (self.layout.unpack_into(disk)).map_err(|error| error.to_string()),
+                Err(why) => Err(why.to_owned()),
+            };
+            unpacked.map_err(|why| {
+                format!("its {chunks} are too large to be read in parts, and {why}")
+            })?;
+        }
+        let mut masks = self.masks.iter_mut();
+        let left = masks.try_for_each(|mask| mask.leave_in_file(disk));
+        left.map_err(|why| {
+            self.layout.unpacked = None;
+            format!("the strips or tiles of its mask are too large to be read in parts, and {why}")
+        })
+    }
+
+    /// Bytes that it takes unpacked on disk at most.
+    pub(super) fn unpacked_bytes(&self) -> u64 {
+        let own = self.layout.unpacked.as_ref();
+        let masks = self.masks.iter().map(Mask::unpacked_bytes);
+        own.map_or(0, |unpacked| unpacked.most_bytes()) + masks.sum::<u64>()
+    }
 }
 
 impl TiffBlocks {
-    /// The full image of a file and the overviews in it and in one beside it that are of the
-    /// same kind; `asked` is the band that the user chose, and `name` the file's in warnings.
+    /// The full image of a file, [left in it](Image::leave_in_file), and the overviews in the file
+    /// and in one beside it that are of the same kind.
     pub(super) fn new(
         (file, remote): Opened,
-        mask: Option<TiffFile>,
+        full: Image,
         overviews: Option<Opened>,
-        (name, asked, classes): (&str, Option<u32>, bool),
+        known: &Known<'_>,
         inputs: &[&FileBytes],
     ) -> Result<Self, BadRaster> {
-        let full = Image {
-            file: MAIN,
-            layout: Layout::read(&images::full(&file)?, asked, classes)?,
-        };
         let (also, also_remote) = overviews.unzip();
         let files: Vec<_> = [file].into_iter().chain(also).collect();
         let remote: Vec<_> = [remote].into_iter().chain(also_remote).collect();
@@ -146,17 +198,18 @@ impl TiffBlocks {
         for (index, file) in files.iter().enumerate() {
             for directory in images::overviews(file) {
                 // An overview that cannot be used is no reason not to feel the field.
-                let Ok(layout) = Layout::read(&directory, asked, classes) else {
+                let Ok(image) = Image::of(&directory, known) else {
                     continue;
                 };
-                let image = Image {
+                let mut image = Image {
                     file: index,
-                    layout,
+                    ..image
                 };
                 let bytes = file.source().len();
-                let suits = masks_suit(&directory, mask.as_ref())
-                    && budget::check(&image.layout, bytes, true).is_ok();
-                if suits && image.is_overview_of(&found[MAIN]) {
+                let suits = budget::check(&image.layout, bytes, true).is_ok()
+                    && image.is_overview_of(&found[MAIN])
+                    && image.leave_in_file(known.disk).is_ok();
+                if suits {
                     found.push(image);
                 }
             }
@@ -174,8 +227,7 @@ impl TiffBlocks {
         Ok(Self {
             blocks: blocks.collect(),
             remote,
-            mask,
-            unread: Unread::of(name),
+            unread: Unread::of(known.name),
             inputs: stamped(inputs)?,
             index: OnceLock::new(),
             images: found,
@@ -184,11 +236,10 @@ impl TiffBlocks {
 
     /// A part of an image.
     fn block(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
-        let image = &self.images[image];
-        let layout = &image.layout;
+        let Image { layout, masks, .. } = &self.images[image];
         Ok(Block {
             samples: read(layout, layout.band, part)?,
-            holes: holes(layout, self.mask.as_ref(), part)?,
+            holes: holes(layout, masks, part)?,
             is_lacking: false,
         })
     }
@@ -208,12 +259,12 @@ impl TiffBlocks {
         Ok(all)
     }
 
-    /// The same of plain samples, of which any row may be read without the others. What masks
+    /// The same of samples that are read by rows, of which any row may be read without the others. What masks
     /// them is decoded once.
     fn by_rows(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
-        let layout = &self.images[image].layout;
+        let Image { layout, masks, .. } = &self.images[image];
         let mut all = self.nothing_of(part);
-        let masked = || holes(layout, self.mask.as_ref(), part);
+        let masked = || holes(layout, masks, part);
         let masked = match guarded(super::FORMAT.name, masked) {
             Ok(masked) => masked,
             Err(fault) if fault.is_of_the_line() => return Err(fault),
@@ -325,7 +376,6 @@ impl Image {
             && times[0] > 1.0
             && (times[0] / times[1] - 1.0).abs() <= 1.5 * one
             && ours.of_band().is_some()
-            && suit(ours)
             && self.has_place_of(full, times)
     }
 
@@ -409,10 +459,12 @@ impl BlockReader for TiffBlocks {
         // The decoder asks for one chunk after the other.
         self.want(image, std::slice::from_ref(part));
         match self.block(image, part) {
-            Err(fault) if !fault.is_of_the_line() => match self.images[image].layout.is_plain {
-                true => self.by_rows(image, part),
-                false => self.by_chunks(image, part),
-            },
+            Err(fault) if !fault.is_of_the_line() => {
+                match self.images[image].layout.is_read_by_rows() {
+                    true => self.by_rows(image, part),
+                    false => self.by_chunks(image, part),
+                }
+            }
             block => block,
         }
     }

@@ -1,7 +1,9 @@
 //! Whether a file can hold what its header promises, before room is made for it.
 
 use super::layout::Layout;
+use super::unpack;
 use crate::raster::BadRaster;
+use crate::raster::blocks::Part;
 
 /// Room that a sparse file's holes may take beyond its data, so that a small file
 /// does not fill a machine's memory with nothing.
@@ -18,7 +20,9 @@ const LARGEST_CHUNK: u64 = 1 << 30;
 /// that is no damage.
 pub(super) fn check_memory(layout: &Layout) -> Result<(), BadRaster> {
     let (columns, rows, bytes) = (layout.columns.into(), layout.rows.into(), layout.bytes());
-    let is_large = bytes > MOST_BYTES || (layout.chunk_size() > LARGEST_CHUNK && !layout.is_plain);
+    let all = Part::whole(layout.columns, layout.rows);
+    let is_in_parts = layout.is_plain || unpack::suits_whole(layout, &all);
+    let is_large = bytes > MOST_BYTES || (layout.chunk_size() > LARGEST_CHUNK && !is_in_parts);
     let bytes = bytes.max(layout.chunk_size());
     match is_large && layout.of_band().is_some() {
         true => Err(BadRaster::TooLarge {

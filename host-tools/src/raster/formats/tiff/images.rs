@@ -43,21 +43,23 @@ pub(super) fn full(file: &Arc<TiffFile>) -> Result<Directory, BadRaster> {
     })
 }
 
-/// The masks of an image or overview, each with its file: the one that GDAL keeps in the same
-/// file, and the one in a file `beside`; they are of its size. 0 is no data.
-pub(super) fn masks<'f>(
-    image: &'f Directory,
-    beside: Option<&'f TiffFile>,
-) -> impl Iterator<Item = (&'f TiffFile, &'f Ifd)> {
+/// The masks of an image or overview: the one that GDAL keeps in the same file, and the one in a
+/// file `beside`; they are of its size. 0 is no data.
+pub(super) fn masks(image: &Directory, beside: Option<&Arc<TiffFile>>) -> Vec<Directory> {
     let size = |image: &Ifd| (image.width(), image.height());
-    let (file, wanted) = (image.file(), size(image.ifd()));
-    let mut others = file.ifds().iter().skip(1);
-    let inside = others.find(|other| kind(other) & MASK != 0 && size(other) == wanted);
-    let outside = beside.and_then(|beside| {
-        let mask = beside.ifds().iter().find(|other| size(other) == wanted);
-        mask.map(|mask| (beside, mask))
+    let wanted = size(image.ifd());
+    let mut inside = image.file().ifds().iter().skip(1);
+    let inside = inside.position(|other| kind(other) & MASK != 0 && size(other) == wanted);
+    let inside = inside.map(|number| Directory {
+        file: image.file.clone(),
+        number: number + 1,
     });
-    inside.map(|mask| (file, mask)).into_iter().chain(outside)
+    let outside = beside.and_then(|file| {
+        let number = file.ifds().iter().position(|other| size(other) == wanted)?;
+        let file = file.clone();
+        Some(Directory { file, number })
+    });
+    inside.into_iter().chain(outside).collect()
 }
 
 /// The overviews in a file, the finest first.

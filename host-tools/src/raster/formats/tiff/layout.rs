@@ -1,16 +1,23 @@
 //! How an image's samples are stored, and whether they can be heights.
 
+use std::io;
+use std::ops::Range;
+use std::sync::Arc;
+
 use tiff_reader::{ByteOrder, Ifd, PhotometricInterpretation};
 
 use super::fault::{fault, unsupported};
 use super::images::Directory;
 use super::index::Index;
+use super::unpack;
+use super::unpacked::Unpacked;
+use crate::disk_cache::DiskCache;
 use crate::raster::blocks::Part;
 use crate::raster::read::Stored;
 use crate::raster::{BadRaster, SampleType};
 
-/// Larger uncompressed chunks are not decoded as a whole, bytes.
-const LARGEST_DECODED: u64 = 1 << 20;
+/// Larger chunks are not decoded as a whole where that can be helped, bytes.
+pub(super) const LARGEST_DECODED: u64 = 1 << 20;
 
 /// How an image's samples are stored.
 pub(super) struct Layout {
@@ -35,6 +42,8 @@ pub(super) struct Layout {
     /// Bytes are samples, in an order without surprises, and chunks are so large that they are
     /// read row by row.
     pub(super) is_plain: bool,
+    /// Chunks that are too large to be decoded where they are touched, once they are.
+    pub(super) unpacked: Option<Arc<Unpacked>>,
 }
 
 /// A strip or tile.
@@ -87,17 +96,43 @@ impl Layout {
         classes: bool,
     ) -> Result<Self, BadRaster> {
         let image = directory.ifd();
+        let bands = image.samples_per_pixel();
+        if !(classes && is_palette(image)) {
+            refuse_colour(image, bands, asked.is_some())?;
+        }
+        let band = chosen_band(asked, bands)?;
+        let layout = Self {
+            band,
+            alpha: alpha(image, bands).filter(|alpha| *alpha != band),
+            ..Self::of(directory, stored_type(image)?)?
+        };
+        // What the decoder refuses is refused here, too, where it does not come to decode.
+        image.raster_layout().map_err(fault)?;
+        Ok(layout)
+    }
+
+    /// The layout of a mask, of as few bits a sample as it has.
+    pub(super) fn of_mask(directory: &Directory) -> Result<Self, BadRaster> {
+        let image = directory.ifd();
+        let bits = image.bits_per_sample().map_err(fault)?;
+        let bits = bits.first().copied().unwrap_or(1);
+        let layout = Self::of(directory, (SampleFormat::Unsigned, bits))?;
+        image.raster_layout().map_err(fault)?;
+        match matches!(bits, 1 | 2 | 4 | 8) && image.predictor() == 1 && layout.bands == 1 {
+            true => Ok(layout),
+            false => Err(unsupported(format!("a mask of {bits} bits a sample"))),
+        }
+    }
+
+    /// Reads how the samples of the first band are laid out.
+    fn of(directory: &Directory, stored: (SampleFormat, u16)) -> Result<Self, BadRaster> {
+        let image = directory.ifd();
         let (columns, rows) = (image.width(), image.height());
         if columns == 0 || rows == 0 {
             return Err(BadRaster::damaged(format!(
                 "TIFF: an image of {columns} × {rows}"
             )));
         }
-        let bands = image.samples_per_pixel();
-        if !(classes && is_palette(image)) {
-            refuse_colour(image, bands, asked.is_some())?;
-        }
-        let band = chosen_band(asked, bands)?;
         let (tiled, chunk) = match (image.tile_width(), image.tile_height()) {
             (Some(width), Some(height)) => (true, (width, height)),
             _ => (false, (columns, image.rows_per_strip().min(rows))),
@@ -113,30 +148,71 @@ impl Layout {
             directory: directory.clone(),
             columns,
             rows,
-            stored: stored_type(image)?,
-            bands,
-            band,
-            alpha: alpha(image, bands).filter(|alpha| *alpha != band),
+            stored,
+            bands: image.samples_per_pixel(),
+            band: 0,
+            alpha: None,
             compression: compression(image.compression())?,
             planar: image.planar_configuration() == 2,
             tiled,
             chunk,
             is_plain: false,
+            unpacked: None,
         };
-        // What the decoder refuses is refused here, too, where it does not come to decode.
-        image.raster_layout().map_err(fault)?;
         Ok(Self {
             is_plain: layout.chunk_size() > LARGEST_DECODED && has_plain_samples(image),
             ..layout
         })
     }
 
+    /// Has strips or tiles unpacked into a file on disk when they are touched.
+    ///
+    /// # Errors
+    /// Why that cannot be.
+    pub(super) fn unpack_into(&mut self, disk: &DiskCache) -> io::Result<()> {
+        if !unpack::suits(self) {
+            let what = format!("what {} has packed comes as a whole", self.compression.0);
+            return Err(io::Error::other(what));
+        }
+        self.unpacked = Some(Arc::new(Unpacked::new(self, disk)?));
+        Ok(())
+    }
+
+    /// Whether rows are read without the others of their strip or tile.
+    pub(super) fn is_read_by_rows(&self) -> bool {
+        self.is_plain || self.unpacked.is_some()
+    }
+
+    /// Strips, or tiles.
+    pub(super) const fn chunks_name(&self) -> &'static str {
+        if self.tiled { "tiles" } else { "strips" }
+    }
+
+    /// Whether it has strips.
+    pub(super) const fn has_strips(&self) -> bool {
+        !self.tiled
+    }
+
     /// Bytes of the samples of a chunk.
     pub(super) fn chunk_size(&self) -> u64 {
-        let (columns, rows) = (u64::from(self.chunk.0), u64::from(self.chunk.1));
-        columns
-            .saturating_mul(rows)
-            .saturating_mul(self.texel_bytes())
+        self.row_bytes().saturating_mul(self.chunk.1.into())
+    }
+
+    /// Bytes of a row of a chunk.
+    pub(super) fn row_bytes(&self) -> u64 {
+        self.bytes_of(self.chunk.0)
+    }
+
+    /// Bytes of so many texels of a row, the last one filled up.
+    fn bytes_of(&self, columns: u32) -> u64 {
+        let bits = u64::from(self.stored.1) * u64::from(self.bands_together());
+        bits.saturating_mul(columns.into()).div_ceil(8)
+    }
+
+    /// The bytes of a row of a chunk, counted from its first one, that have some of its columns.
+    pub(super) fn row_range(&self, first: u32, columns: u32) -> Range<u64> {
+        let bits = u64::from(self.stored.1) * u64::from(self.bands_together());
+        bits.saturating_mul(first.into()) / 8..self.bytes_of(first.saturating_add(columns))
     }
 
     /// How a sample lies in the file, and in which type it is held.
@@ -204,11 +280,14 @@ impl Layout {
     /// index has too few. A chunk that a sparse file leaves out has 0 bytes.
     pub(super) fn of_band(&self) -> Option<impl Iterator<Item = (u64, u64)>> {
         let (index, first) = (self.index()?, self.first_of(self.band)?);
-        let down = self.rows.div_ceil(self.chunk.1);
-        let chunks = u64::from(self.chunks_across()) * u64::from(down);
-        let end = first.checked_add(usize::try_from(chunks).ok()?)?;
+        let end = first.checked_add(usize::try_from(self.chunks_of_band()).ok()?)?;
         index.at(end.checked_sub(1)?)?;
         Some((first..end).map_while(move |number| index.at(number)))
+    }
+
+    /// How many chunks a band has.
+    pub(super) fn chunks_of_band(&self) -> u64 {
+        u64::from(self.chunks_across()) * u64::from(self.rows.div_ceil(self.chunk.1))
     }
 
     /// Where all chunks lie, those of all bands.
@@ -228,8 +307,7 @@ impl Layout {
 
     /// Number of a band's first chunk among those of all bands.
     fn first_of(&self, band: usize) -> Option<usize> {
-        let down = self.rows.div_ceil(self.chunk.1);
-        let chunks = usize::try_from(u64::from(self.chunks_across()) * u64::from(down)).ok()?;
+        let chunks = usize::try_from(self.chunks_of_band()).ok()?;
         match self.planar {
             true => chunks.checked_mul(band),
             false => Some(0),
@@ -251,8 +329,12 @@ impl Layout {
     /// Bytes of the samples that are stored together: one of each band, or of one
     /// band only where each has its own chunks.
     pub(super) fn texel_bytes(&self) -> u64 {
-        let bands = if self.planar { 1 } else { self.bands };
-        u64::from(self.stored.1 / 8) * u64::from(bands)
+        u64::from(self.stored.1 / 8) * u64::from(self.bands_together())
+    }
+
+    /// Bands that have their samples in the same chunks.
+    pub(super) const fn bands_together(&self) -> u16 {
+        if self.planar { 1 } else { self.bands }
     }
 
     /// The variant in words.

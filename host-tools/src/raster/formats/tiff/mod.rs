@@ -10,10 +10,13 @@ mod georef;
 mod images;
 mod index;
 mod layout;
+mod masks;
 mod metadata;
 mod remote_source;
 mod samples;
 mod uncompressed;
+mod unpack;
+mod unpacked;
 mod user_defined;
 
 use std::iter::once;
@@ -29,7 +32,7 @@ use crate::raster::format::{Claim, Format, Parts, starts_with_any};
 use crate::raster::input::{Data, FileBytes};
 use crate::raster::storage::Storage;
 use crate::raster::{BadRaster, OpenOptions};
-use blocks::TiffBlocks;
+use blocks::{Image, Known, TiffBlocks};
 use fault::fault;
 use layout::Layout;
 use metadata::Metadata;
@@ -58,59 +61,42 @@ const WORLD_FILES: [&str; 4] = ["tfw", "tifw", "tiffw", "tfwx"];
 /// Reads the heights, or lets them stay in the file: of several bands the chosen one or
 /// the first, of several images the first that is neither an overview nor a mask.
 fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
-    let asked = options.band;
     let file = Arc::new(open(input)?);
     let full = images::full(&file)?;
-    let layout = Layout::read(&full, asked, options.classes)?;
-    let most = match input.remote() {
-        // What is not touched is not fetched, either.
-        Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
-        None => options.most_in_memory_bytes,
-    };
     let mask_file = find_appended(input, "msk")?;
-    let mask = mask_file.as_ref().map(open).transpose()?;
-    let suits = blocks::suit(&layout) && blocks::masks_suit(&full, mask.as_ref());
-    let stays = layout.bytes() > most && suits;
-    if !stays {
-        budget::check_memory(&layout)?;
-    }
-    budget::check(&layout, input.len(), stays)?;
-    let format = layout.described(file.byte_order());
-    let size = (layout.columns, layout.rows);
-    let storage = match stays {
-        false if input.is_outline() => Storage::from(layout.sample().held().none()),
-        true => {
-            let overviews = match find_appended(input, "ovr")? {
-                Some(beside) => Some((Arc::new(open(&beside)?), beside.remote())),
-                None => None,
-            };
-            let file = (file.clone(), input.remote());
-            let inputs: Vec<_> = once(input).chain(&mask_file).collect();
-            let named = (input.name(), asked, options.classes);
-            Storage::from(TiffBlocks::new(file, mask, overviews, named, &inputs)?)
-        }
-        false => {
-            let all = Part::whole(layout.columns, layout.rows);
-            if let Some(remote) = input.remote() {
-                remote.want(once(0..input.len()));
-            }
-            let samples = samples::read(&layout, layout.band, &all)?;
-            let mut storage = Storage::from(samples);
-            storage.set_holes(samples::holes(&layout, mask.as_ref(), &all)?);
-            storage
-        }
+    let mask = mask_file.as_ref().map(open).transpose()?.map(Arc::new);
+    let known = Known {
+        name: input.name(),
+        asked: options.band,
+        classes: options.classes,
+        mask: mask.as_ref(),
+        disk: match input.remote() {
+            Some(_) => Err("it is at a URL"),
+            None => Ok(&options.disk_cache),
+        },
     };
+    let image = Image::of(&full, &known)?;
+    let layout = &image.layout;
+    let (size, band, bands) = ((layout.columns, layout.rows), layout.band, layout.bands);
+    let has_alpha = layout.alpha.is_some();
+    let mut format = layout.described(file.byte_order());
+    if options.band.is_some() {
+        format += &format!(", band {} of {bands}", band + 1);
+    }
+    let files: Vec<_> = once(input).chain(&mask_file).collect();
+    let (storage, told) = stored(&files, options, &file, image, &known)?;
     let mut decoded = Decoded::new(format, size, storage);
-    let meant = 1 + u16::from(layout.alpha.is_some());
-    if asked.is_some() {
-        decoded.format += &format!(", band {} of {}", layout.band + 1, layout.bands);
-    } else if layout.bands > meant {
+    match told {
+        Some(Told::Unpacked(remark)) => decoded.remarks.push(remark),
+        Some(Told::Whole(why)) => decoded.why_whole = Some(why),
+        None => {}
+    }
+    if options.band.is_none() && bands > 1 + u16::from(has_alpha) {
         decoded.remarks.push(format!(
-            "it has {} bands: the first is taken for the height (--band)",
-            layout.bands
+            "it has {bands} bands: the first is taken for the height (--band)"
         ));
     }
-    let metadata = Metadata::read(full.ifd(), layout.band)?;
+    let metadata = Metadata::read(full.ifd(), band)?;
     decoded.no_data = metadata.no_data;
     decoded.scale = metadata.scale.unwrap_or(1.0);
     decoded.offset = metadata.offset.unwrap_or(0.0);
@@ -119,6 +105,93 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
         lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?;
     }
     Ok(decoded)
+}
+
+/// What the user is told of where the samples are.
+enum Told {
+    /// What is unpacked on disk.
+    Unpacked(String),
+    /// Why all are in memory.
+    Whole(String),
+}
+
+/// The samples of the full image: left in the file where they are many and that can be, else all
+/// of them. `files` are the TIFF and the one of its mask, if it has one.
+fn stored(
+    files: &[&FileBytes],
+    options: &OpenOptions,
+    file: &Arc<TiffFile>,
+    mut image: Image,
+    known: &Known<'_>,
+) -> Result<(Storage, Option<Told>), BadRaster> {
+    let input = files[0];
+    let most = match input.remote() {
+        // What is not touched is not fetched, either.
+        Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
+        None => options.most_in_memory_bytes,
+    };
+    let mut told = None;
+    if image.layout.bytes() > most {
+        if let Err(fault) = budget::check(&image.layout, input.len(), true) {
+            if !image.has_parts() {
+                budget::check_memory(&image.layout)?;
+            }
+            return Err(fault);
+        }
+        match image.leave_in_file(known.disk) {
+            Ok(()) => {
+                if !input.is_outline() {
+                    unpacked::check_first(&image.layout)?;
+                }
+                told = unpacked_told(&image);
+                let overviews = match find_appended(input, "ovr")? {
+                    Some(beside) => Some((Arc::new(open(&beside)?), beside.remote())),
+                    None => None,
+                };
+                let file = (file.clone(), input.remote());
+                let blocks = TiffBlocks::new(file, image, overviews, known, files)?;
+                return Ok((blocks.into(), told));
+            }
+            Err(why) => told = Some(Told::Whole(why + at_once(&image.layout))),
+        }
+    }
+    let layout = &image.layout;
+    budget::check_memory(layout)?;
+    budget::check(layout, input.len(), false)?;
+    if input.is_outline() {
+        return Ok((layout.sample().held().none().into(), told));
+    }
+    let all = Part::whole(layout.columns, layout.rows);
+    if let Some(remote) = input.remote() {
+        remote.want(once(0..input.len()));
+    }
+    let mut storage = Storage::from(samples::read(layout, layout.band, &all)?);
+    storage.set_holes(samples::holes(layout, &image.masks, &all)?);
+    Ok((storage, told))
+}
+
+/// What is said of the memory that is taken while a file is read as a whole, where that is more
+/// than its samples take.
+fn at_once(layout: &Layout) -> &'static str {
+    let all = Part::whole(layout.columns, layout.rows);
+    match layout.is_plain || unpack::suits_whole(layout, &all) {
+        true => "",
+        false => "; until it is read it takes up to three times that",
+    }
+}
+
+/// What is said of strips or tiles that are unpacked on disk, if some are.
+fn unpacked_told(image: &Image) -> Option<Told> {
+    let megabytes = image.unpacked_bytes().div_ceil(1_000_000);
+    let whose = match &image.layout.unpacked {
+        Some(_) => format!("its {}", image.layout.chunks_name()),
+        None => "the strips or tiles of its mask".into(),
+    };
+    (megabytes > 0).then(|| {
+        Told::Unpacked(format!(
+            "{whose} are too large to be unpacked each time they are touched: they are unpacked on disk (--cache-dir), up to {megabytes} MB, until the program ends"
+        ))
+    })
 }
 
 /// Opens the file. No list in its directories may be longer than the file is.
@@ -158,5 +231,7 @@ fn is_long(reason: &str) -> bool {
         .any(|most| reason.ends_with(&format!("parse budget {most}")))
 }
 
+#[cfg(test)]
+mod made;
 #[cfg(test)]
 mod tests;

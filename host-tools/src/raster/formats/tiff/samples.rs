@@ -5,9 +5,10 @@ use half::f16;
 use tiff_reader::{Ifd, TiffFile, TiffSample};
 
 use super::fault::fault;
-use super::images::masks;
+use super::images::Directory;
 use super::layout::{Layout, SampleFormat};
-use super::uncompressed;
+use super::masks::Mask;
+use super::{uncompressed, unpack};
 use crate::raster::blocks::Part;
 use crate::raster::samples::{HoleMask, SampleValue, with_samples};
 use crate::raster::{BadRaster, Samples};
@@ -15,11 +16,16 @@ use crate::raster::{BadRaster, Samples};
 /// Reads a part of a band, the first being 0.
 pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, BadRaster> {
     use SampleFormat::{Float, Signed, Unsigned};
-    if layout.is_plain {
+    if layout.is_read_by_rows() {
         return uncompressed::read(layout, band, part);
     }
-    let (file, image) = (layout.directory.file(), layout.directory.ifd());
-    let band = Band { file, image, band };
+    if unpack::suits_whole(layout, part) {
+        return unpack::read_whole(layout, band);
+    }
+    let band = Band {
+        band,
+        ..Band::first_of(&layout.directory)
+    };
     Ok(match layout.stored {
         (Unsigned, 8) => band.read(part, |value: u8| value)?.into(),
         (Signed, 8) => band.read(part, |value: i8| value)?.into(),
@@ -36,16 +42,25 @@ pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples,
 }
 
 /// A band of an image.
-struct Band<'f> {
+pub(super) struct Band<'f> {
     file: &'f TiffFile,
     image: &'f Ifd,
     band: usize,
 }
 
-impl Band<'_> {
+impl<'f> Band<'f> {
+    /// The first band of an image.
+    pub(super) fn first_of(directory: &'f Directory) -> Self {
+        Self {
+            file: directory.file(),
+            image: directory.ifd(),
+            band: 0,
+        }
+    }
+
     /// Reads the samples of a part, each converted. They are held once: a row of chunks is
     /// decoded, copied to its place and let go.
-    fn read<T: TiffSample, U>(
+    pub(super) fn read<T: TiffSample, U>(
         &self,
         part: &Part,
         convert: impl Fn(T) -> U,
@@ -79,11 +94,11 @@ impl Band<'_> {
     }
 }
 
-/// The samples of a part in chunks that a sparse file leaves out, those that a mask in the
-/// file or `beside` it calls no data, and those whose alpha is zero.
+/// The samples of a part in chunks that a sparse file leaves out, those that a mask calls no data,
+/// and those whose alpha is zero.
 pub(super) fn holes(
     layout: &Layout,
-    beside: Option<&TiffFile>,
+    masks: &[Mask],
     part: &Part,
 ) -> Result<Option<HoleMask>, BadRaster> {
     let columns = part.columns as usize;
@@ -104,15 +119,8 @@ pub(super) fn holes(
             (west..east).for_each(|column| set(start + column as usize));
         }
     }
-    for (file, image) in masks(&layout.directory, beside) {
-        let mask = Band {
-            file,
-            image,
-            band: 0,
-        };
-        let has_data = mask.read(part, |value: u8| value != 0)?;
-        let missing = has_data.iter().enumerate().filter(|(_, has)| !**has);
-        missing.for_each(|(index, _)| set(index));
+    for mask in masks {
+        mask.missing(part, &mut set)?;
     }
     if let Some(band) = layout.alpha {
         with_samples!(read(layout, band, part)?, alpha => {

@@ -1,0 +1,182 @@
+//! Compressions that can be undone piece by piece.
+
+use std::io::{self, BufRead, Error, ErrorKind, Read};
+
+use flate2::bufread::ZlibDecoder;
+use ruzstd::decoding::StreamingDecoder;
+use weezl::decode::{Configuration, Decoder};
+use weezl::{BitOrder, LzwStatus};
+
+/// Whether what a compression of this code has packed can be unpacked piece by piece. LERC has
+/// bits of all samples of a strip or tile beside their values.
+pub(super) const fn is_known(code: u16) -> bool {
+    matches!(code, 1 | 5 | 8 | 32773 | 32946 | 50000)
+}
+
+/// What was packed with the compression of a code.
+pub(super) fn unpacked<'f>(code: u16, packed: impl BufRead + 'f) -> io::Result<Box<dyn Read + 'f>> {
+    Ok(match code {
+        1 => Box::new(packed),
+        5 => Box::new(Lzw::new(packed)),
+        8 | 32946 => Box::new(ZlibDecoder::new(packed)),
+        32773 => Box::new(PackBits::new(packed)),
+        50000 => Box::new(StreamingDecoder::new(packed).map_err(Error::other)?),
+        _ => return Err(ErrorKind::Unsupported.into()),
+    })
+}
+
+/// LZW as TIFF has it, the most significant bit first.
+struct Lzw<R> {
+    packed: R,
+    decoder: Decoder,
+}
+
+impl<R: BufRead> Lzw<R> {
+    fn new(packed: R) -> Self {
+        let decoder = Configuration::with_tiff_size_switch(BitOrder::Msb, 8)
+            .with_yield_on_full_buffer(true)
+            .build();
+        Self { packed, decoder }
+    }
+}
+
+impl<R: BufRead> Read for Lzw<R> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        // Each pass takes or gives something, or is the last.
+        loop {
+            let packed = self.packed.fill_buf()?;
+            let is_over = packed.is_empty();
+            let done = self.decoder.decode_bytes(packed, into);
+            self.packed.consume(done.consumed_in);
+            if done.consumed_out > 0 || into.is_empty() {
+                return Ok(done.consumed_out);
+            }
+            match done.status {
+                Err(error) => return Err(Error::new(ErrorKind::InvalidData, error)),
+                Ok(LzwStatus::Done) => return Ok(0),
+                Ok(_) if is_over => return Ok(0),
+                Ok(_) if done.consumed_in == 0 => {
+                    return Err(Error::new(ErrorKind::InvalidData, "it does not go on"));
+                }
+                Ok(_) => {}
+            }
+        }
+    }
+}
+
+/// Runs of equal bytes, and of others.
+struct PackBits<R> {
+    packed: R,
+    run: Run,
+}
+
+/// What is left of a run.
+enum Run {
+    Of(usize),
+    Equal(usize, u8),
+}
+
+impl<R: BufRead> PackBits<R> {
+    const fn new(packed: R) -> Self {
+        let run = Run::Of(0);
+        Self { packed, run }
+    }
+
+    fn byte(&mut self) -> io::Result<Option<u8>> {
+        let byte = self.packed.fill_buf()?.first().copied();
+        self.packed.consume(usize::from(byte.is_some()));
+        Ok(byte)
+    }
+
+    /// The next run that is not empty; `None` at the end.
+    fn next(&mut self) -> io::Result<Option<Run>> {
+        let cut = || Error::new(ErrorKind::UnexpectedEof, "it ends in a run");
+        while let Some(head) = self.byte()? {
+            match head {
+                // It stands for nothing.
+                128 => {}
+                0..=127 => return Ok(Some(Run::Of(usize::from(head) + 1))),
+                _ => {
+                    let byte = self.byte()?.ok_or_else(cut)?;
+                    return Ok(Some(Run::Equal(257 - usize::from(head), byte)));
+                }
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl<R: BufRead> Read for PackBits<R> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        if matches!(self.run, Run::Of(0) | Run::Equal(0, _)) {
+            match self.next()? {
+                Some(run) => self.run = run,
+                None => return Ok(0),
+            }
+        }
+        match &mut self.run {
+            Run::Of(left) => {
+                let count = into.len().min(*left);
+                let count = self.packed.read(&mut into[..count])?;
+                *left -= count;
+                Ok(count)
+            }
+            Run::Equal(left, byte) => {
+                let count = into.len().min(*left);
+                into[..count].fill(*byte);
+                *left -= count;
+                Ok(count)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Unpacks what comes in pieces of some bytes, and is asked for in other pieces.
+    fn all(code: u16, packed: &[u8]) -> io::Result<Vec<u8>> {
+        let pieces = io::BufReader::with_capacity(3, packed);
+        let mut from = unpacked(code, pieces)?;
+        let (mut found, mut piece) = (vec![], [0; 5]);
+        loop {
+            match from.read(&mut piece)? {
+                0 => return Ok(found),
+                count => found.extend(&piece[..count]),
+            }
+        }
+    }
+
+    #[test]
+    fn runs_go_on_from_piece_to_piece() {
+        // The example of the TIFF specification, and a head that stands for nothing.
+        let packed = b"\xfe\xaa\x02\x80\x00\x2a\x80\xfd\xaa\x03\x80\x00\x2a\x22\xf7\xaa";
+        let found = all(32773, packed).expect("unpacked");
+        let expected = b"\xaa\xaa\xaa\x80\x00\x2a\xaa\xaa\xaa\xaa\x80\x00\x2a\x22";
+        assert_eq!(found, [&expected[..], &[0xaa; 10]].concat());
+        assert!(all(32773, b"\xfe").is_err());
+    }
+
+    #[test]
+    fn lzw_goes_on_from_piece_to_piece_and_ends() {
+        let bytes: Vec<u8> = (0..40_000_u32)
+            .map(|index| ((index * index) >> 7) as u8)
+            .collect();
+        let mut encoder = weezl::encode::Encoder::with_tiff_size_switch(BitOrder::Msb, 8);
+        let packed = encoder.encode(&bytes).expect("packed");
+        assert!(all(5, &packed).expect("unpacked") == bytes);
+        let cut = all(5, &packed[..packed.len() / 2]).expect("what is there");
+        assert!(!cut.is_empty() && bytes.starts_with(&cut));
+        assert!(all(5, &[0xff; 64]).is_err());
+    }
+
+    #[test]
+    fn what_is_not_known_is_not_unpacked() {
+        for code in 0..=u16::MAX {
+            let is_unsupported =
+                unpacked(code, &[][..]).is_err_and(|error| error.kind() == ErrorKind::Unsupported);
+            assert_eq!(is_unsupported, !is_known(code), "{code}");
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Strips and tiles that are too large to be unpacked each time: unpacked once, into a file
+//! without a name that goes with the program, and read there row by row.
+
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::ops::Range;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::layout::{Chunk, Layout};
+use super::unpack::Rows;
+use crate::disk_cache::{DiskCache, Unnamed};
+use crate::raster::BadRaster;
+use crate::raster::blocks::Part;
+use crate::raster::guard::guarded;
+use crate::raster::input::read_exact_at;
+
+/// Bytes that are written at once.
+const AT_ONCE: usize = 1 << 20;
+
+/// Unpacked strips or tiles of an image.
+pub(super) struct Unpacked {
+    unnamed: Unnamed,
+    /// Places in it.
+    count: u64,
+    /// Bytes that one takes.
+    each: u64,
+    kept: Mutex<Kept>,
+}
+
+/// What is in the file.
+struct Kept {
+    /// The strip or tile at each place of the file.
+    slots: Vec<Option<Slot>>,
+    /// How often something was asked for.
+    asked: u64,
+}
+
+/// A strip or tile that was unpacked.
+struct Slot {
+    /// Where it lies in the TIFF, and how many rows of it are wanted.
+    is_of: (u64, u32),
+    /// How many bytes are here, and what is wrong with the others.
+    bytes: u64,
+    fault: Option<String>,
+    /// When it was asked for last.
+    used: u64,
+}
+
+impl Unpacked {
+    /// Nothing is unpacked yet. A strip, or a row of tiles, is kept whatever its size, so that
+    /// nothing is unpacked twice for a row of heights; and more within the bound of what is kept
+    /// on disk.
+    ///
+    /// # Errors
+    /// Why there is no place for them.
+    pub(super) fn new(layout: &Layout, disk: &DiskCache) -> io::Result<Self> {
+        let each = layout.chunk_size();
+        let least = u64::from(layout.chunks_across());
+        let most = layout.chunks_of_band().max(least);
+        let count = (disk.most_bytes() / each.max(1)).clamp(least, most);
+        let unnamed = disk.file_without_name(each.saturating_mul(count))?;
+        let slots = (0..count).map(|_| None).collect();
+        Ok(Self {
+            unnamed,
+            count,
+            each,
+            kept: Mutex::new(Kept { slots, asked: 0 }),
+        })
+    }
+
+    /// Bytes that it takes on disk at most.
+    pub(super) const fn most_bytes(&self) -> u64 {
+        self.each.saturating_mul(self.count)
+    }
+
+    /// Bytes of a strip or tile, counted from its first one.
+    pub(super) fn read(
+        &self,
+        layout: &Layout,
+        chunk: &Chunk,
+        range: Range<u64>,
+    ) -> Result<Vec<u8>, BadRaster> {
+        // Is held until the bytes are read: another may want the place for something else.
+        let mut kept = self.kept();
+        kept.asked += 1;
+        let asked = kept.asked;
+        let is_of = (chunk.place, chunk.covers.rows);
+        let known = |slot: &Option<Slot>| slot.as_ref().is_some_and(|slot| slot.is_of == is_of);
+        let index = match kept.slots.iter().position(known) {
+            Some(index) => index,
+            None => {
+                let index = kept.oldest();
+                kept.slots[index] = None;
+                let slot = self.unpack(layout, chunk, self.each * index as u64);
+                kept.slots[index] = Some(slot);
+                index
+            }
+        };
+        let Some(slot) = &mut kept.slots[index] else {
+            return Err(BadRaster::damaged("TIFF: nothing was unpacked"));
+        };
+        slot.used = asked;
+        if range.end > slot.bytes {
+            let why = slot.fault.as_deref().unwrap_or("TIFF: a row too many");
+            return Err(BadRaster::damaged(why));
+        }
+        let mut bytes = vec![0; (range.end - range.start) as usize];
+        let place = self.each * index as u64 + range.start;
+        match read_exact_at(&self.unnamed.file, &mut bytes, place) {
+            Ok(()) => Ok(bytes),
+            Err(error) => Err(BadRaster::from_io(error, "what was unpacked")),
+        }
+    }
+
+    /// Writes the rows of a strip or tile to a place. What is wrong with it is known from then
+    /// on, and not tried again.
+    fn unpack(&self, layout: &Layout, chunk: &Chunk, place: u64) -> Slot {
+        let mut bytes = 0;
+        let done = guarded(super::FORMAT.name, || {
+            self.write(layout, chunk, place, &mut bytes)
+        });
+        Slot {
+            is_of: (chunk.place, chunk.covers.rows),
+            bytes,
+            fault: done.err().map(|fault| match fault {
+                BadRaster::Damaged(what) => what,
+                fault => fault.to_string(),
+            }),
+            used: 0,
+        }
+    }
+
+    fn write(
+        &self,
+        layout: &Layout,
+        chunk: &Chunk,
+        place: u64,
+        written: &mut u64,
+    ) -> Result<(), BadRaster> {
+        let no_room = |error: io::Error| {
+            let megabytes = self.each.div_ceil(1_000_000);
+            BadRaster::Damaged(format!(
+                "TIFF: {megabytes} MB could not be unpacked into the folder of --cache-dir: {error}"
+            ))
+        };
+        let mut file = &self.unnamed.file;
+        file.seek(SeekFrom::Start(place)).map_err(no_room)?;
+        let mut to = BufWriter::with_capacity(AT_ONCE, file);
+        let mut rows = Rows::of(layout, chunk)?;
+        let mut came = 0;
+        let mut fault = None;
+        for _ in 0..chunk.covers.rows {
+            match rows.next() {
+                Ok(row) => to.write_all(row).map_err(no_room)?,
+                Err(error) => {
+                    fault = Some(error);
+                    break;
+                }
+            }
+            came += layout.row_bytes();
+        }
+        to.flush().map_err(no_room)?;
+        *written = came;
+        fault.map_or(Ok(()), Err)
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Kept> {
+        // The panics of decoders are caught.
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Kept {
+    /// The place that is free, or was asked for longest ago.
+    fn oldest(&self) -> usize {
+        let used = |index: &usize| self.slots[*index].as_ref().map_or(0, |slot| slot.used);
+        (0..self.slots.len()).min_by_key(used).unwrap_or(0)
+    }
+}
+
+/// Checks that of an image in one strip or tile, which is to be unpacked, the first row is there.
+pub(super) fn check_first(layout: &Layout) -> Result<(), BadRaster> {
+    let all = Part::whole(layout.columns, layout.rows);
+    if layout.unpacked.is_some() && layout.chunks_of_band() == 1 {
+        for chunk in layout.chunks_in(&all) {
+            Rows::of(layout, &chunk)?.next()?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[path = "unpacked_tests.rs"]
+mod tests;
