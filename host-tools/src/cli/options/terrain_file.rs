@@ -86,12 +86,13 @@ pub struct ReadingOptions {
     #[arg(long, value_name = "MB", default_value_t = OpenOptions::IN_MEMORY_MB, help_heading = INPUT)]
     pub in_memory_mb: u32,
 
-    /// Folder for coarse samples and pages of URLs that were read before; it may be deleted at
-    /// any time. Without it: hapterra in the user's folder for caches, as ~/.cache
+    /// Folder for coarse samples and pages of URLs that were read before, and for large strips of a
+    /// TIFF that are unpacked while it is used; it may be deleted at any time. Without it: hapterra in the user's folder for caches, as ~/.cache
     #[arg(long, value_name = "DIR", env = "HAPTERRA_CACHE_DIR", value_hint = ValueHint::DirPath, hide_env_values = true, help_heading = INPUT)]
     pub cache_dir: Option<PathBuf>,
 
-    /// Megabytes that this folder takes at most; 0 keeps nothing there
+    /// Megabytes that this folder takes at most, besides what is unpacked; 0 keeps and unpacks nothing
+    /// there
     #[arg(long, value_name = "MB", env = "HAPTERRA_CACHE_MB", default_value_t = DiskCache::MOST_MB, hide_env_values = true, help_heading = INPUT)]
     pub cache_mb: u32,
 }

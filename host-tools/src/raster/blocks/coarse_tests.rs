@@ -34,6 +34,7 @@ struct Seen {
     threads: Arc<Mutex<Vec<ThreadId>>>,
     is_damaged: Arc<AtomicBool>,
     is_late: Arc<AtomicBool>,
+    takes_long: Arc<AtomicBool>,
     stamp: Arc<Mutex<Option<String>>>,
 }
 
@@ -44,6 +45,7 @@ impl Seen {
             threads: Arc::default(),
             is_damaged: Arc::default(),
             is_late: Arc::default(),
+            takes_long: Arc::default(),
             stamp: Arc::new(Mutex::new(Some(stamp.into()))),
         }
     }
@@ -98,6 +100,10 @@ impl BlockReader for Full {
             holes: None,
             is_lacking: false,
         })
+    }
+
+    fn is_at_hand(&self, _: usize, _: &Part) -> bool {
+        !self.seen.takes_long.load(Ordering::Relaxed)
     }
 
     fn stamp(&self, _: usize, _: &Part) -> Option<String> {
@@ -268,6 +274,31 @@ fn whoever_is_served_waits_for_no_coarse_level_and_gets_it_later() {
     // What is fine is read at once, as ever.
     assert!((1000..1010).any(|column| raster.height(column, 1000) > 0.0));
     assert!(seen.threads.lock().expect("alone").contains(&this));
+}
+
+/// As what lies in a large strip that has to be unpacked first.
+#[test]
+fn whoever_is_served_does_not_wait_for_a_fine_block_that_takes_long() {
+    let seen = Seen::new("");
+    seen.takes_long.store(true, Ordering::Relaxed);
+    let raster = raster(&seen, &DiskCache::off(), USUAL);
+    let there = |column| (raster.height(column, 1000) > 0.0, raster.not_yet());
+    assert!(there(300).0, "whoever may wait does");
+    raster.stop_waiting();
+    seen.threads.lock().expect("alone").clear();
+    let before = raster.not_yet();
+    let mut columns = 1000..1010;
+    let far = columns.find(|column| height(*column, 1000, USUAL) > 0.0);
+    let far = far.expect("no hole");
+    assert_eq!(there(far), (false, before + 1));
+    assert!(there(300).0, "it is in memory");
+    let comes = (0..4000).any(|_| {
+        thread::sleep(Duration::from_millis(5));
+        there(far).0
+    });
+    assert!(comes);
+    let threads = seen.threads.lock().expect("alone").clone();
+    assert!(threads.len() == 1 && threads[0] != thread::current().id());
 }
 
 #[test]

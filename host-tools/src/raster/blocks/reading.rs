@@ -39,7 +39,9 @@ impl Shared {
         if let Some(known) = self.kept().known(&key) {
             return known;
         }
-        if !self.waits() && lasting::is_coarse(self.images.get(image)?) {
+        let of = self.images.get(image)?;
+        let takes_long = || lasting::is_coarse(of) || !self.reader.is_at_hand(image, &of.part(at));
+        if !self.waits() && takes_long() {
             self.later(Job::Fetch(key));
             return None;
         }

@@ -183,6 +183,16 @@ impl Layout {
         self.is_plain || self.unpacked.is_some()
     }
 
+    /// Whether nothing has to be unpacked on disk for a part.
+    pub(super) fn is_at_hand(&self, part: &Part) -> bool {
+        self.unpacked.as_ref().is_none_or(|unpacked| {
+            let bands = self.bands_read();
+            let chunks = bands.flat_map(|band| self.chunks_of(band, part));
+            let mut stored = chunks.filter(|chunk| chunk.bytes > 0);
+            stored.all(|chunk| unpacked.has(&chunk))
+        })
+    }
+
     /// Strips, or tiles.
     pub(super) const fn chunks_name(&self) -> &'static str {
         if self.tiled { "tiles" } else { "strips" }

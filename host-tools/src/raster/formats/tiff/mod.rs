@@ -176,7 +176,7 @@ fn at_once(layout: &Layout) -> &'static str {
     let all = Part::whole(layout.columns, layout.rows);
     match layout.is_plain || unpack::suits_whole(layout, &all) {
         true => "",
-        false => "; until it is read it takes up to three times that",
+        false => "; while it is opened it takes more than that",
     }
 }
 

@@ -1,7 +1,8 @@
 //! Strips and tiles that are too large to be unpacked each time: unpacked once, into a file
 //! without a name that goes with the program, and read there row by row.
 
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -24,6 +25,8 @@ pub(super) struct Unpacked {
     /// Bytes that one takes.
     each: u64,
     kept: Mutex<Kept>,
+    /// Is held by whoever unpacks something.
+    turn: Mutex<()>,
 }
 
 /// What is in the file.
@@ -64,6 +67,7 @@ impl Unpacked {
             count,
             each,
             kept: Mutex::new(Kept { slots, asked: 0 }),
+            turn: Mutex::new(()),
         })
     }
 
@@ -79,36 +83,46 @@ impl Unpacked {
         chunk: &Chunk,
         range: Range<u64>,
     ) -> Result<Vec<u8>, BadRaster> {
+        if let Some(read) = self.read_kept(chunk, &range) {
+            return read;
+        }
+        let turn = self.turn.lock();
+        // The panics of decoders are caught.
+        let _turn = turn.unwrap_or_else(PoisonError::into_inner);
+        // It may have been unpacked by the one who had the turn before.
+        if let Some(read) = self.read_kept(chunk, &range) {
+            return read;
+        }
+        let index = self.kept().leave_oldest();
+        let slot = self.unpack(layout, chunk, self.each * index as u64);
+        self.kept().slots[index] = Some(slot);
+        let read = self.read_kept(chunk, &range);
+        read.unwrap_or_else(|| Err(BadRaster::damaged("TIFF: nothing was unpacked")))
+    }
+
+    /// Whether a strip or tile is unpacked already.
+    pub(super) fn has(&self, chunk: &Chunk) -> bool {
+        self.kept().find(chunk).is_some()
+    }
+
+    /// The same bytes of what is unpacked already.
+    fn read_kept(&self, chunk: &Chunk, range: &Range<u64>) -> Option<Result<Vec<u8>, BadRaster>> {
         // Is held until the bytes are read: another may want the place for something else.
         let mut kept = self.kept();
+        let index = kept.find(chunk)?;
         kept.asked += 1;
         let asked = kept.asked;
-        let is_of = (chunk.place, chunk.covers.rows);
-        let known = |slot: &Option<Slot>| slot.as_ref().is_some_and(|slot| slot.is_of == is_of);
-        let index = match kept.slots.iter().position(known) {
-            Some(index) => index,
-            None => {
-                let index = kept.oldest();
-                kept.slots[index] = None;
-                let slot = self.unpack(layout, chunk, self.each * index as u64);
-                kept.slots[index] = Some(slot);
-                index
-            }
-        };
-        let Some(slot) = &mut kept.slots[index] else {
-            return Err(BadRaster::damaged("TIFF: nothing was unpacked"));
-        };
+        let slot = kept.slots[index].as_mut()?;
         slot.used = asked;
         if range.end > slot.bytes {
             let why = slot.fault.as_deref().unwrap_or("TIFF: a row too many");
-            return Err(BadRaster::damaged(why));
+            return Some(Err(BadRaster::damaged(why)));
         }
         let mut bytes = vec![0; (range.end - range.start) as usize];
         let place = self.each * index as u64 + range.start;
-        match read_exact_at(&self.unnamed.file, &mut bytes, place) {
-            Ok(()) => Ok(bytes),
-            Err(error) => Err(BadRaster::from_io(error, "what was unpacked")),
-        }
+        let read = read_exact_at(&self.unnamed.file, &mut bytes, place);
+        let read = read.map_err(|error| BadRaster::from_io(error, "what was unpacked"));
+        Some(read.map(|()| bytes))
     }
 
     /// Writes the rows of a strip or tile to a place. What is wrong with it is known from then
@@ -142,9 +156,8 @@ impl Unpacked {
                 "TIFF: {megabytes} MB could not be unpacked into the folder of --cache-dir: {error}"
             ))
         };
-        let mut file = &self.unnamed.file;
-        file.seek(SeekFrom::Start(place)).map_err(no_room)?;
-        let mut to = BufWriter::with_capacity(AT_ONCE, file);
+        let file = &self.unnamed.file;
+        let mut to = BufWriter::with_capacity(AT_ONCE, Placed { file, place });
         let mut rows = Rows::of(layout, chunk)?;
         let mut came = 0;
         let mut fault = None;
@@ -164,17 +177,54 @@ impl Unpacked {
     }
 
     fn kept(&self) -> MutexGuard<'_, Kept> {
-        // The panics of decoders are caught.
+        // Nothing that panics runs while this is held.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Kept {
-    /// The place that is free, or was asked for longest ago.
-    fn oldest(&self) -> usize {
-        let used = |index: &usize| self.slots[*index].as_ref().map_or(0, |slot| slot.used);
-        (0..self.slots.len()).min_by_key(used).unwrap_or(0)
+    /// The place of a strip or tile.
+    fn find(&self, chunk: &Chunk) -> Option<usize> {
+        let is_of = (chunk.place, chunk.covers.rows);
+        let known = |slot: &Option<Slot>| slot.as_ref().is_some_and(|slot| slot.is_of == is_of);
+        self.slots.iter().position(known)
     }
+
+    /// The place that is free, or was asked for longest ago: nothing is there from now on.
+    fn leave_oldest(&mut self) -> usize {
+        let used = |index: &usize| self.slots[*index].as_ref().map_or(0, |slot| slot.used);
+        let oldest = (0..self.slots.len()).min_by_key(used).unwrap_or(0);
+        self.slots[oldest] = None;
+        oldest
+    }
+}
+
+/// Writes from a place of a file on, wherever others read meanwhile.
+struct Placed<'f> {
+    file: &'f File,
+    place: u64,
+}
+
+impl Write for Placed<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = write_at(self.file, bytes, self.place)?;
+        self.place += count as u64;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(unix)]
+fn write_at(file: &File, bytes: &[u8], place: u64) -> io::Result<usize> {
+    std::os::unix::fs::FileExt::write_at(file, bytes, place)
+}
+
+#[cfg(windows)]
+fn write_at(file: &File, bytes: &[u8], place: u64) -> io::Result<usize> {
+    std::os::windows::fs::FileExt::seek_write(file, bytes, place)
 }
 
 /// Checks that of an image in one strip or tile, which is to be unpacked, the first row is there.

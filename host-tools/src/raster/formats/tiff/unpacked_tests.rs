@@ -150,6 +150,29 @@ fn a_row_of_tiles_is_kept_whatever_the_bound_and_more_within_it() {
     }
 }
 
+/// Nobody who must not wait has to unpack a tile.
+#[test]
+fn a_tile_is_at_hand_once_it_is_unpacked() {
+    let made = Made {
+        chunk: [1024, 640],
+        packing: DEFLATE,
+        ..ONE_STRIP
+    };
+    let (_folder, layout) = layout(&made, made.bytes(), 1 << 30);
+    let part = |column| Part {
+        column,
+        row: 600,
+        columns: 10,
+        rows: 2,
+    };
+    let is_at_hand = |column| layout.is_at_hand(&part(column));
+    assert!(!is_at_hand(0) && !is_at_hand(1020));
+    uncompressed::read(&layout, 0, &part(0)).expect("read");
+    assert!(is_at_hand(0) && !is_at_hand(1020) && !is_at_hand(1100));
+    uncompressed::read(&layout, 0, &part(1020)).expect("read");
+    assert!(is_at_hand(1020) && is_at_hand(1100));
+}
+
 #[test]
 fn of_a_strip_that_is_cut_the_rows_before_are_there_and_it_is_told_why_the_others_are_not() {
     fn cut(bytes: &[u8]) -> Vec<u8> {
