@@ -174,6 +174,28 @@ fn a_tile_is_at_hand_once_it_is_unpacked() {
 }
 
 #[test]
+fn the_tile_that_was_asked_for_longest_ago_goes_first() {
+    let made = Made {
+        chunk: [1024, 640],
+        packing: DEFLATE,
+        ..ONE_STRIP
+    };
+    let (_folder, layout) = layout(&made, made.bytes(), 3 * 1024 * 640 * 4);
+    let part = |[column, row]: [u32; 2]| Part {
+        column,
+        row,
+        columns: 1,
+        rows: 1,
+    };
+    let tiles = [[0, 0], [1100, 0], [0, 700], [1100, 700]];
+    for tile in [0, 1, 2, 0, 3] {
+        uncompressed::read(&layout, 0, &part(tiles[tile])).expect("read");
+    }
+    let kept = tiles.map(|tile| layout.is_at_hand(&part(tile)));
+    assert_eq!(kept, [true, false, true, true]);
+}
+
+#[test]
 fn of_a_strip_that_is_cut_the_rows_before_are_there_and_it_is_told_why_the_others_are_not() {
     fn cut(bytes: &[u8]) -> Vec<u8> {
         let packed = runs(bytes);
