@@ -25,6 +25,17 @@ pub(in crate::contact) struct Pull {
     rest: Vec3,
     /// Its length squared, cells².
     presses: f32,
+    /// How much the patch's slopes change over a cell of it.
+    twist: f32,
+}
+
+/// How a proxy has come in a tick.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::contact) struct Came {
+    /// Straight from where it stood, cells.
+    pub way: Vec3,
+    /// How long that is, cells.
+    pub length: f32,
 }
 
 /// What is known of the pull at a point of the surface.
@@ -116,7 +127,13 @@ impl Pull {
             pulls: along.length_squared(),
             rest,
             presses: rest.length_squared(),
+            twist: patch.a,
         }
+    }
+
+    /// Along the surface, cells.
+    pub(in crate::contact) const fn along(&self) -> Vec3 {
+        self.along
     }
 
     /// Whether friction of this coefficient holds the proxy.
@@ -124,13 +141,9 @@ impl Pull {
         self.pulls < mu * mu * self.presses
     }
 
-    /// The same for a proxy that trails by so much, cells, for other reasons.
-    pub(in crate::contact) fn is_within_trailing(&self, mu: f32, trail: f32) -> bool {
-        self.is_within(mu)
-            || (trail > 0.0 && {
-                let left = root(self.pulls) - trail;
-                left <= 0.0 || left * left < mu * mu * self.presses
-            })
+    /// How far it pulls along the surface, and how far dry friction of this coefficient holds, cells.
+    pub(in crate::contact) fn along_and_held_by(&self, mu: f32) -> (f32, f32) {
+        (root(self.pulls), mu * root(self.presses))
     }
 
     /// By how much of the pull a proxy that slides is held back, by dynamic friction and by
@@ -142,6 +155,39 @@ impl Pull {
         } else {
             self.along
         }
+    }
+
+    /// The rest of the way of a proxy that `came` so in the tick, from a point inside of a patch, as
+    /// if that were its tangent plane: to where it is pulled by half of `slack` less than friction
+    /// holds. A way back where it has come too far. `None` where it is longer than the pull, or the
+    /// patch turns so much over it that friction may not hold the proxy at its end. Of the pull and
+    /// of what dry friction holds as [`Self::along_and_held_by`] has them.
+    pub(in crate::contact) fn rest_of_way(
+        &self,
+        came: Came,
+        (pulls, dry): (f32, f32),
+        (mu, drag): (f32, f32),
+        slack: f32,
+    ) -> Option<Vec3> {
+        let less = 1.0 - 0.5 * slack;
+        let (dry, drag) = (less * dry, less * drag);
+        // As far as it would go if it went on straight.
+        let straight = (pulls - dry - drag * came.length) / (1.0 + drag);
+        let mut held = dry;
+        if drag > 0.0 {
+            let way = came.way + self.along * (straight / pulls);
+            held += drag * root(way.length_squared());
+        }
+        let length = pulls - held;
+        let is_short = length.abs() <= pulls;
+        // What the viscous part may be off by, and what is left for the patch: a normal that turns by
+        // an angle changes what pulls and what presses by that times the way to the HIP.
+        let left = 0.5 * slack * held - drag * (length - straight).abs();
+        let turns = (1.0 + mu) * self.twist * length;
+        let changes = turns * turns * (self.pulls + self.presses);
+        let is_left = left > 0.0 && changes <= left * left;
+        // The HIP must not come to lie above the surface.
+        (is_short && is_left && changes < self.presses).then(|| self.along * (length / pulls))
     }
 
     /// The same for a proxy that has come `way` cells, if all of its way were in the tangent plane here:

@@ -5,13 +5,14 @@
 //! cone over the surface there. Outside of it the proxy slides: it goes for a point that
 //! is moved from the HIP back along the surface, by as much as the dynamic friction holds. That
 //! point is all the closest-point search hears of it, so whatever holds for a proxy
-//! without friction holds for its way here too. `cone` measures how the HIP pulls.
+//! without friction holds for its way here too. Only the last bit of that way, in one patch, is
+//! gone without a search. `cone` measures how the HIP pulls.
 
 mod cone;
 
 use serde::{Deserialize, Serialize};
 
-pub(super) use cone::{Pull, Pulled, border};
+pub(super) use cone::{Came, Pull, Pulled, border};
 
 /// How rough a surface is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

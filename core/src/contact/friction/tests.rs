@@ -4,8 +4,8 @@ use std::vec::Vec;
 
 use glam::Vec3;
 
-use crate::contact::friction::{Friction, Pull, Pulled};
-use crate::contact::surface::{HipView, SurfacePoint};
+use crate::contact::friction::{Came, Friction, Pull, Pulled};
+use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::contact::{Contact, ContactOutput, ContactSettings, ContactState};
 use crate::grid::{Cell, GridPoint};
 use crate::terrain::FieldSize;
@@ -274,6 +274,99 @@ fn friction_does_not_let_go_where_the_ground_turns_a_way_back() {
     }
     assert!(slides > 3_000, "{slides}");
     assert!(let_go < 10, "{let_go} of {slides}");
+}
+
+/// Numbers from −1 to 1, always the same.
+fn dice() -> impl FnMut() -> f32 {
+    let mut state = 7_u32;
+    move || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / (1 << 23) as f32 - 1.0
+    }
+}
+
+/// Where the rest of a way ends nobody looks again: what is promised of its end is true there.
+#[test]
+fn at_the_end_of_the_rest_of_a_way_friction_holds() {
+    const SLACK: f32 = 0.03;
+    let mut tiles = buffers::<2>();
+    let bumps = |x: i32, y: i32| ((x * 7 + y * 13) % 5) as f32 * 0.4;
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), bumps);
+    let mut dice = dice();
+    let (mut ends, mut back) = (0, 0);
+    for _ in 0..200_000 {
+        let hip = at([3.0 * dice(), 3.0 * dice(), 1.0 + 2.0 * dice()]);
+        let cell = Cell::new(20 + (2.0 * dice()) as i32, 20 + (2.0 * dice()) as i32);
+        let place = |share: f32| 0.5 + 0.499 * share;
+        let point = SurfacePoint {
+            cell,
+            u: place(dice()),
+            v: place(dice()),
+        };
+        let (mu, drag) = (0.5 + 0.45 * dice(), (2.0 * dice()).max(0.0));
+        let view = HipView::new(hip);
+        let Pulled::By(pull) = Pull::at(&field.window, &view, &point) else {
+            continue;
+        };
+        // From any place in the tangent plane, as friction would have it, more or less.
+        let (pulls, dry) = pull.along_and_held_by(mu);
+        let length = (pulls - dry).max(0.0) * (1.0 + 0.1 * dice()) / drag.max(1e-3);
+        let turned = Vec3::new(dice(), dice(), dice()).normalize_or_zero();
+        let way = (pull.along() / pulls + 0.5 * turned).normalize_or_zero() * length;
+        let came = Came { way, length };
+        let held = pull.rest_of_way(came, (pulls, dry), (mu, drag), SLACK);
+        let Some(rest) = held else { continue };
+        let there = point.moved_to(point.u + rest.x, point.v + rest.y);
+        if there.border_within([1e-3; 2]) != Side::NONE {
+            continue;
+        }
+        ends += 1;
+        assert!(rest.length() < pulls * 1.0001, "beside the foot, who knows where");
+        back += i32::from(rest.dot(pull.along()) < 0.0);
+        let Pulled::By(pull) = Pull::at(&field.window, &view, &there) else {
+            panic!("the HIP is above: {point:?} {there:?} {hip:?}");
+        };
+        let (pulls, dry) = pull.along_and_held_by(mu);
+        let held = dry + drag * (way + rest).length();
+        let off = pulls / held - 1.0;
+        assert!(
+            (-SLACK - 1e-3..1e-3).contains(&off),
+            "{off}: {point:?} {there:?} {hip:?} {mu} {drag}"
+        );
+    }
+    assert!(ends > 1_000 && back > 100, "{ends}, {back} of them back");
+}
+
+/// A hand of half a cell a tick over rough ground: a tick that slid twice was cut off by its budget,
+/// one of two.
+#[test]
+fn a_fast_hand_over_rough_ground_is_answered_within_its_tick() {
+    let mut tiles = buffers::<2>();
+    let mut dice = dice();
+    let heights: Vec<f32> = (0..61 * 61).map(|_| 0.2 * dice()).collect();
+    let ground = move |x: i32, y: i32| heights[(y.clamp(0, 60) * 61 + x.clamp(0, 60)) as usize];
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), ground);
+    let friction = Friction {
+        viscous_s: 0.001,
+        ..Friction::coulomb(0.3)
+    };
+    let mut contact = Contact::new(ContactSettings::REAL_TIME.with_friction(friction));
+    let (mut touches, mut late) = (0, 0);
+    for tick in 0..20_000 {
+        let turn = 0.031 * tick as f32;
+        let x = 12.0 * (turn * 1.3).sin();
+        let z = if tick == 0 { 2.0 } else { -0.3 };
+        let hip = at([x, 12.0 * turn.cos(), z]);
+        let felt = contact.step(&field.window, &hip);
+        if felt.state == ContactState::Touching {
+            touches += 1;
+            late += i32::from(!felt.converged);
+        }
+    }
+    assert!(
+        touches > 5_000 && late * 10 < touches,
+        "{late} of {touches}"
+    );
 }
 
 /// How far friction held a proxy back is known to the last place of that way. Times the ticks that

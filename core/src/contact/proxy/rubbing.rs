@@ -4,8 +4,8 @@ use glam::Vec3;
 
 use super::{Contact, OnSurface, Phase, Turn};
 use crate::contact::budget::{Budget, LARGEST_PIECE};
-use crate::contact::closest_point::{Leave, position_on};
-use crate::contact::friction::{Friction, Pull, Pulled, border};
+use crate::contact::closest_point::{Descent, Leave, position_on};
+use crate::contact::friction::{Came, Friction, Pull, Pulled, border};
 use crate::contact::output::ContactState;
 use crate::contact::settings::Execution;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
@@ -120,11 +120,10 @@ impl Rubbing {
     /// where it stood, then.
     #[inline(never)]
     fn not_farther(&self, here: Stood) -> Stood {
-        let view = HipView::new(self.hip);
-        let stood = self
-            .stood
-            .filter(|stood| view.is_nearer(&stood.proxy, &here.proxy));
-        stood.unwrap_or(here)
+        let stood = self.stood;
+        stood
+            .filter(|_| self.stood_nearer_than(&here.proxy))
+            .unwrap_or(here)
     }
 
     /// One more tick. A proxy that slid sticks when it has not moved for a while.
@@ -148,46 +147,65 @@ impl Rubbing {
         self.goes(pull.held_back(dynamic_mu, self.drag(rate)))
     }
 
-    /// The same of one that has slid to a point; `came` works out the way from where it stood.
+    /// The same of one that has slid to where it is.
     #[inline(never)]
-    fn judges_again(
+    fn judges_again<const D: usize>(
         &mut self,
+        window: &Window<'_, D>,
+        descent: &mut Descent,
         pull: &Pull,
         rate: TickRate,
-        point: &SurfacePoint,
-        came: impl Fn(Option<Stood>) -> Vec3,
     ) -> Verdict {
         let (mu, drag) = (self.friction.dynamic_mu, self.drag(rate));
-        let stood = self.stood;
-        let came = || came(stood);
+        let point = descent.entry();
+        let way = match (&self.stood, position_on(window, &point)) {
+            (Some(stood), Some(here)) => stood.proxy.to(&here),
+            _ => Vec3::ZERO,
+        };
+        let length = root(way.length_squared());
+        let came = Came { way, length };
         // The way is known to the last places of both its ends, and the proxy came here by an aim
         // that is known to the last place of how far it was held back.
         let places = RESOLUTION * (8.0 + 4.0 * self.back.abs().element_sum());
-        let gone = if drag > 0.0 {
-            root(came().length_squared())
-        } else {
-            0.0
-        };
-        let (most, least) = (drag * (gone + places), drag * (gone - places));
-        let is_held = pull.is_within_trailing(mu * (1.0 + SLACK), most);
-        let is_inside = border(point) == Side::NONE;
-        let has_passed = is_inside && pull.is_within_trailing(mu * (1.0 - SLACK), least);
-        if is_held && !(has_passed && self.times < SLIDES) {
+        let (pulls, dry) = pull.along_and_held_by(mu);
+        let is_held = pulls < (1.0 + SLACK) * dry + drag * (length + places);
+        let is_inside = border(&point) == Side::NONE;
+        let least = (1.0 - SLACK) * (dry + drag * length) - drag * places;
+        let has_passed = is_held && is_inside && self.times < SLIDES && pulls < least;
+        if is_held && !has_passed {
             self.came_to = None;
             return Verdict::Held;
+        }
+        if is_inside && let Some(way) = pull.rest_of_way(came, (pulls, dry), (mu, drag), SLACK) {
+            let there = point.moved_to(point.u + way.x, point.v + way.y);
+            let is_nearer = |there: GridPoint| !self.stood_nearer_than(&there);
+            // Only a way back leads farther from the HIP.
+            if border(&there) == Side::NONE
+                && (!is_held || position_on(window, &there).is_some_and(is_nearer))
+            {
+                (self.back, self.came_to) = (pull.along() - way, None);
+                descent.restart(there);
+                return Verdict::Held;
+            }
         }
         let has_slid_enough = !is_held && self.times >= SLIDES;
         if has_slid_enough && let Some(point) = self.returns() {
             return Verdict::Returns(point);
         }
-        let back = match is_held {
-            true => pull.held_back_on_plane(came(), mu, drag),
-            false => pull.held_back(mu, drag),
-        };
         if is_held {
-            self.came_to = Some((*point, self.back));
+            self.came_to = Some((point, self.back));
         }
-        self.goes(back)
+        self.goes(match is_held {
+            true => pull.held_back_on_plane(came.way, mu, drag),
+            false => pull.held_back(mu, drag),
+        })
+    }
+
+    /// Whether the proxy stood nearer to the HIP than a place.
+    #[inline(never)]
+    fn stood_nearer_than(&self, place: &GridPoint) -> bool {
+        let stood = self.stood.as_ref();
+        stood.is_some_and(|stood| HipView::new(self.hip).is_nearer(&stood.proxy, place))
     }
 
     /// Returns to where it went back from, if it did.
@@ -198,6 +216,7 @@ impl Rubbing {
     }
 
     /// It slides for the HIP, held back by so much.
+    #[inline(never)]
     fn goes(&mut self, back: Vec3) -> Verdict {
         self.slides = true;
         self.times += 1;
@@ -390,10 +409,16 @@ impl Contact {
     /// It is judged there once more, to the precision of before. Where it was in the air meanwhile,
     /// the way that it slid is another, and it may go for the HIP after all.
     fn returns_to(&mut self, point: SurfacePoint) -> Turn {
+        self.begins_at(point);
+        Turn::GoesOn
+    }
+
+    /// It begins at this point, with the fade from before the tick.
+    #[inline(never)]
+    fn begins_at(&mut self, point: SurfacePoint) {
         if let Some(rubbing) = &self.rubbing {
             self.phase = Phase::OnSurface(OnSurface::at(point, rubbing.fade));
         }
-        Turn::GoesOn
     }
 
     fn aims_at(&mut self, aim: GridPoint) -> Turn {
@@ -428,11 +453,7 @@ impl Contact {
                 if rubbing.times == 0 {
                     return rubbing.judges(&pull, rate);
                 }
-                let came = |stood: Option<Stood>| {
-                    let way = stood.zip(position_on(window, &point));
-                    way.map_or(Vec3::ZERO, |(stood, here)| stood.proxy.to(&here))
-                };
-                rubbing.judges_again(&pull, rate, &point, came)
+                rubbing.judges_again(window, &mut on.descent, &pull, rate)
             }
             Pulled::Unknown(tile) if waits => Verdict::Waits(Some(tile)),
             // Without a patch there is no friction. Before a missing tile the proxy is held
@@ -516,9 +537,7 @@ impl Contact {
         };
         match rubbing.stood {
             // Once for a HIP: after that its only aim is the HIP.
-            Some(stood)
-                if rubbing.times <= SLIDES && HipView::new(hip).is_nearer(&stood.proxy, &to) =>
-            {
+            Some(stood) if rubbing.times <= SLIDES && rubbing.stood_nearer_than(&to) => {
                 let from = match rubbing.returns() {
                     Some(point) => point,
                     None => {
@@ -527,7 +546,7 @@ impl Contact {
                         stood.point
                     }
                 };
-                self.phase = Phase::OnSurface(OnSurface::at(from, rubbing.fade));
+                self.begins_at(from);
                 true
             }
             _ => false,
