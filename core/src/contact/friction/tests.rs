@@ -321,7 +321,10 @@ fn at_the_end_of_the_rest_of_a_way_friction_holds() {
             continue;
         }
         ends += 1;
-        assert!(rest.length() < pulls * 1.0001, "beside the foot, who knows where");
+        assert!(
+            rest.length() < pulls * 1.0001,
+            "beside the foot, who knows where"
+        );
         back += i32::from(rest.dot(pull.along()) < 0.0);
         let Pulled::By(pull) = Pull::at(&field.window, &view, &there) else {
             panic!("the HIP is above: {point:?} {there:?} {hip:?}");
