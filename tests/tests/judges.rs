@@ -162,6 +162,11 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     let broken = at(10.8, 11.2);
     assert_eq!(found(&[first, broken]), [], "it slid until just now");
     assert_eq!(found(&[&rest[..], &[broken]].concat()), [Stuck]);
+    // In the air it forgets, also where it comes back to where it was.
+    let over = with(free([10.5, 10.5, 2.5]), |felt| {
+        (felt.proxy, felt.converged) = (first.felt.proxy, false);
+    });
+    assert_eq!(found(&[&rest[..], &[over, first, broken]].concat()), []);
     // Over the ridge's edge only the side pulls that the HIP is on.
     let ridge = ridge();
     let judge = || Judge::new(&ridge, Rule::Swept).with_friction(friction);

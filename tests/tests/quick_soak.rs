@@ -87,6 +87,7 @@ fn friction_holds_in_scenes_where_it_was_wrong() {
         (270, 10551),
         (31, 777),
         (9501, 278),
+        (9701, 23297),
     ];
     for (seed, number) in scenes {
         let found = run(seed, number, Surface::Rough, &mut Buffers::default());

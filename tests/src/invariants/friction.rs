@@ -60,13 +60,15 @@ impl Judge<'_> {
         Ok(())
     }
 
-    /// A proxy inside the cone does not move.
+    /// A proxy inside the cone does not move. One that was in the air slides at first, also where it
+    /// comes back to where it was.
     pub(super) fn sticks(&mut self, before: &Seen, seen: &Seen) -> Verdict {
         let touches =
             |seen: &Seen| seen.felt.state == ContactState::Touching && seen.felt.converged;
         let moved = before.felt.proxy != seen.felt.proxy;
         let still = self.still;
-        self.still = if moved { 0 } else { still + 1 };
+        let stays = !moved && before.is_touching() && seen.is_touching();
+        self.still = if stays { still + 1 } else { 0 };
         if !(moved && touches(before) && touches(seen)) {
             return Ok(());
         }

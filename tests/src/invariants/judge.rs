@@ -166,10 +166,11 @@ impl<'g> Judge<'g> {
             }
             self.passes_no_wall(&before, seen)?;
         }
-        let moved = self
-            .before
-            .is_none_or(|before| before.felt.proxy != seen.felt.proxy);
-        self.still = if moved { 0 } else { self.still + 1 };
+        let stays = self.before.is_some_and(|before| {
+            let touch = before.is_touching() && seen.is_touching();
+            touch && before.felt.proxy == seen.felt.proxy
+        });
+        self.still = if stays { self.still + 1 } else { 0 };
         self.before = Some(*seen);
         self.tick += 1;
         Ok(())
