@@ -160,8 +160,9 @@ impl Pull {
     /// The rest of the way of a proxy that `came` so in the tick, from a point inside of a patch, as
     /// if that were its tangent plane: to where it is pulled by half of `slack` less than friction
     /// holds. A way back where it has come too far. `None` where it is longer than the pull, or the
-    /// patch turns so much over it that friction may not hold the proxy at its end. Of the pull and
-    /// of what dry friction holds as [`Self::along_and_held_by`] has them.
+    /// patch turns so much over it that friction may not hold the proxy at its end (with
+    /// coefficients above 2 the pull there may be more than what holds it, by 0.2 % at most). Of
+    /// the pull and of what dry friction holds as [`Self::along_and_held_by`] has them.
     pub(in crate::contact) fn rest_of_way(
         &self,
         came: Came,

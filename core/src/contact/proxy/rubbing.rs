@@ -23,9 +23,9 @@ const CONE: u32 = LARGEST_PIECE;
 const STICKS_AFTER_S: f32 = 0.02;
 /// Less than this is no motion, cells.
 const STILL: f32 = 1e-3;
-/// A proxy that has slid is asked for again whether friction holds it there: a crease
-/// may have turned the surface under it. By this part it may slide on less far than it
-/// would.
+/// A proxy that has slid is asked for again whether friction holds it there: a crease may have
+/// turned the surface under it. By this part more than dry friction holds may pull it, and by this
+/// part less than all of friction does.
 const SLACK: f32 = 0.03;
 /// Times that a proxy slides in a tick. Then it returns to the last place where friction held it,
 /// or, if there is none, goes for the HIP itself, which is inside of every cone.

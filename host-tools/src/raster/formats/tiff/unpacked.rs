@@ -49,16 +49,18 @@ struct Slot {
 }
 
 impl Unpacked {
-    /// Nothing is unpacked yet. A strip, or a row of tiles, is kept whatever its size, so that
-    /// nothing is unpacked twice for a row of heights; and more within the bound of what is kept
-    /// on disk.
+    /// Nothing is unpacked yet. Two strips, or rows of tiles, are kept whatever their size, and as
+    /// many of what is transparent where that lies apart: a row of blocks may lie in two, and
+    /// nothing is to be unpacked again for each of its blocks. More of them are kept within the
+    /// bound of what is kept on disk.
     ///
     /// # Errors
     /// Why there is no place for them.
     pub(super) fn new(layout: &Layout, disk: &DiskCache) -> io::Result<Self> {
         let each = layout.chunk_size();
-        let least = u64::from(layout.chunks_across());
-        let most = layout.chunks_of_band().max(least);
+        let bands = layout.bands_read().count() as u64;
+        let most = layout.chunks_of_band().saturating_mul(bands).max(1);
+        let least = most.min(2 * u64::from(layout.chunks_across()) * bands);
         let count = (disk.most_bytes() / each.max(1)).clamp(least, most);
         let unnamed = disk.file_without_name(each.saturating_mul(count))?;
         let slots = (0..count).map(|_| None).collect();

@@ -130,23 +130,65 @@ fn strips_and_tiles_of_several_bands_are_what_was_written() {
     }
 }
 
+/// Two tiles beside each other, three times.
+const TILES: Made = Made {
+    chunk: [1024, 400],
+    packing: DEFLATE,
+    ..ONE_STRIP
+};
+
 #[test]
-fn a_row_of_tiles_is_kept_whatever_the_bound_and_more_within_it() {
-    let made = Made {
-        chunk: [1024, 640],
-        packing: DEFLATE,
-        ..ONE_STRIP
-    };
-    let tile = 1024 * 640 * 4;
-    for (most, kept) in [(1, 2), (3 * tile, 3), (1 << 30, 4)] {
-        let (_folder, layout) = layout(&made, made.bytes(), most);
+fn two_rows_of_tiles_are_kept_whatever_the_bound_and_more_within_it() {
+    let tile = 1024 * 400 * 4;
+    for (most, kept) in [(1, 4), (5 * tile, 5), (1 << 30, 6)] {
+        let (_folder, layout) = layout(&TILES, TILES.bytes(), most);
         // Each tile is asked for twice, in turns.
-        check_parts(&made, &layout);
-        check_parts(&made, &layout);
+        check_parts(&TILES, &layout);
+        check_parts(&TILES, &layout);
         let unpacked = layout.unpacked.as_ref().expect("unpacked");
         assert_eq!(unpacked.most_bytes(), kept * tile);
         let file = unpacked.unnamed.file.metadata().expect("told");
         assert!(file.len() <= kept * tile, "{} {most}", file.len());
+    }
+}
+
+/// Else each block of a row of blocks would unpack both of its strips again.
+#[test]
+fn what_a_row_of_blocks_lies_in_is_at_hand_after_its_first_block() {
+    let at_border = Part {
+        column: 0,
+        row: 300,
+        columns: 10,
+        rows: 200,
+    };
+    let strips = Made {
+        chunk: [SIZE[0], 400],
+        ..TILES
+    };
+    let apart = Made {
+        bands: BANDS,
+        is_planar: true,
+        ..strips
+    };
+    for made in [TILES, strips, apart] {
+        let (folder, mut layout) = layout(&made, made.bytes(), 1);
+        if made.is_planar {
+            // Its third band tells what is transparent.
+            layout.alpha = Some(2);
+            let disk = DiskCache::at(folder.path(), 1);
+            layout.unpack_into(&disk).expect("unpacked");
+        }
+        let bands: Vec<_> = layout.bands_read().collect();
+        for column in [0, 1100] {
+            for band in &bands {
+                let part = Part {
+                    column,
+                    ..at_border
+                };
+                uncompressed::read(&layout, *band, &part).expect("read");
+            }
+        }
+        assert!(layout.is_at_hand(&at_border), "{made:?}");
     }
 }
 
@@ -175,24 +217,19 @@ fn a_tile_is_at_hand_once_it_is_unpacked() {
 
 #[test]
 fn the_tile_that_was_asked_for_longest_ago_goes_first() {
-    let made = Made {
-        chunk: [1024, 640],
-        packing: DEFLATE,
-        ..ONE_STRIP
-    };
-    let (_folder, layout) = layout(&made, made.bytes(), 3 * 1024 * 640 * 4);
+    let (_folder, layout) = layout(&TILES, TILES.bytes(), 1);
     let part = |[column, row]: [u32; 2]| Part {
         column,
         row,
         columns: 1,
         rows: 1,
     };
-    let tiles = [[0, 0], [1100, 0], [0, 700], [1100, 700]];
-    for tile in [0, 1, 2, 0, 3] {
+    let tiles = [[0, 0], [1100, 0], [0, 450], [1100, 450], [0, 850]];
+    for tile in [0, 1, 2, 3, 0, 4] {
         uncompressed::read(&layout, 0, &part(tiles[tile])).expect("read");
     }
     let kept = tiles.map(|tile| layout.is_at_hand(&part(tile)));
-    assert_eq!(kept, [true, false, true, true]);
+    assert_eq!(kept, [true, false, true, true, true]);
 }
 
 #[test]
