@@ -67,8 +67,7 @@ impl Judge<'_> {
             |seen: &Seen| seen.felt.state == ContactState::Touching && seen.felt.converged;
         let moved = before.felt.proxy != seen.felt.proxy;
         let still = self.still;
-        let stays = !moved && before.is_touching() && seen.is_touching();
-        self.still = if stays { still + 1 } else { 0 };
+        self.still = if seen.stays(before) { still + 1 } else { 0 };
         if !(moved && touches(before) && touches(seen)) {
             return Ok(());
         }

@@ -166,10 +166,7 @@ impl<'g> Judge<'g> {
             }
             self.passes_no_wall(&before, seen)?;
         }
-        let stays = self.before.is_some_and(|before| {
-            let touch = before.is_touching() && seen.is_touching();
-            touch && before.felt.proxy == seen.felt.proxy
-        });
+        let stays = self.before.is_some_and(|before| seen.stays(&before));
         self.still = if stays { self.still + 1 } else { 0 };
         self.before = Some(*seen);
         self.tick += 1;

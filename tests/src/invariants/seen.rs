@@ -69,6 +69,11 @@ impl Seen {
         self.felt.state == ContactState::Touching
     }
 
+    /// Whether the proxy has stayed on the ground where it was in the tick before.
+    pub(super) fn stays(&self, before: &Self) -> bool {
+        self.is_touching() && before.is_touching() && self.felt.proxy == before.felt.proxy
+    }
+
     /// What part of the spring is felt; `None` where it is too short to tell.
     pub(super) fn boundary_fade(&self) -> Option<f64> {
         let whole = distance(self.proxy, self.hip);

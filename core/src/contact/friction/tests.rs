@@ -4,6 +4,7 @@ use std::vec::Vec;
 
 use glam::Vec3;
 
+use crate::contact::dice::Dice;
 use crate::contact::friction::{Came, Friction, Pull, Pulled};
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::contact::{Contact, ContactOutput, ContactSettings, ContactState};
@@ -276,15 +277,6 @@ fn friction_does_not_let_go_where_the_ground_turns_a_way_back() {
     assert!(let_go < 10, "{let_go} of {slides}");
 }
 
-/// Numbers from −1 to 1, always the same.
-fn dice() -> impl FnMut() -> f32 {
-    let mut state = 7_u32;
-    move || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 8) as f32 / (1 << 23) as f32 - 1.0
-    }
-}
-
 /// Where the rest of a way ends nobody looks again: what is promised of its end is true there.
 #[test]
 fn at_the_end_of_the_rest_of_a_way_friction_holds() {
@@ -292,7 +284,8 @@ fn at_the_end_of_the_rest_of_a_way_friction_holds() {
     let mut tiles = buffers::<2>();
     let bumps = |x: i32, y: i32| ((x * 7 + y * 13) % 5) as f32 * 0.4;
     let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), bumps);
-    let mut dice = dice();
+    let mut dice = Dice(7);
+    let mut dice = || dice.between(-1.0, 1.0) as f32;
     let (mut ends, mut back) = (0, 0);
     for _ in 0..200_000 {
         let hip = at([3.0 * dice(), 3.0 * dice(), 1.0 + 2.0 * dice()]);
@@ -345,8 +338,9 @@ fn at_the_end_of_the_rest_of_a_way_friction_holds() {
 #[test]
 fn a_fast_hand_over_rough_ground_is_answered_within_its_tick() {
     let mut tiles = buffers::<2>();
-    let mut dice = dice();
-    let heights: Vec<f32> = (0..61 * 61).map(|_| 0.2 * dice()).collect();
+    let mut dice = Dice(7);
+    let mut height = || dice.between(-0.2, 0.2) as f32;
+    let heights: Vec<f32> = (0..61 * 61).map(|_| height()).collect();
     let ground = move |x: i32, y: i32| heights[(y.clamp(0, 60) * 61 + x.clamp(0, 60)) as usize];
     let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), ground);
     let friction = Friction {

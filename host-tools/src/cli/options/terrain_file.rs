@@ -87,7 +87,8 @@ pub struct ReadingOptions {
     pub in_memory_mb: u32,
 
     /// Folder for coarse samples and pages of URLs that were read before, and for large strips of a
-    /// TIFF that are unpacked while it is used; it may be deleted at any time. Without it: hapterra in the user's folder for caches, as ~/.cache
+    /// TIFF that are unpacked while it is used; it may be deleted at any time. Without it: hapterra
+    /// in the user's folder for caches, as ~/.cache
     #[arg(long, value_name = "DIR", env = "HAPTERRA_CACHE_DIR", value_hint = ValueHint::DirPath, hide_env_values = true, help_heading = INPUT)]
     pub cache_dir: Option<PathBuf>,
 
