@@ -4,7 +4,7 @@
 //! takes each number of a message into the sum where that number is read, which makes
 //! every such place in an image larger and the reading slower.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 use serde::{Deserialize, Serialize};
 
 /// CRC-32 (ISO-HDLC). Its 256-entry table costs 1 KiB of flash and is worth it: a
@@ -35,6 +35,12 @@ pub fn put<'b, T: Serialize + ?Sized>(value: &T, buffer: &'b mut [u8]) -> Option
 #[must_use]
 pub fn sum(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes)
+}
+
+/// Takes more bytes into a check sum: a call, where `update` is unrolled for each length.
+#[inline(never)]
+pub(crate) fn add(digest: &mut Digest<'_, u32>, bytes: &[u8]) {
+    digest.update(bytes);
 }
 
 #[cfg(test)]

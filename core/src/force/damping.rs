@@ -73,6 +73,8 @@ pub(crate) struct Damper {
 
 impl Damper {
     /// Of a scene. Points have no hand that energy could be given to.
+    // A call: it is made by two, once for a scene.
+    #[inline(never)]
     pub(crate) fn of(law: &ForceLaw, felt: &FeltWith) -> Option<Self> {
         let is_controlled = felt.arm && law.is_controlled(felt.rate, felt.latency_s);
         let controller = is_controlled.then(|| Passivity::new(law, felt));

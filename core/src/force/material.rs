@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ForceLaw, Texture};
 use crate::contact::Friction;
-use crate::crc::CRC;
+use crate::crc::{CRC, add};
 use crate::force::Damping;
 
 /// How long the surface takes from one material to the next, seconds. So a border of
@@ -129,10 +129,10 @@ impl MaterialTable {
                 texture.direction_deg,
             ];
             for number in numbers {
-                digest.update(&number.to_le_bytes());
+                add(&mut digest, &number.to_le_bytes());
             }
-            digest.update(&texture.seed.to_le_bytes());
-            digest.update(&[texture.pattern as u8]);
+            add(&mut digest, &texture.seed.to_le_bytes());
+            add(&mut digest, &[texture.pattern as u8]);
         }
         digest.finalize()
     }
