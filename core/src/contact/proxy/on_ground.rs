@@ -36,6 +36,11 @@ impl Contact {
             Ended::Suspended => self.touches(window, hip, false, None),
             Ended::Leaves => self.leaves(window, &view, hip),
             Ended::Lost(_) if is_paper => self.becomes_free(hip),
+            // Its tile was here, and comes back: the last answer is none for this HIP.
+            Ended::Lost(Some(tile)) if waits => {
+                (self.output.converged, self.output.missing_tile) = (false, Some(tile));
+                Turn::Ends
+            }
             Ended::Lost(tile) => {
                 let turn = self.loses_contact(window, hip);
                 self.output.missing_tile = self.output.missing_tile.or(tile);
