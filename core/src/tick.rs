@@ -408,6 +408,12 @@ impl<'t, const D: usize> Haptics<'t, D> {
         damper.map_or(0.0, Damper::created_mj)
     }
 
+    /// The contact of the last tick.
+    #[must_use]
+    pub const fn contact(&self) -> &Contact {
+        &self.contact
+    }
+
     /// The calibration in force.
     #[must_use]
     pub fn calibration(&self) -> Option<&Calibration> {

@@ -11,17 +11,11 @@ use hapterra_tests::field::position;
 use hapterra_tests::invariants::surface::distance;
 use hapterra_tests::real_ground::{self, terrain};
 
-const MU: f64 = 0.4;
-
 fn law(friction: Friction) -> ForceLaw {
     ForceLaw {
         friction,
         ..ForceLaw::PREMIUM
     }
-}
-
-fn slippery() -> ForceLaw {
-    law(Friction::coulomb(MU as f32))
 }
 
 /// What a HIP feels that slides around the middle of a terrain on an ellipse, `depth` mm
@@ -67,29 +61,48 @@ fn ratio(terrain: &Terrain<'_>, sample: &Sample) -> Option<f64> {
     Some(distance(along, [0.0; 3]) / pressed)
 }
 
+/// The ratios of the forces of all slides around a terrain, so many millimetres a tick.
+fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64) -> Vec<f64> {
+    let felt = slide(terrain, law(Friction::coulomb(mu as f32)), depth, speed);
+    // The proxy that has just come out of the air has not slid yet, and one that a wall has held for
+    // long comes over many cells at once.
+    let slides = felt.windows(2).filter(|pair| {
+        let touches = |sample: &Sample| sample.state == ContactState::Touching;
+        let gone = distance(position(&pair[0].proxy), position(&pair[1].proxy));
+        touches(&pair[0]) && touches(&pair[1]) && gone > 0.0 && gone < 1.0 + 3.0 * speed
+    });
+    slides.filter_map(|pair| ratio(terrain, &pair[1])).collect()
+}
+
+/// Coefficients, and how deep, mm.
+const ON_REAL_GROUND: [[f64; 2]; 4] = [[0.2, 0.1], [0.4, 0.3], [0.8, 1.0], [0.8, 0.3]];
+/// The same of ground that is as good as sticky: there the force may go to and fro at a crease, and
+/// a few slides that go over many of them at once are not done.
+const ON_STICKY_GROUND: [[f64; 2]; 2] = [[1.25, 0.3], [2.0, 1.0]];
+
 #[test]
-fn on_real_ground_it_slides_within_five_parts_in_a_hundred_at_half_a_cell_a_tick() {
-    for (_, raster) in &real_ground::files() {
-        let terrain = terrain(raster);
-        for speed in [0.01, 0.1, 0.5, 1.0] {
-            let felt = slide(&terrain, slippery(), 0.3, speed);
-            // The proxy that has just come out of the air has not slid yet.
-            let moves = felt.windows(2).filter(|pair| {
-                let touches = |sample: &Sample| sample.state == ContactState::Touching;
-                touches(&pair[0]) && touches(&pair[1]) && pair[0].proxy != pair[1].proxy
-            });
-            let ratios: Vec<f64> = moves.filter_map(|pair| ratio(&terrain, &pair[1])).collect();
-            let off = |ratio: &&f64| (**ratio / MU - 1.0).abs() > 0.05;
-            let least = ratios.iter().copied().fold(f64::MAX, f64::min);
-            let most = ratios.iter().copied().fold(0.0, f64::max);
-            let (wrong, all) = (ratios.iter().filter(off).count(), ratios.len());
-            println!("{speed} mm a tick: {wrong} of {all} slides off, {least:.4} to {most:.4}");
-            assert!(all > 700, "{all} slides");
-            assert!(most < MU * 1.031, "{most}");
-            // Where a tick crosses several creases, three slides may not do.
-            let most_wrong = if speed < 1.0 { 0 } else { all / 1_000 };
-            assert!(wrong <= most_wrong, "{wrong} of {all}");
+fn on_real_ground_it_slides_within_five_parts_in_a_hundred() {
+    let cases = ON_REAL_GROUND.map(|case| (case, 0.0));
+    let sticky = ON_STICKY_GROUND.map(|case| (case, 1e-3));
+    for ([mu, depth], off_at_most) in cases.into_iter().chain(sticky) {
+        let mut all = vec![];
+        for (_, raster) in &real_ground::files() {
+            let terrain = terrain(raster);
+            for speed in [0.01, 0.1, 0.5, 1.0] {
+                all.extend(ratios(&terrain, mu, depth, speed));
+            }
         }
+        let off = |ratio: &&f64| (**ratio / mu - 1.0).abs() > 0.05;
+        let least = all.iter().copied().fold(f64::MAX, f64::min) / mu;
+        let most = all.iter().copied().fold(0.0, f64::max) / mu;
+        let (wrong, all) = (all.iter().filter(off).count(), all.len());
+        println!("{mu}, {depth} mm deep: {wrong} of {all} slides off, {least:.4} to {most:.4}");
+        assert!(all > 14_000, "{all} slides");
+        assert!(most < 1.031, "{most}");
+        assert!(
+            wrong as f64 <= off_at_most * all as f64,
+            "{wrong} of {all} at {mu}"
+        );
     }
 }
 

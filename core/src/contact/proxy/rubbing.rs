@@ -29,7 +29,7 @@ const STILL: f32 = 1e-3;
 const SLACK: f32 = 0.03;
 /// Times that a proxy slides in a tick. Then it returns to the last place where friction held it,
 /// or, if there is none, goes for the HIP itself, which is inside of every cone.
-const SLIDES: u32 = 3;
+const SLIDES: u32 = 6;
 
 /// What a contact with friction remembers.
 #[derive(Clone, Debug)]
@@ -178,15 +178,15 @@ impl Rubbing {
         }
         if is_inside && let Some(way) = pull.rest_of_way(came, (pulls, dry), (mu, drag), SLACK) {
             let there = point.moved_to(point.u + way.x, point.v + way.y);
-            let is_nearer = |there: GridPoint| !self.stood_nearer_than(&there);
             // Only a way back leads farther from the HIP.
-            if border(&there) == Side::NONE
-                && (!is_held || position_on(window, &there).is_some_and(is_nearer))
-            {
+            if border(&there) == Side::NONE && (!is_held || self.may_go_to(window, &there)) {
                 (self.back, self.came_to) = (pull.along() - way, None);
                 descent.restart(there);
                 return Verdict::Held;
             }
+        }
+        if !is_held && let Some(point) = self.crossed(window, &point) {
+            return Verdict::Returns(point);
         }
         let has_slid_enough = !is_held && self.times >= SLIDES;
         if has_slid_enough && let Some(point) = self.returns() {
@@ -206,6 +206,40 @@ impl Rubbing {
     fn stood_nearer_than(&self, place: &GridPoint) -> bool {
         let stood = self.stood.as_ref();
         stood.is_some_and(|stood| HipView::new(self.hip).is_nearer(&stood.proxy, place))
+    }
+
+    /// Where its way back left the patch that it had come to, if that is no farther from the HIP
+    /// than it stood: friction that holds on one side of a crease and not on the other may hold in
+    /// it. Once for a HIP.
+    #[inline(never)]
+    fn crossed<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        here: &SurfacePoint,
+    ) -> Option<SurfacePoint> {
+        let (came_to, _) = self.came_to.as_ref()?;
+        if self.times >= SLIDES || came_to.cell == here.cell {
+            return None;
+        }
+        let nearest = |cells: i32, place: f32| match cells {
+            0 => place,
+            1.. => 1.0,
+            _ => 0.0,
+        };
+        let u = nearest(here.cell.x - came_to.cell.x, here.u);
+        let v = nearest(here.cell.y - came_to.cell.y, here.v);
+        let crease = came_to.moved_to(u, v);
+        if !self.may_go_to(window, &crease) {
+            return None;
+        }
+        (self.aim, self.times) = (None, SLIDES);
+        Some(crease)
+    }
+
+    /// Whether a place is no farther from the HIP than where the proxy stood.
+    #[inline(never)]
+    fn may_go_to<const D: usize>(&self, window: &Window<'_, D>, point: &SurfacePoint) -> bool {
+        position_on(window, point).is_some_and(|place| !self.stood_nearer_than(&place))
     }
 
     /// Returns to where it went back from, if it did.
@@ -240,6 +274,14 @@ impl Contact {
             Some(rubbing) => rubbing.back * -self.boundary_fade(),
             None => Vec3::ZERO,
         }
+    }
+
+    /// Where a proxy on rough ground began to slide for the last HIP, if it was felt: where it
+    /// stood, or where it came down to the surface.
+    #[must_use]
+    pub fn slid_from(&self) -> Option<&GridPoint> {
+        let stood = self.rubbing.as_ref()?.stood.as_ref()?;
+        Some(&stood.proxy)
     }
 
     /// [`Contact::step`] with friction.
