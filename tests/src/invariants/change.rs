@@ -79,14 +79,19 @@ impl Judge<'_> {
         if !(before.is_touching() && seen.is_touching()) || waited {
             return Ok(());
         }
-        let was = distance(before.proxy, seen.hip);
-        let is = distance(seen.proxy, seen.hip);
-        let allowed = |seen: &Seen| seen.allowed_in_space(self.terrain);
-        if is > was * (1.0 + TIE) + allowed(seen) + allowed(before) {
+        if self.is_farther(before, seen) {
+            let [was, is] = [before, seen].map(|at| distance(at.proxy, seen.hip));
             let detail = format!("{is} after {was}: {before:?} then {seen:?}");
             return self.fail(Invariant::Descent, detail);
         }
         Ok(())
+    }
+
+    /// Whether a proxy is farther from the HIP than it was before.
+    pub(super) fn is_farther(&self, before: &Seen, seen: &Seen) -> bool {
+        let [was, is] = [before, seen].map(|at| distance(at.proxy, seen.hip));
+        let allowed = |seen: &Seen| seen.allowed_in_space(self.terrain);
+        is > was * (1.0 + TIE) + allowed(seen) + allowed(before)
     }
 
     /// By the swept rule, in real time: a tick that is repeated has [`Invariant::Settles`].

@@ -2,10 +2,10 @@
 
 use hapterra_core::contact::ContactState;
 
-use super::Invariant;
 use super::judge::{Judge, Verdict};
 use super::seen::Seen;
 use super::surface::{Patch, distance};
+use super::{Invariant, Violation};
 
 /// Part by which a proxy that has slid may be pulled more than its friction holds.
 const SLACK: f64 = 0.0302;
@@ -33,19 +33,15 @@ struct Pull {
 
 impl Judge<'_> {
     /// A proxy that has slid, or was held, is inside the friction cone.
-    pub(super) fn is_in_cone(&self, seen: &Seen) -> Verdict {
+    pub(super) fn is_in_cone(&mut self, seen: &Seen) -> Verdict {
         let Some((least, _)) = self.pulls(seen.proxy, seen.hip) else {
             return Ok(());
         };
         let mu = f64::from(self.friction.static_mu);
-        // What the viscous part holds is told by how far the proxy went in the tick. A free one
-        // that has work left over goes first through a piece of its way to the last HIP: where
-        // it meets the surface, and slides from, is not told.
+        // What the viscous part holds is told by how far the proxy went in the tick.
         let viscous = f64::from(self.friction.viscous_s) * 1e3;
-        let gone = self
-            .before
-            .filter(|before| before.felt.converged || before.is_touching())
-            .map_or(f64::INFINITY, |before| distance(before.proxy, seen.proxy));
+        let gone = self.slid_from(seen)?;
+        let gone = gone.map_or(f64::INFINITY, |from| distance(from, seen.proxy));
         let trail = if viscous > 0.0 {
             viscous * (gone + 4.0 * seen.allowed() * (1.0 + least.slope))
         } else {
@@ -58,6 +54,29 @@ impl Judge<'_> {
             return self.fail(Invariant::Cone, detail);
         }
         Ok(())
+    }
+
+    /// Where a proxy began to slide, if that can be told: where it was in the tick before, or where
+    /// the contact says that it came down to the surface in this one, nearer to the HIP.
+    fn slid_from(&mut self, seen: &Seen) -> Result<Option<[f64; 3]>, Violation> {
+        // A free one that has work left over goes first through a piece of its way to the last HIP.
+        let before = (self.before).filter(|before| before.felt.converged || before.is_touching());
+        let (Some(before), Some(told)) = (before, seen.slid_from) else {
+            return Ok(before.map(|before| before.proxy));
+        };
+        if seen.stays(&before) {
+            return Ok(Some(before.proxy));
+        }
+        let landed = Seen {
+            proxy: told,
+            ..*seen
+        };
+        self.is_on_surface(&landed)?;
+        if self.is_farther(&before, &landed) {
+            let detail = format!("came down farther away: {before:?} then {seen:?}");
+            return self.fail(Invariant::Cone, detail).map(|()| None);
+        }
+        Ok(Some(told))
     }
 
     /// A proxy inside the cone does not move. One that was in the air slides at first, also where it

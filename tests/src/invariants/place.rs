@@ -9,6 +9,16 @@ use super::{Invariant, descent};
 /// to all that is near the proxy count as equal.
 const FAR: f64 = 1e4;
 
+/// An exact local closest point.
+struct Minimum {
+    at: [f64; 3],
+    /// How far the proxy is from it, cells.
+    off: f64,
+    /// Where, and in which patch, the way down to it began.
+    start: [f64; 2],
+    patch: Patch,
+}
+
 impl Judge<'_> {
     pub(super) fn is_on_surface(&mut self, seen: &Seen) -> Verdict {
         let [x, y, z] = seen.proxy;
@@ -29,7 +39,9 @@ impl Judge<'_> {
     }
 
     pub(super) fn is_local_minimum(&mut self, seen: &Seen) -> Verdict {
-        let Some((error, patch, start)) = self.off_minimum(seen.proxy, seen.hip) else {
+        let minima = self.minima(seen.proxy, seen.hip);
+        let error = minima.first().map(|nearest| nearest.off);
+        let Some(error) = error else {
             return Ok(()); // off the surface: said before
         };
         self.measured.judged += 1;
@@ -45,25 +57,36 @@ impl Judge<'_> {
             return Ok(());
         }
         self.measured.beyond += 1;
-        // On steep ground a unit in the last place of a coordinate is much height:
-        // the bound is one in the plane. And how far does the truth move for a
-        // rounding of the HIP, or of the heights above it that are mixed there?
-        let here = descent::from(self.terrain, seen.hip, start, patch).at;
+        // Up a wall the heights of two minima say nothing of which one the proxy is at.
+        let verdicts = minima
+            .iter()
+            .map(|minimum| self.is_near_in_plane(seen, minimum));
+        verdicts.reduce(Verdict::or).unwrap_or(Ok(()))
+    }
+
+    /// On steep ground a unit in the last place of a coordinate is much height: the bound is one in
+    /// the plane. And how far does the truth move for a rounding of the HIP, or of the heights
+    /// above it that are mixed there?
+    fn is_near_in_plane(&self, seen: &Seen, minimum: &Minimum) -> Verdict {
+        let Minimum {
+            at, start, patch, ..
+        } = *minimum;
+        let allowed = seen.allowed();
         let moved = |axis: usize, by: f64| {
             let mut hip = seen.hip;
             hip[axis] += by;
-            level(descent::from(self.terrain, hip, start, patch).at, here)
+            level(descent::from(self.terrain, hip, start, patch).at, at)
         };
-        let heights = patch.mixed_size(here[0], here[1], seen.hip[2]);
+        let heights = patch.mixed_size(at[0], at[1], seen.hip[2]);
         let up = allowed.max(4.0 * f64::from(f32::EPSILON) * heights);
         let moves = [(0, allowed), (1, allowed), (2, up)]
             .into_iter()
             .flat_map(|(axis, by)| [moved(axis, by), moved(axis, -by)]);
         let condition = moves.fold(0.0, f64::max);
-        let error = level(here, seen.proxy);
+        let error = level(at, seen.proxy);
         if error > 4.0 * (allowed + condition) {
             let detail = format!(
-                "{error:.3e} of {allowed:.3e} from {here:?}, truth moves {condition:.1e}: {seen:?}"
+                "{error:.3e} of {allowed:.3e} from {at:?}, truth moves {condition:.1e}: {seen:?}"
             );
             return self.fail(Invariant::LocalMinimum, detail);
         }
@@ -111,15 +134,22 @@ impl Judge<'_> {
         })
     }
 
-    /// Distance from the exact closest point: the least over the patches that
-    /// single precision cannot tell the proxy's place from.
-    fn off_minimum(&self, proxy: [f64; 3], hip: [f64; 3]) -> Option<(f64, Patch, [f64; 2])> {
-        self.nearby(proxy)
-            .map(|(start, patch)| {
-                let exact = descent::from(self.terrain, hip, start, patch);
-                (distance(exact.at, proxy), patch, start)
-            })
-            .min_by(|a, b| a.0.total_cmp(&b.0))
+    /// The exact closest points from the patches that single precision cannot tell the proxy's
+    /// place from, the nearest first.
+    fn minima(&self, proxy: [f64; 3], hip: [f64; 3]) -> Vec<Minimum> {
+        let minimum = |(start, patch)| {
+            let at = descent::from(self.terrain, hip, start, patch).at;
+            let off = distance(at, proxy);
+            Minimum {
+                at,
+                off,
+                start,
+                patch,
+            }
+        };
+        let mut minima: Vec<_> = self.nearby(proxy).map(minimum).collect();
+        minima.sort_by(|a, b| a.off.total_cmp(&b.off));
+        minima
     }
 
     pub(super) fn is_above(&self, seen: &Seen, before: Option<&Seen>) -> Verdict {

@@ -3,6 +3,7 @@
 use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactOutput, ContactState};
 use hapterra_core::force::ForceLaw;
+use hapterra_core::grid::GridPoint;
 
 use super::surface::{distance, patches_at};
 use crate::field::position;
@@ -30,6 +31,8 @@ pub struct Seen {
     pub textured: Option<Vec3>,
     /// The proxy, where the terrain was made.
     pub proxy: [f64; 3],
+    /// Where the contact says that it began to slide for the HIP.
+    pub slid_from: Option<[f64; 3]>,
     /// The force that the product's law gives for it, N, by [`CELLS_MM`].
     pub force_n: [[f64; 3]; CELLS_MM.len()],
 }
@@ -43,17 +46,24 @@ pub struct Shaded {
     pub is_whole: bool,
 }
 
+/// A place, where the terrain was made.
+#[must_use]
+pub fn unshifted(point: &GridPoint, shift: [i32; 3]) -> [f64; 3] {
+    let at = position(point);
+    [0, 1, 2].map(|i| at[i] - f64::from(shift[i]))
+}
+
 impl Seen {
     /// A tick over a terrain that lies `shift` cells away.
     #[must_use]
     pub fn new(hip: [f64; 3], felt: ContactOutput, shift: [i32; 3]) -> Self {
-        let at = position(&felt.proxy);
         Self {
             hip,
             felt,
             shaded: None,
             textured: None,
-            proxy: [0, 1, 2].map(|i| at[i] - f64::from(shift[i])),
+            proxy: unshifted(&felt.proxy, shift),
+            slid_from: None,
             force_n: CELLS_MM.map(|cell_mm| {
                 let force = LAW.force_n(felt.displacement * cell_mm);
                 force.as_dvec3().to_array()

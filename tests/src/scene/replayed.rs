@@ -14,7 +14,7 @@ use super::run::{Scene, shifted};
 use super::supply::{Buffers, Supply};
 use super::terrain::Terrain;
 use crate::counting::{Counted, Event, WINDOW};
-use crate::field::position;
+use crate::invariants::seen::unshifted;
 use crate::invariants::{Invariant, Violation};
 
 /// Ticks that one point may be repeated for.
@@ -27,6 +27,8 @@ pub struct Replied {
     pub hip: [f64; 3],
     /// The proxy there.
     pub proxy: [f64; 3],
+    /// Where the contact says that it began to slide there.
+    pub slid_from: Option<[f64; 3]>,
     /// What the loop told of the tick that answered it.
     pub sample: Sample,
 }
@@ -81,10 +83,11 @@ pub fn replay<const D: usize>(
                 tick,
                 detail: format!("on materials it never settles for {hip:?}"),
             })?;
-        let at = position(&sample.proxy);
+        let here = |point: &GridPoint| unshifted(point, replay.shift);
         let replied = Replied {
             hip: *hip,
-            proxy: [0, 1, 2].map(|i| at[i] - f64::from(replay.shift[i])),
+            proxy: here(&sample.proxy),
+            slid_from: device.haptics.contact().slid_from().map(here),
             sample,
         };
         look(&replied)?;

@@ -147,8 +147,8 @@ const JUMP: f64 = 1e3;
 ///
 /// The core counts from the south-west corner of a patch, so rounding differs.
 /// Where two ways are equally good the twins may part; they are not compared
-/// until both are free again. Where a hair's breadth decides, they are not
-/// compared any more.
+/// until both are free again. Where a hair's breadth decides in one of them, they are
+/// not compared any more.
 ///
 /// # Errors
 /// Where they differ for no such reason.
@@ -169,12 +169,17 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Comp
     let seen = scene.feel(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
     let symmetries = symmetry::all();
     let symmetry = symmetries[chance.below(symmetries.len())];
-    let turned = |p| symmetry.point(&scene.terrain, p);
-    let path = scene.path.iter().map(|p| turned(*p)).collect();
-    let twin = scene.with(symmetry.terrain(&scene.terrain), path);
+    let twin = twin_of(scene, symmetry);
     let mut judge = Judge::of(&twin);
     let other = twin.feel(buffers, [0; 3], Supply::Held, |seen| judge.look(seen))?;
     same_way(scene, symmetry, &seen, &other, buffers)
+}
+
+/// The scene, mirrored or turned.
+fn twin_of(scene: &Scene, symmetry: Symmetry) -> Scene {
+    let turned = |p: &[f64; 3]| symmetry.point(&scene.terrain, *p);
+    let path = scene.path.iter().map(turned).collect();
+    scene.with(symmetry.terrain(&scene.terrain), path)
 }
 
 /// Compares what was felt with what the mirrored or turned twin felt.
@@ -209,11 +214,12 @@ pub fn same_way(
             }
             continue;
         }
-        let decides = |there: &Seen, hair: f64| {
-            distance(there.proxy, a.proxy) > JUMP * hair * distance(a.proxy, a.hip).max(1.0)
-                || agree(turned(there.proxy), there, b)
+        let decides = |there: &Seen, hair| {
+            is_elsewhere(there, a, hair) || agree(turned(there.proxy), there, b)
         };
-        if is_undecided(scene, tick, decides, buffers) {
+        if is_undecided(scene, tick, decides, buffers)
+            || is_twin_undecided(scene, symmetry, tick, buffers)
+        {
             return Ok(false);
         }
         let detail = format!("{symmetry:?}: {a:?} but {b:?}");
@@ -278,8 +284,29 @@ fn is_near(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {
     distance(proxy, b.proxy) <= 1e-4 * distance(a.proxy, a.hip).max(1.0)
 }
 
-/// Whether a hair's breadth on the way to this tick, cells, makes the difference,
-/// too.
+/// Whether a proxy that was moved by a hair's breadth, cells, is elsewhere by far more.
+fn is_elsewhere(there: &Seen, here: &Seen, hair: f64) -> bool {
+    distance(there.proxy, here.proxy) > JUMP * hair * distance(here.proxy, here.hip).max(1.0)
+}
+
+/// Whether a hair's breadth makes the difference in the mirrored or turned twin, as it is felt
+/// once more.
+fn is_twin_undecided(
+    scene: &Scene,
+    symmetry: Symmetry,
+    tick: usize,
+    buffers: &mut Buffers,
+) -> bool {
+    let twin = twin_of(scene, symmetry);
+    let own = felt_at(&twin, tick, |_| [0.0; 3], buffers);
+    own.is_some_and(|own| {
+        let decides = |there: &Seen, hair| is_elsewhere(there, &own, hair);
+        is_undecided(&twin, tick, decides, buffers)
+    })
+}
+
+/// Whether a hair's breadth on the way to this tick, or in this tick alone, cells, makes the
+/// difference, too.
 fn is_undecided(
     scene: &Scene,
     tick: usize,
@@ -287,25 +314,34 @@ fn is_undecided(
     buffers: &mut Buffers,
 ) -> bool {
     const HAIRS: [f64; 3] = [1.0, 16.0, 256.0];
-    for hair in HAIRS {
+    let ways = [0, tick]
+        .into_iter()
+        .flat_map(|first| HAIRS.map(|hair| (first, GRAIN * hair)));
+    for (first, hair) in ways {
         for corner in 0..8 {
-            let mut player = Player::<SIDE>::new(scene, buffers, [0; 3], scene.supply);
-            let off = |bit: usize| {
-                if corner >> bit & 1 == 0 {
-                    GRAIN
-                } else {
-                    -GRAIN
-                }
-            };
-            let mut felt = None;
-            for hip in &scene.path[..=tick] {
-                let hip = [0, 1, 2].map(|i| hip[i] + hair * off(i));
-                felt = player.feel(hip).map(|felt| Seen::new(hip, felt, [0; 3]));
-            }
-            if felt.is_some_and(|felt| decides(&felt, hair * GRAIN)) {
+            let off = [0, 1, 2].map(|bit| if corner >> bit & 1 == 0 { hair } else { -hair });
+            let moved = |now| if now < first { [0.0; 3] } else { off };
+            if felt_at(scene, tick, moved, buffers).is_some_and(|felt| decides(&felt, hair)) {
                 return true;
             }
         }
     }
     false
+}
+
+/// What is felt in a tick of a way that is moved by as much in each.
+fn felt_at(
+    scene: &Scene,
+    tick: usize,
+    moved: impl Fn(usize) -> [f64; 3],
+    buffers: &mut Buffers,
+) -> Option<Seen> {
+    let mut player = Player::<SIDE>::new(scene, buffers, [0; 3], scene.supply);
+    let mut felt = None;
+    for (now, hip) in scene.path[..=tick].iter().enumerate() {
+        let by = moved(now);
+        let hip = [0, 1, 2].map(|i| hip[i] + by[i]);
+        felt = player.feel(hip).map(|felt| Seen::new(hip, felt, [0; 3]));
+    }
+    felt
 }

@@ -104,7 +104,8 @@ impl Felt<'_> {
             spring(most, newtons + unsure),
         );
         let damping = material.damping() + material.unsure_damping();
-        let fast = 1e-3 * damping * self.velocity_mm_s.length();
+        // Of a fast HIP damping takes next to all: it is the difference of two that are rounded.
+        let fast = 1e-3 * damping * self.velocity_mm_s.length() * (1.0 + ROUNDING);
         let least = if fades { 0.0 } else { (least - fast).max(0.0) };
         let most = (most + fast.min(most)).min(self.most_n);
         [
