@@ -64,12 +64,14 @@ fn ratio(terrain: &Terrain<'_>, sample: &Sample) -> Option<f64> {
 /// The ratios of the forces of all slides around a terrain, so many millimetres a tick.
 fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64) -> Vec<f64> {
     let felt = slide(terrain, law(Friction::coulomb(mu as f32)), depth, speed);
-    // The proxy that has just come out of the air has not slid yet, and one that a wall has held for
-    // long comes over many cells at once.
+    // The proxy that has just come out of the air has not slid yet, and one that a wall has held, far
+    // behind the HIP, comes over many cells at once.
+    let trails = 2.0 * depth * (1.0 + mu * mu).sqrt() + 3.0 * speed;
     let slides = felt.windows(2).filter(|pair| {
         let touches = |sample: &Sample| sample.state == ContactState::Touching;
-        let gone = distance(position(&pair[0].proxy), position(&pair[1].proxy));
-        touches(&pair[0]) && touches(&pair[1]) && gone > 0.0 && gone < 1.0 + 3.0 * speed
+        let behind = distance(position(&pair[0].proxy), position(&pair[0].hip));
+        let moves = pair[0].proxy != pair[1].proxy;
+        touches(&pair[0]) && touches(&pair[1]) && moves && behind < trails
     });
     slides.filter_map(|pair| ratio(terrain, &pair[1])).collect()
 }

@@ -2,10 +2,10 @@
 
 use hapterra_core::contact::ContactState;
 
+use super::Invariant;
 use super::judge::{Judge, Verdict};
 use super::seen::Seen;
 use super::surface::{Patch, distance};
-use super::{Invariant, Violation};
 
 /// Part by which a proxy that has slid may be pulled more than its friction holds.
 const SLACK: f64 = 0.0302;
@@ -40,43 +40,47 @@ impl Judge<'_> {
         let mu = f64::from(self.friction.static_mu);
         // What the viscous part holds is told by how far the proxy went in the tick.
         let viscous = f64::from(self.friction.viscous_s) * 1e3;
-        let gone = self.slid_from(seen)?;
-        let gone = gone.map_or(f64::INFINITY, |from| distance(from, seen.proxy));
-        let trail = if viscous > 0.0 {
-            viscous * (gone + 4.0 * seen.allowed() * (1.0 + least.slope))
-        } else {
-            0.0
-        };
         let place = seen.allowed() + least.rounding;
-        let most = mu * least.rest * (1.0 + SLACK) + trail + 4.0 * place * (1.0 + mu);
-        if least.along > most {
-            let detail = format!("{least:?} where {most:.3e} is held: {seen:?}");
+        let most = |from: [f64; 3]| {
+            let gone = distance(from, seen.proxy);
+            let trail = match viscous > 0.0 {
+                true => viscous * (gone + 4.0 * seen.allowed() * (1.0 + least.slope)),
+                false => 0.0,
+            };
+            mu * least.rest * (1.0 + SLACK) + trail + 4.0 * place * (1.0 + mu)
+        };
+        // A free one that has work left over goes first through a piece of its way to the last HIP:
+        // where it meets the surface, and slides from, is not told.
+        let before = (self.before).filter(|before| before.felt.converged || before.is_touching());
+        if before.is_none() && viscous > 0.0 {
+            return Ok(());
+        }
+        let from = before.map_or(seen.proxy, |before| before.proxy);
+        if least.along <= most(from) {
+            return Ok(());
+        }
+        // It may have been in the air meanwhile.
+        if let (Some(before), Some(told)) = (before, seen.slid_from)
+            && !seen.stays(&before)
+            && least.along <= most(told)
+        {
+            return self.came_down(&before, seen, told);
+        }
+        let detail = format!("{least:?} where {:.3e} is held: {seen:?}", most(from));
+        self.fail(Invariant::Cone, detail)
+    }
+
+    /// Whether a proxy may have come down where the contact says so: on the surface, no farther from
+    /// the HIP than it was, and with the HIP below.
+    fn came_down(&mut self, before: &Seen, seen: &Seen, at: [f64; 3]) -> Verdict {
+        let landed = Seen { proxy: at, ..*seen };
+        self.is_on_surface(&landed)?;
+        self.is_hip_below(&landed)?;
+        if self.is_farther(before, &landed) {
+            let detail = format!("came down farther away: {before:?} then {seen:?}");
             return self.fail(Invariant::Cone, detail);
         }
         Ok(())
-    }
-
-    /// Where a proxy began to slide, if that can be told: where it was in the tick before, or where
-    /// the contact says that it came down to the surface in this one, nearer to the HIP.
-    fn slid_from(&mut self, seen: &Seen) -> Result<Option<[f64; 3]>, Violation> {
-        // A free one that has work left over goes first through a piece of its way to the last HIP.
-        let before = (self.before).filter(|before| before.felt.converged || before.is_touching());
-        let (Some(before), Some(told)) = (before, seen.slid_from) else {
-            return Ok(before.map(|before| before.proxy));
-        };
-        if seen.stays(&before) {
-            return Ok(Some(before.proxy));
-        }
-        let landed = Seen {
-            proxy: told,
-            ..*seen
-        };
-        self.is_on_surface(&landed)?;
-        if self.is_farther(&before, &landed) {
-            let detail = format!("came down farther away: {before:?} then {seen:?}");
-            return self.fail(Invariant::Cone, detail).map(|()| None);
-        }
-        Ok(Some(told))
     }
 
     /// A proxy inside the cone does not move. One that was in the air slides at first, also where it

@@ -57,10 +57,10 @@ impl Judge<'_> {
             return Ok(());
         }
         self.measured.beyond += 1;
-        // Up a wall the heights of two minima say nothing of which one the proxy is at.
-        let verdicts = minima
-            .iter()
-            .map(|minimum| self.is_near_in_plane(seen, minimum));
+        // Up a wall rounding of the height decides which of two minima is the nearer one.
+        let tie = error + seen.rounding_of_corners(self.terrain);
+        let near = minima.iter().take_while(|minimum| minimum.off <= tie);
+        let verdicts = near.map(|minimum| self.is_near_in_plane(seen, minimum));
         verdicts.reduce(Verdict::or).unwrap_or(Ok(()))
     }
 

@@ -36,7 +36,7 @@ impl Contact {
             Ended::Suspended => self.touches(window, hip, false, None),
             Ended::Leaves => self.leaves(window, &view, hip),
             Ended::Lost(_) if is_paper => self.becomes_free(hip),
-            // Its tile was here, and comes back: the last answer is none for this HIP.
+            // The window gave up the proxy's tile. Until it comes back no tick counts.
             Ended::Lost(Some(tile)) if waits => {
                 (self.output.converged, self.output.missing_tile) = (false, Some(tile));
                 Turn::Ends

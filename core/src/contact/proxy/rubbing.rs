@@ -13,7 +13,7 @@ use crate::contact::tolerance::RESOLUTION;
 use crate::grid::GridPoint;
 use crate::rate::TickRate;
 use crate::scalar::root;
-use crate::terrain::{TileIndex, Window};
+use crate::terrain::{Ground, TileIndex, Window};
 
 /// Units of work for asking whether friction holds the proxy: what arriving on a border
 /// costs.
@@ -185,8 +185,8 @@ impl Rubbing {
                 return Verdict::Held;
             }
         }
-        if !is_held && let Some(point) = self.crossed(window, &point) {
-            return Verdict::Returns(point);
+        if !is_held && let Some(verdict) = self.stays_in_crease(window, &point) {
+            return verdict;
         }
         let has_slid_enough = !is_held && self.times >= SLIDES;
         if has_slid_enough && let Some(point) = self.returns() {
@@ -208,32 +208,29 @@ impl Rubbing {
         stood.is_some_and(|stood| HipView::new(self.hip).is_nearer(&stood.proxy, place))
     }
 
-    /// Where its way back left the patch that it had come to, if that is no farther from the HIP
-    /// than it stood: friction that holds on one side of a crease and not on the other may hold in
-    /// it. Once for a HIP.
+    /// Back to where its way back left the patch that it had come to, if it did, and that is no
+    /// farther from the HIP than it stood: friction that holds on one side of a crease and not on the
+    /// other may hold in it.
     #[inline(never)]
-    fn crossed<const D: usize>(
+    fn stays_in_crease<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         here: &SurfacePoint,
-    ) -> Option<SurfacePoint> {
-        let (came_to, _) = self.came_to.as_ref()?;
-        if self.times >= SLIDES || came_to.cell == here.cell {
+    ) -> Option<Verdict> {
+        let (came_to, back) = self.came_to?;
+        if self.times >= SLIDES {
             return None;
         }
-        let nearest = |cells: i32, place: f32| match cells {
-            0 => place,
-            1.. => 1.0,
-            _ => 0.0,
-        };
-        let u = nearest(here.cell.x - came_to.cell.x, here.u);
-        let v = nearest(here.cell.y - came_to.cell.y, here.v);
-        let crease = came_to.moved_to(u, v);
-        if !self.may_go_to(window, &crease) {
-            return None;
+        let crease = came_to.leaves_toward(here)?;
+        if let Ground::Missing = window.ground(crease.cell) {
+            // In lock-step the window may have given it up meanwhile.
+            return Some(Verdict::Waits(Some(TileIndex::holding(crease.cell))));
         }
-        (self.aim, self.times) = (None, SLIDES);
-        Some(crease)
+        let may = self.may_go_to(window, &crease);
+        may.then(|| {
+            (self.aim, self.back) = (None, back);
+            Verdict::Returns(crease)
+        })
     }
 
     /// Whether a place is no farther from the HIP than where the proxy stood.
@@ -277,7 +274,8 @@ impl Contact {
     }
 
     /// Where a proxy on rough ground began to slide for the last HIP, if it was felt: where it
-    /// stood, or where it came down to the surface.
+    /// stood, or where it came down to the surface. After a tick that left work over, where that
+    /// tick ended.
     #[must_use]
     pub fn slid_from(&self) -> Option<&GridPoint> {
         let stood = self.rubbing.as_ref()?.stood.as_ref()?;
@@ -297,7 +295,9 @@ impl Contact {
         }
         let mut budget = Budget::new(self.settings.work_per_tick);
         self.remembers_what_was_felt();
-        if has_moved {
+        // While a force comes in, a tick that follows one which ended begins anew, too: the proxy
+        // stands where that one left it.
+        if has_moved || self.output.converged {
             self.begins_anew(window, hip, &mut budget);
             self.begins_to_rub(hip);
         }
@@ -400,7 +400,7 @@ impl Contact {
             (Phase::OnSurface(_), None) => self.is_held(window, hip, budget),
             (Phase::OnSurface(_), Some(aim)) => self.slides(window, aim, hip, budget),
             _ => {
-                (rubbing.aim, rubbing.stood) = (None, None);
+                (rubbing.aim, rubbing.stood, rubbing.came_to) = (None, None, None);
                 rubbing.back = Vec3::ZERO;
                 let turn = self.turn_toward(window, hip, budget);
                 self.has_landed(window);
