@@ -76,22 +76,29 @@ fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64) -> Vec<f64> {
     slides.filter_map(|pair| ratio(terrain, &pair[1])).collect()
 }
 
-/// Coefficients, and how deep, mm.
-const ON_REAL_GROUND: [[f64; 2]; 4] = [[0.2, 0.1], [0.4, 0.3], [0.8, 1.0], [0.8, 0.3]];
+/// Coefficients, how deep, mm, and how many slides there are at least on a terrain at a speed.
+const ON_REAL_GROUND: [(f64, f64, usize); 4] = [
+    (0.2, 0.1, 350),
+    (0.4, 0.3, 700),
+    (0.8, 1.0, 700),
+    (0.8, 0.3, 700),
+];
 /// The same of ground that is as good as sticky: there the force may go to and fro at a crease, and
 /// a few slides that go over many of them at once are not done.
-const ON_STICKY_GROUND: [[f64; 2]; 2] = [[1.25, 0.3], [2.0, 1.0]];
+const ON_STICKY_GROUND: [(f64, f64, usize); 2] = [(1.25, 0.3, 350), (2.0, 1.0, 200)];
 
 #[test]
 fn on_real_ground_it_slides_within_five_parts_in_a_hundred() {
     let cases = ON_REAL_GROUND.map(|case| (case, 0.0));
     let sticky = ON_STICKY_GROUND.map(|case| (case, 1e-3));
-    for ([mu, depth], off_at_most) in cases.into_iter().chain(sticky) {
+    for ((mu, depth, fewest), off_at_most) in cases.into_iter().chain(sticky) {
         let mut all = vec![];
         for (_, raster) in &real_ground::files() {
             let terrain = terrain(raster);
             for speed in [0.01, 0.1, 0.5, 1.0] {
-                all.extend(ratios(&terrain, mu, depth, speed));
+                let ratios = ratios(&terrain, mu, depth, speed);
+                assert!(ratios.len() > fewest, "{} slides", ratios.len());
+                all.extend(ratios);
             }
         }
         let off = |ratio: &&f64| (**ratio / mu - 1.0).abs() > 0.05;
@@ -99,7 +106,6 @@ fn on_real_ground_it_slides_within_five_parts_in_a_hundred() {
         let most = all.iter().copied().fold(0.0, f64::max) / mu;
         let (wrong, all) = (all.iter().filter(off).count(), all.len());
         println!("{mu}, {depth} mm deep: {wrong} of {all} slides off, {least:.4} to {most:.4}");
-        assert!(all > 14_000, "{all} slides");
         assert!(most < 1.031, "{most}");
         assert!(
             wrong as f64 <= off_at_most * all as f64,

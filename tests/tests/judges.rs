@@ -115,6 +115,12 @@ fn reports_of(mut judge: Judge<'_>, ticks: &[Seen]) -> Vec<Violation> {
     judge.all(last)
 }
 
+/// The invariants that the last of these ticks breaks.
+fn broken_of(judge: Judge<'_>, ticks: &[Seen]) -> Vec<Invariant> {
+    let told = reports_of(judge, ticks);
+    told.iter().map(|violation| violation.invariant).collect()
+}
+
 /// Checks that the judge reports the forged tick by this invariant alone, and the
 /// honest tick by none.
 fn reports_only(
@@ -142,8 +148,7 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     let flat = flat();
     let found = |ticks: &[Seen]| -> Vec<Invariant> {
         let judge = Judge::new(&flat, Rule::Swept).with_friction(friction);
-        let told = reports_of(judge, ticks);
-        told.iter().map(|violation| violation.invariant).collect()
+        broken_of(judge, ticks)
     };
     let at = |x: f64, hip_x: f64| touching([hip_x, 10.5, 1.0], [x, 10.5, 2.0]);
     let first = at(10.5, 10.6);
@@ -171,10 +176,7 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     let ridge = ridge();
     let judge = || Judge::new(&ridge, Rule::Swept).with_friction(friction);
     let edge = |x: f64| touching([x, 10.5, 1.0], [20.0, 10.5, 2.0]);
-    let told = |ticks: &[Seen]| -> Vec<Invariant> {
-        let told = reports_of(judge(), ticks);
-        told.iter().map(|violation| violation.invariant).collect()
-    };
+    let told = |ticks: &[Seen]| -> Vec<Invariant> { broken_of(judge(), ticks) };
     assert_eq!(
         told(&[edge(20.1)]),
         [Cone],
@@ -193,8 +195,7 @@ fn a_proxy_that_trails_by_more_than_it_slid_is_found() {
     let flat = flat();
     let found = |ticks: &[Seen]| -> Vec<Invariant> {
         let judge = Judge::new(&flat, Rule::Swept).with_friction(friction);
-        let told = reports_of(judge, ticks);
-        told.iter().map(|violation| violation.invariant).collect()
+        broken_of(judge, ticks)
     };
     // From (12, 10.5), where it met the ground or stood, by 2 cells: that holds 6.
     let slid = touching([20.03, 10.5, 1.0], [14.0, 10.5, 2.0]);
@@ -223,8 +224,7 @@ fn a_proxy_that_trails_from_where_it_cannot_have_come_down_is_found() {
         let judge = Judge::new(&flat, Rule::Swept).with_friction(friction);
         let mut slid = slid;
         slid.slid_from = slid_from;
-        let told = reports_of(judge, &[before, slid]);
-        told.iter().map(|violation| violation.invariant).collect()
+        broken_of(judge, &[before, slid])
     };
     assert_eq!(found(None), [Invariant::Cone]);
     assert_eq!(found(Some([15.0, 8.768, 2.0])), []);
@@ -249,8 +249,7 @@ fn a_pull_in_the_last_place_of_a_patchs_corners_is_not_judged() {
         });
         let judge = Judge::new(&saddle, Rule::Swept).with_friction(Friction::coulomb(0.5));
         let pulled = touching([10.51, 10.5, 1.99], [10.5, 10.5, 2.0]);
-        let told = reports_of(judge, &[pulled]);
-        told.iter().map(|violation| violation.invariant).collect()
+        broken_of(judge, &[pulled])
     };
     assert_eq!(found(1.0), [Invariant::Cone]);
     assert_eq!(found(3e5), []);
@@ -271,10 +270,8 @@ fn a_force_that_is_shaded_otherwise_is_found() {
         });
         Seen { shaded, ..seen }
     };
-    let found = |seen: Seen| -> Vec<Invariant> {
-        let told = reports_of(Judge::new(&ridge, Rule::Swept), &[seen]);
-        told.iter().map(|violation| violation.invariant).collect()
-    };
+    let found =
+        |seen: Seen| -> Vec<Invariant> { broken_of(Judge::new(&ridge, Rule::Swept), &[seen]) };
     // Bends of 90° are turned along a fifth of an edge: this is beyond it.
     let along = [0.05, 0.05];
     assert_eq!(found(shaded(along, true)), []);
@@ -470,8 +467,7 @@ fn friction_at_a_holes_edge_may_hold_a_hip_above_the_ground_beyond_it() {
     let found = |x: f64| -> Vec<Invariant> {
         let judge = Judge::new(&hole, Rule::Swept).with_friction(Friction::coulomb(2.0));
         let seen = touching([22.0, 20.1, 0.1], [x, 20.0, 0.0_f64.max(20.0 - x)]);
-        let told = reports_of(judge, &[seen]);
-        told.iter().map(|violation| violation.invariant).collect()
+        broken_of(judge, &[seen])
     };
     for before in [1e-2, 1e-5, 5e-7] {
         assert_eq!(found(20.0 - before), [], "{before}");

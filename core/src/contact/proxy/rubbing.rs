@@ -27,7 +27,7 @@ const STILL: f32 = 1e-3;
 /// turned the surface under it. By this part more than dry friction holds may pull it, and by this
 /// part less than all of friction does.
 const SLACK: f32 = 0.03;
-/// Times that a proxy slides in a tick. Then it returns to the last place where friction held it,
+/// Times that a proxy slides for a HIP. Then it returns to the last place where friction held it,
 /// or, if there is none, goes for the HIP itself, which is inside of every cone.
 const SLIDES: u32 = 6;
 
