@@ -9,12 +9,10 @@ use glam::Vec3;
 
 use crate::clutch::{Clutch, ClutchHold};
 use crate::contact::{Contact, ContactOutput, ContactSettings, Execution, Friction};
-use crate::force::{Damper, Effects, FeltWith, MaterialTable, Moment};
+use crate::force::{Damper, Effects, FeltWith, MaterialTable, Moment, Shares};
 use crate::grid::GridPoint;
 use crate::guard::thermal::Temperatures;
-use crate::guard::{
-    Drive, Fault, Guard, Jog, Limits, Mode, Report, SceneKind, Sense, Surroundings,
-};
+use crate::guard::{Drive, Fault, Guard, Jog, Limits, Report, SceneKind, Sense, Surroundings};
 use crate::phantom::{Calibration, Mechanism, Pose, to_device_frame, to_terrain_frame};
 use crate::rate::TickRate;
 use crate::scalar::smaller;
@@ -133,7 +131,7 @@ pub struct Haptics<'t, const D: usize> {
     /// Number of the view that is felt.
     view: u8,
     point: Option<Point>,
-    /// Where the point before was, in a scene fed by points.
+    /// The HIP of the tick before.
     before: Option<GridPoint>,
     /// What the scene adds to the spring's force, if anything.
     effects: Option<Effects>,
@@ -572,17 +570,26 @@ impl<'t, const D: usize> Haptics<'t, D> {
         let Some(damper) = &mut effects.damper else {
             return spring_n;
         };
-        if self.guard.mode() != Mode::Armed || !self.clutch.is_closed() {
+        // No force follows the spring where nothing is driven, while the last force goes out, and
+        // while the clutch is open.
+        let Some([ramp, speed]) = self.guard.shares().filter(|_| self.clutch.share() > 0.0) else {
             damper.rest();
+            self.before = None;
             return spring_n;
-        }
+        };
         let velocity_mm_s = to_terrain_frame(self.guard.tip_velocity_mm_s(mechanism, pose));
+        let before = self.before.replace(sample.hip).unwrap_or(sample.hip);
         damper.observe(&Moment {
             displacement_mm,
-            tip_mm: scene.home.to(&sample.hip) * scene.cell_mm,
+            moved_mm: before.to(&sample.hip) * scene.cell_mm,
             velocity_mm_s,
             asked_n: self.guard.force_n(),
             most_n: self.guard.most_force_n(),
+            shares: Shares {
+                clutch: self.clutch.share(),
+                ramp,
+                speed,
+            },
         });
         if damper.created_mj() > 0.0 {
             self.guard.says(Limits::ENERGY_TAKEN_BACK);

@@ -5,7 +5,7 @@ use std::vec::Vec;
 use super::*;
 use crate::cases::cases;
 use crate::contact::{ContactState, Rule};
-use crate::force::ForceLaw;
+use crate::force::{Controller, Damping, ForceLaw};
 use crate::grid::{Cell, MAX_CELL};
 use crate::guard::{Blockers, Mode};
 use crate::terrain::testing::buffers;
@@ -20,6 +20,15 @@ mod views;
 
 const SIZE: i32 = 640;
 
+/// The spring alone: these arms are put from place to place, which no controller takes for a hand.
+const SPRING: ForceLaw = ForceLaw {
+    damping: Damping {
+        controller: Controller::Off,
+        ..Damping::NONE
+    },
+    ..ForceLaw::PREMIUM
+};
+
 fn scene(source: Source) -> Scene {
     Scene {
         epoch: 1,
@@ -29,7 +38,7 @@ fn scene(source: Source) -> Scene {
         underlay: None,
         cell_mm: 1.0,
         home: GridPoint::new([320, 320, 5], Vec3::ZERO),
-        law: ForceLaw::PREMIUM,
+        law: SPRING,
         rule: Rule::Swept,
         source,
         hold_clock: false,

@@ -5,7 +5,7 @@ mod depth;
 mod effects;
 mod in_force;
 mod material;
-pub mod passivity;
+mod passivity;
 mod relief;
 mod shading;
 mod texture;
@@ -16,13 +16,11 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::Friction;
-use crate::rate::TickRate;
-use crate::scalar::smaller;
 pub(crate) use damping::Damper;
 pub use damping::{Controller, Damping};
 pub(crate) use effects::{Effects, FeltWith};
 pub use material::{MATERIAL_CHANGE_S, Material, MaterialTable};
-pub(crate) use passivity::Moment;
+pub(crate) use passivity::{Moment, Shares};
 pub use shading::{Shader, Shading};
 pub use texture::{Pattern, Texture};
 pub use texturer::Texturer;
@@ -89,24 +87,10 @@ impl ForceLaw {
         clamp_length(displacement_mm * self.stiffness_n_per_mm, self.max_force_n)
     }
 
-    /// Whether the passivity controller acts on an arm at a rate, where a force acts so long after
-    /// its tick began, s.
+    /// Returns true if the passivity controller acts on an arm.
     #[must_use]
-    pub fn is_controlled(&self, rate: TickRate, latency_s: f32) -> bool {
-        let stiffest = passivity::stiffest_n_per_mm(rate, latency_s);
-        match self.damping.controller {
-            Controller::Auto => self.stiffness_n_per_mm > stiffest,
-            Controller::On => true,
-            Controller::Off => false,
-        }
-    }
-
-    /// What the spring holds, mJ, for a HIP so deep, where it may make up to `most_n`.
-    fn stored_mj(&self, depth_mm: f32, most_n: f32) -> f32 {
-        let stretched_n = depth_mm * self.stiffness_n_per_mm;
-        let at_limit_n = smaller(stretched_n, smaller(self.max_force_n, most_n));
-        // Beyond the limit the force stays as it is: F (d - d_m) more than at the limit.
-        at_limit_n * (stretched_n - 0.5 * at_limit_n) / self.stiffness_n_per_mm
+    pub const fn is_controlled(&self) -> bool {
+        matches!(self.damping.controller, Controller::On)
     }
 }
 
