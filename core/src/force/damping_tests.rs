@@ -44,7 +44,7 @@ fn damping_is_against_the_motion_and_no_more_than_the_spring() {
     for deep_mm in [0.0_f32, 1e-6, 0.01, 1.0, 6.0, 16.0, 40.0] {
         for speed_mm_s in [-900.0_f32, -50.0, -1e-3, 0.0, 50.0, 900.0] {
             let velocity_mm_s = normal * speed_mm_s + across * 300.0;
-            let force_n = damper.force_n(law.force_n(normal * deep_mm), velocity_mm_s);
+            let force_n = damper.force_n(law.spring().force_n(normal * deep_mm), velocity_mm_s);
             let spring_n = (0.5 * deep_mm).min(8.5);
             let damping_n = (-0.004 * speed_mm_s).clamp(-spring_n, spring_n);
             let wanted = normal * (spring_n + damping_n).clamp(0.0, 8.5);
@@ -209,7 +209,7 @@ impl Taps {
             let velocity_mm_s = Vec3::Z * speed_mm_s as f32;
             let moved_mm = Vec3::Z * (height_mm(now_s) - height_mm(now_s - tick_s)) as f32;
             let asked_n = Vec3::Z * forces_n.last().map_or(0.0, |last| *last as f32);
-            let mut force_n = law.force_n(displacement_mm);
+            let mut force_n = law.spring().force_n(displacement_mm);
             if let Some(damper) = &mut damper {
                 damper.observe(&Moment {
                     displacement_mm,
@@ -344,7 +344,10 @@ fn a_surface_yields_to_a_fast_tip_and_recovers_under_one_that_rests() {
                 shares: Shares::ALL,
             });
         }
-        damper.force_n(law.force_n(displacement_mm), Vec3::ZERO).z / law.force_n(Vec3::Z * -up_mm).z
+        damper
+            .force_n(law.spring().force_n(displacement_mm), Vec3::ZERO)
+            .z
+            / law.spring().force_n(Vec3::Z * -up_mm).z
     };
     // 500 N/s are half of what the guard allows.
     assert_eq!(share(-1.0, 250.0, 1), 1.0);

@@ -146,8 +146,8 @@ fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] 
                 most_n: 8.5,
                 shares: Shares::ALL,
             });
-            asked_n = damper.force_n(law.force_n(felt[0]), velocity_mm_s);
-            let forces = felt.map(|displacement| law.force_n(displacement));
+            asked_n = damper.force_n(law.spring().force_n(felt[0]), velocity_mm_s);
+            let forces = felt.map(|displacement| law.spring().force_n(displacement));
             if let Some((_, before)) = last.replace((tip_mm, forces))
                 && tick > down
             {

@@ -15,7 +15,7 @@ use glam::Vec3;
 
 use super::depth::Depth;
 use super::yielding::Yielding;
-use super::{FeltWith, ForceLaw};
+use super::{FeltWith, ForceLaw, Spring};
 use crate::scalar::{larger, smaller};
 
 /// More than this is forgotten, mJ.
@@ -110,7 +110,6 @@ pub(crate) struct Shares {
     pub(crate) speed: f32,
 }
 
-#[cfg(test)]
 impl Shares {
     /// All of the force.
     pub(crate) const ALL: Self = Self {
@@ -168,10 +167,10 @@ impl Passivity {
             speed,
         } = now.shares;
         let stiffness_n_per_mm = clutch * law.stiffness_n_per_mm;
-        let most_n = smaller(clutch * law.max_force_n, now.most_n);
+        let max_force_n = smaller(clutch * law.max_force_n, now.most_n);
         let ramped = Spring {
-            n_per_mm: ramp * stiffness_n_per_mm,
-            most_n: ramp * most_n,
+            stiffness_n_per_mm: ramp * stiffness_n_per_mm,
+            max_force_n: ramp * max_force_n,
         };
         self.yielding.observe(&ramped, &depth, self.tick_s);
         self.asked.add(now.asked_n);
@@ -179,14 +178,14 @@ impl Passivity {
         let (acting_n, before_n) = (self.asked.ago(whole), self.asked.ago(whole + 1));
         let softening = self.yielding.share();
         let spring = Spring {
-            n_per_mm: softening * stiffness_n_per_mm,
-            most_n,
+            stiffness_n_per_mm: softening * stiffness_n_per_mm,
+            max_force_n,
         };
         let stored_mj = ramp * speed * spring.stored_mj(depth.mm);
         if let Some(before) = self.before {
             let spring = Spring {
-                n_per_mm: before.softening * clutch * before.stiffness_n_per_mm,
-                most_n,
+                stiffness_n_per_mm: before.softening * clutch * before.stiffness_n_per_mm,
+                max_force_n,
             };
             let before_mj = ramp * before.speed * spring.stored_mj(before.depth_mm);
             let acted_n = acting_n + (before_n - acting_n) * part;
@@ -222,22 +221,6 @@ impl Passivity {
             true => takes_back,
             false => most,
         }
-    }
-}
-
-/// A spring with a largest force.
-pub(super) struct Spring {
-    pub(super) n_per_mm: f32,
-    pub(super) most_n: f32,
-}
-
-impl Spring {
-    /// The energy that it holds at a depth, mJ.
-    pub(super) fn stored_mj(&self, depth_mm: f32) -> f32 {
-        let stretched_n = depth_mm * self.n_per_mm;
-        let at_limit_n = smaller(stretched_n, self.most_n);
-        // Beyond the limit the force stays as it is: F (d - d_m) more than at the limit.
-        at_limit_n * (stretched_n - 0.5 * at_limit_n) / self.n_per_mm
     }
 }
 

@@ -7,8 +7,8 @@
 //! felt as softer from the first touch on asks for no more than the guard allows, and gives
 //! back what it got.
 
+use super::Spring;
 use super::depth::Depth;
-use super::passivity::Spring;
 use crate::guard::MAX_SLEW_N_PER_S;
 use crate::scalar::smaller;
 
@@ -60,7 +60,7 @@ impl Yielding {
             self.share = smaller(self.share + recovered, 1.0);
         }
         // Without end where nothing moves.
-        let most = SPRING_PART * MAX_SLEW_N_PER_S / (spring.n_per_mm * speed_mm_s);
+        let most = SPRING_PART * MAX_SLEW_N_PER_S / (spring.stiffness_n_per_mm * speed_mm_s);
         self.share = smaller(most, self.share);
     }
 }

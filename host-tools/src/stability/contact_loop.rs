@@ -11,7 +11,7 @@ use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_core::terrain::{FieldSize, Tile, TileDemand, TileKey, TileRequester};
-use hapterra_core::tick::{Command, Haptics};
+use hapterra_core::tick::{Board, Command, Haptics};
 
 use super::surface_work::SurfaceWork;
 use crate::phantom::{Encoder, HeldPhantom, PhantomModel, Placement, kinematics};
@@ -61,15 +61,20 @@ pub(super) fn run(felt: &Felt, mut arm: HeldPhantom, look: &mut dyn FnMut(f64, &
     let slots = std::array::from_fn(|_| {
         std::array::from_fn(|_| spare.pop().unwrap_or_else(|| unreachable!("a tile a slot")))
     });
-    let mut haptics = Haptics::<WINDOW>::new(slots, felt.rate, None);
+    // What the plant's amplifiers take comes on top.
+    let lag_s = arm.plant().model().drive[0].motor.current_lag_s;
+    let board = Board {
+        rate: felt.rate,
+        latency_s: (felt.delay_s + lag_s) as f32,
+        motors: None,
+        fault: None,
+    };
+    let mut haptics = Haptics::<WINDOW>::on_board(slots, &board);
     let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5).ok();
     if let Some(mechanism) = mechanism {
         haptics.configure(mechanism);
     }
     let scene = scene(felt);
-    // What the plant's amplifiers take comes on top.
-    let lag_s = arm.plant().model().drive[0].motor.current_lag_s;
-    haptics.acts_after((felt.delay_s + lag_s) as f32);
     for command in [Command::Scene(scene), Command::Zero([0; 3]), Command::Arm] {
         let _ = haptics.accept(command);
     }
@@ -105,7 +110,7 @@ pub(super) fn run(felt: &Felt, mut arm: HeldPhantom, look: &mut dyn FnMut(f64, &
             let Some(tile) = spare.pop() else { break };
             fill(tile, key, scene.size);
             requester.received(key);
-            spare.extend(haptics.accept(Command::Tile(tile)));
+            spare.extend(haptics.accept(Command::Tile(tile)).ok().flatten());
         }
         let weight_a = mechanism.map_or(Vec3::ZERO, |mechanism| {
             let pose = mechanism.pose(sense.counts, [0; 3]);
