@@ -95,7 +95,8 @@ pub(crate) fn main() -> Result<(), BadCalibration> {
     for index in SIZE.tiles() {
         let filled = free.fill_from(TileKey { level: 0, index }, 0, SIZE, |_, _| 0.0);
         filled.expect("base 0 is in range");
-        free = haptics.accept(Command::Tile(free)).expect("another buffer");
+        let taken = haptics.accept(Command::Tile(free));
+        free = taken.expect("taken").expect("another buffer");
     }
     let _ = haptics.accept(Command::Zero(arm.counts()));
     let _ = haptics.accept(Command::Arm);

@@ -40,7 +40,9 @@ pub(crate) fn main() -> Result<(), BadField> {
         let at = path(f32::from(tick) / f32::from(TICKS));
         let hip = GridPoint::new([0; 3], at);
         let output = contact.step(&window, &hip);
-        let force_n = ForceLaw::PREMIUM.force_n(output.displacement * CELL_MM);
+        let force_n = ForceLaw::PREMIUM
+            .spring()
+            .force_n(output.displacement * CELL_MM);
         strongest = strongest.max(force_n.length());
         if tick % 50 == 0 {
             let proxy = output.proxy.seen_from([0; 3]);

@@ -27,7 +27,7 @@
 //! assert_eq!(output.state, ContactState::Touching);
 //!
 //! // At 2 mm a cell: up, and back down the slope.
-//! let force_n = ForceLaw::PREMIUM.force_n(output.displacement * 2.0);
+//! let force_n = ForceLaw::PREMIUM.spring().force_n(output.displacement * 2.0);
 //! assert!(force_n.z > 0.9 && force_n.x < -0.2 && force_n.y.abs() < 1e-6);
 //! # Ok::<(), hapterra_core::terrain::BadField>(())
 //! ```
@@ -51,7 +51,9 @@
 //! 7. [`scene`] is what the loop is given to feel, and what it says of a tick. The
 //!    [`clutch`] lets another view in without a step in force.
 //! 8. [`tick`] is all of it as one pure function, called 1,000 to 10,000 times a
-//!    second ([`rate::TickRate`]).
+//!    second ([`rate::TickRate`]): counts, pose, HIP, feel, guard, currents. Contact and
+//!    effects are put together in `feel.rs`, which `replay.rs` uses, too; commands and scene
+//!    changes between ticks are in `haptics.rs`.
 //! 9. [`wire`] is what travels between the device and the host.
 //!
 //! [`crc`] is beside them: the check sum of frames and records.
@@ -72,11 +74,14 @@ struct Readme;
 pub mod clutch;
 pub mod contact;
 pub mod crc;
+mod feel;
 pub mod force;
 pub mod grid;
 pub mod guard;
+mod haptics;
 pub mod phantom;
 pub mod rate;
+mod replay;
 mod scalar;
 pub mod scene;
 pub mod terrain;

@@ -5,11 +5,16 @@ use std::vec::Vec;
 use super::*;
 use crate::cases::cases;
 use crate::contact::{ContactState, Rule};
-use crate::force::ForceLaw;
+use crate::force::{Controller, Damping, ForceLaw};
 use crate::grid::{Cell, MAX_CELL};
-use crate::guard::{Blockers, Mode};
+use crate::guard::{Blockers, Fault, Mode};
+use crate::phantom::Calibration;
+use crate::rate::TickRate;
+use crate::scene::Point;
 use crate::terrain::testing::buffers;
-use crate::terrain::{CoarseTile, FieldSize, POSTS, TileDemand, TileRequester, Underlay};
+use crate::terrain::{
+    CoarseTile, FieldSize, POSTS, Tile, TileDemand, TileKey, TileRequester, Underlay,
+};
 
 #[path = "tick_tests/materials.rs"]
 mod materials;
@@ -20,6 +25,15 @@ mod views;
 
 const SIZE: i32 = 640;
 
+/// The spring alone: these arms are put from place to place, which no controller takes for a hand.
+const SPRING: ForceLaw = ForceLaw {
+    damping: Damping {
+        controller: Controller::Off,
+        ..Damping::NONE
+    },
+    ..ForceLaw::PREMIUM
+};
+
 fn scene(source: Source) -> Scene {
     Scene {
         epoch: 1,
@@ -29,7 +43,7 @@ fn scene(source: Source) -> Scene {
         underlay: None,
         cell_mm: 1.0,
         home: GridPoint::new([320, 320, 5], Vec3::ZERO),
-        law: ForceLaw::PREMIUM,
+        law: SPRING,
         rule: Rule::Swept,
         source,
         hold_clock: false,
@@ -60,7 +74,7 @@ impl<'t, const D: usize> Device<'t, D> {
         let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5);
         haptics.configure(mechanism.expect("valid"));
         let scene = scene(source);
-        assert!(haptics.accept(Command::Scene(scene)).is_none());
+        assert!(matches!(haptics.accept(Command::Scene(scene)), Ok(None)));
         let mut requester = TileRequester::new();
         requester.reset(scene.level, scene.size);
         Self {
@@ -84,7 +98,7 @@ impl<'t, const D: usize> Device<'t, D> {
     }
 
     fn say(&mut self, command: Command<'t>) {
-        assert!(self.haptics.accept(command).is_none());
+        assert!(matches!(self.haptics.accept(command), Ok(None)));
     }
 
     /// Zeroes the arm in its home pose and arms it where it is.
@@ -135,7 +149,11 @@ impl<'t, const D: usize> Device<'t, D> {
             tile.set_materials(4, materials).expect("of the table");
         }
         self.requester.received(key);
-        let spent = self.haptics.accept(Command::Tile(tile)).unwrap();
+        let spent = self
+            .haptics
+            .accept(Command::Tile(tile))
+            .expect("taken")
+            .unwrap();
         assert_ne!(
             spent.key(),
             Some(key),
@@ -150,7 +168,7 @@ impl<'t, const D: usize> Device<'t, D> {
         assert!(
             self.haptics
                 .accept(Command::Point(Point { seq, hip }))
-                .is_none()
+                .is_ok_and(|spare| spare.is_none())
         );
         for _ in 0..20_000 {
             let outcome = self.tick([0; 3]);
@@ -222,7 +240,8 @@ fn a_tile_that_comes_too_late_pushes_out_none_beside_the_proxy() {
     assert_eq!(device.haptics.window.occupant(late), Some(beside));
     let tile = device.spare.pop().expect("a spare one");
     fill(tile, late);
-    let back = device.haptics.accept(Command::Tile(tile)).expect("refused");
+    let back = device.haptics.accept(Command::Tile(tile));
+    let back = back.expect("taken").expect("refused");
     assert_eq!(back.key(), Some(late));
     device.spare.push(back);
     // The same tile again is taken, and so is one that pushes out what is far away.
@@ -232,6 +251,7 @@ fn a_tile_that_comes_too_late_pushes_out_none_beside_the_proxy() {
         let back = device
             .haptics
             .accept(Command::Tile(tile))
+            .expect("taken")
             .expect("a buffer");
         assert_ne!(back.key(), Some(key));
         assert_eq!(device.haptics.window.occupant(key), Some(key));
@@ -261,7 +281,10 @@ fn an_underlay_that_comes_last_is_kept_whatever_the_proxy_touches() {
     for key in underlay.keys(0).into_iter().flatten() {
         let tile = device.spare.pop().expect("a spare one");
         tile.fill(key, 0, |_, _| 0.0).expect("in range");
-        assert!(device.haptics.accept(Command::Tile(tile)).is_none());
+        assert!(matches!(
+            device.haptics.accept(Command::Tile(tile)),
+            Ok(None)
+        ));
     }
     assert_eq!(
         device.haptics.window.occupant(TileKey::new(0, 0, 0)),
@@ -509,7 +532,7 @@ fn without_a_calibration_nothing_is_felt_and_nothing_arms() {
 }
 
 #[test]
-fn a_scene_that_makes_no_sense_is_not_taken() {
+fn a_scene_that_is_not_valid_is_refused() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::armed(&mut tiles, plane);
     let good = scene(Source::Encoders);
@@ -533,12 +556,10 @@ fn a_scene_that_makes_no_sense_is_not_taken() {
     ];
     for scene in bad {
         assert!(!scene.is_valid());
-        assert!(device.haptics.accept(Command::Scene(scene)).is_none());
+        let answer = device.haptics.accept(Command::Scene(scene));
+        assert_eq!(answer.err(), Some(RefusedScene));
     }
-    assert!(
-        device.tick([0; 3]).drive.enabled,
-        "the old scene is still in force"
-    );
+    assert_eq!(device.haptics.report().mode, Mode::Fading);
 }
 
 /// The window's size, the order in which tiles arrive, and how often the work
@@ -645,4 +666,28 @@ fn held_outputs_reach_the_drive_only_while_the_amplifiers_are_off() {
     let drive = device.tick([0; 3]).drive;
     assert!(drive.enabled);
     assert_eq!(drive.held, Vec3::ZERO);
+}
+
+#[test]
+fn a_refused_scene_lets_the_force_out() {
+    let mut tiles = buffers::<1>();
+    let mut device = Device::<1>::armed(&mut tiles, |_, _| 0.0);
+    let refused = Scene {
+        cell_mm: 0.0,
+        ..scene(Source::Encoders)
+    };
+    let answer = device.haptics.accept(Command::Scene(refused));
+    assert_eq!(answer.err(), Some(RefusedScene));
+    assert_eq!(device.haptics.source(), HipSource::None);
+    assert_eq!(device.haptics.report().mode, Mode::Fading);
+    for _ in 0..101 {
+        let _ = device.tick([0; 3]);
+    }
+    assert_eq!(device.haptics.report().mode, Mode::Disarmed);
+    device.say(Command::Arm);
+    for _ in 0..100 {
+        let _ = device.tick([0; 3]);
+    }
+    let refused = device.haptics.report().decision.refused;
+    assert!(refused.contains(Blockers::NO_SCENE), "{refused:?}");
 }

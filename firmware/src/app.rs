@@ -5,7 +5,7 @@ use hapterra_core::guard::Fault;
 use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::phantom::Mechanism;
 use hapterra_core::terrain::Tile;
-use hapterra_core::tick::Haptics;
+use hapterra_core::tick::{self, Haptics};
 use hapterra_core::wire::hello::SerialNumber;
 use hapterra_core::wire::status::{BootReport, CalibrationSource};
 
@@ -135,9 +135,13 @@ where
     let (mechanism, source) = usable(&hardware.calibration, hardware.full_scale_a);
     let is_unusable = hardware.calibration != Stored::Missing && mechanism.is_none();
     let found = is_unusable.then_some(Fault::CalibrationCorrupt);
-    let mut haptics = Haptics::new(window, C::RATE, hardware.boot.fault().or(found));
-    haptics.begin_at(hardware.motors);
-    haptics.acts_after(1e-6 * f32::from(hardware.latency_us));
+    let board_facts = tick::Board {
+        rate: C::RATE,
+        latency_s: 1e-6 * f32::from(hardware.latency_us),
+        motors: Some(hardware.motors),
+        fault: hardware.boot.fault().or(found),
+    };
+    let mut haptics = Haptics::on_board(window, &board_facts);
     if let Some(mechanism) = mechanism {
         haptics.configure(mechanism);
     }

@@ -20,6 +20,14 @@ const LAW: ForceLaw = ForceLaw {
     ..ForceLaw::PREMIUM
 };
 
+const OFF: ForceLaw = ForceLaw {
+    damping: Damping {
+        controller: Controller::Off,
+        ..Damping::NONE
+    },
+    ..ForceLaw::PREMIUM
+};
+
 /// A tick in level ground at height 0, in cells of half a millimetre.
 fn at(tick: u32, height: f32, force_n: Vec3) -> Sample {
     let place = |height| GridPoint::new([20, 20, 0], Vec3::new(0.5, 0.5, height));
@@ -68,7 +76,7 @@ fn a_force_that_pulls_is_told_but_where_it_is_on_its_way() {
 
 #[test]
 fn a_force_larger_than_anything_makes_of_the_depth_is_told() {
-    let plain = ForceLaw::PREMIUM;
+    let plain = OFF;
     let textured = ForceLaw {
         texture: Texture {
             pattern: Pattern::Grating,
@@ -135,7 +143,7 @@ fn a_contact_that_gives_is_told_with_the_controller_on() {
     assert!(told && given > 0.05, "{given}");
     // Not while something goes wrong, or without the controller.
     assert_eq!(tap(&LAW, 0.5, false), (false, 0.0));
-    assert_eq!(tap(&ForceLaw::PREMIUM, 0.0, true), (false, 0.0));
+    assert_eq!(tap(&OFF, 0.0, true), (false, 0.0));
     let shaded = ForceLaw {
         shading: Shading::Smooth,
         ..LAW
@@ -145,4 +153,112 @@ fn a_contact_that_gives_is_told_with_the_controller_on() {
     assert!(!told && given > 0.1, "{given}");
     let (told, given) = taps(&shaded, 0.99, true, 3);
     assert!(told && given > 0.344, "{given}");
+}
+
+/// A press of 2 mm at rest while the ramp lets force in, from the confirmation on, and then `more` times
+/// the force that it may have.
+fn ramped(times: f32) -> Result<(), String> {
+    let mut watch = watch(&LAW, None);
+    let mut look = |tick: u32, mode: Mode, force_n: f32, limits: Limits| {
+        let sample = Sample {
+            mode,
+            limits,
+            ..at(tick, -4.0, Vec3::Z * force_n)
+        };
+        watch.look(&sample, true)
+    };
+    look(0, Mode::Confirming, 0.0, Limits::empty())?;
+    for tick in 1..1000 {
+        let spring_n = tick as f32 / 2000.0;
+        look(tick, Mode::Ramping, spring_n * times, Limits::RAMPING)?;
+    }
+    Ok(())
+}
+
+#[test]
+fn a_ramp_is_judged_by_the_share_that_it_lets_through() {
+    assert_eq!(ramped(1.0), Ok(()));
+    // All of the damping may double it.
+    assert_eq!(ramped(1.99), Ok(()));
+    assert!(ramped(2.01).is_err());
+    assert!(ramped(-0.01).is_err());
+}
+
+/// Taps in the ramp, with more force on the way out, as the old tick gave it.
+#[test]
+fn a_tap_in_the_ramp_that_gives_is_told() {
+    let tapped = |more: f32| {
+        let mut watch = watch(&LAW, None);
+        let mut told = false;
+        for tick in 0..1500_u32 {
+            let share = tick as f32 / 2000.0;
+            let phase = tick.saturating_sub(1000) % 200;
+            let height = match phase {
+                0..100 => 1.0 - 0.04 * phase as f32,
+                _ => -3.0 + 0.04 * (phase - 100) as f32,
+            };
+            let more = if phase < 100 { 1.0 } else { 1.0 + more };
+            let spring_n = -0.25 * height.min(0.0) * share * more;
+            let sample = Sample {
+                mode: match tick {
+                    0 => Mode::Confirming,
+                    _ => Mode::Ramping,
+                },
+                ..at(tick, height, Vec3::Z * spring_n)
+            };
+            told |= watch.look(&sample, true).is_err();
+        }
+        (told, watch.ramp_ticks, watch.most_given_mj)
+    };
+    let (told, _, given) = tapped(0.0);
+    assert!(!told, "{given}");
+    let (told, ramp_ticks, _) = tapped(0.5);
+    assert!(told);
+    let _ = ramp_ticks;
+}
+
+#[test]
+fn a_force_that_grows_on_its_way_out_is_told() {
+    let told = |second_n: f32| {
+        let mut watch = watch(&LAW, None);
+        let fades = |tick, force_n| Sample {
+            mode: Mode::Fading,
+            limits: Limits::FADING,
+            ..at(tick, -4.0, Vec3::Z * force_n)
+        };
+        watch.look(&fades(0, 1.0), true).is_ok() && watch.look(&fades(1, second_n), true).is_err()
+    };
+    assert!(!told(0.99) && !told(1.0) && told(1.01));
+}
+
+#[test]
+fn a_force_with_an_open_clutch_is_told() {
+    let told = |limits| {
+        let mut watch = watch(&LAW, None);
+        let open = |tick, force_n| Sample {
+            limits,
+            ..at(tick, -4.0, force_n)
+        };
+        let _ = watch.look(&open(0, Vec3::ZERO), true);
+        watch.look(&open(1, Vec3::Z * 0.5), true).is_err()
+    };
+    assert!(told(Limits::CLUTCH_OPEN));
+    assert!(!told(Limits::CLUTCH_OPEN | Limits::SLEW_LIMITED));
+}
+
+#[test]
+fn a_tip_that_swings_is_told_and_tremor_is_not() {
+    let told = |hz: f32, amplitude_mm: f32| {
+        let mut watch = watch(&LAW, None);
+        let mut told = false;
+        for tick in 0..1000_u32 {
+            let turn = std::f32::consts::TAU * hz * tick as f32 * 1e-3;
+            let height = -4.0 + 2.0 * amplitude_mm * turn.sin();
+            let sample = at(tick, height, Vec3::Z * -0.25 * height);
+            told |= watch.look(&sample, true).is_err();
+        }
+        told
+    };
+    assert!(told(40.0, 0.4) && told(25.0, 2.0));
+    assert!(!told(11.2, 0.4) && !told(40.0, 0.14));
 }

@@ -61,6 +61,7 @@ pub(super) fn open<'t>(
         fill(grid, TileKey { level: 0, index }, spare);
         spare = haptics
             .accept(Command::Tile(spare))
+            .expect("taken")
             .expect("the field fits the window");
     }
     haptics

@@ -117,6 +117,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     let grating = (&sliding[..], with_law(arm.scene(), grated));
     let shaded = (&sliding[..], with_law(arm.scene(), smooth));
     let damping = (&sliding[..], with_law(arm.scene(), damped));
+    let controlled = |scene| with_law(scene, |law| with_controller(law, Controller::On));
     let all = with_law(with_law(rough(arm.scene()), smooth), damped);
     // Slower than half a cell a tick, at which it has faded.
     let coarse = |law| {
@@ -143,6 +144,10 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
         ..scene
     };
     let on_two = (&sliding[..], on(arm.scene(), &two), Some(&two));
+    let on_two_controlled = (&sliding[..], on(controlled(arm.scene()), &two), Some(&two));
+    let each_controlled = |name, (counts, scene): (_, Scene), state| {
+        arm.row(board, name, in_the_air, (counts, controlled(scene)), state)
+    };
     let on_each = (&fast[..], on(all, &each), Some(&each));
     let all = (&fast[..], all);
     vec![
@@ -239,7 +244,60 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
             &resting,
             ContactState::Touching,
         ),
+        each_controlled(
+            "chain, free, controller",
+            (&free[..], arm.scene()),
+            ContactState::Free,
+        ),
+        each_controlled(
+            "chain, sliding, controller",
+            (&sliding[..], arm.scene()),
+            ContactState::Touching,
+        ),
+        each_controlled(
+            "chain, sliding fast, controller",
+            (&fast[..], arm.scene()),
+            ContactState::Touching,
+        ),
+        each_controlled(
+            "chain, sliding fast, rough, controller",
+            fast_rough,
+            ContactState::Touching,
+        ),
+        each_controlled(
+            "chain, sliding, shaded, controller",
+            shaded,
+            ContactState::Touching,
+        ),
+        each_controlled(
+            "chain, sliding, grain, controller",
+            grain,
+            ContactState::Touching,
+        ),
+        arm.row_on(
+            board,
+            "chain, sliding, materials, controller",
+            in_the_air,
+            on_two_controlled,
+            ContactState::Touching,
+        ),
+        arm.settling(
+            board,
+            "chain, sliding, settling, controller",
+            in_the_air,
+            (controlled(arm.scene()), LATE),
+        ),
+        each_controlled(
+            "chain, resting, controller",
+            (&resting[..], arm.scene()),
+            ContactState::Touching,
+        ),
     ]
+}
+
+fn with_controller(mut law: ForceLaw, controller: Controller) -> ForceLaw {
+    law.damping.controller = controller;
+    law
 }
 
 impl<'g> Arm<'g> {
@@ -281,11 +339,13 @@ impl<'g> Arm<'g> {
     fn scene(&self) -> Scene {
         let [x, y, z] = self.placement.home_mm;
         let home = hapterra_bench::haptics::Hip::at([x, y, z]).grid;
-        Scene {
+        let arm = Scene {
             home,
             source: Source::Encoders,
             ..scene(self.grid)
-        }
+        };
+        // The rows that name it have it.
+        with_law(arm, |law| with_controller(law, Controller::Off))
     }
 
     /// Slides over the underlay, which is [`UNDER_MM`] off, at half a cell a tick, once in each

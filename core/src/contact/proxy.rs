@@ -208,13 +208,22 @@ impl Contact {
         self.redirect(window, self.hip, None, &mut Budget::new(0));
     }
 
-    /// How rough the surface is from the next step on, of a contact that knows friction: one
-    /// that was made with some. A proxy that was held is judged again.
+    /// How rough the surface is from the next step on. A proxy that was held is judged again. The
+    /// paper's rule knows of no friction.
     pub(crate) fn feels_friction(&mut self, friction: Friction) {
-        if let Some(rubbing) = &mut self.rubbing
-            && rubbing.takes(friction)
-        {
-            self.at_rest = false;
+        match &mut self.rubbing {
+            Some(rubbing) => {
+                if rubbing.takes(friction) {
+                    self.at_rest = false;
+                }
+            }
+            None if self.settings.rule == Rule::Swept && !friction.is_none() => {
+                self.rubbing = Rubbing::on(friction);
+                // A proxy that is held back does not follow the HIP.
+                self.settings.shortcuts = false;
+                self.at_rest = false;
+            }
+            None => {}
         }
     }
 

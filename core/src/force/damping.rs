@@ -26,16 +26,15 @@ pub struct Damping {
     pub controller: Controller,
 }
 
-/// When the [passivity controller](super::passivity) acts.
+/// Whether the passivity controller acts: it takes back the energy that a spring which is felt
+/// in ticks creates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[serde(rename_all = "lowercase")]
 pub enum Controller {
-    /// Where the stiffness is above what the device's rate and latency allow without it
-    /// ([`stiffest_n_per_mm`](super::passivity::stiffest_n_per_mm)).
+    /// Wherever a current may flow. Settings of earlier versions say `auto`, too.
     #[default]
-    Auto,
-    /// Always.
+    #[serde(alias = "auto")]
     On,
     /// Never.
     Off,
@@ -44,10 +43,10 @@ pub enum Controller {
 impl Damping {
     /// Most that a scene may ask for, N·s/m.
     pub const MOST_NS_PER_M: f32 = 20.0;
-    /// None, and a controller where the rate needs one.
+    /// None, and the controller.
     pub const NONE: Self = Self {
         ns_per_m: 0.0,
-        controller: Controller::Auto,
+        controller: Controller::On,
     };
 
     /// Whether nothing else than usual is asked for.
@@ -76,8 +75,8 @@ impl Damper {
     // A call: it is made by two, once for a scene.
     #[inline(never)]
     pub(crate) fn of(law: &ForceLaw, felt: &FeltWith) -> Option<Self> {
-        let is_controlled = felt.arm && law.is_controlled(felt.rate, felt.latency_s);
-        let controller = is_controlled.then(|| Passivity::new(law, felt));
+        let is_controlled = felt.arm && law.is_controlled();
+        let controller = is_controlled.then(|| Passivity::new(felt));
         (controller.is_some() || law.damping.ns_per_m > 0.0).then_some(Self {
             law: *law,
             controller,
@@ -85,11 +84,8 @@ impl Damper {
     }
 
     /// The surface is another one from this tick on, of the same controller.
-    pub(crate) fn feels(&mut self, law: &ForceLaw) {
+    pub(crate) const fn feels(&mut self, law: &ForceLaw) {
         self.law = *law;
-        if let Some(controller) = &mut self.controller {
-            controller.feels(law);
-        }
     }
 
     /// The energy that was created and not taken back yet, mJ, where it is watched.

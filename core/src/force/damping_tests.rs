@@ -5,6 +5,7 @@ use std::vec::Vec;
 
 use glam::Vec3;
 
+use super::super::passivity::Shares;
 use super::*;
 use crate::rate::TickRate;
 
@@ -43,7 +44,7 @@ fn damping_is_against_the_motion_and_no_more_than_the_spring() {
     for deep_mm in [0.0_f32, 1e-6, 0.01, 1.0, 6.0, 16.0, 40.0] {
         for speed_mm_s in [-900.0_f32, -50.0, -1e-3, 0.0, 50.0, 900.0] {
             let velocity_mm_s = normal * speed_mm_s + across * 300.0;
-            let force_n = damper.force_n(law.force_n(normal * deep_mm), velocity_mm_s);
+            let force_n = damper.force_n(law.spring().force_n(normal * deep_mm), velocity_mm_s);
             let spring_n = (0.5 * deep_mm).min(8.5);
             let damping_n = (-0.004 * speed_mm_s).clamp(-spring_n, spring_n);
             let wanted = normal * (spring_n + damping_n).clamp(0.0, 8.5);
@@ -56,35 +57,16 @@ fn damping_is_against_the_motion_and_no_more_than_the_spring() {
 }
 
 #[test]
-fn the_controller_acts_where_the_stiffness_is_above_what_the_rate_allows() {
+fn the_controller_acts_on_every_arm_unless_it_is_off() {
     let acts = |stiffness, hz, controller| {
         let damper = damper(&law(stiffness, 0.0, controller), hz);
         damper.is_some_and(|damper| damper.controller.is_some())
     };
-    for (stiffness, hz, by_itself) in [
-        (0.5, 1000, false),
-        (1.0, 1000, false),
-        (1.01, 1000, true),
-        (1.9, 2000, false),
-        (2.1, 2000, true),
-        (3.2, 10_000, false),
-        (3.4, 10_000, true),
-    ] {
-        assert_eq!(acts(stiffness, hz, Controller::Auto), by_itself, "{hz}");
-        assert!(acts(stiffness, hz, Controller::On));
-        assert!(!acts(stiffness, hz, Controller::Off));
+    for (stiffness, hz) in [(0.01, 10_000), (0.5, 1000), (4.0, 1000)] {
+        assert!(acts(stiffness, hz, Controller::default()), "{hz} Hz");
+        assert!(!acts(stiffness, hz, Controller::Off), "{hz} Hz");
     }
-    // A force that comes late: 0.5 N·s/m over 0.5 ms and 0.93 ms.
-    for (stiffness, latency_s, by_itself) in [
-        (1.0, 0.2e-3, false),
-        (0.34, 1.13e-3, false),
-        (0.36, 1.13e-3, true),
-    ] {
-        let law = law(stiffness, 0.0, Controller::Auto);
-        assert_eq!(law.is_controlled(TickRate::DEFAULT, latency_s), by_itself);
-    }
-    // Nothing is asked for, and nothing is there.
-    assert!(damper(&ForceLaw::PREMIUM, 1000).is_none());
+    assert_eq!(ForceLaw::PREMIUM.damping.controller, Controller::On);
     // Points have no hand.
     let points = FeltWith {
         arm: false,
@@ -92,6 +74,100 @@ fn the_controller_acts_where_the_stiffness_is_above_what_the_rate_allows() {
     };
     let points = Damper::of(&law(4.0, 0.0, Controller::On), &points);
     assert!(points.is_none());
+}
+
+/// The energy that `ramps` books on a tip at rest, and on one that leaves with the force of the
+/// whole spring, mJ.
+fn created_by(ramps: impl Fn(u16) -> Shares) -> [f32; 2] {
+    let law = law(1.0, 0.0, Controller::On);
+    let mut damper = damper(&law, 1000).expect("controlled");
+    let mut at = |tick: u16, up_mm: f32, moved_mm: f32| {
+        damper.observe(&Moment {
+            displacement_mm: Vec3::Z * -up_mm,
+            moved_mm: Vec3::Z * moved_mm,
+            velocity_mm_s: Vec3::ZERO,
+            asked_n: Vec3::Z * 2.0,
+            most_n: 8.5,
+            shares: ramps(tick),
+        });
+        damper.created_mj()
+    };
+    let at_rest = (0..100).map(|tick| at(tick, -2.0, 0.0)).last();
+    [at_rest.unwrap_or_default(), at(100, -1.5, 0.5)]
+}
+
+#[test]
+fn ramp_and_clutch_book_only_energy_of_the_motion() {
+    let share = |tick: u16| 0.01 * f32::from(tick.min(50) + 1);
+    for ramps in [
+        (|share| Shares {
+            ramp: share,
+            ..Shares::ALL
+        }) as fn(f32) -> Shares,
+        |share| Shares {
+            clutch: share,
+            ..Shares::ALL
+        },
+    ] {
+        let [at_rest, leaving] = created_by(|tick| ramps(share(tick)));
+        assert_eq!(at_rest, 0.0);
+        // 2 N acted on 0.5 mm, and 0.51 of the spring gave 0.51 · ½ (2² − 1.5²).
+        let given = 2.0 * 0.5 - 0.51 * 0.5 * (4.0 - 2.25);
+        assert!((leaving - given).abs() < 1e-5, "{leaving} mJ, not {given}");
+    }
+    // The speed limit lets a force back in, too, and no hand has asked for that.
+    let [at_rest, _] = created_by(|tick| Shares {
+        speed: share(tick),
+        ..Shares::ALL
+    });
+    assert!((at_rest - 0.5 * 0.5 * 4.0).abs() < 1e-5, "{at_rest} mJ");
+}
+
+#[test]
+fn damping_is_that_of_the_spring_which_is_let_through() {
+    // What half of a spring created takes as much damping a newton as all of one.
+    let damped = |shares: Shares| {
+        let law = law(1.0, 0.0, Controller::On);
+        let mut damper = damper(&law, 1000).expect("controlled");
+        let velocity_mm_s = Vec3::Z * 100.0;
+        let inside = shares.clutch;
+        let outside = shares.ramp * shares.speed;
+        for tick in 0..20 {
+            let deep_mm = 5.0 - 0.1 * tick as f32;
+            damper.observe(&Moment {
+                displacement_mm: Vec3::Z * deep_mm,
+                moved_mm: Vec3::Z * 0.1,
+                velocity_mm_s,
+                asked_n: Vec3::Z * (deep_mm + 0.1) * inside * outside,
+                most_n: 8.5,
+                shares,
+            });
+        }
+        let spring_n = Vec3::Z * 3.1 * inside;
+        damper.force_n(spring_n, velocity_mm_s).z / spring_n.z
+    };
+    let whole = damped(Shares::ALL);
+    assert!(whole < 0.99, "{whole}");
+    for shares in [
+        Shares {
+            ramp: 0.5,
+            ..Shares::ALL
+        },
+        Shares {
+            clutch: 0.5,
+            ..Shares::ALL
+        },
+        Shares {
+            speed: 0.5,
+            ..Shares::ALL
+        },
+    ] {
+        let part = damped(shares);
+        assert!(
+            (part - whole).abs() < 1e-3,
+            "{shares:?}: {part}, not {whole}"
+        );
+    }
 }
 
 /// How a tip taps on a level surface: along a sine, some 3 mm deep.
@@ -131,15 +207,17 @@ impl Taps {
             let displacement_mm = Vec3::Z * -tip_mm.z.min(0.0);
             let speed_mm_s = (height_mm(now_s) - height_mm(now_s - tick_s)) / tick_s;
             let velocity_mm_s = Vec3::Z * speed_mm_s as f32;
+            let moved_mm = Vec3::Z * (height_mm(now_s) - height_mm(now_s - tick_s)) as f32;
             let asked_n = Vec3::Z * forces_n.last().map_or(0.0, |last| *last as f32);
-            let mut force_n = law.force_n(displacement_mm);
+            let mut force_n = law.spring().force_n(displacement_mm);
             if let Some(damper) = &mut damper {
                 damper.observe(&Moment {
                     displacement_mm,
-                    tip_mm,
+                    moved_mm,
                     velocity_mm_s,
                     asked_n,
                     most_n: 8.5,
+                    shares: Shares::ALL,
                 });
                 force_n = damper.force_n(force_n, velocity_mm_s);
             }
@@ -259,13 +337,17 @@ fn a_surface_yields_to_a_fast_tip_and_recovers_under_one_that_rests() {
         for _ in 0..ticks {
             damper.observe(&Moment {
                 displacement_mm,
-                tip_mm: Vec3::Z * up_mm,
+                moved_mm: Vec3::ZERO,
                 velocity_mm_s: Vec3::Z * speed_mm_s,
                 asked_n: Vec3::ZERO,
                 most_n: 8.5,
+                shares: Shares::ALL,
             });
         }
-        damper.force_n(law.force_n(displacement_mm), Vec3::ZERO).z / law.force_n(Vec3::Z * -up_mm).z
+        damper
+            .force_n(law.spring().force_n(displacement_mm), Vec3::ZERO)
+            .z
+            / law.spring().force_n(Vec3::Z * -up_mm).z
     };
     // 500 N/s are half of what the guard allows.
     assert_eq!(share(-1.0, 250.0, 1), 1.0);
@@ -289,10 +371,11 @@ fn what_was_created_is_forgotten_at_rest_and_never_more_than_a_little() {
     let mut at = |up_mm: f32, asked_n: f32| {
         damper.observe(&Moment {
             displacement_mm: Vec3::Z * (5.0 - up_mm),
-            tip_mm: Vec3::Z * up_mm,
+            moved_mm: Vec3::ZERO,
             velocity_mm_s: Vec3::ZERO,
             asked_n: Vec3::Z * asked_n,
             most_n: 8.5,
+            shares: Shares::ALL,
         });
         damper.created_mj()
     };

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::contact::ContactSettings;
-use crate::force::{Controller, Damping, Moment, Shading};
+use crate::force::{Controller, Damping, Moment, Shading, Shares};
 use crate::grid::GridPoint;
 use crate::terrain::{FieldSize, FieldStorage};
 
@@ -27,13 +27,14 @@ fn felt() -> FeltWith {
 /// At one depth the force does so much work.
 fn created(effects: &mut Effects, created_mj: f32) {
     if let Some(damper) = &mut effects.damper {
-        for tip_mm in [Vec3::ZERO, Vec3::Z] {
+        for moved_mm in [Vec3::ZERO, Vec3::Z] {
             damper.observe(&Moment {
                 displacement_mm: Vec3::Z,
-                tip_mm,
+                moved_mm,
                 velocity_mm_s: Vec3::ZERO,
                 asked_n: Vec3::Z * created_mj,
                 most_n: 8.5,
+                shares: Shares::ALL,
             });
         }
     }
@@ -135,18 +136,18 @@ fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] 
             .map(|effects| effects.displacement(&window, &contact, &table));
         if let Some(damper) = &mut controlled.damper {
             let tip_mm = Vec3::new(x, 0.4, height(x) + above);
-            let velocity_mm_s = last.map_or(Vec3::ZERO, |(before, _): (Vec3, _)| {
-                (tip_mm - before) * TickRate::DEFAULT.hz() as f32
-            });
+            let moved_mm = last.map_or(Vec3::ZERO, |(before, _): (Vec3, _)| tip_mm - before);
+            let velocity_mm_s = moved_mm * TickRate::DEFAULT.hz() as f32;
             damper.observe(&Moment {
                 displacement_mm: felt[0],
-                tip_mm,
+                moved_mm,
                 velocity_mm_s,
                 asked_n,
                 most_n: 8.5,
+                shares: Shares::ALL,
             });
-            asked_n = damper.force_n(law.force_n(felt[0]), velocity_mm_s);
-            let forces = felt.map(|displacement| law.force_n(displacement));
+            asked_n = damper.force_n(law.spring().force_n(felt[0]), velocity_mm_s);
+            let forces = felt.map(|displacement| law.spring().force_n(displacement));
             if let Some((_, before)) = last.replace((tip_mm, forces))
                 && tick > down
             {
@@ -192,7 +193,10 @@ fn a_slide_over_facets_is_as_smooth_with_the_controller_as_without() {
 #[test]
 fn without_the_controller_nothing_is_known_of_energy_and_all_of_it_is_turned() {
     let uncontrolled = ForceLaw {
-        damping: Damping::NONE,
+        damping: Damping {
+            controller: Controller::Off,
+            ..Damping::NONE
+        },
         ..LAW
     };
     let [_, shaded] = beside_a_ridge(&LAW, 0.0);

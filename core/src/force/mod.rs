@@ -5,7 +5,7 @@ mod depth;
 mod effects;
 mod in_force;
 mod material;
-pub mod passivity;
+mod passivity;
 mod relief;
 mod shading;
 mod texture;
@@ -16,30 +16,18 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::Friction;
-use crate::rate::TickRate;
 use crate::scalar::smaller;
 pub(crate) use damping::Damper;
 pub use damping::{Controller, Damping};
 pub(crate) use effects::{Effects, FeltWith};
 pub use material::{MATERIAL_CHANGE_S, Material, MaterialTable};
-pub(crate) use passivity::Moment;
+pub(crate) use passivity::{Moment, Shares};
 pub use shading::{Shader, Shading};
 pub use texture::{Pattern, Texture};
 pub use texturer::Texturer;
 
-/// The spring between the haptic interface point (HIP) and the proxy (paper
-/// §4.3.4), the limit of what it may ask for, and what holds the proxy back. Immutable while a tick runs.
-///
-/// ```
-/// use hapterra_core::{Vec3, force::ForceLaw};
-///
-/// let law = ForceLaw { stiffness_n_per_mm: 0.5, max_force_n: 8.5, ..ForceLaw::PREMIUM };
-/// // The proxy is 4 mm above the HIP: half a newton for each.
-/// assert_eq!(law.force_n(Vec3::Z * 4.0), Vec3::Z * 2.0);
-/// // Farther away the limit is kept, and so is the direction.
-/// let most = law.force_n(Vec3::new(300.0, -400.0, 0.0));
-/// assert!((most - Vec3::new(5.1, -6.8, 0.0)).length() < 1e-5);
-/// ```
+/// The parameters of a surface: its spring, and every effect. Immutable while a tick runs. A force
+/// is made of all of it by the tick; of the spring alone by [`Self::spring`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ForceLaw {
@@ -80,6 +68,44 @@ impl ForceLaw {
             && self.texture.is_valid()
     }
 
+    /// The spring, without friction, damping, shading and texture.
+    #[must_use]
+    pub const fn spring(&self) -> Spring {
+        Spring {
+            stiffness_n_per_mm: self.stiffness_n_per_mm,
+            max_force_n: self.max_force_n,
+        }
+    }
+
+    /// Returns true if the passivity controller acts on an arm.
+    #[must_use]
+    pub const fn is_controlled(&self) -> bool {
+        matches!(self.damping.controller, Controller::On)
+    }
+}
+
+/// The spring between the haptic interface point (HIP) and the proxy (paper
+/// §4.3.4), and the limit of what it may ask for.
+///
+/// ```
+/// use hapterra_core::{Vec3, force::Spring};
+///
+/// let spring = Spring { stiffness_n_per_mm: 0.5, max_force_n: 8.5 };
+/// // The proxy is 4 mm above the HIP: half a newton for each.
+/// assert_eq!(spring.force_n(Vec3::Z * 4.0), Vec3::Z * 2.0);
+/// // Farther away the limit is kept, and so is the direction.
+/// let most = spring.force_n(Vec3::new(300.0, -400.0, 0.0));
+/// assert!((most - Vec3::new(5.1, -6.8, 0.0)).length() < 1e-5);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spring {
+    /// Newtons for a millimetre between the HIP and the proxy.
+    pub stiffness_n_per_mm: f32,
+    /// Largest force in newtons; the direction is kept.
+    pub max_force_n: f32,
+}
+
+impl Spring {
     /// Force in newtons for a proxy `displacement_mm` away from the HIP.
     ///
     /// Along `displacement_mm`, proportional to its length, clamped as a vector.
@@ -89,22 +115,10 @@ impl ForceLaw {
         clamp_length(displacement_mm * self.stiffness_n_per_mm, self.max_force_n)
     }
 
-    /// Whether the passivity controller acts on an arm at a rate, where a force acts so long after
-    /// its tick began, s.
-    #[must_use]
-    pub fn is_controlled(&self, rate: TickRate, latency_s: f32) -> bool {
-        let stiffest = passivity::stiffest_n_per_mm(rate, latency_s);
-        match self.damping.controller {
-            Controller::Auto => self.stiffness_n_per_mm > stiffest,
-            Controller::On => true,
-            Controller::Off => false,
-        }
-    }
-
-    /// What the spring holds, mJ, for a HIP so deep, where it may make up to `most_n`.
-    fn stored_mj(&self, depth_mm: f32, most_n: f32) -> f32 {
+    /// The energy that it holds at a depth, mJ.
+    pub(crate) fn stored_mj(&self, depth_mm: f32) -> f32 {
         let stretched_n = depth_mm * self.stiffness_n_per_mm;
-        let at_limit_n = smaller(stretched_n, smaller(self.max_force_n, most_n));
+        let at_limit_n = smaller(stretched_n, self.max_force_n);
         // Beyond the limit the force stays as it is: F (d - d_m) more than at the limit.
         at_limit_n * (stretched_n - 0.5 * at_limit_n) / self.stiffness_n_per_mm
     }
@@ -147,7 +161,7 @@ mod tests {
 
     #[test]
     fn proportional_below_the_limit() {
-        let f = ForceLaw::PREMIUM.force_n(Vec3::new(0.0, 0.0, 4.0));
+        let f = ForceLaw::PREMIUM.spring().force_n(Vec3::new(0.0, 0.0, 4.0));
         assert_eq!(f, Vec3::new(0.0, 0.0, 2.0));
     }
 
@@ -178,14 +192,16 @@ mod tests {
             Vec3::splat(3e38),
             Vec3::new(18.0, 0.0, 0.1),
         ] {
-            let f = ForceLaw::PREMIUM.force_n(displacement);
+            let f = ForceLaw::PREMIUM.spring().force_n(displacement);
             assert!(
                 f.length() <= 8.5 && f.length() > 8.499_99,
                 "{displacement} -> {f}"
             );
             assert!(f.x.signum() == displacement.x.signum());
         }
-        let f = ForceLaw::PREMIUM.force_n(Vec3::new(300.0, -400.0, 0.0));
+        let f = ForceLaw::PREMIUM
+            .spring()
+            .force_n(Vec3::new(300.0, -400.0, 0.0));
         assert!((f - Vec3::new(5.1, -6.8, 0.0)).length() < 1e-5);
     }
 
@@ -216,7 +232,7 @@ mod tests {
     fn not_a_number_gives_no_force() {
         for bad in [f32::NAN, f32::INFINITY] {
             assert_eq!(
-                ForceLaw::PREMIUM.force_n(Vec3::new(0.0, bad, 1.0)),
+                ForceLaw::PREMIUM.spring().force_n(Vec3::new(0.0, bad, 1.0)),
                 Vec3::ZERO
             );
         }

@@ -15,59 +15,47 @@ use glam::Vec3;
 
 use super::depth::Depth;
 use super::yielding::Yielding;
-use super::{FeltWith, ForceLaw};
-use crate::rate::TickRate;
+use super::{FeltWith, ForceLaw, Spring};
 use crate::scalar::{larger, smaller};
 
-/// Least damping of a hand that holds the tip, N·s/mm.
-const HAND_NS_PER_MM: f32 = 0.5e-3;
-/// What the friction of the arm takes up of the energy that encoder counts create, as
-/// a stiffness, N/mm: 2 f_c / Δ (Abbott and Okamura 2005) of a Phantom Premium 1.5.
-const FRICTION_N_PER_MM: f32 = 3.3;
-/// Latency of a board with converters, s: so much of it is borne by the arm's friction in the
-/// map of docs/stability.md.
-const CONVERTERS_S: f32 = 0.2e-3;
 /// More than this is forgotten, mJ.
 pub(super) const MOST_MJ: f32 = 2.0;
 /// Most damping, as ticks of the stiffness, besides the latency. What the velocity is off by,
 /// some 0.1 of a count a tick, makes a force of so many times the spring's for 0.1 of a count.
 const MOST_TICKS: f32 = 2.0;
+/// Below this share of the force hardly any leaves the guard, and damping is not scaled up to it.
+const LEAST_SHARE: f32 = 1e-4;
 /// Forces kept: those on their way, the one that acts and the one before it. A power of two.
 const KEPT: usize = 16;
 /// Most ticks that a force may come late: what is later is taken to come then.
 const MOST_LATE: usize = KEPT - 2;
 
-/// Stiffness up to which a surface needs no controller at a rate, N/mm: b / (T / 2 + L) for the hand
-/// that damps least, and no more than the arm's friction allows. L is what the latency is longer than
-/// that of a board with converters; without it, it is the 2 b / T of Colgate and Schenkel (1997).
-#[must_use]
-pub fn stiffest_n_per_mm(rate: TickRate, latency_s: f32) -> f32 {
-    let late_s = (latency_s - CONVERTERS_S).max(0.0);
-    let by_damping = HAND_NS_PER_MM / (0.5 * rate.tick_s() + late_s);
-    by_damping.min(FRICTION_N_PER_MM)
-}
-
 /// The observer's book, and the controller.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Passivity {
-    stiffness_n_per_mm: f32,
     tick_s: f32,
     /// From the beginning of a tick until its force acts, s: so many ticks, and a part of one.
     latency_s: f32,
     late: (usize, f32),
     yielding: Yielding,
     created_mj: f32,
-    /// The same when this tick's force has acted for a tick, all but the work of that force.
+    /// The same when this tick's force has acted for a tick, all but the work of that force, for
+    /// a force before the guard's share.
     coming_mj: f32,
+    /// The spring before the guard's share, N/mm; the clutch's share is in it.
+    stiffness_n_per_mm: f32,
     before: Option<Before>,
     asked: Asked,
 }
 
-/// What the tick before left.
+/// The state of the tick before.
 #[derive(Clone, Copy, Debug)]
 struct Before {
-    tip_mm: Vec3,
-    stored_mj: f32,
+    depth_mm: f32,
+    stiffness_n_per_mm: f32,
+    /// Shares of the softening and of the speed limit.
+    softening: f32,
+    speed: f32,
 }
 
 /// The forces that the guard let through, N.
@@ -94,35 +82,57 @@ impl Asked {
     }
 }
 
-/// What a tick begins with.
+/// The inputs of a tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moment {
     /// From the HIP to the proxy.
     pub(crate) displacement_mm: Vec3,
-    /// Where the tip is, in a frame that stays.
-    pub(crate) tip_mm: Vec3,
-    /// How fast the tip moves.
+    /// The tip's displacement over the terrain since the tick before.
+    pub(crate) moved_mm: Vec3,
+    /// Velocity of the tip.
     pub(crate) velocity_mm_s: Vec3,
     /// The force that the guard let through in the tick before.
     pub(crate) asked_n: Vec3,
-    /// The most that it lets through.
+    /// The largest force that the guard lets through.
     pub(crate) most_n: f32,
+    /// Shares of the spring's force in this tick.
+    pub(crate) shares: Shares,
+}
+
+/// Shares of a force that clutch and guard let through, each above 0 and at most 1.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shares {
+    /// The clutch's, before the guard's clamp.
+    pub(crate) clutch: f32,
+    /// The guard's after arming, after its clamp.
+    pub(crate) ramp: f32,
+    /// The guard's for a fast tip, after its clamp.
+    pub(crate) speed: f32,
+}
+
+impl Shares {
+    /// All of the force.
+    pub(crate) const ALL: Self = Self {
+        clutch: 1.0,
+        ramp: 1.0,
+        speed: 1.0,
+    };
 }
 
 impl Passivity {
-    pub(super) fn new(law: &ForceLaw, felt: &FeltWith) -> Self {
+    pub(super) fn new(felt: &FeltWith) -> Self {
         let tick_s = felt.rate.tick_s();
         let latency_s = felt.latency_s.max(0.0).min(MOST_LATE as f32 * tick_s);
         let late = latency_s / tick_s;
         let whole = late as usize;
         Self {
-            stiffness_n_per_mm: law.stiffness_n_per_mm,
             tick_s,
             latency_s,
             late: (whole, late - whole as f32),
             yielding: Yielding::NONE,
             created_mj: 0.0,
             coming_mj: 0.0,
+            stiffness_n_per_mm: 0.0,
             before: None,
             asked: Asked::NONE,
         }
@@ -131,12 +141,6 @@ impl Passivity {
     /// The share of the spring's force that is felt.
     pub(super) const fn share(&self) -> f32 {
         self.yielding.share()
-    }
-
-    /// The surface is another one from this tick on. What a spring that becomes stiffer holds
-    /// more is energy that the ticks create.
-    pub(super) const fn feels(&mut self, law: &ForceLaw) {
-        self.stiffness_n_per_mm = law.stiffness_n_per_mm;
     }
 
     pub(super) const fn created_mj(&self) -> f32 {
@@ -151,32 +155,58 @@ impl Passivity {
     /// Books what happened since the tick before, and what is going to happen until this tick's
     /// force has acted for a tick, all but the work of that force. Energy that was lost gives no
     /// credit.
+    ///
+    /// The spring is that of the force which leaves the guard: the law's, times all shares. A
+    /// spring that becomes stiffer puts energy in. Ramp and clutch are meant to do so, each once,
+    /// and that energy is not booked; everything else is.
     pub(super) fn observe(&mut self, law: &ForceLaw, now: &Moment) {
         let depth = Depth::of(now.displacement_mm, now.velocity_mm_s);
-        self.yielding.observe(law, &depth, now.most_n, self.tick_s);
+        let Shares {
+            clutch,
+            ramp,
+            speed,
+        } = now.shares;
+        let stiffness_n_per_mm = clutch * law.stiffness_n_per_mm;
+        let max_force_n = smaller(clutch * law.max_force_n, now.most_n);
+        let ramped = Spring {
+            stiffness_n_per_mm: ramp * stiffness_n_per_mm,
+            max_force_n: ramp * max_force_n,
+        };
+        self.yielding.observe(&ramped, &depth, self.tick_s);
         self.asked.add(now.asked_n);
         let (whole, part) = self.late;
         let (acting_n, before_n) = (self.asked.ago(whole), self.asked.ago(whole + 1));
-        let share = self.yielding.share();
-        // Where less of the force is felt, it gets to its limit later.
-        let most_n = now.most_n / share;
-        let stored_mj = share * law.stored_mj(depth.mm, most_n);
+        let softening = self.yielding.share();
+        let spring = Spring {
+            stiffness_n_per_mm: softening * stiffness_n_per_mm,
+            max_force_n,
+        };
+        let stored_mj = ramp * speed * spring.stored_mj(depth.mm);
         if let Some(before) = self.before {
+            let spring = Spring {
+                stiffness_n_per_mm: before.softening * clutch * before.stiffness_n_per_mm,
+                max_force_n,
+            };
+            let before_mj = ramp * before.speed * spring.stored_mj(before.depth_mm);
             let acted_n = acting_n + (before_n - acting_n) * part;
-            let given_mj = acted_n.dot(now.tip_mm - before.tip_mm);
-            self.created_mj = within(self.created_mj + given_mj + stored_mj - before.stored_mj);
+            let given_mj = acted_n.dot(now.moved_mm);
+            self.created_mj = within(self.created_mj + given_mj + stored_mj - before_mj);
         }
         self.before = Some(Before {
-            tip_mm: now.tip_mm,
-            stored_mj,
+            depth_mm: depth.mm,
+            stiffness_n_per_mm: law.stiffness_n_per_mm,
+            softening,
+            speed,
         });
         // At most `MOST_LATE` ticks.
         let on_their_way = (0..whole).map(|ticks| self.asked.ago(ticks));
         let sum_n = on_their_way.fold(acting_n * part, |sum_n, asked_n| sum_n + asked_n);
         let gives_mj = sum_n.dot(now.velocity_mm_s) * self.tick_s;
         let depth_mm = depth.after_mm(self.latency_s + self.tick_s);
-        let holds_mj = share * law.stored_mj(depth_mm, most_n);
-        self.coming_mj = self.created_mj + gives_mj + holds_mj - stored_mj;
+        let holds_mj = ramp * speed * spring.stored_mj(depth_mm);
+        let coming_mj = self.created_mj + gives_mj + holds_mj - stored_mj;
+        self.coming_mj = coming_mj / larger(ramp * speed, LEAST_SHARE);
+        self.stiffness_n_per_mm = stiffness_n_per_mm;
     }
 
     /// The damping that takes back what was created, and what a spring's force will have created

@@ -353,7 +353,7 @@ fn what_no_number_is_gives_none() {
         ] {
             let at = GridPoint::new([i32::MAX; 3], Vec3::splat(bad));
             let felt = texturer.add(Vec3::new(0.0, bad, 1.0), &at);
-            let force = crate::force::ForceLaw::PREMIUM.force_n(felt);
+            let force = crate::force::ForceLaw::PREMIUM.spring().force_n(felt);
             assert!(force.is_finite(), "{bad}: {force}");
         }
         // And is forgotten.

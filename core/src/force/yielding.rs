@@ -7,7 +7,7 @@
 //! felt as softer from the first touch on asks for no more than the guard allows, and gives
 //! back what it got.
 
-use super::ForceLaw;
+use super::Spring;
 use super::depth::Depth;
 use crate::guard::MAX_SLEW_N_PER_S;
 use crate::scalar::smaller;
@@ -42,10 +42,10 @@ impl Yielding {
         self.share
     }
 
-    /// Takes the depth of a tick of `tick_s`, at which the guard lets `most_n` through: yields to
-    /// a motion that is too fast for the whole stiffness, and recovers in the air at once, and
-    /// under a tip that rests slowly.
-    pub(super) fn observe(&mut self, law: &ForceLaw, depth: &Depth, most_n: f32, tick_s: f32) {
+    /// Takes the depth of a tick of `tick_s` in a spring after the guard's ramp: softens where the
+    /// tip moves too fast for all of its stiffness, and recovers at once in the air, slowly under
+    /// a tip that rests.
+    pub(super) fn observe(&mut self, spring: &Spring, depth: &Depth, tick_s: f32) {
         if depth.mm <= 0.0 {
             return *self = Self::NONE;
         }
@@ -56,11 +56,11 @@ impl Yielding {
             self.rested_s += tick_s;
         }
         if self.share < 1.0 && self.rested_s >= RESTED_S {
-            let recovered = RECOVERS_MJ_PER_S * tick_s / law.stored_mj(depth.mm, most_n);
+            let recovered = RECOVERS_MJ_PER_S * tick_s / spring.stored_mj(depth.mm);
             self.share = smaller(self.share + recovered, 1.0);
         }
         // Without end where nothing moves.
-        let most = SPRING_PART * MAX_SLEW_N_PER_S / (law.stiffness_n_per_mm * speed_mm_s);
+        let most = SPRING_PART * MAX_SLEW_N_PER_S / (spring.stiffness_n_per_mm * speed_mm_s);
         self.share = smaller(most, self.share);
     }
 }

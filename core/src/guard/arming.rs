@@ -154,13 +154,24 @@ impl Arming {
         }
     }
 
+    /// The gain of this tick before [`Arming::drive`] moves it there; none while no force
+    /// follows what is asked for.
+    pub(super) fn next_gain(&self) -> Option<f32> {
+        match self.mode {
+            Mode::Ramping => {
+                Some(self.gain + 1.0 / self.rate.ticks(RAMP_MS) as f32).map(|gain| gain.min(1.0))
+            }
+            Mode::Armed => Some(self.gain),
+            _ => None,
+        }
+    }
+
     /// With the amplifiers on: moves the gain by a tick.
     pub(super) fn drive(&mut self) {
         match self.mode {
             Mode::Ramping => {
-                self.gain += 1.0 / self.rate.ticks(RAMP_MS) as f32;
+                self.gain = self.next_gain().unwrap_or_default();
                 if self.gain >= 1.0 {
-                    self.gain = 1.0;
                     self.enter(Mode::Armed);
                 }
             }

@@ -30,7 +30,7 @@ impl<'t> Bench<'t> {
     }
 
     fn say(&mut self, command: Command<'t>) {
-        assert!(self.haptics.accept(command).is_none());
+        assert!(matches!(self.haptics.accept(command), Ok(None)));
     }
 
     fn report(&self) -> Report {
@@ -266,7 +266,7 @@ fn a_scene_or_new_settings_end_a_jog() {
         (0..200).for_each(|_| _ = bench.tick(held));
         assert_eq!(bench.report().mode, Mode::Disarmed);
         assert!(bench.drives[101..].iter().all(|drive| !drive.enabled));
-        assert!(bench.haptics.accept(Command::Arm).is_none());
+        assert!(matches!(bench.haptics.accept(Command::Arm), Ok(None)));
         (0..100).for_each(|_| _ = bench.tick(held));
         assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
     }

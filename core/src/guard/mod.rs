@@ -266,6 +266,15 @@ impl Guard {
         self.max_force_n
     }
 
+    /// Shares of the force that [`Guard::limit_force`] is about to let through: that of a ramp,
+    /// and that of the speed limit. None while no force follows what is asked for: with the
+    /// amplifiers off, and while the last force goes out.
+    #[must_use]
+    pub fn shares(&self) -> Option<[f32; 2]> {
+        let ramp = self.arming.next_gain()?;
+        Some([ramp, self.speed.share])
+    }
+
     /// Has the tick's report say this, too.
     pub(crate) fn says(&mut self, limits: Limits) {
         self.limits |= limits;

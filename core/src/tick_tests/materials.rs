@@ -53,7 +53,7 @@ impl<'t> Ground<'t> {
         scene.law.stiffness_n_per_mm = table.materials()[0].stiffness_n_per_mm;
         scene.law.shading = shading;
         haptics.take_materials(&table);
-        assert!(haptics.accept(Command::Scene(scene)).is_none());
+        assert!(matches!(haptics.accept(Command::Scene(scene)), Ok(None)));
         assert!(haptics.scene.is_some(), "taken");
         let mut ground = Self {
             haptics,
@@ -75,7 +75,8 @@ impl<'t> Ground<'t> {
         let samples = (0..POSTS * POSTS).map(|i| col * 32 + (i % POSTS) as i32);
         let materials = samples.map(|x| u8::from(x >= border));
         tile.set_materials(2, materials).expect("of the table");
-        self.spare.extend(self.haptics.accept(Command::Tile(tile)));
+        self.spare
+            .extend(self.haptics.accept(Command::Tile(tile)).expect("taken"));
     }
 
     /// What is felt at a place, where a missing tile comes `late` ticks after it is missed.
@@ -86,7 +87,7 @@ impl<'t> Ground<'t> {
         assert!(
             self.haptics
                 .accept(Command::Point(Point { seq, hip }))
-                .is_none()
+                .is_ok_and(|spare| spare.is_none())
         );
         let mut missed = 0;
         for _ in 0..200 {
@@ -399,7 +400,7 @@ fn small_windows_that_wait_for_tiles_give_the_bits_of_a_large_one() {
 }
 
 #[test]
-fn a_scene_whose_table_is_not_here_is_not_taken() {
+fn a_scene_whose_table_is_not_here_is_refused() {
     let mut tiles = tiles();
     let mut ground = Ground::of(&mut tiles, &[SOFT, HARD], 20, Shading::None);
     let before = ground.haptics.scene;
@@ -409,10 +410,16 @@ fn a_scene_whose_table_is_not_here_is_not_taken() {
         materials: Some(other.check_sum()),
         ..before.expect("taken")
     };
-    assert!(ground.haptics.accept(Command::Scene(scene)).is_none());
-    assert_eq!(ground.haptics.scene, before);
+    assert_eq!(
+        ground.haptics.accept(Command::Scene(scene)).err(),
+        Some(RefusedScene)
+    );
+    assert_eq!(ground.haptics.scene, None);
     ground.haptics.take_materials(&other);
-    assert!(ground.haptics.accept(Command::Scene(scene)).is_none());
+    assert!(matches!(
+        ground.haptics.accept(Command::Scene(scene)),
+        Ok(None)
+    ));
     assert_eq!(ground.haptics.scene, Some(scene));
     // A table that nothing can be done with is none, whatever its sum.
     for broken in [
@@ -436,8 +443,11 @@ fn a_scene_whose_table_is_not_here_is_not_taken() {
             materials: Some(broken.check_sum()),
             ..scene
         };
-        assert!(ground.haptics.accept(Command::Scene(scene)).is_none());
-        assert_eq!(ground.haptics.scene.map(|s| s.epoch), Some(9));
+        assert_eq!(
+            ground.haptics.accept(Command::Scene(scene)).err(),
+            Some(RefusedScene)
+        );
+        assert_eq!(ground.haptics.scene, None);
     }
     assert!(MaterialTable::new(&[]).is_none() && MaterialTable::new(&[SOFT; 17]).is_none());
 }

@@ -37,15 +37,18 @@ fn felt(late: u32) -> (Vec<Vec3>, u32) {
         wavelength_mm: 1.0,
         ..Texture::NONE
     };
-    assert!(haptics.accept(Command::Scene(scene)).is_none());
-    assert!(haptics.accept(Command::Tile(west)).is_some());
+    assert!(matches!(haptics.accept(Command::Scene(scene)), Ok(None)));
+    assert!(matches!(haptics.accept(Command::Tile(west)), Ok(Some(_))));
     let mut east = Some(east);
     let (mut forces, mut ticks, mut waited) = (Vec::new(), 0, 0);
     for seq in 0..REST + 25 {
         let x = 27.05 + 0.2 * seq.saturating_sub(REST) as f32;
         let height = if seq == 0 { 1.0 } else { -0.5 };
         let hip = GridPoint::new([0, 10, 0], Vec3::new(x, 0.5, height));
-        assert!(haptics.accept(Command::Point(Point { seq, hip })).is_none());
+        assert!(matches!(
+            haptics.accept(Command::Point(Point { seq, hip })),
+            Ok(None)
+        ));
         loop {
             ticks += 1;
             let outcome = haptics.tick(&Sense::default(), true);
@@ -57,7 +60,7 @@ fn felt(late: u32) -> (Vec<Vec3>, u32) {
             if waited > late
                 && let Some(east) = east.take()
             {
-                assert!(haptics.accept(Command::Tile(east)).is_some());
+                assert!(matches!(haptics.accept(Command::Tile(east)), Ok(Some(_))));
             }
             assert!(ticks < 300, "no answer for {hip:?}");
         }

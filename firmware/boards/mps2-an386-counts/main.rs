@@ -151,7 +151,7 @@ fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &m
             ToDevice::MaterialTile(tile) => {
                 let buffer = spare.take().expect("every tile gives a buffer back");
                 fill_material_tile(buffer, &tile, count);
-                spare = haptics.accept(Command::Tile(buffer));
+                spare = haptics.accept(Command::Tile(buffer)).ok().flatten();
             }
             ToDevice::Point(point) => {
                 let _ = haptics.accept(Command::Point(black_box(point)));
@@ -268,7 +268,7 @@ fn take_tiles(
             }
             _ => panic!("a replay of counts has tiles and points only"),
         }
-        *spare = haptics.accept(Command::Tile(buffer));
+        *spare = haptics.accept(Command::Tile(buffer)).ok().flatten();
     }
     None
 }

@@ -14,8 +14,8 @@ use core::mem;
 use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::guard::{Drive, Fault, Sense};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Scene, Source};
-use hapterra_core::tick::{Command, Haptics, Outcome};
+use hapterra_core::scene::Scene;
+use hapterra_core::tick::{Command, Haptics, HipSource, Outcome};
 
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, TickClock};
 use crate::monitor::Part;
@@ -28,18 +28,6 @@ use timing::Timing;
 
 /// The most commands taken in one tick; the rest wait for the next.
 const COMMANDS_PER_TICK: usize = 4;
-
-/// Where the HIP's position comes from at the moment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum HipSource {
-    /// There is no scene: nothing is rendered and nothing recorded. The guard
-    /// still looks at the arm.
-    None,
-    /// The encoders.
-    Encoders,
-    /// Points over the link; whether one is being rendered.
-    Points { pending: bool },
-}
 
 /// The amplifiers in either of their states.
 enum Power<A: Amplifiers> {
@@ -57,7 +45,6 @@ pub struct HapticLoop<'t, E, A: Amplifiers, C, const D: usize> {
     power: Option<Power<A>>,
     clock: C,
     timing: Timing,
-    hip_source: HipSource,
     clutch_input: ClutchInput,
     /// The last tick's outcome, kept in its place so that it need not be copied.
     outcome: Outcome,
@@ -88,7 +75,6 @@ where
             power: Some(Power::Off(amplifiers)),
             clock,
             timing: Timing::new::<C>(),
-            hip_source: HipSource::None,
             clutch_input: ClutchInput::new(C::RATE),
             outcome: Outcome::default(),
             liveness: Liveness::new(C::RATE),
@@ -151,31 +137,24 @@ where
             let Some(command) = self.ends.commands.dequeue() else {
                 return;
             };
-            match &command {
-                Command::Scene(scene) => {
-                    take_materials(&mut self.haptics, &mut self.ends, scene);
-                    self.hip_source = match scene.source {
-                        Source::Encoders => HipSource::Encoders,
-                        Source::Points => HipSource::Points { pending: false },
-                    };
-                }
-                Command::DropScene | Command::Jog(_) => self.hip_source = HipSource::None,
-                Command::Point(_) => self.hip_source = HipSource::Points { pending: true },
-                _ => {}
+            if let Command::Scene(scene) = &command {
+                take_materials(&mut self.haptics, &mut self.ends, scene);
             }
             self.give_to_haptics(command);
         }
     }
 
     fn give_to_haptics(&mut self, command: Command<'t>) {
-        if let Some(tile) = self.haptics.accept(command) {
+        // A refused scene is none: what is rendered follows from the scene in force alone, and the
+        // guard says that there is none.
+        if let Ok(Some(tile)) = self.haptics.accept(command) {
             // The queue has room for every buffer there is.
             let _ = self.ends.spent.enqueue(tile);
         }
     }
 
     fn render(&mut self, watchdog_live: bool) -> Drive {
-        match self.hip_source {
+        match self.haptics.source() {
             HipSource::Encoders | HipSource::None => self.render_arm(watchdog_live),
             HipSource::Points { pending: true } => self.render_point(watchdog_live),
             HipSource::Points { pending: false } => self.follow_arm(watchdog_live),
@@ -198,7 +177,7 @@ where
         self.run_tick(&sense, watchdog_live);
         let drive = self.outcome.drive;
         self.drive(&drive);
-        let is_rendered = self.hip_source == HipSource::Encoders;
+        let is_rendered = self.haptics.source() == HipSource::Encoders;
         if is_rendered && self.reporter.sends_sample(&self.outcome.sample) {
             let record = self.record(None);
             if self.ends.records.enqueue(record).is_err() {
@@ -219,7 +198,6 @@ where
         self.report(&sense, &drive);
         let record = self.record(self.outcome.answers);
         if record.answers.is_some() {
-            self.hip_source = HipSource::Points { pending: false };
             self.answer(record);
         } else {
             // It only tells the link what holds the point up; the next one will, too.

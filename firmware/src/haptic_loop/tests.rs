@@ -7,10 +7,10 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::{Cell, GridPoint};
-use hapterra_core::guard::Limits;
+use hapterra_core::guard::{Blockers, Limits};
 use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::{Point, Scene};
+use hapterra_core::scene::{Point, Scene, Source};
 use hapterra_core::terrain::{FieldSize, Tile, TileKey};
 
 use super::*;
@@ -224,4 +224,28 @@ fn the_clutch_input_holds_the_clutch_once_it_does_not_bounce() {
     assert_eq!(limits(30, true), open);
     assert_eq!(limits(19, false), open);
     assert_eq!(limits(2, false), Limits::CLUTCH_MOVES);
+}
+
+#[test]
+fn a_refused_scene_leaves_nothing_to_render() {
+    for source in [Source::Encoders, Source::Points] {
+        let (mut haptic_loop, mut link_ends) = looped(source);
+        haptic_loop.tick();
+        assert_ne!(haptic_loop.haptics.source(), HipSource::None);
+        drain(&mut link_ends);
+        let refused = Scene {
+            cell_mm: f32::NAN,
+            ..scene(Source::Encoders)
+        };
+        assert!(link_ends.commands.enqueue(Command::Scene(refused)).is_ok());
+        assert!(link_ends.commands.enqueue(Command::Arm).is_ok());
+        for _ in 0..100 {
+            assert_eq!(haptic_loop.tick(), Drive::default());
+        }
+        // Loop and guard agree, and the guard refuses to arm for it.
+        assert_eq!(haptic_loop.haptics.source(), HipSource::None);
+        assert!(drain(&mut link_ends).is_empty());
+        let refused = haptic_loop.haptics.report().decision.refused;
+        assert!(refused.contains(Blockers::NO_SCENE), "{refused:?}");
+    }
 }

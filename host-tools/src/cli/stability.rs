@@ -51,6 +51,10 @@ pub struct Args {
     #[arg(long, value_name = "US", default_value_t = 80, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     pub delay_us: u32,
 
+    /// Friction of the arm's joints, as parts of the model's
+    #[arg(long, value_name = "PART,…", value_delimiter = ',', default_value = "0.1,1", value_parser = parse_part)]
+    pub arm_friction: Vec<f64>,
+
     /// File for every trial, as CSV
     #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub output: Option<PathBuf>,
@@ -80,11 +84,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         dampings: dampings(args),
         texture: args.texture.relief()?,
         delay_s: 1e-6 * f64::from(args.delay_us),
+        arm_frictions: args.arm_friction.clone(),
     };
     plan.rates.sort_by_key(|rate| rate.hz());
     plan.rates.dedup();
     plan.stiffness_n_per_mm.sort_by(f64::total_cmp);
     plan.stiffness_n_per_mm.dedup();
+    plan.arm_frictions.sort_by(f64::total_cmp);
+    plan.arm_frictions.dedup();
     if args.output.is_some() && args.output == args.picture {
         return Err(Failure::new("the table and the picture cannot be one file").hint(OTHER_FILE));
     }
@@ -164,6 +171,12 @@ fn parse_stiffness(text: &str) -> Result<f64, String> {
     let number = text.trim().parse::<f64>().ok();
     let number = number.filter(|number| (0.001..=100.0).contains(number));
     number.ok_or_else(|| "expected 0.001 to 100 N/mm".to_owned())
+}
+
+fn parse_part(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok();
+    let number = number.filter(|number| (0.0..=10.0).contains(number));
+    number.ok_or_else(|| "expected 0 to 10 times the model's friction".to_owned())
 }
 
 fn parse_damping(text: &str) -> Result<Damping, String> {

@@ -56,9 +56,22 @@ impl HeldPhantom {
     /// first point, presses the dead-man switch after half a second, holds it
     /// from then on, and begins its script [`Self::ARMED_S`] after the start.
     #[must_use]
-    pub fn arming(mut self) -> Self {
-        self.begin_s = Self::ARMED_S;
+    pub fn arming(self) -> Self {
+        self.arming_for(Self::ARMED_S)
+    }
+
+    /// The same hand, which begins its script so long after the start, s: before the force is in,
+    /// where that is shorter than [`Self::ARMED_S`].
+    #[must_use]
+    pub fn arming_for(mut self, begin_s: f64) -> Self {
+        self.begin_s = begin_s;
         self
+    }
+
+    /// When its script begins, s.
+    #[must_use]
+    pub fn begin_s(&self) -> f64 {
+        self.begin_s
     }
 
     /// The same hand, which follows its script so many times.
@@ -67,6 +80,9 @@ impl HeldPhantom {
         self.script = self.script.repeated(times);
         self
     }
+
+    /// When force begins to come in, s: the device has seen the press and confirmed.
+    pub const RAMPS_S: f64 = PRESS_S + 0.1;
 
     /// When a script begins whose hand lets the device arm first, s: after the
     /// device has confirmed and force has come in.

@@ -119,6 +119,16 @@ pub struct Motor {
 }
 
 impl PhantomModel {
+    /// The same arm with so large a part of its friction.
+    #[must_use]
+    pub fn with_friction(self, part: f64) -> Self {
+        Self {
+            coulomb_nm: self.coulomb_nm.map(|nm| nm * part),
+            viscous_nms_per_rad: self.viscous_nms_per_rad.map(|nms| nms * part),
+            ..self
+        }
+    }
+
     /// The Premium 1.5: link lengths, stops, ratios and friction from CAD;
     /// inertia and gravity identified in C2002 (with C2002's own lengths, as
     /// they were fitted together).

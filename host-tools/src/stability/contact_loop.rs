@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use hapterra_core::Vec3;
+use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::Rule;
 use hapterra_core::force::{Damping, ForceLaw, Texture};
 use hapterra_core::grid::GridPoint;
@@ -10,15 +11,15 @@ use hapterra_core::phantom::{Calibration, Mechanism};
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_core::terrain::{FieldSize, Tile, TileDemand, TileKey, TileRequester};
-use hapterra_core::tick::{Command, Haptics};
+use hapterra_core::tick::{Board, Command, Haptics};
 
 use super::surface_work::SurfaceWork;
-use crate::phantom::{HeldPhantom, PhantomModel, Placement};
+use crate::phantom::{Encoder, HeldPhantom, PhantomModel, Placement, kinematics};
 
 /// Tiles to a side of the loop's window, and cells of the plane, of 4 mm.
 const WINDOW: usize = 4;
 const CELLS: i32 = 64;
-const CELL_MM: f64 = 4.0;
+pub(super) const CELL_MM: f64 = 4.0;
 /// The plane's height, and the place of the arm's home pose: in its middle, close above it.
 pub(super) const PLANE_MM: f64 = 20.0;
 pub(super) const HOME: Placement = Placement {
@@ -31,6 +32,8 @@ const MOST_N: f32 = ForceLaw::PREMIUM.max_force_n;
 pub(super) struct Step {
     /// What the tick reported.
     pub(super) sample: Sample,
+    /// Height of the tip by its encoders at the beginning of it, mm.
+    pub(super) read_up_mm: f64,
     /// True place of the tip after it, east, north and up, mm.
     pub(super) tip_mm: [f64; 3],
     /// What the surface gave to the arm meanwhile, mJ: the work of its part of the motors'
@@ -46,37 +49,55 @@ pub(super) struct Felt {
     pub(super) texture: Texture,
     /// From reading the encoders to the amplifiers, s.
     pub(super) delay_s: f64,
+    /// When the clutch is held, and let go again, s after the script's beginning.
+    pub(super) clutch_s: Option<[f64; 2]>,
 }
 
-/// Runs a held arm until its script ends, and shows every tick with the time since the script
+/// Runs an arm in an arming hand until its script ends, and shows every tick with the time since the script
 /// began, s. Ends early where `look` says so.
-pub(super) fn run(felt: &Felt, arm: HeldPhantom, look: &mut dyn FnMut(f64, &Step) -> bool) {
+pub(super) fn run(felt: &Felt, mut arm: HeldPhantom, look: &mut dyn FnMut(f64, &Step) -> bool) {
     let mut tiles = vec![Tile::VACANT; WINDOW * WINDOW + 1];
     let mut spare: Vec<_> = tiles.iter_mut().collect();
     let slots = std::array::from_fn(|_| {
         std::array::from_fn(|_| spare.pop().unwrap_or_else(|| unreachable!("a tile a slot")))
     });
-    let mut haptics = Haptics::<WINDOW>::new(slots, felt.rate, None);
+    // What the plant's amplifiers take comes on top.
+    let lag_s = arm.plant().model().drive[0].motor.current_lag_s;
+    let board = Board {
+        rate: felt.rate,
+        latency_s: (felt.delay_s + lag_s) as f32,
+        motors: None,
+        fault: None,
+    };
+    let mut haptics = Haptics::<WINDOW>::on_board(slots, &board);
     let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5).ok();
     if let Some(mechanism) = mechanism {
         haptics.configure(mechanism);
     }
     let scene = scene(felt);
-    // What the plant's amplifiers take comes on top.
-    let lag_s = arm.plant().model().drive[0].motor.current_lag_s;
-    haptics.acts_after((felt.delay_s + lag_s) as f32);
     for command in [Command::Scene(scene), Command::Zero([0; 3]), Command::Arm] {
         let _ = haptics.accept(command);
     }
     let mut requester = TileRequester::<WINDOW>::new();
     requester.reset(scene.level, scene.size);
 
-    let mut arm = arm.arming();
+    let begin_s = arm.begin_s();
     let tick_s = 1.0 / f64::from(felt.rate.hz());
     let mut wire = Wire::new(felt.delay_s, tick_s, arm.plant().model());
-    let ticks = ((HeldPhantom::ARMED_S + arm.script_s()) / tick_s) as u32;
+    let ticks = ((begin_s + arm.script_s()) / tick_s) as u32;
+    let at = |s: f64| ((begin_s + s) / tick_s) as u32;
     for tick in 0..ticks {
+        if let Some([held_s, let_go_s]) = felt.clutch_s {
+            let hold = [
+                (held_s, ClutchHold::WithHand),
+                (let_go_s, ClutchHold::LetGo),
+            ];
+            for (_, hold) in hold.into_iter().filter(|(s, _)| at(*s) == tick) {
+                let _ = haptics.accept(Command::Clutch(hold));
+            }
+        }
         let sense = arm.sense();
+        let read_up_mm = read_up_mm(&arm, sense.counts);
         let outcome = haptics.tick(&sense, true);
         let sample = outcome.sample;
         let demand = TileDemand {
@@ -89,7 +110,7 @@ pub(super) fn run(felt: &Felt, arm: HeldPhantom, look: &mut dyn FnMut(f64, &Step
             let Some(tile) = spare.pop() else { break };
             fill(tile, key, scene.size);
             requester.received(key);
-            spare.extend(haptics.accept(Command::Tile(tile)));
+            spare.extend(haptics.accept(Command::Tile(tile)).ok().flatten());
         }
         let weight_a = mechanism.map_or(Vec3::ZERO, |mechanism| {
             let pose = mechanism.pose(sense.counts, [0; 3]);
@@ -106,10 +127,11 @@ pub(super) fn run(felt: &Felt, arm: HeldPhantom, look: &mut dyn FnMut(f64, &Step
         let given_mj = wire.carry(sent, &mut arm);
         let step = Step {
             sample,
+            read_up_mm,
             tip_mm: tip_mm(&arm),
             given_mj,
         };
-        if !look(f64::from(tick) * tick_s - HeldPhantom::ARMED_S, &step) {
+        if !look(f64::from(tick) * tick_s - begin_s, &step) {
             return;
         }
     }
@@ -188,6 +210,13 @@ fn scene(felt: &Felt) -> Scene {
 fn fill(tile: &mut Tile, key: TileKey, size: FieldSize) {
     // A level plane fits into every tile.
     let _ = tile.fill_from(key, 0, size, |_, _| (PLANE_MM / CELL_MM) as f32);
+}
+
+/// Height of the tip by its encoders, mm.
+fn read_up_mm(arm: &HeldPhantom, counts: [i32; 3]) -> f64 {
+    let model = arm.plant().model();
+    let q = std::array::from_fn(|axis| Encoder::new(&model.drive[axis]).angle_rad(counts[axis]));
+    HOME.to_terrain_mm(model, kinematics::tip(model, q))[2]
 }
 
 /// True place of the tip, mm, its height over the terrain's datum.

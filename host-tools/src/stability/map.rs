@@ -8,10 +8,14 @@ use hapterra_core::force::{Controller, Damping, Pattern, Texture};
 use hapterra_core::rate::TickRate;
 
 use super::bounds::AtTip;
+use super::entry::Entered;
 use super::grasp::Grasp;
 use super::tap::{TAP_SPEEDS_M_S, Taps};
 use super::trial::{Press, Setting, Trial, Verdict};
 use crate::phantom::{OutOfReach, PhantomModel};
+
+/// A rate, a damping, and the friction of the arm as a part of the model's.
+pub type Column = (TickRate, Damping, f64);
 
 /// Trials of every stiffness in every grasp with every damping at every rate.
 pub struct Map {
@@ -34,13 +38,15 @@ pub struct Plan {
     pub texture: Texture,
     /// From reading the encoders to the amplifiers, s.
     pub delay_s: f64,
+    /// Friction of the arm's joints, as parts of the model's.
+    pub arm_frictions: Vec<f64>,
 }
 
 impl Plan {
     /// All that is tried.
     fn settings(&self) -> Vec<Setting> {
         let mut settings = Vec::new();
-        for (rate, damping) in self.columns() {
+        for (rate, damping, arm_friction) in self.columns() {
             for grasp in Grasp::ALL {
                 settings.extend(self.stiffness_n_per_mm.iter().map(|stiffness| Setting {
                     rate,
@@ -49,19 +55,21 @@ impl Plan {
                     texture: self.texture,
                     grasp,
                     delay_s: self.delay_s,
+                    arm_friction,
                 }));
             }
         }
         settings
     }
 
-    /// Every rate with every damping.
-    fn columns(&self) -> impl Iterator<Item = (TickRate, Damping)> {
-        let with_each = |rate: &TickRate| {
-            let rate = *rate;
-            self.dampings.iter().map(move |damping| (rate, *damping))
-        };
-        self.rates.iter().flat_map(with_each)
+    /// Every rate with every damping and every friction of the arm.
+    fn columns(&self) -> impl Iterator<Item = Column> {
+        let dampings = |rate| self.dampings.iter().map(move |damping| (rate, *damping));
+        let columns = self.rates.iter().flat_map(move |rate| dampings(*rate));
+        columns.flat_map(|(rate, damping)| {
+            let frictions = self.arm_frictions.iter();
+            frictions.map(move |part| (rate, damping, *part))
+        })
     }
 
     /// Tries all of it on all processors. `on_trial` hears of every one that is done, of how
@@ -113,24 +121,19 @@ impl Plan {
 }
 
 impl Map {
-    /// Trials of one rate, damping and grasp, by stiffness.
-    pub fn of(
-        &self,
-        rate: TickRate,
-        damping: Damping,
-        grasp: Grasp,
-    ) -> impl Iterator<Item = &Trial> {
+    /// Trials of one rate, damping, friction of the arm and grasp, by stiffness.
+    pub fn of(&self, column: Column, grasp: Grasp) -> impl Iterator<Item = &Trial> {
         let trials = self.trials.iter();
         trials.filter(move |Trial { setting, .. }| {
-            (setting.rate, setting.damping, setting.grasp) == (rate, damping, grasp)
+            (setting.column(), setting.grasp) == (column, grasp)
         })
     }
 
-    /// Rates that were tried, each with every damping.
+    /// Rates that were tried, each with every damping and every friction of the arm.
     #[must_use]
-    pub fn columns(&self) -> Vec<(TickRate, Damping)> {
+    pub fn columns(&self) -> Vec<Column> {
         let settings = self.trials.iter().map(|trial| trial.setting);
-        let mut columns: Vec<_> = settings.map(|tried| (tried.rate, tried.damping)).collect();
+        let mut columns: Vec<_> = settings.map(Setting::column).collect();
         columns.dedup();
         columns
     }
@@ -138,7 +141,7 @@ impl Map {
     /// Rates that were tried.
     #[must_use]
     pub fn rates(&self) -> Vec<TickRate> {
-        let mut rates: Vec<_> = self.columns().iter().map(|(rate, _)| *rate).collect();
+        let mut rates: Vec<_> = self.columns().iter().map(|(rate, ..)| *rate).collect();
         rates.dedup();
         rates
     }
@@ -146,16 +149,30 @@ impl Map {
     /// Highest stiffness up to which every press was as good as this, N/mm; none where the
     /// lowest was not.
     #[must_use]
-    pub fn up_to(
-        &self,
-        rate: TickRate,
-        damping: Damping,
-        grasp: Grasp,
-        verdict: Verdict,
-    ) -> Option<f64> {
+    pub fn up_to(&self, column: Column, grasp: Grasp, verdict: Verdict) -> Option<f64> {
         let count_mm = self.at_tip.count_mm;
-        let good = |trial: &&Trial| trial.press.verdict(count_mm) <= verdict;
-        let last = self.of(rate, damping, grasp).take_while(good).last();
+        self.while_it(column, grasp, |trial| {
+            trial.press.verdict(count_mm) <= verdict
+        })
+    }
+
+    /// Highest stiffness up to which force came in well on every way, N/mm.
+    #[must_use]
+    pub fn enters_up_to(&self, column: Column, grasp: Grasp) -> Option<f64> {
+        let is_good = |entered: &Option<Entered>| entered.is_some_and(|entered| entered.is_good());
+        self.while_it(column, grasp, |trial| trial.entries.iter().all(is_good))
+    }
+
+    fn while_it(
+        &self,
+        column: Column,
+        grasp: Grasp,
+        is_good: impl Fn(&Trial) -> bool,
+    ) -> Option<f64> {
+        let last = self
+            .of(column, grasp)
+            .take_while(|trial| is_good(trial))
+            .last();
         last.map(|trial| trial.setting.stiffness_n_per_mm)
     }
 
@@ -171,7 +188,7 @@ impl Map {
         });
         writeln!(
             to,
-            "tick_hz,damping_ns_per_m,controller,grasp,stiffness_n_per_mm,delay_us,texture,amplitude_mm,wavelength_mm,press,swing_mm,swings_hz,fault,{}",
+            "tick_hz,damping_ns_per_m,controller,grasp,stiffness_n_per_mm,delay_us,arm_friction,texture,amplitude_mm,wavelength_mm,press,swing_mm,swings_hz,fault,{},ramp_swing_mm,ramp_given_mj,clutch_swing_mm,clutch_given_mj",
             taps.join(",")
         )?;
         for trial in &self.trials {
@@ -182,6 +199,7 @@ impl Map {
                 texture,
                 grasp,
                 delay_s,
+                arm_friction,
             } = trial.setting;
             let verdict = trial.press.verdict(self.at_tip.count_mm).name();
             let press = match trial.press {
@@ -199,9 +217,13 @@ impl Map {
                      }| { format!("{given_mj:.6},{slowest:.4},{fastest:.4}") };
                 taps.map_or_else(|| ",,".to_owned(), row)
             });
+            let entries = trial.entries.map(|entered| {
+                let row = |Entered { swing_mm, given_mj }| format!("{swing_mm:.6},{given_mj:.6}");
+                entered.map_or_else(|| ",".to_owned(), row)
+            });
             writeln!(
                 to,
-                "{},{:.1},{},{},{stiffness_n_per_mm},{:.0},{},{},{},{verdict},{press},{}",
+                "{},{:.1},{},{},{stiffness_n_per_mm},{:.0},{arm_friction},{},{},{},{verdict},{press},{},{}",
                 rate.hz(),
                 damping.ns_per_m,
                 is_controlled(damping),
@@ -210,7 +232,8 @@ impl Map {
                 pattern(texture),
                 texture.amplitude_mm,
                 texture.wavelength_mm,
-                taps.join(",")
+                taps.join(","),
+                entries.join(",")
             )?;
         }
         Ok(())
@@ -221,21 +244,23 @@ impl Map {
     pub fn summary(&self) -> String {
         let AtTip { count_mm, .. } = self.at_tip;
         let mut lines = vec![format!(
-            "stiffness in N/mm up to which a press of 1 N is still (no swing above one encoder count, {count_mm:.3} mm), and up to which it is held at all:"
+            "stiffness in N/mm up to which a press of 1 N is still (no swing above one encoder count, {count_mm:.3} mm), up to which it is held at all, and up to which force comes in well in the ramp and while the clutch closes (0.3 mm, 0.05 mJ):"
         )];
-        for (rate, damping) in self.columns() {
+        let told = |limit: Option<f64>| {
+            limit.map_or_else(|| "none".to_owned(), |n_per_mm| n_per_mm.to_string())
+        };
+        for column @ (rate, damping, part) in self.columns() {
             let limits = Grasp::ALL.map(|grasp| {
-                let limit = |verdict| {
-                    let limit = self.up_to(rate, damping, grasp, verdict);
-                    limit.map_or_else(|| "none".to_owned(), |n_per_mm| n_per_mm.to_string())
-                };
+                let limit = |verdict| told(self.up_to(column, grasp, verdict));
                 let (still, held) = (limit(Verdict::Still), limit(Verdict::Hum));
-                format!("{} {still} / {held}", grasp.name())
+                let enters = told(self.enters_up_to(column, grasp));
+                format!("{} {still} / {held} / {enters}", grasp.name())
             });
             lines.push(format!(
-                "{:>6} Hz, {:<26} {}",
+                "{:>6} Hz, {:<26} {} of the arm's friction: {}",
                 rate.hz(),
                 name(damping),
+                part,
                 limits.join(", ")
             ));
         }

@@ -7,6 +7,7 @@
 //! - `surface_work`: the energy that the surface gives;
 //! - [`tap`]: taps at a stated speed;
 //! - [`trial`]: what a press and taps show: hum, and energy that the surface gave;
+//! - [`entry`]: presses while force comes in;
 //! - [`bounds`]: stiffness that theory says is passive;
 //! - [`map`]: many trials, and the table of them;
 //! - [`limits`]: what of it is said before a surface is felt;
@@ -16,6 +17,7 @@
 
 pub mod bounds;
 mod contact_loop;
+pub mod entry;
 pub mod grasp;
 pub mod limits;
 pub mod map;

@@ -7,11 +7,8 @@ use plotters::element::{Circle, Cross};
 use plotters::style::{Color, RGBColor};
 use plotters_backend::text_anchor::HPos;
 
-use hapterra_core::force::Damping;
-use hapterra_core::rate::TickRate;
-
 use super::grasp::Grasp;
-use super::map::{self, Map};
+use super::map::{self, Column, Map};
 use super::tap::TAP_SPEEDS_M_S;
 use super::trial::{Trial, Verdict};
 use crate::picture::axes::{self, Area, Titles};
@@ -85,7 +82,7 @@ fn header(area: &Area<'_>) -> Result<(), PictureError> {
 fn chart(
     area: &Area<'_>,
     map: &Map,
-    (rate, damping): (TickRate, Damping),
+    column @ (rate, damping, part): Column,
 ) -> Result<(), PictureError> {
     let all = map
         .trials
@@ -97,7 +94,7 @@ fn chart(
     let range = 0.8 * low..1.25 * high;
     let named = map::name(damping);
     let x = format!(
-        "stiffness (N/mm) at {} Hz, {}",
+        "stiffness (N/mm) at {} Hz, {}, {part} of the arm's friction",
         rate.hz(),
         named.trim_end_matches(':')
     );
@@ -118,9 +115,9 @@ fn chart(
         }
     }
     for (grasp, colour) in Grasp::ALL.into_iter().zip(COLOURS) {
-        let points: Vec<_> = map.of(rate, damping, grasp).map(place).collect();
+        let points: Vec<_> = map.of(column, grasp).map(place).collect();
         line::draw(&mut chart, &[points], stroke(&colour, 2.0))?;
-        for trial in map.of(rate, damping, grasp) {
+        for trial in map.of(column, grasp) {
             let at = place(trial);
             let (ring, dot) = (stroke(&colour, 2.0), colour.filled());
             match trial.press.verdict(map.at_tip.count_mm) {

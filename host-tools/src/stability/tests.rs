@@ -4,8 +4,11 @@ use hapterra_core::force::{Controller, Damping, Pattern, Texture};
 use hapterra_core::rate::TickRate;
 
 use super::bounds::AtTip;
+use super::entry::Entry;
 use super::grasp::Grasp;
-use super::limits::{LEFT_WITH_TEXTURE, STILL_LATE_N_PER_MM, STILL_N_PER_MM};
+use super::limits::{
+    ENTERS_LATE_N_PER_MM, ENTERS_N_PER_MM, LEFT_WITH_TEXTURE, STILL_LATE_N_PER_MM, STILL_N_PER_MM,
+};
 use super::map::Plan;
 use super::tap::{TAP_SPEEDS_M_S, Taps};
 use super::trial::{Press, Setting, Trial, Verdict};
@@ -65,6 +68,7 @@ fn set(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp, delay_s: f64, damping: Da
         texture: Texture::NONE,
         grasp,
         delay_s,
+        arm_friction: 1.0,
     }
 }
 
@@ -271,6 +275,7 @@ fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
         dampings: vec![UNDAMPED],
         texture: Texture::NONE,
         delay_s: 80e-6,
+        arm_frictions: vec![1.0],
     };
     let map = plan.map(&|of| of == 6).expect("in reach").expect("whole");
     let mut csv = Vec::new();
@@ -284,11 +289,105 @@ fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
         ["0.5", "6"].map(|stiffness| format!("1000,0.0,false,{},{stiffness}", grasp.name()))
     });
     assert_eq!(begins, wanted.concat());
-    let limit = |grasp| map.up_to(TickRate::DEFAULT, UNDAMPED, grasp, Verdict::Hum);
+    let limit = |grasp| map.up_to((TickRate::DEFAULT, UNDAMPED, 1.0), grasp, Verdict::Hum);
     assert_eq!(
         (limit(Grasp::Limp), limit(Grasp::Firm)),
         (Some(0.5), Some(6.0))
     );
     let none = plan.map(&|_| false).expect("in reach");
     assert!(none.is_none(), "interrupted");
+}
+
+/// Stiffnesses that are tried while force comes in, N/mm.
+const ENTERED_N_PER_MM: [f64; 5] = [0.5, 1.0, 2.0, 3.0, 4.0];
+
+/// Holds every stiffness, in the ramp and while the clutch closes, to a table: ticks a second, and up
+/// to which stiffness force comes in well in the ramp, and through the clutch, N/mm.
+fn enters_up_to(arm_friction: f64, delay_s: f64, table: [(u32, f64, f64); 4]) {
+    for (hz, ramp, clutch) in table {
+        for stiffness in ENTERED_N_PER_MM {
+            for (entry, up_to) in [(Entry::Ramp, ramp), (Entry::Clutch, clutch)] {
+                let setting = Setting {
+                    arm_friction,
+                    ..set(hz, stiffness, Grasp::Limp, delay_s, CONTROLLED)
+                };
+                let entered = setting.enters(entry).expect("in reach").expect("no fault");
+                assert_eq!(
+                    entered.is_good(),
+                    stiffness <= up_to,
+                    "{hz} Hz, {delay_s} s, {stiffness} N/mm, {entry:?}: {entered:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn force_comes_in_without_swing_or_energy() {
+    let all = |hz| (hz, 4.0, 4.0);
+    enters_up_to(1.0, 0.1e-3, [1000, 2000, 4000, 10_000].map(all));
+}
+
+#[test]
+fn force_comes_in_a_millisecond_late() {
+    let late = [
+        (1000, 4.0, 4.0),
+        (2000, 4.0, 4.0),
+        (4000, 4.0, 4.0),
+        (10_000, 4.0, 3.0),
+    ];
+    enters_up_to(1.0, 1e-3, late);
+}
+
+#[test]
+fn force_comes_in_on_a_tenth_of_the_friction() {
+    let little = [
+        (1000, 2.0, 1.0),
+        (2000, 2.0, 2.0),
+        (4000, 3.0, 2.0),
+        (10_000, 4.0, 2.0),
+    ];
+    enters_up_to(0.1, 0.1e-3, little);
+    let late = [
+        (1000, 1.0, 1.0),
+        (2000, 1.0, 1.0),
+        (4000, 1.0, 1.0),
+        (10_000, 1.0, 0.5),
+    ];
+    enters_up_to(0.1, 1e-3, late);
+    for (table, said) in [(little, ENTERS_N_PER_MM), (late, ENTERS_LATE_N_PER_MM)] {
+        for ((hz, ramp, clutch), (of_hz, n_per_mm)) in table.into_iter().zip(said) {
+            assert_eq!((hz, ramp.min(clutch)), (of_hz, f64::from(n_per_mm)));
+        }
+    }
+}
+
+/// Beyond the limits in energy, no swing is above 0.3 mm on a board with converters.
+#[test]
+fn little_friction_makes_small_swings_only() {
+    for hz in [1000, 10_000] {
+        for entry in [Entry::Ramp, Entry::Clutch] {
+            let setting = Setting {
+                arm_friction: 0.1,
+                ..set(hz, 4.0, Grasp::Limp, 0.1e-3, CONTROLLED)
+            };
+            let entered = setting.enters(entry).expect("in reach").expect("no fault");
+            assert!(entered.swing_mm < 0.15, "{hz} Hz, {entry:?}: {entered:?}");
+        }
+    }
+}
+
+#[test]
+fn without_the_controller_the_tip_swings() {
+    let setting = Setting {
+        arm_friction: 0.1,
+        ..set(1000, 3.0, Grasp::Limp, 0.1e-3, UNDAMPED)
+    };
+    for entry in [Entry::Ramp, Entry::Clutch] {
+        let entered = setting.enters(entry).expect("in reach").expect("no fault");
+        assert!(
+            entered.swing_mm > 3.0 && entered.given_mj > 100.0,
+            "{entered:?}"
+        );
+    }
 }

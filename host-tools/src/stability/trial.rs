@@ -5,7 +5,9 @@ use hapterra_core::guard::Fault;
 use hapterra_core::rate::TickRate;
 
 use super::contact_loop::{self, Felt, HOME, PLANE_MM};
+use super::entry::{Entered, Entry};
 use super::grasp::Grasp;
+use super::map::Column;
 use super::tap::{TAP_SPEEDS_M_S, Taps};
 use crate::phantom::{HeldPhantom, OutOfReach, PhantomModel, Script, Touch};
 
@@ -31,6 +33,8 @@ pub struct Setting {
     pub grasp: Grasp,
     /// From reading the encoders to the amplifiers, s.
     pub delay_s: f64,
+    /// Friction of the arm's joints, as a part of the model's.
+    pub arm_friction: f64,
 }
 
 /// What a press did.
@@ -57,6 +61,9 @@ pub struct Trial {
     pub press: Press,
     /// Taps at each of [`TAP_SPEEDS_M_S`]; none where the guard switched the force off.
     pub taps: [Option<Taps>; 3],
+    /// A press from the beginning of the ramp on, and one from the closing of the clutch on;
+    /// none where the guard switched the force off.
+    pub entries: [Option<Entered>; 2],
 }
 
 /// What the hand feels of a press.
@@ -95,6 +102,17 @@ impl Press {
 }
 
 impl Setting {
+    /// From the beginning of a tick until its force acts: the delay, and the lag of the
+    /// amplifiers' current loops, s.
+    pub(super) fn late_s(self) -> f64 {
+        self.delay_s + PhantomModel::premium_1_5().drive[0].motor.current_lag_s
+    }
+
+    /// Rate, damping and the arm's friction.
+    pub(super) const fn column(self) -> Column {
+        (self.rate, self.damping, self.arm_friction)
+    }
+
     /// Presses and taps.
     ///
     /// # Errors
@@ -109,6 +127,7 @@ impl Setting {
             setting: self,
             press,
             taps,
+            entries: [self.enters(Entry::Ramp)?, self.enters(Entry::Clutch)?],
         })
     }
 
@@ -133,12 +152,23 @@ impl Setting {
     }
 
     pub(super) fn arm(self, script: Script) -> Result<HeldPhantom, OutOfReach> {
-        HeldPhantom::new(PhantomModel::premium_1_5(), self.grasp.hand(), HOME, script)
+        let model = PhantomModel::premium_1_5().with_friction(self.arm_friction);
+        let arm = HeldPhantom::new(model, self.grasp.hand(), HOME, script)?;
+        Ok(arm.arming())
     }
 
     pub(super) fn run(
         self,
         arm: HeldPhantom,
+        look: &mut dyn FnMut(f64, &contact_loop::Step) -> bool,
+    ) {
+        self.run_with_clutch(arm, None, look);
+    }
+
+    pub(super) fn run_with_clutch(
+        self,
+        arm: HeldPhantom,
+        clutch_s: Option<[f64; 2]>,
         look: &mut dyn FnMut(f64, &contact_loop::Step) -> bool,
     ) {
         let felt = Felt {
@@ -147,6 +177,7 @@ impl Setting {
             damping: self.damping,
             texture: self.texture,
             delay_s: self.delay_s,
+            clutch_s,
         };
         contact_loop::run(&felt, arm, look);
     }

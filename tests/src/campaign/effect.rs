@@ -104,6 +104,7 @@ impl Mishap {
             }
             Kind::EncoderBeyondLimits => counts[self.axis] += self.sign * 12 * since,
             Kind::EmergencyStop => sense.emergency_stop = true,
+            Kind::Clutch => sense.clutch = true,
             Kind::DeadManReleased | Kind::DeadManBounce => sense.dead_man = false,
             Kind::HardwareFailed => sense.hardware_failed = true,
             Kind::OutputsNotAsSet => sense.outputs_not_as_set = true,

@@ -41,6 +41,12 @@ pub struct Extremes {
     pub given_mj: f32,
     /// Ticks in which that was worked out.
     pub watched_ticks: u64,
+    /// Of these, ticks in the ramp, and ticks in which the clutch moved.
+    pub ramp_ticks: u64,
+    /// See [`Self::ramp_ticks`].
+    pub clutch_ticks: u64,
+    /// The most turns back of the tip in a quarter of a second.
+    pub turns: usize,
     /// Ticks with the amplifiers on and an encoder off by more than [`OFF_COUNTS`].
     pub misled_ticks: u64,
     /// Ticks with the amplifiers on near a singular pose, where the force at the tip
@@ -63,6 +69,9 @@ impl Extremes {
             created_mj: self.created_mj.max(other.created_mj),
             given_mj: self.given_mj.max(other.given_mj),
             watched_ticks: self.watched_ticks + other.watched_ticks,
+            ramp_ticks: self.ramp_ticks + other.ramp_ticks,
+            clutch_ticks: self.clutch_ticks + other.clutch_ticks,
+            turns: self.turns.max(other.turns),
             misled_ticks: self.misled_ticks + other.misled_ticks,
             singular_ticks: self.singular_ticks + other.singular_ticks,
         }

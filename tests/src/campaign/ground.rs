@@ -6,7 +6,6 @@ use hapterra_core::contact::Friction;
 use hapterra_core::force::{
     Controller, Damping, ForceLaw, Material, MaterialTable, Pattern, Shading, Texture,
 };
-use hapterra_core::rate::TickRate;
 
 use crate::chance::Chance;
 
@@ -47,10 +46,9 @@ impl Effects {
     pub fn drawn(seed: u64, segment: u64) -> Self {
         let mut chance = Chance::new(!seed ^ segment.wrapping_mul(0xd134_2543_de82_ef95));
         let chance = &mut chance;
-        let controller = [Controller::Auto, Controller::On][chance.below(2)];
+        let controller = [Controller::Off, Controller::On][chance.below(2)];
         let stiffness_n_per_mm = match chance.below(2) {
             0 => chance.between(0.3, 0.9),
-            // The controller is on, also by itself.
             _ => chance.between(1.0, 2.0),
         };
         let default = material(chance, stiffness_n_per_mm as f32);
@@ -204,10 +202,21 @@ impl Felt {
         spring_n.min(self.hardest.max_force_n)
     }
 
-    /// Whether energy that the ticks create is taken back, on a device so late.
+    /// Whether energy that the ticks create is taken back.
     #[must_use]
-    pub fn is_controlled(&self, latency_s: f32) -> bool {
-        self.hardest.is_controlled(TickRate::DEFAULT, latency_s)
+    pub const fn is_controlled(&self) -> bool {
+        self.hardest.is_controlled()
+    }
+
+    /// The energy that the stiffest of them holds at a depth, mJ, where the guard lets `most_n` through.
+    #[must_use]
+    pub fn stored_mj(&self, depth_mm: f32, most_n: f32) -> f32 {
+        let stiffness = self.stiffest_n_per_mm();
+        let force_n = self.most_n(depth_mm).min(most_n);
+        match stiffness > 0.0 {
+            true => force_n * (depth_mm - 0.5 * force_n / stiffness),
+            false => 0.0,
+        }
     }
 
     /// Whether its force is that of one spring: no material follows a softer one.

@@ -77,6 +77,8 @@ pub enum Kind {
     HostileCalibration,
     /// Endpoints of the USB are halted and cleared in the middle of what is sent.
     EndpointHalt,
+    /// The clutch input is held, and let go again. Nothing goes wrong.
+    Clutch,
 }
 
 /// What may become of it. What is not in here is a violation.
@@ -114,7 +116,7 @@ const fn latch(may_latch: &'static [Fault], within: u32) -> Expectation {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 35] = [
+    pub const ALL: [Self; 36] = [
         Self::EncoderJump,
         Self::EncoderGlitch,
         Self::EncoderNoise,
@@ -150,6 +152,7 @@ impl Kind {
         Self::ReplayThenRun,
         Self::HostileCalibration,
         Self::EndpointHalt,
+        Self::Clutch,
     ];
 
     /// What is expected.
@@ -215,6 +218,7 @@ impl Kind {
             | Self::Misplaced
             | Self::LateTicks
             | Self::EndpointHalt
+            | Self::Clutch
             | Self::TilesMissing
             | Self::TilesPoisoned => RIDE,
         }
@@ -245,6 +249,8 @@ impl Kind {
             Self::HaltedCore => (WATCHDOG_TICKS, WATCHDOG_TICKS),
             Self::ReplayThenRun => (300, 3_000),
             Self::HostileCalibration => (500, 2_500),
+            // It opens to the end.
+            Self::Clutch => (250, 1_000),
             Self::EncoderNoise
             | Self::LinkLoss
             | Self::LinkDelay

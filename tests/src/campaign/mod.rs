@@ -25,6 +25,8 @@ pub mod levers;
 pub mod pipe;
 pub mod report;
 pub mod segment;
+pub mod share;
+pub mod swing;
 pub mod tally;
 pub mod watch;
 

@@ -3,6 +3,7 @@
 use super::Tally;
 use super::extremes::OFF_COUNTS;
 use super::kind::{Kind, STALL_TICKS};
+use super::swing::MOST_TURNS;
 use crate::rows;
 
 /// The page of a campaign that ran with the source at `commit`.
@@ -17,7 +18,7 @@ Written by `cargo xtask campaign --seconds {seconds} --seed {seed}`{commit}; the
 
 A virtual Phantom Premium 1.5 in a wandering hand, and the application of the boards compiled for the desktop, tick by
 tick (`tests/src/campaign`). Each segment is run twice: on ground like ice, and with effects at random
-(`tests/src/campaign/ground.rs`: friction, shading, texture, damping, the passivity controller by itself or always, up to 2.6 N/mm,
+(`tests/src/campaign/ground.rs`: friction, shading, texture, damping, the passivity controller on or off, up to 2.6 N/mm,
 and in every second of them up to 16 materials of up to 1.7 times that). The amplifiers were on for {} s of {} s. {} times something went wrong, each kind of the
 table as often as the others, in random order, place and strength. The mishaps are described in
 `tests/src/campaign/kind.rs` beside what is expected of each; anything else ends the campaign.
@@ -35,10 +36,14 @@ Held in every tick, by `tests/src/campaign/watch.rs`:
 - the virtual motors' windings below 112 °C, and no winding more than 1 K warmer than the device takes it to be, whatever reset
   came between;
 - no calibration in force above the ceilings of a Premium 1.5, and none stored that nobody agreed to;
-- no force against the way from the HIP to the proxy (`tests/src/campaign/felt.rs`), but where both shading and texture turn it, and none
-  larger than the stiffest material, the highest texture and all of the damping make of the depth;
-- with the controller on, while nothing has gone wrong, no contact with ground of one stiffness has given the tip more than
-  0.05 mJ, 2 k A times its depth, and with shading 2 E ([effects](effects.md)) more; and the device keeps no more than 2 mJ to be taken back;
+- in the ramp after arming, armed, and while the clutch opens and closes (`tests/src/campaign/felt.rs`): no force against the way from
+  the HIP to the proxy, but where both shading and texture turn it, and none larger than the share that is let through of what the
+  stiffest material, the highest texture and all of the damping make of the depth;
+- in the same modes, with the controller on and while nothing has gone wrong: no contact with ground of one stiffness has given the
+  tip more than 0.05 mJ, 2 k A times its depth, and with shading 2 E ([effects](effects.md)), besides what a spring is given that
+  becomes stiffer; and the tip does not swing: it turns back by more than 0.3 mm at most {MOST_TURNS} times in 0.25 s, where tremor does so 6 times;
+- the device keeps no more than 2 mJ to be taken back;
+- while the last force goes out it only becomes less, and with an open clutch there is none;
 - while the core stands still with its command on, all of this but what needs an encoder that is read.
 
 Both forces are the least that explain the currents with any share of the arm's weight held. They are not worked out within
@@ -52,7 +57,8 @@ Both forces are the least that explain the currents with any share of the arm's 
 | current of a motor | {:.4} A | 5.5 A |
 | change of the force in a tick | {:.4} N | 1 N |
 | temperature of a winding | {:.1} °C | 112 °C |
-| energy that a contact had given with the controller on, in {:.0} s of contacts | {:.4} mJ | 0.05 mJ and 2 k A d, with shading 2 E |
+| energy that a contact had given with the controller on, in {:.0} s of contacts, {:.1} s of them in the ramp and {:.1} s while the clutch moved | {:.4} mJ | 0.05 mJ and 2 k A d, with shading 2 E |
+| turns back of the tip in 0.25 s | {} | {MOST_TURNS} |
 | energy that the device keeps to be taken back | {:.3} mJ | 2 mJ |
 
 **What is not bounded.** An encoder that creeps within the joint's limits cannot be told from a hand that moves, and while one is
@@ -75,7 +81,10 @@ pose were {:.1} s.
         at.slew_n,
         at.winding_c,
         1e-3 * at.watched_ticks as f64,
+        1e-3 * at.ramp_ticks as f64,
+        1e-3 * at.clutch_ticks as f64,
         at.given_mj,
+        at.turns,
         at.created_mj,
         1e-3 * at.misled_ticks as f64,
         at.misled.force_n,

@@ -80,6 +80,9 @@ pub fn run(seed: u64, segment: u64, ground: Ground, tally: &mut Tally) -> Result
     let felt = &stretch.felt;
     stretch.watch.extremes.given_mj = felt.most_given_mj;
     stretch.watch.extremes.watched_ticks = felt.watched_ticks;
+    stretch.watch.extremes.ramp_ticks = felt.ramp_ticks;
+    stretch.watch.extremes.clutch_ticks = felt.clutch_ticks;
+    stretch.watch.extremes.turns = felt.most_turns;
     tally.add(stretch.now, stretch.armed, &stretch.watch.extremes);
     played.map_err(|what| Violation {
         segment,
@@ -400,7 +403,9 @@ impl<'t> Stretch<'t> {
         let (mut reading, mut stalls) = (Reading::default(), false);
         let mut core = Core::Runs;
         if let Some(mishap) = mishap {
-            self.calm_from = mishap.ticks.end + SETTLE;
+            if mishap.kind != Kind::Clutch {
+                self.calm_from = mishap.ticks.end + SETTLE;
+            }
             mishap.meddle(&mut sense, &mut self.lost, self.now, &mut self.chance);
             (unkind, tiles) = (mishap.unkind(), mishap.tiles());
             (reading, stalls) = (mishap.reading(), mishap.stalls());

@@ -56,7 +56,7 @@ pub fn run(data: &[u8]) {
                 if is_taken(&scene, &table) {
                     law = scene.law;
                 }
-                spare.extend(haptics.accept(Command::View(view)));
+                spare.extend(haptics.accept(Command::View(view)).ok().flatten());
                 ticks = None;
             }
             // A table, and a scene of it or of another.
@@ -74,23 +74,23 @@ pub fn run(data: &[u8]) {
                 if is_taken(&scene, &table) {
                     (law, ticks) = (scene.law, Some(0));
                 }
-                spare.extend(haptics.accept(Command::Scene(scene)));
+                spare.extend(haptics.accept(Command::Scene(scene)).ok().flatten());
             }
             _ if kind == 251 => {
                 let held = bytes.byte().is_multiple_of(2);
-                spare.extend(haptics.accept(Command::ClutchInput(held)));
+                spare.extend(haptics.accept(Command::ClutchInput(held)).ok().flatten());
             }
             _ if kind >= 248 => {
                 let holds = [ClutchHold::LetGo, ClutchHold::WithHand, ClutchHold::InPlace];
                 let hold = holds[usize::from(kind - 248)];
-                spare.extend(haptics.accept(Command::Clutch(hold)));
+                spare.extend(haptics.accept(Command::Clutch(hold)).ok().flatten());
             }
             0 => {
                 let scene = scene(&mut bytes);
                 if scene.is_valid() {
                     (law, ticks) = (scene.law, Some(0));
                 }
-                spare.extend(haptics.accept(Command::Scene(scene)));
+                spare.extend(haptics.accept(Command::Scene(scene)).ok().flatten());
             }
             1 | 2 => {
                 let tile = spare.pop().expect("an underlay keeps two at most");
@@ -98,24 +98,34 @@ pub fn run(data: &[u8]) {
                 if kind % 16 >= 8 {
                     materials::lay(tile, &table, &mut bytes);
                 }
-                spare.extend(haptics.accept(Command::Tile(tile)));
+                spare.extend(haptics.accept(Command::Tile(tile)).ok().flatten());
             }
             3 => {
                 let seen = haptics.report().fault;
-                spare.extend(haptics.accept(Command::ClearFault(seen)));
+                spare.extend(haptics.accept(Command::ClearFault(seen)).ok().flatten());
             }
             4 => {
-                spare.extend(haptics.accept(Command::Trip(Fault::Hardware)));
+                spare.extend(
+                    haptics
+                        .accept(Command::Trip(Fault::Hardware))
+                        .ok()
+                        .flatten(),
+                );
             }
             5 => {
                 let hip = position(&mut bytes);
-                spare.extend(haptics.accept(Command::Point(Point { seq: 1, hip })));
+                spare.extend(
+                    haptics
+                        .accept(Command::Point(Point { seq: 1, hip }))
+                        .ok()
+                        .flatten(),
+                );
             }
             6 => {
-                spare.extend(haptics.accept(Command::Arm));
+                spare.extend(haptics.accept(Command::Arm).ok().flatten());
             }
             _ => {
-                spare.extend(haptics.accept(Command::Zero([0; 3])));
+                spare.extend(haptics.accept(Command::Zero([0; 3])).ok().flatten());
             }
         }
         let counts = [

@@ -65,7 +65,7 @@ impl Seen {
             proxy: unshifted(&felt.proxy, shift),
             slid_from: None,
             force_n: CELLS_MM.map(|cell_mm| {
-                let force = LAW.force_n(felt.displacement * cell_mm);
+                let force = LAW.spring().force_n(felt.displacement * cell_mm);
                 force.as_dvec3().to_array()
             }),
         }

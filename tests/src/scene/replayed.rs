@@ -130,7 +130,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         let mut haptics = Haptics::new(slots, TickRate::DEFAULT, None);
         let message = message(scene, materials, replay.shift);
         haptics.take_materials(&materials.told());
-        assert!(haptics.accept(Command::Scene(message)).is_none());
+        assert!(matches!(haptics.accept(Command::Scene(message)), Ok(None)));
         let mut requester = TileRequester::new();
         requester.reset(0, message.size);
         let mut device = Self {
@@ -184,7 +184,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         tile.set_materials(self.materials.table.len(), classes)
             .expect("of the table");
         self.events.push(Event::Tile(key));
-        let spent = self.haptics.accept(Command::Tile(tile));
+        let spent = self.haptics.accept(Command::Tile(tile)).expect("a tile");
         let is_taken = spent.as_ref().is_none_or(|spent| spent.key() != Some(key));
         self.spare.extend(spent);
         is_taken

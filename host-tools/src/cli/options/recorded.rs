@@ -135,7 +135,6 @@ fn told(name: &str, given: &str, recorded: &str) -> String {
 
 const fn controller(controller: Controller) -> PassivityController {
     match controller {
-        Controller::Auto => PassivityController::Auto,
         Controller::On => PassivityController::On,
         Controller::Off => PassivityController::Off,
     }
@@ -202,7 +201,7 @@ mod tests {
         let mut recorded = recorded();
         recorded.force.damping = Damping {
             ns_per_m: 2.5,
-            controller: Controller::On,
+            controller: Controller::Off,
         };
         let (rendering, told) = Rendering::default().or_recorded(&recorded);
         assert_eq!(told, [""; 0]);
@@ -218,7 +217,7 @@ mod tests {
         assert_eq!(told.len(), 2, "{told:?}");
         let text = recorded.to_toml();
         assert!(
-            text.contains("[force.damping]\nns_per_m = 2.5\ncontroller = \"on\""),
+            text.contains("[force.damping]\nns_per_m = 2.5\ncontroller = \"off\""),
             "{text}"
         );
         assert_eq!(Settings::from_toml(&text).expect("read"), Some(recorded));

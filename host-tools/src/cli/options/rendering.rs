@@ -68,7 +68,8 @@ pub struct Rendering {
     #[arg(long, value_name = "NS/M", allow_negative_numbers = true)]
     pub damping_ns_per_m: Option<f32>,
 
-    /// Whether energy that the ticks create is taken back by damping [default: auto]
+    /// Whether the passivity controller acts: it takes back the energy that a spring which is felt
+    /// in ticks creates [default: on]
     #[arg(long, value_enum)]
     pub passivity: Option<PassivityController>,
 
@@ -107,12 +108,13 @@ pub enum ForceShading {
     Smooth,
 }
 
-/// When the passivity controller acts.
+/// Whether the passivity controller acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum PassivityController {
-    /// Where the stiffness is above what the device's rate allows without it
+    /// As on. Earlier versions decided by the stiffness
+    #[value(hide = true)]
     Auto,
-    /// Always
+    /// Wherever a current may flow
     On,
     /// Never
     Off,
@@ -241,11 +243,13 @@ impl Rendering {
     /// Damping that no tick can make.
     fn damping(&self) -> Result<Damping, Failure> {
         let ns_per_m = self.damping_ns_per_m.unwrap_or(0.0);
+        if self.passivity == Some(PassivityController::Auto) {
+            tracing::warn!("--passivity auto is on: the controller acts on every surface");
+        }
         let damping = Damping {
             ns_per_m,
             controller: match self.passivity {
-                None | Some(PassivityController::Auto) => Controller::Auto,
-                Some(PassivityController::On) => Controller::On,
+                None | Some(PassivityController::Auto | PassivityController::On) => Controller::On,
                 Some(PassivityController::Off) => Controller::Off,
             },
         };

@@ -1,0 +1,61 @@
+//! The share of a scene's force that is let through, by the modes and limits that the device reports.
+
+use hapterra_core::guard::{Limits, Mode};
+use hapterra_core::scene::Sample;
+
+/// What a ramp adds in a tick of a millisecond: 2 s after arming, 0.1 s and 0.5 s of the clutch.
+const RAMPS: f32 = 1.0 / 2_000.0;
+const OPENS: f32 = 1.0 / 100.0;
+const CLOSES: f32 = 1.0 / 500.0;
+
+/// Where the clutch is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Clutch {
+    Closed,
+    Opening(f32),
+    Open,
+    Closing(f32),
+}
+
+/// Follows ramp and clutch from tick to tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Share {
+    ramp: Option<f32>,
+    clutch: Option<Clutch>,
+}
+
+impl Share {
+    /// Before the first sample.
+    pub const UNKNOWN: Self = Self {
+        ramp: None,
+        clutch: None,
+    };
+
+    /// Takes the sample that follows on `last`; none where samples between are missing. Returns the
+    /// share of the force, where it is known and follows what is asked for.
+    pub fn of(&mut self, last: Option<&Sample>, sample: &Sample) -> Option<f32> {
+        self.ramp = match (last.map(|last| last.mode), sample.mode) {
+            (_, Mode::Armed) => Some(1.0),
+            (Some(Mode::Confirming), Mode::Ramping) => Some(RAMPS),
+            (Some(Mode::Ramping), Mode::Ramping) => self.ramp.map(|ramp| ramp + RAMPS),
+            _ => None,
+        };
+        let moves = sample.limits.contains(Limits::CLUTCH_MOVES);
+        let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
+        self.clutch = match (self.clutch.filter(|_| last.is_some()), moves, is_open) {
+            (_, _, true) => Some(Clutch::Open),
+            (_, false, false) => Some(Clutch::Closed),
+            (Some(Clutch::Closed), ..) => Some(Clutch::Opening(1.0 - OPENS)),
+            (Some(Clutch::Opening(share)), ..) => Some(Clutch::Opening(share - OPENS)),
+            (Some(Clutch::Open), ..) => Some(Clutch::Closing(0.0)),
+            (Some(Clutch::Closing(share)), ..) => Some(Clutch::Closing(share + CLOSES)),
+            (None, ..) => None,
+        };
+        let clutch = match self.clutch? {
+            Clutch::Closed => 1.0,
+            Clutch::Open => 0.0,
+            Clutch::Opening(share) | Clutch::Closing(share) => share.clamp(0.0, 1.0),
+        };
+        Some(self.ramp?.min(1.0) * clutch)
+    }
+}

@@ -1,0 +1,41 @@
+//! Whether the tip swings: it goes to and fro faster than any hand does.
+
+use hapterra_core::Vec3;
+
+/// How far it goes, mm; what is less is an encoder's count or two, or the hand's tremor.
+const FAR_MM: f32 = 0.3;
+/// Most turns back in so many ticks. Tremor of 11.2 Hz turns six times in 0.25 s.
+pub const MOST_TURNS: usize = 10;
+const TICKS: u32 = 250;
+
+/// Watches the tip along the force.
+#[derive(Clone, Debug, Default)]
+pub struct Swing {
+    place_mm: f32,
+    /// The farthest since the last turn, and which way it was.
+    farthest_mm: f32,
+    is_out: bool,
+    turns: std::collections::VecDeque<u32>,
+}
+
+impl Swing {
+    /// Takes a tick's motion along a unit vector. Returns the turns of the last quarter of a second.
+    pub fn turns(&mut self, tick: u32, moved_mm: Vec3, along: Vec3) -> usize {
+        self.place_mm += moved_mm.dot(along);
+        let back_mm = match self.is_out {
+            true => self.farthest_mm - self.place_mm,
+            false => self.place_mm - self.farthest_mm,
+        };
+        if back_mm <= 0.0 {
+            self.farthest_mm = self.place_mm;
+        } else if back_mm > FAR_MM {
+            self.is_out = !self.is_out;
+            self.farthest_mm = self.place_mm;
+            self.turns.push_back(tick);
+        }
+        while { self.turns.front() }.is_some_and(|turn| tick.wrapping_sub(*turn) > TICKS) {
+            self.turns.pop_front();
+        }
+        self.turns.len()
+    }
+}
