@@ -208,35 +208,6 @@ fn a_proxy_that_trails_by_more_than_it_slid_is_found() {
     assert_eq!(found(&[over, slid]), []);
 }
 
-/// One that was in the air meanwhile slid from where it came down, if that is a place it may have come
-/// down to: on the surface, and nearer to the HIP than it was.
-#[test]
-fn a_proxy_that_trails_from_where_it_cannot_have_come_down_is_found() {
-    let friction = Friction {
-        viscous_s: 0.003,
-        ..Friction::coulomb(0.05)
-    };
-    let flat = flat();
-    let before = touching([13.0, 10.5, 1.9], [13.0, 10.5, 2.0]);
-    // 2 cells from there, which holds 6, and 7.03 from where it was.
-    let slid = touching([20.03, 10.5, 1.0], [14.0, 10.5, 2.0]);
-    let found = |slid_from: Option<[f64; 3]>| -> Vec<Invariant> {
-        let judge = Judge::new(&flat, Rule::Swept).with_friction(friction);
-        let mut slid = slid;
-        slid.slid_from = slid_from;
-        broken_of(judge, &[before, slid])
-    };
-    assert_eq!(found(None), [Invariant::Cone]);
-    assert_eq!(found(Some([15.0, 8.768, 2.0])), []);
-    assert_eq!(
-        found(Some([14.5, 10.5, 2.0])),
-        [Invariant::Cone],
-        "too near"
-    );
-    assert_eq!(found(Some([12.0, 10.5, 2.0])), [Invariant::Cone], "farther");
-    assert_eq!(found(Some([15.0, 8.768, 2.1])), [Invariant::OnSurface]);
-}
-
 /// A height is known to the last place of the corners that it is mixed from, and so is the pull.
 #[test]
 fn a_pull_in_the_last_place_of_a_patchs_corners_is_not_judged() {

@@ -18,8 +18,14 @@ pub(super) const ARRIVAL: u32 = 6;
 pub(super) const CONVEX: u32 = 4;
 /// Units for the closest point of one ruling.
 pub(super) const RULING: u32 = 4;
+/// Units for looking for a crest between two rulings.
+pub(super) const CREST: u32 = 32;
 /// Units for the slope of the distance into one patch.
 pub(super) const SLOPE: u32 = 3;
+/// Units for a look at the cone of friction.
+pub(super) const LOOK: u32 = 1;
+/// Units of a straight way with friction, at most: four patches at its start, and eight looks.
+pub(super) const WAY: u32 = 4 * SLOPE + 8 * LOOK;
 /// Units for asking whether a box is clear.
 pub(super) const BOX: u32 = 4;
 /// Units for halving a path.
@@ -37,10 +43,11 @@ pub(super) const GAP: u32 = 1;
 /// Units for a cell whose patch is intersected with a path.
 pub(super) const INTERSECTION: u32 = 8;
 
-/// Units of the largest piece of work: arriving at a patch on a border, and asking its four
-/// neighbours; the cone of friction asks as much. A tick that put work off has spent more
-/// than [`WORK_PER_TICK`] less this.
-pub const LARGEST_PIECE: u32 = ARRIVAL + 4 * SLOPE;
+/// Units for arriving at a patch on a border, and asking its four neighbours.
+pub(super) const ON_BORDER: u32 = ARRIVAL + 4 * SLOPE;
+/// Units of the largest piece of work. A tick that put work off has spent more than its budget
+/// less this.
+pub const LARGEST_PIECE: u32 = CREST;
 
 /// What a tick has spent, and what it may.
 #[derive(Debug)]

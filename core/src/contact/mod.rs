@@ -20,6 +20,7 @@ mod paper;
 mod proxy;
 mod settings;
 mod shortcut;
+mod straight_way;
 mod tolerance;
 
 #[cfg(test)]

@@ -184,6 +184,9 @@ impl<'g> Judge<'g> {
             self.is_in_cone(seen)?;
         }
         self.friction = least;
+        if seen.is_touching() {
+            self.is_held_back(seen)?;
+        }
         let still = self.still;
         let verdict = match self.before {
             Some(before) => self.sticks(&before, seen),
@@ -237,6 +240,7 @@ impl<'g> Judge<'g> {
                 told.extend(self.is_local_minimum(seen).err());
             } else {
                 told.extend(self.is_in_cone(seen).err());
+                told.extend(self.is_held_back(seen).err());
             }
             told.extend(self.is_hip_below(seen).err());
         }

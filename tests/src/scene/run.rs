@@ -13,7 +13,7 @@ use super::supply::{Buffers, SIDE, SuppliedWindow, Supply};
 use super::terrain::{KINDS, Terrain};
 use crate::chance::Chance;
 use crate::field::point;
-use crate::invariants::seen::{Seen, Shaded, unshifted};
+use crate::invariants::seen::{Seen, Shaded};
 use crate::invariants::{Invariant, Violation};
 
 /// Ticks that one HIP may be repeated for in lock-step.
@@ -384,7 +384,6 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
                 is_whole: shader.missing().is_none(),
             }),
             textured: self.texturer.as_ref().map(|_| self.textured),
-            slid_from: (self.contact.slid_from()).map(|point| unshifted(point, self.shift)),
             ..Seen::new(hip, felt, self.shift)
         }
     }
