@@ -262,6 +262,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     fn settings_of(&self, scene: Option<&Scene>) -> ContactSettings {
         let rule = scene.map_or_else(Default::default, |scene| scene.rule);
         let from_points = scene.is_some_and(|scene| scene.source == Source::Points);
+        let cell_mm = scene.map_or(1.0, |scene| scene.cell_mm);
         ContactSettings {
             rule,
             execution: if from_points {
@@ -277,7 +278,9 @@ impl<'t, const D: usize> Haptics<'t, D> {
                 Some(scene) => scene.law.friction,
                 None => Friction::NONE,
             },
-            ..ContactSettings::REAL_TIME.at_rate(self.rate)
+            ..ContactSettings::REAL_TIME
+                .at_rate(self.rate)
+                .on_cells_of(cell_mm)
         }
     }
 

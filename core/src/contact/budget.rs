@@ -7,8 +7,34 @@
 //! Cortex-M4F a unit stands for is measured; the table is
 //! `bench/instructions-m4f.csv`.
 
-/// Units of work a tick may spend.
-pub const WORK_PER_TICK: u32 = 86;
+use crate::rate::TickRate;
+
+/// Units of work a tick may spend at 1 kHz, and at any rate at most.
+///
+/// A unit is at most 238 instructions of a Cortex-M4F, so a tick is at most 143,000: what fits
+/// into the 170,000 cycles that a NUCLEO-G474RE has for a millisecond.
+pub const WORK_PER_TICK: u32 = 600;
+/// Units of work a second: 86 a tick at 10 kHz.
+const WORK_PER_S: u32 = 860_000;
+
+/// Units of work that a tick may spend at a rate.
+///
+/// ```
+/// use hapterra_core::contact::work_per_tick;
+/// use hapterra_core::rate::TickRate;
+///
+/// let at = |hz| TickRate::new(hz).map(work_per_tick);
+/// assert_eq!([at(1_000), at(4_000), at(10_000)], [Some(600), Some(215), Some(86)]);
+/// ```
+#[must_use]
+pub const fn work_per_tick(rate: TickRate) -> u32 {
+    let fits = WORK_PER_S / rate.hz();
+    if fits < WORK_PER_TICK {
+        fits
+    } else {
+        WORK_PER_TICK
+    }
+}
 
 /// Units for following the proxy within its patch by the shortcut.
 pub(super) const SHORTCUT: u32 = 2;

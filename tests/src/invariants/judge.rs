@@ -257,6 +257,7 @@ impl<'g> Judge<'g> {
         told.extend(self.fades(before, seen).err());
         told.extend(self.lets_go_gently(before, seen).err());
         told.extend(self.descends(before, seen).err());
+        told.extend(self.stays_in_basin(before, seen).err());
         told.extend(self.advances(before, seen).err());
         if before.is_free() {
             told.extend(self.first_crossing(before, seen).err());

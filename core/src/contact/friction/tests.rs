@@ -8,6 +8,7 @@ use crate::contact::dice::Dice;
 use crate::contact::friction::Friction;
 use crate::contact::{Contact, ContactOutput, ContactSettings, ContactState};
 use crate::grid::GridPoint;
+use crate::rate::TickRate;
 use crate::terrain::FieldSize;
 use crate::terrain::testing::{Field, buffers};
 
@@ -143,6 +144,45 @@ fn an_encoder_count_now_and_then_does_not_make_it_stick() {
     let felt = feel(friction, |_, _| 0.0, press.chain(push));
     for (hip, felt) in &felt[600..] {
         assert!(-felt.displacement.x < 0.301, "{hip:?}: {felt:?}");
+    }
+}
+
+/// On cells of 30 mm a count of 0.029 mm was less than the speed, in cells a tick, at which a proxy
+/// came to rest: a steady hand chattered.
+#[test]
+fn a_steady_hand_breaks_away_once_at_every_cell_size() {
+    let friction = Friction {
+        static_mu: 0.6,
+        ..Friction::coulomb(0.3)
+    };
+    for (cell_mm, speed_mm_s, count_mm) in
+        [(30.0, 10.0, 0.029), (50.0, 2.0, 0.029), (10.0, 5.0, 0.0)]
+    {
+        for hz in [1_000, 10_000] {
+            let rate = TickRate::new(hz).expect("in range");
+            let settings = ContactSettings::REAL_TIME
+                .at_rate(rate)
+                .on_cells_of(cell_mm);
+            let mut tiles = buffers::<2>();
+            let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), |_, _| 0.0);
+            let mut contact = Contact::new(settings.with_friction(friction));
+            let (mut trailed_mm, mut breaks) = (0.0_f32, 0);
+            for tick in 0..hz * 4 {
+                let way_mm = speed_mm_s * tick as f32 / hz as f32;
+                let at_mm = match count_mm > 0.0 {
+                    true => (way_mm / count_mm).floor() * count_mm,
+                    false => way_mm,
+                };
+                let depth_mm = if tick == 0 { -1.0 } else { 2.0 };
+                let hip = at([at_mm / cell_mm, 0.5, -depth_mm / cell_mm]);
+                let felt = contact.step(&field.window, &hip);
+                let trails_mm = -felt.displacement.x * cell_mm;
+                breaks += i32::from(trailed_mm - trails_mm > 0.3);
+                trailed_mm = trails_mm;
+            }
+            assert_eq!(breaks, 1, "{cell_mm} mm a cell at {hz} Hz");
+            assert!((trailed_mm - 0.6).abs() < 0.03, "{trailed_mm} mm");
+        }
     }
 }
 

@@ -15,8 +15,6 @@ use crate::terrain::Window;
 /// A proxy that slides sticks again when it has not moved for so long, s: longer than
 /// a slow hand waits for its next encoder count.
 const STICKS_AFTER_S: f32 = 0.02;
-/// Less than this is no motion, cells.
-const STILL: f32 = 1e-3;
 
 /// What a contact with friction remembers.
 #[derive(Clone, Debug)]
@@ -244,7 +242,8 @@ impl Contact {
     fn counts_stillness(&mut self) {
         self.at_rest = self.output.converged && self.boundary_fade() == 1.0;
         let before = self.felt.map(|(proxy, _)| proxy);
-        let rate = self.settings.rate;
+        let tick_s = self.settings.rate.tick_s();
+        let least_way = self.settings.sticks_below * tick_s;
         let Some(rough) = &mut self.rough else { return };
         if !self.output.converged {
             return;
@@ -255,9 +254,9 @@ impl Contact {
         }
         let way = before.map(|before| before.to(&self.output.proxy).abs().max_element());
         if let Motion::Slides { still } = &mut rough.motion {
-            let is_still = way.is_some_and(|way| way <= STILL);
+            let is_still = way.is_some_and(|way| way <= least_way);
             *still = if is_still { *still + 1 } else { 0 };
-            if (*still as f32) * rate.tick_s() >= STICKS_AFTER_S {
+            if (*still as f32) * tick_s >= STICKS_AFTER_S {
                 rough.motion = Motion::Sticks;
             }
         }
