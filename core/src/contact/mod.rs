@@ -24,6 +24,8 @@ mod straight_way;
 mod tolerance;
 
 #[cfg(test)]
+mod basin_tests;
+#[cfg(test)]
 mod dice;
 #[cfg(test)]
 #[path = "tally_tests.rs"]
