@@ -98,7 +98,10 @@ fn proxy_passes_no_crest_of_a_twisted_patch() {
         let single = Single([0; 4].map(|_| dice.between(-8.0, 8.0) as f32));
         let from = [dice.between(0.0, 1.0), dice.between(0.0, 1.0)];
         let ground = single.height(from[0], from[1]);
-        let (turn, rise) = (dice.between(0.0, 6.2831853), dice.between(-1.2, 1.2));
+        let (turn, rise) = (
+            dice.between(0.0, core::f64::consts::TAU),
+            dice.between(-1.2, 1.2),
+        );
         let first = [from[0], from[1], ground - dice.between(0.0, 1.5)];
         let along = 0.8 * libm::cos(rise);
         let hip = [
