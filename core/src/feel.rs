@@ -141,7 +141,9 @@ impl Feel {
                 true => Execution::LockStep,
                 false => Execution::RealTime,
             },
-            ..ContactSettings::REAL_TIME.at_rate(self.rate)
+            ..ContactSettings::REAL_TIME
+                .at_rate(self.rate)
+                .on_cells_of(scene.map_or(1.0, |scene| scene.cell_mm))
         };
         self.contact = match landing {
             Some((hip, stretch)) => {

@@ -306,8 +306,5 @@ fn seen(replied: &Replied, shift: [i32; 3]) -> Seen {
         missing_tile: None,
         work,
     };
-    Seen {
-        slid_from: replied.slid_from,
-        ..Seen::new(replied.hip, felt, shift)
-    }
+    Seen::new(replied.hip, felt, shift)
 }

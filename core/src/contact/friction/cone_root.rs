@@ -1,0 +1,71 @@
+//! Where on a straight way the cone begins to hold: the first root of what pulls in excess.
+
+use super::cone::Excess;
+
+/// The search: Newton's steps until the cone holds, then false position (Illinois: an end that
+/// stays twice counts half).
+pub(super) struct ConeRoot {
+    /// The last place where the proxy was pulled on, and the excess there.
+    low: (f32, f32),
+    /// The first place where it was held, and the excess there, below zero.
+    high: Option<(f32, f32)>,
+    /// By how much the excess falls over the way on a plane.
+    falls: f32,
+    /// Where to look next.
+    next: f32,
+    /// Looks in a row that moved the same end: above zero the lower one.
+    stayed: i32,
+}
+
+impl ConeRoot {
+    /// A search from the start of a way, where the proxy is pulled, to what it has at 1 on a plane.
+    pub(super) fn new(start: Excess, drag: f32) -> Self {
+        let falls = (1.0 + drag) * start.pulls;
+        Self {
+            low: (0.0, start.over),
+            high: None,
+            falls,
+            next: start.over / falls,
+            stayed: 0,
+        }
+    }
+
+    /// Where to look next.
+    pub(super) const fn next(&self) -> f32 {
+        self.next
+    }
+
+    /// The nearest place found so far at which the cone holds.
+    pub(super) fn inside(&self) -> Option<f32> {
+        self.high.map(|(t, _)| t)
+    }
+
+    /// Takes a look at `t` into account.
+    pub(super) fn look(&mut self, t: f32, excess: &Excess) {
+        let over = excess.over;
+        if over > 0.0 {
+            let fell = (self.low.1 - over) / (t - self.low.0);
+            self.low = (t, over);
+            let Some((_, at_high)) = &mut self.high else {
+                // By the last two looks, or as on a plane where they tell less.
+                let rate = if fell > 0.25 * self.falls {
+                    fell
+                } else {
+                    self.falls
+                };
+                self.next = t + over / rate;
+                return;
+            };
+            *at_high *= if self.stayed > 0 { 0.5 } else { 1.0 };
+            self.stayed = 1;
+        } else {
+            self.low.1 *= if self.stayed < 0 { 0.5 } else { 1.0 };
+            self.high = Some((t, over));
+            self.stayed = -1;
+        }
+        if let Some((high, at_high)) = self.high {
+            let (low, at_low) = self.low;
+            self.next = low + (high - low) * (at_low / (at_low - at_high));
+        }
+    }
+}

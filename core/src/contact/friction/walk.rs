@@ -1,0 +1,292 @@
+//! Friction as a walk: the proxy follows the pull and stops where the cone holds (Moreau's
+//! catching-up).
+//!
+//! From where the proxy is the walk goes straight along the pull through one patch, to the first
+//! of: the cone holds; the border; no nearer to the HIP. There it asks again. Every straight way
+//! ends nearer to the HIP than it began and crosses no crest, so the proxy is never farther from
+//! the HIP than it was, and a walk that is cut short is a point of the surface and nothing else.
+
+use glam::Vec3;
+
+use super::cone::{Cone, Pull, border};
+use super::cone_root::ConeRoot;
+use crate::contact::budget::{Budget, LOOK, SLOPE, WAY};
+use crate::contact::closest_point::Leave;
+use crate::contact::straight_way::StraightWay;
+use crate::contact::surface::patch::Patch;
+use crate::contact::surface::{HipView, Side, SurfacePoint};
+use crate::scalar::smaller;
+use crate::terrain::{Ground, TileIndex, Window};
+
+/// Looks at the cone on one straight way, at most.
+pub(in crate::contact) const LOOKS: u32 = 8;
+/// Straight ways at most for one HIP, some four for each cell of a window. Where rounding sends a
+/// proxy to and fro across a border it rests then.
+const WAYS: u32 = 1_024;
+/// Straight ways along the pull within a patch after which Newton's direction takes its place: in
+/// the bent valley of a twisted patch the pull leads across rather than along.
+const ACROSS: u32 = 3;
+
+/// How a walk ended.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::contact) enum Walked {
+    /// Friction holds the proxy, or no straight way brings it nearer. The tile beyond the border
+    /// that it is on, if it is missing.
+    Rests(Option<TileIndex>),
+    /// The straight path to the HIP leads off the surface.
+    Leaves,
+    /// There is no surface, or it ends here with the HIP above it.
+    Off,
+    /// It depends on a tile that is not here.
+    Missing(TileIndex),
+    /// The budget is spent.
+    Suspended,
+}
+
+/// What is known at a point: the steepest pull, and the patch that offers it.
+struct Asked {
+    pull: Pull,
+    at: SurfacePoint,
+    patch: Patch,
+    missing: Option<TileIndex>,
+}
+
+/// Where a walk ends though nothing holds it.
+#[derive(Clone, Copy)]
+pub(in crate::contact) struct Rules<'l> {
+    /// Where it may leave the surface.
+    pub(in crate::contact) leave: &'l Leave,
+    /// Whether it waits beside a missing tile.
+    pub(in crate::contact) waits: bool,
+}
+
+impl Rules<'_> {
+    /// What becomes of a proxy from which the straight path to the HIP leads off the surface.
+    /// Where it has just come down from such a path, it is on the ground.
+    fn off(self, point: &SurfacePoint) -> Option<Walked> {
+        match self.leave {
+            leave if leave.is_allowed_at(point) => Some(Walked::Leaves),
+            Leave::ButAt(_) => None,
+            _ => Some(Walked::Off),
+        }
+    }
+}
+
+/// A walk under way.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::contact) struct Walk {
+    /// Where it is.
+    pub(in crate::contact) point: SurfacePoint,
+    /// The coefficient of a proxy that has not moved yet.
+    pub(in crate::contact) at_rest: Option<f32>,
+    /// Straight ways for this HIP.
+    pub(in crate::contact) ways: u32,
+    /// Of these, the last ones that ended inside of one patch.
+    pub(in crate::contact) inside: u32,
+    /// What friction held where the last straight way ended, cells.
+    pub(in crate::contact) held: Vec3,
+}
+
+impl Walk {
+    /// Goes on to where friction holds.
+    pub(in crate::contact) fn advance<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        cone: &Cone,
+        rules: Rules<'_>,
+        budget: &mut Budget,
+    ) -> Walked {
+        loop {
+            if !budget.has(WAY) {
+                return Walked::Suspended;
+            }
+            let asked = match ask(window, view, &self.point, rules, budget) {
+                Ok(asked) => asked,
+                Err(why) => return why,
+            };
+            let is_held = match self.at_rest.take() {
+                Some(mu) => asked.pull.pulls <= mu * mu * asked.pull.presses,
+                None => {
+                    let (pulls, holds) = cone.compare(&asked.pull, view, &asked.patch, &asked.at);
+                    pulls <= holds
+                }
+            };
+            if is_held || self.ways == WAYS {
+                return Walked::Rests(asked.missing);
+            }
+            let newton = match self.inside > ACROSS {
+                true => newton(&asked, view),
+                false => None,
+            };
+            let (to, held) = straight(&asked, newton, view, cone, budget);
+            if to == asked.at || to == self.point {
+                return Walked::Rests(asked.missing);
+            }
+            let is_inside = border(&to) == Side::NONE;
+            self.inside = if is_inside { self.inside + 1 } else { 0 };
+            self.ways += 1;
+            (self.point, self.held) = (to, held);
+        }
+    }
+}
+
+/// Newton's direction to the minimum of the distance, if that is downhill, inside of a patch.
+#[inline(never)]
+fn newton(at: &Asked, view: &HipView) -> Option<(f32, f32)> {
+    let Asked { at, patch, .. } = at;
+    if border(at) != Side::NONE {
+        return None;
+    }
+    let (p, q) = view.in_patch(at.cell);
+    let (zu, zv) = (patch.slope_u(at.v), patch.slope_v(at.u));
+    let z = patch.height(at.u, at.v);
+    let (gu, gv) = (at.u - p + z * zu, at.v - q + z * zv);
+    let twist = patch.a * z;
+    let (uu, vv, uv) = (1.0 + zu * zu, 1.0 + zv * zv, zu * zv + twist);
+    let det = 1.0 + zu * zu + zv * zv - twist * (twist + 2.0 * zu * zv);
+    let (du, dv) = ((uv * gv - vv * gu) / det, (uv * gu - uu * gv) / det);
+    (det > 0.0 && du * gu + dv * gv < 0.0).then_some((du, dv))
+}
+
+/// The end of one straight way, and what friction holds there.
+#[inline(never)]
+fn straight(
+    start: &Asked,
+    newton: Option<(f32, f32)>,
+    view: &HipView,
+    cone: &Cone,
+    budget: &mut Budget,
+) -> (SurfacePoint, Vec3) {
+    let Asked {
+        pull, at, patch, ..
+    } = start;
+    let along = newton.unwrap_or((pull.along.x, pull.along.y));
+    let way = StraightWay::new(patch, view.in_patch(at.cell), (at.u, at.v), along);
+    // On a plane the foot of the HIP is at 1.
+    let to_border = way.to_border();
+    let reach = smaller(to_border, 2.0);
+    let least = way.first_minimum(reach);
+    let end = least.unwrap_or(reach);
+    let ends_on_border = least.is_none() && reach == to_border;
+    let place = |t: f32| {
+        let (u, v) = match ends_on_border && t >= end {
+            true => way.on_border(),
+            false => way.at(t),
+        };
+        at.moved_to(u, v)
+    };
+    let edge = runs_along(border(at), along);
+    let mut root = ConeRoot::new(cone.excess(pull, view, patch, at), cone.drag);
+    let mut to = (*at, Vec3::ZERO);
+    for _ in 0..LOOKS {
+        let t = smaller(root.next(), end);
+        budget.spend(LOOK);
+        to.0 = place(t);
+        let pull = Pull::in_patch(patch, view, &to.0, edge);
+        let excess = cone.excess(&pull, view, patch, &to.0);
+        to.1 = pull.along * excess.held_share();
+        let is_at_end = excess.is_pulled() && t >= end;
+        if pull.is_above || is_at_end || excess.is_small() {
+            return to;
+        }
+        root.look(t, &excess);
+    }
+    if let Some(t) = root.inside() {
+        to.0 = place(t);
+    }
+    to
+}
+
+/// The border that a way leads along, and over which it can lead nowhere.
+fn runs_along(border: Side, way: (f32, f32)) -> Side {
+    Side {
+        east: if way.0 == 0.0 { border.east } else { 0 },
+        north: if way.1 == 0.0 { border.north } else { 0 },
+    }
+}
+
+/// The steepest pull over the patches that meet at a point.
+fn ask<const D: usize>(
+    window: &Window<'_, D>,
+    view: &HipView,
+    point: &SurfacePoint,
+    rules: Rules<'_>,
+    budget: &mut Budget,
+) -> Result<Asked, Walked> {
+    budget.spend(SLOPE);
+    let border = border(point);
+    let patch = match window.ground(point.cell) {
+        Ground::Patch(corners) => view.patch(&corners),
+        Ground::Hole => return Err(Walked::Off),
+        Ground::Missing if rules.waits => {
+            return Err(Walked::Missing(TileIndex::holding(point.cell)));
+        }
+        Ground::Missing => return Err(Walked::Off),
+    };
+    let asked = Asked {
+        pull: Pull::in_patch(&patch, view, point, border),
+        at: *point,
+        patch,
+        missing: None,
+    };
+    if border != Side::NONE {
+        return ask_neighbours(window, view, border, asked, rules, budget);
+    }
+    if asked.pull.is_above
+        && let Some(walked) = rules.off(point)
+    {
+        return Err(walked);
+    }
+    Ok(asked)
+}
+
+/// The same on a border. The path to the HIP leads off the surface if the HIP is above the patch
+/// that the path leads into; at a hole nothing presses a proxy whose HIP is above all patches.
+#[inline(never)]
+fn ask_neighbours<const D: usize>(
+    window: &Window<'_, D>,
+    view: &HipView,
+    border: Side,
+    own: Asked,
+    rules: Rules<'_>,
+    budget: &mut Budget,
+) -> Result<Asked, Walked> {
+    let point = own.at;
+    let into = border.toward(view.in_patch(point.cell), (point.u, point.v));
+    let mut leads_off = own.pull.is_above && into == Side::NONE;
+    let (mut all_above, mut has_hole) = (own.pull.is_above, false);
+    let mut best = own;
+    for place in 0..3 {
+        let side = border.neighbour(place);
+        if side == Side::NONE {
+            continue;
+        }
+        budget.spend(SLOPE);
+        let at = point.across(side);
+        match window.ground(at.cell) {
+            Ground::Patch(corners) => {
+                let patch = view.patch(&corners);
+                let pull = Pull::in_patch(&patch, view, &at, border.across(side));
+                leads_off |= pull.is_above && side == into;
+                all_above &= pull.is_above;
+                if pull.pulls > best.pull.pulls {
+                    (best.pull, best.at, best.patch) = (pull, at, patch);
+                }
+            }
+            Ground::Missing if rules.waits => {
+                return Err(Walked::Missing(TileIndex::holding(at.cell)));
+            }
+            Ground::Missing => best.missing = Some(TileIndex::holding(at.cell)),
+            Ground::Hole => has_hole = true,
+        }
+    }
+    has_hole |= best.missing.is_some();
+    if leads_off && let Some(walked) = rules.off(&point) {
+        return Err(walked);
+    }
+    if has_hole && all_above {
+        return Err(Walked::Off);
+    }
+    Ok(best)
+}

@@ -1,0 +1,267 @@
+//! A tick with friction: the proxy is held, or walks behind the HIP.
+
+use glam::Vec3;
+
+use super::{Contact, Phase, Turn};
+use crate::contact::budget::Budget;
+use crate::contact::closest_point::{Leave, position_on};
+use crate::contact::friction::{Cone, Friction, Rules, Walk, Walked};
+use crate::contact::output::ContactState;
+use crate::contact::settings::Execution;
+use crate::contact::surface::HipView;
+use crate::grid::GridPoint;
+use crate::terrain::Window;
+
+/// A proxy that slides sticks again when it has not moved for so long, s: longer than
+/// a slow hand waits for its next encoder count.
+const STICKS_AFTER_S: f32 = 0.02;
+
+/// What a contact with friction remembers.
+#[derive(Clone, Debug)]
+pub(super) struct Rough {
+    friction: Friction,
+    motion: Motion,
+    stage: Stage,
+    /// Where the proxy was when the tick began, or met the surface in it.
+    from: GridPoint,
+    /// The part of the displacement that friction held when the proxy last moved, cells.
+    held: Vec3,
+}
+
+/// Which coefficient holds the proxy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Motion {
+    /// The static one.
+    Sticks,
+    /// The dynamic one: it has moved, and since then been still for so many ticks.
+    Slides { still: u32 },
+}
+
+/// How far the walk of a tick is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// The proxy has not moved in this tick: the cone at rest decides.
+    Begins,
+    /// It has, on so many straight ways, the last ones of them inside of one patch.
+    GoesOn { ways: u32, inside: u32 },
+    /// What remains is not friction's business: the proxy goes to the closest point.
+    Descends,
+}
+
+impl Rough {
+    /// Of a surface that is rough.
+    pub(super) fn on(friction: Friction) -> Option<Self> {
+        (!friction.is_none()).then(|| Self {
+            friction,
+            motion: Motion::Sticks,
+            stage: Stage::Begins,
+            from: GridPoint::default(),
+            held: Vec3::ZERO,
+        })
+    }
+
+    /// Takes other coefficients. Returns true if they differ.
+    pub(super) fn takes(&mut self, friction: Friction) -> bool {
+        let is_other = self.friction != friction;
+        self.friction = friction;
+        is_other
+    }
+
+    /// The coefficient that holds a proxy before it moves.
+    const fn mu_at_rest(&self) -> f32 {
+        match self.motion {
+            Motion::Sticks => self.friction.static_mu,
+            Motion::Slides { .. } => self.friction.dynamic_mu,
+        }
+    }
+}
+
+impl Contact {
+    /// The part of the last displacement that friction holds rather than the surface, cells.
+    pub(crate) fn held_back(&self) -> Vec3 {
+        match &self.rough {
+            Some(rough) => rough.held * -self.boundary_fade(),
+            None => Vec3::ZERO,
+        }
+    }
+
+    /// [`Contact::step`] with friction.
+    #[inline(never)]
+    pub(super) fn step_on_rough_ground<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+    ) {
+        let mut budget = Budget::new(self.settings.work_per_tick);
+        self.remembers_what_was_felt();
+        if self.output.converged || !self.hip.is_same(&hip) {
+            self.begins_to_walk(window, hip, &mut budget);
+        }
+        // Bounded by the budget, as without friction.
+        while self.walks_on(window, hip, &mut budget) == Turn::GoesOn {}
+        self.hip = hip;
+        self.output.work = budget.spent();
+        self.answers_from_the_surface(window);
+        self.counts_stillness();
+    }
+
+    /// Begins a tick: from where the proxy is.
+    fn begins_to_walk<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        budget: &mut Budget,
+    ) {
+        match &mut self.phase {
+            Phase::OnSurface(on) if self.output.converged => {
+                on.descent.restart(on.descent.entry());
+                (on.leave, on.departures) = (Leave::Anywhere, None);
+            }
+            _ => self.redirect(window, hip, None, budget),
+        }
+        self.walks_from_here(window);
+    }
+
+    /// The motion of the tick counts from where the proxy is.
+    fn walks_from_here<const D: usize>(&mut self, window: &Window<'_, D>) {
+        let Some(rough) = &mut self.rough else { return };
+        rough.stage = match rough.friction.is_none() {
+            // A material without friction, in a scene that has others.
+            true => Stage::Descends,
+            false => Stage::Begins,
+        };
+        if let Phase::OnSurface(on) = &self.phase
+            && let Some(from) = position_on(window, &on.descent.entry())
+        {
+            rough.from = from;
+        }
+    }
+
+    /// One step of what the proxy does.
+    fn walks_on<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        budget: &mut Budget,
+    ) -> Turn {
+        let was_on_surface = matches!(self.phase, Phase::OnSurface(_));
+        match &self.rough {
+            Some(Rough { stage, .. }) if was_on_surface && *stage != Stage::Descends => {
+                self.follows_the_pull(window, hip, budget)
+            }
+            _ => {
+                let turn = self.turn(window, hip, budget);
+                if !was_on_surface && matches!(self.phase, Phase::OnSurface(_)) {
+                    self.walks_from_here(window);
+                    if let Some(rough) = &mut self.rough {
+                        rough.held = Vec3::ZERO;
+                    }
+                }
+                turn
+            }
+        }
+    }
+
+    /// On the surface: where friction lets the proxy come to.
+    #[inline(never)]
+    fn follows_the_pull<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        budget: &mut Budget,
+    ) -> Turn {
+        let (Phase::OnSurface(on), Some(rough)) = (&mut self.phase, &mut self.rough) else {
+            return Turn::Ends;
+        };
+        let cone = Cone {
+            mu: rough.friction.dynamic_mu,
+            drag: rough.friction.viscous_s * self.settings.rate.hz() as f32,
+            from: rough.from,
+        };
+        let (at_rest, ways, inside) = match rough.stage {
+            Stage::GoesOn { ways, inside } => (None, ways, inside),
+            _ => (Some(rough.mu_at_rest()), 0, 0),
+        };
+        let begun_at = on.descent.entry();
+        let mut walk = Walk {
+            point: begun_at,
+            at_rest,
+            ways,
+            inside,
+            held: rough.held,
+        };
+        let rules = Rules {
+            leave: &on.leave,
+            waits: self.settings.execution == Execution::LockStep,
+        };
+        let walked = walk.advance(window, &HipView::new(hip), &cone, rules, budget);
+        if walk.at_rest.is_none() {
+            rough.stage = Stage::GoesOn {
+                ways: walk.ways,
+                inside: walk.inside,
+            };
+        }
+        rough.held = walk.held;
+        if walk.point != begun_at {
+            if rough.motion == Motion::Sticks {
+                rough.motion = Motion::Slides { still: 0 };
+            }
+            on.descent.restart(walk.point);
+        }
+        match walked {
+            Walked::Rests(missing) => self.touches(window, hip, missing.is_none(), missing),
+            Walked::Missing(tile) => {
+                // Also where the proxy's own patch is in that tile.
+                (self.output.converged, self.output.missing_tile) = (false, Some(tile));
+                self.touches(window, hip, false, Some(tile))
+            }
+            Walked::Suspended => self.touches(window, hip, false, None),
+            Walked::Leaves => self.leaves(window, &HipView::new(hip), hip),
+            Walked::Off => {
+                (rough.stage, rough.held) = (Stage::Descends, Vec3::ZERO);
+                Turn::GoesOn
+            }
+        }
+    }
+
+    /// In contact the answer is told from the surface, not as the HIP sees it: a proxy that stays
+    /// has the same bits for every HIP.
+    fn answers_from_the_surface<const D: usize>(&mut self, window: &Window<'_, D>) {
+        if let Phase::OnSurface(on) = &self.phase {
+            let nearest = on.descent.nearest(window, &HipView::new(self.hip));
+            let proxy = nearest.and_then(|(point, _)| position_on(window, &point));
+            if let Some(proxy) = proxy {
+                self.output.proxy = proxy;
+                self.output.displacement = self.hip.to(&proxy) * on.fade;
+            }
+        }
+    }
+
+    /// Counts how long the proxy has not moved, by the answers that count, and whether the next
+    /// answer is this one again.
+    fn counts_stillness(&mut self) {
+        self.at_rest = self.output.converged && self.boundary_fade() == 1.0;
+        let before = self.felt.map(|(proxy, _)| proxy);
+        let tick_s = self.settings.rate.tick_s();
+        let least_way = self.settings.sticks_below * tick_s;
+        let Some(rough) = &mut self.rough else { return };
+        if !self.output.converged {
+            return;
+        }
+        if self.output.state != ContactState::Touching {
+            rough.motion = Motion::Sticks;
+            return;
+        }
+        let way = before.map(|before| before.to(&self.output.proxy).abs().max_element());
+        if let Motion::Slides { still } = &mut rough.motion {
+            let is_still = way.is_some_and(|way| way <= least_way);
+            *still = if is_still { *still + 1 } else { 0 };
+            if (*still as f32) * tick_s >= STICKS_AFTER_S {
+                rough.motion = Motion::Sticks;
+            }
+        }
+        // The viscous part of a motion ends with it: the proxy goes on though the HIP rests.
+        let creeps = rough.friction.viscous_s > 0.0 && way != Some(0.0);
+        self.at_rest &= rough.motion == Motion::Sticks && !creeps;
+    }
+}

@@ -1,0 +1,191 @@
+//! A straight way through one patch, and where the distance from the HIP is first least on it.
+//!
+//! In the coordinates of the patch the way is `(u, v) + t·(du, dv)`. The height over it is a
+//! quadratic in `t`, half the squared distance a quartic, and its slope the cubic
+//!
+//! ```text
+//! h(t) = (off + t·d)·d + (z + s·t + w·t²)·(s + 2w·t)        w = a·du·dv
+//! ```
+//!
+//! So the first minimum is exact: a way that ends there has passed no crest.
+
+use glam::Vec3;
+
+use super::surface::Side;
+use super::surface::patch::Patch;
+use crate::scalar::{larger, smaller};
+
+/// Steps of false position at most. Three or four are usual.
+const STEPS: u32 = 16;
+/// The way may end where the slope is less than this part of that at its start.
+const FLAT: f32 = 4e-3;
+
+/// A straight way through one patch.
+#[derive(Debug)]
+pub(super) struct StraightWay {
+    from: (f32, f32),
+    way: (f32, f32),
+    /// Coefficients of h, constant first.
+    slope: [f32; 4],
+}
+
+impl StraightWay {
+    /// From a place of the patch, for a HIP at `hip`, in patch coordinates; at `t = 1` it has gone
+    /// all of `way`.
+    #[inline]
+    pub(super) fn new(patch: &Patch, hip: (f32, f32), from: (f32, f32), way: (f32, f32)) -> Self {
+        let (off_u, off_v) = (from.0 - hip.0, from.1 - hip.1);
+        let z = patch.height(from.0, from.1);
+        let s = patch.slope_u(from.1) * way.0 + patch.slope_v(from.0) * way.1;
+        let w = patch.a * way.0 * way.1;
+        let slope = [
+            off_u * way.0 + off_v * way.1 + z * s,
+            way.0 * way.0 + way.1 * way.1 + s * s + 2.0 * w * z,
+            3.0 * s * w,
+            2.0 * w * w,
+        ];
+        Self { from, way, slope }
+    }
+
+    /// Where it meets the borders eastward or westward, and northward or southward.
+    #[inline]
+    fn to_borders(&self) -> (f32, f32) {
+        let along = |from: f32, way: f32| match way {
+            way if way > 0.0 => (1.0 - from) / way,
+            way if way < 0.0 => from / -way,
+            _ => f32::INFINITY,
+        };
+        let ((u, v), (du, dv)) = (self.from, self.way);
+        (along(u, du), along(v, dv))
+    }
+
+    /// Where it meets the border of the patch.
+    #[inline]
+    pub(super) fn to_border(&self) -> f32 {
+        let (east, north) = self.to_borders();
+        smaller(east, north)
+    }
+
+    /// The place at `t`, in the patch.
+    #[inline]
+    pub(super) fn at(&self, t: f32) -> (f32, f32) {
+        let place = |from: f32, way: f32| larger(smaller(from + t * way, 1.0), 0.0);
+        let ((u, v), (du, dv)) = (self.from, self.way);
+        (place(u, du), place(v, dv))
+    }
+
+    /// The place where it meets the border, exactly on it.
+    #[inline]
+    pub(super) fn on_border(&self) -> (f32, f32) {
+        let end = self.to_border();
+        let (mut u, mut v) = self.at(end);
+        let (to_east, to_north) = self.to_borders();
+        if to_east <= end {
+            u = if self.way.0 > 0.0 { 1.0 } else { 0.0 };
+        }
+        if to_north <= end {
+            v = if self.way.1 > 0.0 { 1.0 } else { 0.0 };
+        }
+        (u, v)
+    }
+
+    /// Half the slope of the squared distance over `t`.
+    #[inline]
+    fn slope_at(&self, t: f32) -> f32 {
+        let [c0, c1, c2, c3] = self.slope;
+        c0 + t * (c1 + t * (c2 + t * c3))
+    }
+
+    /// The first minimum of the distance up to `end`, or short of it by next to nothing; `None`
+    /// where the distance falls all the way. It has to fall at the start.
+    pub(super) fn first_minimum(&self, end: f32) -> Option<f32> {
+        let [c0, c1, c2, c3] = self.slope;
+        let mut end = end;
+        // h has a maximum before its minimum only where it bends down at first. A root before
+        // that maximum is the first one.
+        let bends = c2 * c2 - 3.0 * c1 * c3;
+        if c2 < 0.0 && c1 > 0.0 && bends > 0.0 {
+            let crest = c1 / (libm::sqrtf(bends) - c2);
+            if crest < end && self.slope_at(crest) >= 0.0 {
+                end = crest;
+            }
+        }
+        let mut at_high = self.slope_at(end);
+        if at_high < 0.0 || at_high.is_nan() {
+            return None;
+        }
+        // False position (Illinois): an end that stays twice counts half.
+        let (mut low, mut high, mut at_low) = (0.0, end, c0);
+        let mut stayed = 0;
+        for _ in 0..STEPS {
+            let t = low + (high - low) * (at_low / (at_low - at_high));
+            let at = self.slope_at(t);
+            if at.abs() <= -FLAT * c0 {
+                return Some(t);
+            }
+            if at < 0.0 {
+                (low, at_low) = (t, at);
+                at_high *= if stayed > 0 { 0.5 } else { 1.0 };
+                stayed = 1;
+            } else {
+                (high, at_high) = (t, at);
+                at_low *= if stayed < 0 { 0.5 } else { 1.0 };
+                stayed = -1;
+            }
+        }
+        Some(low)
+    }
+
+    /// Whether the distance is surely nowhere on the way up to `t = 1` more than at its start:
+    /// half the squares by no more than `noise`.
+    pub(super) fn never_rises_above_start(&self, noise: f32) -> bool {
+        // Of the mean slope from the start to `t`, which times `t` is the rise.
+        let [c0, c1, c2, c3] = self.slope;
+        let [c1, c2, c3] = [c1 / 2.0, c2 / 3.0, c3 / 4.0];
+        let bernstein = [
+            c0,
+            c0 + c1 / 3.0,
+            c0 + (2.0 * c1 + c2) / 3.0,
+            c0 + c1 + c2 + c3,
+        ];
+        bernstein.iter().all(|b| *b <= noise)
+    }
+}
+
+/// The part of a vector along the tangent plane of these slopes, or, of a point on a border,
+/// along that direction into the patch which has most of it.
+pub(super) fn steepest(su: f32, sv: f32, border: Side, way: Vec3) -> Vec3 {
+    // The projection onto the plane; multiplied out, so that a wall costs no bits.
+    let (across, norm) = (su * sv, 1.0 + su * su + sv * sv);
+    let free = Vec3::new(
+        ((1.0 + sv * sv) * way.x - across * way.y + su * way.z) / norm,
+        ((1.0 + su * su) * way.y - across * way.x + sv * way.z) / norm,
+        ((su * su + sv * sv) * way.z + su * way.x + sv * way.y) / norm,
+    );
+    if leads_in(free, border) {
+        return free;
+    }
+    let mut best = Vec3::ZERO;
+    if border.north != 0 {
+        let east = (way.x + su * way.z) / (1.0 + su * su);
+        best = longer(best, Vec3::new(east, 0.0, su * east), border);
+    }
+    if border.east != 0 {
+        let north = (way.y + sv * way.z) / (1.0 + sv * sv);
+        best = longer(best, Vec3::new(0.0, north, sv * north), border);
+    }
+    best
+}
+
+/// Whether a direction leads into the patch of a point on this border.
+fn leads_in(way: Vec3, border: Side) -> bool {
+    way.x * border.east as f32 <= 0.0 && way.y * border.north as f32 <= 0.0
+}
+
+fn longer(best: Vec3, other: Vec3, border: Side) -> Vec3 {
+    if leads_in(other, border) && other.length_squared() > best.length_squared() {
+        other
+    } else {
+        best
+    }
+}

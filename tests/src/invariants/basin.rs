@@ -1,0 +1,71 @@
+//! A proxy does not pass a crest: the places no farther from the HIP than its last place are
+//! flooded from there, column by column.
+
+use std::collections::HashSet;
+
+use super::Invariant;
+use super::judge::{Judge, Verdict};
+use super::seen::Seen;
+use super::surface::{distance, patches_at};
+
+/// Shorter moves, in cells, pass no crest that is worth a name.
+const SHORT: f64 = 0.02;
+/// HIPs farther than this, in cells, would flood too much.
+const FAR: f64 = 4.0;
+/// Columns a cell.
+const COLUMNS: f64 = 64.0;
+/// What a channel between two columns may be narrower by, cells.
+const SLACK: f64 = 0.02;
+
+impl Judge<'_> {
+    /// The proxy is joined with where it was.
+    pub(super) fn stays_in_basin(&self, before: &Seen, seen: &Seen) -> Verdict {
+        let reach = distance(before.proxy, seen.hip);
+        let is_judged = before.is_touching()
+            && seen.is_touching()
+            && reach < FAR
+            && distance(before.proxy, seen.proxy) > SHORT;
+        if !is_judged {
+            return Ok(());
+        }
+        let [from, to] = [before.proxy, seen.proxy].map(|at| [at[0], at[1]]);
+        let is_open = |at| self.is_open(at, seen.hip, reach + SLACK);
+        const LOOKS: u32 = 64;
+        let is_straight = (0..=LOOKS).all(|look| {
+            let share = f64::from(look) / f64::from(LOOKS);
+            is_open([0, 1].map(|i| from[i] + share * (to[i] - from[i])))
+        });
+        if is_straight || is_flooded(from, to, is_open) {
+            return Ok(());
+        }
+        let detail = format!("over a crest of more than {reach}: {before:?} then {seen:?}");
+        self.fail(Invariant::Basin, detail)
+    }
+
+    /// Whether a column has places of ground or air so near to the HIP.
+    fn is_open(&self, [x, y]: [f64; 2], hip: [f64; 3], reach: f64) -> bool {
+        let up = reach * reach - (x - hip[0]).powi(2) - (y - hip[1]).powi(2);
+        let ground = patches_at(self.terrain, x, y).map(|patch| patch.height(x, y));
+        let lowest = ground.fold(f64::INFINITY, f64::min);
+        up >= 0.0 && lowest - hip[2] <= up.sqrt()
+    }
+}
+
+/// Whether two places are joined by columns that are open.
+fn is_flooded(from: [f64; 2], to: [f64; 2], is_open: impl Fn([f64; 2]) -> bool) -> bool {
+    let column = |at: [f64; 2]| at.map(|c| (c * COLUMNS).round() as i64);
+    let (start, end) = (column(from), column(to));
+    let mut reached = HashSet::from([start]);
+    let mut edge = vec![start];
+    while let Some([x, y]) = edge.pop() {
+        if (x - end[0]).abs().max((y - end[1]).abs()) <= 1 {
+            return true;
+        }
+        for next in [[x - 1, y], [x + 1, y], [x, y - 1], [x, y + 1]] {
+            if is_open(next.map(|c| c as f64 / COLUMNS)) && reached.insert(next) {
+                edge.push(next);
+            }
+        }
+    }
+    false
+}
