@@ -63,6 +63,11 @@ pub trait TickClock {
     /// [`Self::PERIOD`].
     fn since_due(&self) -> u32;
 
+    /// Returns the counts since the last call, [`Self::PERIOD`] at the first. The clock behind
+    /// it runs on while a debugger halts the core. It may wrap around after 65 ms, by when the
+    /// watchdog has reset a board that stood still.
+    fn since_last_tick(&mut self) -> u32;
+
     /// Acknowledges the timer event that this tick answers.
     fn begin_tick(&mut self);
 

@@ -17,6 +17,8 @@ pub enum LedPattern {
     Touching,
     /// A fault: as many flashes as its number, then a pause.
     Fault(u8),
+    /// A chip that the program refuses to run on: a long and a short flash, then a pause.
+    WrongChip,
 }
 
 /// Length of a fault's flash, ms.
@@ -52,6 +54,7 @@ impl LedPattern {
                 let at = ms % (flashes + PAUSE);
                 at < flashes && at % FLASH_AND_GAP < FLASH
             }
+            Self::WrongChip => matches!(ms % 2_000, 0..600 | 800..1_000),
         }
     }
 }

@@ -1,7 +1,9 @@
 //! What the application's parts tell about themselves: that they run, and what they
 //! count. It decides whether the watchdog is fed; the tick and the status message read it.
 
-use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
+
+use hapterra_core::wire::status::UsbClock;
 
 /// A part of the application that has to check in before the watchdog is fed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +31,7 @@ pub struct Monitor {
     fed: AtomicU32,
     stack_size: AtomicU32,
     stack_high_water: AtomicU32,
+    usb_clock: AtomicU8,
 }
 
 impl Monitor {
@@ -42,6 +45,7 @@ impl Monitor {
             fed: AtomicU32::new(0),
             stack_size: AtomicU32::new(0),
             stack_high_water: AtomicU32::new(0),
+            usb_clock: AtomicU8::new(UsbClock::Unknown as u8),
         }
     }
 
@@ -97,6 +101,19 @@ impl Monitor {
     pub fn measure_stack(&self, (size, high_water): (u32, u32)) {
         self.stack_size.store(size, Relaxed);
         self.stack_high_water.store(high_water, Relaxed);
+    }
+
+    /// Takes whether the oscillator of USB followed the host in the last second.
+    pub fn measure_usb_clock(&self, clock: UsbClock) {
+        self.usb_clock.store(clock as u8, Relaxed);
+    }
+
+    /// Returns whether the oscillator of USB followed the host when that was last measured.
+    #[must_use]
+    pub fn usb_clock(&self) -> UsbClock {
+        let all = [UsbClock::Unknown, UsbClock::Locked, UsbClock::Unlocked];
+        let found = all.get(usize::from(self.usb_clock.load(Relaxed)));
+        found.copied().unwrap_or_default()
     }
 
     /// Returns the size of the stack and how much of it was ever used, bytes.

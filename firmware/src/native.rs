@@ -80,6 +80,11 @@ impl<const TICKS_A_MS: u32> TickClock for StoppedClock<TICKS_A_MS> {
         0
     }
 
+    /// No time passes outside of ticks.
+    fn since_last_tick(&mut self) -> u32 {
+        Self::PERIOD
+    }
+
     fn begin_tick(&mut self) {}
 
     fn next_is_due(&self) -> bool {
@@ -101,6 +106,12 @@ pub struct Device<C, const D: usize> {
 }
 
 impl<C: TickClock, const D: usize> Device<C, D> {
+    /// What its parts tell about themselves.
+    #[must_use]
+    pub const fn monitor(&self) -> &'static Monitor {
+        self.monitor
+    }
+
     /// Builds the device in memory that lives as long as the program, such as a
     /// leaked box, because its halves hand tile buffers to each other by reference.
     pub fn new(

@@ -211,6 +211,49 @@ impl Attendant for Another {
             None => self.user.confirms(question),
         }
     }
+
+    fn time_s(&self, board_ms: f64) -> f64 {
+        self.user.time_s(board_ms)
+    }
+}
+
+/// The finding of the first step, where the board has these mistakes.
+fn found_of_the_board(mistakes: BenchMistakes) -> (Step, Finding) {
+    found(wired(Wiring::RIGHT).with_mistakes(mistakes), RECORD)
+}
+
+#[test]
+fn a_board_that_ticks_at_another_rate_than_it_says_is_named() {
+    for clock_slow_by in [0.05, -0.05, 0.5, -1.0] {
+        let slow = BenchMistakes {
+            clock_slow_by,
+            ..BenchMistakes::default()
+        };
+        let (step, finding) = found_of_the_board(slow);
+        assert_eq!(step, Step::Board);
+        assert!(
+            matches!(finding, Finding::WrongTickRate { .. }),
+            "{clock_slow_by}: {finding}"
+        );
+    }
+    // The chips' own oscillators may be off by a hundredth.
+    let slow = BenchMistakes {
+        clock_slow_by: 0.01,
+        output_off_v: [1.0; 3],
+        ..BenchMistakes::default()
+    };
+    let (step, _) = found_of_the_board(slow);
+    assert_eq!(step, Step::Outputs);
+}
+
+#[test]
+fn a_usb_clock_that_does_not_follow_the_host_is_named() {
+    let unlocked = BenchMistakes {
+        usb_clock_unlocked: true,
+        ..BenchMistakes::default()
+    };
+    let found = found_of_the_board(unlocked);
+    assert_eq!(found, (Step::Board, Finding::UsbClockUnlocked));
 }
 
 #[test]

@@ -222,6 +222,11 @@ impl Contact {
                 // A proxy that is held back does not follow the HIP.
                 self.settings.shortcuts = false;
                 self.at_rest = false;
+                if let Phase::OnSurface(on) = &mut self.phase
+                    && let Some(follow) = on.follow.take()
+                {
+                    on.descent.restart(follow.point);
+                }
             }
             None => {}
         }

@@ -54,11 +54,14 @@ pub enum Fault {
     StackOverflow = 21,
     /// A joint moved faster or farther than a jog may move it.
     JogRanAway = 22,
+    /// More than one and a half periods passed between two ticks: a debugger halted the
+    /// core, or a bus stalled it.
+    TickGap = 23,
 }
 
 impl Fault {
     /// Every fault, by number.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::NotANumber,
         Self::TickOverrun,
         Self::EncoderJump,
@@ -81,6 +84,7 @@ impl Fault {
         Self::OutputsNotAsSet,
         Self::StackOverflow,
         Self::JogRanAway,
+        Self::TickGap,
     ];
 
     /// The fault's number.
@@ -117,6 +121,7 @@ impl Fault {
             }
             Self::StackOverflow => "the board's program overran its stack before it was reset",
             Self::JogRanAway => "a joint moved faster or farther than a jog may move it",
+            Self::TickGap => "the board stood still between two ticks",
         }
     }
 
@@ -154,6 +159,9 @@ impl Fault {
             Self::OutputsNotAsSet => "check the supply and the wires of the converter",
             Self::StackOverflow => "please report it with the crash shown by `hapterra status`",
             Self::JogRanAway => "check the motor's wiring and the axis; make the current smaller",
+            Self::TickGap => {
+                "attach no debug probe while the arm is armed; if there was none, please report it"
+            }
         }
     }
 }
@@ -192,6 +200,7 @@ mod tests {
             (Fault::OutputsNotAsSet, 20),
             (Fault::StackOverflow, 21),
             (Fault::JogRanAway, 22),
+            (Fault::TickGap, 23),
         ];
         for (fault, number) in named {
             assert_eq!(fault.number(), number);

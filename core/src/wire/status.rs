@@ -146,6 +146,19 @@ pub struct StackFigures {
     pub high_water: u32,
 }
 
+/// Whether the oscillator of a board's USB follows the host's start-of-frames. Without that it
+/// is too far off for some hosts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum UsbClock {
+    /// There is none, or it was not measured yet.
+    #[default]
+    Unknown,
+    /// It followed all of them in the last second.
+    Locked,
+    /// It did not.
+    Unlocked,
+}
+
 /// Everything worth knowing about a device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Status {
@@ -163,6 +176,8 @@ pub struct Status {
     pub ticks: TickFigures,
     /// The stack.
     pub stack: StackFigures,
+    /// The oscillator of USB.
+    pub usb_clock: UsbClock,
     /// Frames that were not understood.
     pub bad_frames: u32,
     /// Frames of a session that is not the open one.

@@ -29,6 +29,8 @@ mod chip;
 #[path = "../nucleo-h743zi2/flash.rs"]
 mod flash;
 mod outputs;
+#[path = "../nucleo-h743zi2/revision.rs"]
+mod revision;
 #[path = "../common/stm32/mod.rs"]
 mod stm32;
 mod stop;

@@ -1,6 +1,8 @@
 //! The STM32H743ZI: its clocks, pins and what is particular to it. The pins of the
 //! outputs are the image's own ([`crate::outputs`]).
 
+use core::mem::MaybeUninit;
+
 use cortex_m::Peripherals as Core;
 use embassy_stm32::adc::{Adc, AdcChannel};
 use embassy_stm32::flash::Flash;
@@ -8,7 +10,7 @@ use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::pac::Interrupt;
 use embassy_stm32::pac::adc::regs::{Pcsel, Smpr};
 use embassy_stm32::pac::crs::vals::Syncsrc;
-use embassy_stm32::pac::gpio::vals::Odr;
+use embassy_stm32::pac::gpio::vals::{Idr, Odr};
 use embassy_stm32::peripherals::{IWDG1, TIM3, TIM4, TIM8, USB_OTG_FS};
 use embassy_stm32::usb::{self, Driver, InterruptHandler};
 use embassy_stm32::{Config, Peripherals, interrupt, pac, rcc};
@@ -18,6 +20,7 @@ use static_cell::ConstStaticCell;
 
 use crate::flash;
 use crate::outputs::{Outputs, take_outputs};
+use crate::revision;
 use crate::stm32::clock::CycleClock;
 use crate::stm32::encoders::{SafetyInputs, TimerEncoders, quadrature};
 use crate::stm32::feedback::{Feedback, Monitors};
@@ -70,6 +73,9 @@ static USB_BUFFER: ConstStaticCell<[u8; 256]> = ConstStaticCell::new([0; 256]);
 /// Bits that a current monitor's reading has too many: it has 16, and 12 are used.
 pub(crate) const MONITOR_SHIFT: u32 = 4;
 
+/// Conversions at the beginning of a sequence that are not read: this chip has no need of any.
+pub(crate) const DUMMY_CONVERSIONS: usize = 0;
+
 /// Time that a sequence of three conversions takes, µs, on the slower of the chip's revisions.
 pub(crate) const SEQUENCE_US: u32 = 75;
 
@@ -85,8 +91,9 @@ pub(crate) fn sample_slowly(channels: [u8; 3]) {
 }
 
 /// Sets up what comes before the clocks: faults and caches. No DMA is used, so the data
-/// cache needs no care.
+/// cache needs no care. Does not return on a chip that is too old.
 pub(crate) fn prepare(core: &mut Core) {
+    revision::refuse_older();
     flash::tell_bus_faults(core);
     core.SCB.enable_icache();
     core.SCB.enable_dcache(&mut core.CPUID);
@@ -192,12 +199,24 @@ pub(crate) fn take_reset_cause() -> ResetCause {
     }
 }
 
-/// Makes the data cache forget bytes, after memory has got them.
+/// A line of the data cache that is written after what has to outlive a reset.
+#[repr(align(32))]
+struct Line(u32);
+
+/// Writes bytes from the data cache to memory, and then a line more: the SRAM keeps the last
+/// word written in a buffer, for its check bits, and a reset loses that (RM0433, 2.4).
 pub(crate) fn write_back(address: usize, bytes: usize) {
+    #[unsafe(link_section = ".uninit.last_line")]
+    static mut LAST: MaybeUninit<Line> = MaybeUninit::uninit();
+    let last = (&raw mut LAST).cast::<Line>();
     // SAFETY: cleaning and invalidating by address keeps what memory is to
     // hold, and nothing relies on a state of the cache's registers.
     let mut core = unsafe { Core::steal() };
     core.SCB.clean_invalidate_dcache_by_address(address, bytes);
+    // SAFETY: nothing reads it, and no reference to it is made.
+    unsafe { (&raw mut (*last).0).write_volatile(0) };
+    core.SCB
+        .clean_invalidate_dcache_by_address(last as usize, size_of::<Line>());
 }
 
 /// Has USB's oscillator follow the start-of-frames of OTG_FS. embassy chooses source 2, which
@@ -240,10 +259,12 @@ pub(crate) fn resets_below_mv() -> u16 {
     }
 }
 
-/// Lets the watchdog run on while a debugger halts the core, whatever that asked for, and
-/// lets the halt stop TIM1. Its outputs are then off as by a break (RM0433, 38.3.28).
+/// Lets the watchdog and the clock of embassy's time run on while a debugger halts the core,
+/// whatever that asked for: the one resets the chip, by the other the next tick knows of the
+/// halt. Lets the halt stop TIM1. Its outputs are then off as by a break (RM0433, 38.3.28).
 pub(crate) fn let_a_halt_stop_the_arm() {
     pac::DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(false));
+    pac::DBGMCU.apb1lfzr1().modify(|w| w.set_tim5(false));
     pac::DBGMCU.apb2fzr1().modify(|w| w.set_tim1(true));
 }
 
@@ -254,6 +275,13 @@ pub(crate) fn toggle_heartbeat() {
         true => w.set_br(1, true),
         false => w.set_bs(1, true),
     });
+}
+
+/// Returns true if the level at the enable pin is not the one that is put out.
+pub(crate) fn enable_pin_differs() -> bool {
+    let is_high = pac::GPIOF.idr().read().idr(3) == Idr::HIGH;
+    let is_set = pac::GPIOF.odr().read().odr(3) == Odr::HIGH;
+    is_high != is_set
 }
 
 /// Sets the enable pin low, past any driver, for a program that failed.

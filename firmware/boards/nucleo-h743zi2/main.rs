@@ -27,6 +27,7 @@ mod application;
 mod chip;
 mod flash;
 mod outputs;
+mod revision;
 #[path = "../common/stm32/mod.rs"]
 mod stm32;
 mod stop;

@@ -1,7 +1,8 @@
 //! The emergency stop, which is also the break of TIM1: pressing it ends the duty cycles
 //! in hardware.
 //!
-//! A lockup of the core and a falling supply are breaks, too. A break clears
+//! A lockup of the core, a falling supply and memory that cannot be read (a double error of
+//! its check bits) are breaks, too. A break clears
 //! TIM1_BDTR.MOE, and the outputs go to their idle level, which is low (RM0433, 38.3.16).
 //! An amplifier that reads a duty cycle of 0 % as a broken wire is off then, whatever the
 //! program does.
@@ -24,9 +25,10 @@ pub(crate) struct EmergencyStop(Flex<'static>);
 const SETTLE_CYCLES: u32 = 4_800;
 /// SYSCFG_CFGR (RM0433, 12.3.3), counted in words, which metapac does not know.
 const SYSCFG_CFGR: usize = 0x18 / 4;
-/// Its bits PVDL and CM7L: the supply's comparator, which is locked as it is set up, and
-/// the core's lockup are breaks.
-const SUPPLY_AND_LOCKUP: u32 = 1 << 2 | 1 << 6;
+/// Its bits PVDL, FLASHL, CM7L, DTCML, ITCML and AXISRAML: the supply's comparator, which is
+/// locked as it is set up, the core's lockup, and double errors of flash and of the memories
+/// in use are breaks.
+const BREAKS: u32 = 1 << 2 | 1 << 3 | 1 << 6 | 1 << 13 | 1 << 14 | 1 << 15;
 
 /// Whether the enable pin is high.
 fn amplifiers_are_on() -> bool {
@@ -49,7 +51,7 @@ pub(crate) fn new(pin: Peri<'static, PE15>) -> EmergencyStop {
         .set_as_af_unchecked(function, AfType::input(Pull::Up));
     let cfgr = SYSCFG.as_ptr().cast::<u32>().wrapping_add(SYSCFG_CFGR);
     // SAFETY: a register of SYSCFG, whose clock is on. Its bits can only be set.
-    unsafe { cfgr.write_volatile(SUPPLY_AND_LOCKUP) };
+    unsafe { cfgr.write_volatile(BREAKS) };
     TIM1.bdtr().modify(|w| {
         w.set_ossi(Ossi::IDLE_LEVEL);
         // Eight equal samples of the stop at 7.1 MHz: a microsecond.

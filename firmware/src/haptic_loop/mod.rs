@@ -92,6 +92,11 @@ where
     /// Runs one tick. Returns what the amplifiers were left with.
     pub fn tick(&mut self) -> Drive {
         let began = self.timing.begin(&mut self.clock);
+        if began.after_gap {
+            // First of all: the force of the last tick has acted for too long already.
+            self.drive(&Drive::default());
+            self.give_to_haptics(Command::Trip(Fault::TickGap));
+        }
         self.ends.monitor.count_tick();
         self.ends.monitor.check_in(Part::Tick);
         let live = self.liveness.tick(self.ends.monitor.fed());

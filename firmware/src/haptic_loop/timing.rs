@@ -1,4 +1,8 @@
 //! What a tick costs and whether it came in time, by the board's own timers.
+//!
+//! A tick that begins late is counted. A gap of more than one and a half periods is a fault:
+//! the timer's own count tells the time within a period only, so it cannot see that whole
+//! periods are missing, and the last force was held meanwhile.
 
 use hapterra_core::scene::Sample;
 
@@ -8,14 +12,20 @@ use crate::board::TickClock;
 /// the haptic interrupt, so only masked interrupts could have delayed it.
 const LATE_PART: u32 = 100;
 
-/// When a tick began, by the free-running clock.
+/// The beginning of a tick.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct TickStart(u32);
+pub(super) struct TickStart {
+    /// By the free-running clock.
+    at: u32,
+    /// More than one and a half periods have passed since the tick before.
+    pub(super) after_gap: bool,
+}
 
 /// Cost and lateness so far; costs in counts of the board's clock.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Timing {
     latest_begin: u32,
+    max_gap: u32,
     cost: u32,
     worst_cost: u32,
     late: u32,
@@ -25,15 +35,19 @@ impl Timing {
     pub(super) const fn new<C: TickClock>() -> Self {
         Self {
             latest_begin: C::PERIOD / LATE_PART,
+            max_gap: C::PERIOD + C::PERIOD / 2,
             cost: 0,
             worst_cost: 0,
             late: 0,
         }
     }
 
-    /// Acknowledges the timer and counts a tick that is late.
+    /// Acknowledges the timer, counts a tick that is late and tells whether ticks are missing.
     pub(super) fn begin<C: TickClock>(&mut self, clock: &mut C) -> TickStart {
-        let began = TickStart(clock.now());
+        let began = TickStart {
+            at: clock.now(),
+            after_gap: clock.since_last_tick() > self.max_gap,
+        };
         if clock.since_due() > self.latest_begin {
             self.late = self.late.saturating_add(1);
         }
@@ -43,7 +57,7 @@ impl Timing {
 
     /// Measures the cost. Returns whether the next tick is already due: an overrun.
     pub(super) fn end<C: TickClock>(&mut self, clock: &C, began: TickStart) -> bool {
-        self.cost = clock.now().wrapping_sub(began.0);
+        self.cost = clock.now().wrapping_sub(began.at);
         self.worst_cost = self.worst_cost.max(self.cost);
         let overrun = clock.next_is_due();
         if overrun {
@@ -68,6 +82,7 @@ mod tests {
     struct Fake {
         now: u32,
         since_due: u32,
+        since_last_tick: u32,
         next_is_due: bool,
     }
 
@@ -81,6 +96,10 @@ mod tests {
 
         fn since_due(&self) -> u32 {
             self.since_due
+        }
+
+        fn since_last_tick(&mut self) -> u32 {
+            self.since_last_tick
         }
 
         fn begin_tick(&mut self) {
@@ -98,6 +117,7 @@ mod tests {
         let mut clock = Fake {
             now: u32::MAX - 4,
             since_due: 10,
+            since_last_tick: 1000,
             next_is_due: true,
         };
         let began = timing.begin(&mut clock);
@@ -118,11 +138,28 @@ mod tests {
         let mut clock = Fake {
             now: 0,
             since_due: 11,
+            since_last_tick: 1000,
             next_is_due: false,
         };
         let began = timing.begin(&mut clock);
         clock.next_is_due = true;
         assert!(timing.end(&clock, began));
         assert_eq!(timing.late, 2);
+    }
+
+    #[test]
+    fn a_gap_begins_above_one_and_a_half_periods() {
+        let mut timing = Timing::new::<Fake>();
+        let mut after = |since_last_tick| {
+            let mut clock = Fake {
+                now: 0,
+                since_due: 0,
+                since_last_tick,
+                next_is_due: false,
+            };
+            timing.begin(&mut clock).after_gap
+        };
+        assert!(!after(1000) && !after(1500));
+        assert!(after(1501) && after(2000) && after(44_000));
     }
 }

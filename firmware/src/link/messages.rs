@@ -308,6 +308,7 @@ impl<const D: usize> Link<'_, D> {
                 late: latest.late,
             },
             stack: StackFigures { size, high_water },
+            usb_clock: monitor.usb_clock(),
             bad_frames: self.bad_frames,
             foreign_frames: self.foreign_frames,
             dropped: self.samples_dropped(),

@@ -35,6 +35,10 @@ pub trait Attendant {
         || false
     }
 
+    /// The time that has passed on a clock beside the board since some moment; that of the
+    /// board itself is `board_ms`.
+    fn time_s(&self, board_ms: f64) -> f64;
+
     /// Is told that the arm may be armed from now on, or is known to be disarmed.
     fn may_be_armed(&mut self, _may: bool) {}
 }

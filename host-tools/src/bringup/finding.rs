@@ -15,6 +15,19 @@ pub enum Finding {
     /// The board finds something wrong with itself.
     #[error("the board is not ready: {}", .0.meaning())]
     NotReady(Blockers),
+    /// The board's ticks are not those of another clock.
+    #[error(
+        "the board ticks {hz:.0} times a second by this computer's clock where it says {stated_hz:.0}"
+    )]
+    WrongTickRate {
+        /// Counted.
+        hz: f64,
+        /// What the board says.
+        stated_hz: f64,
+    },
+    /// The oscillator of USB does not follow the host's.
+    #[error("the board's USB clock does not follow this computer's")]
+    UsbClockUnlocked,
     /// The board does not do what it is asked for.
     #[error("the board refuses: {0}")]
     Refused(Refusal),
@@ -169,6 +182,8 @@ impl Finding {
                 "check the amplifier's full scale against the board's page, then the torque constant of the motor's data sheet"
             }
             Self::NotReady(_) | Self::Refused(_) => "look at hapterra status",
+            Self::WrongTickRate { .. } => "do not go on: every limit in seconds would be wrong; flash the image of this very board again, and report it if it stays so",
+            Self::UsbClockUnlocked => "try another USB port without a hub; if it stays so, report it with the board's name and revision",
             Self::NotSeen(Task::PullReadyWire(_) | Task::ConnectReadyWire(_)) => {
                 "check that the amplifier is there, that its logic has power, and that its ready output is low while it is ready; an input that is tied to ground belongs to an amplifier without such an output"
             }

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use hapterra_core::guard::{Drive, Sense};
+use hapterra_core::wire::status::UsbClock;
 
 use crate::calibrate::N_PER_GRAM;
 use crate::phantom::{HandModel, PhantomModel, Plant, Wiring, kinematics};
@@ -56,6 +57,10 @@ pub struct BenchMistakes {
     pub amplifier_missing: [bool; 3],
     /// The ready input is tied to ground instead of to its amplifier.
     pub ready_grounded: [bool; 3],
+    /// The part by which the board's clock is slow.
+    pub clock_slow_by: f64,
+    /// The oscillator of the board's USB does not follow the host's.
+    pub usb_clock_unlocked: bool,
 }
 
 /// An arm, its wires, and the hand on it.
@@ -169,6 +174,19 @@ impl VirtualBench {
     #[must_use]
     pub fn fastest_rad_s(&self) -> [f64; 3] {
         self.fastest_rad_s
+    }
+
+    /// The time that passes on a right clock while so much passes on the board's, s.
+    pub(super) fn time_s(&self, board_ms: f64) -> f64 {
+        1e-3 * board_ms / (1.0 - self.mistakes.clock_slow_by)
+    }
+
+    /// What the board says of the oscillator of its USB.
+    pub(super) const fn usb_clock(&self) -> UsbClock {
+        match self.mistakes.usb_clock_unlocked {
+            true => UsbClock::Unlocked,
+            false => UsbClock::Locked,
+        }
     }
 
     /// Where the tip is, m, device frame.

@@ -72,6 +72,7 @@ impl VirtualUser {
             }))
             .restless()
             .in_steps_of(LOOK_MS)
+            .with_usb_clock(self.bench.borrow().usb_clock())
     }
 
     fn act(&mut self, task: Task) {
@@ -168,5 +169,9 @@ impl Attendant for VirtualUser {
             if yes { "yes" } else { "no" }
         ));
         Ok(yes)
+    }
+
+    fn time_s(&self, board_ms: f64) -> f64 {
+        self.bench.borrow().time_s(board_ms)
     }
 }

@@ -3,7 +3,7 @@
 use hapterra_core::wire::hello::PROTOCOL;
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::status::{
-    BootReport, CalibrationSource, Crash, CrashKind, ResetCause, Status,
+    BootReport, CalibrationSource, Crash, CrashKind, ResetCause, Status, UsbClock,
 };
 
 use super::failure::Failure;
@@ -72,13 +72,14 @@ fn text(status: &Status) -> String {
         "device         {device}\n\
          link           protocol {} on the device, {PROTOCOL} here; {} frames not understood, {} of other sessions, {} samples dropped\n\
          calibration    {}\n\
-         {}{arm}",
+         {}{}{arm}",
         status.device.protocol,
         status.bad_frames,
         status.foreign_frames,
         status.dropped,
         calibration(status),
         boot(&status.boot),
+        usb_clock(status.usb_clock),
     )
 }
 
@@ -118,6 +119,17 @@ fn boot(boot: &BootReport) -> String {
         String::new()
     };
     format!("started        {cause}\n{crash}{brown_out}")
+}
+
+/// A line about the oscillator of USB, if the board has one.
+const fn usb_clock(clock: UsbClock) -> &'static str {
+    match clock {
+        UsbClock::Unknown => "",
+        UsbClock::Locked => "USB clock      follows this computer\n",
+        UsbClock::Unlocked => {
+            "USB clock      does not follow this computer: try another port or hub\n"
+        }
+    }
 }
 
 fn crashed(crash: &Crash) -> String {
@@ -224,6 +236,7 @@ mod tests {
                 ..TickFigures::default()
             },
             stack: StackFigures::default(),
+            usb_clock: UsbClock::Locked,
             bad_frames: 0,
             foreign_frames: 0,
             dropped: 0,

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use hapterra_core::guard::{Drive, Sense};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::wire::status::BootReport;
+use hapterra_core::wire::status::{BootReport, UsbClock};
 use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::board::TickClock;
 use hapterra_firmware::native::{Device, StoppedClock};
@@ -48,6 +48,11 @@ impl TickClock for HostClock {
 
     fn since_due(&self) -> u32 {
         0
+    }
+
+    /// The virtual arm stands still with this program, so no force is held meanwhile.
+    fn since_last_tick(&mut self) -> u32 {
+        Self::PERIOD
     }
 
     fn begin_tick(&mut self) {}
@@ -138,6 +143,13 @@ impl<C: TickClock> Native<C> {
     #[must_use]
     pub fn restless(mut self) -> Self {
         self.restless = true;
+        self
+    }
+
+    /// The same device, which says this of the oscillator of its USB.
+    #[must_use]
+    pub fn with_usb_clock(self, clock: UsbClock) -> Self {
+        self.device.monitor().measure_usb_clock(clock);
         self
     }
 

@@ -2,7 +2,8 @@
 //! the channels that are connected to it, and an injected sequence that the program starts.
 //!
 //! Modelled: of CR DEEPPWD, ADVREGEN with its start-up time, ADCAL, ADEN, JADSTART; of ISR
-//! ADRDY, JEOC, JEOS; JQDIS of CFGR; JSQR and JDR; on an H743 PCSEL.
+//! ADRDY, JEOC, JEOS; JQDIS of CFGR; JSQR and JDR; on an H743 PCSEL; on a G474 that the first
+//! conversion after a millisecond without one is wrong (ES0430).
 //!
 //! Not modelled: what a calibration corrects, sampling times and prescalers (a sequence takes
 //! the longest that the slower chip's can take), DIFSEL, offsets, oversampling, resolutions,
@@ -31,6 +32,11 @@ const JQDIS: u32 = 1 << 31;
 /// How long a sequence takes, ns: three conversions of the slower chip in its slower revision,
 /// an H743 of revision V, whose converter halves its clock once more.
 const SEQUENCE_NS: u64 = 75_000;
+/// The time without a conversion after which the next one is wrong on a G474, ns: a tenth less
+/// than the millisecond of ES0430, which a chip's own clock and temperature may make of it.
+const STALE_NS: u64 = 900_000;
+/// What a wrong conversion reads.
+const WRONG: u32 = 0xFFF;
 /// How long the regulator takes to start, ns: a G474's 20 µs, an H743's 10.
 const REGULATOR_NS: [u64; 2] = [20_000, 10_000];
 
@@ -43,6 +49,10 @@ pub struct Adc {
     regulator_ns: Option<u64>,
     /// Until when a sequence is under way, ns.
     busy_until_ns: Option<u64>,
+    /// When the last sequence ended, ns.
+    ended_ns: Option<u64>,
+    /// The first conversion of the sequence under way is wrong.
+    first_is_wrong: bool,
     /// Readings of 12 bits at the channels, by their numbers.
     pub levels: [u16; 20],
 }
@@ -59,6 +69,8 @@ impl Adc {
             bits,
             regulator_ns: None,
             busy_until_ns: None,
+            ended_ns: None,
+            first_is_wrong: false,
             levels: [2048; 20],
         }
     }
@@ -114,6 +126,8 @@ impl Adc {
                 let may_start = written & ADEN != 0 && *self.register(CFGR) & JQDIS != 0;
                 if written & JADSTART != 0 && may_start && self.busy_until_ns.is_none() {
                     self.busy_until_ns = Some(now_ns + SEQUENCE_NS);
+                    let is_stale = |ended_ns| now_ns > ended_ns + STALE_NS;
+                    self.first_is_wrong = !self.is_h743() && self.ended_ns.is_none_or(is_stale);
                 }
             }
             _ => *self.register(offset) = written,
@@ -122,15 +136,19 @@ impl Adc {
 
     /// Ends a sequence whose time is up.
     fn finish(&mut self, now_ns: u64) {
-        if self.busy_until_ns.is_none_or(|until_ns| now_ns < until_ns) {
+        let Some(until_ns) = self.busy_until_ns.filter(|until_ns| now_ns >= *until_ns) else {
             return;
-        }
+        };
         self.busy_until_ns = None;
+        self.ended_ns = Some(until_ns);
         let sequence = *self.register(JSQR);
         for rank in 0..=(sequence & 3) {
             let channel = sequence >> (9 + 6 * rank) & 0x1F;
-            let level = self.level(channel);
-            *self.register(JDR1 + 4 * rank) = u32::from(level) << (self.bits - 12);
+            let level = match rank == 0 && self.first_is_wrong {
+                true => WRONG,
+                false => u32::from(self.level(channel)),
+            };
+            *self.register(JDR1 + 4 * rank) = level << (self.bits - 12);
         }
         *self.register(ISR) |= JEOC | JEOS;
     }
@@ -166,6 +184,22 @@ mod tests {
         assert_eq!(adc.read(JDR1 + 4, done_ns), 0, "channel 2 is not connected");
         adc.write(ISR, JEOS, u32::MAX, done_ns);
         assert_eq!(adc.read(ISR, done_ns), ADRDY | JEOC);
+    }
+
+    #[test]
+    fn the_first_conversion_after_a_millisecond_is_wrong() {
+        let mut adc = with_regulator(12);
+        adc.levels[9] = 0x123;
+        adc.write(JSQR, 1 | 9 << 9 | 9 << 15, u32::MAX, UP_NS);
+        adc.write(CR, ON, u32::MAX, UP_NS);
+        let mut convert = |at_ns: u64| {
+            adc.write(CR, ON | JADSTART, u32::MAX, at_ns);
+            let done_ns = at_ns + SEQUENCE_NS;
+            [JDR1, JDR1 + 4].map(|register| adc.read(register, done_ns))
+        };
+        assert_eq!(convert(UP_NS), [WRONG, 0x123]);
+        assert_eq!(convert(UP_NS + 500_000), [0x123; 2]);
+        assert_eq!(convert(UP_NS + 1_500_000), [WRONG, 0x123]);
     }
 
     #[test]

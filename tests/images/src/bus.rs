@@ -28,6 +28,8 @@ const PLL1ON: u32 = 1 << 24;
 const PLLCKSELR: u32 = 0x28;
 /// CRS_CR: the clock recovery runs.
 const CRS_CEN: u32 = 1 << 5;
+/// DBGMCU_IDC of an H743, and what it reads on one of revision V.
+const H743_IDC: (u32, u32) = (0x5C00_1000, 0x2003_6450);
 /// DWT's cycle counter.
 const CYCCNT: u32 = 0xE000_1004;
 
@@ -96,6 +98,16 @@ pub struct Bus {
     pub is_halted: bool,
     /// Whether the core has locked up.
     pub is_locked_up: bool,
+    /// A memory with a double error, of those of [`BreakAt::memories`].
+    pub failing_memory: Option<usize>,
+    /// The level that the enable pin is held at from outside.
+    pub enable_held_at: Option<bool>,
+    /// A command's pin (axis 0 to 2) and the 12-bit reading that it is held at from outside.
+    pub command_held_at: Option<(usize, u16)>,
+    /// Whether the oscillator of USB follows the host's start-of-frames.
+    pub usb_clock_follows: bool,
+    /// What reads the commands back.
+    read_back: Adc,
     /// Time since power-up.
     pub now_ns: u64,
     /// Runs while a test measures.
@@ -116,6 +128,9 @@ impl Bus {
         words.insert(chip.reset_flags.register, chip.reset_flags.after(cause));
         let (option_bytes, field, highest) = chip.brown_out_level;
         words.insert(option_bytes, highest << field);
+        if chip.is_m7 {
+            words.insert(H743_IDC.0, H743_IDC.1);
+        }
         Self {
             chip,
             words,
@@ -136,6 +151,11 @@ impl Bus {
             cleared_options: None,
             is_halted: false,
             is_locked_up: false,
+            failing_memory: None,
+            enable_held_at: None,
+            command_held_at: None,
+            usb_clock_follows: true,
+            read_back: Adc::new(chip.monitors.1),
             now_ns: 0,
             stopwatch: None,
             effects: vec![],
@@ -148,8 +168,12 @@ impl Bus {
         if self.is_halted && self.is_frozen(self.chip.freeze.watchdog) {
             self.watchdog.stand_still(by_ns);
         }
-        for timer in &mut self.timers {
-            timer.advance(self.now_ns);
+        let clock_stands = self.is_halted && self.is_frozen(self.chip.freeze.clock);
+        for (timer, at) in self.timers.iter_mut().zip(self.chip.timers) {
+            match clock_stands && at.name == "TIM5" {
+                true => timer.stand_still(self.now_ns),
+                false => timer.advance(self.now_ns),
+            }
         }
         self.raise_interrupts();
     }
@@ -190,7 +214,10 @@ impl Bus {
         let sources = Sources {
             pin: bears.then_some(level),
             system: through & by_supply != 0 && is_low
-                || through & by_lockup != 0 && self.is_locked_up,
+                || through & by_lockup != 0 && self.is_locked_up
+                || self
+                    .failing_memory
+                    .is_some_and(|n| through & at.memories[n] != 0),
         };
         if let Some(timer) = self.timer_named(at.timer) {
             shutdown::follow(timer, sources);
@@ -217,6 +244,13 @@ impl Bus {
     fn timer_named(&mut self, name: &str) -> Option<&mut Timer> {
         let found = self.chip.timers.iter().position(|t| t.name == name);
         found.and_then(|i| self.timers.get_mut(i))
+    }
+
+    /// Sets the revision of an H743, as DBGMCU_IDC.REV_ID tells it.
+    pub fn set_revision(&mut self, revision: u16) {
+        let (register, v) = H743_IDC;
+        self.words
+            .insert(register, v & 0xFFFF | u32::from(revision) << 16);
     }
 
     /// Sets the brown-out level of the option bytes.
@@ -306,6 +340,34 @@ impl Bus {
             .then(|| address - base)
     }
 
+    fn read_back_offset(&self, address: u32) -> Option<u32> {
+        let (base, _) = self.chip.read_back?;
+        (base..base + 0x100)
+            .contains(&address)
+            .then(|| address - base)
+    }
+
+    /// The converter that reads the commands back sees what is at their pins.
+    fn follow_commands(&mut self) {
+        let (Commands::Converters(at), Some((_, channels))) =
+            (self.chip.commands, self.chip.read_back)
+        else {
+            return;
+        };
+        for (axis, channel) in channels.into_iter().enumerate() {
+            let held = self.command_held_at.filter(|(held, _)| *held == axis);
+            self.read_back.levels[channel] =
+                held.map_or(self.plain(at[axis]) as u16, |(_, reading)| reading);
+        }
+    }
+
+    /// The level at a pin: what a driven one puts out, else what is there from outside.
+    fn level(&self, pin: (u32, u32)) -> bool {
+        let held = self.enable_held_at.filter(|_| pin == self.chip.enable);
+        let from_outside = || self.inputs.get(&pin).copied().unwrap_or(false);
+        held.unwrap_or_else(|| self.output(pin) || from_outside())
+    }
+
     /// Sets what the current monitors of axes 1 to 3 show, A, as 12-bit readings.
     pub fn set_monitors(&mut self, currents_a: [f64; 3]) {
         let (_, _, channels) = self.chip.monitors;
@@ -335,11 +397,16 @@ impl Bus {
             return self.usb.read(offset);
         }
         if let Some((port, IDR)) = self.port(address) {
-            let level = |pin| self.inputs.get(&(port, pin)).copied().unwrap_or(false);
-            return (0..16).map(|pin| u32::from(level(pin)) << pin).sum();
+            return (0..16)
+                .map(|pin| u32::from(self.level((port, pin))) << pin)
+                .sum();
         }
         if let Some(offset) = self.adc_offset(address) {
             return self.adc.read(offset, self.now_ns);
+        }
+        if let Some(offset) = self.read_back_offset(address) {
+            self.follow_commands();
+            return self.read_back.read(offset, self.now_ns);
         }
         match address {
             nvic::BASE..=0xE000_EFFF => self.nvic.read(address - nvic::BASE),
@@ -349,9 +416,21 @@ impl Bus {
             _ if address & !0x3FF == self.chip.watchdog => {
                 self.watchdog.read(address - self.chip.watchdog)
             }
+            _ if address == self.chip.recovery.0 + 8 => self.recovery_status(),
             _ if self.is_sent(address) => self.converter.status(self.plain(address)),
             _ if self.is_back(address) => self.converter.give().into(),
             _ => self.ready(address, self.plain(address)),
+        }
+    }
+
+    /// CRS_ISR: SYNCOKF, or ERRF and SYNCMISS. With a start-of-frame each millisecond the
+    /// flags are set again as soon as they were cleared.
+    fn recovery_status(&self) -> u32 {
+        let runs = self.plain(self.chip.recovery.0) & CRS_CEN != 0;
+        match (runs, self.usb_clock_follows) {
+            (false, _) => 0,
+            (true, true) => 1 << 0,
+            (true, false) => 1 << 2 | 1 << 9,
         }
     }
 
@@ -402,6 +481,9 @@ impl Bus {
             self.usb.write(offset, value, mask);
         } else if let Some(offset) = self.adc_offset(address) {
             self.adc.write(offset, value, mask, self.now_ns);
+        } else if let Some(offset) = self.read_back_offset(address) {
+            self.follow_commands();
+            self.read_back.write(offset, value, mask, self.now_ns);
         } else if let Some((port, BSRR)) = self.port(address) {
             let odr = self.chip.gpio + 0x400 * port + ODR;
             let level = self.plain(odr) & !(value >> 16) | value & 0xFFFF;

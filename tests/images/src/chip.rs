@@ -186,6 +186,9 @@ pub struct Chip {
     /// The converter that reads the current monitors: its address, its bits, and the
     /// channels of axes 1 to 3.
     pub monitors: (u32, u32, [usize; 3]),
+    /// The converter that reads the commands of axes 1 to 3 back at their pins, and its
+    /// channels there.
+    pub read_back: Option<(u32, [usize; 3])>,
     /// The flash with the calibrations.
     pub flash: Flash,
     /// Where the commands of axes 1 to 3 are.
@@ -262,9 +265,10 @@ pub static G474: Chip = Chip {
     // RCC_CR.HSEON.
     external_clock: (0x4002_1000, 1 << 16),
     recovery: (0x4000_2000, 0b10),
-    // DBGMCU_APB1FZR1.DBG_IWDG_STOP.
+    // DBGMCU_APB1FZR1.DBG_IWDG_STOP, DBG_TIM5_STOP.
     freeze: Freeze {
         watchdog: (0xE004_2008, 1 << 12),
+        clock: (0xE004_2008, 1 << 3),
         outputs: None,
     },
     output_break: None,
@@ -296,6 +300,8 @@ pub static G474: Chip = Chip {
     monitors_fitted: (C, 8),
     // ADC1: PC2, PC3, PB1.
     monitors: (0x5000_0000, 12, [8, 9, 12]),
+    // ADC2: PA4, PA5, PA6.
+    read_back: Some((0x5000_0100, [17, 13, 3])),
     // FLASH_CR: PNB, BKER, STRT; FLASH_SR.BSY. Pages of 2 KiB.
     flash: Flash {
         control: (0x4002_2014, 1 << 16),
@@ -364,16 +370,18 @@ pub static H743: Chip = Chip {
     external_clock: (0x5802_4400, 1 << 16),
     // 0b10 is OTG_HS (USB1), 0b11 is OTG_FS (USB2).
     recovery: (0x4000_8400, 0b11),
-    // DBGMCU_APB4FZ1.DBG_IWDG1, APB2FZ1.DBG_TIM1.
+    // DBGMCU_APB4FZ1.DBG_IWDG1, APB1LFZ1.DBG_TIM5, APB2FZ1.DBG_TIM1.
     freeze: Freeze {
         watchdog: (0x5C00_1054, 1 << 18),
+        clock: (0x5C00_103C, 1 << 3),
         outputs: Some((0x5C00_104C, 1 << 0)),
     },
-    // SYSCFG_CFGR: PVDL, CM7L.
+    // SYSCFG_CFGR: PVDL, CM7L; FLASHL, DTCML, ITCML, AXISRAML.
     output_break: Some(BreakAt {
         timer: "TIM1",
         pin: (E, 15, 1),
         system: (0x5800_0418, 1 << 2, 1 << 6),
+        memories: [1 << 3, 1 << 13, 1 << 14, 1 << 15],
     }),
     follows: &[
         // RCC_CR: HSI, CSI, HSI48, the PLLs. Nothing is on the pins of an external clock.
@@ -411,6 +419,7 @@ pub static H743: Chip = Chip {
     monitors_fitted: (F, 15),
     // ADC1: PA3, PC0, PB1.
     monitors: (0x4002_2000, 16, [15, 10, 5]),
+    read_back: None,
     // FLASH_CR2: SNB, START; FLASH_SR2: BSY, QW. Sectors of 128 KiB.
     flash: Flash {
         control: (0x5200_210C, 1 << 7),

@@ -3,7 +3,7 @@
 //! Modelled as RM0433 has it: of TIM1 CEN of CR1, the compare modes of CCMR1 and CCMR2, the
 //! enables of CCER (38.4.7 to 38.4.11), and (38.3.16, 38.3.28, 38.4.20) BKE, BKP, OSSI and MOE
 //! of BDTR, BKINE of AF1, BIF of SR; of SYSCFG_CFGR (12.3.3) PVDL, which also locks the
-//! comparator's settings, and CM7L; of DBGMCU (60.5.8) the bits that
+//! comparator's settings, CM7L, and the bits for double errors of flash and RAM; of DBGMCU (60.5.8) the bits that
 //! stop the watchdog and TIM1 with the core, and of the G474's (RM0440, 47.16) the
 //! watchdog's.
 //!
@@ -44,6 +44,8 @@ pub struct BreakAt {
     pub pin: (u32, u32, u32),
     /// SYSCFG_CFGR, and its bits for the supply's comparator and the core's lockup.
     pub system: (u32, u32, u32),
+    /// Its bits for double errors of flash, DTCM, ITCM and AXI SRAM.
+    pub memories: [u32; 4],
 }
 
 /// Registers and bits that stop parts of the chip while the core is halted.
@@ -51,6 +53,8 @@ pub struct BreakAt {
 pub struct Freeze {
     /// The watchdog's.
     pub watchdog: (u32, u32),
+    /// That of the timer of embassy's time.
+    pub clock: (u32, u32),
     /// TIM1's.
     pub outputs: Option<(u32, u32)>,
 }
@@ -60,7 +64,7 @@ pub struct Freeze {
 pub struct Sources {
     /// The pin's level, where it bears the break's function.
     pub pin: Option<bool>,
-    /// The comparator or a lockup, where they are let through.
+    /// The comparator, a lockup or a double error, where they are let through.
     pub system: bool,
 }
 

@@ -122,6 +122,11 @@ impl Timer {
         self.step(clocks / a_count);
     }
 
+    /// Lets time pass up to `now_ns` without counting: the halted core stops it.
+    pub fn stand_still(&mut self, now_ns: u64) {
+        self.now_ns = now_ns;
+    }
+
     fn step(&mut self, counts: u64) {
         let period = u64::from(self.get(ARR)) + 1;
         let from = u64::from(self.get(CNT));

@@ -233,6 +233,19 @@ fn a_supply_that_falls_ends_the_duty_cycles_without_the_program() {
 }
 
 #[test]
+fn memory_that_cannot_be_read_ends_the_duty_cycles() {
+    for memory in 0..4 {
+        on_each_hung(|machine| {
+            assert_eq!(machine.bus().drives_duty_cycles(), Some(true));
+            machine.bus().failing_memory = Some(memory);
+            machine.run_ms(1);
+            assert_low(machine, "broken off");
+            assert!(machine.is_enabled(), "no program has switched off");
+        });
+    }
+}
+
+#[test]
 fn a_stop_too_short_for_a_tick_to_see_is_a_stop() {
     on_each(|machine, terrain, scene| {
         let mut device = Device::arm(machine, terrain, scene);

@@ -12,6 +12,8 @@ pub struct Reading {
     pub since_due: u32,
     /// Whether the next tick is due before this one is done.
     pub overrun: bool,
+    /// Periods that passed without a tick before this one.
+    pub missing: u32,
 }
 
 /// A clock in lock-step that is set from outside.
@@ -35,6 +37,10 @@ impl TickClock for SetClock {
 
     fn since_due(&self) -> u32 {
         self.0.get().since_due
+    }
+
+    fn since_last_tick(&mut self) -> u32 {
+        Self::PERIOD * (1 + self.0.get().missing)
     }
 
     fn begin_tick(&mut self) {}

@@ -166,17 +166,21 @@ impl Mishap {
         }
     }
 
-    /// What it does to the clock.
+    /// What it does to the clock at `now`.
     #[must_use]
-    pub fn reading(&self) -> Reading {
+    pub fn reading(&self, now: u64) -> Reading {
         match self.kind {
             Kind::TickOverrun => Reading {
-                since_due: 0,
                 overrun: true,
+                ..Reading::default()
             },
             Kind::LateTicks => Reading {
                 since_due: 11 + (900.0 * self.size) as u32,
-                overrun: false,
+                ..Reading::default()
+            },
+            Kind::CoreHaltedBriefly => Reading {
+                missing: (now - self.ticks.start) as u32,
+                ..Reading::default()
             },
             _ => Reading::default(),
         }
@@ -209,6 +213,7 @@ impl Mishap {
         match self.kind {
             Kind::HaltedCore if is_last => Core::Resets(ResetCause::Watchdog),
             Kind::HaltedCore => Core::Halted,
+            Kind::CoreHaltedBriefly if !is_last => Core::Halted,
             Kind::BrownOut if is_last => Core::Resets(ResetCause::BrownOut),
             Kind::BrownOut if now >= self.ticks.start + u64::from(LOADED_TICKS) => Core::Down,
             Kind::ResetUnderLoad if is_last && self.sign > 0 => Core::Resets(ResetCause::Pin),

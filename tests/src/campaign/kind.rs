@@ -70,6 +70,8 @@ pub enum Kind {
     ResetUnderLoad,
     /// The core stands still with its command on, until the watchdog resets it.
     HaltedCore,
+    /// The core stands still with its command on and runs again before the watchdog resets it.
+    CoreHaltedBriefly,
     /// The host replays points while the arm is moved, and then runs a terrain.
     ReplayThenRun,
     /// The host sends calibrations above every ceiling, or of garbage, or wants one
@@ -149,6 +151,7 @@ impl Kind {
         Self::BrownOut,
         Self::ResetUnderLoad,
         Self::HaltedCore,
+        Self::CoreHaltedBriefly,
         Self::ReplayThenRun,
         Self::HostileCalibration,
         Self::EndpointHalt,
@@ -195,6 +198,8 @@ impl Kind {
             },
             // No later than the watchdog's reset.
             Self::HaltedCore => latch(&[Fault::WatchdogReset], WATCHDOG_TICKS),
+            // The first tick after it has no force.
+            Self::CoreHaltedBriefly => latch(&[Fault::TickGap], WATCHDOG_TICKS),
             Self::BrownOut => Expectation {
                 may_ride: false,
                 may_latch: &[Fault::SupplyLow],
@@ -247,6 +252,7 @@ impl Kind {
             Self::BrownOut => (LOADED_TICKS + 50, LOADED_TICKS + 2_000),
             Self::ResetUnderLoad => (3_000, 12_000),
             Self::HaltedCore => (WATCHDOG_TICKS, WATCHDOG_TICKS),
+            Self::CoreHaltedBriefly => (2, 40),
             Self::ReplayThenRun => (300, 3_000),
             Self::HostileCalibration => (500, 2_500),
             // It opens to the end.

@@ -408,7 +408,7 @@ impl<'t> Stretch<'t> {
             }
             mishap.meddle(&mut sense, &mut self.lost, self.now, &mut self.chance);
             (unkind, tiles) = (mishap.unkind(), mishap.tiles());
-            (reading, stalls) = (mishap.reading(), mishap.stalls());
+            (reading, stalls) = (mishap.reading(self.now), mishap.stalls());
             self.poisoned |= tiles == Tiles::Poisoned;
             core = mishap.core(self.now);
             if mishap.unplugs(self.now) || mishap.halts_endpoint(&mut self.chance) {

@@ -1,4 +1,6 @@
-//! The tick's timer, and the core's cycle counter as the clock.
+//! The tick's timer, the core's cycle counter as the clock of what a tick costs, and the
+//! timer of embassy's time, which runs on while a debugger halts the core, as the clock of
+//! what passes between two ticks.
 
 use cortex_m::Peripherals;
 use cortex_m::peripheral::DWT;
@@ -23,6 +25,22 @@ const DIVIDER: u16 = 4;
 /// `PER_COUNT` are one count of the timer.
 pub(crate) struct CycleClock<const HZ: u32, const PER_COUNT: u32> {
     timer: Timer<'static, TickTimer>,
+    /// The microsecond of the tick before, of 65,536.
+    last_us: Option<u16>,
+}
+
+/// Counts of [`microsecond`] in a second, as embassy sets its timer up.
+const US_HZ: u32 = {
+    assert!(
+        embassy_time::TICK_HZ == 1_000_000,
+        "embassy's time is in microseconds"
+    );
+    1_000_000
+};
+
+/// The microsecond that it is, of 65,536: embassy's timer, which wraps around in 16 bits.
+fn microsecond() -> u16 {
+    pac::TIM5.cnt().read() as u16
 }
 
 impl<const HZ: u32, const PER_COUNT: u32> CycleClock<HZ, PER_COUNT> {
@@ -46,7 +64,10 @@ impl<const HZ: u32, const PER_COUNT: u32> CycleClock<HZ, PER_COUNT> {
         timer.generate_update_event();
         timer.clear_update_interrupt();
         timer.enable_update_interrupt(true);
-        Self { timer }
+        Self {
+            timer,
+            last_us: None,
+        }
     }
 }
 
@@ -72,6 +93,14 @@ impl<const HZ: u32, const PER_COUNT: u32> TickClock for CycleClock<HZ, PER_COUNT
 
     fn since_due(&self) -> u32 {
         u32::from(self.timer.regs_core().cnt().read().cnt()) * PER_COUNT
+    }
+
+    fn since_last_tick(&mut self) -> u32 {
+        let now_us = microsecond();
+        let last_us = self.last_us.replace(now_us);
+        last_us.map_or(Self::PERIOD, |last_us| {
+            u32::from(now_us.wrapping_sub(last_us)) * (HZ / US_HZ)
+        })
     }
 
     fn begin_tick(&mut self) {

@@ -29,7 +29,7 @@ use hapterra_firmware::board::{Encoders, Sense};
 use hapterra_firmware::encoder::EndlessCount;
 
 use super::feedback::Feedback;
-use crate::outputs;
+use crate::{chip, outputs};
 
 /// The emergency stop's input.
 pub(crate) trait Stop {
@@ -101,7 +101,7 @@ impl<A: Timer, B: Timer, C: Timer, S: Stop> Encoders for TimerEncoders<A, B, C, 
             dead_man: self.inputs.dead_man.is_low(),
             emergency_stop: self.inputs.emergency_stop.is_pressed(),
             hardware_failed: outputs::failed() || measured.is_err(),
-            outputs_not_as_set: outputs::not_as_set(),
+            outputs_not_as_set: outputs::not_as_set() | chip::enable_pin_differs(),
             amplifier_not_ready: self.feedback.is_unready(),
             measured_ma: measured.unwrap_or_default(),
             clutch: self.inputs.clutch.is_low(),

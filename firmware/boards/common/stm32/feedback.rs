@@ -8,8 +8,9 @@ use embassy_stm32::peripherals::ADC1;
 use hapterra_firmware::amplifier::monitor_ma;
 
 use super::clock::TICK_HZ;
+use super::injected::Injected;
 use super::start::FULL_SCALE_A;
-use crate::chip::{MONITOR_SHIFT, SEQUENCE_US, sample_slowly};
+use crate::chip::{SEQUENCE_US, sample_slowly};
 
 // What a tick starts is there in the next one, with a tenth of the period to spare.
 const _: () = assert!(SEQUENCE_US * TICK_HZ <= 900_000);
@@ -45,9 +46,10 @@ impl Feedback {
 /// The converter has not done what it was told a tick before.
 pub(crate) struct NotConverted;
 
-/// The three monitors on ADC1, as one injected sequence that each tick starts and the
-/// next tick reads. embassy sets the converter up; it has no injected sequences for both
-/// chips, and in a tick nothing may wait for a conversion.
+/// The sequence that reads the monitors.
+const SEQUENCE: Injected = Injected(REGISTERS);
+
+/// The three monitors on ADC1.
 pub(crate) struct Monitors {
     /// Keeps the converter as it was set up.
     _adc: Adc<'static, ADC1>,
@@ -59,32 +61,17 @@ impl Monitors {
         adc: Adc<'static, ADC1>,
         channels: [AnyAdcChannel<'static, ADC1>; 3],
     ) -> Self {
-        let [a, b, c] = channels.map(|channel| channel.get_hw_channel());
-        sample_slowly([a, b, c]);
-        // A sequence that the program starts, and no queue of them.
-        REGISTERS.cfgr().modify(|w| w.set_jqdis(true));
-        REGISTERS.jsqr().write(|w| {
-            w.set_jl(2);
-            w.set_jsq(0, a);
-            w.set_jsq(1, b);
-            w.set_jsq(2, c);
-        });
-        start();
+        let channels = channels.map(|channel| channel.get_hw_channel());
+        sample_slowly(channels);
+        SEQUENCE.set_up(channels);
+        SEQUENCE.start();
         Self { _adc: adc }
     }
 
     /// What was converted since the last call, if all of it was; starts anew.
     fn read(&self) -> Option<[u16; 3]> {
-        let is_done = REGISTERS.isr().read().jeos();
-        // What is written as set is cleared.
-        REGISTERS.isr().write(|w| w.set_jeos(true));
-        let code = |n| (REGISTERS.jdr(n).read().0 >> MONITOR_SHIFT) as u16;
-        let codes = [code(0), code(1), code(2)];
-        start();
-        is_done.then_some(codes)
+        let codes = SEQUENCE.read();
+        SEQUENCE.start();
+        codes
     }
-}
-
-fn start() {
-    REGISTERS.cr().modify(|w| w.set_jadstart(true));
 }

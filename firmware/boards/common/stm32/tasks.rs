@@ -18,15 +18,15 @@ use hapterra_firmware::monitor::{Monitor, Part};
 use hapterra_firmware::usb::{BulkStream, EndpointFilter};
 
 use super::calibration_memory::CalibrationMemory;
-use super::{loader, stack, usb_interrupt};
+use super::{loader, stack, usb_clock, usb_interrupt};
 use crate::application::TICK_DONE;
 use crate::chip::{self, UsbDriver, WINDOW, WatchdogTimer};
 use crate::usb::EndpointHalts;
 
 /// How often parts check in and the supervisor looks, milliseconds.
 const CHECK_MS: u32 = 10;
-/// How often the stack is measured, milliseconds.
-const STACK_MS: u32 = 1_000;
+/// How often the stack and the oscillator of USB are measured, milliseconds.
+const MEASURE_MS: u32 = 1_000;
 
 /// How long the host has to fetch the answer before the board enters its loader.
 const FAREWELL: Duration = Duration::from_millis(50);
@@ -112,8 +112,13 @@ pub(crate) async fn supervise(
         if monitor.may_feed_watchdog(&[Part::Tick, Part::Link, Part::Usb]) {
             watchdog.pet();
         }
-        if ms.is_multiple_of(STACK_MS) {
+        if ms.is_multiple_of(MEASURE_MS) {
             monitor.measure_stack(stack::figures());
+            // Before the first second there may have been no host.
+            let usb_clock = usb_clock::measure();
+            if ms > 0 {
+                monitor.measure_usb_clock(usb_clock);
+            }
         }
         ms = ms.wrapping_add(CHECK_MS);
         led.set_level(LED.lock(Cell::get).is_lit(ms).into());

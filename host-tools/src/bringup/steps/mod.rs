@@ -1,5 +1,6 @@
 //! The steps, one file for what is done alike.
 
+mod clocks;
 mod encoders;
 mod gravity;
 mod lines;
@@ -35,7 +36,7 @@ pub(super) fn go(
         attendant.finish(Task::Wire(how))?;
     }
     match step {
-        Step::Board => answers(board),
+        Step::Board => answers(board, attendant),
         Step::Switches => switches::both_positions(board, attendant),
         Step::EnableLine => lines::ready_and_enable(board, attendant),
         Step::Outputs => outputs::held(board, attendant),
@@ -49,8 +50,8 @@ pub(super) fn go(
     }
 }
 
-/// The board answers, is disarmed, and finds nothing wrong with itself.
-fn answers(board: &mut Board<'_, '_>) -> Result<String, Halt> {
+/// The board answers, is disarmed, and finds nothing wrong with itself; its clocks are right.
+fn answers(board: &mut Board<'_, '_>, attendant: &dyn Attendant) -> Result<String, Halt> {
     let status = board.look()?;
     let report = status.health.report;
     if let Some(fault) = report.fault {
@@ -61,9 +62,10 @@ fn answers(board: &mut Board<'_, '_>) -> Result<String, Halt> {
     if !wrong.is_empty() || report.mode != Mode::Disarmed {
         return Err(Finding::NotReady(wrong).into());
     }
+    let hz = clocks::agree(board, attendant)?;
     let device = &status.device;
     Ok(format!(
-        "{} with firmware {}, {} ticks a second, disarmed",
+        "{} with firmware {}, {} ticks a second ({hz:.0} counted), disarmed",
         shown(&device.board),
         shown(&device.version),
         device.tick_hz

@@ -4,7 +4,7 @@ pub(super) mod required;
 mod terminal;
 
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::ValueHint;
 use hapterra_core::phantom::Calibration;
@@ -58,7 +58,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     // There is none in memory.
     let native = || Native::new(HostClock::default(), None);
-    bring_up(args, &mut UserAtTerminal, PATIENCE, |_| {
+    let since = Instant::now();
+    bring_up(args, &mut UserAtTerminal { since }, PATIENCE, |_| {
         Ok(args.device.connect(native)?)
     })
 }

@@ -1,12 +1,17 @@
 //! The first power-up's tasks and questions at a terminal.
 
+use std::time::Instant;
+
 use crate::bringup::{Attendant, Question, Reading, Stopped, Task};
 use crate::cli::terminal::interrupt;
 use crate::cli::terminal::questions::{ask, number};
 use crate::cli::terminal::voice::say;
 
 /// A user at a terminal.
-pub(super) struct UserAtTerminal;
+pub(super) struct UserAtTerminal {
+    /// From when on this computer's clock is counted.
+    pub(super) since: Instant,
+}
 
 impl Attendant for UserAtTerminal {
     fn hear(&mut self, line: &str) {
@@ -39,6 +44,10 @@ impl Attendant for UserAtTerminal {
 
     fn stops(&self) -> fn() -> bool {
         interrupt::requested
+    }
+
+    fn time_s(&self, _board_ms: f64) -> f64 {
+        self.since.elapsed().as_secs_f64()
     }
 
     fn may_be_armed(&mut self, may: bool) {

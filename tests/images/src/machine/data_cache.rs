@@ -3,6 +3,8 @@
 //!
 //! Modelled: DC of CCR, and cleaning by address (DCCMVAC, DCCIMVAC), over the AXI SRAM. The
 //! worst cache is assumed: it writes nothing back that it was not told to, and keeps everything.
+//! The worst memory, too: its buffer (RM0433, 2.4) holds the last line that was written, until
+//! the next one, and not only a word that is incomplete.
 //! Not modelled: sets and ways, an invalidation that drops what was written, other masters of
 //! the bus, and the instruction cache. No image uses DMA, and a test patches both the cache and
 //! the memory.
@@ -24,6 +26,8 @@ const LINE: usize = 32;
 #[derive(Default)]
 pub(super) struct DataCache {
     behind: Option<Vec<u8>>,
+    /// The line in the memory's buffer: its offset and bytes.
+    buffered: Option<(usize, Vec<u8>)>,
 }
 
 impl DataCache {
@@ -36,11 +40,15 @@ impl DataCache {
         };
         match (register, &mut self.behind) {
             (CCR, None) if value & DC != 0 => self.behind = Some(held(0, bytes)),
-            (CCR, Some(_)) if value & DC == 0 => self.behind = None,
+            (CCR, Some(_)) if value & DC == 0 => (self.behind, self.buffered) = (None, None),
             (DCCMVAC | DCCIMVAC, Some(behind)) => {
                 let at = value.wrapping_sub(start) as usize / LINE * LINE;
-                if let Some(line) = behind.get_mut(at..at + LINE) {
-                    line.copy_from_slice(&held(at, LINE));
+                if behind.len() < at + LINE {
+                    return;
+                }
+                let before = self.buffered.replace((at, held(at, LINE)));
+                if let Some((at, bytes)) = before {
+                    behind[at..at + LINE].copy_from_slice(&bytes);
                 }
             }
             _ => {}
@@ -58,6 +66,7 @@ impl DataCache {
 
     /// A reset switches it off. Where the memory is that it covered, and what that holds.
     pub(super) fn reset(&mut self) -> Option<(u32, Vec<u8>)> {
+        self.buffered = None;
         self.behind.take().map(|behind| (CACHED.0, behind))
     }
 }

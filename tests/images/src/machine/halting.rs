@@ -1,5 +1,5 @@
 //! A debugger that halts the core, and a core that has locked up: time passes, and no
-//! instruction runs.
+//! instruction runs. And a probe that stops reading the log.
 
 use super::{Machine, Stop};
 
@@ -7,14 +7,22 @@ use super::{Machine, Stop};
 const LOOK_NS: u64 = 5_000;
 
 impl Machine {
-    /// Says to the chip what a debugger says when it attaches: the watchdog is to stop
-    /// while the core is halted, and nothing else is.
+    /// Says to the chip what a debugger says when it attaches: the watchdog and the clock of
+    /// embassy's time are to stop while the core is halted, and nothing else is.
     pub fn attach_debugger(&mut self) {
-        let (register, bit) = self.chip.freeze.watchdog;
-        self.bus().write(register, bit, bit);
+        for (register, bit) in [self.chip.freeze.watchdog, self.chip.freeze.clock] {
+            self.bus().write(register, bit, bit);
+        }
         if let Some((register, bit)) = self.chip.freeze.outputs {
             self.bus().write(register, 0, bit);
         }
+    }
+
+    /// Feeds the watchdog as the supervisor does, so that a halt may take all of its time.
+    pub fn feed_watchdog(&mut self) {
+        let mut bus = self.bus();
+        let now_ns = bus.now_ns;
+        bus.watchdog.restart(now_ns);
     }
 
     /// Halts the core for so many milliseconds, or until the watchdog resets the chip.
@@ -31,5 +39,25 @@ impl Machine {
             }
             bus.advance(LOOK_NS);
         }
+    }
+
+    /// Lets a halted core run again.
+    pub fn resume(&mut self) {
+        self.bus().is_halted = false;
+    }
+
+    /// Has the log's buffer full and not read any more, as a probe leaves it that is pulled
+    /// out: the channel is in the mode in which a writer waits for room.
+    ///
+    /// # Panics
+    /// When the image has no log.
+    pub fn stop_reading_log(&mut self) {
+        // SEGGER's control block: 16 bytes of name, two counts, then the first channel's name,
+        // buffer, size, write and read position and flags.
+        let block = self.image.symbol("_SEGGER_RTT").expect("a log");
+        let (size, write) = (self.word(block + 32), self.word(block + 36));
+        const BLOCK_IF_FULL: u32 = 2;
+        self.patch(block + 40, &((write + 1) % size).to_le_bytes());
+        self.patch(block + 44, &BLOCK_IF_FULL.to_le_bytes());
     }
 }

@@ -1,0 +1,79 @@
+//! A core that a debugger halts while force is out, and that runs again before the watchdog
+//! resets it: `probe-rs` halts it on every attach and every detach.
+
+use hapterra_core::guard::Fault;
+use hapterra_image_tests::bench::Bench;
+use hapterra_image_tests::bus::Effect;
+use hapterra_image_tests::machine::Stop;
+
+/// Halts with force out, ms: from two periods to just below the watchdog's time.
+const HALTS_MS: [u64; 4] = [2, 5, 20, 44];
+/// From the end of a halt until the amplifiers are off, at most, ns: the tick is due, and it
+/// switches off before it reads an encoder.
+const OFF_NS: u64 = 20_000;
+
+#[test]
+fn the_first_tick_after_a_halt_has_no_force() {
+    let bench = Bench::new();
+    for ms in HALTS_MS {
+        bench.on_each(|device| {
+            let mut machine = device.machine.borrow_mut();
+            let board = machine.chip.board;
+            let idle = machine.bus().code(0.0);
+            let is_idle = |code: i32| (f64::from(code) - idle).abs() < 1.0;
+            let held = machine.bus().commands();
+            assert!(!held.into_iter().all(is_idle), "{board}: force is out");
+            // The supervisor has just fed it: the halt ends before the watchdog does.
+            machine.feed_watchdog();
+            assert_eq!(machine.halt_ms(ms), Stop::Time, "{board}");
+            assert_eq!(machine.bus().commands(), held, "{board}: halted");
+            machine.resume();
+            machine.slice = 10;
+            let resumed_ns = machine.bus().now_ns;
+            let off = machine.run_until(1, |m| !m.is_enabled());
+            assert_eq!(off, Stop::Asked, "{board}, {ms} ms: still on");
+            let took_ns = machine.bus().now_ns - resumed_ns;
+            assert!(took_ns < OFF_NS, "{board}, {ms} ms: off after {took_ns} ns");
+            machine.slice = 200;
+            assert_eq!(machine.run_ticks(2), Stop::Asked, "{board}");
+            let on = machine
+                .take_effects()
+                .into_iter()
+                .find(|effect| match effect {
+                    Effect::Enable(on) => *on,
+                    Effect::Command(_, code) => !is_idle(*code),
+                });
+            assert_eq!(on, None, "{board}, {ms} ms: nothing is driven after it");
+            drop(machine);
+            device.run_ms(40);
+            let told = device.latest.and_then(|sample| sample.fault);
+            assert_eq!(told, Some(Fault::TickGap), "{board}, {ms} ms");
+        });
+    }
+}
+
+#[test]
+fn a_halt_is_noticed_although_the_debugger_stops_the_clock() {
+    Bench::new().on_each(|device| {
+        let mut machine = device.machine.borrow_mut();
+        let board = machine.chip.board;
+        machine.attach_debugger();
+        // One look of the supervisor.
+        assert_eq!(machine.run_ms(15), Stop::Time, "{board}");
+        assert!(
+            machine.is_enabled(),
+            "{board}: attaching alone does nothing"
+        );
+        // The halt comes between two ticks.
+        assert_eq!(machine.run_ticks(1), Stop::Asked, "{board}");
+        machine.feed_watchdog();
+        assert_eq!(machine.halt_ms(20), Stop::Time, "{board}");
+        machine.resume();
+        assert_eq!(machine.run_ticks(1), Stop::Asked, "{board}");
+        assert!(!machine.is_enabled(), "{board}");
+        drop(machine);
+        device.run_ms(40);
+        let told = device.latest.and_then(|sample| sample.fault);
+        assert_eq!(told, Some(Fault::TickGap), "{board}");
+    });
+}
