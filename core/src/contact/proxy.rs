@@ -211,19 +211,13 @@ impl Contact {
     /// How rough the surface is from the next step on. A proxy that was held is judged again. The
     /// paper's rule knows of no friction.
     pub(crate) fn feels_friction(&mut self, friction: Friction) {
-        match &mut self.rubbing {
-            Some(rubbing) => {
-                if rubbing.takes(friction) {
-                    self.at_rest = false;
-                }
-            }
-            None if self.settings.rule == Rule::Swept && !friction.is_none() => {
-                self.rubbing = Rubbing::on(friction);
-                // A proxy that is held back does not follow the HIP.
-                self.settings.shortcuts = false;
-                self.at_rest = false;
-            }
-            None => {}
+        if let Some(rubbing) = &mut self.rubbing {
+            self.at_rest &= !rubbing.takes(friction);
+        } else if self.settings.rule == Rule::Swept && !friction.is_none() {
+            self.rubbing = Rubbing::on(friction);
+            // A proxy that is held back does not follow the HIP.
+            self.settings.shortcuts = false;
+            self.at_rest = false;
         }
     }
 
