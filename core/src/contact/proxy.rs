@@ -211,24 +211,18 @@ impl Contact {
     /// How rough the surface is from the next step on. A proxy that was held is judged again. The
     /// paper's rule knows of no friction.
     pub(crate) fn feels_friction(&mut self, friction: Friction) {
-        match &mut self.rough {
-            Some(rough) => {
-                if rough.takes(friction) {
-                    self.at_rest = false;
-                }
+        if let Some(rough) = &mut self.rough {
+            self.at_rest &= !rough.takes(friction);
+        } else if self.settings.rule == Rule::Swept && !friction.is_none() {
+            self.rough = Rough::on(friction);
+            // A proxy that is held back does not follow the HIP.
+            self.settings.shortcuts = false;
+            self.at_rest = false;
+            if let Phase::OnSurface(on) = &mut self.phase
+                && let Some(follow) = on.follow.take()
+            {
+                on.descent.restart(follow.point);
             }
-            None if self.settings.rule == Rule::Swept && !friction.is_none() => {
-                self.rough = Rough::on(friction);
-                // A proxy that is held back does not follow the HIP.
-                self.settings.shortcuts = false;
-                self.at_rest = false;
-                if let Phase::OnSurface(on) = &mut self.phase
-                    && let Some(follow) = on.follow.take()
-                {
-                    on.descent.restart(follow.point);
-                }
-            }
-            None => {}
         }
     }
 
