@@ -175,7 +175,7 @@ fn friction_of_the_place_after_is_found() {
     // On the way back it is held, and does not move.
     let [stuck, before] = [280, 279].map(|at| way.felt[at].sample.proxy);
     assert_eq!(stuck, before);
-    assert_eq!(way.proxy(280, 1e-4, 0.4), Some(Invariant::Stuck));
+    assert_eq!(way.proxy(280, 1e-4, 0.4), Some(Invariant::Cone));
 }
 
 #[test]

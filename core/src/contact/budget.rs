@@ -11,9 +11,9 @@ use crate::rate::TickRate;
 
 /// Units of work a tick may spend at 1 kHz, and at any rate at most.
 ///
-/// A unit is at most 238 instructions of a Cortex-M4F, so a tick is at most 143,000: what fits
+/// A unit is at most 238 instructions of a Cortex-M4F, so a tick is at most 167,000: what fits
 /// into the 170,000 cycles that a NUCLEO-G474RE has for a millisecond.
-pub const WORK_PER_TICK: u32 = 600;
+pub const WORK_PER_TICK: u32 = 700;
 /// Units of work a second: 86 a tick at 10 kHz.
 const WORK_PER_S: u32 = 860_000;
 
@@ -24,7 +24,7 @@ const WORK_PER_S: u32 = 860_000;
 /// use hapterra_core::rate::TickRate;
 ///
 /// let at = |hz| TickRate::new(hz).map(work_per_tick);
-/// assert_eq!([at(1_000), at(4_000), at(10_000)], [Some(600), Some(215), Some(86)]);
+/// assert_eq!([at(1_000), at(4_000), at(10_000)], [Some(700), Some(215), Some(86)]);
 /// ```
 #[must_use]
 pub const fn work_per_tick(rate: TickRate) -> u32 {

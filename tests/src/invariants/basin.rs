@@ -12,8 +12,8 @@ use super::surface::{distance, patches_at};
 const SHORT: f64 = 0.02;
 /// HIPs farther than this, in cells, would flood too much.
 const FAR: f64 = 4.0;
-/// Columns a cell.
-const COLUMNS: f64 = 64.0;
+/// Columns over the reach of the HIP, where that is a cell or less: 64 a cell at least.
+const COLUMNS: f64 = 256.0;
 /// What a channel between two columns may be narrower by, cells.
 const SLACK: f64 = 0.02;
 
@@ -24,6 +24,8 @@ impl Judge<'_> {
         let is_judged = before.is_touching()
             && seen.is_touching()
             && reach < FAR
+            // One that is farther from the HIP is found by that.
+            && distance(seen.proxy, seen.hip) <= reach + SLACK
             && distance(before.proxy, seen.proxy) > SHORT;
         if !is_judged {
             return Ok(());
@@ -35,7 +37,8 @@ impl Judge<'_> {
             let share = f64::from(look) / f64::from(LOOKS);
             is_open([0, 1].map(|i| from[i] + share * (to[i] - from[i])))
         });
-        if is_straight || is_flooded(from, to, is_open) {
+        let columns = (COLUMNS / reach).clamp(64.0, 1_024.0);
+        if is_straight || is_flooded(from, to, columns, is_open) {
             return Ok(());
         }
         let detail = format!("over a crest of more than {reach}: {before:?} then {seen:?}");
@@ -46,14 +49,20 @@ impl Judge<'_> {
     fn is_open(&self, [x, y]: [f64; 2], hip: [f64; 3], reach: f64) -> bool {
         let up = reach * reach - (x - hip[0]).powi(2) - (y - hip[1]).powi(2);
         let ground = patches_at(self.terrain, x, y).map(|patch| patch.height(x, y));
-        let lowest = ground.fold(f64::INFINITY, f64::min);
+        // Over a hole there is air alone.
+        let lowest = ground.reduce(f64::min).unwrap_or(f64::NEG_INFINITY);
         up >= 0.0 && lowest - hip[2] <= up.sqrt()
     }
 }
 
 /// Whether two places are joined by columns that are open.
-fn is_flooded(from: [f64; 2], to: [f64; 2], is_open: impl Fn([f64; 2]) -> bool) -> bool {
-    let column = |at: [f64; 2]| at.map(|c| (c * COLUMNS).round() as i64);
+fn is_flooded(
+    from: [f64; 2],
+    to: [f64; 2],
+    columns: f64,
+    is_open: impl Fn([f64; 2]) -> bool,
+) -> bool {
+    let column = |at: [f64; 2]| at.map(|c| (c * columns).round() as i64);
     let (start, end) = (column(from), column(to));
     let mut reached = HashSet::from([start]);
     let mut edge = vec![start];
@@ -62,7 +71,7 @@ fn is_flooded(from: [f64; 2], to: [f64; 2], is_open: impl Fn([f64; 2]) -> bool) 
             return true;
         }
         for next in [[x - 1, y], [x + 1, y], [x, y - 1], [x, y + 1]] {
-            if is_open(next.map(|c| c as f64 / COLUMNS)) && reached.insert(next) {
+            if is_open(next.map(|c| c as f64 / columns)) && reached.insert(next) {
                 edge.push(next);
             }
         }
