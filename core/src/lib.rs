@@ -37,7 +37,7 @@
 //! and a device that exchange the messages of the link in memory).
 //!
 //! Read the modules in this order to follow the data through one tick; each
-//! needs those before it only:
+//! needs those before it only, which `tests/imports.rs` checks:
 //!
 //! 1. [`phantom`] turns encoder counts into the tip position, and forces back
 //!    into motor currents.
