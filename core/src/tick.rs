@@ -184,6 +184,19 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.latency_s = latency_s;
     }
 
+    /// The scene in force: the last one that was accepted, unless it was dropped. A scene that
+    /// cannot be felt is refused, and the one before stays.
+    #[must_use]
+    pub const fn scene(&self) -> Option<&Scene> {
+        self.scene.as_ref()
+    }
+
+    /// Whether a point waits for its answer.
+    #[must_use]
+    pub const fn has_point(&self) -> bool {
+        self.point.is_some()
+    }
+
     /// How warm the motors are: what a board keeps over a reset.
     #[must_use]
     pub const fn temperatures(&self) -> Temperatures {

@@ -20,7 +20,7 @@ use hapterra_core::tick::{Command, Haptics, Outcome};
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, TickClock};
 use crate::monitor::Part;
 use crate::motor_memory::{MotorLog, Words};
-use crate::queues::{LoopEnds, TickRecord};
+use crate::queues::{LoopEnds, LoopReport, TickRecord};
 use clutch_input::ClutchInput;
 use liveness::Liveness;
 use reporter::Reporter;
@@ -28,18 +28,6 @@ use timing::Timing;
 
 /// The most commands taken in one tick; the rest wait for the next.
 const COMMANDS_PER_TICK: usize = 4;
-
-/// Where the HIP's position comes from at the moment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum HipSource {
-    /// There is no scene: nothing is rendered and nothing recorded. The guard
-    /// still looks at the arm.
-    None,
-    /// The encoders.
-    Encoders,
-    /// Points over the link; whether one is being rendered.
-    Points { pending: bool },
-}
 
 /// The amplifiers in either of their states.
 enum Power<A: Amplifiers> {
@@ -57,7 +45,6 @@ pub struct HapticLoop<'t, E, A: Amplifiers, C, const D: usize> {
     power: Option<Power<A>>,
     clock: C,
     timing: Timing,
-    hip_source: HipSource,
     clutch_input: ClutchInput,
     /// The last tick's outcome, kept in its place so that it need not be copied.
     outcome: Outcome,
@@ -88,7 +75,6 @@ where
             power: Some(Power::Off(amplifiers)),
             clock,
             timing: Timing::new::<C>(),
-            hip_source: HipSource::None,
             clutch_input: ClutchInput::new(C::RATE),
             outcome: Outcome::default(),
             liveness: Liveness::new(C::RATE),
@@ -151,17 +137,8 @@ where
             let Some(command) = self.ends.commands.dequeue() else {
                 return;
             };
-            match &command {
-                Command::Scene(scene) => {
-                    take_materials(&mut self.haptics, &mut self.ends, scene);
-                    self.hip_source = match scene.source {
-                        Source::Encoders => HipSource::Encoders,
-                        Source::Points => HipSource::Points { pending: false },
-                    };
-                }
-                Command::DropScene | Command::Jog(_) => self.hip_source = HipSource::None,
-                Command::Point(_) => self.hip_source = HipSource::Points { pending: true },
-                _ => {}
+            if let Command::Scene(scene) = &command {
+                take_materials(&mut self.haptics, &mut self.ends, scene);
             }
             self.give_to_haptics(command);
         }
@@ -175,11 +152,17 @@ where
     }
 
     fn render(&mut self, watchdog_live: bool) -> Drive {
-        match self.hip_source {
-            HipSource::Encoders | HipSource::None => self.render_arm(watchdog_live),
-            HipSource::Points { pending: true } => self.render_point(watchdog_live),
-            HipSource::Points { pending: false } => self.follow_arm(watchdog_live),
+        match self.source() {
+            // Without a scene nothing is rendered, and the guard still watches the arm.
+            Some(Source::Encoders) | None => self.render_arm(watchdog_live),
+            Some(Source::Points) if self.haptics.has_point() => self.render_point(watchdog_live),
+            Some(Source::Points) => self.follow_arm(watchdog_live),
         }
+    }
+
+    /// Where the HIP of the scene in force comes from.
+    fn source(&self) -> Option<Source> {
+        self.haptics.scene().map(|scene| scene.source)
     }
 
     /// Runs the pure tick. A function of its own, and there once: the tick's code
@@ -198,7 +181,7 @@ where
         self.run_tick(&sense, watchdog_live);
         let drive = self.outcome.drive;
         self.drive(&drive);
-        let is_rendered = self.hip_source == HipSource::Encoders;
+        let is_rendered = self.source() == Some(Source::Encoders);
         if is_rendered && self.reporter.sends_sample(&self.outcome.sample) {
             let record = self.record(None);
             if self.ends.records.enqueue(record).is_err() {
@@ -219,7 +202,6 @@ where
         self.report(&sense, &drive);
         let record = self.record(self.outcome.answers);
         if record.answers.is_some() {
-            self.hip_source = HipSource::Points { pending: false };
             self.answer(record);
         } else {
             // It only tells the link what holds the point up; the next one will, too.
@@ -251,8 +233,10 @@ where
     fn report(&mut self, sense: &Sense, drive: &Drive) {
         let report = self.haptics.report();
         if self.reporter.sends_report(&report) && self.ends.health.ready() {
+            let health = self.haptics.health(sense, drive);
+            let epoch = self.haptics.scene().map(|scene| scene.epoch);
             // There is room.
-            let _ = self.ends.health.enqueue(self.haptics.health(sense, drive));
+            let _ = self.ends.health.enqueue(LoopReport { health, epoch });
             self.reporter.sent_report(&report);
         }
     }

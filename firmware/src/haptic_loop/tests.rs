@@ -70,6 +70,27 @@ fn samples_that_find_no_room_are_counted() {
     assert_eq!(drain(&mut link_ends).len() as u32 + dropped, 200);
 }
 
+#[test]
+fn refused_scene_leaves_the_scene_before_in_force() {
+    let (mut haptic_loop, mut link_ends) = looped(Source::Encoders);
+    haptic_loop.tick();
+    let refused = Scene {
+        epoch: 2,
+        cell_mm: f32::NAN,
+        ..scene(Source::Points)
+    };
+    assert!(link_ends.commands.enqueue(Command::Scene(refused)).is_ok());
+    drain(&mut link_ends);
+    for _ in 0..200 {
+        haptic_loop.tick();
+    }
+    let records = drain(&mut link_ends);
+    assert!(!records.is_empty(), "the arm is not rendered any more");
+    let report = || link_ends.health.dequeue();
+    let latest = core::iter::from_fn(report).last().expect("a report");
+    assert_eq!(latest.epoch, Some(1));
+}
+
 /// Moves the arm by 100 counts a tick; returns where it is.
 fn wave(haptic_loop: &mut Loop, from: i32, ticks: i32) -> i32 {
     for n in 1..=ticks {
@@ -108,7 +129,7 @@ fn the_arm_is_followed_in_every_tick_of_a_replay() {
     assert_eq!(haptic_loop.haptics.report().fault, None);
     let report = || link_ends.health.dequeue();
     let latest = core::iter::from_fn(report).last().expect("a report");
-    assert_eq!(latest.zero, Some([0; 3]));
+    assert_eq!(latest.health.zero, Some([0; 3]));
     haptic_loop.encoders_mut().0.counts = [0; 3];
     haptic_loop.tick();
     let fault = haptic_loop.haptics.report().fault;

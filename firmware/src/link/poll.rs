@@ -8,6 +8,7 @@ use heapless::Vec;
 
 use super::{Link, log, tiles};
 use crate::monitor::Part;
+use crate::queues::LoopReport;
 
 impl<const D: usize> Link<'_, D> {
     /// Does what is due: reads what the loop left, requests tiles, hands on the
@@ -57,9 +58,17 @@ impl<const D: usize> Link<'_, D> {
         // them all before the reports so far were read.
         let follows = self.commands_taken;
         self.commands_taken = self.ends.commands.is_empty();
-        while let Some(health) = self.ends.health.dequeue() {
+        while let Some(LoopReport { health, epoch }) = self.ends.health.dequeue() {
             self.device.take_health(health, self.ends.monitor.ticks());
             self.device.may_drive &= !(follows && health.report.mode == Mode::Disarmed);
+            let is_refused = self.scene.is_some_and(|scene| Some(scene.epoch) != epoch);
+            // A scene that this link took and the loop did not is nobody's.
+            if follows
+                && is_refused
+                && let Some(room) = self.room_for_command()
+            {
+                self.drop_scene(room);
+            }
         }
         while self.session.is_open() && self.tx.has_room() {
             let Some(message) = self.device.next_message() else {
