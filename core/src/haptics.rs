@@ -344,6 +344,12 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.window.take(tile, felt.map(|point| point.column()))
     }
 
+    /// The scene in force.
+    #[must_use]
+    pub const fn scene(&self) -> Option<&Scene> {
+        self.scene.as_ref()
+    }
+
     /// The contact of the last tick.
     #[must_use]
     pub const fn contact(&self) -> &Contact {

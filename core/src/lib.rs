@@ -32,12 +32,12 @@
 //! # Ok::<(), hapterra_core::terrain::BadField>(())
 //! ```
 //!
-//! Three longer examples come with the crate: `forces_along_a_path`,
+//! Longer examples come with the crate, among them `forces_along_a_path`,
 //! `closed_loop` (the whole tick with a simulated arm) and `serve_tiles` (a host
 //! and a device that exchange the messages of the link in memory).
 //!
 //! Read the modules in this order to follow the data through one tick; each
-//! needs those before it only:
+//! needs those before it only, which `tests/imports.rs` checks:
 //!
 //! 1. [`phantom`] turns encoder counts into the tip position, and forces back
 //!    into motor currents.

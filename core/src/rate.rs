@@ -1,5 +1,9 @@
 //! How often the loop ticks, and what follows from it.
 
+/// Most that the force may change, newtons a second. A hand at 2 m/s against
+/// 0.5 N/mm makes 1 N/ms; what is faster is no hand.
+pub const MAX_SLEW_N_PER_S: f32 = 1_000.0;
+
 /// Ticks a second: a build choice, 1 kHz by default. The stiffness that a user
 /// can hold grows with it.
 ///

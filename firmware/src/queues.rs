@@ -38,6 +38,15 @@ pub(crate) struct TickRecord {
     pub(crate) answers: Option<u32>,
 }
 
+/// The state of the loop as it reports it to the link.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LoopReport {
+    /// The guard's state, and what was measured and driven.
+    pub(crate) health: Health,
+    /// The epoch of the scene in force.
+    pub(crate) epoch: Option<u32>,
+}
+
 /// All queues between the loop and the link.
 pub(crate) struct Queues<'t> {
     commands: Queue<Command<'t>, COMMANDS>,
@@ -46,7 +55,7 @@ pub(crate) struct Queues<'t> {
     records: Queue<TickRecord, RECORDS>,
     settings: Queue<Mechanism, SETTINGS>,
     materials: Queue<MaterialTable, MATERIALS>,
-    health: Queue<Health, HEALTH>,
+    health: Queue<LoopReport, HEALTH>,
     monitor: Monitor,
 }
 
@@ -57,7 +66,7 @@ pub(crate) struct LoopEnds<'t> {
     pub(crate) records: Producer<'t, TickRecord>,
     pub(crate) settings: Consumer<'t, Mechanism>,
     pub(crate) materials: Consumer<'t, MaterialTable>,
-    pub(crate) health: Producer<'t, Health>,
+    pub(crate) health: Producer<'t, LoopReport>,
     pub(crate) monitor: &'t Monitor,
 }
 
@@ -68,7 +77,7 @@ pub(crate) struct LinkEnds<'t> {
     pub(crate) records: Consumer<'t, TickRecord>,
     pub(crate) settings: Producer<'t, Mechanism>,
     pub(crate) materials: Producer<'t, MaterialTable>,
-    pub(crate) health: Consumer<'t, Health>,
+    pub(crate) health: Consumer<'t, LoopReport>,
     pub(crate) monitor: &'t Monitor,
 }
 

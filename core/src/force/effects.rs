@@ -3,9 +3,8 @@
 use glam::Vec3;
 
 use super::in_force::MaterialInForce;
-use super::{Damper, ForceLaw, MaterialTable, Shader, Texturer};
+use super::{Damper, FeltWith, ForceLaw, MaterialTable, Shader, Texturer};
 use crate::contact::{Contact, Friction};
-use crate::rate::TickRate;
 use crate::scalar::root;
 use crate::terrain::{TileIndex, Window};
 
@@ -17,17 +16,6 @@ pub(crate) struct Effects {
     pub(crate) damper: Option<Damper>,
     material: Option<MaterialInForce>,
     cell_mm: f32,
-}
-
-/// What a scene is felt with, besides its law.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct FeltWith {
-    pub(crate) cell_mm: f32,
-    pub(crate) rate: TickRate,
-    /// From the beginning of a tick until its force acts, s.
-    pub(crate) latency_s: f32,
-    /// An arm follows it, not points.
-    pub(crate) arm: bool,
 }
 
 impl Effects {

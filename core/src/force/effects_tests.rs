@@ -4,6 +4,7 @@ use super::*;
 use crate::contact::ContactSettings;
 use crate::force::{Controller, Damping, Moment, Shading, Shares};
 use crate::grid::GridPoint;
+use crate::rate::TickRate;
 use crate::terrain::{FieldSize, FieldStorage};
 
 const LAW: ForceLaw = ForceLaw {

@@ -9,7 +9,7 @@
 
 use super::Spring;
 use super::depth::Depth;
-use crate::guard::MAX_SLEW_N_PER_S;
+use crate::rate::MAX_SLEW_N_PER_S;
 use crate::scalar::smaller;
 
 /// The spring's part of what the force may change by; the rest is for damping.

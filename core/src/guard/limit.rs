@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{Blockers, Drive, Fault, Guard, Limits, Mode, SMALL_FORCE_N};
-use crate::force::{clamp_length, is_finite};
+use crate::scalar::{clamp_length, is_finite};
 
 impl Guard {
     /// The force that may be asked of the motors: no longer than the device

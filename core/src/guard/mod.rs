@@ -36,6 +36,7 @@ pub use mode::Mode;
 pub use stall::TRAVEL as TRAVEL_WHILE_ONE_STANDS;
 
 use crate::phantom::{JointLimits, Mechanism, Pose};
+pub use crate::rate::MAX_SLEW_N_PER_S;
 use crate::rate::TickRate;
 use arming::Arming;
 use feedback::Feedback;
@@ -45,9 +46,6 @@ use speed::SpeedMonitor;
 use stall::StallDetector;
 use thermal::{Motors, Temperatures};
 
-/// Most that the force may change, newtons a second. A hand at 2 m/s against
-/// 0.5 N/mm makes 1 N/ms; what is faster is no hand.
-pub const MAX_SLEW_N_PER_S: f32 = 1_000.0;
 /// Share of the record's largest force that the guard clamps to. An encoder that
 /// is wrong by twice what a tick's jump may be, some 7 mm at the tip, makes the
 /// levers, and with them the force at the tip, wrong by up to 9 %; this keeps it

@@ -1,13 +1,9 @@
 //! A tile: 32 × 32 patches of terrain, and the maxima that let a sweep skip it.
 
 use super::extent::FieldSize;
-use super::index::{BLOCK_SHIFT, TILE_CELLS, TileIndex, TileKey};
+use super::index::{BLOCK_SHIFT, POSTS, TILE_CELLS, TileIndex, TileKey};
 use super::packed::Unpacker;
 use crate::grid::{Altitude, Cell, MAX_CELL};
-
-/// Samples along a tile's side; the last row and column are shared with the
-/// next tile, so that a patch never needs two tiles.
-pub const POSTS: usize = TILE_CELLS + 1;
 
 const BLOCKS: usize = TILE_CELLS >> BLOCK_SHIFT;
 const QUARTERS: usize = BLOCKS / 2;

@@ -1,5 +1,7 @@
 //! The window: the tiles a device holds, in a torus around the HIP.
 
+mod unsettled;
+
 use super::extent::{CellBox, FieldSize};
 use super::index::{BLOCK_SHIFT, Block, TILE_SHIFT, TileIndex, TileKey, wrap};
 use super::max_pyramid::MaxPyramid;

@@ -6,7 +6,7 @@ use crate::force::MaterialTable;
 use crate::scene::Scene;
 use crate::terrain::{BadTile, POSTS, Tile};
 
-use super::message::TileMessage;
+use super::tile::TileMessage;
 
 /// Samples of a tile.
 const SAMPLES: usize = POSTS * POSTS;

@@ -11,6 +11,7 @@ use super::materials::{MaterialScene, MaterialTile};
 use super::request::{Answer, Request};
 use super::session::{SampleCount, SessionEnd};
 use super::status::Status;
+pub use super::tile::{Heights, TileMessage};
 use crate::guard::Report;
 use crate::phantom::Calibration;
 use crate::scene::{Point, Sample, Scene, View};
@@ -144,50 +145,6 @@ pub enum ToHost {
         /// Why: [`SessionEnd::Replaced`] where another session was opened since,
         /// [`SessionEnd::HostSilent`] where none was.
         end: SessionEnd,
-    },
-}
-
-/// A tile's content.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TileMessage<'a> {
-    /// The scene it belongs to.
-    pub epoch: u32,
-    /// Which tile.
-    pub key: TileKey,
-    /// The heights.
-    #[serde(borrow)]
-    pub heights: Heights<'a>,
-}
-
-/// The heights of a tile. A constant tile is one number.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Heights<'a> {
-    /// No surface anywhere.
-    Hole,
-    /// All samples at `base + height` cells.
-    Flat {
-        /// Whole cells.
-        base: i32,
-        /// Cells above the base.
-        height: f32,
-    },
-    /// 33 × 33 little-endian `f32`, rows from the south, cells above the base;
-    /// NaN where there is no surface.
-    Samples {
-        /// Whole cells.
-        base: i32,
-        /// 4,356 bytes.
-        #[serde(borrow)]
-        bytes: &'a [u8],
-    },
-    /// The same samples in the form of [`packed`](crate::terrain::packed): bit for bit,
-    /// but for the bits of a NaN.
-    Packed {
-        /// Whole cells.
-        base: i32,
-        /// At most [`MAX_PACKED`](crate::terrain::packed::MAX_PACKED) bytes.
-        #[serde(borrow)]
-        bytes: &'a [u8],
     },
 }
 

@@ -135,6 +135,7 @@ pub mod plant;
 pub mod request;
 pub mod session;
 pub mod status;
+pub mod tile;
 pub mod version;
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ use hapterra_core::tick::{Command, Haptics, HipSource, Outcome};
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, TickClock};
 use crate::monitor::Part;
 use crate::motor_memory::{MotorLog, Words};
-use crate::queues::{LoopEnds, TickRecord};
+use crate::queues::{LoopEnds, LoopReport, TickRecord};
 use clutch_input::ClutchInput;
 use liveness::Liveness;
 use reporter::Reporter;
@@ -234,8 +234,10 @@ where
     fn report(&mut self, sense: &Sense, drive: &Drive) {
         let report = self.haptics.report();
         if self.reporter.sends_report(&report) && self.ends.health.ready() {
+            let health = self.haptics.health(sense, drive);
+            let epoch = self.haptics.scene().map(|scene| scene.epoch);
             // There is room.
-            let _ = self.ends.health.enqueue(self.haptics.health(sense, drive));
+            let _ = self.ends.health.enqueue(LoopReport { health, epoch });
             self.reporter.sent_report(&report);
         }
     }

@@ -108,7 +108,7 @@ fn the_arm_is_followed_in_every_tick_of_a_replay() {
     assert_eq!(haptic_loop.haptics.report().fault, None);
     let report = || link_ends.health.dequeue();
     let latest = core::iter::from_fn(report).last().expect("a report");
-    assert_eq!(latest.zero, Some([0; 3]));
+    assert_eq!(latest.health.zero, Some([0; 3]));
     haptic_loop.encoders_mut().0.counts = [0; 3];
     haptic_loop.tick();
     let fault = haptic_loop.haptics.report().fault;

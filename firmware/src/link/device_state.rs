@@ -11,8 +11,8 @@ use hapterra_core::wire::request::Refusal;
 use hapterra_core::wire::session::LastSession;
 use hapterra_core::wire::status::{BootReport, CalibrationSource};
 
-use super::conversation::Conversation;
 use super::requests::LatestRequest;
+use super::session::Session;
 use crate::board::TickClock;
 use crate::press::PressWait;
 
@@ -107,17 +107,12 @@ impl DeviceState {
     }
 
     /// Answers the hello of this number, of a host that may come back to `scene`.
-    pub(super) fn hello(
-        &self,
-        number: u8,
-        scene: Option<Scene>,
-        conversation: &Conversation,
-    ) -> DeviceHello {
+    pub(super) fn hello(&self, number: u8, scene: Option<Scene>, session: &Session) -> DeviceHello {
         DeviceHello {
             number,
-            opened_by: conversation.opened_by,
+            opened_by: session.opened_by,
             epoch: scene.map(|scene| scene.epoch),
-            last: conversation.last(),
+            last: session.last(),
             ..self.hello.clone()
         }
     }

@@ -4,6 +4,7 @@ use hapterra_core::tick::Command;
 use hapterra_core::wire::request::Refusal;
 
 use super::Link;
+use super::commands::CommandRoom;
 
 /// Where the way into the loader stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,7 +42,7 @@ impl<const D: usize> Link<'_, D> {
 
     /// Takes the request for the loader: only while the arm is disarmed and nothing is
     /// under way that would arm it or is to be stored.
-    pub(super) fn want_loader(&mut self) -> Result<(), Refusal> {
+    pub(super) fn want_loader(&mut self, room: CommandRoom) -> Result<(), Refusal> {
         if self.loader == LoaderEntry::None {
             return Err(Refusal::NoLoader);
         }
@@ -54,7 +55,7 @@ impl<const D: usize> Link<'_, D> {
         }
         // It ends outputs that are held, too: a converter outside of the chip would keep them
         // through the whole update.
-        self.command(Command::Disarm);
+        self.command(room, Command::Disarm);
         self.loader = LoaderEntry::Wanted;
         Ok(())
     }

@@ -6,6 +6,7 @@ use hapterra_core::terrain::{BadTile, Tile, TileKey};
 use hapterra_core::wire::materials::{MaterialScene, TileMaterials};
 
 use super::Link;
+use super::commands::CommandRoom;
 
 /// What is remembered of a table that the loop was given.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +24,7 @@ impl<const D: usize> Link<'_, D> {
     }
 
     /// Takes a scene with its table.
-    pub(super) fn take_material_scene(&mut self, message: &MaterialScene<'_>) {
+    pub(super) fn take_material_scene(&mut self, message: &MaterialScene<'_>, room: CommandRoom) {
         let scene = message.scene;
         if let Some(table) = message.table()
             && scene.is_valid()
@@ -31,7 +32,7 @@ impl<const D: usize> Link<'_, D> {
         {
             self.give_materials(table);
         }
-        self.take_scene(scene);
+        self.take_scene(scene, room);
     }
 
     fn give_materials(&mut self, table: MaterialTable) {
@@ -39,7 +40,7 @@ impl<const D: usize> Link<'_, D> {
             sum: table.check_sum(),
             count: table.materials().len(),
         });
-        // Whoever leads here has asked `has_room`.
+        // Callers have checked that there is room.
         let _ = self.ends.materials.enqueue(table);
     }
 

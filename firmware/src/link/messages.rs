@@ -10,19 +10,20 @@ use hapterra_core::wire::session::{InSession, ONLY_LOOKS, SessionEnd, SessionNum
 use hapterra_core::wire::status::{StackFigures, Status, TickFigures};
 use hapterra_core::wire::version::VersionCheck;
 
-use super::conversation::{Greeting, SessionState};
+use super::commands::CommandRoom;
+use super::session::{Greeting, SessionState};
 use super::views::ClutchOfHost;
 use super::{Link, ReplayProgress, log};
 
 impl<const D: usize> Link<'_, D> {
     /// Acts on a frame's decoded bytes.
-    pub(super) fn on_content(&mut self, content: &[u8]) -> Result<(), BadFrame> {
+    pub(super) fn on_content(&mut self, content: &[u8], room: CommandRoom) -> Result<(), BadFrame> {
         self.nothing_to_request_at = None;
         if VersionCheck::is_in(content) {
             self.on_version_check(decode(content)?);
         } else {
             let InSession { session, message } = decode(content)?;
-            self.on_message(session, message);
+            self.on_message(session, message, room);
         }
         Ok(())
     }
@@ -42,24 +43,22 @@ impl<const D: usize> Link<'_, D> {
         self.tx.push_refusal(&VersionCheck::Refused { protocol });
     }
 
-    fn on_message(&mut self, session: SessionNumber, message: ToDevice<'_>) {
+    fn on_message(&mut self, session: SessionNumber, message: ToDevice<'_>, room: CommandRoom) {
         if let ToDevice::Hello(hello) = message {
-            return self.on_hello(session, hello);
+            return self.on_hello(session, hello, room);
         }
-        if !self.conversation.is_of(session) && self.looker == Some(session) {
+        if !self.session.is_of(session) && self.looker == Some(session) {
             return self.on_look(session, &message);
         }
-        if !self.conversation.is_of(session) {
+        if !self.session.is_of(session) {
             self.foreign_frames = self.foreign_frames.saturating_add(1);
             return;
         }
-        self.conversation.heard(self.ends.monitor.ticks());
-        match (message, self.conversation.state) {
-            (ToDevice::Bye, state) => self.on_bye(state),
-            (ToDevice::Detach, state) => self.on_detach(state),
-            (ToDevice::Close, SessionState::Ended(SessionEnd::Goodbye)) => {
-                self.conversation.state = SessionState::Gone;
-            }
+        self.session.heard(self.ends.monitor.ticks());
+        match (message, self.session.state()) {
+            (ToDevice::Bye, state) => self.on_bye(state, room),
+            (ToDevice::Detach, state) => self.on_detach(state, room),
+            (ToDevice::Close, SessionState::Ended(SessionEnd::Goodbye)) => self.session.close(),
             (
                 _,
                 SessionState::Closed
@@ -71,31 +70,31 @@ impl<const D: usize> Link<'_, D> {
             (ToDevice::Status { number }, _) => self.tell_status(session, number),
             (ToDevice::GetCalibration { number }, _) => self.tell_calibration(session, number),
             (_, SessionState::Leaving) => {}
-            (ToDevice::Scene(scene), _) => self.take_scene(scene),
-            (ToDevice::View(view), _) => self.take_view(view),
-            (ToDevice::Tile(tile), _) => self.take_tile(&tile, None),
-            (ToDevice::MaterialScene(scene), _) => self.take_material_scene(&scene),
+            (ToDevice::Scene(scene), _) => self.take_scene(scene, room),
+            (ToDevice::View(view), _) => self.take_view(view, room),
+            (ToDevice::Tile(tile), _) => self.take_tile(&tile, None, room),
+            (ToDevice::MaterialScene(scene), _) => self.take_material_scene(&scene, room),
             (ToDevice::MaterialTile(message), _) => {
-                self.take_tile(&message.tile, Some(message.materials));
+                self.take_tile(&message.tile, Some(message.materials), room);
             }
             (ToDevice::Point(point), _) => self.take_point(point),
-            (ToDevice::Request { number, request }, _) => self.take_request(number, &request),
+            (ToDevice::Request { number, request }, _) => {
+                self.take_request(number, &request, room);
+            }
             (ToDevice::Hello(_) | ToDevice::Close, _) => {}
         }
     }
 
-    fn on_hello(&mut self, session: SessionNumber, hello: HostHello) {
+    fn on_hello(&mut self, session: SessionNumber, hello: HostHello, room: CommandRoom) {
         if hello.protocol != PROTOCOL {
             return self.refuse(hello.protocol);
         }
-        if hello.silence_s == ONLY_LOOKS && !self.conversation.is_of(session) {
+        if hello.silence_s == ONLY_LOOKS && !self.session.is_of(session) {
             self.looker = Some(session);
-            let hello = self
-                .device
-                .hello(hello.number, self.scene, &self.conversation);
+            let hello = self.device.hello(hello.number, self.scene, &self.session);
             return self.say_in(session, &ToHost::Hello(hello));
         }
-        match self.conversation.greeting(session) {
+        match self.session.greeting(session) {
             Greeting::Stale => {
                 self.foreign_frames = self.foreign_frames.saturating_add(1);
                 return;
@@ -106,14 +105,12 @@ impl<const D: usize> Link<'_, D> {
                 return self.say_in(session, &ToHost::Over { number, end });
             }
             Greeting::Again => {}
-            Greeting::Opens => self.open(session, hello.number),
+            Greeting::Opens => self.open(session, hello.number, room),
         }
-        self.conversation.heard(self.ends.monitor.ticks());
+        self.session.heard(self.ends.monitor.ticks());
         let tick_hz = self.device.tick_hz();
-        self.conversation.set_silence(hello.silence_s, tick_hz);
-        let hello = self
-            .device
-            .hello(hello.number, self.scene, &self.conversation);
+        self.session.set_silence(hello.silence_s, tick_hz);
+        let hello = self.device.hello(hello.number, self.scene, &self.session);
         self.say(&ToHost::Hello(hello));
     }
 
@@ -141,16 +138,16 @@ impl<const D: usize> Link<'_, D> {
     }
 
     /// Begins a session, which keeps the scene and what is held of it.
-    fn open(&mut self, session: SessionNumber, hello: u8) {
+    fn open(&mut self, session: SessionNumber, hello: u8, room: CommandRoom) {
         self.forget_conversation();
         self.forsake_clutch();
         let dropped = self.samples_dropped();
-        self.conversation.open(session, hello, dropped);
+        self.session.open(session, hello, dropped);
         self.device.session_opened();
-        log::opened(session, self.conversation.last().end, self.bad_frames);
+        log::opened(session, self.session.last().end, self.bad_frames);
         // What the host before asked for and was not done yet is not done any more.
         if self.device.is_being_armed() {
-            self.command(Command::Disarm);
+            self.command(room, Command::Disarm);
         }
     }
 
@@ -169,15 +166,15 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    fn on_bye(&mut self, state: SessionState) {
+    fn on_bye(&mut self, state: SessionState, room: CommandRoom) {
         match state {
             SessionState::Open
             | SessionState::Detached
             | SessionState::Ended(SessionEnd::HostSilent) => {
                 self.read_records();
                 self.device.forget_press();
-                self.drop_scene();
-                self.conversation.state = SessionState::Leaving;
+                self.drop_scene(room);
+                self.session.leave();
             }
             // The host has missed the answer.
             SessionState::Ended(_) | SessionState::Gone => {
@@ -189,7 +186,7 @@ impl<const D: usize> Link<'_, D> {
 
     /// The host has looked and goes: what drives goes on, and what only waits to drive, or
     /// to be stored, does not.
-    fn on_detach(&mut self, state: SessionState) {
+    fn on_detach(&mut self, state: SessionState, room: CommandRoom) {
         match state {
             SessionState::Closed | SessionState::Leaving => return,
             SessionState::Open => {
@@ -197,9 +194,9 @@ impl<const D: usize> Link<'_, D> {
                 self.drop_samples();
                 self.forsake_clutch();
                 if self.device.is_being_armed() {
-                    self.command(Command::Disarm);
+                    self.command(room, Command::Disarm);
                 }
-                self.conversation.state = SessionState::Detached;
+                self.session.detach();
             }
             // The host has missed the answer.
             SessionState::Detached | SessionState::Ended(_) | SessionState::Gone => {}
@@ -208,13 +205,18 @@ impl<const D: usize> Link<'_, D> {
     }
 
     /// Disarms and drops the scene. The loop lets the force out by itself.
-    pub(super) fn drop_scene(&mut self) {
-        let held = self.scene.take().is_some();
-        self.command(if held {
-            Command::DropScene
-        } else {
-            Command::Disarm
-        });
+    pub(super) fn drop_scene(&mut self, room: CommandRoom) {
+        let command = match self.scene {
+            Some(_) => Command::DropScene,
+            None => Command::Disarm,
+        };
+        self.forget_scene();
+        self.command(room, command);
+    }
+
+    /// Forgets the scene, which the loop drops or has dropped.
+    pub(super) fn forget_scene(&mut self) {
+        self.scene = None;
         self.forget_positions();
         self.requester.forget_asked();
     }
@@ -250,7 +252,7 @@ impl<const D: usize> Link<'_, D> {
 
     /// Drops and counts the samples of a scene that another replaces.
     fn drop_what_was_felt(&mut self) {
-        if self.renders_arm() && self.conversation.is_open() {
+        if self.renders_arm() && self.session.is_open() {
             while self.ends.records.dequeue().is_some() {
                 self.dropped = self.dropped.wrapping_add(1);
             }
@@ -258,7 +260,7 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    pub(super) fn take_scene(&mut self, scene: Scene) {
+    pub(super) fn take_scene(&mut self, scene: Scene, room: CommandRoom) {
         let accepted = scene.is_valid() && self.has_materials_of(&scene);
         // The very scene in force goes on: its host came back.
         if accepted && self.scene != Some(scene) {
@@ -267,7 +269,7 @@ impl<const D: usize> Link<'_, D> {
             self.requester.lay(scene.underlay);
             self.forget_positions();
             self.scene = Some(scene);
-            self.command(Command::Scene(scene));
+            self.command(room, Command::Scene(scene));
         }
         let epoch = scene.epoch;
         log::scene(epoch, accepted);
@@ -296,7 +298,7 @@ impl<const D: usize> Link<'_, D> {
         let latest = &self.last_record.sample;
         let (size, high_water) = monitor.stack();
         Status {
-            device: device.hello(0, self.scene, &self.conversation),
+            device: device.hello(0, self.scene, &self.session),
             boot: device.boot.clone(),
             calibration: device.source,
             model: device.calibration.map(|calibration| calibration.model),

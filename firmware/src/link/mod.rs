@@ -21,7 +21,7 @@
 //! - Another view of a scene is put in only while nothing is felt; the arm stays armed.
 //! - Goodbye is answered when the amplifiers are off.
 
-mod conversation;
+mod commands;
 mod device_state;
 mod loader;
 mod log;
@@ -29,6 +29,7 @@ mod materials;
 mod messages;
 mod poll;
 mod requests;
+mod session;
 pub mod task;
 #[cfg(test)]
 mod tests;
@@ -40,7 +41,6 @@ use hapterra_core::contact::ContactState;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Point, Sample, Scene, Source};
 use hapterra_core::terrain::{Tile, TileDemand, TileRequester};
-use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
 use hapterra_core::wire::message::ToHost;
 use hapterra_core::wire::request::Refusal;
@@ -49,10 +49,11 @@ use heapless::{Deque, Vec};
 
 use crate::led::LedPattern;
 use crate::queues::{LinkEnds, SPARES, TickRecord};
-use conversation::{Conversation, SessionState};
+use commands::CommandRoom;
 pub(crate) use device_state::{DeviceState, KnownArm};
 use loader::LoaderEntry;
 use materials::KnownTable;
+use session::{Session, SessionState};
 pub use tiles::fill_tile;
 use tx_queue::TxQueue;
 use views::ClutchOfHost;
@@ -96,7 +97,7 @@ pub struct Link<'t, const D: usize> {
     tx: &'t mut TxQueue,
     samples: &'t mut Deque<Sample, SAMPLES>,
     ends: LinkEnds<'t>,
-    conversation: Conversation,
+    session: Session,
     /// The session of the last host that only looks.
     looker: Option<SessionNumber>,
     /// The loop had taken every command when its reports were last read.
@@ -142,7 +143,7 @@ impl<'t, const D: usize> Link<'t, D> {
             tx: &mut buffers.tx,
             samples: &mut buffers.samples,
             ends,
-            conversation: Conversation::new(),
+            session: Session::new(),
             looker: None,
             commands_taken: false,
             device,
@@ -173,15 +174,15 @@ impl<'t, const D: usize> Link<'t, D> {
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
         let mut taken = 0;
         while let Some(rest) = bytes.get(taken..).filter(|rest| !rest.is_empty()) {
-            if !self.has_room() {
+            let Some(room) = self.room_for_message() else {
                 break;
-            }
+            };
             let Some(reader) = self.reader.take() else {
                 break;
             };
             let (n, frame) = reader.push(rest);
             taken += n;
-            let heard = frame.map(|frame| frame.and_then(|content| self.on_content(content)));
+            let heard = frame.map(|frame| frame.and_then(|content| self.on_content(content, room)));
             if let Some(Err(bad)) = heard {
                 self.on_bad_frame(bad);
             }
@@ -190,9 +191,10 @@ impl<'t, const D: usize> Link<'t, D> {
         taken
     }
 
-    /// Whether a message can be acted on: it may need one command, one table and one answer.
-    fn has_room(&self) -> bool {
-        self.ends.commands.ready() && self.ends.materials.ready() && self.tx.has_room()
+    /// Room for acting on a message, which may need one command, one table and one answer.
+    fn room_for_message(&self) -> Option<CommandRoom> {
+        let has_room = self.ends.materials.ready() && self.tx.has_room();
+        self.room_for_command().filter(|_| has_room)
     }
 
     /// The transport was interrupted: what was under way is lost.
@@ -219,7 +221,7 @@ impl<'t, const D: usize> Link<'t, D> {
         };
         // What was told to the loop has to reach it, force has to go out, and a host
         // that leaves has to be told that it has.
-        let leaves = self.conversation.state == SessionState::Leaving;
+        let leaves = self.session.is_leaving();
         waits
             && !(leaves && self.device.may_drive)
             && self.ends.commands.is_empty()
@@ -262,27 +264,7 @@ impl<'t, const D: usize> Link<'t, D> {
     /// Whether the host has heard that the arm is disarmed, and is gone.
     #[must_use]
     pub fn has_ended(&self) -> bool {
-        self.conversation.state == SessionState::Gone && self.tx.is_empty()
-    }
-
-    fn command(&mut self, command: Command<'t>) {
-        // Of these none leads to driving; of others that is not known here.
-        self.device.may_drive |= !matches!(
-            command,
-            Command::Scene(_)
-                | Command::DropScene
-                | Command::View(_)
-                | Command::Clutch(_)
-                | Command::Tile(_)
-                | Command::Point(_)
-                | Command::Disarm
-                | Command::Zero(_)
-                | Command::ClearFault(_)
-                | Command::Trip(_)
-        );
-        self.commands_taken = false;
-        // Whoever leads here has asked `has_room`.
-        let _ = self.ends.commands.enqueue(command);
+        self.session.state() == SessionState::Gone && self.tx.is_empty()
     }
 
     /// The session's samples that have gone out before what is said next.
@@ -292,21 +274,21 @@ impl<'t, const D: usize> Link<'t, D> {
         } else {
             0
         };
-        self.conversation.count(waiting, self.samples_dropped())
+        self.session.count(waiting, self.samples_dropped())
     }
 
     fn say(&mut self, message: &ToHost) {
-        self.say_in(self.conversation.session(), message);
+        self.say_in(self.session.number(), message);
     }
 
     fn say_in(&mut self, session: SessionNumber, message: &ToHost) {
-        // Whoever leads here has asked `has_room`.
+        // Callers have checked that there is room.
         self.tx.push(session, message);
     }
 
     /// Answers a point with what the loop rendered there.
     fn answer_point(&mut self, record: TickRecord) {
-        let is_open = self.conversation.is_open();
+        let is_open = self.session.is_open();
         if let Some(seq) = record.answers.filter(|_| is_open) {
             let sample = record.sample;
             self.say(&ToHost::PointAnswer { seq, sample });

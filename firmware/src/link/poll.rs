@@ -4,12 +4,11 @@
 use hapterra_core::guard::Mode;
 use hapterra_core::tick::Command;
 use hapterra_core::wire::message::{BATCH, Telemetry, ToHost};
-use hapterra_core::wire::session::SessionEnd;
 use heapless::Vec;
 
-use super::conversation::SessionState;
 use super::{Link, log, tiles};
 use crate::monitor::Part;
+use crate::queues::LoopReport;
 
 impl<const D: usize> Link<'_, D> {
     /// Does what is due: reads what the loop left, requests tiles, hands on the
@@ -45,7 +44,7 @@ impl<const D: usize> Link<'_, D> {
                 self.replay.last = Some(record);
                 self.answer_point(record);
             } else if self.renders_arm()
-                && self.conversation.is_open()
+                && self.session.is_open()
                 && self.samples.push_back(record.sample).is_err()
             {
                 self.dropped = self.dropped.wrapping_add(1);
@@ -59,11 +58,19 @@ impl<const D: usize> Link<'_, D> {
         // them all before the reports so far were read.
         let follows = self.commands_taken;
         self.commands_taken = self.ends.commands.is_empty();
-        while let Some(health) = self.ends.health.dequeue() {
+        while let Some(LoopReport { health, epoch }) = self.ends.health.dequeue() {
             self.device.take_health(health, self.ends.monitor.ticks());
             self.device.may_drive &= !(follows && health.report.mode == Mode::Disarmed);
+            let is_refused = self.scene.is_some_and(|scene| Some(scene.epoch) != epoch);
+            // A scene that this link took and the loop did not is nobody's.
+            if follows
+                && is_refused
+                && let Some(room) = self.room_for_command()
+            {
+                self.drop_scene(room);
+            }
         }
-        while self.conversation.is_open() && self.tx.has_room() {
+        while self.session.is_open() && self.tx.has_room() {
             let Some(message) = self.device.next_message() else {
                 return;
             };
@@ -77,50 +84,50 @@ impl<const D: usize> Link<'_, D> {
         let now = self.ends.monitor.ticks();
         let waits = self.device.is_being_armed() || self.device.waits_for_press();
         if waits
-            && self.ends.commands.ready()
-            && self.conversation.is_absent(now, self.device.ticks_per_ms())
+            && let Some(room) = self.room_for_command()
+            && self.session.is_absent(now, self.device.ticks_per_ms())
         {
             log::forsaken();
             self.device.give_up_press();
-            self.command(Command::Disarm);
+            self.command(room, Command::Disarm);
         }
-        if !self.conversation.is_forsaken(now) || !self.device.may_drive {
+        if !self.session.is_forsaken(now) || !self.device.may_drive {
             return;
         }
-        if self.ends.commands.ready() {
+        if let Some(room) = self.room_for_command() {
             log::forsaken();
-            self.command(Command::Disarm);
+            self.command(room, Command::Disarm);
             self.forget_conversation();
             self.forsake_clutch();
-            self.conversation.state = SessionState::Ended(SessionEnd::HostSilent);
+            self.session.end_silent();
         }
     }
 
     /// Says goodbye once nothing is driven and everything else was said.
     fn say_goodbye(&mut self) {
-        let leaves = self.conversation.state == SessionState::Leaving;
+        let leaves = self.session.is_leaving();
         let said = self.samples.is_empty() && self.tx.wants_telemetry();
         if leaves && said && !self.device.may_drive && self.tx.has_room() {
             self.say(&ToHost::Goodbye(self.sample_count()));
-            self.conversation.state = SessionState::Ended(SessionEnd::Goodbye);
+            self.session.answer_goodbye();
             log::ended();
         }
     }
 
     /// Hands the next point to the loop, which would forget a second one.
     fn start_next_point(&mut self) {
-        if self.replay.under_way.is_some() || !self.ends.commands.ready() {
-            return;
-        }
-        if let Some(point) = self.points.pop_front() {
+        if self.replay.under_way.is_none()
+            && let Some(room) = self.room_for_command()
+            && let Some(point) = self.points.pop_front()
+        {
             self.replay.under_way = Some(point.seq);
-            self.command(Command::Point(point));
+            self.command(room, Command::Point(point));
         }
     }
 
     /// Packs the next telemetry message, once the last one has left.
     fn pack_telemetry(&mut self) {
-        let leaves = self.conversation.state == SessionState::Leaving;
+        let leaves = self.session.is_leaving();
         let enough = self.samples.len() >= BATCH || leaves;
         if !enough || self.samples.is_empty() || !self.tx.wants_telemetry() {
             return;
@@ -132,16 +139,15 @@ impl<const D: usize> Link<'_, D> {
             };
             let _ = samples.push(sample);
         }
-        let first = self.conversation.packed;
+        let first = self.session.packed;
         self.batch = samples.len() as u32;
-        self.conversation.packed = first.wrapping_add(self.batch);
+        self.session.packed = first.wrapping_add(self.batch);
         let message = ToHost::Telemetry(Telemetry {
             first,
             dropped: self.sample_count().dropped,
             samples,
         });
-        self.tx
-            .push_telemetry(self.conversation.session(), &message);
+        self.tx.push_telemetry(self.session.number(), &message);
     }
 
     /// Moves bytes that are sent next into `into` and returns how many. They count

@@ -8,6 +8,7 @@ use hapterra_core::wire::message::ToHost;
 use hapterra_core::wire::request::{Answer, Refusal, Request};
 
 use super::Link;
+use super::commands::CommandRoom;
 
 /// How far a request has come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,9 +79,9 @@ impl LatestRequest {
 
 impl<const D: usize> Link<'_, D> {
     /// Takes a request. Asked again, it is answered again and not done again.
-    pub(super) fn take_request(&mut self, number: u8, request: &Request) {
+    pub(super) fn take_request(&mut self, number: u8, request: &Request, room: CommandRoom) {
         if self.device.request.is_new(number) {
-            let progress = self.begin(request);
+            let progress = self.begin(request, room);
             self.device.request.began(number, progress);
         }
         // There is room: no other answer was given to this message.
@@ -89,46 +90,46 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    fn begin(&mut self, request: &Request) -> Progress {
+    fn begin(&mut self, request: &Request, room: CommandRoom) -> Progress {
         Progress::Done(match *request {
-            Request::EnterLoader => self.want_loader(),
+            Request::EnterLoader => self.want_loader(room),
             _ if self.is_leaving() => Err(Refusal::Busy),
             // While the board stores, nobody polls this link.
             Request::Arm | Request::Jog(_) if self.to_store().is_some() => Err(Refusal::Busy),
             Request::Arm => {
                 self.device.arming = Some(self.device.health.report.decision.count);
-                self.command(Command::Arm);
+                self.command(room, Command::Arm);
                 return Progress::Arming;
             }
-            Request::Jog(jog) => match self.begin_jog(jog) {
+            Request::Jog(jog) => match self.begin_jog(jog, room) {
                 Ok(()) => return Progress::Arming,
                 refused => refused,
             },
             Request::HoldOutputs(shares) => self
                 .device
                 .may_hold_outputs()
-                .and_then(|()| self.obey(Command::HoldOutputs(shares))),
+                .and_then(|()| self.obey(room, Command::HoldOutputs(shares))),
             Request::StoreCalibration => match self.device.begin_storing(self.ends.monitor.ticks())
             {
                 Ok(()) => return Progress::Storing,
                 refused => refused,
             },
-            Request::Disarm => self.obey(Command::Disarm),
+            Request::Disarm => self.obey(room, Command::Disarm),
             Request::Clutch { hold } => {
-                self.set_clutch(hold);
+                self.set_clutch(hold, room);
                 Ok(())
             }
             Request::ClearFault { seen } => self
                 .device
                 .may_clear(seen)
-                .and_then(|()| self.obey(Command::ClearFault(seen))),
+                .and_then(|()| self.obey(room, Command::ClearFault(seen))),
             Request::Zero { counts } => self
                 .device
                 .may_change_settings()
-                .and_then(|()| self.obey(Command::Zero(counts))),
+                .and_then(|()| self.obey(room, Command::Zero(counts))),
             Request::SetCalibration { calibration } => self.set_calibration(&calibration),
             Request::DropScene => {
-                self.drop_scene();
+                self.drop_scene(room);
                 Ok(())
             }
         })
@@ -136,21 +137,21 @@ impl<const D: usize> Link<'_, D> {
 
     /// Hands a command to the loop.
     #[allow(clippy::unnecessary_wraps)] // It is what came of the request.
-    fn obey(&mut self, command: Command<'static>) -> Result<(), Refusal> {
-        self.command(command);
+    fn obey(&mut self, room: CommandRoom, command: Command<'static>) -> Result<(), Refusal> {
+        self.command(room, command);
         Ok(())
     }
 
     /// Checks a jog and hands it to the loop, which drops the scene.
-    fn begin_jog(&mut self, jog: Jog) -> Result<(), Refusal> {
+    fn begin_jog(&mut self, jog: Jog, room: CommandRoom) -> Result<(), Refusal> {
         self.device.may_change_settings()?;
         let record = self.device.calibration.as_ref();
         if !jog.is_valid(record.ok_or(Refusal::NoCalibration)?) {
             return Err(Refusal::NoSuchJog);
         }
-        self.drop_scene();
+        self.forget_scene();
         self.device.arming = Some(self.device.health.report.decision.count);
-        self.command(Command::Jog(jog));
+        self.command(room, Command::Jog(jog));
         Ok(())
     }
 

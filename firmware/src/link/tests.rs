@@ -1,6 +1,7 @@
 //! The link against a scripted host in memory: every fault byte by byte.
 
 mod buffers;
+mod commands;
 mod device_state;
 mod faults;
 mod loader;

@@ -7,6 +7,7 @@ use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::{Heights, TileMessage, ToHost};
 
 use super::Link;
+use super::commands::CommandRoom;
 use crate::queues::TickRecord;
 
 impl<'t, const D: usize> Link<'t, D> {
@@ -33,6 +34,7 @@ impl<'t, const D: usize> Link<'t, D> {
         &mut self,
         message: &TileMessage<'_>,
         materials: Option<TileMaterials<'_>>,
+        room: CommandRoom,
     ) {
         let ours = self.scene.is_some_and(|s| s.epoch == message.epoch);
         if !ours || !self.requester.awaits(message.key) {
@@ -51,12 +53,12 @@ impl<'t, const D: usize> Link<'t, D> {
             return self.on_bad_frame(BadFrame::Content);
         }
         self.requester.received(key);
-        self.command(Command::Tile(tile));
+        self.command(room, Command::Tile(tile));
     }
 
     /// Requests tiles, each with a buffer that waits for it.
     pub(super) fn request_tiles(&mut self) {
-        let (true, Some(scene)) = (self.conversation.is_open(), self.scene) else {
+        let (true, Some(scene)) = (self.session.is_open(), self.scene) else {
             return;
         };
         let focus = self.focus.unwrap_or_else(|| TileDemand {

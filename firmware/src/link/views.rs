@@ -11,6 +11,7 @@ use hapterra_core::tick::Command;
 use hapterra_core::wire::message::ToHost;
 
 use super::Link;
+use super::commands::CommandRoom;
 
 /// Views whose numbers are at most so far ahead are newer than the one in force; others are
 /// late, or said twice.
@@ -30,12 +31,12 @@ pub(super) enum ClutchOfHost {
 
 impl<const D: usize> Link<'_, D> {
     /// The host holds the clutch, or lets it go.
-    pub(super) fn set_clutch(&mut self, hold: ClutchHold) {
+    pub(super) fn set_clutch(&mut self, hold: ClutchHold, room: CommandRoom) {
         self.clutch = match hold {
             ClutchHold::LetGo => ClutchOfHost::LetGo,
             ClutchHold::WithHand | ClutchHold::InPlace => ClutchOfHost::Held,
         };
-        self.command(Command::Clutch(hold));
+        self.command(room, Command::Clutch(hold));
     }
 
     /// The host that may hold the clutch is gone.
@@ -47,13 +48,15 @@ impl<const D: usize> Link<'_, D> {
 
     /// Lets the clutch of a host go that is gone.
     pub(super) fn release_forsaken_clutch(&mut self) {
-        if self.clutch == ClutchOfHost::Forsaken && self.ends.commands.ready() {
-            self.set_clutch(ClutchHold::LetGo);
+        if self.clutch == ClutchOfHost::Forsaken
+            && let Some(room) = self.room_for_command()
+        {
+            self.set_clutch(ClutchHold::LetGo, room);
         }
     }
 
     /// Puts another view in, and answers; one that was said twice is answered twice.
-    pub(super) fn take_view(&mut self, view: View) {
+    pub(super) fn take_view(&mut self, view: View, room: CommandRoom) {
         let (epoch, ahead) = (view.scene.epoch, view.number.wrapping_sub(self.view));
         let is_again = ahead == 0 && self.scene == Some(view.scene);
         if !is_again && !(1..NEWER).contains(&ahead) {
@@ -62,7 +65,7 @@ impl<const D: usize> Link<'_, D> {
         let may_come = || self.has_materials_of(&view.scene) && self.may_change_view(&view.scene);
         let accepted = is_again || (view.scene.is_valid() && may_come());
         if accepted && !is_again {
-            self.put_in(view);
+            self.put_in(view, room);
         }
         self.say(&ToHost::SceneTaken { epoch, accepted });
     }
@@ -83,7 +86,7 @@ impl<const D: usize> Link<'_, D> {
         })
     }
 
-    fn put_in(&mut self, view: View) {
+    fn put_in(&mut self, view: View, room: CommandRoom) {
         let (scene, at) = (view.scene, view.hip.column());
         if !view.keeps_tiles {
             self.requester.reset(scene.level, scene.size);
@@ -101,6 +104,6 @@ impl<const D: usize> Link<'_, D> {
         self.nothing_to_request_at = None;
         self.scene = Some(scene);
         self.view = view.number;
-        self.command(Command::View(view));
+        self.command(room, Command::View(view));
     }
 }

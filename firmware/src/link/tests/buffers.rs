@@ -19,7 +19,7 @@ use crate::native::{FULL_SCALE_A, StoppedClock};
 use crate::queues::{LoopEnds, SPARES, TickRecord};
 
 /// A link in a session, and the loop's ends of its queues.
-fn link() -> (Link<'static, D>, LoopEnds<'static>) {
+pub(super) fn link() -> (Link<'static, D>, LoopEnds<'static>) {
     let tiles = Box::leak(Box::new(TileBuffers::<D>::VACANT));
     let memory = Box::leak(Box::new(WorkingMemory::new()));
     let (loop_ends, link_ends) = memory.queues.split();

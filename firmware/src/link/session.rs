@@ -14,7 +14,16 @@ const KNOWN: usize = 8;
 /// for so long, ms, is not there to see what the press does.
 const ABSENT_MS: u32 = 2_000;
 
-/// Where the conversation with a host stands.
+/// Where the conversation with a host stands. [`Session`] alone goes from one to another:
+///
+/// | from | to | by |
+/// | --- | --- | --- |
+/// | any | open | [`Session::open`] |
+/// | open, detached, ended by silence | leaving | [`Session::leave`] |
+/// | open | detached | [`Session::detach`] |
+/// | leaving | ended by goodbye | [`Session::answer_goodbye`] |
+/// | open, detached | ended by silence | [`Session::end_silent`] |
+/// | ended by goodbye | gone | [`Session::close`] |
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SessionState {
     /// No host has said hello.
@@ -46,10 +55,10 @@ pub(super) enum Greeting {
 
 /// The present session.
 #[derive(Clone, Debug)]
-pub(super) struct Conversation {
-    pub(super) state: SessionState,
+pub(super) struct Session {
+    state: SessionState,
     /// The session; any before the first.
-    session: SessionNumber,
+    number: SessionNumber,
     /// The number of the hello that opened it.
     pub(super) opened_by: u8,
     last: LastSession,
@@ -67,11 +76,11 @@ pub(super) struct Conversation {
     dropped_before: u32,
 }
 
-impl Conversation {
+impl Session {
     pub(super) const fn new() -> Self {
         Self {
             state: SessionState::Closed,
-            session: SessionNumber::new(0),
+            number: SessionNumber::new(0),
             opened_by: 0,
             last: LastSession {
                 session: 0,
@@ -91,13 +100,46 @@ impl Conversation {
         }
     }
 
-    pub(super) const fn session(&self) -> SessionNumber {
-        self.session
+    pub(super) const fn number(&self) -> SessionNumber {
+        self.number
     }
 
     /// The session before this one that was not detached.
     pub(super) const fn last(&self) -> LastSession {
         self.last
+    }
+
+    pub(super) const fn state(&self) -> SessionState {
+        self.state
+    }
+
+    /// The host has said goodbye.
+    pub(super) const fn leave(&mut self) {
+        self.state = SessionState::Leaving;
+    }
+
+    /// The host that leaves was answered.
+    pub(super) const fn answer_goodbye(&mut self) {
+        self.state = SessionState::Ended(SessionEnd::Goodbye);
+    }
+
+    /// The host was silent for too long.
+    pub(super) const fn end_silent(&mut self) {
+        self.state = SessionState::Ended(SessionEnd::HostSilent);
+    }
+
+    /// The host has looked and is gone.
+    pub(super) const fn detach(&mut self) {
+        self.state = SessionState::Detached;
+    }
+
+    /// The host has heard the answer to its goodbye.
+    pub(super) const fn close(&mut self) {
+        self.state = SessionState::Gone;
+    }
+
+    pub(super) fn is_leaving(&self) -> bool {
+        self.state == SessionState::Leaving
     }
 
     pub(super) fn is_open(&self) -> bool {
@@ -107,7 +149,7 @@ impl Conversation {
     /// Whether there is a session of this number. What belongs to another is not
     /// heard.
     pub(super) fn is_of(&self, session: SessionNumber) -> bool {
-        self.state != SessionState::Closed && self.session == session
+        self.state != SessionState::Closed && self.number == session
     }
 
     pub(super) fn greeting(&self, session: SessionNumber) -> Greeting {
@@ -132,17 +174,17 @@ impl Conversation {
         };
         if end != SessionEnd::None {
             self.last = LastSession {
-                session: self.session.get(),
+                session: self.number.get(),
                 opened_by: self.opened_by,
                 end,
                 count: self.count(0, dropped),
             };
         }
         if self.state != SessionState::Closed {
-            self.over.write(self.session);
+            self.over.write(self.number);
         }
         self.state = SessionState::Open;
-        self.session = session;
+        self.number = session;
         self.opened_by = hello;
         self.packed = 0;
         self.dropped_before = dropped;

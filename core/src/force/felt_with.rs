@@ -1,0 +1,14 @@
+//! What every effect of a scene depends on besides its law.
+
+use crate::rate::TickRate;
+
+/// What a scene is felt with, besides its law.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FeltWith {
+    pub(crate) cell_mm: f32,
+    pub(crate) rate: TickRate,
+    /// From the beginning of a tick until its force acts, s.
+    pub(crate) latency_s: f32,
+    /// An arm follows it, not points.
+    pub(crate) arm: bool,
+}

@@ -1,0 +1,292 @@
+//! What lies in a window where the surface is not a tile of the scene's level: before it comes,
+//! and while it settles ([`Settling`](super::Settling)).
+
+use super::{Corners, Ground, Window};
+use crate::grid::{Altitude, Cell, GridPoint};
+use crate::scalar::larger;
+use crate::terrain::index::{TILE_CELLS, TileIndex};
+use crate::terrain::settling::{Allowance, Settling, within};
+use crate::terrain::tile::Tile;
+use crate::terrain::underlay::Underlay;
+
+/// A height that is felt at a sample, and whether it is a tile's.
+#[derive(Clone, Copy)]
+struct Felt {
+    height: f32,
+    is_of_tile: bool,
+}
+
+impl<'t, const D: usize> Window<'t, D> {
+    /// Lays an underlay under the field, or none; the tiles that are held are the surface as
+    /// they are. The buffers of the underlay before are kept for this one
+    /// ([`Self::take_spare`]).
+    pub fn lay(&mut self, underlay: Option<Underlay>) {
+        self.underlay.lay(underlay);
+        self.settling = Settling::NOTHING;
+        for row in 0..D {
+            for col in 0..D {
+                self.slots[row][col].become_surface();
+                let key = self.slots[row][col].key();
+                if let (Some(key), true) = (key, underlay.is_some()) {
+                    let top = self.slots[row][col].top();
+                    self.renew_maxima(key.index, top);
+                }
+            }
+        }
+    }
+
+    /// Gives back a buffer that held a tile of an underlay, where there is to be none any more.
+    /// There may be another.
+    #[must_use]
+    pub fn take_spare(&mut self) -> Option<&'t mut Tile> {
+        self.underlay.take_spare()
+    }
+
+    /// Takes a tile that was asked for: one of the field, or of the underlay. Gives back a buffer,
+    /// if one is left over.
+    ///
+    /// `felt` are the cells of proxy and HIP. A tile of the field settles where what is felt there
+    /// depends on it: it, or one beside it that is not the surface, has one of them. Any other
+    /// is the surface at once, as with [`Self::install`].
+    #[must_use]
+    pub fn take(&mut self, tile: &'t mut Tile, felt: [Cell; 2]) -> Option<&'t mut Tile> {
+        if !self.underlay.is_wanted() {
+            return Some(self.install(tile));
+        }
+        if let Some(part) = self.underlay.part(tile.key(), self.level()) {
+            self.settling.has_changed = true;
+            return self.underlay.put(part, tile);
+        }
+        let depends = |cell: Cell, index: TileIndex| {
+            let at = TileIndex::holding(cell);
+            let apart = at.col.abs_diff(index.col).max(at.row.abs_diff(index.row));
+            apart == 0 || (apart == 1 && self.held(at).is_none())
+        };
+        let settles = tile
+            .key()
+            .is_some_and(|key| felt.into_iter().any(|cell| depends(cell, key.index)));
+        Some(self.put(tile, settles))
+    }
+
+    /// Whether a patch is that of its tile, and not of the underlay, nor between the two.
+    #[must_use]
+    #[inline]
+    pub fn is_settled(&self, cell: Cell) -> bool {
+        self.held(TileIndex::holding(cell)).is_some()
+    }
+
+    /// Moves the surface on to the tiles that have come, by `step` cells at most. Returns
+    /// whether it may be another than in the tick before.
+    pub fn settle(&mut self, step: f32) -> bool {
+        let has_changed = core::mem::take(&mut self.settling.has_changed);
+        if self.settling.count == 0 {
+            return has_changed;
+        }
+        self.settle_each(step);
+        true
+    }
+
+    #[inline(never)]
+    fn settle_each(&mut self, step: f32) {
+        let mut left = self.settling.count;
+        for slot in 0..D * D {
+            let (row, col) = (slot / D, slot % D);
+            let Allowance { now, far } = &mut self.settling.slots[row][col];
+            if *now == f32::INFINITY {
+                continue;
+            }
+            *now += step;
+            if *now >= *far {
+                let tile = &mut self.slots[row][col];
+                tile.become_surface();
+                let (key, top) = (tile.key(), tile.top());
+                if let Some(key) = key {
+                    self.settling.begin(key.index, None);
+                    self.renew_maxima(key.index, top);
+                }
+            }
+            left -= 1;
+            if left == 0 {
+                return;
+            }
+        }
+    }
+
+    /// A tile has come into the slot of `index`: it settles if it is to, and the underlay was felt
+    /// there. One that was there before goes on as it was.
+    pub(super) fn has_come(&mut self, index: TileIndex, settles: bool, was_here: bool) {
+        let (row, col) = Settling::<D>::slot(index);
+        self.settling.has_changed = self.underlay.is_wanted();
+        if was_here && self.settling.allowed(index) < f32::INFINITY {
+            return;
+        }
+        let far = match settles && !was_here {
+            true => self.far(self.slots[row][col], index),
+            false => None,
+        };
+        self.settling.begin(index, far);
+        if far.is_none() {
+            self.slots[row][col].become_surface();
+        }
+    }
+
+    /// How far the samples of a tile can be from the underlay, cells; `None` where that is not felt.
+    fn far(&self, tile: &Tile, index: TileIndex) -> Option<f32> {
+        let [lowest, highest] = tile.range()?;
+        let [low, high] = self.underlay.felt()?.range_over(index, tile.base())?;
+        let far = larger(highest - low, high - lowest);
+        (far > 0.0).then_some(far)
+    }
+
+    /// What lies in a cell of the field whose tile is not the surface.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn unsettled_ground(&self, cell: Cell) -> Ground {
+        let Some(under) = self.underlay.felt() else {
+            return Ground::Missing;
+        };
+        let index = TileIndex::holding(cell);
+        let own = self.tile_here(index);
+        let base = own.map_or(under.base(), Tile::base);
+        let coarse = under.corners(cell, base);
+        // As far as no other tile has the same samples.
+        let alone = match own {
+            Some(tile) => {
+                let (own, allowed) = (tile.corners(cell), self.settling.allowed(index));
+                let felt = |corner: usize| within(own[corner], coarse[corner], allowed);
+                [felt(0), felt(1), felt(2), felt(3)]
+            }
+            None => coarse,
+        };
+        let (mut heights, mut are_of_tiles) = (alone, own.is_some());
+        if !is_inside(cell) {
+            are_of_tiles = self.felt_on_border(cell, (&mut heights, are_of_tiles), coarse, base);
+        }
+        let [sw, se, nw, ne] = heights;
+        match (sw + se + nw + ne).is_nan() {
+            false => Ground::Patch(Corners { base, heights }),
+            true if are_of_tiles => Ground::Hole,
+            // What the underlay does not know may yet come.
+            true => Ground::Missing,
+        }
+    }
+
+    /// Puts the heights that are felt at the corners of a cell which are on its tile's border in the
+    /// place of those that `alone` has, with or without its tile. Returns whether every corner without
+    /// a height is one of a tile.
+    #[inline(never)]
+    fn felt_on_border(
+        &self,
+        cell: Cell,
+        alone: (&mut [f32; 4], bool),
+        coarse: [f32; 4],
+        base: i32,
+    ) -> bool {
+        let (heights, is_of_tile) = alone;
+        let mut are_of_tiles = true;
+        for (corner, height) in (0..).zip(heights) {
+            let sample = cell.offset(corner & 1, corner >> 1);
+            let felt = match is_on_border(sample.x) || is_on_border(sample.y) {
+                true => self.felt(sample, coarse[corner as usize], base),
+                false => Felt {
+                    height: *height,
+                    is_of_tile,
+                },
+            };
+            *height = felt.height;
+            are_of_tiles &= felt.is_of_tile || !felt.height.is_nan();
+        }
+        are_of_tiles
+    }
+
+    /// The height felt at a sample that several tiles may share, in cells above `base`.
+    // A call: four copies of it would be a kilobyte.
+    #[inline(never)]
+    fn felt(&self, sample: Cell, coarse: f32, base: i32) -> Felt {
+        let mut felt = Felt {
+            height: coarse,
+            is_of_tile: false,
+        };
+        let mut most = -1.0;
+        for west in 0..=i32::from(is_on_border(sample.x)) {
+            for south in 0..=i32::from(is_on_border(sample.y)) {
+                let index = TileIndex::holding(sample.offset(-west, -south));
+                let allowed = self.settling.allowed(index);
+                if allowed <= most {
+                    continue;
+                }
+                let Some(tile) = self.tile_here(index) else {
+                    continue;
+                };
+                most = allowed;
+                let first = index.first_cell();
+                let (col, row) = (sample.x - first.x, sample.y - first.y);
+                let own =
+                    tile.post(col as usize, row as usize) + tile.base().wrapping_sub(base) as f32;
+                felt = Felt {
+                    height: within(own, coarse, allowed),
+                    is_of_tile: true,
+                };
+            }
+        }
+        felt
+    }
+
+    /// The tile of the field in its slot, whether it is the surface or not.
+    #[inline(never)]
+    fn tile_here(&self, index: TileIndex) -> Option<&Tile> {
+        let (row, col) = Settling::<D>::slot(index);
+        let tile = &*self.slots[row][col];
+        tile.key()
+            .is_some_and(|key| key.index == index)
+            .then_some(tile)
+    }
+
+    /// Which material of the scene's table the sample nearest to a place on a patch has; `None`
+    /// where the patch's tile is not here, or came without materials.
+    pub(crate) fn material_near(&self, patch: Cell, place: &GridPoint) -> Option<u8> {
+        let [x, y, _] = place.cell();
+        let frac = place.frac();
+        // A place on the far border of its patch may be counted from the next one.
+        let is_far = |at: i32, frac: f32, patch: i32| {
+            usize::from(at.wrapping_sub(patch) as f32 + frac >= 0.5)
+        };
+        let far = [is_far(x, frac.x, patch.x), is_far(y, frac.y, patch.y)];
+        self.tile_here(TileIndex::holding(patch))?
+            .material(patch, far)
+    }
+
+    /// Whether what is felt in place of a tile is known to lie below `low`, all over the tile.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn unsettled_is_below(&self, index: TileIndex, low: Altitude) -> bool {
+        let Some(under) = self.underlay.felt() else {
+            return false;
+        };
+        // Where neither a tile nor the underlay has heights, anything may be.
+        let is_known = self.tile_here(index).is_some() || under.covers(index);
+        if !(is_known && under.is_below(low)) {
+            return false;
+        }
+        // A border that is shared is felt as the neighbour has it.
+        (0..9).all(|place| {
+            let near = self.tile_here(index.offset(place % 3 - 1, place / 3 - 1));
+            near.is_none_or(|tile| tile.is_below(low))
+        })
+    }
+}
+
+/// Whether a column or row of samples is the border of two tiles.
+const fn is_on_border(at: i32) -> bool {
+    at & (TILE_CELLS as i32 - 1) == 0
+}
+
+/// Whether no corner of a cell is on the border of its tile.
+fn is_inside(cell: Cell) -> bool {
+    let on_border = |at: i32| is_on_border(at) || is_on_border(at + 1);
+    !(on_border(cell.x) || on_border(cell.y))
+}
+
+#[cfg(test)]
+#[path = "unsettled_tests.rs"]
+mod tests;
