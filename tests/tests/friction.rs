@@ -63,14 +63,6 @@ fn ratio(terrain: &Terrain<'_>, sample: &Sample) -> Option<f64> {
     Some(distance(along, [0.0; 3]) / pressed)
 }
 
-/// Whether a proxy is on the border of the data, where nothing presses it if the HIP is above.
-fn is_beside_hole(terrain: &Terrain<'_>, sample: &Sample) -> bool {
-    let [x, y, _] = position(&sample.proxy);
-    let beside = [[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]];
-    let there = |[east, north]: [f64; 2]| terrain.height_mm(x + 1e-3 * east, y + 1e-3 * north);
-    beside.into_iter().any(|way| there(way).is_none())
-}
-
 /// The ratios of the forces of all slides around a terrain, so many millimetres a tick.
 fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64) -> Vec<f64> {
     let felt = slide(terrain, law(Friction::coulomb(mu as f32)), depth, speed);
@@ -81,8 +73,13 @@ fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64) -> Vec<f64> {
         let touches = |sample: &Sample| sample.state == ContactState::Touching;
         let behind = distance(position(&pair[0].proxy), position(&pair[0].hip));
         let moves = pair[0].proxy != pair[1].proxy;
-        let slides = touches(&pair[0]) && touches(&pair[1]) && moves && behind < trails;
-        slides && !is_beside_hole(terrain, &pair[0])
+        // Over a hole the HIP is not moved: it comes out beyond it, cells away, in one tick.
+        let [from, to] = [0, 1].map(|i| {
+            let [x, y, _] = position(&pair[i].hip);
+            [x, y, 0.0]
+        });
+        let is_jump = distance(from, to) > 1.5 * speed;
+        touches(&pair[0]) && touches(&pair[1]) && moves && behind < trails && !is_jump
     });
     slides.filter_map(|pair| ratio(terrain, &pair[1])).collect()
 }

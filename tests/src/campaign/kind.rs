@@ -118,7 +118,7 @@ const fn latch(may_latch: &'static [Fault], within: u32) -> Expectation {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 36] = [
+    pub const ALL: [Self; 37] = [
         Self::EncoderJump,
         Self::EncoderGlitch,
         Self::EncoderNoise,

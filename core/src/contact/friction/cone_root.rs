@@ -35,9 +35,13 @@ impl ConeRoot {
         self.next
     }
 
-    /// The nearest place found so far at which the cone holds.
-    pub(super) fn inside(&self) -> Option<f32> {
-        self.high.map(|(t, _)| t)
+    /// Where a way ends whose looks are used up: the farthest place at which the proxy is still
+    /// pulled, from which the next way goes on; only where that is the start, the nearest place
+    /// at which the cone holds.
+    pub(super) fn so_far(&self) -> Option<f32> {
+        let (low, _) = self.low;
+        let high = self.high.map(|(t, _)| t);
+        if low > 0.0 { Some(low) } else { high }
     }
 
     /// Takes a look at `t` into account.

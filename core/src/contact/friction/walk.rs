@@ -192,7 +192,7 @@ fn straight(
         }
         root.look(t, &excess);
     }
-    if let Some(t) = root.inside() {
+    if let Some(t) = root.so_far() {
         to.0 = place(t);
     }
     to
