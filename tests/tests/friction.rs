@@ -63,6 +63,17 @@ fn ratio(terrain: &Terrain<'_>, sample: &Sample) -> Option<f64> {
     Some(distance(along, [0.0; 3]) / pressed)
 }
 
+/// Whether the straight way to a HIP leads through the air, or over a hole: a proxy there leaves
+/// the surface and comes down elsewhere, and may be held where it does.
+fn flies(terrain: &Terrain<'_>, proxy: [f64; 3], hip: [f64; 3]) -> bool {
+    (1..=64).any(|part| {
+        let t = f64::from(part) / 64.0;
+        let at = [0, 1, 2].map(|i| proxy[i] + t * (hip[i] - proxy[i]));
+        let ground = terrain.height_mm(at[0], at[1]);
+        ground.is_none_or(|ground| at[2] > ground + 1e-6)
+    })
+}
+
 /// The ratios of the forces of all slides around a terrain, so many millimetres a tick.
 fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64) -> Vec<f64> {
     let felt = slide(terrain, law(Friction::coulomb(mu as f32)), depth, speed);
@@ -73,13 +84,8 @@ fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64) -> Vec<f64> {
         let touches = |sample: &Sample| sample.state == ContactState::Touching;
         let behind = distance(position(&pair[0].proxy), position(&pair[0].hip));
         let moves = pair[0].proxy != pair[1].proxy;
-        // Over a hole the HIP is not moved: it comes out beyond it, cells away, in one tick.
-        let [from, to] = [0, 1].map(|i| {
-            let [x, y, _] = position(&pair[i].hip);
-            [x, y, 0.0]
-        });
-        let is_jump = distance(from, to) > 1.5 * speed;
-        touches(&pair[0]) && touches(&pair[1]) && moves && behind < trails && !is_jump
+        let flies = flies(terrain, position(&pair[0].proxy), position(&pair[1].hip));
+        touches(&pair[0]) && touches(&pair[1]) && moves && behind < trails && !flies
     });
     slides.filter_map(|pair| ratio(terrain, &pair[1])).collect()
 }

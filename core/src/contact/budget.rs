@@ -11,9 +11,9 @@ use crate::rate::TickRate;
 
 /// Units of work a tick may spend at 1 kHz, and at any rate at most.
 ///
-/// A unit is at most 238 instructions of a Cortex-M4F, so a tick is at most 167,000: what fits
-/// into the 170,000 cycles that a NUCLEO-G474RE has for a millisecond.
-pub const WORK_PER_TICK: u32 = 700;
+/// A unit is at most 238 instructions of a Cortex-M4F, so a tick is at most 102,000: at 1.5 cycles
+/// each 154,000 of the 168,000 cycles that a NUCLEO-G474RE has for a millisecond.
+pub const WORK_PER_TICK: u32 = 430;
 /// Units of work a second: 86 a tick at 10 kHz.
 const WORK_PER_S: u32 = 860_000;
 
@@ -24,15 +24,14 @@ const WORK_PER_S: u32 = 860_000;
 /// use hapterra_core::rate::TickRate;
 ///
 /// let at = |hz| TickRate::new(hz).map(work_per_tick);
-/// assert_eq!([at(1_000), at(4_000), at(10_000)], [Some(700), Some(215), Some(86)]);
+/// assert_eq!([at(1_000), at(4_000), at(10_000)], [Some(430), Some(215), Some(86)]);
 /// ```
 #[must_use]
 pub const fn work_per_tick(rate: TickRate) -> u32 {
-    let fits = WORK_PER_S / rate.hz();
-    if fits < WORK_PER_TICK {
-        fits
-    } else {
-        WORK_PER_TICK
+    // A rate of zero is none, but the compiler does not know that.
+    match WORK_PER_S.checked_div(rate.hz()) {
+        Some(fits) if fits < WORK_PER_TICK => fits,
+        _ => WORK_PER_TICK,
     }
 }
 

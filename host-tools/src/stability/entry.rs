@@ -187,7 +187,7 @@ impl Judge {
             Entry::Clutch => {
                 if sample.limits.contains(Limits::CLUTCH_OPEN) {
                     // The surface goes with the tip.
-                    let hip_mm = sample.hip.cell()[2] as f64 + f64::from(sample.hip.frac().z);
+                    let hip_mm = f64::from(sample.hip.cell()[2]) + f64::from(sample.hip.frac().z);
                     self.plane_mm = PLANE_MM + step.read_up_mm - CELL_MM * hip_mm;
                     self.has_begun = true;
                     return;
@@ -223,9 +223,9 @@ impl Block {
     /// outwards.
     fn swing_mm(&mut self, tip_mm: [f64; 3], becomes_stiffer: bool) -> f64 {
         self.ticks += 1;
-        for axis in 0..3 {
-            self.low_mm[axis] = self.low_mm[axis].min(tip_mm[axis]);
-            self.high_mm[axis] = self.high_mm[axis].max(tip_mm[axis]);
+        let bounds = self.low_mm.iter_mut().zip(&mut self.high_mm);
+        for ((low, high), at) in bounds.zip(tip_mm) {
+            (*low, *high) = (low.min(at), high.max(at));
         }
         self.fell_mm = self.fell_mm.max(self.high_mm[2] - tip_mm[2]);
         let [east, north, up] = [0, 1, 2].map(|axis| self.high_mm[axis] - self.low_mm[axis]);
