@@ -30,6 +30,11 @@
 // Before all others: its macros hold from here on.
 #[macro_use]
 mod say;
+// What the tests of all crates wait with, of which each uses its part.
+#[cfg(test)]
+#[path = "../../tests/src/timeouts.rs"]
+#[allow(dead_code, unreachable_pub)]
+mod timeouts;
 
 pub mod board;
 pub mod bringup;

@@ -12,6 +12,7 @@ use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::session::SessionNumber;
 
 use crate::link_campaign::{hostile, wire};
+use crate::timeouts::pass;
 
 /// Between two reads of so many bytes.
 const PAUSE: Duration = Duration::from_millis(100);
@@ -56,7 +57,7 @@ fn answer(mut host: TcpStream) {
             if host.write_all(&needs).is_err() {
                 return;
             }
-            std::thread::sleep(PAUSE);
+            pass(PAUSE);
         }
     }
 }

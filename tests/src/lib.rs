@@ -27,6 +27,7 @@ pub mod served;
 pub mod slow_line;
 pub mod soak;
 pub mod tiffs;
+pub mod timeouts;
 pub mod usb;
 pub mod walk;
 

@@ -5,11 +5,15 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
 
 use crate::hapterra_binary;
+use crate::link_campaign::wire::said_by_host;
+use crate::timeouts::{HANG, wait_until};
 use hapterra::link::{Dialogue, Native, Tcp, Transport};
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
+use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::session::SessionEnd;
 use hapterra_core::wire::status::Status;
 
@@ -20,6 +24,17 @@ pub struct Served {
     pub address: SocketAddr,
     /// Whether nothing reaches it.
     pub deaf: Arc<AtomicBool>,
+    seen: Arc<Seen>,
+}
+
+/// What a test may wait for.
+#[derive(Default)]
+struct Seen {
+    /// Ticks of the device.
+    ticks: AtomicU64,
+    /// Hellos and goodbyes that did not reach it, since it is deaf.
+    unheard_hellos: AtomicU64,
+    unheard_byes: AtomicU64,
 }
 
 impl Served {
@@ -34,14 +49,39 @@ impl Served {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let address = listener.local_addr().expect("a port");
         let deaf = Arc::new(AtomicBool::new(false));
-        let is_deaf = Arc::clone(&deaf);
+        let seen = Arc::new(Seen::default());
+        let (is_deaf, to_see) = (Arc::clone(&deaf), Arc::clone(&seen));
         std::thread::spawn(move || {
             let (mut device, mut between) = make();
             for stream in listener.incoming() {
-                serve(&mut device, stream.expect("a host"), &is_deaf, &mut between);
+                let stream = stream.expect("a host");
+                serve(&mut device, stream, &is_deaf, &to_see, &mut between);
             }
         });
-        Self { address, deaf }
+        Self {
+            address,
+            deaf,
+            seen,
+        }
+    }
+
+    /// Waits until this many milliseconds of the device's time have passed.
+    pub fn pass_ms(&self, ms: u64) {
+        let ticks = || self.seen.ticks.load(Ordering::Relaxed);
+        let until = ticks() + ms;
+        wait_until("ticks of the device", || ticks() >= until);
+    }
+
+    /// Waits until a host has greeted the device, which is deaf.
+    pub fn wait_for_unheard_hello(&self) {
+        let hellos = &self.seen.unheard_hellos;
+        wait_until("a hello", || hellos.load(Ordering::Relaxed) > 0);
+    }
+
+    /// Waits until a host has said goodbye to the device, which is deaf.
+    pub fn wait_for_unheard_bye(&self) {
+        let byes = &self.seen.unheard_byes;
+        wait_until("a goodbye", || byes.load(Ordering::Relaxed) > 0);
     }
 
     /// How the last session ended, as the next host hears it.
@@ -57,12 +97,22 @@ impl Served {
     fn dialogue(&self) -> Dialogue<'static> {
         self.deaf.store(false, Ordering::Relaxed);
         let link = Tcp::connect(&self.address.to_string()).expect("there");
-        Dialogue::open(Box::new(link), Duration::from_secs(20)).expect("answers")
+        Dialogue::open(Box::new(link), HANG).expect("answers")
     }
 }
 
+/// Ticks of the device after each look at its host.
+const TICKS: u32 = 2;
+
 /// Until the host is gone.
-fn serve(device: &mut Native, mut stream: TcpStream, deaf: &AtomicBool, between: &mut dyn FnMut()) {
+fn serve(
+    device: &mut Native,
+    mut stream: TcpStream,
+    deaf: &AtomicBool,
+    seen: &Seen,
+    between: &mut dyn FnMut(),
+) {
+    let mut unheard = FrameReader::<MAX_FRAME>::new();
     let wait = Some(Duration::from_millis(1));
     stream.set_read_timeout(wait).expect("set");
     let mut chunk = [0; 4096];
@@ -70,19 +120,34 @@ fn serve(device: &mut Native, mut stream: TcpStream, deaf: &AtomicBool, between:
         match stream.read(&mut chunk) {
             Ok(0) => return,
             Ok(n) if !deaf.load(Ordering::Relaxed) => device.send(&chunk[..n]).expect("in memory"),
-            Ok(_) => {}
+            Ok(n) => note(seen, &mut unheard, &chunk[..n]),
             Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => {}
             Err(_) => return,
         }
         between();
         // A few milliseconds of its time go by.
-        device.pass(2);
+        device.pass(TICKS);
+        seen.ticks.fetch_add(TICKS.into(), Ordering::Relaxed);
         let said = device
             .receive(&mut chunk, Duration::ZERO)
             .expect("in memory");
         if stream.write_all(&chunk[..said]).is_err() {
             return;
         }
+    }
+}
+
+/// Counts what does not reach the device.
+fn note(seen: &Seen, reader: &mut FrameReader<MAX_FRAME>, mut bytes: &[u8]) {
+    while !bytes.is_empty() {
+        let (taken, content) = reader.push(bytes);
+        bytes = &bytes[taken..];
+        let count = match content.and_then(Result::ok).and_then(said_by_host) {
+            Some(said) if matches!(said.message, ToDevice::Hello(_)) => &seen.unheard_hellos,
+            Some(said) if said.message == ToDevice::Bye => &seen.unheard_byes,
+            _ => continue,
+        };
+        count.fetch_add(1, Ordering::Relaxed);
     }
 }
 
@@ -135,20 +200,6 @@ pub fn signal(child: &Child, name: &str) {
         .args([format!("-{name}"), child.id().to_string()])
         .status();
     assert!(sent.expect("kill runs").success());
-}
-
-/// Waits for its end; none where it does not end within this time. It is ended then.
-pub fn ended_within(mut child: Child, time: Duration) -> Option<Output> {
-    let began = Instant::now();
-    while began.elapsed() < time {
-        if child.try_wait().expect("a child").is_some() {
-            return child.wait_with_output().ok();
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    child.kill().expect("ended");
-    child.wait().expect("ended");
-    None
 }
 
 /// What it has written, to both.

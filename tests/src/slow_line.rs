@@ -1,99 +1,250 @@
-//! A line to a device that carries so many bytes in a millisecond of the device's own time.
+//! A line to a device that carries a number of bytes in a tick, and devices whose ticks wait
+//! for it.
 
 use std::collections::VecDeque;
-use std::io;
-use std::time::Duration;
 
-use hapterra::link::Transport;
-use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode};
-use hapterra_core::wire::message::ToHost;
-use hapterra_core::wire::session::InSession;
+use hapterra::link::{Tcp, Transport};
+use hapterra::phantom::HeldPhantom;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
+use hapterra_core::wire::message::{ToDevice, ToHost};
+use hapterra_core::wire::plant::{Currents, Sensed};
+use hapterra_core::wire::session::{InSession, SessionNumber};
+use hapterra_core::wire::status::BootReport;
+use hapterra_firmware::app::{TileBuffers, WorkingMemory};
+use hapterra_firmware::native::{Device, StoppedClock};
+use hapterra_firmware::store::Stored;
 
-/// A slow line around another. What the host says waits until the device's samples tell that
-/// enough of its time has passed; before the first sample all goes through.
-pub struct SlowLine<T> {
-    inner: T,
-    bytes_a_ms: u64,
-    reader: Box<FrameReader<MAX_FRAME>>,
-    waiting: VecDeque<u8>,
-    /// Samples told so far, one a millisecond.
-    samples: u64,
-    /// What was carried since the first of them, bytes.
-    carried: u64,
+use crate::link_campaign::wire::{from_host, said_by_host};
+use crate::timeouts::HANG;
+
+/// Tiles along the side of the window, as on the emulated board.
+const WINDOW: usize = 16;
+
+/// Frames to the device. A frame arrives with its last byte.
+pub struct SlowLine {
+    bytes_a_tick: usize,
+    waiting: VecDeque<Vec<u8>>,
+    /// Bytes that the line may carry by now and has not.
+    credit: usize,
 }
 
-impl<T> SlowLine<T> {
-    /// A line that carries so many bytes a millisecond to the device.
-    pub fn new(inner: T, bytes_a_ms: u64) -> Self {
+impl SlowLine {
+    /// An empty line of this rate.
+    #[must_use]
+    pub const fn new(bytes_a_tick: usize) -> Self {
         Self {
-            inner,
-            bytes_a_ms,
-            reader: Box::default(),
+            bytes_a_tick,
             waiting: VecDeque::new(),
-            samples: 0,
-            carried: 0,
+            credit: 0,
         }
     }
 
-    fn listen(&mut self, mut bytes: &[u8]) {
+    /// Takes whole frames from the host.
+    pub fn send(&mut self, frames: &[u8]) {
+        let frames = frames.split_inclusive(|byte| *byte == 0);
+        self.waiting.extend(frames.map(<[u8]>::to_vec));
+    }
+
+    /// The frames that arrive in the next tick.
+    pub fn carry(&mut self) -> Vec<u8> {
+        self.credit += self.bytes_a_tick;
+        let mut arrived = vec![];
+        while let Some(frame) = self
+            .waiting
+            .pop_front_if(|frame| frame.len() <= self.credit)
+        {
+            self.credit -= frame.len();
+            arrived.extend(frame);
+        }
+        // An idle line saves nothing for later.
+        if self.waiting.is_empty() {
+            self.credit = 0;
+        }
+        arrived
+    }
+}
+
+/// A device whose time passes tick by tick, when its host says so.
+pub trait Stepped {
+    /// Sends frames in no time of the device. Returns what it said since.
+    fn exchange(&mut self, frames: &[u8]) -> Vec<u8>;
+
+    /// Runs one tick, then takes frames of this session. Returns all that the device said
+    /// until it had done with both.
+    fn tick(&mut self, session: SessionNumber, frames: &[u8]) -> Vec<u8>;
+}
+
+/// The device in this program, and the arm at it.
+pub struct InMemory {
+    device: Device<StoppedClock, WINDOW>,
+    arm: HeldPhantom,
+    /// What the device takes after a tick only.
+    unread: Vec<u8>,
+}
+
+impl InMemory {
+    /// A device that has just started, with a Premium 1.5's calibration.
+    #[must_use]
+    pub fn new(arm: HeldPhantom) -> Self {
+        // The two halves of the application hand tile buffers to each other by reference, for
+        // as long as the program runs.
+        let tiles = Box::leak(Box::new(TileBuffers::VACANT));
+        let memory = Box::leak(Box::new(WorkingMemory::new()));
+        let stored = Stored::Found(Calibration::PREMIUM_1_5);
+        let device = Device::new(tiles, memory, StoppedClock, stored, BootReport::default());
+        let unread = vec![];
+        Self {
+            device,
+            arm,
+            unread,
+        }
+    }
+}
+
+impl Stepped for InMemory {
+    fn exchange(&mut self, frames: &[u8]) -> Vec<u8> {
+        self.unread.extend(frames);
+        let (mut said, mut chunk) = (vec![], [0; 512]);
+        loop {
+            let taken = self.device.receive(&self.unread);
+            self.unread.drain(..taken);
+            let n = self.device.link.transmit(&mut chunk);
+            said.extend(&chunk[..n]);
+            if (taken, n) == (0, 0) {
+                return said;
+            }
+        }
+    }
+
+    fn tick(&mut self, _: SessionNumber, frames: &[u8]) -> Vec<u8> {
+        let drive = self.device.tick(self.arm.sense());
+        if self.device.link.drives_arm() {
+            let currents_a = drive.currents_a.to_array().map(f64::from);
+            self.arm.step(currents_a, 1e-3);
+        }
+        self.exchange(frames)
+    }
+}
+
+/// The emulated board and the arm at its plant line, in this one thread.
+///
+/// The board's clock stands from the end of a tick until the counts of the next are there. They
+/// are sent when the board has answered a message alive that was sent after the tick and its
+/// frames: it has read those, and its requests have come.
+pub struct OnBoard {
+    /// The link.
+    pub link: Tcp,
+    /// The plant line.
+    pub plant: Tcp,
+    /// The arm.
+    pub arm: HeldPhantom,
+    from_link: Box<FrameReader<MAX_FRAME>>,
+    from_plant: Box<FrameReader<MAX_FRAME>>,
+    ticks: u32,
+    /// Messages alive that the board has not answered.
+    unanswered: i32,
+}
+
+impl OnBoard {
+    /// A board that has just started.
+    #[must_use]
+    pub fn new(link: Tcp, plant: Tcp, arm: HeldPhantom) -> Self {
+        Self {
+            link,
+            plant,
+            arm,
+            from_link: Box::default(),
+            from_plant: Box::default(),
+            ticks: 0,
+            unanswered: 0,
+        }
+    }
+
+    /// What comes next over the link.
+    fn read(&mut self) -> Vec<u8> {
+        let mut chunk = [0; 4096];
+        let n = self
+            .link
+            .receive(&mut chunk, HANG)
+            .expect("the board is there");
+        assert!(n > 0, "the board said nothing for {HANG:?}");
+        chunk[..n].to_vec()
+    }
+
+    /// Counts the answers to messages alive that end in these bytes.
+    fn hear(&mut self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
-            let (taken, frame) = self.reader.push(bytes);
-            let content = frame.and_then(Result::ok);
-            let message = content.and_then(|content| decode::<InSession<ToHost>>(content).ok());
-            match message.map(|said| said.message) {
-                Some(ToHost::Telemetry(telemetry)) => {
-                    let told = telemetry.first as usize + telemetry.samples.len();
-                    self.samples = self.samples.max(told as u64);
-                }
-                // No sample follows: what is still to be said is not held back.
-                Some(ToHost::Goodbye(_)) => self.bytes_a_ms = u64::MAX,
-                _ => {}
-            }
+            let (taken, frame) = self.from_link.push(bytes);
             bytes = &bytes[taken..];
+            let frame = frame.map(|frame| frame.and_then(decode::<InSession<ToHost>>));
+            if let Some(Ok(said)) = frame {
+                self.unanswered -= i32::from(matches!(said.message, ToHost::Alive { .. }));
+            }
         }
     }
 
-    /// Bytes that may go now.
-    fn due(&self) -> usize {
-        match self.samples {
-            0 => self.waiting.len(),
-            samples => {
-                let all = samples.saturating_mul(self.bytes_a_ms);
-                (all.saturating_sub(self.carried) as usize).min(self.waiting.len())
+    /// Sends a frame; the host has messages alive of its own among them.
+    fn send(&mut self, frame: &[u8]) {
+        let mut reader = FrameReader::<MAX_FRAME>::new();
+        let (_, content) = reader.push(frame);
+        let message = content.and_then(Result::ok).and_then(said_by_host);
+        self.unanswered += i32::from(message.is_some_and(|said| said.message == ToDevice::Alive));
+        self.link.send(frame).expect("the board is there");
+    }
+
+    /// Waits until the board has done with all that it was sent. Returns what it said.
+    fn settle(&mut self, session: SessionNumber) -> Vec<u8> {
+        self.send(&from_host(session, &ToDevice::Alive));
+        let mut said = vec![];
+        while self.unanswered > 0 {
+            let more = self.read();
+            self.hear(&more);
+            said.extend(more);
+        }
+        said
+    }
+
+    fn currents(&mut self) -> Currents {
+        let mut chunk = [0; 64];
+        loop {
+            let n = self.plant.receive(&mut chunk, HANG);
+            let n = n.expect("the board is there");
+            assert!(n > 0, "no currents for {HANG:?}");
+            // Nothing follows a tick's currents before the next counts are sent.
+            if let (_, Some(frame)) = self.from_plant.push(&chunk[..n]) {
+                return frame.and_then(decode).expect("currents");
             }
         }
     }
 }
 
-impl<T: Transport> SlowLine<T> {
-    fn carry(&mut self) -> io::Result<()> {
-        let due = self.due();
-        if due == 0 {
-            // What was not used is not kept for later.
-            let all = self.samples.saturating_mul(self.bytes_a_ms);
-            if self.waiting.is_empty() {
-                self.carried = self.carried.max(all);
-            }
-            return Ok(());
-        }
-        let bytes: Vec<u8> = self.waiting.drain(..due).collect();
-        if self.samples > 0 {
-            self.carried += bytes.len() as u64;
-        }
-        self.inner.send(&bytes)
-    }
-}
-
-impl<T: Transport> Transport for SlowLine<T> {
-    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.waiting.extend(bytes);
-        self.carry()
+impl Stepped for OnBoard {
+    fn exchange(&mut self, frames: &[u8]) -> Vec<u8> {
+        self.link.send(frames).expect("the board is there");
+        let said = self.read();
+        self.hear(&said);
+        said
     }
 
-    fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
-        self.carry()?;
-        let count = self.inner.receive(into, wait)?;
-        self.listen(&into[..count]);
-        Ok(count)
+    fn tick(&mut self, session: SessionNumber, frames: &[u8]) -> Vec<u8> {
+        let (tick, sense) = (self.ticks, self.arm.sense());
+        let mut frame = [0; 64];
+        let sensed = encode(&Sensed { tick, sense }, &mut frame).expect("it fits");
+        self.plant.send(sensed).expect("the board is there");
+        let currents = self.currents();
+        assert_eq!(currents.tick, tick);
+        let tick_s = f64::from(currents.tick_ns) / 1e9;
+        self.arm.step(currents.currents_a.map(f64::from), tick_s);
+        self.ticks += 1;
+        let mut said = self.settle(session);
+        // One by one: what a frame leads to does not depend on when the next one comes.
+        for frame in frames.split_inclusive(|byte| *byte == 0) {
+            self.send(frame);
+            said.extend(self.settle(session));
+        }
+        // Answers overtake samples that wait, which are on the line before the next answer.
+        said.extend(self.settle(session));
+        said
     }
 }

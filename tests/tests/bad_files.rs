@@ -3,16 +3,13 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::time::{Duration, Instant};
 
 use hapterra::raster::{BadRaster, OpenOptions, Raster};
+use hapterra_tests::timeouts::end_of;
 use hapterra_tests::{hapterra_binary, shared};
 
 /// Address space a child may use. The program itself takes some 100 MB of it.
 const MEMORY_KIB: u64 = 1 << 20;
-
-/// Far longer than any machine needs for these small files: only a hang reaches it.
-const HANG: Duration = Duration::from_secs(120);
 
 fn files_in(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).expect("a folder");
@@ -24,8 +21,8 @@ fn files_in(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Runs `hapterra info FILE` in limited memory; `None` is a hang.
-fn info(path: &Path) -> Option<Output> {
+/// Runs `hapterra info FILE` in limited memory.
+fn info(path: &Path) -> Output {
     let mut command = if cfg!(unix) {
         let mut shell = Command::new("sh");
         shell
@@ -38,27 +35,19 @@ fn info(path: &Path) -> Option<Output> {
         binary.arg("info");
         binary
     };
-    let mut child = command
+    let child = command
         .arg(path)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .expect("the binary starts");
-    let started = Instant::now();
-    while child.try_wait().expect("a child to wait for").is_none() {
-        if started.elapsed() > HANG {
-            child.kill().expect("the child can be ended");
-            return None;
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    Some(child.wait_with_output().expect("its output"))
+    end_of(child)
 }
 
 /// An exit of 0 with a report, or of 1 with what is wrong and what to do.
 fn assert_ends_well(path: &Path) -> bool {
-    let output = info(path).unwrap_or_else(|| panic!("{} hangs", path.display()));
+    let output = info(path);
     let told = String::from_utf8_lossy(&output.stderr);
     let context = format!("{}: {:?}\n{told}", path.display(), output.status);
     assert!(!told.contains("panicked"), "{context}");

@@ -4,7 +4,6 @@
 
 use std::cell::RefCell;
 use std::path::Path;
-use std::time::Duration;
 
 use hapterra::bringup::{
     Attendant, BenchMistakes, BringupError, Finding, Identity, Log, Question, Reading, Step,
@@ -16,6 +15,7 @@ use hapterra_core::guard::{Blockers, JOG_FAST_RAD_S, Jog};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_firmware::native::StoppedClock;
+use hapterra_tests::timeouts::HANG;
 
 const RECORD: Calibration = Calibration::PREMIUM_1_5;
 /// What the guard may be late or wrong by: two counts in a millisecond, and what a
@@ -65,7 +65,7 @@ fn walked_once(
     device: Native<StoppedClock>,
     log: &mut Log,
 ) -> Result<Walked, BringupError> {
-    let opened = Dialogue::open(Box::new(device), Duration::from_secs(20));
+    let opened = Dialogue::open(Box::new(device), HANG);
     walk(&mut opened.expect("it answers"), user, log, &mut |_| Ok(()))
 }
 
@@ -89,7 +89,7 @@ fn found_from(from: Step, bench: VirtualBench, record: Calibration) -> (Step, Fi
     let mut user = VirtualUser::at(bench);
     user.says = say;
     let mut log = Log::default();
-    let opened = Dialogue::open(Box::new(user.device(record)), Duration::from_secs(20));
+    let opened = Dialogue::open(Box::new(user.device(record)), HANG);
     let opened = opened.expect("it answers");
     _ = log.meet(Identity::of(opened.device(), Some(&record)));
     for step in Step::ALL.into_iter().filter(|step| *step < from) {
@@ -498,7 +498,7 @@ fn a_motor_that_does_not_push_is_named() {
 #[test]
 fn a_jog_beyond_its_bounds_is_refused() {
     let user = VirtualUser::new(Wiring::RIGHT);
-    let opened = Dialogue::open(Box::new(user.device(RECORD)), Duration::from_secs(20));
+    let opened = Dialogue::open(Box::new(user.device(RECORD)), HANG);
     let mut dialogue = opened.expect("it answers");
     let mut ask = |request| dialogue.request(&request).expect("it answers");
     let jog = |axis, current_a, hold_ms| {

@@ -1,12 +1,11 @@
 //! The calibration walk against a virtual Phantom whose true numbers differ
 //! from the preset, over the real link.
 
-use std::time::Duration;
-
 use hapterra::calibrate::{Attendant, Plan, Review, VirtualUser, walk};
 use hapterra::link::{Dialogue, HostClock, LinkError, Native};
 use hapterra::phantom::STANDARD_GRAVITY;
 use hapterra_core::phantom::Calibration;
+use hapterra_tests::timeouts::HANG;
 
 /// The joints' friction, Nm: how far off a torque read off a still arm may be.
 const FRICTION_NM: f64 = 0.01;
@@ -15,7 +14,7 @@ fn calibrated(user: &mut VirtualUser) -> Review {
     let device = Native::new(HostClock::default(), None)
         .meddled_with(user.hands())
         .restless();
-    let opened = Dialogue::open(Box::new(device), Duration::from_secs(20));
+    let opened = Dialogue::open(Box::new(device), HANG);
     let mut dialogue = opened.expect("it answers");
     let plan = Plan {
         ratios: true,

@@ -25,7 +25,7 @@ fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec
         scene,
         Some(Arming::VIRTUAL),
         device,
-        Patience::REAL_TIME,
+        Patience::EMULATED,
     )
     .expect("opened");
     let mut samples = Vec::new();

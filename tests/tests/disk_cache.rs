@@ -4,11 +4,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use hapterra::disk_cache::DiskCache;
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra_tests::hapterra_binary;
+use hapterra_tests::timeouts::set_age;
 
 /// A level whose samples lie in many blocks.
 const LEVEL: u8 = 6;
@@ -25,9 +26,7 @@ fn hills(path: &Path, seed: &str) {
 }
 
 fn age(path: &Path, seconds: u64) {
-    let time = SystemTime::now() - Duration::from_secs(seconds);
-    let file = fs::File::options().append(true).open(path).expect("opens");
-    file.set_modified(time).expect("aged");
+    set_age(path, Duration::from_secs(seconds));
 }
 
 fn open(path: &Path, disk_cache: &DiskCache) -> Raster {

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
 use hapterra_tests::hapterra_binary;
+use hapterra_tests::timeouts::wait_for;
 
 /// Points that fill the recording's buffer more than once.
 const POINTS: usize = 4_000;
@@ -56,14 +57,11 @@ fn killed(folder: &Path, terrain: &Path) -> PathBuf {
     let mut process = replay(folder, terrain).spawn().expect("started");
     // Its input stays open, so it cannot come to its end.
     say_points(&mut process);
-    let left = loop {
-        let is_written = |path: &PathBuf| path.metadata().is_ok_and(|meta| meta.len() > 0);
-        if let Some(path) = partial(folder).into_iter().find(is_written) {
-            break path;
-        }
+    let left = wait_for("a partial recording", || {
         assert_eq!(process.try_wait().expect("waited for"), None, "it ended");
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    };
+        let is_written = |path: &PathBuf| path.metadata().is_ok_and(|meta| meta.len() > 0);
+        partial(folder).into_iter().find(is_written)
+    });
     process.kill().expect("killed");
     process.wait().expect("waited for");
     left

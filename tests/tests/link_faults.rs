@@ -24,6 +24,7 @@ use hapterra_core::wire::session::InSession;
 use hapterra_core::wire::version::VersionCheck;
 use hapterra_firmware::native::StoppedClock;
 use hapterra_tests::faulty::{Fault, Faulty, Shared};
+use hapterra_tests::timeouts::HANG;
 use hapterra_tests::walk::wander;
 
 /// A device in memory answers at once: what has not come in a moment is lost.
@@ -31,8 +32,8 @@ const AT_ONCE: Patience = Patience {
     again: Duration::from_millis(2),
     alive: Duration::from_millis(2),
     greet_again: Duration::from_millis(10),
-    give_up: Duration::from_secs(60),
-    goodbye: Duration::from_secs(60),
+    give_up: HANG,
+    goodbye: HANG,
     ..Patience::REAL_TIME
 };
 

@@ -3,6 +3,7 @@
 //! arithmetic, which IEEE 754 defines to the last bit.
 
 use std::process::Command;
+use std::time::Duration;
 
 use hapterra::link::{Emulator, Patience};
 use hapterra::raster::Raster;
@@ -14,6 +15,7 @@ use hapterra_core::force::{ForceLaw, Pattern, Shading, Texture};
 use hapterra_core::scene::Sample;
 use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::hapterra_binary;
+use hapterra_tests::timeouts::pass;
 use hapterra_tests::walk::wander;
 
 /// What has to be the same: all but the work and the time it took, which
@@ -181,7 +183,7 @@ fn an_interrupted_demonstration_on_the_emulated_board_ends_in_an_orderly_manner(
     let mut lines = std::io::BufReader::new(demo.stdout.take().expect("piped")).lines();
     let device = lines.find(|line| line.as_ref().is_ok_and(|line| line.starts_with("device")));
     assert!(device.is_some(), "it never says which device");
-    std::thread::sleep(std::time::Duration::from_secs(1));
+    pass(Duration::from_secs(1));
     let group = format!("-{}", demo.id());
     let signal = Command::new("kill").args(["-INT", "--", &group]).status();
     assert!(signal.expect("kill runs").success());

@@ -4,19 +4,16 @@
 
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 use hapterra::link::Native;
 use hapterra_core::guard::Sense;
 use hapterra_core::wire::session::SessionEnd;
-use hapterra_tests::served::{Served, ended_within, signal, terrain, told};
+use hapterra_tests::served::{Served, signal, terrain, told};
+use hapterra_tests::timeouts::end_of;
 use hapterra_tests::{greedy, hapterra_binary};
-
-/// Longer than a session and its goodbye take.
-const AN_END: Duration = Duration::from_secs(60);
 
 /// Serves the terrain in a folder to these devices.
 fn command(folder: &Path, devices: &[&str], more: &[&str]) -> Command {
@@ -101,10 +98,6 @@ fn hear<R: std::io::Read>(from: R, beginnings: &[String]) -> R {
     lines.into_inner()
 }
 
-fn end(child: Child) -> Output {
-    ended_within(child, AN_END).expect("it ends")
-}
-
 /// The rows of a recording without what a tick cost, which is the machine's; and its settings.
 fn felt(path: &Path) -> (Vec<Vec<String>>, Vec<String>) {
     let text = std::fs::read_to_string(path).expect("a recording");
@@ -174,7 +167,7 @@ fn a_signal_ends_each_with_a_goodbye_that_its_board_confirms() {
         let pair = Pair::of(Served::start());
         let child = pair.start();
         signal(&child, name);
-        let output = end(child);
+        let output = end_of(child);
         let told = told(&output);
         assert!(output.status.success(), "{name}: {told}");
         for number in [1, 2] {
@@ -191,7 +184,7 @@ fn where_one_board_does_not_confirm_it_is_named_and_the_other_has_confirmed() {
     let child = pair.start();
     pair.served[1].deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
-    let output = end(child);
+    let output = end_of(child);
     let told = told(&output);
     assert_eq!(output.status.code(), Some(1), "{told}");
     let says = "did not confirm that it is disarmed: switch the amplifiers off";
@@ -211,18 +204,20 @@ fn where_one_board_does_not_confirm_it_is_named_and_the_other_has_confirmed() {
 #[test]
 fn the_second_signal_names_the_boards_that_have_not_confirmed() {
     let pair = Pair::of(Served::start());
-    let child = pair.start();
+    let mut child = pair.start();
     pair.served[1].deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
-    // It answers another host when this one has gone.
-    assert_eq!(pair.served[0].last_end(), SessionEnd::Goodbye);
-    std::thread::sleep(Duration::from_millis(200));
+    // The first has confirmed, and the second waits.
+    let kept = format!("{} recording ", pair.name(1));
+    child.stdout = Some(hear(child.stdout.take().expect("piped"), &[kept]));
+    pair.served[1].wait_for_unheard_bye();
     signal(&child, "INT");
-    let output = end(child);
+    let output = end_of(child);
     let told = told(&output);
     assert_eq!(output.status.code(), Some(130), "{told}");
     let line = told.lines().find(|line| line.contains("ended at once"));
     let line = line.expect(&told);
+    assert_eq!(pair.served[0].last_end(), SessionEnd::Goodbye);
     assert!(line.contains(&pair.name(2)), "{told}");
     assert!(!line.contains(&pair.name(1)), "{told}");
 }
@@ -254,7 +249,7 @@ fn a_device_that_is_lost_is_waited_for_and_the_other_goes_on() {
     assert!(line.starts_with(&name), "{line}");
     child.stderr = Some(lines.into_inner());
     signal(&child, "INT");
-    let output = end(child);
+    let output = end_of(child);
     let told = told(&output);
     assert_eq!(output.status.code(), Some(1), "{told}");
     assert!(told.contains("error: 1 of 2 devices failed"), "{told}");
@@ -287,7 +282,7 @@ fn a_device_that_is_not_there_fails_alone_and_is_told_at_once() {
     let serves = format!("[2 {there}] device ");
     child.stdout = Some(hear(child.stdout.take().expect("piped"), &[serves]));
     signal(&child, "INT");
-    let output = end(child);
+    let output = end_of(child);
     let told = told(&output);
     assert_eq!(output.status.code(), Some(1), "{told}");
     assert!(
@@ -314,7 +309,7 @@ fn a_fault_of_one_arm_is_told_of_it_and_the_other_knows_nothing_of_it() {
     let fault = format!("{} FAULT ", pair.name(2));
     child.stderr = Some(hear(child.stderr.take().expect("piped"), &[fault]));
     signal(&child, "INT");
-    let output = end(child);
+    let output = end_of(child);
     let told = told(&output);
     assert!(output.status.success(), "{told}");
     assert!(!told.contains(&format!("{} FAULT", pair.name(1))), "{told}");
@@ -349,7 +344,7 @@ fn a_hostile_device_costs_the_other_nothing() {
     let goes = format!("[2 {there}] ");
     child.stderr = Some(hear(child.stderr.take().expect("piped"), &[goes]));
     signal(&child, "INT");
-    let output = end(child);
+    let output = end_of(child);
     let told = told(&output);
     assert_eq!(output.status.code(), Some(1), "{told}");
     assert!(told.contains(&format!("[1 {greedy}] error: ")), "{told}");

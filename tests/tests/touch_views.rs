@@ -95,7 +95,7 @@ fn pressed_at<T>(
     let foot = Rc::clone(&pedal);
     let device: Native = Native::new(StoppedClock, Some(Box::new(arm.arming())))
         .meddled_with(Box::new(move |_, sense, _| sense.clutch = foot.get()));
-    let (arming, patience) = (Some(Arming::VIRTUAL), Patience::REAL_TIME);
+    let (arming, patience) = (Some(Arming::VIRTUAL), Patience::EMULATED);
     let opened = Session::open(&terrain, scene, arming, Box::new(device), patience);
     let bounds = Bounds {
         first: Laid { view, law },

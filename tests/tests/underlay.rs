@@ -1,10 +1,11 @@
-//! A hand that is faster than the link: 2,000 cells a second over a line of 200 kB/s. It feels the
-//! underlay where its tiles are late, and no hole.
+//! A hand that is faster than the link: 2,000 cells a second over a line of 200 bytes a tick. It
+//! feels the underlay where its tiles are late, and no hole.
 
+use std::path::Path;
 use std::time::Duration;
 
 use hapterra::link::{
-    Arming, Emulator, Event, Native, Patience, Session, Tally, Transport, move_arm_while,
+    Arming, Client, Emulator, Event, Patience, State, Tally, Transport, move_arm_while,
 };
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
 use hapterra::place::Reach;
@@ -17,16 +18,20 @@ use hapterra_core::guard::Limits;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_core::terrain::CoarseTile;
-use hapterra_firmware::native::StoppedClock;
 use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::shared;
-use hapterra_tests::slow_line::SlowLine;
+use hapterra_tests::slow_line::{InMemory, OnBoard, SlowLine, Stepped};
+use hapterra_tests::timeouts::HANG;
 
 /// Millimetres of the hand a cell: 2,000 cells a second are 200 mm/s.
 const CELL_MM: f64 = 0.1;
 const SPEED_MM_S: f64 = 200.0;
-/// What the line carries: 200 kB/s.
-const BYTES_A_MS: u64 = 200;
+/// What the line carries in a tick, which is a millisecond: 200 kB/s.
+const BYTES_A_TICK: usize = 200;
+/// The same over real ground, whose tiles take fewer bytes: 100 kB/s.
+const REAL_BYTES_A_TICK: usize = 100;
+/// Of the number of the session.
+const SEED: u64 = 36;
 /// From the middle of the slide to either end, mm.
 const AWAY_MM: f64 = 60.0;
 /// The guard changes the force by at most so much in a tick of a millisecond, N.
@@ -87,27 +92,42 @@ impl<'t> Slide<'t> {
         }
     }
 
-    fn felt(&self, scene: Scene, line: impl Transport, patience: Patience) -> (Vec<Sample>, Tally) {
-        let line = Box::new(SlowLine::new(line, BYTES_A_MS));
-        let arming = Some(Arming::VIRTUAL);
-        let (mut session, _) =
-            Session::open(self.terrain, scene, arming, line, patience).expect("opened");
-        let mut samples = Vec::new();
-        while samples
-            .last()
-            .is_none_or(|last: &Sample| last.tick < self.ticks)
-        {
+    /// The samples of a slide over a line of this rate, and the client, which has not left.
+    fn felt(
+        &self,
+        scene: Scene,
+        rate: usize,
+        device: &mut dyn Stepped,
+    ) -> (Vec<Sample>, Client<'t>) {
+        let (arming, patience) = (Some(Arming::VIRTUAL), Patience::REAL_TIME);
+        let mut client = Client::numbered(self.terrain, scene, arming, patience, SEED);
+        let (mut out, mut is_open) = (vec![], false);
+        client.greet(ms(0), &mut out);
+        // Without a scene the device's time stands still, and a line carries all.
+        while !is_open {
+            let said = device.exchange(&std::mem::take(&mut out));
+            let mut open = |event: Event<'_>| is_open |= matches!(event, Event::Opened { .. });
+            client
+                .receive(ms(0), &said, &mut out, &mut open)
+                .expect("it answers");
+        }
+        let (mut line, mut samples) = (SlowLine::new(rate), vec![]);
+        for tick in 1..=self.ticks {
             let mut take = |event: Event<'_>| {
                 if let Event::Sample(sample) = event {
                     samples.push(*sample);
                 }
             };
-            session
-                .poll(Duration::from_millis(20), &mut take)
-                .expect("goes on");
+            client
+                .due(ms(tick), &mut out, &mut take)
+                .expect("it is there");
+            line.send(&std::mem::take(&mut out));
+            let said = device.tick(client.session(), &line.carry());
+            client
+                .receive(ms(tick), &said, &mut out, &mut take)
+                .expect("it is there");
         }
-        session.say_goodbye(&mut |_| {}).expect("disarmed");
-        (samples, session.tally().clone())
+        (samples, client)
     }
 
     /// The underlay's own error over all that the hand slides over, mm: at the samples, where the
@@ -202,8 +222,7 @@ fn judged(terrain: &Terrain<'_>, samples: &[Sample]) -> Ground {
     ground
 }
 
-fn holds(name: &str, slide: &Slide<'_>, scene: &Scene, felt: &(Vec<Sample>, Tally)) {
-    let (samples, tally) = felt;
+fn holds(name: &str, slide: &Slide<'_>, scene: &Scene, (samples, tally): &(Vec<Sample>, Tally)) {
     assert_eq!(tally.lost + tally.dropped, 0, "{name}");
     let ground = judged(slide.terrain, samples);
     let stated = slide.stated_error_mm(scene);
@@ -232,10 +251,39 @@ fn holds(name: &str, slide: &Slide<'_>, scene: &Scene, felt: &(Vec<Sample>, Tall
     );
 }
 
-fn native(slide: &Slide<'_>, scene: Scene) -> (Vec<Sample>, Tally) {
-    let arm = Some(Box::new(slide.rig.clone()));
-    let device: Native = Native::new(StoppedClock, arm).in_steps_of(1);
-    slide.felt(scene, device, Patience::REAL_TIME)
+fn in_memory(slide: &Slide<'_>, scene: Scene) -> (Vec<Sample>, Tally) {
+    let mut device = InMemory::new(slide.rig.clone());
+    let (samples, client) = slide.felt(scene, BYTES_A_TICK, &mut device);
+    (samples, client.tally().clone())
+}
+
+/// As [`in_memory`], on the emulated board, which then says goodbye.
+fn on_board(slide: &Slide<'_>, scene: Scene, qemu: &Path, image: &Path) -> (Vec<Sample>, Tally) {
+    let (emulator, lines) = Emulator::start(qemu, image).expect("starts");
+    let mut board = OnBoard::new(lines.link, lines.plant, slide.rig.clone());
+    let (samples, mut client) = slide.felt(scene, REAL_BYTES_A_TICK, &mut board);
+    let felt = (samples, client.tally().clone());
+    let mut out = vec![];
+    client.leave(ms(slide.ticks), &mut out);
+    move_arm_while(&mut board.plant, &mut board.arm, || {
+        while client.state() != State::Closed {
+            board
+                .link
+                .send(&std::mem::take(&mut out))
+                .expect("it is there");
+            let mut chunk = [0; 4096];
+            let n = board.link.receive(&mut chunk, HANG).expect("it is there");
+            let received = client.receive(ms(slide.ticks), &chunk[..n], &mut out, &mut |_| {});
+            received.expect("it confirms");
+        }
+        board.link.send(&out).expect("it is there");
+        emulator.finish().expect("ends");
+    });
+    felt
+}
+
+fn ms(tick: u32) -> Duration {
+    Duration::from_millis(tick.into())
 }
 
 fn made() -> Raster {
@@ -251,7 +299,7 @@ fn at_2000_cells_a_second_over_200_kb_a_second_there_is_no_hole() {
     let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
     let slide = Slide::over(&terrain);
     let without = slide.scene(false);
-    let ground = judged(&terrain, &native(&slide, without).0);
+    let ground = judged(&terrain, &in_memory(&slide, without).0);
     assert!(
         ground.lacked > 100,
         "without an underlay there are holes: {ground:?}"
@@ -261,7 +309,7 @@ fn at_2000_cells_a_second_over_200_kb_a_second_there_is_no_hole() {
         "made, in this program",
         &slide,
         &scene,
-        &native(&slide, scene),
+        &in_memory(&slide, scene),
     );
 }
 
@@ -271,21 +319,18 @@ fn on_the_emulated_board_over_real_ground_there_is_none_either() {
         return;
     };
     let file = shared("dem/large/globe_g10g_10800x6000_i16_cog.tif");
-    let raster = match file {
-        Some(path) => Raster::open(path, &OpenOptions::default()).expect("opens"),
-        None => made(),
-    };
     // Mountains of thousands of metres in millimetres.
-    let scale = Scale::new(CELL_MM, 0.0005).expect("scale");
+    let (raster, height_mm) = match file {
+        Some(path) => (
+            Raster::open(path, &OpenOptions::default()).expect("opens"),
+            0.0005,
+        ),
+        None => (made(), 0.1),
+    };
+    let scale = Scale::new(CELL_MM, height_mm).expect("scale");
     let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
     let slide = Slide::over(&terrain);
     let scene = slide.scene(true);
-    let (emulator, mut lines) = Emulator::start(&qemu, &image).expect("starts");
-    let mut arm = slide.rig.clone();
-    let felt = move_arm_while(&mut lines.plant, &mut arm, || {
-        let felt = slide.felt(scene, lines.link, Patience::EMULATED);
-        emulator.finish().expect("ends");
-        felt
-    });
+    let felt = on_board(&slide, scene, &qemu, &image);
     holds("real, on the emulated board", &slide, &scene, &felt);
 }

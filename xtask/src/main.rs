@@ -36,8 +36,11 @@ cargo xtask COMMAND
   view [--test|--pictures]
                          build the viewer; --test: run its tests, in a browser where there is
                          one; --pictures: take those in docs/
-  test [--quick]         all tests, with images, budgets and dependencies;
-                         --quick: the emulated board only, no dependencies
+  test [--quick] [-- ARGS]
+                         all tests, with images, budgets and dependencies; what failed is
+                         listed at the end; --quick: the emulated board only, no
+                         dependencies; ARGS go to `cargo test` and select programs, as
+                         `--test usb`
   lint                   formatting, clippy and documentation, warnings as errors
   setup                  only find or install what the commands need
   size [BOARD]           build the images and hold them to their flash and RAM budgets
@@ -92,7 +95,7 @@ fn command() -> Result<ExitCode> {
                 .and_then(|r| demo::demo(&r))
                 .map(exit_code);
         }
-        "test" => test::test(flag(&mut words, "quick")?)?,
+        "test" => test::test(&test_words(&mut words)?)?,
         "soak" => soak::soak(words.raw_args()?.collect())?,
         "counts" => counts::counts(flag(&mut words, "write")?)?,
         "size" => test::check_sizes(&test::images(boards(&mut words)?)?)?,
@@ -167,6 +170,26 @@ fn flag(words: &mut lexopt::Parser, name: &str) -> Result<bool> {
     Ok(given)
 }
 
+/// `[--quick] [-- ARGS]`: what follows `--` is not looked at here.
+fn test_words(words: &mut lexopt::Parser) -> Result<test::Request> {
+    let mut request = test::Request::default();
+    loop {
+        let rest = words.raw_args()?;
+        if rest.peek().is_some_and(|word| word == "--") {
+            request.only = rest.skip(1).collect();
+            return Ok(request);
+        }
+        match words.next()? {
+            Some(Long("quick")) => request.quick = true,
+            Some(other) => {
+                let what = other.unexpected();
+                bail!("{what}; arguments of `cargo test` come after `--`");
+            }
+            None => return Ok(request),
+        }
+    }
+}
+
 /// `[--view] [FILE] [-- ARGS]`: what follows `--` is not looked at here.
 fn demo_words(words: &mut lexopt::Parser) -> Result<demo::Request> {
     let mut request = demo::Request::default();
@@ -214,6 +237,17 @@ mod tests {
         let viewed = demo(&["--view", "a.tif"]).unwrap();
         assert_eq!((viewed.view, viewed.file), (true, Some("a.tif".into())));
         assert_eq!(demo(&[]).unwrap(), demo::Request::default());
+    }
+
+    #[test]
+    fn test_arguments_follow_two_dashes() {
+        let request = |words: &[&str]| test_words(&mut lexopt::Parser::from_args(words));
+        let some = request(&["--quick", "--", "--test", "usb"]).unwrap();
+        assert!(some.quick);
+        assert_eq!(some.only, ["--test", "usb"]);
+        assert_eq!(request(&[]).unwrap(), test::Request::default());
+        let message = request(&["--test"]).unwrap_err().to_string();
+        assert!(message.contains("after `--`"), "{message}");
     }
 
     #[test]

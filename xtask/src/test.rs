@@ -1,11 +1,14 @@
 //! `cargo xtask test`: everything that must hold, from set-up to verdict.
 
+use std::ffi::OsString;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
 
 use crate::board::{BOARDS, Board};
-use crate::run::{cargo, run, timed};
+use crate::run::{cargo, say, shown, timed};
 use crate::setup::{emulator, qemu, toolchain};
 use crate::{counts, deny, image, panics, size};
 
@@ -23,36 +26,105 @@ const QUICK: [&str; 4] = [
 /// it, too.
 const WITH_PROBES: [&str; 2] = ["--features", "hapterra/probe"];
 
-/// Builds the images, holds them to their budgets, runs every test of the
-/// workspace on the host with QEMU beside it, and checks the dependencies.
-/// `quick` leaves out the boards that are not emulated and the dependencies.
-pub(crate) fn test(quick: bool) -> Result<()> {
+/// What is to be tested.
+#[derive(Debug, Default, PartialEq)]
+pub(crate) struct Request {
+    /// Neither the boards that are not emulated nor the dependencies.
+    pub(crate) quick: bool,
+    /// Arguments of `cargo test`, which select programs and tests; all where there are none.
+    pub(crate) only: Vec<OsString>,
+}
+
+/// Builds the images, holds them to their budgets, runs every test of the workspace on the host
+/// with QEMU beside it, and checks the dependencies. Runs each step and each program to its end.
+/// With [`Request::only`] runs these programs alone.
+///
+/// # Errors
+/// All that failed, with the commands that repeat it.
+pub(crate) fn test(request: &Request) -> Result<()> {
     let qemu = qemu::ready()?;
-    if !quick {
+    if !request.quick {
         emulator::ready()?;
     }
-    let images = images(if quick { &BOARDS[..1] } else { &BOARDS })?;
-    check_sizes(&images)?;
-    check_panics(&images)?;
+    let boards: &[Board] = if request.quick { &BOARDS[..1] } else { &BOARDS };
+    let images = images(boards)?;
     let counts = counts::image()?;
-    if !quick {
-        timed(
-            "checking licences, bans and sources of dependencies",
-            deny::check,
-        )?;
-    }
-    timed("running the workspace's tests", || {
-        let mut command = cargo();
-        command
-            .args(["test", "--workspace"])
-            .args(if quick { &QUICK[..] } else { &WITH_PROBES })
-            .env("HAPTERRA_QEMU", qemu)
-            .env(image::COUNTS_VARIABLE, &counts);
-        for (board, path) in &images {
-            command.env(board.elf_variable, path);
+    let mut failures = vec![];
+    let mut step = |repeat: &str, result: Result<()>| {
+        if let Err(why) = result {
+            say(format!("error: {why:#}"));
+            failures.push(repeat.to_owned());
         }
-        run(&mut command)
-    })
+    };
+    if request.only.is_empty() {
+        step("cargo xtask size", check_sizes(&images));
+        step("cargo xtask panics", check_panics(&images));
+        if !request.quick {
+            let name = "checking licences, bans and sources of dependencies";
+            step("cargo xtask deny", timed(name, deny::check));
+        }
+    }
+    let mut command = cargo();
+    command
+        .args(["test", "--workspace", "--no-fail-fast"])
+        .args(if request.quick {
+            &QUICK[..]
+        } else {
+            &WITH_PROBES
+        })
+        .args(&request.only)
+        .env("HAPTERRA_QEMU", qemu)
+        .env(image::COUNTS_VARIABLE, &counts);
+    for (board, path) in &images {
+        command.env(board.elf_variable, path);
+    }
+    let failed = timed("running the workspace's tests", || {
+        failed_targets(&mut command)
+    })?;
+    failures.extend(failed.iter().map(|target| repeat(target, request.quick)));
+    if failures.is_empty() {
+        return Ok(());
+    }
+    bail!(
+        "{} failed; to repeat:\n  {}",
+        failures.len(),
+        failures.join("\n  ")
+    )
+}
+
+/// Runs `cargo test`. Returns the targets that failed, as cargo selects them: `-p PACKAGE --lib`.
+fn failed_targets(command: &mut Command) -> Result<Vec<String>> {
+    let line = shown(command);
+    let mut child = command
+        .stderr(Stdio::piped())
+        .spawn()
+        .with_context(|| format!("cannot start `{line}`"))?;
+    let mut failed = vec![];
+    for said in BufReader::new(child.stderr.take().context("piped")?).lines() {
+        let said = said?;
+        eprintln!("{said}");
+        failed.extend(listed_target(&said).map(str::to_owned));
+    }
+    let status = child.wait()?;
+    if !status.success() && failed.is_empty() {
+        bail!("`{line}` failed ({status})");
+    }
+    Ok(failed)
+}
+
+/// The target in a line of the list with which `cargo test --no-fail-fast` ends.
+fn listed_target(line: &str) -> Option<&str> {
+    line.strip_prefix("    `")?.strip_suffix('`')
+}
+
+/// The command that runs a target's programs again. Packages are not named: what cargo builds
+/// depends on which are selected, and all have to be to build the same programs.
+fn repeat(target: &str, quick: bool) -> String {
+    let of_package = target.strip_prefix("-p ");
+    let kind = of_package.and_then(|target| target.split_once(' '));
+    let (package, kind) = kind.unwrap_or((target, ""));
+    let quick = if quick { " --quick" } else { "" };
+    format!("cargo xtask test{quick} -- {kind}    # {package}")
 }
 
 /// Builds the images of `boards`.
@@ -81,4 +153,27 @@ pub(crate) fn check_panics(images: &[Image]) -> Result<()> {
 
 fn by_path((board, path): &Image) -> (&Board, &Path) {
     (board, path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failed_target_is_repeated_by_its_kind() {
+        let said = [
+            "     Running tests/underlay.rs (target/debug/deps/underlay-1)",
+            "error: test failed, to rerun pass `-p hapterra-tests --test underlay`",
+            "error: 2 targets failed:",
+            "    `-p hapterra-tests --test underlay`",
+            "    `-p hapterra-core --doc`",
+        ];
+        let failed = said.iter().filter_map(|line| listed_target(line));
+        let commands: Vec<_> = failed.map(|target| repeat(target, false)).collect();
+        let expected = [
+            "cargo xtask test -- --test underlay    # hapterra-tests",
+            "cargo xtask test -- --doc    # hapterra-core",
+        ];
+        assert_eq!(commands, expected);
+    }
 }

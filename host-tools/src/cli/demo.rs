@@ -194,7 +194,7 @@ fn show(
             if args.viewing.view {
                 device = device.in_real_time();
             }
-            tour.go(Box::new(device), Patience::REAL_TIME)?
+            tour.go(Box::new(device), Patience::EMULATED)?
         }
         RunsOn::Emulated => tour_emulated(args, tour, arm)?,
     };

@@ -1,9 +1,10 @@
 //! A folder of records: whole or absent, within its bound, and never in the way.
 
 use std::path::PathBuf;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use super::*;
+use crate::timeouts::{set_age, set_just_changed};
 
 fn name(number: usize) -> Name {
     Name::of(&["test", &number.to_string()])
@@ -93,10 +94,9 @@ fn the_records_used_longest_ago_go_first_and_nothing_else() {
     fs::write(&beside, [1; 100]).expect("written");
     for number in 0..300 {
         cache.put(&name(number), &bytes(number));
-        let aged = fs::File::options().append(true).open(path(&folder, number));
         // Each is some hours older than the next.
-        let time = SystemTime::now() - Duration::from_secs(3600 * (1000 - number as u64));
-        aged.and_then(|file| file.set_modified(time)).expect("aged");
+        let age = Duration::from_secs(3600 * (1000 - number as u64));
+        set_age(&path(&folder, number), age);
         // This one is used again and again.
         assert_eq!(cache.get(&name(0)), Some(bytes(0)), "{number}");
         assert!(used(folder.path()) <= MOST + 200, "{}", used(folder.path()));
@@ -170,9 +170,7 @@ fn what_a_killed_program_has_left_goes() {
     fs::create_dir_all(&inner).expect("made");
     let left = inner.join(".new-killed");
     fs::write(&left, [0; 50]).expect("written");
-    let time = SystemTime::now() - Duration::from_secs(7200);
-    let aged = fs::File::options().append(true).open(&left);
-    aged.and_then(|file| file.set_modified(time)).expect("aged");
+    set_age(&left, Duration::from_secs(7200));
     cache.put(&name(1), &bytes(1));
     assert!(!left.exists());
 }
@@ -182,14 +180,10 @@ fn a_stamp_tells_a_file_from_others_and_from_itself_after_a_change() {
     let folder = tempfile::tempdir().expect("a folder");
     let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
     fs::write(&a, [1; 9]).expect("written");
+    set_just_changed(&a);
     let first = FileStamp::at(&a).expect("there");
     assert_eq!(first.settled(), None, "it was written a moment ago");
-    let age = |path: &Path| {
-        let time = SystemTime::now() - Duration::from_secs(100);
-        let file = fs::File::options().append(true).open(path);
-        file.and_then(|file| file.set_modified(time)).expect("aged");
-    };
-    age(&a);
+    set_age(&a, Duration::from_secs(100));
     let aged = FileStamp::at(&a).expect("there");
     assert!(aged.settled().is_some() && aged != first);
     assert_eq!(FileStamp::at(&a).as_ref(), Some(&aged));

@@ -366,6 +366,7 @@ mod tests {
     use crate::link::{Meddler, Native};
     use crate::raster::Raster;
     use crate::terrain::{Scale, Terrain};
+    use crate::timeouts;
     use hapterra_core::contact::Rule;
     use hapterra_core::force::ForceLaw;
     use hapterra_core::grid::GridPoint;
@@ -374,10 +375,11 @@ mod tests {
     use hapterra_core::wire::session::SessionEnd;
     use hapterra_core::wire::version::VersionCheck;
     use hapterra_firmware::native::StoppedClock;
+    use std::cell::Cell;
     use std::io;
-    use std::time::Instant;
+    use std::rc::Rc;
 
-    const PATIENCE: Duration = Duration::from_secs(20);
+    const PATIENCE: Duration = timeouts::HANG;
 
     #[test]
     fn a_device_says_who_and_how_it_is() {
@@ -511,8 +513,8 @@ mod tests {
         }
     }
 
-    /// A device that hears nothing any more after so many sends.
-    struct Deaf(Native<StoppedClock>, usize);
+    /// A device that hears nothing any more after so many sends, and the time.
+    struct Deaf(Native<StoppedClock>, usize, Rc<Cell<Duration>>);
 
     impl Transport for Deaf {
         fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
@@ -524,31 +526,36 @@ mod tests {
         }
 
         fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
-            std::thread::sleep(wait / 10);
+            self.2.set(self.2.get() + wait / 10);
             self.0.receive(into, wait)
+        }
+
+        fn now(&self) -> Duration {
+            self.2.get()
         }
     }
 
     #[test]
     fn an_end_that_is_not_heard_is_told_within_its_time() {
         let patience = Duration::from_millis(300);
+        let time = Rc::new(Cell::new(Duration::ZERO));
         let open = || {
-            let deaf = Deaf(Native::for_replay().restless(), 3);
+            let deaf = Deaf(Native::for_replay().restless(), 3, Rc::clone(&time));
             Dialogue::open(Box::new(deaf), patience).expect("it answers")
         };
-        let within = |began: Instant| {
-            let took = began.elapsed();
+        let within = |began: Duration| {
+            let took = time.get() - began;
             assert!(took >= patience && took < 10 * patience, "{took:?}");
         };
         let mut dialogue = open();
         assert!(dialogue.request(&Request::Arm).is_ok(), "the second send");
-        let began = Instant::now();
+        let began = time.get();
         let end = dialogue.end();
         assert!(matches!(end, Err(LinkError::NotConfirmed)), "{end:?}");
         within(began);
         let mut dialogue = open();
         assert!(dialogue.status().is_ok());
-        let began = Instant::now();
+        let began = time.get();
         drop(dialogue);
         within(began);
     }

@@ -21,8 +21,8 @@ pub const QEMU_VARIABLE: &str = "HAPTERRA_QEMU";
 pub const QEMU: &str = "qemu-system-arm";
 /// How long QEMU may take to connect its lines.
 const START: Duration = Duration::from_secs(60);
-/// How long the board may take to end after a goodbye.
-const END: Duration = Duration::from_secs(10);
+/// How long the board may take to end after a goodbye, on a machine that others use, too.
+const END: Duration = Duration::from_secs(60);
 
 /// Bytes of a report that are read, at most.
 const SAID: u64 = 16 << 10;

@@ -1,7 +1,7 @@
-//! A transport, the clock that a conversation over it is told, and bytes on their way.
+//! A transport, the time that a conversation over it is told, and bytes on their way.
 
 use std::io;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::error::LinkError;
 use super::transport::{NoLine, Transport};
@@ -16,7 +16,6 @@ const TAKES: Duration = Duration::from_secs(5);
 pub(super) struct Line<'t> {
     transport: Box<dyn Transport + 't>,
     is_open: bool,
-    began: Instant,
     incoming: Box<[u8; 4096]>,
     /// What is to be said with the next [`Line::flush`].
     pub(super) out: Vec<u8>,
@@ -27,7 +26,6 @@ impl<'t> Line<'t> {
         Self {
             transport,
             is_open: true,
-            began: Instant::now(),
             incoming: Box::new([0; 4096]),
             out: vec![],
         }
@@ -40,15 +38,15 @@ impl<'t> Line<'t> {
         self.out.clear();
     }
 
-    /// The time since the line was made.
+    /// The time since a fixed moment ([`Transport::now`]).
     pub(super) fn now(&self) -> Duration {
-        self.began.elapsed()
+        self.transport.now()
     }
 
     /// Closes the line. Some devices can be opened once only: another line to them comes
     /// after this one is closed.
     pub(super) fn hang_up(&mut self) {
-        self.replace(Box::new(NoLine));
+        self.replace(Box::new(NoLine(self.now())));
         self.is_open = false;
     }
 
@@ -66,13 +64,13 @@ impl<'t> Line<'t> {
     /// taken it by `until`, is gone; where no more is wanted, the rest is not said.
     pub(super) fn flush_while(
         &mut self,
-        until: Option<Instant>,
+        until: Option<Duration>,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<(), LinkError> {
-        let until = until.unwrap_or_else(|| Instant::now() + TAKES);
+        let until = until.unwrap_or_else(|| self.now() + TAKES);
         let mut sent = 0;
         while let Some(rest) = self.out.get(sent..).filter(|rest| !rest.is_empty()) {
-            let taken = match Instant::now() < until {
+            let taken = match self.now() < until {
                 true => self.transport.send_some(rest, LOOK),
                 false => Err(io::ErrorKind::TimedOut.into()),
             };
@@ -98,7 +96,8 @@ impl<'t> Line<'t> {
     ) -> Result<(Duration, &[u8], &mut Vec<u8>), LinkError> {
         let received = self.transport.receive(self.incoming.as_mut_slice(), wait);
         let received = received.map_err(LinkError::Gone)?;
+        let now = self.now();
         let bytes = self.incoming.get(..received).unwrap_or(&[]);
-        Ok((self.began.elapsed(), bytes, &mut self.out))
+        Ok((now, bytes, &mut self.out))
     }
 }

@@ -38,7 +38,8 @@ impl Patience {
         silence_s: DEFAULT_SILENCE_S,
     };
 
-    /// For an emulated board, whose speed is that of a shared machine.
+    /// For an emulated board, or a device in this program, whose speed is that of a shared
+    /// machine.
     pub const EMULATED: Self = Self {
         again: Duration::from_secs(5),
         alive: Duration::from_millis(500),

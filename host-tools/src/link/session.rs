@@ -1,6 +1,6 @@
 //! A client over a transport, and the clock that it is told.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use hapterra_core::scene::{Point, Scene, View};
 use hapterra_core::wire::hello::DeviceHello;
@@ -23,7 +23,7 @@ pub struct Session<'t> {
     /// Whether it is to go on; what a device does not read is not waited for else.
     goes_on: &'t dyn Fn() -> bool,
     /// Until then goodbye is to be said and answered.
-    leaves_by: Option<Instant>,
+    leaves_by: Option<Duration>,
 }
 
 impl<'t> Session<'t> {
@@ -185,7 +185,7 @@ impl<'t> Session<'t> {
         self.client.leave(self.line.now(), &mut self.line.out);
         // The user wants the end, and the end is to be heard.
         self.goes_on = &|| true;
-        self.leaves_by = Some(Instant::now() + self.client.patience().goodbye);
+        self.leaves_by = Some(self.line.now() + self.client.patience().goodbye);
         while self.client.state() != State::Closed {
             self.poll(LOOK, on).map_err(|error| {
                 tracing::debug!(%error, "on the way to goodbye");

@@ -1,7 +1,8 @@
 //! What a byte stream to a device is, whatever it runs over.
 
 use std::io;
-use std::time::Duration;
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
 
 /// A byte stream to a device.
 pub trait Transport {
@@ -27,6 +28,13 @@ pub trait Transport {
         let _ = wait;
         self.send(bytes).map(|()| bytes.len())
     }
+
+    /// The time since a fixed moment, by which a conversation over it is timed: this
+    /// machine's, unless the transport stands for a device in another time.
+    fn now(&self) -> Duration {
+        static BEGAN: LazyLock<Instant> = LazyLock::new(Instant::now);
+        BEGAN.elapsed()
+    }
 }
 
 impl<T: Transport + ?Sized> Transport for &mut T {
@@ -41,10 +49,14 @@ impl<T: Transport + ?Sized> Transport for &mut T {
     fn send_some(&mut self, bytes: &[u8], wait: Duration) -> io::Result<usize> {
         (**self).send_some(bytes, wait)
     }
+
+    fn now(&self) -> Duration {
+        (**self).now()
+    }
 }
 
-/// The line of somebody who has hung up.
-pub(super) struct NoLine;
+/// The line of somebody who has hung up, at this time.
+pub(super) struct NoLine(pub(super) Duration);
 
 impl Transport for NoLine {
     fn send(&mut self, _: &[u8]) -> io::Result<()> {
@@ -53,6 +65,10 @@ impl Transport for NoLine {
 
     fn receive(&mut self, _: &mut [u8], _: Duration) -> io::Result<usize> {
         Err(io::ErrorKind::NotConnected.into())
+    }
+
+    fn now(&self) -> Duration {
+        self.0
     }
 }
 

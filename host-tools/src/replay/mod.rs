@@ -179,7 +179,7 @@ pub fn on_native<'t>(
     rule: Rule,
 ) -> Result<Replayer<'t>, LinkError> {
     let device: Box<dyn Transport> = Box::new(Native::for_replay());
-    Replayer::open(terrain, law, rule, device, Patience::REAL_TIME)
+    Replayer::open(terrain, law, rule, device, Patience::EMULATED)
 }
 
 /// A state's name in a recording.

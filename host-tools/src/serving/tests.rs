@@ -44,6 +44,8 @@ struct Bench {
     /// Lines made so far.
     made: Rc<Cell<u32>>,
     told: Rc<RefCell<Vec<String>>>,
+    /// The host's time: a millisecond for each look at a line.
+    time: Rc<Cell<Duration>>,
 }
 
 /// A line to the device.
@@ -62,11 +64,16 @@ impl Transport for Line {
     }
 
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
-        if self.is_dead() {
-            std::thread::sleep(wait.min(ms(1)));
-            return Ok(0);
+        let time = &self.bench.time;
+        time.set(time.get() + ms(1));
+        match self.is_dead() {
+            true => Ok(0),
+            false => self.bench.device.borrow_mut().receive(into, wait),
         }
-        self.bench.device.borrow_mut().receive(into, wait)
+    }
+
+    fn now(&self) -> Duration {
+        self.bench.time.get()
     }
 }
 
@@ -93,6 +100,7 @@ impl Bench {
             dead_up_to: Rc::default(),
             made: Rc::default(),
             told: Rc::default(),
+            time: Rc::default(),
         }
     }
 
@@ -117,7 +125,7 @@ impl Bench {
     fn last_end(&self) -> SessionEnd {
         self.deaf.set(false);
         let line = Box::new(self.line());
-        let dialogue = Dialogue::open(line, Duration::from_secs(20)).expect("it answers");
+        let dialogue = Dialogue::open(line, PATIENCE.give_up).expect("it answers");
         dialogue.device().last.end
     }
 
@@ -248,7 +256,7 @@ fn what_cannot_begin_says_goodbye_and_where_that_is_not_heard_the_user_is_told()
         let bench = Bench::new();
         // The host before was killed.
         let line = Box::new(bench.line());
-        let killed = Dialogue::open(line, Duration::from_secs(20)).expect("it answers");
+        let killed = Dialogue::open(line, PATIENCE.give_up).expect("it answers");
         bench.deaf.set(deaf);
         drop(killed);
         let began = played(&bench, &|| true, &mut || bench.only_line(), |service| {
@@ -338,7 +346,7 @@ fn whoever_loses_the_device_to_another_host_is_told_that_the_arm_may_be_armed() 
     let end = played(&bench, &|| true, &mut || bench.only_line(), |service| {
         let served = open(service).expect("it answers");
         let line = Box::new(bench.line());
-        another = Some(Dialogue::open(line, Duration::from_secs(20)).expect("it answers"));
+        another = Some(Dialogue::open(line, PATIENCE.give_up).expect("it answers"));
         served.serve(&mut onlooker)
     });
     let Err(taken @ LinkError::Taken) = end.why else {

@@ -200,7 +200,7 @@ fn read_lines(
 mod tests {
     use super::*;
     use crate::place::ViewChange;
-    use std::time::{Duration, Instant};
+    use crate::timeouts::{wait_for, wait_until};
 
     #[test]
     fn commands_wait_for_their_time_and_for_the_ones_before() {
@@ -211,18 +211,20 @@ mod tests {
         let origin: Origin = path.to_str().expect("text").parse().expect("a file");
         let mut queue = CommandQueue::of(&origin).expect("opened");
         let mut told = Vec::new();
-        let until = Instant::now() + Duration::from_secs(20);
-        while told.is_empty() && Instant::now() < until {
+        wait_until("the line that is no command", || {
             let due = queue.due(0.9, true, &mut |line| told.push(line));
             assert_eq!(due, None);
-        }
-        std::thread::sleep(Duration::from_millis(50));
+            !told.is_empty()
+        });
         let mut due = |t_s, is_free| queue.due(t_s, is_free, &mut |_| {});
-        let zoom = |times| Some(Steer::Change(ViewChange::Zoom(times)));
-        assert_eq!(due(1.0, true), zoom(2.0));
+        let zoom = |times| Steer::Change(ViewChange::Zoom(times));
+        assert_eq!(due(1.0, true), Some(zoom(2.0)));
         assert_eq!(due(1.0, false), None, "not while that is under way");
-        assert_eq!(due(1.1, true), zoom(4.0));
-        assert_eq!(due(1.2, true), Some(Steer::Change(ViewChange::Reset)));
+        // The file is read meanwhile.
+        let fourth = wait_for("the fourth line", || due(1.1, true));
+        assert_eq!(fourth, zoom(4.0));
+        let fifth = wait_for("the fifth line", || due(1.2, true));
+        assert_eq!(fifth, Steer::Change(ViewChange::Reset));
         assert_eq!(due(9.0, true), None);
         assert!(
             told[0].starts_with("line 3 of the commands: `nonsense`"),
@@ -232,16 +234,15 @@ mod tests {
         assert_eq!("-".parse(), Ok(Origin::StandardInput));
     }
 
-    /// Takes all that is due of some queues until there was so much of each, or for 20 s.
+    /// Takes all that is due of some queues until there was so much of each.
     fn all_due(queues: &mut [CommandQueue], counts: &[usize]) -> (Vec<Vec<Steer>>, Vec<String>) {
         let (mut due, mut told) = (vec![vec![]; queues.len()], vec![]);
-        let until = Instant::now() + Duration::from_secs(20);
-        let is_short = |due: &[Vec<Steer>]| due.iter().map(Vec::len).ne(counts.iter().copied());
-        while is_short(&due) && Instant::now() < until {
+        wait_until("all commands", || {
             for (queue, due) in queues.iter_mut().zip(&mut due) {
                 due.extend(queue.due(0.0, true, &mut |line| told.push(line)));
             }
-        }
+            due.iter().map(Vec::len).eq(counts.iter().copied())
+        });
         (due, told)
     }
 

@@ -85,10 +85,10 @@ mod tests {
     use super::*;
     use crate::raster::Raster;
     use crate::terrain::Scale;
+    use crate::timeouts::HANG;
     use crate::view_feed::pipe::Pipe;
     use hapterra_view_stream::read;
     use std::sync::mpsc::sync_channel;
-    use std::time::Duration;
 
     /// More than anything here takes.
     const ROOM: usize = 64 << 20;
@@ -111,7 +111,7 @@ mod tests {
                 surroundings.tell(&terrain, &queue);
             }
         }
-        queue.end(Duration::from_secs(20));
+        queue.end(HANG);
         let bytes: Vec<u8> = out.try_iter().flatten().collect();
         let mut rest = bytes.as_slice();
         let messages = std::iter::from_fn(|| read(&mut rest).expect("whole"));

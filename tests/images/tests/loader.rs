@@ -4,7 +4,6 @@
 
 use std::cell::RefCell;
 use std::rc::Rc;
-use std::time::Duration;
 
 use hapterra::link::{Bulk, BulkEndpoints, Dialogue};
 use hapterra_core::wire::request::{Refusal, Request};
@@ -12,6 +11,7 @@ use hapterra_image_tests::bus::Effect;
 use hapterra_image_tests::device::{Device, machines, on_each_board, rough_ground};
 use hapterra_image_tests::machine::{Machine, Stop};
 use hapterra_image_tests::supply::Reset;
+use hapterra_tests::timeouts;
 use hapterra_tests::usb::host::{ScriptedPipes, enumerate};
 use nusb::descriptors::ConfigurationDescriptor;
 
@@ -50,7 +50,7 @@ fn ask_to_enter(mut machine: Machine) -> Machine {
     let endpoints = BulkEndpoints::find(&configuration).expect("the link's");
     let machine = Rc::new(RefCell::new(machine));
     let link = Bulk(ScriptedPipes::new(Rc::clone(&machine), endpoints));
-    let mut dialogue = Dialogue::open(Box::new(link), Duration::from_secs(60)).expect("opened");
+    let mut dialogue = Dialogue::open(Box::new(link), timeouts::HANG).expect("opened");
     let answer = dialogue.request(&Request::EnterLoader).expect("an answer");
     assert_eq!(answer, Ok(()));
     drop(dialogue);

@@ -87,7 +87,7 @@ impl<'t> Bed<'t> {
 
     pub(crate) fn open(&mut self, arming: Option<Arming>) {
         let link = Box::new(Shared(Rc::clone(&self.device)));
-        let (terrain, scene, patience) = (self.terrain, self.scene, Patience::REAL_TIME);
+        let (terrain, scene, patience) = (self.terrain, self.scene, Patience::EMULATED);
         let opened = Session::open(terrain, scene, arming, link, patience);
         self.session = Some(opened.expect("opened").0);
     }

@@ -36,7 +36,7 @@ fn at_ten_kilohertz_all_of_it_takes_as_long_and_feels_the_same() {
     let home = terrain.scale().to_grid(home_mm).expect("addressable");
     let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
     let (arming, link) = (Arming::VIRTUAL, Box::new(device));
-    let opened = Session::open(&terrain, scene, Some(arming), link, Patience::REAL_TIME);
+    let opened = Session::open(&terrain, scene, Some(arming), link, Patience::EMULATED);
     let (mut session, hello) = opened.expect("opened");
     assert_eq!(hello.tick_hz, 10_000);
     let mut samples: Vec<Sample> = Vec::new();

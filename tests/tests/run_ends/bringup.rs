@@ -5,7 +5,6 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Sender, channel};
-use std::time::{Duration, Instant};
 
 use hapterra::bringup::{Attendant, Identity, Log, Step, Task, VirtualUser};
 use hapterra::link::{Dialogue, Tcp};
@@ -14,7 +13,8 @@ use hapterra_core::guard::Mode;
 use hapterra_core::phantom::Calibration;
 use hapterra_tests::hapterra_binary;
 
-use hapterra_tests::served::{Served, ended_within, signal, told};
+use hapterra_tests::served::{Served, signal, told};
+use hapterra_tests::timeouts::{HANG, end_of};
 
 const RECORD: Calibration = Calibration::PREMIUM_1_5;
 /// What the terminal shows of a task, and the tasks after which Enter is pressed.
@@ -37,7 +37,7 @@ fn at_a_bench() -> (Served, Sender<Task>) {
 /// A log in which the last step alone is missing.
 fn log(served: &Served, file: &Path) {
     let link = Tcp::connect(&served.address.to_string()).expect("there");
-    let dialogue = Dialogue::open(Box::new(link), Duration::from_secs(20)).expect("answers");
+    let dialogue = Dialogue::open(Box::new(link), HANG).expect("answers");
     let mut log = Log::default();
     _ = log.meet(Identity::of(dialogue.device(), Some(&RECORD)));
     for step in Step::ALL.into_iter().filter(|s| *s != Step::FirstTouch) {
@@ -61,21 +61,26 @@ fn armed(served: &Served, bench: &Sender<Task>, folder: &Path) -> Child {
         .expect("it runs");
     let mut keys = child.stdin.take().expect("piped");
     let mut lines = BufReader::new(child.stdout.take().expect("piped"));
-    while !lead(&mut lines, &mut keys, bench) {}
+    while !lead(&mut lines, &mut keys, served, bench) {}
     child.stdout = Some(lines.into_inner());
     child.stdin = Some(keys);
     child
 }
 
 /// Does what the next line asks for. Whether the arm is armed and is to be moved now.
-fn lead(lines: &mut impl BufRead, keys: &mut ChildStdin, bench: &Sender<Task>) -> bool {
+fn lead(
+    lines: &mut impl BufRead,
+    keys: &mut ChildStdin,
+    served: &Served,
+    bench: &Sender<Task>,
+) -> bool {
     let mut line = String::new();
     assert!(lines.read_line(&mut line).expect("text") > 0, "it ended");
     for task in CONFIRMED.into_iter().chain(SEEN) {
         if line.contains(&format!("> {task}")) {
             bench.send(task).expect("a bench");
             // The tip is led there.
-            std::thread::sleep(Duration::from_millis(500));
+            served.pass_ms(1_000);
             if CONFIRMED.contains(&task) {
                 keys.write_all(b"\n").expect("written");
             }
@@ -90,7 +95,7 @@ fn one_signal_disarms_and_ends_a_bring_up() {
     let (served, bench) = at_a_bench();
     let child = armed(&served, &bench, folder.path());
     signal(&child, "INT");
-    let output = ended_within(child, Duration::from_secs(5)).expect("it ends");
+    let output = end_of(child);
     let told = told(&output);
     assert!(told.contains("stopped"), "{told}");
     assert!(!told.contains("did not confirm"), "{told}");
@@ -104,7 +109,7 @@ fn where_a_board_does_not_confirm_the_end_of_a_bring_up_the_user_is_told() {
     let child = armed(&served, &bench, folder.path());
     served.deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
-    let output = ended_within(child, Duration::from_secs(15)).expect("it ends");
+    let output = end_of(child);
     let told = told(&output);
     assert!(told.contains("switch the amplifiers off"), "{told}");
 }
@@ -116,12 +121,12 @@ fn the_second_signal_ends_a_bring_up_at_once_and_tells_that_the_arm_may_be_armed
     let child = armed(&served, &bench, folder.path());
     served.deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
-    std::thread::sleep(Duration::from_millis(300));
-    let began = Instant::now();
+    served.wait_for_unheard_bye();
     signal(&child, "INT");
-    let output = ended_within(child, Duration::from_secs(5)).expect("it ends");
-    assert!(began.elapsed() < Duration::from_secs(1));
+    let output = end_of(child);
     let told = told(&output);
+    // Not by itself, as where the board does not confirm in time.
+    assert_eq!(output.status.code(), Some(130), "{told}");
     assert!(told.contains("switch the amplifiers off"), "{told}");
 }
 
@@ -133,9 +138,9 @@ fn a_pipe_whose_reader_is_gone_ends_no_bring_up_with_an_armed_arm() {
     drop((child.stdout.take(), child.stderr.take()));
     // The next line is written when the tip is down.
     bench.send(Task::LowerTip).expect("a bench");
-    std::thread::sleep(Duration::from_secs(4));
+    served.pass_ms(8_000);
     signal(&child, "INT");
-    let output = ended_within(child, Duration::from_secs(5)).expect("it ends");
+    let output = end_of(child);
     assert_eq!(output.status.code(), Some(1));
     assert_eq!(served.status().health.report.mode, Mode::Disarmed);
 }

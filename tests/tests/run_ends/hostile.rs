@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use hapterra_tests::greedy;
-use hapterra_tests::served::{command, ended_within, has_begun, signal, told};
+use hapterra_tests::served::{command, has_begun, signal, told};
+use hapterra_tests::timeouts::{end_of, pass};
 
 #[test]
 fn a_device_that_asks_for_much_and_reads_little_holds_no_end_up() {
@@ -11,9 +12,10 @@ fn a_device_that_asks_for_much_and_reads_little_holds_no_end_up() {
     let mut command = command(greedy::start(), folder.path());
     let mut child = command.arg("--unchecked").spawn().expect("it runs");
     has_begun(child.stdout.as_mut().expect("piped"));
-    std::thread::sleep(Duration::from_secs(2));
+    // What waits for the device grows.
+    pass(Duration::from_secs(2));
     signal(&child, "INT");
-    let output = ended_within(child, Duration::from_secs(4)).expect("it ends");
+    let output = end_of(child);
     let told = told(&output);
     assert!(told.contains("switch the amplifiers off"), "{told}");
 }

@@ -6,19 +6,18 @@ use std::os::fd::OwnedFd;
 use std::path::Path;
 use std::process::{Child, Stdio};
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use hapterra_core::wire::session::SessionEnd;
 use rustix::io::{FdFlags, fcntl_setfd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{LocalModes, tcgetattr};
 
-use hapterra_tests::served::{Served, command, ended_within, has_begun, signal, start, told};
+use hapterra_tests::served::{Served, command, has_begun, signal, start, told};
+use hapterra_tests::timeouts::{end_of, pass, wait_for, wait_until};
 
 /// Longer than it takes until a line is written to what is no terminal any more.
 const A_LINE: Duration = Duration::from_millis(3_000);
-/// Longer than a goodbye takes.
-const AN_END: Duration = Duration::from_secs(10);
 
 /// The two ends of a terminal: the window's, and the program's.
 fn terminal() -> (File, File) {
@@ -55,9 +54,9 @@ fn a_terminal_window_that_is_closed_is_a_goodbye() {
     has_begun(&mut window);
     drop(window);
     // It goes on as long as nobody asks for its end.
-    std::thread::sleep(A_LINE);
+    pass(A_LINE);
     signal(&child, "HUP");
-    let output = ended_within(child, AN_END).expect("it ends");
+    let output = end_of(child);
     assert!(output.status.success(), "{}", output.status);
     assert!(folder.path().join("felt.csv").exists());
     assert_eq!(served.last_end(), SessionEnd::Goodbye);
@@ -69,9 +68,9 @@ fn a_reader_that_is_gone_costs_its_lines_and_nothing_else() {
     let served = Served::start();
     let mut child = start(&served, folder.path(), &[]);
     drop((child.stderr.take(), child.stdout.take()));
-    std::thread::sleep(A_LINE);
+    pass(A_LINE);
     signal(&child, "INT");
-    let output = ended_within(child, AN_END).expect("it ends");
+    let output = end_of(child);
     assert!(output.status.success(), "{}", output.status);
     assert!(folder.path().join("felt.csv").exists());
     assert_eq!(served.last_end(), SessionEnd::Goodbye);
@@ -89,7 +88,7 @@ fn a_disk_that_is_full_costs_its_lines_and_nothing_else() {
     let mut command = command(served.address, folder.path());
     let command = command.args(["--seconds", "0.5"]).stdout(out).stderr(err);
     let child = command.spawn().expect("it runs");
-    let output = ended_within(child, AN_END).expect("it ends");
+    let output = end_of(child);
     assert!(output.status.success(), "{}", output.status);
     assert!(folder.path().join("felt.csv").exists());
     assert_eq!(served.last_end(), SessionEnd::Goodbye);
@@ -105,27 +104,30 @@ fn where_nobody_reads_the_first_signal_is_a_goodbye_and_the_second_ends_it_at_on
     let mut command = command(served.address, folder.path());
     let mut child = command.stderr(pipe).spawn().expect("it runs");
     has_begun(child.stdout.as_mut().expect("piped"));
-    std::thread::sleep(A_LINE);
+    pass(A_LINE);
     served.deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
-    std::thread::sleep(Duration::from_millis(300));
-    let began = Instant::now();
+    served.wait_for_unheard_bye();
     signal(&child, "INT");
-    let output = ended_within(child, AN_END).expect("it ends");
-    assert!(began.elapsed() < Duration::from_secs(1));
+    let output = end_of(child);
+    // Not by itself, as where the board does not confirm in time.
     assert_eq!(output.status.code(), Some(130), "{}", told(&output));
 }
 
 /// Reads what is shown in a window until it holds a text.
 fn shows(window: &mut File, text: &str) -> String {
+    shows_all(window, &[text])
+}
+
+/// Reads what is shown in a window until it holds all of these texts, in any order.
+fn shows_all(window: &mut File, texts: &[&str]) -> String {
     let (mut shown, mut chunk) = (String::new(), [0; 4096]);
-    let until = Instant::now() + AN_END;
-    while !shown.contains(text) {
-        assert!(Instant::now() < until, "no `{text}` in {shown}");
+    wait_for(&texts.join(", "), || {
         let n = window.read(&mut chunk).expect("open");
         shown += &String::from_utf8_lossy(&chunk[..n]);
-    }
-    shown
+        let is_there = texts.iter().all(|text| shown.contains(text));
+        is_there.then(|| shown.clone())
+    })
 }
 
 /// An arm in its zero pose whose hand lets it arm, behind a socket; keys are typed.
@@ -137,12 +139,10 @@ fn keys_change_the_view_ctrl_c_is_a_goodbye_and_the_terminal_is_put_back() {
     let before = modes(&end);
     assert!(before.contains(LocalModes::ICANON | LocalModes::ECHO));
     let child = start_in(&end, &served, folder.path());
-    shows(&mut window, "arrows pan");
-    std::thread::sleep(Duration::from_millis(300));
-    assert!(
-        !modes(&end).contains(LocalModes::ICANON),
-        "keys come one by one"
-    );
+    shows_all(&mut window, &["arrows pan", "hold it there and press"]);
+    wait_until("keys that come one by one", || {
+        !modes(&end).contains(LocalModes::ICANON)
+    });
     // Enter answers the prompt: the arm is zeroed, and has samples to steer by.
     window.write_all(b"\r").expect("typed");
     shows(&mut window, "zeroed at");
@@ -151,7 +151,7 @@ fn keys_change_the_view_ctrl_c_is_a_goodbye_and_the_terminal_is_put_back() {
     window.write_all(b"\x1b[C").expect("typed");
     shows(&mut window, "view 2: ");
     window.write_all(&[3]).expect("typed");
-    let output = ended_within(child, AN_END).expect("it ends");
+    let output = end_of(child);
     assert!(output.status.success(), "{}", output.status);
     assert_eq!(modes(&end), before, "the terminal is as it was");
     assert_eq!(served.last_end(), SessionEnd::Goodbye);
@@ -166,20 +166,19 @@ fn a_second_ctrl_c_and_a_signal_put_the_terminal_back_too() {
         let before = modes(&end);
         let child = start_in(&end, &served, folder.path());
         shows(&mut window, "arrows pan");
-        std::thread::sleep(Duration::from_millis(300));
-        assert_ne!(modes(&end), before, "{ends_by}");
+        wait_until("the terminal to change", || modes(&end) != before);
         match ends_by {
             "interrupts" => {
                 served.deaf.store(true, Ordering::Relaxed);
                 window.write_all(&[3]).expect("typed");
-                std::thread::sleep(Duration::from_millis(300));
+                served.wait_for_unheard_bye();
                 window.write_all(&[3]).expect("typed");
-                let output = ended_within(child, AN_END).expect("it ends");
+                let output = end_of(child);
                 assert_eq!(output.status.code(), Some(130));
             }
             _ => {
                 signal(&child, "TERM");
-                let output = ended_within(child, AN_END).expect("it ends");
+                let output = end_of(child);
                 assert!(output.status.success(), "{}", output.status);
             }
         }
@@ -224,7 +223,7 @@ fn enter_and_keys_go_to_the_device_that_was_chosen_and_to_no_other() {
     window.write_all(b"1\r").expect("typed");
     shows(&mut window, &format!("{}zeroed at", name(1)));
     window.write_all(&[3]).expect("typed");
-    let output = ended_within(child, AN_END).expect("it ends");
+    let output = end_of(child);
     assert!(output.status.success(), "{}", output.status);
     assert_eq!(modes(&end), before, "the terminal is as it was");
     for served in &served {

@@ -65,6 +65,8 @@ struct Faults {
     /// Only of what is behind a file's beginning.
     is_beyond: bool,
     latency: Duration,
+    /// Of files whose names end so, answers alone are held back; of all where there are none.
+    held: Vec<String>,
     /// The version of all files.
     version: u32,
     requests: Vec<String>,
@@ -128,7 +130,14 @@ impl Server {
 
     /// Holds answers back, or lets them go.
     pub fn hold(&self, hold: bool) {
+        self.shared.state().held.clear();
         self.shared.is_open.send_replace(!hold);
+    }
+
+    /// Holds answers back about files whose names end so, in small or capital letters.
+    pub fn hold_at(&self, endings: &[&str]) {
+        self.shared.state().held = endings.iter().map(ToString::to_string).collect();
+        self.shared.is_open.send_replace(false);
     }
 
     /// All files are others now.
@@ -178,8 +187,13 @@ impl Shared {
 async fn between(State(shared): State<Arc<Shared>>, mut request: Request, next: Next) -> Response {
     let (fault, latency, version) = shared.next(&request);
     tokio::time::sleep(latency).await;
-    let mut gate = shared.is_open.subscribe();
-    let _ = gate.wait_for(|is_open| *is_open).await;
+    let path = request.uri().path().to_lowercase();
+    let is_held = |held: &[String]| held.is_empty() || held.iter().any(|end| path.ends_with(end));
+    let is_held = is_held(&shared.state().held);
+    if is_held {
+        let mut gate = shared.is_open.subscribe();
+        let _ = gate.wait_for(|is_open| *is_open).await;
+    }
     shared.state().at_once[0] -= 1;
     match fault {
         Fault::Error500 => return StatusCode::INTERNAL_SERVER_ERROR.into_response(),

@@ -1,8 +1,7 @@
 //! What a server or the line to it may do wrong: it is told, and nothing wrong is felt.
 
-use std::time::Duration;
-
 use hapterra::raster::{BadRaster, OpenOptions, Raster};
+use hapterra_tests::timeouts::wait_for;
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::{Fault, Server};
 
@@ -94,14 +93,10 @@ fn bytes_that_were_not_asked_for_are_not_taken() {
 
 /// A height, as soon as it has come.
 fn comes(raster: &Raster, column: u32, row: u32) -> f64 {
-    for _ in 0..2000 {
+    wait_for("the height", || {
         let height = raster.height(column, row);
-        if !height.is_nan() {
-            return height;
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    panic!("it does not come");
+        (!height.is_nan()).then_some(height)
+    })
 }
 
 #[test]

@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use hapterra::raster::{OpenOptions, Raster};
+use hapterra_tests::timeouts::wait_until;
 use hapterra_url_tests::http::{Fault, Server};
 
 fn data() -> PathBuf {
@@ -135,11 +136,7 @@ fn comes_late(
     assert!(!has_come(), "opening the file fetched none of it");
     assert!(raster.not_yet() > before);
     server.fail(Fault::None, 0);
-    let comes = (0..2000).find(|_| {
-        std::thread::sleep(std::time::Duration::from_millis(5));
-        has_come()
-    });
-    assert!(comes.is_some(), "it is no hole that stays");
+    wait_until("what is no hole that stays", has_come);
 }
 
 #[test]

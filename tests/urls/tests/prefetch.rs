@@ -11,8 +11,14 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Source, View};
 use hapterra_core::terrain::TileKey;
+use hapterra_tests::timeouts::{pass, wait_until};
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::Server;
+
+/// Requests for what two tiles beside each other need, and for what lies around a HIP: runs of
+/// pages that the layout of the file puts there.
+const OF_TWO_TILES: usize = 1;
+const OF_A_VIEW: usize = 1;
 
 fn height(column: u32, row: u32) -> f32 {
     (column % 100) as f32 + 0.5 * (row % 64) as f32
@@ -40,17 +46,15 @@ fn terrain(raster: &Raster) -> Terrain<'_> {
     Terrain::new(raster, scale, 0).expect("a terrain")
 }
 
-fn settled(server: &Server) -> usize {
-    let mut requests = server.seen().0.len();
-    for _ in 0..200 {
-        std::thread::sleep(Duration::from_millis(20));
-        let now = server.seen().0.len();
-        if now == requests {
-            return now;
-        }
-        requests = now;
-    }
-    requests
+/// Requests so far.
+fn requests(server: &Server) -> usize {
+    server.seen().0.len()
+}
+
+/// Requests so far, after time for those that must not be.
+fn requests_later(server: &Server) -> usize {
+    pass(Duration::from_millis(100));
+    requests(server)
 }
 
 #[test]
@@ -59,31 +63,23 @@ fn a_tile_that_was_read_ahead_takes_no_request_and_too_many_are_not_asked_for() 
     let terrain = terrain(&raster);
     let keys = [TileKey::new(0, 60, 20), TileKey::new(0, 61, 20)];
     // As long as whoever reads waits, nothing is read ahead.
-    let opened = settled(&server);
+    let opened = requests(&server);
     terrain.grid().prefetch(0, [1920, 640], [1984, 672]);
-    assert_eq!(settled(&server), opened);
+    assert_eq!(requests_later(&server), opened);
     raster.stop_waiting();
     // It waits for nothing: the server holds its answers back for ever.
     server.hold(true);
     terrain.grid().prefetch(0, [1920, 640], [1984, 672]);
-    let ahead = settled(&server);
-    assert!(ahead > opened);
+    let ahead = opened + OF_TWO_TILES;
+    wait_until("requests ahead", || requests(&server) >= ahead);
     server.hold(false);
     for key in keys {
-        let comes = (0..2000).any(|_| {
-            std::thread::sleep(Duration::from_millis(5));
-            is_here(&terrain, key)
-        });
-        assert!(comes, "{key:?}");
+        wait_until("a tile", || is_here(&terrain, key));
     }
-    assert_eq!(
-        server.seen().0.len(),
-        ahead,
-        "the tiles asked for nothing more"
-    );
+    assert_eq!(requests(&server), ahead, "the tiles asked for nothing more");
     // All of it, or what lies outside, is not read ahead.
     terrain.grid().prefetch(0, [0, 0], [4200, 1800]);
-    assert_eq!(settled(&server), ahead);
+    assert_eq!(requests_later(&server), ahead);
     terrain.grid().prefetch(0, [-900, -900], [-800, -800]);
     terrain.grid().prefetch(0, [i32::MIN; 2], [i32::MAX; 2]);
     terrain.grid().prefetch(40, [i32::MAX; 2], [i32::MIN; 2]);
@@ -98,7 +94,7 @@ fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
     let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, at(640));
     let mut client = Client::numbered(&terrain, scene, None, Patience::REAL_TIME, 1);
     raster.stop_waiting();
-    let before = settled(&server);
+    let before = requests(&server);
     server.hold(true);
     let view = View {
         number: 1,
@@ -107,15 +103,17 @@ fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
         keeps_tiles: true,
     };
     client.put_view(Duration::ZERO, view, terrain.clone(), &mut vec![]);
-    let after = settled(&server);
-    assert!(after > before, "{after} requests");
+    let after = before + OF_A_VIEW;
+    wait_until("requests around the HIP", || requests(&server) >= after);
     server.hold(false);
-    let comes = (0..2000).any(|_| {
-        std::thread::sleep(Duration::from_millis(5));
+    wait_until("the tile at the HIP", || {
         is_here(&terrain, TileKey::new(0, 3500 / 32, 20))
     });
-    assert!(comes, "what was asked for is enough");
-    assert_eq!(settled(&server), after, "the tile asks for nothing more");
+    assert_eq!(
+        requests_later(&server),
+        after,
+        "the tile asks for nothing more"
+    );
 }
 
 /// `cargo test -p hapterra-url-tests --test prefetch -- --ignored --nocapture`: looks, one every
@@ -133,7 +131,7 @@ fn looks_without_a_tile_at_100_ms() {
             let looks = 3000 * 100 / speed;
             let cells = |look: i32| 40 + look * speed / 100;
             let missing = (0..looks).filter(|look| {
-                std::thread::sleep(Duration::from_millis(10));
+                pass(Duration::from_millis(10));
                 let (at, ahead) = (cells(*look), cells(*look + 50));
                 if reads_ahead {
                     let edge = |cell: i32| cell / 32 * 32;

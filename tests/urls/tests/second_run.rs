@@ -1,12 +1,15 @@
 //! Pages of a file at a URL that are kept on disk for another run.
 
-use std::path::Path;
-use std::time::Duration;
+use std::path::{Path, PathBuf};
 
 use hapterra::disk_cache::DiskCache;
 use hapterra::raster::{OpenOptions, Raster};
+use hapterra_tests::timeouts::wait_until;
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::Server;
+
+/// Pages of what [`Bed::look`] looks at.
+const PAGES: usize = 50;
 
 fn height(column: u32, row: u32) -> f32 {
     (column * 7 % 1000) as f32 + 0.25 * (row % 400) as f32
@@ -51,17 +54,16 @@ impl Bed {
         (heights, self.server.seen().0.len() - before)
     }
 
-    /// Waits until what came was written.
+    /// Waits until what came with the first look was written, each page in a file.
     fn settle(&self) {
-        let mut was = 0;
-        for _ in 0..400 {
-            std::thread::sleep(Duration::from_millis(50));
-            let now = files(self.kept.path()).len();
-            if now == was && now > 0 {
-                return;
-            }
-            was = now;
-        }
+        let is_whole = |path: &PathBuf| {
+            let name = path.file_name().expect("a name").to_string_lossy();
+            !name.starts_with('.')
+        };
+        wait_until("all pages on disk", || {
+            let files = files(self.kept.path());
+            files.iter().filter(|path| is_whole(path)).count() >= PAGES
+        });
     }
 }
 

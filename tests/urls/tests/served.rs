@@ -14,6 +14,7 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
 use hapterra_core::terrain::TileKey;
+use hapterra_tests::timeouts::{pass, wait_for, wait_until};
 use hapterra_url_tests::cog::{cog, in_tiles};
 use hapterra_url_tests::http::{Fault, Server};
 
@@ -49,13 +50,7 @@ fn tile(terrain: &Terrain<'_>) -> Option<String> {
 }
 
 fn comes(terrain: &Terrain<'_>) -> String {
-    for _ in 0..2000 {
-        if let Some(heights) = tile(terrain) {
-            return heights;
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    panic!("it does not come");
+    wait_for("the tile", || tile(terrain))
 }
 
 #[test]
@@ -83,7 +78,7 @@ fn a_server_that_is_gone_for_a_while_is_asked_again_and_nothing_becomes_a_hole()
     server.fail(Fault::Error500, usize::MAX);
     for _ in 0..100 {
         assert_eq!(tile(&terrain), None);
-        std::thread::sleep(Duration::from_millis(10));
+        pass(Duration::from_millis(10));
     }
     server.fail(Fault::None, 0);
     comes(&terrain);
@@ -102,13 +97,9 @@ fn all_that_a_touch_needs_is_asked_for_at_once() {
     server.hold(true);
     let before = server.seen().0.len();
     assert!(raster.height(1500, 500).is_nan());
-    for _ in 0..400 {
-        std::thread::sleep(Duration::from_millis(5));
-        if server.seen().0.len() >= before + 4 {
-            return;
-        }
-    }
-    panic!("{} rows of chunks of four", server.seen().0.len() - before);
+    wait_until("requests for four rows of chunks", || {
+        server.seen().0.len() >= before + 4
+    });
 }
 
 /// The names that a world file may have, of a picture that says nothing of its place.
@@ -141,12 +132,16 @@ fn all_neighbours_that_may_be_are_looked_for_at_once() {
     bytes.extend((0..side * side).map(|sample| (sample % 200) as u8));
     std::fs::write(folder.path().join("plain.tif"), bytes).expect("written");
     let server = Server::of(folder.path());
-    // Long enough for all of them to be under way.
-    server.set_latency(Duration::from_millis(100));
-    Raster::open(server.url("plain.tif"), &OpenOptions::default()).expect("opens");
+    server.hold_at(&["tfw", "tifw", "tiffw", "tfwx", "wld"]);
+    let url = server.url("plain.tif");
+    std::thread::scope(|scope| {
+        let open = scope.spawn(|| Raster::open(url, &OpenOptions::default()));
+        wait_until("six requests at once", || server.most_at_once() >= 6);
+        server.hold(false);
+        open.join().expect("no panic").expect("opens");
+    });
     let (requests, _) = server.seen();
     assert!(requests.iter().any(|line| line.contains("plain.tfw")));
-    assert!(server.most_at_once() >= 6, "{requests:?}");
 }
 
 #[test]
@@ -186,17 +181,13 @@ fn a_source_of_a_vrt_that_has_not_come_is_no_hole() {
     }
     server.hold(false);
     for (column, row) in places {
-        let comes = (0..2000).find(|_| {
-            std::thread::sleep(Duration::from_millis(10));
-            !raster.height(column, row).is_nan()
-        });
-        assert!(comes.is_some(), "{column} comes");
+        wait_until("the height", || !raster.height(column, row).is_nan());
         let expected = f64::from(height(column % 2200, 1799 - row));
         assert_eq!(raster.height(column, row), expected);
     }
 }
 
-/// A line to a device from which nothing may come.
+/// A line to a device from which nothing may come. The host's time stands still.
 struct Line<'d> {
     device: &'d mut Native,
     is_mute: Rc<Cell<bool>>,
@@ -212,6 +203,10 @@ impl Transport for Line<'_> {
             true => Ok(0),
             false => self.device.receive(into, wait),
         }
+    }
+
+    fn now(&self) -> Duration {
+        Duration::ZERO
     }
 }
 
@@ -246,10 +241,8 @@ fn a_device_gets_its_tiles_when_they_have_come_and_no_holes_before() {
     // What was asked for is sent without being asked for again.
     is_mute.set(true);
     server.hold(false);
-    let sent_mute = (0..150).find(|_| look(&mut session) > 0);
-    assert!(sent_mute.is_some(), "as soon as it has come");
+    wait_until("a tile that has come", || look(&mut session) > 0);
     is_mute.set(false);
-    let looks = (0..4000).find(|_| look(&mut session) > 3);
-    assert!(looks.is_some(), "they are sent when they have come");
+    wait_until("more tiles", || look(&mut session) > 3);
     session.say_goodbye(&mut |_| {}).expect("confirmed");
 }

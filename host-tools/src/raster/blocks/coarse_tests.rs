@@ -10,6 +10,7 @@ use super::*;
 use crate::raster::Raster;
 use crate::raster::decoded::Decoded;
 use crate::raster::storage::Storage;
+use crate::timeouts::{pass, wait_for, wait_until};
 
 const SIZE: [u32; 2] = [2101, 1250];
 const BLOCK: [u32; 2] = [64, 48];
@@ -236,13 +237,7 @@ fn look(raster: &Raster, level: u8) -> Option<Vec<f64>> {
 }
 
 fn comes(raster: &Raster, level: u8) -> Vec<f64> {
-    for _ in 0..4000 {
-        if let Some(heights) = look(raster, level) {
-            return heights;
-        }
-        thread::sleep(Duration::from_millis(5));
-    }
-    panic!("it does not come");
+    wait_for("the level", || look(raster, level))
 }
 
 fn same(one: &[f64], other: &[f64]) {
@@ -292,11 +287,7 @@ fn whoever_is_served_does_not_wait_for_a_fine_block_that_takes_long() {
     let far = far.expect("no hole");
     assert_eq!(there(far), (false, before + 1));
     assert!(there(300).0, "it is in memory");
-    let comes = (0..4000).any(|_| {
-        thread::sleep(Duration::from_millis(5));
-        there(far).0
-    });
-    assert!(comes);
+    wait_until("the block", || there(far).0);
     let threads = seen.threads.lock().expect("alone").clone();
     assert!(threads.len() == 1 && threads[0] != thread::current().id());
 }
@@ -319,32 +310,21 @@ fn what_has_not_come_is_no_hole_and_what_cannot_be_read_is_none_for_long() {
         };
         for _ in 0..20 {
             assert_eq!(late(&raster), None);
-            thread::sleep(Duration::from_millis(5));
+            pass(Duration::from_millis(5));
         }
         seen.is_late.store(false, Ordering::Relaxed);
-        let mut tries = 0;
-        let heights = loop {
-            if let Some(heights) = late(&raster) {
-                break heights;
-            }
-            tries += 1;
-            assert!(tries < 4000, "it does not come");
-            thread::sleep(Duration::from_millis(5));
-        };
+        let heights = wait_for("the late block", || late(&raster));
         let expected: Vec<f64> = (56..64)
             .map(|c| height(c * 8, 37 * 8, [true, false]))
             .collect();
         same(&heights, &expected);
         // The damaged one has columns 320 to 383, rows 192 to 239.
         let mut bad = [0.0; 8];
-        for _ in 0..4000 {
+        wait_until("the damaged block", || {
             let before = raster.not_yet();
             raster.copy_row(3, 25, 40, &mut bad);
-            if raster.not_yet() == before {
-                break;
-            }
-            thread::sleep(Duration::from_millis(5));
-        }
+            raster.not_yet() == before
+        });
         assert!(bad.iter().all(|height| height.is_nan()), "{bad:?}");
     }
     // It was damaged in that run only.
@@ -472,11 +452,7 @@ fn what_lies_ahead_is_read_in_the_background_and_too_much_is_not() {
         };
         let keys = [12, 13].map(|row| [15, 16, 17].map(|column| [column, row]));
         let has = |at: &[u32; 2]| blocks.kept().cache.has(&Key { image: 0, at: *at });
-        let comes = (0..4000).any(|_| {
-            thread::sleep(Duration::from_millis(5));
-            keys.as_flattened().iter().all(has)
-        });
-        assert!(comes);
+        wait_until("the blocks", || keys.as_flattened().iter().all(has));
         assert!(there(&raster));
         assert_eq!(seen.reads(), 6);
         let this = thread::current().id();
