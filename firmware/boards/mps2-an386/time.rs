@@ -33,7 +33,7 @@ pub(crate) fn start() -> Clock {
     clock_timer().value.set(u32::MAX);
     tick_timer().reload.set(PERIOD - 1);
     tick_timer().value.set(PERIOD - 1);
-    Clock { last: None }
+    Clock
 }
 
 /// Stops the board's time until this reason is gone.
@@ -56,10 +56,7 @@ pub(crate) fn release(reason: Reason) {
 }
 
 /// The two timers as the application sees them.
-pub(crate) struct Clock {
-    /// What [`Clock::now`] read at the tick before.
-    last: Option<u32>,
-}
+pub(crate) struct Clock;
 
 impl TickClock for Clock {
     const HZ: u32 = TIMER_HZ;
@@ -73,11 +70,10 @@ impl TickClock for Clock {
         (PERIOD - 1).saturating_sub(tick_timer().value.get())
     }
 
-    /// Both timers stand still together, so what they hold is no gap.
+    /// The virtual Phantom answers each tick before the next one comes, so no force is held
+    /// while the board's time stands still.
     fn since_last_tick(&mut self) -> u32 {
-        let now = self.now();
-        let last = self.last.replace(now);
-        last.map_or(PERIOD, |last| now.wrapping_sub(last))
+        PERIOD
     }
 
     fn begin_tick(&mut self) {
