@@ -106,7 +106,7 @@ pub struct Device<C, const D: usize> {
 }
 
 impl<C: TickClock, const D: usize> Device<C, D> {
-    /// What its parts tell about themselves.
+    /// The check-ins and counters of its parts.
     #[must_use]
     pub const fn monitor(&self) -> &'static Monitor {
         self.monitor

@@ -146,8 +146,8 @@ pub struct StackFigures {
     pub high_water: u32,
 }
 
-/// Whether the oscillator of a board's USB follows the host's start-of-frames. Without that it
-/// is too far off for some hosts.
+/// The state of the clock recovery of a board's USB: its oscillator follows the host's
+/// start-of-frames, or is too inaccurate for some hosts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum UsbClock {
     /// There is none, or it was not measured yet.

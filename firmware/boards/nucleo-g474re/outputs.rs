@@ -27,8 +27,8 @@ pub(crate) struct Outputs {
 
 /// ADC2's channels at PA4, PA5 and PA6 (data sheet, table of pins).
 const READ_BACK: [u8; 3] = [17, 13, 3];
-/// What a pin may read beside its command, codes: 50 mV, twice what the errors of a buffered
-/// output and of the converter add up to, and 3.6 % of full scale.
+/// Difference allowed between a pin's reading and its command, codes: 50 mV, twice the sum of the
+/// errors of a buffered output and of the converter, and 3.6 % of full scale.
 const MAX_DIFFERENCE: u16 = 64;
 /// As many ticks in a row a pin has to differ: the conversion of one tick may have met the next
 /// command.
@@ -96,7 +96,7 @@ impl CurrentOutputs for Outputs {
     }
 }
 
-/// Whether the pins read what was last put out, within [`MAX_DIFFERENCE`].
+/// Returns true if the pins read the last command, within [`MAX_DIFFERENCE`].
 fn reads_back() -> bool {
     let set = [
         pac::DAC1.dhr12r(0).read().dhr(),

@@ -181,7 +181,7 @@ impl VirtualBench {
         1e-3 * board_ms / (1.0 - self.mistakes.clock_slow_by)
     }
 
-    /// What the board says of the oscillator of its USB.
+    /// The state of USB's clock recovery that the board reports.
     pub(super) const fn usb_clock(&self) -> UsbClock {
         match self.mistakes.usb_clock_unlocked {
             true => UsbClock::Unlocked,

@@ -17,7 +17,7 @@ impl Injected {
         self.0.cfgr().modify(|w| w.set_jqdis(true));
         self.0.jsqr().write(|w| {
             w.set_jl((DUMMY_CONVERSIONS + 2) as u8);
-            // What comes first and is not read may be of any channel.
+            // A dummy conversion may be of any channel.
             w.set_jsq(0, channels[0]);
             for (n, channel) in channels.into_iter().enumerate() {
                 w.set_jsq(DUMMY_CONVERSIONS + n, channel);
@@ -34,7 +34,7 @@ impl Injected {
     /// if they have not.
     pub(crate) fn read(self) -> Option<[u16; 3]> {
         let is_done = self.0.isr().read().jeos();
-        // What is written as set is cleared.
+        // Writing 1 clears the flag.
         self.0.isr().write(|w| w.set_jeos(true));
         let code = |n| (self.0.jdr(DUMMY_CONVERSIONS + n).read().0 >> MONITOR_SHIFT) as u16;
         is_done.then_some([code(0), code(1), code(2)])
