@@ -11,7 +11,7 @@ use hapterra_core::scene::{Scene as SceneMessage, Source};
 use hapterra_core::terrain::FieldSize;
 
 use super::replayed::noted;
-use super::run::{Player, Scene, Surface};
+use super::run::{LEAST_WORK_PER_TICK, Player, Scene, Surface};
 use super::supply::Buffers;
 use super::terrain::Terrain;
 use crate::counting::{Counted, Event, Replay, Samples, WINDOW};
@@ -40,6 +40,8 @@ impl Recorded {
     pub fn random(seed: u64, number: u64, surface: Surface) -> Self {
         let scene = Scene {
             execution: Execution::RealTime,
+            // As the counting board, which counts at 10 kHz.
+            work_per_tick: LEAST_WORK_PER_TICK,
             ..Scene::random(seed, number).with_surface(surface)
         };
         let mut buffers = Buffers::new(WINDOW);
