@@ -44,13 +44,16 @@ pub(super) const CONVEX: u32 = 4;
 /// Units for the closest point of one ruling.
 pub(super) const RULING: u32 = 4;
 /// Units for looking for a crest between two rulings.
-pub(super) const CREST: u32 = 32;
+pub(super) const CREST: u32 = 36;
 /// Units for the slope of the distance into one patch.
 pub(super) const SLOPE: u32 = 3;
 /// Units for a look at the cone of friction.
-pub(super) const LOOK: u32 = 1;
-/// Units of a straight way with friction, at most: four patches at its start, and eight looks.
-pub(super) const WAY: u32 = 4 * SLOPE + 8 * LOOK;
+pub(super) const LOOK: u32 = 5;
+/// Units for the direction and the end of a straight way with friction.
+pub(super) const DIRECTION: u32 = 3;
+/// Units that a straight way with friction needs: four patches at its start, and two looks. Without
+/// more it ends at the last place where the proxy was still pulled.
+pub(super) const WAY: u32 = 4 * SLOPE + DIRECTION + 2 * LOOK;
 /// Units for asking whether a box is clear.
 pub(super) const BOX: u32 = 4;
 /// Units for halving a path.

@@ -17,7 +17,7 @@ use crate::contact::tolerance::{DOUBTFUL_STEP, LEAST_STEP, RESOLUTION};
 pub const MAX_EVALUATIONS: u32 = 32;
 
 /// Rulings that are looked at for a crest.
-const CREST_LOOKS: u32 = 32;
+const CREST_LOOKS: u32 = 16;
 /// Steps downhill after which the end of the patch is tried, where halving the
 /// way to it would take as many as a place has bits.
 const DOWNHILL: u32 = 2;

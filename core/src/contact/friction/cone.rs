@@ -68,26 +68,8 @@ pub(in crate::contact) struct Cone {
 }
 
 impl Cone {
-    /// The pull, and how much pull friction holds, cells, at a point of a patch that counts its
+    /// The pull beside how much of it friction holds, cells, at a point of a patch that counts its
     /// heights from the HIP.
-    #[inline]
-    pub(in crate::contact) fn compare(
-        &self,
-        pull: &Pull,
-        view: &HipView,
-        patch: &Patch,
-        at: &SurfacePoint,
-    ) -> (f32, f32) {
-        let mut held = self.mu * root(pull.presses) + pull.rounding;
-        if self.drag > 0.0 {
-            let (u, v) = view_from(&self.from, at);
-            let chord = Vec3::new(u, v, view.above(&self.from) + patch.height(at.u, at.v));
-            held += self.drag * root(chord.length_squared());
-        }
-        (root(pull.pulls), held)
-    }
-
-    /// By how much the pull exceeds what a walk may end with.
     pub(in crate::contact) fn excess(
         &self,
         pull: &Pull,
@@ -95,7 +77,13 @@ impl Cone {
         patch: &Patch,
         at: &SurfacePoint,
     ) -> Excess {
-        let (pulls, held) = self.compare(pull, view, patch, at);
+        let mut held = self.mu * root(pull.presses) + pull.rounding;
+        if self.drag > 0.0 {
+            let (u, v) = view_from(&self.from, at);
+            let chord = Vec3::new(u, v, view.above(&self.from) + patch.height(at.u, at.v));
+            held += self.drag * root(chord.length_squared());
+        }
+        let pulls = root(pull.pulls);
         Excess {
             over: pulls - held * (1.0 - 0.5 * SHORT),
             pulls,
@@ -119,6 +107,11 @@ impl Excess {
     /// Whether a walk ends here: friction holds, and by hardly more than it has to.
     pub(in crate::contact) fn is_small(&self) -> bool {
         self.over.abs() <= 0.5 * SHORT * self.held
+    }
+
+    /// Whether friction holds the pull.
+    pub(in crate::contact) fn is_held(&self) -> bool {
+        self.pulls <= self.held
     }
 
     /// Whether the pull is more than a walk may end with.

@@ -8,9 +8,9 @@
 
 use glam::Vec3;
 
-use super::cone::{Cone, Pull, border};
+use super::cone::{Cone, Excess, Pull, border};
 use super::cone_root::ConeRoot;
-use crate::contact::budget::{Budget, LOOK, SLOPE, WAY};
+use crate::contact::budget::{Budget, DIRECTION, LOOK, SLOPE, WAY};
 use crate::contact::closest_point::Leave;
 use crate::contact::straight_way::StraightWay;
 use crate::contact::surface::patch::Patch;
@@ -105,28 +105,30 @@ impl Walk {
                 Ok(asked) => asked,
                 Err(why) => return why,
             };
-            let is_held = match self.at_rest.take() {
-                Some(mu) => asked.pull.pulls <= mu * mu * asked.pull.presses,
-                None => {
-                    let (pulls, holds) = cone.compare(&asked.pull, view, &asked.patch, &asked.at);
-                    pulls <= holds
-                }
-            };
-            if is_held || self.ways == WAYS {
+            if let Some(mu) = self.at_rest.take()
+                && asked.pull.pulls <= mu * mu * asked.pull.presses
+            {
+                return Walked::Rests(asked.missing);
+            }
+            let excess = cone.excess(&asked.pull, view, &asked.patch, &asked.at);
+            if excess.is_held() || self.ways == WAYS {
                 return Walked::Rests(asked.missing);
             }
             let newton = match self.inside > ACROSS {
                 true => newton(&asked, view),
                 false => None,
             };
-            let (to, held) = straight(&asked, newton, view, cone, budget);
-            if to == asked.at || to == self.point {
+            let end = straight(&asked, excess, newton, view, cone, budget);
+            if end.at == asked.at || end.at == self.point {
                 return Walked::Rests(asked.missing);
             }
-            let is_inside = border(&to) == Side::NONE;
+            let is_inside = border(&end.at) == Side::NONE;
             self.inside = if is_inside { self.inside + 1 } else { 0 };
             self.ways += 1;
-            (self.point, self.held) = (to, held);
+            (self.point, self.held) = (end.at, end.held);
+            if is_inside && end.rests {
+                return Walked::Rests(None);
+            }
         }
     }
 }
@@ -149,15 +151,25 @@ fn newton(at: &Asked, view: &HipView) -> Option<(f32, f32)> {
     (det > 0.0 && du * gu + dv * gv < 0.0).then_some((du, dv))
 }
 
-/// The end of one straight way, and what friction holds there.
+/// The end of one straight way.
+struct End {
+    at: SurfacePoint,
+    /// What friction holds there, cells.
+    held: Vec3,
+    /// Whether the cone holds there.
+    rests: bool,
+}
+
+/// Goes one straight way, from where the pull is in excess by so much.
 #[inline(never)]
 fn straight(
     start: &Asked,
+    excess: Excess,
     newton: Option<(f32, f32)>,
     view: &HipView,
     cone: &Cone,
     budget: &mut Budget,
-) -> (SurfacePoint, Vec3) {
+) -> End {
     let Asked {
         pull, at, patch, ..
     } = start;
@@ -177,23 +189,32 @@ fn straight(
         at.moved_to(u, v)
     };
     let edge = runs_along(border(at), along);
-    let mut root = ConeRoot::new(cone.excess(pull, view, patch, at), cone.drag);
-    let mut to = (*at, Vec3::ZERO);
+    let mut root = ConeRoot::new(excess, cone.drag);
+    let mut to = End {
+        at: *at,
+        held: Vec3::ZERO,
+        rests: false,
+    };
+    budget.spend(DIRECTION);
     for _ in 0..LOOKS {
-        let t = smaller(root.next(), end);
+        if !budget.has(LOOK) {
+            break;
+        }
         budget.spend(LOOK);
-        to.0 = place(t);
-        let pull = Pull::in_patch(patch, view, &to.0, edge);
-        let excess = cone.excess(&pull, view, patch, &to.0);
-        to.1 = pull.along * excess.held_share();
+        let t = smaller(root.next(), end);
+        to.at = place(t);
+        let pull = Pull::in_patch(patch, view, &to.at, edge);
+        let excess = cone.excess(&pull, view, patch, &to.at);
+        to.held = pull.along * excess.held_share();
+        to.rests = !pull.is_above && excess.is_small();
         let is_at_end = excess.is_pulled() && t >= end;
-        if pull.is_above || is_at_end || excess.is_small() {
+        if pull.is_above || is_at_end || to.rests {
             return to;
         }
         root.look(t, &excess);
     }
     if let Some(t) = root.so_far() {
-        to.0 = place(t);
+        to.at = place(t);
     }
     to
 }
@@ -224,39 +245,35 @@ fn ask<const D: usize>(
         }
         Ground::Missing => return Err(Walked::Off),
     };
-    let asked = Asked {
+    let mut asked = Asked {
         pull: Pull::in_patch(&patch, view, point, border),
         at: *point,
         patch,
         missing: None,
     };
-    if border != Side::NONE {
-        return ask_neighbours(window, view, border, asked, rules, budget);
-    }
-    if asked.pull.is_above
-        && let Some(walked) = rules.off(point)
-    {
-        return Err(walked);
-    }
-    Ok(asked)
+    let ended = match border {
+        Side::NONE if asked.pull.is_above => rules.off(point),
+        Side::NONE => None,
+        _ => ask_neighbours(window, view, border, &mut asked, rules, budget),
+    };
+    ended.map_or(Ok(asked), Err)
 }
 
-/// The same on a border. The path to the HIP leads off the surface if the HIP is above the patch
+/// Asks the patches across a border, too; how the walk ends, if it does. The path to the HIP leads off the surface if the HIP is above the patch
 /// that the path leads into; at a hole nothing presses a proxy whose HIP is above all patches.
 #[inline(never)]
 fn ask_neighbours<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,
     border: Side,
-    own: Asked,
+    best: &mut Asked,
     rules: Rules<'_>,
     budget: &mut Budget,
-) -> Result<Asked, Walked> {
-    let point = own.at;
+) -> Option<Walked> {
+    let point = best.at;
     let into = border.toward(view.in_patch(point.cell), (point.u, point.v));
-    let mut leads_off = own.pull.is_above && into == Side::NONE;
-    let (mut all_above, mut has_hole) = (own.pull.is_above, false);
-    let mut best = own;
+    let mut leads_off = best.pull.is_above && into == Side::NONE;
+    let (mut all_above, mut has_hole) = (best.pull.is_above, false);
     for place in 0..3 {
         let side = border.neighbour(place);
         if side == Side::NONE {
@@ -275,7 +292,7 @@ fn ask_neighbours<const D: usize>(
                 }
             }
             Ground::Missing if rules.waits => {
-                return Err(Walked::Missing(TileIndex::holding(at.cell)));
+                return Some(Walked::Missing(TileIndex::holding(at.cell)));
             }
             Ground::Missing => best.missing = Some(TileIndex::holding(at.cell)),
             Ground::Hole => has_hole = true,
@@ -283,10 +300,7 @@ fn ask_neighbours<const D: usize>(
     }
     has_hole |= best.missing.is_some();
     if leads_off && let Some(walked) = rules.off(&point) {
-        return Err(walked);
+        return Some(walked);
     }
-    if has_hole && all_above {
-        return Err(Walked::Off);
-    }
-    Ok(best)
+    (has_hole && all_above).then_some(Walked::Off)
 }

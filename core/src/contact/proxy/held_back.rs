@@ -2,15 +2,16 @@
 
 use glam::Vec3;
 
+use super::on_ground::Felt;
 use super::{Contact, Phase, Turn};
 use crate::contact::budget::Budget;
 use crate::contact::closest_point::{Leave, position_on};
 use crate::contact::friction::{Cone, Friction, Rules, Walk, Walked};
 use crate::contact::output::ContactState;
 use crate::contact::settings::Execution;
-use crate::contact::surface::HipView;
+use crate::contact::surface::{HipView, SurfacePoint};
 use crate::grid::GridPoint;
-use crate::terrain::Window;
+use crate::terrain::{TileIndex, Window};
 
 /// A proxy that slides sticks again when it has not moved for so long, s: longer than
 /// a slow hand waits for its next encoder count.
@@ -101,7 +102,6 @@ impl Contact {
         while self.walks_on(window, hip, &mut budget) == Turn::GoesOn {}
         self.hip = hip;
         self.output.work = budget.spent();
-        self.answers_from_the_surface(window);
         self.counts_stillness();
     }
 
@@ -119,22 +119,31 @@ impl Contact {
             }
             _ => self.redirect(window, hip, None, budget),
         }
-        self.walks_from_here(window);
+        match self.output.state {
+            ContactState::Touching => self.walks_from(self.output.proxy),
+            _ => self.walks_from_here(window),
+        }
     }
 
-    /// The motion of the tick counts from where the proxy is.
+    /// The walk begins where the proxy is.
+    #[inline(never)]
     fn walks_from_here<const D: usize>(&mut self, window: &Window<'_, D>) {
+        let at = match &self.phase {
+            Phase::OnSurface(on) => position_on(window, &on.descent.entry()),
+            _ => None,
+        };
+        self.walks_from(at.unwrap_or(self.output.proxy));
+    }
+
+    /// The motion of the tick counts from there.
+    fn walks_from(&mut self, at: GridPoint) {
         let Some(rough) = &mut self.rough else { return };
+        rough.from = at;
         rough.stage = match rough.friction.is_none() {
             // A material without friction, in a scene that has others.
             true => Stage::Descends,
             false => Stage::Begins,
         };
-        if let Phase::OnSurface(on) = &self.phase
-            && let Some(from) = position_on(window, &on.descent.entry())
-        {
-            rough.from = from;
-        }
     }
 
     /// One step of what the proxy does.
@@ -209,13 +218,15 @@ impl Contact {
             on.descent.restart(walk.point);
         }
         match walked {
-            Walked::Rests(missing) => self.touches(window, hip, missing.is_none(), missing),
+            Walked::Rests(missing) => {
+                self.is_held_at(window, hip, walk.point, missing.is_none(), missing)
+            }
             Walked::Missing(tile) => {
                 // Also where the proxy's own patch is in that tile.
                 (self.output.converged, self.output.missing_tile) = (false, Some(tile));
-                self.touches(window, hip, false, Some(tile))
+                self.is_held_at(window, hip, walk.point, false, Some(tile))
             }
-            Walked::Suspended => self.touches(window, hip, false, None),
+            Walked::Suspended => self.is_held_at(window, hip, walk.point, false, None),
             Walked::Leaves => self.leaves(window, &HipView::new(hip), hip),
             Walked::Off => {
                 (rough.stage, rough.held) = (Stage::Descends, Vec3::ZERO);
@@ -224,17 +235,26 @@ impl Contact {
         }
     }
 
-    /// In contact the answer is told from the surface, not as the HIP sees it: a proxy that stays
-    /// has the same bits for every HIP.
-    fn answers_from_the_surface<const D: usize>(&mut self, window: &Window<'_, D>) {
-        if let Phase::OnSurface(on) = &self.phase {
-            let nearest = on.descent.nearest(window, &HipView::new(self.hip));
-            let proxy = nearest.and_then(|(point, _)| position_on(window, &point));
-            if let Some(proxy) = proxy {
-                self.output.proxy = proxy;
-                self.output.displacement = self.hip.to(&proxy) * on.fade;
-            }
-        }
+    /// The answer of a walk that ends here. It is told from the surface, not as the HIP sees it: a
+    /// proxy that is held has the same bits for every HIP.
+    #[inline(never)]
+    fn is_held_at<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        point: SurfacePoint,
+        converged: bool,
+        missing_tile: Option<TileIndex>,
+    ) -> Turn {
+        let Some(proxy) = position_on(window, &point) else {
+            return Turn::Ends;
+        };
+        let felt = Felt {
+            point,
+            proxy,
+            displacement: hip.to(&proxy),
+        };
+        self.touches_at(window, hip, felt, converged, missing_tile)
     }
 
     /// Counts how long the proxy has not moved, by the answers that count, and whether the next

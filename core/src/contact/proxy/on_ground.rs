@@ -1,5 +1,7 @@
 //! A tick of a proxy on the surface, and of one that lost it.
 
+use glam::Vec3;
+
 use super::departures::count_departure;
 use super::{Contact, Phase, Sweeping, Turn};
 use crate::contact::boundary_fade::{self, approach};
@@ -8,10 +10,19 @@ use crate::contact::closest_point::{Ended, Leave, position_on};
 use crate::contact::output::{ContactOutput, ContactState};
 use crate::contact::settings::{Execution, Rule};
 use crate::contact::shortcut::Follow;
-use crate::contact::surface::HipView;
+use crate::contact::surface::{HipView, SurfacePoint};
 use crate::contact::sweep::Path;
 use crate::grid::{Cell, GridPoint};
 use crate::terrain::{TileIndex, Window};
+
+/// A point of the surface that is felt.
+pub(super) struct Felt {
+    pub(super) point: SurfacePoint,
+    /// Where it is.
+    pub(super) proxy: GridPoint,
+    /// From the HIP to it, cells.
+    pub(super) displacement: Vec3,
+}
 
 impl Contact {
     /// On the surface: downhill to the closest point.
@@ -77,23 +88,44 @@ impl Contact {
         Turn::GoesOn
     }
 
-    /// The answer in contact, faded where the surface ends.
+    /// The answer in contact at the nearest point that is known, faded where the surface ends.
     pub(super) fn touches<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
-        mut converged: bool,
-        mut missing_tile: Option<TileIndex>,
+        converged: bool,
+        missing_tile: Option<TileIndex>,
     ) -> Turn {
-        let is_real_time = self.settings.execution == Execution::RealTime;
-        let most = boundary_fade::RATE_PER_S * self.settings.rate.tick_s();
         let view = HipView::new(hip);
-        let Phase::OnSurface(on) = &mut self.phase else {
+        let Phase::OnSurface(on) = &self.phase else {
             return Turn::Ends;
         };
         let Some((point, z)) = on.descent.nearest(window, &view) else {
             return Turn::Ends;
         };
+        let felt = Felt {
+            point,
+            proxy: view.position(&point, z),
+            displacement: view.displacement(&point, z),
+        };
+        self.touches_at(window, hip, felt, converged, missing_tile)
+    }
+
+    /// The answer in contact, faded where the surface ends.
+    pub(super) fn touches_at<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        hip: GridPoint,
+        felt: Felt,
+        mut converged: bool,
+        mut missing_tile: Option<TileIndex>,
+    ) -> Turn {
+        let is_real_time = self.settings.execution == Execution::RealTime;
+        let most = boundary_fade::RATE_PER_S * self.settings.rate.tick_s();
+        let Phase::OnSurface(on) = &mut self.phase else {
+            return Turn::Ends;
+        };
+        let point = felt.point;
         let mut may_follow = self.settings.shortcuts && self.settings.rule == Rule::Swept;
         if converged || is_real_time {
             let target = boundary_fade::target(window, &hip, point.cell);
@@ -109,7 +141,7 @@ impl Contact {
                 }
             }
         }
-        let displacement = view.displacement(&point, z) * on.fade;
+        let displacement = felt.displacement * on.fade;
         // A proxy that has stayed in its patch is likely to stay for another tick.
         let [x, y, _] = self.output.proxy.cell();
         let stayed = point.cell == Cell::new(x, y);
@@ -123,7 +155,7 @@ impl Contact {
         }
         // Field by field: a whole answer would be made elsewhere first, and copied.
         self.output.state = ContactState::Touching;
-        self.output.proxy = view.position(&point, z);
+        self.output.proxy = felt.proxy;
         self.output.displacement = displacement;
         self.output.converged = converged;
         self.output.missing_tile = missing_tile;
