@@ -89,6 +89,12 @@ impl Output {
         &self.path
     }
 
+    /// Where it grows until it is complete; none for a pipe, a device and standard output.
+    #[must_use]
+    pub fn partial(&self) -> Option<&Path> {
+        self.beside.as_deref()
+    }
+
     /// Puts the complete file in its place.
     ///
     /// # Errors

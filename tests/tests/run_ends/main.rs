@@ -3,6 +3,7 @@
 #![cfg(unix)]
 
 mod bringup;
+mod guardian;
 mod hostile;
 mod terminal;
 

@@ -11,6 +11,7 @@ use super::watch::Watch;
 use super::{Args, OTHER_FILE};
 use crate::cli::bringup::required::{brought_up, drives_no_arm};
 use crate::cli::failure::{Failure, OrHint};
+use crate::cli::guardian::{self, News};
 use crate::cli::options::placing;
 use crate::cli::options::steering::ViewControl;
 use crate::cli::session_summary::{self, SessionSummary};
@@ -80,12 +81,12 @@ impl<'t> Serving<'_, 't> {
         let name = speaker.name().unwrap_or_default();
         let tell = |line: &str| speaker.tell(line);
         let service = service(args, (device, placed), &tell);
-        interrupt::device_may_be_armed(name, true);
+        let may_be_armed = |may| interrupt::device_may_be_armed(name, &device.address, may);
+        may_be_armed(true);
         let met = self.met;
         let opened = service.open(|line| met.and_then(|()| fit_to_serve(args, device, line)));
         // Where it could not be opened, what has to be told is told.
-        let (served, hello) =
-            opened.inspect_err(|_| interrupt::device_may_be_armed(name, false))?;
+        let (served, hello) = opened.inspect_err(|_| may_be_armed(false))?;
         let how = session_summary::in_words(placed.terrain);
         speaker.say(format!("terrain        {}: {how}", args.terrain.name()));
         speaker.show(placing::told(&placed.view, placed.terrain));
@@ -132,7 +133,7 @@ impl<'t> Serving<'_, 't> {
         let log = watch.finish();
         let kept = log.kept.or_hint(OTHER_FILE);
         let ended = told(end.why, end.disarmed, &tell).and(came(log.stood_still));
-        interrupt::device_may_be_armed(name, false);
+        may_be_armed(false);
         let summary = SessionSummary {
             ticks: log.ticks,
             device: hello,
@@ -248,6 +249,9 @@ pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure
     let columns = [state, tick, work, cost, late, mode, limits, view];
     let recording = device.record.as_deref().map(|path| {
         let output = Output::create(path)?;
+        if let Some(partial) = output.partial() {
+            guardian::report(&News::Recording(partial.to_owned()));
+        }
         Recording::new(output, &columns)
     });
     recording.transpose().or_hint(OTHER_FILE)
