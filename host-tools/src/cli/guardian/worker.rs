@@ -1,7 +1,7 @@
 //! The worker's end of the two pipes.
 
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 use std::os::unix::process::parent_id;
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::thread::Builder;
@@ -18,29 +18,36 @@ static NEWS: OnceLock<Mutex<File>> = OnceLock::new();
 
 /// Connects to the guardian. Returns false if no guardian has started this process.
 pub(super) fn begin() -> bool {
-    let Some((presses, news)) = pipes() else {
+    let Some([presses, news]) = descriptors() else {
         return false;
     };
-    let _ = NEWS.set(Mutex::new(news));
-    // Without the thread the guardian still ends this process by force.
-    let _ = Builder::new()
-        .name("guardian".into())
-        .spawn(move || listen(presses));
+    let connected = pipes(presses, news).and_then(|(presses, news)| {
+        let _ = NEWS.set(Mutex::new(news));
+        let listen = move || listen(presses);
+        Builder::new().name("guardian".into()).spawn(listen)
+    });
+    if let Err(error) = connected {
+        // The guardian still sees the end of this process, and passes signals on.
+        eprintln!("warning: the guardian is not told which arm may be armed: {error}");
+    }
     true
 }
 
-fn pipes() -> Option<(File, File)> {
+/// The numbers of the two descriptors, if this process is the child that they are for.
+fn descriptors() -> Option<[u32; 2]> {
     let variable = std::env::var(VARIABLE).ok()?;
-    let [parent, presses, news] = &variable.split(':').collect::<Vec<_>>()[..] else {
-        return None;
-    };
-    let of = |descriptor: &str| format!("/dev/fd/{descriptor}");
-    match parent.parse() == Ok(parent_id()) {
-        true => File::open(of(presses))
-            .and_then(|presses| Ok((presses, File::options().write(true).open(of(news))?)))
-            .ok(),
-        false => None,
+    let numbers: Vec<u32> = variable.split(':').map_while(|n| n.parse().ok()).collect();
+    match numbers[..] {
+        [guardian, presses, news] if guardian == parent_id() => Some([presses, news]),
+        _ => None,
     }
+}
+
+fn pipes(presses: u32, news: u32) -> io::Result<(File, File)> {
+    let of = |descriptor: u32| format!("/dev/fd/{descriptor}");
+    let presses = File::open(of(presses))?;
+    let news = File::options().write(true).open(of(news))?;
+    Ok((presses, news))
 }
 
 pub(super) fn is_worker() -> bool {
