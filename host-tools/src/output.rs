@@ -262,6 +262,10 @@ fn is_partial(beginning: &str, name: &OsStr) -> bool {
 
 /// Whether no process is writing a partial file.
 fn is_nobodys(path: &Path) -> bool {
+    // To open a pipe waits for a writer.
+    if !path.metadata().is_ok_and(|there| there.is_file()) {
+        return false;
+    }
     let file = File::open(path);
     file.is_ok_and(|file| !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }
