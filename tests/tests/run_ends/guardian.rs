@@ -149,7 +149,7 @@ fn device(is_on: Arc<AtomicBool>, is_pressed: Arc<AtomicBool>) -> Native {
 }
 
 /// The recording that was cut off.
-fn partial(folder: &Path) -> Option<String> {
+pub(super) fn partial(folder: &Path) -> Option<String> {
     let names = std::fs::read_dir(folder).expect("listed");
     let names = names.map(|entry| entry.expect("entry").file_name());
     let mut names = names.filter_map(|name| name.into_string().ok());

@@ -109,6 +109,7 @@ impl Watch {
         if status.signal().is_some() || !self.may_be_armed.is_empty() {
             self.clean_up(status, was_killed);
         }
+        self.name_recordings();
         let code = match (was_killed, status.signal()) {
             (true, _) => INTERRUPTED,
             (false, Some(signal)) => 128 + signal,
@@ -199,6 +200,10 @@ impl Watch {
         if let Some(line) = interrupt::not_confirmed(&self.may_be_armed) {
             interrupt::say(line);
         }
+    }
+
+    /// Names what is left of recordings.
+    fn name_recordings(&self) {
         for path in &self.recordings {
             if let Ok(file) = fs::metadata(path) {
                 let (path, bytes) = (path.display(), file.len());

@@ -1,5 +1,6 @@
 //! The session with one device, from its opening to its last word.
 
+use std::path::Path;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -22,7 +23,7 @@ use crate::link::{
     Arming, DeviceAddress, HostClock, LinkError, Native, Patience, Tcp, Transport, serve_plant,
 };
 use crate::materials::Materials;
-use crate::output::Output;
+use crate::output::{Output, folder_of};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::Laid;
 use crate::remote::without_key;
@@ -36,6 +37,9 @@ use crate::steering::CommandQueue;
 const RETRY: Duration = Duration::from_millis(500);
 /// For how long the virtual arm stays after the session has ended.
 const LINGER: Duration = Duration::from_secs(2);
+
+/// Bytes that a recording may have on any disk: a day of CSV at 1 kHz.
+const MOST_RECORDED: u64 = 16 << 30;
 
 /// A device that is to be served, and all that it is given.
 pub(super) struct Serving<'p, 't> {
@@ -248,13 +252,20 @@ pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure
     let [tick, work, cost, late] = ["tick", "work", "cost", "late"].map(Column::Count);
     let columns = [state, tick, work, cost, late, mode, limits, view];
     let recording = device.record.as_deref().map(|path| {
-        let output = Output::create(path)?;
+        let output = Output::create(path)?.of_recording(most_recorded(path));
         if let Some(partial) = output.partial() {
             guardian::report(&News::Recording(partial.to_owned()));
         }
         Recording::new(output, &columns)
     });
     recording.transpose().or_hint(OTHER_FILE)
+}
+
+/// Bytes that a recording may have: half of what is free at its beginning, so that no device
+/// fills the disk, however fast its samples come.
+fn most_recorded(path: &Path) -> u64 {
+    let free = fs4::available_space(folder_of(path));
+    free.map_or(MOST_RECORDED, |free| MOST_RECORDED.min(free / 2))
 }
 
 /// The recording, with the settings in which the device feels the terrain.
