@@ -25,13 +25,17 @@ pub struct OutputError {
 }
 
 /// A file being written. Dropped before [`Output::finish`], it leaves nothing
-/// behind.
+/// behind, but for a recording that could not be written on ([`Output::of_recording`]).
 pub struct Output {
     path: PathBuf,
     writer: BufWriter<File>,
     /// Where it is written, beside the file that it will replace; none for a
     /// pipe, a device and standard output, where there is nothing to replace.
     beside: Option<TempPath>,
+    /// What is written stays where it cannot be written on.
+    is_recording: bool,
+    /// Bytes that it may still have.
+    room: u64,
 }
 
 impl Output {
@@ -61,6 +65,8 @@ impl Output {
             path: path.to_owned(),
             writer: BufWriter::with_capacity(1 << 16, file),
             beside,
+            is_recording: false,
+            room: u64::MAX,
         })
     }
 
@@ -80,7 +86,28 @@ impl Output {
             path: path.to_owned(),
             writer: BufWriter::with_capacity(1 << 16, file),
             beside: None,
+            is_recording: false,
+            room: u64::MAX,
         })
+    }
+
+    /// The same of a recording: as nobody can make it again, its partial file stays where it
+    /// cannot be written to the end. It takes `most` bytes at most, because a device decides how
+    /// fast it grows.
+    #[must_use]
+    pub fn of_recording(self, most: u64) -> Self {
+        Self {
+            is_recording: true,
+            room: most,
+            ..self
+        }
+    }
+
+    /// Keeps what is written of a recording.
+    fn keep(&mut self) {
+        if let (true, Some(beside)) = (self.is_recording, &mut self.beside) {
+            beside.disable_cleanup(true);
+        }
     }
 
     /// The file's path.
@@ -89,12 +116,23 @@ impl Output {
         &self.path
     }
 
+    /// Where it grows until it is complete; none for a pipe, a device and standard output.
+    #[must_use]
+    pub fn partial(&self) -> Option<&Path> {
+        self.beside.as_deref()
+    }
+
     /// Puts the complete file in its place.
     ///
     /// # Errors
     /// When it cannot be written to the end.
-    pub fn finish(self) -> Result<(), OutputError> {
+    pub fn finish(mut self) -> Result<(), OutputError> {
+        let flushed = self.writer.flush().inspect_err(|_| self.keep());
         let path = self.path;
+        flushed.map_err(|source| OutputError {
+            path: path.clone(),
+            source,
+        })?;
         let finished = self.writer.into_inner().map_err(|error| error.into_error());
         let placed = finished.and_then(|mut file| match self.beside {
             Some(beside) => beside.persist(&path).map_err(|error| error.error),
@@ -106,7 +144,14 @@ impl Output {
 
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.writer.write(bytes)
+        let written = match self.room.checked_sub(bytes.len() as u64) {
+            Some(room) => {
+                self.room = room;
+                self.writer.write(bytes)
+            }
+            None => Err(io::Error::other("it has as many bytes as it may have")),
+        };
+        written.inspect_err(|_| self.keep())
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -256,6 +301,10 @@ fn is_partial(beginning: &str, name: &OsStr) -> bool {
 
 /// Whether no process is writing a partial file.
 fn is_nobodys(path: &Path) -> bool {
+    // To open a pipe waits for a writer.
+    if !path.metadata().is_ok_and(|there| there.is_file()) {
+        return false;
+    }
     let file = File::open(path);
     file.is_ok_and(|file| !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }
@@ -293,6 +342,25 @@ mod tests {
         output.finish().expect("finished");
         assert_eq!(std::fs::read(&path).expect("there"), b"all");
         assert_eq!(entries(), 1);
+    }
+
+    #[test]
+    fn recording_that_cannot_grow_is_kept() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("felt.csv");
+        let begin = || Output::create(&path).expect("created").of_recording(12);
+        let mut output = begin();
+        output.write_all(b"eight by").expect("written");
+        drop(output);
+        assert_eq!(left_behind(&path), [], "it was not wanted");
+        let mut output = begin();
+        output.write_all(b"eight by").expect("written");
+        assert!(output.write_all(b"eight by").is_err(), "too many");
+        drop(output);
+        let [left] = &left_behind(&path)[..] else {
+            panic!("none, or several");
+        };
+        assert_eq!(left.bytes, 8);
     }
 
     #[test]

@@ -84,6 +84,18 @@ impl Served {
         wait_until("a goodbye", || byes.load(Ordering::Relaxed) > 0);
     }
 
+    /// Waits until a host, or its guardian, has said anything that ends a session to the
+    /// device, which is deaf.
+    pub fn wait_for_unheard_end(&self) {
+        let count = |of: &AtomicU64| of.load(Ordering::Relaxed);
+        let Seen {
+            unheard_hellos,
+            unheard_byes,
+            ..
+        } = &*self.seen;
+        wait_until("an end", || count(unheard_hellos) + count(unheard_byes) > 0);
+    }
+
     /// How the last session ended, as the next host hears it.
     pub fn last_end(&self) -> SessionEnd {
         self.dialogue().device().last.end

@@ -233,3 +233,32 @@ fn damaged_copies_of_good_files_never_panic() {
         "{panicked} of {copies} decoders failed"
     );
 }
+
+/// To open a pipe waits for a writer: it is refused by its kind before that.
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_are_refused_unopened() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = |name: &str| {
+        let path = folder.path().join(name);
+        let made = Command::new("mkfifo").arg(&path).status();
+        assert!(made.expect("mkfifo runs").success());
+        path
+    };
+    let told = |path: &Path| String::from_utf8_lossy(&info(path).stderr).into_owned();
+    for (path, kind) in [
+        (pipe("pipe.tif"), "it is a pipe (FIFO)"),
+        ("/dev/zero".into(), "it is a character device"),
+    ] {
+        assert!(!assert_ends_well(&path));
+        assert!(told(&path).contains(kind), "{}", told(&path));
+    }
+    // One that is named like what a killed command left holds nothing up.
+    let _ = pipe("out.tif.a1B2c3.partial");
+    let made = Command::new(hapterra_binary())
+        .args(["synth", "fractal", "--size", "16", "-o"])
+        .arg(folder.path().join("out.tif"))
+        .spawn();
+    let made = end_of(made.expect("the binary starts"));
+    assert!(made.status.success(), "{:?}", made.status);
+}

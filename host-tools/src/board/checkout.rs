@@ -1,4 +1,4 @@
-//! The source of the firmware, where this program is run inside it.
+//! The source of the firmware, where this program was built from it.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -35,17 +35,22 @@ pub enum BuildError {
 }
 
 impl Checkout {
-    /// The checkout that `folder` lies in.
+    /// The checkout that this program was built from, where it is still there. Another one, as
+    /// around the working folder, may be a stranger's: what is built there is run there, too.
     #[must_use]
-    pub fn around(folder: &Path) -> Option<Self> {
-        let root = folder.ancestors().find(|root| {
-            let manifest = std::fs::read_to_string(root.join("firmware/Cargo.toml"));
-            manifest.is_ok_and(|text| text.contains("name = \"hapterra-firmware\""))
-                && root.join("xtask/Cargo.toml").is_file()
-        });
-        root.map(|root| Self {
+    pub fn own() -> Option<Self> {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent()?;
+        let manifest = std::fs::read_to_string(root.join("firmware/Cargo.toml"));
+        let is_one = manifest.is_ok_and(|text| text.contains("name = \"hapterra-firmware\""));
+        is_one.then(|| Self {
             root: root.to_owned(),
         })
+    }
+
+    /// Its folder.
+    #[must_use]
+    pub fn root(&self) -> &Path {
+        &self.root
     }
 
     /// Builds the image of a board and gives the ELF's path.
@@ -79,11 +84,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_checkout_is_found_from_any_folder_in_it_and_nowhere_else() {
+    fn own_checkout_is_that_of_this_source() {
         let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let found = Checkout::around(&here.join("src/board")).expect("this is one");
-        assert_eq!(Some(found.root.as_path()), here.parent());
-        let elsewhere = tempfile::tempdir().expect("a folder");
-        assert_eq!(Checkout::around(elsewhere.path()), None);
+        let own = Checkout::own().expect("this is one");
+        assert_eq!(Some(own.root()), here.parent());
     }
 }

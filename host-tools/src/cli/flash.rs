@@ -20,7 +20,7 @@ pub struct Args {
     #[arg(long, value_name = "BOARD", value_parser = parse_board)]
     pub board: &'static Board,
 
-    /// Its image [default: built from the checkout that this is run in]
+    /// Its image [default: built from the checkout that this program was built from]
     #[arg(long, value_name = "ELF", value_hint = ValueHint::FilePath)]
     pub image: Option<PathBuf>,
 
@@ -96,13 +96,13 @@ fn image(args: &Args) -> Result<PathBuf, Failure> {
     if let Some(path) = &args.image {
         return Ok(path.clone());
     }
-    let here = std::env::current_dir().map_err(Failure::new)?;
-    let checkout = Checkout::around(&here)
+    let checkout = Checkout::own()
         .ok_or_else(|| {
-            let (board, here) = (args.board.name, here.display());
-            format!("no image of {board}: looked for the project's source around {here}")
+            let board = args.board.name;
+            format!("no image of {board}: the source that this program was built from is gone")
         })
-        .or_hint("name one with --image ELF, or run this inside a checkout")?;
+        .or_hint("name one with --image ELF, or build this program anew in a checkout")?;
+    println!("source         {}", checkout.root().display());
     let built = checkout.build(args.board);
     built.or_hint("what cargo said above tells why")
 }

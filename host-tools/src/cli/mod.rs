@@ -4,6 +4,7 @@
 //! - [`options`]: what several subcommands let their user say;
 //! - `terminal`: progress, Ctrl-C, and prompts while a command runs;
 //! - [`failure`] and `hints`: what an error looks like, and what to do about it;
+//! - `guardian`: the process that outlives one whose arm may be armed;
 //! - `report`: what a command exists to print;
 //! - `log` and `sparing`: diagnostics, and lines that a device can cause kept to so many
 //!   a second.
@@ -14,6 +15,7 @@ pub mod calibrate;
 pub mod demo;
 pub mod failure;
 pub mod flash;
+mod guardian;
 mod hints;
 pub mod info;
 pub mod list;
@@ -86,6 +88,10 @@ pub enum Command {
 /// 2 on wrong usage.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
+    let may_arm = matches!(cli.command, Command::Run(_) | Command::Bringup(_));
+    if may_arm && let Some(code) = guardian::watch() {
+        return code;
+    }
     let log = log::to_stderr(cli.verbose);
     let outcome = match cli.command {
         Command::Info(args) => info::run(&args),

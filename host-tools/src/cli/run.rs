@@ -24,7 +24,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::ValueHint;
-use hapterra_core::wire::session::{DEFAULT_SILENCE_S, SILENCE_S};
+use hapterra_core::wire::session::SILENCE_S;
 
 use super::failure::{Failure, OrHint};
 use super::options::placing::Placing;
@@ -43,6 +43,12 @@ use devices::OneDevice;
 use placed::{InReach, Placed};
 use session::{Serving, recording};
 use together::serve_each;
+
+/// The device lets an armed arm be for so long, seconds, without a word from here, where the user
+/// does not say: longer than a host that goes on takes to come back.
+const SILENCE_BY_DEFAULT_S: u16 = 30;
+/// The stiffest surface that `hapterra stability` tries by itself.
+const STIFFEST_TRIED_N_PER_MM: f32 = 20.0;
 
 /// What to do where the recording cannot be written.
 const OTHER_FILE: &str = "name another file with --record";
@@ -77,7 +83,7 @@ pub struct Args {
 
     /// For how many seconds the device lets an armed arm be while it hears nothing from
     /// here; then it lets the force out and disarms
-    #[arg(long, value_name = "S", default_value_t = DEFAULT_SILENCE_S,
+    #[arg(long, value_name = "S", default_value_t = SILENCE_BY_DEFAULT_S,
           value_parser = clap::value_parser!(u16).range(i64::from(SILENCE_S.0)..=i64::from(SILENCE_S.1)))]
     pub silence_s: u16,
 
@@ -142,6 +148,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut asked = args.placing.of(&args.rendering, &raster)?;
     asked.grid = asked.grid.with_materials(materials.as_ref());
     let law = args.rendering.law()?;
+    check_stiffness(law.stiffness_n_per_mm)?;
     let law = args.rendering.materials.law(materials.as_ref(), law);
     let law = (law, args.rendering.rule());
     // What cannot be recorded is known before anything is armed.
@@ -178,6 +185,17 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         shown: shown.take(),
     });
     serve_each(servings.collect())
+}
+
+/// Checks that an arm can be meant by a stiffness.
+fn check_stiffness(n_per_mm: f32) -> Result<(), Failure> {
+    if n_per_mm <= STIFFEST_TRIED_N_PER_MM {
+        return Ok(());
+    }
+    Err(Failure::new(format!(
+        "a stiffness of {n_per_mm} N/mm: no arm feels more than {STIFFEST_TRIED_N_PER_MM} N/mm"
+    ))
+    .hint("people hold 0.4 to 0.8 N/mm: hapterra stability tries what an arm holds still"))
 }
 
 /// Makes something of each, or says what is wrong with the first for which that fails.

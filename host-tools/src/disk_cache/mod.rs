@@ -155,6 +155,10 @@ fn make_private(folder: &Path) -> io::Result<()> {
 }
 
 fn read(path: &Path, name: &Name) -> io::Result<Vec<u8>> {
+    // To open a pipe waits for a writer.
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::other("it is no record"));
+    }
     let file = File::open(path)?;
     let metadata = file.metadata()?;
     let most = (LARGEST_RECORD + record::HEAD) as u64;

@@ -100,6 +100,15 @@ impl<'t> Dialogue<'t> {
         self.exchange.end()
     }
 
+    /// As [`Dialogue::end`], and the device is disarmed, whoever has armed it.
+    ///
+    /// # Errors
+    /// As [`Dialogue::end`].
+    pub fn disarm(mut self) -> Result<(), LinkError> {
+        self.exchange.drives = true;
+        self.end()
+    }
+
     /// The state of the device as it answers: guard, calibration, ticks, stack.
     ///
     /// # Errors

@@ -12,7 +12,7 @@ const LARGEST_CELL_MM: f64 = 50.0;
 const SMALLEST_TERRAIN_MM: f64 = 5.0;
 /// Above this an arm most likely buzzes or kicks, N/mm: people hold 0.4 to 0.8 N/mm on a
 /// Premium 1.5 (`docs/hardware.md`).
-const STIFFEST_N_PER_MM: f32 = 1.0;
+pub const STIFFEST_N_PER_MM: f32 = 1.0;
 /// Less is not felt, N/mm.
 const SOFTEST_N_PER_MM: f32 = 0.005;
 
@@ -148,6 +148,9 @@ pub struct Changed<'r> {
     /// The HIP, hand millimetres of the new view. Its height over the place under
     /// the hand is what it was.
     pub hip_mm: [f64; 3],
+    /// Whether the heights that this follows from have been read. If not, the HIP has the
+    /// height of before, and the same changes give the right one when they have come.
+    pub ground_came: bool,
 }
 
 impl Bounds {
@@ -181,13 +184,14 @@ impl Bounds {
             None => finest_level(&grid, self.resolution_mm, &laid.view.scale),
         };
         let terrain_after = terrain.relaid(grid, laid.view.scale, laid.view.level)?;
-        let hip_mm = hip_after((terrain, &terrain_after), hand, at_mm, at);
+        let (hip_mm, ground_came) = hip_after((terrain, &terrain_after), hand, at_mm, at);
         let moved = |axis: usize| before.view.home_mm[axis] + hip_mm[axis] - hand.hip_mm[axis];
         let home_mm = [moved(0), moved(1), moved(2)];
         let was = (before.view.scale, terrain.grid());
         laid.view = laid.view.moved_to(&grid, home_mm, was);
         Ok(Changed {
             laid,
+            ground_came,
             terrain: terrain_after,
             hip_mm,
         })
@@ -253,13 +257,13 @@ impl Bounds {
 }
 
 /// The HIP in the view that comes after: beside the place under the hand as far as before,
-/// and as high over its ground, or as deep.
+/// and as high over its ground, or as deep; and whether that ground has been read.
 fn hip_after(
     (before, after): (&Terrain<'_>, &Terrain<'_>),
     hand: &Hand,
     at_mm: [f64; 3],
     at: [f64; 2],
-) -> [f64; 3] {
+) -> ([f64; 3], bool) {
     let cell_mm = after.scale_of_level_0().cell_mm();
     let [east, north] = at.map(|cells| cells * cell_mm);
     let beside = |axis: usize| hand.hip_mm[axis] - at_mm[axis];
@@ -267,23 +271,30 @@ fn hip_after(
         Some(proxy) => Some(proxy[2]),
         None => before.height_mm(at_mm[0], at_mm[1]),
     };
+    let (ground_after, came) = ground_of(after, [east, north], at);
     // Over a hole the height stays what it is.
     let risen = ground_before
-        .zip(ground_of(after, [east, north], at))
+        .zip(ground_after)
         .map_or(0.0, |(before, after)| after - before);
-    [east + beside(0), north + beside(1), hand.hip_mm[2] + risen]
+    let hip_mm = [east + beside(0), north + beside(1), hand.hip_mm[2] + risen];
+    (hip_mm, came)
 }
 
 /// The ground at a place, in millimetres and in felt cells of level 0. Where the terrain's level
-/// is coarse and not here yet it is that of the finest level.
-fn ground_of(terrain: &Terrain<'_>, [east, north]: [f64; 2], at: [f64; 2]) -> Option<f64> {
-    let before = terrain.raster().not_yet();
+/// is coarse and not here yet it is that of the finest level. And whether that has been read: a
+/// hole has.
+fn ground_of(terrain: &Terrain<'_>, [east, north]: [f64; 2], at: [f64; 2]) -> (Option<f64>, bool) {
+    let not_yet = || terrain.raster().not_yet();
+    let before = not_yet();
     let ground = terrain.height_mm(east, north);
-    if ground.is_some() || terrain.raster().not_yet() == before {
-        return ground;
+    if ground.is_some() || not_yet() == before {
+        return (ground, true);
     }
-    let height = terrain.grid().surface(at)?;
-    Some(height * terrain.scale().height_mm_per_unit())
+    let before = not_yet();
+    let height = terrain.grid().surface(at);
+    let came = height.is_some() || not_yet() == before;
+    let per_unit = terrain.scale().height_mm_per_unit();
+    (height.map(|height| height * per_unit), came)
 }
 
 fn factor_of(factor: f64) -> Result<f64, ChangeError> {

@@ -15,7 +15,7 @@ mod target;
 mod view;
 mod words;
 
-pub use change::{Bounds, ChangeError, Changed, Hand, Laid, ViewChange};
+pub use change::{Bounds, ChangeError, Changed, Hand, Laid, STIFFEST_N_PER_MM, ViewChange};
 pub use coordinates::Coordinates;
 pub use error::PlaceError;
 pub use reach::{Reach, ReachBox};

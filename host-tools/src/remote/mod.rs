@@ -15,11 +15,13 @@
 //! A file that was changed at its server is not read on: what was fetched of it and what
 //! would come do not belong together.
 //!
-//! `object_store` makes the requests; it is named in `store`, `servers` and `errors` only.
+//! `object_store` makes the requests; it is named in `store`, `servers`, `capped` and `errors` only.
 //! Without the feature `remote` there is no such file (`absent`).
 
 #[cfg(not(feature = "remote"))]
 mod absent;
+#[cfg(feature = "remote")]
+mod capped;
 #[cfg(feature = "remote")]
 mod elsewhere;
 #[cfg(feature = "remote")]

@@ -1,5 +1,7 @@
 //! What the user wants of the view, done with a device.
 
+use std::time::{Duration, Instant};
+
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::guard::Limits;
@@ -16,6 +18,9 @@ const WAITING: usize = 64;
 /// The clutch opens in 100 ticks of a millisecond; a device that has not opened it after so
 /// many samples is not going to.
 const SAMPLES_TO_OPEN: u32 = 5_000;
+
+/// For so long the ground under the hand in another view is waited for, with the clutch open.
+const GROUND_WITHIN: Duration = Duration::from_secs(2);
 
 /// A view that is to be put in.
 pub struct Put<'r> {
@@ -60,6 +65,8 @@ pub struct Steering<'r> {
     measures: bool,
     /// How the device was asked to hold it.
     asked: ClutchHold,
+    /// Since when the ground of another view has been awaited.
+    awaits: Option<Instant>,
     stage: Stage<'r>,
     asks: Vec<Ask>,
     put: Option<Put<'r>>,
@@ -81,6 +88,7 @@ impl<'r> Steering<'r> {
             by_input: false,
             measures: false,
             asked: ClutchHold::LetGo,
+            awaits: None,
             stage: Stage::Idle,
             asks: vec![],
             put: None,
@@ -246,8 +254,16 @@ impl<'r> Steering<'r> {
             return;
         }
         let changes = std::mem::take(&mut self.waiting);
-        match self.next_view(&changes, sample) {
-            Ok(put) => {
+        let waited = self.awaits.get_or_insert_with(Instant::now).elapsed();
+        let next = self.next_view(&changes, sample, waited < GROUND_WITHIN);
+        if let Ok(None) = next {
+            (self.waiting, self.measures) = (changes, measures);
+            return;
+        }
+        self.awaits = None;
+        match next {
+            Ok(None) => {}
+            Ok(Some(put)) => {
                 self.stage = Stage::Putting(Box::new((put.laid, put.terrain.clone())));
                 self.put = Some(put);
             }
@@ -265,14 +281,25 @@ impl<'r> Steering<'r> {
         }
     }
 
-    fn next_view(&self, changes: &[ViewChange], sample: &Sample) -> Result<Put<'r>, String> {
+    /// The view that changes make; none where its ground has not been read yet, if that is
+    /// waited for.
+    fn next_view(
+        &self,
+        changes: &[ViewChange],
+        sample: &Sample,
+        waits: bool,
+    ) -> Result<Option<Put<'r>>, String> {
         let hand = self.hand(sample);
         let changed = self.bounds.apply(&self.terrain, &self.now, changes, &hand);
         let Changed {
             laid,
             terrain,
             hip_mm,
+            ground_came,
         } = changed.map_err(|why| why.to_string())?;
+        if waits && !ground_came {
+            return Ok(None);
+        }
         let on_grid = |mm| {
             let point = terrain.scale().to_grid(mm);
             point.ok_or("that is too far from the first sample")
@@ -285,11 +312,11 @@ impl<'r> Steering<'r> {
             hip,
             keeps_tiles: terrain.has_tiles_of(&self.terrain),
         };
-        Ok(Put {
+        Ok(Some(Put {
             view,
             terrain,
             laid,
-        })
+        }))
     }
 
     fn on_viewed(&mut self, view: &View, taken: bool) {

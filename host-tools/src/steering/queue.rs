@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader};
+use std::io::{self, BufRead, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Arc;
@@ -17,6 +17,10 @@ const WAITING: usize = 256;
 /// The same where several devices are served: a device that is gone holds the others' commands
 /// up as little as its own, so beyond these its own are left out.
 const WAITING_EACH: usize = 1 << 16;
+
+/// Bytes of a line with its end; commands take some dozen. What is longer is read to here, and
+/// is the last.
+const LONGEST: u64 = 1 << 16;
 
 /// Where commands come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -186,9 +190,14 @@ fn read_lines(
         Origin::File(path) => Box::new(File::open(path)?),
     };
     std::thread::spawn(move || {
-        let lines = BufReader::new(input).lines().map_while(Result::ok);
-        for (line, number) in lines.zip(1..) {
-            if !take(&line, number) {
+        let mut input = BufReader::new(input);
+        for number in 1.. {
+            let mut line = String::new();
+            let read = input.by_ref().take(LONGEST).read_line(&mut line);
+            let is_whole = line.ends_with('\n') || (line.len() as u64) < LONGEST;
+            // Where a line has no end, nor has what follows a meaning.
+            let goes_on = matches!(read, Ok(1..)) && take(line.trim_end_matches('\n'), number);
+            if !goes_on || !is_whole {
                 return;
             }
         }
@@ -200,7 +209,18 @@ fn read_lines(
 mod tests {
     use super::*;
     use crate::place::ViewChange;
-    use crate::timeouts::{wait_for, wait_until};
+    use crate::timeouts::{next, wait_for, wait_until};
+
+    #[cfg(unix)]
+    #[test]
+    fn line_without_end_is_refused_and_the_last() {
+        let (send, lines) = sync_channel(4);
+        let take = move |line: &str, number| send.send((line.len(), number)).is_ok();
+        let endless = Origin::File("/dev/zero".into());
+        read_lines(&endless, take).expect("opened");
+        assert_eq!(next(&lines), Some((LONGEST as usize, 1)));
+        assert_eq!(next(&lines), None);
+    }
 
     #[test]
     fn commands_wait_for_their_time_and_for_the_ones_before() {

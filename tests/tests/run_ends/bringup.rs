@@ -121,7 +121,7 @@ fn the_second_signal_ends_a_bring_up_at_once_and_tells_that_the_arm_may_be_armed
     let child = armed(&served, &bench, folder.path());
     served.deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
-    served.wait_for_unheard_bye();
+    served.wait_for_unheard_end();
     signal(&child, "INT");
     let output = end_of(child);
     let told = told(&output);

@@ -3,6 +3,7 @@
 #![cfg(unix)]
 
 mod bringup;
+mod guardian;
 mod hostile;
 mod terminal;
 
@@ -87,6 +88,49 @@ fn a_silence_that_no_device_keeps_to_is_refused() {
             .expect("it runs");
         assert_eq!(output.status.code(), Some(2), "{}", told(&output));
     }
+}
+
+#[test]
+fn stiffness_that_no_arm_feels_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let served = Served::start();
+    let output = command(served.address, folder.path())
+        .args(["--stiffness-n-per-mm", "1e30"])
+        .output()
+        .expect("it runs");
+    let told = told(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("no arm feels more than 20 N/mm"), "{told}");
+}
+
+/// A bound of the system on the size of files stands for a disk that is full.
+#[test]
+fn recording_that_fills_the_disk_is_kept_and_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let served = Served::start();
+    let usual = command(served.address, folder.path());
+    let output = Command::new("sh")
+        .args(["-c", "trap '' XFSZ; ulimit -f 128; exec \"$0\" \"$@\""])
+        .arg(usual.get_program())
+        .args(usual.get_args())
+        .output()
+        .expect("it ends by itself");
+    let told = told(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("cannot write"), "{told}");
+    let partial = guardian::partial(folder.path()).expect("what was written");
+    let bytes = folder
+        .path()
+        .join(&partial)
+        .metadata()
+        .expect("there")
+        .len();
+    assert!(bytes >= 1 << 15, "{bytes}");
+    assert!(
+        told.contains(&format!("{partial} ({bytes} bytes)")),
+        "{told}"
+    );
+    assert_eq!(served.last_end(), SessionEnd::Goodbye, "{told}");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
 use std::os::fd::OwnedFd;
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ use hapterra_tests::timeouts::{end_of, pass, wait_for, wait_until};
 const A_LINE: Duration = Duration::from_millis(3_000);
 
 /// The two ends of a terminal: the window's, and the program's.
-fn terminal() -> (File, File) {
+pub(super) fn terminal() -> (File, File) {
     let window = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a terminal");
     // The program does not hold the window's end, too.
     fcntl_setfd(&window, FdFlags::CLOEXEC).expect("set");
@@ -34,14 +34,18 @@ fn terminal() -> (File, File) {
 
 /// Starts `run` with a terminal's end for all that it reads and writes.
 fn start_in(end: &File, served: &Served, folder: &Path) -> Child {
+    start_command_in(end, command(served.address, folder))
+}
+
+/// Starts a command with a terminal's end for all that it reads and writes.
+pub(super) fn start_command_in(end: &File, mut command: Command) -> Child {
     let end = || Stdio::from(OwnedFd::from(end.try_clone().expect("another")));
-    let mut command = command(served.address, folder);
     let command = command.stdin(end()).stdout(end()).stderr(end());
     command.spawn().expect("it runs")
 }
 
 /// Whether the terminal gives lines, and shows what is typed.
-fn modes(end: &File) -> LocalModes {
+pub(super) fn modes(end: &File) -> LocalModes {
     tcgetattr(end).expect("a terminal").local_modes
 }
 
@@ -115,7 +119,7 @@ fn where_nobody_reads_the_first_signal_is_a_goodbye_and_the_second_ends_it_at_on
 }
 
 /// Reads what is shown in a window until it holds a text.
-fn shows(window: &mut File, text: &str) -> String {
+pub(super) fn shows(window: &mut File, text: &str) -> String {
     shows_all(window, &[text])
 }
 

@@ -47,6 +47,8 @@ pub enum Fault {
     Page,
     /// Ranges are not known.
     NoRanges,
+    /// There is no such file, which a page of 64 MB says.
+    LongError,
 }
 
 struct Shared {
@@ -199,6 +201,10 @@ async fn between(State(shared): State<Arc<Shared>>, mut request: Request, next: 
         Fault::Error500 => return StatusCode::INTERNAL_SERVER_ERROR.into_response(),
         Fault::Forbidden => return StatusCode::FORBIDDEN.into_response(),
         Fault::Page => return "<!doctype html><title>Hills</title>".into_response(),
+        Fault::LongError => {
+            let page = Body::new(Page(shared.clone(), 64));
+            return (StatusCode::NOT_FOUND, page).into_response();
+        }
         Fault::NoRanges => drop(request.headers_mut().remove(RANGE)),
         Fault::OtherRange => {
             let other = HeaderValue::from_static("bytes=4096-8191");
@@ -228,6 +234,27 @@ async fn between(State(shared): State<Arc<Shared>>, mut request: Request, next: 
         _ => Body::from(bytes),
     };
     Response::from_parts(head, body)
+}
+
+/// So many megabytes, which are counted as they are sent.
+struct Page(Arc<Shared>, usize);
+
+impl axum::body::HttpBody for Page {
+    type Data = Bytes;
+    type Error = std::io::Error;
+
+    fn poll_frame(
+        mut self: std::pin::Pin<&mut Self>,
+        _: &mut std::task::Context<'_>,
+    ) -> std::task::Poll<Option<Result<http_body::Frame<Bytes>, Self::Error>>> {
+        let megabyte = Bytes::from_static(&[b'E'; 1 << 20]);
+        let next = self.1.checked_sub(1).map(|left| {
+            self.1 = left;
+            self.0.state().bytes += megabyte.len();
+            Ok(http_body::Frame::data(megabyte))
+        });
+        std::task::Poll::Ready(next)
+    }
 }
 
 /// Some bytes, and then the line is gone.

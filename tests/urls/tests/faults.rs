@@ -69,6 +69,17 @@ fn what_it_never_answers_is_told_with_the_file_and_why() {
 }
 
 #[test]
+fn long_page_of_an_error_is_not_read_to_its_end() {
+    let (_folder, server) = hills();
+    server.fail(Fault::LongError, usize::MAX);
+    let told = open(&server, "hills.tif").expect_err("none");
+    assert!(told.contains("there is no such file"), "{told}");
+    let (requests, bytes) = server.seen();
+    // Besides what is on its way in the system's buffers.
+    assert!(bytes <= requests.len() * (16 << 20), "{bytes} bytes came");
+}
+
+#[test]
 fn bytes_that_were_not_asked_for_are_not_taken() {
     for fault in [Fault::OtherRange, Fault::Short, Fault::Endless] {
         let (_folder, server) = hills();

@@ -58,8 +58,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     // There is none in memory.
     let native = || Native::new(HostClock::default(), None);
-    let since = Instant::now();
-    bring_up(args, &mut UserAtTerminal { since }, PATIENCE, |_| {
+    let mut user = UserAtTerminal {
+        since: Instant::now(),
+        address: args.device.clone(),
+    };
+    bring_up(args, &mut user, PATIENCE, |_| {
         Ok(args.device.connect(native)?)
     })
 }

@@ -6,11 +6,14 @@ use crate::bringup::{Attendant, Question, Reading, Stopped, Task};
 use crate::cli::terminal::interrupt;
 use crate::cli::terminal::questions::{ask, number};
 use crate::cli::terminal::voice::say;
+use crate::link::DeviceAddress;
 
 /// A user at a terminal.
 pub(super) struct UserAtTerminal {
     /// From when on this computer's clock is counted.
     pub(super) since: Instant,
+    /// The board.
+    pub(super) address: DeviceAddress,
 }
 
 impl Attendant for UserAtTerminal {
@@ -51,6 +54,6 @@ impl Attendant for UserAtTerminal {
     }
 
     fn may_be_armed(&mut self, may: bool) {
-        interrupt::board_may_be_armed(may);
+        interrupt::device_may_be_armed("", &self.address, may);
     }
 }

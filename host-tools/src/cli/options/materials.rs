@@ -12,6 +12,7 @@ use super::texture::{SurfacePattern, SurfaceTexture};
 use crate::cli::failure::{Failure, Hint, OrHint};
 use crate::materials::table::{Look, TableFile, TextureName};
 use crate::materials::{ClassMaterial, Looks, Materials};
+use crate::place::STIFFEST_N_PER_MM;
 use crate::raster::{Raster, files_read_with};
 use crate::replay::settings::MaterialSettings;
 
@@ -119,6 +120,10 @@ fn of_classes(error: crate::raster::Error) -> Failure {
 fn looks(file: &Path, rendering: &Rendering) -> Result<Looks, Failure> {
     let table = TableFile::open(file)?;
     let (line, default) = &table.default;
+    let of_classes = table.classes.iter().map(|(_, line, look)| (*line, look));
+    for (line, look) in std::iter::once((*line, default)).chain(of_classes) {
+        check_stiffness(look, rendering, (file, line))?;
+    }
     let default = over(rendering, default);
     let material = material(&default, (file, *line, "the default"))?;
     if material.stiffness_n_per_mm == 0.0 {
@@ -138,6 +143,27 @@ fn looks(file: &Path, rendering: &Rendering) -> Result<Looks, Failure> {
         default: material,
         class,
     })
+}
+
+/// Checks that a table, which may be a stranger's, asks for no more stiffness than keys may, or
+/// than the command line does.
+fn check_stiffness(
+    look: &Look,
+    rendering: &Rendering,
+    (file, line): (&Path, usize),
+) -> Result<(), Failure> {
+    let most = STIFFEST_N_PER_MM.max(rendering.stiffness_n_per_mm.unwrap_or(0.0));
+    let Some(stiffness) = look.stiffness_n_per_mm.filter(|asked| *asked > most) else {
+        return Ok(());
+    };
+    let place = format!("{}, line {line}:", file.display());
+    Err(Failure::new(format!(
+        "a stiffness of {stiffness} N/mm: a table may ask for {most} N/mm at most"
+    ))
+    .hint(format!(
+        "if you trust the table, say --stiffness-n-per-mm {stiffness}"
+    ))
+    .about(Some(&place)))
 }
 
 /// What these options make of a surface.
@@ -211,7 +237,7 @@ mod tests {
             static_friction: Some(0.9),
             ..Rendering::default()
         };
-        let text = "[default]\ntexture = \"grating\"\ntexture_direction = 20\n[class.3]\nfriction = 0.5\ntexture = \"grain\"\n[class.2]\nstiffness_n_per_mm = 1.5\n";
+        let text = "[default]\ntexture = \"grating\"\ntexture_direction = 20\n[class.3]\nfriction = 0.5\ntexture = \"grain\"\n[class.2]\nstiffness_n_per_mm = 0.9\n";
         let looks = read(text, &rendering).expect("a table");
         assert_eq!(looks.default.stiffness_n_per_mm, 0.7);
         assert_eq!(looks.default.friction.static_mu, 0.9);
@@ -219,7 +245,7 @@ mod tests {
             panic!("{looks:?}");
         };
         assert_eq!((two.class, three.class), (2, 3));
-        assert_eq!(two.material.stiffness_n_per_mm, 1.5);
+        assert_eq!(two.material.stiffness_n_per_mm, 0.9);
         assert_eq!(two.material.texture, looks.default.texture);
         assert_eq!(three.material.stiffness_n_per_mm, 0.7);
         assert_eq!(three.material.friction, Friction::coulomb(0.5));
@@ -259,6 +285,32 @@ mod tests {
             ..usual
         };
         assert!(read("[class.1]\nfriction = 0.3", &paper).is_err());
+    }
+
+    #[test]
+    fn table_asks_for_no_more_stiffness_than_the_command_line() {
+        let usual = Rendering::default();
+        let stiff = Rendering {
+            stiffness_n_per_mm: Some(3.0),
+            ..Rendering::default()
+        };
+        for (text, told, allowed) in [
+            (
+                "[default]\nstiffness_n_per_mm = 3",
+                "line 1: a stiffness of 3",
+                true,
+            ),
+            (
+                "[class.1]\nstiffness_n_per_mm = 1.1",
+                "a stiffness of 1.1",
+                true,
+            ),
+            ("[class.1]\nstiffness_n_per_mm = 1e30", "at most", false),
+        ] {
+            let why = read(text, &usual).expect_err(text);
+            assert!(why.contains(told) && why.contains("--stiffness"), "{why}");
+            assert_eq!(read(text, &stiff).is_ok(), allowed, "{text}");
+        }
     }
 
     #[test]

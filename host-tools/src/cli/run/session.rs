@@ -1,5 +1,6 @@
 //! The session with one device, from its opening to its last word.
 
+use std::path::Path;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -11,6 +12,7 @@ use super::watch::Watch;
 use super::{Args, OTHER_FILE};
 use crate::cli::bringup::required::{brought_up, drives_no_arm};
 use crate::cli::failure::{Failure, OrHint};
+use crate::cli::guardian::{self, News};
 use crate::cli::options::placing;
 use crate::cli::options::steering::ViewControl;
 use crate::cli::session_summary::{self, SessionSummary};
@@ -21,7 +23,7 @@ use crate::link::{
     Arming, DeviceAddress, HostClock, LinkError, Native, Patience, Tcp, Transport, serve_plant,
 };
 use crate::materials::Materials;
-use crate::output::Output;
+use crate::output::{Output, folder_of};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::Laid;
 use crate::remote::without_key;
@@ -35,6 +37,9 @@ use crate::steering::CommandQueue;
 const RETRY: Duration = Duration::from_millis(500);
 /// For how long the virtual arm stays after the session has ended.
 const LINGER: Duration = Duration::from_secs(2);
+
+/// Bytes that a recording may have on any disk: a day of CSV at 1 kHz.
+const MOST_RECORDED: u64 = 16 << 30;
 
 /// A device that is to be served, and all that it is given.
 pub(super) struct Serving<'p, 't> {
@@ -80,12 +85,12 @@ impl<'t> Serving<'_, 't> {
         let name = speaker.name().unwrap_or_default();
         let tell = |line: &str| speaker.tell(line);
         let service = service(args, (device, placed), &tell);
-        interrupt::device_may_be_armed(name, true);
+        let may_be_armed = |may| interrupt::device_may_be_armed(name, &device.address, may);
+        may_be_armed(true);
         let met = self.met;
         let opened = service.open(|line| met.and_then(|()| fit_to_serve(args, device, line)));
         // Where it could not be opened, what has to be told is told.
-        let (served, hello) =
-            opened.inspect_err(|_| interrupt::device_may_be_armed(name, false))?;
+        let (served, hello) = opened.inspect_err(|_| may_be_armed(false))?;
         let how = session_summary::in_words(placed.terrain);
         speaker.say(format!("terrain        {}: {how}", args.terrain.name()));
         speaker.show(placing::told(&placed.view, placed.terrain));
@@ -132,7 +137,7 @@ impl<'t> Serving<'_, 't> {
         let log = watch.finish();
         let kept = log.kept.or_hint(OTHER_FILE);
         let ended = told(end.why, end.disarmed, &tell).and(came(log.stood_still));
-        interrupt::device_may_be_armed(name, false);
+        may_be_armed(false);
         let summary = SessionSummary {
             ticks: log.ticks,
             device: hello,
@@ -247,10 +252,20 @@ pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure
     let [tick, work, cost, late] = ["tick", "work", "cost", "late"].map(Column::Count);
     let columns = [state, tick, work, cost, late, mode, limits, view];
     let recording = device.record.as_deref().map(|path| {
-        let output = Output::create(path)?;
+        let output = Output::create(path)?.of_recording(most_recorded(path));
+        if let Some(partial) = output.partial() {
+            guardian::report(&News::Recording(partial.to_owned()));
+        }
         Recording::new(output, &columns)
     });
     recording.transpose().or_hint(OTHER_FILE)
+}
+
+/// Bytes that a recording may have: half of what is free at its beginning, so that no device
+/// fills the disk, however fast its samples come.
+fn most_recorded(path: &Path) -> u64 {
+    let free = fs4::available_space(folder_of(path));
+    free.map_or(MOST_RECORDED, |free| MOST_RECORDED.min(free / 2))
 }
 
 /// The recording, with the settings in which the device feels the terrain.

@@ -1,6 +1,7 @@
 //! Ctrl-C, and the signals that ask a program to end or tell that its terminal is
 //! gone: the first asks for a clean end, the second ends at once.
 
+use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::io;
 use std::process::exit;
@@ -12,8 +13,23 @@ use std::time::Duration;
 
 use super::raw_keys;
 use super::voice::put;
+use crate::cli::guardian::{self, News};
+use crate::link::DeviceAddress;
 
+/// Signals that ask for an end.
+#[cfg(unix)]
+pub(in crate::cli) const ASK_FOR_AN_END: [i32; 7] = {
+    use signal_hook::consts::signal::{
+        SIGALRM, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2,
+    };
+    [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM]
+};
+
+static IS_LISTENING: AtomicBool = AtomicBool::new(false);
+/// An end is asked for.
 static REQUESTED: AtomicBool = AtomicBool::new(false);
+/// Somebody has pressed Ctrl-C, or what counts as that.
+static PRESSED: AtomicBool = AtomicBool::new(false);
 /// The boards that may be armed by this program, by what lines about them begin with: nothing,
 /// where there is one.
 static MAY_BE_ARMED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
@@ -22,23 +38,76 @@ static MAY_BE_ARMED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 const WRITTEN: Duration = Duration::from_millis(200);
 
 /// Exit code of a program that was interrupted twice, as shells have it.
-const INTERRUPTED: i32 = 130;
+pub(in crate::cli) const INTERRUPTED: i32 = 130;
+
+thread_local! {
+    /// The device that this thread serves, until it has seen that an end is asked for.
+    static SERVES: RefCell<Option<String>> = const { RefCell::new(None) };
+}
 
 /// Listens from now on.
 pub(in crate::cli) fn listen() {
     static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        let listening = ctrlc::set_handler(press);
-        if let Err(error) = listening {
-            // Then it ends this program the hard way, as without a handler.
-            tracing::debug!("cannot listen to Ctrl-C: {error}");
+    ONCE.call_once(|| match handle(on_signal) {
+        Ok(()) => {
+            IS_LISTENING.store(true, Ordering::Relaxed);
+            guardian::report(&News::Listening);
         }
+        // Then it ends this program the hard way, as without a handler.
+        Err(error) => tracing::debug!("cannot listen to Ctrl-C: {error}"),
     });
 }
 
+#[cfg(unix)]
+fn handle(on_signal: fn()) -> io::Result<()> {
+    let mut signals = signal_hook::iterator::Signals::new(ASK_FOR_AN_END)?;
+    let wait = move || signals.forever().for_each(|_| on_signal());
+    Builder::new().name("signals".into()).spawn(wait).map(drop)
+}
+
+#[cfg(windows)]
+fn handle(on_signal: fn()) -> io::Result<()> {
+    ctrlc::set_handler(on_signal).map_err(io::Error::other)
+}
+
+/// In a terminal Ctrl-C reaches a worker and its guardian, which passes it on: the signal
+/// alone asks for an end, and what is passed on counts.
+fn on_signal() {
+    match guardian::counts_presses() {
+        true => REQUESTED.store(true, Ordering::Relaxed),
+        false => press(),
+    }
+}
+
+/// A press that the guardian passes on. Before this program listens, the guardian sends it
+/// the signal, too.
+#[cfg(unix)]
+pub(in crate::cli) fn press_if_listening() {
+    if IS_LISTENING.load(Ordering::Relaxed) {
+        press();
+    }
+}
+
+/// Ends this program, whose guardian is gone, as after Ctrl-C.
+#[cfg(unix)]
+pub(in crate::cli) fn end_without_guardian() {
+    if !IS_LISTENING.load(Ordering::Relaxed) {
+        exit(INTERRUPTED);
+    }
+    super::voice::tell("the process that watches this one is gone: it ends");
+    REQUESTED.store(true, Ordering::Relaxed);
+}
+
+/// Ctrl-C as a key.
+pub(super) fn press_key() {
+    guardian::report(&News::Pressed);
+    press();
+}
+
 /// Ctrl-C, from wherever it is heard: the first asks for an end, the second ends at once.
-pub(in crate::cli) fn press() {
-    if REQUESTED.swap(true, Ordering::Relaxed) {
+fn press() {
+    REQUESTED.store(true, Ordering::Relaxed);
+    if PRESSED.swap(true, Ordering::Relaxed) {
         raw_keys::put_back();
         if let Some(line) = not_confirmed(&may_be_armed()) {
             say(line);
@@ -48,7 +117,7 @@ pub(in crate::cli) fn press() {
 }
 
 /// What is said where a program ends that may leave these boards armed.
-fn not_confirmed(boards: &BTreeSet<String>) -> Option<String> {
+pub(in crate::cli) fn not_confirmed(boards: &BTreeSet<String>) -> Option<String> {
     let names: Vec<&str> = boards.iter().map(String::as_str).collect();
     let (who, is) = match &names[..] {
         [] => return None,
@@ -63,7 +132,7 @@ fn not_confirmed(boards: &BTreeSet<String>) -> Option<String> {
 
 /// Writes to a terminal that somebody reads; one that nobody reads does not hold the end
 /// up.
-fn say(line: String) {
+pub(in crate::cli) fn say(line: String) {
     let (done, is_done) = channel();
     let write = move || {
         put(io::stderr(), &line);
@@ -75,18 +144,22 @@ fn say(line: String) {
 }
 
 /// Says whether a board may be armed by this program from now on: who ends it at once
-/// is then told to switch the amplifiers off.
-pub(in crate::cli) fn board_may_be_armed(may: bool) {
-    device_may_be_armed("", may);
-}
-
-/// The same of one of several boards, by what lines about it begin with.
-pub(in crate::cli) fn device_may_be_armed(name: &str, may: bool) {
-    let mut boards = may_be_armed();
+/// is then told to switch the amplifiers off. Called by the thread that serves the board,
+/// which then calls [`requested`] many times a second. `name` is what lines about the board
+/// begin with: nothing, where there is one.
+pub(in crate::cli) fn device_may_be_armed(name: &str, address: &DeviceAddress, may: bool) {
     match may {
-        true => boards.insert(name.to_owned()),
-        false => boards.remove(name),
+        true => may_be_armed().insert(name.to_owned()),
+        false => may_be_armed().remove(name),
     };
+    if *address != DeviceAddress::Native {
+        let address = address.to_string();
+        SERVES.set(may.then(|| address.clone()));
+        guardian::report(&match may {
+            true => News::MayBeArmed(address),
+            false => News::Settled(address),
+        });
+    }
 }
 
 fn may_be_armed() -> MutexGuard<'static, BTreeSet<String>> {
@@ -97,7 +170,11 @@ fn may_be_armed() -> MutexGuard<'static, BTreeSet<String>> {
 /// Whether an end was asked for.
 #[must_use]
 pub(in crate::cli) fn requested() -> bool {
-    REQUESTED.load(Ordering::Relaxed)
+    let requested = REQUESTED.load(Ordering::Relaxed);
+    if requested && let Some(address) = SERVES.take() {
+        guardian::report(&News::Leaving(address));
+    }
+    requested
 }
 
 #[cfg(test)]

@@ -65,7 +65,7 @@ pub(super) fn read(pressed: &SyncSender<Pressed>) {
     while let Ok(n @ 1..) = stdin.read(&mut chunk) {
         for byte in chunk.iter().take(n) {
             match keys.take(*byte) {
-                Some(Typed::Interrupt) => interrupt::press(),
+                Some(Typed::Interrupt) => interrupt::press_key(),
                 // Whoever types ahead so far is not heeded.
                 Some(Typed::Pressed(key)) => drop(pressed.try_send(key)),
                 None => {}

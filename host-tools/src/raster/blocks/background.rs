@@ -1,5 +1,5 @@
-//! What is made or read ahead while somebody is served who must not wait: one thread, and
-//! a queue of what is wanted.
+//! What is made or read while somebody is served who must not wait: a queue of what is wanted,
+//! for one thread.
 
 use std::collections::{HashSet, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};

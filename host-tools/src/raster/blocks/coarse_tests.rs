@@ -35,7 +35,6 @@ struct Seen {
     threads: Arc<Mutex<Vec<ThreadId>>>,
     is_damaged: Arc<AtomicBool>,
     is_late: Arc<AtomicBool>,
-    takes_long: Arc<AtomicBool>,
     stamp: Arc<Mutex<Option<String>>>,
 }
 
@@ -46,7 +45,6 @@ impl Seen {
             threads: Arc::default(),
             is_damaged: Arc::default(),
             is_late: Arc::default(),
-            takes_long: Arc::default(),
             stamp: Arc::new(Mutex::new(Some(stamp.into()))),
         }
     }
@@ -101,10 +99,6 @@ impl BlockReader for Full {
             holes: None,
             is_lacking: false,
         })
-    }
-
-    fn is_at_hand(&self, _: usize, _: &Part) -> bool {
-        !self.seen.takes_long.load(Ordering::Relaxed)
     }
 
     fn stamp(&self, _: usize, _: &Part) -> Option<String> {
@@ -266,16 +260,11 @@ fn whoever_is_served_waits_for_no_coarse_level_and_gets_it_later() {
     let this = thread::current().id();
     let threads = seen.threads.lock().expect("alone").clone();
     assert!(!threads.is_empty() && !threads.contains(&this));
-    // What is fine is read at once, as ever.
-    assert!((1000..1010).any(|column| raster.height(column, 1000) > 0.0));
-    assert!(seen.threads.lock().expect("alone").contains(&this));
 }
 
-/// As what lies in a large strip that has to be unpacked first.
 #[test]
-fn whoever_is_served_does_not_wait_for_a_fine_block_that_takes_long() {
+fn whoever_is_served_reads_no_fine_block() {
     let seen = Seen::new("");
-    seen.takes_long.store(true, Ordering::Relaxed);
     let raster = raster(&seen, &DiskCache::off(), USUAL);
     let there = |column| (raster.height(column, 1000) > 0.0, raster.not_yet());
     assert!(there(300).0, "whoever may wait does");

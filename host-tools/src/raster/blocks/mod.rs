@@ -9,11 +9,12 @@
 //!
 //! A block that cannot be read is a hole, with a warning: what is wrong in one place of a
 //! file that is larger than memory is no reason to feel nothing of it. What has not come yet
-//! from elsewhere is not known: it is counted, and asked for again. So is what is coarse, once
-//! somebody is served who must not wait: a thread of its own makes it (`background`).
+//! from elsewhere is not known: it is counted, and asked for again. So is everything that is not in
+//! memory, once somebody is served who must not wait: one thread makes what is coarse, another
+//! reads what is fine (`background`). However long a file takes, nobody who is served waits for it.
 //!
 //! Several threads may share the blocks, as those of several devices on one terrain do. Of them one
-//! reads at a time, besides the thread in the background, so the bound of the memory does not grow with
+//! reads at a time, besides the threads in the background, so the bound of the memory does not grow with
 //! them, and a block that one thread has read is not read again for another. Whoever touches blocks in
 //! memory does not wait for one that is being read.
 
@@ -54,11 +55,11 @@ const AS_COARSE: f64 = 1.01;
 /// The blocks of a file, those touched last in memory.
 pub(super) struct Blocks {
     shared: Arc<Shared>,
-    /// Does the jobs, once nobody waits any more.
-    thread: Mutex<Option<JoinHandle<()>>>,
+    /// Do the jobs, once nobody waits any more.
+    threads: Mutex<Vec<JoinHandle<()>>>,
 }
 
-/// What the one who reads and the thread in the background share.
+/// What the one who reads and the threads in the background share.
 pub(super) struct Shared {
     reader: Box<dyn BlockReader>,
     /// The reader's images, and coarse ones that are made of them.
@@ -69,7 +70,10 @@ pub(super) struct Shared {
     turn: Mutex<()>,
     coarse: Mutex<Coarse>,
     disk: DiskCache,
+    /// What is coarse.
     queue: Queue,
+    /// What is fine, which is wanted at once.
+    fine: Queue,
     has_stopped_waiting: AtomicBool,
     /// Blocks that were read from the file.
     read: AtomicU64,
@@ -91,13 +95,14 @@ impl Blocks {
             coarse: Mutex::new(Coarse::none()),
             disk: DiskCache::off(),
             queue: Queue::default(),
+            fine: Queue::default(),
             has_stopped_waiting: AtomicBool::new(false),
             read: AtomicU64::new(0),
             path: OnceLock::new(),
         };
         Self {
             shared: Arc::new(shared),
-            thread: Mutex::new(None),
+            threads: Mutex::new(vec![]),
         }
     }
 
@@ -124,23 +129,29 @@ impl Blocks {
         }
     }
 
-    /// From now on nobody waits for what is coarse and not here yet: it is made in the
-    /// background, and counted until then.
+    /// From now on nobody waits for what is not in memory: it is read in the background, and
+    /// counted until then.
     pub(super) fn stop_waiting(&self) {
-        let mut thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
-        if thread.is_some() {
+        let mut threads = self.threads.lock().unwrap_or_else(PoisonError::into_inner);
+        if !threads.is_empty() {
             return;
         }
-        let shared = self.shared.clone();
-        let builder = thread::Builder::new().name("coarse samples".into());
-        match builder.spawn(move || shared.work()) {
-            Ok(started) => {
-                *thread = Some(started);
-                self.has_stopped_waiting.store(true, Ordering::Release);
+        let start = |name: &str, queue: fn(&Shared) -> &Queue| {
+            let shared = self.shared.clone();
+            let builder = thread::Builder::new().name(name.into());
+            builder.spawn(move || shared.work(queue(&shared)))
+        };
+        let coarse = start("coarse samples", |shared| &shared.queue);
+        let fine = start("fine samples", |shared| &shared.fine);
+        let are_both = coarse.is_ok() && fine.is_ok();
+        for started in [coarse, fine] {
+            match started {
+                Ok(thread) => threads.push(thread),
+                // Then they are waited for.
+                Err(error) => tracing::warn!("no thread for samples: {error}"),
             }
-            // Then they are waited for.
-            Err(error) => tracing::warn!("no thread for coarse samples: {error}"),
         }
+        self.has_stopped_waiting.store(are_both, Ordering::Release);
     }
 }
 
@@ -155,8 +166,9 @@ impl Deref for Blocks {
 impl Drop for Blocks {
     fn drop(&mut self) {
         self.queue.end();
-        let thread = self.thread.get_mut();
-        if let Some(thread) = thread.unwrap_or_else(PoisonError::into_inner).take() {
+        self.fine.end();
+        let threads = self.threads.get_mut();
+        for thread in threads.unwrap_or_else(PoisonError::into_inner).drain(..) {
             // It ends after its present job.
             let _ = thread.join();
         }

@@ -25,13 +25,6 @@ pub(in crate::raster) trait BlockReader: Send + Sync {
     /// What is wrong with that part of the file.
     fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster>;
 
-    /// Whether a part is read in the time of a few blocks. What is not is read in the background
-    /// once nobody waits.
-    fn is_at_hand(&self, image: usize, part: &Part) -> bool {
-        let _ = (image, part);
-        true
-    }
-
     /// Is told the file's order before anything is read: coarse levels count their samples
     /// from the south and west.
     fn set_order(&mut self, south_up: bool, east_first: bool) {

@@ -6,7 +6,7 @@ use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::super::guard::guarded;
-use super::background::Job;
+use super::background::{Job, Queue};
 use super::cache::Key;
 use super::coarse::Piece;
 use super::kept::count_not_yet;
@@ -40,9 +40,12 @@ impl Shared {
             return known;
         }
         let of = self.images.get(image)?;
-        let takes_long = || lasting::is_coarse(of) || !self.reader.is_at_hand(image, &of.part(at));
-        if !self.waits() && takes_long() {
-            self.later(Job::Fetch(key));
+        if !self.waits() {
+            match lasting::is_coarse(of) {
+                true => self.queue.want(Job::Fetch(key)),
+                false => self.fine.want_first(Job::Fetch(key)),
+            }
+            count_not_yet();
             return None;
         }
         // Nothing that panics runs while this is held but decoders, whose panics are caught.
@@ -123,7 +126,7 @@ impl Shared {
         let parts: Vec<Part> = wanted.iter().map(|at| of.part(*at)).collect();
         self.reader.want(image, &parts);
         for at in wanted {
-            self.queue.want_first(Job::Fetch(Key { image, at }));
+            self.fine.want_first(Job::Fetch(Key { image, at }));
         }
     }
 
@@ -182,11 +185,11 @@ impl Shared {
         }
     }
 
-    /// Does what is wanted in the background until that ends.
-    pub(super) fn work(&self) {
+    /// Does what a queue holds until that ends.
+    pub(super) fn work(&self, queue: &Queue) {
         let mut kept = Instant::now();
         loop {
-            while let Some(job) = self.queue.next() {
+            while let Some(job) = queue.next() {
                 match job {
                     Job::Seek(key) => self.seek(key),
                     Job::Pass(at) => self.pass(at),
@@ -197,7 +200,7 @@ impl Shared {
                         }
                     }
                 }
-                self.queue.done(&job);
+                queue.done(&job);
                 let outgoing = self.coarse().take_outgoing();
                 self.keep(outgoing);
             }
@@ -208,7 +211,7 @@ impl Shared {
                 self.keep(new);
                 kept = Instant::now();
             }
-            if !self.queue.wait() {
+            if !queue.wait() {
                 return;
             }
         }

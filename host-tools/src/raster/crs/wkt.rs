@@ -7,6 +7,9 @@ use proj4wkt::parser::{Attribute, Processor, parse};
 const LONGEST: usize = 1 << 16;
 /// Real systems nest to about 8 brackets; the parser calls itself for each.
 const DEEPEST: usize = 32;
+/// Real systems have some hundred brackets. However a text hides how deep it nests, a
+/// thread's stack is enough for the parser to call itself so often.
+const MOST: usize = 512;
 
 /// A node, as `UNIT["metre", 1]`.
 #[derive(Debug)]
@@ -110,17 +113,21 @@ impl Node {
     }
 }
 
+/// Returns true if the parser may read a text: it is short, has brackets, and these nest
+/// as those of real systems do. What stands in quotes is no bracket.
 fn is_sensible(text: &str) -> bool {
-    let mut depth = 0_usize;
-    let deepest = text.bytes().map(|byte| {
+    let (mut opened, mut depth, mut deepest) = (0_usize, 0_usize, 0);
+    let mut is_quoted = false;
+    for byte in text.bytes() {
         match byte {
-            b'[' | b'(' => depth += 1,
-            b']' | b')' => depth = depth.saturating_sub(1),
+            b'"' => is_quoted = !is_quoted,
+            b'[' | b'(' if !is_quoted => (opened, depth) = (opened + 1, depth + 1),
+            b']' | b')' if !is_quoted => depth = depth.saturating_sub(1),
             _ => {}
         }
-        depth
-    });
-    text.len() <= LONGEST && (1..=DEEPEST).contains(&deepest.max().unwrap_or(0))
+        deepest = deepest.max(depth);
+    }
+    text.len() <= LONGEST && (1..=MOST).contains(&opened) && deepest <= DEEPEST
 }
 
 #[cfg(test)]
@@ -145,6 +152,11 @@ mod tests {
             Node::parse(&deep).is_none(),
             "too deep for the stack of a thread"
         );
+        // Brackets in quotes close nothing.
+        let hidden = "A[\"]\",".repeat(40) + "\"x\"" + &"]".repeat(40);
+        assert!(Node::parse(&hidden).is_none(), "deep");
+        let wide = format!("A[\"x\"{}]", ",B[1]".repeat(MOST));
+        assert!(Node::parse(&wide).is_none(), "wide");
     }
 
     #[test]

@@ -30,6 +30,8 @@ const HEIGHT_NAMES: &str = "elevation elev z dem height heights topo arr_0";
 
 /// Bytes a header may have; real ones have 128.
 const LONGEST_HEADER: u64 = 1 << 16;
+/// Brackets that a header opens, at most: the dictionary and the shape, and a few of a record.
+const MOST_BRACKETS: usize = 12;
 
 /// The height array of an `.npz`, with the cell size from scalars `dx` and `dy`
 /// beside it, where there are such.
@@ -87,8 +89,9 @@ struct Array {
     first: u64,
 }
 
-/// `npyz` makes room for as long a header as the file says.
-fn check_header_length<R: Read + Seek + ?Sized>(reader: &mut R) -> Result<(), BadRaster> {
+/// `npyz` makes room for as long a header as the file says, and the time that it takes doubles
+/// with each level of nesting.
+fn check_header<R: Read + Seek + ?Sized>(reader: &mut R) -> Result<(), BadRaster> {
     let start = reader.stream_position().map_err(BadRaster::Unreadable)?;
     let mut head = [0; 12];
     reader
@@ -98,6 +101,20 @@ fn check_header_length<R: Read + Seek + ?Sized>(reader: &mut R) -> Result<(), Ba
     if head[6] > 1 && long > LONGEST_HEADER {
         return Err(BadRaster::AbsurdSize(format!(
             "an array header of {long} bytes"
+        )));
+    }
+    let (begins, long) = match head[6] > 1 {
+        true => (12, long),
+        false => (10, u64::from(u16::from_le_bytes([head[8], head[9]]))),
+    };
+    let mut seek = |to| reader.seek(std::io::SeekFrom::Start(to));
+    seek(start + begins).map_err(BadRaster::Unreadable)?;
+    let mut header = Vec::new();
+    (reader.take(long).read_to_end(&mut header)).map_err(BadRaster::Unreadable)?;
+    let opened = header.iter().filter(|byte| b"{[(".contains(byte)).count();
+    if opened > MOST_BRACKETS {
+        return Err(BadRaster::NotAHeightField(format!(
+            "an array whose header opens {opened} brackets; one of plain numbers opens 2"
         )));
     }
     reader
@@ -140,7 +157,7 @@ impl Array {
     /// Reads an array's header; the file holds its samples.
     fn in_file(input: &FileBytes) -> Result<Self, BadRaster> {
         let reader = &mut *input.reader()?;
-        check_header_length(reader)?;
+        check_header(reader)?;
         let header = NpyHeader::from_reader(&mut *reader)
             .map_err(|error| BadRaster::from_io(error, "the array's header"))?;
         let (stored, endian) = sample_type(&header.dtype())?;
@@ -261,5 +278,13 @@ mod tests {
         assert!(matches!(fault, BadRaster::Truncated(_)), "{fault}");
         let fault = samples("<c8", &[0; 48]).expect_err("complex numbers");
         assert!(matches!(fault, BadRaster::NotAHeightField(_)), "{fault}");
+    }
+
+    #[test]
+    fn header_that_nests_deep_is_refused_at_once() {
+        for deep in ["{".repeat(30), "{\"}\":".repeat(30)] {
+            let fault = samples(&format!("', 'x': {deep}"), &[]).expect_err("deep");
+            assert!(matches!(fault, BadRaster::NotAHeightField(_)), "{fault}");
+        }
     }
 }

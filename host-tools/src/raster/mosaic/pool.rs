@@ -1,7 +1,11 @@
 //! The files of a terrain that are open: few, and those touched last.
 
 use std::collections::{HashMap, HashSet};
+use std::io::{Error, ErrorKind};
 use std::sync::Arc;
+use std::sync::mpsc::sync_channel;
+use std::thread::Builder;
+use std::time::Duration;
 
 use lru::LruCache;
 
@@ -10,7 +14,7 @@ use super::super::storage::Storage;
 use super::super::{BadRaster, Decoded, OpenOptions};
 use super::source::{Opened, Source, Values};
 use super::tile_file;
-use crate::remote::without_key;
+use crate::remote::{is_url, without_key};
 
 /// No more files are open at once: each may have a mask and overviews beside it.
 const MOST_OPEN: usize = 32;
@@ -20,6 +24,9 @@ const MOST_BYTES: usize = 64 << 20;
 const SHARE_BYTES: usize = 16 << 20;
 /// A file that has no blocks is held as a whole, and has to fit, bytes.
 const MOST_WHOLE_BYTES: u64 = 64 << 20;
+
+/// A file that is not open after so long is a hole.
+const OPEN_WITHIN: Duration = Duration::from_secs(20);
 
 /// Open files by their number among the terrain's.
 pub(super) struct Pool {
@@ -89,9 +96,13 @@ impl Pool {
         let mut options = self.options.clone();
         options.band = source.band.or(options.band);
         let stamps = source.stamps();
-        let whole = whole_bytes(&outline(source, &options)?)?;
+        let (path, by) = (source.path.clone(), options.clone());
+        let outline = in_time(source, OPEN_WITHIN, move || tile_file::outline(&path, &by))?;
+        let whole = whole_bytes(&outline)?;
         self.make_room(usize::try_from(whole).unwrap_or(usize::MAX));
-        let mut decoded = guarded("terrain", || tile_file::decode(&source.path, &options))?;
+        let (path, by) = (source.path.clone(), options.clone());
+        let decode = move || guarded("terrain", || tile_file::decode(&path, &by));
+        let mut decoded = in_time(source, OPEN_WITHIN, decode)?;
         let found = (decoded.columns, decoded.rows);
         if let Some((columns, rows)) = source.size.filter(|size| *size != found) {
             return Err(BadRaster::damaged(format!(
@@ -148,9 +159,24 @@ pub(super) fn options_for_tiles(options: &OpenOptions) -> OpenOptions {
     }
 }
 
-/// What the header of a file says.
-fn outline(source: &Source, options: &OpenOptions) -> Result<Decoded, BadRaster> {
-    tile_file::outline(&source.path, options)
+/// Opens a file in a thread of its own, which nobody waits for any more after a time: a disk of
+/// another computer may never answer. Requests to servers have times of their own.
+fn in_time<T: Send + 'static>(
+    source: &Source,
+    within: Duration,
+    open: impl FnOnce() -> Result<T, BadRaster> + Send + 'static,
+) -> Result<T, BadRaster> {
+    if source.path.to_str().is_some_and(is_url) {
+        return open();
+    }
+    let (send, opened) = sync_channel(1);
+    let thread = Builder::new().name("opening".into());
+    let spawned = thread.spawn(move || drop(send.send(open())));
+    spawned.map_err(BadRaster::Unreadable)?;
+    opened.recv_timeout(within).unwrap_or_else(|_| {
+        let why = format!("it was not open after {} s", within.as_secs());
+        Err(BadRaster::Unreadable(Error::new(ErrorKind::TimedOut, why)))
+    })
 }
 
 /// Bytes that a file takes that is held as a whole; none where it is read in blocks.
@@ -169,5 +195,44 @@ pub(super) fn whole_bytes(outline: &Decoded) -> Result<u64, BadRaster> {
             format: "a terrain of many files",
             feature: format!("a file of {columns} × {rows} samples that cannot be read in blocks"),
         }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::SampleType;
+    use crate::raster::blocks::Part;
+    use crate::raster::mosaic::source::Axis;
+
+    #[test]
+    fn file_that_never_opens_is_given_up() {
+        let axis = Axis {
+            start: 0.0,
+            step: 1.0,
+        };
+        let source = Source {
+            path: "never.tif".into(),
+            bytes: 1,
+            band: None,
+            covers: Part::whole(2, 2),
+            axes: [axis; 2],
+            size: None,
+            values: Values::Stored {
+                no_data: None,
+                covers: false,
+                scale: 1.0,
+                offset: 0.0,
+                sample: SampleType::F32,
+            },
+        };
+        let (ends, never) = sync_channel::<()>(0);
+        let open = move || {
+            let _ = never.recv();
+            Ok(())
+        };
+        let fault = in_time(&source, Duration::ZERO, open).expect_err("never");
+        assert!(fault.to_string().contains("not open after"), "{fault}");
+        drop(ends);
     }
 }

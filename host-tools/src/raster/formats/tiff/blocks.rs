@@ -448,14 +448,6 @@ impl BlockReader for TiffBlocks {
         chunks.any(|chunk| chunk.bytes > 0)
     }
 
-    fn is_at_hand(&self, image: usize, part: &Part) -> bool {
-        let Image { layout, masks, .. } = &self.images[image];
-        let masks = masks.iter().filter_map(Mask::layout);
-        std::iter::once(layout)
-            .chain(masks)
-            .all(|of| of.is_at_hand(part))
-    }
-
     fn want(&self, image: usize, parts: &[Part]) {
         let Image { file, layout, .. } = &self.images[image];
         if let Some(remote) = &self.remote[*file] {

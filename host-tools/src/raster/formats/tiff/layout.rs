@@ -184,6 +184,7 @@ impl Layout {
     }
 
     /// Whether nothing has to be unpacked on disk for a part.
+    #[cfg(test)]
     pub(super) fn is_at_hand(&self, part: &Part) -> bool {
         self.unpacked.as_ref().is_none_or(|unpacked| {
             let bands = self.bands_read();

@@ -31,11 +31,6 @@ impl Mask {
         masks.collect()
     }
 
-    /// How it is laid out, where that is as masks are.
-    pub(super) const fn layout(&self) -> Option<&Layout> {
-        self.layout.as_ref()
-    }
-
     /// Samples of a strip or tile.
     fn chunk_samples(&self) -> u64 {
         let mask = self.directory.ifd();

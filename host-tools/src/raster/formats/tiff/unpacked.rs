@@ -103,6 +103,7 @@ impl Unpacked {
     }
 
     /// Whether a strip or tile is unpacked already.
+    #[cfg(test)]
     pub(super) fn has(&self, chunk: &Chunk) -> bool {
         self.kept().find(chunk).is_some()
     }

@@ -1,0 +1,75 @@
+//! Lines from the worker to its guardian.
+
+use std::path::PathBuf;
+
+/// Something that the guardian has to know.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::cli) enum News {
+    /// The worker handles signals itself from now on.
+    Listening,
+    /// A key asked for an end.
+    Pressed,
+    /// The device at this address may be armed.
+    MayBeArmed(String),
+    /// The thread that serves this device has seen that an end is asked for.
+    Leaving(String),
+    /// The device has confirmed that it is disarmed, or the user was told that it has not.
+    Settled(String),
+    /// This file grows.
+    Recording(PathBuf),
+}
+
+#[cfg(unix)]
+mod lines {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+
+    use super::News;
+
+    impl News {
+        /// As a line, without its end.
+        pub(in crate::cli::guardian) fn line(&self) -> Vec<u8> {
+            let (word, rest): (&str, &[u8]) = match self {
+                Self::Listening => ("listening", b""),
+                Self::Pressed => ("pressed", b""),
+                Self::MayBeArmed(address) => ("armed", address.as_bytes()),
+                Self::Leaving(address) => ("leaving", address.as_bytes()),
+                Self::Settled(address) => ("settled", address.as_bytes()),
+                Self::Recording(path) => ("recording", path.as_os_str().as_bytes()),
+            };
+            [word.as_bytes(), b" ", rest].concat()
+        }
+
+        /// Reads a line; none if it is no news.
+        pub(in crate::cli::guardian) fn read(line: &[u8]) -> Option<Self> {
+            let space = line.iter().position(|byte| *byte == b' ')?;
+            let (word, rest) = (line.get(..space)?, line.get(space + 1..)?);
+            let text = || String::from_utf8_lossy(rest).into_owned();
+            Some(match word {
+                b"listening" => Self::Listening,
+                b"pressed" => Self::Pressed,
+                b"armed" => Self::MayBeArmed(text()),
+                b"leaving" => Self::Leaving(text()),
+                b"settled" => Self::Settled(text()),
+                b"recording" => Self::Recording(OsStr::from_bytes(rest).into()),
+                _ => return None,
+            })
+        }
+    }
+
+    #[test]
+    fn each_news_is_read_as_it_was_written() {
+        for news in [
+            News::Listening,
+            News::Pressed,
+            News::MayBeArmed("usb:0039".into()),
+            News::Leaving("tcp:localhost:4000".into()),
+            News::Settled(String::new()),
+            News::Recording("a folder/felt.csv.a1b2c3.partial".into()),
+        ] {
+            assert_eq!(News::read(&news.line()), Some(news));
+        }
+        assert_eq!(News::read(b"something else"), None);
+        assert_eq!(News::read(b""), None);
+    }
+}

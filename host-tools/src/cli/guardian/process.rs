@@ -1,0 +1,224 @@
+//! The process that waits.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{self, ErrorKind, PipeReader, PipeWriter, Read, Write, pipe};
+use std::os::fd::AsRawFd;
+use std::os::unix::process::ExitStatusExt;
+use std::path::PathBuf;
+use std::process::{Child, Command, ExitCode, ExitStatus};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use rustix::io::{FdFlags, fcntl_setfd, ioctl_fionbio};
+use rustix::process::{Pid, Signal, kill_process};
+use rustix::termios::{OptionalActions, Termios, tcgetattr, tcsetattr};
+use signal_hook::iterator::Signals;
+use signal_hook::low_level::signal_name;
+
+use super::{News, close, worker};
+use crate::cli::failure::Failure;
+use crate::cli::terminal::interrupt::{self, ASK_FOR_AN_END, INTERRUPTED};
+
+/// Between two looks.
+const LOOK: Duration = Duration::from_millis(20);
+/// A serving thread that does not react to a press for so long never will. With the time
+/// that a board takes to confirm this stays below three seconds.
+pub(super) const DEAF: Duration = Duration::from_secs(2);
+/// So long a worker may take to end at once.
+const AT_ONCE: Duration = Duration::from_secs(1);
+
+/// The worker, and what is known of it.
+struct Watch {
+    child: Child,
+    signals: Signals,
+    presses: PipeWriter,
+    news: PipeReader,
+    /// The beginning of a line.
+    rest: Vec<u8>,
+    terminal: Option<Termios>,
+    is_listening: bool,
+    may_be_armed: BTreeSet<String>,
+    leaving: BTreeSet<String>,
+    recordings: Vec<PathBuf>,
+    /// When an end was asked for, each time.
+    pressed: Vec<Instant>,
+}
+
+/// Starts the worker and waits for its end; gives its exit code.
+pub(super) fn watch() -> ExitCode {
+    match Watch::begin() {
+        Ok(mut watch) => watch.until_end(),
+        Err(error) => {
+            let error = format!("cannot start the process that serves: {error}");
+            Failure::new(error).report();
+            ExitCode::FAILURE
+        }
+    }
+}
+
+impl Watch {
+    fn begin() -> io::Result<Self> {
+        let signals = Signals::new(ASK_FOR_AN_END)?;
+        let (its_presses, presses) = pipe()?;
+        let (news, its_news) = pipe()?;
+        ioctl_fionbio(&news, true)?;
+        // These two ends are the worker's.
+        fcntl_setfd(&its_presses, FdFlags::empty())?;
+        fcntl_setfd(&its_news, FdFlags::empty())?;
+        let descriptors = (its_presses.as_raw_fd(), its_news.as_raw_fd());
+        let (me, (presses_fd, news_fd)) = (std::process::id(), descriptors);
+        let child = Command::new(std::env::current_exe()?)
+            .args(std::env::args_os().skip(1))
+            .env(worker::VARIABLE, format!("{me}:{presses_fd}:{news_fd}"))
+            .spawn()?;
+        Ok(Self {
+            child,
+            signals,
+            presses,
+            news,
+            rest: vec![],
+            terminal: tcgetattr(io::stdin()).ok(),
+            is_listening: false,
+            may_be_armed: BTreeSet::new(),
+            leaving: BTreeSet::new(),
+            recordings: vec![],
+            pressed: vec![],
+        })
+    }
+
+    fn until_end(&mut self) -> ExitCode {
+        let mut was_killed = false;
+        let status = loop {
+            // Before the news: all of what the worker wrote is then there to read.
+            let ended = self.child.try_wait();
+            self.read_news();
+            match ended {
+                Ok(None) => {}
+                Ok(Some(status)) => break status,
+                // Nothing more can be known of it.
+                Err(_) => break ExitStatus::from_raw(1 << 8),
+            }
+            self.pass_signals();
+            if !was_killed && self.is_stuck() {
+                was_killed = self.child.kill().is_ok();
+            }
+            sleep(LOOK);
+        };
+        if status.signal().is_some() || !self.may_be_armed.is_empty() {
+            self.clean_up(status, was_killed);
+        }
+        self.name_recordings();
+        let code = match (was_killed, status.signal()) {
+            (true, _) => INTERRUPTED,
+            (false, Some(signal)) => 128 + signal,
+            (false, None) => status.code().unwrap_or(1),
+        };
+        ExitCode::from(u8::try_from(code).unwrap_or(1))
+    }
+
+    /// Passes each signal on.
+    fn pass_signals(&mut self) {
+        for signal in self.signals.pending() {
+            self.pressed.push(Instant::now());
+            let _ = self.presses.write_all(b"!");
+            // It does not read the pipe yet. A signal twice is one to it.
+            let pid = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
+            if let (false, Some(pid), Some(signal)) =
+                (self.is_listening, pid, Signal::from_named_raw(signal))
+            {
+                let _ = kill_process(pid, signal);
+            }
+        }
+    }
+
+    fn is_stuck(&self) -> bool {
+        let since = |pressed: &Instant| pressed.elapsed();
+        let is_deaf = !self.may_be_armed.is_subset(&self.leaving);
+        is_deaf && self.pressed.first().map(since) > Some(DEAF)
+            || self.pressed.get(1).map(since) > Some(AT_ONCE)
+    }
+
+    fn read_news(&mut self) {
+        let mut chunk = [0; 4096];
+        loop {
+            match self.news.read(&mut chunk) {
+                Ok(n @ 1..) => self.rest.extend_from_slice(chunk.get(..n).unwrap_or(&[])),
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                _ => break,
+            }
+        }
+        while let Some(end) = self.rest.iter().position(|byte| *byte == b'\n') {
+            let line: Vec<u8> = self.rest.drain(..=end).collect();
+            if let Some(news) = line.get(..end).and_then(News::read) {
+                self.take(news);
+            }
+        }
+    }
+
+    fn take(&mut self, news: News) {
+        match news {
+            News::Listening => self.is_listening = true,
+            News::Pressed => self.pressed.push(Instant::now()),
+            News::MayBeArmed(address) => drop(self.may_be_armed.insert(address)),
+            News::Leaving(address) => drop(self.leaving.insert(address)),
+            News::Settled(address) => drop(self.may_be_armed.remove(&address)),
+            News::Recording(path) => self.recordings.push(path),
+        }
+    }
+
+    /// Does what the worker has left undone.
+    fn clean_up(&mut self, status: ExitStatus, was_killed: bool) {
+        let (done, closed) = channel();
+        for address in &self.may_be_armed {
+            close::begin(address.clone(), done.clone());
+        }
+        drop(done);
+        self.put_terminal_back();
+        if let Some(signal) = status.signal() {
+            interrupt::say(match was_killed {
+                true => "the program did not react to Ctrl-C and was killed\n".into(),
+                false => {
+                    let name = signal_name(signal).unwrap_or("a signal");
+                    format!("the process that served was ended by {name}\n")
+                }
+            });
+        }
+        let _ = self.signals.pending().count();
+        while !self.may_be_armed.is_empty() && self.signals.pending().next().is_none() {
+            let line = match closed.recv_timeout(LOOK) {
+                Ok((address, Ok(()))) => {
+                    self.may_be_armed.remove(&address);
+                    format!("{address}: the board has confirmed that it is disarmed\n")
+                }
+                Ok((_, Err(_))) | Err(RecvTimeoutError::Timeout) => continue,
+                Err(RecvTimeoutError::Disconnected) => break,
+            };
+            interrupt::say(line);
+        }
+        if let Some(line) = interrupt::not_confirmed(&self.may_be_armed) {
+            interrupt::say(line);
+        }
+    }
+
+    /// Names what is left of recordings.
+    fn name_recordings(&self) {
+        for path in &self.recordings {
+            if let Ok(file) = fs::metadata(path) {
+                let (path, bytes) = (path.display(), file.len());
+                interrupt::say(format!(
+                    "recording      {path} ({bytes} bytes) is what was written of it (its last line may be cut); it stays until you delete it\n"
+                ));
+            }
+        }
+    }
+
+    /// Gives the terminal its modes of before. The cursor may be anywhere in a line.
+    fn put_terminal_back(&self) {
+        if let Some(before) = &self.terminal {
+            let _ = tcsetattr(io::stdin(), OptionalActions::Now, before);
+            interrupt::say("\n".into());
+        }
+    }
+}

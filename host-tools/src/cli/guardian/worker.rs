@@ -1,0 +1,72 @@
+//! The worker's end of the two pipes.
+
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::os::unix::process::parent_id;
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::thread::Builder;
+
+use super::News;
+use crate::cli::terminal::interrupt;
+
+/// The variable with the guardian's process number and the descriptors of the two pipes.
+/// Programs that the worker starts have other parents, so it is nothing to them.
+pub(super) const VARIABLE: &str = "HAPTERRA_GUARDIAN";
+
+/// Where news goes; none where this is no worker.
+static NEWS: OnceLock<Mutex<File>> = OnceLock::new();
+
+/// Connects to the guardian. Returns false if no guardian has started this process.
+pub(super) fn begin() -> bool {
+    let Some([presses, news]) = descriptors() else {
+        return false;
+    };
+    let connected = pipes(presses, news).and_then(|(presses, news)| {
+        let _ = NEWS.set(Mutex::new(news));
+        let listen = move || listen(presses);
+        Builder::new().name("guardian".into()).spawn(listen)
+    });
+    if let Err(error) = connected {
+        // The guardian still sees the end of this process, and passes signals on.
+        eprintln!("warning: the guardian is not told which arm may be armed: {error}");
+    }
+    true
+}
+
+/// The numbers of the two descriptors, if this process is the child that they are for.
+fn descriptors() -> Option<[u32; 2]> {
+    let variable = std::env::var(VARIABLE).ok()?;
+    let numbers: Vec<u32> = variable.split(':').map_while(|n| n.parse().ok()).collect();
+    match numbers[..] {
+        [guardian, presses, news] if guardian == parent_id() => Some([presses, news]),
+        _ => None,
+    }
+}
+
+fn pipes(presses: u32, news: u32) -> io::Result<(File, File)> {
+    let of = |descriptor: u32| format!("/dev/fd/{descriptor}");
+    let presses = File::open(of(presses))?;
+    let news = File::options().write(true).open(of(news))?;
+    Ok((presses, news))
+}
+
+pub(super) fn is_worker() -> bool {
+    NEWS.get().is_some()
+}
+
+pub(super) fn report(news: &News) {
+    if let Some(to) = NEWS.get() {
+        let line = [news.line(), b"\n".to_vec()].concat();
+        let mut to = to.lock().unwrap_or_else(PoisonError::into_inner);
+        // A guardian that is gone is noticed by whoever reads from it.
+        let _ = to.write_all(&line);
+    }
+}
+
+/// A byte is a press of Ctrl-C. The end of the pipe is the end of the guardian.
+fn listen(mut presses: File) {
+    while let Ok(1) = presses.read(&mut [0]) {
+        interrupt::press_if_listening();
+    }
+    interrupt::end_without_guardian();
+}

@@ -1,0 +1,244 @@
+//! A worker that ends without a word while the arm is armed: its guardian disarms the
+//! board, puts the terminal back and names the recording. In a terminal, armed by Enter
+//! and a press of the dead-man switch; whether the amplifiers are on is the device's word.
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use hapterra::link::Native;
+use hapterra_core::guard::{Drive, Sense};
+use hapterra_core::wire::session::SessionEnd;
+use hapterra_tests::served::{Served, command, signal};
+use hapterra_tests::timeouts::{end_of, wait_for, wait_until};
+use rustix::termios::LocalModes;
+
+use super::terminal::{modes, shows, start_command_in, terminal};
+
+/// The line in which the user is told.
+const SWITCH_OFF: &str = "switch the amplifiers off";
+
+/// An arm that a user at a terminal has armed, and the processes that serve it.
+struct Armed {
+    folder: tempfile::TempDir,
+    served: Served,
+    amplifiers: Arc<AtomicBool>,
+    window: File,
+    end: File,
+    before: LocalModes,
+    guardian: Child,
+}
+
+/// How it has ended.
+struct Ended {
+    status: ExitStatus,
+    shown: String,
+}
+
+impl Armed {
+    fn new() -> Self {
+        Self::with(|_| {})
+    }
+
+    /// With more options of the command.
+    fn with(more: impl FnOnce(&mut Command)) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (amplifiers, pressed) = (Arc::default(), Arc::default());
+        let (is_on, is_pressed) = (Arc::clone(&amplifiers), Arc::clone(&pressed));
+        let served = Served::with(move || (device(is_on, is_pressed), || {}));
+        let (mut window, end) = terminal();
+        let before = modes(&end);
+        let mut command = command(served.address, folder.path());
+        more(&mut command);
+        let guardian = start_command_in(&end, command);
+        shows(&mut window, "hold it there and press");
+        window.write_all(b"\r").expect("typed");
+        shows(&mut window, "waits for your hand");
+        pressed.store(true, Ordering::Relaxed);
+        shows(&mut window, "amplifiers on; force comes in");
+        assert!(amplifiers.load(Ordering::Relaxed), "armed");
+        assert_ne!(modes(&end), before, "keys come one by one");
+        Self {
+            folder,
+            served,
+            amplifiers,
+            window,
+            end,
+            before,
+            guardian,
+        }
+    }
+
+    /// The number of the process that serves.
+    fn worker(&self) -> String {
+        let id = self.guardian.id().to_string();
+        let found = Command::new("pgrep").args(["-P", &id]).output();
+        let found = String::from_utf8(found.expect("pgrep runs").stdout);
+        found.expect("a number").trim().to_owned()
+    }
+
+    fn kill_worker(&self, name: &str) {
+        let worker = self.worker();
+        let sent = Command::new("kill")
+            .args([format!("-{name}"), worker])
+            .status();
+        assert!(sent.expect("kill runs").success());
+    }
+
+    fn signal(&self, name: &str) {
+        signal(&self.guardian, name);
+    }
+
+    /// Waits for the end. The terminal is then as it was before.
+    fn end(self) -> (Ended, Rest) {
+        let Self {
+            folder,
+            served,
+            amplifiers,
+            mut window,
+            end,
+            before,
+            guardian,
+        } = self;
+        let reader = std::thread::spawn(move || {
+            let (mut shown, mut chunk) = (vec![], [0; 4096]);
+            // A terminal whose other end is closed is an error to read on some systems.
+            while let Ok(n @ 1..) = window.read(&mut chunk) {
+                shown.extend_from_slice(&chunk[..n]);
+            }
+            String::from_utf8_lossy(&shown).into_owned()
+        });
+        let status = end_of(guardian).status;
+        wait_until("the terminal to be put back", || modes(&end) == before);
+        drop(end);
+        let shown = reader.join().expect("read");
+        let rest = Rest {
+            folder,
+            served,
+            amplifiers,
+        };
+        (Ended { status, shown }, rest)
+    }
+}
+
+/// What is there after the end.
+struct Rest {
+    folder: tempfile::TempDir,
+    served: Served,
+    amplifiers: Arc<AtomicBool>,
+}
+
+impl Rest {
+    /// Fails unless the amplifiers are off, and the session was closed.
+    fn is_disarmed(&self, how: &str) {
+        assert_eq!(self.served.last_end(), SessionEnd::Goodbye, "{how}");
+        assert!(!self.amplifiers.load(Ordering::Relaxed), "{how}");
+    }
+}
+
+/// An arm at rest over the terrain, whose user holds the dead-man switch once told to.
+fn device(is_on: Arc<AtomicBool>, is_pressed: Arc<AtomicBool>) -> Native {
+    let hand = move |_, sense: &mut Sense, drive: &Drive| {
+        is_on.store(drive.enabled, Ordering::Relaxed);
+        sense.dead_man = is_pressed.load(Ordering::Relaxed);
+    };
+    Native::for_replay().restless().meddled_with(Box::new(hand))
+}
+
+/// The recording that was cut off.
+pub(super) fn partial(folder: &Path) -> Option<String> {
+    let names = std::fs::read_dir(folder).expect("listed");
+    let names = names.map(|entry| entry.expect("entry").file_name());
+    let mut names = names.filter_map(|name| name.into_string().ok());
+    names.find(|name| name.ends_with(".partial"))
+}
+
+#[test]
+fn worker_killed_while_armed_is_disarmed_by_guardian() {
+    // A stack that overflows and memory that ends are both an abort.
+    for (name, number) in [("ABRT", 6), ("KILL", 9)] {
+        let armed = Armed::new();
+        armed.kill_worker(name);
+        let (ended, rest) = armed.end();
+        let shown = &ended.shown;
+        rest.is_disarmed(name);
+        assert_eq!(ended.status.code(), Some(128 + number), "{shown}");
+        assert!(shown.contains(&format!("ended by SIG{name}")), "{shown}");
+        let confirmed = format!("tcp:{}: the board has confirmed", rest.served.address);
+        assert!(shown.contains(&confirmed), "{shown}");
+        assert!(!shown.contains(SWITCH_OFF), "{shown}");
+        let partial = partial(rest.folder.path()).expect("a recording");
+        assert!(shown.contains(&partial), "{partial}: {shown}");
+    }
+}
+
+#[test]
+fn user_is_told_where_guardian_gets_no_confirmation() {
+    let armed = Armed::new();
+    armed.served.deaf.store(true, Ordering::Relaxed);
+    armed.kill_worker("KILL");
+    let (ended, rest) = armed.end();
+    assert!(ended.shown.contains(SWITCH_OFF), "{}", ended.shown);
+    assert!(
+        rest.amplifiers.load(Ordering::Relaxed),
+        "nothing reached it"
+    );
+}
+
+#[test]
+fn each_signal_that_can_be_handled_is_a_clean_end() {
+    for name in ["QUIT", "USR1", "USR2", "ALRM", "TERM"] {
+        for is_to_worker in [false, true] {
+            let armed = Armed::new();
+            match is_to_worker {
+                true => armed.kill_worker(name),
+                false => armed.signal(name),
+            }
+            let (ended, rest) = armed.end();
+            assert!(ended.status.success(), "{name}: {}", ended.shown);
+            rest.is_disarmed(name);
+            assert!(rest.folder.path().join("felt.csv").exists(), "{name}");
+        }
+    }
+}
+
+#[test]
+fn worker_whose_guardian_is_killed_ends_as_after_ctrl_c() {
+    for name in ["KILL", "ABRT"] {
+        let armed = Armed::new();
+        armed.signal(name);
+        let (ended, rest) = armed.end();
+        rest.is_disarmed(name);
+        let recording = rest.folder.path().join("felt.csv");
+        wait_for("the recording", || recording.exists().then_some(()));
+        assert!(!ended.shown.contains(SWITCH_OFF), "{}", ended.shown);
+    }
+}
+
+/// A worker that is stopped stands for one that reads a file without end.
+#[test]
+fn worker_that_does_not_react_to_ctrl_c_is_killed() {
+    let armed = Armed::new();
+    armed.kill_worker("STOP");
+    armed.signal("INT");
+    let (ended, rest) = armed.end();
+    rest.is_disarmed("INT");
+    assert_eq!(ended.status.code(), Some(130), "{}", ended.shown);
+    assert!(ended.shown.contains("did not react"), "{}", ended.shown);
+}
+
+/// Ctrl-C in a terminal reaches both processes, and is pressed once: the worker goes on saying
+/// goodbye, and is not ended at once.
+#[test]
+fn signal_to_both_processes_is_pressed_once() {
+    let armed = Armed::new();
+    armed.served.deaf.store(true, Ordering::Relaxed);
+    armed.kill_worker("INT");
+    armed.signal("INT");
+    let (ended, _rest) = armed.end();
+    assert_eq!(ended.status.code(), Some(1), "{}", ended.shown);
+    assert!(ended.shown.contains(SWITCH_OFF), "{}", ended.shown);
+}
