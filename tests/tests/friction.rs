@@ -115,7 +115,7 @@ const ON_REAL_GROUND: [(f64, f64, usize); 4] = [
     (0.8, 0.3, 700),
 ];
 /// The same of ground that is as good as sticky, where a proxy rests on many lines of the grid, too.
-const ON_STICKY_GROUND: [(f64, f64, usize); 2] = [(1.25, 0.3, 350), (2.0, 1.0, 200)];
+const ON_STICKY_GROUND: [(f64, f64, usize); 2] = [(1.25, 0.3, 350), (2.0, 1.0, 80)];
 
 #[test]
 fn on_real_ground_it_slides_within_two_parts_in_a_hundred() {

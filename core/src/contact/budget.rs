@@ -11,8 +11,8 @@ use crate::rate::TickRate;
 
 /// Units of work a tick may spend at 1 kHz, and at any rate at most.
 ///
-/// A unit is at most 238 instructions of a Cortex-M4F, so a tick is at most 102,000: at 1.5 cycles
-/// each 154,000 of the 168,000 cycles that a NUCLEO-G474RE has for a millisecond.
+/// A unit is at most 246 instructions of a Cortex-M4F, so a tick is at most 106,000: at 1.5 cycles
+/// each 159,000 of the 168,000 cycles that a NUCLEO-G474RE has for a millisecond.
 pub const WORK_PER_TICK: u32 = 430;
 /// Units of work a second: 86 a tick at 10 kHz.
 const WORK_PER_S: u32 = 860_000;
