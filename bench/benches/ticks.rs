@@ -6,7 +6,6 @@ use hapterra_bench::grid::Grid;
 use hapterra_bench::haptics::Haptics;
 use hapterra_bench::path::{self, Flight, Path};
 use hapterra_bench::product::{self, Product, SIDE};
-use hapterra_core::contact::Rule;
 
 const TICKS: usize = 4000;
 const PATHS: [&str; 6] = [
@@ -52,7 +51,7 @@ fn swept(bencher: Bencher<'_, '_>, name: &'static str) {
     run(
         bencher,
         &path(&grid, name),
-        &mut Product::new(&window, Rule::Swept),
+        &mut Product::new(&window),
     );
 }
 

@@ -1,6 +1,5 @@
 //! All variants on one terrain along all paths, interleaved in one run.
 
-use hapterra_core::contact::Rule;
 use hapterra_core::terrain::Window;
 
 use crate::baseline::{GodObject, Paper, Parry, Project, ProxyGraph, Start};
@@ -149,16 +148,9 @@ pub const SWEPT: Label = Label {
     extra_bytes: (21.0 * 4.0 + 8.0) / 1024.0,
 };
 
-/// The product's rules on a held field.
+/// The product on a held field.
 pub(crate) fn ours<'w, const D: usize>(window: &'w Window<'_, D>) -> Vec<Entry<'w>> {
-    let by_paper = Label {
-        name: "hapterra paper rule",
-        ..SWEPT
-    };
-    vec![
-        (SWEPT, Box::new(Product::new(window, Rule::Swept))),
-        (by_paper, Box::new(Product::new(window, Rule::Paper))),
-    ]
+    vec![(SWEPT, Box::new(Product::new(window)))]
 }
 
 pub(crate) fn opponents(grid: &Grid) -> Vec<Entry<'_>> {

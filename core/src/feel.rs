@@ -136,7 +136,6 @@ impl Feel {
     fn begin(&mut self, scene: Option<&Scene>, landing: Option<(GridPoint, Vec3)>) {
         let is_replay = scene.is_some_and(|scene| scene.source == Source::Points);
         let settings = ContactSettings {
-            rule: scene.map_or_else(Default::default, |scene| scene.rule),
             execution: match is_replay {
                 true => Execution::LockStep,
                 false => Execution::RealTime,

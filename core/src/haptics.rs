@@ -89,7 +89,7 @@ pub struct Board {
 ///
 /// ```
 /// use hapterra_core::Vec3;
-/// use hapterra_core::contact::{ContactState, Rule};
+/// use hapterra_core::contact::ContactState;
 /// use hapterra_core::force::ForceLaw;
 /// use hapterra_core::grid::GridPoint;
 /// use hapterra_core::guard::Sense;
@@ -112,7 +112,6 @@ pub struct Board {
 ///     cell_mm: 1.0,
 ///     home: GridPoint::default(),
 ///     law: ForceLaw::PREMIUM,
-///     rule: Rule::Swept,
 ///     source: Source::Points,
 ///     hold_clock: false,
 ///     materials: None,

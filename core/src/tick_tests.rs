@@ -4,7 +4,7 @@ use std::vec::Vec;
 
 use super::*;
 use crate::cases::cases;
-use crate::contact::{ContactState, Rule};
+use crate::contact::ContactState;
 use crate::force::{Controller, Damping, ForceLaw};
 use crate::grid::{Cell, MAX_CELL};
 use crate::guard::{Blockers, Fault, Mode};
@@ -44,7 +44,6 @@ fn scene(source: Source) -> Scene {
         cell_mm: 1.0,
         home: GridPoint::new([320, 320, 5], Vec3::ZERO),
         law: SPRING,
-        rule: Rule::Swept,
         source,
         hold_clock: false,
         materials: None,

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::contact::ContactState;
 use hapterra_core::force::{Material, MaterialTable};
 use hapterra_tests::invariants::judge::Judge;
 use hapterra_tests::invariants::seen::Seen;
@@ -100,7 +100,7 @@ fn all_that_is_promised_is_felt_and_judged() {
     let mut touched = vec![0_u64; KINDS.len()];
     for number in 0..SCENES {
         let scene = Scene::random(SEED, number);
-        let mut judge = Judge::new(&scene.terrain, scene.rule);
+        let mut judge = Judge::new(&scene.terrain);
         let Ok(seen) = scene.feel(&mut buffers, [0; 3], scene.supply, |_| Ok(())) else {
             panic!("scene {number} does not settle");
         };
@@ -119,14 +119,7 @@ fn all_that_is_promised_is_felt_and_judged() {
             Supply::Pulled { latency: 0 } => "tiles at once",
             Supply::Pulled { .. } => "tiles late",
         };
-        let rule = if scene.rule == Rule::Swept {
-            "swept"
-        } else {
-            "paper"
-        };
-        for name in [supply, rule] {
-            *settings.entry(name).or_default() += 1;
-        }
+        *settings.entry(supply).or_default() += 1;
     }
     println!("{counts:#?}\n{settings:#?}");
     for (kind, ticks) in KINDS.iter().zip(&touched) {

@@ -4,7 +4,7 @@
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{
-    ContactOutput, ContactState, Execution, Friction, Rule, WORK_PER_TICK,
+    ContactOutput, ContactState, Execution, Friction, WORK_PER_TICK,
 };
 use hapterra_core::force::{Pattern, Texture};
 use hapterra_core::grid::GridPoint;
@@ -104,7 +104,7 @@ fn forged_position() -> GridPoint {
 /// All that the judge reports of the last of these ticks. It must report nothing of
 /// those before.
 fn reports(terrain: &Terrain, ticks: &[Seen]) -> Vec<Violation> {
-    reports_of(Judge::new(terrain, Rule::Swept), ticks)
+    reports_of(Judge::new(terrain), ticks)
 }
 
 fn reports_of(mut judge: Judge<'_>, ticks: &[Seen]) -> Vec<Violation> {
@@ -147,7 +147,7 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     };
     let flat = flat();
     let found = |ticks: &[Seen]| -> Vec<Invariant> {
-        let judge = Judge::new(&flat, Rule::Swept).with_friction(friction);
+        let judge = Judge::new(&flat).with_friction(friction);
         broken_of(judge, ticks)
     };
     let at = |x: f64, hip_x: f64| touching([hip_x, 10.5, 1.0], [x, 10.5, 2.0]);
@@ -176,7 +176,7 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     assert_eq!(found(&[&rest[..], &[over, first, broken]].concat()), []);
     // Over the ridge's edge only the side pulls that the HIP is on.
     let ridge = ridge();
-    let judge = || Judge::new(&ridge, Rule::Swept).with_friction(friction);
+    let judge = || Judge::new(&ridge).with_friction(friction);
     let edge = |x: f64| touching([x, 10.5, 1.0], [20.0, 10.5, 2.0]);
     let told = |ticks: &[Seen]| -> Vec<Invariant> { broken_of(judge(), ticks) };
     assert_eq!(
@@ -195,7 +195,7 @@ fn a_proxy_that_trails_by_more_than_it_slid_is_found() {
     };
     let flat = flat();
     let found = |ticks: &[Seen]| -> Vec<Invariant> {
-        let judge = Judge::new(&flat, Rule::Swept).with_friction(friction);
+        let judge = Judge::new(&flat).with_friction(friction);
         broken_of(judge, ticks)
     };
     // From (12, 10.5), where it met the ground or stood, by 2 cells: that holds 6.
@@ -215,7 +215,7 @@ fn a_pull_in_the_last_place_of_a_patchs_corners_is_not_judged() {
             (11, 10) | (10, 11) => 2.0 - corner,
             _ => 2.0,
         });
-        let judge = Judge::new(&saddle, Rule::Swept).with_friction(Friction::coulomb(0.5));
+        let judge = Judge::new(&saddle).with_friction(Friction::coulomb(0.5));
         let pulled = touching([10.51, 10.5, 1.99], [10.5, 10.5, 2.0]);
         broken_of(judge, &[pulled])
     };
@@ -239,7 +239,7 @@ fn a_force_that_is_shaded_otherwise_is_found() {
         Seen { shaded, ..seen }
     };
     let found =
-        |seen: Seen| -> Vec<Invariant> { broken_of(Judge::new(&ridge, Rule::Swept), &[seen]) };
+        |seen: Seen| -> Vec<Invariant> { broken_of(Judge::new(&ridge), &[seen]) };
     // Bends of 90° are turned along a fifth of an edge: this is beyond it.
     let along = [0.05, 0.05];
     assert_eq!(found(shaded(along, true)), []);
@@ -279,7 +279,7 @@ fn a_force_that_is_textured_otherwise_is_found() {
     };
     let (crest, slope) = ([0.0, 0.6], [-std::f64::consts::TAU / 48.0, 0.5]);
     let told = |honest: Option<Seen>, last: Seen| -> Vec<Invariant> {
-        let mut judge = Judge::new(&flat, Rule::Swept).with_texture(grating);
+        let mut judge = Judge::new(&flat).with_texture(grating);
         for seen in honest
             .iter()
             .cycle()
@@ -433,7 +433,7 @@ fn friction_at_a_holes_edge_may_hold_a_hip_above_the_ground_beyond_it() {
         _ => 0.0_f32.max((20 - x) as f32),
     });
     let found = |x: f64| -> Vec<Invariant> {
-        let judge = Judge::new(&hole, Rule::Swept).with_friction(Friction::coulomb(2.0));
+        let judge = Judge::new(&hole).with_friction(Friction::coulomb(2.0));
         let seen = touching([22.0, 20.1, 0.1], [x, 20.0, 0.0_f64.max(20.0 - x)]);
         broken_of(judge, &[seen])
     };
@@ -589,7 +589,6 @@ fn played(supply: Supply) -> (Scene, Vec<Seen>, Buffers) {
     let scene = Scene::given(
         ridge(),
         path.to_vec(),
-        Rule::Swept,
         Execution::LockStep,
         supply,
     );
@@ -698,6 +697,6 @@ fn a_scene_that_feels_otherwise_mirrored_is_found() {
 fn a_hip_that_is_never_answered_is_found() {
     let path = vec![ABOVE, BELOW];
     let never = Supply::Pulled { latency: 1 << 30 };
-    let scene = Scene::given(flat(), path, Rule::Swept, Execution::LockStep, never);
+    let scene = Scene::given(flat(), path, Execution::LockStep, never);
     only(Invariant::Settles, scene.run(&mut Buffers::default()));
 }

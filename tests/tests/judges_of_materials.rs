@@ -2,7 +2,7 @@
 //! honest ones beside them, which the product's loop made, of none.
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::{ContactState, Execution, Friction, Rule};
+use hapterra_core::contact::{ContactState, Execution, Friction};
 use hapterra_core::force::{Material, Pattern, Shading, Texture};
 use hapterra_tests::field::point;
 use hapterra_tests::invariants::Invariant;
@@ -50,7 +50,7 @@ impl Way {
         let along = steps.map(|i| [from + step * f64::from(i), 10.25, 0.5]);
         let path = [[from, 10.25, 3.0]].into_iter().chain(along).collect();
         let (execution, supply) = (Execution::LockStep, Supply::Held);
-        let mut scene = Scene::given(terrain, path, Rule::Swept, execution, supply);
+        let mut scene = Scene::given(terrain, path, execution, supply);
         scene.shading = shading;
         let shift = [0; 3];
         let how = Replay { shift, supply };

@@ -5,7 +5,7 @@
 //! kept in `properties.proptest-regressions` and run first the next time; what
 //! they taught has a test of its own in `regressions.rs`.
 
-use hapterra_core::contact::{Execution, Rule};
+use hapterra_core::contact::Execution;
 use hapterra_tests::scene::hip_path::GRAIN;
 use hapterra_tests::scene::run::Scene;
 use hapterra_tests::scene::supply::{Buffers, Supply};
@@ -78,10 +78,6 @@ fn path() -> impl Strategy<Value = Vec<[f64; 3]>> {
     })
 }
 
-fn rule() -> impl Strategy<Value = Rule> {
-    prop_oneof![4 => Just(Rule::Swept), 1 => Just(Rule::Paper)]
-}
-
 fn execution() -> impl Strategy<Value = Execution> {
     prop_oneof![Just(Execution::RealTime), Just(Execution::LockStep)]
 }
@@ -106,16 +102,16 @@ proptest! {
 
     #[test]
     fn everything_holds_on_gentle_ground(
-        heights in gentle(), path in path(), rule in rule(), execution in execution(),
+        heights in gentle(), path in path(), execution in execution(),
     ) {
-        holds(&Scene::given(terrain(&heights), path, rule, execution, Supply::Held))?;
+        holds(&Scene::given(terrain(&heights), path, execution, Supply::Held))?;
     }
 
     #[test]
     fn everything_holds_on_wild_ground(
-        heights in wild(), path in path(), rule in rule(), execution in execution(),
+        heights in wild(), path in path(), execution in execution(),
     ) {
-        holds(&Scene::given(terrain(&heights), path, rule, execution, Supply::Held))?;
+        holds(&Scene::given(terrain(&heights), path, execution, Supply::Held))?;
     }
 
     #[test]
@@ -123,6 +119,6 @@ proptest! {
         heights in gentle(), path in path(), execution in execution(), latency in 0..4_u32,
     ) {
         let supply = Supply::Pulled { latency };
-        holds(&Scene::given(terrain(&heights), path, Rule::Swept, execution, supply))?;
+        holds(&Scene::given(terrain(&heights), path, execution, supply))?;
     }
 }

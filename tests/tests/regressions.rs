@@ -1,6 +1,6 @@
 //! What random scenes found, as small as it gets, each by the name of its cause.
 
-use hapterra_core::contact::{ContactState, Execution, Rule};
+use hapterra_core::contact::{ContactState, Execution};
 use hapterra_tests::invariants::Violation;
 use hapterra_tests::scene::run::Scene;
 use hapterra_tests::scene::supply::{Buffers, Supply};
@@ -17,7 +17,7 @@ fn run(
     execution: Execution,
     supply: Supply,
 ) -> Result<Vec<ContactState>, Violation> {
-    let scene = Scene::given(terrain, path.to_vec(), Rule::Swept, execution, supply);
+    let scene = Scene::given(terrain, path.to_vec(), execution, supply);
     let mut buffers = Buffers::default();
     scene.run(&mut buffers)?;
     let seen = scene.feel(&mut buffers, [0; 3], supply, |_| Ok(()))?;
@@ -406,7 +406,6 @@ fn a_slope_far_above_the_hip_leads_on_to_its_end() {
     let scene = Scene::given(
         slope,
         path.to_vec(),
-        Rule::Swept,
         Execution::LockStep,
         Supply::Held,
     );

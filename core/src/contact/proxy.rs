@@ -5,7 +5,6 @@ mod held_back;
 mod in_air;
 mod landing;
 mod on_ground;
-mod paper_rule;
 
 use glam::Vec3;
 
@@ -13,8 +12,7 @@ use super::budget::{Budget, SHORTCUT};
 use super::closest_point::{Descent, Leave, Place};
 use super::friction::Friction;
 use super::output::{ContactOutput, ContactState};
-use super::paper::Candidates;
-use super::settings::{ContactSettings, Execution, Rule};
+use super::settings::{ContactSettings, Execution};
 use super::shortcut::{self, Follow, Followed};
 use super::surface::{HipView, SurfacePoint};
 use super::sweep::Path;
@@ -43,8 +41,6 @@ enum Phase {
         displacement: Vec3,
         fade: f32,
     },
-    /// By the paper's rule: the cells under a segment are looked at.
-    Seeking { cells: Candidates, was_late: bool },
 }
 
 #[derive(Clone, Debug)]
@@ -127,10 +123,7 @@ impl Contact {
     /// A contact that waits to see the HIP above the surface.
     #[must_use]
     pub fn new(settings: ContactSettings) -> Self {
-        let rough = match settings.rule {
-            Rule::Swept => Rough::on(settings.friction),
-            Rule::Paper => None,
-        };
+        let rough = Rough::on(settings.friction);
         let is_smooth = rough.is_none();
         Self {
             // A proxy that is held back does not follow the HIP.
@@ -208,12 +201,11 @@ impl Contact {
         self.redirect(window, self.hip, None, &mut Budget::new(0));
     }
 
-    /// How rough the surface is from the next step on. A proxy that was held is judged again. The
-    /// paper's rule knows of no friction.
+    /// How rough the surface is from the next step on. A proxy that was held is judged again.
     pub(crate) fn feels_friction(&mut self, friction: Friction) {
         if let Some(rough) = &mut self.rough {
             self.at_rest &= !rough.takes(friction);
-        } else if self.settings.rule == Rule::Swept && !friction.is_none() {
+        } else if !friction.is_none() {
             self.rough = Rough::on(friction);
             // A proxy that is held back does not follow the HIP.
             self.settings.shortcuts = false;
@@ -385,15 +377,8 @@ impl Contact {
         match &mut self.phase {
             Phase::Waiting => self.looks_around(window, hip),
             Phase::Fading { .. } => self.fades_out(window, hip),
-            Phase::Free if self.settings.rule == Rule::Paper => {
-                let cells = Candidates::between(self.hip, hip);
-                let was_late = false;
-                self.phase = Phase::Seeking { cells, was_late };
-                Turn::GoesOn
-            }
             Phase::Free => self.flies(window, hip, budget),
             Phase::Sweeping(_) => self.sweeps(window, hip, budget),
-            Phase::Seeking { .. } => self.seeks(window, hip, budget),
             Phase::OnSurface(_) => self.descends(window, hip, budget),
         }
     }

@@ -143,7 +143,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     asked.grid = asked.grid.with_materials(materials.as_ref());
     let law = args.rendering.law()?;
     let law = args.rendering.materials.law(materials.as_ref(), law);
-    let law = (law, args.rendering.rule());
+    args.rendering.needs_the_devices_rule()?;
     // What cannot be recorded is known before anything is armed.
     let recordings = of_each(&devices, recording)?;
     let commands = args.commands.open_for(devices.len())?;

@@ -1,6 +1,5 @@
 //! Classes over a terrain: which lies where.
 
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
@@ -144,7 +143,6 @@ fn the_scene_names_the_table_and_another_file_of_classes_makes_another_scene() {
         let felt = Terrain::over(grid, Scale::new(1.0, 1.0).expect("valid"), 0).expect("terrain");
         felt.scene(
             ForceLaw::PREMIUM,
-            Rule::Swept,
             Source::Points,
             GridPoint::default(),
         )

@@ -8,6 +8,7 @@
 
 mod felt;
 mod loop_columns;
+mod published;
 mod recording;
 pub mod settings;
 mod trajectory;
@@ -15,10 +16,10 @@ mod trajectory;
 pub use felt::Replayer;
 pub use loop_columns::LoopColumns;
 pub use recording::{Column, Record, Recording, Value};
-pub use settings::Settings;
+pub use settings::{Rule, Settings};
 pub use trajectory::{FeltRow, FeltRows, Row, Told, Trajectory, TrajectoryError};
 
-use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::Sample;
 
@@ -176,10 +177,9 @@ pub fn is_below_ground(sample: &Sample, record: &Record, terrain: &Terrain<'_>) 
 pub fn on_native<'t>(
     terrain: &'t Terrain<'t>,
     law: ForceLaw,
-    rule: Rule,
 ) -> Result<Replayer<'t>, LinkError> {
     let device: Box<dyn Transport> = Box::new(Native::for_replay());
-    Replayer::open(terrain, law, rule, device, Patience::EMULATED)
+    Replayer::open(terrain, law, device, Patience::EMULATED)
 }
 
 /// A state's name in a recording.

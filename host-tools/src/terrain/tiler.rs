@@ -2,7 +2,6 @@
 
 use std::sync::OnceLock;
 
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::scene::{Scene, Source};
@@ -243,7 +242,7 @@ impl<'r> Terrain<'r> {
     /// The scene in which the device feels this terrain. Its epoch is a hash
     /// of the heights and of everything else in it.
     #[must_use]
-    pub fn scene(&self, law: ForceLaw, rule: Rule, source: Source, home: GridPoint) -> Scene {
+    pub fn scene(&self, law: ForceLaw, source: Source, home: GridPoint) -> Scene {
         let mut scene = Scene {
             epoch: 0,
             level: self.level,
@@ -253,7 +252,6 @@ impl<'r> Terrain<'r> {
             cell_mm: self.scale.cell_mm() as f32,
             home,
             law,
-            rule,
             source,
             hold_clock: true,
             materials: (self.grid.materials()).map(|materials| materials.table().check_sum()),

@@ -152,7 +152,7 @@ fn a_scenes_epoch_follows_heights_scale_and_law() {
         };
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
         let home = GridPoint::default();
-        terrain.scene(law, Rule::Swept, Source::Points, home).epoch
+        terrain.scene(law, Source::Points, home).epoch
     };
     let same = scene(1.0, 1.0, 0.5);
     assert_eq!(same, scene(1.0, 1.0, 0.5));

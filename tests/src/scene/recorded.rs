@@ -72,7 +72,6 @@ impl Recorded {
                 texture: scene.texture,
                 ..ForceLaw::PREMIUM
             },
-            rule: scene.rule,
             source: Source::Points,
             hold_clock: false,
             materials: None,

@@ -2,7 +2,7 @@
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{
-    Contact, ContactOutput, ContactSettings, Execution, Friction, Rule, WORK_PER_TICK,
+    Contact, ContactOutput, ContactSettings, Execution, Friction, WORK_PER_TICK,
     work_per_tick,
 };
 use hapterra_core::force::{Pattern, Shader, Shading, Texture, Texturer};
@@ -37,8 +37,6 @@ pub struct Scene {
     pub terrain: Terrain,
     /// The HIP, cells.
     pub path: Vec<[f64; 3]>,
-    /// The contact rule.
-    pub rule: Rule,
     /// Whether a tick is repeated until it is done.
     pub execution: Execution,
     /// How the tiles come.
@@ -167,9 +165,6 @@ impl Scene {
             _ => hip_path::random(&terrain, &mut chance, ticks),
         };
         let materials = Materials::drawn(mixed, &terrain);
-        // The paper's rule wants the whole way at once, and its ticks do not go on.
-        let paper = chance.below(12) == 0 && supply == Supply::Held;
-        let rule = if paper { Rule::Paper } else { Rule::Swept };
         let execution = if chance.below(2) == 0 {
             Execution::RealTime
         } else {
@@ -178,7 +173,6 @@ impl Scene {
         Self {
             terrain,
             path,
-            rule,
             execution,
             supply,
             friction: Friction::NONE,
@@ -187,7 +181,7 @@ impl Scene {
             texture: texture(mixed),
             materials,
             shortcuts: true,
-            twins: Twins::One(if paper { 0 } else { chance.below(6) }),
+            twins: Twins::One(chance.below(6)),
             seed: chance.bits(),
         }
     }
@@ -199,7 +193,6 @@ impl Scene {
             return self;
         }
         Self {
-            rule: Rule::Swept,
             friction: friction(&mut Chance::new(self.seed ^ 0xf71c_7104)),
             materials: self.materials.map(Materials::roughened),
             ..self
@@ -211,14 +204,12 @@ impl Scene {
     pub const fn given(
         terrain: Terrain,
         path: Vec<[f64; 3]>,
-        rule: Rule,
         execution: Execution,
         supply: Supply,
     ) -> Self {
         Self {
             terrain,
             path,
-            rule,
             execution,
             supply,
             friction: Friction::NONE,
@@ -235,7 +226,6 @@ impl Scene {
     #[must_use]
     pub const fn settings(&self) -> ContactSettings {
         ContactSettings {
-            rule: self.rule,
             execution: self.execution,
             friction: self.friction,
             shortcuts: self.shortcuts,

@@ -1,6 +1,6 @@
 //! Scenes run twice, the second time so that nothing felt may change.
 
-use hapterra_core::contact::{ContactState, Execution, Rule};
+use hapterra_core::contact::{ContactState, Execution};
 
 use super::hip_path::GRAIN;
 use super::run::{Player, Scene};
@@ -65,7 +65,7 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Com
     );
     let mut felt = |shift| {
         // Of grain, and of most gratings, another part is there; it is judged as well.
-        let mut judge = Judge::new(&scene.terrain, scene.rule).with_texture(scene.texture);
+        let mut judge = Judge::new(&scene.terrain).with_texture(scene.texture);
         let pulled = Supply::Pulled { latency: 0 };
         let seen = scene.feel(buffers, shift, pulled, |seen| judge.look_at_texture(seen))?;
         Ok(seen.into_iter().map(|seen| Seen {
@@ -91,7 +91,7 @@ pub fn windowed(
     chance: &mut Chance,
 ) -> Compared {
     let fits = scene.terrain.size.iter().all(|patches| *patches <= 256);
-    if scene.execution != Execution::LockStep || scene.rule == Rule::Paper || !fits {
+    if scene.execution != Execution::LockStep || !fits {
         return Ok(false);
     }
     let latency = [0, 1, 5][chance.below(3)];
@@ -157,7 +157,7 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Comp
     // mirrored or not; and what is left over of a tick may differ.
     let settles = scene.execution == Execution::LockStep && scene.supply == Supply::Held;
     let plain = scene.terrain.steepest() <= STEEP && scene.terrain.kind != Kind::Holes;
-    if !settles || scene.rule == Rule::Paper || !plain {
+    if !settles || !plain {
         return Ok(false);
     }
     let inside = |p: &[f64; 3]| {

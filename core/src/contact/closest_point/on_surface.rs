@@ -42,8 +42,6 @@ pub(in crate::contact) enum Leave {
     ButAt(SurfacePoint),
     /// Nowhere any more: it has left too often. Here it was held last, above the HIP.
     NoMore(SurfacePoint),
-    /// Nowhere: the rule does not know of leaving.
-    Nowhere,
 }
 
 impl Leave {
@@ -53,7 +51,7 @@ impl Leave {
         match self {
             Self::Anywhere => true,
             Self::ButAt(place) => !point.is_same_place(place),
-            Self::NoMore(_) | Self::Nowhere => false,
+            Self::NoMore(_) => false,
         }
     }
 }

@@ -4,9 +4,9 @@ use super::departures::count_departure;
 use super::{Contact, Phase, Sweeping, Turn};
 use crate::contact::boundary_fade::{self, approach};
 use crate::contact::budget::Budget;
-use crate::contact::closest_point::{Ended, Leave, position_on};
+use crate::contact::closest_point::{Ended, position_on};
 use crate::contact::output::{ContactOutput, ContactState};
-use crate::contact::settings::{Execution, Rule};
+use crate::contact::settings::Execution;
 use crate::contact::shortcut::Follow;
 use crate::contact::surface::HipView;
 use crate::contact::sweep::Path;
@@ -26,16 +26,12 @@ impl Contact {
             return Turn::Ends;
         };
         let view = HipView::new(hip);
-        let is_paper = self.settings.rule == Rule::Paper;
-        let leave = if is_paper { &Leave::Nowhere } else { &on.leave };
         let waits = self.settings.execution == Execution::LockStep;
-        match on.descent.advance(window, &view, leave, waits, budget) {
-            Ended::Rests if is_paper => self.decides(window, &view, hip),
+        match on.descent.advance(window, &view, &on.leave, waits, budget) {
             Ended::Rests => self.touches(window, hip, true, None),
             Ended::Missing(tile) => self.touches(window, hip, false, Some(tile)),
             Ended::Suspended => self.touches(window, hip, false, None),
             Ended::Leaves => self.leaves(window, &view, hip),
-            Ended::Lost(_) if is_paper => self.becomes_free(hip),
             // The window gave up the proxy's tile. Until it comes back no tick counts.
             Ended::Lost(Some(tile)) if waits => {
                 (self.output.converged, self.output.missing_tile) = (false, Some(tile));
@@ -94,7 +90,7 @@ impl Contact {
         let Some((point, z)) = on.descent.nearest(window, &view) else {
             return Turn::Ends;
         };
-        let mut may_follow = self.settings.shortcuts && self.settings.rule == Rule::Swept;
+        let mut may_follow = self.settings.shortcuts;
         if converged || is_real_time {
             let target = boundary_fade::target(window, &hip, point.cell);
             may_follow &= target.over_patch;

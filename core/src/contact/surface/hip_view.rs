@@ -44,12 +44,6 @@ impl HipView {
         Patch::new(corners.heights).seen_from(self.altitude(), corners.base)
     }
 
-    /// Whether any of these corners is above the HIP.
-    pub(in crate::contact) fn is_below_any(&self, corners: &Corners) -> bool {
-        let up = |height: &f32| self.altitude().up_to(corners.base, *height);
-        corners.heights.iter().any(|height| up(height) > 0.0)
-    }
-
     /// The cell that the HIP is over and what lies there: of cells that share the place,
     /// one that is no hole.
     pub(in crate::contact) fn ground<const D: usize>(

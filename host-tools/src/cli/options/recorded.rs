@@ -2,11 +2,11 @@
 
 use std::fmt::Debug;
 
-use hapterra_core::contact::{Friction, Rule};
+use hapterra_core::contact::Friction;
 use hapterra_core::force::{Controller, Shading};
 
 use super::exaggeration::Exaggeration;
-use super::rendering::{ContactRule, ForceShading, PassivityController, Rendering};
+use super::rendering::{ForceShading, PassivityController, Rendering};
 use crate::replay::Settings;
 
 impl Rendering {
@@ -69,7 +69,7 @@ impl Rendering {
                 &mut told,
             )),
             texture: self.texture.or_recorded(&force.texture, &mut told),
-            contact: Some(merged("contact", self.contact, rule(force.rule), &mut told)),
+            contact: Some(merged("contact", self.contact, force.rule, &mut told)),
             ..self.clone()
         };
         match (self.height_mm_per_unit, self.exaggeration) {
@@ -146,20 +146,13 @@ const fn shading(shading: Shading) -> ForceShading {
         Shading::Smooth => ForceShading::Smooth,
     }
 }
-
-const fn rule(rule: Rule) -> ContactRule {
-    match rule {
-        Rule::Swept => ContactRule::Swept,
-        Rule::Paper => ContactRule::Paper,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use hapterra_core::force::{Damping, ForceLaw, Pattern, Texture};
 
     use super::super::texture::{SurfacePattern, SurfaceTexture};
     use super::*;
+    use crate::replay::Rule;
     use crate::raster::Raster;
     use crate::replay::settings::Device;
     use crate::terrain::{FeltCells, Scale, Terrain};
