@@ -48,11 +48,7 @@ fn swept(bencher: Bencher<'_, '_>, name: &'static str) {
     let grid = terrain();
     let mut buffers = product::buffers::<SIDE>();
     let window = product::window::<SIDE>(&grid, &mut buffers);
-    run(
-        bencher,
-        &path(&grid, name),
-        &mut Product::new(&window),
-    );
+    run(bencher, &path(&grid, name), &mut Product::new(&window));
 }
 
 #[divan::bench(args = PATHS)]

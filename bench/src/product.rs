@@ -83,14 +83,14 @@ impl<'w, 't, const D: usize> Product<'w, 't, D> {
     pub fn new(window: &'w Window<'t, D>) -> Self {
         Self {
             window,
-            contact: Contact::new(ContactSettings::REAL_TIME),
+            contact: Contact::new(ContactSettings::AT_1_KHZ),
         }
     }
 }
 
 impl<const D: usize> Haptics for Product<'_, '_, D> {
     fn forget(&mut self) {
-        self.contact = Contact::new(ContactSettings::REAL_TIME);
+        self.contact = Contact::new(ContactSettings::AT_1_KHZ);
     }
 
     #[inline]

@@ -44,7 +44,7 @@ impl FieldContact {
         }
         Self {
             window,
-            contact: Contact::new(ContactSettings::LOCK_STEP),
+            contact: Contact::new(ContactSettings::AT_1_KHZ),
         }
     }
 

@@ -176,7 +176,7 @@ fn live(
     };
     let window = field.window();
     let rate = TickRate::new(hz).expect("in range");
-    let settings = ContactSettings::REAL_TIME
+    let settings = ContactSettings::AT_1_KHZ
         .at_rate(rate)
         .on_cells_of(cell_mm as f32);
     let mut contact = Contact::new(settings.with_friction(friction));

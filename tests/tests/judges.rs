@@ -3,9 +3,7 @@
 //! reported by none.
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::{
-    ContactOutput, ContactState, Execution, Friction, WORK_PER_TICK,
-};
+use hapterra_core::contact::{ContactOutput, ContactState, Friction, WORK_PER_TICK};
 use hapterra_core::force::{Pattern, Texture};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::terrain::TileIndex;
@@ -15,7 +13,7 @@ use hapterra_tests::field::point;
 use hapterra_tests::invariants::judge::Judge;
 use hapterra_tests::invariants::seen::{Seen, Shaded};
 use hapterra_tests::invariants::{Invariant, Violation};
-use hapterra_tests::scene::run::Scene;
+use hapterra_tests::scene::run::{Execution, Scene};
 use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::symmetry;
 use hapterra_tests::scene::terrain::{Kind, Terrain};
@@ -238,8 +236,7 @@ fn a_force_that_is_shaded_otherwise_is_found() {
         });
         Seen { shaded, ..seen }
     };
-    let found =
-        |seen: Seen| -> Vec<Invariant> { broken_of(Judge::new(&ridge), &[seen]) };
+    let found = |seen: Seen| -> Vec<Invariant> { broken_of(Judge::new(&ridge), &[seen]) };
     // Bends of 90° are turned along a fifth of an edge: this is beyond it.
     let along = [0.05, 0.05];
     assert_eq!(found(shaded(along, true)), []);
@@ -586,12 +583,7 @@ fn a_force_that_comes_or_goes_at_once_is_found() {
 fn played(supply: Supply) -> (Scene, Vec<Seen>, Buffers) {
     // Down into a side of the ridge, along it, and up again.
     let path = [3.0, 0.0, 0.25, 3.0].map(|z| [18.5 + 0.5 * z, 10.5, z]);
-    let scene = Scene::given(
-        ridge(),
-        path.to_vec(),
-        Execution::LockStep,
-        supply,
-    );
+    let scene = Scene::given(ridge(), path.to_vec(), Execution::LockStep, supply);
     let mut buffers = Buffers::default();
     let seen = scene
         .feel(&mut buffers, [0; 3], supply, |_| Ok(()))

@@ -2,14 +2,14 @@
 //! honest ones beside them, which the product's loop made, of none.
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::{ContactState, Execution, Friction};
+use hapterra_core::contact::{ContactState, Friction};
 use hapterra_core::force::{Material, Pattern, Shading, Texture};
 use hapterra_tests::field::point;
 use hapterra_tests::invariants::Invariant;
 use hapterra_tests::invariants::material::{Judged, MaterialJudge};
 use hapterra_tests::scene::materials::Materials;
 use hapterra_tests::scene::replayed::{Replay, Replied, replay};
-use hapterra_tests::scene::run::Scene;
+use hapterra_tests::scene::run::{Execution, Scene};
 use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::terrain::{Kind, Terrain};
 

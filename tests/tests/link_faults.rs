@@ -76,8 +76,7 @@ fn a_bad_link_changes_nothing_that_is_felt() {
     ] {
         let link = Faulty::new(Native::for_replay(), fault, one_in, 1);
         let harmed = Rc::clone(&link.harmed);
-        let mut replayer =
-            Replayer::open(&terrain, law, Box::new(link), AT_ONCE).expect("opened");
+        let mut replayer = Replayer::open(&terrain, law, Box::new(link), AT_ONCE).expect("opened");
         let got = walk(&mut replayer);
         assert!(expected == got, "{fault:?} changed what is felt");
         let tally = replayer.tally();
@@ -230,8 +229,7 @@ fn a_device_that_restarts_ends_a_replay_with_a_word() {
         }
     }
     let link = Box::new(Restarting(Native::for_replay(), 0));
-    let mut replayer =
-        Replayer::open(&terrain, ForceLaw::PREMIUM, link, AT_ONCE).expect("opened");
+    let mut replayer = Replayer::open(&terrain, ForceLaw::PREMIUM, link, AT_ONCE).expect("opened");
     let path = wander(&terrain, 9, 100, 1.0);
     let mut hips = path
         .iter()
@@ -280,12 +278,7 @@ fn the_host_says_which_versions_do_not_fit() {
     }
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
-    let replayer = Replayer::open(
-        &terrain,
-        ForceLaw::PREMIUM,
-        Box::new(Newer),
-        AT_ONCE,
-    );
+    let replayer = Replayer::open(&terrain, ForceLaw::PREMIUM, Box::new(Newer), AT_ONCE);
     let error = replayer.err().expect("refused").to_string();
     let (ours, theirs) = (PROTOCOL, PROTOCOL + 1);
     assert!(error.contains("version mismatch"), "{error}");

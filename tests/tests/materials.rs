@@ -425,8 +425,7 @@ fn a_replay_with_materials_gives_the_same_bits_on_the_emulated_board() {
     let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
     let _plant = lines.plant;
     let link = Box::new(lines.link);
-    let mut board =
-        Replayer::open(&several, law, link, Patience::EMULATED).expect("opened");
+    let mut board = Replayer::open(&several, law, link, Patience::EMULATED).expect("opened");
     let got = walk(&mut board, &path);
     for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
         assert_eq!(expected, got, "row {i} at {:?}", path[i]);

@@ -79,11 +79,7 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
     };
     for (name, raster, law) in [
         ("fractal", made(Kind::Fractal), plain),
-        (
-            "steps",
-            made(Kind::Steps),
-            with(Pattern::Grating),
-        ),
+        ("steps", made(Kind::Steps), with(Pattern::Grating)),
         ("holes", holed(), with(Pattern::Grain)),
     ] {
         let scale = Scale::new(0.8, 0.9).expect("scale");
@@ -94,8 +90,7 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
         let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
         let _plant = lines.plant;
         let link = Box::new(lines.link);
-        let mut board =
-            Replayer::open(&terrain, law, link, Patience::EMULATED).expect("opened");
+        let mut board = Replayer::open(&terrain, law, link, Patience::EMULATED).expect("opened");
         assert_eq!(board.device().board.as_str(), "mps2-an386");
         let got = walk(&mut board, &path);
         for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {

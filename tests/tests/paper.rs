@@ -1,9 +1,9 @@
 //! The statements of *Height Field Haptics*, one by one.
 
-use hapterra_core::contact::closest_point::nearest_downhill;
-use hapterra_core::contact::surface::patch::Patch;
 use hapterra::published::{Heights, Paper, Start};
 use hapterra_core::contact::ContactState;
+use hapterra_core::contact::closest_point::nearest_downhill;
+use hapterra_core::contact::surface::patch::Patch;
 use hapterra_core::force::ForceLaw;
 use hapterra_tests::field::{FieldContact, position};
 

@@ -3,7 +3,7 @@
 
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{FeltCells, FeltGrid};
-use hapterra_core::contact::{ContactState, Execution};
+use hapterra_core::contact::ContactState;
 use hapterra_tests::chance::Chance;
 use hapterra_tests::invariants::judge::Judge;
 use hapterra_tests::invariants::seen::Seen;
@@ -11,7 +11,7 @@ use hapterra_tests::invariants::surface::{Patch, distance};
 use hapterra_tests::invariants::{Invariant, descent};
 use hapterra_tests::minima;
 use hapterra_tests::scene::hip_path;
-use hapterra_tests::scene::run::Scene;
+use hapterra_tests::scene::run::{Execution, Scene};
 use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::terrain::{Kind, Terrain};
 use hapterra_tests::shared;
@@ -187,12 +187,7 @@ fn on_real_terrain_every_proxy_rests_at_a_closest_point() {
             let mut total = Found::default();
             for _ in 0..12 {
                 let path = hip_path::random(&terrain, &mut chance, 1000);
-                let scene = Scene::given(
-                    terrain.clone(),
-                    path,
-                    Execution::LockStep,
-                    Supply::Held,
-                );
+                let scene = Scene::given(terrain.clone(), path, Execution::LockStep, Supply::Held);
                 let found = look(&scene, &mut Buffers::default());
                 let none = [&found.wrong, &found.disputed, &found.late]
                     .iter()

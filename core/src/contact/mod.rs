@@ -35,4 +35,4 @@ pub use budget::{LARGEST_PIECE, WORK_PER_TICK, work_per_tick};
 pub use friction::Friction;
 pub use output::{ContactOutput, ContactState};
 pub use proxy::Contact;
-pub use settings::{ContactSettings, Execution};
+pub use settings::ContactSettings;

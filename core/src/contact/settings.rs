@@ -4,24 +4,9 @@ use super::budget::{WORK_PER_TICK, work_per_tick};
 use super::friction::Friction;
 use crate::rate::TickRate;
 
-/// What happens when a tick cannot finish: a tile is missing, or the budget is
-/// spent.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Execution {
-    /// The loop goes on; the proxy waits, and a force that has to wait comes
-    /// in at a bounded rate.
-    #[default]
-    RealTime,
-    /// The tick will be repeated with the same HIP until it can finish, and
-    /// only then counts; nothing of the wait is felt.
-    LockStep,
-}
-
 /// What does not change while a contact lasts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSettings {
-    /// What happens when a tick cannot finish.
-    pub execution: Execution,
     /// Ticks a second: fades are bounded in time.
     pub rate: TickRate,
     /// Units of work a tick may spend: [`work_per_tick`] of the rate, or at least
@@ -45,20 +30,13 @@ impl ContactSettings {
     /// to move.
     pub const STICKS_BELOW_MM_S: f32 = 1.0;
 
-    /// In real time at 1 kHz, over cells of a millimetre.
-    pub const REAL_TIME: Self = Self {
-        execution: Execution::RealTime,
+    /// At 1 kHz, over cells of a millimetre.
+    pub const AT_1_KHZ: Self = Self {
         rate: TickRate::DEFAULT,
         work_per_tick: WORK_PER_TICK,
         sticks_below: Self::STICKS_BELOW_MM_S,
         friction: Friction::NONE,
         shortcuts: true,
-    };
-
-    /// In lock-step.
-    pub const LOCK_STEP: Self = Self {
-        execution: Execution::LockStep,
-        ..Self::REAL_TIME
     };
 
     /// The same on a rough surface.
@@ -89,6 +67,6 @@ impl ContactSettings {
 
 impl Default for ContactSettings {
     fn default() -> Self {
-        Self::REAL_TIME
+        Self::AT_1_KHZ
     }
 }

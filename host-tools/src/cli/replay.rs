@@ -19,7 +19,8 @@ use crate::materials::Materials;
 use crate::output::{Output, keep_apart};
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{
-    Record, ReplayError, Replayer, Rule, Settings, Summary, Trajectory, on_native, replay_trajectory,
+    Record, ReplayError, Replayer, Rule, Settings, Summary, Trajectory, on_native,
+    replay_trajectory,
 };
 use crate::stability::limits;
 use crate::terrain::Terrain;
@@ -130,6 +131,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         eprintln!(
             "{} rows are below ground and not felt: the HIP had not been above the surface before them",
             summary.below_ground
+        );
+    }
+    if summary.leaps > 0 {
+        eprintln!(
+            "{} rows move the HIP by more than the device's window: contact begins anew there",
+            summary.leaps
         );
     }
     eprintln!(

@@ -367,7 +367,7 @@ mod tests {
     use crate::raster::Raster;
     use crate::terrain::{Scale, Terrain};
     use crate::timeouts;
-        use hapterra_core::force::ForceLaw;
+    use hapterra_core::force::ForceLaw;
     use hapterra_core::grid::GridPoint;
     use hapterra_core::scene::Source;
     use hapterra_core::wire::frame::encode;

@@ -231,11 +231,7 @@ impl View {
     ///
     /// # Errors
     /// [`PlaceError::FarAway`] where the home position is farther out than can be addressed.
-    pub fn scene(
-        &self,
-        terrain: &Terrain<'_>,
-        law: ForceLaw,
-    ) -> Result<Scene, PlaceError> {
+    pub fn scene(&self, terrain: &Terrain<'_>, law: ForceLaw) -> Result<Scene, PlaceError> {
         let home = terrain.scale().to_grid(self.home_mm);
         let home = home.ok_or(PlaceError::FarAway(self.home_mm))?;
         let scene = terrain.scene(law, Source::Encoders, home);

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant, SystemTime};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Point, Sample, Source, View};
+use hapterra_core::terrain::TILE_CELLS;
 use hapterra_core::wire::hello::DeviceHello;
 
 use super::published::Published;
@@ -26,6 +27,7 @@ pub struct Replayer<'t> {
     device: DeviceHello,
     seq: u32,
     published: Option<Published<'t>>,
+    last: Option<GridPoint>,
 }
 
 impl<'t> Replayer<'t> {
@@ -53,6 +55,7 @@ impl<'t> Replayer<'t> {
             device,
             seq: 0,
             published: None,
+            last: None,
         })
     }
 
@@ -81,6 +84,7 @@ impl<'t> Replayer<'t> {
         hip: GridPoint,
     ) -> Result<(), LinkError> {
         self.view = self.view.wrapping_add(1);
+        self.last = None;
         let mut scene = terrain.scene(law, Source::Points, GridPoint::default());
         // One that comes again is another one.
         scene.epoch ^= self.nonce.rotate_left(8) ^ u32::from(self.view);
@@ -118,6 +122,16 @@ impl<'t> Replayer<'t> {
         &self.device
     }
 
+    /// Returns true if a HIP is more than a window of the device away from the last one.
+    #[must_use]
+    pub fn is_leap_to(&self, hip: &GridPoint) -> bool {
+        let window = u32::from(self.device.window) * TILE_CELLS as u32;
+        self.last.is_some_and(|last| {
+            let (from, to) = (last.column(), hip.column());
+            from.x.abs_diff(to.x).max(from.y.abs_diff(to.y)) > window
+        })
+    }
+
     /// What went over the link so far.
     #[must_use]
     pub const fn tally(&self) -> &Tally {
@@ -129,6 +143,7 @@ impl<'t> Replayer<'t> {
     /// # Errors
     /// [`LinkError`]; the replay cannot go on after one.
     pub fn feel(&mut self, hip: GridPoint) -> Result<Sample, LinkError> {
+        self.last = Some(hip);
         let seq = self.seq;
         self.seq = seq.wrapping_add(1);
         if let Some(published) = &mut self.published {

@@ -30,9 +30,7 @@ impl InCells<'_> {
         let terrain = &self.0;
         let scale = terrain.scale();
         let height = |column, row| {
-            let height = terrain
-                .grid()
-                .height_of_level(terrain.level(), column, row);
+            let height = terrain.grid().height_of_level(terrain.level(), column, row);
             (height * scale.height_mm_per_unit() / scale.cell_mm()) as f32
         };
         let corners = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[e, n]| height(x + e, y + n));

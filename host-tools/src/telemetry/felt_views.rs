@@ -80,7 +80,7 @@ mod tests {
     use crate::link::hello;
     use crate::place::{Reach, ViewOptions};
     use crate::raster::Raster;
-        use hapterra_core::force::ForceLaw;
+    use hapterra_core::force::ForceLaw;
     use hapterra_core::grid::GridPoint;
     use hapterra_core::phantom::Calibration;
     use hapterra_core::scene::{Source, View};

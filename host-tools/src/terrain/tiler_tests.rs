@@ -164,3 +164,21 @@ fn a_scenes_epoch_follows_heights_scale_and_law() {
         assert_ne!(same, other);
     }
 }
+
+#[test]
+fn tile_with_too_steep_step_is_a_hole() {
+    let wall = |height: f64| {
+        let raster = Raster::from_fn(64, 9, move |x, _| if x > 40 { height } else { 0.0 });
+        raster.expect("raster")
+    };
+    for (height, is_hole) in [(9_999.0, false), (10_001.0, true)] {
+        let raster = wall(height);
+        let scale = Scale::new(1.0, 1.0).expect("scale");
+        let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+        let mut buffer = TileBuffer::default();
+        let steep = terrain.tile(key(0, 1, 0), &mut buffer).expect("a tile");
+        assert_eq!(steep == Heights::Hole, is_hole, "{height}");
+        let flat = terrain.tile(key(0, 0, 0), &mut buffer).expect("a tile");
+        assert_ne!(flat, Heights::Hole);
+    }
+}

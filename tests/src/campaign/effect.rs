@@ -29,7 +29,6 @@ pub enum Core {
     Resets(ResetCause),
 }
 
-
 /// One mishap under way.
 #[derive(Clone, Debug)]
 pub struct Mishap {

@@ -2,8 +2,7 @@
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{
-    Contact, ContactOutput, ContactSettings, Execution, Friction, WORK_PER_TICK,
-    work_per_tick,
+    Contact, ContactOutput, ContactSettings, Friction, WORK_PER_TICK, work_per_tick,
 };
 use hapterra_core::force::{Pattern, Shader, Shading, Texture, Texturer};
 use hapterra_core::grid::GridPoint;
@@ -226,7 +225,6 @@ impl Scene {
     #[must_use]
     pub const fn settings(&self) -> ContactSettings {
         ContactSettings {
-            execution: self.execution,
             friction: self.friction,
             shortcuts: self.shortcuts,
             // Every second scene has what a tick has at 10 kHz.
@@ -234,7 +232,7 @@ impl Scene {
                 0 => WORK_PER_TICK,
                 _ => LEAST_WORK_PER_TICK,
             },
-            ..ContactSettings::REAL_TIME
+            ..ContactSettings::AT_1_KHZ
         }
     }
 
@@ -297,6 +295,15 @@ impl Scene {
     }
 }
 
+/// When a HIP has its answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Execution {
+    /// After one tick.
+    RealTime,
+    /// Once all is done for it with all of the terrain it needs, as in a replay.
+    LockStep,
+}
+
 /// A contact in a scene, tick by tick.
 pub struct Player<'t, 'g, const D: usize> {
     /// Its state, for those who want to try a tick twice.
@@ -341,28 +348,35 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
         let hip = shifted(hip, self.shift);
         let mut work = 0;
         let in_real_time = self.execution == Execution::RealTime;
-        let mut only_shading_waits = false;
+        let before = (self.contact.clone(), self.shader);
+        let installed = self.supplied.installed.len();
         for _ in 0..PATIENCE {
-            if !only_shading_waits {
-                self.contact.step(&self.supplied.window, &hip);
-            }
+            self.contact.step(&self.supplied.window, &hip);
             let felt = *self.contact.output();
             work = work.max(felt.work);
             self.shaded = self.shade();
-            let missing = self.missing();
+            // A HIP that needs more tiles than the window holds is felt without them.
+            let waits = self.supplied.installed.len() - installed < 4 * D * D;
+            let missing = felt.missing_tile.or(self.missing());
             let waits_for = ContactOutput {
-                missing_tile: felt.missing_tile.or(missing),
+                missing_tile: missing,
                 ..felt
             };
             self.supplied
                 .supply(self.now, &self.contact, &waits_for, &hip);
             self.now += 1;
-            only_shading_waits = felt.converged && missing.is_some();
-            if in_real_time || (felt.converged && missing.is_none()) {
+            let is_done = felt.converged && missing.is_none();
+            if in_real_time || is_done || (missing.is_some() && !waits) {
                 if let Some(texturer) = &mut self.texturer {
                     self.textured = texturer.add(self.shaded, &felt.proxy);
                 }
                 return Some(ContactOutput { work, ..felt });
+            }
+            if missing.is_some() && waits {
+                // As a replay does: a transaction.
+                (self.contact, self.shader) = before.clone();
+            } else {
+                self.contact.resume(before.0.output());
             }
         }
         None

@@ -16,7 +16,7 @@ use crate::contact::straight_way::StraightWay;
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::scalar::smaller;
-use crate::terrain::{Ground, TileIndex, Window};
+use crate::terrain::{Ground, Window};
 
 /// Looks at the cone on one straight way, at most.
 pub(in crate::contact) const LOOKS: u32 = 8;
@@ -30,15 +30,14 @@ const ACROSS: u32 = 3;
 /// How a walk ended.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) enum Walked {
-    /// Friction holds the proxy, or no straight way brings it nearer. The tile beyond the border
-    /// that it is on, if it is missing.
-    Rests(Option<TileIndex>),
+    /// Friction holds the proxy, or no straight way brings it nearer.
+    Rests,
+    /// The same, beside a tile that is not here.
+    Missing,
     /// The straight path to the HIP leads off the surface.
     Leaves,
     /// There is no surface, or it ends here with the HIP above it.
     Off,
-    /// It depends on a tile that is not here.
-    Missing(TileIndex),
     /// The budget is spent.
     Suspended,
 }
@@ -48,27 +47,27 @@ struct Asked {
     pull: Pull,
     at: SurfacePoint,
     patch: Patch,
-    missing: Option<TileIndex>,
+    /// Whether a tile beside it is missing.
+    is_open: bool,
 }
 
-/// Where a walk ends though nothing holds it.
-#[derive(Clone, Copy)]
-pub(in crate::contact) struct Rules<'l> {
-    /// Where it may leave the surface.
-    pub(in crate::contact) leave: &'l Leave,
-    /// Whether it waits beside a missing tile.
-    pub(in crate::contact) waits: bool,
-}
-
-impl Rules<'_> {
-    /// What becomes of a proxy from which the straight path to the HIP leads off the surface.
-    /// Where it has just come down from such a path, it is on the ground.
-    fn off(self, point: &SurfacePoint) -> Option<Walked> {
-        match self.leave {
-            leave if leave.is_allowed_at(point) => Some(Walked::Leaves),
-            Leave::ButAt(_) => None,
-            _ => Some(Walked::Off),
+impl Asked {
+    const fn rests(&self) -> Walked {
+        if self.is_open {
+            Walked::Missing
+        } else {
+            Walked::Rests
         }
+    }
+}
+
+/// What becomes of a proxy from which the straight path to the HIP leads off the surface.
+/// Where it has just come down from such a path, it is on the ground.
+fn off(leave: &Leave, point: &SurfacePoint) -> Option<Walked> {
+    match leave {
+        leave if leave.is_allowed_at(point) => Some(Walked::Leaves),
+        Leave::ButAt(_) => None,
+        _ => Some(Walked::Off),
     }
 }
 
@@ -94,14 +93,14 @@ impl Walk {
         window: &Window<'_, D>,
         view: &HipView,
         cone: &Cone,
-        rules: Rules<'_>,
+        leave: &Leave,
         budget: &mut Budget,
     ) -> Walked {
         loop {
             if !budget.has(WAY) {
                 return Walked::Suspended;
             }
-            let asked = match ask(window, view, &self.point, rules, budget) {
+            let asked = match ask(window, view, &self.point, leave, budget) {
                 Ok(asked) => asked,
                 Err(why) => return why,
             };
@@ -113,7 +112,7 @@ impl Walk {
                 }
             };
             if is_held || self.ways == WAYS {
-                return Walked::Rests(asked.missing);
+                return asked.rests();
             }
             let newton = match self.inside > ACROSS {
                 true => newton(&asked, view),
@@ -121,7 +120,7 @@ impl Walk {
             };
             let (to, held) = straight(&asked, newton, view, cone, budget);
             if to == asked.at || to == self.point {
-                return Walked::Rests(asked.missing);
+                return asked.rests();
             }
             let is_inside = border(&to) == Side::NONE;
             self.inside = if is_inside { self.inside + 1 } else { 0 };
@@ -211,7 +210,7 @@ fn ask<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,
     point: &SurfacePoint,
-    rules: Rules<'_>,
+    leave: &Leave,
     budget: &mut Budget,
 ) -> Result<Asked, Walked> {
     budget.spend(SLOPE);
@@ -219,22 +218,22 @@ fn ask<const D: usize>(
     let patch = match window.ground(point.cell) {
         Ground::Patch(corners) => view.patch(&corners),
         Ground::Hole => return Err(Walked::Off),
-        Ground::Missing if rules.waits => {
-            return Err(Walked::Missing(TileIndex::holding(point.cell)));
+        Ground::Missing => {
+            budget.lacks(point.cell);
+            return Err(Walked::Off);
         }
-        Ground::Missing => return Err(Walked::Off),
     };
     let asked = Asked {
         pull: Pull::in_patch(&patch, view, point, border),
         at: *point,
         patch,
-        missing: None,
+        is_open: false,
     };
     if border != Side::NONE {
-        return ask_neighbours(window, view, border, asked, rules, budget);
+        return ask_neighbours(window, view, border, asked, leave, budget);
     }
     if asked.pull.is_above
-        && let Some(walked) = rules.off(point)
+        && let Some(walked) = off(leave, point)
     {
         return Err(walked);
     }
@@ -249,7 +248,7 @@ fn ask_neighbours<const D: usize>(
     view: &HipView,
     border: Side,
     own: Asked,
-    rules: Rules<'_>,
+    leave: &Leave,
     budget: &mut Budget,
 ) -> Result<Asked, Walked> {
     let point = own.at;
@@ -274,15 +273,15 @@ fn ask_neighbours<const D: usize>(
                     (best.pull, best.at, best.patch) = (pull, at, patch);
                 }
             }
-            Ground::Missing if rules.waits => {
-                return Err(Walked::Missing(TileIndex::holding(at.cell)));
+            Ground::Missing => {
+                budget.lacks(at.cell);
+                best.is_open = true;
             }
-            Ground::Missing => best.missing = Some(TileIndex::holding(at.cell)),
             Ground::Hole => has_hole = true,
         }
     }
-    has_hole |= best.missing.is_some();
-    if leads_off && let Some(walked) = rules.off(&point) {
+    has_hole |= best.is_open;
+    if leads_off && let Some(walked) = off(leave, &point) {
         return Err(walked);
     }
     if has_hole && all_above {

@@ -2,12 +2,12 @@
 
 use glam::Vec3;
 
+use super::on_ground::Came;
 use super::{Contact, Phase, Turn};
 use crate::contact::budget::Budget;
 use crate::contact::closest_point::{Leave, position_on};
-use crate::contact::friction::{Cone, Friction, Rules, Walk, Walked};
+use crate::contact::friction::{Cone, Friction, Walk, Walked};
 use crate::contact::output::ContactState;
-use crate::contact::settings::Execution;
 use crate::contact::surface::HipView;
 use crate::grid::GridPoint;
 use crate::terrain::Window;
@@ -94,13 +94,14 @@ impl Contact {
     ) {
         let mut budget = Budget::new(self.settings.work_per_tick);
         self.remembers_what_was_felt();
+        self.gives_up_beyond_window::<D>(&hip);
         if self.output.converged || !self.hip.is_same(&hip) {
             self.begins_to_walk(window, hip, &mut budget);
         }
         // Bounded by the budget, as without friction.
         while self.walks_on(window, hip, &mut budget) == Turn::GoesOn {}
         self.hip = hip;
-        self.output.work = budget.spent();
+        self.ends(&budget);
         self.answers_from_the_surface(window);
         self.counts_stillness();
     }
@@ -190,11 +191,7 @@ impl Contact {
             inside,
             held: rough.held,
         };
-        let rules = Rules {
-            leave: &on.leave,
-            waits: self.settings.execution == Execution::LockStep,
-        };
-        let walked = walk.advance(window, &HipView::new(hip), &cone, rules, budget);
+        let walked = walk.advance(window, &HipView::new(hip), &cone, &on.leave, budget);
         if walk.at_rest.is_none() {
             rough.stage = Stage::GoesOn {
                 ways: walk.ways,
@@ -209,13 +206,9 @@ impl Contact {
             on.descent.restart(walk.point);
         }
         match walked {
-            Walked::Rests(missing) => self.touches(window, hip, missing.is_none(), missing),
-            Walked::Missing(tile) => {
-                // Also where the proxy's own patch is in that tile.
-                (self.output.converged, self.output.missing_tile) = (false, Some(tile));
-                self.touches(window, hip, false, Some(tile))
-            }
-            Walked::Suspended => self.touches(window, hip, false, None),
+            Walked::Rests => self.touches(window, hip, Came::ToRest, budget),
+            Walked::Missing => self.touches(window, hip, Came::ToMissingTile, budget),
+            Walked::Suspended => self.touches(window, hip, Came::AsFarAsWork, budget),
             Walked::Leaves => self.leaves(window, &HipView::new(hip), hip),
             Walked::Off => {
                 (rough.stage, rough.held) = (Stage::Descends, Vec3::ZERO);
@@ -240,7 +233,6 @@ impl Contact {
     /// Counts how long the proxy has not moved, by the answers that count, and whether the next
     /// answer is this one again.
     fn counts_stillness(&mut self) {
-        self.at_rest = self.output.converged && self.boundary_fade() == 1.0;
         let before = self.felt.map(|(proxy, _)| proxy);
         let tick_s = self.settings.rate.tick_s();
         let least_way = self.settings.sticks_below * tick_s;

@@ -152,8 +152,8 @@ mod tests {
 
     use super::super::texture::{SurfacePattern, SurfaceTexture};
     use super::*;
-    use crate::replay::Rule;
     use crate::raster::Raster;
+    use crate::replay::Rule;
     use crate::replay::settings::Device;
     use crate::terrain::{FeltCells, Scale, Terrain};
 

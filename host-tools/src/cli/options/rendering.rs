@@ -279,8 +279,11 @@ impl Rendering {
     pub fn needs_the_devices_rule(&self) -> Result<(), Failure> {
         match self.rule() {
             Rule::Swept => Ok(()),
-            Rule::Paper => Err("--contact paper: no device has the paper's contact rule".to_owned())
-                .or_hint("leave it out, or render a trajectory: hapterra replay --contact paper"),
+            Rule::Paper => {
+                Err("--contact paper: no device has the paper's contact rule".to_owned()).or_hint(
+                    "leave it out, or render a trajectory: hapterra replay --contact paper",
+                )
+            }
         }
     }
 
