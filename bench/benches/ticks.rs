@@ -54,6 +54,6 @@ fn swept(bencher: Bencher<'_, '_>, name: &'static str) {
 #[divan::bench(args = PATHS)]
 fn plain(bencher: Bencher<'_, '_>, name: &'static str) {
     let grid = terrain();
-    let mut paper = Paper::<f32>::new(&grid, Start::LastPoint, 10);
+    let mut paper = Paper::<_, f32>::new(&grid, Start::LastPoint, 10);
     run(bencher, &path(&grid, name), &mut paper);
 }

@@ -155,9 +155,9 @@ pub(crate) fn ours<'w, const D: usize>(window: &'w Window<'_, D>) -> Vec<Entry<'
 
 pub(crate) fn opponents(grid: &Grid) -> Vec<Entry<'_>> {
     use Family::{Bound, Triangles};
-    let single = |start, newton_steps| Box::new(Paper::<f32>::new(grid, start, newton_steps));
+    let single = |start, newton_steps| Box::new(Paper::<_, f32>::new(grid, start, newton_steps));
     let (last, centre) = (Start::LastPoint, Start::Centre);
-    let double = Box::new(Paper::<f64>::new(grid, last, 20));
+    let double = Box::new(Paper::<_, f64>::new(grid, last, 20));
     let parry = |project| Box::new(Parry::new(grid, project));
     // parry has its own copy of the heights and a byte of status a cell.
     let entries: [(&'static str, Family, f64, Box<dyn Haptics + '_>); 10] = [

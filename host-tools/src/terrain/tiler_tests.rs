@@ -167,7 +167,7 @@ fn a_scenes_epoch_follows_heights_scale_and_law() {
 
 #[test]
 fn tile_with_too_steep_step_is_a_hole() {
-    let wall = |height: f64| {
+    let wall = |height: f32| {
         let raster = Raster::from_fn(64, 9, move |x, _| if x > 40 { height } else { 0.0 });
         raster.expect("raster")
     };
