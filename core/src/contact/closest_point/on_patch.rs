@@ -29,9 +29,6 @@ use crate::scalar::smaller;
 /// turns out to be the better one to eliminate.
 pub const MAX_PASSES: u32 = 3;
 
-/// Searches for a crest in one pass, at most; a pass that finds one more ends where it began.
-const MAX_CRESTS: u32 = 2;
-
 /// A point of a patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
@@ -143,8 +140,10 @@ fn pass_over(
                 search.crest(patch, hip)
             }
         };
+        // As long as the search stays within its units.
+        let may_look_again = search.evaluations + CREST * (crests + 1) <= SEARCH;
         match crest {
-            Some(v) if search.evaluations < MAX_EVALUATIONS && crests < MAX_CRESTS => {
+            Some(v) if search.evaluations < MAX_EVALUATIONS && may_look_again => {
                 search.begin_again_before(v);
             }
             Some(_) => {

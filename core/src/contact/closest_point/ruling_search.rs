@@ -13,7 +13,7 @@ use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{DOUBTFUL_STEP, LEAST_STEP, RESOLUTION};
 
 /// Rulings looked at for one patch, at most; the best point so far is then the answer.
-pub const MAX_EVALUATIONS: u32 = 24;
+pub const MAX_EVALUATIONS: u32 = 40;
 
 /// Rulings that are looked at for a crest.
 pub(super) const CREST_LOOKS: u32 = 16;
