@@ -192,6 +192,7 @@ mod tests {
     #[test]
     fn damping_is_as_recorded_and_what_is_stated_wins() {
         let mut recorded = recorded();
+        recorded.force.rule = Rule::Swept;
         recorded.force.damping = Damping {
             ns_per_m: 2.5,
             controller: Controller::Off,
@@ -219,6 +220,7 @@ mod tests {
     #[test]
     fn shading_is_as_recorded_and_what_is_stated_wins() {
         let mut recorded = recorded();
+        recorded.force.rule = Rule::Swept;
         recorded.force.shading = Shading::Smooth;
         let (rendering, told) = Rendering::default().or_recorded(&recorded);
         assert_eq!(told, [""; 0]);
@@ -245,6 +247,7 @@ mod tests {
             direction_deg: 30.0,
             seed: 4,
         };
+        recorded.force.rule = Rule::Swept;
         recorded.force.texture = grating;
         let with = |change: fn(&mut SurfaceTexture)| {
             let mut rendering = Rendering::default();
