@@ -6,7 +6,6 @@ use hapterra_bench::grid::Grid;
 use hapterra_bench::haptics::Haptics;
 use hapterra_bench::path::{self, Flight, Path};
 use hapterra_bench::product::{self, Product, SIDE};
-use hapterra_core::contact::Rule;
 
 const TICKS: usize = 4000;
 const PATHS: [&str; 6] = [
@@ -49,16 +48,12 @@ fn swept(bencher: Bencher<'_, '_>, name: &'static str) {
     let grid = terrain();
     let mut buffers = product::buffers::<SIDE>();
     let window = product::window::<SIDE>(&grid, &mut buffers);
-    run(
-        bencher,
-        &path(&grid, name),
-        &mut Product::new(&window, Rule::Swept),
-    );
+    run(bencher, &path(&grid, name), &mut Product::new(&window));
 }
 
 #[divan::bench(args = PATHS)]
 fn plain(bencher: Bencher<'_, '_>, name: &'static str) {
     let grid = terrain();
-    let mut paper = Paper::<f32>::new(&grid, Start::LastPoint, 10);
+    let mut paper = Paper::<_, f32>::new(&grid, Start::LastPoint, 10);
     run(bencher, &path(&grid, name), &mut paper);
 }

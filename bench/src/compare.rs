@@ -1,6 +1,5 @@
 //! All variants on one terrain along all paths, interleaved in one run.
 
-use hapterra_core::contact::Rule;
 use hapterra_core::terrain::Window;
 
 use crate::baseline::{GodObject, Paper, Parry, Project, ProxyGraph, Start};
@@ -149,23 +148,16 @@ pub const SWEPT: Label = Label {
     extra_bytes: (21.0 * 4.0 + 8.0) / 1024.0,
 };
 
-/// The product's rules on a held field.
+/// The product on a held field.
 pub(crate) fn ours<'w, const D: usize>(window: &'w Window<'_, D>) -> Vec<Entry<'w>> {
-    let by_paper = Label {
-        name: "hapterra paper rule",
-        ..SWEPT
-    };
-    vec![
-        (SWEPT, Box::new(Product::new(window, Rule::Swept))),
-        (by_paper, Box::new(Product::new(window, Rule::Paper))),
-    ]
+    vec![(SWEPT, Box::new(Product::new(window)))]
 }
 
 pub(crate) fn opponents(grid: &Grid) -> Vec<Entry<'_>> {
     use Family::{Bound, Triangles};
-    let single = |start, newton_steps| Box::new(Paper::<f32>::new(grid, start, newton_steps));
+    let single = |start, newton_steps| Box::new(Paper::<_, f32>::new(grid, start, newton_steps));
     let (last, centre) = (Start::LastPoint, Start::Centre);
-    let double = Box::new(Paper::<f64>::new(grid, last, 20));
+    let double = Box::new(Paper::<_, f64>::new(grid, last, 20));
     let parry = |project| Box::new(Parry::new(grid, project));
     // parry has its own copy of the heights and a byte of status a cell.
     let entries: [(&'static str, Family, f64, Box<dyn Haptics + '_>); 10] = [

@@ -1,6 +1,6 @@
 //! The product's own contact over a window that holds the whole field.
 
-use hapterra_core::contact::{Contact, ContactSettings, ContactState, Rule};
+use hapterra_core::contact::{Contact, ContactSettings, ContactState};
 use hapterra_core::terrain::{FieldSize, TILE_CELLS, Tile, TileKey, Window};
 
 use crate::grid::Grid;
@@ -71,32 +71,26 @@ pub fn fill(grid: &Grid, key: TileKey, tile: &mut Tile) {
     tile.fill(key, 0, height).expect("base 0 is in range");
 }
 
-fn contact(rule: Rule) -> Contact {
-    Contact::new(ContactSettings::REAL_TIME.with_rule(rule))
-}
-
-/// One of the product's rules.
+/// The product.
 pub struct Product<'w, 't, const D: usize> {
     window: &'w Window<'t, D>,
     contact: Contact,
-    rule: Rule,
 }
 
 impl<'w, 't, const D: usize> Product<'w, 't, D> {
-    /// The contact by `rule` on a held field.
+    /// The contact on a held field.
     #[must_use]
-    pub fn new(window: &'w Window<'t, D>, rule: Rule) -> Self {
+    pub fn new(window: &'w Window<'t, D>) -> Self {
         Self {
             window,
-            contact: contact(rule),
-            rule,
+            contact: Contact::new(ContactSettings::AT_1_KHZ),
         }
     }
 }
 
 impl<const D: usize> Haptics for Product<'_, '_, D> {
     fn forget(&mut self) {
-        self.contact = contact(self.rule);
+        self.contact = Contact::new(ContactSettings::AT_1_KHZ);
     }
 
     #[inline]

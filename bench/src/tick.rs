@@ -10,7 +10,6 @@ use std::process::ExitCode;
 use hapterra_bench::haptics::{Answer, Haptics, Hip};
 use hapterra_bench::product::{self, Product};
 use hapterra_bench::state::{STATES, terrain};
-use hapterra_core::contact::Rule;
 
 /// Tiles along the window's side, as on a device.
 const SIDE: usize = 8;
@@ -25,7 +24,7 @@ fn main() -> ExitCode {
     let grid = terrain();
     let mut buffers = product::buffers::<SIDE>();
     let window = product::window::<SIDE>(&grid, &mut buffers);
-    let mut product = Product::new(&window, Rule::Swept);
+    let mut product = Product::new(&window);
     let mut ticks = 0;
     for step in make(&grid) {
         if step.counts {

@@ -6,7 +6,6 @@
 //! ```
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Drive, Mode, Sense};
@@ -84,7 +83,6 @@ pub(crate) fn main() -> Result<(), BadCalibration> {
         cell_mm: 2.0,
         home: GridPoint::new([32, 32, 0], Vec3::Z * (ABOVE_PLANE_MM / 2.0)),
         law: ForceLaw::PREMIUM,
-        rule: Rule::Swept,
         source: Source::Encoders,
         hold_clock: false,
         materials: None,

@@ -32,7 +32,7 @@ fn path(t: f32) -> Vec3 {
 pub(crate) fn main() -> Result<(), BadField> {
     let mut field = FieldStorage::<2>::from_fn(FieldSize::new(60, 40), hill)?;
     let window = field.window();
-    let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
 
     println!("  HIP x      z   proxy x      z     force east  north     up   state");
     let mut strongest = 0.0_f32;

@@ -88,7 +88,7 @@ pub(crate) fn main() -> Result<(), BadFrame> {
     window.reset(0, SIZE, TOP);
     let mut requester = TileRequester::<4>::new();
     requester.reset(0, SIZE);
-    let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
 
     // On the link: when each tile arrives, and its frame.
     let mut link: VecDeque<(u32, Vec<u8>)> = VecDeque::new();

@@ -27,7 +27,7 @@ pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
     let size = FieldSize::new(SECTION.len() as i32 - 1, 4);
     let mut field = FieldStorage::<1>::from_fn(size, |x, _| SECTION[x as usize])?;
     let window = field.window();
-    let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut shader = Shader::of(Shading::Smooth).ok_or("no shading")?;
     let (mut plain, mut shaded) = (String::new(), String::new());
     contact.step(&window, &hip(A_CELL, 1.0));

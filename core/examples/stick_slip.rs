@@ -86,7 +86,7 @@ fn dragged() -> Result<Vec<Seen>, Box<dyn Error>> {
     let size = FieldSize::new(64, 4);
     let mut field = FieldStorage::<2>::from_fn(size, |_, _| 0.0)?;
     let window = field.window();
-    let mut contact = Contact::new(ContactSettings::REAL_TIME.with_friction(FRICTION));
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ.with_friction(FRICTION));
     // Counted from the place where the tip comes down.
     let at = |x: f32, height: f32| GridPoint::new([5, 2, 0], Vec3::new(x, 0.5, height));
     contact.step(&window, &at(0.0, 1.0));

@@ -9,7 +9,7 @@
 
 use glam::Vec3;
 
-use crate::contact::{Contact, ContactSettings, Execution};
+use crate::contact::{Contact, ContactSettings};
 use crate::force::{Effects, FeltWith, MaterialTable, Moment, Shares};
 use crate::grid::GridPoint;
 use crate::guard::Guard;
@@ -18,10 +18,13 @@ use crate::rate::TickRate;
 use crate::scene::{Scene, Source};
 use crate::terrain::{TileIndex, Window};
 
+/// Tiles that one point of a replay may ask for, for each that the window holds.
+const TILES_PER_SLOT: u32 = 4;
+
 /// What moves the HIP.
 #[derive(Clone, Copy)]
 pub(crate) enum Mover<'a> {
-    /// The host's points, one a tick. A tick is repeated until it is done.
+    /// The host's points, each felt with all of the terrain that it needs.
     Points,
     /// An arm.
     Arm {
@@ -80,13 +83,41 @@ impl Mover<'_> {
     }
 }
 
-/// Contact and effects of the scene in force.
-pub(crate) struct Feel {
+/// What a tick changes.
+#[derive(Clone)]
+struct Felt {
     contact: Contact,
     /// What the scene adds to the spring's force, if anything.
     effects: Option<Effects>,
     /// The HIP of the last tick that was done and driven.
     before: Option<GridPoint>,
+}
+
+/// A replay's point that is not done.
+struct BegunPoint {
+    /// The state before it.
+    before: Felt,
+    /// How often it lacked another tile.
+    lacked: u32,
+}
+
+/// How far a replay is with its point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Progress {
+    /// The point was felt, with all of its terrain.
+    Done,
+    /// Work is left for the next tick.
+    GoesOn,
+    /// A tile is missing: the point will be felt again, from the state before it.
+    Lacks(TileIndex),
+}
+
+/// Contact and effects of the scene in force.
+pub(crate) struct Feel {
+    felt: Felt,
+    /// A replay's point that is not done.
+    point: Option<BegunPoint>,
+    progress: Progress,
     rate: TickRate,
     /// From the beginning of a tick until its force acts, s.
     latency_s: f32,
@@ -99,9 +130,13 @@ impl Feel {
     /// Without a scene.
     pub(crate) fn new(rate: TickRate, latency_s: f32) -> Self {
         Self {
-            contact: Contact::new(ContactSettings::REAL_TIME.at_rate(rate)),
-            effects: None,
-            before: None,
+            felt: Felt {
+                contact: Contact::new(ContactSettings::AT_1_KHZ.at_rate(rate)),
+                effects: None,
+                before: None,
+            },
+            point: None,
+            progress: Progress::Done,
             rate,
             latency_s,
             materials: MaterialTable::EMPTY,
@@ -124,7 +159,7 @@ impl Feel {
     /// Takes a scene that it can take, or none. The one door for all effects. `landing` is the HIP of
     /// another view, and the displacement with which the proxy begins on its surface, cells.
     pub(crate) fn take(&mut self, scene: Option<&Scene>, landing: Option<(GridPoint, Vec3)>) {
-        self.effects = scene.and_then(|scene| self.effects_of(scene));
+        self.felt.effects = scene.and_then(|scene| self.effects_of(scene));
         self.begin(scene, landing);
     }
 
@@ -134,18 +169,11 @@ impl Feel {
     }
 
     fn begin(&mut self, scene: Option<&Scene>, landing: Option<(GridPoint, Vec3)>) {
-        let is_replay = scene.is_some_and(|scene| scene.source == Source::Points);
-        let settings = ContactSettings {
-            rule: scene.map_or_else(Default::default, |scene| scene.rule),
-            execution: match is_replay {
-                true => Execution::LockStep,
-                false => Execution::RealTime,
-            },
-            ..ContactSettings::REAL_TIME
-                .at_rate(self.rate)
-                .on_cells_of(scene.map_or(1.0, |scene| scene.cell_mm))
-        };
-        self.contact = match landing {
+        let settings = ContactSettings::AT_1_KHZ
+            .at_rate(self.rate)
+            .on_cells_of(scene.map_or(1.0, |scene| scene.cell_mm));
+        (self.point, self.progress) = (None, Progress::Done);
+        self.felt.contact = match landing {
             Some((hip, stretch)) => {
                 let at = GridPoint::new(hip.cell(), hip.frac() + stretch);
                 Contact::landing(settings, at, stretch)
@@ -154,12 +182,13 @@ impl Feel {
         };
         if let Some(scene) = scene {
             let law = self
+                .felt
                 .effects
                 .as_ref()
                 .map_or(&scene.law, |it| it.law(&scene.law));
-            self.contact.feels_friction(law.friction);
+            self.felt.contact.feels_friction(law.friction);
         }
-        self.before = None;
+        self.felt.before = None;
     }
 
     fn effects_of(&self, scene: &Scene) -> Option<Effects> {
@@ -184,25 +213,62 @@ impl Feel {
         hip: GridPoint,
         mover: &Mover<'_>,
     ) -> Vec3 {
-        match mover {
-            Mover::Points => self.step_to_point(window, &hip),
-            Mover::Arm { .. } => drop(self.contact.step(window, &hip)),
-        }
-        match self.effects {
-            Some(_) => self.with_effects(window, scene, hip, mover),
-            None => {
-                let displacement_mm = self.contact.output().displacement * scene.cell_mm;
-                scene.law.spring().force_n(displacement_mm) * mover.clutch()
-            }
-        }
+        self.felt.contact.step(window, &hip);
+        self.force_n(window, scene, hip, mover)
     }
 
-    /// A repeated tick that only waits for a tile of an effect has its contact.
-    fn step_to_point<const D: usize>(&mut self, window: &Window<'_, D>, hip: &GridPoint) {
-        if self.missing().is_none() || !self.contact.has_answered(hip) {
-            // Where the HIP is follows from the point.
-            let _ = self.contact.land(window);
-            self.contact.step(window, hip);
+    /// The same for a replay's point, as a transaction: where a tile is missing, nothing has
+    /// happened but that it is asked for. A point that needs more tiles than the window holds is
+    /// felt as by an arm, with those that are here.
+    #[inline(never)]
+    pub(crate) fn step_to_point<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        scene: &Scene,
+        hip: GridPoint,
+    ) -> Vec3 {
+        let mut point = self.point.take().unwrap_or_else(|| BegunPoint {
+            before: self.felt.clone(),
+            lacked: 0,
+        });
+        // Where the HIP is follows from the point.
+        let _ = self.felt.contact.land(window);
+        let output = *self.felt.contact.step(window, &hip);
+        let may_lack = point.lacked < TILES_PER_SLOT * (D * D) as u32;
+        let missing = output.missing_tile.filter(|_| may_lack);
+        if missing.is_none() && !output.converged {
+            self.felt.contact.resume(point.before.contact.output());
+            (self.progress, self.point) = (Progress::GoesOn, Some(point));
+            return Vec3::ZERO;
+        }
+        let force_n = match missing {
+            Some(_) => Vec3::ZERO,
+            None => self.force_n(window, scene, hip, &Mover::Points),
+        };
+        let Some(tile) = missing.or_else(|| self.missing().filter(|_| may_lack)) else {
+            self.progress = Progress::Done;
+            return force_n;
+        };
+        point.lacked += u32::from(self.progress != Progress::Lacks(tile));
+        self.progress = Progress::Lacks(tile);
+        self.felt = point.before.clone();
+        self.point = Some(point);
+        Vec3::ZERO
+    }
+
+    fn force_n<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        scene: &Scene,
+        hip: GridPoint,
+        mover: &Mover<'_>,
+    ) -> Vec3 {
+        match self.felt.effects {
+            Some(_) => self.with_effects(window, scene, hip, mover),
+            None => {
+                let displacement_mm = self.contact().output().displacement * scene.cell_mm;
+                scene.law.spring().force_n(displacement_mm) * mover.clutch()
+            }
         }
     }
 
@@ -216,33 +282,34 @@ impl Feel {
         hip: GridPoint,
         mover: &Mover<'_>,
     ) -> Vec3 {
-        let Some(effects) = &mut self.effects else {
+        let Felt {
+            contact,
+            effects,
+            before,
+        } = &mut self.felt;
+        let Some(effects) = effects else {
             return Vec3::ZERO;
         };
-        let displacement = effects.displacement(window, &self.contact, &self.materials);
+        let displacement = effects.displacement(window, contact, &self.materials);
         let displacement_mm = displacement * scene.cell_mm;
         let spring = effects.law(&scene.law).spring();
         let spring_n = spring.force_n(displacement_mm) * mover.clutch();
-        let is_done = self.contact.is_felt()
-            && (effects.missing().is_none() || !self.contact.is_in_lock_step());
-        if is_done && let Some(friction) = effects.friction() {
-            self.contact.feels_friction(friction);
+        if let Some(friction) = effects.friction() {
+            contact.feels_friction(friction);
         }
         let Some(damper) = &mut effects.damper else {
             return spring_n;
         };
-        let moved = self.before.map_or(Vec3::ZERO, |before| before.to(&hip));
+        let moved = before.map_or(Vec3::ZERO, |before| before.to(&hip));
         match mover.moment(displacement_mm, moved * scene.cell_mm, self.rate) {
             Some(moment) => {
-                if is_done {
-                    self.before = Some(hip);
-                }
+                *before = Some(hip);
                 damper.observe(&moment);
                 damper.force_n(spring_n, moment.velocity_mm_s)
             }
             None => {
                 damper.rest();
-                self.before = None;
+                *before = None;
                 spring_n
             }
         }
@@ -250,32 +317,44 @@ impl Feel {
 
     /// The contact of the last tick.
     pub(crate) const fn contact(&self) -> &Contact {
-        &self.contact
+        &self.felt.contact
     }
 
     /// The same, for the clutch and for tiles that move the surface.
     pub(crate) const fn contact_mut(&mut self) -> &mut Contact {
-        &mut self.contact
+        &mut self.felt.contact
     }
 
     /// Returns true if the scene adds something to the spring's force.
     pub(crate) const fn has_effects(&self) -> bool {
-        self.effects.is_some()
+        self.felt.effects.is_some()
     }
 
     /// A tile without which the last force is not that of the whole terrain, besides the contact's.
-    pub(crate) fn missing(&self) -> Option<TileIndex> {
-        self.effects.as_ref().and_then(Effects::missing)
+    fn missing(&self) -> Option<TileIndex> {
+        self.felt.effects.as_ref().and_then(Effects::missing)
     }
 
-    /// Returns true if a replay's tick is done.
+    /// The tile that the last tick lacked, of an arm or a point.
+    pub(crate) fn missing_tile(&self) -> Option<TileIndex> {
+        match self.progress {
+            Progress::Lacks(tile) => Some(tile),
+            Progress::Done | Progress::GoesOn => {
+                let missing = self.contact().output().missing_tile;
+                missing.or_else(|| self.missing())
+            }
+        }
+    }
+
+    /// Returns true if a replay's point was felt.
     pub(crate) fn is_done(&self) -> bool {
-        self.contact.output().converged && self.missing().is_none()
+        self.progress == Progress::Done
     }
 
     /// The energy that the ticks have created and that was not taken back yet, mJ.
     pub(crate) fn created_mj(&self) -> f32 {
-        let damper = self.effects.as_ref().and_then(|it| it.damper.as_ref());
+        let effects = self.felt.effects.as_ref();
+        let damper = effects.and_then(|it| it.damper.as_ref());
         damper.map_or(0.0, |damper| damper.created_mj())
     }
 }

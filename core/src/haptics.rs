@@ -89,7 +89,7 @@ pub struct Board {
 ///
 /// ```
 /// use hapterra_core::Vec3;
-/// use hapterra_core::contact::{ContactState, Rule};
+/// use hapterra_core::contact::ContactState;
 /// use hapterra_core::force::ForceLaw;
 /// use hapterra_core::grid::GridPoint;
 /// use hapterra_core::guard::Sense;
@@ -112,7 +112,6 @@ pub struct Board {
 ///     cell_mm: 1.0,
 ///     home: GridPoint::default(),
 ///     law: ForceLaw::PREMIUM,
-///     rule: Rule::Swept,
 ///     source: Source::Points,
 ///     hold_clock: false,
 ///     materials: None,
@@ -322,19 +321,22 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.zero = Some(counts);
     }
 
-    /// Refuses a tile whose slot holds the tile under the proxy, or, in real time, a tile next to it.
-    /// Such a tile was requested for a place that the proxy has left.
+    /// Refuses a tile of an arm's scene whose slot holds the tile under the proxy, or a tile next to
+    /// it. Such a tile was requested for a place that the proxy has left.
     fn take_tile(&mut self, tile: &'t mut Tile) -> Option<&'t mut Tile> {
         let level = self.window.level();
-        let under_proxy = self.feel.contact().patch();
+        let of_arm = self
+            .scene
+            .as_ref()
+            .is_some_and(|it| it.source == Source::Encoders);
+        let under_proxy = self.feel.contact().patch().filter(|_| of_arm);
         let under_proxy = under_proxy.map(|cell| TileKey::holding(level, cell));
         if let (Some(under_proxy), Some(key)) = (under_proxy, tile.key())
             && key != under_proxy
             && self.window.expects(key)
             && let Some(occupant) = self.window.occupant(key)
             && (occupant == under_proxy
-                || (!self.feel.contact().is_in_lock_step()
-                    && occupant.index.is_beside(under_proxy.index)
+                || (occupant.index.is_beside(under_proxy.index)
                     && !key.index.is_beside(under_proxy.index)))
         {
             return Some(tile);

@@ -17,7 +17,7 @@
 //! let window = slope.window();
 //!
 //! // The HIP comes down through the air and goes one cell into the ground.
-//! let mut contact = Contact::new(ContactSettings::REAL_TIME);
+//! let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
 //! for height in [9.0, 6.0, 4.125] {
 //!     let hip = GridPoint::new([20, 20, 0], Vec3::new(0.5, 0.5, height));
 //!     contact.step(&window, &hip);

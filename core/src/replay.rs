@@ -2,23 +2,20 @@
 
 use glam::Vec3;
 
-use crate::feel::Mover;
 use crate::guard::Drive;
 use crate::haptics::Haptics;
 use crate::tick::{Outcome, write_nothing, write_output};
 
 impl<const D: usize> Haptics<'_, D> {
-    /// One tick. It is repeated until no tile is missing and no work is left; only then is the
-    /// point answered.
+    /// One tick. It is repeated until the point was felt with all of its terrain; only then is
+    /// the point answered.
     pub(crate) fn tick_point(&mut self, outcome: &mut Outcome) {
         outcome.drive = Drive::default();
         outcome.answers = None;
         let sample = &mut outcome.sample;
         let mut force_n = Vec3::ZERO;
         if let (Some(scene), Some(point)) = (&self.scene, self.point) {
-            force_n = self
-                .feel
-                .step(&self.window, scene, point.hip, &Mover::Points);
+            force_n = self.feel.step_to_point(&self.window, scene, point.hip);
             write_output(point.hip, &self.feel, sample);
             if self.feel.is_done() {
                 outcome.answers = Some(point.seq);

@@ -6,7 +6,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::{ContactState, Rule};
+use crate::contact::ContactState;
 use crate::force::ForceLaw;
 use crate::grid::{GridPoint, MAX_CELL};
 use crate::guard::{Fault, Limits, Mode, Report, Sense};
@@ -42,8 +42,6 @@ pub struct Scene {
     pub home: GridPoint,
     /// Spring and limit.
     pub law: ForceLaw,
-    /// Contact rule.
-    pub rule: Rule,
     /// Where the haptic interface point comes from.
     pub source: Source,
     /// On an emulated board: let its clock stand still while the host owes a

@@ -206,9 +206,7 @@ impl<const D: usize> Haptics<'_, D> {
 /// Writes the contact's output into the sample.
 pub(crate) fn write_output(hip: GridPoint, feel: &Feel, sample: &mut Sample) {
     write_contact(hip, feel.contact().output(), sample);
-    if feel.has_effects() {
-        sample.missing_tile = sample.missing_tile.or(feel.missing());
-    }
+    sample.missing_tile = feel.missing_tile();
 }
 
 // A call: it is needed in several places.
@@ -217,7 +215,6 @@ fn write_contact(hip: GridPoint, output: &ContactOutput, sample: &mut Sample) {
     sample.hip = hip;
     sample.proxy = output.proxy;
     sample.state = output.state;
-    sample.missing_tile = output.missing_tile;
     sample.work = output.work;
 }
 

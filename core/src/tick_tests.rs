@@ -4,7 +4,7 @@ use std::vec::Vec;
 
 use super::*;
 use crate::cases::cases;
-use crate::contact::{ContactState, Rule};
+use crate::contact::ContactState;
 use crate::force::{Controller, Damping, ForceLaw};
 use crate::grid::{Cell, MAX_CELL};
 use crate::guard::{Blockers, Fault, Mode};
@@ -44,7 +44,6 @@ fn scene(source: Source) -> Scene {
         cell_mm: 1.0,
         home: GridPoint::new([320, 320, 5], Vec3::ZERO),
         law: SPRING,
-        rule: Rule::Swept,
         source,
         hold_clock: false,
         materials: None,
@@ -577,15 +576,13 @@ fn a_small_window_feels_what_a_whole_one_feels() {
         dice ^= dice << 5;
         dice % range
     };
-    let mut touched = 0;
+    let (mut touched, mut at) = (0, [100, 100]);
     const POINTS: u32 = cases(400, 12);
     for seq in 0..POINTS {
-        let jump = if seq % 4 == 0 { 600 } else { 20 };
-        let cell = [
-            20 + random(jump) as i32,
-            20 + random(jump) as i32,
-            random(24) as i32 - 12,
-        ];
+        // Never farther than half of the small window.
+        let jump = if seq % 4 == 0 { 64 } else { 20 };
+        at = at.map(|x| (x + random(2 * jump) as i32 - jump as i32).clamp(20, 620));
+        let cell = [at[0], at[1], random(24) as i32 - 12];
         let hip = GridPoint::new(cell, Vec3::splat(random(1000) as f32 / 1000.0));
         let (a, b) = (small.feel(seq, hip), large.feel(seq, hip));
         let same = Sample {

@@ -13,6 +13,7 @@
 //! - [`serving`]: that session from its first line to an end that is known;
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
 //! - [`stability`]: how stiff a surface may be before a hand on that Phantom feels the ticks;
+//! - [`published`]: the paper's algorithm, for comparison;
 //! - [`replay`]: a trajectory felt in lock-step, and recordings;
 //! - [`place`]: where a terrain lies in front of the arm, and how large;
 //! - [`steering`]: another view of the terrain while it is touched;
@@ -47,6 +48,7 @@ pub mod output;
 pub mod phantom;
 pub mod picture;
 pub mod place;
+pub mod published;
 pub mod raster;
 mod remote;
 pub mod replay;

@@ -1,7 +1,7 @@
 //! A field of patches held whole by the product's own window.
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::{Contact, ContactOutput, ContactSettings, Rule};
+use hapterra_core::contact::{Contact, ContactOutput, ContactSettings};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::terrain::{FieldSize, TILE_CELLS, Tile, TileKey, Window};
 
@@ -20,7 +20,7 @@ impl FieldContact {
     /// # Panics
     /// When the field is larger than the window.
     #[must_use]
-    pub fn new(size: i32, rule: Rule, height: impl Fn(i32, i32) -> f32) -> Self {
+    pub fn new(size: i32, height: impl Fn(i32, i32) -> f32) -> Self {
         let tile = || -> &'static mut Tile { Box::leak(Box::new(Tile::VACANT)) };
         let mut window = Window::new(std::array::from_fn(|_| std::array::from_fn(|_| tile())));
         window.reset(0, FieldSize::new(size, size), 1 << 28);
@@ -44,7 +44,7 @@ impl FieldContact {
         }
         Self {
             window,
-            contact: Contact::new(ContactSettings::LOCK_STEP.with_rule(rule)),
+            contact: Contact::new(ContactSettings::AT_1_KHZ),
         }
     }
 

@@ -11,7 +11,7 @@ use hapterra::replay::Record;
 use hapterra::synth::{Kind, Synth};
 use hapterra::telemetry::Figures;
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_firmware::native::StoppedClock;
@@ -65,7 +65,7 @@ fn press(stiffness_n_per_mm: f32) -> (Vec<Sample>, usize, Scale) {
         ..ForceLaw::PREMIUM
     };
     let home = scale.to_grid(home_mm).expect("addressable");
-    let scene = terrain.scene(law, Rule::Swept, Source::Encoders, home);
+    let scene = terrain.scene(law, Source::Encoders, home);
     let samples = run(&terrain, scene, rig, ticks);
     (
         samples,
@@ -113,7 +113,7 @@ fn slid_across_terrain_the_proxy_stays_on_the_surface_and_the_force_in_bounds() 
         let raster = Synth::new(kind, 2, 30.0).raster(400, 400).expect("raster");
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-        let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("placed");
+        let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM).expect("placed");
         let ticks = (placed.duration_s() * 1e3) as u32;
         let rig = placed.held_phantom();
         let samples = run(&terrain, placed.scene(), rig, ticks);

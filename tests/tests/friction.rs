@@ -3,7 +3,7 @@
 use hapterra::raster::Raster;
 use hapterra::replay::on_native;
 use hapterra::terrain::Terrain;
-use hapterra_core::contact::{Contact, ContactSettings, ContactState, Friction, Rule};
+use hapterra_core::contact::{Contact, ContactSettings, ContactState, Friction};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::Sample;
@@ -23,7 +23,7 @@ fn law(friction: Friction) -> ForceLaw {
 /// What a HIP feels that slides around the middle of a terrain on an ellipse, `depth` mm
 /// deep, so many millimetres a tick.
 fn slide(terrain: &Terrain<'_>, law: ForceLaw, depth: f64, speed: f64) -> Vec<Sample> {
-    let mut replayer = on_native(terrain, law, Rule::Swept).expect("opened");
+    let mut replayer = on_native(terrain, law).expect("opened");
     let size = terrain.size_mm();
     let radius = size[0].min(size[1]) / 3.0;
     let mut felt = vec![];
@@ -152,7 +152,7 @@ fn an_hour_of_encoder_noise_moves_a_stuck_proxy_by_no_bit() {
     let mut chance = Chance::new(5);
     // Inside a patch, on an edge, on a vertex.
     for at in [[20.3, 30.6], [25.0, 30.4], [41.0, 17.0]] {
-        let mut replayer = on_native(&terrain, law, Rule::Swept).expect("opened");
+        let mut replayer = on_native(&terrain, law).expect("opened");
         let ground = terrain.height_mm(at[0], at[1]).expect("inside");
         let mut feel = |off: [f64; 3]| {
             let hip = [at[0] + off[0], at[1] + off[1], ground + off[2]];
@@ -196,7 +196,7 @@ fn live(
     };
     let window = field.window();
     let rate = TickRate::new(hz).expect("in range");
-    let settings = ContactSettings::REAL_TIME
+    let settings = ContactSettings::AT_1_KHZ
         .at_rate(rate)
         .on_cells_of(cell_mm as f32);
     let mut contact = Contact::new(settings.with_friction(friction));

@@ -3,9 +3,7 @@
 //! reported by none.
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::{
-    ContactOutput, ContactState, Execution, Friction, Rule, WORK_PER_TICK,
-};
+use hapterra_core::contact::{ContactOutput, ContactState, Friction, WORK_PER_TICK};
 use hapterra_core::force::{Pattern, Texture};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::terrain::TileIndex;
@@ -15,7 +13,7 @@ use hapterra_tests::field::point;
 use hapterra_tests::invariants::judge::Judge;
 use hapterra_tests::invariants::seen::{Seen, Shaded};
 use hapterra_tests::invariants::{Invariant, Violation};
-use hapterra_tests::scene::run::Scene;
+use hapterra_tests::scene::run::{Execution, Scene};
 use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::symmetry;
 use hapterra_tests::scene::terrain::{Kind, Terrain};
@@ -104,7 +102,7 @@ fn forged_position() -> GridPoint {
 /// All that the judge reports of the last of these ticks. It must report nothing of
 /// those before.
 fn reports(terrain: &Terrain, ticks: &[Seen]) -> Vec<Violation> {
-    reports_of(Judge::new(terrain, Rule::Swept), ticks)
+    reports_of(Judge::new(terrain), ticks)
 }
 
 fn reports_of(mut judge: Judge<'_>, ticks: &[Seen]) -> Vec<Violation> {
@@ -147,7 +145,7 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     };
     let flat = flat();
     let found = |ticks: &[Seen]| -> Vec<Invariant> {
-        let judge = Judge::new(&flat, Rule::Swept).with_friction(friction);
+        let judge = Judge::new(&flat).with_friction(friction);
         broken_of(judge, ticks)
     };
     let at = |x: f64, hip_x: f64| touching([hip_x, 10.5, 1.0], [x, 10.5, 2.0]);
@@ -176,7 +174,7 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     assert_eq!(found(&[&rest[..], &[over, first, broken]].concat()), []);
     // Over the ridge's edge only the side pulls that the HIP is on.
     let ridge = ridge();
-    let judge = || Judge::new(&ridge, Rule::Swept).with_friction(friction);
+    let judge = || Judge::new(&ridge).with_friction(friction);
     let edge = |x: f64| touching([x, 10.5, 1.0], [20.0, 10.5, 2.0]);
     let told = |ticks: &[Seen]| -> Vec<Invariant> { broken_of(judge(), ticks) };
     assert_eq!(
@@ -195,7 +193,7 @@ fn a_proxy_that_trails_by_more_than_it_slid_is_found() {
     };
     let flat = flat();
     let found = |ticks: &[Seen]| -> Vec<Invariant> {
-        let judge = Judge::new(&flat, Rule::Swept).with_friction(friction);
+        let judge = Judge::new(&flat).with_friction(friction);
         broken_of(judge, ticks)
     };
     // From (12, 10.5), where it met the ground or stood, by 2 cells: that holds 6.
@@ -215,7 +213,7 @@ fn a_pull_in_the_last_place_of_a_patchs_corners_is_not_judged() {
             (11, 10) | (10, 11) => 2.0 - corner,
             _ => 2.0,
         });
-        let judge = Judge::new(&saddle, Rule::Swept).with_friction(Friction::coulomb(0.5));
+        let judge = Judge::new(&saddle).with_friction(Friction::coulomb(0.5));
         let pulled = touching([10.51, 10.5, 1.99], [10.5, 10.5, 2.0]);
         broken_of(judge, &[pulled])
     };
@@ -238,8 +236,7 @@ fn a_force_that_is_shaded_otherwise_is_found() {
         });
         Seen { shaded, ..seen }
     };
-    let found =
-        |seen: Seen| -> Vec<Invariant> { broken_of(Judge::new(&ridge, Rule::Swept), &[seen]) };
+    let found = |seen: Seen| -> Vec<Invariant> { broken_of(Judge::new(&ridge), &[seen]) };
     // Bends of 90° are turned along a fifth of an edge: this is beyond it.
     let along = [0.05, 0.05];
     assert_eq!(found(shaded(along, true)), []);
@@ -279,7 +276,7 @@ fn a_force_that_is_textured_otherwise_is_found() {
     };
     let (crest, slope) = ([0.0, 0.6], [-std::f64::consts::TAU / 48.0, 0.5]);
     let told = |honest: Option<Seen>, last: Seen| -> Vec<Invariant> {
-        let mut judge = Judge::new(&flat, Rule::Swept).with_texture(grating);
+        let mut judge = Judge::new(&flat).with_texture(grating);
         for seen in honest
             .iter()
             .cycle()
@@ -433,7 +430,7 @@ fn friction_at_a_holes_edge_may_hold_a_hip_above_the_ground_beyond_it() {
         _ => 0.0_f32.max((20 - x) as f32),
     });
     let found = |x: f64| -> Vec<Invariant> {
-        let judge = Judge::new(&hole, Rule::Swept).with_friction(Friction::coulomb(2.0));
+        let judge = Judge::new(&hole).with_friction(Friction::coulomb(2.0));
         let seen = touching([22.0, 20.1, 0.1], [x, 20.0, 0.0_f64.max(20.0 - x)]);
         broken_of(judge, &[seen])
     };
@@ -586,13 +583,7 @@ fn a_force_that_comes_or_goes_at_once_is_found() {
 fn played(supply: Supply) -> (Scene, Vec<Seen>, Buffers) {
     // Down into a side of the ridge, along it, and up again.
     let path = [3.0, 0.0, 0.25, 3.0].map(|z| [18.5 + 0.5 * z, 10.5, z]);
-    let scene = Scene::given(
-        ridge(),
-        path.to_vec(),
-        Rule::Swept,
-        Execution::LockStep,
-        supply,
-    );
+    let scene = Scene::given(ridge(), path.to_vec(), Execution::LockStep, supply);
     let mut buffers = Buffers::default();
     let seen = scene
         .feel(&mut buffers, [0; 3], supply, |_| Ok(()))
@@ -698,6 +689,6 @@ fn a_scene_that_feels_otherwise_mirrored_is_found() {
 fn a_hip_that_is_never_answered_is_found() {
     let path = vec![ABOVE, BELOW];
     let never = Supply::Pulled { latency: 1 << 30 };
-    let scene = Scene::given(flat(), path, Rule::Swept, Execution::LockStep, never);
+    let scene = Scene::given(flat(), path, Execution::LockStep, never);
     only(Invariant::Settles, scene.run(&mut Buffers::default()));
 }

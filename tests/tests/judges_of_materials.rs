@@ -2,14 +2,14 @@
 //! honest ones beside them, which the product's loop made, of none.
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::{ContactState, Execution, Friction, Rule};
+use hapterra_core::contact::{ContactState, Friction};
 use hapterra_core::force::{Material, Pattern, Shading, Texture};
 use hapterra_tests::field::point;
 use hapterra_tests::invariants::Invariant;
 use hapterra_tests::invariants::material::{Judged, MaterialJudge};
 use hapterra_tests::scene::materials::Materials;
 use hapterra_tests::scene::replayed::{Replay, Replied, replay};
-use hapterra_tests::scene::run::Scene;
+use hapterra_tests::scene::run::{Execution, Scene};
 use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::terrain::{Kind, Terrain};
 
@@ -50,7 +50,7 @@ impl Way {
         let along = steps.map(|i| [from + step * f64::from(i), 10.25, 0.5]);
         let path = [[from, 10.25, 3.0]].into_iter().chain(along).collect();
         let (execution, supply) = (Execution::LockStep, Supply::Held);
-        let mut scene = Scene::given(terrain, path, Rule::Swept, execution, supply);
+        let mut scene = Scene::given(terrain, path, execution, supply);
         scene.shading = shading;
         let shift = [0; 3];
         let how = Replay { shift, supply };

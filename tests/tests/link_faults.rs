@@ -12,7 +12,7 @@ use hapterra::raster::Raster;
 use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Mode;
@@ -65,7 +65,7 @@ fn a_bad_link_changes_nothing_that_is_felt() {
         hips.map(|hip| felt(&replayer.feel(hip).expect("felt")))
             .collect()
     };
-    let mut clean = on_native(&terrain, law, Rule::Swept).expect("opened");
+    let mut clean = on_native(&terrain, law).expect("opened");
     let expected = walk(&mut clean);
     // The last says everything twice, the greeting included.
     for (fault, one_in) in [
@@ -76,8 +76,7 @@ fn a_bad_link_changes_nothing_that_is_felt() {
     ] {
         let link = Faulty::new(Native::for_replay(), fault, one_in, 1);
         let harmed = Rc::clone(&link.harmed);
-        let mut replayer =
-            Replayer::open(&terrain, law, Rule::Swept, Box::new(link), AT_ONCE).expect("opened");
+        let mut replayer = Replayer::open(&terrain, law, Box::new(link), AT_ONCE).expect("opened");
         let got = walk(&mut replayer);
         assert!(expected == got, "{fault:?} changed what is felt");
         let tally = replayer.tally();
@@ -129,7 +128,7 @@ impl Transport for Tap {
 fn telemetry_that_is_lost_is_counted() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
-    let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("placed");
+    let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM).expect("placed");
     let rig = placed.held_phantom();
     let made = Rc::new(Cell::new((0, 0)));
     let device: Native = Native::new(StoppedClock, Some(Box::new(rig)));
@@ -166,7 +165,7 @@ fn telemetry_that_is_lost_is_counted() {
 fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
-    let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("placed");
+    let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM).expect("placed");
     let rig = placed.held_phantom();
     let device: Native = Native::new(StoppedClock, Some(Box::new(rig)));
     let device = Rc::new(RefCell::new(device));
@@ -230,8 +229,7 @@ fn a_device_that_restarts_ends_a_replay_with_a_word() {
         }
     }
     let link = Box::new(Restarting(Native::for_replay(), 0));
-    let mut replayer =
-        Replayer::open(&terrain, ForceLaw::PREMIUM, Rule::Swept, link, AT_ONCE).expect("opened");
+    let mut replayer = Replayer::open(&terrain, ForceLaw::PREMIUM, link, AT_ONCE).expect("opened");
     let path = wander(&terrain, 9, 100, 1.0);
     let mut hips = path
         .iter()
@@ -280,13 +278,7 @@ fn the_host_says_which_versions_do_not_fit() {
     }
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
-    let replayer = Replayer::open(
-        &terrain,
-        ForceLaw::PREMIUM,
-        Rule::Swept,
-        Box::new(Newer),
-        AT_ONCE,
-    );
+    let replayer = Replayer::open(&terrain, ForceLaw::PREMIUM, Box::new(Newer), AT_ONCE);
     let error = replayer.err().expect("refused").to_string();
     let (ours, theirs) = (PROTOCOL, PROTOCOL + 1);
     assert!(error.contains("version mismatch"), "{error}");

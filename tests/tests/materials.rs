@@ -11,7 +11,7 @@ use hapterra::raster::Raster;
 use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
-use hapterra_core::contact::{ContactState, Friction, Rule};
+use hapterra_core::contact::{ContactState, Friction};
 use hapterra_core::force::{ForceLaw, Material, Pattern, Shading, Texture};
 use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::hapterra_binary;
@@ -408,9 +408,9 @@ fn a_replay_with_materials_gives_the_same_bits_on_the_emulated_board() {
         shading: Shading::Smooth,
         ..ForceLaw::PREMIUM
     };
-    let mut native = on_native(&several, law, Rule::Swept).expect("opened");
+    let mut native = on_native(&several, law).expect("opened");
     let expected = walk(&mut native, &path);
-    let mut plain = on_native(&one, law, Rule::Swept).expect("opened");
+    let mut plain = on_native(&one, law).expect("opened");
     let plain = walk(&mut plain, &path);
     let touching = |felt: &&(ContactState, [u32; 9])| felt.0 == ContactState::Touching;
     assert!(expected.iter().filter(touching).count() > 80);
@@ -425,8 +425,7 @@ fn a_replay_with_materials_gives_the_same_bits_on_the_emulated_board() {
     let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
     let _plant = lines.plant;
     let link = Box::new(lines.link);
-    let mut board =
-        Replayer::open(&several, law, Rule::Swept, link, Patience::EMULATED).expect("opened");
+    let mut board = Replayer::open(&several, law, link, Patience::EMULATED).expect("opened");
     let got = walk(&mut board, &path);
     for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
         assert_eq!(expected, got, "row {i} at {:?}", path[i]);

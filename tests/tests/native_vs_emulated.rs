@@ -10,7 +10,7 @@ use hapterra::raster::Raster;
 use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::contact::ContactState;
 use hapterra_core::force::{ForceLaw, Pattern, Shading, Texture};
 use hapterra_core::scene::Sample;
 use hapterra_tests::emulation::emulated_board;
@@ -77,31 +77,24 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
         },
         ..plain
     };
-    for (name, raster, rule, law) in [
-        ("fractal", made(Kind::Fractal), Rule::Swept, plain),
-        (
-            "steps",
-            made(Kind::Steps),
-            Rule::Swept,
-            with(Pattern::Grating),
-        ),
-        ("holes", holed(), Rule::Swept, with(Pattern::Grain)),
-        ("fractal", made(Kind::Fractal), Rule::Paper, plain),
+    for (name, raster, law) in [
+        ("fractal", made(Kind::Fractal), plain),
+        ("steps", made(Kind::Steps), with(Pattern::Grating)),
+        ("holes", holed(), with(Pattern::Grain)),
     ] {
         let scale = Scale::new(0.8, 0.9).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
         let path = wander(&terrain, 17, 300, -2.0);
-        let mut native = on_native(&terrain, law, rule).expect("opened");
+        let mut native = on_native(&terrain, law).expect("opened");
         let expected = walk(&mut native, &path);
         let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
         let _plant = lines.plant;
         let link = Box::new(lines.link);
-        let mut board =
-            Replayer::open(&terrain, law, rule, link, Patience::EMULATED).expect("opened");
+        let mut board = Replayer::open(&terrain, law, link, Patience::EMULATED).expect("opened");
         assert_eq!(board.device().board.as_str(), "mps2-an386");
         let got = walk(&mut board, &path);
         for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
-            assert_eq!(expected, got, "{name}, {rule:?}: row {i} at {:?}", path[i]);
+            assert_eq!(expected, got, "{name}: row {i} at {:?}", path[i]);
         }
         let touched = got
             .iter()

@@ -1,11 +1,45 @@
 //! The statements of *Height Field Haptics*, one by one.
 
-use hapterra_core::Vec3;
+use hapterra::published::{Heights, Paper, Start};
+use hapterra_core::contact::ContactState;
 use hapterra_core::contact::closest_point::nearest_downhill;
 use hapterra_core::contact::surface::patch::Patch;
-use hapterra_core::contact::{ContactState, Rule};
 use hapterra_core::force::ForceLaw;
 use hapterra_tests::field::{FieldContact, position};
+
+/// What a rule says of a HIP: whether there is contact, and the proxy.
+type Felt = (bool, [f64; 3]);
+
+/// A field as wide as a test's, made by a function.
+struct Field(fn(i32, i32) -> f32);
+
+impl Heights for Field {
+    fn has(&self, cell: [i32; 2]) -> bool {
+        cell.iter().all(|i| (0..64).contains(i))
+    }
+
+    fn corners(&self, [x, y]: [i32; 2]) -> [f32; 4] {
+        [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[east, north]| (self.0)(x + east, y + north))
+    }
+}
+
+/// The paper's rule and the product's over a field of 64 × 64 patches.
+fn rules(height: fn(i32, i32) -> f32) -> [Box<dyn FnMut([f64; 3]) -> Felt>; 2] {
+    let mut paper = Paper::<_, f64>::new(Field(height), Start::LastPoint, 20);
+    let mut swept = FieldContact::new(64, height);
+    [
+        Box::new(move |hip| {
+            let displacement = paper.step(hip);
+            let way = displacement.unwrap_or_default();
+            (displacement.is_some(), [0, 1, 2].map(|i| hip[i] + way[i]))
+        }),
+        Box::new(move |hip| {
+            let felt = swept.feel(hip);
+            let touches = felt.state == ContactState::Touching;
+            (touches, position(&felt.proxy))
+        }),
+    ]
+}
 
 fn rolling(x: i32, y: i32) -> f32 {
     ((f64::from(x) * 0.37).sin() + (f64::from(y) * 0.23).cos()) as f32
@@ -29,10 +63,10 @@ fn eq_1_to_5_the_patch_is_uva_plus_ub_plus_vc_plus_d() {
 
 #[test]
 fn eq_6_and_7_on_the_unit_grid_x_and_y_are_u_and_v_plus_the_cell() {
-    let mut contact = FieldContact::new(64, Rule::Paper, |_, _| 1.0);
-    contact.feel([37.25, 12.75, 2.0]);
-    let felt = contact.feel([37.25, 12.75, 0.9]);
-    assert_eq!(position(&felt.proxy), [37.25, 12.75, 1.0]);
+    for mut rule in rules(|_, _| 1.0) {
+        rule([37.25, 12.75, 2.0]);
+        assert_eq!(rule([37.25, 12.75, 0.9]), (true, [37.25, 12.75, 1.0]));
+    }
 }
 
 #[test]
@@ -90,27 +124,21 @@ fn section_4_3_2_outside_the_square_the_bounded_closest_point_is_on_an_edge_or_v
 
 #[test]
 fn step_1_no_patch_higher_than_the_segment_means_free_space_and_the_proxy_is_the_hip() {
-    for rule in [Rule::Paper, Rule::Swept] {
-        let mut contact = FieldContact::new(64, rule, rolling);
+    for mut rule in rules(rolling) {
         for i in 0..100 {
             let hip = [5.0 + 0.5 * f64::from(i), 20.0, 2.25];
-            let felt = contact.feel(hip);
-            assert_eq!(felt.state, ContactState::Free);
-            assert_eq!(position(&felt.proxy), hip);
-            assert_eq!(felt.displacement, Vec3::ZERO);
+            assert_eq!(rule(hip), (false, hip));
         }
     }
 }
 
 #[test]
 fn step_2_the_search_goes_on_over_edges_and_vertices() {
-    for rule in [Rule::Paper, Rule::Swept] {
-        let mut contact = FieldContact::new(64, rule, |x, _| 0.1 * x as f32);
-        contact.feel([10.5, 10.5, 3.0]);
-        contact.feel([10.5, 10.5, 1.0]);
+    for mut rule in rules(|x, _| 0.1 * x as f32) {
+        rule([10.5, 10.5, 3.0]);
+        rule([10.5, 10.5, 1.0]);
         // Diagonally over many patches in one tick.
-        let felt = contact.feel([17.2, 14.8, 1.2]);
-        let proxy = position(&felt.proxy);
+        let (_, proxy) = rule([17.2, 14.8, 1.2]);
         // The foot of the perpendicular on the plane z = x/10.
         let foot = (17.2 + 0.1 * 1.2) / 1.01;
         assert!((proxy[0] - foot).abs() < 1e-5, "{proxy:?}");
@@ -120,28 +148,27 @@ fn step_2_the_search_goes_on_over_edges_and_vertices() {
 
 #[test]
 fn step_2_concave_places_rest_on_an_edge_or_a_vertex() {
-    for rule in [Rule::Paper, Rule::Swept] {
-        let mut valley = FieldContact::new(64, rule, |x, _| (x - 20).abs() as f32);
-        valley.feel([20.3, 10.5, 2.0]);
-        let felt = valley.feel([20.1, 10.5, -0.5]);
-        assert_eq!(position(&felt.proxy)[0], 20.0, "the edge");
-        let mut pit = FieldContact::new(64, rule, |x, y| (x - 20).abs().max((y - 20).abs()) as f32);
-        pit.feel([20.2, 20.1, 2.0]);
-        let felt = pit.feel([20.05, 19.95, -0.5]);
-        assert_eq!(position(&felt.proxy)[..2], [20.0, 20.0], "the vertex");
+    for mut valley in rules(|x, _| (x - 20).abs() as f32) {
+        valley([20.3, 10.5, 2.0]);
+        let (_, proxy) = valley([20.1, 10.5, -0.5]);
+        assert_eq!(proxy[0], 20.0, "the edge");
+    }
+    for mut pit in rules(|x, y| (x - 20).abs().max((y - 20).abs()) as f32) {
+        pit([20.2, 20.1, 2.0]);
+        let (_, proxy) = pit([20.05, 19.95, -0.5]);
+        assert_eq!(proxy[..2], [20.0, 20.0], "the vertex");
     }
 }
 
 #[test]
 fn step_3_the_sign_of_the_way_out_along_the_normal_decides() {
-    let mut contact = FieldContact::new(64, Rule::Paper, rolling);
+    let [mut paper, _] = rules(rolling);
     let mut both = [0, 0];
     for i in 0..600 {
         let t = f64::from(i) * 0.01;
         let (x, y) = (20.0 + 3.0 * t.sin(), 30.0 + t);
         let z = surface(x, y) + 0.2 * (7.0 * t).cos();
-        let felt = contact.feel([x, y, z]);
-        let touching = felt.state == ContactState::Touching;
+        let (touching, _) = paper([x, y, z]);
         both[usize::from(touching)] += 1;
         assert_eq!(touching, z < surface(x, y), "tick {i}");
     }
@@ -159,18 +186,16 @@ fn surface(x: f64, y: f64) -> f64 {
 #[test]
 fn step_4_the_force_is_along_the_way_out_and_proportional_to_its_length() {
     let law = ForceLaw::PREMIUM;
-    for rule in [Rule::Paper, Rule::Swept] {
-        let mut contact = FieldContact::new(64, rule, rolling);
-        contact.feel([30.5, 30.5, 3.0]);
-        for depth in [0.01, 0.1, 0.5] {
-            let hip = [30.5, 30.5, surface(30.5, 30.5) - depth];
-            let felt = contact.feel(hip);
-            let proxy = position(&felt.proxy);
-            let force = law.spring().force_n(felt.displacement);
-            for axis in 0..3 {
-                let expected = 0.5 * (proxy[axis] - hip[axis]);
-                assert!((f64::from(force[axis]) - expected).abs() < 1e-6);
-            }
+    let mut contact = FieldContact::new(64, rolling);
+    contact.feel([30.5, 30.5, 3.0]);
+    for depth in [0.01, 0.1, 0.5] {
+        let hip = [30.5, 30.5, surface(30.5, 30.5) - depth];
+        let felt = contact.feel(hip);
+        let proxy = position(&felt.proxy);
+        let force = law.spring().force_n(felt.displacement);
+        for axis in 0..3 {
+            let expected = 0.5 * (proxy[axis] - hip[axis]);
+            assert!((f64::from(force[axis]) - expected).abs() < 1e-6);
         }
     }
 }
@@ -182,7 +207,7 @@ fn walls(x: i32, _: i32) -> f32 {
 
 #[test]
 fn figure_8_a_fast_sweep_does_not_pass_through_what_is_thin() {
-    let mut contact = FieldContact::new(64, Rule::Swept, walls);
+    let mut contact = FieldContact::new(64, walls);
     contact.feel([10.0, 30.3, 3.0]);
     let felt = contact.feel([50.0, 30.7, 3.0]);
     assert_eq!(felt.state, ContactState::Touching);

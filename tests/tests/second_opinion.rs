@@ -3,7 +3,7 @@
 
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{FeltCells, FeltGrid};
-use hapterra_core::contact::{ContactState, Execution, Rule};
+use hapterra_core::contact::ContactState;
 use hapterra_tests::chance::Chance;
 use hapterra_tests::invariants::judge::Judge;
 use hapterra_tests::invariants::seen::Seen;
@@ -11,7 +11,7 @@ use hapterra_tests::invariants::surface::{Patch, distance};
 use hapterra_tests::invariants::{Invariant, descent};
 use hapterra_tests::minima;
 use hapterra_tests::scene::hip_path;
-use hapterra_tests::scene::run::Scene;
+use hapterra_tests::scene::run::{Execution, Scene};
 use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::terrain::{Kind, Terrain};
 use hapterra_tests::shared;
@@ -42,7 +42,7 @@ impl Found {
 }
 
 fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
-    let mut judge = Judge::new(&scene.terrain, scene.rule);
+    let mut judge = Judge::new(&scene.terrain);
     let mut found = Found::default();
     let seen = scene.feel(buffers, [0; 3], scene.supply, |_| Ok(()));
     let seen = seen.expect("it settles");
@@ -132,7 +132,7 @@ fn a_proxy_beside_its_place_is_seen_there() {
         [20.5, 20.25, 9.0],
         [20.5, 20.25, ground.height_about(20.5, 20.25) - 0.5],
     ];
-    let scene = Scene::given(ground, path, Rule::Swept, Execution::LockStep, Supply::Held);
+    let scene = Scene::given(ground, path, Execution::LockStep, Supply::Held);
     let seen = scene.feel(&mut Buffers::default(), [0; 3], Supply::Held, |_| Ok(()));
     let honest = seen.expect("it settles")[1];
     assert_eq!(rests_right(&scene.terrain, &honest), Some(true));
@@ -143,17 +143,16 @@ fn a_proxy_beside_its_place_is_seen_there() {
     }
 }
 
-/// All scenes of a seed in that range that are felt by the swept rule.
-fn swept(numbers: std::ops::Range<u64>) -> impl Iterator<Item = (u64, Scene)> {
-    let scenes = numbers.map(|number| (number, Scene::random(77, number)));
-    scenes.filter(|(_, scene)| scene.rule == Rule::Swept)
+/// All scenes of a seed in that range.
+fn scenes(numbers: std::ops::Range<u64>) -> impl Iterator<Item = (u64, Scene)> {
+    numbers.map(|number| (number, Scene::random(77, number)))
 }
 
 #[test]
 fn both_judges_say_the_same_of_random_scenes() {
     let mut buffers = Buffers::default();
     let mut total = Found::default();
-    for (number, scene) in swept(0..200) {
+    for (number, scene) in scenes(0..200) {
         let found = look(&scene, &mut buffers);
         let kind = scene.terrain.kind;
         assert_eq!(
@@ -188,13 +187,7 @@ fn on_real_terrain_every_proxy_rests_at_a_closest_point() {
             let mut total = Found::default();
             for _ in 0..12 {
                 let path = hip_path::random(&terrain, &mut chance, 1000);
-                let scene = Scene::given(
-                    terrain.clone(),
-                    path,
-                    Rule::Swept,
-                    Execution::LockStep,
-                    Supply::Held,
-                );
+                let scene = Scene::given(terrain.clone(), path, Execution::LockStep, Supply::Held);
                 let found = look(&scene, &mut Buffers::default());
                 let none = [&found.wrong, &found.disputed, &found.late]
                     .iter()

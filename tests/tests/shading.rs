@@ -3,7 +3,7 @@
 use hapterra::replay::on_native;
 use hapterra::terrain::Terrain;
 use hapterra_core::Vec3;
-use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::contact::ContactState;
 use hapterra_core::force::{ForceLaw, Shading};
 use hapterra_core::scene::Sample;
 use hapterra_tests::field::position;
@@ -21,7 +21,7 @@ fn circle(terrain: &Terrain<'_>, shading: Shading, depth: f64) -> Vec<Sample> {
         shading,
         ..ForceLaw::PREMIUM
     };
-    let mut replayer = on_native(terrain, law, Rule::Swept).expect("opened");
+    let mut replayer = on_native(terrain, law).expect("opened");
     let size = terrain.size_mm();
     let radius = STEP * f64::from(STEPS) / std::f64::consts::TAU;
     let felt = (0..=STEPS).filter_map(|tick| {

@@ -7,7 +7,7 @@ use hapterra::raster::{OpenOptions, Raster};
 use hapterra::replay::on_native;
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
-use hapterra_core::contact::{ContactOutput, ContactState, Rule};
+use hapterra_core::contact::{ContactOutput, ContactState};
 use hapterra_core::force::{ForceLaw, Pattern, Shading, Texture};
 use hapterra_core::scene::Sample;
 use hapterra_tests::field::position;
@@ -54,7 +54,7 @@ fn rasters() -> Vec<(&'static str, Raster)> {
 /// it lifts twice and goes fast for some time. A cell is a millimetre, so that the force is half of
 /// the displacement, to the bit.
 fn circle(terrain: &Terrain<'_>, law: ForceLaw) -> Vec<Sample> {
-    let mut replayer = on_native(terrain, law, Rule::Swept).expect("opened");
+    let mut replayer = on_native(terrain, law).expect("opened");
     let size = terrain.size_mm();
     let radius = STEP * f64::from(STEPS) / std::f64::consts::TAU;
     let radius = radius.min(0.4 * size[0].min(size[1]));

@@ -10,7 +10,7 @@ use hapterra::phantom::PlacedTerrain;
 use hapterra::synth::{Kind, Synth};
 use hapterra::telemetry::Mean;
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Mode;
 use hapterra_core::scene::Sample;
@@ -28,7 +28,7 @@ fn felt() -> Option<(Vec<Sample>, Status)> {
         .raster(400, 400)
         .expect("raster");
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
-    let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("placed");
+    let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM).expect("placed");
     let mut rig = placed.held_phantom();
     let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
     let mut plant = lines.plant;

@@ -14,7 +14,7 @@ use hapterra::raster::{OpenOptions, Raster};
 use hapterra::steering::{Steer, Steering};
 use hapterra::terrain::FeltCells;
 use hapterra_core::Vec3;
-use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Limits, MAX_SLEW_N_PER_S, Mode};
 use hapterra_core::phantom::Calibration;
@@ -82,7 +82,7 @@ fn pressed_at<T>(
     let view = View::new(&grid, &reach, options).expect("a view");
     let terrain = view.terrain(grid).expect("a terrain");
     let law = ForceLaw::PREMIUM;
-    let scene = view.scene(&terrain, law, Rule::Swept).expect("a scene");
+    let scene = view.scene(&terrain, law).expect("a scene");
     let [east, north, _] = view.home_mm;
     let surface = |x: f64, y: f64| terrain.height_mm(x, y);
     let (hand, wall) = (HandModel::default(), f64::from(law.stiffness_n_per_mm));
@@ -104,7 +104,7 @@ fn pressed_at<T>(
     };
     let mut touching = Touching {
         session: opened.expect("opened").0,
-        steering: Steering::new(bounds, Rule::Swept, terrain.clone()),
+        steering: Steering::new(bounds, terrain.clone()),
         samples: vec![],
         said: vec![],
         pedal,

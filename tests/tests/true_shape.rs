@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::replay::on_native;
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
-use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
 
 /// Samples along a side, and degrees between them.
@@ -45,7 +45,7 @@ fn plane(latitude_deg: f64, slope: [f64; 2]) -> PathBuf {
 
 /// The force over the middle of a terrain, a cell deep.
 fn force(terrain: &Terrain<'_>) -> [f64; 3] {
-    let mut replayer = on_native(terrain, ForceLaw::PREMIUM, Rule::Swept).expect("opened");
+    let mut replayer = on_native(terrain, ForceLaw::PREMIUM).expect("opened");
     let [east, north] = terrain.size_mm().map(|size| size / 2.0);
     let ground = terrain.height_mm(east, north).expect("known");
     for depth in [-2.0, 1.0] {

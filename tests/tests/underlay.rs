@@ -12,7 +12,7 @@ use hapterra::place::Reach;
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Limits;
 use hapterra_core::phantom::Calibration;
@@ -78,7 +78,7 @@ impl<'t> Slide<'t> {
         let home = home.expect("addressable");
         let scene = self
             .terrain
-            .scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
+            .scene(ForceLaw::PREMIUM, Source::Encoders, home);
         // Its time goes on, as a board's does.
         let scene = Scene {
             hold_clock: false,

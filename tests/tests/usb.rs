@@ -8,7 +8,6 @@ use std::time::Duration;
 use hapterra::link::{Bulk, BulkEndpoints, Event, Patience, Session, is_hapterra};
 use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::Source;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
@@ -231,7 +230,7 @@ fn visit(then: impl FnOnce(&mut Session<'_>, &Rc<RefCell<Board>>)) {
         .scale
         .to_grid([128.3, 128.6, 4.0])
         .expect("addressable");
-    let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
+    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home);
     let (board, found) = enumerated();
     let board = Rc::new(RefCell::new(board));
     let opened = Session::open(

@@ -4,7 +4,8 @@
 //!
 //! In f64, so that it cannot fall through a facet by rounding.
 
-use super::line::Line;
+use hapterra::published::Line;
+
 use super::triangle::{Facet, Plane};
 use crate::grid::Grid;
 use crate::haptics::{Answer, Haptics, Hip};

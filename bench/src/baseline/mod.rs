@@ -2,15 +2,13 @@
 //! remembers, and none does work that its own description does not ask for.
 
 mod god_object;
-mod line;
 mod paper;
 mod parry;
 mod proxy_graph;
-mod real;
 mod triangle;
 
+pub use hapterra::published::{Paper, Real, Start, newton};
+
 pub use god_object::GodObject;
-pub use paper::{Paper, Start, newton};
 pub use parry::{Parry, Project};
 pub use proxy_graph::ProxyGraph;
-pub use real::Real;

@@ -79,7 +79,7 @@ fn felt(due: u32, underlay: Option<Underlay>) -> Vec<Answer> {
     }
 
     let (hips, approach) = hips(&grid);
-    let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut coming: Vec<TileKey> = Vec::new();
     let mut answers = Vec::new();
     for (tick, hip) in (0..).zip(&hips) {

@@ -23,9 +23,8 @@ const WAYS: usize = 24;
 /// Ticks on each of them.
 const TICKS: usize = 1000;
 /// The variants.
-const COMPARED: [&str; 7] = [
+const COMPARED: [&str; 6] = [
     "hapterra swept",
-    "hapterra paper rule",
     "paper f32",
     "paper f64",
     "god-object",

@@ -1,6 +1,5 @@
 //! What is felt along a path of points, in lock-step.
 
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::rate::TickRate;
@@ -35,7 +34,6 @@ pub(super) fn scene(grid: &Grid, law: ForceLaw, source: Source, home: GridPoint)
         cell_mm: 1.0,
         home,
         law,
-        rule: Rule::Swept,
         source,
         hold_clock: false,
         materials: None,

@@ -3,7 +3,6 @@
 use hapterra::phantom::{Encoder, PhantomModel, Placement};
 use hapterra::place::Reach;
 use hapterra::terrain::Terrain;
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::Sense;
 use hapterra_core::phantom::Calibration;
@@ -57,7 +56,7 @@ impl Hand {
         let scene = Scene {
             hold_clock: false,
             materials: None,
-            ..terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home)
+            ..terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home)
         };
         Ok(match late {
             Late::Hole => scene,

@@ -5,7 +5,7 @@ use hapterra_bench::grid::Grid;
 use hapterra_bench::haptics::Hip;
 use hapterra_bench::path;
 use hapterra_bench::state::{STATES, Step, TICKS, terrain};
-use hapterra_core::contact::{Friction, Rule};
+use hapterra_core::contact::Friction;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Scene, Source};
@@ -183,7 +183,6 @@ pub(crate) fn scene(grid: &Grid) -> Scene {
         cell_mm: 1.0,
         home: GridPoint::default(),
         law: ForceLaw::PREMIUM,
-        rule: Rule::Swept,
         source: Source::Points,
         hold_clock: false,
         materials: None,

@@ -5,7 +5,6 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
-use hapterra_core::contact::Rule;
 use hapterra_tests::counting::CountingBoard;
 use hapterra_tests::scene::recorded::Recorded;
 use hapterra_tests::scene::run::Surface;
@@ -23,7 +22,7 @@ pub(crate) const ALL: u64 = 10_000;
 pub(crate) const PART: u64 = 1000;
 /// Scenes that the emulated processor replays at once.
 const BATCH: u64 = 20;
-/// Scenes of every kind of terrain, and of the paper's rule, at least.
+/// Scenes of every kind of terrain at least.
 const OF_EACH: usize = 30;
 /// Most instructions that a tick of the contact may take on any scene: with the
 /// chain around it a tick at 10 kHz then fits a processor of 168 MHz.
@@ -32,12 +31,10 @@ const MOST: u32 = 12_000;
 /// The settings of a scene, and what its ticks cost.
 struct CountedScene {
     kind: Kind,
-    rule: Rule,
     ticks: Vec<Tick>,
 }
 
-/// A row over all scenes of the product's rule, one for each kind of terrain among
-/// them, and one over the scenes of the paper's rule.
+/// A row over all scenes, and one for each kind of terrain among them.
 pub(crate) fn rows(board: &CountingBoard, scenes: u64) -> Vec<Row> {
     let counted = count(board, scenes, Surface::Smooth);
     let target = Target {
@@ -51,13 +48,11 @@ pub(crate) fn rows(board: &CountingBoard, scenes: u64) -> Vec<Row> {
         let row = Row::new(name, target, ticks.collect());
         if scenes < ALL { row.of_a_part() } else { row }
     };
-    let is_swept = |scene: &CountedScene| scene.rule == Rule::Swept;
-    let mut rows = vec![row("soak", &is_swept)];
+    let mut rows = vec![row("soak", &|_| true)];
     rows.extend(KINDS.iter().map(|kind| {
         let name = format!("soak, {kind:?}").to_lowercase();
-        row(&name, &|scene| is_swept(scene) && scene.kind == *kind)
+        row(&name, &|scene| scene.kind == *kind)
     }));
-    rows.push(row("soak, paper's rule", &|scene| !is_swept(scene)));
     rows.push(rough_row(board, scenes / 4));
     rows
 }
@@ -113,7 +108,7 @@ fn count_batch(
     let scenes = numbers.zip(&recorded).zip(&there);
     scenes
         .map(|((number, recorded), there)| {
-            let (kind, rule) = (recorded.scene.terrain.kind, recorded.scene.rule);
+            let kind = recorded.scene.terrain.kind;
             let differs = recorded.differs(there);
             assert_eq!(differs, None, "seed {SEED}, scene {number}, {kind:?}: tick");
             let ticks = there.iter().enumerate().map(|(index, tick)| Tick {
@@ -123,7 +118,7 @@ fn count_batch(
                 index,
             });
             let ticks = ticks.collect();
-            CountedScene { kind, rule, ticks }
+            CountedScene { kind, ticks }
         })
         .collect()
 }

@@ -35,7 +35,7 @@ impl Single {
                 f32::NAN
             }
         });
-        let mut contact = Contact::new(ContactSettings::LOCK_STEP);
+        let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
         let mut felt = vec![];
         for hip in hips {
             let hip = GridPoint::new([1, 1, 0], Vec3::from_array(hip.map(|c| c as f32)));

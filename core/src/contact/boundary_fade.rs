@@ -9,8 +9,9 @@
 //! The boundary fade is a factor on the force: 1 where all of it is felt, 0 where
 //! nothing is.
 
+use super::budget::Budget;
 use crate::grid::{Cell, GridPoint};
-use crate::terrain::{Ground, TILE_CELLS, TileIndex, Window};
+use crate::terrain::{Ground, TILE_CELLS, Window};
 
 /// Distance of the HIP from the nearest patch, in cells, at which nothing is felt.
 pub const REACH: f32 = 0.5;
@@ -39,8 +40,6 @@ pub(super) struct Target {
     /// in the HIP within [`FAR`] of the proxy's cell, and 1 beyond. What is missing
     /// counts as not there.
     pub(super) fade: f32,
-    /// A tile that might make it more.
-    pub(super) missing: Option<TileIndex>,
     /// Whether nothing fades as long as the HIP stays over its cell: there is a patch.
     pub(super) over_patch: bool,
 }
@@ -48,7 +47,6 @@ pub(super) struct Target {
 impl Target {
     const ALL: Self = Self {
         fade: 1.0,
-        missing: None,
         over_patch: true,
     };
 }
@@ -58,6 +56,7 @@ pub(super) fn target<const D: usize>(
     window: &Window<'_, D>,
     hip: &GridPoint,
     proxy: Cell,
+    budget: &mut Budget,
 ) -> Target {
     // Nearly always the HIP is over the patch that the proxy is on.
     if proxy == hip.column() {
@@ -69,16 +68,19 @@ pub(super) fn target<const D: usize>(
             ..Target::ALL
         };
     }
-    beside_patches(window, hip)
+    beside_patches(window, hip, budget)
 }
 
-fn beside_patches<const D: usize>(window: &Window<'_, D>, hip: &GridPoint) -> Target {
-    let mut missing = None;
+fn beside_patches<const D: usize>(
+    window: &Window<'_, D>,
+    hip: &GridPoint,
+    budget: &mut Budget,
+) -> Target {
     let mut is_patch = |cell| match window.ground(cell) {
         Ground::Patch(_) => true,
         Ground::Hole => false,
         Ground::Missing => {
-            missing = Some(TileIndex::holding(cell));
+            budget.lacks(cell);
             false
         }
     };
@@ -98,7 +100,6 @@ fn beside_patches<const D: usize>(window: &Window<'_, D>, hip: &GridPoint) -> Ta
     }
     Target {
         fade: 1.0 - libm::sqrtf(nearest) / REACH,
-        missing,
         over_patch: false,
     }
 }
@@ -132,7 +133,7 @@ mod tests {
     use crate::contact::{Contact, ContactSettings, ContactState};
     use crate::rate::TickRate;
     use crate::terrain::testing::{Field, buffers};
-    use crate::terrain::{FieldSize, Tile};
+    use crate::terrain::{FieldSize, Tile, TileIndex};
     use glam::Vec3;
 
     fn hole_at_10_10(tiles: &mut [Tile]) -> Field<'_, 2> {
@@ -145,6 +146,10 @@ mod tests {
         })
     }
 
+    fn beside(field: &Field<'_, 2>, hip: GridPoint) -> Target {
+        beside_patches(&field.window, &hip, &mut Budget::new(0))
+    }
+
     fn at(x: f32, y: f32) -> GridPoint {
         GridPoint::new([0; 3], Vec3::new(x, y, -1.0))
     }
@@ -153,20 +158,19 @@ mod tests {
     fn full_over_a_patch_and_none_far_from_one() {
         let mut tiles = buffers::<2>();
         let field = hole_at_10_10(&mut tiles);
-        assert_eq!(beside_patches(&field.window, &at(8.99, 10.5)).fade, 1.0);
-        assert_eq!(beside_patches(&field.window, &at(10.5, 10.5)).fade, 0.0);
-        assert_eq!(beside_patches(&field.window, &at(-3.0, 5.0)).fade, 0.0);
+        assert_eq!(beside(&field, at(8.99, 10.5)).fade, 1.0);
+        assert_eq!(beside(&field, at(10.5, 10.5)).fade, 0.0);
+        assert_eq!(beside(&field, at(-3.0, 5.0)).fade, 0.0);
     }
 
     #[test]
     fn a_missing_tile_is_named() {
         let mut tiles = buffers::<2>();
         let field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), |_, _| 0.0);
-        let there = beside_patches(&field.window, &at(40.5, 5.5));
-        assert_eq!(
-            (there.fade, there.missing),
-            (0.0, Some(TileIndex::new(1, 0)))
-        );
+        let mut budget = Budget::new(0);
+        let there = beside_patches(&field.window, &at(40.5, 5.5), &mut budget);
+        let missing = budget.missing();
+        assert_eq!((there.fade, missing), (0.0, Some(TileIndex::new(1, 0))));
     }
 
     #[test]
@@ -174,7 +178,7 @@ mod tests {
         let mut tiles = buffers::<2>();
         let field = hole_at_10_10(&mut tiles);
         let over_patch = |hip: GridPoint, proxy| {
-            let target = target(&field.window, &hip, proxy);
+            let target = target(&field.window, &hip, proxy, &mut Budget::new(0));
             (target.over_patch, target.fade)
         };
         let proxy = Cell::new(8, 10);
@@ -189,15 +193,15 @@ mod tests {
     fn continuous_across_every_border() {
         let mut tiles = buffers::<2>();
         let field = hole_at_10_10(&mut tiles);
-        let mut last = beside_patches(&field.window, &at(7.0, 9.2)).fade;
+        let mut last = beside(&field, at(7.0, 9.2)).fade;
         let steps = cases(6000, 300);
         let step = 6.0 / steps as f32;
         for i in 1..=steps {
-            let now = beside_patches(&field.window, &at(7.0 + i as f32 * step, 9.2)).fade;
+            let now = beside(&field, at(7.0 + i as f32 * step, 9.2)).fade;
             assert!((now - last).abs() < 3.0 * step, "at {i}");
             last = now;
         }
-        assert!((beside_patches(&field.window, &at(40.25, 5.0)).fade - 0.5).abs() < 1e-6);
+        assert!((beside(&field, at(40.25, 5.0)).fade - 0.5).abs() < 1e-6);
     }
 
     /// Milliseconds that a HIP which is moved into the hole goes on feeling
@@ -206,7 +210,7 @@ mod tests {
         let mut tiles = buffers::<2>();
         let field = hole_at_10_10(&mut tiles);
         let rate = TickRate::new(1_000 * khz).expect("in range");
-        let mut contact = Contact::new(ContactSettings::REAL_TIME.at_rate(rate));
+        let mut contact = Contact::new(ContactSettings::AT_1_KHZ.at_rate(rate));
         let mut step = |hip: GridPoint| {
             let felt = *contact.step(&field.window, &hip);
             (felt.state, contact.boundary_fade())

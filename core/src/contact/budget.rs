@@ -7,7 +7,9 @@
 //! Cortex-M4F a unit stands for is measured; the table is
 //! `bench/instructions-m4f.csv`.
 
+use crate::grid::Cell;
 use crate::rate::TickRate;
+use crate::terrain::TileIndex;
 
 /// Units of work a tick may spend at 1 kHz, and at any rate at most.
 ///
@@ -42,9 +44,12 @@ pub(super) const ARRIVAL: u32 = 6;
 /// Units for the closest point of a convex patch.
 pub(super) const CONVEX: u32 = 4;
 /// Units for the closest point of one ruling.
-pub(super) const RULING: u32 = 4;
+pub(super) const RULING: u32 = 1;
 /// Units for looking for a crest between two rulings.
-pub(super) const CREST: u32 = 36;
+pub(super) const CREST: u32 = 16;
+/// Units that are left where the closest point of a patch is searched by rulings: it is always
+/// searched in one go, and most of the time takes a tenth of them.
+pub(super) const SEARCH: u32 = 56;
 /// Units for the slope of the distance into one patch.
 pub(super) const SLOPE: u32 = 3;
 /// Units for a look at the cone of friction.
@@ -56,18 +61,6 @@ pub(super) const DIRECTION: u32 = 3;
 pub(super) const WAY: u32 = 4 * SLOPE + DIRECTION + 2 * LOOK;
 /// Units for asking whether a box is clear.
 pub(super) const BOX: u32 = 4;
-/// Units for halving a path.
-pub(super) const HALF: u32 = 4;
-/// Units for a block that a path is looked along over.
-pub(super) const BLOCK: u32 = 2;
-/// Units for a block whose cells are looked at.
-pub(super) const BLOCK_CELLS: u32 = 3;
-/// Units for a cell that a path is looked along over.
-pub(super) const CELL: u32 = 2;
-/// Units for the cells beside one of a hole.
-pub(super) const BESIDE: u32 = 1;
-/// Units for the height of a path over a cell.
-pub(super) const GAP: u32 = 1;
 /// Units for a cell whose patch is intersected with a path.
 pub(super) const INTERSECTION: u32 = 8;
 
@@ -75,18 +68,23 @@ pub(super) const INTERSECTION: u32 = 8;
 pub(super) const ON_BORDER: u32 = ARRIVAL + 4 * SLOPE;
 /// Units of the largest piece of work. A tick that put work off has spent more than its budget
 /// less this.
-pub const LARGEST_PIECE: u32 = CREST;
+pub const LARGEST_PIECE: u32 = SEARCH;
 
-/// What a tick has spent, and what it may.
+/// What a tick has spent, and what it may; and the terrain that it had to do without.
 #[derive(Debug)]
 pub(super) struct Budget {
     spent: u32,
     limit: u32,
+    missing: Option<TileIndex>,
 }
 
 impl Budget {
     pub(super) const fn new(limit: u32) -> Self {
-        Self { spent: 0, limit }
+        Self {
+            spent: 0,
+            limit,
+            missing: None,
+        }
     }
 
     /// Whether so many units are left.
@@ -100,6 +98,17 @@ impl Budget {
     #[inline]
     pub(super) const fn spend(&mut self, units: u32) {
         self.spent += units;
+    }
+
+    /// Notes that the tile of a cell is not here.
+    #[cold]
+    pub(super) fn lacks(&mut self, cell: Cell) {
+        self.missing.get_or_insert(TileIndex::holding(cell));
+    }
+
+    /// The first tile that was looked for and is not here.
+    pub(super) const fn missing(&self) -> Option<TileIndex> {
+        self.missing
     }
 
     /// Units spent so far.

@@ -5,8 +5,7 @@
 //! this order: `proxy` (what a tick does), [`sweep`] (from free space to the
 //! surface), [`closest_point`] (over the surface), `friction` (what holds it back there), [`boundary_fade`] (at the border
 //! of the data); [`surface`] is what all of them speak of. `tolerance` says how exact
-//! each is and `budget` how much a tick may do; `paper` is the rule as it was published, and `shortcut` what
-//! nearly every tick is.
+//! each is and `budget` how much a tick may do; `shortcut` is what nearly every tick is.
 
 pub mod boundary_fade;
 pub mod closest_point;
@@ -16,7 +15,6 @@ pub mod sweep;
 mod budget;
 mod friction;
 mod output;
-mod paper;
 mod proxy;
 mod settings;
 mod shortcut;
@@ -37,4 +35,4 @@ pub use budget::{LARGEST_PIECE, WORK_PER_TICK, work_per_tick};
 pub use friction::Friction;
 pub use output::{ContactOutput, ContactState};
 pub use proxy::Contact;
-pub use settings::{ContactSettings, Execution, Rule};
+pub use settings::ContactSettings;

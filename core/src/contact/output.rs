@@ -32,9 +32,9 @@ pub struct ContactOutput {
     /// From the HIP to the proxy in cells, times the boundary fade: what the spring
     /// stretches by. Zero unless touching or fading.
     pub displacement: Vec3,
-    /// Whether the tick did all there was to do for this HIP.
+    /// Returns true if the tick did all there was to do for this HIP, with the tiles that are here.
     pub converged: bool,
-    /// The tile whose absence held the tick up.
+    /// A tile that the tick looked for and that is not here: with it the answer may be another.
     pub missing_tile: Option<TileIndex>,
     /// Units of work spent; more than [`super::WORK_PER_TICK`] would be a fault.
     pub work: u32,

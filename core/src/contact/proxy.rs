@@ -5,7 +5,6 @@ mod held_back;
 mod in_air;
 mod landing;
 mod on_ground;
-mod paper_rule;
 
 use glam::Vec3;
 
@@ -13,13 +12,12 @@ use super::budget::{Budget, SHORTCUT};
 use super::closest_point::{Descent, Leave, Place};
 use super::friction::Friction;
 use super::output::{ContactOutput, ContactState};
-use super::paper::Candidates;
-use super::settings::{ContactSettings, Execution, Rule};
+use super::settings::ContactSettings;
 use super::shortcut::{self, Follow, Followed};
 use super::surface::{HipView, SurfacePoint};
 use super::sweep::Path;
 use crate::grid::{Cell, GridPoint};
-use crate::terrain::Window;
+use crate::terrain::{TILE_CELLS, Window};
 use departures::Departures;
 use held_back::Rough;
 use landing::Landing;
@@ -43,15 +41,35 @@ enum Phase {
         displacement: Vec3,
         fade: f32,
     },
-    /// By the paper's rule: the cells under a segment are looked at.
-    Seeking { cells: Candidates, was_late: bool },
+}
+
+impl Phase {
+    /// Its name, and the phases in which a tick may end that begins in it. Nothing else begins
+    /// one but [`Contact::land`], after which a proxy that waited is on the surface.
+    #[cfg(test)]
+    const fn exits(&self) -> (&'static str, &'static [&'static str]) {
+        match self {
+            // The HIP is above the surface.
+            Self::Waiting => ("waiting", &["free"]),
+            // The path goes on in the next tick; it has hit the surface; it leads under it from
+            // the side, or the HIP has leapt.
+            Self::Free => ("free", &["sweeping", "on surface", "waiting"]),
+            // The same, and the path is at its end.
+            Self::Sweeping(_) => ("sweeping", &["free", "on surface", "waiting"]),
+            // The HIP is free; the path to it goes on; the surface is lost; it has ended under the
+            // HIP, or the HIP has leapt.
+            Self::OnSurface(_) => ("on surface", &["free", "sweeping", "fading", "waiting"]),
+            // The force has faded, and the HIP is above the surface or not.
+            Self::Fading { .. } => ("fading", &["free", "waiting"]),
+        }
+    }
 }
 
 #[derive(Clone, Debug)]
 struct Sweeping {
     path: Path,
-    /// The proxy had to wait, for terrain or for work: the force of the contact that
-    /// follows may not come at once.
+    /// The proxy had to wait for terrain, or the HIP has moved while the path was under way: the
+    /// force of the contact that follows may not come at once.
     was_late: bool,
     /// What a hop from the surface to the surface keeps.
     fade: f32,
@@ -114,8 +132,7 @@ pub struct Contact {
     at_rest: bool,
     settings: ContactSettings,
     phase: Phase,
-    /// What was felt by the last answer that counted, one that did not wait in
-    /// lock-step: where the proxy was, and the displacement to it.
+    /// The last answer: where the proxy was, and the displacement to it, if it touched.
     felt: Option<(GridPoint, Vec3)>,
     /// Another view was put in: the proxy is to begin on its surface. It waits meanwhile.
     landing: Option<Landing>,
@@ -127,10 +144,7 @@ impl Contact {
     /// A contact that waits to see the HIP above the surface.
     #[must_use]
     pub fn new(settings: ContactSettings) -> Self {
-        let rough = match settings.rule {
-            Rule::Swept => Rough::on(settings.friction),
-            Rule::Paper => None,
-        };
+        let rough = Rough::on(settings.friction);
         let is_smooth = rough.is_none();
         Self {
             // A proxy that is held back does not follow the HIP.
@@ -154,24 +168,16 @@ impl Contact {
         &self.output
     }
 
+    /// The last step's answer was not felt, because the next one goes on with it for the same
+    /// HIP: what was felt last is still the answer `before` it.
+    pub const fn resume(&mut self, before: &ContactOutput) {
+        (self.output.state, self.output.proxy) = (before.state, before.proxy);
+        self.output.displacement = before.displacement;
+    }
+
     /// The HIP of the last tick.
     pub(crate) const fn hip(&self) -> &GridPoint {
         &self.hip
-    }
-
-    /// Whether what the last tick answered is felt: in lock-step only once all is done.
-    pub(crate) fn is_felt(&self) -> bool {
-        self.output.converged || self.settings.execution == Execution::RealTime
-    }
-
-    /// Whether a tick is repeated until all is done.
-    pub(crate) fn is_in_lock_step(&self) -> bool {
-        self.settings.execution == Execution::LockStep
-    }
-
-    /// Whether the last tick did all there was to do, for this HIP.
-    pub(crate) fn has_answered(&self, hip: &GridPoint) -> bool {
-        self.output.converged && self.hip.is_same(hip)
     }
 
     /// How much of the force is felt: less than 1 where it fades at the boundary of
@@ -208,12 +214,11 @@ impl Contact {
         self.redirect(window, self.hip, None, &mut Budget::new(0));
     }
 
-    /// How rough the surface is from the next step on. A proxy that was held is judged again. The
-    /// paper's rule knows of no friction.
+    /// How rough the surface is from the next step on. A proxy that was held is judged again.
     pub(crate) fn feels_friction(&mut self, friction: Friction) {
         if let Some(rough) = &mut self.rough {
             self.at_rest &= !rough.takes(friction);
-        } else if self.settings.rule == Rule::Swept && !friction.is_none() {
+        } else if !friction.is_none() {
             self.rough = Rough::on(friction);
             // A proxy that is held back does not follow the HIP.
             self.settings.shortcuts = false;
@@ -242,7 +247,7 @@ impl Contact {
     /// // Flat ground at height 2, felt by a HIP that goes down and along.
     /// let mut field = FieldStorage::<2>::from_fn(FieldSize::new(40, 40), |_, _| 2.0)?;
     /// let window = field.window();
-    /// let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    /// let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     /// let hip = |x, z| GridPoint::new([20, 20, 0], Vec3::new(x, 0.5, z));
     ///
     /// assert_eq!(contact.step(&window, &hip(0.2, 2.5)).state, ContactState::Free);
@@ -319,6 +324,7 @@ impl Contact {
         }
         let mut budget = Budget::new(self.settings.work_per_tick);
         self.remembers_what_was_felt();
+        self.gives_up_beyond_window::<D>(&hip);
         if !hip.is_same(&self.hip) {
             self.redirect(window, hip, known, &mut budget);
         }
@@ -326,22 +332,37 @@ impl Contact {
         // none comes back to the one before.
         while self.turn(window, hip, &mut budget) == Turn::GoesOn {}
         self.hip = hip;
-        self.at_rest = self.output.converged && self.boundary_fade() == 1.0;
+        self.ends(&budget);
+    }
+
+    /// No arm moves by more than a window in a tick: a HIP that does begins anew.
+    fn gives_up_beyond_window<const D: usize>(&mut self, hip: &GridPoint) {
+        let (from, to) = (self.hip.column(), hip.column());
+        let way = from.x.abs_diff(to.x).max(from.y.abs_diff(to.y));
+        if way > (D * TILE_CELLS) as u32 {
+            self.phase = Phase::Waiting;
+        }
+    }
+
+    /// The end of a tick.
+    fn ends(&mut self, budget: &Budget) {
         self.output.work = budget.spent();
+        self.output.missing_tile = budget.missing();
+        self.at_rest = self.output.converged
+            && self.output.missing_tile.is_none()
+            && self.boundary_fade() == 1.0;
     }
 
     #[inline]
     fn remembers_what_was_felt(&mut self) {
-        if self.is_felt() {
-            let ContactOutput {
-                state,
-                proxy,
-                displacement,
-                ..
-            } = &self.output;
-            let touched = *state == ContactState::Touching;
-            self.felt = touched.then_some((*proxy, *displacement));
-        }
+        let ContactOutput {
+            state,
+            proxy,
+            displacement,
+            ..
+        } = &self.output;
+        let touched = *state == ContactState::Touching;
+        self.felt = touched.then_some((*proxy, *displacement));
     }
 
     /// The HIP has moved: a way under way now leads to its new place.
@@ -354,7 +375,10 @@ impl Contact {
     ) {
         match &mut self.phase {
             // Its departures count on: it may come back to where it left.
-            Phase::Sweeping(sweeping) => sweeping.path.redirect(hip),
+            Phase::Sweeping(sweeping) => {
+                sweeping.path.redirect(hip);
+                sweeping.was_late = true;
+            }
             Phase::OnSurface(on) => {
                 match (&on.follow, known) {
                     (Some(follow), Some(place)) => {
@@ -383,17 +407,10 @@ impl Contact {
         budget: &mut Budget,
     ) -> Turn {
         match &mut self.phase {
-            Phase::Waiting => self.looks_around(window, hip),
-            Phase::Fading { .. } => self.fades_out(window, hip),
-            Phase::Free if self.settings.rule == Rule::Paper => {
-                let cells = Candidates::between(self.hip, hip);
-                let was_late = false;
-                self.phase = Phase::Seeking { cells, was_late };
-                Turn::GoesOn
-            }
+            Phase::Waiting => self.looks_around(window, hip, budget),
+            Phase::Fading { .. } => self.fades_out(window, hip, budget),
             Phase::Free => self.flies(window, hip, budget),
             Phase::Sweeping(_) => self.sweeps(window, hip, budget),
-            Phase::Seeking { .. } => self.seeks(window, hip, budget),
             Phase::OnSurface(_) => self.descends(window, hip, budget),
         }
     }
@@ -405,3 +422,7 @@ impl Contact {
         Turn::Ends
     }
 }
+
+#[cfg(test)]
+#[path = "proxy/exits_tests.rs"]
+mod exits;

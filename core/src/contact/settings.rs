@@ -1,43 +1,12 @@
-//! What a contact is told once: its rule, and how its ticks run.
-
-use serde::{Deserialize, Serialize};
+//! What does not change while a contact lasts.
 
 use super::budget::{WORK_PER_TICK, work_per_tick};
 use super::friction::Friction;
 use crate::rate::TickRate;
 
-/// Which contact rule is in force.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Rule {
-    /// Continuous: the first true crossing starts a contact, and the proxy
-    /// moves on the surface.
-    #[default]
-    Swept,
-    /// As published, for comparison.
-    Paper,
-}
-
-/// What happens when a tick cannot finish: a tile is missing, or the budget is
-/// spent.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Execution {
-    /// The loop goes on; the proxy waits, and a force that has to wait comes
-    /// in at a bounded rate.
-    #[default]
-    RealTime,
-    /// The tick will be repeated with the same HIP until it can finish, and
-    /// only then counts; nothing of the wait is felt.
-    LockStep,
-}
-
 /// What does not change while a contact lasts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSettings {
-    /// The contact rule.
-    pub rule: Rule,
-    /// What happens when a tick cannot finish.
-    pub execution: Execution,
     /// Ticks a second: fades are bounded in time.
     pub rate: TickRate,
     /// Units of work a tick may spend: [`work_per_tick`] of the rate, or at least
@@ -46,7 +15,7 @@ pub struct ContactSettings {
     /// Slower than this, in cells a second, a proxy that slides comes to rest:
     /// [`Self::STICKS_BELOW_MM_S`].
     pub sticks_below: f32,
-    /// How rough the surface is. The paper's rule knows of no friction.
+    /// How rough the surface is.
     pub friction: Friction,
     /// Whether the shortcuts are taken: free as before, and sliding within a patch.
     /// Without them every answer has the same bits.
@@ -61,28 +30,14 @@ impl ContactSettings {
     /// to move.
     pub const STICKS_BELOW_MM_S: f32 = 1.0;
 
-    /// The swept rule in real time at 1 kHz, over cells of a millimetre.
-    pub const REAL_TIME: Self = Self {
-        rule: Rule::Swept,
-        execution: Execution::RealTime,
+    /// At 1 kHz, over cells of a millimetre.
+    pub const AT_1_KHZ: Self = Self {
         rate: TickRate::DEFAULT,
         work_per_tick: WORK_PER_TICK,
         sticks_below: Self::STICKS_BELOW_MM_S,
         friction: Friction::NONE,
         shortcuts: true,
     };
-
-    /// The swept rule in lock-step.
-    pub const LOCK_STEP: Self = Self {
-        execution: Execution::LockStep,
-        ..Self::REAL_TIME
-    };
-
-    /// The same with another rule.
-    #[must_use]
-    pub const fn with_rule(self, rule: Rule) -> Self {
-        Self { rule, ..self }
-    }
 
     /// The same on a rough surface.
     #[must_use]
@@ -112,6 +67,6 @@ impl ContactSettings {
 
 impl Default for ContactSettings {
     fn default() -> Self {
-        Self::REAL_TIME
+        Self::AT_1_KHZ
     }
 }

@@ -78,7 +78,7 @@ fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]])
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let truth = Ground64 { height };
-    let mut contact = Contact::new(ContactSettings::LOCK_STEP);
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut seen = [0; 4];
     for (tick, p) in path.iter().enumerate() {
         let hip = point(*p);
@@ -272,7 +272,7 @@ fn proxy_does_not_tunnel_through_a_wall() {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), two_walls);
     let (above, beyond) = (point([10.0, 30.2, 5.0]), point([40.0, 30.7, 5.0]));
-    let mut swept = Contact::new(ContactSettings::LOCK_STEP);
+    let mut swept = Contact::new(ContactSettings::AT_1_KHZ);
     swept.step(&field.window, &above);
     let mut felt = *swept.step(&field.window, &beyond);
     while !felt.converged {
@@ -292,8 +292,8 @@ fn shifting_the_scene_changes_no_bit() {
         let mut far_tiles = buffers::<2>();
         let far = Field::<2>::shifted(&mut far_tiles, SIZE, shift, rough);
         let (mut a, mut b) = (
-            Contact::new(ContactSettings::LOCK_STEP),
-            Contact::new(ContactSettings::LOCK_STEP),
+            Contact::new(ContactSettings::AT_1_KHZ),
+            Contact::new(ContactSettings::AT_1_KHZ),
         );
         for p in wander(3, cases(1500, 30), 0.2, 1.0, 1.5) {
             let hip = point(p);
@@ -496,7 +496,7 @@ fn straight_down_onto_any_sample_meets_the_surface() {
     for (x, y) in (0..=16).flat_map(|y| (0..=16).map(move |x| (x, y))) {
         for fast in [0.1, 1.5, 500.0] {
             let at = |z: f32| GridPoint::new([x, y, 0], Vec3::Z * z);
-            let mut contact = Contact::new(ContactSettings::REAL_TIME);
+            let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
             let above = contact.step(&field.window, &at(1.0 + fast)).state;
             let felt = contact.step(&field.window, &at(0.75));
             let expected = match with_a_hole(x, y).is_nan() {
@@ -522,7 +522,7 @@ fn a_mirrored_way_along_grid_lines_is_felt_mirrored() {
     let mut dice = Dice(5);
     let mut touched = 0;
     for _ in 0..cases(400, 10) {
-        let mut contacts = [(); 2].map(|()| Contact::new(ContactSettings::REAL_TIME));
+        let mut contacts = [(); 2].map(|()| Contact::new(ContactSettings::AT_1_KHZ));
         let mut at = [8.0, 8.0, 4.0_f32];
         for tick in 0..60 {
             let axis = (dice.between(0.0, 3.0) as usize).min(2);
@@ -582,6 +582,7 @@ fn side_by_side(
                 let hip = point(p);
                 let mut turns = [0; 2];
                 let answers = [0, 1].map(|i| {
+                    let before = *contacts[i].output();
                     loop {
                         turns[i] += 1;
                         let output = *contacts[i].step(&field.window, &hip);
@@ -589,6 +590,7 @@ fn side_by_side(
                             return output;
                         }
                         assert!(turns[i] < 10_000, "{hip:?} never converges");
+                        contacts[i].resume(&before);
                     }
                 });
                 look(&answers[0], &answers[1], turns);
@@ -606,10 +608,10 @@ fn bits(output: &ContactOutput) -> (ContactState, GridPoint, [u32; 3]) {
 fn the_shortcuts_change_no_bit() {
     let without = ContactSettings {
         shortcuts: false,
-        ..ContactSettings::LOCK_STEP
+        ..ContactSettings::AT_1_KHZ
     };
     let (mut ticks, mut shorter) = (0, 0);
-    side_by_side(ContactSettings::LOCK_STEP, without, |with, without, _| {
+    side_by_side(ContactSettings::AT_1_KHZ, without, |with, without, _| {
         assert_eq!(bits(with), bits(without));
         ticks += 1;
         shorter += u32::from(with.work < without.work);
@@ -621,13 +623,13 @@ fn the_shortcuts_change_no_bit() {
 fn a_tick_cut_short_anywhere_ends_on_the_same_bits() {
     let whole = ContactSettings {
         work_per_tick: u32::MAX / 2,
-        ..ContactSettings::LOCK_STEP
+        ..ContactSettings::AT_1_KHZ
     };
     let mut cut = 0;
     for work_per_tick in [ContactSettings::LEAST_WORK, WORK_PER_TICK] {
         let short = ContactSettings {
             work_per_tick,
-            ..ContactSettings::LOCK_STEP
+            ..ContactSettings::AT_1_KHZ
         };
         side_by_side(whole, short, |whole, short, turns| {
             assert_eq!(bits(whole), bits(short));
@@ -656,7 +658,7 @@ fn on_an_edge_or_vertex_the_steepest_way_down_decides() {
             let turned = |c: i32, turned: bool| if turned { SIZE - c } else { c };
             tent(turned(x, mirrored[0]), turned(y, mirrored[1]), 30)
         });
-        let mut contact = Contact::new(ContactSettings::LOCK_STEP);
+        let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
         contact.step(&field.window, &point([30.0, 30.0, 1.0]));
         let output = *contact.step(&field.window, &point([30.0, 30.0, -0.2]));
         assert_eq!(output.state, ContactState::Touching);
@@ -665,4 +667,19 @@ fn on_an_edge_or_vertex_the_steepest_way_down_decides() {
         assert!(toward(east, mirrored[0]) > 0.0, "{mirrored:?} {output:?}");
         assert!(toward(north, mirrored[1]) > 0.0, "{mirrored:?} {output:?}");
     }
+}
+
+/// No arm moves by a window in a tick: a HIP that does is a new one, without force until it has
+/// been above the surface.
+#[test]
+fn hip_that_leaps_beyond_the_window_begins_anew() {
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), |_, _| 0.0);
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
+    let mut state = |hip| contact.step(&field.window, &point(hip)).state;
+    assert_eq!(state([2.5, 2.5, 1.0]), ContactState::Free);
+    assert_eq!(state([2.5, 2.5, -0.5]), ContactState::Touching);
+    assert_eq!(state([-60.5, 2.5, -0.5]), ContactState::Touching);
+    assert_eq!(state([4.5, 2.5, -0.5]), ContactState::Waiting);
+    assert_eq!(state([4.5, 2.5, 0.5]), ContactState::Free);
 }

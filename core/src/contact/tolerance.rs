@@ -1,5 +1,4 @@
-//! The tolerances of the contact, in one place, with where each comes from. (What
-//! rounding makes of a look along a path is worked out in `sweep/look_ahead`.)
+//! The tolerances of the contact, in one place, with where each comes from.
 //!
 //! Lengths are in cells. An `f32` in `[0.5, 1)` resolves 6·10⁻⁸; what is
 //! rounded a few times on its way is known to a small multiple of that.
@@ -51,10 +50,3 @@ pub(super) const HEIGHT_NOISE: f32 = 1e-5;
 /// Length of a step over a cell's corner that is passed over where the path
 /// leaves the surface.
 pub(super) const TINY_STEP: f32 = 1e-6;
-/// Rounding of a height over a long path, relative to the path's length: places
-/// on it are known to 2⁻²⁰ of that, and so are heights on slopes as steep as the
-/// path is long.
-pub(super) const PATH_NOISE: f32 = 1e-5;
-/// A path whose gap over the ground is less than its own rise by this factor runs
-/// along the ground.
-pub(super) const RUNS_ALONG: f32 = 16.0;

@@ -64,11 +64,6 @@ impl Effects {
         table: &MaterialTable,
     ) -> Vec3 {
         let displacement = self.shaded(window, contact);
-        // A tick that is repeated for the same point is no tick of the proxy's way.
-        let goes_on = contact.is_in_lock_step() && self.missing().is_some();
-        if !contact.is_felt() || goes_on {
-            return displacement;
-        }
         if self.material.is_some() {
             return self.on_material(window, contact, table, displacement);
         }

@@ -47,7 +47,7 @@ fn beside_a_ridge(law: &ForceLaw, created_mj: f32) -> [Vec3; 2] {
     let ridge = |x: i32, _| -0.5 * (x - 20).abs() as f32;
     let mut field = FieldStorage::<2>::from_fn(size, ridge).expect("it fits");
     let window = field.window();
-    let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     for height in [1.0, -0.5] {
         contact.step(
             &window,
@@ -118,7 +118,7 @@ fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] 
     let size = FieldSize::new(60, 60);
     let mut field = FieldStorage::<2>::from_fn(size, |x, _| height(x as f32)).expect("it fits");
     let window = field.window();
-    let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut controlled = Effects::of(&law, &felt()).expect("shaded");
     let mut free = Effects::of(&uncontrolled, &felt()).expect("shaded");
     let table = MaterialTable::EMPTY;

@@ -9,6 +9,7 @@ mod material;
 mod passivity;
 mod relief;
 mod shading;
+mod slopes;
 mod texture;
 mod texturer;
 mod yielding;

@@ -2,13 +2,13 @@
 //! is (Morgenbesser and Srinivasan 1996).
 //!
 //! The force is turned as a whole, from the normal that the contact has to the normal of the
-//! [smoothed slopes](crate::contact::surface), and keeps its size. Without friction it then
+//! smoothed slopes (`slopes`), and keeps its size. Without friction it then
 //! points along the smoothed normal; what friction adds is turned with it.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::surface::{Slopes, SlopesAt};
+use super::slopes::{Slopes, SlopesAt};
 use crate::contact::{Contact, ContactState};
 use crate::scalar::one_over_root;
 use crate::terrain::{TileIndex, Window};
@@ -63,7 +63,7 @@ impl Shader {
     /// let size = FieldSize::new(40, 40);
     /// let mut field = FieldStorage::<2>::from_fn(size, |x, _| 0.5 * (x - 20).abs() as f32)?;
     /// let window = field.window();
-    /// let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    /// let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     /// let mut shader = Shader::of(Shading::Smooth).expect("smooth");
     /// for height in [1.0, 0.0] {
     ///     contact.step(&window, &GridPoint::new([20, 20, 0], Vec3::new(0.1, 0.5, height)));
@@ -78,7 +78,6 @@ impl Shader {
         let output = contact.output();
         self.missing = None;
         if output.state == ContactState::Touching
-            && contact.is_felt()
             && let Some(slopes) = SlopesAt::point(window, &output.proxy)
         {
             let normal = output.displacement - contact.held_back();

@@ -55,7 +55,7 @@ fn felt_along<const D: usize>(
 ) -> Vec<Felt> {
     let settings = ContactSettings {
         friction,
-        ..ContactSettings::REAL_TIME
+        ..ContactSettings::AT_1_KHZ
     };
     let mut contact = Contact::new(settings);
     let mut shader = Shader::of(Shading::Smooth).expect("shaded");
@@ -290,7 +290,7 @@ fn next_to_a_hole_the_force_turns_evenly_and_the_pull_back_stays() {
     }
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), level);
-    let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut shader = Shader::of(Shading::Smooth).expect("shaded");
     let mut faded = 0;
     for (x, z) in [(14.5, 3.5), (14.9, 2.9)]

@@ -315,7 +315,7 @@ fn the_proxy_is_not_moved_and_texture_is_along_the_slopes_normal() {
     let size = FieldSize::new(60, 60);
     let mut field = FieldStorage::<2>::from_fn(size, |x, _| 0.75 * x as f32).expect("a field");
     let window = field.window();
-    let mut contact = Contact::new(ContactSettings::REAL_TIME);
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut texturer = texturer(&GRATING);
     contact.step(
         &window,

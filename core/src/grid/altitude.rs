@@ -20,16 +20,6 @@ impl Altitude {
         self.cell
     }
 
-    /// The altitude so many cells higher, to within the rounding of `by`.
-    #[must_use]
-    #[inline]
-    pub(crate) fn raised(self, by: f32) -> Self {
-        Self {
-            cell: self.cell,
-            frac: self.frac + by,
-        }
-    }
-
     /// `height`, counted in cells from `base`, as seen from this altitude.
     ///
     /// The whole cells are taken off first, so nearby heights lose no bit.

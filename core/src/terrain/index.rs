@@ -104,16 +104,6 @@ impl TileKey {
     }
 }
 
-/// The column and row of a block of 8 × 8 cells, the smallest part of a field
-/// whose maximum is kept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Block {
-    /// Column, counted eastward.
-    pub(crate) col: i32,
-    /// Row, counted northward.
-    pub(crate) row: i32,
-}
-
 /// A tile's column or row, wrapped onto a torus of `D` × `D` tiles.
 #[inline]
 pub(super) const fn wrap<const D: usize>(index: i32) -> usize {

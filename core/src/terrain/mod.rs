@@ -16,11 +16,10 @@ mod window;
 
 pub use coarse_tile::CoarseTile;
 pub use extent::{CellBox, FieldSize};
-pub(crate) use index::{BLOCK_SHIFT, Block};
 pub use index::{POSTS, TILE_CELLS, TILE_SHIFT, TileIndex, TileKey};
 pub use settling::SETTLING_MM_S;
 pub use storage::{BadField, FieldStorage};
-pub use tile::{BadTile, Tile};
+pub use tile::{BadTile, MAX_STEP_CELLS, Tile};
 pub use tile_requests::{
     HORIZON_TICKS, IN_FLIGHT, MARGIN_CELLS, RETRY_TICKS, TileDemand, TileRequester,
 };

@@ -2,7 +2,7 @@
 
 use super::extent::FieldSize;
 use super::index::{TILE_CELLS, TileKey};
-use super::tile::Tile;
+use super::tile::{MAX_STEP_CELLS, Tile};
 use super::window::Window;
 use crate::grid::MAX_CELL;
 
@@ -46,6 +46,11 @@ pub enum BadField {
     /// More or fewer heights than a field of the size has: so many.
     #[error("a field of this size has {0} heights: one more than cells each way")]
     Count(i32),
+    /// Too steep.
+    #[error(
+        "neighbouring samples differ by more than {MAX_STEP_CELLS} cells: scale the heights down, or fill the samples"
+    )]
+    Step,
 }
 
 impl<const D: usize> FieldStorage<D> {
@@ -158,6 +163,11 @@ impl<const D: usize> FieldStorage<D> {
             }
         }
         self.size = size;
+        let held = self.tiles.as_flattened().iter();
+        if !held.into_iter().all(Tile::is_climbable) {
+            self.size = FieldSize::new(0, 0);
+            return Err(BadField::Step);
+        }
         for index in size.tiles() {
             let tile = &mut self.tiles[index.row as usize][index.col as usize];
             tile.close(TileKey { level: 0, index }, 0);
@@ -286,6 +296,24 @@ mod tests {
         assert_eq!(
             format!("{few}"),
             "a field of this size has 9 heights: one more than cells each way"
+        );
+    }
+
+    #[test]
+    fn field_with_too_steep_step_is_refused() {
+        let size = FieldSize::new(40, 40);
+        let wall = |height: f32| {
+            FieldStorage::<2>::from_fn(size, move |x, _| if x > 32 { height } else { 0.0 })
+        };
+        assert!(wall(MAX_STEP_CELLS).is_ok());
+        assert_eq!(wall(MAX_STEP_CELLS + 1.0).err(), Some(BadField::Step));
+        let mut tile = std::boxed::Box::new(Tile::VACANT);
+        let refused = tile.fill(TileKey::new(0, 0, 0), 0, |_, row| {
+            1e4 * row as f32 * row as f32
+        });
+        assert_eq!(
+            (refused, tile.key()),
+            (Err(crate::terrain::BadTile::Step), None)
         );
     }
 }

@@ -8,6 +8,10 @@ use crate::grid::{Altitude, Cell, MAX_CELL};
 const BLOCKS: usize = TILE_CELLS >> BLOCK_SHIFT;
 const QUARTERS: usize = BLOCKS / 2;
 
+/// Most by which neighbouring samples may differ, cells: a wall of this height is all but
+/// vertical to a hand, and up to it the contact is exact.
+pub const MAX_STEP_CELLS: f32 = 1e4;
+
 /// Why the bytes of a tile were refused. The buffer is left vacant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -20,6 +24,8 @@ pub enum BadTile {
     Packed,
     /// Not 33 × 33 materials of the scene's table.
     Materials,
+    /// Neighbouring samples differ by more than [`MAX_STEP_CELLS`].
+    Step,
 }
 
 /// What a buffer holds.
@@ -154,7 +160,7 @@ impl Tile {
     /// and row in `0..33`. NaN is a hole; so is anything beyond ±[`MAX_CELL`].
     ///
     /// # Errors
-    /// [`BadTile::Base`] when `base` is out of range.
+    /// [`BadTile::Base`] when `base` is out of range, [`BadTile::Step`] when it is too steep.
     pub fn fill(
         &mut self,
         key: TileKey,
@@ -181,8 +187,31 @@ impl Tile {
                 self.set(col, row, height(col, row));
             }
         }
+        if !self.is_climbable() {
+            return Err(BadTile::Step);
+        }
         self.close(key, base);
         Ok(())
+    }
+
+    /// Returns true if no neighbouring samples differ by more than [`MAX_STEP_CELLS`].
+    pub(super) fn is_climbable(&self) -> bool {
+        // A hole has no step.
+        let steps = |a: f32, b: f32| (a - b).abs() > MAX_STEP_CELLS;
+        let in_row = |row: &[f32; POSTS]| {
+            let next = row.iter().skip(1);
+            row.iter().zip(next).any(|(a, b)| steps(*a, *b))
+        };
+        let between = |south: &[f32; POSTS], north: &[f32; POSTS]| {
+            south.iter().zip(north).any(|(a, b)| steps(*a, *b))
+        };
+        let north = self.posts.iter().skip(1);
+        !self.posts.iter().any(in_row)
+            && !self
+                .posts
+                .iter()
+                .zip(north)
+                .any(|(south, north)| between(south, north))
     }
 
     /// Forgets the tile, and makes every sample a hole.

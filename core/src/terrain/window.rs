@@ -3,7 +3,7 @@
 mod unsettled;
 
 use super::extent::{CellBox, FieldSize};
-use super::index::{BLOCK_SHIFT, Block, TILE_SHIFT, TileIndex, TileKey, wrap};
+use super::index::{BLOCK_SHIFT, TILE_SHIFT, TileIndex, TileKey, wrap};
 use super::max_pyramid::MaxPyramid;
 use super::settling::Settling;
 use super::tile::Tile;
@@ -255,14 +255,6 @@ impl<'t, const D: usize> Window<'t, D> {
             && self
                 .held(tile)
                 .is_some_and(|tile| tile.is_below_around(from, to, low))
-    }
-
-    /// Whether everything in one block of 8 × 8 patches is known to lie below
-    /// `low`.
-    #[inline]
-    pub(crate) fn block_is_clear(&self, block: Block, low: Altitude) -> bool {
-        let Block { col, row } = block;
-        self.part_is_below(BLOCK_SHIFT, col, row, low) || !self.size.has(col, row, BLOCK_SHIFT)
     }
 
     fn box_is_clear(&self, span: CellBox, low: Altitude) -> bool {

@@ -12,7 +12,7 @@ use super::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
 use super::request::{Answer, Refusal, Request};
 use super::session::{InSession, LastSession, SampleCount, SessionEnd, SessionNumber};
 use crate::clutch::ClutchHold;
-use crate::contact::{ContactState, Friction, Rule};
+use crate::contact::{ContactState, Friction};
 use crate::force::{
     Controller, Damping, ForceLaw, Material, MaterialTable, Pattern, Shading, Texture,
 };
@@ -68,7 +68,6 @@ fn a_scene() {
             },
             ..ForceLaw::PREMIUM
         },
-        rule: Rule::Paper,
         source: Source::Points,
         hold_clock: true,
         materials: Some(300),
@@ -87,14 +86,14 @@ fn a_scene() {
         float(8.5),
         std::vec![0; 12],
         float(2.0),
-        // Controller, shading; the texture; rule, source, clock.
+        // Controller, shading; the texture; source, clock.
         std::vec![1, 1],
         std::vec![2],
         float(0.125),
         float(2.0),
         float(-45.0),
         std::vec![0xAC, 0x02],
-        std::vec![1, 1, 1],
+        std::vec![1, 1],
         // Its materials.
         std::vec![1, 0xAC, 0x02],
     ];
@@ -156,7 +155,6 @@ fn a_view_and_the_clutch() {
         cell_mm: 1.5,
         home: GridPoint::default(),
         law: ForceLaw::PREMIUM,
-        rule: Rule::Swept,
         source: Source::Encoders,
         hold_clock: false,
         materials: None,
@@ -277,7 +275,7 @@ fn a_hello_in_its_session() {
         }),
     };
     // The session is 300 | 128; then variant, protocol, number, seconds.
-    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 13, 9, 0xB4, 0x01]);
+    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 14, 9, 0xB4, 0x01]);
 }
 
 #[test]
@@ -306,7 +304,7 @@ fn a_device_that_introduces_itself() {
         },
     });
     let wanted = [
-        std::vec![0, 13, 9, 8, 1, b'b'],
+        std::vec![0, 14, 9, 8, 1, b'b'],
         serial.to_vec(),
         std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xBE, 0x01, 0xAC, 0x02, 1, 7],
         std::vec![0xAC, 0x02, 6, 3, 5, 1],

@@ -236,7 +236,6 @@ mod tests {
             cell_mm: 1.0,
             home: crate::grid::GridPoint::default(),
             law: ForceLaw::PREMIUM,
-            rule: crate::contact::Rule::Swept,
             source: crate::scene::Source::Points,
             hold_clock: false,
             materials,

@@ -190,7 +190,7 @@ fn contact_of(scene: &Scene) -> Contact {
     let settings = ContactSettings {
         // What a tick has at 10 kHz: there the instructions count.
         work_per_tick: work_per_tick(TickRate::new(10_000).unwrap_or_default()),
-        ..ContactSettings::REAL_TIME.with_rule(scene.rule)
+        ..ContactSettings::AT_1_KHZ
     };
     Contact::new(settings.with_friction(scene.law.friction))
 }

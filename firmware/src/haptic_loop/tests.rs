@@ -4,7 +4,6 @@ use std::boxed::Box;
 use std::vec::Vec;
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::{Cell, GridPoint};
 use hapterra_core::guard::{Blockers, Limits};
@@ -48,7 +47,6 @@ fn scene(source: Source) -> Scene {
         cell_mm: 1.0,
         home: GridPoint::new([100, 100, 10], Vec3::ZERO),
         law: ForceLaw::PREMIUM,
-        rule: Rule::Swept,
         source,
         hold_clock: false,
         materials: None,

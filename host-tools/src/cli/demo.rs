@@ -26,7 +26,7 @@ use crate::place::{Laid, View};
 use crate::raster::{Raster, files_read_with};
 use crate::remote::without_key;
 use crate::replay::settings::{Device, ViewSettings};
-use crate::replay::{LoopColumns, Record, Recording, Settings};
+use crate::replay::{LoopColumns, Record, Recording, Rule, Settings};
 use crate::stability::limits;
 use crate::synth::{Kind, Synth};
 use crate::telemetry::{FeltViews, SampleLog};
@@ -104,8 +104,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let terrain = view.terrain(asked.grid)?;
     let law = args.rendering.law()?;
     let law = args.rendering.materials.law(materials.as_ref(), law);
-    let rule = args.rendering.rule();
-    let placed = PlacedTerrain::in_view(&terrain, view.home_mm, law, rule)?;
+    args.rendering.needs_the_devices_rule()?;
+    let placed = PlacedTerrain::in_view(&terrain, view.home_mm, law)?;
     let placed = placed.repeated(args.rounds);
     show(args, (&placed, &view), &name, &outputs)
 }
@@ -203,7 +203,8 @@ fn show(
     let file = args.file.as_ref();
     let file = file.map_or(OWN_TERRAIN.into(), |file| without_key(file));
     let device = Device::of(&toured.summary.device);
-    let settings = Settings::new(&file, terrain, placed.law(), Some(placed.home_mm()), device);
+    let law = (placed.law(), Rule::Swept);
+    let settings = Settings::new(&file, terrain, law, Some(placed.home_mm()), device);
     write(&toured, &settings, &outputs.recording).or_hint(OTHER_FOLDER)?;
     let summary = &toured.summary;
     print!("{}", summary.text());
@@ -243,9 +244,9 @@ fn control<'t>(
     placed: &PlacedTerrain<'t>,
     view: &View,
 ) -> Result<ViewControl<'t>, Failure> {
-    let ((law, rule), view) = (placed.law(), *view);
+    let (law, view) = (placed.law(), *view);
     let arm = (&Calibration::PREMIUM_1_5, args.rendering.level);
-    let served = (placed.terrain(), Laid { view, law }, rule);
+    let served = (placed.terrain(), Laid { view, law });
     Ok(ViewControl::new(served, arm, args.commands.open()?))
 }
 

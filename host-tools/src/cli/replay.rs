@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::ValueHint;
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::Sample;
 
@@ -20,7 +19,8 @@ use crate::materials::Materials;
 use crate::output::{Output, keep_apart};
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{
-    Record, ReplayError, Replayer, Settings, Summary, Trajectory, on_native, replay_trajectory,
+    Record, ReplayError, Replayer, Rule, Settings, Summary, Trajectory, on_native,
+    replay_trajectory,
 };
 use crate::stability::limits;
 use crate::terrain::Terrain;
@@ -133,6 +133,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             summary.below_ground
         );
     }
+    if summary.leaps > 0 {
+        eprintln!(
+            "{} rows move the HIP by more than the device's window: contact begins anew there",
+            summary.leaps
+        );
+    }
     eprintln!(
         "{} rows, {} in contact, {:.0} rows a second: {}",
         summary.rows,
@@ -223,17 +229,24 @@ fn rendering(args: &Args, recorded: Option<&Settings>) -> Result<Rendering, Fail
 
 fn native(args: &Args, felt: &Felt<'_>, trajectory: &mut Trajectory) -> Result<Summary, Failure> {
     let (law, rule) = felt.law;
-    let mut replayer = on_native(felt.terrain, law, rule)?;
+    let mut replayer = on_native(felt.terrain, law)?;
+    if rule == Rule::Paper {
+        replayer = replayer.by_published_rule(law);
+    }
     replay(args, felt, trajectory, &mut replayer)
 }
 
 fn emulated(args: &Args, felt: &Felt<'_>, trajectory: &mut Trajectory) -> Result<Summary, Failure> {
     let (law, rule) = felt.law;
+    if rule == Rule::Paper {
+        return Err("--contact paper: no device has the paper's contact rule".to_owned())
+            .or_hint("leave --on emulated out: the host renders it");
+    }
     let (emulator, lines) = args.board.start()?;
     // The other line stays open and silent: points take the arm's place.
     let _plant = lines.plant;
     let link: Box<dyn Transport> = Box::new(lines.link);
-    let mut replayer = Replayer::open(felt.terrain, law, rule, link, Patience::EMULATED)?;
+    let mut replayer = Replayer::open(felt.terrain, law, link, Patience::EMULATED)?;
     let summary = replay(args, felt, trajectory, &mut replayer)?;
     replayer.say_goodbye()?;
     if let Err(why) = emulator.finish() {

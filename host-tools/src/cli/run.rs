@@ -150,7 +150,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let law = args.rendering.law()?;
     check_stiffness(law.stiffness_n_per_mm)?;
     let law = args.rendering.materials.law(materials.as_ref(), law);
-    let law = (law, args.rendering.rule());
+    args.rendering.needs_the_devices_rule()?;
     // What cannot be recorded is known before anything is armed.
     let recordings = of_each(&devices, recording)?;
     let commands = args.commands.open_for(devices.len())?;

@@ -1,4 +1,3 @@
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
@@ -51,7 +50,7 @@ fn on_bench(arming: Option<Arming>, test: impl FnOnce(&mut Bench<'_>)) {
     let scale = Scale::new(1.0, 1.0).expect("scale");
     let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
     let home = GridPoint::default();
-    let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
+    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home);
     let mut bench = Bench {
         client: Client::new(&terrain, scene, arming, Patience::REAL_TIME),
         now: ms(10_000),

@@ -376,7 +376,6 @@ mod tests {
     use crate::raster::Raster;
     use crate::terrain::{Scale, Terrain};
     use crate::timeouts;
-    use hapterra_core::contact::Rule;
     use hapterra_core::force::ForceLaw;
     use hapterra_core::grid::GridPoint;
     use hapterra_core::scene::Source;
@@ -476,7 +475,7 @@ mod tests {
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
         let home = GridPoint::default();
-        terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home)
+        terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home)
     }
 
     fn open<'t>(device: &'t mut Native<StoppedClock>) -> Dialogue<'t> {

@@ -1,6 +1,5 @@
 //! Classes over a terrain: which lies where.
 
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
@@ -142,12 +141,7 @@ fn the_scene_names_the_table_and_another_file_of_classes_makes_another_scene() {
     let scene = |materials: Option<&Materials>| {
         let grid = FeltGrid::new(&terrain, FeltCells::Stored).with_materials(materials);
         let felt = Terrain::over(grid, Scale::new(1.0, 1.0).expect("valid"), 0).expect("terrain");
-        felt.scene(
-            ForceLaw::PREMIUM,
-            Rule::Swept,
-            Source::Points,
-            GridPoint::default(),
-        )
+        felt.scene(ForceLaw::PREMIUM, Source::Points, GridPoint::default())
     };
     let classes = |value| raster((41, 41), [0.0; 2], 1.0, None, move |_, _| value);
     let one = over(&terrain, classes(1.0), looks(&[1])).expect("overlap");

@@ -1,6 +1,5 @@
 //! A terrain in front of the arm, with the tour of a scripted hand over it.
 
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::{Scene, Source};
 
@@ -38,8 +37,8 @@ impl<'t> PlacedTerrain<'t> {
     ///
     /// # Errors
     /// [`PlacingError`].
-    pub fn new(terrain: &'t Terrain<'t>, law: ForceLaw, rule: Rule) -> Result<Self, PlacingError> {
-        Self::toured(terrain, law, rule, None)
+    pub fn new(terrain: &'t Terrain<'t>, law: ForceLaw) -> Result<Self, PlacingError> {
+        Self::toured(terrain, law, None)
     }
 
     /// Leaves the terrain where a view has it, with this point of it at the tip in the home pose
@@ -51,15 +50,13 @@ impl<'t> PlacedTerrain<'t> {
         terrain: &'t Terrain<'t>,
         home_mm: [f64; 3],
         law: ForceLaw,
-        rule: Rule,
     ) -> Result<Self, PlacingError> {
-        Self::toured(terrain, law, rule, Some(home_mm))
+        Self::toured(terrain, law, Some(home_mm))
     }
 
     fn toured(
         terrain: &'t Terrain<'t>,
         law: ForceLaw,
-        rule: Rule,
         home_mm: Option<[f64; 3]>,
     ) -> Result<Self, PlacingError> {
         let (model, hand) = (PhantomModel::premium_1_5(), HandModel::default());
@@ -80,7 +77,7 @@ impl<'t> PlacedTerrain<'t> {
         let duration_s = HeldPhantom::ARMED_S + tour.script.duration_s() + REST_S;
         Ok(Self {
             terrain,
-            scene: terrain.scene(law, rule, Source::Encoders, home),
+            scene: terrain.scene(law, Source::Encoders, home),
             home_mm,
             arm: HeldPhantom::new(model, hand, tour.placement, tour.script)?.arming(),
             duration_s,
@@ -107,10 +104,10 @@ impl<'t> PlacedTerrain<'t> {
         self.scene
     }
 
-    /// The force law and the contact rule.
+    /// The force law.
     #[must_use]
-    pub const fn law(&self) -> (ForceLaw, Rule) {
-        (self.scene.law, self.scene.rule)
+    pub const fn law(&self) -> ForceLaw {
+        self.scene.law
     }
 
     /// The point of the terrain that is at the tip in the arm's home pose, hand

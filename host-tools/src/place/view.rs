@@ -1,6 +1,5 @@
 //! What of a terrain lies where in front of the arm, and how large.
 
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::{Scene, Source};
 
@@ -232,15 +231,10 @@ impl View {
     ///
     /// # Errors
     /// [`PlaceError::FarAway`] where the home position is farther out than can be addressed.
-    pub fn scene(
-        &self,
-        terrain: &Terrain<'_>,
-        law: ForceLaw,
-        rule: Rule,
-    ) -> Result<Scene, PlaceError> {
+    pub fn scene(&self, terrain: &Terrain<'_>, law: ForceLaw) -> Result<Scene, PlaceError> {
         let home = terrain.scale().to_grid(self.home_mm);
         let home = home.ok_or(PlaceError::FarAway(self.home_mm))?;
-        let scene = terrain.scene(law, rule, Source::Encoders, home);
+        let scene = terrain.scene(law, Source::Encoders, home);
         Ok(terrain.underlaid(scene, self.reach_mm))
     }
 }

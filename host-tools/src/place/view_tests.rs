@@ -123,9 +123,7 @@ fn boxed(sides: [f64; 4], coordinates: Coordinates) -> ViewOptions {
 /// The coordinates under the home position of the scene that a device would get.
 fn ground_at_home(grid: &FeltGrid<'_>, view: &View) -> [f64; 2] {
     let terrain = view.terrain(*grid).expect("a terrain");
-    let scene = view
-        .scene(&terrain, ForceLaw::PREMIUM, Rule::Swept)
-        .expect("a scene");
+    let scene = view.scene(&terrain, ForceLaw::PREMIUM).expect("a scene");
     let [east, north, _] = terrain.scale().to_mm(&scene.home);
     grid.to_ground([east, north].map(|mm| mm / view.scale.cell_mm()))
 }
@@ -530,7 +528,7 @@ fn a_home_that_is_too_far_to_be_addressed_is_named() {
         home_mm: [1e15, 0.0, 0.0],
         ..view
     };
-    let scene = |view: &View| view.scene(&terrain, ForceLaw::PREMIUM, Rule::Swept);
+    let scene = |view: &View| view.scene(&terrain, ForceLaw::PREMIUM);
     assert!(scene(&view).is_ok());
     assert_eq!(scene(&far), Err(PlaceError::FarAway(far.home_mm)));
 }

@@ -2,12 +2,13 @@
 
 use std::time::{Duration, Instant, SystemTime};
 
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Point, Sample, Source, View};
+use hapterra_core::terrain::TILE_CELLS;
 use hapterra_core::wire::hello::DeviceHello;
 
+use super::published::Published;
 use crate::link::{Event, LinkError, Patience, Session, Tally, Transport};
 use crate::terrain::Terrain;
 
@@ -18,7 +19,6 @@ const ANSWERS_A_POINT: u32 = 8;
 /// Feels points on a device, in a scene of its own.
 pub struct Replayer<'t> {
     terrain: Terrain<'t>,
-    rule: Rule,
     /// Tells the epochs of this replay from those of another.
     nonce: u32,
     /// Number of the view that is felt.
@@ -26,6 +26,8 @@ pub struct Replayer<'t> {
     session: Session<'t>,
     device: DeviceHello,
     seq: u32,
+    published: Option<Published<'t>>,
+    last: Option<GridPoint>,
 }
 
 impl<'t> Replayer<'t> {
@@ -36,11 +38,10 @@ impl<'t> Replayer<'t> {
     pub fn open(
         terrain: &'t Terrain<'t>,
         law: ForceLaw,
-        rule: Rule,
         transport: Box<dyn Transport + 't>,
         patience: Patience,
     ) -> Result<Self, LinkError> {
-        let mut scene = terrain.scene(law, rule, Source::Points, GridPoint::default());
+        let mut scene = terrain.scene(law, Source::Points, GridPoint::default());
         // A device that holds the scene of an earlier replay would go on from
         // where that ended.
         let nonce = nonce();
@@ -48,13 +49,21 @@ impl<'t> Replayer<'t> {
         let (session, device) = Session::open(terrain, scene, None, transport, patience)?;
         Ok(Self {
             terrain: terrain.clone(),
-            rule,
             nonce,
             view: 0,
             session,
             device,
             seq: 0,
+            published: None,
+            last: None,
         })
+    }
+
+    /// Renders the points by the paper's rule on the host from now on, and not on the device.
+    #[must_use]
+    pub fn by_published_rule(mut self, law: ForceLaw) -> Self {
+        self.published = Some(Published::new(self.terrain.clone(), law));
+        self
     }
 
     /// The terrain that is felt.
@@ -75,7 +84,8 @@ impl<'t> Replayer<'t> {
         hip: GridPoint,
     ) -> Result<(), LinkError> {
         self.view = self.view.wrapping_add(1);
-        let mut scene = terrain.scene(law, self.rule, Source::Points, GridPoint::default());
+        self.last = None;
+        let mut scene = terrain.scene(law, Source::Points, GridPoint::default());
         // One that comes again is another one.
         scene.epoch ^= self.nonce.rotate_left(8) ^ u32::from(self.view);
         let view = View {
@@ -85,6 +95,9 @@ impl<'t> Replayer<'t> {
             keeps_tiles: terrain.has_tiles_of(&self.terrain),
         };
         self.terrain = terrain.clone();
+        if self.published.is_some() {
+            self.published = Some(Published::new(terrain.clone(), law));
+        }
         self.session.put_view(view, terrain)?;
         let deadline = Instant::now() + 2 * self.session.patience().give_up;
         while Instant::now() < deadline {
@@ -109,6 +122,16 @@ impl<'t> Replayer<'t> {
         &self.device
     }
 
+    /// Returns true if a HIP is more than a window of the device away from the last one.
+    #[must_use]
+    pub fn is_leap_to(&self, hip: &GridPoint) -> bool {
+        let window = u32::from(self.device.window) * TILE_CELLS as u32;
+        self.last.is_some_and(|last| {
+            let (from, to) = (last.column(), hip.column());
+            from.x.abs_diff(to.x).max(from.y.abs_diff(to.y)) > window
+        })
+    }
+
     /// What went over the link so far.
     #[must_use]
     pub const fn tally(&self) -> &Tally {
@@ -120,8 +143,17 @@ impl<'t> Replayer<'t> {
     /// # Errors
     /// [`LinkError`]; the replay cannot go on after one.
     pub fn feel(&mut self, hip: GridPoint) -> Result<Sample, LinkError> {
+        self.last = Some(hip);
         let seq = self.seq;
         self.seq = seq.wrapping_add(1);
+        if let Some(published) = &mut self.published {
+            let sample = published.step(hip);
+            return Ok(Sample {
+                tick: seq,
+                view: self.view,
+                ..sample
+            });
+        }
         self.session.feel(Point { seq, hip })?;
         let deadline = Instant::now() + ANSWERS_A_POINT * self.session.patience().give_up;
         while Instant::now() < deadline {
@@ -177,7 +209,7 @@ mod tests {
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
         let (law, hip) = (ForceLaw::PREMIUM, GridPoint::default());
-        let mut replayer = on_native(&terrain, law, Rule::Swept).expect("opened");
+        let mut replayer = on_native(&terrain, law).expect("opened");
         let (mut epochs, mut last) = (std::collections::HashSet::new(), 0);
         for view in 0..300_u32 {
             if view > 0 {
@@ -193,7 +225,7 @@ mod tests {
         }
         // As many as there are numbers, and the beginning.
         assert_eq!(epochs.len(), 257);
-        let another = on_native(&terrain, law, Rule::Swept).expect("opened");
+        let another = on_native(&terrain, law).expect("opened");
         assert!(!epochs.contains(&another.session.scene().epoch));
     }
 }

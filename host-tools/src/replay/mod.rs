@@ -8,6 +8,7 @@
 
 mod felt;
 mod loop_columns;
+mod published;
 mod recording;
 pub mod settings;
 mod trajectory;
@@ -15,10 +16,10 @@ mod trajectory;
 pub use felt::Replayer;
 pub use loop_columns::LoopColumns;
 pub use recording::{Column, Record, Recording, Value};
-pub use settings::Settings;
+pub use settings::{Rule, Settings};
 pub use trajectory::{FeltRow, FeltRows, Row, Told, Trajectory, TrajectoryError};
 
-use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::Sample;
 
@@ -62,6 +63,9 @@ pub struct Summary {
     /// Of those, rows below the ground that were not felt, because the HIP had not been
     /// above it.
     pub below_ground: u64,
+    /// Of those, rows whose HIP is more than a window of the device away from the one before:
+    /// contact begins anew there.
+    pub leaps: u64,
 }
 
 /// The columns that a replay's recording has after the usual ones; the view only where
@@ -106,6 +110,7 @@ pub fn replay_trajectory<'t>(
         let terrain = replayer.terrain();
         let scale = *terrain.scale();
         let row = trajectory.lay(&told, &scale)?;
+        summary.leaps += u64::from(replayer.is_leap_to(&row.hip));
         let sample = replayer.feel(row.hip)?;
         let terrain = replayer.terrain();
         let record = Record::new(row.t_s, row.hip_mm, &sample, &scale);
@@ -173,13 +178,9 @@ pub fn is_below_ground(sample: &Sample, record: &Record, terrain: &Terrain<'_>) 
 ///
 /// # Errors
 /// As [`Replayer::open`].
-pub fn on_native<'t>(
-    terrain: &'t Terrain<'t>,
-    law: ForceLaw,
-    rule: Rule,
-) -> Result<Replayer<'t>, LinkError> {
+pub fn on_native<'t>(terrain: &'t Terrain<'t>, law: ForceLaw) -> Result<Replayer<'t>, LinkError> {
     let device: Box<dyn Transport> = Box::new(Native::for_replay());
-    Replayer::open(terrain, law, rule, device, Patience::EMULATED)
+    Replayer::open(terrain, law, device, Patience::EMULATED)
 }
 
 /// A state's name in a recording.

@@ -4,7 +4,7 @@
 //! The text is TOML. In a CSV recording each of its lines stands behind `# ` before the
 //! header; in a Parquet recording it is the value of [`KEY`] among the file's metadata.
 
-use hapterra_core::contact::{Friction, Rule};
+use hapterra_core::contact::Friction;
 use hapterra_core::force::{Damping, ForceLaw, Shading, Texture};
 use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use serde::{Deserialize, Serialize};
@@ -195,6 +195,16 @@ pub struct Felt {
     pub home_mm: Option<[f64; 3]>,
 }
 
+/// Contact rule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Rule {
+    /// The device's: nothing passes through the surface
+    Swept,
+    /// As published in the paper, for comparison: in `replay`, on the host
+    Paper,
+}
+
 /// How force was made.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Force {
@@ -203,7 +213,6 @@ pub struct Force {
     /// Largest force, N.
     pub max_force_n: f32,
     /// The contact rule.
-    #[serde(with = "rule_name")]
     pub rule: Rule,
     /// Which normals the force follows; left out where they are those of the patches.
     #[serde(default, skip_serializing_if = "Shading::is_none")]
@@ -485,29 +494,6 @@ impl Scale {
 
 fn digits(terrain: &Terrain<'_>) -> String {
     format!("{:016x}", terrain.fingerprint())
-}
-
-/// A contact rule by the name that the command line gives it.
-mod rule_name {
-    use hapterra_core::contact::Rule;
-    use serde::{Deserialize as _, Deserializer, Serializer, de::Error as _};
-
-    pub(super) fn serialize<S: Serializer>(rule: &Rule, to: S) -> Result<S::Ok, S::Error> {
-        to.serialize_str(match rule {
-            Rule::Swept => "swept",
-            Rule::Paper => "paper",
-        })
-    }
-
-    pub(super) fn deserialize<'d, D: Deserializer<'d>>(from: D) -> Result<Rule, D::Error> {
-        match String::deserialize(from)?.as_str() {
-            "swept" => Ok(Rule::Swept),
-            "paper" => Ok(Rule::Paper),
-            other => Err(D::Error::custom(format!(
-                "no contact rule is called {other}"
-            ))),
-        }
-    }
 }
 
 #[cfg(test)]

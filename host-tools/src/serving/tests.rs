@@ -6,7 +6,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 use std::time::Duration;
 
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
@@ -197,7 +196,7 @@ fn played<T>(
     let home = GridPoint::default();
     play(Service {
         terrain: &terrain,
-        scene: terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home),
+        scene: terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home),
         arming: Arming::default(),
         patience: PATIENCE,
         connect: Box::new(|| connect().map(|line| line as Box<dyn Transport>)),

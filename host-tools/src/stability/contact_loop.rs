@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 
 use hapterra_core::Vec3;
 use hapterra_core::clutch::ClutchHold;
-use hapterra_core::contact::Rule;
 use hapterra_core::force::{Damping, ForceLaw, Texture};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::phantom::{Calibration, Mechanism};
@@ -200,7 +199,6 @@ fn scene(felt: &Felt) -> Scene {
             texture: felt.texture,
             ..ForceLaw::PREMIUM
         },
-        rule: Rule::Swept,
         source: Source::Encoders,
         hold_clock: false,
         materials: None,

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use hapterra_core::clutch::ClutchHold;
-use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::{Sample, Source, View};
 use hapterra_core::wire::request::Request;
@@ -51,7 +51,6 @@ enum Stage<'r> {
 /// samples.
 pub struct Steering<'r> {
     bounds: Bounds,
-    rule: Rule,
     now: Laid,
     terrain: Terrain<'r>,
     /// Number of the view in force on the device.
@@ -76,10 +75,9 @@ pub struct Steering<'r> {
 impl<'r> Steering<'r> {
     /// Begins with the view that is served first.
     #[must_use]
-    pub fn new(bounds: Bounds, rule: Rule, terrain: Terrain<'r>) -> Self {
+    pub fn new(bounds: Bounds, terrain: Terrain<'r>) -> Self {
         Self {
             bounds,
-            rule,
             now: bounds.first,
             terrain,
             number: 0,
@@ -305,7 +303,7 @@ impl<'r> Steering<'r> {
             point.ok_or("that is too far from the first sample")
         };
         let (hip, home) = (on_grid(hip_mm)?, on_grid(laid.view.home_mm)?);
-        let scene = terrain.scene(laid.law, self.rule, Source::Encoders, home);
+        let scene = terrain.scene(laid.law, Source::Encoders, home);
         let view = View {
             number: self.number.wrapping_add(1),
             scene: terrain.underlaid(scene, laid.view.reach_mm),

@@ -34,7 +34,7 @@ fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) ->
         resolution_mm: reach.resolution_mm(),
         level: None,
     };
-    look(&mut Steering::new(bounds, Rule::Swept, terrain.clone()))
+    look(&mut Steering::new(bounds, terrain.clone()))
 }
 
 fn samples(steering: &mut Steering<'_>, limits: Limits, count: usize) {

@@ -80,7 +80,6 @@ mod tests {
     use crate::link::hello;
     use crate::place::{Reach, ViewOptions};
     use crate::raster::Raster;
-    use hapterra_core::contact::Rule;
     use hapterra_core::force::ForceLaw;
     use hapterra_core::grid::GridPoint;
     use hapterra_core::phantom::Calibration;
@@ -126,7 +125,7 @@ mod tests {
         with(|mut views, terrain, laid| {
             views.put(1, terrain.clone(), laid);
             let hip = GridPoint::default();
-            let scene = terrain.scene(laid.law, Rule::Swept, Source::Encoders, hip);
+            let scene = terrain.scene(laid.law, Source::Encoders, hip);
             let view = View {
                 number: 1,
                 scene,

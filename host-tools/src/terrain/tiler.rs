@@ -2,12 +2,11 @@
 
 use std::sync::OnceLock;
 
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
-use hapterra_core::terrain::{FieldSize, POSTS, TILE_CELLS, TileKey};
+use hapterra_core::terrain::{FieldSize, MAX_STEP_CELLS, POSTS, TILE_CELLS, TileKey};
 use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::Heights;
 
@@ -35,6 +34,8 @@ pub struct Terrain<'r> {
     size: [i32; 2],
     top: i32,
     fingerprint: OnceLock<u64>,
+    /// Whether it was said that a tile is too steep.
+    steep: OnceLock<()>,
 }
 
 /// Why a raster cannot be felt at a scale.
@@ -114,6 +115,17 @@ impl TileBuffer {
     }
 }
 
+/// A sample that differs from its neighbour to the east or north by more than [`MAX_STEP_CELLS`],
+/// and by how much.
+fn steep_step(heights: &[f64; POSTS * POSTS]) -> Option<(usize, f64)> {
+    let step = |at: usize, to: usize| {
+        let step = heights.get(to)? - heights.get(at)?;
+        (step.abs() > f64::from(MAX_STEP_CELLS)).then_some((at, step.abs()))
+    };
+    let east = |at: usize| (at % POSTS + 1 < POSTS).then(|| step(at, at + 1)).flatten();
+    (0..heights.len()).find_map(|at| east(at).or_else(|| step(at, at + POSTS)))
+}
+
 impl<'r> Terrain<'r> {
     /// The raster at `scale`, with every `2^level`-th sample.
     ///
@@ -151,6 +163,7 @@ impl<'r> Terrain<'r> {
             size,
             top: top(grid.raster(), &scale)?,
             fingerprint: OnceLock::new(),
+            steep: OnceLock::new(),
         })
     }
 
@@ -243,7 +256,7 @@ impl<'r> Terrain<'r> {
     /// The scene in which the device feels this terrain. Its epoch is a hash
     /// of the heights and of everything else in it.
     #[must_use]
-    pub fn scene(&self, law: ForceLaw, rule: Rule, source: Source, home: GridPoint) -> Scene {
+    pub fn scene(&self, law: ForceLaw, source: Source, home: GridPoint) -> Scene {
         let mut scene = Scene {
             epoch: 0,
             level: self.level,
@@ -253,7 +266,6 @@ impl<'r> Terrain<'r> {
             cell_mm: self.scale.cell_mm() as f32,
             home,
             law,
-            rule,
             source,
             hold_clock: true,
             materials: (self.grid.materials()).map(|materials| materials.table().check_sum()),
@@ -312,6 +324,10 @@ impl<'r> Terrain<'r> {
             return None;
         }
         let unit = self.read(key, &mut buffer.heights);
+        if let Some(step) = steep_step(&buffer.heights) {
+            self.warn_of_step(key, step);
+            return Some(Heights::Hole);
+        }
         let Some((low, high, known)) = range(buffer.heights.as_slice()) else {
             return Some(Heights::Hole);
         };
@@ -325,6 +341,23 @@ impl<'r> Terrain<'r> {
             false => steps(unit, self.scale.height_cells(1.0)).collect(),
         };
         Some(buffer.above(low, high, &steps))
+    }
+
+    /// Says once where neighbouring samples differ by more than a contact can be exact over.
+    fn warn_of_step(&self, key: TileKey, (sample, cells): (usize, f64)) {
+        if self.steep.set(()).is_err() {
+            return;
+        }
+        let first = key.index.first_cell();
+        let (column, row) = (
+            first.x as usize + sample % POSTS,
+            first.y as usize + sample / POSTS,
+        );
+        tracing::warn!(
+            "sample {column}, {row} of level {}, from the south-west, differs from a neighbour by {cells:.3e} cells, at most {MAX_STEP_CELLS} can be rendered: \
+             its tile, and each that is as steep, is a hole; scale the heights down with --exaggeration or --height-mm-per-unit, or fill the sample",
+            self.level
+        );
     }
 
     /// The materials of a tile of a terrain that has some, as they go on the link; `None` where

@@ -117,7 +117,7 @@ fn holes_stay_holes_and_an_empty_tile_says_so() {
 
 #[test]
 fn the_top_is_above_every_sample_however_far_up() {
-    for (offset, step) in [(0.0f32, 0.37f32), (-1e6, 0.1), (1e6, 0.06), (0.0, 1e6)] {
+    for (offset, step) in [(0.0f32, 0.37f32), (-1e6, 0.1), (1e6, 0.06), (0.0, 100.0)] {
         let raster = Raster::from_fn(33, 33, |x, y| offset + step * (x * y % 97) as f32);
         let raster = raster.expect("raster");
         let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
@@ -129,12 +129,12 @@ fn the_top_is_above_every_sample_however_far_up() {
 
 #[test]
 fn too_tall_is_an_error_and_the_limit_is_not() {
-    let raster = Raster::from_fn(4, 4, |x, _| if x == 0 { -1.0 } else { 1.0 }).expect("raster");
+    let raster = Raster::from_fn(4, 4, |_, _| 1.0).expect("raster");
     let limit = f64::from(MAX_CELL);
     let scale = |height| Scale::new(1.0, height).expect("valid");
     let terrain = Terrain::new(&raster, scale(limit), 0).expect("at the limit");
     let tile = samples(&terrain, key(0, 0, 0));
-    assert_eq!((tile[0], tile[1]), (-limit, limit));
+    assert_eq!((tile[0], tile[1]), (limit, limit));
     let error = Terrain::new(&raster, scale(limit * 1.001), 0).err();
     assert!(matches!(error, Some(TerrainError::TooTall { .. })));
 }
@@ -152,7 +152,7 @@ fn a_scenes_epoch_follows_heights_scale_and_law() {
         };
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
         let home = GridPoint::default();
-        terrain.scene(law, Rule::Swept, Source::Points, home).epoch
+        terrain.scene(law, Source::Points, home).epoch
     };
     let same = scene(1.0, 1.0, 0.5);
     assert_eq!(same, scene(1.0, 1.0, 0.5));
@@ -162,5 +162,23 @@ fn a_scenes_epoch_follows_heights_scale_and_law() {
         scene(1.0, 1.0, 0.4),
     ] {
         assert_ne!(same, other);
+    }
+}
+
+#[test]
+fn tile_with_too_steep_step_is_a_hole() {
+    let wall = |height: f32| {
+        let raster = Raster::from_fn(64, 9, move |x, _| if x > 40 { height } else { 0.0 });
+        raster.expect("raster")
+    };
+    for (height, is_hole) in [(9_999.0, false), (10_001.0, true)] {
+        let raster = wall(height);
+        let scale = Scale::new(1.0, 1.0).expect("scale");
+        let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+        let mut buffer = TileBuffer::default();
+        let steep = terrain.tile(key(0, 1, 0), &mut buffer).expect("a tile");
+        assert_eq!(steep == Heights::Hole, is_hole, "{height}");
+        let flat = terrain.tile(key(0, 0, 0), &mut buffer).expect("a tile");
+        assert_ne!(flat, Heights::Hole);
     }
 }

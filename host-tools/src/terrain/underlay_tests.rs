@@ -1,6 +1,5 @@
 //! The tiles of an underlay as a device holds them.
 
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
@@ -24,7 +23,7 @@ fn hills() -> Raster {
 
 fn underlay(terrain: &Terrain<'_>, home: [i32; 2], reach_mm: [f64; 4]) -> (Scene, Underlay) {
     let home = GridPoint::new([home[0], home[1], 100], hapterra_core::Vec3::ZERO);
-    let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
+    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home);
     let scene = terrain.underlaid(scene, reach_mm);
     let underlay = scene.underlay.expect("an underlay");
     (scene, underlay)

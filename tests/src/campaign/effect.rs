@@ -1,7 +1,6 @@
 //! What a kind of mishap does to a tick.
 
 use hapterra::phantom::AmplifierFault;
-use hapterra_core::contact::Rule;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Sense;
 use hapterra_core::phantom::Calibration;
@@ -29,9 +28,6 @@ pub enum Core {
     /// It comes out of a reset.
     Resets(ResetCause),
 }
-
-/// The contact rule of all scenes.
-pub const RULE: Rule = Rule::Swept;
 
 /// One mishap under way.
 #[derive(Clone, Debug)]

@@ -19,7 +19,7 @@ use hapterra_core::wire::status::{ResetCause, Status};
 use super::arm::{Arm, Mood};
 use super::board::{self, Board};
 use super::clock::{Reading, SetClock};
-use super::effect::{Core, Mishap, RULE};
+use super::effect::{Core, Mishap};
 use super::felt::FeltWatch;
 use super::ground::{Effects, Felt, Ground};
 use super::host::{Host, Tiles};
@@ -511,6 +511,6 @@ fn scene(
     Scene {
         // Real time: nothing waits for the host.
         hold_clock: false,
-        ..terrain.scene(law, RULE, Source::Encoders, home)
+        ..terrain.scene(law, Source::Encoders, home)
     }
 }

@@ -6,7 +6,6 @@ use std::time::Duration;
 use hapterra::link::{Arming, Ask, Client, Event, LinkError, Patience, State};
 use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Mode, Sense};
 use hapterra_core::phantom::Calibration;
@@ -122,7 +121,7 @@ pub fn check(plan: &Plan) -> Result<Report, Wrong> {
     let scene = Scene {
         hold_clock: false,
         materials: None,
-        ..terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home)
+        ..terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home)
     };
     World::new(&terrain, scene, plan).play(plan)
 }

@@ -2,7 +2,7 @@
 
 use hapterra_core::Vec3;
 use hapterra_core::clutch::ClutchHold;
-use hapterra_core::contact::{Friction, Rule, WORK_PER_TICK};
+use hapterra_core::contact::{Friction, WORK_PER_TICK};
 use hapterra_core::force::{
     Controller, Damping, ForceLaw, MaterialTable, Pattern, Shading, Texture,
 };
@@ -168,11 +168,6 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
         cell_mm: 1.0,
         home: GridPoint::new([30, 30, 2], Vec3::ZERO),
         law: ForceLaw::PREMIUM,
-        rule: if kind & 1 == 0 {
-            Rule::Swept
-        } else {
-            Rule::Paper
-        },
         source: if kind & 2 == 0 {
             Source::Points
         } else {

@@ -1,6 +1,5 @@
 //! Arbitrary bytes into the frame decoder and the device's end of the link.
 
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Fault, Sense};
@@ -218,7 +217,6 @@ pub fn scene() -> Scene {
         cell_mm: 1.0,
         home: GridPoint::default(),
         law: ForceLaw::PREMIUM,
-        rule: Rule::Swept,
         source: Source::Points,
         hold_clock: false,
         materials: None,

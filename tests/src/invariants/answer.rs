@@ -32,14 +32,13 @@ impl Judge<'_> {
     }
 
     /// No force but of a contact; a free proxy in the HIP; a contact's displacement
-    /// a part of the way to the proxy. (A tick of the paper's rule that could not
-    /// be done gives the last answer again.)
-    pub(super) fn is_consistent(&self, seen: &Seen, swept: bool) -> Verdict {
+    /// a part of the way to the proxy.
+    pub(super) fn is_consistent(&self, seen: &Seen) -> Verdict {
         let felt = &seen.felt;
         let none = felt.displacement.to_array() == [0.0; 3];
         let free_at_hip = !seen.is_free() || seen.proxy == seen.hip;
         let may_press = seen.is_touching() || felt.state == ContactState::Fading;
-        let is_part = !(swept && seen.is_touching()) || is_part_of_the_way(seen);
+        let is_part = !seen.is_touching() || is_part_of_the_way(seen);
         if (!may_press && !none) || !free_at_hip || !is_part {
             return self.fail(Invariant::Consistent, format!("{seen:?}"));
         }

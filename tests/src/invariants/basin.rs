@@ -12,7 +12,8 @@ use super::surface::{distance, patches_at};
 const SHORT: f64 = 0.02;
 /// HIPs farther than this, in cells, would flood too much.
 const FAR: f64 = 4.0;
-/// Columns over the reach of the HIP, where that is a cell or less: 64 a cell at least.
+/// Columns over the reach of the HIP, where that is a cell or less: 64 a cell at least, and a
+/// whole number, so that edges between patches lie in columns.
 const COLUMNS: f64 = 256.0;
 /// What a channel between two columns may be narrower by, cells.
 const SLACK: f64 = 0.02;
@@ -37,7 +38,7 @@ impl Judge<'_> {
             let share = f64::from(look) / f64::from(LOOKS);
             is_open([0, 1].map(|i| from[i] + share * (to[i] - from[i])))
         });
-        let columns = (COLUMNS / reach).clamp(64.0, 1_024.0);
+        let columns = (COLUMNS / reach).clamp(64.0, 1_024.0).round();
         if is_straight || is_flooded(from, to, columns, is_open) {
             return Ok(());
         }

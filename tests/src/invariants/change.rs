@@ -94,7 +94,7 @@ impl Judge<'_> {
         is > was * (1.0 + TIE) + allowed(seen) + allowed(before)
     }
 
-    /// By the swept rule, in real time: a tick that is repeated has [`Invariant::Settles`].
+    /// In real time: a tick that is repeated has [`Invariant::Settles`].
     pub(super) fn advances(&mut self, before: &Seen, seen: &Seen) -> Verdict {
         let flies = |seen: &Seen| {
             let felt = &seen.felt;

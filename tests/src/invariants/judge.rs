@@ -3,7 +3,7 @@
 //! What a tick says by itself is looked at in `answer`, where its proxy lies in
 //! `place`, how it came there from the tick before in `change`.
 
-use hapterra_core::contact::{Friction, Rule, WORK_PER_TICK};
+use hapterra_core::contact::{Friction, WORK_PER_TICK};
 use hapterra_core::force::Texture;
 
 use super::material::Judged;
@@ -74,7 +74,6 @@ impl Measured {
 /// Looks at the ticks of one scene in turn.
 pub struct Judge<'g> {
     pub(super) terrain: &'g Terrain,
-    rule: Rule,
     pub(super) friction: Friction,
     texture: Option<TextureJudge>,
     /// Units of work that a tick may spend.
@@ -97,10 +96,9 @@ pub type Verdict = Result<(), Violation>;
 impl<'g> Judge<'g> {
     /// A judge over a terrain.
     #[must_use]
-    pub fn new(terrain: &'g Terrain, rule: Rule) -> Self {
+    pub fn new(terrain: &'g Terrain) -> Self {
         Self {
             terrain,
-            rule,
             friction: Friction::NONE,
             texture: None,
             work: WORK_PER_TICK,
@@ -116,7 +114,7 @@ impl<'g> Judge<'g> {
     /// A judge of a scene.
     #[must_use]
     pub fn of(scene: &'g Scene) -> Self {
-        let judge = Self::new(&scene.terrain, scene.rule)
+        let judge = Self::new(&scene.terrain)
             .with_friction(scene.friction)
             .with_texture(scene.texture);
         Self {
@@ -232,15 +230,11 @@ impl<'g> Judge<'g> {
     fn finite(&mut self, seen: &Seen, told: &mut Vec<Violation>) {
         told.extend(self.is_within_work(seen).err());
         told.extend(self.is_clamped(seen).err());
-        let swept = self.rule == Rule::Swept;
-        told.extend(self.is_consistent(seen, swept).err());
-        told.extend(self.is_shaded(seen, swept).err());
+        told.extend(self.is_consistent(seen).err());
+        told.extend(self.is_shaded(seen).err());
         told.extend(self.is_textured(seen).err());
         if seen.is_touching() {
             told.extend(self.is_on_surface(seen).err());
-        }
-        if !swept {
-            return;
         }
         if seen.is_touching() && seen.felt.converged {
             if self.friction.is_none() {

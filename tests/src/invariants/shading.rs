@@ -26,7 +26,7 @@ const SHARP: f64 = 75.0 / 45.0 * FRAC_PI_4;
 
 impl Judge<'_> {
     /// As long as without shading; inside of a patch along the smoothed normal, on ice.
-    pub(super) fn is_shaded(&self, seen: &Seen, swept: bool) -> Verdict {
+    pub(super) fn is_shaded(&self, seen: &Seen) -> Verdict {
         let Some(shaded) = seen.shaded else {
             return Ok(());
         };
@@ -42,7 +42,7 @@ impl Judge<'_> {
         let inside = |c: f64| (BORDER..1.0 - BORDER).contains(&(c - c.floor()));
         let is_told =
             is_whole && seen.is_touching() && seen.felt.converged && plain.length() > SHORT;
-        if !is_told || !inside(x) || !inside(y) || !self.friction.is_none() || !swept {
+        if !is_told || !inside(x) || !inside(y) || !self.friction.is_none() {
             return Ok(());
         }
         let Some(smoothed) = smoothed_normal(self.terrain, [x, y]) else {

@@ -1,7 +1,7 @@
 //! Programs that mean no good: one that talks to the device, one that answers a host.
 
 use hapterra_core::clutch::ClutchHold;
-use hapterra_core::contact::{Friction, Rule};
+use hapterra_core::contact::Friction;
 use hapterra_core::force::{Controller, Damping, ForceLaw, Pattern, Shading, Texture};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Report;
@@ -153,7 +153,6 @@ fn host_scene(chance: &mut Chance, epoch: u32) -> Scene {
                 seed: chance.bits() as u32,
             },
         },
-        rule: Rule::Swept,
         source: [Source::Encoders, Source::Points][chance.below(2)],
         hold_clock: chance.below(2) == 0,
         materials: [None, Some(chance.bits() as u32)][chance.below(2)],

@@ -2,7 +2,6 @@
 //! other end, millisecond by millisecond.
 
 use hapterra::terrain::Terrain;
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::wire::session::SessionEnd;
@@ -314,6 +313,6 @@ fn scene(terrain: &Terrain<'_>, board: &Board<'_>, chance: &mut Chance) -> Scene
     Scene {
         hold_clock: board.lock_step,
         materials: None,
-        ..terrain.scene(law, Rule::Swept, Source::Encoders, home)
+        ..terrain.scene(law, Source::Encoders, home)
     }
 }

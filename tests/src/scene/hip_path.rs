@@ -1,6 +1,6 @@
 //! Random paths of the HIP over a terrain, wild and gentle.
 
-use super::terrain::{Terrain, WALL_EVERY};
+use super::terrain::Terrain;
 use crate::chance::Chance;
 
 /// Positions are whole multiples of this many cells, so that they are exact in
@@ -8,6 +8,11 @@ use crate::chance::Chance;
 pub const GRAIN: f64 = 1.0 / (1 << 20) as f64;
 /// An encoder count at the tip, cells of a millimetre.
 const COUNT: f64 = 0.03;
+
+/// The HIP moves no farther than this along an axis in a tick, cells.
+pub const LEAP: f64 = 32.0;
+/// Leaps toward a place, at most.
+const LEAPS: usize = 12;
 
 /// What the HIP does for a while.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,11 +35,9 @@ enum Habit {
     Sweep,
     /// Does not move.
     Still,
-    /// As far away as positions go.
-    Beyond,
 }
 
-const HABITS: [Habit; 10] = [
+const HABITS: [Habit; 9] = [
     Habit::Wander,
     Habit::Teleport,
     Habit::Tremble,
@@ -44,7 +47,6 @@ const HABITS: [Habit; 10] = [
     Habit::Tap,
     Habit::Sweep,
     Habit::Still,
-    Habit::Beyond,
 ];
 
 /// `ticks` positions in cells; the first is high above everything.
@@ -96,7 +98,7 @@ struct Walker<'a> {
 }
 
 impl<'a> Walker<'a> {
-    /// High above everything, somewhere.
+    /// High above the surface, somewhere.
     fn in_the_sky(terrain: &'a Terrain, chance: &'a mut Chance) -> Self {
         let size = terrain.size.map(f64::from);
         let at = [chance.between(1.0, size[0]), chance.between(1.0, size[1])];
@@ -113,14 +115,25 @@ impl<'a> Walker<'a> {
 
     fn rise(&mut self) {
         let [x, y] = self.at;
-        let sky = f64::from(self.terrain.top()).min(1e7) + 2.0;
-        self.put(x, y, sky);
+        self.above(x, y, 40.0);
     }
 
     fn put(&mut self, x: f64, y: f64, z: f64) {
         self.at = [x, y];
-        self.path
-            .push([x, y, z].map(|c| (c / GRAIN).round() * GRAIN));
+        for _ in 0..LEAPS {
+            let to = [x, y, z];
+            let last = self.path.last().copied().unwrap_or(to);
+            let way = |axis: usize| (to[axis] - last[axis]).clamp(-LEAP, LEAP);
+            let next = [0, 1, 2].map(|axis| ((last[axis] + way(axis)) / GRAIN).round() * GRAIN);
+            self.path.push(next);
+            if next
+                .iter()
+                .zip(to)
+                .all(|(a, b)| (a - b).abs() < 2.0 * GRAIN)
+            {
+                break;
+            }
+        }
     }
 
     fn above(&mut self, x: f64, y: f64, height: f64) {
@@ -153,7 +166,6 @@ impl<'a> Walker<'a> {
             Habit::Tap => self.tap(ticks),
             Habit::Sweep => self.sweep(1 + ticks / 8),
             Habit::Still => self.still(ticks),
-            Habit::Beyond => self.beyond(),
         }
     }
 
@@ -268,14 +280,5 @@ impl<'a> Walker<'a> {
     fn still(&mut self, ticks: usize) {
         let last = self.path[self.path.len() - 1];
         self.path.extend(std::iter::repeat_n(last, ticks));
-    }
-
-    fn beyond(&mut self) {
-        let far = [1e4, 1e6, 1e8][self.chance.below(3)];
-        let mut sign = || [far, -far, 3.0][self.chance.below(3)];
-        let (x, y, z) = (sign(), sign(), sign());
-        self.put(x, y, z);
-        let half = 0.5 * f64::from(WALL_EVERY);
-        self.at = [half, half];
     }
 }

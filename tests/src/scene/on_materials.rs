@@ -1,6 +1,7 @@
 //! The replay of a scene on materials under its judge, and beside twins in which nothing felt may
 //! change.
 
+use super::hip_path::LEAP;
 use super::materials::Materials;
 use super::replayed::{Replay, Replied, replay};
 use super::run::{Scene, is_alike};
@@ -49,7 +50,7 @@ pub fn run(
     measured.on_materials = judge.judged;
     let twin = chance.below(6);
     match twin {
-        0 => windowed(scene, materials, &replied, buffers, &mut chance)?,
+        0 if is_near(&replied) => windowed(scene, materials, &replied, buffers, &mut chance)?,
         1 => shifted(scene, materials, buffers, &mut chance)?,
         // Mirrored walls are elsewhere than the judge of walls takes them to be.
         2 if scene.terrain.kind != Kind::Walls => turned(scene, materials, buffers, &mut chance)?,
@@ -72,8 +73,18 @@ fn replay_in(
         2 => replay::<2>(scene, materials, buffers, how, look),
         3 => replay::<3>(scene, materials, buffers, how, look),
         4 => replay::<4>(scene, materials, buffers, how, look),
+        6 => replay::<6>(scene, materials, buffers, how, look),
         _ => replay::<SIDE>(scene, materials, buffers, how, look),
     }
+}
+
+/// Whether each path from the proxy to the HIP fits into a window of 6 × 6 tiles.
+fn is_near(replied: &[Replied]) -> bool {
+    let is_near = |ticks: &[Replied]| {
+        let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
+        way(0).max(way(1)) <= 4.0 * LEAP
+    };
+    replied.windows(2).all(is_near)
 }
 
 /// In another window, whose tiles come at other times: the same bits.
@@ -84,7 +95,7 @@ fn windowed(
     buffers: &mut Buffers,
     chance: &mut Chance,
 ) -> Result<(), Violation> {
-    let side = [2, 3, 4][chance.below(3)];
+    let side = [6, SIDE][chance.below(2)];
     let latency = [0, 1, 5][chance.below(3)];
     let how = Replay {
         shift: [0; 3],

@@ -4,7 +4,7 @@
 //! The board's window has room for 16 × 16 tiles, as many as this one, so every
 //! scene can be replayed: also those whose tiles are pulled, late and in parts.
 
-use hapterra_core::contact::Execution;
+use crate::scene::run::Execution;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Scene as SceneMessage, Source};
@@ -74,7 +74,6 @@ impl Recorded {
                 texture: scene.texture,
                 ..ForceLaw::PREMIUM
             },
-            rule: scene.rule,
             source: Source::Points,
             hold_clock: false,
             materials: None,

@@ -1,6 +1,5 @@
 //! A scene on materials, felt by the product's whole loop: points go in, samples come out.
 
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Sense;
@@ -270,7 +269,6 @@ fn message(scene: &Scene, materials: &Materials, shift: [i32; 3]) -> SceneMessag
             shading: scene.shading,
             ..materials.law
         },
-        rule: Rule::Swept,
         source: Source::Points,
         hold_clock: false,
         materials: Some(materials.told().check_sum()),

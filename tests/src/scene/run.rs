@@ -2,8 +2,7 @@
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{
-    Contact, ContactOutput, ContactSettings, Execution, Friction, Rule, WORK_PER_TICK,
-    work_per_tick,
+    Contact, ContactOutput, ContactSettings, Friction, WORK_PER_TICK, work_per_tick,
 };
 use hapterra_core::force::{Pattern, Shader, Shading, Texture, Texturer};
 use hapterra_core::grid::GridPoint;
@@ -37,8 +36,6 @@ pub struct Scene {
     pub terrain: Terrain,
     /// The HIP, cells.
     pub path: Vec<[f64; 3]>,
-    /// The contact rule.
-    pub rule: Rule,
     /// Whether a tick is repeated until it is done.
     pub execution: Execution,
     /// How the tiles come.
@@ -169,9 +166,6 @@ impl Scene {
             _ => hip_path::random(&terrain, &mut chance, ticks),
         };
         let materials = Materials::drawn(mixed, &terrain);
-        // The paper's rule wants the whole way at once, and its ticks do not go on.
-        let paper = chance.below(12) == 0 && supply == Supply::Held;
-        let rule = if paper { Rule::Paper } else { Rule::Swept };
         let execution = if chance.below(2) == 0 {
             Execution::RealTime
         } else {
@@ -180,7 +174,6 @@ impl Scene {
         Self {
             terrain,
             path,
-            rule,
             execution,
             supply,
             friction: Friction::NONE,
@@ -189,7 +182,7 @@ impl Scene {
             texture: texture(mixed),
             materials,
             shortcuts: true,
-            twins: Twins::One(if paper { 0 } else { chance.below(6) }),
+            twins: Twins::One(chance.below(6)),
             // By number, as the path.
             work_per_tick: [WORK_PER_TICK, LEAST_WORK_PER_TICK][(number / 4 % 2) as usize],
             seed: chance.bits(),
@@ -203,7 +196,6 @@ impl Scene {
             return self;
         }
         Self {
-            rule: Rule::Swept,
             friction: friction(&mut Chance::new(self.seed ^ 0xf71c_7104)),
             materials: self.materials.map(Materials::roughened),
             ..self
@@ -215,14 +207,12 @@ impl Scene {
     pub const fn given(
         terrain: Terrain,
         path: Vec<[f64; 3]>,
-        rule: Rule,
         execution: Execution,
         supply: Supply,
     ) -> Self {
         Self {
             terrain,
             path,
-            rule,
             execution,
             supply,
             friction: Friction::NONE,
@@ -240,12 +230,10 @@ impl Scene {
     #[must_use]
     pub const fn settings(&self) -> ContactSettings {
         ContactSettings {
-            rule: self.rule,
-            execution: self.execution,
             friction: self.friction,
             shortcuts: self.shortcuts,
             work_per_tick: self.work_per_tick,
-            ..ContactSettings::REAL_TIME
+            ..ContactSettings::AT_1_KHZ
         }
     }
 
@@ -308,6 +296,15 @@ impl Scene {
     }
 }
 
+/// When a HIP has its answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Execution {
+    /// After one tick.
+    RealTime,
+    /// Once all is done for it with all of the terrain it needs, as in a replay.
+    LockStep,
+}
+
 /// A contact in a scene, tick by tick.
 pub struct Player<'t, 'g, const D: usize> {
     /// Its state, for those who want to try a tick twice.
@@ -352,28 +349,35 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
         let hip = shifted(hip, self.shift);
         let mut work = 0;
         let in_real_time = self.execution == Execution::RealTime;
-        let mut only_shading_waits = false;
+        let before = (self.contact.clone(), self.shader);
+        let installed = self.supplied.installed.len();
         for _ in 0..PATIENCE {
-            if !only_shading_waits {
-                self.contact.step(&self.supplied.window, &hip);
-            }
+            self.contact.step(&self.supplied.window, &hip);
             let felt = *self.contact.output();
             work = work.max(felt.work);
             self.shaded = self.shade();
-            let missing = self.missing();
+            // A HIP that needs more tiles than the window holds is felt without them.
+            let waits = self.supplied.installed.len() - installed < 4 * D * D;
+            let missing = felt.missing_tile.or(self.missing());
             let waits_for = ContactOutput {
-                missing_tile: felt.missing_tile.or(missing),
+                missing_tile: missing,
                 ..felt
             };
             self.supplied
                 .supply(self.now, &self.contact, &waits_for, &hip);
             self.now += 1;
-            only_shading_waits = felt.converged && missing.is_some();
-            if in_real_time || (felt.converged && missing.is_none()) {
+            let is_done = felt.converged && missing.is_none();
+            if in_real_time || is_done || (missing.is_some() && !waits) {
                 if let Some(texturer) = &mut self.texturer {
                     self.textured = texturer.add(self.shaded, &felt.proxy);
                 }
                 return Some(ContactOutput { work, ..felt });
+            }
+            if missing.is_some() && waits {
+                // As a replay does: a transaction.
+                (self.contact, self.shader) = before.clone();
+            } else {
+                self.contact.resume(before.0.output());
             }
         }
         None

@@ -1,5 +1,7 @@
 //! Terrains from flat to absurd, as plain samples.
 
+use hapterra_core::terrain::MAX_STEP_CELLS;
+
 use crate::chance::Chance;
 
 /// Heights beyond this, in cells, are holes: no position can say them.
@@ -20,7 +22,7 @@ pub enum Kind {
     Noise,
     /// 0 and 1 in turns.
     Checkerboard,
-    /// Flat, one sample in thirty 10⁶ high.
+    /// Flat, one sample in thirty as high as a neighbour may be.
     Spikes,
     /// Numbers too small to be normal, of both signs.
     Denormals,
@@ -30,7 +32,7 @@ pub enum Kind {
     Ridges,
     /// Cliffs between plateaus.
     Steps,
-    /// A twist from 10⁻⁹ to 10⁶ in each patch.
+    /// A twist from 10⁻⁹ to 10⁴ in each patch.
     Twisted,
     /// A few raised rows and columns, far higher than any HIP.
     Walls,
@@ -81,8 +83,8 @@ impl Terrain {
             kind,
             seed,
             wave: [chance.between(0.1, 0.9), chance.between(0.1, 0.9)],
-            // Powers of ten, as gentle as nothing and as steep as there is.
-            amplitude: 10_f64.powf(chance.between(-9.0, 6.0)),
+            // Powers of ten, as gentle as nothing and as steep as a tile may be.
+            amplitude: 10_f64.powf(chance.between(-9.0, 3.5)),
             tilt: [chance.between(-2.0, 2.0), chance.between(-2.0, 2.0)],
         };
         Self::from_fn(kind, size, |x, y| shape.height(x, y))
@@ -196,7 +198,7 @@ impl Shape {
             Kind::Rough => 2.0 * dice,
             Kind::Noise => 600.0 * dice - 300.0,
             Kind::Checkerboard => f64::from((x + y) & 1),
-            Kind::Spikes => f64::from(dice > 0.967) * 1e6,
+            Kind::Spikes => f64::from(dice > 0.967) * f64::from(MAX_STEP_CELLS),
             Kind::Denormals => {
                 let tiny = f32::from_bits((dice * 1000.0) as u32);
                 return if self.dice(y, x) > 0.5 { tiny } else { -tiny };

@@ -1,8 +1,9 @@
 //! Scenes run twice, the second time so that nothing felt may change.
 
-use hapterra_core::contact::{ContactState, Execution, Rule};
+use crate::scene::run::Execution;
+use hapterra_core::contact::ContactState;
 
-use super::hip_path::GRAIN;
+use super::hip_path::{GRAIN, LEAP};
 use super::run::{Player, Scene};
 use super::supply::{Buffers, SIDE, Supply};
 use super::symmetry::{self, Symmetry};
@@ -65,7 +66,7 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Com
     );
     let mut felt = |shift| {
         // Of grain, and of most gratings, another part is there; it is judged as well.
-        let mut judge = Judge::new(&scene.terrain, scene.rule).with_texture(scene.texture);
+        let mut judge = Judge::new(&scene.terrain).with_texture(scene.texture);
         let pulled = Supply::Pulled { latency: 0 };
         let seen = scene.feel(buffers, shift, pulled, |seen| judge.look_at_texture(seen))?;
         Ok(seen.into_iter().map(|seen| Seen {
@@ -79,7 +80,7 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Com
     same_bits(Invariant::Shift, &near, &away, by).map(|()| true)
 }
 
-/// With a window of 4 × 4 tiles that waits for them, and with the whole field
+/// With a window of 7 × 7 tiles that waits for them, and with the whole field
 /// held: the same bits, where waiting leaves no trace.
 ///
 /// # Errors
@@ -91,12 +92,17 @@ pub fn windowed(
     chance: &mut Chance,
 ) -> Compared {
     let fits = scene.terrain.size.iter().all(|patches| *patches <= 256);
-    if scene.execution != Execution::LockStep || scene.rule == Rule::Paper || !fits {
+    // A path from the proxy to the HIP fits into the small window.
+    let is_near = |ticks: &[Seen]| {
+        let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
+        way(0).max(way(1)) <= 5.0 * LEAP
+    };
+    if scene.execution != Execution::LockStep || !fits || !seen.windows(2).all(is_near) {
         return Ok(false);
     }
     let latency = [0, 1, 5][chance.below(3)];
     let pulled = Supply::Pulled { latency };
-    let small = scene.feel_in::<4>(buffers, [0; 3], pulled, |_| Ok(()))?;
+    let small = scene.feel_in::<7>(buffers, [0; 3], pulled, |_| Ok(()))?;
     same_bits(Invariant::Window, seen, &small, [0; 3])?;
     if scene.supply != Supply::Held {
         let whole = scene.feel(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
@@ -157,7 +163,7 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Comp
     // mirrored or not; and what is left over of a tick may differ.
     let settles = scene.execution == Execution::LockStep && scene.supply == Supply::Held;
     let plain = scene.terrain.steepest() <= STEEP && scene.terrain.kind != Kind::Holes;
-    if !settles || scene.rule == Rule::Paper || !plain {
+    if !settles || !plain {
         return Ok(false);
     }
     let inside = |p: &[f64; 3]| {

@@ -8,7 +8,6 @@ use hapterra::link::{Arming, Event, Native, Patience, Session};
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
 use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Drive, Report, Sense, WORKING_SHARE};
 use hapterra_core::phantom::Calibration;
@@ -75,7 +74,7 @@ impl<'t> Bed<'t> {
         let law = ForceLaw::PREMIUM;
         Self {
             terrain,
-            scene: terrain.scene(law, Rule::Swept, Source::Encoders, home),
+            scene: terrain.scene(law, Source::Encoders, home),
             device: Rc::new(RefCell::new(device)),
             session: None,
             log,

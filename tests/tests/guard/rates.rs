@@ -2,7 +2,6 @@
 
 use hapterra::link::{Arming, Event, Native, Patience, Session};
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement};
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Fault, Mode};
 use hapterra_core::scene::{Sample, Source};
@@ -34,7 +33,7 @@ fn at_ten_kilohertz_all_of_it_takes_as_long_and_feels_the_same() {
         }),
     );
     let home = terrain.scale().to_grid(home_mm).expect("addressable");
-    let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
+    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home);
     let (arming, link) = (Arming::VIRTUAL, Box::new(device));
     let opened = Session::open(&terrain, scene, Some(arming), link, Patience::EMULATED);
     let (mut session, hello) = opened.expect("opened");

@@ -5,7 +5,7 @@
 //! that is the mirrored patch. What a neighbour is said to offer is searched for
 //! before the way goes there.
 
-use super::on_patch::{Nearest, PatchSearch, finest_resolution, resolution};
+use super::on_patch::{Nearest, finest_resolution, resolution, search};
 use crate::contact::budget::{Budget, SLOPE};
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
@@ -13,14 +13,14 @@ use crate::contact::tolerance::{
     BESIDE, COARSEST_RESOLUTION, EQUALLY_STEEP, LEAST_WAY, RESOLUTION, SLOPE_NOISE,
 };
 use crate::scalar::{larger, smaller};
-use crate::terrain::{Ground, TileIndex, Window};
+use crate::terrain::{Ground, Window};
 
 /// Where downhill goes on from the closest point of a patch.
 pub(super) enum Onward {
     /// Into a neighbouring patch, as [`Asking::best`] has it.
     Into,
     /// It may go on in a tile that is not here.
-    Missing(TileIndex),
+    Missing,
     /// The budget is spent.
     Suspended,
     /// Nowhere: the point is a local minimum of the distance.
@@ -78,8 +78,6 @@ pub(super) struct Asking {
     asked: u8,
     /// The best offer so far.
     pub(super) best: Option<Offer>,
-    /// A neighbour is being searched.
-    is_searching: bool,
 }
 
 /// Where the asking begins: the closest point of a patch.
@@ -93,7 +91,6 @@ impl Asking {
     pub(super) const NONE: Self = Self {
         asked: 0,
         best: None,
-        is_searching: false,
     };
 
     /// Forgets what was asked.
@@ -101,11 +98,9 @@ impl Asking {
     pub(super) const fn restart(&mut self) {
         self.asked = 0;
         self.best = None;
-        self.is_searching = false;
     }
 
-    /// Goes on until it is known where downhill goes on. `search` is where a
-    /// neighbour is searched; `patch` becomes that of the best offer, if that is made
+    /// Goes on until it is known where downhill goes on. `patch` becomes that of the best offer, if that is made
     /// now.
     #[inline]
     pub(super) fn advance<const D: usize>(
@@ -114,7 +109,6 @@ impl Asking {
         view: &HipView,
         start: &Start<'_>,
         patch: &mut Patch,
-        search: &mut PatchSearch,
         budget: &mut Budget,
     ) -> Onward {
         // Up a wall a proxy may stand beside the edge without being on it.
@@ -124,7 +118,7 @@ impl Asking {
         if border == Side::NONE {
             return Onward::Nowhere;
         }
-        self.over_border(window, view, start, border, patch, search, budget)
+        self.over_border(window, view, start, border, patch, budget)
     }
 
     // What a descent is made of, each borrowed from another place.
@@ -137,7 +131,6 @@ impl Asking {
         start: &Start<'_>,
         border: Side,
         patch: &mut Patch,
-        search: &mut PatchSearch,
         budget: &mut Budget,
     ) -> Onward {
         loop {
@@ -159,14 +152,10 @@ impl Asking {
                 break;
             }
             let hip = view.in_patch(next.entry.cell);
-            if !self.is_searching {
-                search.restart((next.entry.u, next.entry.v));
-            }
-            let Some(closest) = search.advance(&next.patch, hip, budget) else {
-                self.is_searching = true;
+            let start_at = (next.entry.u, next.entry.v);
+            let Some(closest) = search(&next.patch, hip, start_at, budget) else {
                 return Onward::Suspended;
             };
-            self.is_searching = false;
             self.asked |= next.bit;
             if let Some(offer) = offer(&next, hip, start.here, closest)
                 && self
@@ -223,7 +212,10 @@ impl Asking {
             let patch = match window.ground(entry.cell) {
                 Ground::Hole => continue,
                 // It might be the better way: the proxy waits to know.
-                Ground::Missing => return Err(Onward::Missing(TileIndex::holding(entry.cell))),
+                Ground::Missing => {
+                    budget.lacks(entry.cell);
+                    return Err(Onward::Missing);
+                }
                 Ground::Patch(corners) => view.patch(&corners),
             };
             let Some(steepness) = fall_into(&patch, view, &entry, side, start.here) else {
@@ -348,10 +340,8 @@ fn gain(here: &Nearest, there: &Nearest, (p, q): (f32, f32), side: Side) -> (f32
 }
 
 /// Takes a point on a border of its patch to the one into which the distance falls most
-/// steeply, of those that meet at it; leaves it where it is if there is none.
-///
-/// # Errors
-/// The tile of one of them that is not here; nothing has changed then.
+/// steeply, of those that meet at it; leaves it where it is if there is none, or if the tile
+/// of one of them is not here.
 #[inline(never)]
 pub(super) fn to_steepest_patch<const D: usize>(
     window: &Window<'_, D>,
@@ -359,7 +349,8 @@ pub(super) fn to_steepest_patch<const D: usize>(
     border: Side,
     at: &mut SurfacePoint,
     patch: &mut Patch,
-) -> Result<(), TileIndex> {
+    budget: &mut Budget,
+) {
     let before = (*at, *patch);
     let mut most = larger(steepness_at(patch, view.in_patch(at.cell), at, border), 0.0);
     for place in 0..3 {
@@ -371,8 +362,9 @@ pub(super) fn to_steepest_patch<const D: usize>(
         let its_patch = match window.ground(point.cell) {
             Ground::Hole => continue,
             Ground::Missing => {
+                budget.lacks(point.cell);
                 (*at, *patch) = before;
-                return Err(TileIndex::holding(point.cell));
+                return;
             }
             Ground::Patch(corners) => view.patch(&corners),
         };
@@ -384,7 +376,6 @@ pub(super) fn to_steepest_patch<const D: usize>(
             (*at, *patch, most) = (point, its_patch, steepness);
         }
     }
-    Ok(())
 }
 
 /// How steeply the distance to a HIP at `(p, q)` falls from a point on a border of a

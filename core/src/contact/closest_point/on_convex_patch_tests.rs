@@ -19,7 +19,7 @@ fn convex(heights: [f32; 4], hip: (f32, f32), from: (f32, f32)) -> Option<(f32, 
 /// The closest point as the search by rulings finds it, both ways round.
 fn by_rulings(patch: &Patch, hip: (f32, f32), (u, v): (f32, f32)) -> (f32, f32) {
     let search = |patch: &Patch, hip, start| -> Ruling {
-        let mut search = RulingSearch::from(patch, hip, start);
+        let mut search = RulingSearch::from(patch, hip, start, 1);
         while let Some(next) = search.next(patch, hip) {
             search.look_at(patch, hip, next);
         }

@@ -19,8 +19,8 @@
 
 use super::on_convex_patch::{Convexity, Place};
 use super::on_ruling::Ruling;
-use super::ruling_search::RulingSearch;
-use crate::contact::budget::{Budget, CONVEX, CREST, RULING};
+use super::ruling_search::{MAX_EVALUATIONS, RulingSearch};
+use crate::contact::budget::{Budget, CONVEX, CREST, RULING, SEARCH};
 use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{COARSEST_RESOLUTION, RESOLUTION};
 use crate::scalar::smaller;
@@ -63,161 +63,97 @@ pub struct Nearest {
 /// ```
 #[must_use]
 pub fn nearest_downhill(patch: &Patch, hip: (f32, f32), start: (f32, f32)) -> Nearest {
-    let mut search = PatchSearch::from(start);
     let mut budget = Budget::new(u32::MAX);
-    // Without a limit it comes to its end.
-    search
-        .advance(patch, hip, &mut budget)
-        .unwrap_or_else(|| search.so_far(patch))
+    // Without a limit it is always found.
+    search(patch, hip, start, &mut budget).unwrap_or(Nearest::NONE)
 }
 
-/// A search in one patch that can be cut short after any evaluation, and gone on
-/// with later to the same bits.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PatchSearch {
-    /// The closest place of the passes that have ended, or where the search begins.
-    best: (f32, f32),
-    /// Its height above the HIP, if it was searched for.
-    z: Option<f32>,
-    evaluations: u32,
-    passes: u32,
-    /// Whether u and v are exchanged, once that is decided.
-    turned: Option<bool>,
-    /// The pass under way.
-    rulings: Option<RulingSearch>,
+/// As [`nearest_downhill`], within a budget: `None` where that does not reach for all of it.
+pub(super) fn search(
+    patch: &Patch,
+    hip: (f32, f32),
+    start: (f32, f32),
+    budget: &mut Budget,
+) -> Option<Nearest> {
+    if !budget.has(CONVEX) {
+        return None;
+    }
+    budget.spend(CONVEX);
+    let found = match closest_if_convex(patch, hip, start) {
+        Some(place) => place,
+        None if budget.has(SEARCH) => by_rulings(patch, hip, start, budget),
+        None => return None,
+    };
+    #[cfg(test)]
+    crate::contact::tally::searched(found.evaluations);
+    Some(found)
 }
 
-impl PatchSearch {
-    /// A search from a place in the patch.
-    pub(super) const fn from(start: (f32, f32)) -> Self {
-        Self {
-            best: start,
-            z: None,
-            evaluations: 0,
-            passes: 0,
-            turned: None,
-            rulings: None,
-        }
-    }
-
-    /// Another search, from a place in another patch or for another HIP.
-    #[inline]
-    pub(super) const fn restart(&mut self, start: (f32, f32)) {
-        self.best = start;
-        self.z = None;
-        (self.evaluations, self.passes) = (0, 0);
-        self.turned = None;
-        self.rulings = None;
-    }
-
-    /// Goes on to the end; `None` where the budget ends before.
-    #[inline]
-    pub(super) fn advance(
-        &mut self,
-        patch: &Patch,
-        hip: (f32, f32),
-        budget: &mut Budget,
-    ) -> Option<Nearest> {
-        if self.turned.is_none() {
-            if !budget.has(CONVEX) {
-                return None;
-            }
-            budget.spend(CONVEX);
-            if let Some(place) = closest_if_convex(patch, hip, self.best) {
-                #[cfg(test)]
-                crate::contact::tally::searched(1);
-                return Some(place);
-            }
-        }
-        let found = self.by_rulings(patch, hip, budget)?;
-        #[cfg(test)]
-        crate::contact::tally::searched(found.evaluations);
-        Some(found)
-    }
-
-    #[inline(never)]
-    fn by_rulings(
-        &mut self,
-        patch: &Patch,
-        hip: (f32, f32),
-        budget: &mut Budget,
-    ) -> Option<Nearest> {
-        loop {
-            let (u, v) = self.best;
-            let turned = *self
-                .turned
-                .get_or_insert_with(|| is_steeper_north(patch, hip, (u, v)));
-            let found = if turned {
-                self.pass(&patch.transposed(), (hip.1, hip.0), u, budget)?
-            } else {
-                self.pass(patch, hip, v, budget)?
+#[inline(never)]
+fn by_rulings(patch: &Patch, hip: (f32, f32), start: (f32, f32), budget: &mut Budget) -> Nearest {
+    let transposed = patch.transposed();
+    let mut turned = is_steeper_north(patch, hip, start);
+    let (mut best, mut evaluations) = (start, 0);
+    for pass in 1.. {
+        let (found, looks) = match turned {
+            true => pass_over(&transposed, (hip.1, hip.0), best.0, evaluations, budget),
+            false => pass_over(patch, hip, best.1, evaluations, budget),
+        };
+        best = exchanged_if(turned, (found.u, found.v));
+        evaluations = looks;
+        if !wants_turning(&found) || pass == MAX_PASSES || evaluations >= MAX_EVALUATIONS {
+            let (u, v) = best;
+            let z = found.z;
+            let nearest = Nearest {
+                u,
+                v,
+                z,
+                evaluations,
             };
-            self.rulings = None;
-            self.best = exchanged_if(turned, (found.u, found.v));
-            self.z = Some(found.z);
-            self.passes += 1;
-            if !wants_turning(&found) || self.passes == MAX_PASSES {
-                return Some(self.so_far(patch).snapped(patch, hip));
-            }
-            self.turned = Some(!turned);
+            return nearest.snapped(patch, hip);
         }
+        turned = !turned;
     }
+    Nearest::NONE
+}
 
-    /// One pass with u eliminated, from the ruling at `start`.
-    fn pass(
-        &mut self,
-        patch: &Patch,
-        hip: (f32, f32),
-        start: f32,
-        budget: &mut Budget,
-    ) -> Option<Ruling> {
-        let search = match &mut self.rulings {
-            Some(search) => search,
-            begins if budget.has(RULING) => {
-                budget.spend(RULING);
-                self.evaluations += 1;
-                begins.insert(RulingSearch::from(patch, hip, start))
-            }
-            _ => return None,
-        };
-        loop {
-            while let Some(v) = search.next(patch, hip) {
-                if !budget.has(RULING) {
-                    return None;
-                }
-                budget.spend(RULING);
-                self.evaluations += 1;
-                search.look_at(patch, hip, v);
-            }
-            if search.is_plainly_downhill(patch, hip) {
-                return Some(search.best);
-            }
-            if !budget.has(CREST) {
-                return None;
-            }
-            budget.spend(CREST);
-            match search.crest(patch, hip) {
-                Some(v) => search.begin_again_before(v),
-                None => return Some(search.best),
-            }
+/// One pass with u eliminated, from the ruling at `start`: where it ends, and the evaluations
+/// after it, of which there were some before.
+fn pass_over(
+    patch: &Patch,
+    hip: (f32, f32),
+    start: f32,
+    before: u32,
+    budget: &mut Budget,
+) -> (Ruling, u32) {
+    let mut search = RulingSearch::from(patch, hip, start, before + 1);
+    let mut crests = 0;
+    loop {
+        while let Some(v) = search.next(patch, hip) {
+            search.look_at(patch, hip, v);
         }
-    }
-
-    /// The closest point found so far.
-    pub(super) fn so_far(&self, patch: &Patch) -> Nearest {
-        let (place, z) = match &self.rulings {
-            Some(search) => {
-                let best = &search.best;
-                let turned = self.turned == Some(true);
-                (exchanged_if(turned, (best.u, best.v)), Some(best.z))
+        let crest = match search.is_plainly_downhill(patch, hip) {
+            true => None,
+            false => {
+                budget.spend(CREST);
+                crests += 1;
+                search.crest(patch, hip)
             }
-            None => (self.best, self.z),
         };
-        Nearest {
-            u: place.0,
-            v: place.1,
-            z: z.unwrap_or_else(|| patch.height(place.0, place.1)),
-            evaluations: self.evaluations,
+        // As long as the search stays within its units.
+        let may_look_again = search.evaluations + CREST * (crests + 1) <= SEARCH;
+        match crest {
+            Some(v) if search.evaluations < MAX_EVALUATIONS && may_look_again => {
+                search.begin_again_before(v);
+            }
+            Some(_) => {
+                budget.spend(RULING * (search.evaluations - before));
+                return (search.first, search.evaluations);
+            }
+            None => {
+                budget.spend(RULING * (search.evaluations - before));
+                return (search.best, search.evaluations);
+            }
         }
     }
 }

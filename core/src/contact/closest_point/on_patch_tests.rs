@@ -118,7 +118,7 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
 
 #[test]
 fn within_two_millionths_of_a_cell_on_any_slope() {
-    let slopes = [0.0, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4, 1e6];
+    let slopes = [0.0, 0.1, 1.0, 10.0, 100.0, 1e3, 3e3];
     for slope in slopes.into_iter().step_by(cases(1, 3) as usize) {
         for depth in [1e-4, 0.01, 0.1, 1.0] {
             for twist in [0.0, 1e-9, slope, 3.0 * slope] {
@@ -135,7 +135,7 @@ fn within_two_millionths_of_a_cell_on_any_slope() {
                     errors.mean_evaluations
                 );
                 assert!(
-                    errors.most_evaluations <= MAX_PASSES * MAX_EVALUATIONS,
+                    errors.most_evaluations <= MAX_EVALUATIONS + MAX_PASSES,
                     "{at}"
                 );
             }

@@ -3,17 +3,16 @@
 
 use super::beyond_border::{Asking, Onward, Start, to_steepest_patch};
 use super::on_convex_patch::Place;
-use super::on_patch::{Nearest, PatchSearch};
+use super::on_patch::{Nearest, search};
 use crate::contact::budget::{ARRIVAL, Budget, CONVEX, ON_BORDER};
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::contact::tolerance::HEIGHT_NOISE;
 use crate::grid::{Altitude, Cell, GridPoint};
-use crate::terrain::{Ground, TileIndex, Window};
+use crate::terrain::{Ground, Window};
 
 /// Patches entered in a row without getting nearer to the HIP until the descent is
-/// taken to be at its end: at the foot of a wall of 10⁶ a place knows its distance
-/// only to 10⁻².
+/// taken to be at its end: up a wall rounding may send it to and fro.
 const IDLE: u32 = 16;
 
 /// How a descent ended.
@@ -25,12 +24,11 @@ pub(in crate::contact) enum Ended {
     /// From here the straight way to the HIP leads off the surface.
     Leaves,
     /// The next patch is in a tile that is not here.
-    Missing(TileIndex),
+    Missing,
     /// The budget is spent.
     Suspended,
-    /// There is no surface under the proxy any more; the tile wanted, if it
-    /// is missing.
-    Lost(Option<TileIndex>),
+    /// There is no surface under the proxy any more.
+    Lost,
 }
 
 /// Where a proxy may leave the surface.
@@ -42,8 +40,6 @@ pub(in crate::contact) enum Leave {
     ButAt(SurfacePoint),
     /// Nowhere any more: it has left too often. Here it was held last, above the HIP.
     NoMore(SurfacePoint),
-    /// Nowhere: the rule does not know of leaving.
-    Nowhere,
 }
 
 impl Leave {
@@ -53,7 +49,7 @@ impl Leave {
         match self {
             Self::Anywhere => true,
             Self::ButAt(place) => !point.is_same_place(place),
-            Self::NoMore(_) | Self::Nowhere => false,
+            Self::NoMore(_) => false,
         }
     }
 }
@@ -70,8 +66,6 @@ pub(in crate::contact) struct Descent {
     stage: Stage,
     /// The patch's closest point, in the stages that know it.
     here: Nearest,
-    /// The search in this patch, or in a neighbour.
-    search: PatchSearch,
     asking: Asking,
     /// The nearest place so far, and patches entered since without getting nearer.
     idle: Option<(GridPoint, u32)>,
@@ -85,8 +79,6 @@ enum Stage {
     Arrived,
     /// The patch was entered, and its closest point is known.
     ArrivedKnowing,
-    /// Its closest point is searched for.
-    Searching,
     /// The neighbours are asked.
     Asking,
 }
@@ -98,7 +90,6 @@ impl Descent {
             at,
             stage: Stage::Arrived,
             here: Nearest::NONE,
-            search: PatchSearch::from((0.0, 0.0)),
             asking: Asking::NONE,
             idle: None,
         }
@@ -160,52 +151,40 @@ impl Descent {
         window: &Window<'_, D>,
         view: &HipView,
     ) -> Option<(SurfacePoint, f32)> {
-        let patch = patch_at(window, view, &self.at).ok()?;
-        if matches!(self.stage, Stage::Searching) {
-            let nearest = self.search.so_far(&patch);
-            return Some((self.at.moved_to(nearest.u, nearest.v), nearest.z));
-        }
+        let patch = patch_at(window, view, &self.at)?;
         Some((self.at, patch.height(self.at.u, self.at.v)))
     }
 
-    /// Goes on until the proxy rests, leaves, or may not go on. A proxy that
-    /// `waits` for a missing tile also waits where it could go another way.
+    /// Goes on until the proxy rests, leaves, or may not go on.
     pub(in crate::contact) fn advance<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         view: &HipView,
         leave: &Leave,
-        waits: bool,
         budget: &mut Budget,
     ) -> Ended {
         // Not by `patch_at`: a call costs 20 instructions more.
         let cell = self.at.cell;
         let mut patch = match window.ground(cell) {
             Ground::Patch(corners) => view.patch(&corners),
-            Ground::Hole => return Ended::Lost(None),
-            Ground::Missing => return Ended::Lost(Some(TileIndex::holding(cell))),
+            Ground::Hole => return Ended::Lost,
+            Ground::Missing => {
+                budget.lacks(cell);
+                return Ended::Lost;
+            }
         };
         loop {
             if matches!(self.stage, Stage::Arrived | Stage::ArrivedKnowing)
-                && let Some(ended) = self.arrive(window, view, &mut patch, leave, waits, budget)
+                && let Some(ended) = self.arrive(window, view, &mut patch, leave, budget)
             {
                 return ended;
-            }
-            if matches!(self.stage, Stage::Searching) {
-                let hip = view.in_patch(self.at.cell);
-                let Some(here) = self.search.advance(&patch, hip, budget) else {
-                    return Ended::Suspended;
-                };
-                self.here = here;
-                self.knows_here();
             }
             let start = Start {
                 at: &self.at,
                 here: &self.here,
             };
             let is_resumed = self.asking.best.is_some();
-            let (asking, search) = (&mut self.asking, &mut self.search);
-            match asking.advance(window, view, &start, &mut patch, search, budget) {
+            match (self.asking).advance(window, view, &start, &mut patch, budget) {
                 Onward::Into => {
                     if let Some(ended) = self.enter(window, view, leave) {
                         return ended;
@@ -213,12 +192,12 @@ impl Descent {
                     if is_resumed {
                         // The best neighbour may be one of an earlier tick.
                         patch = match patch_at(window, view, &self.at) {
-                            Ok(patch) => patch,
-                            Err(tile) => return Ended::Lost(tile),
+                            Some(patch) => patch,
+                            None => return Ended::Lost,
                         };
                     }
                 }
-                Onward::Missing(tile) => return Ended::Missing(tile),
+                Onward::Missing => return Ended::Missing,
                 Onward::Suspended => return Ended::Suspended,
                 Onward::Nowhere => return self.ends(window, view, &patch, leave),
             }
@@ -233,7 +212,6 @@ impl Descent {
         view: &HipView,
         patch: &mut Patch,
         leave: &Leave,
-        waits: bool,
         budget: &mut Budget,
     ) -> Option<Ended> {
         let is_known = matches!(self.stage, Stage::ArrivedKnowing);
@@ -252,15 +230,14 @@ impl Descent {
             return None;
         }
         if on_border {
-            let moved = to_steepest_patch(window, view, border, &mut self.at, patch);
-            if let Err(tile) = moved
-                && waits
-            {
-                return Some(Ended::Missing(tile));
-            }
+            to_steepest_patch(window, view, border, &mut self.at, patch, budget);
         }
-        self.search.restart((self.at.u, self.at.v));
-        self.stage = Stage::Searching;
+        let hip = view.in_patch(self.at.cell);
+        let Some(here) = search(patch, hip, (self.at.u, self.at.v), budget) else {
+            return Some(Ended::Suspended);
+        };
+        self.here = here;
+        self.knows_here();
         None
     }
 
@@ -326,18 +303,14 @@ impl Descent {
 }
 
 /// The patch of a point, as the HIP sees it.
-///
-/// # Errors
-/// There is none; the tile that is missing, if that is why.
 fn patch_at<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,
     point: &SurfacePoint,
-) -> Result<Patch, Option<TileIndex>> {
+) -> Option<Patch> {
     match window.ground(point.cell) {
-        Ground::Patch(corners) => Ok(view.patch(&corners)),
-        Ground::Hole => Err(None),
-        Ground::Missing => Err(Some(TileIndex::holding(point.cell))),
+        Ground::Patch(corners) => Some(view.patch(&corners)),
+        Ground::Hole | Ground::Missing => None,
     }
 }
 
@@ -394,22 +367,6 @@ pub(in crate::contact) fn passes_over(
     patch.height(at.u, at.v) + rise < 0.0
 }
 
-/// The position of a point of the surface, `z` cells above the HIP: up a wall that
-/// height is known better than the place tells it, of a far HIP worse.
-fn position<const D: usize>(
-    window: &Window<'_, D>,
-    view: &HipView,
-    at: &SurfacePoint,
-    z: f32,
-) -> GridPoint {
-    let steep = patch_at(window, view, at).map_or(f32::INFINITY, |patch| {
-        patch.slope_u(at.v).abs() + patch.slope_v(at.u).abs()
-    });
-    position_on(window, at)
-        .filter(|_| z.abs() > steep)
-        .unwrap_or_else(|| view.position(at, z))
-}
-
 /// The position of a point of the surface, no matter how far the HIP is; `None`
 /// where there is no patch.
 pub(in crate::contact) fn position_on<const D: usize>(
@@ -424,6 +381,22 @@ pub(in crate::contact) fn position_on<const D: usize>(
     let up = corners.base.saturating_add(patch.height(at.u, at.v) as i32);
     let near = patch.seen_from(Altitude::new(up, 0.0), corners.base);
     Some(at.position(up, near.height(at.u, at.v)))
+}
+
+/// The position of a point of the surface, `z` cells above the HIP: up a wall that
+/// height is known better than the place tells it, of a far HIP worse.
+fn position<const D: usize>(
+    window: &Window<'_, D>,
+    view: &HipView,
+    at: &SurfacePoint,
+    z: f32,
+) -> GridPoint {
+    let steep = patch_at(window, view, at).map_or(f32::INFINITY, |patch| {
+        patch.slope_u(at.v).abs() + patch.slope_v(at.u).abs()
+    });
+    position_on(window, at)
+        .filter(|_| z.abs() > steep)
+        .unwrap_or_else(|| view.position(at, z))
 }
 
 /// Counts how often in a row a position is no nearer to the HIP than the nearest

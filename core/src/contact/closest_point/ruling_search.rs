@@ -12,12 +12,11 @@ use crate::contact::straight_way::StraightWay;
 use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{DOUBTFUL_STEP, LEAST_STEP, RESOLUTION};
 
-/// Rulings looked at, at most. Reached only on patches steeper than about 10⁶; the
-/// best point so far is then the answer.
-pub const MAX_EVALUATIONS: u32 = 32;
+/// Rulings looked at for one patch, at most; the best point so far is then the answer.
+pub const MAX_EVALUATIONS: u32 = 40;
 
 /// Rulings that are looked at for a crest.
-const CREST_LOOKS: u32 = 16;
+pub(super) const CREST_LOOKS: u32 = 16;
 /// Steps downhill after which the end of the patch is tried, where halving the
 /// way to it would take as many as a place has bits.
 const DOWNHILL: u32 = 2;
@@ -29,7 +28,7 @@ const STRIDE: f32 = 8.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RulingSearch {
     /// Where it began.
-    first: Ruling,
+    pub(super) first: Ruling,
     /// The closest ruling so far.
     pub(super) best: Ruling,
     pub(super) evaluations: u32,
@@ -51,12 +50,15 @@ pub(super) struct RulingSearch {
 impl RulingSearch {
     /// A search downhill from the ruling at `v`, for a HIP at `hip` in patch
     /// coordinates.
-    pub(super) fn from(patch: &Patch, hip: (f32, f32), v: f32) -> Self {
-        let best = Ruling::at(patch, hip, v);
+    pub(super) fn from(patch: &Patch, hip: (f32, f32), v: f32, evaluations: u32) -> Self {
+        Self::at(Ruling::at(patch, hip, v), evaluations)
+    }
+
+    const fn at(best: Ruling, evaluations: u32) -> Self {
         Self {
             first: best,
             best,
-            evaluations: 1,
+            evaluations,
             wall: if best.slope < 0.0 { 1.0 } else { 0.0 },
             wall_is_end: true,
             lazy: 0,
@@ -68,17 +70,10 @@ impl RulingSearch {
 
     /// Begins again where it began, with a minimum before a ruling that is farther.
     pub(super) fn begin_again_before(&mut self, v: f32) {
-        let first = self.first;
         *self = Self {
-            first,
-            best: first,
-            evaluations: 1,
             wall: v,
             wall_is_end: false,
-            lazy: 0,
-            stride: STRIDE,
-            downhill: 0,
-            back: f32::NAN,
+            ..Self::at(self.first, self.evaluations)
         };
     }
 

@@ -12,7 +12,7 @@ mod walk;
 use serde::{Deserialize, Serialize};
 
 pub(super) use cone::Cone;
-pub(super) use walk::{Rules, Walk, Walked};
+pub(super) use walk::{Walk, Walked};
 
 /// How rough a surface is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -24,7 +24,7 @@ fn feel(
 ) -> Vec<([f32; 3], ContactOutput)> {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), height);
-    let mut contact = Contact::new(ContactSettings::REAL_TIME.with_friction(friction));
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ.with_friction(friction));
     path.into_iter()
         .map(|hip| (hip, *contact.step(&field.window, &at(hip))))
         .collect()
@@ -160,9 +160,7 @@ fn a_steady_hand_breaks_away_once_at_every_cell_size() {
     {
         for hz in [1_000, 10_000] {
             let rate = TickRate::new(hz).expect("in range");
-            let settings = ContactSettings::REAL_TIME
-                .at_rate(rate)
-                .on_cells_of(cell_mm);
+            let settings = ContactSettings::AT_1_KHZ.at_rate(rate).on_cells_of(cell_mm);
             let mut tiles = buffers::<2>();
             let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), |_, _| 0.0);
             let mut contact = Contact::new(settings.with_friction(friction));
@@ -265,7 +263,7 @@ fn a_fast_hand_over_rough_ground_is_answered_within_its_tick() {
         viscous_s: 0.001,
         ..Friction::coulomb(0.3)
     };
-    let mut contact = Contact::new(ContactSettings::REAL_TIME.with_friction(friction));
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ.with_friction(friction));
     let (mut touches, mut late) = (0, 0);
     for tick in 0..20_000 {
         let turn = 0.031 * tick as f32;

@@ -16,7 +16,7 @@ use crate::contact::straight_way::StraightWay;
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::scalar::smaller;
-use crate::terrain::{Ground, TileIndex, Window};
+use crate::terrain::{Ground, Window};
 
 /// Looks at the cone on one straight way, at most.
 pub(in crate::contact) const LOOKS: u32 = 8;
@@ -30,15 +30,14 @@ const ACROSS: u32 = 3;
 /// How a walk ended.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) enum Walked {
-    /// Friction holds the proxy, or no straight way brings it nearer. The tile beyond the border
-    /// that it is on, if it is missing.
-    Rests(Option<TileIndex>),
+    /// Friction holds the proxy, or no straight way brings it nearer.
+    Rests,
+    /// The same, beside a tile that is not here.
+    Missing,
     /// The straight path to the HIP leads off the surface.
     Leaves,
     /// There is no surface, or it ends here with the HIP above it.
     Off,
-    /// It depends on a tile that is not here.
-    Missing(TileIndex),
     /// The budget is spent.
     Suspended,
 }
@@ -48,27 +47,27 @@ struct Asked {
     pull: Pull,
     at: SurfacePoint,
     patch: Patch,
-    missing: Option<TileIndex>,
+    /// Whether a tile beside it is missing.
+    is_open: bool,
 }
 
-/// Where a walk ends though nothing holds it.
-#[derive(Clone, Copy)]
-pub(in crate::contact) struct Rules<'l> {
-    /// Where it may leave the surface.
-    pub(in crate::contact) leave: &'l Leave,
-    /// Whether it waits beside a missing tile.
-    pub(in crate::contact) waits: bool,
-}
-
-impl Rules<'_> {
-    /// What becomes of a proxy from which the straight path to the HIP leads off the surface.
-    /// Where it has just come down from such a path, it is on the ground.
-    fn off(self, point: &SurfacePoint) -> Option<Walked> {
-        match self.leave {
-            leave if leave.is_allowed_at(point) => Some(Walked::Leaves),
-            Leave::ButAt(_) => None,
-            _ => Some(Walked::Off),
+impl Asked {
+    const fn rests(&self) -> Walked {
+        if self.is_open {
+            Walked::Missing
+        } else {
+            Walked::Rests
         }
+    }
+}
+
+/// What becomes of a proxy from which the straight path to the HIP leads off the surface.
+/// Where it has just come down from such a path, it is on the ground.
+fn off(leave: &Leave, point: &SurfacePoint) -> Option<Walked> {
+    match leave {
+        leave if leave.is_allowed_at(point) => Some(Walked::Leaves),
+        Leave::ButAt(_) => None,
+        _ => Some(Walked::Off),
     }
 }
 
@@ -94,25 +93,25 @@ impl Walk {
         window: &Window<'_, D>,
         view: &HipView,
         cone: &Cone,
-        rules: Rules<'_>,
+        leave: &Leave,
         budget: &mut Budget,
     ) -> Walked {
         loop {
             if !budget.has(WAY) {
                 return Walked::Suspended;
             }
-            let asked = match ask(window, view, &self.point, rules, budget) {
+            let asked = match ask(window, view, &self.point, leave, budget) {
                 Ok(asked) => asked,
                 Err(why) => return why,
             };
             if let Some(mu) = self.at_rest.take()
                 && asked.pull.pulls <= mu * mu * asked.pull.presses
             {
-                return Walked::Rests(asked.missing);
+                return asked.rests();
             }
             let excess = cone.excess(&asked.pull, view, &asked.patch, &asked.at);
             if excess.is_held() || self.ways == WAYS {
-                return Walked::Rests(asked.missing);
+                return asked.rests();
             }
             let newton = match self.inside > ACROSS {
                 true => newton(&asked, view),
@@ -120,14 +119,14 @@ impl Walk {
             };
             let end = straight(&asked, excess, newton, view, cone, budget);
             if end.at == asked.at || end.at == self.point {
-                return Walked::Rests(asked.missing);
+                return asked.rests();
             }
             let is_inside = border(&end.at) == Side::NONE;
             self.inside = if is_inside { self.inside + 1 } else { 0 };
             self.ways += 1;
             (self.point, self.held) = (end.at, end.held);
             if is_inside && end.rests {
-                return Walked::Rests(None);
+                return Walked::Rests;
             }
         }
     }
@@ -232,7 +231,7 @@ fn ask<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,
     point: &SurfacePoint,
-    rules: Rules<'_>,
+    leave: &Leave,
     budget: &mut Budget,
 ) -> Result<Asked, Walked> {
     budget.spend(SLOPE);
@@ -240,34 +239,35 @@ fn ask<const D: usize>(
     let patch = match window.ground(point.cell) {
         Ground::Patch(corners) => view.patch(&corners),
         Ground::Hole => return Err(Walked::Off),
-        Ground::Missing if rules.waits => {
-            return Err(Walked::Missing(TileIndex::holding(point.cell)));
+        Ground::Missing => {
+            budget.lacks(point.cell);
+            return Err(Walked::Off);
         }
-        Ground::Missing => return Err(Walked::Off),
     };
     let mut asked = Asked {
         pull: Pull::in_patch(&patch, view, point, border),
         at: *point,
         patch,
-        missing: None,
+        is_open: false,
     };
     let ended = match border {
-        Side::NONE if asked.pull.is_above => rules.off(point),
+        Side::NONE if asked.pull.is_above => off(leave, point),
         Side::NONE => None,
-        _ => ask_neighbours(window, view, border, &mut asked, rules, budget),
+        _ => ask_neighbours(window, view, border, &mut asked, leave, budget),
     };
     ended.map_or(Ok(asked), Err)
 }
 
-/// Asks the patches across a border, too; how the walk ends, if it does. The path to the HIP leads off the surface if the HIP is above the patch
-/// that the path leads into; at a hole nothing presses a proxy whose HIP is above all patches.
+/// Asks the patches across a border, too; how the walk ends, if it does. The path to the HIP leads
+/// off the surface if the HIP is above the patch that the path leads into; at a hole nothing
+/// presses a proxy whose HIP is above all patches.
 #[inline(never)]
 fn ask_neighbours<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,
     border: Side,
     best: &mut Asked,
-    rules: Rules<'_>,
+    leave: &Leave,
     budget: &mut Budget,
 ) -> Option<Walked> {
     let point = best.at;
@@ -291,15 +291,15 @@ fn ask_neighbours<const D: usize>(
                     (best.pull, best.at, best.patch) = (pull, at, patch);
                 }
             }
-            Ground::Missing if rules.waits => {
-                return Some(Walked::Missing(TileIndex::holding(at.cell)));
+            Ground::Missing => {
+                budget.lacks(at.cell);
+                best.is_open = true;
             }
-            Ground::Missing => best.missing = Some(TileIndex::holding(at.cell)),
             Ground::Hole => has_hole = true,
         }
     }
-    has_hole |= best.missing.is_some();
-    if leads_off && let Some(walked) = rules.off(&point) {
+    has_hole |= best.is_open;
+    if leads_off && let Some(walked) = off(leave, &point) {
         return Some(walked);
     }
     (has_hole && all_above).then_some(Walked::Off)

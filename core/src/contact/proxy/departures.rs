@@ -8,9 +8,6 @@ use crate::terrain::Window;
 /// After so many departures without getting nearer to the HIP the proxy may leave the
 /// surface no more: it only moves to and fro by rounding.
 const DEPARTURES: u32 = 32;
-/// The same after so many that each come nearer by next to nothing: it creeps along what
-/// is all but vertical, and would for hours.
-const CREEPING: u32 = 2_048;
 
 /// The departures from the surface since the HIP last found the proxy on it, if there was
 /// one.
@@ -22,8 +19,6 @@ pub(super) struct Departed {
     nearest: GridPoint,
     /// Departures since from where it was no nearer.
     in_vain: u32,
-    /// Departures in a row from where it was not clearly nearer.
-    creeping: u32,
 }
 
 /// Counts a departure, and how it compares with the nearest one before.
@@ -32,13 +27,8 @@ pub(super) fn count_departure(departures: &mut Departures, from: GridPoint, view
         *departures = Some(Departed {
             nearest: from,
             in_vain: 0,
-            creeping: 0,
         });
         return;
-    };
-    before.creeping = match view.is_clearly_nearer(&from, &before.nearest) {
-        true => 0,
-        false => before.creeping + 1,
     };
     if view.is_nearer(&from, &before.nearest) {
         (before.nearest, before.in_vain) = (from, 0);
@@ -58,9 +48,7 @@ pub(super) fn may_leave<const D: usize>(
         position_on(window, &hit).is_some_and(|position| view.is_nearer(&position, before))
     };
     match departures {
-        Some(before) if before.in_vain >= DEPARTURES || before.creeping >= CREEPING => {
-            Leave::NoMore(hit)
-        }
+        Some(before) if before.in_vain >= DEPARTURES => Leave::NoMore(hit),
         Some(before) if !is_nearer(&before.nearest) => Leave::ButAt(hit),
         _ => Leave::Anywhere,
     }

@@ -2,16 +2,15 @@
 
 use glam::Vec3;
 
-use super::on_ground::Felt;
+use super::on_ground::{Came, Felt};
 use super::{Contact, Phase, Turn};
 use crate::contact::budget::Budget;
 use crate::contact::closest_point::{Leave, position_on};
-use crate::contact::friction::{Cone, Friction, Rules, Walk, Walked};
+use crate::contact::friction::{Cone, Friction, Walk, Walked};
 use crate::contact::output::ContactState;
-use crate::contact::settings::Execution;
 use crate::contact::surface::{HipView, SurfacePoint};
 use crate::grid::GridPoint;
-use crate::terrain::{TileIndex, Window};
+use crate::terrain::Window;
 
 /// A proxy that slides sticks again when it has not moved for so long, s: longer than
 /// a slow hand waits for its next encoder count.
@@ -95,13 +94,14 @@ impl Contact {
     ) {
         let mut budget = Budget::new(self.settings.work_per_tick);
         self.remembers_what_was_felt();
+        self.gives_up_beyond_window::<D>(&hip);
         if self.output.converged || !self.hip.is_same(&hip) {
             self.begins_to_walk(window, hip, &mut budget);
         }
         // Bounded by the budget, as without friction.
         while self.walks_on(window, hip, &mut budget) == Turn::GoesOn {}
         self.hip = hip;
-        self.output.work = budget.spent();
+        self.ends(&budget);
         self.counts_stillness();
     }
 
@@ -199,11 +199,7 @@ impl Contact {
             inside,
             held: rough.held,
         };
-        let rules = Rules {
-            leave: &on.leave,
-            waits: self.settings.execution == Execution::LockStep,
-        };
-        let walked = walk.advance(window, &HipView::new(hip), &cone, rules, budget);
+        let walked = walk.advance(window, &HipView::new(hip), &cone, &on.leave, budget);
         if walk.at_rest.is_none() {
             rough.stage = Stage::GoesOn {
                 ways: walk.ways,
@@ -218,15 +214,13 @@ impl Contact {
             on.descent.restart(walk.point);
         }
         match walked {
-            Walked::Rests(missing) => {
-                self.is_held_at(window, hip, walk.point, missing.is_none(), missing)
+            Walked::Rests => self.is_held_at(window, hip, walk.point, Came::ToRest, budget),
+            Walked::Missing => {
+                self.is_held_at(window, hip, walk.point, Came::ToMissingTile, budget)
             }
-            Walked::Missing(tile) => {
-                // Also where the proxy's own patch is in that tile.
-                (self.output.converged, self.output.missing_tile) = (false, Some(tile));
-                self.is_held_at(window, hip, walk.point, false, Some(tile))
+            Walked::Suspended => {
+                self.is_held_at(window, hip, walk.point, Came::AsFarAsWork, budget)
             }
-            Walked::Suspended => self.is_held_at(window, hip, walk.point, false, None),
             Walked::Leaves => self.leaves(window, &HipView::new(hip), hip),
             Walked::Off => {
                 (rough.stage, rough.held) = (Stage::Descends, Vec3::ZERO);
@@ -243,8 +237,8 @@ impl Contact {
         window: &Window<'_, D>,
         hip: GridPoint,
         point: SurfacePoint,
-        converged: bool,
-        missing_tile: Option<TileIndex>,
+        came: Came,
+        budget: &mut Budget,
     ) -> Turn {
         let Some(proxy) = position_on(window, &point) else {
             return Turn::Ends;
@@ -254,13 +248,12 @@ impl Contact {
             proxy,
             displacement: hip.to(&proxy),
         };
-        self.touches_at(window, hip, felt, converged, missing_tile)
+        self.touches_at(window, hip, felt, came, budget)
     }
 
     /// Counts how long the proxy has not moved, by the answers that count, and whether the next
     /// answer is this one again.
     fn counts_stillness(&mut self) {
-        self.at_rest = self.output.converged && self.boundary_fade() == 1.0;
         let before = self.felt.map(|(proxy, _)| proxy);
         let tick_s = self.settings.rate.tick_s();
         let least_way = self.settings.sticks_below * tick_s;

@@ -4,11 +4,10 @@ use super::departures::{Departures, may_leave};
 use super::{Contact, OnSurface, Phase, Sweeping, Turn};
 use crate::contact::budget::Budget;
 use crate::contact::output::{ContactOutput, ContactState};
-use crate::contact::settings::Execution;
 use crate::contact::surface::HipView;
 use crate::contact::sweep::{Path, Swept};
 use crate::grid::GridPoint;
-use crate::terrain::{Ground, TileIndex, Window};
+use crate::terrain::{Ground, Window};
 
 impl Contact {
     /// Waiting ends when the HIP is above the patch it is over, or above everything.
@@ -17,9 +16,10 @@ impl Contact {
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
+        budget: &mut Budget,
     ) -> Turn {
         if let Some(landing) = &self.landing {
-            let waits = landing.waits();
+            let waits = landing.waits(budget);
             return self.answers(waits);
         }
         let view = HipView::new(hip);
@@ -31,20 +31,21 @@ impl Contact {
         }
         self.phase = Phase::Waiting;
         let is_missing = ground == Ground::Missing;
+        if is_missing {
+            budget.lacks(cell);
+        }
         self.answers(ContactOutput {
             proxy: hip,
             converged: !is_missing,
-            missing_tile: is_missing.then(|| TileIndex::holding(cell)),
             ..ContactOutput::default()
         })
     }
 
     /// A free proxy has to wait: it is as far as its path is known to be free.
-    pub(super) fn waits_at(&mut self, proxy: GridPoint, missing_tile: Option<TileIndex>) -> Turn {
+    pub(super) fn waits_at(&mut self, proxy: GridPoint) -> Turn {
         self.answers(ContactOutput {
             state: ContactState::Free,
             proxy,
-            missing_tile,
             ..ContactOutput::default()
         })
     }
@@ -77,13 +78,13 @@ impl Contact {
             departures: None,
         };
         let swept = sweeping.path.advance(window, budget);
-        if matches!(swept, Swept::Missing(_) | Swept::Suspended) {
-            sweeping.was_late = self.settings.execution == Execution::RealTime;
+        if matches!(swept, Swept::Missing | Swept::Suspended) {
+            sweeping.was_late = matches!(swept, Swept::Missing);
             let at = sweeping.path.at();
             self.phase = Phase::Sweeping(sweeping);
-            return self.waits_at(at, swept.missing_tile());
+            return self.waits_at(at);
         }
-        self.arrives(window, hip, swept, Departures::None, 1.0)
+        self.arrives(window, hip, swept, (Departures::None, 1.0), budget)
     }
 
     /// Goes on with a path from an earlier tick, or off the surface.
@@ -98,10 +99,10 @@ impl Contact {
             return Turn::Ends;
         };
         let swept = sweeping.path.advance(window, budget);
-        if matches!(swept, Swept::Missing(_) | Swept::Suspended) {
-            sweeping.was_late |= self.settings.execution == Execution::RealTime;
+        if matches!(swept, Swept::Missing | Swept::Suspended) {
+            sweeping.was_late |= matches!(swept, Swept::Missing);
             let at = sweeping.path.at();
-            return self.waits_at(at, swept.missing_tile());
+            return self.waits_at(at);
         }
         let fade = if sweeping.was_late {
             0.0
@@ -109,7 +110,7 @@ impl Contact {
             sweeping.fade
         };
         let departures = sweeping.departures;
-        self.arrives(window, hip, swept, departures, fade)
+        self.arrives(window, hip, swept, (departures, fade), budget)
     }
 
     /// What a path that ended comes to: on the surface the tick goes on.
@@ -118,8 +119,8 @@ impl Contact {
         window: &Window<'_, D>,
         hip: GridPoint,
         swept: Swept,
-        departures: Departures,
-        fade: f32,
+        (departures, fade): (Departures, f32),
+        budget: &mut Budget,
     ) -> Turn {
         match swept {
             Swept::Hit(point) => {
@@ -130,8 +131,8 @@ impl Contact {
                 });
                 Turn::GoesOn
             }
-            Swept::Under => self.loses_contact(window, hip),
-            Swept::Clear | Swept::Missing(_) | Swept::Suspended => self.becomes_free(hip),
+            Swept::Under => self.loses_contact(window, hip, budget),
+            Swept::Clear | Swept::Missing | Swept::Suspended => self.becomes_free(hip),
         }
     }
 }

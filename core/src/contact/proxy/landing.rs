@@ -4,12 +4,13 @@
 use glam::Vec3;
 
 use super::{Contact, OnSurface, Phase};
+use crate::contact::budget::Budget;
 use crate::contact::closest_point::position_on;
 use crate::contact::output::{ContactOutput, ContactState};
 use crate::contact::settings::ContactSettings;
 use crate::contact::surface::SurfacePoint;
 use crate::grid::GridPoint;
-use crate::terrain::{Ground, TileIndex, Window};
+use crate::terrain::{Ground, Window};
 
 /// Where a contact is to begin.
 #[derive(Clone, Debug)]
@@ -80,10 +81,10 @@ impl Contact {
 impl Landing {
     /// The answer while the terrain at the place is not here yet.
     #[cold]
-    pub(super) fn waits(&self) -> ContactOutput {
+    pub(super) fn waits(&self, budget: &mut Budget) -> ContactOutput {
+        budget.lacks(self.at.column());
         ContactOutput {
             proxy: self.at,
-            missing_tile: Some(TileIndex::holding(self.at.column())),
             ..ContactOutput::default()
         }
     }
@@ -93,7 +94,7 @@ impl Landing {
 mod tests {
     use super::*;
     use crate::terrain::testing::{Field, buffers};
-    use crate::terrain::{FieldSize, TileKey};
+    use crate::terrain::{FieldSize, TileIndex, TileKey};
 
     fn column(x: f32, y: f32) -> GridPoint {
         GridPoint::new([0; 3], Vec3::new(x, y, -77.0))
@@ -110,7 +111,7 @@ mod tests {
         let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), wall);
         // Pushed three cells into the wall from the west, as the HIP sees the proxy.
         let stretch = Vec3::new(-3.0, 0.1, 0.0);
-        let mut contact = Contact::landing(ContactSettings::REAL_TIME, column(10.5, 20.5), stretch);
+        let mut contact = Contact::landing(ContactSettings::AT_1_KHZ, column(10.5, 20.5), stretch);
         assert!(contact.is_landing());
         let hip = contact.land(&field.window).expect("the terrain is there");
         assert!(!contact.is_landing());
@@ -133,7 +134,7 @@ mod tests {
         let mut tiles = buffers::<2>();
         let mut field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), |_, _| 2.0);
         let stretch = Vec3::new(40.0, 0.0, 1.0);
-        let mut contact = Contact::landing(ContactSettings::REAL_TIME, column(60.5, 5.5), stretch);
+        let mut contact = Contact::landing(ContactSettings::AT_1_KHZ, column(60.5, 5.5), stretch);
         let hip = GridPoint::new([20, 5, 1], Vec3::splat(0.5));
         for _ in 0..3 {
             assert_eq!(contact.land(&field.window), None);
@@ -158,7 +159,7 @@ mod tests {
             if x > 20 { f32::NAN } else { 0.0 }
         });
         let stretch = Vec3::new(0.0, 0.0, 1.0);
-        let mut contact = Contact::landing(ContactSettings::REAL_TIME, column(30.5, 5.5), stretch);
+        let mut contact = Contact::landing(ContactSettings::AT_1_KHZ, column(30.5, 5.5), stretch);
         assert_eq!(contact.land(&field.window), None);
         let output = *contact.step(&field.window, &column(30.5, 5.5));
         assert_eq!(

@@ -6,14 +6,24 @@ use super::departures::count_departure;
 use super::{Contact, Phase, Sweeping, Turn};
 use crate::contact::boundary_fade::{self, approach};
 use crate::contact::budget::Budget;
-use crate::contact::closest_point::{Ended, Leave, position_on};
+use crate::contact::closest_point::{Ended, position_on};
 use crate::contact::output::{ContactOutput, ContactState};
-use crate::contact::settings::{Execution, Rule};
 use crate::contact::shortcut::Follow;
 use crate::contact::surface::{HipView, SurfacePoint};
 use crate::contact::sweep::Path;
 use crate::grid::{Cell, GridPoint};
-use crate::terrain::{TileIndex, Window};
+use crate::terrain::Window;
+
+/// How far a proxy on the surface has come in a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Came {
+    /// Nothing is left to do.
+    ToRest,
+    /// It stands beside a tile that is not here.
+    ToMissingTile,
+    /// The budget is spent.
+    AsFarAsWork,
+}
 
 /// A point of the surface that is felt.
 pub(super) struct Felt {
@@ -37,26 +47,12 @@ impl Contact {
             return Turn::Ends;
         };
         let view = HipView::new(hip);
-        let is_paper = self.settings.rule == Rule::Paper;
-        let leave = if is_paper { &Leave::Nowhere } else { &on.leave };
-        let waits = self.settings.execution == Execution::LockStep;
-        match on.descent.advance(window, &view, leave, waits, budget) {
-            Ended::Rests if is_paper => self.decides(window, &view, hip),
-            Ended::Rests => self.touches(window, hip, true, None),
-            Ended::Missing(tile) => self.touches(window, hip, false, Some(tile)),
-            Ended::Suspended => self.touches(window, hip, false, None),
+        match on.descent.advance(window, &view, &on.leave, budget) {
+            Ended::Rests => self.touches(window, hip, Came::ToRest, budget),
+            Ended::Missing => self.touches(window, hip, Came::ToMissingTile, budget),
+            Ended::Suspended => self.touches(window, hip, Came::AsFarAsWork, budget),
             Ended::Leaves => self.leaves(window, &view, hip),
-            Ended::Lost(_) if is_paper => self.becomes_free(hip),
-            // The window gave up the proxy's tile. Until it comes back no tick counts.
-            Ended::Lost(Some(tile)) if waits => {
-                (self.output.converged, self.output.missing_tile) = (false, Some(tile));
-                Turn::Ends
-            }
-            Ended::Lost(tile) => {
-                let turn = self.loses_contact(window, hip);
-                self.output.missing_tile = self.output.missing_tile.or(tile);
-                turn
-            }
+            Ended::Lost => self.loses_contact(window, hip, budget),
         }
     }
 
@@ -93,8 +89,8 @@ impl Contact {
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
-        converged: bool,
-        missing_tile: Option<TileIndex>,
+        came: Came,
+        budget: &mut Budget,
     ) -> Turn {
         let view = HipView::new(hip);
         let Phase::OnSurface(on) = &self.phase else {
@@ -108,7 +104,7 @@ impl Contact {
             proxy: view.position(&point, z),
             displacement: view.displacement(&point, z),
         };
-        self.touches_at(window, hip, felt, converged, missing_tile)
+        self.touches_at(window, hip, felt, came, budget)
     }
 
     /// The answer in contact, faded where the surface ends.
@@ -117,30 +113,26 @@ impl Contact {
         window: &Window<'_, D>,
         hip: GridPoint,
         felt: Felt,
-        mut converged: bool,
-        mut missing_tile: Option<TileIndex>,
+        came: Came,
+        budget: &mut Budget,
     ) -> Turn {
-        let is_real_time = self.settings.execution == Execution::RealTime;
         let most = boundary_fade::RATE_PER_S * self.settings.rate.tick_s();
         let Phase::OnSurface(on) = &mut self.phase else {
             return Turn::Ends;
         };
         let point = felt.point;
-        let mut may_follow = self.settings.shortcuts && self.settings.rule == Rule::Swept;
-        if converged || is_real_time {
-            let target = boundary_fade::target(window, &hip, point.cell);
+        let mut may_follow = self.settings.shortcuts;
+        // What is left over of a tick is no tick of its own.
+        if came != Came::AsFarAsWork {
+            let target = boundary_fade::target(window, &hip, point.cell, budget);
             may_follow &= target.over_patch;
-            if let (Some(tile), false) = (target.missing, is_real_time) {
-                (converged, missing_tile) = (false, Some(tile));
-            } else {
-                on.fade = approach(on.fade, target.fade, most);
-                if on.fade == 0.0 && target.fade == 0.0 {
-                    // The HIP may be above the surface already; to look now and not in
-                    // the next tick is what makes a missing tile leave no trace.
-                    return self.looks_around(window, hip);
-                }
+            on.fade = approach(on.fade, target.fade, most);
+            if on.fade == 0.0 && target.fade == 0.0 {
+                // The HIP may be above the surface already.
+                return self.looks_around(window, hip, budget);
             }
         }
+        let converged = came == Came::ToRest;
         let displacement = felt.displacement * on.fade;
         // A proxy that has stayed in its patch is likely to stay for another tick.
         let [x, y, _] = self.output.proxy.cell();
@@ -158,7 +150,6 @@ impl Contact {
         self.output.proxy = felt.proxy;
         self.output.displacement = displacement;
         self.output.converged = converged;
-        self.output.missing_tile = missing_tile;
         Turn::Ends
     }
 
@@ -167,16 +158,17 @@ impl Contact {
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
+        budget: &mut Budget,
     ) -> Turn {
         let Some((proxy, displacement)) = self.felt else {
-            return self.looks_around(window, hip);
+            return self.looks_around(window, hip, budget);
         };
         self.phase = Phase::Fading {
             proxy,
             displacement,
             fade: 1.0,
         };
-        self.fades_out(window, hip)
+        self.fades_out(window, hip, budget)
     }
 
     /// A tick of fading out.
@@ -184,6 +176,7 @@ impl Contact {
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
+        budget: &mut Budget,
     ) -> Turn {
         let most = boundary_fade::RATE_PER_S * self.settings.rate.tick_s();
         if let Phase::Fading {
@@ -204,6 +197,6 @@ impl Contact {
                 return Turn::Ends;
             }
         }
-        self.looks_around(window, hip)
+        self.looks_around(window, hip, budget)
     }
 }

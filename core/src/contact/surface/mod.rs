@@ -4,9 +4,7 @@ pub mod patch;
 
 mod hip_view;
 mod point;
-mod smoothed;
 
-pub(super) use hip_view::HipView;
+pub(crate) use hip_view::HipView;
 pub(super) use point::is_well_inside;
 pub use point::{Side, SurfacePoint};
-pub(crate) use smoothed::{Slopes, SlopesAt};

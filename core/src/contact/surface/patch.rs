@@ -123,7 +123,7 @@ impl Patch {
 
 /// From `x` at 0 to `y` at 1, both exactly.
 #[inline]
-pub(super) fn mix(x: f32, y: f32, t: f32) -> f32 {
+pub(crate) fn mix(x: f32, y: f32, t: f32) -> f32 {
     x * (1.0 - t) + y * t
 }
 

@@ -68,12 +68,6 @@ impl Side {
             north: toward(self.north, to.1 - v),
         }
     }
-
-    /// The patch itself and its neighbours over a border toward this side.
-    pub(in crate::contact) fn itself_and_neighbours(self) -> impl Iterator<Item = Self> {
-        let neighbours = (0..3).map(move |place| self.neighbour(place));
-        core::iter::once(Self::NONE).chain(neighbours.filter(|side| *side != Self::NONE))
-    }
 }
 
 /// A point on the surface; its height is its patch's.

@@ -2,7 +2,7 @@
 
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{Side, SurfacePoint};
-use crate::contact::tolerance::{RUNS_ALONG, TINY_STEP};
+use crate::contact::tolerance::TINY_STEP;
 use crate::grid::{Cell, GridPoint};
 use crate::scalar::larger;
 use crate::terrain::{Ground, Window};
@@ -26,23 +26,6 @@ impl Step {
             .max((self.to.1 - self.from.1).abs())
             < TINY_STEP
             && self.z_from - self.z_to < TINY_STEP
-    }
-
-    /// Height of its lower end above the start of the path, cells.
-    #[inline]
-    pub(super) fn low(&self) -> f32 {
-        if self.z_to < self.z_from {
-            self.z_to
-        } else {
-            self.z_from
-        }
-    }
-
-    /// Whether the ground, no corner of which is farther up or down than
-    /// `largest`, rises or falls with the path, `gap` over it.
-    pub(super) fn runs_along(&self, gap: &[f32; 3], largest: f32) -> bool {
-        let rise = (self.z_to - self.z_from).abs();
-        largest <= RUNS_ALONG * rise && gap.iter().all(|gap| RUNS_ALONG * gap.abs() <= rise)
     }
 
     /// The patch's height over the path, cells, as Bernstein coefficients.
@@ -119,14 +102,9 @@ pub(super) struct Steps {
     east: Axis,
     north: Axis,
     from: (f32, f32),
-    /// Heights, cells: where the path begins, where it ends, and where the last
-    /// step ended.
-    z_start: f32,
+    /// Heights above the start of the path, cells: where it ends, and where the last step ended.
     z_end: f32,
     z_from: f32,
-    /// Fractions of the path at which the last step began and ended.
-    t_from: f32,
-    t_to: f32,
     done: bool,
 }
 
@@ -136,22 +114,15 @@ impl Steps {
         let axis = |axis: usize| {
             let (first, last) = (at.cell()[axis], end.cell()[axis]);
             let end = last.wrapping_sub(first) as f32 + end.frac()[axis];
-            Axis::new(first, [first, last], [at.frac()[axis], end])
+            Axis::new(first, last, [at.frac()[axis], end])
         };
-        Self::along(axis(0), axis(1), [0.0, at.to(end).z])
-    }
-
-    /// The cells under a path with these axes, between two heights.
-    pub(super) fn along(east: Axis, north: Axis, [z_start, z_end]: [f32; 2]) -> Self {
+        let (east, north) = (axis(0), axis(1));
         Self {
             from: (east.at(0.0), north.at(0.0)),
             east,
             north,
-            z_start,
-            z_end,
-            z_from: z_start,
-            t_from: 0.0,
-            t_to: 0.0,
+            z_end: at.to(end).z,
+            z_from: 0.0,
             done: false,
         }
     }
@@ -159,12 +130,6 @@ impl Steps {
     /// Whether the last cell has been given.
     pub(super) fn is_done(&self) -> bool {
         self.done
-    }
-
-    /// The fraction of the path up to a fraction of the last step.
-    pub(super) fn passed(&self, part: f32) -> f32 {
-        let t_to = if self.done { 1.0 } else { self.t_to };
-        self.t_from + part * (t_to - self.t_from)
     }
 
     #[inline]
@@ -175,20 +140,19 @@ impl Steps {
         let Self { east, north, .. } = self;
         let cell = Cell::new(east.square, north.square);
         let (from, z_from) = (self.from, self.z_from);
-        self.t_from = self.t_to;
         let (to, z_to);
         if east.left | north.left == 0 {
             self.done = true;
             (to, z_to) = ((east.ends(), north.ends()), self.z_end);
         } else if east.t <= north.t {
             let (t, u, v) = (east.t, east.ahead(), north.at(east.t));
-            (to, z_to) = ((u, v), self.z_start + (self.z_end - self.z_start) * t);
-            (self.from, self.t_to) = ((1.0 - u, v), t);
+            (to, z_to) = ((u, v), self.z_end * t);
+            self.from = (1.0 - u, v);
             east.crosses();
         } else {
             let (t, u, v) = (north.t, east.at(north.t), north.ahead());
-            (to, z_to) = ((u, v), self.z_start + (self.z_end - self.z_start) * t);
-            (self.from, self.t_to) = ((u, 1.0 - v), t);
+            (to, z_to) = ((u, v), self.z_end * t);
+            self.from = (u, 1.0 - v);
             north.crosses();
         }
         self.z_from = z_to;
@@ -203,28 +167,27 @@ impl Steps {
 }
 
 /// The squares of a lattice that a path passes along one axis. Places are counted
-/// in sides of a square from an origin that is a square's lower border.
-pub(super) struct Axis {
+/// in sides of a square from the first square's lower border.
+struct Axis {
     start: f32,
     end: f32,
     way: f32,
     per_way: f32,
     /// Square now, its lower border, and how many squares are still to come.
-    pub(super) square: i32,
+    square: i32,
     floor: f32,
-    pub(super) left: u32,
+    left: u32,
     /// +1 or −1: where they lie.
     toward: i32,
     /// At which fraction of the path the next border is reached; infinite when the
     /// path ends before.
-    pub(super) t: f32,
+    t: f32,
 }
 
 impl Axis {
-    /// From the first square to the last, from one place to another as seen from
-    /// the `origin` square.
+    /// From the first square to the last, from one place to another as seen from the first.
     #[inline]
-    pub(super) fn new(origin: i32, [first, last]: [i32; 2], [start, end]: [f32; 2]) -> Self {
+    fn new(first: i32, last: i32, [start, end]: [f32; 2]) -> Self {
         let way = end - start;
         let mut axis = Self {
             start,
@@ -232,7 +195,7 @@ impl Axis {
             way,
             per_way: 1.0 / way,
             square: first,
-            floor: first.wrapping_sub(origin) as f32,
+            floor: 0.0,
             left: first.abs_diff(last),
             toward: if last < first { -1 } else { 1 },
             t: f32::INFINITY,
@@ -243,7 +206,7 @@ impl Axis {
 
     /// Goes over the border ahead.
     #[inline]
-    pub(super) fn crosses(&mut self) {
+    fn crosses(&mut self) {
         self.square = self.square.wrapping_add(self.toward);
         self.floor += self.toward as f32;
         self.left -= 1;
@@ -268,7 +231,7 @@ impl Axis {
 
     /// Where in the square the path is after a fraction of it.
     #[inline]
-    pub(super) fn at(&self, t: f32) -> f32 {
+    fn at(&self, t: f32) -> f32 {
         (self.start + self.way * t - self.floor).clamp(0.0, 1.0)
     }
 

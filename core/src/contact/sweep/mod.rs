@@ -3,7 +3,6 @@
 pub mod intersect;
 
 mod cells;
-mod look_ahead;
 mod path;
 
 pub(super) use path::{Path, Swept, lower};

@@ -1,10 +1,9 @@
 //! The first true crossing of the HIP's path with the bilinear surface.
 //!
 //! The path is halved until a piece is known to be clear, by one look at the
-//! maximum pyramid or by a look along it (`look_ahead`), or is short enough to be
-//! intersected cell by cell. Half-way points are exact to 2⁻²⁴ cell at any
-//! distance, so a sweep of thousands of cells is as accurate as one of a tenth, and
-//! one that hits nothing costs the logarithm of its length. Pieces are always the
+//! maximum pyramid, or is short enough to be intersected cell by cell. Half-way points are exact to 2⁻²⁴ cell at any
+//! distance, so a sweep of thousands of cells is as accurate as one of a tenth.
+//! Pieces are always the
 //! same halves of halves, so a sweep that runs out of budget or meets a missing tile
 //! goes on later to the same bits.
 
@@ -12,11 +11,10 @@ use heapless::Vec;
 
 use super::cells::{Steps, beside};
 use super::intersect::{first_crossing, next_crossing};
-use super::look_ahead::look_along;
-use crate::contact::budget::{BOX, Budget, HALF, INTERSECTION};
+use crate::contact::budget::{BOX, Budget, INTERSECTION};
 use crate::contact::surface::{HipView, SurfacePoint};
-use crate::grid::{Altitude, Cell, GridPoint};
-use crate::terrain::{CellBox, Ground, TileIndex, Window};
+use crate::grid::{Altitude, GridPoint};
+use crate::terrain::{CellBox, Ground, Window};
 
 /// Most columns, or rows, that a piece which is intersected cell by cell goes on
 /// from its first: it is over nine cells at most, which a tick's budget is enough
@@ -24,11 +22,9 @@ use crate::terrain::{CellBox, Ground, TileIndex, Window};
 const WALK_CELLS: u32 = 4;
 /// Tallest piece, in cells, that is intersected.
 const WALK_HEIGHT: u32 = 16;
-/// Longest piece, in cells along an axis, that is looked along at once.
-const LOOK_CELLS: u32 = 64;
-/// Halvings that bring the longest possible path down to a walk, and two: where the
+/// Halvings that bring a path of millions of cells down to a walk, and two: where the
 /// path began, and where it leads since the HIP has moved.
-const DEPTH: usize = 31;
+const DEPTH: usize = 22;
 
 /// How a sweep ended.
 #[derive(Clone, Copy, Debug)]
@@ -41,19 +37,9 @@ pub(in crate::contact) enum Swept {
     /// border of the data: nothing was crossed from above.
     Under,
     /// A tile on the path is not here.
-    Missing(TileIndex),
+    Missing,
     /// The budget is spent.
     Suspended,
-}
-
-impl Swept {
-    /// The tile that is not here.
-    pub(in crate::contact) const fn missing_tile(&self) -> Option<TileIndex> {
-        match self {
-            Self::Missing(tile) => Some(*tile),
-            _ => None,
-        }
-    }
 }
 
 /// A sweep under way: where the proxy has come, and what is still to do.
@@ -63,9 +49,6 @@ pub(in crate::contact) struct Path {
     at: GridPoint,
     /// Ends of the pieces still to do, the last one first.
     ends: Vec<GridPoint, DEPTH>,
-    /// The fraction of the first piece that is known to be clear, while the rest is
-    /// being halved.
-    clear: Option<f32>,
     /// The path starts on the surface and leaves it.
     on_surface: bool,
     /// The last cell passed holds no patch: a hole, or beyond the data.
@@ -92,7 +75,6 @@ impl Path {
         Self {
             at: from,
             ends,
-            clear: None,
             on_surface,
             over_hole: false,
             is_missing: false,
@@ -113,9 +95,8 @@ impl Path {
         self.ends.clear();
         // Capacity is DEPTH > 2.
         let _ = self.ends.push(to);
-        match begun {
-            Some(end) => drop(self.ends.push(end)),
-            None => self.clear = None,
+        if let Some(end) = begun {
+            let _ = self.ends.push(end);
         }
     }
 
@@ -131,12 +112,11 @@ impl Path {
         budget: &mut Budget,
     ) -> Swept {
         self.is_missing = false;
-        while !self.ends.is_empty() {
-            if !self.halve(window, budget) || !budget.has(BOX) {
+        while let Some(&end) = self.ends.last() {
+            if !budget.has(BOX) {
                 return Swept::Suspended;
             }
             budget.spend(BOX);
-            let Some(&end) = self.ends.last() else { break };
             let around = CellBox::around(self.at.column(), end.column());
             let span = with_borders(around, &end);
             let low = lower(&self.at, &end);
@@ -144,51 +124,17 @@ impl Path {
                 // Above all that is around, so only the field's border matters.
                 self.over_hole = !window.has_cell(end.column());
                 self.on_surface = false;
-            } else if self.is_walked(&end) {
-                if let Some(ended) = self.walk(window, end, budget) {
-                    return ended;
-                }
-            } else if longer_side(around) > LOOK_CELLS {
+            } else if !self.is_walked(&end) {
                 // Not full: such a piece is walked.
                 let _ = self.ends.push(self.at.midpoint(&end));
                 continue;
-            } else {
-                if let Err(clear) = look_along(window, &self.at, &end, budget) {
-                    self.clear = Some(clear);
-                    continue;
-                }
-                self.passes(window, self.at, end);
+            } else if let Some(ended) = self.walk(window, end, budget) {
+                return ended;
             }
             self.at = end;
             self.ends.pop();
         }
         Swept::Clear
-    }
-
-    /// Goes on through the part of the first piece that is known to be clear, and
-    /// halves what follows down to a walk; `false` where the budget is spent.
-    fn halve<const D: usize>(&mut self, window: &Window<'_, D>, budget: &mut Budget) -> bool {
-        while let (Some(clear), Some(&end)) = (self.clear, self.ends.last()) {
-            if self.is_walked(&end) {
-                self.clear = None;
-                break;
-            }
-            if !budget.has(HALF) {
-                return false;
-            }
-            budget.spend(HALF);
-            let middle = self.at.midpoint(&end);
-            if clear >= 0.5 {
-                self.passes(window, self.at, middle);
-                self.at = middle;
-                self.clear = Some(2.0 * clear - 1.0);
-            } else {
-                // Not full: such a piece is walked.
-                let _ = self.ends.push(middle);
-                self.clear = Some(2.0 * clear);
-            }
-        }
-        true
     }
 
     /// Whether the piece up to `end` is intersected cell by cell: it is short, and
@@ -197,18 +143,6 @@ impl Path {
         let span = CellBox::around(self.at.column(), end.column());
         let is_low = self.at.cell()[2].abs_diff(end.cell()[2]) <= WALK_HEIGHT;
         (longer_side(span) <= WALK_CELLS && is_low) || self.ends.is_full()
-    }
-
-    /// The path is clear from one place to another.
-    fn passes<const D: usize>(&mut self, window: &Window<'_, D>, from: GridPoint, to: GridPoint) {
-        // On a border, what was passed is the cell before it.
-        let way = from.to(&to);
-        let [x, y] = [0, 1].map(|axis| {
-            let enters = to.frac()[axis] == 0.0 && way[axis] > 0.0;
-            to.cell()[axis] - i32::from(enters)
-        });
-        self.over_hole = window.ground(Cell::new(x, y)) == Ground::Hole;
-        self.on_surface = false;
     }
 
     /// Intersects the cells of one short piece.
@@ -241,7 +175,8 @@ impl Path {
                 Ground::Patch(corners) => view.patch(&corners),
                 Ground::Missing => {
                     self.is_missing = true;
-                    return Some(Swept::Missing(TileIndex::holding(step.cell)));
+                    budget.lacks(step.cell);
+                    return Some(Swept::Missing);
                 }
                 Ground::Hole => {
                     over_hole = true;

@@ -10,7 +10,7 @@ use super::*;
 use crate::cases::cases;
 use crate::contact::{Contact, ContactSettings, ContactState, Friction};
 use crate::grid::GridPoint;
-use crate::terrain::index::{BLOCK_SHIFT, Block, TileKey};
+use crate::terrain::index::TileKey;
 use crate::terrain::testing::buffers;
 use crate::terrain::{CellBox, CoarseTile, FieldSize};
 
@@ -388,11 +388,8 @@ fn a_hole_of_the_near_tile_is_not_known_where_the_wide_one_has_none() {
     bed.lays_part(NEAR, -2, &holed);
     assert_eq!(bed.window.ground(Cell::new(141, 146)), Ground::Missing);
     let low = Altitude::new(60, 0.0);
-    let block = |at: i32| Block {
-        col: at >> BLOCK_SHIFT,
-        row: at >> BLOCK_SHIFT,
-    };
-    assert!(!bed.window.block_is_clear(block(144), low));
+    let at = Cell::new(144, 144);
+    assert!(!bed.window.box_is_clear(CellBox::around(at, at), low));
     assert!(matches!(
         bed.window.ground(Cell::new(100, 100)),
         Ground::Patch(_)
@@ -406,12 +403,9 @@ fn what_the_near_tile_alone_has_counts_for_what_is_clear_and_for_how_far_a_tile_
     bed.lays_part(WIDE, 0, &|_, _| 0.0);
     let bump = |x, y| if (x, y) == (144, 144) { 10.0 } else { 0.0 };
     bed.lays_part(NEAR, 0, &bump);
-    let block = Block {
-        col: 144 >> BLOCK_SHIFT,
-        row: 144 >> BLOCK_SHIFT,
-    };
-    assert!(!bed.window.block_is_clear(block, Altitude::new(5, 0.0)));
-    assert!(bed.window.block_is_clear(block, Altitude::new(11, 0.0)));
+    let at = CellBox::around(Cell::new(144, 144), Cell::new(144, 144));
+    assert!(!bed.window.box_is_clear(at, Altitude::new(5, 0.0)));
+    assert!(bed.window.box_is_clear(at, Altitude::new(11, 0.0)));
     let tile = bed.spare.pop().expect("a buffer");
     let key = TileKey::new(0, 4, 4);
     tile.fill(key, 0, |_, _| 0.0).expect("in range");
@@ -443,25 +437,9 @@ fn clear_means_clear_over_what_has_not_settled() {
         }
         let a = Cell::new(96 + (step * 7) % 128, 96 + (step * 13) % 128);
         let b = a.offset(step % 41 - 20, step * 3 % 57 - 28);
-        // Also as a path's lower end is told: far up from where the path begins.
-        let up = step % 3 * 17;
-        let low = Altitude::new(25 + step % 12 + up, 0.5).raised(-up as f32);
+        let low = Altitude::new(25 + step % 12, 0.5);
         let span = CellBox::around(a, b);
-        let block = Block {
-            col: a.x >> BLOCK_SHIFT,
-            row: a.y >> BLOCK_SHIFT,
-        };
-        let (span, clear) = match step % 2 {
-            0 => {
-                let first = Cell::new(block.col << BLOCK_SHIFT, block.row << BLOCK_SHIFT);
-                let whole = CellBox::around(first, first.offset(7, 7));
-                (whole, bed.window.block_is_clear(block, low))
-            }
-            _ => {
-                let low = Altitude::new(25 + step % 12, 0.5);
-                (span, bed.window.is_clear(span, low))
-            }
-        };
+        let clear = bed.window.is_clear(span, low);
         seen[usize::from(clear)] += 1;
         for (x, y) in (span.from.x..=span.to.x + 1)
             .flat_map(|x| (span.from.y..=span.to.y + 1).map(move |y| (x, y)))
@@ -521,7 +499,7 @@ fn where_it_moves(up: bool) -> (i32, i32) {
 fn held_still(friction: Friction, up: bool, above: f64) -> Vec<(f64, ContactState)> {
     let mut room = room();
     let mut bed = Bed::with_underlay(&mut room);
-    let settings = ContactSettings::REAL_TIME.with_friction(friction);
+    let settings = ContactSettings::AT_1_KHZ.with_friction(friction);
     let mut contact = Box::new(Contact::new(settings));
     let (x, y) = where_it_moves(up);
     let z = (coarse(x, y).expect("known") + above) as f32;
@@ -597,7 +575,7 @@ fn a_hand_that_the_surface_passes_does_not_fall_through_it() {
     let (x, y) = where_it_moves(true);
     let mut room = room();
     let mut bed = Bed::with_underlay(&mut room);
-    let mut contact = Box::new(Contact::new(ContactSettings::REAL_TIME));
+    let mut contact = Box::new(Contact::new(ContactSettings::AT_1_KHZ));
     let z = (coarse(x, y).expect("known") + 0.1) as f32;
     let hip = GridPoint::new([x, y, 0], Vec3::new(0.01, 0.01, z));
     contact.step(&bed.window, &GridPoint::new([x, y, 60], Vec3::ZERO));

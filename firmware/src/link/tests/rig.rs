@@ -5,7 +5,6 @@ use std::collections::VecDeque;
 use std::vec::Vec;
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Mode, Report, Sense};
@@ -58,7 +57,6 @@ pub(super) fn scene(source: Source) -> Scene {
         cell_mm: 1.0,
         home: GridPoint::new([100, 100, 10], Vec3::ZERO),
         law: ForceLaw::PREMIUM,
-        rule: Rule::Swept,
         source,
         hold_clock: false,
         materials: None,

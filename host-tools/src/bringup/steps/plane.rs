@@ -1,7 +1,6 @@
 //! A flat plane under the arm, without a terrain file.
 
 use glam::{DVec3, Vec3};
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::phantom::{Calibration, to_terrain_frame};
@@ -41,7 +40,6 @@ pub(super) fn below_tip(record: &Calibration, status: &Status, below_mm: f32) ->
             Vec3::Z * ((below_mm - up_mm) / CELL_MM),
         ),
         law: SOFT,
-        rule: Rule::default(),
         source: Source::Encoders,
         hold_clock: false,
         materials: None,

@@ -281,7 +281,7 @@ mod tests {
             assert!(why.contains(wanted) && why.contains("hint: "), "{why}");
         }
         let paper = Rendering {
-            contact: Some(super::super::rendering::ContactRule::Paper),
+            contact: Some(crate::replay::settings::Rule::Paper),
             ..usual
         };
         assert!(read("[class.1]\nfriction = 0.3", &paper).is_err());

@@ -2,11 +2,11 @@
 
 use std::fmt::Debug;
 
-use hapterra_core::contact::{Friction, Rule};
+use hapterra_core::contact::Friction;
 use hapterra_core::force::{Controller, Shading};
 
 use super::exaggeration::Exaggeration;
-use super::rendering::{ContactRule, ForceShading, PassivityController, Rendering};
+use super::rendering::{ForceShading, PassivityController, Rendering};
 use crate::replay::Settings;
 
 impl Rendering {
@@ -69,7 +69,7 @@ impl Rendering {
                 &mut told,
             )),
             texture: self.texture.or_recorded(&force.texture, &mut told),
-            contact: Some(merged("contact", self.contact, rule(force.rule), &mut told)),
+            contact: Some(merged("contact", self.contact, force.rule, &mut told)),
             ..self.clone()
         };
         match (self.height_mm_per_unit, self.exaggeration) {
@@ -146,14 +146,6 @@ const fn shading(shading: Shading) -> ForceShading {
         Shading::Smooth => ForceShading::Smooth,
     }
 }
-
-const fn rule(rule: Rule) -> ContactRule {
-    match rule {
-        Rule::Swept => ContactRule::Swept,
-        Rule::Paper => ContactRule::Paper,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use hapterra_core::force::{Damping, ForceLaw, Pattern, Texture};
@@ -161,6 +153,7 @@ mod tests {
     use super::super::texture::{SurfacePattern, SurfaceTexture};
     use super::*;
     use crate::raster::Raster;
+    use crate::replay::Rule;
     use crate::replay::settings::Device;
     use crate::terrain::{FeltCells, Scale, Terrain};
 
@@ -199,6 +192,7 @@ mod tests {
     #[test]
     fn damping_is_as_recorded_and_what_is_stated_wins() {
         let mut recorded = recorded();
+        recorded.force.rule = Rule::Swept;
         recorded.force.damping = Damping {
             ns_per_m: 2.5,
             controller: Controller::Off,
@@ -226,6 +220,7 @@ mod tests {
     #[test]
     fn shading_is_as_recorded_and_what_is_stated_wins() {
         let mut recorded = recorded();
+        recorded.force.rule = Rule::Swept;
         recorded.force.shading = Shading::Smooth;
         let (rendering, told) = Rendering::default().or_recorded(&recorded);
         assert_eq!(told, [""; 0]);
@@ -252,6 +247,7 @@ mod tests {
             direction_deg: 30.0,
             seed: 4,
         };
+        recorded.force.rule = Rule::Swept;
         recorded.force.texture = grating;
         let with = |change: fn(&mut SurfaceTexture)| {
             let mut rendering = Rendering::default();

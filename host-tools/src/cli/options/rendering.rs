@@ -1,6 +1,6 @@
 //! Options that say how a terrain feels, shared by `replay`, `run` and `demo`.
 
-use hapterra_core::contact::{Friction, Rule};
+use hapterra_core::contact::Friction;
 use hapterra_core::force::{Controller, Damping, ForceLaw, Shading};
 
 use super::exaggeration::Exaggeration;
@@ -9,6 +9,7 @@ use super::texture::SurfaceTexture;
 use crate::cli::failure::{Failure, OrHint};
 use crate::place::{Heights, suited_height};
 use crate::raster::Raster;
+use crate::replay::Rule;
 use crate::terrain::{FeltCells, FeltGrid, Scale, Terrain};
 
 /// How the terrain feels.
@@ -87,16 +88,7 @@ pub struct Rendering {
 
     /// Contact rule [default: swept]
     #[arg(long, value_enum)]
-    pub contact: Option<ContactRule>,
-}
-
-/// Contact rule.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum ContactRule {
-    /// Continuous: nothing passes through the surface
-    Swept,
-    /// As published in the paper, for comparison
-    Paper,
+    pub contact: Option<Rule>,
 }
 
 /// Which normals the force follows.
@@ -191,6 +183,19 @@ impl Rendering {
             shading: self.normals(),
             texture: self.texture.relief()?,
         };
+        let plain = ForceLaw {
+            stiffness_n_per_mm: law.stiffness_n_per_mm,
+            max_force_n: law.max_force_n,
+            damping: Damping {
+                ns_per_m: 0.0,
+                ..law.damping
+            },
+            ..ForceLaw::PREMIUM
+        };
+        if self.rule() == Rule::Paper && law != plain {
+            return Err("an effect with the paper's contact rule, which has none".to_owned())
+                .or_hint("leave --contact paper out, or friction, damping, shading and texture");
+        }
         let ForceLaw {
             stiffness_n_per_mm: k,
             max_force_n: limit,
@@ -207,7 +212,7 @@ impl Rendering {
     /// How rough the surface is.
     ///
     /// # Errors
-    /// Coefficients that no surface has, or the paper's rule, which knows of no friction.
+    /// Coefficients that no surface has.
     fn surface(&self) -> Result<Friction, Failure> {
         let dynamic_mu = self.friction.unwrap_or(0.0);
         let friction = Friction {
@@ -229,10 +234,6 @@ impl Rendering {
                 Friction::MOST,
                 Friction::MOST_VISCOUS_S
             ));
-        }
-        if !friction.is_none() && self.rule() == Rule::Paper {
-            return Err("friction with the paper's contact rule, which knows of none".to_owned())
-                .or_hint("leave --contact paper or the friction out");
         }
         Ok(friction)
     }
@@ -271,12 +272,27 @@ impl Rendering {
         }
     }
 
+    /// Returns an error if the paper's contact rule is asked for, which no device has.
+    ///
+    /// # Errors
+    /// The rule, and where it is.
+    pub fn needs_the_devices_rule(&self) -> Result<(), Failure> {
+        match self.rule() {
+            Rule::Swept => Ok(()),
+            Rule::Paper => {
+                Err("--contact paper: no device has the paper's contact rule".to_owned()).or_hint(
+                    "leave it out, or render a trajectory: hapterra replay --contact paper",
+                )
+            }
+        }
+    }
+
     /// The contact rule.
     #[must_use]
     pub const fn rule(&self) -> Rule {
         match self.contact {
-            None | Some(ContactRule::Swept) => Rule::Swept,
-            Some(ContactRule::Paper) => Rule::Paper,
+            None => Rule::Swept,
+            Some(rule) => rule,
         }
     }
 }
@@ -311,7 +327,7 @@ mod tests {
             with(Some(11.0), None, None),
             with(None, None, Some(-0.1)),
             Rendering {
-                contact: Some(ContactRule::Paper),
+                contact: Some(Rule::Paper),
                 ..with(Some(0.5), None, None)
             },
         ];

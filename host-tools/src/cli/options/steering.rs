@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use hapterra_core::contact::Rule;
 use hapterra_core::phantom::Calibration;
 
 use super::placing::{self, scale_in_words, short};
@@ -112,7 +111,7 @@ impl Typing {
 impl<'t> ViewControl<'t> {
     /// Begins with what is served first.
     pub(in crate::cli) fn new(
-        (terrain, laid, rule): (&Terrain<'t>, Laid, Rule),
+        (terrain, laid): (&Terrain<'t>, Laid),
         (arm, level): (&Calibration, Option<u8>),
         commands: CommandQueue,
     ) -> Self {
@@ -122,7 +121,7 @@ impl<'t> ViewControl<'t> {
             level,
         };
         Self {
-            steering: Steering::new(bounds, rule, terrain.clone()),
+            steering: Steering::new(bounds, terrain.clone()),
             commands,
             keys: Keys::default(),
             typing: Typing::Nobody,

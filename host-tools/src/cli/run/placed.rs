@@ -1,6 +1,5 @@
 //! A terrain as it lies in the reach of a device's arm.
 
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::Scene;
@@ -49,17 +48,17 @@ impl<'t> Placed<'t> {
     pub(super) fn new(
         device: &OneDevice,
         laid: &'t InReach<'t>,
-        (law, rule): (ForceLaw, Rule),
+        law: ForceLaw,
     ) -> Result<Self, Failure> {
         let (view, terrain) = (laid.view, &laid.terrain);
         let tour = match device.is_scripted() {
-            true => Some(PlacedTerrain::in_view(terrain, view.home_mm, law, rule)?),
+            true => Some(PlacedTerrain::in_view(terrain, view.home_mm, law)?),
             false => None,
         };
         Ok(Self {
             terrain,
             view,
-            scene: view.scene(terrain, law, rule)?,
+            scene: view.scene(terrain, law)?,
             arm: laid.arm,
             tour,
         })

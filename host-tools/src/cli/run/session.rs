@@ -28,7 +28,7 @@ use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::Laid;
 use crate::remote::without_key;
 use crate::replay::settings::Device;
-use crate::replay::{Column, LoopColumns, Recording, Settings};
+use crate::replay::{Column, LoopColumns, Recording, Rule, Settings};
 use crate::serving::{Service, told_of_last_end};
 use crate::stability::limits;
 use crate::steering::CommandQueue;
@@ -113,7 +113,7 @@ impl<'t> Serving<'_, 't> {
             law: placed.scene.law,
         };
         let mut control = ViewControl::new(
-            (placed.terrain, laid, placed.scene.rule),
+            (placed.terrain, laid),
             (&placed.arm, args.rendering.level),
             self.commands,
         );
@@ -277,7 +277,7 @@ fn described(
 ) -> Option<Recording> {
     if let Some(recording) = &mut recording {
         let (file, device) = (without_key(&args.terrain.file), Device::of(device));
-        let law = (placed.scene.law, placed.scene.rule);
+        let law = (placed.scene.law, Rule::Swept);
         let home_mm = Some(placed.view.home_mm);
         let settings = Settings::new(&file, placed.terrain, law, home_mm, device);
         recording.describe(&settings);

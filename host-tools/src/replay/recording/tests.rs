@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use ::parquet::file::reader::{FileReader, SerializedFileReader};
 use ::parquet::record::RowAccessor;
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 
 use super::*;
@@ -27,7 +26,7 @@ fn settings() -> Settings {
         firmware: "0.1.0".into(),
         tick_hz: 1000,
     };
-    let law = (ForceLaw::PREMIUM, Rule::Swept);
+    let law = (ForceLaw::PREMIUM, crate::replay::Rule::Swept);
     Settings::new("flat.tif", &terrain.expect("terrain"), law, None, device)
 }
 

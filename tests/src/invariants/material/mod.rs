@@ -10,7 +10,7 @@ mod slides;
 
 use glam::DVec3;
 use hapterra_core::Vec3;
-use hapterra_core::contact::{ContactOutput, ContactState, Rule};
+use hapterra_core::contact::{ContactOutput, ContactState};
 use hapterra_core::force::Shading;
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::Sample;
@@ -81,7 +81,7 @@ impl<'g> MaterialJudge<'g> {
     #[must_use]
     pub fn new(scene: &'g Scene, materials: &'g Materials, shift: [i32; 3]) -> Self {
         Self {
-            place: Judge::new(&scene.terrain, Rule::Swept),
+            place: Judge::new(&scene.terrain),
             materials,
             kind: scene.terrain.kind,
             shading: scene.shading,

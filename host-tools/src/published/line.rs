@@ -2,9 +2,8 @@
 
 use super::real::Real;
 
-/// Iterates over the cells from one point to another, both east and north of
-/// the origin.
-pub(super) struct Line<R> {
+/// Iterates over the cells from one point to another.
+pub struct Line<R> {
     cell: [i32; 2],
     step: [i32; 2],
     /// Part of the segment at which the next border is reached.
@@ -14,8 +13,10 @@ pub(super) struct Line<R> {
 }
 
 impl<R: Real> Line<R> {
+    /// From one point to another.
+    #[must_use]
     #[inline]
-    pub(super) fn new(from: [R; 2], to: [R; 2]) -> Self {
+    pub fn new(from: [R; 2], to: [R; 2]) -> Self {
         let cell = from.map(R::whole);
         let last = to.map(R::whole);
         let axis = |i: usize| {

@@ -8,8 +8,8 @@
 //! takes the whole edge, at a sharp one, which is meant, a fifth of it. Columns and the slope
 //! northward are smoothed likewise.
 
-use super::hip_view::HipView;
-use super::patch::mix;
+use crate::contact::surface::HipView;
+use crate::contact::surface::patch::mix;
 use crate::grid::GridPoint;
 use crate::scalar::one_over_root;
 use crate::terrain::{Corners, Ground, TileIndex, Window};

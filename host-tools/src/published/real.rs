@@ -4,8 +4,6 @@ use std::fmt::Debug;
 
 use num_traits::Float;
 
-use crate::haptics::Hip;
-
 /// The arithmetic of a baseline.
 pub trait Real: Float + Debug {
     /// 1/2
@@ -14,18 +12,16 @@ pub trait Real: Float + Debug {
     const LAST_STEP: Self;
     /// Nearest value.
     fn of(value: f32) -> Self;
-    /// Toward zero.
+    /// Downwards.
     fn whole(self) -> i32;
     /// Exact up to 2²⁴.
     fn from_whole(whole: i32) -> Self;
-    /// The HIP counted from the origin.
-    fn hip(hip: &Hip) -> [Self; 3];
     /// To single precision.
     fn single(self) -> f32;
 }
 
 macro_rules! real {
-    ($real:ident, $hip:ident, $last_step:expr) => {
+    ($real:ident, $last_step:expr) => {
         impl Real for $real {
             const HALF: Self = 0.5;
             const LAST_STEP: Self = $last_step;
@@ -35,17 +31,13 @@ macro_rules! real {
             }
             #[inline]
             fn whole(self) -> i32 {
-                self as i32
+                self.floor() as i32
             }
             // Exact for f64 only: the cast is what both can do.
             #[allow(clippy::cast_lossless)]
             #[inline]
             fn from_whole(whole: i32) -> Self {
                 whole as Self
-            }
-            #[inline]
-            fn hip(hip: &Hip) -> [Self; 3] {
-                hip.$hip
             }
             #[inline]
             fn single(self) -> f32 {
@@ -55,5 +47,5 @@ macro_rules! real {
     };
 }
 
-real!(f32, single, 1e-6);
-real!(f64, wide, 1e-12);
+real!(f32, 1e-6);
+real!(f64, 1e-12);

@@ -1,0 +1,54 @@
+//! Every exit of every phase is walked, and no other.
+
+use std::collections::BTreeSet;
+
+use glam::Vec3;
+
+use super::*;
+use crate::cases::cases;
+use crate::contact::dice::Dice;
+use crate::terrain::FieldSize;
+use crate::terrain::testing::{Field, buffers};
+
+const SIZE: i32 = 128;
+
+/// Rough ground with holes, around which a HIP goes that leaps now and then.
+#[test]
+fn every_exit_of_a_phase_is_walked_and_no_other() {
+    let mut dice = Dice(39);
+    let holes = |x: i32, y: i32| {
+        let hole = (x / 6 + y / 7) % 3 == 0;
+        if hole {
+            f32::NAN
+        } else {
+            ((x * 7 + y * 13) % 5) as f32
+        }
+    };
+    let mut walked = BTreeSet::new();
+    for _ in 0..cases(60, 60) {
+        let mut tiles = buffers::<4>();
+        let field = Field::<4>::held(&mut tiles, FieldSize::new(SIZE, SIZE), holes);
+        let settings = ContactSettings {
+            work_per_tick: ContactSettings::LEAST_WORK,
+            ..ContactSettings::AT_1_KHZ
+        };
+        let mut contact = Contact::new(settings);
+        let mut at = [64.0; 2];
+        for _ in 0..400 {
+            let way = match dice.unit() {
+                x if x < 0.01 => 300.0,
+                x if x < 0.1 => 40.0,
+                _ => 1.0,
+            };
+            at = at.map(|x| (x + dice.between(-way, way)).clamp(0.0, 126.0));
+            let z = dice.between(-2.0, 5.0);
+            let hip = GridPoint::new([0; 3], Vec3::new(at[0] as f32, at[1] as f32, z as f32));
+            let (from, exits) = contact.phase.exits();
+            contact.step(&field.window, &hip);
+            let (to, _) = contact.phase.exits();
+            assert!(from == to || exits.contains(&to), "from {from} to {to}");
+            walked.extend((from != to).then_some((from, to)));
+        }
+    }
+    assert_eq!(walked.len(), 13, "{walked:?}");
+}

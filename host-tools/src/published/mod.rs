@@ -1,0 +1,321 @@
+//! The paper's algorithm as published (§4.3), as plainly as it can be written: Newton
+//! in two variables, the bounded point over edges and vertices, averaged normals, the
+//! candidate patch by the lowest height of the whole segment.
+//!
+//! `hapterra replay --contact paper` renders it, and the speed tables compare with it
+//! ("× plain"). No device knows it. Two properties are the paper's own: the first candidate
+//! may not be the first patch hit, and a fast HIP passes through what is thin.
+
+mod line;
+mod real;
+
+use num_traits::clamp;
+
+pub use line::Line;
+pub use real::Real;
+
+/// The heights of a field, cells.
+pub trait Heights {
+    /// Returns true if there is such a patch.
+    fn has(&self, cell: [i32; 2]) -> bool;
+
+    /// The corners of a patch that exists: south-west, south-east, north-west, north-east.
+    fn corners(&self, cell: [i32; 2]) -> [f32; 4];
+}
+
+impl<H: Heights + ?Sized> Heights for &H {
+    #[inline]
+    fn has(&self, cell: [i32; 2]) -> bool {
+        (**self).has(cell)
+    }
+
+    #[inline]
+    fn corners(&self, cell: [i32; 2]) -> [f32; 4] {
+        (**self).corners(cell)
+    }
+}
+
+/// Where Newton starts in the patch that held the last closest point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// In the middle of the patch, always.
+    Centre,
+    /// At the last closest point.
+    LastPoint,
+}
+
+/// Patches looked at in one tick, at most.
+const PATCHES: u32 = 1024;
+
+/// eq. 1-5 on the unit grid: z = d + b·u + c·v + a·u·v
+#[derive(Clone, Copy, Debug)]
+struct Patch<R> {
+    a: R,
+    b: R,
+    c: R,
+    d: R,
+}
+
+/// A place in a patch.
+#[derive(Clone, Copy, Debug)]
+struct Place<R> {
+    cell: [i32; 2],
+    u: R,
+    v: R,
+    /// From the HIP to this place.
+    displacement: [R; 3],
+    squared: R,
+    /// Toward which neighbours it lies on the border.
+    border: [i32; 2],
+}
+
+/// The algorithm, in the arithmetic of `R`.
+pub struct Paper<H, R> {
+    heights: H,
+    start: Start,
+    iterations: u32,
+    last_hip: Option<[R; 3]>,
+    contact: Option<Place<R>>,
+}
+
+impl<H: Heights, R: Real> Paper<H, R> {
+    /// At most `iterations` Newton steps a patch, from `start`.
+    #[must_use]
+    pub const fn new(heights: H, start: Start, iterations: u32) -> Self {
+        Self {
+            heights,
+            start,
+            iterations,
+            last_hip: None,
+            contact: None,
+        }
+    }
+
+    /// Forgets the last tick.
+    pub const fn forget(&mut self) {
+        self.last_hip = None;
+        self.contact = None;
+    }
+
+    /// One tick: the displacement from the HIP, counted from the origin, to the proxy in
+    /// contact, cells.
+    #[inline]
+    pub fn step(&mut self, hip: [R; 3]) -> Option<[R; 3]> {
+        match self.last_hip.replace(hip) {
+            Some(last) if last != hip => self.follow(last, hip),
+            _ => {}
+        }
+        self.contact.as_ref().map(|place| place.displacement)
+    }
+
+    #[inline]
+    fn follow(&mut self, last: [R; 3], hip: [R; 3]) {
+        let middle = (R::HALF, R::HALF);
+        let start = match (&self.contact, self.start) {
+            (Some(place), Start::LastPoint) => Some((place.cell, (place.u, place.v))),
+            (Some(place), Start::Centre) => Some((place.cell, middle)),
+            (None, _) => self.candidate(&last, &hip).map(|cell| (cell, middle)),
+        };
+        self.contact = start
+            .map(|(cell, start)| self.closest(cell, &hip, start))
+            .filter(|place| self.is_inside(place));
+    }
+
+    #[inline]
+    fn patch(&self, cell: [i32; 2]) -> Patch<R> {
+        Patch::new(self.heights.corners(cell).map(R::of))
+    }
+
+    /// Step 1 from free space.
+    #[inline]
+    fn candidate(&self, from: &[R; 3], to: &[R; 3]) -> Option<[i32; 2]> {
+        let low = if from[2] < to[2] { from[2] } else { to[2] };
+        Line::new([from[0], from[1]], [to[0], to[1]])
+            .filter(|cell| self.heights.has(*cell))
+            .find(|cell| {
+                let [sw, se, nw, ne] = self.heights.corners(*cell);
+                R::of(sw.max(se).max(nw.max(ne))) > low
+            })
+    }
+
+    /// Step 2 in one patch.
+    #[inline]
+    fn closest_in(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R)) -> Place<R> {
+        let [x, y] = cell.map(R::from_whole);
+        let local = [hip[0] - x, hip[1] - y, hip[2]];
+        self.patch(cell)
+            .closest(cell, &local, start, self.iterations)
+    }
+
+    /// Step 2 across patches.
+    #[inline]
+    fn closest(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R)) -> Place<R> {
+        let mut here = self.closest_in(cell, hip, start);
+        let middle = (R::HALF, R::HALF);
+        for _ in 0..PATCHES {
+            if here.border == [0, 0] {
+                break;
+            }
+            let mut best = here;
+            for cell in around(&here).filter(|cell| self.heights.has(*cell)) {
+                let there = self.closest_in(cell, hip, middle);
+                if there.squared < best.squared {
+                    best = there;
+                }
+            }
+            if best.cell == here.cell {
+                break;
+            }
+            here = best;
+        }
+        here
+    }
+
+    /// Step 3: (LCP − HIP)·n > 0, n averaged at edges and vertices.
+    #[inline]
+    fn is_inside(&self, place: &Place<R>) -> bool {
+        let normal = self.patch(place.cell).normal(place.u, place.v);
+        if place.border == [0, 0] {
+            return dot(&place.displacement, &normal) > R::zero();
+        }
+        let mut sum = unit(normal);
+        for cell in around(place).filter(|cell| self.heights.has(*cell)) {
+            let across = |x: R, i: usize| {
+                if cell[i] == place.cell[i] {
+                    x
+                } else {
+                    R::one() - x
+                }
+            };
+            let (u, v) = (across(place.u, 0), across(place.v, 1));
+            let normal = unit(self.patch(cell).normal(u, v));
+            sum = [0, 1, 2].map(|i| sum[i] + normal[i]);
+        }
+        dot(&place.displacement, &sum) > R::zero()
+    }
+}
+
+/// The one patch that shares the edge, or the three that share the vertex.
+#[inline]
+fn around<R: Real>(place: &Place<R>) -> impl Iterator<Item = [i32; 2]> + use<R> {
+    let ([x, y], [east, north]) = (place.cell, place.border);
+    let corner = east != 0 && north != 0;
+    let across = [
+        (east != 0).then_some([x + east, y]),
+        (north != 0).then_some([x, y + north]),
+        corner.then_some([x + east, y + north]),
+    ];
+    across.into_iter().flatten()
+}
+
+impl<R: Real> Patch<R> {
+    #[inline]
+    fn new([sw, se, nw, ne]: [R; 4]) -> Self {
+        Self {
+            a: ne - se - nw + sw,
+            b: se - sw,
+            c: nw - sw,
+            d: sw,
+        }
+    }
+
+    #[inline]
+    fn height(&self, u: R, v: R) -> R {
+        u * v * self.a + u * self.b + v * self.c + self.d
+    }
+
+    #[inline]
+    fn normal(&self, u: R, v: R) -> [R; 3] {
+        [-(self.b + self.a * v), -(self.c + self.a * u), R::one()]
+    }
+
+    /// Newton's point, or where that is outside the patch the bounded one.
+    #[inline]
+    fn closest(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R), iterations: u32) -> Place<R> {
+        let inside = |x: R| x >= R::zero() && x <= R::one();
+        match self.newton(hip, start, iterations) {
+            Some((u, v)) if inside(u) && inside(v) => self.place(cell, hip, u, v),
+            _ => self.bounded(cell, hip),
+        }
+    }
+
+    /// eq. 8-11. `None` where the Jacobian is singular.
+    #[inline]
+    fn newton(&self, [p, q, r]: &[R; 3], start: (R, R), iterations: u32) -> Option<(R, R)> {
+        let (mut u, mut v) = start;
+        for _ in 0..iterations {
+            let (zu, zv) = (self.b + self.a * v, self.c + self.a * u);
+            let lift = self.height(u, v) - *r;
+            let (fu, fv) = (u - *p + lift * zu, v - *q + lift * zv);
+            let (uu, vv) = (R::one() + zu * zu, R::one() + zv * zv);
+            let uv = lift * self.a + zu * zv;
+            let det = uu * vv - uv * uv;
+            if det == R::zero() {
+                return None;
+            }
+            let (du, dv) = ((fu * vv - fv * uv) / det, (fv * uu - fu * uv) / det);
+            (u, v) = (u - du, v - dv);
+            if du.abs() + dv.abs() < R::LAST_STEP {
+                break;
+            }
+        }
+        Some((u, v))
+    }
+
+    /// The nearest point over the four edges, vertices included.
+    #[inline]
+    fn bounded(&self, cell: [i32; 2], hip: &[R; 3]) -> Place<R> {
+        let [p, q, r] = *hip;
+        let along_u = |v: R| {
+            let (slope, start) = (self.b + self.a * v, self.d + self.c * v);
+            let u = (p - (start - r) * slope) / (R::one() + slope * slope);
+            self.place(cell, hip, clamp(u, R::zero(), R::one()), v)
+        };
+        let along_v = |u: R| {
+            let (slope, start) = (self.c + self.a * u, self.d + self.b * u);
+            let v = (q - (start - r) * slope) / (R::one() + slope * slope);
+            self.place(cell, hip, u, clamp(v, R::zero(), R::one()))
+        };
+        let mut best = along_u(R::zero());
+        for other in [along_u(R::one()), along_v(R::zero()), along_v(R::one())] {
+            if other.squared < best.squared {
+                best = other;
+            }
+        }
+        best
+    }
+
+    #[inline]
+    fn place(&self, cell: [i32; 2], hip: &[R; 3], u: R, v: R) -> Place<R> {
+        let displacement = [u - hip[0], v - hip[1], self.height(u, v) - hip[2]];
+        let side = |x: R| i32::from(x == R::one()) - i32::from(x == R::zero());
+        Place {
+            cell,
+            u,
+            v,
+            displacement,
+            squared: dot(&displacement, &displacement),
+            border: [side(u), side(v)],
+        }
+    }
+}
+
+/// Step 2 in one patch, for the solver's own comparison: the place in the unit
+/// square that is found from the middle.
+#[inline]
+pub fn newton<R: Real>(corners: [R; 4], hip: [R; 3], iterations: u32) -> (R, R) {
+    let middle = (R::HALF, R::HALF);
+    let place = Patch::new(corners).closest([0, 0], &hip, middle, iterations);
+    (place.u, place.v)
+}
+
+#[inline]
+fn dot<R: Real>(a: &[R; 3], b: &[R; 3]) -> R {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline]
+fn unit<R: Real>(v: [R; 3]) -> [R; 3] {
+    let length = dot(&v, &v).sqrt();
+    v.map(|x| x / length)
+}
